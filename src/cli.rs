@@ -1,0 +1,112 @@
+//! The command line as typed. What it means is decided in [`crate::commands`].
+
+use camino::Utf8PathBuf;
+use clap::{Args, Parser, Subcommand};
+
+use crate::imaging::board::Squares;
+
+/// Robot calibration with two cameras and a checkerboard.
+#[derive(Debug, Parser)]
+#[command(name = "stereocal", version, about, max_term_width = 100)]
+pub struct Cli {
+    /// Settings file [default: stereocal.toml in the working directory, if there]
+    #[arg(long, global = true, value_name = "FILE")]
+    pub config: Option<Utf8PathBuf>,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands, in the order of the data.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Calibrate both cameras from pictures of the check board, and judge the rig's accuracy
+    CameraCheck(CameraCheck),
+    /// Measure the target's point and orientation for each robot pose
+    Measure(Measure),
+    /// Identify the robot's kinematic parameters from measurements and joint angles
+    Identify(Identify),
+    /// Make pictures and measurements whose truth is known
+    Simulate(Simulate),
+}
+
+/// Where results go and how they are shown.
+#[derive(Debug, Args)]
+pub struct Output {
+    /// Folder for results [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `stereocal camera-check`
+#[derive(Debug, Args)]
+pub struct CameraCheck {
+    /// Folder with left/ and right/ pictures, or with left*/right* names
+    #[arg(required_unless_present = "corners", conflicts_with = "corners")]
+    pub images: Option<Utf8PathBuf>,
+    /// Corners from a CSV file instead of pictures
+    #[arg(long, value_name = "FILE")]
+    pub corners: Option<Utf8PathBuf>,
+    /// Squares of the check board, not inner corners [default: 20x20]
+    #[arg(long, value_name = "CxR")]
+    pub squares: Option<Squares>,
+    /// Side of a square, mm [default: 10]
+    #[arg(long, value_name = "MM")]
+    pub square_mm: Option<f64>,
+    /// Largest length error that passes, mm [default: 0.05]
+    #[arg(long, value_name = "MM")]
+    pub tolerance_mm: Option<f64>,
+    /// Results.
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// `stereocal measure`
+#[derive(Debug, Args)]
+pub struct Measure {
+    /// Folder with left/ and right/ pictures and poses.csv
+    pub poses: Utf8PathBuf,
+    /// The rig [default: calibration.json in the results folder]
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<Utf8PathBuf>,
+    /// Squares of the target, not inner corners [default: 7x6]
+    #[arg(long, value_name = "CxR")]
+    pub squares: Option<Squares>,
+    /// Side of a square, mm [default: 10]
+    #[arg(long, value_name = "MM")]
+    pub square_mm: Option<f64>,
+    /// Results.
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// `stereocal identify`
+#[derive(Debug, Args)]
+pub struct Identify {
+    /// Measurements [default: measurements.csv in the results folder]
+    #[arg(long, value_name = "FILE")]
+    pub measurements: Option<Utf8PathBuf>,
+    /// The nominal robot
+    #[arg(long, value_name = "FILE")]
+    pub robot: Option<Utf8PathBuf>,
+    /// Seed of every random draw
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Results.
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// `stereocal simulate`
+#[derive(Debug, Args)]
+pub struct Simulate {
+    /// Seed of every random draw
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for the simulated world [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+}

@@ -1,0 +1,135 @@
+//! What can go wrong, how it is told, and which exit status it ends in.
+//!
+//! Each stage has an error enum of its own whose variants carry the numbers; [`enum@Error`] gathers them.
+//! A message says what was found and what was needed; [`Explain`] adds where, and what to try.
+
+use camino::Utf8PathBuf;
+
+/// Result of anything in this crate that can fail.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Exit status of the program, as the contract has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// Done, and within tolerance where there is one.
+    Done,
+    /// Done, but out of tolerance.
+    OutOfTolerance,
+    /// Bad usage or bad input.
+    BadInput,
+    /// A computation did not converge, or the data cannot determine the answer.
+    Undetermined,
+}
+
+impl Status {
+    /// The number the process ends with.
+    pub fn code(self) -> u8 {
+        match self {
+            Status::Done => 0,
+            Status::OutOfTolerance => 1,
+            Status::BadInput => 2,
+            Status::Undetermined => 3,
+        }
+    }
+}
+
+/// What an error adds to its message.
+pub trait Explain {
+    /// The exit status it ends in.
+    fn status(&self) -> Status {
+        Status::BadInput
+    }
+    /// The file, folder, pose or pair it is about.
+    fn place(&self) -> Option<String> {
+        None
+    }
+    /// A command or a change to try.
+    fn hint(&self) -> Option<String> {
+        None
+    }
+}
+
+/// Anything that ends a command.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Reading or writing files.
+    #[error(transparent)]
+    Files(#[from] crate::files::Error),
+    /// Settings from the command line or `stereocal.toml`.
+    #[error(transparent)]
+    Config(#[from] crate::config::Error),
+    /// Pictures, pairs, corners.
+    #[error(transparent)]
+    Imaging(#[from] crate::imaging::Error),
+    /// Calibration, triangulation, the target's pose.
+    #[error(transparent)]
+    Stereo(#[from] crate::stereo::Error),
+    /// Robot files and kinematics.
+    #[error(transparent)]
+    Robot(#[from] crate::robot::Error),
+    /// Measurements and identification.
+    #[error(transparent)]
+    Identify(#[from] crate::identify::Error),
+    /// The simulator.
+    #[error(transparent)]
+    Simulate(#[from] crate::simulate::Error),
+    /// Figures and pages.
+    #[error(transparent)]
+    Report(#[from] crate::report::Error),
+}
+
+impl Error {
+    fn explain(&self) -> &dyn Explain {
+        match self {
+            Error::Files(e) => e,
+            Error::Config(e) => e,
+            Error::Imaging(e) => e,
+            Error::Stereo(e) => e,
+            Error::Robot(e) => e,
+            Error::Identify(e) => e,
+            Error::Simulate(e) => e,
+            Error::Report(e) => e,
+        }
+    }
+
+    /// The exit status the program ends in.
+    pub fn status(&self) -> Status {
+        self.explain().status()
+    }
+}
+
+/// The message as a person reads it on stderr: what, where, hint.
+pub fn report(error: &Error) -> String {
+    let mut text = format!("error: {error}\n");
+    let mut source = std::error::Error::source(error);
+    while let Some(cause) = source {
+        text.push_str(&format!("  cause: {cause}\n"));
+        source = cause.source();
+    }
+    if let Some(place) = error.explain().place() {
+        text.push_str(&format!("  in: {place}\n"));
+    }
+    if let Some(hint) = error.explain().hint() {
+        text.push_str(&format!("  hint: {hint}\n"));
+    }
+    text
+}
+
+/// A line of a text file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// The file.
+    pub path: Utf8PathBuf,
+    /// Its line, counted from 1, where one is to blame.
+    pub line: Option<u64>,
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.line {
+            Some(line) => write!(f, "{}:{line}", self.path),
+            None => write!(f, "{}", self.path),
+        }
+    }
+}

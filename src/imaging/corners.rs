@@ -1,0 +1,55 @@
+//! Corners found in pairs of pictures: what imaging hands to stereo, and what `corners.csv` holds.
+
+use nalgebra::{Matrix2, Point2};
+
+use super::Board;
+
+/// One corner of the board in one picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corner {
+    /// Column on the board, along x.
+    pub col: usize,
+    /// Row on the board, along y.
+    pub row: usize,
+    /// Raw (distorted) place in the picture, px.
+    pub px: Point2<f64>,
+    /// Covariance of the place, px^2, where the refinement gave one.
+    pub covariance_px2: Option<Matrix2<f64>>,
+    /// False for a corner that was found but is not to be relied on.
+    pub used: bool,
+}
+
+/// The corners of one board in one pair of pictures. Each list is sorted by row, then column; a corner may be missing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PairCorners {
+    /// Name of the pair: the pictures' common stem.
+    pub pair: String,
+    /// Corners in the left picture.
+    pub left: Vec<Corner>,
+    /// Corners in the right picture.
+    pub right: Vec<Corner>,
+}
+
+/// A pair that was not used, and why.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Skipped {
+    /// Name of the pair.
+    pub pair: String,
+    /// Why, for a person.
+    pub reason: String,
+}
+
+/// The corners of all pairs of a folder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Corners {
+    /// The board that was looked for.
+    pub board: Board,
+    /// Width and height of the left pictures, px.
+    pub left_size: (u32, u32),
+    /// Width and height of the right pictures, px.
+    pub right_size: (u32, u32),
+    /// Pairs in which the board was found in both pictures, sorted by name.
+    pub pairs: Vec<PairCorners>,
+    /// Pairs that were not used.
+    pub skipped: Vec<Skipped>,
+}

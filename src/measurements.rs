@@ -1,0 +1,324 @@
+//! `poses.csv` and `measurements.csv`: where the robot was sent, and what was measured there.
+
+use std::fmt::Write as _;
+
+use camino::Utf8Path;
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::error::{Place, Result};
+use crate::files;
+
+/// What a pose is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// The centre of its group's sphere; one a group at the most.
+    Center,
+    /// Used to identify.
+    Sample,
+    /// Held out to verify.
+    Verify,
+}
+
+impl Role {
+    /// The word in the files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Center => "center",
+            Role::Sample => "sample",
+            Role::Verify => "verify",
+        }
+    }
+}
+
+/// A pose the robot was sent to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotPose {
+    /// Its name: the stem of its pictures.
+    pub pose: String,
+    /// One placement of the camera and one sphere.
+    pub group: String,
+    /// What it is for.
+    pub role: Role,
+    /// Commanded joint angles as the file has them, deg.
+    pub joints_deg: Vec<f64>,
+}
+
+impl RobotPose {
+    /// Commanded joint angles, rad.
+    pub fn joints_rad(&self) -> Vec<f64> {
+        self.joints_deg.iter().map(|deg| deg.to_radians()).collect()
+    }
+}
+
+/// What was measured at a pose.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Observed {
+    /// The mark point in the group's own frame (the left camera's, a tracker's).
+    Position {
+        /// The point, mm.
+        point_mm: Point3<f64>,
+        /// Its covariance, mm^2, where known.
+        covariance_mm2: Option<Matrix3<f64>>,
+        /// Rotation vector of the target in that frame, rad, where known.
+        rotation_rad: Option<Vector3<f64>>,
+    },
+    /// The distance to the group's centre pose, or to a fixed point that is unknown.
+    Distance {
+        /// The distance, mm.
+        distance_mm: f64,
+        /// Its standard deviation, mm, where known.
+        sigma_mm: Option<f64>,
+    },
+    /// Nothing, and why.
+    Missing {
+        /// The row's `status`.
+        reason: String,
+    },
+}
+
+/// A row of `measurements.csv`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measurement {
+    /// Where the robot was.
+    pub at: RobotPose,
+    /// What was seen.
+    pub observed: Observed,
+}
+
+/// A CSV file with its header understood: fields by name, complaints with the line.
+struct Table<'a> {
+    path: &'a Utf8Path,
+    header: Vec<String>,
+    /// Line number in the file (from 1) and fields.
+    rows: Vec<(u64, Vec<String>)>,
+}
+
+impl<'a> Table<'a> {
+    fn read(path: &'a Utf8Path, what: &'static str, hint: &str) -> Result<Table<'a>> {
+        let text = files::read_text(path, what, Some(hint))?;
+        // Spreadsheets put a byte order mark first and, in half of Europe, semicolons between.
+        let text = text.trim_start_matches('\u{feff}');
+        let first = text.lines().next().unwrap_or_default();
+        let delimiter = if first.contains(';') && !first.contains(',') { b';' } else { b',' };
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(delimiter)
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .from_reader(text.as_bytes());
+        let refuse = |e: csv::Error| {
+            let line = e.position().map(csv::Position::line);
+            files::Error::Format {
+                message: format!("not readable as CSV: {e}"),
+                place: Place { path: path.to_owned(), line },
+                hint: None,
+            }
+        };
+        let header: Vec<String> = reader.headers().map_err(refuse)?.iter().map(str::to_owned).collect();
+        let mut table = Table { path, header, rows: Vec::new() };
+        for record in reader.records() {
+            let record = record.map_err(refuse)?;
+            let line = record.position().map_or(0, csv::Position::line);
+            if record.iter().all(str::is_empty) {
+                continue;
+            }
+            if record.len() != table.header.len() {
+                let message = format!("{} fields, but the header has {}", record.len(), table.header.len());
+                return Err(table.refuse(line, message));
+            }
+            table.rows.push((line, record.iter().map(str::to_owned).collect()));
+        }
+        if table.rows.is_empty() {
+            return Err(table.refuse(1, "the file has no rows below its header".to_owned()));
+        }
+        Ok(table)
+    }
+
+    fn refuse(&self, line: u64, message: String) -> crate::Error {
+        let place = Place { path: self.path.to_owned(), line: Some(line) };
+        files::Error::Format { message, place, hint: None }.into()
+    }
+
+    fn column(&self, name: &str) -> Option<usize> {
+        self.header.iter().position(|h| h == name)
+    }
+
+    fn require(&self, name: &str) -> Result<usize> {
+        self.column(name)
+            .ok_or_else(|| self.refuse(1, format!("no column `{name}`; the header has: {}", self.header.join(", "))))
+    }
+
+    fn number(&self, line: u64, row: &[String], column: usize) -> Result<f64> {
+        match row[column].parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(self.refuse(line, format!("`{}` is not a number: `{}`", self.header[column], row[column]))),
+        }
+    }
+
+    /// The columns `j1_deg`, `j2_deg`, ... without a gap.
+    fn joint_columns(&self) -> Result<Vec<usize>> {
+        let columns: Vec<usize> = (1..).map_while(|i| self.column(&format!("j{i}_deg"))).collect();
+        if columns.is_empty() {
+            self.require("j1_deg")?;
+        }
+        Ok(columns)
+    }
+
+    fn poses(&self) -> Result<Vec<RobotPose>> {
+        let (pose, group, role) = (self.require("pose")?, self.require("group")?, self.require("role")?);
+        let joints = self.joint_columns()?;
+        let mut seen = std::collections::BTreeMap::new();
+        let mut centers = std::collections::BTreeMap::new();
+        let mut poses = Vec::with_capacity(self.rows.len());
+        for (line, row) in &self.rows {
+            let line = *line;
+            let role = match row[role].as_str() {
+                "center" | "centre" => Role::Center,
+                "sample" => Role::Sample,
+                "verify" => Role::Verify,
+                other => {
+                    return Err(self.refuse(line, format!("role is `{other}`; it is one of center, sample, verify")));
+                }
+            };
+            if row[pose].is_empty() {
+                return Err(self.refuse(line, "the pose has no name".to_owned()));
+            }
+            if let Some(first) = seen.insert(row[pose].clone(), line) {
+                return Err(self.refuse(line, format!("pose `{}` stands in line {first} already", row[pose])));
+            }
+            if role == Role::Center
+                && let Some(first) = centers.insert(row[group].clone(), line)
+            {
+                let message = format!("group `{}` has a center in line {first} already; a group has one", row[group]);
+                return Err(self.refuse(line, message));
+            }
+            let joints_deg = joints.iter().map(|&c| self.number(line, row, c)).collect::<Result<Vec<f64>>>()?;
+            poses.push(RobotPose { pose: row[pose].clone(), group: row[group].clone(), role, joints_deg });
+        }
+        Ok(poses)
+    }
+}
+
+/// Reads `poses.csv`.
+pub fn read_poses(path: &Utf8Path) -> Result<Vec<RobotPose>> {
+    let hint = "a poses folder holds left/, right/ and poses.csv with the columns pose,group,role,j1_deg,...";
+    Table::read(path, "the list of poses", hint)?.poses()
+}
+
+/// Reads `measurements.csv`, or any CSV with `pose,group,role,j1_deg..` and either `x_mm,y_mm,z_mm` or `distance_mm`.
+/// A row whose `status` is not `ok`, or whose numbers are all empty, is [`Observed::Missing`].
+pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
+    let hint = "`stereocal measure POSES` writes out/measurements.csv; `--measurements FILE` names another";
+    let table = Table::read(path, "the measurements", hint)?;
+    let poses = table.poses()?;
+    let status = table.column("status");
+    let all = |names: &[&str]| names.iter().map(|n| table.column(n)).collect::<Option<Vec<usize>>>();
+    let position = all(&["x_mm", "y_mm", "z_mm"]);
+    let distance = table.column("distance_mm");
+    let covariance = all(&["sxx_mm2", "sxy_mm2", "sxz_mm2", "syy_mm2", "syz_mm2", "szz_mm2"]);
+    let rotation = all(&["rx_rad", "ry_rad", "rz_rad"]);
+    let sigma = table.column("sigma_mm");
+    if position.is_none() && distance.is_none() {
+        let message =
+            format!("neither the columns x_mm,y_mm,z_mm nor distance_mm; the header has: {}", table.header.join(", "));
+        return Err(table.refuse(1, message));
+    }
+    let mut rows = Vec::with_capacity(poses.len());
+    for (at, (line, row)) in poses.into_iter().zip(&table.rows) {
+        let line = *line;
+        let numbers =
+            |columns: &[usize]| columns.iter().map(|&c| table.number(line, row, c)).collect::<Result<Vec<_>>>();
+        let optional = |columns: &Option<Vec<usize>>| match columns {
+            Some(columns) if !columns.iter().all(|&c| row[c].is_empty()) => numbers(columns).map(Some),
+            _ => Ok(None),
+        };
+        let said = status.map_or("ok", |c| row[c].as_str());
+        let observed = if !(said.is_empty() || said == "ok") {
+            Observed::Missing { reason: said.to_owned() }
+        } else if let Some(p) = optional(&position)? {
+            let covariance_mm2 =
+                optional(&covariance)?.map(|s| Matrix3::new(s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5]));
+            if let Some(s) = &covariance_mm2
+                && s.cholesky().is_none()
+            {
+                return Err(table.refuse(line, "the covariance sxx..szz is not positive definite".to_owned()));
+            }
+            let rotation_rad = optional(&rotation)?.map(|r| Vector3::new(r[0], r[1], r[2]));
+            Observed::Position { point_mm: Point3::new(p[0], p[1], p[2]), covariance_mm2, rotation_rad }
+        } else if let Some(d) = optional(&distance.map(|c| vec![c]))? {
+            let sigma_mm = optional(&sigma.map(|c| vec![c]))?.map(|s| s[0]);
+            if d[0] < 0.0 || sigma_mm.is_some_and(|s| s <= 0.0) {
+                return Err(table.refuse(line, "a distance is not negative, and its sigma_mm is positive".to_owned()));
+            }
+            Observed::Distance { distance_mm: d[0], sigma_mm }
+        } else {
+            Observed::Missing { reason: "no numbers".to_owned() }
+        };
+        rows.push(Measurement { at, observed });
+    }
+    Ok(rows)
+}
+
+/// The header's first columns: `pose,group,role,j1_deg,...`.
+pub fn pose_header(joint_count: usize) -> String {
+    let mut text = String::from("pose,group,role");
+    for i in 1..=joint_count {
+        let _ = write!(text, ",j{i}_deg");
+    }
+    text
+}
+
+/// A row's first columns. Names with a comma or a quote in them are quoted.
+pub fn pose_fields(pose: &RobotPose) -> String {
+    let mut text = format!("{},{},{}", quoted(&pose.pose), quoted(&pose.group), pose.role.name());
+    for deg in &pose.joints_deg {
+        let _ = write!(text, ",{deg}");
+    }
+    text
+}
+
+/// A text as a field of a CSV file.
+pub fn quoted(field: &str) -> String {
+    if field.contains([',', '"', '\n', ';']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_str(text: &str) -> Result<Vec<Measurement>> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = Utf8Path::from_path(dir.path()).unwrap().join("m.csv");
+        std::fs::write(&path, text).unwrap();
+        read(&path)
+    }
+
+    #[test]
+    fn positions_distances_and_gaps() {
+        let rows = read_str(
+            "pose,group,role,j1_deg,j2_deg,x_mm,y_mm,z_mm,status\na,1,center,0,10,1,2,3,ok\nb,1,sample,5,6,,,,no board\n",
+        )
+        .unwrap();
+        assert_eq!(rows[0].at.joints_deg, [0.0, 10.0]);
+        assert!(matches!(rows[0].observed, Observed::Position { covariance_mm2: None, .. }));
+        assert_eq!(rows[1].observed, Observed::Missing { reason: "no board".into() });
+        let rows = read_str("pose;group;role;j1_deg;distance_mm;sigma_mm\na;1;sample;0;12.5;0.1\n").unwrap();
+        assert_eq!(rows[0].observed, Observed::Distance { distance_mm: 12.5, sigma_mm: Some(0.1) });
+    }
+
+    #[test]
+    fn complaints_name_the_line() {
+        for (text, line, part) in [
+            ("pose,group,role,j1_deg,x_mm,y_mm,z_mm\na,1,sample,0,1,2,x\n", 2, "`z_mm` is not a number"),
+            ("pose,group,role,j1_deg,distance_mm\na,1,sample,0,1\na,1,sample,0,1\n", 3, "in line 2 already"),
+            ("pose,group,role,j1_deg,distance_mm\na,1,start,0,1\n", 2, "role is `start`"),
+            ("pose,group,role,j1_deg,distance_mm\na,1,center,0,1\nb,1,center,0,1\n", 3, "has a center in line 2"),
+            ("pose,group,role,distance_mm\na,1,center,0\n", 1, "no column `j1_deg`"),
+            ("pose,group,role,j1_deg,distance_mm\na,1,sample,nan,0\n", 2, "`j1_deg` is not a number"),
+            ("pose,group,role,j1_deg,distance_mm\na,1,sample,0\n", 2, "4 fields"),
+            ("pose,group,role,j1_deg,distance_mm\n", 1, "no rows"),
+        ] {
+            let message = crate::error::report(&read_str(text).unwrap_err());
+            assert!(message.contains(part) && message.contains(&format!("m.csv:{line}")), "{message}");
+        }
+    }
+}

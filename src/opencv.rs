@@ -1,0 +1,1 @@
+//! Everything this program asks of OpenCV. No other file names the bindings.

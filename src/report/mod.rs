@@ -1,0 +1,22 @@
+//! What people look at: tables for the terminal, figures and HTML pages. Computes no metric of its own.
+
+pub mod page;
+pub mod table;
+
+use crate::error::Explain;
+
+/// What can go wrong in a report.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The plotting library refused.
+    #[error("cannot draw the figure `{figure}`: {message}")]
+    Figure {
+        /// Its title.
+        figure: String,
+        /// The library's reason.
+        message: String,
+    },
+}
+
+impl Explain for Error {}

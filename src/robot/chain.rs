@@ -1,0 +1,129 @@
+//! Modified Denavit-Hartenberg chain: forward kinematics of the flange and the target point.
+//!
+//! Source: eq. (1), (2) and (5) of Shi et al., with Hayati's rotation about y for nearly parallel axes.
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+
+use crate::geometry::Transform;
+
+/// One joint with the link before it: `Rx(alpha) Tx(a) Ry(beta) Rz(q + theta) Tz(d)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joint {
+    /// Twist of the link before, rad.
+    pub alpha_rad: f64,
+    /// Length of the link before, mm.
+    pub a_mm: f64,
+    /// Hayati's rotation about y, rad; zero in the plain model.
+    pub beta_rad: f64,
+    /// Offset of the joint angle, rad.
+    pub theta_rad: f64,
+    /// Offset along the joint's axis, mm.
+    pub d_mm: f64,
+    /// Range of the commanded angle, rad, where known.
+    pub limits_rad: Option<(f64, f64)>,
+}
+
+/// A serial robot with a target at its flange.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Robot {
+    /// What it is called.
+    pub name: String,
+    /// Its joints from the base.
+    pub joints: Vec<Joint>,
+    /// The target's mark point in the last joint's frame, mm.
+    pub tool_mm: Vector3<f64>,
+}
+
+impl Joint {
+    /// Maps the joint's frame to the frame of the joint before, at the commanded angle `q_rad`.
+    pub fn previous_from_this(&self, q_rad: f64) -> Transform {
+        let x = Vector3::x_axis();
+        let link = Isometry3::from_parts(
+            Translation3::new(self.a_mm, 0.0, 0.0),
+            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.beta_rad),
+        );
+        let joint = Isometry3::from_parts(
+            Translation3::new(0.0, 0.0, self.d_mm),
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), q_rad + self.theta_rad),
+        );
+        UnitQuaternion::from_axis_angle(&x, self.alpha_rad) * link * joint
+    }
+}
+
+impl Robot {
+    /// The flange's frame (the last joint's) in the base frame. One angle a joint, rad.
+    pub fn base_from_flange(&self, joints_rad: &[f64]) -> Transform {
+        debug_assert_eq!(joints_rad.len(), self.joints.len());
+        self.joints
+            .iter()
+            .zip(joints_rad)
+            .fold(Transform::identity(), |base, (joint, &q)| base * joint.previous_from_this(q))
+    }
+
+    /// The target's mark point in the base frame, mm.
+    pub fn target_mm(&self, joints_rad: &[f64]) -> Point3<f64> {
+        self.base_from_flange(joints_rad) * Point3::from(self.tool_mm)
+    }
+
+    /// The robot of Table 1 of the paper, with the target point in the flange's origin.
+    pub fn paper() -> Robot {
+        let joint = |alpha_deg: f64, a_mm, theta_deg: f64, d_mm| Joint {
+            alpha_rad: alpha_deg.to_radians(),
+            a_mm,
+            beta_rad: 0.0,
+            theta_rad: theta_deg.to_radians(),
+            d_mm,
+            limits_rad: None,
+        };
+        Robot {
+            name: "six-axis robot of Table 1".to_owned(),
+            joints: vec![
+                joint(0.0, 0.0, 0.0, 144.0),
+                joint(90.0, 0.0, -90.0, 0.0),
+                joint(0.0, -264.0, 0.0, 0.0),
+                joint(0.0, -236.0, -90.0, 106.0),
+                joint(90.0, 0.0, 0.0, 114.0),
+                joint(-90.0, 0.0, 0.0, 67.0),
+            ],
+            tool_mm: Vector3::zeros(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use nalgebra::Matrix4;
+
+    /// Eq. (1) written out as the paper prints it.
+    fn equation_1(joint: &Joint, q: f64) -> Matrix4<f64> {
+        let (st, ct) = (q + joint.theta_rad).sin_cos();
+        let (sa, ca) = joint.alpha_rad.sin_cos();
+        let (a, d) = (joint.a_mm, joint.d_mm);
+        #[rustfmt::skip]
+        let matrix = Matrix4::new(
+            ct, -st, 0.0, a,
+            st * ca, ct * ca, -sa, -d * sa,
+            st * sa, ct * sa, ca, d * ca,
+            0.0, 0.0, 0.0, 1.0,
+        );
+        matrix
+    }
+
+    #[test]
+    fn joints_agree_with_equation_1() {
+        for joint in Robot::paper().joints {
+            for q in [-2.0, 0.0, 0.3] {
+                assert_relative_eq!(joint.previous_from_this(q).to_matrix(), equation_1(&joint, q), epsilon = 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn the_stretched_robot_stands_upright() {
+        // All angles zero: the links 264 and 236 point straight up from the shoulder at 144 mm.
+        let base_from_flange = Robot::paper().base_from_flange(&[0.0; 6]);
+        assert_relative_eq!(base_from_flange.translation.vector.z, 144.0 + 264.0 + 236.0 + 114.0, epsilon = 1e-9);
+    }
+}

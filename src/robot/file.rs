@@ -1,0 +1,135 @@
+//! `robot.toml`: a robot's parameters as a person writes them, degrees and mm.
+
+use camino::Utf8Path;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::{Error, Joint, Robot};
+use crate::error::{Place, Result};
+use crate::files;
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RobotRecord {
+    name: String,
+    convention: String,
+    joint: Vec<JointRecord>,
+    #[serde(default)]
+    tool: ToolRecord,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct JointRecord {
+    alpha_deg: f64,
+    a_mm: f64,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    beta_deg: f64,
+    theta_deg: f64,
+    d_mm: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    limits_deg: Option<[f64; 2]>,
+}
+
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ToolRecord {
+    x_mm: f64,
+    y_mm: f64,
+    z_mm: f64,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+/// Reads `robot.toml`.
+pub fn read(path: &Utf8Path) -> Result<Robot> {
+    let hint = "`--robot FILE` names the robot's nominal parameters; `stereocal simulate` writes an example";
+    let record: RobotRecord = files::read_toml(path, "the robot", Some(hint))?;
+    record.robot().map_err(|message| Error::File { message, place: Place { path: path.to_owned(), line: None } }.into())
+}
+
+/// The text of `robot.toml`.
+pub fn to_toml(robot: &Robot) -> String {
+    // A struct of numbers and strings, tables last: serialisation has no way to fail.
+    toml::to_string(&RobotRecord::from(robot)).unwrap_or_default()
+}
+
+impl RobotRecord {
+    fn robot(&self) -> std::result::Result<Robot, String> {
+        if self.convention != "mdh" {
+            return Err(format!(
+                "convention is \"{}\"; only \"mdh\" is known (alpha and a of link i-1, theta and d of joint i)",
+                self.convention
+            ));
+        }
+        if self.joint.is_empty() {
+            return Err("a robot needs at least one [[joint]]".to_owned());
+        }
+        let tool_mm = Vector3::new(self.tool.x_mm, self.tool.y_mm, self.tool.z_mm);
+        let mut joints = Vec::with_capacity(self.joint.len());
+        for (i, j) in self.joint.iter().enumerate() {
+            let limits = j.limits_deg.unwrap_or([-1.0, 1.0]);
+            let numbers = [j.alpha_deg, j.a_mm, j.beta_deg, j.theta_deg, j.d_mm, limits[0], limits[1]];
+            if numbers.iter().any(|v| !v.is_finite()) {
+                return Err(format!("joint {}: every number must be finite", i + 1));
+            }
+            if limits[0] >= limits[1] {
+                return Err(format!("joint {}: limits_deg runs from {} to {}", i + 1, limits[0], limits[1]));
+            }
+            joints.push(Joint {
+                alpha_rad: j.alpha_deg.to_radians(),
+                a_mm: j.a_mm,
+                beta_rad: j.beta_deg.to_radians(),
+                theta_rad: j.theta_deg.to_radians(),
+                d_mm: j.d_mm,
+                limits_rad: j.limits_deg.map(|[low, high]| (low.to_radians(), high.to_radians())),
+            });
+        }
+        if tool_mm.iter().any(|v| !v.is_finite()) {
+            return Err("[tool]: every number must be finite".to_owned());
+        }
+        Ok(Robot { name: self.name.clone(), joints, tool_mm })
+    }
+}
+
+impl From<&Robot> for RobotRecord {
+    fn from(robot: &Robot) -> RobotRecord {
+        RobotRecord {
+            name: robot.name.clone(),
+            convention: "mdh".to_owned(),
+            joint: robot
+                .joints
+                .iter()
+                .map(|j| JointRecord {
+                    alpha_deg: j.alpha_rad.to_degrees(),
+                    a_mm: j.a_mm,
+                    beta_deg: j.beta_rad.to_degrees(),
+                    theta_deg: j.theta_rad.to_degrees(),
+                    d_mm: j.d_mm,
+                    limits_deg: j.limits_rad.map(|(low, high)| [low.to_degrees(), high.to_degrees()]),
+                })
+                .collect(),
+            tool: ToolRecord { x_mm: robot.tool_mm.x, y_mm: robot.tool_mm.y, z_mm: robot.tool_mm.z },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_survives_the_file() {
+        let mut robot = Robot::paper();
+        robot.joints[2].beta_rad = 0.001;
+        robot.joints[0].limits_rad = Some((-3.0, 3.0));
+        robot.tool_mm = Vector3::new(1.5, -2.0, 30.0);
+        let back = toml::from_str::<RobotRecord>(&to_toml(&robot)).unwrap().robot().unwrap();
+        for (a, b) in back.joints.iter().zip(&robot.joints) {
+            assert!((a.alpha_rad - b.alpha_rad).abs() < 1e-15 && (a.beta_rad - b.beta_rad).abs() < 1e-15);
+        }
+        assert_eq!(back.tool_mm, robot.tool_mm);
+    }
+}

@@ -1,0 +1,30 @@
+//! The robot: its kinematic parameters, where they put the target, and the file they live in.
+
+pub mod chain;
+pub mod file;
+
+use crate::error::{Explain, Place};
+
+pub use chain::{Joint, Robot};
+
+/// What can go wrong with a robot.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The file says something that is no robot.
+    #[error("{message}")]
+    File {
+        /// What was found and what was needed.
+        message: String,
+        /// Where.
+        place: Place,
+    },
+}
+
+impl Explain for Error {
+    fn place(&self) -> Option<String> {
+        match self {
+            Error::File { place, .. } => Some(place.to_string()),
+        }
+    }
+}

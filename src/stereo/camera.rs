@@ -1,0 +1,187 @@
+//! One camera: a pinhole with OpenCV's distortion model.
+
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
+
+/// How many numbers of OpenCV's distortion vector are free.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Lens {
+    /// `k1 k2`; `p1 p2` stay zero.
+    Radial2,
+    /// `k1 k2 p1 p2`.
+    Brown4,
+    /// `k1 k2 p1 p2 k3`.
+    Brown5,
+    /// Adds the denominators `k4 k5 k6`.
+    Rational8,
+    /// Adds the thin prism `s1..s4`.
+    ThinPrism12,
+    /// Adds the tilted sensor `tauX tauY`.
+    Tilted14,
+}
+
+impl Lens {
+    /// All of them, from the simplest.
+    pub const LADDER: [Lens; 6] =
+        [Lens::Radial2, Lens::Brown4, Lens::Brown5, Lens::Rational8, Lens::ThinPrism12, Lens::Tilted14];
+
+    /// Number of free distortion parameters.
+    pub fn free_count(self) -> usize {
+        match self {
+            Lens::Radial2 => 2,
+            Lens::Brown4 => 4,
+            Lens::Brown5 => 5,
+            Lens::Rational8 => 8,
+            Lens::ThinPrism12 => 12,
+            Lens::Tilted14 => 14,
+        }
+    }
+
+    /// Length of the distortion vector in files: one that OpenCV takes.
+    pub fn vector_length(self) -> usize {
+        self.free_count().max(4)
+    }
+
+    /// The name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Lens::Radial2 => "radial2",
+            Lens::Brown4 => "brown4",
+            Lens::Brown5 => "brown5",
+            Lens::Rational8 => "rational8",
+            Lens::ThinPrism12 => "thin-prism12",
+            Lens::Tilted14 => "tilted14",
+        }
+    }
+
+    /// The lens of a name, or of a bare count of parameters (`5`).
+    pub fn from_name(name: &str) -> Option<Lens> {
+        Lens::LADDER.into_iter().find(|lens| lens.name() == name || lens.free_count().to_string() == name)
+    }
+}
+
+/// A pinhole camera with lens distortion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Width of its pictures, px.
+    pub width: u32,
+    /// Height of its pictures, px.
+    pub height: u32,
+    /// Focal length along x, px.
+    pub fx: f64,
+    /// Focal length along y, px.
+    pub fy: f64,
+    /// Principal point, px.
+    pub cx: f64,
+    /// Principal point, px.
+    pub cy: f64,
+    /// Which of the distortion parameters are in use.
+    pub lens: Lens,
+    /// OpenCV's `k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tauX tauY`; those beyond the lens are zero.
+    pub distortion: [f64; 14],
+}
+
+impl Camera {
+    /// A camera without distortion.
+    pub fn pinhole(width: u32, height: u32, focal_px: f64) -> Camera {
+        Camera {
+            width,
+            height,
+            fx: focal_px,
+            fy: focal_px,
+            cx: (f64::from(width) - 1.0) / 2.0,
+            cy: (f64::from(height) - 1.0) / 2.0,
+            lens: Lens::Radial2,
+            distortion: [0.0; 14],
+        }
+    }
+
+    /// Where a point in the camera's frame (mm, any scale) falls in the raw picture, px. The point must lie in front (z > 0).
+    pub fn project(&self, point: &Point3<f64>) -> Point2<f64> {
+        let d = self.distort(&Point2::new(point.x / point.z, point.y / point.z));
+        Point2::new(self.fx * d.x + self.cx, self.fy * d.y + self.cy)
+    }
+
+    /// Normalised image coordinates (x/z, y/z) as the lens bends them (OpenCV, `calib3d` documentation).
+    pub fn distort(&self, n: &Point2<f64>) -> Point2<f64> {
+        let [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y] = self.distortion;
+        let (x, y) = (n.x, n.y);
+        let r2 = x * x + y * y;
+        let radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
+        let xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x) + r2 * (s1 + r2 * s2);
+        let yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y + r2 * (s3 + r2 * s4);
+        if tau_x == 0.0 && tau_y == 0.0 {
+            return Point2::new(xd, yd);
+        }
+        let tilted = tilt_matrix(tau_x, tau_y) * Vector3::new(xd, yd, 1.0);
+        Point2::new(tilted.x / tilted.z, tilted.y / tilted.z)
+    }
+
+    /// The ray through a raw picture point: normalised coordinates (x/z, y/z) with `distort` undone by Newton's method.
+    /// `None` where the lens model folds over, so that no ray belongs to the point.
+    pub fn undistort(&self, px: &Point2<f64>) -> Option<Point2<f64>> {
+        let target = Point2::new((px.x - self.cx) / self.fx, (px.y - self.cy) / self.fy);
+        let mut n = target;
+        // Numerical slopes suffice: Newton only needs them to converge, the answer is judged by `distort` itself.
+        let step = 1e-7;
+        for _ in 0..50 {
+            let at = self.distort(&n);
+            let miss = at - target;
+            let along_x = (self.distort(&Point2::new(n.x + step, n.y)) - at) / step;
+            let along_y = (self.distort(&Point2::new(n.x, n.y + step)) - at) / step;
+            let det = along_x.x * along_y.y - along_y.x * along_x.y;
+            // A lens keeps orientation; past the fold of the radial polynomial the determinant changes sign.
+            if det <= 1e-6 || !det.is_finite() {
+                return None;
+            }
+            let dx = (along_y.y * miss.x - along_y.x * miss.y) / det;
+            let dy = (along_x.x * miss.y - along_x.y * miss.x) / det;
+            n.x -= dx;
+            n.y -= dy;
+            if dx.abs().max(dy.abs()) < 1e-14 * (1.0 + n.coords.amax()) {
+                break;
+            }
+        }
+        let miss = self.distort(&n) - target;
+        (miss.amax() < 1e-10).then_some(n)
+    }
+
+    /// The pinhole matrix.
+    pub fn matrix(&self) -> Matrix3<f64> {
+        Matrix3::new(self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
+    }
+}
+
+/// OpenCV's matrix of a tilted sensor, `[[R33, 0, -R13], [0, R33, -R23], [0, 0, 1]] R(tau_x, tau_y)`.
+pub fn tilt_matrix(tau_x: f64, tau_y: f64) -> Matrix3<f64> {
+    let (sx, cx) = tau_x.sin_cos();
+    let (sy, cy) = tau_y.sin_cos();
+    let about_x = Matrix3::new(1.0, 0.0, 0.0, 0.0, cx, sx, 0.0, -sx, cx);
+    let about_y = Matrix3::new(cy, 0.0, -sy, 0.0, 1.0, 0.0, sy, 0.0, cy);
+    let r = about_y * about_x;
+    Matrix3::new(r[(2, 2)], 0.0, -r[(0, 2)], 0.0, r[(2, 2)], -r[(1, 2)], 0.0, 0.0, 1.0) * r
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn undistort_inverts_distort() {
+        let mut camera = Camera::pinhole(1280, 1280, 2500.0);
+        camera.lens = Lens::Tilted14;
+        camera.distortion = [-0.12, 0.08, 1e-3, -7e-4, 0.02, 0.01, -0.02, 0.003, 1e-3, -2e-4, 5e-4, 3e-4, 0.01, -0.02];
+        for (x, y) in [(0.0, 0.0), (0.25, -0.2), (-0.25, 0.25), (0.1, 0.02)] {
+            let ray = Point2::new(x, y);
+            let px = camera.project(&Point3::new(x, y, 1.0));
+            let back = camera.undistort(&px).unwrap();
+            assert!((back - ray).norm() < 1e-12, "{ray} came back as {back}");
+        }
+    }
+
+    #[test]
+    fn a_point_beyond_the_fold_has_no_ray() {
+        let mut camera = Camera::pinhole(1000, 1000, 500.0);
+        camera.distortion[0] = -0.5;
+        assert_eq!(camera.undistort(&Point2::new(5000.0, 499.5)), None);
+    }
+}
