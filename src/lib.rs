@@ -21,6 +21,7 @@
 pub mod cli;
 pub mod commands;
 pub mod config;
+pub mod csv_table;
 pub mod error;
 pub mod files;
 pub mod geometry;

@@ -5,8 +5,9 @@ use std::fmt::Write as _;
 use camino::Utf8Path;
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::error::{Place, Result};
-use crate::files;
+use crate::csv_table::Table;
+pub use crate::csv_table::quoted;
+use crate::error::Result;
 
 /// What a pose is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,75 +86,7 @@ pub struct Measurement {
     pub observed: Observed,
 }
 
-/// A CSV file with its header understood: fields by name, complaints with the line.
-struct Table<'a> {
-    path: &'a Utf8Path,
-    header: Vec<String>,
-    /// Line number in the file (from 1) and fields.
-    rows: Vec<(u64, Vec<String>)>,
-}
-
-impl<'a> Table<'a> {
-    fn read(path: &'a Utf8Path, what: &'static str, hint: &str) -> Result<Table<'a>> {
-        let text = files::read_text(path, what, Some(hint))?;
-        // Spreadsheets put a byte order mark first and, in half of Europe, semicolons between.
-        let text = text.trim_start_matches('\u{feff}');
-        let first = text.lines().next().unwrap_or_default();
-        let delimiter = if first.contains(';') && !first.contains(',') { b';' } else { b',' };
-        let mut reader = csv::ReaderBuilder::new()
-            .delimiter(delimiter)
-            .trim(csv::Trim::All)
-            .flexible(true)
-            .from_reader(text.as_bytes());
-        let refuse = |e: csv::Error| {
-            let line = e.position().map(csv::Position::line);
-            files::Error::Format {
-                message: format!("not readable as CSV: {e}"),
-                place: Place { path: path.to_owned(), line },
-                hint: None,
-            }
-        };
-        let header: Vec<String> = reader.headers().map_err(refuse)?.iter().map(str::to_owned).collect();
-        let mut table = Table { path, header, rows: Vec::new() };
-        for record in reader.records() {
-            let record = record.map_err(refuse)?;
-            let line = record.position().map_or(0, csv::Position::line);
-            if record.iter().all(str::is_empty) {
-                continue;
-            }
-            if record.len() != table.header.len() {
-                let message = format!("{} fields, but the header has {}", record.len(), table.header.len());
-                return Err(table.refuse(line, message));
-            }
-            table.rows.push((line, record.iter().map(str::to_owned).collect()));
-        }
-        if table.rows.is_empty() {
-            return Err(table.refuse(1, "the file has no rows below its header".to_owned()));
-        }
-        Ok(table)
-    }
-
-    fn refuse(&self, line: u64, message: String) -> crate::Error {
-        let place = Place { path: self.path.to_owned(), line: Some(line) };
-        files::Error::Format { message, place, hint: None }.into()
-    }
-
-    fn column(&self, name: &str) -> Option<usize> {
-        self.header.iter().position(|h| h == name)
-    }
-
-    fn require(&self, name: &str) -> Result<usize> {
-        self.column(name)
-            .ok_or_else(|| self.refuse(1, format!("no column `{name}`; the header has: {}", self.header.join(", "))))
-    }
-
-    fn number(&self, line: u64, row: &[String], column: usize) -> Result<f64> {
-        match row[column].parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(self.refuse(line, format!("`{}` is not a number: `{}`", self.header[column], row[column]))),
-        }
-    }
-
+impl Table<'_> {
     /// The columns `j1_deg`, `j2_deg`, ... without a gap.
     fn joint_columns(&self) -> Result<Vec<usize>> {
         let columns: Vec<usize> = (1..).map_while(|i| self.column(&format!("j{i}_deg"))).collect();
@@ -274,11 +207,6 @@ pub fn pose_fields(pose: &RobotPose) -> String {
         let _ = write!(text, ",{deg}");
     }
     text
-}
-
-/// A text as a field of a CSV file.
-pub fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\n', ';']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.to_owned() }
 }
 
 #[cfg(test)]

@@ -4,6 +4,25 @@ use nalgebra::{Matrix2, Point2};
 
 use super::Board;
 
+/// Left or right picture of a pair.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Side {
+    /// The reference camera's.
+    Left,
+    /// The other.
+    Right,
+}
+
+impl Side {
+    /// The word in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Side::Left => "left",
+            Side::Right => "right",
+        }
+    }
+}
+
 /// One corner of the board in one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corner {
@@ -52,4 +71,6 @@ pub struct Corners {
     pub pairs: Vec<PairCorners>,
     /// Pairs that were not used.
     pub skipped: Vec<Skipped>,
+    /// What a person should know beside that: files left out, a size that was guessed, another board that was seen.
+    pub notes: Vec<String>,
 }

@@ -2,11 +2,12 @@
 
 pub mod board;
 pub mod corners;
+pub mod corners_file;
 
 use crate::error::Explain;
 
 pub use board::Board;
-pub use corners::{Corner, Corners, PairCorners, Skipped};
+pub use corners::{Corner, Corners, PairCorners, Side, Skipped};
 
 /// What can go wrong between a folder and its corners.
 #[derive(Debug, thiserror::Error)]

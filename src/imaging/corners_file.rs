@@ -1,0 +1,268 @@
+//! `corners.csv`: corners of all pairs as text, from this program or from any other detector.
+//!
+//! In: a CSV file with the columns `pair,side,col,row,x_px,y_px` and optionally `sxx_px2,sxy_px2,syy_px2,used`, rows in
+//! any order. Out: [`Corners`], and back. Raw (distorted) pixels, pixel (0, 0) is the centre of the top-left pixel.
+//!
+//! The size of the pictures is not in the file. A reader that knows it says so; otherwise it is guessed from where the
+//! corners lie (as if they were centred), which only moves the calibration's starting point, and a note says it.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use camino::Utf8Path;
+use nalgebra::{Matrix2, Point2};
+
+use super::{Board, Corner, Corners, PairCorners, Side, Skipped};
+use crate::csv_table::{Table, quoted};
+use crate::error::{Place, Result};
+use crate::files;
+
+/// The header of `corners.csv`.
+pub const HEADER: &str = "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,used";
+
+/// The text of `corners.csv`. Numbers are written so that they read back exactly.
+pub fn to_csv(corners: &Corners) -> String {
+    let mut text = String::from(HEADER);
+    text.push('\n');
+    for pair in &corners.pairs {
+        for (side, list) in [(Side::Left, &pair.left), (Side::Right, &pair.right)] {
+            for c in list {
+                let s = c.covariance_px2.map(|s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]]);
+                let s = s.map_or_else(|| ",,".to_owned(), |[xx, xy, yy]| format!("{xx},{xy},{yy}"));
+                let (name, used) = (quoted(&pair.pair), u8::from(c.used));
+                let _ = writeln!(text, "{name},{},{},{},{},{},{s},{used}", side.name(), c.col, c.row, c.px.x, c.px.y);
+            }
+        }
+    }
+    text
+}
+
+/// Reads `corners.csv`. `size` is the width and height of the pictures, px, where known.
+///
+/// Refused with the line: bad numbers, an unknown side, a corner that stands there twice or does not exist on the board.
+/// A file whose columns run along the shorter side is turned by 90 degrees. Pairs seen by one camera only are skipped.
+pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<Corners> {
+    let hint = "`stereocal camera-check IMAGES` writes corners.csv beside its report";
+    let table = Table::read(path, "the file of corners", hint)?;
+    let mut rows = parse(&table)?;
+    let mut notes = Vec::new();
+    if fit_to_board(&table, &mut rows, board)? {
+        notes.push("the columns of the corners file run along the shorter side: turned by 90 degrees".to_owned());
+    }
+    let extent = rows.iter().fold((0.0, 0.0, f64::MAX, f64::MAX), |(x, y, x0, y0): (f64, f64, f64, f64), r| {
+        (x.max(r.corner.px.x), y.max(r.corner.px.y), x0.min(r.corner.px.x), y0.min(r.corner.px.y))
+    });
+    let size = match size {
+        Some(size) => {
+            if let Some(row) = rows.iter().find(|r| !inside(&r.corner.px, size)) {
+                let (w, h) = size;
+                let message = format!(
+                    "a corner at ({:.2}, {:.2}) lies outside of a picture of {w}x{h}",
+                    row.corner.px.x, row.corner.px.y
+                );
+                return Err(table.refuse(row.line, message));
+            }
+            size
+        }
+        None => {
+            let guess = |most: f64, least: f64| (most + least.max(0.0)).ceil() as u32 + 1;
+            let size = (guess(extent.0, extent.2), guess(extent.1, extent.3));
+            let (w, h) = size;
+            notes.push(format!("the corners file does not hold the pictures' size; {w}x{h} px taken from its extent"));
+            size
+        }
+    };
+    let (pairs, skipped) = gather(rows);
+    Ok(Corners { board, left_size: size, right_size: size, pairs, skipped, notes })
+}
+
+struct Row {
+    line: u64,
+    pair: String,
+    side: Side,
+    corner: Corner,
+}
+
+fn inside(px: &Point2<f64>, (w, h): (u32, u32)) -> bool {
+    (-0.5..=f64::from(w) - 0.5).contains(&px.x) && (-0.5..=f64::from(h) - 0.5).contains(&px.y)
+}
+
+fn parse(table: &Table) -> Result<Vec<Row>> {
+    let (pair, side) = (table.require("pair")?, table.require("side")?);
+    let (col, row) = (table.require("col")?, table.require("row")?);
+    let (x, y) = (table.require("x_px")?, table.require("y_px")?);
+    let covariance = ["sxx_px2", "sxy_px2", "syy_px2"].map(|name| table.column(name));
+    let used = table.column("used");
+    let mut rows = Vec::with_capacity(table.rows.len());
+    let mut seen = BTreeMap::new();
+    for (line, fields) in &table.rows {
+        let line = *line;
+        let name = fields[pair].clone();
+        if name.is_empty() {
+            return Err(table.refuse(line, "the pair has no name".to_owned()));
+        }
+        let side = match fields[side].to_ascii_lowercase().as_str() {
+            "left" => Side::Left,
+            "right" => Side::Right,
+            other => return Err(table.refuse(line, format!("side is `{other}`; it is left or right"))),
+        };
+        let count = |column: usize| {
+            fields[column].parse::<usize>().map_err(|_| {
+                table.refuse(line, format!("`{}` is not a count: `{}`", table.header[column], fields[column]))
+            })
+        };
+        let (col, row) = (count(col)?, count(row)?);
+        if let Some(first) = seen.insert((name.clone(), side, col, row), line) {
+            let message = format!("corner {col},{row} of the {} picture of {name} stands in line {first}", side.name());
+            return Err(table.refuse(line, message));
+        }
+        let covariance_px2 = match covariance {
+            [Some(xx), Some(xy), Some(yy)] if [xx, xy, yy].iter().any(|&c| !fields[c].is_empty()) => {
+                let number = |c| table.number(line, fields, c);
+                Some(Matrix2::new(number(xx)?, number(xy)?, number(xy)?, number(yy)?))
+            }
+            _ => None,
+        };
+        if covariance_px2.is_some_and(|s| s.cholesky().is_none()) {
+            let message = "the covariance sxx, sxy, syy is not positive definite".to_owned();
+            return Err(table.refuse(line, message));
+        }
+        let used = match used.map_or("", |c| fields[c].as_str()).to_ascii_lowercase().as_str() {
+            "" | "1" | "true" | "yes" => true,
+            "0" | "false" | "no" => false,
+            other => return Err(table.refuse(line, format!("used is `{other}`; it is 1 or 0"))),
+        };
+        let px = Point2::new(table.number(line, fields, x)?, table.number(line, fields, y)?);
+        rows.push(Row { line, pair: name, side, corner: Corner { col, row, px, covariance_px2, used } });
+    }
+    Ok(rows)
+}
+
+/// Checks that every corner exists on the board; true where the file's columns ran along the shorter side and were turned.
+fn fit_to_board(table: &Table, rows: &mut [Row], board: Board) -> Result<bool> {
+    let (columns, lines) = (board.columns(), board.rows());
+    if rows.iter().all(|r| r.corner.col < columns && r.corner.row < lines) {
+        return Ok(false);
+    }
+    if rows.iter().all(|r| r.corner.col < lines && r.corner.row < columns) {
+        for row in rows {
+            // A quarter turn, not a transposition: a mirrored board would lie behind the camera.
+            (row.corner.col, row.corner.row) = (row.corner.row, lines - 1 - row.corner.col);
+        }
+        return Ok(true);
+    }
+    let col = rows.iter().map(|r| r.corner.col).max().unwrap_or(0);
+    let row = rows.iter().map(|r| r.corner.row).max().unwrap_or(0);
+    let line = rows.iter().find(|r| r.corner.col >= columns || r.corner.row >= lines).map_or(1, |r| r.line);
+    Err(files::Error::Format {
+        message: format!(
+            "corners reach col {col} and row {row}, but a board of {} squares has {columns}x{lines} inner corners",
+            board.squares
+        ),
+        place: Place { path: table.path.to_owned(), line: Some(line) },
+        hint: Some(format!("`--squares {}x{}` if the board has that many squares", col + 2, row + 2)),
+    }
+    .into())
+}
+
+fn gather(rows: Vec<Row>) -> (Vec<PairCorners>, Vec<Skipped>) {
+    let mut pairs: BTreeMap<String, PairCorners> = BTreeMap::new();
+    for row in rows {
+        let pair =
+            pairs.entry(row.pair.clone()).or_insert_with(|| PairCorners { pair: row.pair, ..PairCorners::default() });
+        match row.side {
+            Side::Left => pair.left.push(row.corner),
+            Side::Right => pair.right.push(row.corner),
+        }
+    }
+    let (mut kept, mut skipped) = (Vec::new(), Vec::new());
+    for mut pair in pairs.into_values() {
+        for (list, side) in [(&pair.left, Side::Left), (&pair.right, Side::Right)] {
+            if list.is_empty() {
+                let reason = format!("no corners in the {} picture", side.name());
+                skipped.push(Skipped { pair: pair.pair.clone(), reason });
+            }
+        }
+        if pair.left.is_empty() || pair.right.is_empty() {
+            continue;
+        }
+        pair.left.sort_by_key(|c| (c.row, c.col));
+        pair.right.sort_by_key(|c| (c.row, c.col));
+        kept.push(pair);
+    }
+    (kept, skipped)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_str(text: &str, squares: &str, size: Option<(u32, u32)>) -> Result<Corners> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = Utf8Path::from_path(dir.path()).unwrap().join("corners.csv");
+        std::fs::write(&path, text).unwrap();
+        read(&path, Board { squares: squares.parse().unwrap(), square_mm: 10.0 }, size)
+    }
+
+    #[test]
+    fn what_is_written_reads_back_exactly() {
+        let covariance_px2 = Some(Matrix2::new(1.0 / 3.0e4, 1e-7, 1e-7, 2.2e-5));
+        let corner = |col, row, x: f64| Corner { col, row, px: Point2::new(x, 2.0 / 7.0), covariance_px2, used: true };
+        let plain = |c: Corner| Corner { covariance_px2: None, used: false, ..c };
+        let corners = Corners {
+            board: Board { squares: "4x3".parse().unwrap(), square_mm: 10.0 },
+            left_size: (640, 480),
+            right_size: (640, 480),
+            pairs: vec![PairCorners {
+                pair: "a,b".to_owned(),
+                left: vec![corner(0, 0, 0.1), corner(2, 1, 639.0)],
+                right: vec![plain(corner(1, 1, 3.0))],
+            }],
+            skipped: Vec::new(),
+            notes: Vec::new(),
+        };
+        let back = read_str(&to_csv(&corners), "4x3", Some((640, 480))).unwrap();
+        assert_eq!(back, corners);
+    }
+
+    #[test]
+    fn complaints_name_the_line() {
+        let top = "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,used\na,left,0,0,1,2,,,,1\n";
+        for (row, part) in [
+            ("a,left,0,0,1,2,,,,1", "stands in line 2"),
+            ("a,middle,0,0,1,2,,,,1", "side is `middle`"),
+            ("a,left,-1,0,1,2,,,,1", "`col` is not a count"),
+            ("a,left,1,0,x,2,,,,1", "`x_px` is not a number"),
+            ("a,left,1,0,1,2,1,,,1", "`sxy_px2` is not a number"),
+            ("a,left,1,0,1,2,1,2,1,1", "not positive definite"),
+            ("a,left,1,0,1,2,,,,maybe", "used is `maybe`"),
+            ("a,left,1,7,1,2,,,,1", "`--squares 3x9`"),
+            ("a,left,1,0,700,2,,,,1", "outside of a picture of 640x480"),
+        ] {
+            let error = read_str(&format!("{top}{row}\n"), "4x3", Some((640, 480))).unwrap_err();
+            let message = crate::error::report(&error);
+            assert!(message.contains(part) && message.contains("corners.csv:3"), "{message}");
+        }
+    }
+
+    #[test]
+    fn columns_along_the_shorter_side_are_turned() {
+        let text = "pair,side,col,row,x_px,y_px\na,left,0,0,0,0\na,left,0,2,0,20\na,left,1,0,10,0\na,right,0,0,0,0\n";
+        let corners = read_str(text, "4x3", None).unwrap();
+        let at = |col, row| corners.pairs[0].left.iter().find(|c| c.col == col && c.row == row).unwrap().px;
+        // x now runs down the picture and y to the left: still right-handed.
+        assert_eq!(
+            (at(0, 1), at(2, 1), at(0, 0)),
+            (Point2::new(0.0, 0.0), Point2::new(0.0, 20.0), Point2::new(10.0, 0.0))
+        );
+        assert_eq!(corners.notes.len(), 2);
+    }
+
+    #[test]
+    fn a_pair_with_one_side_is_skipped() {
+        let text = "pair,side,col,row,x_px,y_px\nb,left,0,0,5,6\nb,right,0,0,5,6\na,left,0,0,0,0\n";
+        let corners = read_str(text, "4x3", None).unwrap();
+        assert_eq!(corners.pairs.len(), 1);
+        assert_eq!(corners.skipped[0].reason, "no corners in the right picture");
+    }
+}
