@@ -1,0 +1,414 @@
+//! Figures as SVG text: axes with units, a legend, nothing that needs a network or a font file.
+
+use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::Error;
+use crate::error::Result;
+
+/// Drawn at twice the size it is shown, because the backend rounds to whole units.
+const SCALE: u32 = 2;
+/// Size on the page, px.
+const SIZE: (u32, u32) = (640, 400);
+
+/// Colours of the series in turn: distinct for the colour-blind (Okabe and Ito), dark enough on white.
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 140, 180),
+    RGBColor(180, 140, 0),
+    RGBColor(90, 90, 90),
+];
+
+/// How a series is drawn.
+#[derive(Debug, Clone, PartialEq)]
+enum Marks {
+    Points(Vec<(f64, f64)>),
+    Line(Vec<(f64, f64)>),
+    Bars(Vec<(f64, f64)>),
+    /// x, y, half length of the bar.
+    ErrorBars(Vec<(f64, f64, f64)>),
+    /// x, y, dx, dy; the arrows' lengths are in the axes' units.
+    Vectors(Vec<[f64; 4]>),
+}
+
+impl Marks {
+    /// Every place that must lie inside the axes.
+    fn extent(&self) -> Vec<(f64, f64)> {
+        match self {
+            Marks::Points(xy) | Marks::Line(xy) => xy.clone(),
+            Marks::Bars(xy) => {
+                let half = bar_half_width(xy);
+                xy.iter().flat_map(|&(x, y)| [(x - half, y), (x + half, 0.0)]).collect()
+            }
+            Marks::ErrorBars(bars) => bars.iter().flat_map(|&(x, y, h)| [(x, y - h), (x, y + h)]).collect(),
+            Marks::Vectors(v) => v.iter().flat_map(|&[x, y, dx, dy]| [(x, y), (x + dx, y + dy)]).collect(),
+        }
+    }
+}
+
+/// A figure with one pair of axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plot {
+    title: String,
+    x_label: String,
+    y_label: String,
+    series: Vec<(String, Marks)>,
+    guides: Vec<(f64, String)>,
+    x_range: Option<(f64, f64)>,
+    y_range: Option<(f64, f64)>,
+    size: (u32, u32),
+    log_y: bool,
+    equal_axes: bool,
+    y_down: bool,
+}
+
+impl Plot {
+    /// An empty figure. The labels carry their units: "distance, mm".
+    pub fn new(title: &str, x_label: &str, y_label: &str) -> Plot {
+        Plot {
+            title: title.to_owned(),
+            x_label: x_label.to_owned(),
+            y_label: y_label.to_owned(),
+            series: Vec::new(),
+            guides: Vec::new(),
+            x_range: None,
+            y_range: None,
+            size: SIZE,
+            log_y: false,
+            equal_axes: false,
+            y_down: false,
+        }
+    }
+
+    fn with(mut self, label: &str, marks: Marks) -> Plot {
+        self.series.push((label.to_owned(), marks));
+        self
+    }
+
+    /// Adds points. An empty label keeps a series out of the legend.
+    pub fn points(self, label: &str, xy: &[(f64, f64)]) -> Plot {
+        self.with(label, Marks::Points(xy.to_vec()))
+    }
+
+    /// Adds a line through points.
+    pub fn line(self, label: &str, xy: &[(f64, f64)]) -> Plot {
+        self.with(label, Marks::Line(xy.to_vec()))
+    }
+
+    /// Adds upright bars from zero.
+    pub fn bars(self, label: &str, xy: &[(f64, f64)]) -> Plot {
+        self.with(label, Marks::Bars(xy.to_vec()))
+    }
+
+    /// Adds points with upright bars of the given half length: `(x, y, half)`.
+    pub fn error_bars(self, label: &str, bars: &[(f64, f64, f64)]) -> Plot {
+        self.with(label, Marks::ErrorBars(bars.to_vec()))
+    }
+
+    /// Adds arrows `[x, y, dx, dy]`, lengths in the axes' units: the caller magnifies and says so in the caption.
+    pub fn vectors(self, label: &str, arrows: &[[f64; 4]]) -> Plot {
+        self.with(label, Marks::Vectors(arrows.to_vec()))
+    }
+
+    /// Adds a level line across the figure, for a tolerance.
+    pub fn hline(mut self, y: f64, label: &str) -> Plot {
+        self.guides.push((y, label.to_owned()));
+        self
+    }
+
+    /// Fixes the range of x.
+    pub fn x_range(mut self, low: f64, high: f64) -> Plot {
+        self.x_range = Some((low, high));
+        self
+    }
+
+    /// Fixes the range of y.
+    pub fn y_range(mut self, low: f64, high: f64) -> Plot {
+        self.y_range = Some((low, high));
+        self
+    }
+
+    /// Size on the page, px, instead of 640x400.
+    pub fn size(mut self, width: u32, height: u32) -> Plot {
+        self.size = (width, height);
+        self
+    }
+
+    /// Powers of ten along y; values that are not positive are left out.
+    pub fn log_y(mut self) -> Plot {
+        self.log_y = true;
+        self
+    }
+
+    /// The same length a unit along x and y, for places.
+    pub fn equal_axes(mut self) -> Plot {
+        self.equal_axes = true;
+        self
+    }
+
+    /// y grows downward, as in a picture.
+    pub fn y_down(mut self) -> Plot {
+        self.y_down = true;
+        self
+    }
+
+    /// The figure as SVG text, ready to stand in a page.
+    pub fn svg(&self) -> Result<String> {
+        let mut text = String::new();
+        let size = (self.size.0 * SCALE, self.size.1 * SCALE);
+        let drawn = {
+            let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
+            self.draw(&root).and_then(|()| root.present().map_err(|e| e.to_string()))
+        };
+        drawn.map_err(|message| Error::Figure { figure: self.title.clone(), message })?;
+        // The page decides the shown size; the drawing keeps its own units in the view box.
+        let (shown_width, shown_height) = self.size;
+        Ok(text.replacen(
+            &format!("<svg width=\"{}\" height=\"{}\"", size.0, size.1),
+            &format!("<svg width=\"{shown_width}\" height=\"{shown_height}\" font-family=\"sans-serif\""),
+            1,
+        ))
+    }
+
+    /// y as it is plotted; `None` where it can't be.
+    fn plotted(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
+        let y = if self.log_y { y.log10() } else { y };
+        (x.is_finite() && y.is_finite()).then_some((x, y))
+    }
+
+    fn ranges(&self) -> ((f64, f64), (f64, f64)) {
+        let places: Vec<(f64, f64)> =
+            self.series.iter().flat_map(|(_, m)| m.extent()).filter_map(|p| self.plotted(p)).collect();
+        let guides = self.guides.iter().filter_map(|g| self.plotted((0.0, g.0))).map(|p| p.1);
+        let mut x = padded(places.iter().map(|p| p.0));
+        let mut y = padded(places.iter().map(|p| p.1).chain(guides));
+        x = self.x_range.unwrap_or(x);
+        if let Some((low, high)) = self.y_range {
+            y = if self.log_y { (low.log10(), high.log10()) } else { (low, high) };
+        }
+        if self.equal_axes {
+            let area = (f64::from(self.size.0) - 90.0, f64::from(self.size.1) - 90.0);
+            let per_px = ((x.1 - x.0) / area.0).max((y.1 - y.0) / area.1);
+            x = widened(x, per_px * area.0);
+            y = widened(y, per_px * area.1);
+        }
+        (x, y)
+    }
+
+    fn draw(&self, root: &DrawingArea<SVGBackend<'_>, Shift>) -> std::result::Result<(), String> {
+        let say = |e: DrawingAreaErrorKind<_>| e.to_string();
+        root.fill(&WHITE).map_err(say)?;
+        let (x, mut y) = self.ranges();
+        if self.y_down {
+            y = (y.1, y.0);
+        }
+        let font = |px: u32| ("sans-serif", px * SCALE).into_font();
+        let mut chart = ChartBuilder::on(root)
+            .caption(&self.title, font(16))
+            .margin(10 * SCALE)
+            .x_label_area_size(40 * SCALE)
+            .y_label_area_size(62 * SCALE)
+            .build_cartesian_2d(x.0..x.1, y.0..y.1)
+            .map_err(say)?;
+        let y_text = |v: &f64| if self.log_y { power_of_ten(*v) } else { tick(*v, y) };
+        chart
+            .configure_mesh()
+            .x_desc(&self.x_label)
+            .y_desc(&self.y_label)
+            .x_label_formatter(&|v| tick(*v, x))
+            .y_label_formatter(&y_text)
+            .x_labels(9)
+            .y_labels(8)
+            .label_style(font(12))
+            .axis_desc_style(font(13))
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(BLACK.mix(0.1))
+            .draw()
+            .map_err(say)?;
+        for (k, (label, marks)) in self.series.iter().enumerate() {
+            self.draw_series(&mut chart, label, marks, COLOURS[k % COLOURS.len()])?;
+        }
+        self.draw_guides(&mut chart, x)?;
+        if self.series.iter().any(|(label, _)| !label.is_empty()) {
+            chart
+                .configure_series_labels()
+                .position(SeriesLabelPosition::UpperRight)
+                .background_style(WHITE.mix(0.85))
+                .border_style(BLACK.mix(0.2))
+                .label_font(font(12))
+                .margin(6 * SCALE)
+                .legend_area_size(22 * SCALE)
+                .draw()
+                .map_err(say)?;
+        }
+        Ok(())
+    }
+
+    fn draw_series(
+        &self,
+        chart: &mut Chart<'_, '_>,
+        label: &str,
+        marks: &Marks,
+        colour: RGBColor,
+    ) -> std::result::Result<(), String> {
+        let say = |e: DrawingAreaErrorKind<_>| e.to_string();
+        let keep = |xy: &[(f64, f64)]| -> Vec<(f64, f64)> { xy.iter().filter_map(|&p| self.plotted(p)).collect() };
+        let width = SCALE + SCALE / 2;
+        let anno = match marks {
+            Marks::Points(xy) => {
+                let radius = if xy.len() > 2000 { 1 } else { 2 } * SCALE as i32;
+                chart.draw_series(keep(xy).into_iter().map(|p| Circle::new(p, radius, colour.mix(0.6).filled())))
+            }
+            Marks::Line(xy) => chart.draw_series(LineSeries::new(keep(xy), colour.stroke_width(width))),
+            Marks::Bars(xy) => {
+                let floor = if self.log_y { self.ranges().1.0 } else { 0.0 };
+                let half = bar_half_width(xy);
+                chart.draw_series(
+                    keep(xy)
+                        .into_iter()
+                        .map(|(x, y)| Rectangle::new([(x - half, floor), (x + half, y)], colour.mix(0.7).filled())),
+                )
+            }
+            Marks::ErrorBars(bars) => {
+                let bars: Vec<_> =
+                    bars.iter().filter(|(x, y, h)| x.is_finite() && y.is_finite() && h.is_finite()).copied().collect();
+                chart
+                    .draw_series(bars.iter().map(|&(x, y, h)| {
+                        PathElement::new(vec![(x, y - h), (x, y + h)], colour.mix(0.6).stroke_width(width))
+                    }))
+                    .map_err(say)?;
+                chart.draw_series(bars.iter().map(|&(x, y, _)| Circle::new((x, y), 3 * SCALE as i32, colour.filled())))
+            }
+            Marks::Vectors(arrows) => {
+                let arrows: Vec<_> = arrows.iter().filter(|a| a.iter().all(|v| v.is_finite())).copied().collect();
+                chart
+                    .draw_series(arrows.iter().map(|&[x, y, _, _]| Circle::new((x, y), SCALE as i32, colour.filled())))
+                    .map_err(say)?;
+                chart.draw_series(arrows.iter().map(|&[x, y, dx, dy]| {
+                    PathElement::new(vec![(x, y), (x + dx, y + dy)], colour.stroke_width(SCALE))
+                }))
+            }
+        }
+        .map_err(say)?;
+        if !label.is_empty() {
+            let s = SCALE as i32;
+            anno.label(label).legend(move |(x, y)| {
+                Rectangle::new([(x, y - 4 * s), (x + 16 * s, y + 4 * s)], colour.mix(0.8).filled())
+            });
+        }
+        Ok(())
+    }
+
+    fn draw_guides(&self, chart: &mut Chart<'_, '_>, x: (f64, f64)) -> std::result::Result<(), String> {
+        let say = |e: DrawingAreaErrorKind<_>| e.to_string();
+        let colour = RGBColor(170, 30, 30);
+        for (level, label) in &self.guides {
+            let Some((_, y)) = self.plotted((0.0, *level)) else { continue };
+            let dashes = DashedLineSeries::new([(x.0, y), (x.1, y)], 8 * SCALE, 5 * SCALE, colour.stroke_width(SCALE));
+            chart.draw_series(dashes).map_err(say)?;
+            let at = (x.0 + 0.01 * (x.1 - x.0), y);
+            let style = TextStyle::from(("sans-serif", 12 * SCALE).into_font())
+                .color(&colour)
+                .pos(Pos::new(HPos::Left, VPos::Bottom));
+            chart.draw_series([Text::new(label.clone(), at, style)]).map_err(say)?;
+        }
+        Ok(())
+    }
+}
+
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+/// Half of the width of bars that stand one step apart.
+fn bar_half_width(xy: &[(f64, f64)]) -> f64 {
+    let mut x: Vec<f64> = xy.iter().map(|p| p.0).filter(|x| x.is_finite()).collect();
+    x.sort_by(f64::total_cmp);
+    let step = x.windows(2).map(|w| w[1] - w[0]).filter(|&s| s > 0.0).fold(f64::INFINITY, f64::min);
+    if step.is_finite() { 0.4 * step } else { 0.4 }
+}
+
+/// The range of finite values with a margin; something drawable where there is none.
+fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values
+        .filter(|v| v.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    if low > high {
+        return (0.0, 1.0);
+    }
+    let margin = if high > low { 0.05 * (high - low) } else { 0.5 * low.abs().max(1e-6) };
+    (low - margin, high + margin)
+}
+
+/// A range of the given length about the middle of another.
+fn widened(range: (f64, f64), length: f64) -> (f64, f64) {
+    let middle = 0.5 * (range.0 + range.1);
+    (middle - 0.5 * length, middle + 0.5 * length)
+}
+
+/// An axis label with as many decimals as the axis needs.
+fn tick(value: f64, range: (f64, f64)) -> String {
+    let span = (range.1 - range.0).abs();
+    if !span.is_finite() || span == 0.0 {
+        return format!("{value}");
+    }
+    if !(1e-4..=1e7).contains(&span) {
+        return format!("{value:.1e}");
+    }
+    let decimals = (1.5 - span.log10()).ceil().clamp(0.0, 6.0) as usize;
+    let text = format!("{value:.decimals$}");
+    // Rounding leaves "-0.00" at the origin.
+    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
+        text.trim_start_matches('-').to_owned()
+    } else {
+        text
+    }
+}
+
+fn power_of_ten(exponent: f64) -> String {
+    let value = 10f64.powf(exponent);
+    let decimals = (-exponent).ceil().max(0.0) as usize;
+    if (1e-3..1e4).contains(&value) { format!("{value:.decimals$}") } else { format!("{value:.0e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_of_mark_is_drawn() {
+        let svg = Plot::new("a & b", "x, mm", "y, <px>")
+            .points("p", &[(0.0, 1.0), (1.0, f64::NAN)])
+            .line("l", &[(0.0, 0.0), (1.0, 1.0)])
+            .bars("b", &[(0.0, 0.5), (1.0, 0.7)])
+            .error_bars("e", &[(0.5, 0.5, 0.1)])
+            .vectors("v", &[[0.0, 0.0, 0.1, 0.1]])
+            .hline(0.9, "limit")
+            .svg()
+            .unwrap();
+        for part in ["a &amp; b", "x, mm", "y, &lt;px&gt;", "limit", "<circle", "<polyline", "<rect", "viewBox"] {
+            assert!(svg.contains(part), "{part} is missing");
+        }
+        assert!(!svg.contains("NaN"));
+    }
+
+    #[test]
+    fn nothing_to_draw_is_an_empty_frame() {
+        for plot in [Plot::new("t", "x", "y"), Plot::new("t", "x", "y").log_y().line("l", &[(0.0, 0.0), (1.0, -1.0)])] {
+            assert!(plot.equal_axes().svg().unwrap().starts_with("<svg"));
+        }
+    }
+
+    #[test]
+    fn axis_labels_have_the_decimals_they_need() {
+        assert_eq!(tick(0.05, (0.0, 0.1)), "0.050");
+        assert_eq!(tick(-0.0001, (-0.1, 0.1)), "0.000");
+        assert_eq!(tick(500.0, (0.0, 1000.0)), "500");
+        assert_eq!(power_of_ten(-6.0), "1e-6");
+        assert_eq!(power_of_ten(-2.0), "0.01");
+        assert_eq!(power_of_ten(1.0), "10");
+    }
+}
