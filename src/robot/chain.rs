@@ -4,6 +4,7 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
+use super::corrections::Corrections;
 use crate::geometry::Transform;
 
 /// One joint with the link before it: `Rx(alpha) Tx(a) Ry(beta) Rz(q + theta) Tz(d)`.
@@ -32,6 +33,8 @@ pub struct Robot {
     pub joints: Vec<Joint>,
     /// The target's mark point in the last joint's frame, mm.
     pub tool_mm: Vector3<f64>,
+    /// What the joints do beyond the commanded angle; nothing by default.
+    pub corrections: Corrections,
 }
 
 impl Joint {
@@ -51,12 +54,13 @@ impl Joint {
 }
 
 impl Robot {
-    /// The flange's frame (the last joint's) in the base frame. One angle a joint, rad.
+    /// The flange's frame (the last joint's) in the base frame. One commanded angle a joint, rad; corrections are applied.
     pub fn base_from_flange(&self, joints_rad: &[f64]) -> Transform {
         debug_assert_eq!(joints_rad.len(), self.joints.len());
+        let corrected_rad = self.corrected_rad(joints_rad);
         self.joints
             .iter()
-            .zip(joints_rad)
+            .zip(&corrected_rad)
             .fold(Transform::identity(), |base, (joint, &q)| base * joint.previous_from_this(q))
     }
 
@@ -86,6 +90,7 @@ impl Robot {
                 joint(-90.0, 0.0, 0.0, 67.0),
             ],
             tool_mm: Vector3::zeros(),
+            corrections: Corrections::default(),
         }
     }
 }

@@ -4,7 +4,8 @@ use camino::Utf8Path;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{Error, Joint, Robot};
+use super::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
+use super::{Corrections, Error, Joint, Robot};
 use crate::error::{Place, Result};
 use crate::files;
 
@@ -16,6 +17,10 @@ struct RobotRecord {
     joint: Vec<JointRecord>,
     #[serde(default)]
     tool: ToolRecord,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    gravity: Option<GravityRecord>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    harmonics: Option<HarmonicsRecord>,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -37,6 +42,43 @@ struct ToolRecord {
     x_mm: f64,
     y_mm: f64,
     z_mm: f64,
+}
+
+/// Sag of the joints: `k_mrad_per_m` times the lever of a unit weight at `point`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GravityRecord {
+    #[serde(default = "downwards")]
+    direction: [f64; 3],
+    #[serde(default)]
+    terms: Vec<GravityTermRecord>,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GravityTermRecord {
+    joint: usize,
+    point: String,
+    k_mrad_per_m: f64,
+}
+
+/// Periodic errors of the drives, in the commanded angle.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HarmonicsRecord {
+    terms: Vec<HarmonicTermRecord>,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HarmonicTermRecord {
+    joint: usize,
+    wave: String,
+    amplitude_mrad: f64,
+}
+
+fn downwards() -> [f64; 3] {
+    [0.0, 0.0, -1.0]
 }
 
 fn is_zero(value: &f64) -> bool {
@@ -90,8 +132,69 @@ impl RobotRecord {
         if tool_mm.iter().any(|v| !v.is_finite()) {
             return Err("[tool]: every number must be finite".to_owned());
         }
-        Ok(Robot { name: self.name.clone(), joints, tool_mm })
+        let corrections = self.corrections(joints.len())?;
+        Ok(Robot { name: self.name.clone(), joints, tool_mm, corrections })
     }
+
+    fn corrections(&self, joint_count: usize) -> std::result::Result<Corrections, String> {
+        let mut corrections = Corrections::default();
+        let index = |table: &str, joint: usize| match joint {
+            1.. if joint <= joint_count => Ok(joint - 1),
+            _ => Err(format!("[{table}]: joint {joint} of a robot with {joint_count}")),
+        };
+        if let Some(gravity) = &self.gravity {
+            let direction = Vector3::from(gravity.direction);
+            if !(direction.norm().is_finite() && direction.norm() > 0.0) {
+                return Err("[gravity]: direction must be a vector that is finite and not zero".to_owned());
+            }
+            corrections.gravity_direction = direction.normalize();
+            for term in &gravity.terms {
+                let point = LoadPoint::from_name(&term.point)
+                    .ok_or_else(|| format!("[gravity]: point \"{}\"; it is elbow, wrist or tool", term.point))?;
+                let joint = index("gravity", term.joint)?;
+                corrections.gravity.push(GravityTerm { joint, point, k_rad_per_m: term.k_mrad_per_m / 1000.0 });
+            }
+        }
+        for term in self.harmonics.iter().flat_map(|h| &h.terms) {
+            let wave = Wave::ALL
+                .into_iter()
+                .find(|w| w.name() == term.wave)
+                .ok_or_else(|| format!("[harmonics]: wave \"{}\"; it is sin, cos, sin2 or cos2", term.wave))?;
+            let joint = index("harmonics", term.joint)?;
+            corrections.harmonics.push(HarmonicTerm { joint, wave, amplitude_rad: term.amplitude_mrad / 1000.0 });
+        }
+        let coefficients = corrections.gravity.iter().map(|t| t.k_rad_per_m);
+        if coefficients.chain(corrections.harmonics.iter().map(|t| t.amplitude_rad)).any(|v| !v.is_finite()) {
+            return Err("[gravity] and [harmonics]: every number must be finite".to_owned());
+        }
+        Ok(corrections)
+    }
+}
+
+fn gravity_record(corrections: &Corrections) -> Option<GravityRecord> {
+    let default = Corrections::default();
+    if corrections.gravity.is_empty() && corrections.gravity_direction == default.gravity_direction {
+        return None;
+    }
+    let term = |t: &GravityTerm| GravityTermRecord {
+        joint: t.joint + 1,
+        point: t.point.name().to_owned(),
+        k_mrad_per_m: 1000.0 * t.k_rad_per_m,
+    };
+    Some(GravityRecord {
+        direction: corrections.gravity_direction.into(),
+        terms: corrections.gravity.iter().map(term).collect(),
+    })
+}
+
+fn harmonics_record(corrections: &Corrections) -> Option<HarmonicsRecord> {
+    let term = |t: &HarmonicTerm| HarmonicTermRecord {
+        joint: t.joint + 1,
+        wave: t.wave.name().to_owned(),
+        amplitude_mrad: 1000.0 * t.amplitude_rad,
+    };
+    let terms: Vec<_> = corrections.harmonics.iter().map(term).collect();
+    if terms.is_empty() { None } else { Some(HarmonicsRecord { terms }) }
 }
 
 impl From<&Robot> for RobotRecord {
@@ -112,6 +215,8 @@ impl From<&Robot> for RobotRecord {
                 })
                 .collect(),
             tool: ToolRecord { x_mm: robot.tool_mm.x, y_mm: robot.tool_mm.y, z_mm: robot.tool_mm.z },
+            gravity: gravity_record(&robot.corrections),
+            harmonics: harmonics_record(&robot.corrections),
         }
     }
 }
@@ -126,10 +231,21 @@ mod tests {
         robot.joints[2].beta_rad = 0.001;
         robot.joints[0].limits_rad = Some((-3.0, 3.0));
         robot.tool_mm = Vector3::new(1.5, -2.0, 30.0);
+        robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Wrist, k_rad_per_m: 0.25 }];
+        robot.corrections.harmonics = vec![HarmonicTerm { joint: 5, wave: Wave::Sin2, amplitude_rad: 0.5 }];
         let back = toml::from_str::<RobotRecord>(&to_toml(&robot)).unwrap().robot().unwrap();
         for (a, b) in back.joints.iter().zip(&robot.joints) {
             assert!((a.alpha_rad - b.alpha_rad).abs() < 1e-15 && (a.beta_rad - b.beta_rad).abs() < 1e-15);
         }
         assert_eq!(back.tool_mm, robot.tool_mm);
+        assert_eq!(back.corrections, robot.corrections);
+    }
+
+    #[test]
+    fn a_joint_that_the_robot_lacks_is_refused() {
+        let text =
+            to_toml(&Robot::paper()) + "\n[harmonics]\nterms = [{ joint = 7, wave = \"sin\", amplitude_mrad = 1.0 }]\n";
+        let message = toml::from_str::<RobotRecord>(&text).unwrap().robot().unwrap_err();
+        assert!(message.contains("joint 7 of a robot with 6"), "{message}");
     }
 }

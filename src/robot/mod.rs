@@ -1,11 +1,16 @@
 //! The robot: its kinematic parameters, where they put the target, and the file they live in.
 
 pub mod chain;
+pub mod corrections;
 pub mod file;
+pub mod jacobian;
+pub mod parameters;
 
 use crate::error::{Explain, Place};
 
 pub use chain::{Joint, Robot};
+pub use corrections::Corrections;
+pub use parameters::{Parameter, Unit};
 
 /// What can go wrong with a robot.
 #[derive(Debug, thiserror::Error)]

@@ -1,0 +1,179 @@
+//! The target's point and its derivatives with respect to every parameter, in closed form.
+//!
+//! A rotation about an axis `u` through `o` moves the target `p` by `u x (p - o)`, a shift along `u` by `u`; every
+//! parameter of the chain is one of the two. Corrections of a joint turn it, by their feature at the pose.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use super::corrections::Torques;
+use super::{Parameter, Robot};
+
+/// Columns of angles are per mrad.
+const RAD_PER_MRAD: f64 = 1e-3;
+
+/// The screws of a chain in one pose: what each of its parameters turns about or shifts along, base frame.
+#[derive(Debug, Clone)]
+pub struct Screws {
+    joints: Vec<JointScrews>,
+    base_from_flange: Matrix3<f64>,
+    /// The target's mark point, mm.
+    pub target_mm: Point3<f64>,
+}
+
+#[derive(Debug, Clone)]
+struct JointScrews {
+    /// Axis of alpha and a, and a point on it.
+    x: Vector3<f64>,
+    before: Point3<f64>,
+    /// Axis of beta.
+    y: Vector3<f64>,
+    /// Axis of theta and d; both this and `y` pass through `origin`.
+    z: Vector3<f64>,
+    origin: Point3<f64>,
+}
+
+impl Screws {
+    /// At the angles that the joints really take, rad (see [`Robot::corrected_rad`]).
+    pub fn new(robot: &Robot, corrected_rad: &[f64]) -> Screws {
+        let mut rotation = Matrix3::identity();
+        let mut origin = Point3::origin();
+        let mut joints = Vec::with_capacity(robot.joints.len());
+        for (joint, &q) in robot.joints.iter().zip(corrected_rad) {
+            let (sa, ca) = joint.alpha_rad.sin_cos();
+            let (sb, cb) = joint.beta_rad.sin_cos();
+            let (st, ct) = (q + joint.theta_rad).sin_cos();
+            let x: Vector3<f64> = rotation.column(0).into();
+            let (y0, z0) = (rotation.column(1), rotation.column(2));
+            let y: Vector3<f64> = ca * y0 + sa * z0;
+            let z1: Vector3<f64> = ca * z0 - sa * y0;
+            let before = origin;
+            origin += joint.a_mm * x;
+            let x1 = cb * x - sb * z1;
+            let z = sb * x + cb * z1;
+            joints.push(JointScrews { x, before, y, z, origin });
+            origin += joint.d_mm * z;
+            rotation = Matrix3::from_columns(&[ct * x1 + st * y, ct * y - st * x1, z]);
+        }
+        let target_mm = origin + rotation * robot.tool_mm;
+        Screws { joints, base_from_flange: rotation, target_mm }
+    }
+
+    /// Rotation of the flange, base frame.
+    pub fn base_from_flange(&self) -> &Matrix3<f64> {
+        &self.base_from_flange
+    }
+
+    /// Derivative of the target's point, mm per mm or mrad. `feature` is the parameter's factor at this pose (see [`feature`]).
+    pub fn point_column(&self, parameter: Parameter, feature: f64) -> Vector3<f64> {
+        let p = self.target_mm;
+        let column =
+            |i: usize, f: &dyn Fn(&JointScrews) -> Vector3<f64>| self.joints.get(i).map_or(Vector3::zeros(), f);
+        match parameter {
+            Parameter::Alpha(i) => column(i, &|s| s.x.cross(&(p - s.before)) * RAD_PER_MRAD),
+            Parameter::A(i) => column(i, &|s| s.x),
+            Parameter::Beta(i) => column(i, &|s| s.y.cross(&(p - s.origin)) * RAD_PER_MRAD),
+            Parameter::Theta(i) | Parameter::Gravity(i, _) | Parameter::Harmonic(i, _) => {
+                column(i, &|s| s.z.cross(&(p - s.origin)) * (feature * RAD_PER_MRAD))
+            }
+            Parameter::D(i) => column(i, &|s| s.z),
+            Parameter::V(axis) => self.base_from_flange.column(axis.min(2)).into(),
+        }
+    }
+
+    /// Derivative of the flange's orientation as a rotation vector in the base frame, rad per mm or mrad.
+    pub fn rotation_column(&self, parameter: Parameter, feature: f64) -> Vector3<f64> {
+        let column =
+            |i: usize, f: &dyn Fn(&JointScrews) -> Vector3<f64>| self.joints.get(i).map_or(Vector3::zeros(), f);
+        match parameter {
+            Parameter::Alpha(i) => column(i, &|s| s.x * RAD_PER_MRAD),
+            Parameter::Beta(i) => column(i, &|s| s.y * RAD_PER_MRAD),
+            Parameter::Theta(i) | Parameter::Gravity(i, _) | Parameter::Harmonic(i, _) => {
+                column(i, &|s| s.z * (feature * RAD_PER_MRAD))
+            }
+            Parameter::A(_) | Parameter::D(_) | Parameter::V(_) => Vector3::zeros(),
+        }
+    }
+}
+
+/// What a parameter's joint turns by at this pose per unit of the parameter: 1 but for corrections.
+pub fn feature(parameter: Parameter, torques: &Torques, joints_rad: &[f64]) -> f64 {
+    match parameter {
+        Parameter::Gravity(joint, point) => torques.lever_m(joint, point),
+        Parameter::Harmonic(joint, wave) => joints_rad.get(joint).map_or(0.0, |&q| wave.at(q)),
+        _ => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::chain::Joint;
+
+    /// Step of the central differences, mm or mrad; their error is its square times the third derivative (below 1e-3 mm).
+    const STEP: f64 = 1e-2;
+    const TOLERANCE_MM: f64 = 1e-6;
+
+    fn robots() -> Vec<Robot> {
+        let mut bent = Robot::paper();
+        for (i, joint) in bent.joints.iter_mut().enumerate() {
+            joint.alpha_rad += 0.01 * i as f64;
+            joint.beta_rad = 0.02 - 0.01 * i as f64;
+            joint.a_mm += 3.0;
+        }
+        bent.tool_mm = Vector3::new(11.0, -7.0, 40.0);
+        let mut seven = bent.clone();
+        let limits_rad = None;
+        seven.joints.push(Joint { alpha_rad: 1.5, a_mm: 10.0, beta_rad: 0.0, theta_rad: 0.3, d_mm: 20.0, limits_rad });
+        let mut two = bent.clone();
+        two.joints.truncate(2);
+        vec![bent, seven, two]
+    }
+
+    #[test]
+    fn points_agree_with_the_chain() {
+        for robot in robots() {
+            let q: Vec<f64> = (0..robot.joints.len()).map(|i| 0.4 * i as f64 - 1.0).collect();
+            assert!((Screws::new(&robot, &q).target_mm - robot.target_mm(&q)).norm() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn columns_agree_with_central_differences() {
+        for robot in robots() {
+            let mut parameters = robot.mdh_parameters();
+            parameters.extend((1..robot.joints.len()).map(Parameter::Beta));
+            parameters.extend(robot.harmonic_parameters(2));
+            let q: Vec<f64> = (0..robot.joints.len()).map(|i| 0.7 * i as f64 - 1.1).collect();
+            let screws = Screws::new(&robot, &q);
+            let torques = Torques::new(&robot, &q);
+            for parameter in parameters {
+                let at = |delta: f64| robot.shifted(&[parameter], &[delta]);
+                let (plus, minus) = (at(STEP), at(-STEP));
+                let difference = (plus.target_mm(&q) - minus.target_mm(&q)) / (2.0 * STEP);
+                let feature = feature(parameter, &torques, &q);
+                let column = screws.point_column(parameter, feature);
+                assert!((column - difference).norm() < TOLERANCE_MM, "{}: {column} {difference}", parameter.name());
+                let turn = plus.base_from_flange(&q).rotation * minus.base_from_flange(&q).rotation.inverse();
+                let turn = turn.scaled_axis() / (2.0 * STEP);
+                assert!(
+                    (screws.rotation_column(parameter, feature) - turn).norm() < TOLERANCE_MM,
+                    "{}",
+                    parameter.name()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn sag_turns_its_joint_by_its_lever() {
+        let robot = &robots()[0];
+        let q = [0.3, -0.4, 0.5, 0.6, -0.7, 0.8];
+        let (screws, torques) = (Screws::new(robot, &q), Torques::new(robot, &q));
+        for parameter in robot.gravity_parameters(true) {
+            let at = |delta: f64| robot.shifted(&[parameter], &[delta]).target_mm(&q);
+            let difference = (at(STEP) - at(-STEP)) / (2.0 * STEP);
+            let column = screws.point_column(parameter, feature(parameter, &torques, &q));
+            assert!((column - difference).norm() < TOLERANCE_MM, "{}", parameter.name());
+        }
+    }
+}

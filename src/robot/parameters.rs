@@ -1,0 +1,207 @@
+//! The robot as a vector of parameters, in mm and mrad (about equal effect at a robot's reach), and their names.
+
+use super::Robot;
+use super::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
+
+/// |sin alpha| below which two neighbouring axes count as parallel: 3 degrees, far above any tolerance of manufacture.
+const PARALLEL_SIN: f64 = 0.05;
+
+/// One number of the robot. Joints count from 0 here and as in the paper in [`Parameter::name`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Parameter {
+    /// Twist of the link before the joint.
+    Alpha(usize),
+    /// Length of the link before the joint.
+    A(usize),
+    /// Hayati's rotation about y before the joint.
+    Beta(usize),
+    /// Offset of the joint's angle.
+    Theta(usize),
+    /// Offset along the joint's axis.
+    D(usize),
+    /// The target point along x, y or z (0, 1, 2) of the last joint's frame.
+    V(usize),
+    /// Compliance of a joint under a weight.
+    Gravity(usize, LoadPoint),
+    /// Amplitude of a periodic error.
+    Harmonic(usize, Wave),
+}
+
+/// Unit of a parameter in vectors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// Lengths.
+    Mm,
+    /// Angles.
+    Mrad,
+}
+
+impl Unit {
+    /// As in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Unit::Mm => "mm",
+            Unit::Mrad => "mrad",
+        }
+    }
+}
+
+impl Parameter {
+    /// Its name: `alpha_0..`, `a_0..`, `beta_2..`, `theta_1..`, `d_1..`, `v_x`, `k_2_elbow`, `sin_1`, ...
+    pub fn name(self) -> String {
+        match self {
+            Parameter::Alpha(i) => format!("alpha_{i}"),
+            Parameter::A(i) => format!("a_{i}"),
+            Parameter::Beta(i) => format!("beta_{i}"),
+            Parameter::Theta(i) => format!("theta_{}", i + 1),
+            Parameter::D(i) => format!("d_{}", i + 1),
+            Parameter::V(0) => "v_x".to_owned(),
+            Parameter::V(1) => "v_y".to_owned(),
+            Parameter::V(_) => "v_z".to_owned(),
+            Parameter::Gravity(i, point) => format!("k_{}_{}", i + 1, point.name()),
+            Parameter::Harmonic(i, wave) => format!("{}_{}", wave.name(), i + 1),
+        }
+    }
+
+    /// mm for lengths, mrad for angles (compliances: mrad a metre of lever).
+    pub fn unit(self) -> Unit {
+        match self {
+            Parameter::A(_) | Parameter::D(_) | Parameter::V(_) => Unit::Mm,
+            _ => Unit::Mrad,
+        }
+    }
+}
+
+impl Robot {
+    /// The paper's parameters, 4 a joint and 3 of the target: alpha, a, theta, d joint by joint, then v.
+    pub fn mdh_parameters(&self) -> Vec<Parameter> {
+        let joint = |i| [Parameter::Alpha(i), Parameter::A(i), Parameter::Theta(i), Parameter::D(i)];
+        (0..self.joints.len()).flat_map(joint).chain((0..3).map(Parameter::V)).collect()
+    }
+
+    /// Hayati's rotation for every pair of neighbouring axes that are parallel (none before the first joint: the base is free).
+    pub fn beta_parameters(&self) -> Vec<Parameter> {
+        let parallel = |i: &usize| self.joints[*i].alpha_rad.sin().abs() < PARALLEL_SIN;
+        (1..self.joints.len()).filter(parallel).map(Parameter::Beta).collect()
+    }
+
+    /// Compliances that matter on an upright arm: of the shoulder and the elbow under the arm's own weight, then (`tool`)
+    /// of shoulder, elbow and the last but one joint under the load's. Terms whose joints the robot lacks are left out.
+    pub fn gravity_parameters(&self, tool: bool) -> Vec<Parameter> {
+        let count = self.joints.len();
+        let mut terms = Vec::new();
+        if count >= 4 {
+            terms.push(Parameter::Gravity(1, LoadPoint::Elbow));
+            terms.push(Parameter::Gravity(1, LoadPoint::Wrist));
+            terms.push(Parameter::Gravity(2, LoadPoint::Wrist));
+        }
+        if tool {
+            let joints = [1, 2, count.saturating_sub(2)];
+            terms.extend(
+                joints.iter().filter(|&&j| j >= 1 && j < count).map(|&j| Parameter::Gravity(j, LoadPoint::Tool)),
+            );
+        }
+        terms.dedup();
+        terms
+    }
+
+    /// Once-a-turn (`order` 1) or also twice-a-turn (`order` 2) errors of every joint.
+    pub fn harmonic_parameters(&self, order: usize) -> Vec<Parameter> {
+        let waves = &Wave::ALL[..(2 * order).min(4)];
+        (0..self.joints.len()).flat_map(|i| waves.iter().map(move |&w| Parameter::Harmonic(i, w))).collect()
+    }
+
+    /// The parameter's value, mm or mrad.
+    pub fn value(&self, parameter: Parameter) -> f64 {
+        let joint = |i: usize| self.joints.get(i);
+        match parameter {
+            Parameter::Alpha(i) => joint(i).map_or(0.0, |j| 1000.0 * j.alpha_rad),
+            Parameter::A(i) => joint(i).map_or(0.0, |j| j.a_mm),
+            Parameter::Beta(i) => joint(i).map_or(0.0, |j| 1000.0 * j.beta_rad),
+            Parameter::Theta(i) => joint(i).map_or(0.0, |j| 1000.0 * j.theta_rad),
+            Parameter::D(i) => joint(i).map_or(0.0, |j| j.d_mm),
+            Parameter::V(axis) => self.tool_mm[axis.min(2)],
+            Parameter::Gravity(joint, point) => {
+                let terms = self.corrections.gravity.iter();
+                1000.0 * terms.filter(|t| t.joint == joint && t.point == point).map(|t| t.k_rad_per_m).sum::<f64>()
+            }
+            Parameter::Harmonic(joint, wave) => {
+                let terms = self.corrections.harmonics.iter();
+                1000.0 * terms.filter(|t| t.joint == joint && t.wave == wave).map(|t| t.amplitude_rad).sum::<f64>()
+            }
+        }
+    }
+
+    /// Adds to a parameter, mm or mrad. A joint that the robot lacks is left alone.
+    pub fn add(&mut self, parameter: Parameter, delta: f64) {
+        let angle = delta / 1000.0;
+        match parameter {
+            Parameter::V(axis) => self.tool_mm[axis.min(2)] += delta,
+            Parameter::Gravity(joint, point) => {
+                let terms = &mut self.corrections.gravity;
+                match terms.iter_mut().find(|t| t.joint == joint && t.point == point) {
+                    Some(term) => term.k_rad_per_m += angle,
+                    None => terms.push(GravityTerm { joint, point, k_rad_per_m: angle }),
+                }
+            }
+            Parameter::Harmonic(joint, wave) => {
+                let terms = &mut self.corrections.harmonics;
+                match terms.iter_mut().find(|t| t.joint == joint && t.wave == wave) {
+                    Some(term) => term.amplitude_rad += angle,
+                    None => terms.push(HarmonicTerm { joint, wave, amplitude_rad: angle }),
+                }
+            }
+            Parameter::Alpha(i) | Parameter::A(i) | Parameter::Beta(i) | Parameter::Theta(i) | Parameter::D(i) => {
+                let Some(joint) = self.joints.get_mut(i) else { return };
+                match parameter {
+                    Parameter::Alpha(_) => joint.alpha_rad += angle,
+                    Parameter::A(_) => joint.a_mm += delta,
+                    Parameter::Beta(_) => joint.beta_rad += angle,
+                    Parameter::Theta(_) => joint.theta_rad += angle,
+                    _ => joint.d_mm += delta,
+                }
+            }
+        }
+    }
+
+    /// The robot with `delta` (mm, mrad) added to `parameters`.
+    pub fn shifted(&self, parameters: &[Parameter], delta: &[f64]) -> Robot {
+        let mut robot = self.clone();
+        for (&parameter, &delta) in parameters.iter().zip(delta) {
+            if delta != 0.0 {
+                robot.add(parameter, delta);
+            }
+        }
+        robot
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_robot_has_27_parameters_and_two_parallel_pairs() {
+        let robot = Robot::paper();
+        let names: Vec<String> = robot.mdh_parameters().into_iter().map(Parameter::name).collect();
+        assert_eq!(names.len(), 27);
+        assert_eq!(names[..5], ["alpha_0", "a_0", "theta_1", "d_1", "alpha_1"]);
+        assert_eq!(names[24..], ["v_x", "v_y", "v_z"]);
+        assert_eq!(robot.beta_parameters(), [Parameter::Beta(2), Parameter::Beta(3)]);
+    }
+
+    #[test]
+    fn what_is_added_is_there() {
+        let robot = Robot::paper();
+        let mut parameters = robot.mdh_parameters();
+        parameters.extend(robot.beta_parameters());
+        parameters.extend(robot.gravity_parameters(true));
+        parameters.extend(robot.harmonic_parameters(2));
+        let delta: Vec<f64> = (0..parameters.len()).map(|i| 0.1 + i as f64).collect();
+        let shifted = robot.shifted(&parameters, &delta);
+        for (&p, d) in parameters.iter().zip(&delta) {
+            // Angles near 1571 mrad carry rounding of 1e-13.
+            assert!((shifted.value(p) - robot.value(p) - d).abs() < 1e-10, "{}", p.name());
+        }
+    }
+}
