@@ -1,0 +1,88 @@
+//! What must not be in the source: each rule keeps a promise that the documentation makes.
+
+use std::path::{Path, PathBuf};
+
+fn source_files() -> Vec<PathBuf> {
+    fn walk(folder: &Path, into: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                walk(&path, into);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                into.push(path);
+            }
+        }
+    }
+    let mut files = Vec::new();
+    walk(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    files.sort();
+    assert!(files.len() > 10, "the source was not found");
+    files
+}
+
+/// The part of a file before its tests, line by line, without comments.
+fn code(path: &Path) -> Vec<(usize, String)> {
+    let text = std::fs::read_to_string(path).unwrap();
+    text.lines()
+        .enumerate()
+        .take_while(|(_, line)| line.trim() != "#[cfg(test)]")
+        .map(|(i, line)| (i + 1, line.split("//").next().unwrap_or_default().to_owned()))
+        .collect()
+}
+
+fn offenders(pattern: &str, allowed: &[&str]) -> Vec<String> {
+    let mut found = Vec::new();
+    for path in source_files() {
+        if allowed.iter().any(|a| path.ends_with(a)) {
+            continue;
+        }
+        for (number, line) in code(&path) {
+            if line.contains(pattern) {
+                found.push(format!("{}:{number}: {}", path.display(), line.trim()));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn one_file_names_opencv() {
+    // `crate::opencv` is that file; the bindings themselves start with a bare `opencv::`.
+    let found: Vec<String> =
+        offenders("opencv::", &["src/opencv.rs"]).into_iter().filter(|l| !l.contains("crate::opencv::")).collect();
+    assert!(found.is_empty(), "{found:#?}");
+}
+
+#[test]
+fn results_never_come_from_a_hash_map() {
+    // Its order changes from run to run, and the same input must give the same bytes.
+    for name in ["HashMap", "HashSet"] {
+        let found = offenders(name, &[]);
+        assert!(found.is_empty(), "{found:#?}");
+    }
+}
+
+#[test]
+fn stdout_belongs_to_main() {
+    for name in ["println!(", "print!(", "stdout()"] {
+        let found: Vec<String> =
+            offenders(name, &["src/main.rs"]).into_iter().filter(|l| !l.contains("eprint")).collect();
+        assert!(found.is_empty(), "{found:#?}");
+    }
+}
+
+#[test]
+fn every_random_draw_comes_from_the_seed() {
+    for name in ["thread_rng", "rand::rng()", "from_os_rng", "SystemTime", "Instant::now"] {
+        let found = offenders(name, &[]);
+        assert!(found.is_empty(), "{found:#?}");
+    }
+}
+
+#[test]
+fn nothing_panics_on_purpose() {
+    for name in [".unwrap()", ".expect(", "panic!(", "unreachable!("] {
+        let found = offenders(name, &[]);
+        assert!(found.is_empty(), "{found:#?}");
+    }
+}

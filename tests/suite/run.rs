@@ -1,0 +1,28 @@
+//! How the tests run the program, and where they find pictures and measurements that are not in the repository.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// A folder of the test's own, removed at its end.
+pub fn workplace() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+/// Runs the program in `folder` and returns what it said and how it ended.
+pub fn stereocal(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_stereocal"))
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .expect("the program starts")
+}
+
+/// What the program wrote to stderr.
+pub fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// What the program wrote to stdout.
+pub fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
