@@ -3,6 +3,7 @@
 pub mod chain;
 pub mod corrections;
 pub mod file;
+pub mod inverse;
 pub mod jacobian;
 pub mod parameters;
 

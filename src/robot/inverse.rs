@@ -1,0 +1,166 @@
+//! Inverse kinematics of any serial robot: joint angles that bring the flange to a pose.
+//!
+//! In: a robot, the pose wanted in the base frame, angles to start from. Out: angles within the joints' limits.
+//! Method: damped least squares (Levenberg-Marquardt) on the pose's six residuals; angles stay inside the limits by clamping each
+//! step. It finds the solution near its start, so callers pass several. What goes wrong: out of reach, a
+//! singular wrist, or a start on the wrong side of a limit all end in `None`.
+
+use nalgebra::{DMatrix, DVector, Vector6};
+
+use super::Robot;
+use crate::geometry::{Transform, rotation_vector};
+
+/// Length by which angles are weighed against mm: a robot's wrist at about arm's length.
+const ARM_MM: f64 = 200.0;
+
+/// The pose is reached when the target is missed by less than this, mm (angles times the arm).
+const REACHED_MM: f64 = 1e-7;
+
+/// Steps from one start.
+const MAX_STEPS: usize = 100;
+
+/// Difference between the flange's pose at `joints_rad` and the wanted one, base frame: translation (mm), then rotation times [`ARM_MM`].
+fn miss(robot: &Robot, wanted: &Transform, joints_rad: &[f64]) -> Vector6<f64> {
+    let reached = robot.base_from_flange(joints_rad);
+    let t = reached.translation.vector - wanted.translation.vector;
+    let r = rotation_vector(&(reached * wanted.inverse())) * ARM_MM;
+    Vector6::new(t.x, t.y, t.z, r.x, r.y, r.z)
+}
+
+/// Change of the flange's pose with each joint, in the units of [`miss`]: columns `z_j x (p - o_j)` and `z_j`.
+fn jacobian(robot: &Robot, joints_rad: &[f64]) -> DMatrix<f64> {
+    let flange = robot.base_from_flange(joints_rad).translation.vector;
+    let mut base_from_joint = Transform::identity();
+    let mut columns = DMatrix::zeros(6, robot.joints.len());
+    for (k, (joint, &q)) in robot.joints.iter().zip(joints_rad).enumerate() {
+        base_from_joint *= joint.previous_from_this(q);
+        let axis = base_from_joint.rotation * nalgebra::Vector3::z();
+        let lever = flange - base_from_joint.translation.vector;
+        columns.fixed_view_mut::<3, 1>(0, k).copy_from(&axis.cross(&lever));
+        columns.fixed_view_mut::<3, 1>(3, k).copy_from(&(axis * ARM_MM));
+    }
+    columns
+}
+
+fn clamp_to_limits(robot: &Robot, joints_rad: &mut [f64]) {
+    for (joint, q) in robot.joints.iter().zip(joints_rad) {
+        if let Some((low, high)) = joint.limits_rad {
+            *q = q.clamp(low, high);
+        }
+    }
+}
+
+/// Angles (rad) that bring the flange to `base_from_flange`, searched from `start_rad`. `None` when the search does not arrive.
+pub fn from_start(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]) -> Option<Vec<f64>> {
+    if start_rad.len() != robot.joints.len() {
+        return None;
+    }
+    let mut q = start_rad.to_vec();
+    clamp_to_limits(robot, &mut q);
+    let mut residual = miss(robot, base_from_flange, &q);
+    let mut damping = 1e-2;
+    for _ in 0..MAX_STEPS {
+        if residual.norm() < REACHED_MM {
+            return Some(q);
+        }
+        let j = jacobian(robot, &q);
+        let normal = j.tr_mul(&j);
+        let gradient = j.tr_mul(&DVector::from_column_slice(residual.as_slice()));
+        let mut damped = normal.clone();
+        for k in 0..damped.nrows() {
+            damped[(k, k)] += damping * (ARM_MM * ARM_MM);
+        }
+        let step = damped.cholesky()?.solve(&gradient);
+        let mut next: Vec<f64> = q.iter().zip(step.iter()).map(|(q, s)| q - s).collect();
+        clamp_to_limits(robot, &mut next);
+        let next_residual = miss(robot, base_from_flange, &next);
+        if next_residual.norm() < residual.norm() {
+            (q, residual) = (next, next_residual);
+            damping = (damping * 0.1).max(1e-14);
+        } else {
+            damping *= 10.0;
+            if damping > 1e6 {
+                return None;
+            }
+        }
+    }
+    (residual.norm() < REACHED_MM).then_some(q)
+}
+
+/// The first solution found from any of the starts, in their order.
+pub fn from_starts(robot: &Robot, base_from_flange: &Transform, starts_rad: &[Vec<f64>]) -> Option<Vec<f64>> {
+    starts_rad.iter().find_map(|start| from_start(robot, base_from_flange, start))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::Joint;
+
+    fn with_limits(mut robot: Robot) -> Robot {
+        robot.joints.iter_mut().for_each(|j: &mut Joint| j.limits_rad = Some((-2.8, 2.8)));
+        robot
+    }
+
+    #[test]
+    fn forward_of_inverse_is_the_pose() {
+        let robot = with_limits(Robot::paper());
+        let there = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
+        let wanted = robot.base_from_flange(&there);
+        let start: Vec<f64> = there.iter().map(|q| q + 0.3).collect();
+        let q = from_start(&robot, &wanted, &start).unwrap();
+        assert!(miss(&robot, &wanted, &q).norm() < REACHED_MM);
+        for (a, b) in q.iter().zip(&there) {
+            assert!((a - b).abs() < 1e-6, "the nearby solution is the one we came from");
+        }
+    }
+
+    #[test]
+    fn out_of_reach_is_none() {
+        let robot = Robot::paper();
+        let wanted = crate::geometry::transform(nalgebra::Vector3::zeros(), nalgebra::Vector3::new(2000.0, 0.0, 0.0));
+        assert_eq!(from_start(&robot, &wanted, &[0.1; 6]), None);
+    }
+
+    #[test]
+    fn limits_are_kept() {
+        let mut robot = Robot::paper();
+        let there = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
+        let wanted = robot.base_from_flange(&there);
+        robot.joints[0].limits_rad = Some((-0.3, 0.3));
+        if let Some(q) = from_start(&robot, &wanted, &there) {
+            assert!(q[0].abs() <= 0.3);
+        }
+    }
+
+    #[test]
+    fn any_number_of_joints() {
+        let mut robot = Robot::paper();
+        let extra = robot.joints[4];
+        robot.joints.push(extra);
+        let there = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7, 0.2];
+        let wanted = robot.base_from_flange(&there);
+        let q = from_start(&robot, &wanted, &[0.3; 7]).unwrap();
+        assert!(miss(&robot, &wanted, &q).norm() < REACHED_MM);
+    }
+
+    #[test]
+    fn the_jacobian_agrees_with_differences() {
+        let robot = Robot::paper();
+        let q = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
+        let wanted = robot.base_from_flange(&q);
+        let j = jacobian(&robot, &q);
+        let h = 1e-6;
+        for k in 0..6 {
+            let shifted = |by: f64| {
+                let mut q = q;
+                q[k] += by;
+                miss(&robot, &wanted, &q)
+            };
+            let difference = (shifted(h) - shifted(-h)) / (2.0 * h);
+            for i in 0..6 {
+                assert!((difference[i] - j[(i, k)]).abs() < 1e-4, "row {i}, joint {k}");
+            }
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! One picture to be taken: a camera, a board, what stands behind it, the light and the sensor.
+
+use nalgebra::{Point2, Point3};
+
+use super::outline::{self, Outline};
+use super::physical_board::PhysicalBoard;
+use super::psf::Optics;
+use super::sensor::{Lighting, Sensor};
+use crate::geometry::Transform;
+use crate::stereo::Camera;
+
+/// Brightness of a surface: at its first corner and how it changes per mm along its x and y. 1 is the board's white.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tone {
+    /// Reflectance.
+    pub value: f64,
+    /// Change along the patch's x over its whole picture, as a share.
+    pub slope: (f64, f64),
+}
+
+impl Tone {
+    /// The same everywhere.
+    pub fn flat(value: f64) -> Tone {
+        Tone { value, slope: (0.0, 0.0) }
+    }
+}
+
+/// A flat shape somewhere in space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Patch {
+    /// Its plane (z = 0) in the frame of what it belongs to.
+    pub parent_from_patch: Transform,
+    /// Its corners in that plane, mm.
+    pub corners_mm: Vec<Point2<f64>>,
+    /// Its brightness.
+    pub tone: Tone,
+}
+
+/// Reflectances of a printed board.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Print {
+    /// White squares and margin.
+    pub white: f64,
+    /// Black squares.
+    pub black: f64,
+    /// The plate's bevelled rim.
+    pub rim: f64,
+    /// Width of the rim, mm.
+    pub rim_mm: f64,
+}
+
+/// Everything that makes one picture.
+#[derive(Debug, Clone)]
+pub struct Scene<'a> {
+    /// The camera that takes it.
+    pub camera: Camera,
+    /// The lens's spread.
+    pub optics: Optics,
+    /// The board.
+    pub board: &'a PhysicalBoard,
+    /// Where it is.
+    pub camera_from_board: Transform,
+    /// Its print.
+    pub print: Print,
+    /// What carries the board, in the board's frame, from behind to before.
+    pub holder: &'a [Patch],
+    /// What stands behind, in the left camera's frame, from far to near.
+    pub clutter: &'a [Patch],
+    /// Where the camera stands in the rig.
+    pub camera_from_left: Transform,
+    /// The light.
+    pub lighting: Lighting,
+    /// The sensor.
+    pub sensor: Sensor,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Number of the picture, so that each has noise of its own.
+    pub picture: u64,
+}
+
+/// Shapes of one brightness, to be painted together.
+#[derive(Debug, Clone)]
+pub struct Layer {
+    /// Their outlines; they may touch but not overlap, but for those of sign -1.
+    pub outlines: Vec<Outline>,
+    /// Brightness at picture point (0, 0) and its change per px along x and y.
+    pub tone: (f64, f64, f64),
+}
+
+impl Scene<'_> {
+    /// All layers, from behind to before, as this camera sees them.
+    pub fn layers(&self) -> Vec<Layer> {
+        let mut layers = Vec::new();
+        for patch in self.clutter {
+            layers.extend(self.patch_layer(&self.camera_from_left, patch));
+        }
+        for patch in self.holder {
+            layers.extend(self.patch_layer(&self.camera_from_board, patch));
+        }
+        let (w, h) = self.board.plate_half_mm();
+        layers.extend(self.plate_layer(w + self.print.rim_mm, h + self.print.rim_mm, self.print.rim));
+        layers.extend(self.plate_layer(w, h, self.print.white));
+        layers.push(self.black_layer());
+        layers
+    }
+
+    fn board_outline(&self, corners: &[Point2<f64>]) -> Option<Outline> {
+        let lift = |p: Point2<f64>| self.camera_from_board * self.board.on_surface(p.x, p.y);
+        outline::project(&self.camera, corners, &lift)
+    }
+
+    fn plate_layer(&self, w: f64, h: f64, value: f64) -> Option<Layer> {
+        let corners = [(-w, -h), (w, -h), (w, h), (-w, h)].map(|(x, y)| Point2::new(x, y));
+        Some(Layer { outlines: vec![self.board_outline(&corners)?], tone: (value, 0.0, 0.0) })
+    }
+
+    fn black_layer(&self) -> Layer {
+        let squares = self.board.drawing.squares;
+        let mut outlines = Vec::new();
+        for j in 0..squares.rows {
+            for i in 0..squares.columns {
+                if PhysicalBoard::is_black(i, j) {
+                    outlines.extend(self.board_outline(&self.board.square_mm(i, j)));
+                }
+            }
+        }
+        if self.board.workmanship.ink_spread_um > 0.0 {
+            for j in 1..squares.rows {
+                for i in 1..squares.columns {
+                    let overlap = self.board_outline(&self.board.overlap_mm(i, j));
+                    outlines.extend(overlap.map(|o| Outline { sign: -1.0, ..o }));
+                }
+            }
+        }
+        Layer { outlines, tone: (self.print.black, 0.0, 0.0) }
+    }
+
+    fn patch_layer(&self, camera_from_parent: &Transform, patch: &Patch) -> Option<Layer> {
+        let camera_from_patch = camera_from_parent * patch.parent_from_patch;
+        let lift = |p: Point2<f64>| camera_from_patch * Point3::new(p.x, p.y, 0.0);
+        let outline = outline::project(&self.camera, &patch.corners_mm, &lift)?;
+        let size = (outline.high - outline.low).map(|v| v.max(1.0));
+        let slope = (
+            patch.tone.value * patch.tone.slope.0 / size.x,
+            patch.tone.value * patch.tone.slope.1 / size.y,
+        );
+        let middle = nalgebra::center(&outline.low, &outline.high);
+        let at_zero = patch.tone.value - slope.0 * middle.x - slope.1 * middle.y;
+        Some(Layer { outlines: vec![outline], tone: (at_zero, slope.0, slope.1) })
+    }
+
+    /// True places of all inner corners in the raw picture, row by row, px.
+    pub fn corners_px(&self) -> Vec<Point2<f64>> {
+        let drawing = self.board.drawing;
+        (0..drawing.rows())
+            .flat_map(|row| (0..drawing.columns()).map(move |col| (col, row)))
+            .map(|(col, row)| self.camera.project(&(self.camera_from_board * self.board.corner_mm(col, row))))
+            .collect()
+    }
+}

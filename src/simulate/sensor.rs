@@ -1,0 +1,86 @@
+//! From light to numbers: uneven light, vignetting, photon and read noise, quantisation.
+
+use nalgebra::Point2;
+
+use super::draws::{Draws, NormalTable, Purpose};
+
+/// How the light falls. Everything here is smooth over the whole picture and applied after the lens's spread.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lighting {
+    /// Change of the light from the middle to the right and to the lower edge, as a share.
+    pub gradient: (f64, f64),
+    /// Loss at the picture's corners, as a share (grows with the square of the distance from the middle).
+    pub vignetting: f64,
+    /// The board's white in the middle of the picture, as a share of the sensor's range.
+    pub exposure: f64,
+}
+
+impl Lighting {
+    /// Light at a picture point, as a share of the sensor's range for reflectance 1.
+    pub fn at(&self, px: &Point2<f64>, width: u32, height: u32) -> f64 {
+        let (half_w, half_h) = (f64::from(width) / 2.0, f64::from(height) / 2.0);
+        let (u, v) = ((px.x + 0.5) / half_w - 1.0, (px.y + 0.5) / half_h - 1.0);
+        let falloff = 1.0 - self.vignetting * 0.5 * (u * u + v * v);
+        self.exposure * falloff * (1.0 + self.gradient.0 * u + self.gradient.1 * v)
+    }
+}
+
+/// A sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensor {
+    /// Bits a pixel: 8, or 9 to 16 (then stored in 16 bits, the high ones).
+    pub bits: u8,
+    /// Electrons at the end of its range. Not finite: no photon noise.
+    pub full_well_e: f64,
+    /// Read noise, electrons.
+    pub read_noise_e: f64,
+    /// Dark level, as a share of the range.
+    pub dark: f64,
+}
+
+impl Sensor {
+    /// The largest number it gives.
+    pub fn top(&self) -> f64 {
+        f64::from((1u32 << self.bits) - 1)
+    }
+
+    /// Factor from its numbers to those in a file: 1 for 8 bits, else the high bits of 16.
+    pub fn file_scale(&self) -> u16 {
+        if self.bits <= 8 { 1 } else { 1 << (16 - self.bits) }
+    }
+}
+
+/// Turns light into numbers, with noise from streams of its own for each picture and tile.
+#[derive(Debug)]
+pub struct Exposer<'a> {
+    sensor: Sensor,
+    normals: &'a NormalTable,
+    seed: u64,
+    picture: u64,
+}
+
+impl<'a> Exposer<'a> {
+    /// For one picture of a seed.
+    pub fn new(sensor: Sensor, normals: &'a NormalTable, seed: u64, picture: u64) -> Exposer<'a> {
+        Exposer { sensor, normals, seed, picture }
+    }
+
+    /// The sensor's numbers for light given as shares of its range, in the order given; `tile` names the stream.
+    pub fn expose(&self, light: &[f32], tile: u64, numbers: &mut [u16]) {
+        let top = self.sensor.top() as f32;
+        let per_e = if self.sensor.full_well_e.is_finite() { 1.0 / self.sensor.full_well_e } else { 0.0 } as f32;
+        let read = (self.sensor.read_noise_e * f64::from(per_e)) as f32;
+        let read_variance = read * read;
+        let dark = self.sensor.dark as f32;
+        let scale = self.sensor.file_scale();
+        let mut draws = Draws::new(self.seed, Purpose::Pixels, self.picture << 32 | tile);
+        let mut bits = 0u64;
+        for (k, (value, number)) in light.iter().zip(numbers).enumerate() {
+            // One draw of 64 bits serves four pixels.
+            bits = if k % 4 == 0 { draws.bits() } else { bits >> 16 };
+            let sigma = (value.max(0.0) * per_e + read_variance).sqrt();
+            let noisy = value + dark + sigma * self.normals.deviate(bits);
+            *number = (noisy * top + 0.5).clamp(0.0, top) as u16 * scale;
+        }
+    }
+}
