@@ -1,9 +1,10 @@
 //! The command line as typed. What it means is decided in [`crate::commands`].
 
 use camino::Utf8PathBuf;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::imaging::board::Squares;
+use crate::simulate::settings::Orientation;
 
 /// Robot calibration with two cameras and a checkerboard.
 #[derive(Debug, Parser)]
@@ -103,10 +104,31 @@ pub struct Identify {
 /// `stereocal simulate`
 #[derive(Debug, Args)]
 pub struct Simulate {
+    /// The world to start from
+    #[arg(long, value_enum, default_value = "small")]
+    pub preset: Preset,
+    /// Width and height of the pictures, px [default: the preset's]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(320..=16384))]
+    pub size: Option<u32>,
     /// Seed of every random draw
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// How the flange is turned along a group's poses [default: the preset's]
+    #[arg(long, value_enum)]
+    pub orientation: Option<Orientation>,
+    /// No pictures: measurements.csv with noise
+    #[arg(long)]
+    pub points_only: bool,
     /// Folder for the simulated world [default: out]
     #[arg(long, value_name = "DIR")]
     pub out: Option<Utf8PathBuf>,
+}
+
+/// The worlds that come with the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Preset {
+    /// The paper's: 5120x5120, 30 check pairs, 262 poses, 50 to verify
+    Paper,
+    /// The same shape at 1280x1280 with fewer poses
+    Small,
 }

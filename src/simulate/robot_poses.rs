@@ -1,0 +1,211 @@
+//! Where the cameras stand, and where the robot is sent: poses on spheres that it reaches and both cameras see.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::Error;
+use super::check_poses::seen_by_both;
+use super::draws::{Draws, Purpose};
+use super::physical_board::PhysicalBoard;
+use super::rig::left_from_field;
+use super::settings::{Orientation, Settings, Sphere};
+use crate::geometry::{Transform, transform};
+use crate::measurements::{Role, RobotPose};
+use crate::robot::{Robot, inverse};
+use crate::stereo::Rig;
+
+/// Largest tilt of the flange out of its group's orientation, and largest turn about its axis, deg.
+const VARIED_DEG: f64 = 25.0;
+
+/// How far the cameras miss the place that was meant for them: rad and mm.
+const PLACEMENT_RAD: f64 = 0.03;
+const PLACEMENT_MM: f64 = 5.0;
+
+/// How far the target is mounted off its drawing, rad.
+const MOUNTING_RAD: f64 = 0.005;
+
+/// Commanded angles are given to the controller with this many digits after the point, deg.
+const COMMAND_STEP_DEG: f64 = 1e-4;
+
+/// Draws a pose before it is given up.
+const ATTEMPTS: usize = 4000;
+
+/// ISO 9283: RP is the mean distance from the barycentre plus three standard deviations. For three equal
+/// normal coordinates of standard deviation s that is (1.596 + 3 * 0.673) s.
+const RP_OVER_SIGMA: f64 = 3.616;
+
+/// A pose of the robot and what is true there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TruePose {
+    /// What the controller was told.
+    pub commanded: RobotPose,
+    /// Index of its group.
+    pub group: usize,
+    /// Where the target really was in the left camera's frame.
+    pub left_from_target: Transform,
+}
+
+/// The robot, nominal and true, and the target on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arm {
+    /// As its maker says.
+    pub nominal: Robot,
+    /// As it is.
+    pub truth: Robot,
+}
+
+/// The target's printed side faces along the flange's z-axis: its own z-axis points back into the flange.
+fn flange_from_target(robot: &Robot, mounting_rad: Vector3<f64>) -> Transform {
+    let facing = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
+    let turned = UnitQuaternion::from_scaled_axis(mounting_rad) * facing;
+    transform(turned.scaled_axis(), robot.tool_mm)
+}
+
+/// A rotation whose z-axis points along `axis` and whose x-axis lies as level as can be.
+fn facing(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let z = axis.normalize();
+    let level = Vector3::z().cross(&z);
+    let x = if level.norm() > 1e-6 { level.normalize() } else { Vector3::x() };
+    let rotation = nalgebra::Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[x, z.cross(&x), z]));
+    UnitQuaternion::from_rotation_matrix(&rotation)
+}
+
+struct Group<'a> {
+    settings: &'a Settings,
+    arm: &'a Arm,
+    rig: &'a Rig,
+    target: &'a PhysicalBoard,
+    sphere: &'a Sphere,
+    index: usize,
+    nominal_flange_from_target: Transform,
+    true_flange_from_target: Transform,
+    left_from_base: Transform,
+    draws: Draws,
+}
+
+/// All poses of all groups: each group its centre, then its samples, then those to verify.
+pub fn plan(settings: &Settings, arm: &Arm, rig: &Rig, target: &PhysicalBoard) -> Result<Vec<TruePose>, Error> {
+    let mut poses = Vec::new();
+    let groups = settings.spheres.len();
+    let share = |total: usize, index: usize| total / groups + usize::from(index < total % groups);
+    for index in 0..groups {
+        let mut group = Group::new(settings, arm, rig, target, index);
+        let (samples, verify) = (share(settings.samples, index), share(settings.verify, index));
+        let roles = std::iter::once(Role::Center)
+            .chain(std::iter::repeat_n(Role::Sample, samples))
+            .chain(std::iter::repeat_n(Role::Verify, verify));
+        let center = group.center_start()?;
+        for (number, role) in roles.enumerate() {
+            poses.push(group.pose(number, role, &center)?);
+        }
+    }
+    Ok(poses)
+}
+
+impl<'a> Group<'a> {
+    fn new(settings: &'a Settings, arm: &'a Arm, rig: &'a Rig, target: &'a PhysicalBoard, index: usize) -> Group<'a> {
+        let sphere = &settings.spheres[index];
+        let mut draws = Draws::new(settings.seed, Purpose::RobotPoses, index as u64);
+        // One target is mounted once: its stream does not depend on the group.
+        let mounting = Draws::new(settings.seed, Purpose::RobotPoses, u64::MAX).direction() * MOUNTING_RAD;
+        let placement = transform(draws.direction() * PLACEMENT_RAD, draws.direction() * PLACEMENT_MM);
+        let nominal_flange_from_target = flange_from_target(&arm.nominal, Vector3::zeros());
+        let base_from_flange = facing(&sphere.flange_axis);
+        let base_from_field = transform(
+            (base_from_flange * nominal_flange_from_target.rotation).scaled_axis(),
+            sphere.center_mm,
+        );
+        let left_from_base = left_from_field() * placement * base_from_field.inverse();
+        Group {
+            settings,
+            arm,
+            rig,
+            target,
+            sphere,
+            index,
+            nominal_flange_from_target,
+            true_flange_from_target: flange_from_target(&arm.truth, mounting),
+            left_from_base,
+            draws,
+        }
+    }
+
+    /// Joint angles of the group's centre, from starts spread over the joints' ranges.
+    fn center_start(&mut self) -> Result<Vec<f64>, Error> {
+        let wanted = self.base_from_flange(self.sphere.center_mm, UnitQuaternion::identity());
+        let mut starts = Draws::new(0, Purpose::RobotPoses, self.index as u64);
+        (0..ATTEMPTS)
+            .find_map(|_| {
+                let start: Vec<f64> = self
+                    .arm
+                    .nominal
+                    .joints
+                    .iter()
+                    .map(|joint| {
+                        let (low, high) = joint.limits_rad.unwrap_or((-std::f64::consts::PI, std::f64::consts::PI));
+                        starts.uniform(0.8 * low, 0.8 * high)
+                    })
+                    .collect();
+                inverse::from_start(&self.arm.nominal, &wanted, &start)
+            })
+            .ok_or(Error::OutOfReach { group: self.name(), point_mm: self.sphere.center_mm.into() })
+    }
+
+    fn name(&self) -> String {
+        format!("{}", self.index + 1)
+    }
+
+    /// The flange's pose that brings the mark point to `point_mm`, turned by `turn` from the group's orientation.
+    fn base_from_flange(&self, point_mm: Vector3<f64>, turn: UnitQuaternion<f64>) -> Transform {
+        let rotation = facing(&self.sphere.flange_axis) * turn * self.nominal_flange_from_target.rotation;
+        transform(rotation.scaled_axis(), point_mm) * self.nominal_flange_from_target.inverse()
+    }
+
+    fn turn(&mut self) -> UnitQuaternion<f64> {
+        match self.settings.orientation {
+            Orientation::Fixed => UnitQuaternion::identity(),
+            Orientation::Varied => {
+                let (sin, cos) = self.draws.uniform(0.0, std::f64::consts::TAU).sin_cos();
+                let tilt = VARIED_DEG.to_radians() * self.draws.unit().sqrt();
+                let spin = self.draws.uniform(-VARIED_DEG, VARIED_DEG).to_radians();
+                UnitQuaternion::from_scaled_axis(Vector3::new(cos, sin, 0.0) * tilt)
+                    * UnitQuaternion::from_scaled_axis(Vector3::z() * spin)
+            }
+        }
+    }
+
+    fn pose(&mut self, number: usize, role: Role, center_rad: &[f64]) -> Result<TruePose, Error> {
+        for _ in 0..ATTEMPTS {
+            let (point, turn) = if role == Role::Center {
+                (self.sphere.center_mm, UnitQuaternion::identity())
+            } else {
+                (self.sphere.center_mm + self.draws.direction() * self.settings.radius_mm, self.turn())
+            };
+            let wanted = self.base_from_flange(point, turn);
+            let Some(q) = inverse::from_start(&self.arm.nominal, &wanted, center_rad) else { continue };
+            let joints_deg = q.iter().map(|q| (q.to_degrees() / COMMAND_STEP_DEG).round() * COMMAND_STEP_DEG);
+            let commanded = RobotPose {
+                pose: format!("g{}_{number:03}", self.index + 1),
+                group: self.name(),
+                role,
+                // Rounded once more so that the file shows four digits, not the products of a binary fraction.
+                joints_deg: joints_deg.map(|deg| format!("{deg:.4}").parse().unwrap_or(deg)).collect(),
+            };
+            let left_from_target = self.true_pose(&commanded);
+            if seen_by_both(self.rig, self.target, &left_from_target) {
+                return Ok(TruePose { commanded, group: self.index, left_from_target });
+            }
+            if role == Role::Center {
+                break;
+            }
+        }
+        Err(Error::OutOfReach { group: self.name(), point_mm: self.sphere.center_mm.into() })
+    }
+
+    /// Where the true robot brings the target when told these angles, repeatability included.
+    fn true_pose(&mut self, commanded: &RobotPose) -> Transform {
+        let base_from_flange = self.arm.truth.base_from_flange(&commanded.joints_rad());
+        let sigma_mm = self.settings.robot.repeatability_mm / RP_OVER_SIGMA;
+        let shift = transform(Vector3::zeros(), self.draws.normal3() * sigma_mm);
+        self.left_from_base * shift * base_from_flange * self.true_flange_from_target
+    }
+}

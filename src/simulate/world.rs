@@ -1,0 +1,212 @@
+//! A whole simulated world: rig, boards, robot and poses, and the files that hold its pictures and its truth.
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use nalgebra::{Point2, Point3, Vector3};
+use rayon::prelude::*;
+
+use super::check_poses;
+use super::clutter;
+use super::draws::{Draws, NormalTable, Purpose};
+use super::physical_board::PhysicalBoard;
+use super::render::{Picture, Renderer};
+use super::rig::true_rig;
+use super::robot_poses::{self, Arm, TruePose};
+use super::scene::{Patch, Scene};
+use super::settings::Settings;
+use super::{Error, true_robot, truth_files};
+use crate::error::Result;
+use crate::files::OutDir;
+use crate::geometry::Transform;
+use crate::imaging::{Corner, Corners, PairCorners, corners::Side};
+use crate::progress;
+use crate::robot::Robot;
+use crate::stereo::Rig;
+
+/// A world whose every number is known.
+#[derive(Debug, Clone)]
+pub struct World {
+    /// What it was made from.
+    pub settings: Settings,
+    /// The true cameras.
+    pub rig: Rig,
+    /// The check board as made.
+    pub check_board: PhysicalBoard,
+    /// The target as made.
+    pub target: PhysicalBoard,
+    /// `left_from_board` of each check pair.
+    pub check_poses: Vec<Transform>,
+    /// The robot, nominal and true.
+    pub arm: Arm,
+    /// Its poses, in the order of the run.
+    pub poses: Vec<TruePose>,
+}
+
+/// A pair of pictures to be taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shot {
+    /// Folder and stem, as in `check/` and `01`.
+    pub folder: &'static str,
+    /// The stem of both files.
+    pub stem: String,
+    /// Whether the target is in it, or else the check board.
+    pub shows_target: bool,
+    /// Where the board is.
+    pub left_from_board: Transform,
+    /// Which placement of the cameras: what stands behind depends on it.
+    pub placement: u64,
+    /// Its number in the world.
+    pub number: u64,
+}
+
+impl World {
+    /// Draws a world. `true_robot` replaces the deviations drawn from the seed.
+    pub fn new(settings: Settings, true_robot: Option<Robot>) -> Result<World> {
+        let rig = true_rig(settings.size_px);
+        let check_board = PhysicalBoard::new(settings.check_board, settings.check_workmanship, settings.seed, 0);
+        let target = PhysicalBoard::new(settings.target_board, settings.target_workmanship, settings.seed, 1);
+        let nominal = true_robot::nominal();
+        let truth =
+            true_robot.unwrap_or_else(|| true_robot::deviated(&nominal, &settings.robot, settings.seed));
+        let arm = Arm { nominal, truth };
+        let check_poses = check_poses::poses(&rig, &check_board, settings.check_pairs, settings.seed)?;
+        let poses = robot_poses::plan(&settings, &arm, &rig, &target)?;
+        Ok(World { settings, rig, check_board, target, check_poses, arm, poses })
+    }
+
+    /// All pairs of pictures, check board first.
+    pub fn shots(&self) -> Vec<Shot> {
+        let check = self.check_poses.iter().enumerate().map(|(k, &left_from_board)| Shot {
+            folder: "check",
+            stem: format!("{:02}", k + 1),
+            shows_target: false,
+            left_from_board,
+            placement: 0,
+            number: k as u64,
+        });
+        let poses = self.poses.iter().enumerate().map(|(k, pose)| Shot {
+            folder: "poses",
+            stem: pose.commanded.pose.clone(),
+            shows_target: true,
+            left_from_board: pose.left_from_target,
+            placement: 1 + pose.group as u64,
+            number: (self.check_poses.len() + k) as u64,
+        });
+        check.chain(poses).collect()
+    }
+
+    /// The scene of one side of a pair. `clutter` is what stands behind at that placement ([`clutter::behind`]).
+    pub fn scene<'a>(&'a self, shot: &Shot, side: Side, clutter: &'a [Patch], holder: &'a [Patch]) -> Scene<'a> {
+        let camera_from_left = match side {
+            Side::Left => Transform::identity(),
+            Side::Right => self.rig.right_from_left,
+        };
+        let mut lighting = self.settings.lighting;
+        // The two cameras see the light from two sides, and each pair a little differently.
+        let mut draws = Draws::new(self.settings.seed, Purpose::Lighting, 2 * shot.number + u64::from(side == Side::Right));
+        lighting.gradient.0 += draws.uniform(-0.05, 0.05);
+        lighting.gradient.1 += draws.uniform(-0.05, 0.05);
+        lighting.exposure *= draws.uniform(0.93, 1.05);
+        Scene {
+            camera: match side {
+                Side::Left => self.rig.left,
+                Side::Right => self.rig.right,
+            },
+            optics: self.settings.optics,
+            board: if shot.shows_target { &self.target } else { &self.check_board },
+            camera_from_board: camera_from_left * shot.left_from_board,
+            print: self.settings.print,
+            holder,
+            clutter,
+            camera_from_left,
+            lighting,
+            sensor: self.settings.sensor,
+            seed: self.settings.seed,
+            picture: 2 * shot.number + u64::from(side == Side::Right),
+        }
+    }
+
+    /// True corners of all check pairs.
+    pub fn check_corners(&self) -> Corners {
+        self.corners(false)
+    }
+
+    /// True corners of the target in all poses.
+    pub fn pose_corners(&self) -> Corners {
+        self.corners(true)
+    }
+
+    fn corners(&self, of_target: bool) -> Corners {
+        let board = if of_target { self.target.drawing } else { self.check_board.drawing };
+        let list = |shot: &Shot, side: Side| -> Vec<Corner> {
+            let at = self.scene(shot, side, &[], &[]).corners_px();
+            let columns = board.columns();
+            let corner = |(k, px): (usize, Point2<f64>)| Corner {
+                col: k % columns,
+                row: k / columns,
+                px,
+                covariance_px2: None,
+                used: true,
+            };
+            at.into_iter().enumerate().map(corner).collect()
+        };
+        let shots = self.shots();
+        let pairs = shots.iter().filter(|shot| shot.shows_target == of_target).map(|shot| PairCorners {
+            pair: shot.stem.clone(),
+            left: list(shot, Side::Left),
+            right: list(shot, Side::Right),
+        });
+        let size = (self.settings.size_px, self.settings.size_px);
+        Corners { board, left_size: size, right_size: size, pairs: pairs.collect(), skipped: Vec::new(), notes: Vec::new() }
+    }
+
+    /// Writes everything but pictures.
+    pub fn write_truth(&self, out: &OutDir) -> Result<()> {
+        truth_files::write(self, out)
+    }
+
+    /// Renders and writes all pictures, several at a time; each is on disk before the next of its thread begins.
+    pub fn write_pictures(&self, out: &OutDir) -> Result<()> {
+        let shots = self.shots();
+        let normals = NormalTable::new();
+        let behind: Vec<Vec<Patch>> =
+            (0..=self.settings.spheres.len()).map(|k| clutter::behind(self.settings.seed, k as u64)).collect();
+        let holders = [clutter::stand(&self.check_board), clutter::arm(&self.target)];
+        let bar = progress::bar("rendering", 2 * shots.len() as u64);
+        let jobs: Vec<(&Shot, Side)> =
+            shots.iter().flat_map(|shot| [(shot, Side::Left), (shot, Side::Right)]).collect();
+        let done: Result<Vec<()>> = jobs
+            .par_iter()
+            .map(|&(shot, side)| {
+                let clutter = behind.get(shot.placement as usize).map_or(&[][..], Vec::as_slice);
+                let scene = self.scene(shot, side, clutter, &holders[usize::from(shot.shows_target)]);
+                let picture = Renderer::new(&scene).picture(&normals);
+                out.write(&format!("{}/{}/{}.png", shot.folder, side.name(), shot.stem), &png(&picture)?)?;
+                bar.inc(1);
+                Ok(())
+            })
+            .collect();
+        bar.finish_and_clear();
+        done.map(|_| ())
+    }
+
+    /// The target's true mark point at a pose, left camera's frame, mm, and its rotation vector.
+    pub fn mark_point(pose: &TruePose) -> (Point3<f64>, Vector3<f64>) {
+        (pose.left_from_target * Point3::origin(), pose.left_from_target.rotation.scaled_axis())
+    }
+}
+
+/// A picture as PNG. Noise does not compress: the fast way is as small as the slow one within a few percent.
+pub fn png(picture: &Picture) -> Result<Vec<u8>, Error> {
+    let mut bytes = Vec::new();
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Up);
+    let (width, height) = (picture.width as u32, picture.height as u32);
+    if picture.file_bits == 8 {
+        let samples: Vec<u8> = picture.samples.iter().map(|&v| v as u8).collect();
+        encoder.write_image(&samples, width, height, ExtendedColorType::L8)?;
+    } else {
+        let samples: Vec<u8> = picture.samples.iter().flat_map(|v| v.to_ne_bytes()).collect();
+        encoder.write_image(&samples, width, height, ExtendedColorType::L16)?;
+    }
+    Ok(bytes)
+}
