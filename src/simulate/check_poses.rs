@@ -63,7 +63,8 @@ fn pose(rig: &Rig, board: &PhysicalBoard, k: usize, seed: u64) -> Result<Transfo
             draws.uniform(DEPTH_MM.0, DEPTH_MM.1),
         );
         let tilted = UnitQuaternion::from_scaled_axis(Vector3::new(about.cos(), about.sin(), 0.0) * tilt);
-        let field_from_board = transform((tilted * UnitQuaternion::from_scaled_axis(Vector3::z() * turn)).scaled_axis(), place);
+        let field_from_board =
+            transform((tilted * UnitQuaternion::from_scaled_axis(Vector3::z() * turn)).scaled_axis(), place);
         let left_from_board = left_from_field() * field_from_board;
         if seen_by_both(rig, board, &left_from_board) {
             return Ok(left_from_board);

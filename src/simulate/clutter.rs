@@ -20,8 +20,11 @@ pub fn behind(seed: u64, placement: u64) -> Vec<Patch> {
     let wall = rectangle(1200.0, 1200.0);
     let tone = Tone { value: draws.uniform(0.25, 0.4), slope: (draws.uniform(-0.5, 0.5), draws.uniform(-0.5, 0.5)) };
     let field = left_from_field();
-    let mut patches =
-        vec![Patch { parent_from_patch: field * transform(Vector3::zeros(), Vector3::z() * 420.0), corners_mm: wall, tone }];
+    let mut patches = vec![Patch {
+        parent_from_patch: field * transform(Vector3::zeros(), Vector3::z() * 420.0),
+        corners_mm: wall,
+        tone,
+    }];
     for k in 0..SHAPES {
         let depth = 400.0 - 230.0 * k as f64 / SHAPES as f64;
         let place = Vector3::new(draws.uniform(-330.0, 330.0), draws.uniform(-330.0, 330.0), depth);
@@ -32,10 +35,8 @@ pub fn behind(seed: u64, placement: u64) -> Vec<Patch> {
             2 => irregular(&mut draws),
             _ => rectangle(draws.uniform(15.0, 110.0), draws.uniform(15.0, 110.0)),
         };
-        let tone = Tone {
-            value: draws.uniform(0.04, 0.75),
-            slope: (draws.uniform(-0.4, 0.4), draws.uniform(-0.4, 0.4)),
-        };
+        let tone =
+            Tone { value: draws.uniform(0.04, 0.75), slope: (draws.uniform(-0.4, 0.4), draws.uniform(-0.4, 0.4)) };
         patches.push(Patch { parent_from_patch: field * transform(lean, place), corners_mm, tone });
     }
     patches

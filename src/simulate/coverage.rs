@@ -145,10 +145,7 @@ mod tests {
     #[test]
     fn a_slanted_quadrilateral_keeps_its_area() {
         let quad = [(0.3, 0.7), (8.2, 1.9), (9.1, 8.8), (1.2, 6.4)];
-        let area: f64 = (0..4)
-            .map(|i| (quad[i], quad[(i + 1) % 4]))
-            .map(|(a, b)| 0.5 * (a.0 * b.1 - b.0 * a.1))
-            .sum();
+        let area: f64 = (0..4).map(|i| (quad[i], quad[(i + 1) % 4])).map(|(a, b)| 0.5 * (a.0 * b.1 - b.0 * a.1)).sum();
         let cells = areas(&quad, 10, 10);
         assert!((f64::from(cells.iter().sum::<f32>()) - area).abs() < 1e-5 * area);
         assert!(cells.iter().all(|&c| (-1e-6..=1.0 + 1e-6).contains(&c)));

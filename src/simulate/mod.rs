@@ -50,8 +50,12 @@ pub enum Error {
 impl Explain for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Error::BoardTooLarge { .. } => Some("the field is about 256 mm wide; take fewer or smaller squares".to_owned()),
-            Error::OutOfReach { .. } => Some("the spheres of the presets suit the robot of Table 1 of the paper".to_owned()),
+            Error::BoardTooLarge { .. } => {
+                Some("the field is about 256 mm wide; take fewer or smaller squares".to_owned())
+            }
+            Error::OutOfReach { .. } => {
+                Some("the spheres of the presets suit the robot of Table 1 of the paper".to_owned())
+            }
             Error::Encode(_) => None,
         }
     }

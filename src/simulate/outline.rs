@@ -50,11 +50,7 @@ pub fn project(
     if points.iter().any(|p| !(p.x.is_finite() && p.y.is_finite())) {
         return None;
     }
-    let doubled_area: f64 = points
-        .iter()
-        .zip(points.iter().cycle().skip(1))
-        .map(|(a, b)| a.x * b.y - b.x * a.y)
-        .sum();
+    let doubled_area: f64 = points.iter().zip(points.iter().cycle().skip(1)).map(|(a, b)| a.x * b.y - b.x * a.y).sum();
     if doubled_area < 0.0 {
         points.reverse();
     }
@@ -112,7 +108,8 @@ mod tests {
         let mut camera = Camera::pinhole(1280, 1280, 2500.0);
         camera.distortion[0] = -0.3;
         let lift = |p: Point2<f64>| Point3::new(p.x, p.y, 525.0);
-        let corners = [(-120.0, -120.0), (120.0, -120.0), (120.0, 120.0), (-120.0, 120.0)].map(|(x, y)| Point2::new(x, y));
+        let corners =
+            [(-120.0, -120.0), (120.0, -120.0), (120.0, 120.0), (-120.0, 120.0)].map(|(x, y)| Point2::new(x, y));
         let outline = project(&camera, &corners, &lift).unwrap();
         for (a, b) in outline.points.iter().zip(outline.points.iter().cycle().skip(1)) {
             let ray = camera.undistort(&nalgebra::center(a, b)).unwrap();

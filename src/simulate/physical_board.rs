@@ -77,8 +77,7 @@ impl PhysicalBoard {
 
     /// Half the plate's width and height, mm.
     pub fn plate_half_mm(&self) -> (f64, f64) {
-        let half =
-            |squares: usize| squares as f64 * self.drawing.square_mm / 2.0 + self.workmanship.margin_mm;
+        let half = |squares: usize| squares as f64 * self.drawing.square_mm / 2.0 + self.workmanship.margin_mm;
         (half(self.drawing.squares.columns), half(self.drawing.squares.rows))
     }
 

@@ -108,7 +108,10 @@ mod tests {
             let cell = 1.0 / FINE as f64;
             // Weights sampled at the cells' centres lack a cell's own variance once, and gave up two.
             let expected = sigma * sigma + 1.0 / 12.0 - cell * cell / 6.0;
-            assert!((variance - expected).abs() < 0.02 * expected + cell * cell / 12.0 + 1e-3, "{sigma}: {variance} {expected}");
+            assert!(
+                (variance - expected).abs() < 0.02 * expected + cell * cell / 12.0 + 1e-3,
+                "{sigma}: {variance} {expected}"
+            );
         }
     }
 

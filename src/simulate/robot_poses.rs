@@ -9,7 +9,7 @@ use super::physical_board::PhysicalBoard;
 use super::rig::left_from_field;
 use super::settings::{Orientation, Settings, Sphere};
 use crate::geometry::{Transform, transform};
-use crate::measurements::{Role, RobotPose};
+use crate::measurements::{RobotPose, Role};
 use crate::robot::{Robot, inverse};
 use crate::stereo::Rig;
 
@@ -110,10 +110,8 @@ impl<'a> Group<'a> {
         let placement = transform(draws.direction() * PLACEMENT_RAD, draws.direction() * PLACEMENT_MM);
         let nominal_flange_from_target = flange_from_target(&arm.nominal, Vector3::zeros());
         let base_from_flange = facing(&sphere.flange_axis);
-        let base_from_field = transform(
-            (base_from_flange * nominal_flange_from_target.rotation).scaled_axis(),
-            sphere.center_mm,
-        );
+        let base_from_field =
+            transform((base_from_flange * nominal_flange_from_target.rotation).scaled_axis(), sphere.center_mm);
         let left_from_base = left_from_field() * placement * base_from_field.inverse();
         Group {
             settings,

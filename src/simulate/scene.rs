@@ -140,10 +140,7 @@ impl Scene<'_> {
         let lift = |p: Point2<f64>| camera_from_patch * Point3::new(p.x, p.y, 0.0);
         let outline = outline::project(&self.camera, &patch.corners_mm, &lift)?;
         let size = (outline.high - outline.low).map(|v| v.max(1.0));
-        let slope = (
-            patch.tone.value * patch.tone.slope.0 / size.x,
-            patch.tone.value * patch.tone.slope.1 / size.y,
-        );
+        let slope = (patch.tone.value * patch.tone.slope.0 / size.x, patch.tone.value * patch.tone.slope.1 / size.y);
         let middle = nalgebra::center(&outline.low, &outline.high);
         let at_zero = patch.tone.value - slope.0 * middle.x - slope.1 * middle.y;
         Some(Layer { outlines: vec![outline], tone: (at_zero, slope.0, slope.1) })

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::draws::{Draws, Purpose};
 use super::settings::RobotDeviations;
-use crate::robot::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
 use crate::robot::Robot;
+use crate::robot::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
 
 /// Ranges of the joints, deg. The paper gives none; these are a common arm's.
 const LIMITS_DEG: [f64; 6] = [175.0, 130.0, 150.0, 175.0, 175.0, 175.0];
@@ -57,7 +57,11 @@ fn add_effects(robot: &mut Robot, nominal: &Robot, deviations: &RobotDeviations,
     if per_m > 0.0 {
         for (joint, point) in [(1, LoadPoint::Elbow), (1, LoadPoint::Wrist), (2, LoadPoint::Wrist)] {
             if joint < robot.joints.len() {
-                robot.corrections.gravity.push(GravityTerm { joint, point, k_rad_per_m: per_m * draws.uniform(0.5, 1.0) });
+                robot.corrections.gravity.push(GravityTerm {
+                    joint,
+                    point,
+                    k_rad_per_m: per_m * draws.uniform(0.5, 1.0),
+                });
             }
         }
     }

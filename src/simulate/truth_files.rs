@@ -12,7 +12,8 @@ use crate::robot::file::to_toml;
 use crate::stereo::calibration_file::CalibrationFile;
 
 /// The columns of `measurements.csv` behind the pose.
-const MEASURED: &str = "x_mm,y_mm,z_mm,sxx_mm2,sxy_mm2,sxz_mm2,syy_mm2,syz_mm2,szz_mm2,rx_rad,ry_rad,rz_rad,fit_rms_mm,corners,status";
+const MEASURED: &str =
+    "x_mm,y_mm,z_mm,sxx_mm2,sxy_mm2,sxz_mm2,syy_mm2,syz_mm2,szz_mm2,rx_rad,ry_rad,rz_rad,fit_rms_mm,corners,status";
 
 /// Writes `poses/poses.csv`, `robot.toml` and `truth/`.
 pub fn write(world: &World, out: &OutDir) -> Result<()> {

@@ -66,8 +66,7 @@ impl World {
         let check_board = PhysicalBoard::new(settings.check_board, settings.check_workmanship, settings.seed, 0);
         let target = PhysicalBoard::new(settings.target_board, settings.target_workmanship, settings.seed, 1);
         let nominal = true_robot::nominal();
-        let truth =
-            true_robot.unwrap_or_else(|| true_robot::deviated(&nominal, &settings.robot, settings.seed));
+        let truth = true_robot.unwrap_or_else(|| true_robot::deviated(&nominal, &settings.robot, settings.seed));
         let arm = Arm { nominal, truth };
         let check_poses = check_poses::poses(&rig, &check_board, settings.check_pairs, settings.seed)?;
         let poses = robot_poses::plan(&settings, &arm, &rig, &target)?;
@@ -103,7 +102,8 @@ impl World {
         };
         let mut lighting = self.settings.lighting;
         // The two cameras see the light from two sides, and each pair a little differently.
-        let mut draws = Draws::new(self.settings.seed, Purpose::Lighting, 2 * shot.number + u64::from(side == Side::Right));
+        let mut draws =
+            Draws::new(self.settings.seed, Purpose::Lighting, 2 * shot.number + u64::from(side == Side::Right));
         lighting.gradient.0 += draws.uniform(-0.05, 0.05);
         lighting.gradient.1 += draws.uniform(-0.05, 0.05);
         lighting.exposure *= draws.uniform(0.93, 1.05);
@@ -157,7 +157,14 @@ impl World {
             right: list(shot, Side::Right),
         });
         let size = (self.settings.size_px, self.settings.size_px);
-        Corners { board, left_size: size, right_size: size, pairs: pairs.collect(), skipped: Vec::new(), notes: Vec::new() }
+        Corners {
+            board,
+            left_size: size,
+            right_size: size,
+            pairs: pairs.collect(),
+            skipped: Vec::new(),
+            notes: Vec::new(),
+        }
     }
 
     /// Writes everything but pictures.
