@@ -1,1 +1,75 @@
 //! Everything this program asks of OpenCV. No other file names the bindings.
+//!
+//! OpenCV starts threads of its own; inside rayon's that would be one pool a worker, so it is held to one thread.
+
+use std::sync::Once;
+
+use nalgebra::Point2;
+use opencv::core::{Mat, Point2f, Size, Vector};
+use opencv::{calib3d, core};
+
+use crate::imaging::picture::Grey8;
+
+/// What OpenCV said where it could not work at all (not: where it found nothing).
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("OpenCV: {0}")]
+pub struct Failure(String);
+
+impl From<opencv::Error> for Failure {
+    fn from(e: opencv::Error) -> Failure {
+        Failure(e.message)
+    }
+}
+
+/// Ways to look for a board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Detector {
+    /// Adaptive threshold, then quads: fast, wants a light margin.
+    Classic,
+    /// The same on an equalised copy, for uneven light.
+    ClassicEqualised,
+    /// Sector based (Duda and Frese 2018): slower, holds against blur and noise.
+    Sectors,
+}
+
+/// Looks for a board with `columns` x `rows` inner corners. Gives all corners row by row, to about half a pixel, in a
+/// direction of OpenCV's choosing; `None` where the whole board was not found. At least three corners each way.
+pub fn find_board(
+    picture: &Grey8,
+    columns: usize,
+    rows: usize,
+    detector: Detector,
+) -> Result<Option<Vec<Point2<f64>>>, Failure> {
+    hold_to_one_thread();
+    if columns < 3 || rows < 3 {
+        return Ok(None);
+    }
+    let image = Mat::new_rows_cols_with_data(picture.height as i32, picture.width as i32, &picture.pixels)?;
+    let size = Size::new(columns as i32, rows as i32);
+    let mut corners = Vector::<Point2f>::new();
+    // No CALIB_CB_FAST_CHECK: it takes half of the boards in ordinary rooms for none.
+    let found = match detector {
+        Detector::Classic => {
+            calib3d::find_chessboard_corners(&image, size, &mut corners, calib3d::CALIB_CB_ADAPTIVE_THRESH)?
+        }
+        Detector::ClassicEqualised => {
+            let flags = calib3d::CALIB_CB_ADAPTIVE_THRESH | calib3d::CALIB_CB_NORMALIZE_IMAGE;
+            calib3d::find_chessboard_corners(&image, size, &mut corners, flags)?
+        }
+        Detector::Sectors => {
+            calib3d::find_chessboard_corners_sb(&image, size, &mut corners, calib3d::CALIB_CB_EXHAUSTIVE)?
+        }
+    };
+    if !found || corners.len() != columns * rows {
+        return Ok(None);
+    }
+    Ok(Some(corners.iter().map(|p| Point2::new(f64::from(p.x), f64::from(p.y))).collect()))
+}
+
+fn hold_to_one_thread() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        // Where it refuses, OpenCV only runs with more threads than is good.
+        let _ = core::set_num_threads(1);
+    });
+}

@@ -1,13 +1,25 @@
 //! From a folder of pictures to the corners of the board in each, in an order both cameras agree on.
 
 pub mod board;
+pub mod corner_fit;
 pub mod corners;
 pub mod corners_file;
+pub mod detect;
+pub mod find;
+pub mod folder;
+pub mod grid;
+pub mod order;
+pub mod picture;
+pub mod refine;
+pub mod special;
+
+use camino::Utf8PathBuf;
 
 use crate::error::Explain;
 
 pub use board::Board;
 pub use corners::{Corner, Corners, PairCorners, Side, Skipped};
+pub use find::{Wanted, find_corners};
 
 /// What can go wrong between a folder and its corners.
 #[derive(Debug, thiserror::Error)]
@@ -19,12 +31,121 @@ pub enum Error {
         /// What was typed.
         found: String,
     },
+    /// The folder is not there.
+    #[error("folder not found")]
+    NoFolder {
+        /// The folder.
+        path: Utf8PathBuf,
+    },
+    /// A file where a folder was needed.
+    #[error("a folder of pictures is needed, this is a file")]
+    NotAFolder {
+        /// The file.
+        path: Utf8PathBuf,
+    },
+    /// `left/` without `right/`, or the other way round.
+    #[error("there is {found}/ but no {missing}/")]
+    OneSide {
+        /// The folder.
+        path: Utf8PathBuf,
+        /// The side that is there.
+        found: &'static str,
+        /// The side that is not.
+        missing: &'static str,
+    },
+    /// Pictures, perhaps, but no left one with a right one.
+    #[error("{}", no_pairs(*.single, *.sideless))]
+    NoPairs {
+        /// The folder.
+        path: Utf8PathBuf,
+        /// Pictures of one side whose partner is missing.
+        single: usize,
+        /// Pictures whose names tell no side.
+        sideless: usize,
+        /// A folder below that holds left/ and right/.
+        deeper: Option<Utf8PathBuf>,
+    },
+    /// Two files that would be the same picture of the same pair.
+    #[error("two pictures claim the same side of pair `{pair}`: {first} and {second}")]
+    SameName {
+        /// The pair.
+        pair: String,
+        /// One file.
+        first: Utf8PathBuf,
+        /// The other.
+        second: Utf8PathBuf,
+    },
+    /// The board was not found often enough.
+    #[error("only {found} of {total} pairs show the whole {} board; {needed} are needed{}", .board.squares, reasons(.skipped))]
+    TooFewPairs {
+        /// Pairs with the board in both pictures.
+        found: usize,
+        /// Pairs in the folder.
+        total: usize,
+        /// Pairs needed.
+        needed: usize,
+        /// The board that was looked for.
+        board: Board,
+        /// The folder.
+        path: Utf8PathBuf,
+        /// The others, and why.
+        skipped: Vec<Skipped>,
+        /// Another board size that the pictures show.
+        other: Option<board::Squares>,
+    },
+}
+
+fn no_pairs(single: usize, sideless: usize) -> String {
+    match (single, sideless) {
+        (0, 0) => "there are no pictures here (PNG, TIFF, BMP, JPEG, PGM)".to_owned(),
+        (0, n) => format!("no pair found: the names of {n} pictures tell neither left nor right"),
+        (n, _) => format!("no pair found: {n} pictures have no partner of the same name on the other side"),
+    }
+}
+
+/// The first few pairs that were skipped, a line each.
+fn reasons(skipped: &[Skipped]) -> String {
+    /// More would push the message itself off the screen.
+    const MOST: usize = 8;
+    let mut text: String = skipped.iter().take(MOST).map(|s| format!("\n  {}: {}", s.pair, s.reason)).collect();
+    if skipped.len() > MOST {
+        text.push_str(&format!("\n  and {} more", skipped.len() - MOST));
+    }
+    text
 }
 
 impl Explain for Error {
+    fn place(&self) -> Option<String> {
+        match self {
+            Error::BoardSize { .. } | Error::SameName { .. } => None,
+            Error::NoFolder { path }
+            | Error::NotAFolder { path }
+            | Error::OneSide { path, .. }
+            | Error::NoPairs { path, .. }
+            | Error::TooFewPairs { path, .. } => Some(path.to_string()),
+        }
+    }
+
     fn hint(&self) -> Option<String> {
         match self {
             Error::BoardSize { .. } => Some("`--squares 20x20` is a board with 19x19 inner corners".to_owned()),
+            Error::NoPairs { deeper: Some(folder), .. } => Some(format!("name `{folder}`, which holds left/ and right/")),
+            Error::NoFolder { .. } | Error::NotAFolder { .. } | Error::OneSide { .. } | Error::NoPairs { .. } => Some(
+                "a folder of pairs holds left/ and right/ with equal names, or left*/right*, *_left/*_right, *_L/*_R names"
+                    .to_owned(),
+            ),
+            Error::SameName { .. } => Some("remove or rename one of them".to_owned()),
+            Error::TooFewPairs { other: Some(squares), .. } => {
+                let (columns, rows) = (squares.columns - 1, squares.rows - 1);
+                Some(format!("`--squares {squares}`: the pictures show a board with {columns}x{rows} inner corners"))
+            }
+            Error::TooFewPairs { board, .. } => {
+                let (columns, rows) = (board.columns(), board.rows());
+                Some(format!(
+                    "`--squares` counts squares, not inner corners: {} means {columns}x{rows} inner corners",
+                    board.squares
+                ))
+            }
         }
     }
 }

@@ -1,0 +1,140 @@
+//! The stages of imaging in their order: folder, pairs, pictures, boards, corners, agreement.
+//!
+//! Pictures are worked on in parallel, each worker holds one. What can't be used is kept with its reason; the run fails
+//! when fewer pairs remain than the caller needs.
+
+use std::collections::BTreeMap;
+
+use camino::Utf8Path;
+use nalgebra::Point2;
+use rayon::prelude::*;
+
+use super::folder::{self, PairFiles};
+use super::grid::Grid;
+use super::{Board, Corner, Corners, Error, PairCorners, Side, Skipped, detect, order, picture, refine};
+use crate::error::Result;
+use crate::progress;
+
+/// What is looked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted {
+    /// The board.
+    pub board: Board,
+    /// The least number of pairs that is of use.
+    pub needed: usize,
+}
+
+/// Finds the board's corners in all pairs of a folder, numbered alike in left and right.
+///
+/// An error where the folder holds no pairs, or fewer than needed show the board.
+pub fn find_corners(folder: &Utf8Path, wanted: &Wanted) -> Result<Corners> {
+    let pairing = folder::pair_files(folder)?;
+    let mut notes: Vec<String> = pairing.left_out().into_iter().collect();
+    let sizes = majority_sizes(&pairing.pairs);
+    let bar = progress::bar("looking for the board", 2 * pairing.pairs.len() as u64);
+    let seen: Vec<[Result<Grid<Corner>, String>; 2]> = pairing
+        .pairs
+        .par_iter()
+        .map(|files| {
+            let (left, right) = rayon::join(
+                || look(&files.left, wanted.board, sizes[0], &bar),
+                || look(&files.right, wanted.board, sizes[1], &bar),
+            );
+            [left, right]
+        })
+        .collect();
+    bar.finish_and_clear();
+    let (found, skipped) = sort_out(&pairing.pairs, seen);
+    let total = pairing.pairs.len();
+    if found.len() < wanted.needed {
+        return Err(Error::TooFewPairs {
+            found: found.len(),
+            total,
+            needed: wanted.needed,
+            board: wanted.board,
+            path: folder.to_owned(),
+            skipped,
+            other: None,
+        }
+        .into());
+    }
+    let pairs = number_alike(found, wanted.board);
+    if !skipped.is_empty() {
+        notes.push(format!("the board was found in {} of {total} pairs", pairs.len()));
+    }
+    Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, notes })
+}
+
+/// One picture from file to corners; the reason where that fails.
+fn look(path: &Utf8Path, board: Board, size: (u32, u32), bar: &indicatif::ProgressBar) -> Result<Grid<Corner>, String> {
+    let corners = look_quietly(path, board, size);
+    bar.inc(1);
+    corners
+}
+
+fn look_quietly(path: &Utf8Path, board: Board, size: (u32, u32)) -> Result<Grid<Corner>, String> {
+    let bytes = std::fs::read(path).map_err(|e| format!("cannot be read: {e}"))?;
+    let picture = picture::decode(&bytes, path)?;
+    drop(bytes);
+    let found = (picture.width as u32, picture.height as u32);
+    if found != size {
+        return Err(format!("is {}x{} px, most others are {}x{}", found.0, found.1, size.0, size.1));
+    }
+    let detected = detect::detect(&picture, board)?;
+    Ok(refine::refine(&picture, &detected))
+}
+
+/// The size that most left and most right pictures have; the larger one where two are equally frequent.
+fn majority_sizes(pairs: &[PairFiles]) -> [(u32, u32); 2] {
+    [Side::Left, Side::Right].map(|side| {
+        let mut counts: BTreeMap<(u32, u32), usize> = BTreeMap::new();
+        for files in pairs {
+            let path = if side == Side::Left { &files.left } else { &files.right };
+            // A file that can't be read is met again, and named, when it is decoded.
+            if let Some(size) = picture::size(path) {
+                *counts.entry(size).or_default() += 1;
+            }
+        }
+        counts.into_iter().max_by_key(|&(size, count)| (count, size)).map_or((0, 0), |(size, _)| size)
+    })
+}
+
+type Found = (String, Grid<Corner>, Grid<Corner>);
+
+fn sort_out(files: &[PairFiles], seen: Vec<[Result<Grid<Corner>, String>; 2]>) -> (Vec<Found>, Vec<Skipped>) {
+    let (mut found, mut skipped) = (Vec::new(), Vec::new());
+    for (files, sides) in files.iter().zip(seen) {
+        let pair = files.pair.clone();
+        match sides {
+            [Ok(left), Ok(right)] => found.push((pair, left, right)),
+            [Err(left), Err(right)] if left == right => {
+                skipped.push(Skipped { pair, reason: format!("both pictures: {left}") });
+            }
+            [Err(left), Err(right)] => {
+                skipped.push(Skipped { pair, reason: format!("left picture: {left}; right picture: {right}") });
+            }
+            [Err(left), Ok(_)] => skipped.push(Skipped { pair, reason: format!("left picture: {left}") }),
+            [Ok(_), Err(right)] => skipped.push(Skipped { pair, reason: format!("right picture: {right}") }),
+        }
+    }
+    (found, skipped)
+}
+
+fn number_alike(found: Vec<Found>, board: Board) -> Vec<PairCorners> {
+    let places = |grid: &Grid<Corner>| -> Grid<Point2<f64>> { grid.map(|c| c.px) };
+    let pairs: Vec<_> = found.iter().map(|(_, left, right)| (places(left), places(right))).collect();
+    let turns = order::agreed_turns(&pairs, board);
+    found
+        .into_iter()
+        .zip(turns)
+        .map(|((pair, left, right), (turn_left, turn_right))| PairCorners {
+            pair,
+            left: list(&left.turned(turn_left)),
+            right: list(&right.turned(turn_right)),
+        })
+        .collect()
+}
+
+fn list(grid: &Grid<Corner>) -> Vec<Corner> {
+    grid.iter().map(|(col, row, corner)| Corner { col, row, ..*corner }).collect()
+}

@@ -1,0 +1,106 @@
+//! A rectangular grid of corners, some perhaps missing, and the turns it can be given.
+
+/// Corners (or anything that belongs to one) by column and row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid<T> {
+    /// Number of columns.
+    pub columns: usize,
+    /// Number of rows.
+    pub rows: usize,
+    /// Row by row; `None` where the corner is missing.
+    pub cells: Vec<Option<T>>,
+}
+
+impl<T: Clone> Grid<T> {
+    /// A grid filled by column and row, in order.
+    pub fn from_fn(columns: usize, rows: usize, mut at: impl FnMut(usize, usize) -> Option<T>) -> Grid<T> {
+        let cells = (0..columns * rows).map(|i| at(i % columns, i / columns)).collect();
+        Grid { columns, rows, cells }
+    }
+
+    /// All places, with what is there.
+    pub fn iter_all(&self) -> impl Iterator<Item = (usize, usize, Option<&T>)> {
+        let columns = self.columns;
+        self.cells.iter().enumerate().map(move |(i, c)| (i % columns, i / columns, c.as_ref()))
+    }
+
+    /// The corner at a place; `None` where it is missing or outside of the grid.
+    pub fn get(&self, col: usize, row: usize) -> Option<&T> {
+        if col < self.columns && row < self.rows { self.cells[row * self.columns + col].as_ref() } else { None }
+    }
+
+    /// The corner at a place that may lie outside of the grid.
+    pub fn around(&self, col: isize, row: isize) -> Option<&T> {
+        self.get(usize::try_from(col).ok()?, usize::try_from(row).ok()?)
+    }
+
+    /// Number of corners that are there.
+    pub fn count(&self) -> usize {
+        self.cells.iter().flatten().count()
+    }
+
+    /// Corners that are there, with column and row.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, usize, &T)> {
+        let columns = self.columns;
+        self.cells.iter().enumerate().filter_map(move |(i, c)| c.as_ref().map(|c| (i % columns, i / columns, c)))
+    }
+
+    /// The same corners numbered from the opposite corner of the board.
+    pub fn half_turn(&self) -> Grid<T> {
+        Grid::from_fn(self.columns, self.rows, |col, row| {
+            self.get(self.columns - 1 - col, self.rows - 1 - row).cloned()
+        })
+    }
+
+    /// The same corners with columns along the former rows; handedness stays.
+    pub fn quarter_turn(&self) -> Grid<T> {
+        Grid::from_fn(self.rows, self.columns, |col, row| self.get(row, self.rows - 1 - col).cloned())
+    }
+
+    /// The same corners with the rows numbered backwards: the other handedness.
+    pub fn flip_rows(&self) -> Grid<T> {
+        Grid::from_fn(self.columns, self.rows, |col, row| self.get(col, self.rows - 1 - row).cloned())
+    }
+
+    /// The grid turned `quarters` times by 90 degrees.
+    pub fn turned(&self, quarters: usize) -> Grid<T> {
+        match quarters % 4 {
+            0 => self.clone(),
+            1 => self.quarter_turn(),
+            2 => self.half_turn(),
+            _ => self.half_turn().quarter_turn(),
+        }
+    }
+
+    /// The grid with something else at each corner.
+    pub fn map<U: Clone>(&self, to: impl Fn(&T) -> U) -> Grid<U> {
+        Grid { columns: self.columns, rows: self.rows, cells: self.cells.iter().map(|c| c.as_ref().map(&to)).collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbered() -> Grid<(usize, usize)> {
+        Grid::from_fn(4, 3, |col, row| (row != 2).then_some((col, row)))
+    }
+
+    #[test]
+    fn four_quarter_turns_are_none_and_two_are_a_half() {
+        let grid = numbered();
+        assert_eq!(grid.quarter_turn().quarter_turn(), grid.half_turn());
+        assert_eq!(grid.turned(3).turned(1), grid);
+        assert_eq!(grid.flip_rows().flip_rows(), grid);
+    }
+
+    #[test]
+    fn a_quarter_turn_keeps_handedness() {
+        let turned = numbered().quarter_turn();
+        let at = |col, row| *turned.get(col, row).unwrap_or(&(9, 9));
+        let (o, x, y) = (at(1, 0), at(2, 0), at(1, 1));
+        let cross = (x.0 as i32 - o.0 as i32) * (y.1 as i32 - o.1 as i32)
+            - (x.1 as i32 - o.1 as i32) * (y.0 as i32 - o.0 as i32);
+        assert_eq!(cross, 1, "{o:?} {x:?} {y:?}");
+    }
+}
