@@ -8,7 +8,7 @@
 use nalgebra::{Point2, Vector2};
 
 use super::Board;
-use super::grid::Grid;
+use super::grid::{Grid, Places};
 use super::picture::{Grey8, Picture};
 use crate::opencv::{Detector, find_board};
 
@@ -19,7 +19,7 @@ pub const COARSE_PX: usize = 1_000_000;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detected {
     /// Coarse places of the inner corners at full size, px.
-    pub corners: Grid<Point2<f64>>,
+    pub corners: Places,
     /// How many pixels of the picture one pixel of the copy was: the places are good to about half of that.
     pub factor: usize,
 }
@@ -67,7 +67,7 @@ fn factor_for(picture: &Picture, pixels: usize) -> usize {
 }
 
 /// Numbers the rows so that columns, rows and the viewing direction are right-handed.
-pub fn right_handed(grid: Grid<Point2<f64>>) -> Grid<Point2<f64>> {
+pub fn right_handed(grid: Places) -> Places {
     let mut sum = 0.0;
     for (col, row, p) in grid.iter() {
         if let (Some(x), Some(y)) = (grid.get(col + 1, row), grid.get(col, row + 1)) {
@@ -82,14 +82,14 @@ fn cross(a: Vector2<f64>, b: Vector2<f64>) -> f64 {
 }
 
 /// Turns the grid so that the square beyond corner (0, 0) is dark, where turning can change that.
-pub fn turn_by_colours(small: &Grey8, grid: Grid<Point2<f64>>, board: Board) -> Grid<Point2<f64>> {
+pub fn turn_by_colours(small: &Grey8, grid: Places, board: Board) -> Places {
     if first_square_is_dark(small, &grid) {
         return grid;
     }
     if !board.looks_the_same_after_half_turn() {
         return grid.half_turn();
     }
-    if board.columns() == board.rows() && board.squares.columns % 2 == 0 {
+    if board.columns() == board.rows() && board.squares.columns.is_multiple_of(2) {
         return grid.quarter_turn();
     }
     grid
@@ -97,7 +97,7 @@ pub fn turn_by_colours(small: &Grey8, grid: Grid<Point2<f64>>, board: Board) -> 
 
 /// True where the squares of the colour of square (0, 0) are the darker ones. Each cell is compared with its neighbours, so
 /// that uneven light does not matter.
-fn first_square_is_dark(small: &Grey8, grid: &Grid<Point2<f64>>) -> bool {
+fn first_square_is_dark(small: &Grey8, grid: &Places) -> bool {
     let centre = |col: usize, row: usize| {
         let p = [grid.get(col, row)?, grid.get(col + 1, row)?, grid.get(col, row + 1)?, grid.get(col + 1, row + 1)?];
         let sum = p.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / 4.0;

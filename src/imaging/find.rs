@@ -6,11 +6,10 @@
 use std::collections::BTreeMap;
 
 use camino::Utf8Path;
-use nalgebra::Point2;
 use rayon::prelude::*;
 
 use super::folder::{self, PairFiles};
-use super::grid::Grid;
+use super::grid::{Grid, Places};
 use super::{Board, Corner, Corners, Error, PairCorners, Side, Skipped, detect, order, picture, refine};
 use crate::error::Result;
 use crate::progress;
@@ -121,7 +120,7 @@ fn sort_out(files: &[PairFiles], seen: Vec<[Result<Grid<Corner>, String>; 2]>) -
 }
 
 fn number_alike(found: Vec<Found>, board: Board) -> Vec<PairCorners> {
-    let places = |grid: &Grid<Corner>| -> Grid<Point2<f64>> { grid.map(|c| c.px) };
+    let places = |grid: &Grid<Corner>| -> Places { grid.map(|c| c.px) };
     let pairs: Vec<_> = found.iter().map(|(_, left, right)| (places(left), places(right))).collect();
     let turns = order::agreed_turns(&pairs, board);
     found

@@ -1,5 +1,7 @@
 //! A rectangular grid of corners, some perhaps missing, and the turns it can be given.
 
+use nalgebra::Point2;
+
 /// Corners (or anything that belongs to one) by column and row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid<T> {
@@ -10,6 +12,9 @@ pub struct Grid<T> {
     /// Row by row; `None` where the corner is missing.
     pub cells: Vec<Option<T>>,
 }
+
+/// Places in a picture, px.
+pub type Places = Grid<Point2<f64>>;
 
 impl<T: Clone> Grid<T> {
     /// A grid filled by column and row, in order.

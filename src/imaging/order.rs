@@ -8,10 +8,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use nalgebra::{Point2, Vector2};
+use nalgebra::Vector2;
 
 use super::Board;
-use super::grid::Grid;
+use super::grid::Places;
 
 /// The smallest turn, in quarter turns, after which the board looks the same; `None` where only a whole turn does.
 pub fn ambiguity(board: Board) -> Option<usize> {
@@ -24,7 +24,7 @@ pub fn ambiguity(board: Board) -> Option<usize> {
 }
 
 /// For each pair the quarter turns that its left and its right grid need.
-pub fn agreed_turns(pairs: &[(Grid<Point2<f64>>, Grid<Point2<f64>>)], board: Board) -> Vec<(usize, usize)> {
+pub fn agreed_turns(pairs: &[(Places, Places)], board: Board) -> Vec<(usize, usize)> {
     let Some(step) = ambiguity(board) else { return vec![(0, 0); pairs.len()] };
     let period = step as f64 * FRAC_PI_2;
     let angles: Vec<(f64, f64)> = pairs.iter().map(|(l, r)| (direction(l), direction(r))).collect();
@@ -41,7 +41,7 @@ pub fn agreed_turns(pairs: &[(Grid<Point2<f64>>, Grid<Point2<f64>>)], board: Boa
 }
 
 /// Direction of the columns in the picture, rad.
-pub fn direction(grid: &Grid<Point2<f64>>) -> f64 {
+pub fn direction(grid: &Places) -> f64 {
     let mut sum = Vector2::zeros();
     for (col, row, p) in grid.iter() {
         if let Some(next) = grid.get(col + 1, row) {
@@ -74,13 +74,16 @@ pub fn angle_between(a: f64, b: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Point2;
+
+    use super::super::grid::Grid;
     use super::*;
 
     fn board(squares: &str) -> Board {
         Board { squares: squares.parse().unwrap(), square_mm: 10.0 }
     }
 
-    fn grid(board: Board, angle: f64) -> Grid<Point2<f64>> {
+    fn grid(board: Board, angle: f64) -> Places {
         let (sin, cos) = angle.sin_cos();
         Grid::from_fn(board.columns(), board.rows(), |col, row| {
             let p = board.corner_mm(col, row);

@@ -10,7 +10,7 @@ use nalgebra::{Matrix2, Point2, Vector2};
 use super::Corner;
 use super::corner_fit::{Fit, Model, Window, fit};
 use super::detect::Detected;
-use super::grid::Grid;
+use super::grid::{Grid, Places};
 use super::picture::Picture;
 
 /// Half of the first window, px of the reduced copy.
@@ -52,7 +52,7 @@ struct Cell {
 }
 
 impl Cell {
-    fn of(grid: &Grid<Point2<f64>>, col: usize, row: usize) -> Option<Cell> {
+    fn of(grid: &Places, col: usize, row: usize) -> Option<Cell> {
         let place = *grid.get(col, row)?;
         let (c, r) = (col as isize, row as isize);
         let edge = |dc: isize, dr: isize| {
@@ -81,7 +81,8 @@ fn refine_one(
     window: &mut Window,
 ) -> Option<(Point2<f64>, Fit)> {
     let side = cell.edges[0].norm().min(cell.edges[1].norm());
-    if !(side * cell.skew() > 2.0) {
+    let area_px = side * cell.skew();
+    if area_px.is_nan() || area_px <= 2.0 {
         return None;
     }
     let first_half = (FIRST_HALF_COPY_PX * factor).clamp(6.0, 40.0).min(0.6 * side);
