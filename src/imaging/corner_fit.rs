@@ -24,8 +24,8 @@ const N: usize = 12;
 const LANES: usize = 4;
 /// Steps after which a fit that still moves is given up; a good start needs four to eight.
 const MAX_STEPS: usize = 40;
-/// Least blur, px: below it the box of a pixel is wider than the edge, and the slope is no longer told apart.
-const LEAST_BLUR_PX: f64 = 0.2;
+/// Least blur, px: that of the box of a pixel alone, 1/sqrt(12). Sharpened pictures would fit less, with a slope that no pixel sees.
+const LEAST_BLUR_PX: f64 = 0.3;
 
 /// Pixels of a window, relative to its start.
 #[derive(Debug, Clone, Default)]
@@ -115,6 +115,18 @@ impl Model {
             half_contrast: self.half_contrast + d[9],
             contrast_slope: self.contrast_slope + Vector2::new(d[10], d[11]),
             bend: self.bend,
+        }
+    }
+
+    /// Takes a blur at its bound out of the equations where they would push it below.
+    fn hold_least_blur(&self, matrix: &mut Normal, gradient: &mut Column) {
+        for k in [0, 1] {
+            if self.blur_px[k] <= LEAST_BLUR_PX && gradient[4 + k] <= 0.0 {
+                matrix.fill_row(4 + k, 0.0);
+                matrix.fill_column(4 + k, 0.0);
+                matrix[(4 + k, 4 + k)] = 1.0;
+                gradient[4 + k] = 0.0;
+            }
         }
     }
 
@@ -229,6 +241,7 @@ pub fn fit(start: &Model, window: &Window) -> Option<Fit> {
     let mut settled = false;
     for _ in 0..MAX_STEPS {
         let mut damped = matrix;
+        model.hold_least_blur(&mut damped, &mut gradient);
         for i in 0..N {
             damped[(i, i)] *= 1.0 + damping;
         }
@@ -258,6 +271,7 @@ pub fn fit(start: &Model, window: &Window) -> Option<Fit> {
     }
     // Rounding to whole grey values alone leaves 1/12.
     let variance = (cost / (window.count - N) as f64).max(1.0 / 12.0);
+    model.hold_least_blur(&mut matrix, &mut gradient);
     let inverse = matrix.cholesky()?.inverse();
     let covariance_px2 = inverse.fixed_view::<2, 2>(0, 0) * variance;
     let fit = Fit { model, covariance_px2, residual: variance.sqrt(), pixels: window.count };

@@ -85,20 +85,7 @@ fn refine_one(
     if area_px.is_nan() || area_px <= 2.0 {
         return None;
     }
-    let first_half = (FIRST_HALF_COPY_PX * factor).clamp(6.0, 40.0).min(0.6 * side);
-    let start = Model {
-        corner: Vector2::zeros(),
-        angles_rad: cell.edges.map(|e| e.y.atan2(e.x)),
-        blur_px: [(0.5 * factor).clamp(1.0, 0.3 * side.max(4.0)); 2],
-        level: 0.0,
-        level_slope: Vector2::zeros(),
-        half_contrast: 0.0,
-        contrast_slope: Vector2::zeros(),
-        bend: [0.0; 2],
-    };
-    collect(picture, saturation, &cell.place, &start, cell.edges.map(|e| e.normalize() * first_half), f64::MAX, window);
-    let first = fit(&start, window)?;
-    plausible(&first, &start, cell, factor)?;
+    let first = first_fit(picture, saturation, cell, factor, window)?;
     let place = first.place(&cell.place);
     let start = Model { corner: Vector2::zeros(), ..first.model };
     let blur = start.blur_px[0].max(start.blur_px[1]);
@@ -111,18 +98,48 @@ fn refine_one(
     }
 }
 
-/// `None` for a fit that wandered off, turned away, or found no contrast.
-fn plausible(fit: &Fit, start: &Model, cell: &Cell, factor: f64) -> Option<()> {
+/// A fit in a small window, or in larger ones where a wide blur fills it.
+fn first_fit(picture: &Picture, saturation: f64, cell: &Cell, factor: f64, window: &mut Window) -> Option<Fit> {
+    let side = cell.edges[0].norm().min(cell.edges[1].norm());
+    let most = 0.6 * side;
+    let mut half = (FIRST_HALF_COPY_PX * factor).max(6.0).min(most);
+    loop {
+        let start = Model {
+            corner: Vector2::zeros(),
+            angles_rad: cell.edges.map(|e| e.y.atan2(e.x)),
+            blur_px: [(0.15 * half).max(0.8); 2],
+            level: 0.0,
+            level_slope: Vector2::zeros(),
+            half_contrast: 0.0,
+            contrast_slope: Vector2::zeros(),
+            bend: [0.0; 2],
+        };
+        let halves = cell.edges.map(|e| e.normalize() * half);
+        collect(picture, saturation, &cell.place, &start, halves, f64::MAX, window);
+        if let Some(first) = fit(&start, window)
+            && plausible(&first, &start, cell, factor)
+            && (first.model.blur_px.iter().all(|&s| s < 0.4 * half) || half >= most)
+        {
+            return Some(first);
+        }
+        if half >= most {
+            return None;
+        }
+        half = (2.0 * half).min(most);
+    }
+}
+
+/// False for a fit that wandered off, turned away, or found no contrast.
+fn plausible(fit: &Fit, start: &Model, cell: &Cell, factor: f64) -> bool {
     let side = cell.edges[0].norm().min(cell.edges[1].norm());
     let moved = fit.model.corner.norm();
     let turned = (0..2).map(|k| (fit.model.angles_rad[k] - start.angles_rad[k]).abs()).fold(0.0, f64::max);
     let sigma = fit.covariance_px2.trace().sqrt();
-    let ok = moved < (3.0 * factor).max(2.0).min(0.4 * side)
+    moved < (3.0 * factor).max(2.0).min(0.4 * side)
         && turned < 0.35
         && fit.model.blur_px.iter().all(|&s| s < 0.5 * side)
         && fit.model.half_contrast.abs() > fit.residual
-        && sigma < 0.5;
-    ok.then_some(())
+        && sigma < 0.5
 }
 
 /// True where the large window tells the same as the small one: a hidden or unprinted neighbour square shows as misfit.
