@@ -1,0 +1,268 @@
+//! What can be chosen in an identification: method, model, box, swarm constants; section `[identify]` of `stereocal.toml`.
+
+use serde::{Deserialize, Serialize};
+
+use super::trust_region;
+use crate::config::positive;
+
+/// How the parameters are searched for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Bounded trust region.
+    TrustRegion,
+    /// Sine-cosine and trust-region particle swarm, the paper's.
+    Stapso,
+    /// Particle swarm as in eq. (14).
+    Pso,
+    /// With constriction.
+    Cpso,
+    /// With adaptive inertia.
+    Apso,
+    /// Attracting and repelling by diversity.
+    Arpso,
+}
+
+impl Method {
+    /// All, the cheapest first: it wins a tie.
+    pub const ALL: [Method; 6] =
+        [Method::TrustRegion, Method::Stapso, Method::Pso, Method::Cpso, Method::Apso, Method::Arpso];
+
+    /// Its name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::TrustRegion => "trust-region",
+            Method::Stapso => "stapso",
+            Method::Pso => "pso",
+            Method::Cpso => "cpso",
+            Method::Apso => "apso",
+            Method::Arpso => "arpso",
+        }
+    }
+}
+
+/// What counts as a residual.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Model {
+    /// Distances to the group's centre, the paper's.
+    CenterDistance,
+    /// All distances within a group.
+    PairwiseDistance,
+    /// Points, with a free rigid transform a group.
+    Position,
+    /// Points and orientations.
+    Pose,
+}
+
+impl Model {
+    /// Its name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Model::CenterDistance => "center-distance",
+            Model::PairwiseDistance => "pairwise-distance",
+            Model::Position => "position",
+            Model::Pose => "pose",
+        }
+    }
+}
+
+/// Whether terms beyond MDH may be taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Extensions {
+    /// Parallel axes, gravity and harmonics as far as held-out samples get better by them.
+    Auto,
+    /// The paper's parameters alone.
+    None,
+}
+
+/// How redundant parameters are dropped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Redundancy {
+    /// Rank-revealing QR.
+    Qr,
+    /// The paper's: the largest correlation, repeatedly.
+    Correlation,
+}
+
+/// Whether the manufacturing tolerance is used as a prior.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Prior {
+    /// Its size from the evidence of the data.
+    Evidence,
+    /// None.
+    Off,
+}
+
+/// Section `[identify]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// `None` (absent) runs all methods and keeps the best.
+    pub method: Option<Method>,
+    /// `None` (absent) chooses the model by folds.
+    pub model: Option<Model>,
+    /// Terms beyond MDH.
+    pub extensions: Extensions,
+    /// How redundant parameters are dropped.
+    pub redundancy: Redundancy,
+    /// Prior.
+    pub prior: Prior,
+    /// Half-width of the box for lengths, mm (section 3.2 of the paper).
+    pub bound_mm: f64,
+    /// Half-width of the box for angles, deg (section 3.2 of the paper).
+    pub bound_deg: f64,
+    /// Whether the box is doubled for a parameter until the trust region no longer ends at its wall.
+    pub widen_bounds: bool,
+    /// Relative to the longest column, below which the poses don't determine a direction: 1e-6 mm a mm.
+    pub rank_tolerance: f64,
+    /// Folds that choose between models.
+    pub folds: usize,
+    /// Whether a wire's zero is unknown as well as its anchor.
+    pub wire_offset: bool,
+    /// Rows that fit worse than so many robust standard deviations are left out and named; 0 keeps all.
+    pub outlier_sigmas: f64,
+    /// The trust region's constants.
+    pub trust_region: trust_region::Settings,
+    /// The swarms' constants.
+    pub swarm: SwarmSettings,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings {
+            method: None,
+            model: None,
+            extensions: Extensions::Auto,
+            redundancy: Redundancy::Qr,
+            prior: Prior::Evidence,
+            bound_mm: 1.0,
+            bound_deg: 1.0,
+            widen_bounds: true,
+            rank_tolerance: 1e-6,
+            folds: 5,
+            wire_offset: true,
+            outlier_sigmas: 7.0,
+            trust_region: trust_region::Settings::default(),
+            swarm: SwarmSettings::default(),
+        }
+    }
+}
+
+impl Settings {
+    /// Notes what makes no sense.
+    pub fn validate(&self, problems: &mut Vec<String>) {
+        positive(problems, "identify.bound_mm", self.bound_mm);
+        positive(problems, "identify.bound_deg", self.bound_deg);
+        positive(problems, "identify.rank_tolerance", self.rank_tolerance);
+        positive(problems, "identify.trust_region.radius", self.trust_region.radius);
+        if self.folds < 2 {
+            problems.push(format!("identify.folds is {}; at least 2 are needed", self.folds));
+        }
+        if self.outlier_sigmas.is_nan() || self.outlier_sigmas < 0.0 {
+            problems.push(format!("identify.outlier_sigmas is {}; it must not be negative", self.outlier_sigmas));
+        }
+        self.swarm.validate(problems);
+    }
+}
+
+/// Section `[identify.swarm]`: all swarms.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SwarmSettings {
+    /// M of the paper.
+    pub particles: usize,
+    /// K of the paper.
+    pub iterations: usize,
+    /// Iterations that must improve the best cost by `improvement_mm2` in all (the paper: 50); 0 never stops early.
+    pub patience: usize,
+    /// See `patience` (the paper: 1e-4).
+    pub improvement_mm2: f64,
+    /// Largest velocity as a fraction of the box's width. Eq. (14) has no inertia and diverges without one;
+    /// Eberhart and Shi, "Comparing inertia weights and constriction factors" (2000), limit it by the dynamic range.
+    pub velocity_limit: f64,
+    /// c1 of PSO and STAPSO: 2, Kennedy and Eberhart (1995).
+    pub c1: f64,
+    /// c2 of PSO and STAPSO.
+    pub c2: f64,
+    /// c1 = c2 of CPSO: 2.05, Clerc and Kennedy (2002), with constriction 0.7298.
+    pub cpso_c: f64,
+    /// Inertia of APSO for the best and for poor particles: 0.4 and 0.9, Shi and Eberhart (1998), spread by fitness.
+    pub apso_inertia: [f64; 2],
+    /// Diversity below which ARPSO repels and above which it attracts: Riget and Vesterstrom (2002).
+    pub arpso_diversity: [f64; 2],
+    /// STAPSO: the constants.
+    pub stapso: StapsoSettings,
+}
+
+/// Section `[identify.swarm.stapso]`: what the paper leaves open.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StapsoSettings {
+    /// S: the best cost is watched over so many iterations.
+    pub stagnation_iterations: usize,
+    /// beta: relative to the best cost; less improvement than this over S iterations is stagnation.
+    pub stagnation_improvement: f64,
+    /// a of eq. (19).
+    pub sine_cosine_a: f64,
+    /// Particles (the best ones) that make trust-region steps when the swarm stagnates.
+    pub trust_region_particles: usize,
+    /// Iterations of the trust region that a particle makes each time.
+    pub trust_region_steps: usize,
+}
+
+impl Default for SwarmSettings {
+    fn default() -> SwarmSettings {
+        SwarmSettings {
+            particles: 100,
+            iterations: 500,
+            patience: 50,
+            improvement_mm2: 1e-4,
+            velocity_limit: 0.1,
+            c1: 2.0,
+            c2: 2.0,
+            cpso_c: 2.05,
+            apso_inertia: [0.4, 0.9],
+            arpso_diversity: [5e-6, 0.25],
+            stapso: StapsoSettings::default(),
+        }
+    }
+}
+
+impl Default for StapsoSettings {
+    fn default() -> StapsoSettings {
+        StapsoSettings {
+            stagnation_iterations: 5,
+            stagnation_improvement: 0.01,
+            sine_cosine_a: 2.0,
+            trust_region_particles: 1,
+            trust_region_steps: 5,
+        }
+    }
+}
+
+impl SwarmSettings {
+    fn validate(&self, problems: &mut Vec<String>) {
+        if self.particles < 2 {
+            problems.push(format!("identify.swarm.particles is {}; at least 2 are needed", self.particles));
+        }
+        if self.iterations == 0 {
+            problems.push("identify.swarm.iterations is 0; at least 1 is needed".to_owned());
+        }
+        positive(problems, "identify.swarm.velocity_limit", self.velocity_limit);
+        if self.cpso_c.is_nan() || self.cpso_c <= 2.0 {
+            problems.push(format!("identify.swarm.cpso_c is {}; constriction needs more than 2", self.cpso_c));
+        }
+        for (name, value) in [("c1", self.c1), ("c2", self.c2), ("improvement_mm2", self.improvement_mm2)] {
+            if !(value.is_finite() && value >= 0.0) {
+                problems.push(format!("identify.swarm.{name} is {value}; it must not be negative"));
+            }
+        }
+        if self.stapso.stagnation_iterations == 0 {
+            problems.push("identify.swarm.stapso.stagnation_iterations is 0; at least 1 is needed".to_owned());
+        }
+    }
+}
