@@ -90,9 +90,18 @@ pub struct Identify {
     /// Measurements [default: measurements.csv in the results folder]
     #[arg(long, value_name = "FILE")]
     pub measurements: Option<Utf8PathBuf>,
-    /// The nominal robot
+    /// The nominal robot [default: robot.toml in the working directory if there, else Table 1 of the paper]
     #[arg(long, value_name = "FILE")]
     pub robot: Option<Utf8PathBuf>,
+    /// Solver; `auto` runs all and keeps the best on samples held out [default: auto]
+    #[arg(long, value_name = "NAME", value_parser = ["auto", "trust-region", "stapso", "pso", "cpso", "apso", "arpso"])]
+    pub method: Option<String>,
+    /// Residual model [default: chosen on samples held out]
+    #[arg(long, value_name = "NAME")]
+    pub model: Option<crate::identify::Model>,
+    /// Terms beyond MDH: parallel axes, gravity, harmonics [default: auto]
+    #[arg(long, value_name = "NAME")]
+    pub extensions: Option<crate::identify::settings::Extensions>,
     /// Seed of every random draw
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,

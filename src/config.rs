@@ -36,6 +36,8 @@ pub struct Config {
     pub target_board: BoardSettings,
     /// The accuracy the rig must have, mm (section 4 of the paper).
     pub tolerance_mm: f64,
+    /// Identification: method, model, box, solvers.
+    pub identify: crate::identify::Settings,
 }
 
 /// A board in the file.
@@ -66,6 +68,7 @@ impl Default for Config {
             check_board: BoardSettings { squares: Squares { columns: 20, rows: 20 }, square_mm: 10.0 },
             target_board: BoardSettings { squares: Squares { columns: 7, rows: 6 }, square_mm: 10.0 },
             tolerance_mm: 0.05,
+            identify: crate::identify::Settings::default(),
         }
     }
 }
@@ -89,6 +92,7 @@ impl Config {
         positive(&mut problems, "tolerance_mm", self.tolerance_mm);
         positive(&mut problems, "check_board.square_mm", self.check_board.square_mm);
         positive(&mut problems, "target_board.square_mm", self.target_board.square_mm);
+        self.identify.validate(&mut problems);
         reject(problems)
     }
 }

@@ -78,7 +78,14 @@ fn check_joints(robot: &Robot, rows: &[Measurement], path: &Utf8Path) -> Result<
     Ok(())
 }
 
-fn write(out: &OutDir, set: &Dataset, nominal: &Robot, found: &Identification, record: &Record, settings: &Settings) -> Result<()> {
+fn write(
+    out: &OutDir,
+    set: &Dataset,
+    nominal: &Robot,
+    found: &Identification,
+    record: &Record,
+    settings: &Settings,
+) -> Result<()> {
     let identified = &found.candidates[found.chosen].robot;
     let errors = |robot: &Robot| quality(set, robot, found, settings).1;
     let page = report::page(set, record, &errors(nominal), &errors(identified))?;

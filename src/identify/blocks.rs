@@ -162,7 +162,7 @@ impl Block {
                 let step: DVector<f64> = -(&inverse * &gradient);
                 let gain = -gradient.dot(&step);
                 let cost = residuals.norm_squared();
-                if !(gain > INNER_GAIN * cost) {
+                if gain.is_nan() || gain <= INNER_GAIN * cost {
                     break;
                 }
                 let Some(moved) = self.descend(places, scatter, &unknowns, &step, cost) else { break };
@@ -206,7 +206,8 @@ impl Block {
         match (self, unknowns) {
             (Block::Center { center, lengths }, _) => {
                 let center = places[*center].point_mm;
-                let residual = |l: &Length| ((places[l.pose].point_mm - center).norm() - l.length_mm) / sd(l, scatter, 2.0);
+                let residual =
+                    |l: &Length| ((places[l.pose].point_mm - center).norm() - l.length_mm) / sd(l, scatter, 2.0);
                 (DVector::from_iterator(lengths.len(), lengths.iter().map(residual)), DMatrix::zeros(lengths.len(), 0))
             }
             (Block::Pairwise(pairs), _) => {
@@ -310,7 +311,10 @@ impl Block {
                         let residual = frame * place.point_mm - spot.point_mm;
                         list.push((spot.pose, Raw::Point(residual, spot.covariance_mm2)));
                         if let (true, Some(measured)) = (*oriented, &spot.rotation) {
-                            list.push((spot.pose, Raw::Turn(turn(frame, &place.rotation, flange_from_target, measured))));
+                            list.push((
+                                spot.pose,
+                                Raw::Turn(turn(frame, &place.rotation, flange_from_target, measured)),
+                            ));
                         }
                     }
                 }
@@ -331,7 +335,8 @@ impl Unknowns {
                 offset_mm: anchor.offset_mm + if step.len() > 3 { step[3] } else { 0.0 },
             }),
             Unknowns::Frames(frames, flange_from_target) => {
-                let moved = frames.iter().enumerate().map(|(g, f)| perturb(f, three(6 * g), three(6 * g + 3))).collect();
+                let moved =
+                    frames.iter().enumerate().map(|(g, f)| perturb(f, three(6 * g), three(6 * g + 3))).collect();
                 let target = if step.len() > 6 * frames.len() {
                     nalgebra::Rotation3::from_scaled_axis(three(6 * frames.len())).into_inner() * flange_from_target
                 } else {
@@ -381,7 +386,12 @@ fn frames_linearised(
 }
 
 /// Predicted orientation after the measured one, as a rotation vector in the sensor's frame.
-fn turn(frame: &Transform, rotation: &Matrix3<f64>, flange_from_target: &Matrix3<f64>, measured: &Matrix3<f64>) -> Vector3<f64> {
+fn turn(
+    frame: &Transform,
+    rotation: &Matrix3<f64>,
+    flange_from_target: &Matrix3<f64>,
+    measured: &Matrix3<f64>,
+) -> Vector3<f64> {
     let predicted = crate::geometry::rotation_matrix(frame) * rotation * flange_from_target;
     nalgebra::Rotation3::from_matrix_unchecked(predicted * measured.transpose()).scaled_axis()
 }

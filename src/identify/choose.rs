@@ -23,9 +23,6 @@ use super::verify::{RowError, errors};
 use crate::measurements::Role;
 use crate::robot::Robot;
 
-/// Held-out scores within this fraction of the best are equal: solvers of one problem agree to rounding.
-const EQUAL: f64 = 1e-6;
-
 /// Mixed into the seed that draws the folds, so that they differ from the swarm's draws.
 const FOLD_SEED: u64 = 0x5f01d;
 
@@ -44,6 +41,8 @@ pub struct Candidate {
     pub robot: Robot,
     /// Root mean square held-out error, mm; `None` where it was not judged.
     pub held_out_mm: Option<f64>,
+    /// Squared held-out errors by row, mm^2.
+    held_out: Vec<(usize, f64)>,
 }
 
 /// A rung of the ladder of terms, or a model, and how it did.
@@ -163,7 +162,15 @@ impl Session<'_> {
         }
         let offsets = prepared.fit().offsets(&solution.x);
         let robot = self.robot.shifted(prepared.parameters(), &offsets);
-        Ok(Candidate { method, model: choice.model, prepared, solution, robot, held_out_mm: None })
+        Ok(Candidate {
+            method,
+            model: choice.model,
+            prepared,
+            solution,
+            robot,
+            held_out_mm: None,
+            held_out: Vec::new(),
+        })
     }
 
     /// Fits without the rows that fit far worse than the rest, until none does. At most a tenth of the rows go.
@@ -173,8 +180,7 @@ impl Session<'_> {
         let sigmas = self.settings.outlier_sigmas;
         while sigmas > 0.0 && outliers.len() < most {
             let prepared = self.prepare(choice, &self.rows)?;
-            let robot =
-                self.robot.shifted(prepared.parameters(), &prepared.fit().offsets(&prepared.free_fit.x));
+            let robot = self.robot.shifted(prepared.parameters(), &prepared.fit().offsets(&prepared.free_fit.x));
             let scatter = prepared.estimate.scatter;
             let mut sizes: Vec<(usize, f64)> = self
                 .errors(&robot, &self.rows, &self.rows, scatter)
@@ -285,7 +291,8 @@ impl Session<'_> {
             if let Some((fitted, held)) = &fold
                 && let Ok(partial) = self.run(choice, method, fitted)
             {
-                candidate.held_out_mm = root_mean(&self.scores(&partial.robot, fitted, held));
+                candidate.held_out = self.scores(&partial.robot, fitted, held);
+                candidate.held_out_mm = root_mean(&candidate.held_out);
             }
             candidates.push(candidate);
         }
@@ -316,8 +323,14 @@ fn clearly_less(new: &[(usize, f64)], old: &[(usize, f64)]) -> bool {
     gains.mean() > standard_error
 }
 
-/// The candidate with the least held-out error; the first of equals, and the first where none was judged.
+/// The first candidate that none beats by more than chance: the one of least held-out error, or a cheaper one whose
+/// errors differ from it by less than their paired standard error. Solvers of one problem mostly agree to rounding.
 fn best(candidates: &[Candidate]) -> usize {
-    let least = candidates.iter().filter_map(|c| c.held_out_mm).fold(f64::INFINITY, f64::min);
-    candidates.iter().position(|c| c.held_out_mm.is_some_and(|e| e <= least * (1.0 + EQUAL))).unwrap_or(0)
+    let judged = |c: &&Candidate| c.held_out_mm.is_some();
+    let least = candidates.iter().filter(judged).min_by(|a, b| {
+        let error = |c: &Candidate| c.held_out_mm.unwrap_or(f64::INFINITY);
+        error(a).total_cmp(&error(b))
+    });
+    let Some(least) = least else { return 0 };
+    candidates.iter().position(|c| c.held_out_mm.is_some() && !clearly_less(&least.held_out, &c.held_out)).unwrap_or(0)
 }

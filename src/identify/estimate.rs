@@ -97,15 +97,17 @@ impl Estimate {
         let mut precision = Vec::new();
         for block in &self.blocks {
             match block {
-                Block::Center { lengths, .. } => precision.extend(
-                    lengths.iter().map(|l| 1.0 / (l.variance_mm2 + 2.0 * self.scatter.point_mm.powi(2))),
-                ),
+                Block::Center { lengths, .. } => precision
+                    .extend(lengths.iter().map(|l| 1.0 / (l.variance_mm2 + 2.0 * self.scatter.point_mm.powi(2)))),
                 Block::Wire { lengths, .. } => {
                     precision.extend(lengths.iter().map(|l| 1.0 / (l.variance_mm2 + self.scatter.point_mm.powi(2))));
                 }
-                Block::Frames { placements, .. } => precision.extend(placements.iter().flatten().map(|s| {
-                    1.0 / (s.covariance_mm2.trace() / 3.0 + self.scatter.point_mm.powi(2))
-                })),
+                Block::Frames { placements, .. } => precision.extend(
+                    placements
+                        .iter()
+                        .flatten()
+                        .map(|s| 1.0 / (s.covariance_mm2.trace() / 3.0 + self.scatter.point_mm.powi(2))),
+                ),
                 Block::Pairwise(_) => precision.push(1.0 / self.scatter.point_mm.powi(2).max(f64::MIN_POSITIVE)),
             }
         }
@@ -200,7 +202,12 @@ impl Inputs<'_> {
         let chunks = spots.len().div_ceil(CHUNK).max(1);
         // Every chunk takes every so-manieth pose, so that each spans the group.
         let chunk = |k: usize| spots.iter().skip(k).step_by(chunks).cloned().collect::<Vec<_>>();
-        (0..chunks).map(chunk).filter(|c| c.len() > 2).filter_map(|c| Pairs::new(c, &self.scatter)).map(Block::Pairwise).collect()
+        (0..chunks)
+            .map(chunk)
+            .filter(|c| c.len() > 2)
+            .filter_map(|c| Pairs::new(c, &self.scatter))
+            .map(Block::Pairwise)
+            .collect()
     }
 
     fn frames(&self, oriented: bool) -> Option<Block> {
@@ -214,7 +221,8 @@ impl Inputs<'_> {
         }
         let start = |spots: &Vec<Spot>| fitted_frame(spots.iter().map(|s| (self.places[s.pose].point_mm, s.point_mm)));
         let sensor_from_base: Vec<Transform> = placements.iter().map(start).collect();
-        let flange_from_target = if oriented { mean_target(&placements, &sensor_from_base, self.places) } else { Matrix3::identity() };
+        let flange_from_target =
+            if oriented { mean_target(&placements, &sensor_from_base, self.places) } else { Matrix3::identity() };
         Some(Block::Frames { placements, sensor_from_base, flange_from_target, oriented })
     }
 }
@@ -259,9 +267,14 @@ fn mean_target(placements: &[Vec<Spot>], frames: &[Transform], places: &[Place])
 fn first_anchor(places: &[Place], lengths: &[Length]) -> Anchor {
     let n = lengths.len();
     let mean = lengths.iter().map(|l| places[l.pose].point_mm.coords).sum::<nalgebra::Vector3<f64>>() / n.max(1) as f64;
-    let design = DMatrix::from_fn(n, 4, |r, c| {
-        if c < 3 { 2.0 * (places[lengths[r].pose].point_mm.coords - mean)[c] } else { 1.0 }
-    });
+    let design =
+        DMatrix::from_fn(
+            n,
+            4,
+            |r, c| {
+                if c < 3 { 2.0 * (places[lengths[r].pose].point_mm.coords - mean)[c] } else { 1.0 }
+            },
+        );
     let rhs = DVector::from_fn(n, |r, _| {
         (places[lengths[r].pose].point_mm.coords - mean).norm_squared() - lengths[r].length_mm.powi(2)
     });

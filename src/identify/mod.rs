@@ -38,7 +38,9 @@ pub use settings::{Method, Model, Settings};
 #[non_exhaustive]
 pub enum Error {
     /// No row can be fitted.
-    #[error("none of the {rows} rows can be fitted ({skipped} have no usable reading); rows of role `sample` are needed")]
+    #[error(
+        "none of the {rows} rows can be fitted ({skipped} have no usable reading); rows of role `sample` are needed"
+    )]
     NoSamples {
         /// Rows in the file.
         rows: usize,

@@ -33,17 +33,22 @@ impl Pairs {
     /// Of the points of one chunk; `None` where they coincide.
     pub fn new(spots: Vec<Spot>, scatter: &Scatter) -> Option<Pairs> {
         let n = spots.len();
-        let colour: Vec<Matrix3<f64>> =
-            spots.iter().map(|s| whitener(&s.covariance_mm2, scatter).try_inverse().unwrap_or_else(Matrix3::identity)).collect();
+        let colour: Vec<Matrix3<f64>> = spots
+            .iter()
+            .map(|s| whitener(&s.covariance_mm2, scatter).try_inverse().unwrap_or_else(Matrix3::identity))
+            .collect();
         let (mut directions, mut lengths_mm) = (Vec::new(), Vec::new());
         let mut normal = DMatrix::<f64>::zeros(3 * n, 3 * n);
         for a in 0..n {
             for b in a + 1..n {
                 let (u, length) = direction(&(spots[a].point_mm - spots[b].point_mm));
                 let (row_a, row_b) = (colour[a].tr_mul(&u), colour[b].tr_mul(&u));
-                for (i, j, sign, left, right) in
-                    [(a, a, 1.0, row_a, row_a), (b, b, 1.0, row_b, row_b), (a, b, -1.0, row_a, row_b), (b, a, -1.0, row_b, row_a)]
-                {
+                for (i, j, sign, left, right) in [
+                    (a, a, 1.0, row_a, row_a),
+                    (b, b, 1.0, row_b, row_b),
+                    (a, b, -1.0, row_a, row_b),
+                    (b, a, -1.0, row_b, row_a),
+                ] {
                     let mut view = normal.fixed_view_mut::<3, 3>(3 * i, 3 * j);
                     view += sign * left * right.transpose();
                 }

@@ -125,7 +125,13 @@ impl Prepared {
     }
 }
 
-fn prior_rows(tolerance: &Tolerance, base: &Base, parameters: &[Parameter], settings: &Settings, first: bool) -> DMatrix<f64> {
+fn prior_rows(
+    tolerance: &Tolerance,
+    base: &Base,
+    parameters: &[Parameter],
+    settings: &Settings,
+    first: bool,
+) -> DMatrix<f64> {
     if settings.prior == Prior::Off && !first {
         return DMatrix::zeros(0, base.rank());
     }
@@ -158,7 +164,8 @@ fn effective(estimate: &Estimate, fit: &Fit, x: &[f64], prior: &DMatrix<f64>) ->
 /// and orientations apart.
 fn scatter(estimate: &Estimate, offsets: &[f64], effective: f64) -> Scatter {
     let raw = estimate.raw(offsets);
-    let turns: Vec<f64> = raw.iter().filter_map(|(_, r)| if let Raw::Turn(t) = r { Some(t.norm_squared()) } else { None }).collect();
+    let turns: Vec<f64> =
+        raw.iter().filter_map(|(_, r)| if let Raw::Turn(t) = r { Some(t.norm_squared()) } else { None }).collect();
     let lost = estimate.count() as f64;
     let total: f64 = raw.iter().map(|(_, r)| if matches!(r, Raw::Length(..)) { 1.0 } else { 3.0 }).sum();
     // Each number loses the same share to parameters and placements.

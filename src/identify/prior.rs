@@ -52,7 +52,8 @@ impl Tolerance {
     /// Covariance of the base parameters: their own, and what they stand for.
     pub fn covariance(&self, base: &Base, parameters: &[Parameter]) -> DMatrix<f64> {
         let variance = |i: &usize| self.of(parameters[*i]).powi(2);
-        let mut covariance = DMatrix::from_diagonal(&DVector::from_iterator(base.free.len(), base.free.iter().map(variance)));
+        let mut covariance =
+            DMatrix::from_diagonal(&DVector::from_iterator(base.free.len(), base.free.iter().map(variance)));
         let others = DVector::from_iterator(base.dependent.len(), base.dependent.iter().map(variance));
         covariance += &base.coefficients * DMatrix::from_diagonal(&others) * base.coefficients.transpose();
         covariance
@@ -67,7 +68,12 @@ impl Tolerance {
 
     /// The tolerance of greatest evidence for data that are linear in the base parameters: `residuals` at offset zero and
     /// `jacobian`, both white.
-    pub fn from_evidence(base: &Base, parameters: &[Parameter], residuals: &DVector<f64>, jacobian: &DMatrix<f64>) -> Tolerance {
+    pub fn from_evidence(
+        base: &Base,
+        parameters: &[Parameter],
+        residuals: &DVector<f64>,
+        jacobian: &DMatrix<f64>,
+    ) -> Tolerance {
         let normal = jacobian.tr_mul(jacobian);
         let gradient = jacobian.tr_mul(residuals);
         let score = |t: &Tolerance| evidence(&t.covariance(base, parameters), &normal, &gradient);

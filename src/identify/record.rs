@@ -212,10 +212,17 @@ impl Record {
             list.push(format!("left out because they fit far worse than the rest: {}", self.outliers.join(", ")));
         }
         if !self.skipped.is_empty() {
-            list.push(format!("{} rows have no usable reading, first {} ({})", self.skipped.len(), self.skipped[0].pose, self.skipped[0].reason));
+            list.push(format!(
+                "{} rows have no usable reading, first {} ({})",
+                self.skipped.len(),
+                self.skipped[0].pose,
+                self.skipped[0].reason
+            ));
         }
         if set.split_here {
-            list.push("the file has no verify rows: a fifth of the samples, drawn from the seed, was held out".to_owned());
+            list.push(
+                "the file has no verify rows: a fifth of the samples, drawn from the seed, was held out".to_owned(),
+            );
         }
         let worse = |before: &Spread, after: &Spread| match (before.mean_abs_mm, after.mean_abs_mm) {
             (Some(before), Some(after)) if after > before => Some((before, after)),

@@ -89,7 +89,8 @@ pub fn solve(problem: &dyn Problem, start: &[f64], settings: &Settings) -> Solut
                     None
                 };
             }
-            if predicted <= settings.reduction * cost {
+            // A step cut at a wall may predict a rise; that asks for a smaller radius, not for the end.
+            if predicted >= 0.0 && predicted <= settings.reduction * cost {
                 break Some(Stop::SmallReduction);
             }
             if radius <= settings.step * scaled_norm(&x, &scale).max(1e-3) {
@@ -203,11 +204,12 @@ fn more_step(jacobian: DMatrix<f64>, residuals: &DVector<f64>, radius: f64) -> D
     let s = &svd.singular_values;
     let projected = u.tr_mul(&rhs);
     let threshold = s.max() * f64::EPSILON * n as f64;
-    let coefficients = |lambda: f64| {
-        DVector::from_fn(s.len(), |i, _| {
-            if s[i] <= threshold { 0.0 } else { -s[i] * projected[i] / (s[i] * s[i] + lambda) }
-        })
-    };
+    let coefficients =
+        |lambda: f64| {
+            DVector::from_fn(s.len(), |i, _| {
+                if s[i] <= threshold { 0.0 } else { -s[i] * projected[i] / (s[i] * s[i] + lambda) }
+            })
+        };
     let mut lambda = 0.0;
     let mut y = coefficients(0.0);
     if y.norm() > radius {
@@ -283,7 +285,8 @@ mod tests {
     }
 
     fn helical_valley(x: &[f64]) -> Vec<f64> {
-        let theta = x[1].atan2(x[0]) / (2.0 * std::f64::consts::PI);
+        // MINPACK's branch, smooth across the start at (-1, 0, 0).
+        let theta = (x[1] / x[0]).atan() / std::f64::consts::TAU + if x[0] < 0.0 { 0.5 } else { 0.0 };
         vec![10.0 * (x[2] - 10.0 * theta), 10.0 * (x[0].hypot(x[1]) - 1.0), x[2]]
     }
 

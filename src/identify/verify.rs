@@ -77,7 +77,14 @@ impl RowError {
 }
 
 /// Errors of `rows`, the sensor placed by `fitted`. Rows of groups that cannot be placed are left out.
-pub fn errors(set: &Dataset, robot: &Robot, fitted: &[usize], rows: &[usize], scatter: Scatter, wire_offset: bool) -> Vec<RowError> {
+pub fn errors(
+    set: &Dataset,
+    robot: &Robot,
+    fitted: &[usize],
+    rows: &[usize],
+    scatter: Scatter,
+    wire_offset: bool,
+) -> Vec<RowError> {
     match set.kind {
         Kind::Positions => position_errors(set, robot, fitted, rows, scatter),
         Kind::Distances => distance_errors(set, robot, fitted, rows, scatter, wire_offset),

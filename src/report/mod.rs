@@ -1,6 +1,7 @@
 //! What people look at: tables for the terminal, figures and HTML pages. Computes no metric of its own.
 
 pub mod figure;
+pub mod identify;
 pub mod page;
 pub mod table;
 

@@ -24,9 +24,11 @@ pub fn solve(problem: &dyn Problem, settings: &SwarmSettings, seed: u64) -> Solu
     let half = |at: usize| joint.chunks(2 * n).flat_map(move |p| p[at..at + n].to_vec());
     let draws: Vec<f64> = half(0).chain(half(n)).collect();
     let mut swarm = Swarm::start(problem, settings, Pcg64::seed_from_u64(seed), &draws);
-    swarm.run(|swarm, history| {
-        if stagnant(history, settings) { swarm.choose(history.len()) } else { swarm.advance(Method::Pso) }
-    })
+    swarm.run(
+        |swarm, history| {
+            if stagnant(history, settings) { swarm.choose(history.len()) } else { swarm.advance(Method::Pso) }
+        },
+    )
 }
 
 fn stagnant(history: &[f64], settings: &SwarmSettings) -> bool {

@@ -1,0 +1,171 @@
+//! The tables and the page of `identify`.
+
+use maud::{Markup, html};
+
+use super::figure::Plot;
+use super::page::{self, Tone};
+use super::table::{Table, number};
+use crate::error::Result;
+use crate::identify::dataset::Dataset;
+use crate::identify::record::{MethodRecord, PointSpread, Record};
+use crate::identify::verify::{RowError, Spread};
+
+/// What goes to stdout: before and after, method by method.
+pub fn summary(record: &Record) -> String {
+    let verify = &record.before.verify;
+    let mut table = Table::new(["verification distances, mm", "mean", "std", "max", "min", "better by"]);
+    table.row(distance_row("before", &verify.distance, None));
+    for method in &record.methods {
+        let name = format!("{}/{}", method.name, method.model);
+        let mark = if name == record.chosen { " *" } else { "" };
+        table.row(distance_row(&format!("{name}{mark}"), &method.verify.distance, Some(&verify.distance)));
+    }
+    let i = &record.identifiability;
+    let mut text = table.to_string();
+    text.push_str(&format!(
+        "\n* kept, by its error on samples held out. {}: {} of {} parameters determined, condition {}\n",
+        record.terms,
+        i.rank,
+        i.parameters,
+        number(i.condition, 0)
+    ));
+    if let (Some(before), Some(after)) = (&verify.point, record.chosen_method().and_then(|m| m.verify.point.as_ref())) {
+        text.push_str(&format!(
+            "position error of the verify rows, mean: {} -> {} mm\n",
+            number(before.mean_abs_mm, 4),
+            number(after.mean_abs_mm, 4)
+        ));
+    }
+    text
+}
+
+fn distance_row(name: &str, spread: &Spread, before: Option<&Spread>) -> Vec<String> {
+    let gain = match (before.and_then(|b| b.mean_abs_mm), spread.mean_abs_mm) {
+        (Some(before), Some(after)) if before > 0.0 => format!("{:.1} %", 100.0 * (1.0 - after / before)),
+        _ => String::new(),
+    };
+    let figures = [spread.mean_abs_mm, spread.std_mm, spread.max_abs_mm, spread.min_abs_mm];
+    let mut row = vec![name.to_owned()];
+    row.extend(figures.map(|f| number(f, 4)));
+    row.push(gain);
+    row
+}
+
+/// The page. `before` and `after` are the errors of the verify rows under the nominal and the identified robot.
+pub fn page(set: &Dataset, record: &Record, before: &[RowError], after: &[RowError]) -> Result<String> {
+    let lead = format!(
+        "{} poses in {} groups, {} to verify; {} kept, seed {}",
+        set.poses.len(),
+        set.groups.len(),
+        set.verify_rows().len(),
+        record.chosen,
+        record.seed
+    );
+    let content = html! {
+        (verdict(record))
+        (page::warnings(&record.warnings))
+        h2 { "Verification" }
+        (verification_figure(before, after)?)
+        (verification_table(record))
+        h2 { "Parameters" }
+        (parameter_table(record))
+        h2 { "What the poses determine" }
+        (rank_table(record))
+        h2 { "Convergence" }
+        (convergence_figure(record)?)
+    };
+    Ok(page::page("Identification", &lead, &content))
+}
+
+fn verdict(record: &Record) -> Markup {
+    let before = record.before.verify.distance.mean_abs_mm;
+    let after = record.chosen_method().and_then(|m| m.verify.distance.mean_abs_mm);
+    let tone = match (before, after) {
+        (Some(before), Some(after)) if after < before => Tone::Good,
+        (Some(_), Some(_)) => Tone::Bad,
+        _ => Tone::Doubtful,
+    };
+    let headline = format!("mean distance error {} mm before, {} mm after", number(before, 4), number(after, 4));
+    page::verdict(tone, &headline, "on rows that took no part in the fit or in any choice")
+}
+
+fn verification_figure(before: &[RowError], after: &[RowError]) -> Result<Markup> {
+    let series = |errors: &[RowError]| -> Vec<(f64, f64)> {
+        errors.iter().enumerate().filter_map(|(i, e)| Some(((i + 1) as f64, e.distance_mm?.abs()))).collect()
+    };
+    let svg = Plot::new("Distance errors of the verify rows", "verify row", "absolute error, mm")
+        .points("before", &series(before))
+        .points("after", &series(after))
+        .svg()?;
+    Ok(page::figure(
+        &svg,
+        "Fig. 9 of the paper: each verification distance before and after. Points of `after` that stay as high as `before` \
+         are poses that the model cannot explain.",
+    ))
+}
+
+fn verification_table(record: &Record) -> Markup {
+    let row = |name: &str, s: &PointSpread| {
+        let mut row = distance_row(name, &s.distance, Some(&record.before.verify.distance));
+        row.push(number(s.point.and_then(|p| p.mean_abs_mm), 4));
+        row.push(number(s.point.and_then(|p| p.max_abs_mm), 4));
+        row
+    };
+    let mut rows = vec![row("before", &record.before.verify)];
+    rows.extend(record.methods.iter().map(|m| row(&format!("{}/{}", m.name, m.model), &m.verify)));
+    page::table(&["distances, mm", "mean", "std", "max", "min", "better by", "point mean", "point max"], &rows)
+}
+
+fn parameter_table(record: &Record) -> Markup {
+    let Some(method) = record.chosen_method() else { return html! {} };
+    let row = |p: &crate::identify::record::ParameterRecord| {
+        let state = match (p.identifiable, p.at_bound) {
+            (false, _) => "stays nominal",
+            (true, true) => "at the wall",
+            (true, false) => "",
+        };
+        vec![
+            p.name.clone(),
+            p.unit.to_owned(),
+            number(Some(p.nominal), 4),
+            number(Some(p.delta), 4),
+            number(p.sigma, 4),
+            state.to_owned(),
+        ]
+    };
+    let rows: Vec<Vec<String>> = method.parameters.iter().map(row).collect();
+    page::table(&["parameter", "unit", "nominal", "correction", "sigma", ""], &rows)
+}
+
+fn rank_table(record: &Record) -> Markup {
+    let i = &record.identifiability;
+    let list = |names: &[String]| if names.is_empty() { "none".to_owned() } else { names.join("; ") };
+    let mut rows = vec![
+        vec!["rank".to_owned(), format!("{} of {}", i.rank, i.parameters)],
+        vec!["not seen at all".to_owned(), list(&i.zero)],
+        vec!["seen only together".to_owned(), list(&i.dependent)],
+        vec!["hardly seen".to_owned(), list(&i.weak)],
+        vec!["condition".to_owned(), number(i.condition, 1)],
+    ];
+    if let Some(o) = &i.observability {
+        for (name, value) in [("O1", o.o1), ("O2", o.o2), ("O3", o.o3), ("O4", o.o4), ("O5", o.o5)] {
+            rows.push(vec![name.to_owned(), format!("{value:.3e}")]);
+        }
+    }
+    page::table(&["", ""], &rows)
+}
+
+fn convergence_figure(record: &Record) -> Result<Markup> {
+    let model = record.chosen_method().map_or("", |m| m.model);
+    let series = |m: &MethodRecord| -> Vec<(f64, f64)> {
+        m.history.iter().enumerate().filter(|(_, c)| **c > 0.0).map(|(i, &c)| (i as f64, c)).collect()
+    };
+    let mut plot = Plot::new("Best cost by iteration", "iteration", "cost, mm²").log_y();
+    for method in record.methods.iter().filter(|m| m.model == model) {
+        plot = plot.line(method.name, &series(method));
+    }
+    Ok(page::figure(
+        &plot.svg()?,
+        "Fig. 8 of the paper: lines that end above the lowest one have stopped short of the minimum.",
+    ))
+}
