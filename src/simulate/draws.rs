@@ -28,6 +28,8 @@ pub enum Purpose {
     Points = 9,
     /// Gear harmonics, gravity and parallel axes.
     Effects = 10,
+    /// Roughness of what stands behind.
+    Texture = 11,
 }
 
 /// A stream of draws.

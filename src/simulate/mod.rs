@@ -1,5 +1,6 @@
 //! The truth that everything else is tested against: a rig, boards, a robot with hidden errors, and their pictures.
 
+pub mod backdrop;
 pub mod check_poses;
 pub mod clutter;
 pub mod coverage;

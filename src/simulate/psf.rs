@@ -53,11 +53,12 @@ const STEPS: usize = 32;
 impl Taps {
     /// The pixel's box spread by a Gaussian.
     ///
-    /// Cell means in place of the scene widen the result by two boxes of a cell, of variance 1/12 cell^2 each;
-    /// the Gaussian gives that variance up, so that the mean over all positions of an edge within a cell is right.
-    pub fn gaussian(sigma_px: f64) -> Taps {
+    /// Cell means in place of the scene widen the result by two boxes of a cell, of variance 1/12 cell^2 each, and a
+    /// [`Spot`] on cells by one more; the Gaussian gives the variance of so many `boxes` up, so that the mean over all
+    /// positions of an edge within a cell is right.
+    pub fn gaussian(sigma_px: f64, boxes: usize) -> Taps {
         let cell = 1.0 / FINE as f64;
-        let variance = sigma_px * sigma_px - cell * cell / 6.0;
+        let variance = sigma_px * sigma_px - boxes as f64 * cell * cell / 12.0;
         let sigma = variance.max(0.0).sqrt();
         let reach = (REACH * sigma / cell).ceil() as isize;
         let first = -reach;
@@ -88,6 +89,90 @@ impl Taps {
     }
 }
 
+/// Points of the pupil that make a spot. They lie in a sunflower's pattern, each with its opposite.
+const PUPIL_POINTS: usize = 8192;
+
+/// The pupil's points, in a unit disc.
+pub fn pupil() -> Vec<(f32, f32)> {
+    let half = PUPIL_POINTS / 2;
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    (0..half)
+        .flat_map(|k| {
+            let radius = ((k as f64 + 0.5) / half as f64).sqrt();
+            let (sin, cos) = (k as f64 * golden).sin_cos();
+            let (x, y) = ((radius * cos) as f32, (radius * sin) as f32);
+            [(x, y), (-x, -y)]
+        })
+        .collect()
+}
+
+/// Where the rays of one scene point land, as weights on fine cells: what is not Gaussian in the lens.
+///
+/// A ray through the pupil at `(rho cos t, rho sin t)` lands at `R rho (cos t, sin t) + B rho^2 (2 + cos 2t, sin 2t)`:
+/// a disc of radius R out of focus, a comatic flare of length 3 B along the field. The chief ray (rho = 0) stays at
+/// the point's true place, so a flare moves the centroid of light: that is what coma does to a measurement.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Spot {
+    /// Cells from the centre to each side.
+    pub reach: usize,
+    /// Weights, `2 reach + 1` rows and columns; their sum is 1.
+    pub weights: Vec<f32>,
+}
+
+impl Spot {
+    /// Largest reach for a blur disc and a flare of these sizes, px, in cells.
+    pub fn reach_cells(disc_px: f64, flare_px: f64) -> usize {
+        ((disc_px + flare_px) * FINE as f64 + 0.5).ceil() as usize
+    }
+
+    /// The spot for a blur disc of a radius and a flare along `(x, y)`, all px.
+    pub fn new(pupil: &[(f32, f32)], disc_px: f64, flare_px: (f64, f64)) -> Spot {
+        let reach = Spot::reach_cells(disc_px, flare_px.0.hypot(flare_px.1));
+        let side = 2 * reach + 1;
+        let mut weights = vec![0.0; side * side];
+        let each = 1.0 / pupil.len() as f32;
+        let scale = FINE as f32;
+        let disc = disc_px as f32 * scale;
+        let (fx, fy) = (flare_px.0 as f32 * scale / 3.0, flare_px.1 as f32 * scale / 3.0);
+        let middle = reach as f32 + 0.5;
+        for &(u, v) in pupil {
+            // rho^2 (2 + cos 2t, sin 2t) with u, v along and across the field.
+            let (along, across) = (3.0 * u * u + v * v, 2.0 * u * v);
+            let x = disc * u + fx * along - fy * across + middle;
+            let y = disc * v + fy * along + fx * across + middle;
+            let (i, j) = (x.max(0.0) as usize, y.max(0.0) as usize);
+            weights[j.min(side - 1) * side + i.min(side - 1)] += each;
+        }
+        Spot { reach, weights }
+    }
+
+    /// Spreads a square of `side` cells; what lies within `reach` of its border is left as it is.
+    pub fn spread(&self, cells: &[f32], side: usize, out: &mut [f32]) {
+        out.copy_from_slice(cells);
+        let (reach, width) = (self.reach, 2 * self.reach + 1);
+        if side <= 2 * reach {
+            return;
+        }
+        let inner = side - 2 * reach;
+        for y in reach..side - reach {
+            let line = &mut out[y * side + reach..][..inner];
+            line.fill(0.0);
+            for (j, row) in self.weights.chunks_exact(width).enumerate() {
+                // Light from the cell at -offset lands here.
+                let from = &cells[(y + reach - j) * side..][..side];
+                for (i, &weight) in row.iter().enumerate() {
+                    if weight != 0.0 {
+                        let source = &from[2 * reach - i..][..inner];
+                        for (value, cell) in line.iter_mut().zip(source) {
+                            *value += weight * cell;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,7 +180,7 @@ mod tests {
     #[test]
     fn taps_keep_the_light_and_the_variance() {
         for sigma in [0.3, 0.7, 1.5] {
-            let taps = Taps::gaussian(sigma);
+            let taps = Taps::gaussian(sigma, 2);
             let sum: f32 = taps.weights.iter().sum();
             assert!((sum - 1.0).abs() < 1e-6);
             let middle = FINE as f64 / 2.0;
@@ -120,5 +205,38 @@ mod tests {
         let defocus = Defocus { pupil_mm: 2.0, focus_mm: 525.0 };
         assert_eq!(defocus.radius_px(525.0, 10_000.0), 0.0);
         assert!(defocus.radius_px(425.0, 10_000.0) > defocus.radius_px(625.0, 10_000.0));
+    }
+
+    #[test]
+    fn a_disc_is_centred_and_a_flare_points_along_the_field() {
+        let pupil = pupil();
+        let centroid = |spot: &Spot| {
+            let width = 2 * spot.reach + 1;
+            let at = |k: usize| (k as f64 - spot.reach as f64) / FINE as f64;
+            let sum = |f: &dyn Fn(usize, usize) -> f64| -> f64 {
+                spot.weights.iter().enumerate().map(|(k, &w)| f64::from(w) * f(k % width, k / width)).sum()
+            };
+            (sum(&|_, _| 1.0), sum(&|i, _| at(i)), sum(&|_, j| at(j)), sum(&|i, j| at(i).powi(2) + at(j).powi(2)))
+        };
+        let (total, x, y, spread) = centroid(&Spot::new(&pupil, 1.3, (0.0, 0.0)));
+        assert!((total - 1.0).abs() < 1e-5 && x.abs() < 1e-4 && y.abs() < 1e-4, "{total} {x} {y}");
+        // A disc's second moment is R^2 / 2; cells add 1/12 of their side squared each way.
+        assert!((spread - (1.3f64.powi(2) / 2.0 + 1.0 / 96.0)).abs() < 0.005, "{spread}");
+        // The flare's centroid: 2 B <rho^2> = B, a third of its length.
+        let (_, x, y, _) = centroid(&Spot::new(&pupil, 0.0, (0.9, -1.2)));
+        assert!((x - 0.3).abs() < 0.01 && (y + 0.4).abs() < 0.01, "{x} {y}");
+    }
+
+    #[test]
+    fn a_spot_lands_on_the_side_it_points_to() {
+        let spot = Spot::new(&pupil(), 0.0, (0.75, 0.0));
+        let side = 21;
+        let mut cells = vec![0.0; side * side];
+        cells[10 * side + 10] = 1.0;
+        let mut out = cells.clone();
+        spot.spread(&cells, side, &mut out);
+        let right: f32 = (11..side).map(|i| out[10 * side + i]).sum();
+        let left: f32 = (0..10).map(|i| out[10 * side + i]).sum();
+        assert!(right > 0.1 && left == 0.0, "{right} {left}");
     }
 }

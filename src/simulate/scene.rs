@@ -2,6 +2,7 @@
 
 use nalgebra::{Point2, Point3};
 
+use super::backdrop::Backdrop;
 use super::outline::{self, Outline};
 use super::physical_board::PhysicalBoard;
 use super::psf::Optics;
@@ -14,11 +15,19 @@ use crate::stereo::Camera;
 pub struct Tone {
     /// Reflectance.
     pub value: f64,
-    /// Change along the patch's x over its whole picture, as a share.
+    /// Change across its whole extent in the picture, along x and y, as a share.
     pub slope: (f64, f64),
 }
 
 impl Tone {
+    /// Brightness at picture point (0, 0) and its change per px along x and y, for a surface with this outline.
+    pub fn across(&self, outline: &Outline) -> (f64, f64, f64) {
+        let size = (outline.high - outline.low).map(|v| v.max(1.0));
+        let (along_x, along_y) = (self.value * self.slope.0 / size.x, self.value * self.slope.1 / size.y);
+        let middle = nalgebra::center(&outline.low, &outline.high);
+        (self.value - along_x * middle.x - along_y * middle.y, along_x, along_y)
+    }
+
     /// The same everywhere.
     pub fn flat(value: f64) -> Tone {
         Tone { value, slope: (0.0, 0.0) }
@@ -64,10 +73,8 @@ pub struct Scene<'a> {
     pub print: Print,
     /// What carries the board, in the board's frame, from behind to before.
     pub holder: &'a [Patch],
-    /// What stands behind, in the left camera's frame, from far to near.
-    pub clutter: &'a [Patch],
-    /// Where the camera stands in the rig.
-    pub camera_from_left: Transform,
+    /// What stands behind.
+    pub backdrop: &'a Backdrop,
     /// The light.
     pub lighting: Lighting,
     /// The sensor.
@@ -88,14 +95,11 @@ pub struct Layer {
 }
 
 impl Scene<'_> {
-    /// All layers, from behind to before, as this camera sees them.
+    /// All layers in front of the backdrop, from behind to before, as this camera sees them.
     pub fn layers(&self) -> Vec<Layer> {
         let mut layers = Vec::new();
-        for patch in self.clutter {
-            layers.extend(self.patch_layer(&self.camera_from_left, patch));
-        }
         for patch in self.holder {
-            layers.extend(self.patch_layer(&self.camera_from_board, patch));
+            layers.extend(self.patch_layer(patch));
         }
         let (w, h) = self.board.plate_half_mm();
         layers.extend(self.plate_layer(w + self.print.rim_mm, h + self.print.rim_mm, self.print.rim));
@@ -135,15 +139,12 @@ impl Scene<'_> {
         Layer { outlines, tone: (self.print.black, 0.0, 0.0) }
     }
 
-    fn patch_layer(&self, camera_from_parent: &Transform, patch: &Patch) -> Option<Layer> {
-        let camera_from_patch = camera_from_parent * patch.parent_from_patch;
+    fn patch_layer(&self, patch: &Patch) -> Option<Layer> {
+        let camera_from_patch = self.camera_from_board * patch.parent_from_patch;
         let lift = |p: Point2<f64>| camera_from_patch * Point3::new(p.x, p.y, 0.0);
         let outline = outline::project(&self.camera, &patch.corners_mm, &lift)?;
-        let size = (outline.high - outline.low).map(|v| v.max(1.0));
-        let slope = (patch.tone.value * patch.tone.slope.0 / size.x, patch.tone.value * patch.tone.slope.1 / size.y);
-        let middle = nalgebra::center(&outline.low, &outline.high);
-        let at_zero = patch.tone.value - slope.0 * middle.x - slope.1 * middle.y;
-        Some(Layer { outlines: vec![outline], tone: (at_zero, slope.0, slope.1) })
+        let tone = patch.tone.across(&outline);
+        Some(Layer { outlines: vec![outline], tone })
     }
 
     /// True places of all inner corners in the raw picture, row by row, px.

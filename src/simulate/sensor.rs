@@ -3,6 +3,7 @@
 use nalgebra::Point2;
 
 use super::draws::{Draws, NormalTable, Purpose};
+use crate::stereo::Camera;
 
 /// How the light falls. Everything here is smooth over the whole picture and applied after the lens's spread.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,11 +18,26 @@ pub struct Lighting {
 
 impl Lighting {
     /// Light at a picture point, as a share of the sensor's range for reflectance 1.
-    pub fn at(&self, px: &Point2<f64>, width: u32, height: u32) -> f64 {
-        let (half_w, half_h) = (f64::from(width) / 2.0, f64::from(height) / 2.0);
-        let (u, v) = ((px.x + 0.5) / half_w - 1.0, (px.y + 0.5) / half_h - 1.0);
-        let falloff = 1.0 - self.vignetting * 0.5 * (u * u + v * v);
-        self.exposure * falloff * (1.0 + self.gradient.0 * u + self.gradient.1 * v)
+    pub fn at(&self, px: &Point2<f64>, camera: &Camera) -> f64 {
+        let mut row = [1.0];
+        self.shine(&mut row, px.x, px.y, camera);
+        f64::from(row[0])
+    }
+
+    /// Multiplies reflectances of a row of pixels that starts at `(x, y)` px by the light there.
+    pub fn shine(&self, row: &mut [f32], x: f64, y: f64, camera: &Camera) {
+        let per_px = 2.0 / f64::from(camera.width);
+        let u0 = ((x + 0.5) * per_px - 1.0) as f32;
+        let v = (y + 0.5) * 2.0 / f64::from(camera.height) - 1.0;
+        let loss = (0.5 * self.vignetting) as f32;
+        let at_row = (1.0 - 0.5 * self.vignetting * v * v) as f32;
+        let level = (self.exposure * (1.0 + self.gradient.1 * v)) as f32;
+        let along = (self.exposure * self.gradient.0) as f32;
+        let per_px = per_px as f32;
+        for (k, value) in row.iter_mut().enumerate() {
+            let u = u0 + k as f32 * per_px;
+            *value *= (at_row - loss * u * u) * (level + along * u);
+        }
     }
 }
 

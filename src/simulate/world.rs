@@ -5,6 +5,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use nalgebra::{Point2, Point3, Vector3};
 use rayon::prelude::*;
 
+use super::backdrop::Backdrop;
 use super::check_poses;
 use super::clutter;
 use super::draws::{Draws, NormalTable, Purpose};
@@ -21,7 +22,7 @@ use crate::geometry::Transform;
 use crate::imaging::{Corner, Corners, PairCorners, corners::Side};
 use crate::progress;
 use crate::robot::Robot;
-use crate::stereo::Rig;
+use crate::stereo::{Camera, Rig};
 
 /// A world whose every number is known.
 #[derive(Debug, Clone)]
@@ -94,12 +95,30 @@ impl World {
         check.chain(poses).collect()
     }
 
-    /// The scene of one side of a pair. `clutter` is what stands behind at that placement ([`clutter::behind`]).
-    pub fn scene<'a>(&'a self, shot: &Shot, side: Side, clutter: &'a [Patch], holder: &'a [Patch]) -> Scene<'a> {
-        let camera_from_left = match side {
-            Side::Left => Transform::identity(),
-            Side::Right => self.rig.right_from_left,
-        };
+    /// A camera and `camera_from_left`.
+    fn camera(&self, side: Side) -> (Camera, Transform) {
+        match side {
+            Side::Left => (self.rig.left, Transform::identity()),
+            Side::Right => (self.rig.right, self.rig.right_from_left),
+        }
+    }
+
+    /// What a camera sees behind the board from one placement.
+    pub fn backdrop(&self, placement: u64, side: Side) -> Backdrop {
+        let (camera, camera_from_left) = self.camera(side);
+        let patches = clutter::behind(self.settings.seed, placement);
+        let index = 2 * placement + u64::from(side == Side::Right);
+        Backdrop::new(&camera, &camera_from_left, &patches, self.settings.seed, index)
+    }
+
+    /// What carries the board of a shot.
+    pub fn holder(&self, shot: &Shot) -> Vec<Patch> {
+        if shot.shows_target { clutter::arm(&self.target) } else { clutter::stand(&self.check_board) }
+    }
+
+    /// The scene of one side of a pair. `backdrop` is what stands behind ([`World::backdrop`]), `holder` what carries the board.
+    pub fn scene<'a>(&'a self, shot: &Shot, side: Side, backdrop: &'a Backdrop, holder: &'a [Patch]) -> Scene<'a> {
+        let (camera, camera_from_left) = self.camera(side);
         let mut lighting = self.settings.lighting;
         // The two cameras see the light from two sides, and each pair a little differently.
         let mut draws =
@@ -108,17 +127,13 @@ impl World {
         lighting.gradient.1 += draws.uniform(-0.05, 0.05);
         lighting.exposure *= draws.uniform(0.93, 1.05);
         Scene {
-            camera: match side {
-                Side::Left => self.rig.left,
-                Side::Right => self.rig.right,
-            },
+            camera,
             optics: self.settings.optics,
             board: if shot.shows_target { &self.target } else { &self.check_board },
             camera_from_board: camera_from_left * shot.left_from_board,
             print: self.settings.print,
             holder,
-            clutter,
-            camera_from_left,
+            backdrop,
             lighting,
             sensor: self.settings.sensor,
             seed: self.settings.seed,
@@ -138,8 +153,9 @@ impl World {
 
     fn corners(&self, of_target: bool) -> Corners {
         let board = if of_target { self.target.drawing } else { self.check_board.drawing };
+        let plain = Backdrop::plain(0.0);
         let list = |shot: &Shot, side: Side| -> Vec<Corner> {
-            let at = self.scene(shot, side, &[], &[]).corners_px();
+            let at = self.scene(shot, side, &plain, &[]).corners_px();
             let columns = board.columns();
             let corner = |(k, px): (usize, Point2<f64>)| Corner {
                 col: k % columns,
@@ -176,17 +192,23 @@ impl World {
     pub fn write_pictures(&self, out: &OutDir) -> Result<()> {
         let shots = self.shots();
         let normals = NormalTable::new();
-        let behind: Vec<Vec<Patch>> =
-            (0..=self.settings.spheres.len()).map(|k| clutter::behind(self.settings.seed, k as u64)).collect();
-        let holders = [clutter::stand(&self.check_board), clutter::arm(&self.target)];
+        let placements = 1 + self.settings.spheres.len() as u64;
+        let sides = [Side::Left, Side::Right];
+        let backdrops: Vec<Backdrop> = (0..placements)
+            .flat_map(|p| sides.map(|side| (p, side)))
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|(placement, side)| self.backdrop(placement, side))
+            .collect();
         let bar = progress::bar("rendering", 2 * shots.len() as u64);
         let jobs: Vec<(&Shot, Side)> =
             shots.iter().flat_map(|shot| [(shot, Side::Left), (shot, Side::Right)]).collect();
         let done: Result<Vec<()>> = jobs
             .par_iter()
             .map(|&(shot, side)| {
-                let clutter = behind.get(shot.placement as usize).map_or(&[][..], Vec::as_slice);
-                let scene = self.scene(shot, side, clutter, &holders[usize::from(shot.shows_target)]);
+                let backdrop = &backdrops[2 * shot.placement as usize + usize::from(side == Side::Right)];
+                let holder = self.holder(shot);
+                let scene = self.scene(shot, side, backdrop, &holder);
                 let picture = Renderer::new(&scene).picture(&normals);
                 out.write(&format!("{}/{}/{}.png", shot.folder, side.name(), shot.stem), &png(&picture)?)?;
                 bar.inc(1);
