@@ -19,7 +19,7 @@ const GRID: usize = 640;
 const BLUR: f32 = 2.0;
 
 /// Roughness of surfaces, as a share of their brightness.
-const TEXTURE: f64 = 0.06;
+const TEXTURE: f64 = 0.035;
 
 /// A smooth picture.
 #[derive(Debug, Clone, PartialEq)]

@@ -60,7 +60,7 @@ impl<'a> Renderer<'a> {
     pub fn new(scene: &'a Scene<'a>) -> Renderer<'a> {
         let layers = scene.layers();
         let has_spot = scene.optics.defocus.is_some() || scene.optics.coma_px != 0.0;
-        let taps = Taps::gaussian(scene.optics.gaussian_px, if has_spot { 3 } else { 2 });
+        let taps = Taps::gaussian(scene.optics.gaussian_px, if has_spot { 4 } else { 2 });
         let spot_cells = if has_spot { scene.largest_spot_cells() } else { 0 };
         let apron_px = (taps.apron_cells() + spot_cells).div_ceil(FINE);
         let tiles = |px: u32| (px as usize).div_ceil(TILE);
