@@ -207,3 +207,37 @@ impl<'a> Group<'a> {
         self.left_from_base * shift * base_from_flange * self.true_flange_from_target
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::world::World;
+
+    fn before(world: &World) -> Vec<f64> {
+        let mut center = (Vector3::zeros(), Vector3::zeros());
+        let mut deviations = Vec::new();
+        for pose in &world.poses {
+            let nominal = world.arm.nominal.target_mm(&pose.commanded.joints_rad()).coords;
+            let truth = pose.left_from_target.translation.vector;
+            match pose.commanded.role {
+                Role::Center => center = (nominal, truth),
+                Role::Sample => {}
+                Role::Verify => deviations.push(((truth - center.1).norm() - (nominal - center.0).norm()).abs()),
+            }
+        }
+        deviations
+    }
+
+    #[test]
+    fn explore() {
+        for orientation in [Orientation::Fixed, Orientation::Varied] {
+            let mut means = Vec::new();
+            for seed in 1..25 {
+                let world = World::new(Settings { seed, orientation, ..Settings::paper() }, None).unwrap();
+                let d = before(&world);
+                means.push((100.0 * d.iter().sum::<f64>() / d.len() as f64).round() / 100.0);
+            }
+            println!("{orientation:?}: {means:?} {}", means.iter().sum::<f64>() / means.len() as f64);
+        }
+    }
+}

@@ -127,9 +127,10 @@ fn made(pitch_um: f64, margin_mm: f64) -> Workmanship {
     Workmanship { pitch_um, bow_um: (0.0, 0.0), ink_spread_um: 0.0, scale_ppm: 0.0, margin_mm }
 }
 
-/// The start points of section 4.2 of the paper. Where the flange points is not given there.
+/// The start points of section 4.2 of the paper. Where the flange points is not given there: away from the robot, so that
+/// cameras that stand round it see the target's face and the robot stays behind it.
 fn paper_spheres() -> Vec<Sphere> {
     [(200.0, 0.0), (-200.0, 0.0), (0.0, 200.0), (0.0, -230.0)]
-        .map(|(x, y)| Sphere { center_mm: Vector3::new(x, y, 379.0), flange_axis: Vector3::z() })
+        .map(|(x, y)| Sphere { center_mm: Vector3::new(x, y, 379.0), flange_axis: Vector3::new(x, y, 0.0).normalize() })
         .to_vec()
 }
