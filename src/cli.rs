@@ -125,12 +125,76 @@ pub struct Simulate {
     /// How the flange is turned along a group's poses [default: the preset's]
     #[arg(long, value_enum)]
     pub orientation: Option<Orientation>,
+    /// Pairs of pictures of the check board [default: the preset's]
+    #[arg(long, value_name = "N")]
+    pub check_pairs: Option<usize>,
+    /// Robot poses to identify from, besides the centres [default: the preset's]
+    #[arg(long, value_name = "N")]
+    pub samples: Option<usize>,
+    /// Robot poses to verify with [default: the preset's]
+    #[arg(long, value_name = "N")]
+    pub verify: Option<usize>,
     /// No pictures: measurements.csv with noise
     #[arg(long)]
     pub points_only: bool,
+    /// Noise of each coordinate with --points-only, mm [default: 0.01]
+    #[arg(long, value_name = "MM", value_parser = not_negative, requires = "points_only")]
+    pub point_noise_mm: Option<f64>,
+    /// What the lens does to a point
+    #[arg(long, value_enum, default_value = "gaussian")]
+    pub lens_blur: LensBlur,
+    /// Bits a pixel, 8 to 16; more than 8 are stored as the high bits of 16 [default: 8]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(8..=16))]
+    pub bits: Option<u8>,
+    /// How far the check board's middle stands out, um [default: 0]
+    #[arg(long, value_name = "UM", allow_negative_numbers = true, value_parser = finite)]
+    pub bow_um: Option<f64>,
+    /// How far black runs over each edge of both boards, um [default: 0]
+    #[arg(long, value_name = "UM", value_parser = not_negative)]
+    pub ink_um: Option<f64>,
+    /// Stretch of both boards against their certificates, parts per million [default: 0]
+    #[arg(long, value_name = "PPM", allow_negative_numbers = true, value_parser = finite)]
+    pub thermal_ppm: Option<f64>,
+    /// The true robot, instead of one drawn from the seed
+    #[arg(long, value_name = "FILE")]
+    pub true_robot: Option<Utf8PathBuf>,
+    /// Largest misalignment of parallel axes, deg [default: 0]
+    #[arg(long, value_name = "DEG", value_parser = not_negative)]
+    pub beta_deg: Option<f64>,
+    /// Sag of joints 2 and 3 under a unit weight, mrad a metre of lever [default: 0]
+    #[arg(long, value_name = "MRAD", value_parser = not_negative)]
+    pub gravity_mrad: Option<f64>,
+    /// Amplitude of the drives' periodic errors, mrad [default: 0]
+    #[arg(long, value_name = "MRAD", value_parser = not_negative)]
+    pub harmonics_mrad: Option<f64>,
+    /// Pose repeatability (ISO 9283 RP) [default: 0.02]
+    #[arg(long, value_name = "MM", value_parser = not_negative)]
+    pub repeatability_mm: Option<f64>,
     /// Folder for the simulated world [default: out]
     #[arg(long, value_name = "DIR")]
     pub out: Option<Utf8PathBuf>,
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("a finite number is needed".to_owned()),
+    }
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    finite(text).and_then(|value| if value < 0.0 { Err("it must not be negative".to_owned()) } else { Ok(value) })
+}
+
+/// Kinds of blur.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LensBlur {
+    /// The same Gaussian everywhere
+    Gaussian,
+    /// A Gaussian, and a disc by the distance from the focal plane (f/16)
+    Defocus,
+    /// A Gaussian, and a comatic flare that grows with the field (1 px at the corners)
+    Coma,
 }
 
 /// The worlds that come with the program.

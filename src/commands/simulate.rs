@@ -1,18 +1,28 @@
 //! `stereocal simulate`: A world whose truth is known, as files.
 
 use super::Outcome;
-use crate::cli::{Preset, Simulate};
+use crate::cli::{LensBlur, Preset, Simulate};
 use crate::config::Config;
 use crate::error::{Result, Status};
 use crate::files::OutDir;
-use crate::simulate::settings::Settings;
+use crate::robot;
+use crate::simulate::psf::{Defocus, Optics};
+use crate::simulate::rig::DISTANCE_MM;
+use crate::simulate::settings::{RobotDeviations, Settings};
 use crate::simulate::truth_files;
 use crate::simulate::world::World;
 
+/// Entrance pupil of the paper's 25 mm lenses at f/16, mm.
+const PUPIL_MM: f64 = 25.0 / 16.0;
+
+/// Comatic flare at the picture's corners, px.
+const COMA_PX: f64 = 1.0;
+
 /// Runs the command: settings, world, truth, pictures.
 pub fn run(args: &Simulate, config: &Config) -> Result<Outcome> {
+    let true_robot = args.true_robot.as_deref().map(robot::file::read).transpose()?;
+    let world = World::new(settings(args, config)?, true_robot)?;
     let out = OutDir::open(args.out.as_ref().unwrap_or(&config.out))?;
-    let world = World::new(settings(args), None)?;
     if args.points_only {
         truth_files::write_points_only(&world, &out)?;
     } else {
@@ -22,16 +32,47 @@ pub fn run(args: &Simulate, config: &Config) -> Result<Outcome> {
     Ok(Outcome { stdout: summary(args, &world, &out), status: Status::Done })
 }
 
-fn settings(args: &Simulate) -> Settings {
-    let preset = match args.preset {
+/// The preset with what was typed in place of its values. The boards are those of the settings file.
+fn settings(args: &Simulate, config: &Config) -> Result<Settings> {
+    let mut s = match args.preset {
         Preset::Paper => Settings::paper(),
         Preset::Small => Settings::small(),
     };
-    Settings {
-        size_px: args.size.unwrap_or(preset.size_px),
-        seed: args.seed,
-        orientation: args.orientation.unwrap_or(preset.orientation),
-        ..preset
+    s.seed = args.seed;
+    s.check_board = config.check_board.board(None, None)?;
+    s.target_board = config.target_board.board(None, None)?;
+    s.optics = optics(args.lens_blur, s.optics);
+    replace(&mut s.size_px, args.size);
+    replace(&mut s.orientation, args.orientation);
+    replace(&mut s.check_pairs, args.check_pairs);
+    replace(&mut s.samples, args.samples);
+    replace(&mut s.verify, args.verify);
+    replace(&mut s.point_noise_mm, args.point_noise_mm);
+    replace(&mut s.sensor.bits, args.bits);
+    replace(&mut s.check_workmanship.bow_um, args.bow_um.map(|bow| (bow / 2.0, bow / 2.0)));
+    for board in [&mut s.check_workmanship, &mut s.target_workmanship] {
+        replace(&mut board.ink_spread_um, args.ink_um);
+        replace(&mut board.scale_ppm, args.thermal_ppm);
+    }
+    let RobotDeviations { beta_deg, gravity_mrad_per_m, harmonics_mrad, repeatability_mm, .. } = &mut s.robot;
+    replace(beta_deg, args.beta_deg);
+    replace(gravity_mrad_per_m, args.gravity_mrad);
+    replace(harmonics_mrad, args.harmonics_mrad);
+    replace(repeatability_mm, args.repeatability_mm);
+    Ok(s)
+}
+
+fn replace<T>(setting: &mut T, typed: Option<T>) {
+    if let Some(value) = typed {
+        *setting = value;
+    }
+}
+
+fn optics(blur: LensBlur, preset: Optics) -> Optics {
+    match blur {
+        LensBlur::Gaussian => preset,
+        LensBlur::Defocus => Optics { defocus: Some(Defocus { pupil_mm: PUPIL_MM, focus_mm: DISTANCE_MM }), ..preset },
+        LensBlur::Coma => Optics { coma_px: COMA_PX, ..preset },
     }
 }
 

@@ -45,6 +45,14 @@ pub enum Error {
         /// Its start point, mm.
         point_mm: [f64; 3],
     },
+    /// The true robot is another kind of robot.
+    #[error("the true robot has {found} joints; the nominal one has {needed}")]
+    Joints {
+        /// Its joints.
+        found: usize,
+        /// Those of Table 1.
+        needed: usize,
+    },
     /// A picture could not be encoded.
     #[error("cannot encode a picture: {0}")]
     Encode(#[from] image::ImageError),
@@ -58,6 +66,9 @@ impl Explain for Error {
             }
             Error::OutOfReach { .. } => {
                 Some("the spheres of the presets suit the robot of Table 1 of the paper".to_owned())
+            }
+            Error::Joints { .. } => {
+                Some("take the robot.toml that `stereocal simulate` writes and change its numbers".to_owned())
             }
             Error::Encode(_) => None,
         }

@@ -68,6 +68,9 @@ impl World {
         let target = PhysicalBoard::new(settings.target_board, settings.target_workmanship, settings.seed, 1);
         let nominal = true_robot::nominal();
         let truth = true_robot.unwrap_or_else(|| true_robot::deviated(&nominal, &settings.robot, settings.seed));
+        if truth.joints.len() != nominal.joints.len() {
+            return Err(Error::Joints { found: truth.joints.len(), needed: nominal.joints.len() }.into());
+        }
         let arm = Arm { nominal, truth };
         let check_poses = check_poses::poses(&rig, &check_board, settings.check_pairs, settings.seed)?;
         let poses = robot_poses::plan(&settings, &arm, &rig, &target)?;
