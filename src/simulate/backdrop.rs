@@ -39,7 +39,8 @@ impl Backdrop {
 
     /// Draws patches given in the left camera's frame, from far to near. `index` tells backdrops of one seed apart.
     pub fn new(camera: &Camera, camera_from_left: &Transform, patches: &[Patch], seed: u64, index: u64) -> Backdrop {
-        let step_px = f64::from(camera.width.max(camera.height)) / GRID as f64;
+        // Small pictures get no finer grid than their pixels.
+        let step_px = (f64::from(camera.width.max(camera.height)) / GRID as f64).max(1.0);
         // One more point than steps, and one to spare for rounding.
         let points = |px: u32| (f64::from(px) / step_px).ceil() as usize + 2;
         let (width, height) = (points(camera.width), points(camera.height));
@@ -87,13 +88,13 @@ fn blur(values: &mut [f32], width: usize, height: usize) {
     let reach = (3.0 * BLUR).ceil() as isize;
     let weights: Vec<f32> = (-reach..=reach).map(|k| (-0.5 * (k as f32 / BLUR).powi(2)).exp()).collect();
     let total: f32 = weights.iter().sum();
-    let source = values.to_vec();
     let clamp = |v: isize, count: usize| v.clamp(0, count as isize - 1) as usize;
     let mut rows = vec![0.0; width * height];
-    for y in 0..height {
-        for x in 0..width {
-            let at = |k: isize| source[y * width + clamp(x as isize + k, width)];
-            rows[y * width + x] = (-reach..=reach).zip(&weights).map(|(k, w)| w * at(k)).sum::<f32>() / total;
+    let mut padded = vec![0.0; width + 2 * reach as usize];
+    for (source, out) in values.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
+        padded.iter_mut().enumerate().for_each(|(x, v)| *v = source[clamp(x as isize - reach, width)]);
+        for (k, w) in weights.iter().enumerate() {
+            out.iter_mut().zip(&padded[k..]).for_each(|(value, v)| *value += w / total * v);
         }
     }
     for y in 0..height {

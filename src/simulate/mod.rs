@@ -7,8 +7,6 @@ pub mod coverage;
 pub mod draws;
 pub mod outline;
 pub mod physical_board;
-#[cfg(test)]
-mod picture_tests;
 pub mod psf;
 pub mod render;
 pub mod rig;

@@ -1,4 +1,5 @@
 //! Time of one picture on one core, before encoding: `cargo bench --bench render`.
+#![expect(clippy::print_stdout, reason = "a benchmark says what it measured")]
 
 use std::time::Instant;
 

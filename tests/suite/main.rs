@@ -1,6 +1,8 @@
 //! The program as its users meet it, and the habits of its house.
 
+mod pictures;
 mod run;
+mod worlds;
 
 mod house;
 mod messages;

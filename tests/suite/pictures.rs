@@ -5,16 +5,16 @@
 
 use nalgebra::{Matrix3, Point2, Vector3};
 
-use super::backdrop::Backdrop;
-use super::physical_board::{PhysicalBoard, Workmanship};
-use super::psf::{Defocus, Optics};
-use super::render::Renderer;
-use super::rig::{left_from_field, true_rig};
-use super::scene::{Print, Scene};
-use super::sensor::{Lighting, Sensor};
-use super::settings::Settings;
-use crate::geometry::{Transform, transform};
-use crate::stereo::Camera;
+use stereocal::geometry::{Transform, transform};
+use stereocal::simulate::backdrop::Backdrop;
+use stereocal::simulate::physical_board::{PhysicalBoard, Workmanship};
+use stereocal::simulate::psf::{Defocus, Optics};
+use stereocal::simulate::render::Renderer;
+use stereocal::simulate::rig::{left_from_field, true_rig};
+use stereocal::simulate::scene::{Print, Scene};
+use stereocal::simulate::sensor::{Lighting, Sensor};
+use stereocal::simulate::settings::Settings;
+use stereocal::stereo::Camera;
 
 /// Rays a pixel, each way.
 const RAYS: usize = 32;
@@ -164,7 +164,7 @@ fn pictures_agree_with_rays() {
     }
 }
 
-/// Weights at ray offsets of a disc and a flare, from the formula of [`super::psf::Spot`] over a pupil of its own.
+/// Weights at ray offsets of a disc and a flare, from the formula of `psf::Spot` over a pupil of its own.
 fn spot_by_rays(disc_px: f64, flare_px: (f64, f64)) -> Vec<(isize, isize, f64)> {
     let mut spot = std::collections::BTreeMap::new();
     let rings = 200;
