@@ -72,4 +72,19 @@ fn hold_to_one_thread() {
         // Where it refuses, OpenCV only runs with more threads than is good.
         let _ = core::set_num_threads(1);
     });
+
+/// OpenCV's own projection of points in a camera's frame, px: the oracle for [`crate::stereo::Camera::project`].
+#[cfg(test)]
+pub fn project_points(
+    camera: &crate::stereo::Camera,
+    points: &[nalgebra::Point3<f64>],
+) -> opencv::Result<Vec<nalgebra::Point2<f64>>> {
+    use opencv::core::{Mat, Point2d, Point3d, Vector, no_array};
+    let points: Vector<Point3d> = points.iter().map(|p| Point3d::new(p.x, p.y, p.z)).collect();
+    let zero = Mat::from_slice(&[0.0, 0.0, 0.0])?.clone_pointee();
+    let matrix = Mat::from_slice_2d(&[[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]])?;
+    let distortion = Mat::from_slice(&camera.distortion[..camera.lens.vector_length()])?.clone_pointee();
+    let mut px: Vector<Point2d> = Vector::new();
+    opencv::calib3d::project_points(&points, &zero, &zero, &matrix, &distortion, &mut px, &mut no_array(), 0.0)?;
+    Ok(px.iter().map(|p| nalgebra::Point2::new(p.x, p.y)).collect())
 }

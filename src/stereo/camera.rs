@@ -121,20 +121,16 @@ impl Camera {
     pub fn undistort(&self, px: &Point2<f64>) -> Option<Point2<f64>> {
         let target = Point2::new((px.x - self.cx) / self.fx, (px.y - self.cy) / self.fy);
         let mut n = target;
-        // Numerical slopes suffice: Newton only needs them to converge, the answer is judged by `distort` itself.
-        let step = 1e-7;
         for _ in 0..50 {
-            let at = self.distort(&n);
+            let (at, slope) = self.distort_with_slope(&n);
             let miss = at - target;
-            let along_x = (self.distort(&Point2::new(n.x + step, n.y)) - at) / step;
-            let along_y = (self.distort(&Point2::new(n.x, n.y + step)) - at) / step;
-            let det = along_x.x * along_y.y - along_y.x * along_x.y;
+            let det = slope.determinant();
             // A lens keeps orientation; past the fold of the radial polynomial the determinant changes sign.
             if det <= 1e-6 || !det.is_finite() {
                 return None;
             }
-            let dx = (along_y.y * miss.x - along_y.x * miss.y) / det;
-            let dy = (along_x.x * miss.y - along_x.y * miss.x) / det;
+            let dx = (slope.m22 * miss.x - slope.m12 * miss.y) / det;
+            let dy = (slope.m11 * miss.y - slope.m21 * miss.x) / det;
             n.x -= dx;
             n.y -= dy;
             if dx.abs().max(dy.abs()) < 1e-14 * (1.0 + n.coords.amax()) {

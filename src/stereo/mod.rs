@@ -1,17 +1,139 @@
 //! From corners to a calibrated rig, and from a rig to points in space.
+//!
+//! Corners become [`observations`]; [`start`] and [`consensus`] find a first rig and the pairs that agree on it; [`calibrate`]
+//! solves the [`bundle`] with the lens of [`lens_choice`]; [`accuracy`] judges the rig by pairs it has not seen; [`target`]
+//! measures a board's pose with it.
 
+pub mod accuracy;
+pub mod bundle;
+pub mod calibrate;
 pub mod calibration_file;
 pub mod camera;
+pub mod consensus;
+pub mod folds;
+pub mod homography;
+pub mod layout;
+pub mod lens_choice;
+pub mod noise;
+pub mod observations;
+pub mod pose;
+pub mod projection;
+pub mod residuals;
 pub mod rig;
+pub mod robust;
+pub mod schur;
+pub mod screening;
+pub mod start;
+pub mod target;
+pub mod triangulate;
 
-use crate::error::Explain;
+use crate::error::{Explain, Status};
+use crate::imaging::Skipped;
 
 pub use camera::{Camera, Lens};
+pub use observations::Side;
 pub use rig::Rig;
 
 /// What can go wrong between corners and points.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {}
+pub enum Error {
+    /// Not enough pairs to calibrate and to hold one out.
+    #[error("only {found} of {total} pairs can be used; calibration needs {}{}", calibrate::FEWEST_PAIRS, list(.skipped))]
+    TooFewPairs {
+        /// Usable pairs.
+        found: usize,
+        /// Pairs there were.
+        total: usize,
+        /// The others.
+        skipped: Vec<Skipped>,
+    },
+    /// Too few corners for so many unknowns.
+    #[error("{corners} corners give {} numbers for {unknowns} unknowns", 2 * .corners)]
+    TooFewCorners {
+        /// Corners that are no outliers.
+        corners: usize,
+        /// Unknowns.
+        unknowns: usize,
+    },
+    /// One camera's pictures fit no camera.
+    #[error("the corners in the {} pictures fit no camera", side.name())]
+    NoCamera {
+        /// Whose.
+        side: Side,
+    },
+    /// Most pairs do not belong to one rig.
+    #[error("the pairs contradict each other: only {agreeing} of {total} fit one rig{}", list(.bad))]
+    Contradiction {
+        /// Pairs that fit one rig.
+        agreeing: usize,
+        /// Pairs that were compared.
+        total: usize,
+        /// The others.
+        bad: Vec<Skipped>,
+    },
+    /// The views do not tell the cameras.
+    #[error("the views are too similar to tell the cameras{}", focal(.focal_sigma))]
+    Undetermined {
+        /// Worst relative standard deviation of a focal length, where there is one.
+        focal_sigma: Option<f64>,
+    },
+    /// The search did not end at a minimum.
+    #[error("the calibration did not converge within {steps} steps")]
+    NotConverged {
+        /// Steps tried.
+        steps: usize,
+    },
+    /// Pictures of another size than the calibration's.
+    #[error("the {} pictures are {found_width}x{found_height} px, the calibration is for {width}x{height}", side.name())]
+    PictureSize {
+        /// Whose.
+        side: Side,
+        /// Found.
+        found_width: u32,
+        /// Found.
+        found_height: u32,
+        /// Needed.
+        width: u32,
+        /// Needed.
+        height: u32,
+    },
+}
 
-impl Explain for Error {}
+fn list(pairs: &[Skipped]) -> String {
+    pairs.iter().map(|s| format!("\n  {}: {}", s.pair, s.reason)).collect()
+}
+
+fn focal(sigma: &Option<f64>) -> String {
+    sigma.map_or(String::new(), |s| format!(": a focal length is known to {:.0} % only", 100.0 * s))
+}
+
+impl Explain for Error {
+    fn status(&self) -> Status {
+        match self {
+            Error::TooFewPairs { .. } | Error::PictureSize { .. } => Status::BadInput,
+            _ => Status::Undetermined,
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        Some(
+            match self {
+                Error::TooFewPairs { .. } => {
+                    "photograph more pairs; `--squares CxR` must be the board's squares, not its inner corners"
+                }
+                Error::TooFewCorners { .. } => "photograph more pairs, or `--lens radial2` for fewer unknowns",
+                Error::NoCamera { .. } => "`--squares CxR` must be the board's squares, not its inner corners",
+                Error::Contradiction { .. } => {
+                    "trigger both cameras at once, clamp them and the board, and check that equal names belong together"
+                }
+                Error::Undetermined { .. } => {
+                    "photograph the board tilted by 20 to 45 degrees about both of its axes, at several distances"
+                }
+                Error::NotConverged { .. } => "`--lens radial2` has fewer unknowns; add pairs with the board tilted",
+                Error::PictureSize { .. } => "calibrate with pictures of the same size and cut: `stereocal camera-check IMAGES`",
+            }
+            .to_owned(),
+        )
+    }
+}

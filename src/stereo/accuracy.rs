@@ -1,0 +1,261 @@
+//! How far lengths on the board come out wrong, measured by cameras that have not seen the pair (Fig. 6 of the paper).
+//!
+//! In: a calibration. Out: signed length errors of every range along x and y, a pair and in all, and the verdict. Method: k folds over the
+//! pairs; each fold's rig triangulates the corners of the pairs it was not calibrated with. The board's pitch sets the scale, so
+//! that a wrong pitch is invisible here: only a second board shows it.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::calibrate::{Calibration, Problem};
+use super::folds;
+use super::observations::View;
+use super::rig::Covariance;
+use super::triangulate::{RigCovariance, SpacePoint, common, triangulate};
+use super::{Rig, bundle};
+use crate::imaging::Board;
+
+/// Folds over the pairs; with fewer pairs each is a fold of its own.
+const FOLDS: usize = 10;
+
+/// The short and the long range of Fig. 6 (b), in squares: 10 and 70 mm on the paper's board.
+const SHORT_SQUARES: usize = 1;
+const LONG_SQUARES: usize = 7;
+
+/// Coverage factor of the expanded uncertainty: 95 %.
+const COVERAGE: f64 = 2.0;
+
+/// Along the board's columns or rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// Along x.
+    X,
+    /// Along y.
+    Y,
+}
+
+/// The errors of one range over all pairs; measured minus nominal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Range {
+    /// Direction on the board.
+    pub axis: Axis,
+    /// Nominal length, mm.
+    pub nominal_mm: f64,
+    /// How many lengths.
+    pub count: usize,
+    /// Mean error, mm.
+    pub mean_error_mm: f64,
+    /// Standard deviation of the errors, mm.
+    pub std_mm: f64,
+    /// Largest absolute error, mm.
+    pub max_abs_error_mm: f64,
+}
+
+/// One pair as measured by cameras that have not seen it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldOutPair {
+    /// Its name.
+    pub pair: String,
+    /// Mean error of the short range along x, mm; `None` where no such length was seen.
+    pub mean_error_x_short_mm: Option<f64>,
+    /// Along y.
+    pub mean_error_y_short_mm: Option<f64>,
+    /// Mean error of the long range along x, mm.
+    pub mean_error_x_long_mm: Option<f64>,
+    /// Along y.
+    pub mean_error_y_long_mm: Option<f64>,
+    /// Largest absolute error of any range, mm.
+    pub max_abs_error_mm: f64,
+    /// Root mean square of the distance between the two rays of a corner, mm.
+    pub gap_rms_mm: f64,
+    /// Errors of the long range, x then y, mm: Fig. 6 (a).
+    pub long_errors_mm: Vec<f64>,
+}
+
+/// What the verdict is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// Within tolerance, uncertainty included.
+    Pass,
+    /// Out of tolerance, whatever the uncertainty.
+    Fail,
+    /// The uncertainty reaches across the tolerance.
+    Undecided,
+}
+
+/// The accuracy of a rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Accuracy {
+    /// Largest absolute error of any length, mm.
+    pub max_abs_error_mm: f64,
+    /// Its expanded uncertainty (k = 2), mm.
+    pub expanded_uncertainty_mm: f64,
+    /// Number of folds.
+    pub folds: usize,
+    /// Lengths of the short and the long range, mm, along x and y alike where the board allows.
+    pub short_mm: [f64; 2],
+    /// Long range along x and y, mm.
+    pub long_mm: [f64; 2],
+    /// Every range, x first, from the shortest.
+    pub ranges: Vec<Range>,
+    /// Every pair.
+    pub pairs: Vec<HeldOutPair>,
+}
+
+impl Accuracy {
+    /// Pass only where the uncertainty fits into the tolerance as well, fail only where it cannot help (ISO 14253-1).
+    pub fn verdict(&self, tolerance_mm: f64) -> Verdict {
+        if self.max_abs_error_mm + self.expanded_uncertainty_mm <= tolerance_mm {
+            Verdict::Pass
+        } else if self.max_abs_error_mm - self.expanded_uncertainty_mm > tolerance_mm {
+            Verdict::Fail
+        } else {
+            Verdict::Undecided
+        }
+    }
+}
+
+/// A length between two corners in a row or column.
+struct Length {
+    axis: Axis,
+    squares: usize,
+    error_mm: f64,
+    /// Variance through the calibration, mm^2; only where asked for.
+    ends: (usize, usize),
+}
+
+struct Measured {
+    points: Vec<SpacePoint>,
+    lengths: Vec<Length>,
+}
+
+/// Holds out every pair once and measures it.
+pub fn hold_out(calibration: &Calibration) -> Option<Accuracy> {
+    let count = calibration.views.len();
+    let folds = folds::assign(count, FOLDS);
+    let fold_count = FOLDS.min(count);
+    let problem = Problem { views: calibration.views.clone(), values: calibration.values.clone() };
+    let rigs: Vec<Option<Rig>> = (0..fold_count)
+        .into_par_iter()
+        .map(|fold| {
+            let kept = problem.subset(|i| folds[i] != fold);
+            let mut values = kept.refit(&calibration.layout)?;
+            let matrix = bundle::uncertainty(&kept.views, &calibration.layout, &values)?.shared;
+            values.shared.rig.covariance = Some(Covariance { order: calibration.layout.names(), matrix });
+            Some(values.shared.rig)
+        })
+        .collect();
+    let rigs = rigs.into_iter().collect::<Option<Vec<Rig>>>()?;
+    let measured: Vec<Measured> = calibration
+        .views
+        .par_iter()
+        .enumerate()
+        .map(|(i, view)| measure(&rigs[folds[i]], &calibration.board, view))
+        .collect();
+    summarise(calibration, &rigs, &folds, &measured)
+}
+
+/// Triangulates the corners of a pair and measures all lengths along rows and columns.
+fn measure(rig: &Rig, board: &Board, view: &View) -> Measured {
+    let mut at = vec![None; board.corner_count()];
+    let mut points = Vec::new();
+    for (left, right) in common(view) {
+        if let Some(point) = triangulate(rig, left, right) {
+            at[board.index(left.col, left.row)] = Some(points.len());
+            points.push(point);
+        }
+    }
+    let mut lengths = Vec::new();
+    let (columns, rows) = (board.columns(), board.rows());
+    let mut add = |axis, squares: usize, a: usize, b: usize| {
+        if let (Some(a), Some(b)) = (at[a], at[b]) {
+            let length_mm = (points[b].point_mm - points[a].point_mm).norm();
+            let error_mm = length_mm - squares as f64 * board.square_mm;
+            lengths.push(Length { axis, squares, error_mm, ends: (a, b) });
+        }
+    };
+    for row in 0..rows {
+        for col in 0..columns {
+            for squares in 1..columns - col {
+                add(Axis::X, squares, board.index(col, row), board.index(col + squares, row));
+            }
+            for squares in 1..rows - row {
+                add(Axis::Y, squares, board.index(col, row), board.index(col, row + squares));
+            }
+        }
+    }
+    Measured { points, lengths }
+}
+
+fn summarise(calibration: &Calibration, rigs: &[Rig], folds: &[usize], measured: &[Measured]) -> Option<Accuracy> {
+    let board = &calibration.board;
+    let largest = |squares: usize, corners: usize| squares.min(corners - 1);
+    let short = [SHORT_SQUARES; 2];
+    let long = [largest(LONG_SQUARES, board.columns()), largest(LONG_SQUARES, board.rows())];
+    let ranges = [(Axis::X, board.columns()), (Axis::Y, board.rows())]
+        .into_iter()
+        .flat_map(|(axis, corners)| (1..corners).map(move |squares| (axis, squares)))
+        .filter_map(|(axis, squares)| range(board, measured, axis, squares))
+        .collect();
+    let pairs = calibration.views.iter().zip(measured).map(|(view, m)| pair(view, m, short, long)).collect();
+    let (worst, length) = measured
+        .iter()
+        .enumerate()
+        .flat_map(|(i, m)| m.lengths.iter().map(move |l| (i, l)))
+        .max_by(|a, b| a.1.error_mm.abs().total_cmp(&b.1.error_mm.abs()))?;
+    // The corners' own scatter is drawn thousands of times in the largest error and not added again; the calibration is drawn
+    // once a fold, so that its share of that length stays uncertain.
+    let covariance = RigCovariance::new(rigs[folds[worst]].covariance.as_ref()?);
+    let points = &measured[worst].points;
+    let variance = covariance.length_variance_mm2(&points[length.ends.0], &points[length.ends.1]);
+    Some(Accuracy {
+        max_abs_error_mm: length.error_mm.abs(),
+        expanded_uncertainty_mm: COVERAGE * variance.max(0.0).sqrt(),
+        folds: rigs.len(),
+        short_mm: short.map(|s| s as f64 * board.square_mm),
+        long_mm: long.map(|s| s as f64 * board.square_mm),
+        ranges,
+        pairs,
+    })
+}
+
+fn range(board: &Board, measured: &[Measured], axis: Axis, squares: usize) -> Option<Range> {
+    let errors: Vec<f64> = measured.iter().flat_map(|m| m.errors(axis, squares)).collect();
+    let mean = mean(&errors)?;
+    let spread: f64 = errors.iter().map(|e| (e - mean) * (e - mean)).sum();
+    Some(Range {
+        axis,
+        nominal_mm: squares as f64 * board.square_mm,
+        count: errors.len(),
+        mean_error_mm: mean,
+        std_mm: (spread / (errors.len() as f64 - 1.0).max(1.0)).sqrt(),
+        max_abs_error_mm: errors.iter().fold(0.0, |max: f64, e| max.max(e.abs())),
+    })
+}
+
+fn pair(view: &View, measured: &Measured, short: [usize; 2], long: [usize; 2]) -> HeldOutPair {
+    let mean_of = |axis, squares| mean(&measured.errors(axis, squares).collect::<Vec<_>>());
+    let gaps: Vec<f64> = measured.points.iter().map(|p| p.gap_mm * p.gap_mm).collect();
+    HeldOutPair {
+        pair: view.pair.clone(),
+        mean_error_x_short_mm: mean_of(Axis::X, short[0]),
+        mean_error_y_short_mm: mean_of(Axis::Y, short[1]),
+        mean_error_x_long_mm: mean_of(Axis::X, long[0]),
+        mean_error_y_long_mm: mean_of(Axis::Y, long[1]),
+        max_abs_error_mm: measured.lengths.iter().fold(0.0, |max: f64, l| max.max(l.error_mm.abs())),
+        gap_rms_mm: mean(&gaps).unwrap_or(0.0).sqrt(),
+        long_errors_mm: measured.errors(Axis::X, long[0]).chain(measured.errors(Axis::Y, long[1])).collect(),
+    }
+}
+
+impl Measured {
+    fn errors(&self, axis: Axis, squares: usize) -> impl Iterator<Item = f64> + '_ {
+        self.lengths.iter().filter(move |l| l.axis == axis && l.squares == squares).map(|l| l.error_mm)
+    }
+}
+
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}

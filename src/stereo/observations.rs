@@ -1,0 +1,127 @@
+//! Corners as the bundle sees them: a point of the board, a pixel, a weight.
+
+use nalgebra::{Matrix2, Point2, Point3, Vector2};
+
+use crate::imaging::{Board, Corner, PairCorners};
+
+/// One of the two cameras.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Side {
+    /// The reference camera.
+    Left,
+    /// The other one.
+    Right,
+}
+
+impl Side {
+    /// Both, in the order of every list.
+    pub const BOTH: [Side; 2] = [Side::Left, Side::Right];
+
+    /// The word in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Side::Left => "left",
+            Side::Right => "right",
+        }
+    }
+}
+
+/// A corner of the board seen in one picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observation {
+    /// In which picture.
+    pub side: Side,
+    /// Column on the board.
+    pub col: usize,
+    /// Row on the board.
+    pub row: usize,
+    /// Place on a flat board, mm, in the board's frame.
+    pub board_mm: Point3<f64>,
+    /// How much one unit of the paraboloids along x and along y lifts the corner: `1 - x^2` and `1 - y^2` over [-1, 1]^2.
+    pub lift: [f64; 2],
+    /// Raw pixel.
+    pub px: Point2<f64>,
+    /// The refinement's own covariance, px^2; zero where it gave none.
+    pub covariance_px2: Matrix2<f64>,
+    /// Whitener of the residual: `whitener * (px - predicted)` has unit covariance. Set by the noise model.
+    pub whitener: Matrix2<f64>,
+    /// False for an outlier: it stays in the list, so that it can be reported, and counts for nothing.
+    pub active: bool,
+}
+
+impl Observation {
+    /// Place on a board bent by `shape` (height of the paraboloids along x and y in the middle), mm.
+    pub fn board_point(&self, shape_mm: &[f64; 2]) -> Point3<f64> {
+        let z = self.lift[0] * shape_mm[0] + self.lift[1] * shape_mm[1];
+        Point3::new(self.board_mm.x, self.board_mm.y, z)
+    }
+
+    /// The residual in units of its own standard deviation.
+    pub fn whiten(&self, residual_px: Vector2<f64>) -> Vector2<f64> {
+        self.whitener * residual_px
+    }
+}
+
+/// What one pair of pictures shows of the board: left corners first, then right.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// Name of the pair.
+    pub pair: String,
+    /// Its corners.
+    pub observations: Vec<Observation>,
+}
+
+impl View {
+    /// The usable corners of a pair: those that imaging relies on.
+    pub fn new(board: &Board, corners: &PairCorners) -> View {
+        let left = corners.left.iter().map(|corner| (Side::Left, corner));
+        let right = corners.right.iter().map(|corner| (Side::Right, corner));
+        let observations = left
+            .chain(right)
+            .filter(|(_, corner)| corner.used && corner.col < board.columns() && corner.row < board.rows())
+            .map(|(side, corner)| observation(board, side, corner))
+            .collect();
+        View { pair: corners.pair.clone(), observations }
+    }
+
+    /// Active corners of one picture.
+    pub fn active(&self, side: Side) -> impl Iterator<Item = &Observation> + Clone {
+        self.observations.iter().filter(move |o| o.active && o.side == side)
+    }
+
+    /// Only the corners of one picture.
+    pub fn only(&self, side: Side) -> View {
+        let observations = self.observations.iter().copied().filter(|o| o.side == side).collect();
+        View { pair: self.pair.clone(), observations }
+    }
+
+    /// Renames the right picture's corners as seen on a board turned by 180 degrees in its plane.
+    pub fn turn_right(&mut self, board: &Board) {
+        for o in self.observations.iter_mut().filter(|o| o.side == Side::Right) {
+            (o.col, o.row) = (board.columns() - 1 - o.col, board.rows() - 1 - o.row);
+            o.board_mm = board.corner_mm(o.col, o.row);
+        }
+    }
+}
+
+fn observation(board: &Board, side: Side, corner: &Corner) -> Observation {
+    let board_mm = board.corner_mm(corner.col, corner.row);
+    let edge = board.corner_mm(board.columns() - 1, board.rows() - 1);
+    let lift = |at: f64, edge: f64| 1.0 - (at / edge) * (at / edge);
+    // A covariance that isn't one (not positive, not finite) says nothing: as if none had been given.
+    let covariance_px2 = corner
+        .covariance_px2
+        .filter(|c| c.iter().all(|v| v.is_finite()) && c.m11 > 0.0 && c.determinant() > 0.0)
+        .unwrap_or_else(Matrix2::zeros);
+    Observation {
+        side,
+        col: corner.col,
+        row: corner.row,
+        board_mm,
+        lift: [lift(board_mm.x, edge.x), lift(board_mm.y, edge.y)],
+        px: corner.px,
+        covariance_px2,
+        whitener: Matrix2::identity(),
+        active: true,
+    }
+}
