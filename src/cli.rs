@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::imaging::board::Squares;
 use crate::simulate::settings::Orientation;
+use crate::stereo::Lens;
 
 /// Robot calibration with two cameras and a checkerboard.
 #[derive(Debug, Parser)]
@@ -60,6 +61,12 @@ pub struct CameraCheck {
     /// Largest length error that passes, mm [default: 0.05]
     #[arg(long, value_name = "MM")]
     pub tolerance_mm: Option<f64>,
+    /// Lens model: radial2, brown4, brown5, rational8, thin-prism12 or tilted14 [default: chosen by held-out pairs]
+    #[arg(long, value_name = "NAME", value_parser = lens)]
+    pub lens: Option<Lens>,
+    /// Width and height of the pictures that --corners come from, px [default: from the corners' extent]
+    #[arg(long, value_name = "WxH", requires = "corners", value_parser = picture_size)]
+    pub picture_size: Option<(u32, u32)>,
     /// Results.
     #[command(flatten)]
     pub output: Output,
@@ -204,4 +211,18 @@ pub enum Preset {
     Paper,
     /// The same shape at 1280x1280 with fewer poses
     Small,
+}
+
+fn lens(name: &str) -> Result<Lens, String> {
+    Lens::from_name(name).ok_or_else(|| {
+        let names = Lens::LADDER.map(Lens::name).join(", ");
+        format!("no lens of this name; there are {names}")
+    })
+}
+
+fn picture_size(text: &str) -> Result<(u32, u32), String> {
+    let parse = |side: &str| side.trim().parse::<u32>().ok().filter(|n| *n > 0);
+    text.split_once(['x', 'X'])
+        .and_then(|(w, h)| Some((parse(w)?, parse(h)?)))
+        .ok_or_else(|| "a picture's size is WIDTHxHEIGHT in px, as in 2448x2048".to_owned())
 }

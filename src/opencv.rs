@@ -72,6 +72,7 @@ fn hold_to_one_thread() {
         // Where it refuses, OpenCV only runs with more threads than is good.
         let _ = core::set_num_threads(1);
     });
+}
 
 /// OpenCV's own projection of points in a camera's frame, px: the oracle for [`crate::stereo::Camera::project`].
 #[cfg(test)]

@@ -14,6 +14,9 @@ pub enum Side {
 }
 
 impl Side {
+    /// Both, left first.
+    pub const BOTH: [Side; 2] = [Side::Left, Side::Right];
+
     /// The word in files and messages.
     pub fn name(self) -> &'static str {
         match self {

@@ -8,15 +8,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::calibrate::{Calibration, Problem};
-use super::folds;
+use super::folds::{self, FOLDS};
 use super::observations::View;
 use super::rig::Covariance;
 use super::triangulate::{RigCovariance, SpacePoint, common, triangulate};
 use super::{Rig, bundle};
 use crate::imaging::Board;
-
-/// Folds over the pairs; with fewer pairs each is a fold of its own.
-const FOLDS: usize = 10;
 
 /// The short and the long range of Fig. 6 (b), in squares: 10 and 70 mm on the paper's board.
 const SHORT_SQUARES: usize = 1;

@@ -61,6 +61,25 @@ impl Calibration {
     pub fn rig(&self) -> &Rig {
         &self.values.shared.rig
     }
+
+    /// The corners as they were used: outliers and the corners of pairs that are out are marked, turned boards turned.
+    pub fn mark(&self, corners: &Corners) -> Corners {
+        let mut marked = corners.clone();
+        for pair in &mut marked.pairs {
+            let view = self.views.iter().find(|view| view.pair == pair.pair);
+            for (side, list) in [(Side::Left, &mut pair.left), (Side::Right, &mut pair.right)] {
+                for corner in list.iter_mut() {
+                    let seen = view.and_then(|v| v.observations.iter().find(|o| o.side == side && o.px == corner.px));
+                    corner.used = corner.used && seen.is_some_and(|o| o.active);
+                    if let Some(o) = seen {
+                        (corner.col, corner.row) = (o.col, o.row);
+                    }
+                }
+                list.sort_by_key(|c| (c.row, c.col));
+            }
+        }
+        marked
+    }
 }
 
 /// Calibrates both cameras and the rig.
@@ -163,6 +182,12 @@ impl Problem {
         Ok(Solved { problem: Problem { views, values }, noise, rms_px })
     }
 
+    /// Whether the views, at a minimum, determine this layout.
+    pub fn determines(&self, layout: &Layout) -> bool {
+        bundle::uncertainty(&self.views, layout, &self.values)
+            .is_some_and(|u| worst_focal_sigma(&u, layout, &self.values.shared.rig) <= WORST_FOCAL_SIGMA)
+    }
+
     /// The same without some pairs: `keep` says which stay.
     pub fn subset(&self, keep: impl Fn(usize) -> bool) -> Problem {
         let kept = |i: &usize| keep(*i);
@@ -176,11 +201,12 @@ impl Problem {
         }
     }
 
-    /// Solves again by least squares with the weights and outliers as they are: for folds.
+    /// Solves again by least squares with the weights and outliers as they are: for folds. `None` where the search does not
+    /// end at a minimum: these pairs do not determine this lens.
     pub fn refit(&self, layout: &Layout) -> Option<Values> {
         let start = self.with_layout(layout);
         let solution = bundle::solve(&start.views, layout, start.values, Loss::Squared);
-        solution.cost.is_finite().then_some(solution.values)
+        (solution.stop == Stop::Minimum).then_some(solution.values)
     }
 }
 
@@ -189,14 +215,7 @@ impl Solved {
     pub fn uncertainty(&self, layout: &Layout) -> Result<Uncertainty, Error> {
         let Problem { views, values } = &self.problem;
         let uncertainty = bundle::uncertainty(views, layout, values).ok_or(Error::Undetermined { focal_sigma: None })?;
-        let rig = &values.shared.rig;
-        let mut worst: f64 = 0.0;
-        for (side, camera) in Side::BOTH.into_iter().zip([&rig.left, &rig.right]) {
-            let at = layout.camera_start(side);
-            for (i, focal) in [camera.fx, camera.fy].into_iter().enumerate() {
-                worst = worst.max(uncertainty.shared[(at + i, at + i)].sqrt() / focal.abs());
-            }
-        }
+        let worst = worst_focal_sigma(&uncertainty, layout, &values.shared.rig);
         let known = worst <= WORST_FOCAL_SIGMA;
         if known { Ok(uncertainty) } else { Err(Error::Undetermined { focal_sigma: Some(worst) }) }
     }
@@ -205,6 +224,18 @@ impl Solved {
     pub fn shared(&self) -> &Shared {
         &self.problem.values.shared
     }
+}
+
+/// Largest relative standard deviation of a focal length.
+fn worst_focal_sigma(uncertainty: &Uncertainty, layout: &Layout, rig: &Rig) -> f64 {
+    let mut worst: f64 = 0.0;
+    for (side, camera) in Side::BOTH.into_iter().zip([&rig.left, &rig.right]) {
+        let at = layout.camera_start(side);
+        for (i, focal) in [camera.fx, camera.fy].into_iter().enumerate() {
+            worst = worst.max(uncertainty.shared[(at + i, at + i)].sqrt() / focal.abs());
+        }
+    }
+    worst
 }
 
 /// Marks corners beyond the limit. True where a mark changed.

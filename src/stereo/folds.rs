@@ -1,5 +1,8 @@
 //! Folds over pairs: each pair is held out once.
 
+/// Folds over the pairs; with fewer pairs each is a fold of its own.
+pub const FOLDS: usize = 10;
+
 /// The fold of every pair, round robin: pairs taken one after another are alike, and should not all be missing at once.
 pub fn assign(pairs: usize, folds: usize) -> Vec<usize> {
     let folds = folds.clamp(1, pairs.max(1));

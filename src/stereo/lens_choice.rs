@@ -7,16 +7,13 @@
 use rayon::prelude::*;
 
 use super::calibrate::{Options, Problem};
-use super::folds;
+use super::folds::{self, FOLDS};
 use super::layout::{Layout, Shared};
 use super::observations::View;
 use super::pose;
 use super::residuals::residual_px;
 use super::robust::Loss;
 use super::{Error, Lens};
-
-/// Folds of the choice.
-const FOLDS: usize = 5;
 
 /// How a lens predicts pairs it has not seen.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -76,9 +73,19 @@ fn score(problem: &Problem, lens: Lens, shape: bool) -> LensScore {
     let folds = folds::assign(count, FOLDS);
     let mut by_pair = vec![None; count];
     let none = LensScore { model: lens.name(), held_out_rms_px: None, loss: None, lens: None, by_pair: Vec::new() };
+    // A lens that all pairs together do not determine is none; one that they do is a start for every fold.
+    let Some(values) = problem.refit(&layout) else { return none };
+    let problem = Problem { views: problem.views.clone(), values };
+    if !problem.determines(&layout) {
+        return none;
+    }
     let (mut squares, mut corners) = (0.0, 0);
     for fold in 0..FOLDS.min(count) {
-        let Some(values) = problem.subset(|i| folds[i] != fold).refit(&layout) else { return none };
+        let kept = problem.subset(|i| folds[i] != fold);
+        let Some(values) = kept.refit(&layout) else { return none };
+        if !kept.determines(&layout) {
+            return none;
+        }
         for i in (0..count).filter(|&i| folds[i] == fold) {
             let Some(left) = held_out(&values.shared, &problem.views[i]) else { return none };
             squares += left.squares_px2;

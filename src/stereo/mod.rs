@@ -9,6 +9,7 @@ pub mod bundle;
 pub mod calibrate;
 pub mod calibration_file;
 pub mod camera;
+pub mod check_file;
 pub mod consensus;
 pub mod folds;
 pub mod homography;

@@ -2,29 +2,8 @@
 
 use nalgebra::{Matrix2, Point2, Point3, Vector2};
 
+pub use crate::imaging::Side;
 use crate::imaging::{Board, Corner, PairCorners};
-
-/// One of the two cameras.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Side {
-    /// The reference camera.
-    Left,
-    /// The other one.
-    Right,
-}
-
-impl Side {
-    /// Both, in the order of every list.
-    pub const BOTH: [Side; 2] = [Side::Left, Side::Right];
-
-    /// The word in files and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Side::Left => "left",
-            Side::Right => "right",
-        }
-    }
-}
 
 /// A corner of the board seen in one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
