@@ -28,8 +28,15 @@ pub fn refine(picture: &Picture, detected: &Detected) -> Grid<Corner> {
         rows: fits.rows,
         cells: fits
             .iter_all()
-            .map(|(col, row, fit)| {
-                fit.map(|(px, fit)| Corner { col, row, px: *px, covariance_px2: Some(fit.covariance_px2), used: true })
+            .map(|(col, row, fit)| match fit {
+                Some((px, fit)) => {
+                    Some(Corner { col, row, px: *px, covariance_px2: Some(fit.covariance_px2), used: true })
+                }
+                // Kept where it was seen roughly, so that a picture in which nothing could be measured can still be judged.
+                None => {
+                    let px = *detected.corners.get(col, row)?;
+                    Some(Corner { col, row, px, covariance_px2: None, used: false })
+                }
             })
             .collect(),
     }

@@ -12,7 +12,7 @@ use super::noise::Noise;
 use super::observations::{Side, View};
 use super::residuals;
 use super::robust::Loss;
-use super::screening::{self, Look};
+use super::screening::{self, Look, Usual};
 use super::start::{self, CAUCHY_WIDTH, OneCamera};
 use super::{Error, Lens, Rig};
 use crate::geometry::Transform;
@@ -45,10 +45,11 @@ struct Candidate {
 pub fn find(corners: &Corners) -> Result<Consensus, Error> {
     let mut skipped = corners.skipped.clone();
     let mut views = Vec::new();
+    let fewest = FEWEST_CORNERS.max(fewest_corners(&corners.board));
     for pair in &corners.pairs {
-        let view = View::new(&corners.board, pair);
+        let view = View::new(&corners.board, pair, fewest);
         let [left, right] = Side::BOTH.map(|side| view.active(side).count());
-        if left.min(right) < FEWEST_CORNERS.max(fewest_corners(&corners.board)) {
+        if left.min(right) < fewest {
             skipped.push(Skipped { pair: view.pair, reason: format!("too few corners: {left} left, {right} right") });
         } else {
             views.push(view);
@@ -68,8 +69,9 @@ pub fn find(corners: &Corners) -> Result<Consensus, Error> {
         .map(|(i, view)| Candidate { view, alone_px: [left.median_px[i], right.median_px[i]] })
         .collect();
     let (candidates, first) = first_rig(&corners.board, candidates, &left, &right)?;
-    let (shared, inside) = agree(&candidates, first, total)?;
-    gather(&corners.board, candidates, &shared, &inside, skipped, total)
+    let usual = Usual { px: usual_px(&candidates), width_px: corners.left_size.0.max(corners.right_size.0) };
+    let (shared, inside) = agree(&candidates, first, &usual)?;
+    gather(&corners.board, candidates, &shared, &inside, skipped, &usual)
 }
 
 /// A quarter of the board tells its pose well enough.
@@ -117,7 +119,7 @@ fn first_rig(
 }
 
 /// Improves the rig on the pairs that agree with it until they stay the same; says which do.
-fn agree(candidates: &[Candidate], first: Shared, total: usize) -> Result<(Shared, Vec<bool>), Error> {
+fn agree(candidates: &[Candidate], first: Shared, usual: &Usual) -> Result<(Shared, Vec<bool>), Error> {
     let mut shared = first;
     let readable: Vec<bool> = candidates.iter().map(|c| c.alone_px.iter().all(Option::is_some)).collect();
     let mut inside = readable.clone();
@@ -141,18 +143,16 @@ fn agree(candidates: &[Candidate], first: Shared, total: usize) -> Result<(Share
             values = bundle::solve(&views, &layout, values, Loss::Cauchy(CAUCHY_WIDTH)).values;
         }
         shared = values.shared;
-        let usual_px = usual_px(candidates);
         let next: Vec<bool> = candidates
             .iter()
             .zip(&readable)
-            .map(|(c, readable)| *readable && misfit(&shared, c, usual_px) <= 1.0)
+            .map(|(c, readable)| *readable && misfit(&shared, c, usual) <= 1.0)
             .collect();
         if next == inside {
             break;
         }
         inside = next;
     }
-    let _ = total;
     Ok((shared, inside))
 }
 
@@ -164,9 +164,9 @@ fn usual_px(candidates: &[Candidate]) -> f64 {
 }
 
 /// A pair's residual on the rig as a share of its limit; above one it does not belong.
-fn misfit(shared: &Shared, candidate: &Candidate, usual_px: f64) -> f64 {
+fn misfit(shared: &Shared, candidate: &Candidate, usual: &Usual) -> f64 {
     let alone = candidate.alone_px[0].unwrap_or(f64::INFINITY).max(candidate.alone_px[1].unwrap_or(f64::INFINITY));
-    let limit = screening::limit_px(alone.min(2.0 * usual_px), usual_px);
+    let limit = usual.limit_px(alone);
     screening::misfit_px(shared, &candidate.view).map_or(f64::INFINITY, |(px, _)| px / limit)
 }
 
@@ -177,9 +177,9 @@ fn gather(
     shared: &Shared,
     inside: &[bool],
     mut skipped: Vec<Skipped>,
-    total: usize,
+    usual: &Usual,
 ) -> Result<Consensus, Error> {
-    let usual_px = usual_px(&candidates);
+    let total = candidates.len() + skipped.len();
     let judged = candidates.len();
     let (mut views, mut poses, mut bad) = (Vec::new(), Vec::new(), Vec::new());
     for (candidate, inside) in candidates.into_iter().zip(inside) {
@@ -189,8 +189,8 @@ fn gather(
                 poses.push(pose);
             }
             misfit => {
-                let look = screening::look(shared, board, &candidate.view, candidate.alone_px, usual_px);
-                bad.push(Skipped { pair: candidate.view.pair, reason: reason(look, misfit.map(|m| m.0), usual_px) });
+                let look = screening::look(shared, board, &candidate.view, candidate.alone_px, usual);
+                bad.push(Skipped { pair: candidate.view.pair, reason: reason(look, misfit.map(|m| m.0), usual.px) });
             }
         }
     }

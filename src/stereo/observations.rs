@@ -41,6 +41,9 @@ impl Observation {
     }
 }
 
+/// How far a corner that was found but could not be measured may be off, px.
+const COARSE_PX: f64 = 1.0;
+
 /// What one pair of pictures shows of the board: left corners first, then right.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
@@ -51,15 +54,20 @@ pub struct View {
 }
 
 impl View {
-    /// The usable corners of a pair: those that imaging relies on.
-    pub fn new(board: &Board, corners: &PairCorners) -> View {
-        let left = corners.left.iter().map(|corner| (Side::Left, corner));
-        let right = corners.right.iter().map(|corner| (Side::Right, corner));
-        let observations = left
-            .chain(right)
-            .filter(|(_, corner)| corner.used && corner.col < board.columns() && corner.row < board.rows())
-            .map(|(side, corner)| observation(board, side, corner))
-            .collect();
+    /// The corners of a pair: those that imaging relies on, or, in a picture with fewer than `fewest` of them, all that it found.
+    /// A whole picture out of focus is judged by how it fits, with the covariances it has.
+    pub fn new(board: &Board, corners: &PairCorners, fewest: usize) -> View {
+        let of = |side, list: &[Corner]| -> Vec<Observation> {
+            let inside = |c: &&Corner| c.col < board.columns() && c.row < board.rows() && c.px.iter().all(|v| v.is_finite());
+            let relied = list.iter().filter(|c| c.used).count();
+            list.iter()
+                .filter(inside)
+                .filter(|c| c.used || relied < fewest)
+                .map(|c| observation(board, side, c))
+                .collect()
+        };
+        let mut observations = of(Side::Left, &corners.left);
+        observations.extend(of(Side::Right, &corners.right));
         View { pair: corners.pair.clone(), observations }
     }
 
@@ -91,7 +99,7 @@ fn observation(board: &Board, side: Side, corner: &Corner) -> Observation {
     let covariance_px2 = corner
         .covariance_px2
         .filter(|c| c.iter().all(|v| v.is_finite()) && c.m11 > 0.0 && c.determinant() > 0.0)
-        .unwrap_or_else(Matrix2::zeros);
+        .unwrap_or_else(|| if corner.used { Matrix2::zeros() } else { Matrix2::identity() * (COARSE_PX * COARSE_PX) });
     Observation {
         side,
         col: corner.col,

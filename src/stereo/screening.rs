@@ -18,6 +18,10 @@ const FACTOR: f64 = 4.0;
 /// ... and farther than this: smaller contradictions are an uncertainty to be reported, not a wrong pair.
 const LEAST_PX: f64 = 0.3;
 
+/// Whatever single pictures leave, a rig that misses the corners by more than this share of the picture's width measures nothing:
+/// pictures in motion, out of focus, or of another board fit badly one by one, too.
+const LARGEST_SHARE: f64 = 1e-3;
+
 /// What a pair that does not belong looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Look {
@@ -33,8 +37,8 @@ impl Look {
     /// The words for a person.
     pub fn describe(self) -> &'static str {
         match self {
-            Look::Misread(Side::Left) => "the left corners do not form a board: misread, wrong order, or blurred",
-            Look::Misread(Side::Right) => "the right corners do not form a board: misread, wrong order, or blurred",
+            Look::Misread(Side::Left) => "the left corners do not form a board: misread, in a wrong order, blurred or moving",
+            Look::Misread(Side::Right) => "the right corners do not form a board: misread, in a wrong order, blurred or moving",
             Look::Turned => "the board is turned by 180 degrees between left and right",
             Look::NotSimultaneous => {
                 "each picture fits a board, but not the same one: not taken at the same time, or a camera moved"
@@ -60,23 +64,33 @@ pub fn misfit_px(shared: &Shared, view: &View) -> Option<(f64, Transform)> {
     Some((both[0]?.max(both[1]?), fit.left_from_board))
 }
 
-/// The limit above which a pair does not belong: `alone_px` is what its pictures leave one by one, `usual_px` what those of
-/// most pairs leave.
-pub fn limit_px(alone_px: f64, usual_px: f64) -> f64 {
-    (FACTOR * alone_px.max(usual_px)).max(LEAST_PX)
+/// What pictures of this rig usually leave one by one, and how wide they are: what a pair's residual is compared with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Usual {
+    /// Median over the pictures, px.
+    pub px: f64,
+    /// Width of the wider picture, px.
+    pub width_px: u32,
+}
+
+impl Usual {
+    /// The limit above which a pair does not belong; `alone_px` is what its pictures leave one by one.
+    pub fn limit_px(&self, alone_px: f64) -> f64 {
+        (FACTOR * alone_px.min(2.0 * self.px).max(self.px)).max(LEAST_PX).min(LARGEST_SHARE * f64::from(self.width_px))
+    }
 }
 
 /// What is wrong with a pair that does not belong. `alone_px` are its pictures' residuals one by one, left and right.
-pub fn look(shared: &Shared, board: &Board, view: &View, alone_px: [Option<f64>; 2], usual_px: f64) -> Look {
+pub fn look(shared: &Shared, board: &Board, view: &View, alone_px: [Option<f64>; 2], usual: &Usual) -> Look {
     for (side, alone) in Side::BOTH.into_iter().zip(alone_px) {
-        if alone.is_none_or(|px| px > limit_px(0.0, usual_px)) {
+        if alone.is_none_or(|px| px > usual.limit_px(0.0)) {
             return Look::Misread(side);
         }
     }
     let mut turned = view.clone();
     turned.turn_right(board);
     match misfit_px(shared, &turned) {
-        Some((px, _)) if px <= limit_px(0.0, usual_px) => Look::Turned,
+        Some((px, _)) if px <= usual.limit_px(0.0) => Look::Turned,
         _ => Look::NotSimultaneous,
     }
 }

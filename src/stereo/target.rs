@@ -12,7 +12,7 @@ use super::layout::{Layout, Shared};
 use super::noise::Noise;
 use super::observations::{Observation, Side, View};
 use super::pose;
-use super::residuals::{residual_px, rms_px, root_mean_square};
+use super::residuals::{residual_px, root_mean_square};
 use super::robust::Loss;
 use super::rig::Covariance;
 use super::schur;
@@ -46,7 +46,7 @@ pub struct TargetPose {
 /// Measures the target at every pose; the answer has one entry a pair, in the same order.
 pub fn measure(rig: &Rig, board: &Board, pairs: &[PairCorners]) -> Vec<Result<TargetPose, String>> {
     let shared = Shared { rig: rig.clone(), shape_mm: [0.0; 2] };
-    let mut views: Vec<View> = pairs.iter().map(|pair| View::new(board, pair)).collect();
+    let mut views: Vec<View> = pairs.iter().map(|pair| View::new(board, pair, FEWEST_CORNERS)).collect();
     let robust = |view: &View| pose::fit(&shared, view, Loss::Cauchy(CAUCHY_WIDTH)).map(|fit| fit.left_from_board);
     let mut noise = Noise::UNIT;
     let mut starts: Vec<Option<Transform>> = Vec::new();
@@ -147,10 +147,4 @@ pub fn nearest_half_turn(board: &Board, reference: &Transform, pose: &TargetPose
         turned.cam_from_board *= transform(Vector3::z() * std::f64::consts::PI, Vector3::zeros());
     }
     turned
-}
-
-/// Root mean square of one picture's residuals of a measured pose, px.
-pub fn side_rms_px(rig: &Rig, board: &Board, pair: &PairCorners, pose: &TargetPose, side: Side) -> Option<f64> {
-    let shared = Shared { rig: rig.clone(), shape_mm: [0.0; 2] };
-    rms_px(&shared, &pose.cam_from_board, &View::new(board, pair), side)
 }
