@@ -8,11 +8,11 @@ use crate::files::{OutDir, to_json};
 use crate::imaging::{Board, Corners, Wanted, corners_file, find_corners};
 use crate::progress;
 use crate::report;
+use crate::stereo;
 use crate::stereo::accuracy::{self, Verdict};
 use crate::stereo::calibrate::{FEWEST_PAIRS, Options, calibrate};
 use crate::stereo::calibration_file::CalibrationFile;
 use crate::stereo::check_file::CameraCheckFile;
-use crate::stereo;
 
 /// Runs the command.
 pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
@@ -53,6 +53,8 @@ fn corners(args: &CameraCheck, board: Board) -> Result<Corners> {
         (Some(file), _) => corners_file::read(file, board, args.picture_size),
         (None, Some(images)) => find_corners(images, &Wanted { board, needed: FEWEST_PAIRS }),
         // The command line asks for one of the two.
-        (None, None) => Err(config::Error::Invalid { problems: vec!["neither pictures nor --corners given".into()] }.into()),
+        (None, None) => {
+            Err(config::Error::Invalid { problems: vec!["neither pictures nor --corners given".into()] }.into())
+        }
     }
 }

@@ -3,6 +3,7 @@
 pub mod camera_check;
 pub mod figure;
 pub mod identify;
+pub mod measure;
 pub mod page;
 pub mod table;
 

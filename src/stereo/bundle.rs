@@ -153,11 +153,7 @@ pub struct Uncertainty {
 pub fn uncertainty(views: &[View], layout: &Layout, values: &Values) -> Option<Uncertainty> {
     let blocks = blocks(views, layout, values, Loss::Squared)?;
     let count = layout.count();
-    let shared = if count == 0 {
-        DMatrix::zeros(0, 0)
-    } else {
-        invert(&schur::eliminate(&blocks, 0.0, count)?.0)?
-    };
+    let shared = if count == 0 { DMatrix::zeros(0, 0) } else { invert(&schur::eliminate(&blocks, 0.0, count)?.0)? };
     let poses = blocks
         .iter()
         .map(|block| {

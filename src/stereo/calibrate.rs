@@ -10,8 +10,8 @@ use super::lens_choice::{self, LensScore};
 use super::noise::Noise;
 use super::observations::{Side, View};
 use super::residuals;
-use super::robust::Loss;
 use super::rig::Covariance;
+use super::robust::Loss;
 use super::{Error, Lens, Rig};
 use crate::imaging::{Board, Corners, Skipped};
 
@@ -90,8 +90,7 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
     let solved = start.solve(&layout)?;
     let uncertainty = solved.uncertainty(&layout)?;
     let Problem { views, mut values } = solved.problem;
-    values.shared.rig.covariance =
-        Some(Covariance { order: layout.names(), matrix: uncertainty.shared.clone() });
+    values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: uncertainty.shared.clone() });
     Ok(Calibration {
         board: corners.board,
         layout,
@@ -214,7 +213,8 @@ impl Solved {
     /// Covariance of everything; an error where the views do not tell.
     pub fn uncertainty(&self, layout: &Layout) -> Result<Uncertainty, Error> {
         let Problem { views, values } = &self.problem;
-        let uncertainty = bundle::uncertainty(views, layout, values).ok_or(Error::Undetermined { focal_sigma: None })?;
+        let uncertainty =
+            bundle::uncertainty(views, layout, values).ok_or(Error::Undetermined { focal_sigma: None })?;
         let worst = worst_focal_sigma(&uncertainty, layout, &values.shared.rig);
         let known = worst <= WORST_FOCAL_SIGMA;
         if known { Ok(uncertainty) } else { Err(Error::Undetermined { focal_sigma: Some(worst) }) }

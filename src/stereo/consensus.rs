@@ -86,8 +86,10 @@ fn first_rig(
     left: &OneCamera,
     right: &OneCamera,
 ) -> Result<(Vec<Candidate>, Shared), Error> {
-    let both: Vec<Option<(Transform, Transform)>> = left.poses.iter().zip(&right.poses).map(|(l, r)| l.zip(*r)).collect();
-    let half_turn = crate::geometry::transform(nalgebra::Vector3::z() * std::f64::consts::PI, nalgebra::Vector3::zeros());
+    let both: Vec<Option<(Transform, Transform)>> =
+        left.poses.iter().zip(&right.poses).map(|(l, r)| l.zip(*r)).collect();
+    let half_turn =
+        crate::geometry::transform(nalgebra::Vector3::z() * std::f64::consts::PI, nalgebra::Vector3::zeros());
     let choices: Vec<Vec<Transform>> = both
         .iter()
         .flatten()
@@ -130,10 +132,8 @@ fn agree(candidates: &[Candidate], first: Shared, usual: &Usual) -> Result<(Shar
             break;
         }
         // A new rig needs poses that suit it: the old ones of a pair that was out belong to nothing.
-        let (poses, kept): (Vec<Transform>, Vec<View>) = views
-            .drain(..)
-            .filter_map(|view| Some((screening::misfit_px(&shared, &view)?.1, view)))
-            .unzip();
+        let (poses, kept): (Vec<Transform>, Vec<View>) =
+            views.drain(..).filter_map(|view| Some((screening::misfit_px(&shared, &view)?.1, view))).unzip();
         let mut views = kept;
         let mut values = Values { shared, poses };
         for _ in 0..2 {
@@ -208,7 +208,10 @@ fn gather(
 
 fn reason(look: Look, misfit_px: Option<f64>, usual_px: f64) -> String {
     match misfit_px {
-        Some(px) => format!("{} (residual {px:.2} px on the common rig, {usual_px:.2} px in most single pictures)", look.describe()),
+        Some(px) => format!(
+            "{} (residual {px:.2} px on the common rig, {usual_px:.2} px in most single pictures)",
+            look.describe()
+        ),
         None => look.describe().to_owned(),
     }
 }

@@ -39,11 +39,10 @@ pub fn homography(points: &[(Point3<f64>, Point2<f64>)]) -> Option<(Matrix3<f64>
         return None;
     }
     let h = eigen.eigenvectors.column(order[0]);
-    let picture_from_board = from_picture * Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]) * to_board;
-    let squares: f64 = points
-        .iter()
-        .map(|(board, picture)| (apply(&picture_from_board, board) - picture).norm_squared())
-        .sum();
+    let picture_from_board =
+        from_picture * Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]) * to_board;
+    let squares: f64 =
+        points.iter().map(|(board, picture)| (apply(&picture_from_board, board) - picture).norm_squared()).sum();
     let rms = (squares / points.len() as f64).sqrt();
     rms.is_finite().then_some((picture_from_board, rms))
 }
@@ -154,7 +153,8 @@ mod tests {
 
     #[test]
     fn corners_on_a_line_have_no_homography() {
-        let line: Vec<_> = (0..10).map(|i| (Point3::new(f64::from(i), 0.0, 0.0), Point2::new(f64::from(i) * 3.0, 5.0))).collect();
+        let line: Vec<_> =
+            (0..10).map(|i| (Point3::new(f64::from(i), 0.0, 0.0), Point2::new(f64::from(i) * 3.0, 5.0))).collect();
         assert!(homography(&line).is_none());
     }
 }

@@ -7,9 +7,8 @@ use super::{Camera, Lens, Rig};
 use crate::geometry::perturb;
 
 /// Names of a camera's numbers in the order of [`super::projection::Projection::by_camera`].
-pub const CAMERA_NAMES: [&str; 18] = [
-    "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tauX", "tauY",
-];
+pub const CAMERA_NAMES: [&str; 18] =
+    ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tauX", "tauY"];
 
 /// Names of the transform's numbers.
 pub const TRANSFORM_NAMES: [&str; 6] = ["rx_rad", "ry_rad", "rz_rad", "tx_mm", "ty_mm", "tz_mm"];

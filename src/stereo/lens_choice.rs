@@ -38,9 +38,9 @@ pub fn choose(start: &Problem, options: &Options) -> Result<(Layout, Vec<LensSco
         return Ok((Layout::rig(lens, shape), Vec::new()));
     }
     // Weights and outliers from a lens that is at least as rich as most need; the comparison uses the same for all.
-    let solved = start.solve(&Layout::rig(Lens::Brown5, shape)).or_else(|_| start.solve(&Layout::rig(Lens::Brown4, shape)))?;
-    let scores: Vec<LensScore> =
-        Lens::LADDER.par_iter().map(|&lens| score(&solved.problem, lens, shape)).collect();
+    let solved =
+        start.solve(&Layout::rig(Lens::Brown5, shape)).or_else(|_| start.solve(&Layout::rig(Lens::Brown4, shape)))?;
+    let scores: Vec<LensScore> = Lens::LADDER.par_iter().map(|&lens| score(&solved.problem, lens, shape)).collect();
     let best = scores.iter().filter(|s| s.loss.is_some()).min_by(|a, b| a.total().total_cmp(&b.total()));
     let Some(best) = best else { return Err(Error::Undetermined { focal_sigma: None }) };
     let chosen = scores

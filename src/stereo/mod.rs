@@ -15,6 +15,7 @@ pub mod folds;
 pub mod homography;
 pub mod layout;
 pub mod lens_choice;
+pub mod measure_file;
 pub mod noise;
 pub mod observations;
 pub mod pose;
@@ -85,6 +86,12 @@ pub enum Error {
         /// Steps tried.
         steps: usize,
     },
+    /// Not one pose of a robot was measured.
+    #[error("the target was measured at none of {poses} poses")]
+    NothingMeasured {
+        /// Poses in the list.
+        poses: usize,
+    },
     /// Pictures of another size than the calibration's.
     #[error("the {} pictures are {found_width}x{found_height} px, the calibration is for {width}x{height}", side.name())]
     PictureSize {
@@ -132,7 +139,12 @@ impl Explain for Error {
                     "photograph the board tilted by 20 to 45 degrees about both of its axes, at several distances"
                 }
                 Error::NotConverged { .. } => "`--lens radial2` has fewer unknowns; add pairs with the board tilted",
-                Error::PictureSize { .. } => "calibrate with pictures of the same size and cut: `stereocal camera-check IMAGES`",
+                Error::NothingMeasured { .. } => {
+                    "`--squares CxR` and `--square-mm MM` describe the target on the robot"
+                }
+                Error::PictureSize { .. } => {
+                    "calibrate with pictures of the same size and cut: `stereocal camera-check IMAGES`"
+                }
             }
             .to_owned(),
         )

@@ -58,7 +58,8 @@ impl View {
     /// A whole picture out of focus is judged by how it fits, with the covariances it has.
     pub fn new(board: &Board, corners: &PairCorners, fewest: usize) -> View {
         let of = |side, list: &[Corner]| -> Vec<Observation> {
-            let inside = |c: &&Corner| c.col < board.columns() && c.row < board.rows() && c.px.iter().all(|v| v.is_finite());
+            let inside =
+                |c: &&Corner| c.col < board.columns() && c.row < board.rows() && c.px.iter().all(|v| v.is_finite());
             let relied = list.iter().filter(|c| c.used).count();
             list.iter()
                 .filter(inside)

@@ -40,8 +40,7 @@ impl Camera {
         let ray = Point2::new(point.x / point.z, point.y / point.z);
         let bent = self.bend(&ray);
         let f = Matrix2::new(self.fx, 0.0, 0.0, self.fy);
-        let ray_by_point =
-            Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y) / point.z;
+        let ray_by_point = Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y) / point.z;
         let mut by_camera = [Vector2::zeros(); CAMERA_NUMBERS];
         by_camera[0].x = bent.at.x;
         by_camera[1].y = bent.at.y;
@@ -171,7 +170,9 @@ pub(crate) mod tests {
     fn derivatives_equal_central_differences() {
         for lens in Lens::LADDER {
             let camera = bent_camera(lens);
-            for point in [Point3::new(120.0, -80.0, 500.0), Point3::new(-200.0, 150.0, 620.0), Point3::new(0.0, 0.0, 400.0)] {
+            for point in
+                [Point3::new(120.0, -80.0, 500.0), Point3::new(-200.0, 150.0, 620.0), Point3::new(0.0, 0.0, 400.0)]
+            {
                 let analytic = camera.project_with_derivatives(&point).unwrap();
                 assert!((analytic.px - camera.project(&point)).norm() < 1e-9);
                 for axis in 0..3 {
@@ -205,8 +206,9 @@ pub(crate) mod tests {
     fn projection_equals_opencv() {
         for lens in Lens::LADDER {
             let camera = bent_camera(lens);
-            let points: Vec<Point3<f64>> =
-                (0..40).map(|i| Point3::new(f64::from(i % 8) * 55.0 - 190.0, f64::from(i / 8) * 60.0 - 120.0, 600.0)).collect();
+            let points: Vec<Point3<f64>> = (0..40)
+                .map(|i| Point3::new(f64::from(i % 8) * 55.0 - 190.0, f64::from(i / 8) * 60.0 - 120.0, 600.0))
+                .collect();
             let theirs = crate::opencv::project_points(&camera, &points).unwrap();
             for (point, px) in points.iter().zip(theirs) {
                 let off = (camera.project(point) - px).norm();

@@ -61,7 +61,13 @@ impl Packing {
 }
 
 /// Residual and derivatives of one corner. `None` where the corner would lie behind its camera.
-fn row(shared: &Shared, layout: &Layout, packing: &Packing, left_from_board: &Transform, o: &Observation) -> Option<Row> {
+fn row(
+    shared: &Shared,
+    layout: &Layout,
+    packing: &Packing,
+    left_from_board: &Transform,
+    o: &Observation,
+) -> Option<Row> {
     let on_board = o.board_point(&shared.shape_mm);
     let turned = left_from_board.rotation * on_board.coords;
     let in_left = left_from_board * on_board;

@@ -37,8 +37,12 @@ impl Look {
     /// The words for a person.
     pub fn describe(self) -> &'static str {
         match self {
-            Look::Misread(Side::Left) => "the left corners do not form a board: misread, in a wrong order, blurred or moving",
-            Look::Misread(Side::Right) => "the right corners do not form a board: misread, in a wrong order, blurred or moving",
+            Look::Misread(Side::Left) => {
+                "the left corners do not form a board: misread, in a wrong order, blurred or moving"
+            }
+            Look::Misread(Side::Right) => {
+                "the right corners do not form a board: misread, in a wrong order, blurred or moving"
+            }
             Look::Turned => "the board is turned by 180 degrees between left and right",
             Look::NotSimultaneous => {
                 "each picture fits a board, but not the same one: not taken at the same time, or a camera moved"

@@ -8,17 +8,17 @@
 use nalgebra::{DMatrix, Matrix6, Vector2, Vector3};
 use rayon::prelude::*;
 
+use super::Rig;
 use super::layout::{Layout, Shared};
 use super::noise::Noise;
 use super::observations::{Observation, Side, View};
 use super::pose;
 use super::residuals::{residual_px, root_mean_square};
-use super::robust::Loss;
 use super::rig::Covariance;
+use super::robust::Loss;
 use super::schur;
 use super::start::CAUCHY_WIDTH;
 use super::triangulate::{common, triangulate};
-use super::Rig;
 use crate::geometry::{Transform, transform};
 use crate::imaging::{Board, PairCorners};
 

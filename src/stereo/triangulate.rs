@@ -153,7 +153,7 @@ impl RigCovariance {
 }
 
 /// The corners both pictures show, by their place on the board, row by row.
-pub fn common<'a>(view: &'a super::observations::View) -> Vec<(&'a Observation, &'a Observation)> {
+pub fn common(view: &super::observations::View) -> Vec<(&Observation, &Observation)> {
     let key = |o: &Observation| (o.row, o.col);
     let right: std::collections::BTreeMap<(usize, usize), &Observation> =
         view.active(Side::Right).map(|o| (key(o), o)).collect();
