@@ -9,12 +9,12 @@ use nalgebra::{DMatrix, DVector, Matrix3, Point3, Rotation3};
 use super::base::Base;
 use super::blocks::{Anchor, Block, Evaluated, Length, Raw, Scatter, Spot};
 use super::dataset::{Dataset, Kind, Reading};
+use super::fast::FastCost;
 use super::kinematics::{Kinematics, Place};
 use super::pairwise::{CHUNK, Pairs};
 use super::problem::Problem;
 use super::settings::Model;
 use crate::geometry::{Transform, transform_from_matrix};
-use crate::measurements::Role;
 use crate::robot::{Parameter, Robot};
 
 /// The rows of a data set under a residual model, before it is known what they determine.
@@ -240,7 +240,7 @@ pub fn fitted_frame(pairs: impl Iterator<Item = (Point3<f64>, Point3<f64>)>) -> 
 }
 
 /// The rotation R with the largest trace of R' M.
-fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
+pub fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
     let svd = matrix.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Matrix3::identity() };
     let mut sign = Matrix3::identity();
@@ -295,6 +295,8 @@ pub struct Fit<'a> {
     prior: DMatrix<f64>,
     /// Root of the unit variance: residuals come out in mm.
     unit_mm: f64,
+    /// The cost without matrices, where the blocks allow it.
+    fast: Option<FastCost>,
 }
 
 impl<'a> Fit<'a> {
@@ -302,7 +304,8 @@ impl<'a> Fit<'a> {
     pub fn new(estimate: &'a Estimate, base: &'a Base, bounds: &[f64], prior: DMatrix<f64>) -> Fit<'a> {
         let lower = bounds.iter().map(|b| -b).collect();
         let unit_mm = estimate.unit_variance_mm2().sqrt();
-        Fit { estimate, base, lower, upper: bounds.to_vec(), prior, unit_mm }
+        let fast = FastCost::new(estimate);
+        Fit { estimate, base, lower, upper: bounds.to_vec(), prior, unit_mm, fast }
     }
 
     /// Offsets of all parameters, those that are not free at zero.
@@ -323,6 +326,13 @@ impl<'a> Fit<'a> {
 }
 
 impl Problem for Fit<'_> {
+    fn cost(&self, x: &[f64]) -> f64 {
+        let Some(fast) = &self.fast else { return 0.5 * self.residuals(x).norm_squared() };
+        let of_prior: f64 =
+            self.prior.row_iter().map(|row| row.iter().zip(x).map(|(w, x)| w * x).sum::<f64>().powi(2)).sum();
+        0.5 * self.unit_mm * self.unit_mm * (fast.sum_of_squares(&self.offsets(x)) + of_prior)
+    }
+
     fn lower(&self) -> &[f64] {
         &self.lower
     }
@@ -346,9 +356,4 @@ impl Problem for Fit<'_> {
         all.rows_mut(count, self.prior.nrows()).copy_from(&self.prior);
         (self.with_prior(residuals, x), all * self.unit_mm)
     }
-}
-
-/// The rows of a group's samples, centres first: what a person would call the fitted poses.
-pub fn is_fitted(role: Role) -> bool {
-    role != Role::Verify
 }

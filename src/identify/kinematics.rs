@@ -65,6 +65,16 @@ impl Kinematics {
         &self.nominal
     }
 
+    /// Number of poses.
+    pub fn pose_count(&self) -> usize {
+        self.poses.len()
+    }
+
+    /// Of a pose: its angles with the nominal robot's own corrections, rad, and the features of the parameters.
+    pub fn constants(&self, pose: usize) -> (&[f64], &[f64]) {
+        (&self.poses[pose].angles_rad, &self.poses[pose].features)
+    }
+
     /// Every pose, with derivatives where asked.
     pub fn places(&self, offsets: &[f64], derivatives: bool) -> Vec<Place> {
         let robot = self.nominal.shifted(&self.parameters, offsets);

@@ -7,7 +7,7 @@
 //!  base       what the poses determine
 //!  prior      manufacturing tolerance, sized by the data
 //!  prepare    weights, prior, box: the problem that all solvers get      estimate, problem
-//!  trust_region, swarm                                                   the solvers
+//!  trust_region, swarm                                                   the solvers; kernel and fast are their hot loop
 //!  verify     errors on rows that were not fitted
 //!  choose     models, terms and methods judged on samples held out
 //! ```
@@ -17,6 +17,8 @@ pub mod blocks;
 pub mod choose;
 pub mod dataset;
 pub mod estimate;
+pub mod fast;
+pub mod kernel;
 pub mod kinematics;
 pub mod pairwise;
 pub mod prepare;
@@ -25,6 +27,8 @@ pub mod problem;
 pub mod record;
 pub mod settings;
 pub mod swarm;
+#[cfg(test)]
+pub mod synthetic;
 pub mod terms;
 pub mod trust_region;
 pub mod verify;

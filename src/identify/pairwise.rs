@@ -12,7 +12,7 @@ use super::blocks::{Raw, Scatter, Spot, direction, whitener};
 use super::kinematics::Place;
 
 /// Poses whose distances are taken together at the most.
-pub const CHUNK: usize = 120;
+pub const CHUNK: usize = 60;
 
 /// Ridge on the normal matrix as a fraction of its mean diagonal: far above rounding, far below any weight.
 const RIDGE: f64 = 1e-10;

@@ -1,0 +1,131 @@
+//! A small world for tests: the paper's robot with Table 2's errors, measured on spheres round the paper's four start points.
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use crate::geometry::Transform;
+use crate::measurements::{Measurement, Observed, RobotPose, Role};
+use crate::robot::{Parameter, Robot, inverse};
+
+/// A nominal robot, the true one, and what was measured.
+pub struct World {
+    /// As its maker delivers it.
+    pub nominal: Robot,
+    /// As it is.
+    pub truth: Robot,
+    /// What was measured.
+    pub rows: Vec<Measurement>,
+}
+
+/// Start points of section 4.2, mm in the base frame.
+const STARTS: [[f64; 3]; 4] = [[200.0, 0.0, 379.0], [-200.0, 0.0, 379.0], [0.0, 200.0, 379.0], [0.0, -230.0, 379.0]];
+
+/// Table 2 of the paper: deviations in deg and mm.
+pub fn table_2(nominal: &Robot) -> Robot {
+    let deg = |v: f64| 1000.0 * v.to_radians();
+    let alpha = [-0.1746, 0.6159, -0.7798, -0.5255, 0.9999, 0.6489];
+    let a = [0.0, 0.9999, 0.9999, -0.2770, 0.2263, 0.0];
+    let theta = [-0.3136, -0.9993, 0.9999, -0.6520, 0.1365, 0.0];
+    let d = [0.0, 0.0, 0.0, 0.5261, 0.2078, 0.1015];
+    let mut truth = nominal.clone();
+    for i in 0..6 {
+        truth.add(Parameter::Alpha(i), deg(alpha[i]));
+        truth.add(Parameter::A(i), a[i]);
+        truth.add(Parameter::Theta(i), deg(theta[i]));
+        truth.add(Parameter::D(i), d[i]);
+    }
+    truth
+}
+
+/// `samples` poses with orientations tilted up to 25 degrees, noise a coordinate in mm; an eighth as many again to verify.
+pub fn world(samples: usize, noise_mm: f64, seed: u64) -> World {
+    planned(samples, samples / 8 + 4, 25.0, noise_mm, seed, &|_| {})
+}
+
+/// Poses on spheres of radius 100 mm; the flange keeps one orientation where `tilt_deg` is zero.
+pub fn planned(
+    samples: usize,
+    verify: usize,
+    tilt_deg: f64,
+    noise_mm: f64,
+    seed: u64,
+    spoil: &dyn Fn(&mut Robot),
+) -> World {
+    let mut nominal = Robot::paper();
+    nominal.tool_mm = Vector3::new(12.0, -8.0, 25.0);
+    let mut truth = table_2(&nominal);
+    spoil(&mut truth);
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let mut rows = Vec::new();
+    let roles = std::iter::repeat_n(Role::Sample, samples).chain(std::iter::repeat_n(Role::Verify, verify));
+    let plan: Vec<(usize, Role)> =
+        (0..4).map(|g| (g, Role::Center)).chain(roles.enumerate().map(|(i, r)| (i % 4, r))).collect();
+    for (group, role) in plan {
+        for _ in 0..200 {
+            let start = Vector3::from(STARTS[group]);
+            let mut unit = || 2.0 * random.random::<f64>() - 1.0;
+            let towards = Vector3::new(unit(), unit(), unit());
+            let tilt = Vector3::new(unit(), unit(), unit()) * tilt_deg.to_radians();
+            let radius = if role == Role::Center { 0.0 } else { 100.0 };
+            if towards.norm() > 1.0 || towards.norm() < 0.1 {
+                continue;
+            }
+            // The flange looks down and outwards, so that the robot reaches all four spheres with the same wrist.
+            let flange = UnitQuaternion::from_scaled_axis(tilt)
+                * UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.4);
+            let origin = start + radius * towards.normalize();
+            let target = Transform::from_parts(origin.into(), flange);
+            let Some(q) = inverse::from_starts(&nominal, &target, &starts()) else { continue };
+            let q_deg: Vec<f64> = q.iter().map(|r| r.to_degrees()).collect();
+            let q_rad: Vec<f64> = q_deg.iter().map(|d| d.to_radians()).collect();
+            let point = sensor(group) * truth.target_mm(&q_rad) + noise_mm * normal(&mut random);
+            let at =
+                RobotPose { pose: format!("p{}", rows.len()), group: format!("g{group}"), role, joints_deg: q_deg };
+            let observed = Observed::Position { point_mm: point, covariance_mm2: None, rotation_rad: None };
+            rows.push(Measurement { at, observed });
+            break;
+        }
+    }
+    World { nominal, truth, rows }
+}
+
+/// Elbow up, all round the base.
+fn starts() -> Vec<Vec<f64>> {
+    (0..8).map(|k| vec![0.785 * k as f64 - 3.0, 0.6, -1.2, 0.5, 1.3, 0.2]).collect()
+}
+
+/// A camera frame somewhere.
+fn sensor(group: usize) -> Transform {
+    let turn = Vector3::new(0.3 + group as f64, -0.7, 1.1);
+    Transform::from_parts(Vector3::new(50.0, 80.0, 500.0).into(), UnitQuaternion::from_scaled_axis(turn))
+}
+
+/// Three normal numbers (Box and Muller).
+fn normal(random: &mut Pcg64Mcg) -> Vector3<f64> {
+    let mut one = || {
+        let (u, v): (f64, f64) = (random.random(), random.random());
+        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    };
+    Vector3::new(one(), one(), one())
+}
+
+/// Distances alone, to the group's centre.
+pub fn as_distances(rows: &[Measurement]) -> Vec<Measurement> {
+    let center = |group: &str| {
+        rows.iter().find(|r| r.at.group == group && r.at.role == Role::Center).and_then(|r| position(&r.observed))
+    };
+    rows.iter()
+        .map(|row| {
+            let distance_mm = match (center(&row.at.group), position(&row.observed)) {
+                (Some(c), Some(p)) => (p - c).norm(),
+                _ => 0.0,
+            };
+            Measurement { at: row.at.clone(), observed: Observed::Distance { distance_mm, sigma_mm: None } }
+        })
+        .collect()
+}
+
+fn position(observed: &Observed) -> Option<Point3<f64>> {
+    if let Observed::Position { point_mm, .. } = observed { Some(*point_mm) } else { None }
+}
