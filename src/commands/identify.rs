@@ -10,7 +10,7 @@ use crate::files::{self, OutDir};
 use crate::identify::choose::{Identification, identify};
 use crate::identify::dataset::Dataset;
 use crate::identify::record::{Record, quality};
-use crate::identify::{Error, Settings};
+use crate::identify::{Error, Settings, sessions};
 use crate::measurements::{self, Measurement};
 use crate::progress;
 use crate::report::identify as report;
@@ -27,14 +27,14 @@ pub fn run(args: &Identify, config: &Config) -> Result<Outcome> {
     let rows = measurements::read(&path)?;
     let nominal = nominal_robot(args.robot.as_deref())?;
     check_joints(&nominal, &rows, &path)?;
-    let set = Dataset::new(&rows, args.seed)?;
+    let (set, sessions) = sessions::find(&Dataset::new(&rows, args.seed)?, &nominal, &settings)?;
     let out = OutDir::open(&out)?;
 
     let bar = progress::bar("identifying", 0);
     let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.set_message(step.to_owned()))?;
     bar.finish_and_clear();
 
-    let record = Record::new(&set, &nominal, &found, &settings, args.seed);
+    let record = Record::new(&set, &nominal, &found, &sessions, &settings, args.seed);
     for warning in &record.warnings {
         progress::warn(warning);
     }

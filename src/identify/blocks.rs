@@ -140,6 +140,22 @@ impl Block {
         }
     }
 
+    /// Number of residuals.
+    pub fn row_count(&self) -> usize {
+        match self {
+            Block::Center { lengths, .. } | Block::Wire { lengths, .. } => lengths.len(),
+            Block::Pairwise(pairs) => pairs.row_count(),
+            Block::Frames { placements, oriented, .. } => {
+                placements.iter().map(Vec::len).sum::<usize>() * if *oriented { 6 } else { 3 }
+            }
+        }
+    }
+
+    /// Whitened derivatives with respect to the block's own unknowns, at their best.
+    pub fn design(&self, places: &[Place], scatter: &Scatter) -> DMatrix<f64> {
+        self.linearised(places, scatter, &self.evaluate(places, scatter, false).unknowns).1
+    }
+
     fn start(&self) -> Unknowns {
         match self {
             Block::Center { .. } | Block::Pairwise(_) => Unknowns::Nothing,

@@ -109,10 +109,10 @@ pub fn identify(
     let outliers = session.drop_outliers(reference)?;
     session.scatter = session.prepare(reference, &session.rows)?.estimate.scatter;
     let mut judged = Vec::new();
-    let model = session.choose_model(&models, &mut judged);
+    let (model, plain) = session.choose_model(&models, &mut judged);
     let terms = match settings.extensions {
         Extensions::None => Terms::default(),
-        Extensions::Auto => session.choose_terms(model, &mut judged),
+        Extensions::Auto => session.choose_terms(model, plain, &mut judged),
     };
     let choice = Choice { model, terms };
     let methods = settings.method.map_or(Method::ALL.to_vec(), |m| vec![m]);
@@ -250,11 +250,11 @@ impl Session<'_> {
     }
 
     /// The first model, which uses most of the data, unless another's held-out errors are clearly less.
-    fn choose_model(&self, models: &[Model], judged: &mut Vec<Judged>) -> Model {
+    fn choose_model(&self, models: &[Model], judged: &mut Vec<Judged>) -> (Model, Option<Vec<(usize, f64)>>) {
         let mut best: (Model, Option<Vec<(usize, f64)>>) =
             (models.first().copied().unwrap_or(Model::CenterDistance), None);
         if models.len() < 2 {
-            return best.0;
+            return best;
         }
         // Pairwise distances say what positions say (see `pairwise`), at many times the work: compared at the end, not chosen.
         for &model in models.iter().filter(|&&m| m != Model::PairwiseDistance) {
@@ -267,12 +267,15 @@ impl Session<'_> {
                 best = (model, held_out);
             }
         }
-        best.0
+        best
     }
 
-    fn choose_terms(&self, model: Model, judged: &mut Vec<Judged>) -> Terms {
+    /// `plain` are the held-out errors without terms, where they are known.
+    fn choose_terms(&self, model: Model, plain: Option<Vec<(usize, f64)>>, judged: &mut Vec<Judged>) -> Terms {
         let mut best = Terms::default();
-        let Some(mut reference) = self.judge(Choice { model, terms: best }, judged) else { return best };
+        let Some(mut reference) = plain.or_else(|| self.judge(Choice { model, terms: best }, judged)) else {
+            return best;
+        };
         for rung in Terms::rungs(self.robot) {
             let terms = rung(best);
             if let Some(held_out) = self.judge(Choice { model, terms }, judged)

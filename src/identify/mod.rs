@@ -2,6 +2,7 @@
 //!
 //! ```text
 //!  dataset    rows by group and role; what is left out and why
+//!  sessions   rows of one wire cut where its anchor moved
 //!  kinematics the robot at those poses, with derivatives
 //!  blocks     residual models, the placement's own unknowns eliminated   pairwise
 //!  base       what the poses determine
@@ -25,6 +26,7 @@ pub mod prepare;
 pub mod prior;
 pub mod problem;
 pub mod record;
+pub mod sessions;
 pub mod settings;
 pub mod swarm;
 #[cfg(test)]

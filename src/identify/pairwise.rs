@@ -126,6 +126,11 @@ impl Pairs {
         self.spots.iter().enumerate().map(raw).collect()
     }
 
+    /// Number of residuals: 3 a pose.
+    pub fn row_count(&self) -> usize {
+        3 * self.spots.len()
+    }
+
     /// Numbers that the distances of these poses can say: 3n - 6.
     pub fn count(&self) -> usize {
         (3 * self.spots.len()).saturating_sub(6)

@@ -95,7 +95,8 @@ impl Prepared {
         self.estimate.kinematics.parameters()
     }
 
-    fn prior(&self) -> DMatrix<f64> {
+    /// Rows of the prior; none without one.
+    pub fn prior(&self) -> DMatrix<f64> {
         match &self.tolerance {
             Some(tolerance) => tolerance.rows(&self.base, self.parameters()),
             None => DMatrix::zeros(0, self.base.rank()),

@@ -8,6 +8,7 @@ use super::dataset::{Dataset, Skipped};
 use super::estimate::Fit;
 use super::prior::Tolerance;
 use super::problem::{Problem, Stop};
+use super::sessions::Session;
 use super::settings::Settings;
 use super::verify::{RowError, Spread, errors};
 use crate::robot::{Parameter, Robot, Unit};
@@ -35,6 +36,9 @@ pub struct Record {
     /// Poses that fit far worse than the rest and were left out.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub outliers: Vec<String>,
+    /// Sessions found along the rows.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sessions: Vec<Session>,
     /// Rows without a usable reading.
     pub skipped: Vec<Skipped>,
     /// Held-out errors of models and terms.
@@ -149,7 +153,14 @@ fn spread(errors: &[RowError]) -> PointSpread {
 
 impl Record {
     /// Gathers everything.
-    pub fn new(set: &Dataset, nominal: &Robot, found: &Identification, settings: &Settings, seed: u64) -> Record {
+    pub fn new(
+        set: &Dataset,
+        nominal: &Robot,
+        found: &Identification,
+        sessions: &[Session],
+        settings: &Settings,
+        seed: u64,
+    ) -> Record {
         let chosen = &found.candidates[found.chosen];
         let identifiability = identifiability(chosen);
         let names = |rows: &[usize]| rows.iter().map(|&i| set.poses[i].name.clone()).collect::<Vec<_>>();
@@ -165,6 +176,7 @@ impl Record {
             identifiability,
             warnings: Vec::new(),
             outliers: names(&found.outliers),
+            sessions: sessions.to_vec(),
             skipped: set.skipped.clone(),
             judged: found.judged.clone(),
             scatter_mm: chosen.prepared.estimate.scatter.point_mm,
@@ -210,6 +222,13 @@ impl Record {
         }
         if !self.outliers.is_empty() {
             list.push(format!("left out because they fit far worse than the rest: {}", self.outliers.join(", ")));
+        }
+        if !self.sessions.is_empty() {
+            list.push(format!(
+                "the rows fall into {} sessions, between which the wire's anchor or its zero moved: {}",
+                self.sessions.len(),
+                self.sessions.iter().map(|s| format!("{}..{}", s.first, s.last)).collect::<Vec<_>>().join(", ")
+            ));
         }
         if !self.skipped.is_empty() {
             list.push(format!(

@@ -211,3 +211,81 @@ impl Rule {
 fn adaptive_inertia(cost: f64, least: f64, mean: f64, [low, high]: [f64; 2]) -> f64 {
     if cost <= mean && mean > least { low + (high - low) * (cost - least) / (mean - least) } else { high }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::dataset::Dataset;
+    use crate::identify::prepare::Prepared;
+    use crate::identify::settings::{Model, Prior, Settings};
+    use crate::identify::{synthetic, trust_region};
+
+    /// Twelve poses' worth of slack: enough rows for 19 parameters, few enough for a test.
+    const SAMPLES: usize = 60;
+
+    fn paper_settings() -> Settings {
+        Settings { prior: Prior::Off, widen_bounds: false, ..Settings::default() }
+    }
+
+    fn prepared(noise_mm: f64) -> Prepared {
+        let world = synthetic::world(SAMPLES, noise_mm, 7);
+        let set = Dataset::new(&world.rows, 1).unwrap();
+        let parameters = world.nominal.mdh_parameters();
+        Prepared::new(&set, &world.nominal, &parameters, &set.fit_rows(), Model::CenterDistance, &paper_settings())
+            .unwrap()
+    }
+
+    /// Best of many trust-region starts drawn in the box.
+    fn best_of_starts(problem: &dyn Problem, starts: usize) -> f64 {
+        let mut random = Pcg64::seed_from_u64(99);
+        let start = |random: &mut Pcg64| -> Vec<f64> {
+            problem.lower().iter().zip(problem.upper()).map(|(l, u)| l + (u - l) * random.random::<f64>()).collect()
+        };
+        let settings = trust_region::Settings::default();
+        (0..starts)
+            .map(|_| trust_region::solve(problem, &start(&mut random), &settings).cost)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    #[ignore = "prints the statistics of 100 seeds; half a minute"]
+    fn statistics_of_a_hundred_seeds() {
+        let prepared = prepared(0.02);
+        let fit = prepared.fit();
+        let least = best_of_starts(&fit, 50);
+        let settings = SwarmSettings { patience: 0, ..SwarmSettings::default() };
+        let seeds = 100;
+        let (mut reached, mut below, mut spent) = (0, 0, Vec::new());
+        for seed in 0..seeds {
+            let ours = solve(&fit, Method::Stapso, &settings, seed);
+            let close = ours.cost <= least * (1.0 + 1e-6);
+            reached += usize::from(close);
+            let at = ours.history.iter().position(|c| *c <= least * (1.0 + 1e-6)).map(|i| ours.history_evaluations[i]);
+            spent.push(at.unwrap_or(usize::MAX));
+            let mut lowest = true;
+            for other in [Method::Pso, Method::Cpso, Method::Apso, Method::Arpso] {
+                let theirs = solve(&fit, other, &settings, seed);
+                let used = theirs.evaluations;
+                let ours_then = ours
+                    .history
+                    .iter()
+                    .zip(&ours.history_evaluations)
+                    .filter(|(_, e)| **e <= used)
+                    .map(|(c, _)| *c)
+                    .fold(f64::INFINITY, f64::min);
+                lowest &= ours_then < theirs.cost;
+                if seed < 3 {
+                    println!("seed {seed} {}: {} ours {} least {least}", other.name(), theirs.cost, ours_then);
+                }
+            }
+            below += usize::from(lowest);
+        }
+        spent.sort_unstable();
+        println!(
+            "dim {} reached {reached}/{seeds}, below the others {below}/{seeds}, evaluations to reach: median {} max {}",
+            fit.dimension(),
+            spent[50],
+            spent[99]
+        );
+    }
+}
