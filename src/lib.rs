@@ -28,7 +28,7 @@ pub mod geometry;
 pub mod progress;
 
 pub mod imaging;
-mod opencv;
+pub mod opencv;
 pub mod stereo;
 
 pub mod measurements;

@@ -5,8 +5,8 @@
 use std::sync::Once;
 
 use nalgebra::Point2;
-use opencv::core::{Mat, Point2f, Size, Vector};
-use opencv::{calib3d, core};
+use opencv::core::{Mat, Point2f, Size, TermCriteria, Vector};
+use opencv::{calib3d, core, imgproc};
 
 use crate::imaging::picture::Grey8;
 
@@ -64,6 +64,16 @@ pub fn find_board(
         return Ok(None);
     }
     Ok(Some(corners.iter().map(|p| Point2::new(f64::from(p.x), f64::from(p.y))).collect()))
+}
+
+/// OpenCV's `cornerSubPix` with a window of `2 half + 1` px: the yardstick of the corner benchmark, not used to measure.
+pub fn corner_sub_pix(picture: &Grey8, start: &[Point2<f64>], half: i32) -> Result<Vec<Point2<f64>>, Failure> {
+    hold_to_one_thread();
+    let image = Mat::new_rows_cols_with_data(picture.height as i32, picture.width as i32, &picture.pixels)?;
+    let mut corners: Vector<Point2f> = start.iter().map(|p| Point2f::new(p.x as f32, p.y as f32)).collect();
+    let stop = TermCriteria::new(core::TermCriteria_COUNT + core::TermCriteria_EPS, 100, 1e-4)?;
+    imgproc::corner_sub_pix(&image, &mut corners, Size::new(half, half), Size::new(-1, -1), stop)?;
+    Ok(corners.iter().map(|p| Point2::new(f64::from(p.x), f64::from(p.y))).collect())
 }
 
 fn hold_to_one_thread() {

@@ -9,7 +9,7 @@ use nalgebra::{Point2, Vector2};
 
 use super::Board;
 use super::grid::{Grid, Places};
-use super::picture::{Grey8, Picture};
+use super::picture::{Grey8, Picture, Pixels};
 use crate::opencv::{Detector, find_board};
 
 /// Pixels of the copy on which the board is looked for first.
@@ -18,10 +18,20 @@ pub const COARSE_PX: usize = 1_000_000;
 /// A board found in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detected {
-    /// Coarse places of the inner corners at full size, px.
+    /// Coarse places of the inner corners on the copy, px, to about half a pixel.
     pub corners: Places,
-    /// How many pixels of the picture one pixel of the copy was: the places are good to about half of that.
+    /// The reduced copy.
+    pub copy: Picture,
+    /// How many pixels of the picture one pixel of the copy was.
     pub factor: usize,
+}
+
+impl Detected {
+    /// A place on the copy as one in the picture, px.
+    pub fn at_full_size(&self, p: &Point2<f64>) -> Point2<f64> {
+        let k = self.factor as f64;
+        Point2::new((p.x + 0.5) * k - 0.5, (p.y + 0.5) * k - 0.5)
+    }
 }
 
 /// Looks for the board; the reason where it was not found.
@@ -51,9 +61,8 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, String> {
             let grid =
                 Grid { columns: board.columns(), rows: board.rows(), cells: corners.into_iter().map(Some).collect() };
             let grid = turn_by_colours(&small, right_handed(grid), board);
-            let k = factor as f64;
-            let up = |p: &Point2<f64>| Point2::new((p.x + 0.5) * k - 0.5, (p.y + 0.5) * k - 0.5);
-            return Ok(Detected { corners: grid.map(up), factor });
+            let copy = Picture { width: small.width, height: small.height, pixels: Pixels::Eight(small.pixels) };
+            return Ok(Detected { corners: grid, copy, factor });
         }
         copy = Some((factor, small));
     }

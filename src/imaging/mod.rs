@@ -1,5 +1,6 @@
 //! From a folder of pictures to the corners of the board in each, in an order both cameras agree on.
 
+pub mod bend;
 pub mod board;
 pub mod corner_fit;
 pub mod corners;
@@ -12,6 +13,7 @@ pub mod order;
 pub mod picture;
 pub mod refine;
 pub mod special;
+pub mod window;
 
 use camino::Utf8PathBuf;
 

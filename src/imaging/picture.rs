@@ -104,6 +104,7 @@ impl Picture {
     }
 
     /// The grey value of a pixel inside the picture.
+    #[inline]
     pub fn at(&self, x: usize, y: usize) -> f64 {
         match &self.pixels {
             Pixels::Eight(values) => f64::from(values[y * self.width + x]),

@@ -1,0 +1,86 @@
+//! Whole boards from the simulator's renderer: time, memory and deviation from the truth.
+
+use std::time::Instant;
+
+use nalgebra::{Point2, Vector2, Vector3};
+use stereocal::geometry::{Transform, transform};
+use stereocal::imaging::picture::{Grey8, Picture, Pixels};
+use stereocal::imaging::{Board, detect, refine};
+use stereocal::opencv::{self, Detector};
+use stereocal::simulate::draws::NormalTable;
+use stereocal::simulate::physical_board::{PhysicalBoard, Workmanship};
+use stereocal::simulate::psf::Optics;
+use stereocal::simulate::render::Renderer;
+use stereocal::simulate::rig::true_rig;
+use stereocal::simulate::scene::{Print, Scene};
+use stereocal::simulate::sensor::{Lighting, Sensor};
+
+/// Boards of the ceramic kind at several sizes of picture.
+pub fn table() {
+    println!("whole boards of 20x20 squares; px; per-axis RMS (largest in brackets)");
+    for (size, detector) in [(1280, true), (2560, true), (5120, false)] {
+        row(size, detector);
+    }
+}
+
+fn rms(found: &[Point2<f64>], truth: &[Point2<f64>]) -> String {
+    let half_turn: Vec<Point2<f64>> = truth.iter().rev().copied().collect();
+    let distances =
+        |truth: &[Point2<f64>]| -> Vec<f64> { found.iter().zip(truth).map(|(a, b)| (a - b).norm()).collect() };
+    let sum = |d: &[f64]| d.iter().map(|v| v * v).sum::<f64>();
+    let (a, b) = (distances(truth), distances(&half_turn));
+    let d = if sum(&a) < sum(&b) { a } else { b };
+    format!("{:.5} ({:.4})", (sum(&d) / (2 * d.len()) as f64).sqrt(), d.iter().copied().fold(0.0, f64::max))
+}
+
+fn row(size: u32, sectors_too: bool) {
+    let drawing = Board { squares: "20x20".parse().expect("a board"), square_mm: 10.0 };
+    let workmanship =
+        Workmanship { pitch_um: 0.0, bow_um: (0.0, 0.0), ink_spread_um: 0.0, scale_ppm: 0.0, margin_mm: 10.0 };
+    let board = PhysicalBoard::new(drawing, workmanship, 1, 0);
+    let rig = true_rig(size);
+    let scene = Scene {
+        camera: rig.left,
+        optics: Optics { gaussian_px: 1.2, defocus: None, coma_px: 0.0 },
+        board: &board,
+        camera_from_board: tilted(),
+        print: Print { white: 0.85, black: 0.08, rim: 0.3, rim_mm: 3.0 },
+        holder: &[],
+        clutter: &[],
+        camera_from_left: Transform::identity(),
+        lighting: Lighting { gradient: (0.1, -0.05), vignetting: 0.1, exposure: 0.75 },
+        sensor: Sensor { bits: 8, full_well_e: 10_000.0, read_noise_e: 10.0, dark: 0.02 },
+        seed: 1,
+        picture: 0,
+    };
+    let truth = scene.corners_px();
+    let rendered = Renderer::new(&scene).picture(&NormalTable::new());
+    let pixels: Vec<u8> = rendered.samples.iter().map(|&v| v as u8).collect();
+    let picture = Picture { width: rendered.width, height: rendered.height, pixels: Pixels::Eight(pixels.clone()) };
+    let clock = Instant::now();
+    let detected = detect::detect(&picture, drawing).expect("the board is in view");
+    let detect_s = clock.elapsed().as_secs_f64();
+    let clock = Instant::now();
+    let fits = refine::measure(&picture, &detected);
+    let refine_s = clock.elapsed().as_secs_f64();
+    let found: Vec<Point2<f64>> = fits.iter().map(|(_, _, fit)| fit.px).collect();
+    let predicted = fits.iter().map(|(_, _, f)| f.fit.covariance_px2.trace() / 2.0).sum::<f64>() / fits.count() as f64;
+    println!("{size} px: detect {detect_s:.3} s, refine {refine_s:.3} s, {} corners", fits.count());
+    println!("   fit {} predicted {:.5}", rms(&found, &truth), predicted.sqrt());
+    let grey = Grey8 { width: rendered.width, height: rendered.height, pixels };
+    let (k, offset) = (detected.factor as f64, Vector2::new(0.5, 0.5));
+    let start: Vec<Point2<f64>> = detected.corners.iter().map(|(_, _, p)| (p + offset) * k - offset).collect();
+    let clock = Instant::now();
+    let sub_pix = opencv::corner_sub_pix(&grey, &start, 5).expect("OpenCV works");
+    println!("   cornerSubPix(11) {} in {:.3} s", rms(&sub_pix, &truth), clock.elapsed().as_secs_f64());
+    if sectors_too {
+        let clock = Instant::now();
+        let found = opencv::find_board(&grey, 19, 19, Detector::Sectors).expect("OpenCV works");
+        let text = found.map_or("not found".to_owned(), |f| rms(&f, &truth));
+        println!("   findChessboardCornersSB {text} in {:.3} s", clock.elapsed().as_secs_f64());
+    }
+}
+
+fn tilted() -> Transform {
+    transform(Vector3::new(0.25, -0.2, 0.07), Vector3::new(2.0, -3.0, 560.0))
+}
