@@ -59,8 +59,12 @@ pub fn measure(picture: &Picture, detected: &Detected) -> Grid<Measured> {
         let fit = first_fit(&detected.copy, &cell, &mut window)?;
         Some(Measured { px: fit.place(&cell.place), fit })
     });
-    let places: Places = first.map(|m| detected.at_full_size(&m.px));
-    let bends = bends(&places);
+    let bends = bends(&first.map(|m| detected.at_full_size(&m.px)));
+    // A neighbour that could not be measured still says how far the squares reach.
+    let places: Places = Grid::from_fn(columns, rows, |col, row| {
+        let px = first.get(col, row).map_or(detected.corners.get(col, row), |m| Some(&m.px))?;
+        Some(detected.at_full_size(px))
+    });
     let saturation = picture.saturation();
     Grid::from_fn(columns, rows, |col, row| {
         let from = first.get(col, row)?;

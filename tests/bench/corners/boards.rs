@@ -7,6 +7,7 @@ use stereocal::geometry::{Transform, transform};
 use stereocal::imaging::picture::{Grey8, Picture, Pixels};
 use stereocal::imaging::{Board, detect, refine};
 use stereocal::opencv::{self, Detector};
+use stereocal::simulate::backdrop::Backdrop;
 use stereocal::simulate::draws::NormalTable;
 use stereocal::simulate::physical_board::{PhysicalBoard, Workmanship};
 use stereocal::simulate::psf::Optics;
@@ -39,6 +40,7 @@ fn row(size: u32, sectors_too: bool) {
         Workmanship { pitch_um: 0.0, bow_um: (0.0, 0.0), ink_spread_um: 0.0, scale_ppm: 0.0, margin_mm: 10.0 };
     let board = PhysicalBoard::new(drawing, workmanship, 1, 0);
     let rig = true_rig(size);
+    let backdrop = Backdrop::plain(0.3);
     let scene = Scene {
         camera: rig.left,
         optics: Optics { gaussian_px: 1.2, defocus: None, coma_px: 0.0 },
@@ -46,8 +48,7 @@ fn row(size: u32, sectors_too: bool) {
         camera_from_board: tilted(),
         print: Print { white: 0.85, black: 0.08, rim: 0.3, rim_mm: 3.0 },
         holder: &[],
-        clutter: &[],
-        camera_from_left: Transform::identity(),
+        backdrop: &backdrop,
         lighting: Lighting { gradient: (0.1, -0.05), vignetting: 0.1, exposure: 0.75 },
         sensor: Sensor { bits: 8, full_well_e: 10_000.0, read_noise_e: 10.0, dark: 0.02 },
         seed: 1,
