@@ -6,3 +6,5 @@ mod worlds;
 
 mod house;
 mod messages;
+mod pipeline;
+mod real;

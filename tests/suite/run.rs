@@ -1,6 +1,6 @@
 //! How the tests run the program, and where they find pictures and measurements that are not in the repository.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// A folder of the test's own, removed at its end.
@@ -25,4 +25,17 @@ pub fn stderr(output: &Output) -> String {
 /// What the program wrote to stdout.
 pub fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
+}
+/// A folder or file of the shared real data, or `None` with a message where this machine does not have it.
+pub fn shared(path: &str) -> Option<PathBuf> {
+    let root = match std::env::var_os("STEREOCAL_SHARED") {
+        Some(root) => PathBuf::from(root),
+        None => Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"),
+    };
+    let found = root.join("data").join(path);
+    if found.exists() {
+        return Some(found);
+    }
+    eprintln!("skipped: {} is not here", found.display());
+    None
 }

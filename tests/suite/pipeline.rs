@@ -1,0 +1,120 @@
+//! The whole way of the data on a simulated world: `simulate`, `camera-check`, `measure`, `identify`, with no flags
+//! but those that keep the world small, and the files of the contract read back.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::run::{stderr, stdout, stereocal, workplace};
+
+/// Runs the program and expects success.
+fn done(folder: &Path, arguments: &[&str]) -> String {
+    let output = stereocal(folder, arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}{}", stdout(&output), stderr(&output));
+    stdout(&output)
+}
+
+fn json(path: &Path) -> Value {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    serde_json::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// A number of a JSON file, by its path of keys.
+fn number(value: &Value, pointer: &str) -> f64 {
+    value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("no number at {pointer} in {value}"))
+}
+
+fn header(path: &Path) -> String {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    text.lines().next().unwrap_or_default().to_owned()
+}
+
+#[test]
+fn pictures_to_corrected_kinematics() {
+    let folder = workplace();
+    let world = folder.path();
+    done(world, &["simulate", "--preset", "small", "--size", "960", "--seed", "5", "--out", "."]);
+    done(world, &["camera-check", "check/"]);
+    let check = json(&world.join("out/camera-check.json"));
+    assert_eq!(check.pointer("/passed"), Some(&Value::Bool(true)));
+    assert!(number(&check, "/max_abs_error_mm") <= 0.05);
+    assert!(number(&check, "/reprojection_rms_px") < 0.1);
+    for key in ["/ranges/0/axis", "/ranges/0/nominal_mm", "/ranges/0/count", "/ranges/0/mean_error_mm"] {
+        assert!(check.pointer(key).is_some(), "{key}");
+    }
+    for key in ["pair", "mean_error_x10_mm", "mean_error_y10_mm", "mean_error_x70_mm", "mean_error_y70_mm"] {
+        assert!(check.pointer(&format!("/pairs/0/{key}")).is_some(), "{key}");
+    }
+    assert_eq!(header(&world.join("out/corners.csv")), "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,used");
+
+    done(world, &["measure", "poses/"]);
+    let columns = "pose,group,role,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,x_mm,y_mm,z_mm,\
+                   sxx_mm2,sxy_mm2,sxz_mm2,syy_mm2,syz_mm2,szz_mm2,rx_rad,ry_rad,rz_rad,fit_rms_mm,corners,status";
+    assert_eq!(header(&world.join("out/measurements.csv")), columns);
+
+    done(world, &["identify"]);
+    let found = json(&world.join("out/identification.json"));
+    let before = number(&found, "/before/verify/mean_abs_mm");
+    let chosen = found.pointer("/chosen").and_then(Value::as_str).expect("a chosen method").to_owned();
+    let methods = found.pointer("/methods").and_then(Value::as_array).expect("methods");
+    let method = methods
+        .iter()
+        .find(|m| format!("{}/{}", m["name"].as_str().unwrap_or(""), m["model"].as_str().unwrap_or("")) == chosen)
+        .expect("the chosen method is one of the methods");
+    let after = number(method, "/verify/mean_abs_mm");
+    assert!(before > 0.5, "the hidden errors are too small to show anything: {before} mm");
+    assert!(after < before / 10.0, "before {before} mm, after {after} mm");
+    for file in ["camera-check.html", "measure.html", "identify.html", "identified.toml", "measure.json"] {
+        assert!(world.join("out").join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
+fn one_thread_and_two_give_the_same_bytes() {
+    let folder = workplace();
+    for (name, threads) in [("one", "1"), ("two", "2")] {
+        let world = folder.path().join(name);
+        std::fs::create_dir(&world).unwrap();
+        for arguments in [
+            &["simulate", "--preset", "small", "--size", "480", "--out", "."][..],
+            &["camera-check", "check/", "--tolerance-mm", "0.5"],
+            &["measure", "poses/"],
+            &["identify", "--method", "stapso"],
+        ] {
+            let output = std::process::Command::new(env!("CARGO_BIN_EXE_stereocal"))
+                .current_dir(&world)
+                .env("RAYON_NUM_THREADS", threads)
+                .args(arguments)
+                .output()
+                .expect("the program starts");
+            // Whether half the size still passes is not the point here.
+            assert!(matches!(output.status.code(), Some(0 | 1)), "{arguments:?}: {}", stderr(&output));
+        }
+    }
+    let files = |name: &str| {
+        let root = folder.path().join(name);
+        let mut found = Vec::new();
+        walk(&root, &root, &mut found);
+        found.sort();
+        found
+    };
+    let (one, two) = (files("one"), files("two"));
+    assert_eq!(one, two);
+    assert!(one.len() > 20);
+    for file in &one {
+        let read = |name: &str| std::fs::read(folder.path().join(name).join(file)).unwrap();
+        assert!(read("one") == read("two"), "{file} differs");
+    }
+}
+
+/// Paths of all files below `folder`, relative to `root`.
+fn walk(root: &Path, folder: &Path, into: &mut Vec<String>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            walk(root, &path, into);
+        } else {
+            into.push(path.strip_prefix(root).unwrap().display().to_string());
+        }
+    }
+}
