@@ -261,7 +261,11 @@ impl Plot {
         let width = SCALE + SCALE / 2;
         let anno = match marks {
             Marks::Points(xy) => {
-                let radius = if xy.len() > 2000 { 1 } else { 2 } * SCALE as i32;
+                let radius = match xy.len() {
+                    0..=200 => 3,
+                    201..=2000 => 2,
+                    _ => 1,
+                } * SCALE as i32;
                 chart.draw_series(keep(xy).into_iter().map(|p| Circle::new(p, radius, colour.mix(0.6).filled())))
             }
             Marks::Line(xy) => chart.draw_series(LineSeries::new(keep(xy), colour.stroke_width(width))),
