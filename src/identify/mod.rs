@@ -18,6 +18,8 @@ pub mod blocks;
 pub mod choose;
 pub mod dataset;
 pub mod estimate;
+#[cfg(test)]
+mod experiment;
 pub mod fast;
 pub mod kernel;
 pub mod kinematics;

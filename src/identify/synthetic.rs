@@ -61,6 +61,8 @@ pub fn planned(
     let roles = std::iter::repeat_n(Role::Sample, samples).chain(std::iter::repeat_n(Role::Verify, verify));
     let plan: Vec<(usize, Role)> =
         (0..4).map(|g| (g, Role::Center)).chain(roles.enumerate().map(|(i, r)| (i % 4, r))).collect();
+    // The centre's angles start the search of its sphere's poses, so that the arm does not flip over within a sphere.
+    let mut centers: Vec<Option<Vec<f64>>> = vec![None; STARTS.len()];
     for (group, role) in plan {
         for _ in 0..200 {
             let start = Vector3::from(STARTS[group]);
@@ -76,7 +78,9 @@ pub fn planned(
                 * UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.4);
             let origin = start + radius * towards.normalize();
             let target = Transform::from_parts(origin.into(), flange);
-            let Some(q) = inverse::from_starts(&nominal, &target, &starts()) else { continue };
+            let near = centers[group].clone().map_or_else(starts, |q| vec![q]);
+            let Some(q) = inverse::from_starts(&nominal, &target, &near) else { continue };
+            centers[group].get_or_insert_with(|| q.clone());
             let q_deg: Vec<f64> = q.iter().map(|r| r.to_degrees()).collect();
             let q_rad: Vec<f64> = q_deg.iter().map(|d| d.to_radians()).collect();
             let point = sensor(group) * truth.target_mm(&q_rad) + noise_mm * normal(&mut random);
