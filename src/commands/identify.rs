@@ -88,7 +88,8 @@ fn write(
 ) -> Result<()> {
     let identified = &found.candidates[found.chosen].robot;
     let errors = |robot: &Robot| quality(set, robot, found, settings).1;
-    let page = report::page(set, record, &errors(nominal), &errors(identified))?;
+    let places: Vec<_> = set.poses.iter().map(|p| (p.role, nominal.target_mm(&p.joints_rad))).collect();
+    let page = report::page(set, record, &places, &errors(nominal), &errors(identified))?;
     out.write_json("identification.json", record)?;
     out.write("identified.toml", robot::file::to_toml(identified).as_bytes())?;
     out.write("identify.html", page.as_bytes())

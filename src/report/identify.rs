@@ -1,6 +1,7 @@
 //! The tables and the page of `identify`.
 
 use maud::{Markup, html};
+use nalgebra::Point3;
 
 use super::figure::Plot;
 use super::page::{self, Tone};
@@ -8,7 +9,9 @@ use super::table::{Table, number};
 use crate::error::Result;
 use crate::identify::dataset::Dataset;
 use crate::identify::record::{MethodRecord, PointSpread, Record};
+use crate::identify::swarm::halton;
 use crate::identify::verify::{RowError, Spread};
+use crate::measurements::Role;
 
 /// What goes to stdout: before and after, method by method.
 pub fn summary(record: &Record) -> String {
@@ -52,7 +55,14 @@ fn distance_row(name: &str, spread: &Spread, before: Option<&Spread>) -> Vec<Str
 }
 
 /// The page. `before` and `after` are the errors of the verify rows under the nominal and the identified robot.
-pub fn page(set: &Dataset, record: &Record, before: &[RowError], after: &[RowError]) -> Result<String> {
+/// `places` are the target's points in the nominal base frame, row by row.
+pub fn page(
+    set: &Dataset,
+    record: &Record,
+    places: &[(Role, Point3<f64>)],
+    before: &[RowError],
+    after: &[RowError],
+) -> Result<String> {
     let lead = format!(
         "{} poses in {} groups, {} to verify; {} kept, seed {}",
         set.poses.len(),
@@ -68,11 +78,19 @@ pub fn page(set: &Dataset, record: &Record, before: &[RowError], after: &[RowErr
         (verification_figure(before, after)?)
         (verification_table(record))
         h2 { "Parameters" }
+        p { "Table 2 of the paper: the corrected parameters of each link and joint; alpha and a of link j - 1, theta and d of joint j." }
+        (joint_table(record))
         (parameter_table(record))
         h2 { "What the poses determine" }
         (rank_table(record))
         h2 { "Convergence" }
         (convergence_figure(record)?)
+        h2 { "How it was chosen" }
+        (judged_table(record))
+        h2 { "Where was measured" }
+        (layout_figures(places)?)
+        h2 { "How the swarms start" }
+        (start_figures(record.seed)?)
     };
     Ok(page::page("Identification", &lead, &content))
 }
@@ -168,4 +186,82 @@ fn convergence_figure(record: &Record) -> Result<Markup> {
         &plot.svg()?,
         "Fig. 8 of the paper: lines that end above the lowest one have stopped short of the minimum.",
     ))
+}
+
+/// Table 2: what every joint's row of Table 1 has become. Empty cells stay nominal.
+fn joint_table(record: &Record) -> Markup {
+    let Some(method) = record.chosen_method() else { return html! {} };
+    let find = |name: String| method.parameters.iter().find(|p| p.name == name);
+    let cell = |name: String| match find(name) {
+        Some(p) if p.delta != 0.0 => format!("{:.4} {:+.4}", p.nominal, p.delta),
+        Some(p) => format!("{:.4}", p.nominal),
+        None => String::new(),
+    };
+    let rows: Vec<Vec<String>> = (1..)
+        .map_while(|j| {
+            find(format!("theta_{j}"))?;
+            let link = j - 1;
+            let cells =
+                [format!("alpha_{link}"), format!("a_{link}"), format!("theta_{j}"), format!("d_{j}")].map(&cell);
+            Some(std::iter::once(j.to_string()).chain(cells).collect())
+        })
+        .collect();
+    page::table(&["j", "alpha, deg", "a, mm", "theta, deg", "d, mm"], &rows)
+}
+
+fn judged_table(record: &Record) -> Markup {
+    let row = |j: &crate::identify::choose::Judged| vec![j.model.to_owned(), j.terms.clone(), number(j.held_out_mm, 4)];
+    let mut rows: Vec<Vec<String>> = record.judged.iter().map(row).collect();
+    rows.extend(
+        record
+            .methods
+            .iter()
+            .filter(|m| m.held_out_mm.is_some())
+            .map(|m| vec![m.model.to_owned(), format!("{} (one fold)", m.name), number(m.held_out_mm, 4)]),
+    );
+    if rows.is_empty() {
+        return html! { p { "Model, terms and method were given." } };
+    }
+    html! {
+        p { "Root mean square error on samples that were held out of the fit, mm. More terms, another model or a dearer method are taken only where this falls by more than two standard errors." }
+        (page::table(&["model", "terms or method", "held-out error, mm"], &rows))
+    }
+}
+
+/// Fig. 7: the poses from above and from the side.
+fn layout_figures(places: &[(Role, Point3<f64>)]) -> Result<Markup> {
+    let view = |title: &str, vertical: &str, axes: (usize, usize)| {
+        let series = |role: Role| -> Vec<(f64, f64)> {
+            places.iter().filter(|(r, _)| *r == role).map(|(_, p)| (p[axes.0], p[axes.1])).collect()
+        };
+        Plot::new(title, "x, mm", vertical)
+            .points("sample", &series(Role::Sample))
+            .points("verify", &series(Role::Verify))
+            .points("center", &series(Role::Center))
+            .equal_axes()
+            .svg()
+    };
+    let caption = "Fig. 7 of the paper: where the nominal robot puts the target, base frame. What lies outside of these points was not \
+                   identified, and the corrections hold there only as far as the model is right.";
+    Ok(html! { div.side {
+        (page::figure(&view("Poses from above", "y, mm", (0, 1))?, caption))
+        (page::figure(&view("Poses from the side", "z, mm", (0, 2))?, "The same poses from the side."))
+    } })
+}
+
+/// Points of each start in Fig. 3.
+const START_POINTS: usize = 200;
+
+/// Fig. 3: Halton's sequence beside pseudo-random numbers.
+fn start_figures(seed: u64) -> Result<Markup> {
+    let pairs = |numbers: &[f64]| -> Vec<(f64, f64)> { numbers.chunks_exact(2).map(|p| (p[0], p[1])).collect() };
+    let plot = |title: &str, numbers: &[f64]| {
+        Plot::new(title, "first coordinate", "second coordinate").points("", &pairs(numbers)).equal_axes().svg()
+    };
+    let halton = plot("Halton sequence", &halton::points(START_POINTS, 2, seed))?;
+    let random = plot("Pseudo-random numbers", &crate::identify::swarm::uniform(2 * START_POINTS, seed))?;
+    Ok(html! { div.side {
+        (page::figure(&halton, "Fig. 3 of the paper: Halton's points, where STAPSO starts, leave neither clusters nor holes."))
+        (page::figure(&random, "Pseudo-random points, where the other swarms start, have both."))
+    } })
 }

@@ -25,6 +25,12 @@ pub fn solve(problem: &dyn Problem, method: Method, settings: &SwarmSettings, se
     }
 }
 
+/// Pseudo-random numbers in [0, 1).
+pub fn uniform(count: usize, seed: u64) -> Vec<f64> {
+    let mut random = Pcg64::seed_from_u64(seed);
+    (0..count).map(|_| random.random::<f64>()).collect()
+}
+
 /// Positions and velocities, one particle after the other.
 pub struct Swarm<'a> {
     problem: &'a dyn Problem,
@@ -45,9 +51,8 @@ pub struct Swarm<'a> {
 impl<'a> Swarm<'a> {
     /// Uniform positions and velocities.
     pub fn random(problem: &'a dyn Problem, settings: &'a SwarmSettings, seed: u64) -> Swarm<'a> {
-        let mut random = Pcg64::seed_from_u64(seed);
-        let count = 2 * settings.particles * problem.dimension();
-        let draws: Vec<f64> = (0..count).map(|_| random.random::<f64>()).collect();
+        let draws = uniform(2 * settings.particles * problem.dimension(), seed);
+        let random = Pcg64::seed_from_u64(seed.wrapping_add(1));
         Swarm::start(problem, settings, random, &draws)
     }
 
