@@ -96,13 +96,14 @@ fn best_cut(prepared: &Prepared) -> Option<usize> {
     let rss = left.norm_squared();
     let mut best: Option<(f64, usize)> = None;
     for (start, rows, design) in &designs {
-        for k in SHORTEST..(rows.len() + 1).saturating_sub(SHORTEST) {
+        let last = (rows.len() + 1).saturating_sub(SHORTEST);
+        for (k, &row) in rows.iter().enumerate().take(last).skip(SHORTEST) {
             let mut late = design.clone();
             late.rows_mut(*start, k).fill(0.0);
             let fresh = &late - &q * q.tr_mul(&late);
             let gain = fresh.qr().q().tr_mul(&left).norm_squared();
             if best.is_none_or(|(g, _)| gain > g) {
-                best = Some((gain, rows[k]));
+                best = Some((gain, row));
             }
         }
     }

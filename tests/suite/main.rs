@@ -5,6 +5,7 @@ mod run;
 mod worlds;
 
 mod house;
+mod identify;
 mod messages;
 mod pipeline;
 mod real;

@@ -1,0 +1,118 @@
+//! `stereocal identify` as a person runs it: what it refuses and with which status, and what it makes of real data.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use predicates::str::contains;
+
+fn identify(folder: &Path) -> Command {
+    let mut command = Command::cargo_bin("stereocal").expect("the program is built");
+    command.current_dir(folder).args(["identify", "--measurements", "m.csv"]);
+    command
+}
+
+/// Distances to a centre for poses whose joints `angle` gives, deg.
+fn folder_with(rows: usize, joints: usize, angle: impl Fn(usize, usize) -> f64) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut text = String::from("pose,group,role");
+    for j in 1..=joints {
+        let _ = write!(text, ",j{j}_deg");
+    }
+    text.push_str(",x_mm,y_mm,z_mm\n");
+    for i in 0..rows {
+        let _ = write!(text, "p{i},g,{}", if i == 0 { "center" } else { "sample" });
+        for j in 0..joints {
+            let _ = write!(text, ",{}", angle(i, j));
+        }
+        let _ = writeln!(text, ",{},{},{}", 10 * i, (7 * i) % 5, (3 * i) % 11);
+    }
+    std::fs::write(folder.path().join("m.csv"), text).expect("written");
+    folder
+}
+
+#[test]
+fn five_poses_determine_nothing_useful() {
+    let folder = folder_with(6, 6, |i, j| ((5 * i + 3 * j) as f64).sin() * 60.0);
+    identify(folder.path())
+        .assert()
+        .code(3)
+        .stdout("")
+        .stderr(contains("more numbers than parameters are needed").and(contains("hint: measure more poses")));
+}
+
+#[test]
+fn the_same_pose_again_and_again_determines_nothing() {
+    let folder = folder_with(60, 6, |_, j| 10.0 * j as f64);
+    identify(folder.path()).assert().code(3).stderr(contains("determine no parameter"));
+}
+
+#[test]
+fn a_robot_of_another_joint_count_is_refused_with_both_counts() {
+    let folder = folder_with(30, 5, |i, j| (i * j) as f64);
+    identify(folder.path())
+        .assert()
+        .code(2)
+        .stderr(contains("the robot has 6 joints, the measurements have 5").and(contains("Table 1 of the paper")));
+}
+
+#[test]
+fn a_model_that_needs_more_is_refused() {
+    let folder = folder_with(30, 6, |i, j| ((5 * i + 3 * j) as f64).sin() * 60.0);
+    identify(folder.path()).args(["--model", "pose"]).assert().code(2).stderr(contains("needs orientations"));
+}
+
+/// A folder of real robot data, where the shared data are at hand.
+fn shared(name: &str) -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
+    let root = std::env::var_os("STEREOCAL_SHARED").map_or(beside, PathBuf::from);
+    let folder = root.join("data/robot").join(name);
+    if !folder.is_dir() {
+        println!("skipped: no {}", folder.display());
+        return None;
+    }
+    Some(folder)
+}
+
+fn record(data: &Path, arguments: &[&str]) -> serde_json::Value {
+    let out = tempfile::tempdir().expect("a folder");
+    let output = Command::cargo_bin("stereocal")
+        .expect("the program is built")
+        .current_dir(out.path())
+        .args(["identify", "--json", "--out", "."])
+        .arg("--measurements")
+        .arg(data.join("measurements.csv"))
+        .arg("--robot")
+        .arg(data.join("robot.toml"))
+        .args(arguments)
+        .output()
+        .expect("it runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("stdout is JSON")
+}
+
+fn mean(quality: &serde_json::Value) -> f64 {
+    quality["verify"]["mean_abs_mm"].as_f64().expect("a mean")
+}
+
+#[test]
+fn irb_120_with_the_papers_model_beats_the_paper() {
+    let Some(data) = shared("irb120-tracker-a") else { return };
+    let arguments = ["--method", "trust-region", "--model", "center-distance", "--extensions", "none"];
+    let record = record(&data, &arguments);
+    assert!(mean(&record["before"]) > 0.5);
+    // The issue asks for 0.10 mm; the paper reached 0.226 on its robot.
+    assert!(mean(&record["methods"][0]) <= 0.10, "{}", record["methods"][0]["verify"]);
+}
+
+#[test]
+fn robotcali_is_seen_to_be_several_sessions() {
+    let Some(data) = shared("robotcali-120") else { return };
+    let record = record(&data, &["--method", "trust-region", "--extensions", "none"]);
+    assert!(record["sessions"].as_array().is_some_and(|s| s.len() > 1), "{}", record["sessions"]);
+    let verify = &record["methods"][0]["verify"];
+    let (mean, std) = (verify["mean_abs_mm"].as_f64().unwrap_or(9.0), verify["std_mm"].as_f64().unwrap_or(9.0));
+    // Published: 0.62 mm root mean square.
+    assert!(mean.hypot(std) < 0.62, "{verify}");
+}
