@@ -62,7 +62,10 @@ impl Prepared {
             Redundancy::Qr => Base::new(&jacobian, settings.rank_tolerance),
             Redundancy::Correlation => Base::by_correlation(&jacobian, settings.rank_tolerance),
         };
-        if base.rank() == 0 {
+        // Identical poses leave columns of rounding errors, whose rank means nothing: judge their size in mm a mm or mrad.
+        let largest = jacobian.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
+        let strength = largest * estimate.unit_variance_mm2().sqrt() / (jacobian.nrows().max(1) as f64).sqrt();
+        if base.rank() == 0 || strength <= settings.rank_tolerance {
             return Err(Error::NothingDetermined { poses: rows.len() });
         }
         if estimate.count() <= base.rank() {
