@@ -26,6 +26,7 @@ pub fn run(args: &Simulate, config: &Config) -> Result<Outcome> {
     if args.points_only {
         truth_files::write_points_only(&world, &out)?;
     } else {
+        world.check_unoccupied(&out)?;
         world.write_truth(&out)?;
         world.write_pictures(&out)?;
     }

@@ -1,4 +1,25 @@
 //! The truth that everything else is tested against: a rig, boards, a robot with hidden errors, and their pictures.
+//!
+//! In: [`settings::Settings`], plain data; the presets are values of it. Out: a [`world::World`] and, where wanted, its
+//! files in the formats that the commands read and write. One picture is a [`scene::Scene`] given to [`render::Renderer`].
+//!
+//! The renderer shares no formula with the corner fit that it judges: areas are exact by Green's theorem, the lens's spread is
+//! summed numerically, and both are compared with rays. What it leaves out: reflexes, motion blur, rolling shutters, and
+//! the depth of what stands behind the board, which is a blurred backdrop.
+//!
+//! ```
+//! use stereocal::imaging::corners::Side;
+//! use stereocal::simulate::{draws::NormalTable, render::Renderer, settings::Settings, world::World};
+//!
+//! let settings = Settings { size_px: 320, check_pairs: 1, samples: 0, verify: 0, ..Settings::small() };
+//! let world = World::new(settings, None)?;
+//! let shot = &world.shots()[0];
+//! let (backdrop, holder) = (world.backdrop(shot.placement, Side::Left), world.holder(shot));
+//! let scene = world.scene(shot, Side::Left, &backdrop, &holder);
+//! let picture = Renderer::new(&scene).picture(&NormalTable::new());
+//! assert_eq!((picture.width, scene.corners_px().len()), (320, 361));
+//! # Ok::<(), stereocal::Error>(())
+//! ```
 
 pub mod backdrop;
 pub mod check_poses;
@@ -17,6 +38,8 @@ pub mod settings;
 pub mod true_robot;
 pub mod truth_files;
 pub mod world;
+
+use camino::Utf8PathBuf;
 
 use crate::error::Explain;
 
@@ -51,12 +74,26 @@ pub enum Error {
         /// Those of Table 1.
         needed: usize,
     },
+    /// Pictures of something else stand where these would go.
+    #[error("the folder holds pictures that are not of this world, {name} for one; they would be taken for its own")]
+    Occupied {
+        /// One of them.
+        name: String,
+        /// The folder.
+        folder: Utf8PathBuf,
+    },
     /// A picture could not be encoded.
     #[error("cannot encode a picture: {0}")]
     Encode(#[from] image::ImageError),
 }
 
 impl Explain for Error {
+    fn place(&self) -> Option<String> {
+        match self {
+            Error::Occupied { folder, .. } => Some(folder.to_string()),
+            _ => None,
+        }
+    }
     fn hint(&self) -> Option<String> {
         match self {
             Error::BoardTooLarge { .. } => {
@@ -68,6 +105,7 @@ impl Explain for Error {
             Error::Joints { .. } => {
                 Some("take the robot.toml that `stereocal simulate` writes and change its numbers".to_owned())
             }
+            Error::Occupied { .. } => Some("`--out DIR` names another folder, or remove the old pictures".to_owned()),
             Error::Encode(_) => None,
         }
     }

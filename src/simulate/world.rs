@@ -191,6 +191,23 @@ impl World {
         truth_files::write(self, out)
     }
 
+    /// Refuses a folder that holds other pictures where this world's will stand: the commands would read them as well.
+    pub fn check_unoccupied(&self, out: &OutDir) -> Result<(), Error> {
+        let names: Vec<(&str, String)> =
+            self.shots().iter().map(|shot| (shot.folder, format!("{}.png", shot.stem))).collect();
+        for (folder, side) in ["check", "poses"].into_iter().flat_map(|f| [(f, Side::Left), (f, Side::Right)]) {
+            let path = out.join(&format!("{folder}/{}", side.name()));
+            let Ok(entries) = path.read_dir_utf8() else { continue };
+            for entry in entries.flatten() {
+                let name = entry.file_name().to_owned();
+                if !names.iter().any(|(f, n)| *f == folder && *n == name) {
+                    return Err(Error::Occupied { name, folder: path });
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Renders and writes all pictures, several at a time; each is on disk before the next of its thread begins.
     pub fn write_pictures(&self, out: &OutDir) -> Result<()> {
         let shots = self.shots();

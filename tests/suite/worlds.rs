@@ -1,4 +1,5 @@
 //! Simulated worlds as files: the same bytes for any number of threads, and what each command's reader makes of them.
+#![allow(clippy::unwrap_used, reason = "a test ends where its world is not as it should be")]
 
 use camino::Utf8Path;
 use stereocal::files::OutDir;
@@ -52,6 +53,18 @@ fn one_thread_and_three_write_the_same_bytes() {
     }
     let (_other_seed, third) = written(Settings { seed: 2, ..tiny() }, 2);
     assert_ne!(first, third);
+}
+
+#[test]
+fn pictures_of_another_world_are_not_mixed_with_this_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = OutDir::open(Utf8Path::from_path(folder.path()).unwrap()).unwrap();
+    let world = World::new(tiny(), None).unwrap();
+    out.write("check/left/01.png", b"").unwrap();
+    world.check_unoccupied(&out).unwrap();
+    out.write("check/left/17.png", b"").unwrap();
+    let message = world.check_unoccupied(&out).unwrap_err().to_string();
+    assert!(message.contains("17.png"), "{message}");
 }
 
 #[test]
