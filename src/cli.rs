@@ -30,6 +30,8 @@ pub enum Command {
     Identify(Identify),
     /// Make pictures and measurements whose truth is known
     Simulate(Simulate),
+    /// Write a calibration for other programs
+    Export(Export),
 }
 
 /// Where results go and how they are shown.
@@ -64,6 +66,24 @@ pub struct CameraCheck {
     /// Lens model: radial2, brown4, brown5, rational8, thin-prism12 or tilted14 [default: chosen by held-out pairs]
     #[arg(long, value_name = "NAME", value_parser = lens)]
     pub lens: Option<Lens>,
+    /// Whether the board may be bowed [default: as held-out pairs say; flat where --lens is given]
+    #[arg(long, value_name = "SHAPE")]
+    pub board_shape: Option<BoardShape>,
+    /// The board's temperature, deg C; with --expansion-ppm-per-k its squares grow from their size at 20 deg C
+    #[arg(long, value_name = "C", requires = "expansion_ppm_per_k", allow_negative_numbers = true)]
+    pub board_temperature_c: Option<f64>,
+    /// The board's coefficient of thermal expansion, 1e-6/K (alumina 7, glass 8, aluminium 23)
+    #[arg(long, value_name = "PPM", requires = "board_temperature_c")]
+    pub expansion_ppm_per_k: Option<f64>,
+    /// Pictures of a second, independent board: shows the scale
+    #[arg(long, value_name = "DIR")]
+    pub check_images: Option<Utf8PathBuf>,
+    /// Squares of the second board [default: as the first]
+    #[arg(long, value_name = "CxR", requires = "check_images")]
+    pub check_squares: Option<Squares>,
+    /// Side of the second board's squares, mm [default: as the first]
+    #[arg(long, value_name = "MM", requires = "check_images")]
+    pub check_square_mm: Option<f64>,
     /// Width and height of the pictures that --corners come from, px [default: from the corners' extent]
     #[arg(long, value_name = "WxH", requires = "corners", value_parser = picture_size)]
     pub picture_size: Option<(u32, u32)>,
@@ -115,6 +135,48 @@ pub struct Identify {
     /// Results.
     #[command(flatten)]
     pub output: Output,
+}
+
+/// `stereocal export`
+#[derive(Debug, Args)]
+pub struct Export {
+    /// What to write.
+    #[command(subcommand)]
+    pub what: ExportWhat,
+}
+
+/// What `export` can write.
+#[derive(Debug, Subcommand)]
+pub enum ExportWhat {
+    /// The stereo calibration
+    Calibration(ExportCalibration),
+}
+
+/// `stereocal export calibration`
+#[derive(Debug, Args)]
+pub struct ExportCalibration {
+    /// For which program
+    #[arg(long)]
+    pub format: CalibrationFormat,
+    /// The rig [default: calibration.json in the results folder]
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<Utf8PathBuf>,
+    /// Folder for results [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+}
+
+/// Programs that a calibration can be written for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CalibrationFormat {
+    /// OpenCV's FileStorage (YAML)
+    Opencv,
+    /// ROS camera_info, one file a camera
+    Ros,
+    /// Kalibr's camchain
+    Kalibr,
+    /// mrcal's cameramodel, one file a camera
+    Mrcal,
 }
 
 /// `stereocal simulate`
@@ -211,6 +273,15 @@ pub enum Preset {
     Paper,
     /// The same shape at 1280x1280 with fewer poses
     Small,
+}
+
+/// What is assumed about the check board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BoardShape {
+    /// A plane
+    Flat,
+    /// Paraboloids along both axes, found with the rig
+    Bowed,
 }
 
 fn lens(name: &str) -> Result<Lens, String> {

@@ -99,3 +99,58 @@ pub fn project_points(
     opencv::calib3d::project_points(&points, &zero, &zero, &matrix, &distortion, &mut px, &mut no_array(), 0.0)?;
     Ok(px.iter().map(|p| nalgebra::Point2::new(p.x, p.y)).collect())
 }
+
+/// A camera matrix (row by row) and distortion as OpenCV's FileStorage reads them from a text.
+#[cfg(test)]
+pub fn read_camera(text: &str, matrix: &str, distortion: &str) -> opencv::Result<(Vec<f64>, Vec<f64>)> {
+    use opencv::core::{FileStorage, FileStorage_MEMORY, FileStorage_READ};
+    use opencv::prelude::{FileNodeTraitConst, FileStorageTraitConst, MatTraitConstManual};
+    let storage = FileStorage::new(text, FileStorage_READ | FileStorage_MEMORY, "")?;
+    let read = |name: &str| storage.get(name)?.mat()?.data_typed::<f64>().map(<[f64]>::to_vec);
+    Ok((read(matrix)?, read(distortion)?))
+}
+
+/// OpenCV's `calibrateCamera` and `stereoCalibrate` on complete boards, four distortion terms: RMS, px, and baseline, mm.
+#[cfg(test)]
+pub fn stereo_calibrate(corners: &crate::imaging::Corners) -> opencv::Result<(f64, f64)> {
+    use opencv::core::{Mat, Point2f, Point3f, Size, TermCriteria, Vector};
+    let (mut objects, mut images) =
+        (Vector::<Vector<Point3f>>::new(), [(); 2].map(|()| Vector::<Vector<Point2f>>::new()));
+    let all = corners.board.corner_count();
+    for pair in corners.pairs.iter().filter(|p| p.left.len() == all && p.right.len() == all) {
+        let place = |c: &crate::imaging::Corner| corners.board.corner_mm(c.col, c.row).cast::<f32>();
+        objects.push(pair.left.iter().map(place).map(|p| Point3f::new(p.x, p.y, p.z)).collect());
+        for (image, list) in images.iter_mut().zip([&pair.left, &pair.right]) {
+            image.push(list.iter().map(|c| c.px.cast::<f32>()).map(|p| Point2f::new(p.x, p.y)).collect());
+        }
+    }
+    let size = Size::new(corners.left_size.0 as i32, corners.left_size.1 as i32);
+    let criteria = TermCriteria::new(3, 100, 1e-9)?;
+    let flags = calib3d::CALIB_FIX_K3;
+    let mut cameras = [(); 2].map(|()| (Mat::default(), Mat::default()));
+    for ((matrix, distortion), image) in cameras.iter_mut().zip(&images) {
+        let (mut r, mut t) = (Mat::default(), Mat::default());
+        calib3d::calibrate_camera(&objects, image, size, matrix, distortion, &mut r, &mut t, flags, criteria)?;
+    }
+    let [(m1, d1), (m2, d2)] = &mut cameras;
+    let [mut r, mut t, mut e, mut f] = [(); 4].map(|()| Mat::default());
+    let rms = calib3d::stereo_calibrate(
+        &objects,
+        &images[0],
+        &images[1],
+        m1,
+        d1,
+        m2,
+        d2,
+        size,
+        &mut r,
+        &mut t,
+        &mut e,
+        &mut f,
+        flags | calib3d::CALIB_USE_INTRINSIC_GUESS,
+        criteria,
+    )?;
+    use opencv::prelude::MatTraitConstManual;
+    let baseline = t.data_typed::<f64>()?.iter().map(|v| v * v).sum::<f64>().sqrt();
+    Ok((rms, baseline))
+}

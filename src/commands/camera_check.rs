@@ -1,22 +1,21 @@
 //! `stereocal camera-check`: Pictures of the check board to a calibrated rig and a verdict.
 
 use super::Outcome;
-use crate::cli::CameraCheck;
+use crate::cli::{BoardShape, CameraCheck};
 use crate::config::{self, Config};
 use crate::error::{Result, Status};
 use crate::files::{OutDir, to_json};
 use crate::imaging::{Board, Corners, Wanted, corners_file, find_corners};
 use crate::progress;
 use crate::report;
-use crate::stereo;
-use crate::stereo::accuracy::{self, Verdict};
-use crate::stereo::calibrate::{FEWEST_PAIRS, Options, calibrate};
+use crate::stereo::accuracy::{self, SecondBoard, Verdict};
+use crate::stereo::calibrate::{Calibration, FEWEST_PAIRS, Options, calibrate};
 use crate::stereo::calibration_file::CalibrationFile;
-use crate::stereo::check_file::CameraCheckFile;
+use crate::stereo::check_file::{CameraCheckFile, Judged};
 
 /// Runs the command.
 pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
-    let board = config.check_board.board(args.squares, args.square_mm)?;
+    let board = board(args, config)?;
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
     let mut problems = Vec::new();
     config::positive(&mut problems, "tolerance_mm", tolerance_mm);
@@ -25,27 +24,42 @@ pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
 
     let corners = corners(args, board)?;
     corners.notes.iter().for_each(progress::note);
-    let calibration = calibrate(&corners, &Options { lens: args.lens, shape: None })?;
+    let calibration = calibrate(&corners, &options(args))?;
     for skipped in &calibration.skipped {
         progress::warn(format!("pair {} is not used: {}", skipped.pair, skipped.reason));
     }
-    let accuracy = accuracy::hold_out(&calibration).ok_or(stereo::Error::Undetermined { focal_sigma: None })?;
-    let verdict = accuracy.verdict(tolerance_mm);
+    let accuracy = accuracy::hold_out(&calibration)?;
+    let second = second_board(args, board, &calibration)?;
+    let judged = Judged::new(&calibration, accuracy, second, tolerance_mm);
+    judged.warnings.iter().for_each(progress::warn);
 
-    let file = CameraCheckFile::new(&calibration, &accuracy, tolerance_mm);
+    let file = CameraCheckFile::new(&calibration, &judged);
     out.write_json("calibration.json", &CalibrationFile::from(calibration.rig()))?;
     out.write("corners.csv", corners_file::to_csv(&calibration.mark(&corners)).as_bytes())?;
     out.write_json("camera-check.json", &file)?;
-    let html = report::camera_check::page(&calibration, &accuracy, tolerance_mm)?;
-    out.write("camera-check.html", html.as_bytes())?;
+    out.write("camera-check.html", report::camera_check::page(&calibration, &judged)?.as_bytes())?;
 
-    let stdout = if args.output.json {
-        to_json(&file)
-    } else {
-        report::camera_check::summary(&calibration, &accuracy, tolerance_mm, &out)
-    };
-    let status = if verdict == Verdict::Pass { Status::Done } else { Status::OutOfTolerance };
+    let stdout =
+        if args.output.json { to_json(&file) } else { report::camera_check::summary(&calibration, &judged, &out) };
+    let status = if judged.verdict == Verdict::Pass { Status::Done } else { Status::OutOfTolerance };
     Ok(Outcome { stdout, status })
+}
+
+/// The check board, as large as its temperature makes it.
+fn board(args: &CameraCheck, config: &Config) -> Result<Board> {
+    /// Temperature at which lengths are certified (ISO 1), deg C.
+    const REFERENCE_C: f64 = 20.0;
+    let board = config.check_board.board(args.squares, args.square_mm)?;
+    let (Some(celsius), Some(ppm)) = (args.board_temperature_c, args.expansion_ppm_per_k) else { return Ok(board) };
+    let growth = 1.0 + 1e-6 * ppm * (celsius - REFERENCE_C);
+    let mut problems = Vec::new();
+    config::positive(&mut problems, "the board's thermal growth", growth);
+    config::reject(problems)?;
+    Ok(Board { square_mm: board.square_mm * growth, ..board })
+}
+
+fn options(args: &CameraCheck) -> Options {
+    Options { lens: args.lens, shape: args.board_shape.map(|shape| shape == BoardShape::Bowed) }
 }
 
 fn corners(args: &CameraCheck, board: Board) -> Result<Corners> {
@@ -57,4 +71,19 @@ fn corners(args: &CameraCheck, board: Board) -> Result<Corners> {
             Err(config::Error::Invalid { problems: vec!["neither pictures nor --corners given".into()] }.into())
         }
     }
+}
+
+/// A second board measured by the rig, where its pictures were named.
+fn second_board(args: &CameraCheck, board: Board, calibration: &Calibration) -> Result<Option<SecondBoard>> {
+    let Some(images) = &args.check_images else { return Ok(None) };
+    let board = Board {
+        squares: args.check_squares.unwrap_or(board.squares),
+        square_mm: args.check_square_mm.unwrap_or(board.square_mm),
+    };
+    let mut problems = Vec::new();
+    config::positive(&mut problems, "check_square_mm", board.square_mm);
+    config::reject(problems)?;
+    let corners = find_corners(images, &Wanted { board, needed: 1 })?;
+    calibration.rig().check_size(&corners)?;
+    Ok(accuracy::second_board(calibration, &corners))
 }

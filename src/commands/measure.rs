@@ -7,7 +7,7 @@ use crate::cli::Measure;
 use crate::config::Config;
 use crate::error::{Result, Status};
 use crate::files::{OutDir, to_json};
-use crate::imaging::{Board, Corners, Side, Wanted, find_corners};
+use crate::imaging::{Board, Corners, Wanted, find_corners};
 use crate::measurements::{self, RobotPose};
 use crate::progress;
 use crate::report;
@@ -25,7 +25,7 @@ pub fn run(args: &Measure, config: &Config) -> Result<Outcome> {
 
     let corners = find_corners(&args.poses, &Wanted { board, needed: 1 })?;
     corners.notes.iter().for_each(progress::note);
-    check_size(&rig, &corners)?;
+    rig.check_size(&corners)?;
     let measured = measure(&rig, &board, &corners, poses);
     for pose in &measured {
         if let Err(reason) = &pose.target {
@@ -43,20 +43,6 @@ pub fn run(args: &Measure, config: &Config) -> Result<Outcome> {
     out.write("measure.html", report::measure::page(&measured, &file)?.as_bytes())?;
     let stdout = if args.output.json { to_json(&file) } else { report::measure::summary(&file, &out) };
     Ok(Outcome { stdout, status: Status::Done })
-}
-
-/// Pictures of another size than the calibration's were binned, cut or taken by other cameras.
-fn check_size(rig: &Rig, corners: &Corners) -> Result<(), stereo::Error> {
-    for (side, camera, found) in
-        [(Side::Left, &rig.left, corners.left_size), (Side::Right, &rig.right, corners.right_size)]
-    {
-        let (width, height) = (camera.width, camera.height);
-        if found != (width, height) {
-            let (found_width, found_height) = found;
-            return Err(stereo::Error::PictureSize { side, found_width, found_height, width, height });
-        }
-    }
-    Ok(())
 }
 
 /// Every pose of the list with its target, or why there is none.

@@ -1,6 +1,7 @@
 //! One file a command; each reads as the list of its stages, and nothing else knows their order.
 
 pub mod camera_check;
+pub mod export;
 pub mod identify;
 pub mod measure;
 pub mod simulate;
@@ -26,5 +27,6 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Measure(args) => measure::run(&args, &config),
         Command::Identify(args) => identify::run(&args, &config),
         Command::Simulate(args) => simulate::run(&args, &config),
+        Command::Export(args) => export::run(&args, &config),
     }
 }

@@ -1,16 +1,21 @@
 //! `camera-check.html` and the table on stdout: can this rig be trusted, and why.
 
-use maud::html;
+use maud::{Markup, html};
 
 use super::figure::Plot;
-use super::page;
+use super::page::{self, Tone};
 use super::table::{Table, number};
 use crate::error::Result;
 use crate::files::OutDir;
-use crate::stereo::accuracy::{Accuracy, Axis, Verdict};
+use crate::stereo::Side;
+use crate::stereo::accuracy::{Axis, Range, Verdict};
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::check_file::Judged;
+use crate::stereo::whiteness::Field;
 
-/// The word for a verdict.
+/// Rows of the table on stdout: more ranges are thinned out.
+const TABLE_ROWS: usize = 7;
+
 fn word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Pass => "PASS",
@@ -19,29 +24,34 @@ fn word(verdict: Verdict) -> &'static str {
     }
 }
 
+fn axis(range: &Range) -> &'static str {
+    if range.axis == Axis::X { "x" } else { "y" }
+}
+
 /// The short table on stdout.
-pub fn summary(calibration: &Calibration, accuracy: &Accuracy, tolerance_mm: f64, out: &OutDir) -> String {
+pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> String {
+    let accuracy = &judged.accuracy;
     let rig = calibration.rig();
-    let skipped = calibration.skipped.len();
-    let mut table = Table::new(["range", "lengths", "mean mm", "std mm", "max |error| mm"]);
-    for range in &accuracy.ranges {
-        let axis = if range.axis == Axis::X { "x" } else { "y" };
-        table.row([
-            format!("{axis} {}", range.nominal_mm),
-            range.count.to_string(),
-            number(Some(range.mean_error_mm), 4),
-            number(Some(range.std_mm), 4),
-            number(Some(range.max_abs_error_mm), 4),
-        ]);
+    let mut table = Table::new(["range mm", "lengths", "mean mm", "std mm", "max |error| mm"]);
+    for along in [Axis::X, Axis::Y] {
+        let ranges: Vec<&Range> = accuracy.ranges.iter().filter(|r| r.axis == along).collect();
+        let step = ranges.len().div_ceil(TABLE_ROWS).max(1);
+        for range in ranges.iter().step_by(step) {
+            table.row([
+                format!("{} {}", axis(range), range.nominal_mm),
+                range.count.to_string(),
+                number(Some(range.mean_error_mm), 4),
+                number(Some(range.std_mm), 4),
+                number(Some(range.max_abs_error_mm), 4),
+            ]);
+        }
     }
+    let total = calibration.views.len() + calibration.skipped.len();
     format!(
-        "{}: largest held-out length error {} mm, expanded uncertainty {} mm, tolerance {tolerance_mm} mm\n\
-         {} of {} pairs, {} lens, reprojection RMS {} px, baseline {} mm\n\n{table}\nreport: {}\n",
-        word(accuracy.verdict(tolerance_mm)),
-        number(Some(accuracy.max_abs_error_mm), 4),
-        number(Some(accuracy.expanded_uncertainty_mm), 4),
+        "{}: {}\n{} of {total} pairs, {} lens, reprojection RMS {} px, baseline {} mm\n\n{table}\nreport: {}\n",
+        word(judged.verdict),
+        explanation(judged),
         calibration.views.len(),
-        calibration.views.len() + skipped,
         rig.left.lens.name(),
         number(Some(calibration.rms_px), 3),
         number(Some(rig.baseline_mm()), 3),
@@ -49,27 +59,273 @@ pub fn summary(calibration: &Calibration, accuracy: &Accuracy, tolerance_mm: f64
     )
 }
 
+fn explanation(judged: &Judged) -> String {
+    format!(
+        "largest held-out length error {:.4} mm, expanded uncertainty {:.4} mm (k = 2), tolerance {} mm",
+        judged.accuracy.max_abs_error_mm, judged.accuracy.expanded_uncertainty_mm, judged.tolerance_mm
+    )
+}
+
 /// The report.
-pub fn page(calibration: &Calibration, accuracy: &Accuracy, tolerance_mm: f64) -> Result<String> {
-    let verdict = accuracy.verdict(tolerance_mm);
-    let tone = match verdict {
-        Verdict::Pass => page::Tone::Good,
-        Verdict::Undecided => page::Tone::Doubtful,
-        Verdict::Fail => page::Tone::Bad,
+pub fn page(calibration: &Calibration, judged: &Judged) -> Result<String> {
+    let tone = match judged.verdict {
+        Verdict::Pass => Tone::Good,
+        Verdict::Undecided => Tone::Doubtful,
+        Verdict::Fail => Tone::Bad,
     };
-    let of = |axis| -> Vec<(f64, f64)> {
-        accuracy.ranges.iter().filter(|r| r.axis == axis).map(|r| (r.nominal_mm, r.max_abs_error_mm)).collect()
-    };
-    let ranges = Plot::new("Largest error of every range", "range, mm", "max |error|, mm")
-        .line("x", &of(Axis::X))
-        .line("y", &of(Axis::Y))
-        .hline(tolerance_mm, "tolerance")
-        .svg()?;
     let content = html! {
-        (page::verdict(tone, word(verdict), &format!(
-            "largest held-out length error {:.4} mm, expanded uncertainty {:.4} mm, tolerance {tolerance_mm} mm",
-            accuracy.max_abs_error_mm, accuracy.expanded_uncertainty_mm)))
-        (page::figure(&ranges, "Every length was measured by cameras that had not seen its pair."))
+        (page::verdict(tone, word(judged.verdict), &explanation(judged)))
+        (page::warnings(&judged.warnings))
+        (scale(judged))
+        h2 { "Lengths on pairs that the cameras had not seen" }
+        (lengths(judged)?)
+        h2 { "Pairs, the worst first" }
+        (pairs(calibration, judged))
+        h2 { "What the model leaves of the corners" }
+        (residuals(calibration, judged)?)
+        h2 { "The cameras and the rig" }
+        (parameters(calibration))
+        (lenses(calibration))
+        h2 { "How uncertain a length is over the working volume" }
+        (volume(judged)?)
     };
-    Ok(page::page("Camera check", &format!("{} pairs", calibration.views.len()), &content))
+    let total = calibration.views.len() + calibration.skipped.len();
+    let board = &calibration.board;
+    let lead = format!(
+        "{} of {total} pairs of a board of {} squares of {} mm; {} lens, board {}",
+        calibration.views.len(),
+        board.squares,
+        board.square_mm,
+        calibration.rig().left.lens.name(),
+        if calibration.layout.shape { "free to be bowed" } else { "flat" }
+    );
+    Ok(page::page("Camera check", &lead, &content))
+}
+
+/// What the figures do not show: the scale.
+fn scale(judged: &Judged) -> Markup {
+    html! {
+        @match &judged.second {
+            Some(second) => p {
+                (format!(
+                    "The second board, which calibrated nothing, comes out too large by {:.1} +- {:.1} parts in a million (k = 2); its worst length over \
+                     {} pairs is off by {:.4} mm.",
+                    1e6 * second.scale_error, 2e6 * second.scale_error_sigma, second.pairs, second.max_abs_error_mm))
+            }
+            None => p {
+                "The scale of every length is the pitch of the board that calibrated: an error of its pitch is invisible in these figures. \
+                 A second board of known pitch shows it: " code { "--check-images DIR" } "."
+            }
+        }
+    }
+}
+
+/// Fig. 6 of the paper, (a) to (d).
+fn lengths(judged: &Judged) -> Result<Markup> {
+    let accuracy = &judged.accuracy;
+    let [long, _] = accuracy.long_mm;
+    let [short, _] = accuracy.short_mm;
+    let mut every = Vec::new();
+    for pair in &accuracy.pairs {
+        every.extend_from_slice(&pair.long_errors_mm);
+    }
+    let every: Vec<(f64, f64)> = every.iter().enumerate().map(|(i, e)| (i as f64, *e)).collect();
+    let guard = |plot: Plot| plot.hline(judged.tolerance_mm, "tolerance").hline(-judged.tolerance_mm, "");
+    let a =
+        guard(Plot::new(&format!("(a) Errors of all lengths of {long} mm"), "length", "error, mm").points("", &every))
+            .svg()?;
+    let mean = |of: fn(&crate::stereo::accuracy::HeldOutPair) -> Option<f64>| -> Vec<(f64, f64)> {
+        accuracy.pairs.iter().enumerate().filter_map(|(i, p)| Some((i as f64 + 1.0, of(p)?))).collect()
+    };
+    let b = Plot::new("(b) Mean error of every pair", "pair", "mean error, mm")
+        .points(&format!("x {short} mm"), &mean(|p| p.mean_error_x_short_mm))
+        .points(&format!("y {short} mm"), &mean(|p| p.mean_error_y_short_mm))
+        .points(&format!("x {long} mm"), &mean(|p| p.mean_error_x_long_mm))
+        .points(&format!("y {long} mm"), &mean(|p| p.mean_error_y_long_mm))
+        .svg()?;
+    let range_plot = |title: &str, along: Axis| {
+        let of = |y: fn(&Range) -> f64| -> Vec<(f64, f64)> {
+            accuracy.ranges.iter().filter(|r| r.axis == along).map(|r| (r.nominal_mm, y(r))).collect()
+        };
+        let bars: Vec<(f64, f64, f64)> = accuracy
+            .ranges
+            .iter()
+            .filter(|r| r.axis == along)
+            .map(|r| (r.nominal_mm, r.mean_error_mm, r.std_mm))
+            .collect();
+        guard(
+            Plot::new(title, "range, mm", "error, mm")
+                .error_bars("mean and std", &bars)
+                .line("max |error|", &of(|r| r.max_abs_error_mm)),
+        )
+        .svg()
+    };
+    let c = range_plot("(c) Every range along x", Axis::X)?;
+    let d = range_plot("(d) Every range along y", Axis::Y)?;
+    Ok(html! {
+        div.side {
+            (page::figure(&a, "Pair after pair, x before y. Steps between pairs are calibration, the width of the band is corner noise."))
+            (page::figure(&b, "A pair far from the others was moved, blurred or hit from the side by light; a mean that grows with the range is a scale."))
+        }
+        div.side {
+            (page::figure(&c, "A mean that bends with the range is a lens or a board's shape that the model lacks."))
+            (page::figure(&d, "Errors that do not grow with the range come from the corners, not from the rig."))
+        }
+    })
+}
+
+fn pairs(calibration: &Calibration, judged: &Judged) -> Markup {
+    let mut order: Vec<usize> = (0..judged.accuracy.pairs.len()).collect();
+    order.sort_by(|&a, &b| {
+        judged.accuracy.pairs[b].max_abs_error_mm.total_cmp(&judged.accuracy.pairs[a].max_abs_error_mm)
+    });
+    let rows: Vec<Vec<String>> = order
+        .iter()
+        .map(|&i| {
+            let pair = &judged.accuracy.pairs[i];
+            let view = &calibration.views[i];
+            let rms = |side| {
+                crate::stereo::residuals::rms_px(&calibration.values.shared, &calibration.values.poses[i], view, side)
+            };
+            vec![
+                pair.pair.clone(),
+                number(Some(pair.max_abs_error_mm), 4),
+                number(pair.mean_error_x_long_mm, 4),
+                number(pair.mean_error_y_long_mm, 4),
+                number(Some(pair.gap_rms_mm), 4),
+                number(rms(Side::Left), 3),
+                number(rms(Side::Right), 3),
+                view.active(Side::Left).count().to_string(),
+                view.active(Side::Right).count().to_string(),
+                view.observations.iter().filter(|o| !o.active).count().to_string(),
+            ]
+        })
+        .collect();
+    let header = [
+        "pair",
+        "max |error| mm",
+        "mean x mm",
+        "mean y mm",
+        "ray gap mm",
+        "left px",
+        "right px",
+        "corners left",
+        "right",
+        "outliers",
+    ];
+    let skipped: Vec<Vec<String>> =
+        calibration.skipped.iter().map(|s| vec![s.pair.clone(), s.reason.clone()]).collect();
+    html! {
+        div.scroll { (page::table(&header, &rows)) }
+        @if !skipped.is_empty() { h2 { "Pairs that were not used" } (page::table(&["pair", "why"], &skipped)) }
+    }
+}
+
+fn residuals(calibration: &Calibration, judged: &Judged) -> Result<Markup> {
+    let rig = calibration.rig();
+    let mut figures = Vec::new();
+    for (field, camera) in judged.whiteness.fields.iter().zip([&rig.left, &rig.right]) {
+        figures.push(field_figure(field, camera.width, camera.height)?);
+    }
+    let noise = &calibration.noise;
+    let chi = match noise.reduced_chi_square {
+        Some(chi) => format!(
+            "The corners' own covariances explain the residuals with a reduced chi-square of {chi:.2}; {:.4} px were added to each coordinate.",
+            noise.added_px
+        ),
+        None => "The corners came without covariances; their scatter is that of the residuals.".to_owned(),
+    };
+    Ok(html! {
+        p {
+            (format!(
+                "Root mean square {:.4} px (length of the 2-D residual, both pictures), corner scatter {:.4} px a coordinate. {chi} \
+                 Neighbouring corners' residuals correlate by {:.3} (chance: {:.3}).",
+                calibration.rms_px,
+                noise.typical_px(&calibration.views),
+                judged.whiteness.neighbour_correlation,
+                judged.whiteness.standard_error))
+        }
+        div.side { @for (svg, caption) in &figures { (page::figure(svg, caption)) } }
+    })
+}
+
+/// Mean residuals over one picture, magnified, and which cells have seen corners.
+fn field_figure(field: &Field, width: u32, height: u32) -> Result<(String, String)> {
+    let longest = field.cells.iter().map(|c| c.mean_px[0].hypot(c.mean_px[1])).fold(0.0, f64::max);
+    let cell = f64::from(width) / (field.cells.len() as f64).sqrt();
+    let magnify = if longest > 0.0 { 0.8 * cell / longest } else { 1.0 };
+    let arrows: Vec<[f64; 4]> = field
+        .cells
+        .iter()
+        .filter(|c| c.corners > 0)
+        .map(|c| [c.x_px, c.y_px, magnify * c.mean_px[0], magnify * c.mean_px[1]])
+        .collect();
+    let empty: Vec<(f64, f64)> = field.cells.iter().filter(|c| c.corners == 0).map(|c| (c.x_px, c.y_px)).collect();
+    let svg = Plot::new(&format!("Mean residuals, {} picture", field.side), "x, px", "y, px")
+        .vectors("", &arrows)
+        .points("no corner", &empty)
+        .x_range(-0.5, f64::from(width) - 0.5)
+        .y_range(-0.5, f64::from(height) - 0.5)
+        .y_down()
+        .equal_axes()
+        .svg()?;
+    let seen = field.cells.iter().filter(|c| c.corners > 0).count();
+    let caption = format!(
+        "Arrows are {magnify:.0} times too long; the longest is {longest:.4} px, the systematic part {:.4} px. Arrows that turn or point outward together \
+         are a lens that the model lacks. Corners reached {seen} of {} cells; what lies in the others is extrapolated.",
+        field.systematic_px,
+        field.cells.len()
+    );
+    Ok((svg, caption))
+}
+
+fn parameters(calibration: &Calibration) -> Markup {
+    let layout = &calibration.layout;
+    let values = layout.numbers(&calibration.values.shared);
+    let covariance = &calibration.uncertainty.shared;
+    let rows: Vec<Vec<String>> = layout
+        .names()
+        .into_iter()
+        .enumerate()
+        .map(|(i, name)| vec![name, format!("{:.6}", values[i]), format!("{:.2e}", covariance[(i, i)].sqrt())])
+        .collect();
+    html! { div.scroll { (page::table(&["number", "value", "standard deviation"], &rows)) } }
+}
+
+fn lenses(calibration: &Calibration) -> Markup {
+    let rows: Vec<Vec<String>> = calibration
+        .lens_scores
+        .iter()
+        .map(|s| {
+            let px = s.held_out_rms_px.map_or("not determined by these pairs".to_owned(), |px| format!("{px:.5}"));
+            vec![s.model.to_owned(), px]
+        })
+        .collect();
+    html! {
+        @if !rows.is_empty() {
+            p { "Lens models on pairs they had not seen. The simplest within one standard error of the best was taken." }
+            (page::table(&["lens", "held-out residual px"], &rows))
+        }
+    }
+}
+
+fn volume(judged: &Judged) -> Result<Markup> {
+    let along =
+        |i: usize| -> Vec<(f64, f64)> { judged.length_sigmas.iter().map(|l| (l.at_mm[2], l.sigma_mm[i])).collect() };
+    let [long, _] = judged.accuracy.long_mm;
+    let svg =
+        Plot::new(&format!("Standard deviation of a length of {long} mm"), "distance from the left camera, mm", "mm")
+            .points("along x", &along(0))
+            .points("along y", &along(1))
+            .points("along z", &along(2))
+            .svg()?;
+    let worst = |i: usize| judged.length_sigmas.iter().map(|l| l.sigma_mm[i]).fold(0.0, f64::max);
+    let caption = format!(
+        "At {} places of the volume in which the boards stood and which both cameras see; corner noise at both ends and the calibration together. The worst: \
+         {:.4} mm across, {:.4} mm along the line of sight.",
+        judged.length_sigmas.len(),
+        worst(0).max(worst(1)),
+        worst(2)
+    );
+    Ok(page::figure(&svg, &caption))
 }

@@ -7,17 +7,26 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::calibrate::{Calibration, Problem};
+use super::calibrate::Calibration;
 use super::folds::{self, FOLDS};
+use super::homography::FEWEST_CORNERS;
+use super::layout::Shared;
 use super::observations::View;
+use super::pose;
+use super::residuals::residual_px;
 use super::rig::Covariance;
+use super::robust::Loss;
+use super::start::CAUCHY_WIDTH;
 use super::triangulate::{RigCovariance, SpacePoint, common, triangulate};
-use super::{Rig, bundle};
-use crate::imaging::Board;
+use super::{Error, Rig, bundle};
+use crate::imaging::{Board, Corners, Skipped};
 
 /// The short and the long range of Fig. 6 (b), in squares: 10 and 70 mm on the paper's board.
 const SHORT_SQUARES: usize = 1;
 const LONG_SQUARES: usize = 7;
+
+/// A corner that misses the rig's prediction by more than this on a second board was not found there, px.
+const GROSS_PX: f64 = 2.0;
 
 /// Coverage factor of the expanded uncertainty: 95 %.
 const COVERAGE: f64 = 2.0;
@@ -129,11 +138,13 @@ struct Measured {
 }
 
 /// Holds out every pair once and measures it.
-pub fn hold_out(calibration: &Calibration) -> Option<Accuracy> {
+///
+/// An error where a fold without some of the pairs does not determine the cameras.
+pub fn hold_out(calibration: &Calibration) -> Result<Accuracy, Error> {
     let count = calibration.views.len();
     let folds = folds::assign(count, FOLDS);
     let fold_count = FOLDS.min(count);
-    let problem = Problem { views: calibration.views.clone(), values: calibration.values.clone() };
+    let problem = calibration.problem();
     let rigs: Vec<Option<Rig>> = (0..fold_count)
         .into_par_iter()
         .map(|fold| {
@@ -144,14 +155,70 @@ pub fn hold_out(calibration: &Calibration) -> Option<Accuracy> {
             Some(values.shared.rig)
         })
         .collect();
-    let rigs = rigs.into_iter().collect::<Option<Vec<Rig>>>()?;
+    let rigs = rigs.into_iter().collect::<Option<Vec<Rig>>>().ok_or(Error::Undetermined { focal_sigma: None })?;
     let measured: Vec<Measured> = calibration
         .views
         .par_iter()
         .enumerate()
         .map(|(i, view)| measure(&rigs[folds[i]], &calibration.board, view))
         .collect();
-    summarise(calibration, &rigs, &folds, &measured)
+    summarise(calibration, &rigs, &folds, &measured).ok_or(Error::Undetermined { focal_sigma: None })
+}
+
+/// A second board, measured by the rig as it is: it helped to calibrate nothing, so that its pitch shows the scale.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SecondBoard {
+    /// Pairs that were measured.
+    pub pairs: usize,
+    /// Pairs that were not, and why.
+    pub pairs_skipped: Vec<Skipped>,
+    /// Largest absolute error of any length, mm.
+    pub max_abs_error_mm: f64,
+    /// Measured lengths over nominal ones, minus one; both boards' pitch errors and the rig's scale together.
+    pub scale_error: f64,
+    /// Its standard deviation over the pairs.
+    pub scale_error_sigma: f64,
+    /// Every range, x first, from the shortest.
+    pub ranges: Vec<Range>,
+}
+
+/// Measures a second board. `None` where no pair shows it.
+pub fn second_board(calibration: &Calibration, corners: &Corners) -> Option<SecondBoard> {
+    let board = &corners.board;
+    let shared = Shared { rig: calibration.rig().clone(), shape_mm: [0.0; 2] };
+    let mut skipped = corners.skipped.clone();
+    let mut measured = Vec::new();
+    for pair in &corners.pairs {
+        let mut views = [View::new(board, pair, FEWEST_CORNERS)];
+        calibration.noise.apply(&mut views);
+        let [mut view] = views;
+        let fit = pose::fit(&shared, &view, Loss::Cauchy(CAUCHY_WIDTH));
+        for o in &mut view.observations {
+            let miss = fit.as_ref().and_then(|fit| residual_px(&shared, &fit.left_from_board, o));
+            // The target's own print may be worse than the check board's: only gross misses are left out.
+            o.active = miss.is_some_and(|r| r.norm() <= GROSS_PX);
+        }
+        let lengths = measure(calibration.rig(), board, &view);
+        if lengths.lengths.is_empty() {
+            let reason =
+                "no length in it fits the rig: another board, or pictures that do not belong together".to_owned();
+            skipped.push(Skipped { pair: pair.pair.clone(), reason });
+        } else {
+            measured.push(lengths);
+        }
+    }
+    let scales: Vec<f64> = measured.iter().map(|m| m.scale_error(board)).collect();
+    let scale_error = mean(&scales)?;
+    let spread: f64 = scales.iter().map(|s| (s - scale_error) * (s - scale_error)).sum();
+    let n = scales.len() as f64;
+    Some(SecondBoard {
+        pairs: measured.len(),
+        pairs_skipped: skipped,
+        max_abs_error_mm: measured.iter().map(Measured::worst_mm).fold(0.0, f64::max),
+        scale_error,
+        scale_error_sigma: (spread / (n - 1.0).max(1.0) / n).sqrt(),
+        ranges: all_ranges(board, &measured),
+    })
 }
 
 /// Triangulates the corners of a pair and measures all lengths along rows and columns.
@@ -191,11 +258,7 @@ fn summarise(calibration: &Calibration, rigs: &[Rig], folds: &[usize], measured:
     let largest = |squares: usize, corners: usize| squares.min(corners - 1);
     let short = [SHORT_SQUARES; 2];
     let long = [largest(LONG_SQUARES, board.columns()), largest(LONG_SQUARES, board.rows())];
-    let ranges = [(Axis::X, board.columns()), (Axis::Y, board.rows())]
-        .into_iter()
-        .flat_map(|(axis, corners)| (1..corners).map(move |squares| (axis, squares)))
-        .filter_map(|(axis, squares)| range(board, measured, axis, squares))
-        .collect();
+    let ranges = all_ranges(board, measured);
     let pairs = calibration.views.iter().zip(measured).map(|(view, m)| pair(view, m, short, long)).collect();
     let (worst, length) = measured
         .iter()
@@ -216,6 +279,14 @@ fn summarise(calibration: &Calibration, rigs: &[Rig], folds: &[usize], measured:
         ranges,
         pairs,
     })
+}
+
+fn all_ranges(board: &Board, measured: &[Measured]) -> Vec<Range> {
+    [(Axis::X, board.columns()), (Axis::Y, board.rows())]
+        .into_iter()
+        .flat_map(|(axis, corners)| (1..corners).map(move |squares| (axis, squares)))
+        .filter_map(|(axis, squares)| range(board, measured, axis, squares))
+        .collect()
 }
 
 fn range(board: &Board, measured: &[Measured], axis: Axis, squares: usize) -> Option<Range> {
@@ -241,13 +312,23 @@ fn pair(view: &View, measured: &Measured, short: [usize; 2], long: [usize; 2]) -
         mean_error_y_short_mm: mean_of(Axis::Y, short[1]),
         mean_error_x_long_mm: mean_of(Axis::X, long[0]),
         mean_error_y_long_mm: mean_of(Axis::Y, long[1]),
-        max_abs_error_mm: measured.lengths.iter().fold(0.0, |max: f64, l| max.max(l.error_mm.abs())),
+        max_abs_error_mm: measured.worst_mm(),
         gap_rms_mm: mean(&gaps).unwrap_or(0.0).sqrt(),
         long_errors_mm: measured.errors(Axis::X, long[0]).chain(measured.errors(Axis::Y, long[1])).collect(),
     }
 }
 
 impl Measured {
+    fn worst_mm(&self) -> f64 {
+        self.lengths.iter().fold(0.0, |max: f64, l| max.max(l.error_mm.abs()))
+    }
+
+    /// Sum of the measured over the sum of the nominal lengths, minus one.
+    fn scale_error(&self, board: &Board) -> f64 {
+        let nominal: f64 = self.lengths.iter().map(|l| l.squares as f64 * board.square_mm).sum();
+        self.lengths.iter().map(|l| l.error_mm).sum::<f64>() / nominal
+    }
+
     fn errors(&self, axis: Axis, squares: usize) -> impl Iterator<Item = f64> + '_ {
         self.lengths.iter().filter(move |l| l.axis == axis && l.squares == squares).map(|l| l.error_mm)
     }

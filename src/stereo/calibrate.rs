@@ -62,6 +62,11 @@ impl Calibration {
         &self.values.shared.rig
     }
 
+    /// The pairs with the values reached, to solve again in part or with another model.
+    pub fn problem(&self) -> Problem {
+        Problem { views: self.views.clone(), values: self.values.clone() }
+    }
+
     /// The corners as they were used: outliers and the corners of pairs that are out are marked, turned boards turned.
     pub fn mark(&self, corners: &Corners) -> Corners {
         let mut marked = corners.clone();

@@ -159,11 +159,16 @@ impl CovarianceRecord {
     }
 }
 
-/// Reads `calibration.json`.
+/// Reads `calibration.json`, or one of the formats that [`super::export`] writes.
 pub fn read(path: &Utf8Path) -> Result<Rig> {
+    const WHAT: &str = "the stereo calibration";
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
-    let file: CalibrationFile = files::read_json(path, "the stereo calibration", Some(hint))?;
-    file.rig().map_err(|message| {
+    let text = files::read_text(path, WHAT, Some(hint))?;
+    let rig = match super::export::read(path, &text) {
+        Some(rig) => rig,
+        None => files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?.rig(),
+    };
+    rig.map_err(|message| {
         files::Error::Format { message, place: Place { path: path.to_owned(), line: None }, hint: None }.into()
     })
 }

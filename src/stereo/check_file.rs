@@ -2,10 +2,66 @@
 
 use serde::Serialize;
 
-use super::accuracy::{Accuracy, Range, Verdict};
+use super::accuracy::{Accuracy, Range, SecondBoard, Verdict};
 use super::calibrate::Calibration;
+use super::disagreement::{self, Disagreement};
 use super::lens_choice::LensScore;
+use super::variety;
+use super::volume::{self, LengthSigma};
+use super::whiteness::{self, Whiteness};
 use crate::imaging::Skipped;
+
+/// A calibration with everything that was asked of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    /// The tolerance, mm.
+    pub tolerance_mm: f64,
+    /// Pass, fail or undecided: the held-out pairs and, where there is one, the second board.
+    pub verdict: Verdict,
+    /// Held-out accuracy.
+    pub accuracy: Accuracy,
+    /// A second board.
+    pub second: Option<SecondBoard>,
+    /// Whether the residuals are noise.
+    pub whiteness: Whiteness,
+    /// Lens models that disagree.
+    pub disagreements: Vec<Disagreement>,
+    /// Uncertainty of the long range over the volume.
+    pub length_sigmas: Vec<LengthSigma>,
+    /// What a person should know before the result.
+    pub warnings: Vec<String>,
+}
+
+impl Judged {
+    /// Judges.
+    pub fn new(
+        calibration: &Calibration,
+        accuracy: Accuracy,
+        second: Option<SecondBoard>,
+        tolerance_mm: f64,
+    ) -> Judged {
+        let whiteness = whiteness::check(calibration);
+        let disagreements = disagreement::find(calibration);
+        let mut warnings = variety::advise(calibration, &whiteness);
+        warnings.extend(whiteness.describe());
+        warnings.extend(disagreements.iter().map(Disagreement::describe));
+        let held_out = accuracy.verdict(tolerance_mm);
+        let verdict = match &second {
+            Some(second) if second.max_abs_error_mm > tolerance_mm => {
+                warnings.push(format!(
+                    "the second board's lengths are off by up to {:.4} mm, its scale by {:.1} +- {:.1} parts in a million",
+                    second.max_abs_error_mm,
+                    1e6 * second.scale_error,
+                    2e6 * second.scale_error_sigma
+                ));
+                Verdict::Fail
+            }
+            _ => held_out,
+        };
+        let length_sigmas = volume::length_sigmas(calibration, accuracy.long_mm[0]);
+        Judged { tolerance_mm, verdict, accuracy, second, whiteness, disagreements, length_sigmas, warnings }
+    }
+}
 
 /// The content of `camera-check.json`. Lengths held out: no pair helped to calibrate the cameras that measured it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -18,6 +74,8 @@ pub struct CameraCheckFile {
     reprojection_rms_px: f64,
     baseline_mm: f64,
     lens: String,
+    /// Height of the board's middle above its edges along x and y, mm; zero where it was taken as flat.
+    board_bow_mm: [f64; 2],
     pairs_used: usize,
     pairs_skipped: Vec<Skipped>,
     folds: usize,
@@ -27,7 +85,11 @@ pub struct CameraCheckFile {
     reduced_chi_square: Option<f64>,
     ranges: Vec<Range>,
     pairs: Vec<PairRecord>,
+    second_board: Option<SecondBoard>,
     lens_scores: Vec<LensScore>,
+    disagreements: Vec<Disagreement>,
+    neighbour_correlation: f64,
+    warnings: Vec<String>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -43,8 +105,8 @@ struct PairRecord {
 
 impl CameraCheckFile {
     /// Gathers the figures. `x10` and `x70` stand for one square and seven, or as many as the board has.
-    pub fn new(calibration: &Calibration, accuracy: &Accuracy, tolerance_mm: f64) -> CameraCheckFile {
-        let verdict = accuracy.verdict(tolerance_mm);
+    pub fn new(calibration: &Calibration, judged: &Judged) -> CameraCheckFile {
+        let accuracy = &judged.accuracy;
         let all = || calibration.views.iter().flat_map(|view| &view.observations);
         let pairs = accuracy
             .pairs
@@ -60,14 +122,15 @@ impl CameraCheckFile {
             })
             .collect();
         CameraCheckFile {
-            passed: verdict == Verdict::Pass,
-            verdict,
-            tolerance_mm,
+            passed: judged.verdict == Verdict::Pass,
+            verdict: judged.verdict,
+            tolerance_mm: judged.tolerance_mm,
             max_abs_error_mm: accuracy.max_abs_error_mm,
             expanded_uncertainty_mm: accuracy.expanded_uncertainty_mm,
             reprojection_rms_px: calibration.rms_px,
             baseline_mm: calibration.rig().baseline_mm(),
             lens: calibration.rig().left.lens.name().to_owned(),
+            board_bow_mm: calibration.values.shared.shape_mm,
             pairs_used: calibration.views.len(),
             pairs_skipped: calibration.skipped.clone(),
             folds: accuracy.folds,
@@ -77,7 +140,11 @@ impl CameraCheckFile {
             reduced_chi_square: calibration.noise.reduced_chi_square,
             ranges: accuracy.ranges.clone(),
             pairs,
+            second_board: judged.second.clone(),
             lens_scores: calibration.lens_scores.clone(),
+            disagreements: judged.disagreements.clone(),
+            neighbour_correlation: judged.whiteness.neighbour_correlation,
+            warnings: judged.warnings.clone(),
         }
     }
 }

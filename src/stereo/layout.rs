@@ -96,6 +96,23 @@ impl Layout {
         names
     }
 
+    /// Their values, in the same order; `right_from_left` as rotation vector and translation.
+    pub fn numbers(&self, shared: &Shared) -> Vec<f64> {
+        let mut numbers = Vec::with_capacity(self.count());
+        for (side, camera) in Side::BOTH.into_iter().zip([&shared.rig.left, &shared.rig.right]) {
+            let all = [camera.fx, camera.fy, camera.cx, camera.cy].into_iter().chain(camera.distortion);
+            numbers.extend(all.take(self.camera_count(side)));
+        }
+        if self.transform {
+            numbers.extend(crate::geometry::rotation_vector(&shared.rig.right_from_left).iter());
+            numbers.extend(shared.rig.right_from_left.translation.vector.iter());
+        }
+        if self.shape {
+            numbers.extend(shared.shape_mm);
+        }
+        numbers
+    }
+
     /// Applies a step; `step` is as long as [`Layout::count`].
     pub fn step(&self, shared: &Shared, step: &[f64]) -> Shared {
         let mut next = shared.clone();

@@ -1,21 +1,25 @@
-//! Which lens model: the one that predicts pairs it has not seen.
+//! Which lens model, and whether the board is flat: what predicts pairs that it has not seen.
 //!
 //! In: views that agree. Out: the layout to solve, and how each lens of the ladder predicts held-out pairs. Method: k folds over the
-//! pairs; the rig of a fold measures the pose of each pair it has not seen, and what is left counts. The simplest lens whose
+//! pairs; the rig of a fold measures the pose of each pair it has not seen, and what is left counts. The simplest model whose
 //! loss is within one standard error of the best wins (Breiman et al. 1984), since a richer one extrapolates worse.
+//! Goes wrong: pairs too few or too alike to tell models apart; then the simplest that fits wins, and
+//! [`super::disagreement`] says what is at stake.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::bundle;
 use super::calibrate::{Options, Problem};
 use super::folds::{self, FOLDS};
 use super::layout::{Layout, Shared};
 use super::observations::View;
 use super::pose;
-use super::residuals::residual_px;
+use super::residuals::{self, residual_px};
 use super::robust::Loss;
 use super::{Error, Lens};
 
-/// How a lens predicts pairs it has not seen.
+/// How a model predicts pairs it has not seen.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct LensScore {
     /// The lens.
@@ -24,41 +28,91 @@ pub struct LensScore {
     pub held_out_rms_px: Option<f64>,
     /// Mean over the pairs of the squared whitened residual a corner.
     pub loss: Option<f64>,
+    /// Calibrated with all pairs, where they determine it.
     #[serde(skip)]
-    lens: Option<Lens>,
-    /// The loss of each pair.
-    #[serde(skip)]
+    pub trial: Option<Trial>,
+}
+
+/// A model calibrated with all pairs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// What was free.
+    pub layout: Layout,
+    /// Rig and shape.
+    pub shared: Shared,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Mean squared whitened residual of the pairs it was fitted to.
+    pub mean_square: f64,
+    /// The held-out loss of each pair.
     by_pair: Vec<f64>,
 }
 
 /// Chooses what is free, where it is not forced.
 pub fn choose(start: &Problem, options: &Options) -> Result<(Layout, Vec<LensScore>), Error> {
-    let shape = options.shape.unwrap_or(false);
-    if let Some(lens) = options.lens {
+    let forced_shape = options.shape.or(options.lens.map(|_| false));
+    if let (Some(lens), Some(shape)) = (options.lens, forced_shape) {
         return Ok((Layout::rig(lens, shape), Vec::new()));
     }
-    // Weights and outliers from a lens that is at least as rich as most need; the comparison uses the same for all.
-    let solved =
-        start.solve(&Layout::rig(Lens::Brown5, shape)).or_else(|_| start.solve(&Layout::rig(Lens::Brown4, shape)))?;
-    let scores: Vec<LensScore> = Lens::LADDER.par_iter().map(|&lens| score(&solved.problem, lens, shape)).collect();
-    let best = scores.iter().filter(|s| s.loss.is_some()).min_by(|a, b| a.total().total_cmp(&b.total()));
-    let Some(best) = best else { return Err(Error::Undetermined { focal_sigma: None }) };
-    let chosen = scores
-        .iter()
-        .filter(|s| s.loss.is_some())
-        .find(|s| s.excess_over(best) <= 0.0)
-        .and_then(|s| s.lens)
-        .unwrap_or(Lens::Brown4);
-    Ok((Layout::rig(chosen, shape), scores))
+    // Weights and outliers from a model that is at least as rich as most need; the comparison uses the same for all.
+    let rich = |shape| start.solve(&Layout::rig(Lens::Brown5, shape));
+    let solved = rich(forced_shape.unwrap_or(true))
+        .or_else(|_| rich(forced_shape.unwrap_or(false)))
+        .or_else(|_| start.solve(&Layout::rig(Lens::Brown4, false)))?;
+    // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
+    let bent = forced_shape.unwrap_or(true);
+    let mut scores: Vec<LensScore> =
+        Lens::LADDER.par_iter().map(|&lens| score(&solved.problem, Layout::rig(lens, bent))).collect();
+    if forced_shape.is_none() && scores.iter().all(|s| s.trial.is_none()) {
+        scores = Lens::LADDER.par_iter().map(|&lens| score(&solved.problem, Layout::rig(lens, false))).collect();
+    }
+    let chosen = simplest(&scores).ok_or(Error::Undetermined { focal_sigma: None })?;
+    if forced_shape.is_some() || !chosen.layout.shape {
+        return Ok((chosen.layout, scores));
+    }
+    let flat = score(&solved.problem, Layout { shape: false, ..chosen.layout });
+    let bends = flat.trial.as_ref().is_none_or(|flat| flat.excess_over(chosen) > 0.0);
+    let layout = Layout { shape: bends, ..chosen.layout };
+    if !bends {
+        scores = Lens::LADDER.par_iter().map(|&lens| score(&solved.problem, Layout::rig(lens, false))).collect();
+        let layout = simplest(&scores).map_or(layout, |trial| trial.layout);
+        return Ok((layout, scores));
+    }
+    Ok((layout, scores))
 }
 
-impl LensScore {
-    fn total(&self) -> f64 {
-        self.loss.unwrap_or(f64::INFINITY)
+/// The simplest model within one standard error of the best.
+fn simplest(scores: &[LensScore]) -> Option<&Trial> {
+    let trials = || scores.iter().filter_map(|s| s.trial.as_ref());
+    let best = trials().min_by(|a, b| a.loss().total_cmp(&b.loss()))?;
+    trials().find(|trial| trial.excess_over(best) <= 0.0)
+}
+
+impl Trial {
+    /// A model calibrated with all pairs and held against none. `None` where the pairs do not determine it.
+    pub fn new(problem: &Problem, layout: Layout) -> Option<Trial> {
+        let problem = Problem { views: problem.views.clone(), values: problem.refit(&layout)? };
+        Trial::at(&problem, layout)
+    }
+
+    /// The model at its minimum.
+    fn at(problem: &Problem, layout: Layout) -> Option<Trial> {
+        if !problem.determines(&layout) {
+            return None;
+        }
+        let Problem { views, values } = problem;
+        let covariance = bundle::uncertainty(views, &layout, values)?.shared;
+        let left = residuals::active(views, values)?;
+        let mean_square = left.iter().map(|(o, r)| o.whiten(*r).norm_squared()).sum::<f64>() / left.len() as f64;
+        Some(Trial { layout, shared: values.shared.clone(), covariance, mean_square, by_pair: Vec::new() })
+    }
+
+    fn loss(&self) -> f64 {
+        self.by_pair.iter().sum::<f64>() / self.by_pair.len() as f64
     }
 
     /// How much worse than `best` beyond one standard error of the pairs' differences.
-    fn excess_over(&self, best: &LensScore) -> f64 {
+    fn excess_over(&self, best: &Trial) -> f64 {
         let differences: Vec<f64> = self.by_pair.iter().zip(&best.by_pair).map(|(a, b)| a - b).collect();
         let n = differences.len() as f64;
         let mean = differences.iter().sum::<f64>() / n;
@@ -67,54 +121,57 @@ impl LensScore {
     }
 }
 
-fn score(problem: &Problem, lens: Lens, shape: bool) -> LensScore {
-    let layout = Layout::rig(lens, shape);
-    let count = problem.views.len();
-    let folds = folds::assign(count, FOLDS);
-    let mut by_pair = vec![None; count];
-    let none = LensScore { model: lens.name(), held_out_rms_px: None, loss: None, lens: None, by_pair: Vec::new() };
-    // A lens that all pairs together do not determine is none; one that they do is a start for every fold.
-    let Some(values) = problem.refit(&layout) else { return none };
-    let problem = Problem { views: problem.views.clone(), values };
-    if !problem.determines(&layout) {
-        return none;
+fn score(problem: &Problem, layout: Layout) -> LensScore {
+    let model = layout.left.map_or("none", Lens::name);
+    match hold_out(problem, layout) {
+        Some((trial, rms_px)) => {
+            LensScore { model, held_out_rms_px: Some(rms_px), loss: Some(trial.loss()), trial: Some(trial) }
+        }
+        None => LensScore { model, held_out_rms_px: None, loss: None, trial: None },
     }
+}
+
+/// The model with all pairs and, fold by fold, on those it has not seen. `None` where the pairs do not determine it.
+fn hold_out(problem: &Problem, layout: Layout) -> Option<(Trial, f64)> {
+    let count = problem.views.len();
+    // A lens that all pairs together do not determine is none; one that they do is a start for every fold.
+    let problem = Problem { views: problem.views.clone(), values: problem.refit(&layout)? };
+    let trial = Trial::at(&problem, layout)?;
+    let folds = folds::assign(count, FOLDS);
+    let mut by_pair = vec![0.0; count];
     let (mut squares, mut corners) = (0.0, 0);
     for fold in 0..FOLDS.min(count) {
         let kept = problem.subset(|i| folds[i] != fold);
-        let Some(values) = kept.refit(&layout) else { return none };
+        let kept = Problem { values: kept.refit(&layout)?, ..kept };
         if !kept.determines(&layout) {
-            return none;
+            return None;
         }
         for i in (0..count).filter(|&i| folds[i] == fold) {
-            let Some(left) = held_out(&values.shared, &problem.views[i]) else { return none };
+            let left = miss(&kept.values.shared, &problem.views[i])?;
             squares += left.squares_px2;
             corners += left.corners;
-            by_pair[i] = Some(left.loss);
+            by_pair[i] = left.loss;
         }
     }
-    let Some(by_pair) = by_pair.into_iter().collect::<Option<Vec<f64>>>() else { return none };
-    let loss = by_pair.iter().sum::<f64>() / count as f64;
-    let held_out_rms_px = (corners > 0).then(|| (squares / corners as f64).sqrt());
-    LensScore { model: lens.name(), held_out_rms_px, loss: Some(loss), lens: Some(lens), by_pair }
+    Some((Trial { by_pair, ..trial }, (squares / f64::from(corners.max(1))).sqrt()))
 }
 
-struct HeldOut {
+struct Miss {
     squares_px2: f64,
-    corners: usize,
+    corners: u32,
     loss: f64,
 }
 
 /// What a rig leaves of a pair that it has not seen.
-fn held_out(shared: &Shared, view: &View) -> Option<HeldOut> {
+fn miss(shared: &Shared, view: &View) -> Option<Miss> {
     let fit = pose::fit(shared, view, Loss::Squared)?;
-    let mut sum = HeldOut { squares_px2: 0.0, corners: 0, loss: 0.0 };
+    let mut sum = Miss { squares_px2: 0.0, corners: 0, loss: 0.0 };
     for o in view.observations.iter().filter(|o| o.active) {
         let r = residual_px(shared, &fit.left_from_board, o)?;
         sum.squares_px2 += r.norm_squared();
         sum.loss += o.whiten(r).norm_squared();
         sum.corners += 1;
     }
-    sum.loss /= sum.corners.max(1) as f64;
+    sum.loss /= f64::from(sum.corners.max(1));
     sum.loss.is_finite().then_some(sum)
 }

@@ -11,6 +11,8 @@ pub mod calibration_file;
 pub mod camera;
 pub mod check_file;
 pub mod consensus;
+pub mod disagreement;
+pub mod export;
 pub mod folds;
 pub mod homography;
 pub mod layout;
@@ -20,14 +22,21 @@ pub mod noise;
 pub mod observations;
 pub mod pose;
 pub mod projection;
+#[cfg(test)]
+mod recovery;
 pub mod residuals;
 pub mod rig;
 pub mod robust;
 pub mod schur;
 pub mod screening;
 pub mod start;
+#[cfg(test)]
+pub(crate) mod synthetic;
 pub mod target;
 pub mod triangulate;
+pub mod variety;
+pub mod volume;
+pub mod whiteness;
 
 use crate::error::{Explain, Status};
 use crate::imaging::Skipped;
@@ -92,6 +101,16 @@ pub enum Error {
         /// Poses in the list.
         poses: usize,
     },
+    /// A lens that another program has no words for.
+    #[error("the {lens} lens cannot be said in {format}'s format; it goes up to {most}")]
+    LensNotExportable {
+        /// The format.
+        format: &'static str,
+        /// The lens of the rig.
+        lens: &'static str,
+        /// The richest lens of the format.
+        most: &'static str,
+    },
     /// Pictures of another size than the calibration's.
     #[error("the {} pictures are {found_width}x{found_height} px, the calibration is for {width}x{height}", side.name())]
     PictureSize {
@@ -119,7 +138,7 @@ fn focal(sigma: &Option<f64>) -> String {
 impl Explain for Error {
     fn status(&self) -> Status {
         match self {
-            Error::TooFewPairs { .. } | Error::PictureSize { .. } => Status::BadInput,
+            Error::TooFewPairs { .. } | Error::PictureSize { .. } | Error::LensNotExportable { .. } => Status::BadInput,
             _ => Status::Undetermined,
         }
     }
@@ -141,6 +160,9 @@ impl Explain for Error {
                 Error::NotConverged { .. } => "`--lens radial2` has fewer unknowns; add pairs with the board tilted",
                 Error::NothingMeasured { .. } => {
                     "`--squares CxR` and `--square-mm MM` describe the target on the robot"
+                }
+                Error::LensNotExportable { most, .. } => {
+                    return Some(format!("calibrate with `--lens {most}`, or `--format opencv`"));
                 }
                 Error::PictureSize { .. } => {
                     "calibrate with pictures of the same size and cut: `stereocal camera-check IMAGES`"

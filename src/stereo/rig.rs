@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, Point2, Point3};
 
-use super::Camera;
+use super::{Camera, Error};
 use crate::geometry::Transform;
+use crate::imaging::{Corners, Side};
 
 /// A calibrated pair of cameras.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +32,20 @@ impl Rig {
     /// Distance of the two cameras' centres, mm.
     pub fn baseline_mm(&self) -> f64 {
         self.right_from_left.translation.vector.norm()
+    }
+
+    /// Pictures of another size than the calibration's were binned, cut or taken by other cameras.
+    pub fn check_size(&self, corners: &Corners) -> Result<(), Error> {
+        for (side, camera, found) in
+            [(Side::Left, &self.left, corners.left_size), (Side::Right, &self.right, corners.right_size)]
+        {
+            let (width, height) = (camera.width, camera.height);
+            if found != (width, height) {
+                let (found_width, found_height) = found;
+                return Err(Error::PictureSize { side, found_width, found_height, width, height });
+            }
+        }
+        Ok(())
     }
 
     /// Raw picture points, left and right, of a point in the left camera's frame, px.

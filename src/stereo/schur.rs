@@ -225,3 +225,95 @@ pub fn solve_scaled(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVect
     let solution = scaled.cholesky()?.solve(&right.component_mul(&scale));
     Some(solution.component_mul(&scale))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::perturb;
+    use crate::stereo::Lens;
+    use crate::stereo::synthetic::World;
+    use nalgebra::Vector3;
+
+    fn cost(shared: &Shared, layout: &Layout, pose: &Transform, view: &View) -> f64 {
+        block(shared, layout, pose, view, Loss::Cauchy(2.0)).unwrap().cost
+    }
+
+    #[test]
+    fn gradients_equal_central_differences() {
+        let world = World::new(1, 3);
+        let layout = Layout::rig(Lens::Brown4, true);
+        let mut view = View::new(&world.board, &world.corners(4).pairs[0], 0);
+        for o in &mut view.observations {
+            o.whitener = nalgebra::Matrix2::new(9.0, 0.0, 2.0, 11.0);
+        }
+        let shared = Shared { rig: world.rig.clone(), shape_mm: [0.1, -0.2] };
+        let pose = &world.poses[0];
+        let analytic = block(&shared, &layout, pose, &view, Loss::Cauchy(2.0)).unwrap();
+        // A cost of some thousands is known to 1e-12; halved by steps that move pixels by about 1e-4.
+        let close = |numeric: f64, analytic: f64, what: &str| {
+            assert!((numeric - analytic).abs() < 1e-4 * (1.0 + analytic.abs()), "{what}: {numeric} and {analytic}");
+        };
+        for (i, name) in layout.names().iter().enumerate() {
+            let h = if name.contains('k') || name.contains(".p") || name.contains("rad") { 1e-6 } else { 1e-4 };
+            let mut step = vec![0.0; layout.count()];
+            step[i] = h;
+            let plus = cost(&layout.step(&shared, &step), &layout, pose, &view);
+            step[i] = -h;
+            let minus = cost(&layout.step(&shared, &step), &layout, pose, &view);
+            close((plus - minus) / (2.0 * h), analytic.shared_gradient[i], name);
+        }
+        for i in 0..6 {
+            let at = |h: f64| {
+                let mut step = Vector6::zeros();
+                step[i] = h;
+                let moved =
+                    perturb(pose, Vector3::new(step[0], step[1], step[2]), Vector3::new(step[3], step[4], step[5]));
+                cost(&shared, &layout, &moved, &view)
+            };
+            let h = if i < 3 { 1e-6 } else { 1e-4 };
+            close((at(h) - at(-h)) / (2.0 * h), analytic.pose_gradient[i], "pose");
+        }
+    }
+
+    #[test]
+    fn elimination_solves_the_whole_system() {
+        let world = World::new(3, 3);
+        let layout = Layout::rig(Lens::Radial2, false);
+        let shared = Shared { rig: world.rig.clone(), shape_mm: [0.0; 2] };
+        let blocks: Vec<Block> = world
+            .corners(4)
+            .pairs
+            .iter()
+            .zip(&world.poses)
+            .map(|(pair, pose)| {
+                block(&shared, &layout, pose, &View::new(&world.board, pair, 0), Loss::Squared).unwrap()
+            })
+            .collect();
+        let n = layout.count();
+        let size = n + 6 * blocks.len();
+        let (mut whole, mut right) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        for (i, b) in blocks.iter().enumerate() {
+            let at = n + 6 * i;
+            let mut add = |row: usize, col: usize, value: f64| whole[(row, col)] += value;
+            for r in 0..n {
+                (0..n).for_each(|c| add(r, c, b.shared[(r, c)]));
+                for c in 0..6 {
+                    add(r, at + c, b.mixed[(r, c)]);
+                    add(at + c, r, b.mixed[(r, c)]);
+                }
+                right[r] += b.shared_gradient[r];
+            }
+            for r in 0..6 {
+                (0..6).for_each(|c| add(at + r, at + c, b.pose[(r, c)]));
+                right[at + r] += b.pose_gradient[r];
+            }
+        }
+        let (matrix, gradient) = eliminate(&blocks, 0.0, n).unwrap();
+        let eliminated = solve_scaled(&matrix, &gradient).unwrap();
+        let direct = solve_scaled(&whole, &right).unwrap();
+        for i in 0..n {
+            // Both solve a system whose condition is about 1e8.
+            assert!((eliminated[i] - direct[i]).abs() <= 1e-6 * direct[i].abs().max(1e-9), "{i}");
+        }
+    }
+}

@@ -161,3 +161,77 @@ pub fn common(view: &super::observations::View) -> Vec<(&Observation, &Observati
     both.sort_by_key(|(l, _)| key(l));
     both
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stereo::observations::View;
+    use crate::stereo::synthetic::World;
+
+    fn seen(sigma_px: f64, seed: u64) -> (World, View) {
+        let mut world = World::new(1, 31);
+        world.sigma_px = sigma_px;
+        let view = View::new(&world.board, &world.corners(seed).pairs[0], 0);
+        (world, view)
+    }
+
+    #[test]
+    fn exact_corners_meet_in_their_point() {
+        let (world, view) = seen(0.0, 1);
+        for (left, right) in common(&view) {
+            let found = triangulate(&world.rig, left, right).unwrap();
+            let truth = world.poses[0] * left.board_mm;
+            assert!((found.point_mm - truth).norm() < 1e-7 && found.gap_mm.abs() < 1e-7, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn the_covariance_is_the_scatter() {
+        let mut sums = Vector3::zeros();
+        let mut count = 0.0;
+        for seed in 0..12 {
+            let (world, view) = seen(0.05, seed);
+            for (left, right) in common(&view) {
+                let found = triangulate(&world.rig, left, right).unwrap();
+                let off = found.point_mm - world.poses[0] * left.board_mm;
+                // The whitener is one pixel here, the noise a twentieth.
+                sums += off.component_mul(&off).component_div(&(found.covariance_mm2.diagonal() * 0.05 * 0.05));
+                count += 1.0;
+            }
+        }
+        for axis in 0..3 {
+            // About a thousand draws know a variance to 5 %.
+            assert!((0.85..1.15).contains(&(sums[axis] / count)), "{}", sums / count);
+        }
+    }
+
+    #[test]
+    fn derivatives_by_the_rig_equal_central_differences() {
+        let (world, view) = seen(0.05, 3);
+        let (left, right) = common(&view)[20];
+        let found = triangulate(&world.rig, left, right).unwrap();
+        let layout = crate::stereo::layout::Layout::rig(crate::stereo::Lens::Brown4, false);
+        let shared = crate::stereo::layout::Shared { rig: world.rig.clone(), shape_mm: [0.0; 2] };
+        for (i, name) in layout.names().iter().enumerate() {
+            let h = if name.contains(".k") || name.contains(".p") || name.contains("rad") { 1e-6 } else { 1e-3 };
+            let at = |h: f64| {
+                let mut step = vec![0.0; layout.count()];
+                step[i] = h;
+                triangulate(&layout.step(&shared, &step).rig, left, right).unwrap().point_mm
+            };
+            let numeric = (at(h) - at(-h)) / (2.0 * h);
+            let analytic = found.by_rig[rig_number(name).unwrap()];
+            // The analytic one leaves out the curvature times the residual, a ten-thousandth here.
+            assert!((numeric - analytic).norm() < 1e-3 * (1e-3 + numeric.norm()), "{name}: {numeric} {analytic}");
+        }
+    }
+
+    #[test]
+    fn parallel_rays_meet_nowhere() {
+        let (mut world, view) = seen(0.0, 1);
+        world.rig.right = world.rig.left;
+        world.rig.right_from_left = crate::geometry::transform(Vector3::zeros(), Vector3::new(-100.0, 0.0, 0.0));
+        let (left, _) = common(&view)[0];
+        assert!(triangulate(&world.rig, left, left).is_none());
+    }
+}

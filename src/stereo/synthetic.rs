@@ -1,0 +1,93 @@
+//! A rig, boards and corners whose truth is known, for the tests of this stage.
+
+use nalgebra::{Matrix2, Point2, Vector2, Vector3};
+
+use super::{Camera, Lens, Rig};
+use crate::geometry::{Transform, transform};
+use crate::imaging::{Board, Corner, Corners, PairCorners};
+use crate::simulate::draws::{Draws, Purpose};
+
+/// A known world.
+#[derive(Debug, Clone)]
+pub(crate) struct World {
+    pub rig: Rig,
+    pub board: Board,
+    /// Height of the board's paraboloids in its middle, mm.
+    pub bow_mm: [f64; 2],
+    pub poses: Vec<Transform>,
+    /// Standard deviation of a corner's coordinate, px.
+    pub sigma_px: f64,
+}
+
+impl World {
+    /// Two cameras 20 degrees towards each other, a board of 12x9 squares, as many pairs as asked for.
+    pub fn new(pairs: usize, seed: u64) -> World {
+        let mut left = Camera::pinhole(1280, 1024, 2000.0);
+        left.lens = Lens::Brown4;
+        left.distortion[..4].copy_from_slice(&[-0.1, 0.12, 4e-4, -3e-4]);
+        let mut right = left;
+        right.fx = 2015.0;
+        right.fy = 2013.0;
+        right.cx += 8.0;
+        right.distortion[..4].copy_from_slice(&[-0.08, 0.05, -2e-4, 5e-4]);
+        let right_from_left = transform(Vector3::new(0.01, 0.35, -0.005), Vector3::new(-190.0, 2.0, 30.0));
+        let rig = Rig { left, right, right_from_left, covariance: None };
+        let board = Board { squares: "12x9".parse().unwrap(), square_mm: 15.0 };
+        let mut draws = Draws::new(seed, Purpose::CheckPoses, 0);
+        let mut between = |low: f64, high: f64| draws.uniform(low, high);
+        let poses = (0..pairs)
+            .map(|_| {
+                let turn = Vector3::new(between(-0.6, 0.6), 0.17 + between(-0.6, 0.6), between(-0.4, 0.4));
+                transform(turn, Vector3::new(between(-55.0, 55.0), between(-45.0, 45.0), between(480.0, 640.0)))
+            })
+            .collect();
+        World { rig, board, bow_mm: [0.0; 2], poses, sigma_px: 0.05 }
+    }
+
+    /// The corners as the cameras see them, with noise; corners outside of a picture are missing.
+    pub fn corners(&self, seed: u64) -> Corners {
+        let mut draws = Draws::new(seed, Purpose::Points, 0);
+        let pairs = self
+            .poses
+            .iter()
+            .enumerate()
+            .map(|(i, pose)| {
+                let mut pair = PairCorners { pair: format!("{i:02}"), ..PairCorners::default() };
+                for row in 0..self.board.rows() {
+                    for col in 0..self.board.columns() {
+                        let (left, right) = self.rig.project(&(pose * self.corner_mm(col, row)));
+                        for (list, px, camera) in
+                            [(&mut pair.left, left, &self.rig.left), (&mut pair.right, right, &self.rig.right)]
+                        {
+                            let px: Point2<f64> = px + Vector2::new(draws.normal(), draws.normal()) * self.sigma_px;
+                            if px.x > 0.0
+                                && px.y > 0.0
+                                && px.x < f64::from(camera.width)
+                                && px.y < f64::from(camera.height)
+                            {
+                                let covariance_px2 = Some(Matrix2::identity() * self.sigma_px * self.sigma_px);
+                                list.push(Corner { col, row, px, covariance_px2, used: true });
+                            }
+                        }
+                    }
+                }
+                pair
+            })
+            .collect();
+        Corners {
+            board: self.board,
+            left_size: (self.rig.left.width, self.rig.left.height),
+            right_size: (self.rig.right.width, self.rig.right.height),
+            pairs,
+            skipped: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    fn corner_mm(&self, col: usize, row: usize) -> nalgebra::Point3<f64> {
+        let mut at = self.board.corner_mm(col, row);
+        let edge = self.board.corner_mm(self.board.columns() - 1, self.board.rows() - 1);
+        at.z = self.bow_mm[0] * (1.0 - (at.x / edge.x).powi(2)) + self.bow_mm[1] * (1.0 - (at.y / edge.y).powi(2));
+        at
+    }
+}

@@ -1,0 +1,174 @@
+//! Are the residuals noise, or does something show in them that the model lacks?
+//!
+//! In: a calibration. Out: the correlation of neighbouring corners' residuals, and the pattern that is common to all pairs in each cell of
+//! both pictures. Noise has neither. A pattern over the picture is a lens that the model cannot bend so; a correlation without one
+//! is a board that is not as assumed, or corners pulled by light and blur.
+
+use nalgebra::Vector2;
+use serde::Serialize;
+
+use super::calibrate::Calibration;
+use super::observations::{Observation, Side};
+use super::residuals::residual_px;
+
+/// Cells along x and y of a picture.
+pub const CELLS: usize = 8;
+
+/// Correlations below this change no result noticeably, however sure they are.
+const HARMLESS: f64 = 0.1;
+
+/// Standard errors beyond which a correlation is not chance.
+const SURE: f64 = 4.0;
+
+/// The mean residual in a cell of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Cell {
+    /// Middle of the cell, px.
+    pub x_px: f64,
+    /// Middle of the cell, px.
+    pub y_px: f64,
+    /// Corners in it.
+    pub corners: usize,
+    /// Mean residual (predicted minus seen), px; zero where there are none.
+    pub mean_px: [f64; 2],
+}
+
+/// The residuals of one picture, cell by cell.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Field {
+    /// Which picture.
+    pub side: &'static str,
+    /// Row by row.
+    pub cells: Vec<Cell>,
+    /// Root mean square of what is systematic in the cells, noise taken off, px.
+    pub systematic_px: f64,
+}
+
+/// The residuals' pattern.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Whiteness {
+    /// Correlation of the whitened residuals of neighbouring corners.
+    pub neighbour_correlation: f64,
+    /// Its standard error if there were none.
+    pub standard_error: f64,
+    /// Left and right picture.
+    pub fields: Vec<Field>,
+}
+
+impl Whiteness {
+    /// True where nothing but noise shows.
+    pub fn white(&self) -> bool {
+        self.neighbour_correlation.abs() <= HARMLESS.max(SURE * self.standard_error)
+    }
+
+    /// The finding for a person, where there is one.
+    pub fn describe(&self) -> Option<String> {
+        if self.white() {
+            return None;
+        }
+        let pattern = self.fields.iter().map(|f| f.systematic_px).fold(0.0, f64::max);
+        Some(format!(
+            "the residuals are not noise: those of neighbouring corners correlate by {:.2} (chance: {:.2}), and {pattern:.3} px of pattern over the \
+             pictures is common to all pairs. The lens model, the board's shape or its print lacks something; the standard deviations \
+             are too small then",
+            self.neighbour_correlation, self.standard_error
+        ))
+    }
+}
+
+/// Looks for patterns.
+pub fn check(calibration: &Calibration) -> Whiteness {
+    let shared = &calibration.values.shared;
+    let (mut product, mut square, mut links, mut count) = (0.0, 0.0, 0usize, 0usize);
+    let mut fields = Side::BOTH.map(|side| {
+        let camera = match side {
+            Side::Left => &shared.rig.left,
+            Side::Right => &shared.rig.right,
+        };
+        Gather::new(side, camera.width, camera.height)
+    });
+    let board = &calibration.board;
+    for (view, pose) in calibration.views.iter().zip(&calibration.values.poses) {
+        for (side, field) in Side::BOTH.into_iter().zip(&mut fields) {
+            let mut at: Vec<Option<Vector2<f64>>> = vec![None; board.corner_count()];
+            for o in view.active(side) {
+                let Some(residual) = residual_px(shared, pose, o) else { continue };
+                field.add(o, residual);
+                at[board.index(o.col, o.row)] = Some(o.whiten(residual));
+            }
+            for row in 0..board.rows() {
+                for col in 0..board.columns() {
+                    let Some(here) = at[board.index(col, row)] else { continue };
+                    square += here.norm_squared();
+                    count += 2;
+                    let right = (col + 1 < board.columns()).then(|| board.index(col + 1, row));
+                    let below = (row + 1 < board.rows()).then(|| board.index(col, row + 1));
+                    for there in [right, below].into_iter().flatten().filter_map(|i| at[i]) {
+                        product += here.dot(&there);
+                        links += 2;
+                    }
+                }
+            }
+        }
+    }
+    let variance = square / count.max(1) as f64;
+    Whiteness {
+        neighbour_correlation: if variance > 0.0 { product / links.max(1) as f64 / variance } else { 0.0 },
+        standard_error: 1.0 / (links.max(1) as f64).sqrt(),
+        fields: fields.into_iter().map(Gather::finish).collect(),
+    }
+}
+
+struct Gather {
+    side: Side,
+    size: [f64; 2],
+    sums: Vec<Vector2<f64>>,
+    variances: Vec<f64>,
+    counts: Vec<usize>,
+}
+
+impl Gather {
+    fn new(side: Side, width: u32, height: u32) -> Gather {
+        let cells = CELLS * CELLS;
+        Gather {
+            side,
+            size: [f64::from(width.max(1)), f64::from(height.max(1))],
+            sums: vec![Vector2::zeros(); cells],
+            variances: vec![0.0; cells],
+            counts: vec![0; cells],
+        }
+    }
+
+    fn add(&mut self, o: &Observation, residual: Vector2<f64>) {
+        let cell = |at: f64, size: f64| (((at + 0.5) / size * CELLS as f64).max(0.0) as usize).min(CELLS - 1);
+        let i = cell(o.px.y, self.size[1]) * CELLS + cell(o.px.x, self.size[0]);
+        self.sums[i] += residual;
+        self.variances[i] += residual.norm_squared();
+        self.counts[i] += 1;
+    }
+
+    fn finish(self) -> Field {
+        let (mut systematic, mut corners) = (0.0, 0usize);
+        let cells = (0..CELLS * CELLS)
+            .map(|i| {
+                let n = self.counts[i];
+                let mean = self.sums[i] / n.max(1) as f64;
+                if n > 1 {
+                    // Noise alone leaves its variance over n in the square of a mean.
+                    let noise = (self.variances[i] / n as f64 - mean.norm_squared()) / (n as f64 - 1.0);
+                    systematic += n as f64 * (mean.norm_squared() - noise);
+                    corners += n;
+                }
+                let middle = |k: usize, size: f64| (k as f64 + 0.5) * size / CELLS as f64 - 0.5;
+                Cell {
+                    x_px: middle(i % CELLS, self.size[0]),
+                    y_px: middle(i / CELLS, self.size[1]),
+                    corners: n,
+                    mean_px: [mean.x, mean.y],
+                }
+            })
+            .collect();
+        let systematic_px = (systematic / corners.max(1) as f64).max(0.0).sqrt();
+        Field { side: self.side.name(), cells, systematic_px }
+    }
+}
