@@ -303,7 +303,7 @@ fn lenses(calibration: &Calibration) -> Markup {
         .collect();
     html! {
         @if !rows.is_empty() {
-            p { "Lens models on pairs they had not seen. The simplest within one standard error of the best was taken." }
+            p { "Lens models on pairs they had not seen. The simplest within two standard errors of the best was taken." }
             (page::table(&["lens", "held-out residual px"], &rows))
         }
     }

@@ -22,7 +22,7 @@ pub const FEWEST_PAIRS: usize = 4;
 const OUTLIER: f64 = 5.3;
 
 /// A focal length that is known no better than this share is not known.
-const WORST_FOCAL_SIGMA: f64 = 0.05;
+const WORST_FOCAL_SIGMA: f64 = 0.02;
 
 /// What may be forced.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -11,15 +11,38 @@ use crate::geometry::{Transform, transform_from_matrix};
 /// Fewest corners that determine a homography with something to spare.
 pub const FEWEST_CORNERS: usize = 6;
 
-/// The homography from the board's plane (mm) to given picture coordinates, and the root mean square of what it leaves.
-/// `None` for too few corners or corners on a line.
+/// Corners that miss the homography by this many medians are left out of the next one.
+const FAR_MEDIANS: f64 = 6.0;
+
+/// The homography from the board's plane (mm) to given picture coordinates, and the median of what it leaves: a wrong corner among
+/// many good ones is left out. `None` for too few corners or corners on a line.
 pub fn homography(points: &[(Point3<f64>, Point2<f64>)]) -> Option<(Matrix3<f64>, f64)> {
+    let mut kept = points.to_vec();
+    let mut found = direct(&kept)?;
+    // A wrong corner pulls the first fit toward itself; the second is nearly free of it, the third free.
+    for _ in 0..2 {
+        let miss = |(board, picture): &(Point3<f64>, Point2<f64>)| (apply(&found, board) - picture).norm();
+        let limit = FAR_MEDIANS * median(points.iter().map(miss))?;
+        kept = points.iter().filter(|pair| miss(pair) <= limit).copied().collect();
+        found = direct(&kept)?;
+    }
+    let left = median(points.iter().map(|(board, picture)| (apply(&found, board) - picture).norm()))?;
+    left.is_finite().then_some((found, left))
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// The direct linear transform of all points.
+fn direct(points: &[(Point3<f64>, Point2<f64>)]) -> Option<Matrix3<f64>> {
     if points.len() < FEWEST_CORNERS {
         return None;
     }
-    let (to_board, from_board) = normaliser(points.iter().map(|(b, _)| Point2::new(b.x, b.y)))?;
+    let (to_board, _) = normaliser(points.iter().map(|(b, _)| Point2::new(b.x, b.y)))?;
     let (to_picture, from_picture) = normaliser(points.iter().map(|(_, p)| *p))?;
-    let _ = from_board;
     let mut design = DMatrix::zeros(2 * points.len(), 9);
     for (i, (board, picture)) in points.iter().enumerate() {
         let b = to_board * Vector3::new(board.x, board.y, 1.0);
@@ -39,12 +62,8 @@ pub fn homography(points: &[(Point3<f64>, Point2<f64>)]) -> Option<(Matrix3<f64>
         return None;
     }
     let h = eigen.eigenvectors.column(order[0]);
-    let picture_from_board =
-        from_picture * Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]) * to_board;
-    let squares: f64 =
-        points.iter().map(|(board, picture)| (apply(&picture_from_board, board) - picture).norm_squared()).sum();
-    let rms = (squares / points.len() as f64).sqrt();
-    rms.is_finite().then_some((picture_from_board, rms))
+    let h = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
+    Some(from_picture * h * to_board)
 }
 
 fn apply(h: &Matrix3<f64>, board: &Point3<f64>) -> Point2<f64> {

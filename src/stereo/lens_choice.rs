@@ -2,7 +2,7 @@
 //!
 //! In: views that agree. Out: the layout to solve, and how each lens of the ladder predicts held-out pairs. Method: k folds over the
 //! pairs; the rig of a fold measures the pose of each pair it has not seen, and what is left counts. The simplest model whose
-//! loss is within one standard error of the best wins (Breiman et al. 1984), since a richer one extrapolates worse.
+//! loss is within two standard errors of the best wins (after Breiman et al. 1984), since a richer one extrapolates worse.
 //! Goes wrong: pairs too few or too alike to tell models apart; then the simplest that fits wins, and
 //! [`super::disagreement`] says what is at stake.
 
@@ -18,6 +18,10 @@ use super::pose;
 use super::residuals::{self, residual_px};
 use super::robust::Loss;
 use super::{Error, Lens};
+
+/// Standard errors by which a richer model must predict better: one is what half of the useless terms reach by chance when the
+/// best of several is taken.
+const STANDARD_ERRORS: f64 = 2.0;
 
 /// How a model predicts pairs it has not seen.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -58,7 +62,12 @@ pub fn choose(start: &Problem, options: &Options) -> Result<(Layout, Vec<LensSco
     let rich = |shape| start.solve(&Layout::rig(Lens::Brown5, shape));
     let solved = rich(forced_shape.unwrap_or(true))
         .or_else(|_| rich(forced_shape.unwrap_or(false)))
-        .or_else(|_| start.solve(&Layout::rig(Lens::Brown4, false)))?;
+        .or_else(|_| start.solve(&Layout::rig(Lens::Brown4, false)))
+        .map_err(|e| match e {
+            // Not even the simplest search ends: the pairs leave a valley, not a minimum.
+            Error::NotConverged { .. } => Error::Undetermined { focal_sigma: None },
+            other => other,
+        })?;
     // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
     let bent = forced_shape.unwrap_or(true);
     let mut scores: Vec<LensScore> =
@@ -81,7 +90,7 @@ pub fn choose(start: &Problem, options: &Options) -> Result<(Layout, Vec<LensSco
     Ok((layout, scores))
 }
 
-/// The simplest model within one standard error of the best.
+/// The simplest model within two standard errors of the best.
 fn simplest(scores: &[LensScore]) -> Option<&Trial> {
     let trials = || scores.iter().filter_map(|s| s.trial.as_ref());
     let best = trials().min_by(|a, b| a.loss().total_cmp(&b.loss()))?;
@@ -111,13 +120,13 @@ impl Trial {
         self.by_pair.iter().sum::<f64>() / self.by_pair.len() as f64
     }
 
-    /// How much worse than `best` beyond one standard error of the pairs' differences.
+    /// How much worse than `best` beyond what chance makes of the pairs' differences.
     fn excess_over(&self, best: &Trial) -> f64 {
         let differences: Vec<f64> = self.by_pair.iter().zip(&best.by_pair).map(|(a, b)| a - b).collect();
         let n = differences.len() as f64;
         let mean = differences.iter().sum::<f64>() / n;
         let variance = differences.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>() / (n - 1.0).max(1.0);
-        mean - (variance / n).sqrt()
+        mean - STANDARD_ERRORS * (variance / n).sqrt()
     }
 }
 

@@ -44,6 +44,29 @@ impl World {
         World { rig, board, bow_mm: [0.0; 2], poses, sigma_px: 0.05 }
     }
 
+    /// The paper's rig and ceramic board: 5120 px, 25 mm lens, 20x20 squares of 10 mm, corners measured to 0.005 px.
+    pub fn paper(pairs: usize, seed: u64) -> World {
+        let mut world = World::new(pairs, seed);
+        let mut camera = Camera::pinhole(5120, 5120, 10_000.0);
+        camera.lens = Lens::Brown4;
+        camera.distortion[..4].copy_from_slice(&[-0.08, 0.12, 2e-4, -3e-4]);
+        world.rig = Rig {
+            left: camera,
+            right: Camera { fx: 9_970.0, fy: 9_972.0, cx: 2_540.0, ..camera },
+            right_from_left: transform(Vector3::new(0.002, 0.41, 0.005), Vector3::new(-213.0, -2.5, 45.0)),
+            covariance: None,
+        };
+        world.board = Board { squares: "20x20".parse().unwrap(), square_mm: 10.0 };
+        world.sigma_px = 0.005;
+        let mut draws = Draws::new(seed, Purpose::CheckPoses, 1);
+        let mut between = |low: f64, high: f64| draws.uniform(low, high);
+        for pose in &mut world.poses {
+            let turn = Vector3::new(between(-0.5, 0.5), 0.2 + between(-0.5, 0.5), between(-0.3, 0.3));
+            *pose = transform(turn, Vector3::new(between(-20.0, 20.0), between(-20.0, 20.0), between(500.0, 550.0)));
+        }
+        world
+    }
+
     /// The corners as the cameras see them, with noise; corners outside of a picture are missing.
     pub fn corners(&self, seed: u64) -> Corners {
         let mut draws = Draws::new(seed, Purpose::Points, 0);
