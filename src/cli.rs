@@ -87,6 +87,9 @@ pub struct CameraCheck {
     /// Width and height of the pictures that --corners come from, px [default: from the corners' extent]
     #[arg(long, value_name = "WxH", requires = "corners", value_parser = picture_size)]
     pub picture_size: Option<(u32, u32)>,
+    /// Draw the corners found over each pair, into overlays/ in the results folder
+    #[arg(long)]
+    pub draw: bool,
     /// Results.
     #[command(flatten)]
     pub output: Output,
@@ -106,6 +109,9 @@ pub struct Measure {
     /// Side of a square, mm [default: 10]
     #[arg(long, value_name = "MM")]
     pub square_mm: Option<f64>,
+    /// Draw the corners found over each pair, into overlays/ in the results folder
+    #[arg(long)]
+    pub draw: bool,
     /// Results.
     #[command(flatten)]
     pub output: Output,

@@ -5,6 +5,7 @@ use crate::cli::{BoardShape, CameraCheck};
 use crate::config::{self, Config};
 use crate::error::{Result, Status};
 use crate::files::{OutDir, to_json};
+use crate::imaging::cache::Cache;
 use crate::imaging::{Board, Corners, Wanted, corners_file, find_corners};
 use crate::progress;
 use crate::report;
@@ -22,7 +23,7 @@ pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
     config::reject(problems)?;
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
 
-    let corners = corners(args, board)?;
+    let corners = corners(args, board, &out)?;
     corners.notes.iter().for_each(progress::note);
     let calibration = calibrate(&corners, &options(args))?;
     for skipped in &calibration.skipped {
@@ -62,10 +63,13 @@ fn options(args: &CameraCheck) -> Options {
     Options { lens: args.lens, shape: args.board_shape.map(|shape| shape == BoardShape::Bowed) }
 }
 
-fn corners(args: &CameraCheck, board: Board) -> Result<Corners> {
+fn corners(args: &CameraCheck, board: Board, out: &OutDir) -> Result<Corners> {
     match (&args.corners, &args.images) {
         (Some(file), _) => corners_file::read(file, board, args.picture_size),
-        (None, Some(images)) => find_corners(images, &Wanted { board, needed: FEWEST_PAIRS }),
+        (None, Some(images)) => {
+            let (cache, overlays) = (Some(Cache { out }), args.draw.then_some(out));
+            find_corners(images, &Wanted { board, needed: FEWEST_PAIRS, cache, overlays })
+        }
         // The command line asks for one of the two.
         (None, None) => {
             Err(config::Error::Invalid { problems: vec!["neither pictures nor --corners given".into()] }.into())

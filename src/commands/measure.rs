@@ -7,6 +7,7 @@ use crate::cli::Measure;
 use crate::config::Config;
 use crate::error::{Result, Status};
 use crate::files::{OutDir, to_json};
+use crate::imaging::cache::Cache;
 use crate::imaging::{Board, Corners, Wanted, find_corners};
 use crate::measurements::{self, RobotPose};
 use crate::progress;
@@ -23,7 +24,8 @@ pub fn run(args: &Measure, config: &Config) -> Result<Outcome> {
     let rig = calibration_file::read(&args.calibration.clone().unwrap_or_else(|| out.join("calibration.json")))?;
     let poses = measurements::read_poses(&args.poses.join("poses.csv"))?;
 
-    let corners = find_corners(&args.poses, &Wanted { board, needed: 1 })?;
+    let (cache, overlays) = (Some(Cache { out: &out }), args.draw.then_some(&out));
+    let corners = find_corners(&args.poses, &Wanted { board, needed: 1, cache, overlays })?;
     corners.notes.iter().for_each(progress::note);
     rig.check_size(&corners)?;
     let measured = measure(&rig, &board, &corners, poses);

@@ -8,25 +8,33 @@ use std::collections::BTreeMap;
 use camino::Utf8Path;
 use rayon::prelude::*;
 
+use super::cache::{Cache, Look};
 use super::folder::{self, PairFiles};
 use super::grid::{Grid, Places};
-use super::{Board, Corner, Corners, Error, PairCorners, Side, Skipped, detect, order, picture, refine};
+use super::{
+    Board, Corner, Corners, Error, PairCorners, Side, Skipped, beyond, detect, order, overlay, picture, refine,
+};
 use crate::error::Result;
+use crate::files::OutDir;
 use crate::progress;
 
 /// What is looked for.
 #[derive(Debug, Clone, Copy)]
-pub struct Wanted {
+pub struct Wanted<'a> {
     /// The board.
     pub board: Board,
     /// The least number of pairs that is of use.
     pub needed: usize,
+    /// Where corners of pictures that were measured before are kept.
+    pub cache: Option<Cache<'a>>,
+    /// Where an overlay picture of each pair goes.
+    pub overlays: Option<&'a OutDir>,
 }
 
 /// Finds the board's corners in all pairs of a folder, numbered alike in left and right.
 ///
 /// An error where the folder holds no pairs, or fewer than needed show the board.
-pub fn find_corners(folder: &Utf8Path, wanted: &Wanted) -> Result<Corners> {
+pub fn find_corners(folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Corners> {
     let pairing = folder::pair_files(folder)?;
     let mut notes: Vec<String> = pairing.left_out().into_iter().collect();
     let sizes = majority_sizes(&pairing.pairs);
@@ -36,8 +44,8 @@ pub fn find_corners(folder: &Utf8Path, wanted: &Wanted) -> Result<Corners> {
         .par_iter()
         .map(|files| {
             let (left, right) = rayon::join(
-                || look(&files.left, wanted.board, sizes[0], &bar),
-                || look(&files.right, wanted.board, sizes[1], &bar),
+                || look(&files.left, wanted, sizes[0], &bar),
+                || look(&files.right, wanted, sizes[1], &bar),
             );
             [left, right]
         })
@@ -58,6 +66,9 @@ pub fn find_corners(folder: &Utf8Path, wanted: &Wanted) -> Result<Corners> {
         .into());
     }
     let pairs = number_alike(found, wanted.board);
+    if let Some(out) = wanted.overlays {
+        draw(&pairs, &pairing.pairs, out)?;
+    }
     if !skipped.is_empty() {
         notes.push(format!("the board was found in {} of {total} pairs", pairs.len()));
     }
@@ -65,22 +76,48 @@ pub fn find_corners(folder: &Utf8Path, wanted: &Wanted) -> Result<Corners> {
 }
 
 /// One picture from file to corners; the reason where that fails.
-fn look(path: &Utf8Path, board: Board, size: (u32, u32), bar: &indicatif::ProgressBar) -> Result<Grid<Corner>, String> {
-    let corners = look_quietly(path, board, size);
+fn look(path: &Utf8Path, wanted: &Wanted<'_>, size: (u32, u32), bar: &indicatif::ProgressBar) -> Look {
     bar.inc(1);
-    corners
-}
-
-fn look_quietly(path: &Utf8Path, board: Board, size: (u32, u32)) -> Result<Grid<Corner>, String> {
-    let bytes = std::fs::read(path).map_err(|e| format!("cannot be read: {e}"))?;
-    let picture = picture::decode(&bytes, path)?;
-    drop(bytes);
-    let found = (picture.width as u32, picture.height as u32);
-    if found != size {
+    // Depends on the other pictures, so it is not a matter for the cache.
+    if let Some(found) = picture::size(path).filter(|found| *found != size) {
         return Err(format!("is {}x{} px, most others are {}x{}", found.0, found.1, size.0, size.1));
     }
+    std::fs::read(path).map_err(|e| format!("cannot be read: {e}")).and_then(|bytes| {
+        let Some(cache) = wanted.cache else { return look_at(bytes, path, wanted.board) };
+        let entry = cache.entry(&bytes, wanted.board);
+        cache.read(&entry, wanted.board).unwrap_or_else(|| {
+            let look = look_at(bytes, path, wanted.board);
+            cache.write(&entry, &look);
+            look
+        })
+    })
+}
+
+fn look_at(bytes: Vec<u8>, path: &Utf8Path, board: Board) -> Look {
+    let picture = picture::decode(&bytes, path)?;
+    drop(bytes);
     let detected = detect::detect(&picture, board)?;
+    let (columns, rows) = beyond::lines_beyond(&detected);
+    if columns + rows > 0 {
+        let squares = board.squares;
+        return Err(format!(
+            "shows a board larger than {squares} squares: its corners go on beyond those (at least {}x{} squares)",
+            squares.columns + columns,
+            squares.rows + rows
+        ));
+    }
     Ok(refine::refine(&picture, &detected))
+}
+
+fn draw(pairs: &[PairCorners], files: &[PairFiles], out: &OutDir) -> Result<()> {
+    let bar = progress::bar("drawing overlays", pairs.len() as u64);
+    pairs.par_iter().try_for_each(|pair| {
+        bar.inc(1);
+        let drawn = files.iter().find(|f| f.pair == pair.pair).and_then(|f| overlay::png(f, pair));
+        drawn.map_or(Ok(()), |bytes| out.write(&format!("overlays/{}.png", pair.pair), &bytes))
+    })?;
+    bar.finish_and_clear();
+    Ok(())
 }
 
 /// The size that most left and most right pictures have; the larger one where two are equally frequent.

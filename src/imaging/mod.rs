@@ -1,7 +1,9 @@
 //! From a folder of pictures to the corners of the board in each, in an order both cameras agree on.
 
 pub mod bend;
+pub mod beyond;
 pub mod board;
+pub mod cache;
 pub mod corner_fit;
 pub mod corners;
 pub mod corners_file;
@@ -10,6 +12,7 @@ pub mod find;
 pub mod folder;
 pub mod grid;
 pub mod order;
+pub mod overlay;
 pub mod picture;
 pub mod refine;
 pub mod special;

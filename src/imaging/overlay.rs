@@ -1,0 +1,81 @@
+//! What was found, drawn over the pictures: left and right of a pair side by side, reduced to about a megapixel each.
+//!
+//! A ring at each corner, coloured by how well it is known; a line from corner (0, 0) along the columns and a shorter one
+//! along the rows shows the order both pictures were read in.
+
+use camino::Utf8Path;
+use image::{Rgb, RgbImage};
+use nalgebra::Point2;
+
+use super::detect::COARSE_PX;
+use super::folder::PairFiles;
+use super::{Corner, PairCorners, picture};
+
+/// Standard deviations up to which a corner gets a colour, px, from the best.
+const COLOURS: [(f64, [u8; 3]); 4] =
+    [(0.005, [0, 200, 0]), (0.02, [150, 220, 0]), (0.05, [255, 160, 0]), (f64::INFINITY, [255, 0, 0])];
+/// Found, but not used.
+const UNUSED: [u8; 3] = [60, 90, 255];
+/// The lines from corner (0, 0).
+const ORDER: [u8; 3] = [255, 0, 255];
+
+/// The pair's overlay as PNG; `None` where a picture can't be read any more.
+pub fn png(files: &PairFiles, corners: &PairCorners) -> Option<Vec<u8>> {
+    let left = drawn(&files.left, &corners.left)?;
+    let right = drawn(&files.right, &corners.right)?;
+    let mut both = RgbImage::new(left.width() + right.width(), left.height().max(right.height()));
+    image::imageops::replace(&mut both, &left, 0, 0);
+    image::imageops::replace(&mut both, &right, i64::from(left.width()), 0);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    both.write_to(&mut bytes, image::ImageFormat::Png).ok()?;
+    Some(bytes.into_inner())
+}
+
+fn drawn(path: &Utf8Path, corners: &[Corner]) -> Option<RgbImage> {
+    let picture = picture::decode(&std::fs::read(path).ok()?, path).ok()?;
+    let factor = ((picture.width * picture.height) as f64 / COARSE_PX as f64).sqrt().floor().max(1.0) as usize;
+    let small = picture.reduced(factor);
+    let mut image = RgbImage::from_fn(small.width as u32, small.height as u32, |x, y| {
+        Rgb([small.pixels[y as usize * small.width + x as usize]; 3])
+    });
+    let k = factor as f64;
+    let down = |p: &Point2<f64>| Point2::new((p.x + 0.5) / k - 0.5, (p.y + 0.5) / k - 0.5);
+    let first = corners.iter().find(|c| c.col == 0 && c.row == 0);
+    for (col, row) in [(2, 0), (0, 1)] {
+        if let (Some(a), Some(b)) = (first, corners.iter().find(|c| c.col == col && c.row == row)) {
+            line(&mut image, down(&a.px), down(&b.px));
+        }
+    }
+    for corner in corners {
+        ring(&mut image, down(&corner.px), colour(corner));
+    }
+    Some(image)
+}
+
+fn colour(corner: &Corner) -> [u8; 3] {
+    let Some(s) = corner.covariance_px2.filter(|_| corner.used) else { return UNUSED };
+    let sigma = (s.trace() / 2.0).sqrt();
+    COLOURS.iter().find(|(most, _)| sigma <= *most).map_or(UNUSED, |(_, colour)| *colour)
+}
+
+fn set(image: &mut RgbImage, x: f64, y: f64, colour: [u8; 3]) {
+    let (x, y) = (x.round(), y.round());
+    if x >= 0.0 && y >= 0.0 && x < f64::from(image.width()) && y < f64::from(image.height()) {
+        image.put_pixel(x as u32, y as u32, Rgb(colour));
+    }
+}
+
+fn ring(image: &mut RgbImage, at: Point2<f64>, colour: [u8; 3]) {
+    for step in 0..32 {
+        let (sin, cos) = (f64::from(step) * std::f64::consts::TAU / 32.0).sin_cos();
+        set(image, at.x + 4.0 * cos, at.y + 4.0 * sin, colour);
+    }
+}
+
+fn line(image: &mut RgbImage, from: Point2<f64>, to: Point2<f64>) {
+    let steps = (to - from).norm().ceil().clamp(1.0, 10_000.0);
+    for step in 0..=steps as usize {
+        let p = from + (to - from) * (step as f64 / steps);
+        set(image, p.x, p.y, ORDER);
+    }
+}
