@@ -30,15 +30,16 @@ pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
         progress::warn(format!("pair {} is not used: {}", skipped.pair, skipped.reason));
     }
     let accuracy = accuracy::hold_out(&calibration)?;
-    let second = second_board(args, board, &calibration)?;
+    let second = second_board(args, board, &calibration, &out)?;
     let judged = Judged::new(&calibration, accuracy, second, tolerance_mm);
     judged.warnings.iter().for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
+    let page = report::camera_check::page(&calibration, &judged)?;
     out.write_json("calibration.json", &CalibrationFile::from(calibration.rig()))?;
     out.write("corners.csv", corners_file::to_csv(&calibration.mark(&corners)).as_bytes())?;
     out.write_json("camera-check.json", &file)?;
-    out.write("camera-check.html", report::camera_check::page(&calibration, &judged)?.as_bytes())?;
+    out.write("camera-check.html", page.as_bytes())?;
 
     let stdout =
         if args.output.json { to_json(&file) } else { report::camera_check::summary(&calibration, &judged, &out) };
@@ -78,7 +79,12 @@ fn corners(args: &CameraCheck, board: Board, out: &OutDir) -> Result<Corners> {
 }
 
 /// A second board measured by the rig, where its pictures were named.
-fn second_board(args: &CameraCheck, board: Board, calibration: &Calibration) -> Result<Option<SecondBoard>> {
+fn second_board(
+    args: &CameraCheck,
+    board: Board,
+    calibration: &Calibration,
+    out: &OutDir,
+) -> Result<Option<SecondBoard>> {
     let Some(images) = &args.check_images else { return Ok(None) };
     let board = Board {
         squares: args.check_squares.unwrap_or(board.squares),
@@ -87,7 +93,7 @@ fn second_board(args: &CameraCheck, board: Board, calibration: &Calibration) -> 
     let mut problems = Vec::new();
     config::positive(&mut problems, "check_square_mm", board.square_mm);
     config::reject(problems)?;
-    let corners = find_corners(images, &Wanted { board, needed: 1 })?;
+    let corners = find_corners(images, &Wanted { board, needed: 1, cache: Some(Cache { out }), overlays: None })?;
     calibration.rig().check_size(&corners)?;
     Ok(accuracy::second_board(calibration, &corners))
 }

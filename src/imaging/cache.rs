@@ -4,9 +4,8 @@
 //! entry is a hash of all that the result depends on, so a changed picture, board or program makes a new
 //! entry. An entry that can't be read is as good as none, and one that can't be written costs only time.
 
-use std::hash::{DefaultHasher, Hasher};
-
 use nalgebra::{Matrix2, Point2};
+use xxhash_rust::xxh3::Xxh3Default;
 
 use super::grid::Grid;
 use super::{Board, Corner};
@@ -28,20 +27,11 @@ pub struct Cache<'a> {
 impl Cache<'_> {
     /// The entry of a picture file.
     pub fn entry(&self, bytes: &[u8], board: Board) -> String {
-        let mut hashes = [0u64; 2];
-        for (k, hash) in hashes.iter_mut().enumerate() {
-            let mut hasher = DefaultHasher::new();
-            hasher.write_usize(k);
-            hasher.write(ALGORITHM.as_bytes());
-            hasher.write(board.squares.to_string().as_bytes());
-            // The second half is of every other word only: two pictures that share the first are not made by chance.
-            match k {
-                0 => hasher.write(bytes),
-                _ => bytes.chunks(8).step_by(2).for_each(|word| hasher.write(word)),
-            }
-            *hash = hasher.finish();
-        }
-        format!("cache/{:016x}{:016x}.txt", hashes[0], hashes[1])
+        let mut hash = Xxh3Default::new();
+        hash.update(ALGORITHM.as_bytes());
+        hash.update(board.squares.to_string().as_bytes());
+        hash.update(bytes);
+        format!("cache/{:032x}.txt", hash.digest128())
     }
 
     /// What a former run found.
