@@ -3,7 +3,7 @@
 use camino::Utf8PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::imaging::board::Squares;
+use crate::imaging::Squares;
 use crate::simulate::settings::Orientation;
 use crate::stereo::Lens;
 

@@ -111,8 +111,8 @@ pub fn read_camera(text: &str, matrix: &str, distortion: &str) -> opencv::Result
 }
 
 /// OpenCV's `calibrateCamera` and `stereoCalibrate` on complete boards, four distortion terms: RMS, px, and baseline, mm.
-#[cfg(test)]
-pub fn stereo_calibrate(corners: &crate::imaging::Corners) -> opencv::Result<(f64, f64)> {
+/// The yardstick of the calibration benchmark, not used to calibrate.
+pub fn stereo_calibrate(corners: &crate::imaging::Corners) -> Result<(f64, f64), Failure> {
     use opencv::core::{Mat, Point2f, Point3f, Size, TermCriteria, Vector};
     let (mut objects, mut images) =
         (Vector::<Vector<Point3f>>::new(), [(); 2].map(|()| Vector::<Vector<Point2f>>::new()));

@@ -13,7 +13,7 @@ pub fn run(args: &Export, config: &Config) -> Result<Outcome> {
     let out = OutDir::open(args.out.as_deref().unwrap_or(&config.out))?;
     let rig = calibration_file::read(&args.calibration.clone().unwrap_or_else(|| out.join("calibration.json")))?;
     let files = match args.format {
-        CalibrationFormat::Opencv => export::opencv::files(&rig),
+        CalibrationFormat::Opencv => export::file_storage::files(&rig),
         CalibrationFormat::Ros => export::ros::files(&rig)?,
         CalibrationFormat::Kalibr => export::kalibr::files(&rig)?,
         CalibrationFormat::Mrcal => export::mrcal::files(&rig)?,

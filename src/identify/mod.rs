@@ -18,8 +18,6 @@ pub mod blocks;
 pub mod choose;
 pub mod dataset;
 pub mod estimate;
-#[cfg(test)]
-mod experiment;
 pub mod fast;
 pub mod kernel;
 pub mod kinematics;
@@ -34,6 +32,8 @@ pub mod swarm;
 #[cfg(test)]
 pub mod synthetic;
 pub mod terms;
+#[cfg(test)]
+mod tests;
 pub mod trust_region;
 pub mod verify;
 

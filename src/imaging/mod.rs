@@ -22,7 +22,7 @@ use camino::Utf8PathBuf;
 
 use crate::error::Explain;
 
-pub use board::Board;
+pub use board::{Board, Squares};
 pub use corners::{Corner, Corners, PairCorners, Side, Skipped};
 pub use find::{Wanted, find_corners};
 
@@ -96,7 +96,7 @@ pub enum Error {
         /// The others, and why.
         skipped: Vec<Skipped>,
         /// Another board size that the pictures show.
-        other: Option<board::Squares>,
+        other: Option<Squares>,
     },
 }
 

@@ -7,7 +7,7 @@ use super::psf::Optics;
 use super::scene::Print;
 use super::sensor::{Lighting, Sensor};
 use crate::imaging::Board;
-use crate::imaging::board::Squares;
+use crate::imaging::Squares;
 
 /// How the flange is turned along the poses of a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

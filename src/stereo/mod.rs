@@ -22,8 +22,6 @@ pub mod noise;
 pub mod observations;
 pub mod pose;
 pub mod projection;
-#[cfg(test)]
-mod recovery;
 pub mod residuals;
 pub mod rig;
 pub mod robust;
@@ -33,6 +31,8 @@ pub mod start;
 #[cfg(test)]
 pub(crate) mod synthetic;
 pub mod target;
+#[cfg(test)]
+mod tests;
 pub mod triangulate;
 pub mod variety;
 pub mod volume;

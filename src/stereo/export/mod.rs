@@ -3,9 +3,9 @@
 //! Angles and pixels mean the same in all of them (pixel (0, 0) is the centre of the top-left pixel); lengths are mm in OpenCV's file and
 //! metres in the others, as is usual there. A lens that a format cannot say is refused, never approximated.
 
+pub mod file_storage;
 pub mod kalibr;
 pub mod mrcal;
-pub mod opencv;
 pub mod ros;
 mod scan;
 
@@ -47,7 +47,7 @@ pub fn read(path: &Utf8Path, text: &str) -> Option<Result<Rig, String>> {
     if text.contains("T_cn_cnm1:") {
         return Some(kalibr::read(text));
     }
-    text.contains("!!opencv-matrix").then(|| opencv::read(text))
+    text.contains("!!opencv-matrix").then(|| file_storage::read(text))
 }
 
 /// Numbers as text that reads back to the same bits.
@@ -116,7 +116,7 @@ mod tests {
     fn every_format_reads_back() {
         for lens in Lens::LADDER {
             let rig = rig(lens);
-            let mut written = vec![opencv::files(&rig)];
+            let mut written = vec![file_storage::files(&rig)];
             written.extend(ros::files(&rig));
             written.extend(kalibr::files(&rig));
             written.extend(mrcal::files(&rig));
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn opencv_itself_reads_its_file() {
         let rig = rig(Lens::Rational8);
-        let text = &opencv::files(&rig)[0].text;
+        let text = &file_storage::files(&rig)[0].text;
         let (matrix, distortion) = crate::opencv::read_camera(text, "M1", "D1").unwrap();
         assert_eq!(matrix, rig.left.matrix().transpose().as_slice());
         assert_eq!(distortion, rig.left.distortion[..8]);

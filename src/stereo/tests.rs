@@ -96,24 +96,29 @@ fn median(values: &[f64]) -> f64 {
     sorted[sorted.len() / 2]
 }
 
-#[test]
-fn predicted_sigmas_are_the_true_ones() {
-    let (ratios, inside, _) = monte_carlo(40, &BROWN4);
-    // 40 runs know a standard deviation to 1 / sqrt(80) = 11 %; numbers are correlated, so the median is hardly better.
-    assert!((0.8..1.25).contains(&median(&ratios)), "{ratios:?}");
-    assert!((0.91..0.985).contains(&inside), "{inside}");
+/// Calibrations of a Monte Carlo; more where the environment says so, with the limits that so many allow.
+fn monte_carlo_runs() -> u64 {
+    std::env::var("STEREOCAL_MONTE_CARLO").ok().and_then(|n| n.parse().ok()).unwrap_or(40)
 }
 
 #[test]
-#[ignore = "200 calibrations: the acceptance of the covariance"]
-fn predicted_sigmas_of_200_calibrations() {
+fn predicted_sigmas_are_the_true_ones() {
+    let runs = monte_carlo_runs();
     for shape in [false, true] {
-        let (ratios, inside, names) = monte_carlo(200, &Options { lens: Some(Lens::Brown4), shape: Some(shape) });
-        println!("shape free: {shape}; median {:.3}, intervals hold {:.1} %", median(&ratios), 100.0 * inside);
-        for (name, ratio) in names.iter().zip(&ratios) {
-            println!("  {name} {ratio:.3}");
-        }
-        assert!((0.93..1.07).contains(&median(&ratios)) && (0.93..0.97).contains(&inside));
+        let (ratios, inside, names) = monte_carlo(runs, &Options { lens: Some(Lens::Brown4), shape: Some(shape) });
+        // So many runs know a standard deviation to 1 / sqrt(2 runs); the numbers are correlated, so their median is hardly better.
+        let known_to = 1.0 / (2.0 * runs as f64).sqrt();
+        let table: Vec<String> = names.iter().zip(&ratios).map(|(name, ratio)| format!("{name} {ratio:.3}")).collect();
+        let said = format!(
+            "{runs} runs, shape free: {shape}; predicted / true sigma: median {:.3}, 95 % intervals hold {:.1} %\n{}",
+            median(&ratios),
+            100.0 * inside,
+            table.join("\n")
+        );
+        println!("{said}");
+        assert!((median(&ratios) - 1.0).abs() < 2.2 * known_to, "{said}");
+        assert!(ratios.iter().all(|r| (r - 1.0).abs() < 4.5 * known_to), "{said}");
+        assert!((0.91..0.985).contains(&inside), "{said}");
     }
 }
 
@@ -249,31 +254,6 @@ fn the_targets_scatter_is_the_predicted_one() {
         assert!((0.5..1.7).contains(&(sum / 60.0)), "{sums}");
     }
     assert!(rotation_vector(&measured[0].as_ref().unwrap().cam_from_board).norm() < std::f64::consts::PI);
-}
-
-#[test]
-#[ignore = "a timing: run it with --nocapture"]
-fn forty_pairs_of_361_corners() {
-    let mut world = World::new(40, 29);
-    world.board = crate::imaging::Board { squares: "20x20".parse().unwrap(), square_mm: 8.0 };
-    let corners = world.corners(30);
-    let found = calibrate(&corners, &BROWN4).unwrap();
-    let problem = found.problem();
-    let begin = std::time::Instant::now();
-    let solved = problem.solve(&found.layout).unwrap();
-    let solve = begin.elapsed();
-    let begin = std::time::Instant::now();
-    let (rms, baseline) = crate::opencv::stereo_calibrate(&corners).unwrap();
-    println!(
-        "{} corners: bundle {:.3} s, RMS {:.4} px, baseline {:.4} mm; stereoCalibrate {:.3} s, RMS {rms:.4} px, baseline {baseline:.4} mm; truth {:.4}",
-        found.views.iter().map(|v| v.observations.len()).sum::<usize>(),
-        solve.as_secs_f64(),
-        solved.rms_px,
-        found.rig().baseline_mm(),
-        begin.elapsed().as_secs_f64(),
-        world.rig.baseline_mm()
-    );
-    assert!(solve.as_secs_f64() < 1.0);
 }
 
 /// Largest deviation of points in the working volume, mm, measured from exact pixels.
