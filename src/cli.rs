@@ -58,10 +58,10 @@ pub struct CameraCheck {
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,
     /// Side of a square, mm [default: 10]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub square_mm: Option<f64>,
     /// Largest length error that passes, mm [default: 0.05]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub tolerance_mm: Option<f64>,
     /// Lens model: radial2, brown4, brown5, rational8, thin-prism12 or tilted14 [default: chosen by held-out pairs]
     #[arg(long, value_name = "NAME", value_parser = lens)]
@@ -82,7 +82,7 @@ pub struct CameraCheck {
     #[arg(long, value_name = "CxR", requires = "check_images")]
     pub check_squares: Option<Squares>,
     /// Side of the second board's squares, mm [default: as the first]
-    #[arg(long, value_name = "MM", requires = "check_images")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "check_images")]
     pub check_square_mm: Option<f64>,
     /// Width and height of the pictures that --corners come from, px [default: from the corners' extent]
     #[arg(long, value_name = "WxH", requires = "corners", value_parser = picture_size)]
@@ -107,7 +107,7 @@ pub struct Measure {
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,
     /// Side of a square, mm [default: 10]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub square_mm: Option<f64>,
     /// Draw the corners found over each pair, into overlays/ in the results folder
     #[arg(long)]

@@ -104,7 +104,11 @@ pub fn report(error: &Error) -> String {
     let mut text = format!("error: {error}\n");
     let mut source = std::error::Error::source(error);
     while let Some(cause) = source {
-        text.push_str(&format!("  cause: {cause}\n"));
+        // Many messages quote their cause already.
+        let said = cause.to_string();
+        if !text.contains(&said) {
+            text.push_str(&format!("  cause: {said}\n"));
+        }
         source = cause.source();
     }
     if let Some(place) = error.explain().place() {

@@ -29,7 +29,7 @@ fn no_command_is_bad_usage() {
 #[test]
 fn a_board_that_is_none() {
     refused(&["camera-check", "x", "--squares", "20"], &[], 2, &["COLUMNSxROWS", "`20`"]);
-    refused(&["camera-check", "x", "--square-mm", "-3"], &[("x/a.txt", "")], 2, &[]);
+    refused(&["camera-check", "x", "--square-mm", "-3"], &[("x/a.txt", "")], 2, &["square_mm is -3", "above zero"]);
 }
 
 #[test]
