@@ -63,6 +63,9 @@ pub struct CameraCheck {
     /// Largest length error that passes, mm [default: 0.05]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub tolerance_mm: Option<f64>,
+    /// Expanded uncertainty (k = 2) of the board's lengths, from its certificate, mm: widens the guard band of the verdict
+    #[arg(long, value_name = "MM")]
+    pub board_uncertainty_mm: Option<f64>,
     /// Lens model: radial2, brown4, brown5, rational8, thin-prism12 or tilted14 [default: chosen by held-out pairs]
     #[arg(long, value_name = "NAME", value_parser = lens)]
     pub lens: Option<Lens>,

@@ -12,7 +12,7 @@ use crate::report;
 use crate::stereo::accuracy::{self, SecondBoard, Verdict};
 use crate::stereo::calibrate::{Calibration, FEWEST_PAIRS, Options, calibrate};
 use crate::stereo::calibration_file::CalibrationFile;
-use crate::stereo::check_file::{CameraCheckFile, Judged};
+use crate::stereo::check_file::{CameraCheckFile, Demand, Judged};
 
 /// Runs the command.
 pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
@@ -20,6 +20,10 @@ pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
     let mut problems = Vec::new();
     config::positive(&mut problems, "tolerance_mm", tolerance_mm);
+    if let Some(mm) = args.board_uncertainty_mm {
+        config::positive(&mut problems, "board_uncertainty_mm", mm);
+    }
+    let demand = Demand { tolerance_mm, board_uncertainty_mm: args.board_uncertainty_mm.unwrap_or(0.0) };
     config::reject(problems)?;
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
 
@@ -31,7 +35,7 @@ pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
     }
     let accuracy = accuracy::hold_out(&calibration)?;
     let second = second_board(args, board, &calibration, &out)?;
-    let judged = Judged::new(&calibration, accuracy, second, tolerance_mm);
+    let judged = Judged::new(&calibration, accuracy, second, &demand);
     judged.warnings.iter().for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);

@@ -96,7 +96,8 @@ pub enum Verdict {
 pub struct Accuracy {
     /// Largest absolute error of any length, mm.
     pub max_abs_error_mm: f64,
-    /// Its expanded uncertainty (k = 2), mm.
+    /// The expanded uncertainty (k = 2) of that length, mm: the corners at both its ends and the calibration that they share; the
+    /// board's own where it is known.
     pub expanded_uncertainty_mm: f64,
     /// Number of folds.
     pub folds: usize,
@@ -110,16 +111,32 @@ pub struct Accuracy {
     pub pairs: Vec<HeldOutPair>,
 }
 
-impl Accuracy {
+impl Verdict {
     /// Pass only where the uncertainty fits into the tolerance as well, fail only where it cannot help (ISO 14253-1).
-    pub fn verdict(&self, tolerance_mm: f64) -> Verdict {
-        if self.max_abs_error_mm + self.expanded_uncertainty_mm <= tolerance_mm {
+    pub fn of(max_abs_error_mm: f64, expanded_uncertainty_mm: f64, tolerance_mm: f64) -> Verdict {
+        if max_abs_error_mm + expanded_uncertainty_mm <= tolerance_mm {
             Verdict::Pass
-        } else if self.max_abs_error_mm - self.expanded_uncertainty_mm > tolerance_mm {
+        } else if max_abs_error_mm - expanded_uncertainty_mm > tolerance_mm {
             Verdict::Fail
         } else {
             Verdict::Undecided
         }
+    }
+
+    /// Of two verdicts on one rig: a pass needs both.
+    pub fn and(self, other: Verdict) -> Verdict {
+        match (self, other) {
+            (Verdict::Fail, _) | (_, Verdict::Fail) => Verdict::Fail,
+            (Verdict::Undecided, _) | (_, Verdict::Undecided) => Verdict::Undecided,
+            (Verdict::Pass, Verdict::Pass) => Verdict::Pass,
+        }
+    }
+}
+
+impl Accuracy {
+    /// What the held-out pairs say.
+    pub fn verdict(&self, tolerance_mm: f64) -> Verdict {
+        Verdict::of(self.max_abs_error_mm, self.expanded_uncertainty_mm, tolerance_mm)
     }
 }
 
@@ -128,7 +145,7 @@ struct Length {
     axis: Axis,
     squares: usize,
     error_mm: f64,
-    /// Variance through the calibration, mm^2; only where asked for.
+    /// Places of its two points.
     ends: (usize, usize),
 }
 
@@ -174,6 +191,8 @@ pub struct SecondBoard {
     pub pairs_skipped: Vec<Skipped>,
     /// Largest absolute error of any length, mm.
     pub max_abs_error_mm: f64,
+    /// The expanded uncertainty (k = 2) of that length, mm.
+    pub expanded_uncertainty_mm: f64,
     /// Measured lengths over nominal ones, minus one; both boards' pitch errors and the rig's scale together.
     pub scale_error: f64,
     /// Its standard deviation over the pairs.
@@ -211,10 +230,12 @@ pub fn second_board(calibration: &Calibration, corners: &Corners) -> Option<Seco
     let scale_error = mean(&scales)?;
     let spread: f64 = scales.iter().map(|s| (s - scale_error) * (s - scale_error)).sum();
     let n = scales.len() as f64;
+    let (max_abs_error_mm, expanded_uncertainty_mm) = worst(&measured, |_| calibration.rig())?;
     Some(SecondBoard {
         pairs: measured.len(),
         pairs_skipped: skipped,
-        max_abs_error_mm: measured.iter().map(Measured::worst_mm).fold(0.0, f64::max),
+        max_abs_error_mm,
+        expanded_uncertainty_mm,
         scale_error,
         scale_error_sigma: (spread / (n - 1.0).max(1.0) / n).sqrt(),
         ranges: all_ranges(board, &measured),
@@ -260,25 +281,30 @@ fn summarise(calibration: &Calibration, rigs: &[Rig], folds: &[usize], measured:
     let long = [largest(LONG_SQUARES, board.columns()), largest(LONG_SQUARES, board.rows())];
     let ranges = all_ranges(board, measured);
     let pairs = calibration.views.iter().zip(measured).map(|(view, m)| pair(view, m, short, long)).collect();
-    let (worst, length) = measured
-        .iter()
-        .enumerate()
-        .flat_map(|(i, m)| m.lengths.iter().map(move |l| (i, l)))
-        .max_by(|a, b| a.1.error_mm.abs().total_cmp(&b.1.error_mm.abs()))?;
-    // The corners' own scatter is drawn thousands of times in the largest error and not added again; the calibration is drawn
-    // once a fold, so that its share of that length stays uncertain.
-    let covariance = RigCovariance::new(rigs[folds[worst]].covariance.as_ref()?);
-    let points = &measured[worst].points;
-    let variance = covariance.length_variance_mm2(&points[length.ends.0], &points[length.ends.1]);
+    let (max_abs_error_mm, expanded_uncertainty_mm) = worst(measured, |i| &rigs[folds[i]])?;
     Some(Accuracy {
-        max_abs_error_mm: length.error_mm.abs(),
-        expanded_uncertainty_mm: COVERAGE * variance.max(0.0).sqrt(),
+        max_abs_error_mm,
+        expanded_uncertainty_mm,
         folds: rigs.len(),
         short_mm: short.map(|s| s as f64 * board.square_mm),
         long_mm: long.map(|s| s as f64 * board.square_mm),
         ranges,
         pairs,
     })
+}
+
+/// The largest absolute error of all lengths and the expanded uncertainty of that length, mm; `rig_of` is what measured a pair.
+fn worst<'a>(measured: &[Measured], rig_of: impl Fn(usize) -> &'a Rig) -> Option<(f64, f64)> {
+    let (pair, length) = measured
+        .iter()
+        .enumerate()
+        .flat_map(|(i, m)| m.lengths.iter().map(move |l| (i, l)))
+        .max_by(|a, b| a.1.error_mm.abs().total_cmp(&b.1.error_mm.abs()))?;
+    let points = &measured[pair].points;
+    let (a, b) = (&points[length.ends.0], &points[length.ends.1]);
+    let calibration = rig_of(pair).covariance.as_ref().map_or(0.0, |c| RigCovariance::new(c).length_variance_mm2(a, b));
+    let variance = a.corner_variance_mm2(b) + calibration;
+    Some((length.error_mm.abs(), COVERAGE * variance.max(0.0).sqrt()))
 }
 
 fn all_ranges(board: &Board, measured: &[Measured]) -> Vec<Range> {

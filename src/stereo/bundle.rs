@@ -15,12 +15,31 @@ use super::robust::Loss;
 use super::schur::{self, Block};
 use crate::geometry::{Transform, perturb};
 
-/// Steps that are tried at most.
-const MAX_STEPS: usize = 100;
-/// The search is done when a step promises to lower the cost by less than this share...
-const COST_SHARE: f64 = 1e-13;
-/// ... or when even a strongly damped step does not lower it.
+/// The search is done when even a strongly damped step does not lower the cost.
 const MAX_DAMPING: f64 = 1e12;
+
+/// How far a search goes, and how carefully it begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Search {
+    /// Damping of the first step: near the minimum hardly any is needed, and any slows the weak directions down.
+    first_damping: f64,
+    /// The search is done when a step promises to lower the cost by less than this share; that step is still taken.
+    cost_share: f64,
+    /// Steps that are tried at most.
+    most_steps: usize,
+}
+
+impl Search {
+    /// A start for another search: from afar, to about a tenth of a standard deviation.
+    pub const ROUGH: Search = Search { first_damping: 1e-4, cost_share: 1e-7, most_steps: 50 };
+    /// From afar to the limit of rounding.
+    pub const EXACT: Search = Search { first_damping: 1e-4, cost_share: 1e-13, most_steps: 100 };
+    /// From a minimum of nearly the same problem to the limit of rounding.
+    pub const NEAR: Search = Search { first_damping: 1e-9, cost_share: 1e-13, most_steps: 100 };
+    /// From a minimum of nearly the same problem to a thousandth of a standard deviation: a model on trial. What creeps on for longer
+    /// than this is a valley, and no model that these views determine.
+    pub const TRIAL: Search = Search { first_damping: 1e-9, cost_share: 1e-10, most_steps: 40 };
+}
 
 /// Values of all unknowns.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,14 +75,16 @@ pub struct Solution {
 }
 
 /// Minimises. Views and `start.poses` correspond by place.
-pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss) -> Solution {
+pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss, search: Search) -> Solution {
     let Some(mut blocks) = blocks(views, layout, &start, loss) else {
         return Solution { values: start, cost: f64::INFINITY, stop: Stop::NoStart, steps: 0 };
     };
     let mut values = start;
     let mut cost = total_cost(&blocks);
-    let mut damping = 1e-4;
-    for steps in 1..=MAX_STEPS {
+    let mut damping = search.first_damping;
+    // Grows while steps fail: the way up from hardly any damping would be long otherwise.
+    let mut rise = 10.0;
+    for steps in 1..=search.most_steps {
         let mut accepted = false;
         if let Some((trial, promise)) = try_step(layout, &values, &blocks, damping) {
             let next = self::blocks(views, layout, &trial, loss);
@@ -73,21 +94,23 @@ pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss) -> Solu
                 blocks = next;
                 cost -= gain;
                 damping = (damping * damping_change(gain / promise)).max(1e-10);
+                rise = 10.0;
                 accepted = true;
             }
             // Rounding in the sum of the costs hides gains smaller than this: what is promised decides.
-            if promise <= COST_SHARE * cost {
+            if promise <= search.cost_share * cost {
                 return Solution { values, cost, stop: Stop::Minimum, steps };
             }
         }
         if !accepted {
-            damping *= 10.0;
+            damping *= rise;
+            rise *= 10.0;
             if damping > MAX_DAMPING {
                 return Solution { values, cost, stop: Stop::Minimum, steps };
             }
         }
     }
-    Solution { values, cost, stop: Stop::Steps, steps: MAX_STEPS }
+    Solution { values, cost, stop: Stop::Steps, steps: search.most_steps }
 }
 
 /// How the damping changes after a step that gained this share of its promise. Gauss-Newton overshoots along weak directions
@@ -100,8 +123,8 @@ fn damping_change(share: f64) -> f64 {
     }
 }
 
-/// The blocks of all pairs, in their order.
-fn blocks(views: &[View], layout: &Layout, values: &Values, loss: Loss) -> Option<Vec<Block>> {
+/// The blocks of all pairs, in their order. `None` where a corner would lie behind its camera.
+pub fn blocks(views: &[View], layout: &Layout, values: &Values, loss: Loss) -> Option<Vec<Block>> {
     views
         .par_iter()
         .zip(&values.poses)
@@ -151,9 +174,13 @@ pub struct Uncertainty {
 
 /// Covariance at a minimum. `None` where the views do not determine the unknowns.
 pub fn uncertainty(views: &[View], layout: &Layout, values: &Values) -> Option<Uncertainty> {
-    let blocks = blocks(views, layout, values, Loss::Squared)?;
+    uncertainty_of(&blocks(views, layout, values, Loss::Squared)?, layout)
+}
+
+/// The same from the blocks at the minimum.
+pub fn uncertainty_of(blocks: &[Block], layout: &Layout) -> Option<Uncertainty> {
     let count = layout.count();
-    let shared = if count == 0 { DMatrix::zeros(0, 0) } else { invert(&schur::eliminate(&blocks, 0.0, count)?.0)? };
+    let shared = if count == 0 { DMatrix::zeros(0, 0) } else { invert(&schur::eliminate(blocks, 0.0, count)?.0)? };
     let poses = blocks
         .iter()
         .map(|block| {
@@ -166,8 +193,8 @@ pub fn uncertainty(views: &[View], layout: &Layout, values: &Values) -> Option<U
     Some(Uncertainty { shared, poses })
 }
 
-/// Inverse of a symmetric positive definite matrix with rows of different units.
-fn invert(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// Inverse of a symmetric positive definite matrix with rows of different units; `None` where it is singular to rounding.
+pub fn invert(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     /// Smallest share of its scaled eigenvalues that double precision still tells from a dependence.
     const SMALLEST: f64 = 1e-13;
     let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());

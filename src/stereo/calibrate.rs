@@ -3,7 +3,9 @@
 //! In: the corners of all pairs. Out: the rig with its covariance, the pairs that were used with their residuals, the pairs that were
 //! not and why. Goes wrong: too few pairs, pairs that contradict each other, views too similar to tell the cameras.
 
-use super::bundle::{self, Stop, Uncertainty, Values};
+use nalgebra::DMatrix;
+
+use super::bundle::{self, Search, Stop, Uncertainty, Values};
 use super::consensus;
 use super::layout::{Layout, Shared};
 use super::lens_choice::{self, LensScore};
@@ -91,8 +93,8 @@ impl Calibration {
 pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Error> {
     let consensus = consensus::find(corners)?;
     let start = Problem { views: consensus.views, values: consensus.values };
-    let (layout, lens_scores) = lens_choice::choose(&start, options)?;
-    let solved = start.solve(&layout)?;
+    let lens_choice::Choice { layout, near, scores: lens_scores } = lens_choice::choose(&start, options)?;
+    let solved = Problem { values: near.unwrap_or(start.values), ..start }.solve(&layout)?;
     let uncertainty = solved.uncertainty(&layout)?;
     let Problem { views, mut values } = solved.problem;
     values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: uncertainty.shared.clone() });
@@ -158,8 +160,8 @@ impl Problem {
         for _ in 0..2 {
             noise = Noise::from_median(&residuals::active(&views, &values).ok_or(Error::NotConverged { steps: 0 })?);
             noise.apply(&mut views);
-            let solution = bundle::solve(&views, layout, values, Loss::Cauchy(super::start::CAUCHY_WIDTH));
-            values = solution.values;
+            let loss = Loss::Cauchy(super::start::CAUCHY_WIDTH);
+            values = bundle::solve(&views, layout, values, loss, Search::ROUGH).values;
         }
         for _ in 0..4 {
             let marked = mark_outliers(&mut views, &values);
@@ -170,7 +172,7 @@ impl Problem {
             let before = noise;
             noise = Noise::from_mean(&left, unknowns);
             noise.apply(&mut views);
-            let solution = bundle::solve(&views, layout, values, Loss::Squared);
+            let solution = bundle::solve(&views, layout, values, Loss::Squared, Search::NEAR);
             if solution.stop != Stop::Minimum {
                 return Err(Error::NotConverged { steps: solution.steps });
             }
@@ -184,12 +186,6 @@ impl Problem {
         let squares: Vec<f64> = left.iter().map(|(_, r)| r.norm_squared()).collect();
         let rms_px = residuals::root_mean_square(&squares).unwrap_or(0.0);
         Ok(Solved { problem: Problem { views, values }, noise, rms_px })
-    }
-
-    /// Whether the views, at a minimum, determine this layout.
-    pub fn determines(&self, layout: &Layout) -> bool {
-        bundle::uncertainty(&self.views, layout, &self.values)
-            .is_some_and(|u| worst_focal_sigma(&u, layout, &self.values.shared.rig) <= WORST_FOCAL_SIGMA)
     }
 
     /// The same without some pairs: `keep` says which stay.
@@ -209,7 +205,7 @@ impl Problem {
     /// end at a minimum: these pairs do not determine this lens.
     pub fn refit(&self, layout: &Layout) -> Option<Values> {
         let start = self.with_layout(layout);
-        let solution = bundle::solve(&start.views, layout, start.values, Loss::Squared);
+        let solution = bundle::solve(&start.views, layout, start.values, Loss::Squared, Search::TRIAL);
         (solution.stop == Stop::Minimum).then_some(solution.values)
     }
 }
@@ -220,7 +216,7 @@ impl Solved {
         let Problem { views, values } = &self.problem;
         let uncertainty =
             bundle::uncertainty(views, layout, values).ok_or(Error::Undetermined { focal_sigma: None })?;
-        let worst = worst_focal_sigma(&uncertainty, layout, &values.shared.rig);
+        let worst = worst_focal_sigma(&uncertainty.shared, layout, &values.shared.rig);
         let known = worst <= WORST_FOCAL_SIGMA;
         if known { Ok(uncertainty) } else { Err(Error::Undetermined { focal_sigma: Some(worst) }) }
     }
@@ -231,13 +227,18 @@ impl Solved {
     }
 }
 
+/// Whether this covariance of the shared numbers tells the cameras.
+pub fn tells(shared: &DMatrix<f64>, layout: &Layout, rig: &Rig) -> bool {
+    worst_focal_sigma(shared, layout, rig) <= WORST_FOCAL_SIGMA
+}
+
 /// Largest relative standard deviation of a focal length.
-fn worst_focal_sigma(uncertainty: &Uncertainty, layout: &Layout, rig: &Rig) -> f64 {
+fn worst_focal_sigma(shared: &DMatrix<f64>, layout: &Layout, rig: &Rig) -> f64 {
     let mut worst: f64 = 0.0;
     for (side, camera) in Side::BOTH.into_iter().zip([&rig.left, &rig.right]) {
         let at = layout.camera_start(side);
         for (i, focal) in [camera.fx, camera.fy].into_iter().enumerate() {
-            worst = worst.max(uncertainty.shared[(at + i, at + i)].sqrt() / focal.abs());
+            worst = worst.max(shared[(at + i, at + i)].sqrt() / focal.abs());
         }
     }
     worst

@@ -32,32 +32,47 @@ pub struct Judged {
     pub warnings: Vec<String>,
 }
 
+/// What lengths are judged by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Demand {
+    /// The largest error that passes, mm.
+    pub tolerance_mm: f64,
+    /// Expanded uncertainty (k = 2) of the boards' own lengths, as certified, mm.
+    pub board_uncertainty_mm: f64,
+}
+
 impl Judged {
     /// Judges.
     pub fn new(
         calibration: &Calibration,
-        accuracy: Accuracy,
-        second: Option<SecondBoard>,
-        tolerance_mm: f64,
+        mut accuracy: Accuracy,
+        mut second: Option<SecondBoard>,
+        demand: &Demand,
     ) -> Judged {
+        let Demand { tolerance_mm, board_uncertainty_mm } = *demand;
+        // An error is measured minus nominal: what the board's true length may differ from its nominal one adds to its uncertainty.
+        let with_board = |uncertainty_mm: &mut f64| *uncertainty_mm = uncertainty_mm.hypot(board_uncertainty_mm);
+        with_board(&mut accuracy.expanded_uncertainty_mm);
+        second.iter_mut().for_each(|second| with_board(&mut second.expanded_uncertainty_mm));
         let whiteness = whiteness::check(calibration);
         let disagreements = disagreement::find(calibration);
         let mut warnings = variety::advise(calibration, &whiteness);
         warnings.extend(whiteness.describe());
         warnings.extend(disagreements.iter().map(Disagreement::describe));
         let held_out = accuracy.verdict(tolerance_mm);
-        let verdict = match &second {
-            Some(second) if second.max_abs_error_mm > tolerance_mm => {
+        let verdict = second.as_ref().map_or(held_out, |second| {
+            let own = Verdict::of(second.max_abs_error_mm, second.expanded_uncertainty_mm, tolerance_mm);
+            if own != Verdict::Pass {
                 warnings.push(format!(
-                    "the second board's lengths are off by up to {:.4} mm, its scale by {:.1} +- {:.1} parts in a million",
+                    "the second board's lengths are off by up to {:.4} mm (+- {:.4} mm, k = 2), its scale by {:.1} +- {:.1} parts in a million",
                     second.max_abs_error_mm,
+                    second.expanded_uncertainty_mm,
                     1e6 * second.scale_error,
                     2e6 * second.scale_error_sigma
                 ));
-                Verdict::Fail
             }
-            _ => held_out,
-        };
+            held_out.and(own)
+        });
         let length_sigmas = volume::length_sigmas(calibration, accuracy.long_mm[0]);
         Judged { tolerance_mm, verdict, accuracy, second, whiteness, disagreements, length_sigmas, warnings }
     }

@@ -4,7 +4,8 @@
 //! alone; the relative pose most pairs agree on (a half turn of a board that looks the same after one is undone); a robust
 //! bundle; pairs that contradict it are taken out and asked again. Goes wrong: most pairs contradict each other.
 
-use super::bundle::{self, Values};
+use super::bundle::{self, Search, Values};
+use rayon::prelude::*;
 use super::calibrate::FEWEST_PAIRS;
 use super::homography::FEWEST_CORNERS;
 use super::layout::{Layout, Shared};
@@ -60,9 +61,12 @@ pub fn find(corners: &Corners) -> Result<Consensus, Error> {
     if views.len() < FEWEST_PAIRS {
         return Err(too_few(views.len(), &skipped));
     }
-    let left = start::one_camera(&views, Side::Left, corners.left_size).ok_or(Error::NoCamera { side: Side::Left })?;
-    let right =
-        start::one_camera(&views, Side::Right, corners.right_size).ok_or(Error::NoCamera { side: Side::Right })?;
+    let (left, right) = rayon::join(
+        || start::one_camera(&views, Side::Left, corners.left_size),
+        || start::one_camera(&views, Side::Right, corners.right_size),
+    );
+    let left = left.ok_or(Error::NoCamera { side: Side::Left })?;
+    let right = right.ok_or(Error::NoCamera { side: Side::Right })?;
     let candidates: Vec<Candidate> = views
         .into_iter()
         .enumerate()
@@ -70,8 +74,8 @@ pub fn find(corners: &Corners) -> Result<Consensus, Error> {
         .collect();
     let (candidates, first) = first_rig(&corners.board, candidates, &left, &right)?;
     let usual = Usual { px: usual_px(&candidates), width_px: corners.left_size.0.max(corners.right_size.0) };
-    let (shared, inside) = agree(&candidates, first, &usual)?;
-    gather(&corners.board, candidates, &shared, &inside, skipped, &usual)
+    let (shared, inside, on_rig) = agree(&candidates, first, &usual)?;
+    gather(&corners.board, candidates, &shared, (&inside, &on_rig), skipped, &usual)
 }
 
 /// A quarter of the board tells its pose well enough.
@@ -120,40 +124,51 @@ fn first_rig(
     Ok((candidates, Shared { rig, shape_mm: [0.0; 2] }))
 }
 
+/// A pair on the common rig: the larger of its pictures' median residuals, px, and its pose there. `None` where it has none.
+type OnRig = Option<(f64, Transform)>;
+
 /// Improves the rig on the pairs that agree with it until they stay the same; says which do.
-fn agree(candidates: &[Candidate], first: Shared, usual: &Usual) -> Result<(Shared, Vec<bool>), Error> {
+fn agree(candidates: &[Candidate], first: Shared, usual: &Usual) -> Result<(Shared, Vec<bool>, Vec<OnRig>), Error> {
     let mut shared = first;
     let readable: Vec<bool> = candidates.iter().map(|c| c.alone_px.iter().all(Option::is_some)).collect();
     let mut inside = readable.clone();
+    let mut on_rig = all_on_rig(candidates, &shared, &vec![None; candidates.len()]);
     for _ in 0..ROUNDS {
-        let mut views: Vec<View> =
-            candidates.iter().zip(&inside).filter(|(_, inside)| **inside).map(|(c, _)| c.view.clone()).collect();
-        if views.len() < FEWEST_PAIRS {
+        let chosen: Vec<usize> = (0..candidates.len()).filter(|&i| inside[i] && on_rig[i].is_some()).collect();
+        if chosen.len() < FEWEST_PAIRS {
             break;
         }
-        // A new rig needs poses that suit it: the old ones of a pair that was out belong to nothing.
-        let (poses, kept): (Vec<Transform>, Vec<View>) =
-            views.drain(..).filter_map(|view| Some((screening::misfit_px(&shared, &view)?.1, view))).unzip();
-        let mut views = kept;
+        let mut views: Vec<View> = chosen.iter().map(|&i| candidates[i].view.clone()).collect();
+        let poses = chosen.iter().filter_map(|&i| on_rig[i].map(|(_, pose)| pose)).collect();
         let mut values = Values { shared, poses };
         for _ in 0..2 {
             let residuals = residuals::active(&views, &values).ok_or(Error::NotConverged { steps: 0 })?;
             Noise::from_median(&residuals).apply(&mut views);
             let layout = Layout::rig(FIRST_LENS, false);
-            values = bundle::solve(&views, &layout, values, Loss::Cauchy(CAUCHY_WIDTH)).values;
+            values = bundle::solve(&views, &layout, values, Loss::Cauchy(CAUCHY_WIDTH), Search::ROUGH).values;
         }
         shared = values.shared;
-        let next: Vec<bool> = candidates
-            .iter()
-            .zip(&readable)
-            .map(|(c, readable)| *readable && misfit(&shared, c, usual) <= 1.0)
-            .collect();
+        on_rig.fill(None);
+        for (&i, pose) in chosen.iter().zip(&values.poses) {
+            let found = screening::worse_median_px(&shared, pose, &candidates[i].view).map(|px| (px, *pose));
+            // What does not fit may only have been led astray by an earlier rig: it is asked afresh, like those that were out.
+            on_rig[i] = found.filter(|_| misfit(&found, &candidates[i], usual) <= 1.0);
+        }
+        on_rig = all_on_rig(candidates, &shared, &on_rig);
+        let next: Vec<bool> =
+            (0..candidates.len()).map(|i| readable[i] && misfit(&on_rig[i], &candidates[i], usual) <= 1.0).collect();
         if next == inside {
             break;
         }
         inside = next;
     }
-    Ok((shared, inside))
+    Ok((shared, inside, on_rig))
+}
+
+/// Every pair on the rig: what is known is kept, the others are looked for.
+fn all_on_rig(candidates: &[Candidate], shared: &Shared, known: &[OnRig]) -> Vec<OnRig> {
+    let of = |(candidate, known): (&Candidate, &OnRig)| known.or_else(|| screening::misfit_px(shared, &candidate.view));
+    candidates.par_iter().zip(known).map(of).collect()
 }
 
 /// Median of what pictures leave alone, px.
@@ -164,10 +179,9 @@ fn usual_px(candidates: &[Candidate]) -> f64 {
 }
 
 /// A pair's residual on the rig as a share of its limit; above one it does not belong.
-fn misfit(shared: &Shared, candidate: &Candidate, usual: &Usual) -> f64 {
+fn misfit(on_rig: &OnRig, candidate: &Candidate, usual: &Usual) -> f64 {
     let alone = candidate.alone_px[0].unwrap_or(f64::INFINITY).max(candidate.alone_px[1].unwrap_or(f64::INFINITY));
-    let limit = usual.limit_px(alone);
-    screening::misfit_px(shared, &candidate.view).map_or(f64::INFINITY, |(px, _)| px / limit)
+    on_rig.map_or(f64::INFINITY, |(px, _)| px / usual.limit_px(alone))
 }
 
 /// Sorts the pairs into those that stay and those that are out, with reasons.
@@ -175,18 +189,18 @@ fn gather(
     board: &Board,
     candidates: Vec<Candidate>,
     shared: &Shared,
-    inside: &[bool],
+    agreed: (&[bool], &[OnRig]),
     mut skipped: Vec<Skipped>,
     usual: &Usual,
 ) -> Result<Consensus, Error> {
     let total = candidates.len() + skipped.len();
     let judged = candidates.len();
     let (mut views, mut poses, mut bad) = (Vec::new(), Vec::new(), Vec::new());
-    for (candidate, inside) in candidates.into_iter().zip(inside) {
-        match screening::misfit_px(shared, &candidate.view) {
+    for (candidate, (inside, on_rig)) in candidates.into_iter().zip(agreed.0.iter().zip(agreed.1)) {
+        match on_rig {
             Some((_, pose)) if *inside => {
                 views.push(candidate.view);
-                poses.push(pose);
+                poses.push(*pose);
             }
             misfit => {
                 let look = screening::look(shared, board, &candidate.view, candidate.alone_px, usual);

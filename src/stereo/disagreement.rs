@@ -72,7 +72,7 @@ fn models(calibration: &Calibration) -> Vec<Trial> {
 fn compare(calibration: &Calibration, chosen: Lens, trial: &Trial) -> Option<Disagreement> {
     let other = trial.layout.left?;
     let names = calibration.layout.names();
-    let (own, theirs) = (calibration.layout.numbers(&calibration.values.shared), trial.layout.numbers(&trial.shared));
+    let (own, theirs) = (calibration.layout.numbers(&calibration.values.shared), trial.layout.numbers(&trial.values.shared));
     // Distortion terms mean different things in different models; the pinhole and the rig mean the same in all.
     let comparable = |name: &str| {
         name.starts_with("right_from_left.") || [".fx", ".fy", ".cx", ".cy"].iter().any(|end| name.ends_with(end))
@@ -90,7 +90,7 @@ fn compare(calibration: &Calibration, chosen: Lens, trial: &Trial) -> Option<Dis
             Some((name, change, change.abs() / variance.sqrt()))
         })
         .max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let t = trial.shared.rig.right_from_left.translation.vector - calibration.rig().right_from_left.translation.vector;
+    let t = trial.values.shared.rig.right_from_left.translation.vector - calibration.rig().right_from_left.translation.vector;
     let sigmas_of = |axis: usize| {
         let variance = |layout: &Layout, covariance: &nalgebra::DMatrix<f64>| {
             let at = layout.transform_start() + 3 + axis;
@@ -99,7 +99,7 @@ fn compare(calibration: &Calibration, chosen: Lens, trial: &Trial) -> Option<Dis
         let own = variance(&calibration.layout, &calibration.uncertainty.shared);
         t[axis].abs() / own.max(variance(&trial.layout, &trial.covariance)).sqrt()
     };
-    let lengths = Lengths::compare(calibration, &trial.shared.rig);
+    let lengths = Lengths::compare(calibration, &trial.values.shared.rig);
     Some(Disagreement {
         chosen: chosen.name(),
         other: other.name(),

@@ -1,7 +1,7 @@
 //! Which lens model, and whether the board is flat: what predicts pairs that it has not seen.
 //!
 //! In: views that agree. Out: the layout to solve, and how each lens of the ladder predicts held-out pairs. Method: k folds over the
-//! pairs; the rig of a fold measures the pose of each pair it has not seen, and what is left counts. The simplest model whose
+//! pairs ([`leave_out`]); the rig of a fold measures the pose of each pair it has not seen, and what is left counts. The simplest model whose
 //! loss is within two standard errors of the best wins (after Breiman et al. 1984), since a richer one extrapolates worse.
 //! Goes wrong: pairs too few or too alike to tell models apart; then the simplest that fits wins, and
 //! [`super::disagreement`] says what is at stake.
@@ -9,15 +9,18 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::bundle;
-use super::calibrate::{Options, Problem};
+use super::bundle::{self, Values};
+use super::calibrate::{Options, Problem, tells};
 use super::folds::{self, FOLDS};
 use super::layout::{Layout, Shared};
+use super::leave_out;
 use super::observations::View;
 use super::pose;
-use super::residuals::{self, residual_px};
+use super::residuals::residual_px;
 use super::robust::Loss;
+use super::schur::Block;
 use super::{Error, Lens};
+use crate::geometry::Transform;
 
 /// Standard errors by which a richer model must predict better: one is what half of the useless terms reach by chance when the
 /// best of several is taken.
@@ -42,9 +45,9 @@ pub struct LensScore {
 pub struct Trial {
     /// What was free.
     pub layout: Layout,
-    /// Rig and shape.
-    pub shared: Shared,
-    /// Their covariance.
+    /// Rig, shape and poses.
+    pub values: Values,
+    /// Covariance of rig and shape.
     pub covariance: DMatrix<f64>,
     /// Mean squared whitened residual of the pairs it was fitted to.
     pub mean_square: f64,
@@ -52,11 +55,22 @@ pub struct Trial {
     by_pair: Vec<f64>,
 }
 
+/// What was chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// What is free.
+    pub layout: Layout,
+    /// Values near the minimum of that model, where it was tried.
+    pub near: Option<Values>,
+    /// Every lens of the ladder; empty where the lens was forced.
+    pub scores: Vec<LensScore>,
+}
+
 /// Chooses what is free, where it is not forced.
-pub fn choose(start: &Problem, options: &Options) -> Result<(Layout, Vec<LensScore>), Error> {
+pub fn choose(start: &Problem, options: &Options) -> Result<Choice, Error> {
     let forced_shape = options.shape.or(options.lens.map(|_| false));
     if let (Some(lens), Some(shape)) = (options.lens, forced_shape) {
-        return Ok((Layout::rig(lens, shape), Vec::new()));
+        return Ok(Choice { layout: Layout::rig(lens, shape), near: None, scores: Vec::new() });
     }
     // Weights and outliers from a model that is at least as rich as most need; the comparison uses the same for all.
     let rich = |shape| start.solve(&Layout::rig(Lens::Brown5, shape));
@@ -70,24 +84,35 @@ pub fn choose(start: &Problem, options: &Options) -> Result<(Layout, Vec<LensSco
         })?;
     // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
     let bent = forced_shape.unwrap_or(true);
-    let mut scores: Vec<LensScore> =
-        Lens::LADDER.par_iter().map(|&lens| score(&solved.problem, Layout::rig(lens, bent))).collect();
+    let mut scores = ladder(&solved.problem, bent);
     if forced_shape.is_none() && scores.iter().all(|s| s.trial.is_none()) {
-        scores = Lens::LADDER.par_iter().map(|&lens| score(&solved.problem, Layout::rig(lens, false))).collect();
+        scores = ladder(&solved.problem, false);
     }
     let chosen = simplest(&scores).ok_or(Error::Undetermined { focal_sigma: None })?;
-    if forced_shape.is_some() || !chosen.layout.shape {
-        return Ok((chosen.layout, scores));
+    if forced_shape.is_none() && chosen.layout.shape {
+        let flat = score(&solved.problem, Layout { shape: false, ..chosen.layout });
+        let bends = flat.trial.as_ref().is_none_or(|flat| flat.excess_over(chosen) > 0.0);
+        if !bends {
+            scores = ladder(&solved.problem, false);
+        }
     }
-    let flat = score(&solved.problem, Layout { shape: false, ..chosen.layout });
-    let bends = flat.trial.as_ref().is_none_or(|flat| flat.excess_over(chosen) > 0.0);
-    let layout = Layout { shape: bends, ..chosen.layout };
-    if !bends {
-        scores = Lens::LADDER.par_iter().map(|&lens| score(&solved.problem, Layout::rig(lens, false))).collect();
-        let layout = simplest(&scores).map_or(layout, |trial| trial.layout);
-        return Ok((layout, scores));
-    }
-    Ok((layout, scores))
+    let chosen = simplest(&scores).ok_or(Error::Undetermined { focal_sigma: None })?;
+    Ok(Choice { layout: chosen.layout, near: Some(chosen.values.clone()), scores })
+}
+
+/// Every lens from the simplest, each from where the one before it ended: a richer lens begins as the simpler one.
+fn ladder(problem: &Problem, shape: bool) -> Vec<LensScore> {
+    let mut problem = problem.clone();
+    Lens::LADDER
+        .into_iter()
+        .map(|lens| {
+            let score = score(&problem, Layout::rig(lens, shape));
+            if let Some(trial) = &score.trial {
+                problem.values = trial.values.clone();
+            }
+            score
+        })
+        .collect()
 }
 
 /// The simplest model within two standard errors of the best.
@@ -100,20 +125,21 @@ fn simplest(scores: &[LensScore]) -> Option<&Trial> {
 impl Trial {
     /// A model calibrated with all pairs and held against none. `None` where the pairs do not determine it.
     pub fn new(problem: &Problem, layout: Layout) -> Option<Trial> {
-        let problem = Problem { views: problem.views.clone(), values: problem.refit(&layout)? };
-        Trial::at(&problem, layout)
+        Some(Trial::with_blocks(problem, layout)?.0)
     }
 
-    /// The model at its minimum.
-    fn at(problem: &Problem, layout: Layout) -> Option<Trial> {
-        if !problem.determines(&layout) {
+    /// The model at its minimum, with the normal equations there.
+    fn with_blocks(problem: &Problem, layout: Layout) -> Option<(Trial, Vec<Block>)> {
+        let values = problem.refit(&layout)?;
+        let views = &problem.views;
+        let blocks = bundle::blocks(views, &layout, &values, Loss::Squared)?;
+        let covariance = bundle::uncertainty_of(&blocks, &layout)?.shared;
+        if !tells(&covariance, &layout, &values.shared.rig) {
             return None;
         }
-        let Problem { views, values } = problem;
-        let covariance = bundle::uncertainty(views, &layout, values)?.shared;
-        let left = residuals::active(views, values)?;
-        let mean_square = left.iter().map(|(o, r)| o.whiten(*r).norm_squared()).sum::<f64>() / left.len() as f64;
-        Some(Trial { layout, shared: values.shared.clone(), covariance, mean_square, by_pair: Vec::new() })
+        let corners = views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count();
+        let mean_square = 2.0 * blocks.iter().map(|block| block.cost).sum::<f64>() / corners.max(1) as f64;
+        Some((Trial { layout, values, covariance, mean_square, by_pair: Vec::new() }, blocks))
     }
 
     fn loss(&self) -> f64 {
@@ -142,26 +168,21 @@ fn score(problem: &Problem, layout: Layout) -> LensScore {
 
 /// The model with all pairs and, fold by fold, on those it has not seen. `None` where the pairs do not determine it.
 fn hold_out(problem: &Problem, layout: Layout) -> Option<(Trial, f64)> {
-    let count = problem.views.len();
-    // A lens that all pairs together do not determine is none; one that they do is a start for every fold.
-    let problem = Problem { views: problem.views.clone(), values: problem.refit(&layout)? };
-    let trial = Trial::at(&problem, layout)?;
-    let folds = folds::assign(count, FOLDS);
-    let mut by_pair = vec![0.0; count];
-    let (mut squares, mut corners) = (0.0, 0);
-    for fold in 0..FOLDS.min(count) {
-        let kept = problem.subset(|i| folds[i] != fold);
-        let kept = Problem { values: kept.refit(&layout)?, ..kept };
-        if !kept.determines(&layout) {
-            return None;
-        }
-        for i in (0..count).filter(|&i| folds[i] == fold) {
-            let left = miss(&kept.values.shared, &problem.views[i])?;
-            squares += left.squares_px2;
-            corners += left.corners;
-            by_pair[i] = left.loss;
-        }
-    }
+    // A lens that all pairs together do not determine is none.
+    let (trial, blocks) = Trial::with_blocks(problem, layout)?;
+    let views = &problem.views;
+    let folds = FOLDS.min(views.len());
+    let fold_of = folds::assign(views.len(), folds);
+    let rigs = leave_out::rigs(&blocks, &layout, &trial.values.shared, &fold_of, folds)?;
+    let misses: Vec<Option<Miss>> = views
+        .par_iter()
+        .enumerate()
+        .map(|(i, view)| miss(&rigs[fold_of[i]], view, trial.values.poses[i]))
+        .collect();
+    let misses = misses.into_iter().collect::<Option<Vec<Miss>>>()?;
+    let squares: f64 = misses.iter().map(|miss| miss.squares_px2).sum();
+    let corners: u32 = misses.iter().map(|miss| miss.corners).sum();
+    let by_pair = misses.iter().map(|miss| miss.loss).collect();
     Some((Trial { by_pair, ..trial }, (squares / f64::from(corners.max(1))).sqrt()))
 }
 
@@ -171,9 +192,9 @@ struct Miss {
     loss: f64,
 }
 
-/// What a rig leaves of a pair that it has not seen.
-fn miss(shared: &Shared, view: &View) -> Option<Miss> {
-    let fit = pose::fit(shared, view, Loss::Squared)?;
+/// What a rig leaves of a pair that it has not seen; `near` is a pose close to the pair's.
+fn miss(shared: &Shared, view: &View, near: Transform) -> Option<Miss> {
+    let fit = pose::follow(shared, view, near)?;
     let mut sum = Miss { squares_px2: 0.0, corners: 0, loss: 0.0 };
     for o in view.observations.iter().filter(|o| o.active) {
         let r = residual_px(shared, &fit.left_from_board, o)?;

@@ -16,6 +16,7 @@ pub mod export;
 pub mod folds;
 pub mod homography;
 pub mod layout;
+pub mod leave_out;
 pub mod lens_choice;
 pub mod measure_file;
 pub mod noise;

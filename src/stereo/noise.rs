@@ -44,9 +44,8 @@ impl Noise {
     /// Fitted to the median, so that up to half of the corners may be wrong. `residuals` are the active corners' in px.
     pub fn from_median(residuals: &[(Observation, Vector2<f64>)]) -> Noise {
         fit(residuals, |chi| {
-            let mut sorted = chi.to_vec();
-            sorted.sort_by(f64::total_cmp);
-            sorted[sorted.len() / 2] / MEDIAN_CHI_SQUARE_2
+            let middle = chi.len() / 2;
+            *chi.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN_CHI_SQUARE_2
         })
     }
 
@@ -68,29 +67,63 @@ impl Noise {
     }
 }
 
+/// A residual along the axes of its corner's own covariance: squares, px^2, and the variances they come with.
+struct Aligned {
+    squares: [f64; 2],
+    variances: [f64; 2],
+}
+
+impl Aligned {
+    fn new(o: &Observation, residual: &Vector2<f64>) -> Aligned {
+        let eigen = o.covariance_px2.symmetric_eigen();
+        let along = eigen.eigenvectors.tr_mul(residual);
+        Aligned { squares: [along.x * along.x, along.y * along.y], variances: [eigen.eigenvalues[0], eigen.eigenvalues[1]] }
+    }
+
+    /// Squared length in units of the covariance with `added` to both variances, px^2.
+    fn chi(&self, added: f64) -> f64 {
+        let floor = FLOOR_PX * FLOOR_PX;
+        self.squares[0] / (self.variances[0] + added).max(floor) + self.squares[1] / (self.variances[1] + added).max(floor)
+    }
+}
+
 /// Finds the model whose `reduced` chi-square is one.
-fn fit(residuals: &[(Observation, Vector2<f64>)], reduced: impl Fn(&[f64]) -> f64) -> Noise {
+fn fit(residuals: &[(Observation, Vector2<f64>)], reduced: impl Fn(&mut [f64]) -> f64) -> Noise {
     if residuals.is_empty() {
         return Noise::UNIT;
     }
-    let chi = |noise: &Noise| -> Vec<f64> {
-        residuals.iter().map(|(o, r)| (whitener(&noise.covariance(o)) * r).norm_squared()).collect()
-    };
-    let plain = reduced(&chi(&Noise::UNIT)).sqrt().max(FLOOR_PX);
+    let mut plain: Vec<f64> = residuals.iter().map(|(_, r)| r.norm_squared()).collect();
+    let plain = reduced(&mut plain).max(FLOOR_PX * FLOOR_PX);
+    if residuals.iter().all(|(o, _)| o.covariance_px2.m11 == 0.0) {
+        return Noise { factor: 1.0, added_px: plain.sqrt(), reduced_chi_square: None };
+    }
+    let aligned: Vec<Aligned> = residuals.iter().map(|(o, r)| Aligned::new(o, r)).collect();
+    let with = |added: f64| reduced(&mut aligned.iter().map(|a| a.chi(added)).collect::<Vec<f64>>());
     let known = residuals.iter().all(|(o, _)| o.covariance_px2.m11 > 0.0);
-    let own = known.then(|| reduced(&chi(&Noise { factor: 1.0, added_px: 0.0, reduced_chi_square: None })));
+    let own = known.then(|| with(0.0));
     if let Some(own) = own.filter(|own| *own <= 1.0) {
         let factor = own.max(f64::MIN_POSITIVE.sqrt());
         return Noise { factor, added_px: 0.0, reduced_chi_square: Some(own) };
     }
-    // With the covariances in, less than the plain scatter is missing: the root lies between zero and it.
+    // With the covariances in, less than the plain scatter is missing: the root lies between zero and it. The inverse of the
+    // reduced chi-square is nearly a straight line in the added variance, which the secant follows; halving guards it.
     let (mut low, mut high) = (0.0, plain);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        let noise = Noise { factor: 1.0, added_px: middle, reduced_chi_square: own };
-        if middle > 0.0 && reduced(&chi(&noise)) > 1.0 { low = middle } else { high = middle }
+    let miss = |added: f64| 1.0 / with(added) - 1.0;
+    let (mut at_low, mut at_high) = (own.map_or(-1.0, |own| 1.0 / own - 1.0), miss(plain));
+    for round in 0..60 {
+        if at_high <= 0.0 || high - low <= 1e-9 * high {
+            break;
+        }
+        let secant = low - at_low * (high - low) / (at_high - at_low);
+        let middle = if round % 3 == 2 { 0.5 * (low + high) } else { secant.clamp(low, high) };
+        let at = miss(middle);
+        if at < 0.0 { (low, at_low) = (middle, at) } else { (high, at_high) = (middle, at) }
+        if at == 0.0 || (at.abs() < 1e-9) {
+            high = middle;
+            break;
+        }
     }
-    Noise { factor: 1.0, added_px: high.max(FLOOR_PX), reduced_chi_square: own }
+    Noise { factor: 1.0, added_px: high.sqrt().max(FLOOR_PX), reduced_chi_square: own }
 }
 
 /// `W` with `W' W = Sigma^-1`, from the Cholesky factor.

@@ -6,7 +6,7 @@
 use nalgebra::{Matrix6, Point2};
 
 use super::Camera;
-use super::bundle::{self, Values};
+use super::bundle::{self, Search, Values};
 use super::homography::{homography, pose};
 use super::layout::{Layout, Shared};
 use super::observations::{Observation, Side, View};
@@ -22,19 +22,28 @@ pub struct PoseFit {
     pub cost: f64,
 }
 
-/// Fits the pose to the view's active corners. `None` where they do not determine it.
+/// Fits the pose to the view's active corners, to about a tenth of a standard deviation. `None` where they do not determine it.
 pub fn fit(shared: &Shared, view: &View, loss: Loss) -> Option<PoseFit> {
     Side::BOTH
         .into_iter()
         .filter_map(|side| start(shared, view, side))
-        .filter_map(|start| refine(shared, view, start, loss))
+        .filter_map(|start| search(shared, view, start, loss, Search::ROUGH))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
-/// Fits the pose from a start that is known.
+/// Fits the pose from a start that is known, to the limit of rounding.
 pub fn refine(shared: &Shared, view: &View, start: Transform, loss: Loss) -> Option<PoseFit> {
+    search(shared, view, start, loss, Search::EXACT)
+}
+
+/// The pose of a pair on a rig that hardly differs from one on which the pose is known.
+pub fn follow(shared: &Shared, view: &View, known: Transform) -> Option<PoseFit> {
+    search(shared, view, known, Loss::Squared, Search::TRIAL)
+}
+
+fn search(shared: &Shared, view: &View, start: Transform, loss: Loss, search: Search) -> Option<PoseFit> {
     let values = Values { shared: shared.clone(), poses: vec![start] };
-    let solution = bundle::solve(std::slice::from_ref(view), &Layout::POSES_ONLY, values, loss);
+    let solution = bundle::solve(std::slice::from_ref(view), &Layout::POSES_ONLY, values, loss, search);
     let left_from_board = *solution.values.poses.first()?;
     solution.cost.is_finite().then_some(PoseFit { left_from_board, cost: solution.cost })
 }

@@ -64,8 +64,13 @@ pub fn median_px(shared: &Shared, left_from_board: &Transform, view: &View, side
 /// The larger of both pictures' median residuals of a pair on a rig, px, with the pose that makes it least.
 pub fn misfit_px(shared: &Shared, view: &View) -> Option<(f64, Transform)> {
     let fit = pose::fit(shared, view, Loss::Cauchy(CAUCHY_WIDTH))?;
-    let both = Side::BOTH.map(|side| median_px(shared, &fit.left_from_board, view, side));
-    Some((both[0]?.max(both[1]?), fit.left_from_board))
+    Some((worse_median_px(shared, &fit.left_from_board, view)?, fit.left_from_board))
+}
+
+/// The larger of both pictures' median residuals at a pose, px.
+pub fn worse_median_px(shared: &Shared, left_from_board: &Transform, view: &View) -> Option<f64> {
+    let both = Side::BOTH.map(|side| median_px(shared, left_from_board, view, side));
+    Some(both[0]?.max(both[1]?))
 }
 
 /// What pictures of this rig usually leave one by one, and how wide they are: what a pair's residual is compared with.

@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Point2};
 
-use super::bundle::{self, Values};
+use super::bundle::{self, Search, Values};
 use super::homography::{focal_lengths, homography, pixel_pairs, pose};
 use super::layout::{Layout, Shared};
 use super::noise::Noise;
@@ -100,8 +100,8 @@ fn from_focal_length(
         values.shared.rig.left.lens = lens;
         let noise = Noise::from_median(&residuals::active(&views, &values)?);
         noise.apply(&mut views);
-        let solution = bundle::solve(&views, &Layout::one_camera(lens), values, Loss::Cauchy(CAUCHY_WIDTH));
-        values = solution.values;
+        let loss = Loss::Cauchy(CAUCHY_WIDTH);
+        values = bundle::solve(&views, &Layout::one_camera(lens), values, loss, Search::ROUGH).values;
         cost = residuals::active(&views, &values).map(|r| Noise::from_median(&r).added_px)?;
     }
     let camera = values.shared.rig.left;

@@ -4,7 +4,9 @@ use nalgebra::{Vector3, Vector6};
 
 use super::calibrate::{Calibration, Options, calibrate};
 use super::layout::Shared;
+use super::observations::View;
 use super::synthetic::World;
+use super::triangulate::{RigCovariance, common, triangulate};
 use super::{Error, Lens, accuracy, disagreement, target};
 use crate::geometry::{rotation_vector, transform};
 use crate::imaging::{Corners, PairCorners};
@@ -67,11 +69,22 @@ fn any_number_of_threads_gives_the_same_bits() {
     assert_eq!(with(1), with(3));
 }
 
-/// Spread over calibrations of fresh noise against the predicted standard deviations: their ratio for every number, and the share of
-/// 95 % intervals that hold the truth.
-fn monte_carlo(runs: u64, options: &Options) -> (Vec<f64>, f64, Vec<String>) {
+/// Spread over calibrations of fresh noise against the predicted standard deviations.
+struct Spread {
+    /// The shared numbers' names, and predicted over true standard deviation of each.
+    names: Vec<String>,
+    ratios: Vec<f64>,
+    /// Share of the 95 % intervals that hold the truth.
+    inside: f64,
+    /// The same ratio for lengths of 70 mm on boards that calibrated nothing: in all, and the calibration's share alone.
+    lengths: f64,
+    lengths_by_calibration: f64,
+}
+
+fn monte_carlo(runs: u64, options: &Options) -> Spread {
     let world = World::new(10, 5);
     let (mut squares, mut predicted, mut inside, mut names) = (Vec::new(), Vec::new(), 0usize, Vec::new());
+    let (mut lengths, mut by_calibration) = (Ratio::default(), Ratio::default());
     for run in 0..runs {
         let found = calibrate(&world.corners(1000 + run), options).unwrap();
         let off = deviations(&found, &world);
@@ -84,10 +97,50 @@ fn monte_carlo(runs: u64, options: &Options) -> (Vec<f64>, f64, Vec<String>) {
             inside += usize::from(off.abs() <= 1.96 * variance.sqrt());
         }
         names = found.layout.names();
+        lengths_of_70_mm(&found, &world, 5000 + run, &mut lengths);
+        lengths_of_70_mm(&found, &World { sigma_px: 1e-9, ..world.clone() }, 0, &mut by_calibration);
     }
     let ratios = squares.iter().zip(&predicted).map(|(s, p): (&f64, &f64)| (p / s).sqrt()).collect::<Vec<f64>>();
     let total = ratios.len() as f64 * runs as f64;
-    (ratios, inside as f64 / total, names)
+    let inside = inside as f64 / total;
+    Spread { names, ratios, inside, lengths: lengths.root(), lengths_by_calibration: by_calibration.root() }
+}
+
+#[derive(Default)]
+struct Ratio {
+    predicted: f64,
+    squares: f64,
+}
+
+impl Ratio {
+    fn root(&self) -> f64 {
+        (self.predicted / self.squares).sqrt()
+    }
+}
+
+/// The four sides of a square of 70 mm in six poses, measured by a calibrated rig in corners as noisy as the world's.
+fn lengths_of_70_mm(calibration: &Calibration, world: &World, seed: u64, ratio: &mut Ratio) {
+    let board = crate::imaging::Board { squares: "9x9".parse().unwrap(), square_mm: 10.0 };
+    let world = World { board, poses: World::new(6, 77).poses, ..world.clone() };
+    let covariance = RigCovariance::new(calibration.rig().covariance.as_ref().unwrap());
+    for pair in &world.corners(seed).pairs {
+        let mut view = View::new(&board, pair, 0);
+        // Each world's own noise: what the corners say of themselves.
+        for o in &mut view.observations {
+            o.whitener = nalgebra::Matrix2::identity() / world.sigma_px;
+        }
+        let seen = common(&view);
+        let point = |col: usize, row: usize| {
+            let (left, right) = seen.iter().find(|(l, _)| (l.col, l.row) == (col, row))?;
+            triangulate(calibration.rig(), left, right)
+        };
+        for (a, b) in [((0, 0), (7, 0)), ((0, 7), (7, 7)), ((0, 0), (0, 7)), ((7, 0), (7, 7))] {
+            let (Some(a), Some(b)) = (point(a.0, a.1), point(b.0, b.1)) else { continue };
+            let off = (b.point_mm - a.point_mm).norm() - 70.0;
+            ratio.squares += off * off;
+            ratio.predicted += a.corner_variance_mm2(&b) + covariance.length_variance_mm2(&a, &b);
+        }
+    }
 }
 
 fn median(values: &[f64]) -> f64 {
@@ -105,20 +158,25 @@ fn monte_carlo_runs() -> u64 {
 fn predicted_sigmas_are_the_true_ones() {
     let runs = monte_carlo_runs();
     for shape in [false, true] {
-        let (ratios, inside, names) = monte_carlo(runs, &Options { lens: Some(Lens::Brown4), shape: Some(shape) });
+        let spread = monte_carlo(runs, &Options { lens: Some(Lens::Brown4), shape: Some(shape) });
+        let Spread { names, ratios, inside, lengths, lengths_by_calibration } = &spread;
         // So many runs know a standard deviation to 1 / sqrt(2 runs); the numbers are correlated, so their median is hardly better.
         let known_to = 1.0 / (2.0 * runs as f64).sqrt();
-        let table: Vec<String> = names.iter().zip(&ratios).map(|(name, ratio)| format!("{name} {ratio:.3}")).collect();
+        let table: Vec<String> = names.iter().zip(ratios).map(|(name, ratio)| format!("{name} {ratio:.3}")).collect();
         let said = format!(
-            "{runs} runs, shape free: {shape}; predicted / true sigma: median {:.3}, 95 % intervals hold {:.1} %\n{}",
-            median(&ratios),
+            "{runs} runs, shape free: {shape}; predicted / true sigma: median {:.3}, 95 % intervals hold {:.1} %, \
+             70 mm lengths {lengths:.3}, their calibration's share {lengths_by_calibration:.3}\n{}",
+            median(ratios),
             100.0 * inside,
             table.join("\n")
         );
         println!("{said}");
-        assert!((median(&ratios) - 1.0).abs() < 2.2 * known_to, "{said}");
+        assert!((median(ratios) - 1.0).abs() < 2.2 * known_to, "{said}");
         assert!(ratios.iter().all(|r| (r - 1.0).abs() < 4.5 * known_to), "{said}");
-        assert!((0.91..0.985).contains(&inside), "{said}");
+        assert!((0.91..0.985).contains(inside), "{said}");
+        // 24 lengths a run with corners of their own: known better than any number of the rig.
+        assert!((lengths - 1.0).abs() < 0.1, "{said}");
+        assert!((lengths_by_calibration - 1.0).abs() < 4.0 * known_to, "{said}");
     }
 }
 
@@ -261,9 +319,9 @@ fn worst_point_mm(calibration: &Calibration, world: &World) -> f64 {
     let exact = World { sigma_px: 1e-9, bow_mm: [0.0; 2], ..world.clone() };
     let mut worst: f64 = 0.0;
     for (pair, pose) in exact.corners(1).pairs.iter().zip(&exact.poses) {
-        let view = super::observations::View::new(&exact.board, pair, 0);
-        for (left, right) in super::triangulate::common(&view) {
-            let found = super::triangulate::triangulate(calibration.rig(), left, right).unwrap();
+        let view = View::new(&exact.board, pair, 0);
+        for (left, right) in common(&view) {
+            let found = triangulate(calibration.rig(), left, right).unwrap();
             worst = worst.max((found.point_mm - pose * left.board_mm).norm());
         }
     }

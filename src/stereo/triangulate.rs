@@ -32,6 +32,15 @@ pub struct SpacePoint {
     pub by_rig: [Vector3<f64>; RIG_NUMBERS],
 }
 
+impl SpacePoint {
+    /// Variance of the length to another point through the corners of both, mm^2; through the calibration:
+    /// [`RigCovariance::length_variance_mm2`].
+    pub fn corner_variance_mm2(&self, other: &SpacePoint) -> f64 {
+        let direction = (other.point_mm - self.point_mm).normalize();
+        direction.dot(&((self.covariance_mm2 + other.covariance_mm2) * direction))
+    }
+}
+
 /// Index of a number of the rig by its name in `calibration.json`; `None` for names of other things (the board's shape).
 pub fn rig_number(name: &str) -> Option<usize> {
     let (part, number) = name.split_once('.')?;

@@ -48,8 +48,7 @@ pub fn length_sigmas(calibration: &Calibration, length_mm: f64) -> Vec<LengthSig
                     let half = direction * (length_mm / 2.0);
                     let a = point(rig, &Point3::from(at - half), sigma_px)?;
                     let b = point(rig, &Point3::from(at + half), sigma_px)?;
-                    let corners = direction.dot(&((a.covariance_mm2 + b.covariance_mm2) * direction));
-                    Some((corners + covariance.length_variance_mm2(&a, &b)).max(0.0).sqrt())
+                    Some((a.corner_variance_mm2(&b) + covariance.length_variance_mm2(&a, &b)).max(0.0).sqrt())
                 });
                 if let [Some(x), Some(y), Some(z)] = sigma {
                     all.push(LengthSigma { at_mm: [at.x, at.y, at.z], sigma_mm: [x, y, z] });
