@@ -36,7 +36,7 @@ pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
     let accuracy = accuracy::hold_out(&calibration)?;
     let second = second_board(args, board, &calibration, &out)?;
     let judged = Judged::new(&calibration, accuracy, second, &demand);
-    judged.warnings.iter().for_each(progress::warn);
+    judged.advice.iter().chain(&judged.warnings).for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
     let page = report::camera_check::page(&calibration, &judged)?;

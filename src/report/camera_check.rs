@@ -8,7 +8,7 @@ use super::table::{Table, number};
 use crate::error::Result;
 use crate::files::OutDir;
 use crate::stereo::Side;
-use crate::stereo::accuracy::{Axis, Range, Verdict};
+use crate::stereo::accuracy::{Accuracy, Axis, HeldOutPair, Range, Verdict};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::check_file::Judged;
 use crate::stereo::whiteness::Field;
@@ -66,6 +66,21 @@ fn explanation(judged: &Judged) -> String {
     )
 }
 
+/// What the verdict means for somebody who must decide.
+fn advice(judged: &Judged) -> String {
+    let [long, _] = judged.accuracy.long_mm;
+    let sure = judged.tolerance_mm;
+    match judged.verdict {
+        Verdict::Pass => format!("Lengths can be trusted to {sure} mm in the volume where the boards stood."),
+        Verdict::Undecided => format!(
+            "The tolerance lies inside the uncertainty: sharper corners or more pairs of the board may decide; until then do not rely on {sure} mm."
+        ),
+        Verdict::Fail => format!(
+            "Do not rely on {sure} mm: errors of lengths of {long} mm, the pairs and the residuals below say where it is lost."
+        ),
+    }
+}
+
 /// The report.
 pub fn page(calibration: &Calibration, judged: &Judged) -> Result<String> {
     let tone = match judged.verdict {
@@ -74,7 +89,8 @@ pub fn page(calibration: &Calibration, judged: &Judged) -> Result<String> {
         Verdict::Fail => Tone::Bad,
     };
     let content = html! {
-        (page::verdict(tone, word(judged.verdict), &explanation(judged)))
+        (page::verdict(tone, word(judged.verdict), &format!("{}. {}", explanation(judged), advice(judged))))
+        @if !judged.advice.is_empty() { p { "What to photograph next, before anything below is relied on:" } (page::warnings(&judged.advice)) }
         (page::warnings(&judged.warnings))
         (scale(judged))
         h2 { "Lengths on pairs that the cameras had not seen" }
@@ -86,6 +102,7 @@ pub fn page(calibration: &Calibration, judged: &Judged) -> Result<String> {
         h2 { "The cameras and the rig" }
         (parameters(calibration))
         (lenses(calibration))
+        (disagreements(judged))
         h2 { "How uncertain a length is over the working volume" }
         (volume(judged)?)
     };
@@ -125,16 +142,12 @@ fn lengths(judged: &Judged) -> Result<Markup> {
     let accuracy = &judged.accuracy;
     let [long, _] = accuracy.long_mm;
     let [short, _] = accuracy.short_mm;
-    let mut every = Vec::new();
-    for pair in &accuracy.pairs {
-        every.extend_from_slice(&pair.long_errors_mm);
-    }
-    let every: Vec<(f64, f64)> = every.iter().enumerate().map(|(i, e)| (i as f64, *e)).collect();
+    let every = every_length(accuracy);
     let guard = |plot: Plot| plot.hline(judged.tolerance_mm, "tolerance").hline(-judged.tolerance_mm, "");
     let a =
-        guard(Plot::new(&format!("(a) Errors of all lengths of {long} mm"), "length", "error, mm").points("", &every))
+        guard(Plot::new(&format!("(a) Errors of all lengths of {long} mm"), "pair", "error, mm").points("", &every))
             .svg()?;
-    let mean = |of: fn(&crate::stereo::accuracy::HeldOutPair) -> Option<f64>| -> Vec<(f64, f64)> {
+    let mean = |of: fn(&HeldOutPair) -> Option<f64>| -> Vec<(f64, f64)> {
         accuracy.pairs.iter().enumerate().filter_map(|(i, p)| Some((i as f64 + 1.0, of(p)?))).collect()
     };
     let b = Plot::new("(b) Mean error of every pair", "pair", "mean error, mm")
@@ -164,7 +177,7 @@ fn lengths(judged: &Judged) -> Result<Markup> {
     let d = range_plot("(d) Every range along y", Axis::Y)?;
     Ok(html! {
         div.side {
-            (page::figure(&a, "Pair after pair, x before y. Steps between pairs are calibration, the width of the band is corner noise."))
+            (page::figure(&a, "Pair after pair, x before y; of very many lengths the worst of each few are drawn. Steps between pairs are calibration, the width of the band is corner noise."))
             (page::figure(&b, "A pair far from the others was moved, blurred or hit from the side by light; a mean that grows with the range is a scale."))
         }
         div.side {
@@ -172,6 +185,23 @@ fn lengths(judged: &Judged) -> Result<Markup> {
             (page::figure(&d, "Errors that do not grow with the range come from the corners, not from the rig."))
         }
     })
+}
+
+/// Fig. 6 (a): all long lengths, spread over their pair's number. Of more than can be told apart the worst of every few stay.
+fn every_length(accuracy: &Accuracy) -> Vec<(f64, f64)> {
+    /// Points of a figure that still loads at once.
+    const MOST_POINTS: usize = 3000;
+    let total: usize = accuracy.pairs.iter().map(|pair| pair.long_errors_mm.len()).sum();
+    let few = total.div_ceil(MOST_POINTS).max(1);
+    let of_pair = |(i, pair): (usize, &HeldOutPair)| -> Vec<(f64, f64)> {
+        let count = pair.long_errors_mm.len().max(1) as f64;
+        let worst = |(k, errors): (usize, &[f64])| {
+            let error = errors.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+            Some((i as f64 + 0.6 + 0.8 * (k * few) as f64 / count, error))
+        };
+        pair.long_errors_mm.chunks(few).enumerate().filter_map(worst).collect()
+    };
+    accuracy.pairs.iter().enumerate().flat_map(of_pair).collect()
 }
 
 fn pairs(calibration: &Calibration, judged: &Judged) -> Markup {
@@ -297,14 +327,43 @@ fn lenses(calibration: &Calibration) -> Markup {
         .lens_scores
         .iter()
         .map(|s| {
-            let px = s.held_out_rms_px.map_or("not determined by these pairs".to_owned(), |px| format!("{px:.5}"));
+            let px = s.held_out_rms_px.map_or("-".to_owned(), |px| format!("{px:.5}"));
             vec![s.model.to_owned(), px]
         })
         .collect();
     html! {
         @if !rows.is_empty() {
-            p { "Lens models on pairs they had not seen. The simplest within two standard errors of the best was taken." }
+            p { "Lens models on pairs they had not seen. The simplest within two standard errors of the best was taken; those without a figure promise nothing beyond chance, or these pairs do not determine them." }
             (page::table(&["lens", "held-out residual px"], &rows))
+        }
+    }
+}
+
+fn disagreements(judged: &Judged) -> Markup {
+    let rows: Vec<Vec<String>> = judged
+        .disagreements
+        .iter()
+        .map(|d| {
+            let [x, y, z] = d.translation_change_mm;
+            vec![
+                format!("{} instead of {}", d.other, d.chosen),
+                format!("{} by {:.4}", d.number, d.change),
+                format!("{:.0}", d.sigmas),
+                format!("{x:.3}, {y:.3}, {z:.3}"),
+                format!("{:.4}", d.length_on_board_change_mm),
+                format!("{:.4}", d.distance_of_boards_change_mm),
+            ]
+        })
+        .collect();
+    let header =
+        ["lens", "moves most", "in its sigmas", "baseline vector mm", "lengths on a board mm", "between boards mm"];
+    html! {
+        @if !rows.is_empty() {
+            p {
+                "Lens models that explain the corners about as well and yet give another rig. The standard deviations above hold only if the lens \
+                 is what it was taken for; the truth may lie anywhere between these models, and lengths with it."
+            }
+            (page::table(&header, &rows))
         }
     }
 }

@@ -133,7 +133,7 @@ pub struct Solved {
 
 impl Problem {
     /// A start for this layout: both cameras with its lens, the shape zero unless free.
-    fn with_layout(&self, layout: &Layout) -> Problem {
+    pub fn with_layout(&self, layout: &Layout) -> Problem {
         let mut problem = self.clone();
         let rig = &mut problem.values.shared.rig;
         for (camera, lens) in [(&mut rig.left, layout.left), (&mut rig.right, layout.right)] {

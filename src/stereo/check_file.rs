@@ -28,7 +28,9 @@ pub struct Judged {
     pub disagreements: Vec<Disagreement>,
     /// Uncertainty of the long range over the volume.
     pub length_sigmas: Vec<LengthSigma>,
-    /// What a person should know before the result.
+    /// What to photograph next, where the views are too few or too much alike.
+    pub advice: Vec<String>,
+    /// What else a person should know.
     pub warnings: Vec<String>,
 }
 
@@ -56,9 +58,9 @@ impl Judged {
         second.iter_mut().for_each(|second| with_board(&mut second.expanded_uncertainty_mm));
         let whiteness = whiteness::check(calibration);
         let disagreements = disagreement::find(calibration);
-        let mut warnings = variety::advise(calibration, &whiteness);
-        warnings.extend(whiteness.describe());
-        warnings.extend(disagreements.iter().map(Disagreement::describe));
+        let advice = variety::advise(calibration, &whiteness);
+        let mut warnings = Vec::from_iter(whiteness.describe());
+        warnings.extend(disagreement::describe(&disagreements));
         let held_out = accuracy.verdict(tolerance_mm);
         let verdict = second.as_ref().map_or(held_out, |second| {
             let own = Verdict::of(second.max_abs_error_mm, second.expanded_uncertainty_mm, tolerance_mm);
@@ -74,7 +76,7 @@ impl Judged {
             held_out.and(own)
         });
         let length_sigmas = volume::length_sigmas(calibration, accuracy.long_mm[0]);
-        Judged { tolerance_mm, verdict, accuracy, second, whiteness, disagreements, length_sigmas, warnings }
+        Judged { tolerance_mm, verdict, accuracy, second, whiteness, disagreements, length_sigmas, advice, warnings }
     }
 }
 
@@ -159,7 +161,7 @@ impl CameraCheckFile {
             lens_scores: calibration.lens_scores.clone(),
             disagreements: judged.disagreements.clone(),
             neighbour_correlation: judged.whiteness.neighbour_correlation,
-            warnings: judged.warnings.clone(),
+            warnings: judged.advice.iter().chain(&judged.warnings).cloned().collect(),
         }
     }
 }

@@ -5,7 +5,6 @@
 //! bundle; pairs that contradict it are taken out and asked again. Goes wrong: most pairs contradict each other.
 
 use super::bundle::{self, Search, Values};
-use rayon::prelude::*;
 use super::calibrate::FEWEST_PAIRS;
 use super::homography::FEWEST_CORNERS;
 use super::layout::{Layout, Shared};
@@ -18,6 +17,7 @@ use super::start::{self, CAUCHY_WIDTH, OneCamera};
 use super::{Error, Lens, Rig};
 use crate::geometry::Transform;
 use crate::imaging::{Board, Corners, Skipped};
+use rayon::prelude::*;
 
 /// Lens of the first rig.
 const FIRST_LENS: Lens = Lens::Brown4;

@@ -72,7 +72,8 @@ fn models(calibration: &Calibration) -> Vec<Trial> {
 fn compare(calibration: &Calibration, chosen: Lens, trial: &Trial) -> Option<Disagreement> {
     let other = trial.layout.left?;
     let names = calibration.layout.names();
-    let (own, theirs) = (calibration.layout.numbers(&calibration.values.shared), trial.layout.numbers(&trial.values.shared));
+    let (own, theirs) =
+        (calibration.layout.numbers(&calibration.values.shared), trial.layout.numbers(&trial.values.shared));
     // Distortion terms mean different things in different models; the pinhole and the rig mean the same in all.
     let comparable = |name: &str| {
         name.starts_with("right_from_left.") || [".fx", ".fy", ".cx", ".cy"].iter().any(|end| name.ends_with(end))
@@ -90,7 +91,8 @@ fn compare(calibration: &Calibration, chosen: Lens, trial: &Trial) -> Option<Dis
             Some((name, change, change.abs() / variance.sqrt()))
         })
         .max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let t = trial.values.shared.rig.right_from_left.translation.vector - calibration.rig().right_from_left.translation.vector;
+    let t = trial.values.shared.rig.right_from_left.translation.vector
+        - calibration.rig().right_from_left.translation.vector;
     let sigmas_of = |axis: usize| {
         let variance = |layout: &Layout, covariance: &nalgebra::DMatrix<f64>| {
             let at = layout.transform_start() + 3 + axis;
@@ -150,6 +152,18 @@ impl Lengths {
         }
         lengths
     }
+}
+
+/// The findings for a person, where there are any: the one that changes lengths most, and the names of the others.
+pub fn describe(all: &[Disagreement]) -> Option<String> {
+    let worst = all.iter().max_by(|a, b| a.length_on_board_change_mm.total_cmp(&b.length_on_board_change_mm))?;
+    let others: Vec<String> = all
+        .iter()
+        .filter(|d| d.other != worst.other)
+        .map(|d| format!("{} ({} by {:.0})", d.other, d.number, d.sigmas))
+        .collect();
+    let and = if others.is_empty() { String::new() } else { format!(". So does {}", others.join(", ")) };
+    Some(worst.describe() + &and)
 }
 
 impl Disagreement {

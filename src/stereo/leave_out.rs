@@ -13,7 +13,13 @@ use super::layout::{Layout, Shared};
 use super::schur::{self, Block};
 
 /// The shared numbers without each fold. `None` where the remaining pairs do not determine them.
-pub fn rigs(blocks: &[Block], layout: &Layout, shared: &Shared, fold_of: &[usize], folds: usize) -> Option<Vec<Shared>> {
+pub fn rigs(
+    blocks: &[Block],
+    layout: &Layout,
+    shared: &Shared,
+    fold_of: &[usize],
+    folds: usize,
+) -> Option<Vec<Shared>> {
     let count = layout.count();
     let reduced: Vec<(DMatrix<f64>, DVector<f64>)> =
         blocks.iter().map(|block| block.reduced(0.0)).collect::<Option<_>>()?;

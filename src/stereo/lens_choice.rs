@@ -31,7 +31,7 @@ const STANDARD_ERRORS: f64 = 2.0;
 pub struct LensScore {
     /// The lens.
     pub model: &'static str,
-    /// Root mean square of the held-out 2-D residuals, px; `None` where the pairs do not determine the lens.
+    /// Root mean square of the held-out 2-D residuals, px; `None` where the pairs do not determine the lens, or it promised nothing.
     pub held_out_rms_px: Option<f64>,
     /// Mean over the pairs of the squared whitened residual a corner.
     pub loss: Option<f64>,
@@ -90,8 +90,8 @@ pub fn choose(start: &Problem, options: &Options) -> Result<Choice, Error> {
     }
     let chosen = simplest(&scores).ok_or(Error::Undetermined { focal_sigma: None })?;
     if forced_shape.is_none() && chosen.layout.shape {
-        let flat = score(&solved.problem, Layout { shape: false, ..chosen.layout });
-        let bends = flat.trial.as_ref().is_none_or(|flat| flat.excess_over(chosen) > 0.0);
+        let flat = chosen.layout.left.and_then(|lens| score(&solved.problem, lens, false).trial);
+        let bends = flat.is_none_or(|flat| flat.excess_over(chosen) > 0.0);
         if !bends {
             scores = ladder(&solved.problem, false);
         }
@@ -100,19 +100,43 @@ pub fn choose(start: &Problem, options: &Options) -> Result<Choice, Error> {
     Ok(Choice { layout: chosen.layout, near: Some(chosen.values.clone()), scores })
 }
 
-/// Every lens from the simplest, each from where the one before it ended: a richer lens begins as the simpler one.
+/// Every lens from the simplest, each from where the one before it ended: a richer lens begins as the simpler one. Above a lens that
+/// the pairs do not determine there is none that they do, and one that promises no more than chance cannot predict better.
 fn ladder(problem: &Problem, shape: bool) -> Vec<LensScore> {
     let mut problem = problem.clone();
-    Lens::LADDER
-        .into_iter()
-        .map(|lens| {
-            let score = score(&problem, Layout::rig(lens, shape));
-            if let Some(trial) = &score.trial {
+    let (mut determined, mut simpler) = (true, None);
+    let mut scores = Vec::new();
+    for lens in Lens::LADDER {
+        let layout = Layout::rig(lens, shape);
+        let dear = lens > Lens::Brown5;
+        let tried = determined && !(dear && simpler.is_some_and(|simpler| !promises(&problem, &layout, &simpler)));
+        let score = if tried { score(&problem, lens, shape) } else { LensScore::untried(lens) };
+        match &score.trial {
+            Some(trial) => {
                 problem.values = trial.values.clone();
+                simpler = Some(layout);
             }
-            score
-        })
-        .collect()
+            None => determined = determined && !tried,
+        }
+        scores.push(score);
+    }
+    scores
+}
+
+/// Whether a richer lens promises to explain more than noise would let it: more than two standard deviations above the mean of
+/// a chi-square with as many degrees of freedom as it adds. What cannot be determined promises nothing.
+fn promises(problem: &Problem, layout: &Layout, simpler: &Layout) -> bool {
+    let start = problem.with_layout(layout);
+    let promised = bundle::blocks(&start.views, layout, &start.values, Loss::Squared)
+        .and_then(|blocks| bundle::promised_chi_square(&blocks, layout));
+    let added = (layout.count() - simpler.count()) as f64;
+    promised.is_some_and(|promised| promised > added + 2.0 * (2.0 * added).sqrt())
+}
+
+impl LensScore {
+    fn untried(lens: Lens) -> LensScore {
+        LensScore { model: lens.name(), held_out_rms_px: None, loss: None, trial: None }
+    }
 }
 
 /// The simplest model within two standard errors of the best.
@@ -156,14 +180,13 @@ impl Trial {
     }
 }
 
-fn score(problem: &Problem, layout: Layout) -> LensScore {
-    let model = layout.left.map_or("none", Lens::name);
-    match hold_out(problem, layout) {
-        Some((trial, rms_px)) => {
-            LensScore { model, held_out_rms_px: Some(rms_px), loss: Some(trial.loss()), trial: Some(trial) }
-        }
-        None => LensScore { model, held_out_rms_px: None, loss: None, trial: None },
-    }
+fn score(problem: &Problem, lens: Lens, shape: bool) -> LensScore {
+    hold_out(problem, Layout::rig(lens, shape)).map_or(LensScore::untried(lens), |(trial, rms_px)| LensScore {
+        held_out_rms_px: Some(rms_px),
+        loss: Some(trial.loss()),
+        trial: Some(trial),
+        ..LensScore::untried(lens)
+    })
 }
 
 /// The model with all pairs and, fold by fold, on those it has not seen. `None` where the pairs do not determine it.
@@ -174,11 +197,8 @@ fn hold_out(problem: &Problem, layout: Layout) -> Option<(Trial, f64)> {
     let folds = FOLDS.min(views.len());
     let fold_of = folds::assign(views.len(), folds);
     let rigs = leave_out::rigs(&blocks, &layout, &trial.values.shared, &fold_of, folds)?;
-    let misses: Vec<Option<Miss>> = views
-        .par_iter()
-        .enumerate()
-        .map(|(i, view)| miss(&rigs[fold_of[i]], view, trial.values.poses[i]))
-        .collect();
+    let misses: Vec<Option<Miss>> =
+        views.par_iter().enumerate().map(|(i, view)| miss(&rigs[fold_of[i]], view, trial.values.poses[i])).collect();
     let misses = misses.into_iter().collect::<Option<Vec<Miss>>>()?;
     let squares: f64 = misses.iter().map(|miss| miss.squares_px2).sum();
     let corners: u32 = misses.iter().map(|miss| miss.corners).sum();

@@ -22,6 +22,7 @@ pub mod measure_file;
 pub mod noise;
 pub mod observations;
 pub mod pose;
+pub mod products;
 pub mod projection;
 pub mod residuals;
 pub mod rig;

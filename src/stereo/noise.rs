@@ -77,13 +77,17 @@ impl Aligned {
     fn new(o: &Observation, residual: &Vector2<f64>) -> Aligned {
         let eigen = o.covariance_px2.symmetric_eigen();
         let along = eigen.eigenvectors.tr_mul(residual);
-        Aligned { squares: [along.x * along.x, along.y * along.y], variances: [eigen.eigenvalues[0], eigen.eigenvalues[1]] }
+        Aligned {
+            squares: [along.x * along.x, along.y * along.y],
+            variances: [eigen.eigenvalues[0], eigen.eigenvalues[1]],
+        }
     }
 
     /// Squared length in units of the covariance with `added` to both variances, px^2.
     fn chi(&self, added: f64) -> f64 {
         let floor = FLOOR_PX * FLOOR_PX;
-        self.squares[0] / (self.variances[0] + added).max(floor) + self.squares[1] / (self.variances[1] + added).max(floor)
+        self.squares[0] / (self.variances[0] + added).max(floor)
+            + self.squares[1] / (self.variances[1] + added).max(floor)
     }
 }
 
@@ -117,7 +121,11 @@ fn fit(residuals: &[(Observation, Vector2<f64>)], reduced: impl Fn(&mut [f64]) -
         let secant = low - at_low * (high - low) / (at_high - at_low);
         let middle = if round % 3 == 2 { 0.5 * (low + high) } else { secant.clamp(low, high) };
         let at = miss(middle);
-        if at < 0.0 { (low, at_low) = (middle, at) } else { (high, at_high) = (middle, at) }
+        if at < 0.0 {
+            (low, at_low) = (middle, at)
+        } else {
+            (high, at_high) = (middle, at)
+        }
         if at == 0.0 || (at.abs() < 1e-9) {
             high = middle;
             break;

@@ -31,6 +31,7 @@ struct Bent {
 
 impl Camera {
     /// Projects a point (mm, in front of the camera) and differentiates. `None` at or behind the camera's plane.
+    #[inline]
     pub fn project_with_derivatives(&self, point: &Point3<f64>) -> Option<Projection> {
         // A comparison with NaN is false, so this way round it is refused as well.
         let in_front = point.z > 0.0;
@@ -47,7 +48,7 @@ impl Camera {
         by_camera[2].x = 1.0;
         by_camera[3].y = 1.0;
         for (column, derivative) in by_camera[4..].iter_mut().zip(&bent.by_distortion[..self.lens.free_count()]) {
-            *column = f * derivative;
+            *column = Vector2::new(self.fx * derivative.x, self.fy * derivative.y);
         }
         Some(Projection {
             px: Point2::new(self.fx * bent.at.x + self.cx, self.fy * bent.at.y + self.cy),
@@ -62,6 +63,7 @@ impl Camera {
         (bent.at, bent.by_ray)
     }
 
+    #[inline]
     fn bend(&self, ray: &Point2<f64>) -> Bent {
         let [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y] = self.distortion;
         let (x, y) = (ray.x, ray.y);

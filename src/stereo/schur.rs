@@ -3,14 +3,13 @@
 //! The matrix is an arrow: every pair touches the shared numbers and its own pose, never another's. With
 //! `H = [A B; B' C]` a pair contributes `A - B C^-1 B'` to the shared system (Triggs et al. 2000, section 6.1), so that a
 //! dense system of some forty unknowns remains however many pairs there are.
-//! The rows of one picture are gathered into a matrix first: one product of matrices is several times faster than a sum of
-//! outer products corner by corner.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, RowVector3, Vector2, Vector3, Vector6};
 
 use super::Camera;
 use super::layout::{Layout, Shared};
 use super::observations::{Observation, Side, View};
+use super::products::{Products, WIDEST};
 use super::robust::Loss;
 use crate::geometry::{Transform, rotation_matrix};
 
@@ -80,9 +79,14 @@ impl<'a> Way<'a> {
         Way { camera, left_turn, left_shift, on }
     }
 
-    /// Writes the whitened residual `predicted - seen` and its derivatives, two rows of the Jacobian, as columns of
-    /// `width` numbers each. `None` where the corner would lie behind its camera.
-    fn rows(&self, packing: &Packing, shape_mm: &[f64; 2], o: &Observation, rows: &mut [f64]) -> Option<Vector2<f64>> {
+    /// Writes the whitened residual `predicted - seen` and its derivatives: two rows of the Jacobian. `None` where the corner would lie behind its camera.
+    fn rows(
+        &self,
+        packing: &Packing,
+        shape_mm: &[f64; 2],
+        o: &Observation,
+        rows: &mut [[f64; WIDEST]],
+    ) -> Option<Vector2<f64>> {
         let turned = self.left_turn * o.board_point(shape_mm).coords;
         let in_left = turned + self.left_shift;
         let (turned_on, in_camera) = match &self.on {
@@ -99,7 +103,7 @@ impl<'a> Way<'a> {
             return None;
         }
         let by_point = o.whitener * projection.by_point;
-        for (k, row) in rows.chunks_exact_mut(packing.width()).enumerate() {
+        for (k, row) in rows.iter_mut().enumerate() {
             let by_point: RowVector3<f64> = by_point.row(k).into();
             let by_left = self.on.as_ref().map_or(by_point, |(turn, _)| by_point * turn);
             let (w0, w1) = (o.whitener[(k, 0)], o.whitener[(k, 1)]);
@@ -149,43 +153,43 @@ pub fn block(shared: &Shared, layout: &Layout, left_from_board: &Transform, view
     for side in Side::BOTH {
         let packing = Packing::new(layout, side);
         let way = Way::new(shared, left_from_board, side);
-        let width = packing.width();
-        let mut rows = DMatrix::zeros(width, 2 * view.active(side).count());
-        for (o, rows) in view.active(side).zip(rows.as_mut_slice().chunks_exact_mut(2 * width)) {
+        let mut products = Products::new(packing.width());
+        for o in view.active(side) {
+            let rows = products.next_two();
             let residual = way.rows(&packing, &shared.shape_mm, o, rows)?;
             let (cost, weight) = loss.cost_and_weight(residual.norm_squared());
             block.cost += cost;
             if weight != 1.0 {
                 let root = weight.sqrt();
-                rows.iter_mut().for_each(|v| *v *= root);
+                rows.iter_mut().flatten().for_each(|v| *v *= root);
             }
         }
-        let products = &rows * rows.transpose();
+        products.finish();
         block.unpack(&packing, &products);
     }
     Some(block)
 }
 
 impl Block {
-    fn unpack(&mut self, packing: &Packing, products: &DMatrix<f64>) {
+    fn unpack(&mut self, packing: &Packing, products: &Products) {
         let pose = packing.shared.len();
         let residual = pose + 6;
         for (i, &to) in packing.shared.iter().enumerate() {
-            self.shared_gradient[to] += products[(residual, i)];
+            self.shared_gradient[to] += products.upper(i, residual);
             for (j, &to_j) in packing.shared.iter().enumerate().skip(i) {
-                self.shared[(to, to_j)] += products[(j, i)];
+                self.shared[(to, to_j)] += products.upper(i, j);
                 if i != j {
-                    self.shared[(to_j, to)] += products[(j, i)];
+                    self.shared[(to_j, to)] += products.upper(i, j);
                 }
             }
             for j in 0..6 {
-                self.mixed[(to, j)] += products[(pose + j, i)];
+                self.mixed[(to, j)] += products.upper(i, pose + j);
             }
         }
         for i in 0..6 {
-            self.pose_gradient[i] += products[(residual, pose + i)];
+            self.pose_gradient[i] += products.upper(pose + i, residual);
             for j in i..6 {
-                let product = products[(pose + j, pose + i)];
+                let product = products.upper(pose + i, pose + j);
                 self.pose[(i, j)] += product;
                 if i != j {
                     self.pose[(j, i)] += product;
@@ -197,10 +201,7 @@ impl Block {
     /// What the pair says about the shared numbers with its own pose eliminated: `A - B C^-1 B'` and the gradient that goes with it.
     pub fn reduced(&self, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let through = &self.mixed * self.pose_inverse(damping)?;
-        Some((
-            &self.shared - &through * self.mixed.transpose(),
-            &self.shared_gradient - &through * self.pose_gradient,
-        ))
+        Some((&self.shared - &through * self.mixed.transpose(), &self.shared_gradient - &through * self.pose_gradient))
     }
 
     /// `C^-1`, the pose's own diagonal stretched by `1 + damping`. `None` where the corners do not determine the pose.

@@ -21,9 +21,19 @@ const LEAST_COVERAGE: f64 = 0.6;
 /// Corners in a cell that make it seen.
 const SEEN: usize = 3;
 
+/// Pairs below which a calibration's own uncertainty rests on too little: a fold then leaves out a tenth or more of all views.
+const ENOUGH_PAIRS: usize = 10;
+
 /// What should be photographed next; empty where the views suffice.
 pub fn advise(calibration: &Calibration, whiteness: &Whiteness) -> Vec<String> {
     let mut advice = Vec::new();
+    let pairs = calibration.views.len();
+    if pairs < ENOUGH_PAIRS {
+        advice.push(format!(
+            "only {pairs} pairs could be used: {} more make the held-out figures reliable",
+            ENOUGH_PAIRS - pairs
+        ));
+    }
     let poses = &calibration.values.poses;
     let normals: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.rotation * Vector3::z()).collect();
     for (name, axis) in [("horizontal", 1usize), ("vertical", 0)] {
