@@ -272,8 +272,8 @@ fn residuals(calibration: &Calibration, judged: &Judged) -> Result<Markup> {
                  Neighbouring corners' residuals correlate by {:.3} (chance: {:.3}).",
                 calibration.rms_px,
                 noise.typical_px(&calibration.views),
-                judged.whiteness.neighbour_correlation,
-                judged.whiteness.standard_error))
+                judged.whiteness.neighbours.along,
+                judged.whiteness.neighbours.standard_error))
         }
         div.side { @for (svg, caption) in &figures { (page::figure(svg, caption)) } }
     })

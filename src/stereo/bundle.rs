@@ -179,6 +179,15 @@ pub struct Uncertainty {
     pub poses: Vec<Matrix6<f64>>,
 }
 
+impl Uncertainty {
+    /// All covariances times a factor.
+    pub fn scaled(mut self, factor: f64) -> Uncertainty {
+        self.shared *= factor;
+        self.poses.iter_mut().for_each(|pose| *pose *= factor);
+        self
+    }
+}
+
 /// Covariance at a minimum. `None` where the views do not determine the unknowns.
 pub fn uncertainty(views: &[View], layout: &Layout, values: &Values) -> Option<Uncertainty> {
     uncertainty_of(&blocks(views, layout, values, Loss::Squared)?, layout)

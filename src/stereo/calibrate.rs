@@ -9,6 +9,7 @@ use super::bundle::{self, Search, Stop, Uncertainty, Values};
 use super::consensus;
 use super::layout::{Layout, Shared};
 use super::lens_choice::{self, LensScore};
+use super::neighbours::NeighbourCorrelation;
 use super::noise::Noise;
 use super::observations::{Side, View};
 use super::residuals;
@@ -50,6 +51,8 @@ pub struct Calibration {
     pub uncertainty: Uncertainty,
     /// How corners scatter.
     pub noise: Noise,
+    /// How neighbouring corners' residuals hang together; the covariance allows for the information that they share.
+    pub neighbours: NeighbourCorrelation,
     /// Root mean square of the length of the 2-D residuals of both pictures, px.
     pub rms_px: f64,
     /// Pairs that were not used.
@@ -95,7 +98,8 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
     let start = Problem { views: consensus.views, values: consensus.values };
     let lens_choice::Choice { layout, near, scores: lens_scores } = lens_choice::choose(&start, options)?;
     let solved = Problem { values: near.unwrap_or(start.values), ..start }.solve(&layout)?;
-    let uncertainty = solved.uncertainty(&layout)?;
+    let neighbours = solved.neighbours(&corners.board);
+    let uncertainty = solved.uncertainty(&layout)?.scaled(neighbours.inflation());
     let Problem { views, mut values } = solved.problem;
     values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: uncertainty.shared.clone() });
     Ok(Calibration {
@@ -106,6 +110,7 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
         values,
         uncertainty,
         noise: solved.noise,
+        neighbours,
         skipped: consensus.skipped,
         lens_scores,
     })
@@ -211,6 +216,12 @@ impl Problem {
 }
 
 impl Solved {
+    fn neighbours(&self, board: &Board) -> NeighbourCorrelation {
+        let Problem { views, values } = &self.problem;
+        let of_view = |(view, pose)| residuals::of_view(&values.shared, view, pose);
+        NeighbourCorrelation::of(board, views.iter().zip(&values.poses).map(of_view))
+    }
+
     /// Covariance of everything; an error where the views do not tell.
     pub fn uncertainty(&self, layout: &Layout) -> Result<Uncertainty, Error> {
         let Problem { views, values } = &self.problem;

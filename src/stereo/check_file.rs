@@ -6,6 +6,7 @@ use super::accuracy::{Accuracy, Range, SecondBoard, Verdict};
 use super::calibrate::Calibration;
 use super::disagreement::{self, Disagreement};
 use super::lens_choice::LensScore;
+use super::neighbours::NeighbourCorrelation;
 use super::variety;
 use super::volume::{self, LengthSigma};
 use super::whiteness::{self, Whiteness};
@@ -105,7 +106,7 @@ pub struct CameraCheckFile {
     second_board: Option<SecondBoard>,
     lens_scores: Vec<LensScore>,
     disagreements: Vec<Disagreement>,
-    neighbour_correlation: f64,
+    neighbour_correlation: NeighbourCorrelation,
     warnings: Vec<String>,
 }
 
@@ -160,7 +161,7 @@ impl CameraCheckFile {
             second_board: judged.second.clone(),
             lens_scores: calibration.lens_scores.clone(),
             disagreements: judged.disagreements.clone(),
-            neighbour_correlation: judged.whiteness.neighbour_correlation,
+            neighbour_correlation: judged.whiteness.neighbours,
             warnings: judged.advice.iter().chain(&judged.warnings).cloned().collect(),
         }
     }

@@ -28,6 +28,11 @@ pub fn active(views: &[View], values: &Values) -> Option<Vec<(Observation, Vecto
         .collect()
 }
 
+/// Residuals (px) of one pair's active corners, where they can be predicted.
+pub fn of_view(shared: &Shared, view: &View, pose: &Transform) -> Vec<(Observation, Vector2<f64>)> {
+    view.observations.iter().filter(|o| o.active).filter_map(|o| Some((*o, residual_px(shared, pose, o)?))).collect()
+}
+
 /// Root mean square of the length of the 2-D residuals of one picture's active corners, px, as OpenCV defines it.
 pub fn rms_px(shared: &Shared, left_from_board: &Transform, view: &View, side: Side) -> Option<f64> {
     let squares = view

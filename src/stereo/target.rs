@@ -10,10 +10,11 @@ use rayon::prelude::*;
 
 use super::Rig;
 use super::layout::{Layout, Shared};
+use super::neighbours::NeighbourCorrelation;
 use super::noise::Noise;
 use super::observations::{Observation, Side, View};
 use super::pose;
-use super::residuals::{residual_px, root_mean_square};
+use super::residuals::{of_view, residual_px, root_mean_square};
 use super::rig::Covariance;
 use super::robust::Loss;
 use super::schur;
@@ -48,7 +49,6 @@ pub fn measure(rig: &Rig, board: &Board, pairs: &[PairCorners]) -> Vec<Result<Ta
     let shared = Shared { rig: rig.clone(), shape_mm: [0.0; 2] };
     let mut views: Vec<View> = pairs.iter().map(|pair| View::new(board, pair, FEWEST_CORNERS)).collect();
     let robust = |view: &View| pose::fit(&shared, view, Loss::Cauchy(CAUCHY_WIDTH)).map(|fit| fit.left_from_board);
-    let mut noise = Noise::UNIT;
     let mut starts: Vec<Option<Transform>> = Vec::new();
     // Twice: the scatter is known only after the first fit.
     for _ in 0..2 {
@@ -57,25 +57,29 @@ pub fn measure(rig: &Rig, board: &Board, pairs: &[PairCorners]) -> Vec<Result<Ta
             .iter()
             .zip(&starts)
             .filter_map(|(view, pose)| Some((view, (*pose)?)))
-            .flat_map(|(view, pose)| residuals_of(&shared, view, &pose))
+            .flat_map(|(view, pose)| of_view(&shared, view, &pose))
             .collect();
-        noise = Noise::from_median(&left);
-        noise.apply(&mut views);
+        Noise::from_median(&left).apply(&mut views);
     }
-    let _ = noise;
-    views.par_iter().zip(&starts).map(|(view, start)| finish(&shared, view, start.as_ref())).collect()
+    let inflation = neighbours(&shared, board, &views, &starts).inflation();
+    views.par_iter().zip(&starts).map(|(view, start)| finish(&shared, view, start.as_ref(), inflation)).collect()
+}
+
+/// How neighbouring corners hang together over all poses, outliers left out.
+fn neighbours(shared: &Shared, board: &Board, views: &[View], starts: &[Option<Transform>]) -> NeighbourCorrelation {
+    let inliers = |(view, start): (&View, &Option<Transform>)| {
+        let all = start.map_or_else(Vec::new, |pose| of_view(shared, view, &pose));
+        all.into_iter().filter(|(o, r)| o.whiten(*r).norm() <= OUTLIER).collect()
+    };
+    NeighbourCorrelation::of(board, views.iter().zip(starts).map(inliers))
 }
 
 fn enough(view: &View) -> bool {
     Side::BOTH.iter().all(|side| view.active(*side).count() >= FEWEST_CORNERS)
 }
 
-fn residuals_of(shared: &Shared, view: &View, pose: &Transform) -> Vec<(Observation, Vector2<f64>)> {
-    view.observations.iter().filter(|o| o.active).filter_map(|o| Some((*o, residual_px(shared, pose, o)?))).collect()
-}
-
-/// Least squares without outliers, and the covariance.
-fn finish(shared: &Shared, view: &View, start: Option<&Transform>) -> Result<TargetPose, String> {
+/// Least squares without outliers, and the covariance. `inflation` allows for what neighbouring corners share.
+fn finish(shared: &Shared, view: &View, start: Option<&Transform>, inflation: f64) -> Result<TargetPose, String> {
     let [left, right] = Side::BOTH.map(|side| view.active(side).count());
     if !enough(view) {
         return Err(format!("too few corners: {left} left, {right} right, at least {FEWEST_CORNERS} each"));
@@ -92,12 +96,13 @@ fn finish(shared: &Shared, view: &View, start: Option<&Transform>) -> Result<Tar
         }
         pose = pose::refine(shared, &view, pose, Loss::Squared).ok_or_else(singular)?.left_from_board;
     }
-    let left = residuals_of(shared, &view, &pose);
+    let left = of_view(shared, &view, &pose);
     let chi: f64 = left.iter().map(|(o, r)| o.whiten(*r).norm_squared()).sum();
     let reduced = chi / (2.0 * left.len() as f64 - 6.0).max(1.0);
     let own = pose::covariance(shared, &view, &pose).ok_or_else(singular)?;
     // A pose that fits worse than the others (blurred, far away) is worth less; one that fits better by chance is not worth more.
-    let covariance = own * reduced.max(1.0) + calibration_share(shared, &view, &pose).unwrap_or_else(Matrix6::zeros);
+    let covariance =
+        own * (inflation * reduced.max(1.0)) + calibration_share(shared, &view, &pose).unwrap_or_else(Matrix6::zeros);
     let squares: Vec<f64> = left.iter().map(|(_, r)| r.norm_squared()).collect();
     Ok(TargetPose {
         cam_from_board: pose,

@@ -1,6 +1,7 @@
 //! Are the residuals noise, or does something show in them that the model lacks?
 //!
-//! In: a calibration. Out: the correlation of neighbouring corners' residuals, and the pattern that is common to all pairs in each cell of
+//! In: a calibration. Out: the correlation of neighbouring corners' residuals along the line that joins them (across it, fits whose
+//! windows overlap correlate without any fault), and the pattern that is common to all pairs in each cell of
 //! both pictures. Noise has neither. A pattern over the picture is a lens that the model cannot bend so; a correlation without one
 //! is a board that is not as assumed, or corners pulled by light and blur.
 
@@ -8,17 +9,15 @@ use nalgebra::Vector2;
 use serde::Serialize;
 
 use super::calibrate::Calibration;
+use super::neighbours::{NeighbourCorrelation, SURE};
 use super::observations::{Observation, Side};
-use super::residuals::residual_px;
+use super::residuals::of_view;
 
 /// Cells along x and y of a picture.
 pub const CELLS: usize = 8;
 
 /// Correlations below this change no result noticeably, however sure they are.
-const HARMLESS: f64 = 0.1;
-
-/// Standard errors beyond which a correlation is not chance.
-const SURE: f64 = 4.0;
+const HARMLESS: f64 = 0.05;
 
 /// The mean residual in a cell of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -47,10 +46,8 @@ pub struct Field {
 /// The residuals' pattern.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Whiteness {
-    /// Correlation of the whitened residuals of neighbouring corners.
-    pub neighbour_correlation: f64,
-    /// Its standard error if there were none.
-    pub standard_error: f64,
+    /// Correlation of the residuals of neighbouring corners.
+    pub neighbours: NeighbourCorrelation,
     /// Left and right picture.
     pub fields: Vec<Field>,
 }
@@ -58,7 +55,7 @@ pub struct Whiteness {
 impl Whiteness {
     /// True where nothing but noise shows.
     pub fn white(&self) -> bool {
-        self.neighbour_correlation.abs() <= HARMLESS.max(SURE * self.standard_error)
+        self.neighbours.along <= HARMLESS.max(SURE * self.neighbours.standard_error)
     }
 
     /// The finding for a person, where there is one.
@@ -71,7 +68,7 @@ impl Whiteness {
             "the residuals are not noise: those of neighbouring corners correlate by {:.2} (chance: {:.2}), and {pattern:.3} px of pattern over the \
              pictures is common to all pairs. The lens model, the board's shape or its print lacks something; the standard deviations \
              are too small then",
-            self.neighbour_correlation, self.standard_error
+            self.neighbours.along, self.neighbours.standard_error
         ))
     }
 }
@@ -79,7 +76,6 @@ impl Whiteness {
 /// Looks for patterns.
 pub fn check(calibration: &Calibration) -> Whiteness {
     let shared = &calibration.values.shared;
-    let (mut product, mut square, mut links, mut count) = (0.0, 0.0, 0usize, 0usize);
     let mut fields = Side::BOTH.map(|side| {
         let camera = match side {
             Side::Left => &shared.rig.left,
@@ -87,36 +83,14 @@ pub fn check(calibration: &Calibration) -> Whiteness {
         };
         Gather::new(side, camera.width, camera.height)
     });
-    let board = &calibration.board;
     for (view, pose) in calibration.views.iter().zip(&calibration.values.poses) {
-        for (side, field) in Side::BOTH.into_iter().zip(&mut fields) {
-            let mut at: Vec<Option<Vector2<f64>>> = vec![None; board.corner_count()];
-            for o in view.active(side) {
-                let Some(residual) = residual_px(shared, pose, o) else { continue };
-                field.add(o, residual);
-                at[board.index(o.col, o.row)] = Some(o.whiten(residual));
-            }
-            for row in 0..board.rows() {
-                for col in 0..board.columns() {
-                    let Some(here) = at[board.index(col, row)] else { continue };
-                    square += here.norm_squared();
-                    count += 2;
-                    let right = (col + 1 < board.columns()).then(|| board.index(col + 1, row));
-                    let below = (row + 1 < board.rows()).then(|| board.index(col, row + 1));
-                    for there in [right, below].into_iter().flatten().filter_map(|i| at[i]) {
-                        product += here.dot(&there);
-                        links += 2;
-                    }
-                }
-            }
+        for (o, residual) in of_view(shared, view, pose) {
+            let [left, right] = &mut fields;
+            let field = if o.side == Side::Left { left } else { right };
+            field.add(&o, residual);
         }
     }
-    let variance = square / count.max(1) as f64;
-    Whiteness {
-        neighbour_correlation: if variance > 0.0 { product / links.max(1) as f64 / variance } else { 0.0 },
-        standard_error: 1.0 / (links.max(1) as f64).sqrt(),
-        fields: fields.into_iter().map(Gather::finish).collect(),
-    }
+    Whiteness { neighbours: calibration.neighbours, fields: fields.into_iter().map(Gather::finish).collect() }
 }
 
 struct Gather {
