@@ -26,6 +26,22 @@ pub fn transform_from_matrix(rotation: Matrix3<f64>, t_mm: Vector3<f64>) -> Tran
     Isometry3::from_parts(Translation3::from(t_mm), rotation)
 }
 
+/// The rotation vector of a rotation matrix, rad. Not from the arc cosine of the trace, which has half the digits near zero
+/// and is no number where rounding makes the trace larger than three.
+pub fn rotation_vector_of_matrix(rotation: &Matrix3<f64>) -> Vector3<f64> {
+    let r = rotation;
+    let sine = 0.5 * Vector3::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]);
+    let s = sine.norm_squared();
+    if s < SMALL_SINE_SQUARED && r.trace() > 1.0 {
+        // arcsin(x) / x; the first term left out is below 1e-16.
+        return sine * (1.0 + s * (1.0 / 6.0 + s * (3.0 / 40.0 + s * (15.0 / 336.0 + s * (105.0 / 3456.0)))));
+    }
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*r)).scaled_axis()
+}
+
+/// Square of the sine up to which a turn is small enough for a short series.
+const SMALL_SINE_SQUARED: f64 = 1e-3;
+
 /// Applies a small change: `exp(delta_r)` on the left of the rotation, `delta_t` added to the translation.
 pub fn perturb(a_from_b: &Transform, delta_r_rad: Vector3<f64>, delta_t_mm: Vector3<f64>) -> Transform {
     let mut rotation = UnitQuaternion::from_scaled_axis(delta_r_rad) * a_from_b.rotation;
@@ -36,4 +52,19 @@ pub fn perturb(a_from_b: &Transform, delta_r_rad: Vector3<f64>, delta_t_mm: Vect
 /// The matrix of the cross product: `skew(a) * b = a x b`.
 pub fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_turn_keeps_its_digits() {
+        for size in [0.0, 1e-12, 1e-7, 1e-3, 0.03, 0.0317, 1.0, 3.0] {
+            let turn = size * Vector3::new(0.48, -0.6, 0.64);
+            let found = rotation_vector_of_matrix(&Rotation3::from_scaled_axis(turn).into_inner());
+            // Entries of the matrix near one are rounded to 1e-16.
+            assert!((found - turn).norm() <= 1e-15 * (1.0 + size), "{size}: {found}");
+        }
+    }
 }

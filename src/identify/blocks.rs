@@ -9,10 +9,10 @@ use nalgebra::{DMatrix, DVector, Matrix3, Point3, SymmetricEigen, Vector3};
 
 use super::kinematics::Place;
 use super::pairwise::Pairs;
-use crate::geometry::{Transform, perturb, skew};
+use crate::geometry::{Transform, perturb, rotation_matrix, rotation_vector_of_matrix, skew};
 
-/// Steps of the inner problem at the most; it is nearly linear and needs two or three.
-const INNER_STEPS: usize = 12;
+/// Steps of the inner problem at the most; it is nearly linear and mostly needs two or three.
+const INNER_STEPS: usize = 50;
 
 /// The inner problem is solved when its step's predicted gain falls below this fraction of its cost.
 const INNER_GAIN: f64 = 1e-14;
@@ -156,6 +156,15 @@ impl Block {
         self.linearised(places, scatter, &self.evaluate(places, scatter, false).unknowns).1
     }
 
+    /// The unknowns at their best, the inverse of their normal matrix, and how they follow the robot's parameters: a column each.
+    pub fn response(&self, places: &[Place], scatter: &Scatter) -> (Unknowns, DMatrix<f64>, DMatrix<f64>) {
+        let unknowns = self.evaluate(places, scatter, false).unknowns;
+        let design = self.linearised(places, scatter, &unknowns).1;
+        let inverse = pseudo_inverse(design.tr_mul(&design));
+        let follows = -(&inverse * design.tr_mul(&self.derivatives(places, scatter, &unknowns)));
+        (unknowns, inverse, follows)
+    }
+
     fn start(&self) -> Unknowns {
         match self {
             Block::Center { .. } | Block::Pairwise(_) => Unknowns::Nothing,
@@ -282,7 +291,7 @@ impl Block {
                 let mut jacobian = DMatrix::zeros(rows_a_spot * count, columns);
                 let mut row = 0;
                 for (spots, frame) in placements.iter().zip(frames) {
-                    let rotation = crate::geometry::rotation_matrix(frame);
+                    let rotation = rotation_matrix(frame);
                     for spot in spots {
                         let place = &places[spot.pose];
                         let whiten = whitener(&spot.covariance_mm2, scatter) * rotation;
@@ -327,10 +336,8 @@ impl Block {
                         let residual = frame * place.point_mm - spot.point_mm;
                         list.push((spot.pose, Raw::Point(residual, spot.covariance_mm2)));
                         if let (true, Some(measured)) = (*oriented, &spot.rotation) {
-                            list.push((
-                                spot.pose,
-                                Raw::Turn(turn(frame, &place.rotation, flange_from_target, measured)),
-                            ));
+                            let sensor_from_flange = rotation_matrix(frame) * place.rotation;
+                            list.push((spot.pose, Raw::Turn(turn(&sensor_from_flange, flange_from_target, measured))));
                         }
                     }
                 }
@@ -342,7 +349,8 @@ impl Block {
 }
 
 impl Unknowns {
-    fn moved(&self, step: &DVector<f64>) -> Unknowns {
+    /// Moved by a step in the coordinates of [`Block::design`].
+    pub fn moved(&self, step: &DVector<f64>) -> Unknowns {
         let three = |at: usize| Vector3::new(step[at], step[at + 1], step[at + 2]);
         match self {
             Unknowns::Nothing => Unknowns::Nothing,
@@ -389,10 +397,10 @@ fn frames_linearised(
             design.fixed_view_mut::<3, 3>(row, 6 * g + 3).copy_from(&whiten);
             if let (true, Some(measured)) = (oriented, &spot.rotation) {
                 let weight = 1.0 / scatter.rotation_rad;
-                let turn = turn(frame, &place.rotation, flange_from_target, measured);
+                let sensor_from_flange = rotation_matrix(frame) * place.rotation;
+                let turn = turn(&sensor_from_flange, flange_from_target, measured);
                 residuals.fixed_rows_mut::<3>(row + 3).copy_from(&(weight * turn));
                 design.fixed_view_mut::<3, 3>(row + 3, 6 * g).copy_from(&(weight * Matrix3::identity()));
-                let sensor_from_flange = crate::geometry::rotation_matrix(frame) * place.rotation;
                 design.fixed_view_mut::<3, 3>(row + 3, last).copy_from(&(weight * sensor_from_flange));
             }
             row += rows_a_spot;
@@ -402,14 +410,12 @@ fn frames_linearised(
 }
 
 /// Predicted orientation after the measured one, as a rotation vector in the sensor's frame.
-fn turn(
-    frame: &Transform,
-    rotation: &Matrix3<f64>,
+pub fn turn(
+    sensor_from_flange: &Matrix3<f64>,
     flange_from_target: &Matrix3<f64>,
     measured: &Matrix3<f64>,
 ) -> Vector3<f64> {
-    let predicted = crate::geometry::rotation_matrix(frame) * rotation * flange_from_target;
-    nalgebra::Rotation3::from_matrix_unchecked(predicted * measured.transpose()).scaled_axis()
+    rotation_vector_of_matrix(&(sensor_from_flange * flange_from_target * measured.transpose()))
 }
 
 /// The matrix W with W (C + s^2 I) W' = I.

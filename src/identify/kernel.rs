@@ -8,11 +8,16 @@
 //! Gravity and harmonics add a small angle that differs by pose; its sine and cosine are short series (error below 1e-13 up to
 //! a tenth of a radian, where the linear models of both have long ceased to hold).
 
+use nalgebra::{Matrix3, Vector3};
+
 use super::kinematics::Kinematics;
 use crate::robot::{Parameter, Robot};
 
 /// Poses that are computed together.
 pub const LANES: usize = 8;
+
+/// Length of the axes whose ends give a rotation, mm: as long as the arm, so that rounding of the points is rounding of the axes.
+const AXIS_MM: f64 = 1000.0;
 
 type Lane = [f64; LANES];
 
@@ -37,6 +42,13 @@ pub struct Points {
     pub y: Vec<f64>,
     /// mm
     pub z: Vec<f64>,
+}
+
+impl Points {
+    /// The point at a pose, mm.
+    pub fn at(&self, pose: usize) -> Vector3<f64> {
+        Vector3::new(self.x[pose], self.y[pose], self.z[pose])
+    }
 }
 
 /// One joint for one vector of offsets.
@@ -90,19 +102,38 @@ impl Kernel {
 
     /// The target's points for these offsets (mm, mrad), written into `points`.
     pub fn points(&self, offsets: &[f64], points: &mut Points) {
+        self.carry(&self.links(offsets), self.tool(offsets), offsets, points);
+    }
+
+    /// `base_from_flange` at every pose for these offsets: where the ends of the flange's axes go.
+    pub fn rotations(&self, offsets: &[f64]) -> Vec<Matrix3<f64>> {
+        let links = self.links(offsets);
+        let [origin, x, y] = [[0.0; 3], [AXIS_MM, 0.0, 0.0], [0.0, AXIS_MM, 0.0]].map(|tool| {
+            let mut points = Points::default();
+            self.carry(&links, tool, offsets, &mut points);
+            points
+        });
+        let axis = |points: &Points, pose: usize| (points.at(pose) - origin.at(pose)) / AXIS_MM;
+        let rotation = |pose: usize| {
+            let (x, y) = (axis(&x, pose), axis(&y, pose));
+            Matrix3::from_columns(&[x, y, x.cross(&y)])
+        };
+        (0..self.pose_count).map(rotation).collect()
+    }
+
+    /// Carries a point of the flange back to the base at every pose.
+    fn carry(&self, links: &[Link], tool: [f64; 3], offsets: &[f64], points: &mut Points) {
         let blocks = self.pose_count.div_ceil(LANES);
         for axis in [&mut points.x, &mut points.y, &mut points.z] {
             axis.resize(blocks * LANES, 0.0);
         }
-        let links = self.links(offsets);
-        let tool = self.tool(offsets);
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
             // SAFETY: the features that the copy is compiled for have just been found.
-            unsafe { self.blocks_avx2(&links, tool, offsets, points) };
+            unsafe { self.blocks_avx2(links, tool, offsets, points) };
             return;
         }
-        self.blocks::<false>(&links, tool, offsets, points);
+        self.blocks::<false>(links, tool, offsets, points);
     }
 
     fn tool(&self, offsets: &[f64]) -> [f64; 3] {
@@ -240,6 +271,8 @@ mod tests {
                 let point = nalgebra::Point3::new(points.x[i], points.y[i], points.z[i]);
                 assert!((point - place.point_mm).norm() < TOLERANCE_MM, "{i}: {point} {}", place.point_mm);
             }
+            let turned = kernel.rotations(&offsets)[i] - place.rotation;
+            assert!(turned.norm() * AXIS_MM < 10.0 * TOLERANCE_MM, "{i}: {turned}");
         }
     }
 }

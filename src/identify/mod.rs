@@ -8,7 +8,7 @@
 //!  base       what the poses determine
 //!  prior      manufacturing tolerance, sized by the data
 //!  prepare    weights, prior, box: the problem that all solvers get      estimate, problem
-//!  trust_region, swarm                                                   the solvers; kernel and fast are their hot loop
+//!  trust_region, swarm                                                   the solvers; kernel, fast and placement are their hot loop
 //!  verify     errors on rows that were not fitted
 //!  choose     models, terms and methods judged on samples held out
 //! ```
@@ -22,6 +22,7 @@ pub mod fast;
 pub mod kernel;
 pub mod kinematics;
 pub mod pairwise;
+pub mod placement;
 pub mod prepare;
 pub mod prior;
 pub mod problem;

@@ -44,6 +44,8 @@ pub struct Swarm<'a> {
     best: Vec<f64>,
     best_cost: f64,
     evaluations: usize,
+    /// Cost at which a particle's last descent by the trust region converged; infinite where none has.
+    bottom: Vec<f64>,
     /// Mean distance to the mean point over the box's diagonal, as ARPSO last judged it: 1 attracts, -1 repels.
     direction: f64,
 }
@@ -78,6 +80,7 @@ impl<'a> Swarm<'a> {
             best: x[..n].to_vec(),
             best_cost: f64::INFINITY,
             evaluations: settings.particles,
+            bottom: vec![f64::INFINITY; settings.particles],
             x,
             v,
             costs,

@@ -13,9 +13,12 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use super::{Swarm, halton};
-use crate::identify::problem::{Problem, Solution};
+use crate::identify::problem::{Problem, Solution, Stop};
 use crate::identify::settings::{Method, SwarmSettings};
 use crate::identify::trust_region;
+
+/// Relative difference below which two costs are one: they come from different sums of the same squares.
+const SAME_COST: f64 = 1e-9;
 
 /// Runs STAPSO.
 pub fn solve(problem: &dyn Problem, settings: &SwarmSettings, seed: u64) -> Solution {
@@ -56,6 +59,9 @@ impl Swarm<'_> {
             }
             if let Some(solution) = &descended[i] {
                 self.evaluations += solution.evaluations;
+                if solution.stop != Stop::IterationLimit {
+                    self.bottom[i] = solution.cost;
+                }
                 if solution.cost < kept.1 {
                     kept = (&solution.x, solution.cost);
                 }
@@ -83,7 +89,8 @@ impl Swarm<'_> {
         moved
     }
 
-    /// Eq. (16) for the particles of least cost; `None` for the others.
+    /// Eq. (16) for the particles of least cost; `None` for the others, and for a particle whose best place is where an
+    /// earlier descent has ended: another one would end there too.
     fn descended(&self) -> Vec<Option<Solution>> {
         let n = self.problem.dimension();
         let mut order: Vec<usize> = (0..self.costs.len()).collect();
@@ -94,6 +101,9 @@ impl Swarm<'_> {
             ..trust_region::Settings::default()
         };
         let step = |i: usize| trust_region::solve(self.problem, &self.own_best[i * n..(i + 1) * n], &trust);
-        (0..self.costs.len()).into_par_iter().map(|i| chosen.contains(&i).then(|| step(i))).collect()
+        (0..self.costs.len())
+            .into_par_iter()
+            .map(|i| (chosen.contains(&i) && self.own_cost[i] < self.bottom[i] * (1.0 - SAME_COST)).then(|| step(i)))
+            .collect()
     }
 }
