@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix3};
 
 use super::Error;
 use super::base::Base;
-use super::blocks::{Raw, Scatter};
+use super::blocks::{Raw, Scatter, product};
 use super::dataset::Dataset;
 use super::estimate::{Estimate, Fit};
 use super::prior::Tolerance;
@@ -115,7 +115,7 @@ impl Prepared {
     pub fn sigmas(&self, x: &[f64]) -> Vec<f64> {
         let (_, jacobian) = white(&self.estimate, &self.base, x);
         let prior = self.prior();
-        let normal = jacobian.tr_mul(&jacobian) + prior.tr_mul(&prior);
+        let normal = product(&jacobian, &jacobian) + prior.tr_mul(&prior);
         let inverse = super::blocks::pseudo_inverse(normal);
         (0..x.len()).map(|i| inverse[(i, i)].max(0.0).sqrt()).collect()
     }
@@ -156,7 +156,7 @@ fn white(estimate: &Estimate, base: &Base, x: &[f64]) -> (DVector<f64>, DMatrix<
 /// Number of parameters that the data, and not the prior, have determined.
 fn effective(estimate: &Estimate, fit: &Fit, x: &[f64], prior: &DMatrix<f64>) -> f64 {
     let (_, jacobian) = white(estimate, fit.base, x);
-    let normal = jacobian.tr_mul(&jacobian);
+    let normal = product(&jacobian, &jacobian);
     let total = &normal + prior.tr_mul(prior);
     match Cholesky::new(total) {
         Some(total) => total.solve(&normal).trace(),

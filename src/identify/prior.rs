@@ -8,6 +8,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::base::Base;
+use super::blocks::product;
 use crate::robot::Parameter;
 
 /// Factors that are tried for every kind.
@@ -74,7 +75,7 @@ impl Tolerance {
         residuals: &DVector<f64>,
         jacobian: &DMatrix<f64>,
     ) -> Tolerance {
-        let normal = jacobian.tr_mul(jacobian);
+        let normal = product(jacobian, jacobian);
         let gradient = jacobian.tr_mul(residuals);
         let score = |t: &Tolerance| evidence(&t.covariance(base, parameters), &normal, &gradient);
         let present = |kind: usize| {

@@ -16,6 +16,9 @@ use crate::robot::{Parameter, Robot, Unit};
 /// A box's wall counts as reached within this fraction of its width.
 const AT_WALL: f64 = 1e-3;
 
+/// Orientations within this are one: a robot keeps an orientation to far less, and so small a turn shows nothing.
+const ONE_ORIENTATION_DEG: f64 = 1.0;
+
 /// The file.
 #[derive(Debug, Clone, Serialize)]
 pub struct Record {
@@ -143,6 +146,14 @@ pub fn quality(set: &Dataset, robot: &Robot, found: &Identification, settings: &
     (Quality { fit: spread(&fit), verify: spread(&verify) }, verify)
 }
 
+/// The largest turn of the nominal flange between two poses of a group (one of them the group's first), deg.
+fn tilt_deg(set: &Dataset, nominal: &Robot, rows: &[usize]) -> f64 {
+    let rotation = |i: usize| nominal.base_from_flange(&set.poses[i].joints_rad).rotation;
+    let mut first = vec![None; set.groups.len()];
+    let turn = |&i: &usize| first[set.poses[i].group].get_or_insert_with(|| rotation(i)).angle_to(&rotation(i));
+    rows.iter().map(turn).fold(0.0, f64::max).to_degrees()
+}
+
 fn spread(errors: &[RowError]) -> PointSpread {
     let points: Vec<f64> = errors.iter().filter_map(|e| e.point_mm.map(|p| p.norm())).collect();
     PointSpread {
@@ -183,6 +194,15 @@ impl Record {
             prior: chosen.prepared.tolerance,
         };
         record.warnings = record.warnings(set, found);
+        if tilt_deg(set, nominal, &found.fitted) < ONE_ORIENTATION_DEG {
+            record.warnings.insert(
+                0,
+                "the flange keeps one orientation within each group: such poses cannot tell the tool and parts of the wrist \
+                 from other parameters, and the identified robot is right for that orientation only; \
+                 vary it by 20 deg or more between poses"
+                    .to_owned(),
+            );
+        }
         record
     }
 

@@ -199,7 +199,9 @@ fn plausible(fit: &Fit, start: &Model, cell: &Cell) -> bool {
 /// True where the large window tells the same as the small one: a hidden or unprinted neighbour square shows as misfit.
 fn agrees(first: &Fit, second: &Fit) -> bool {
     let sigma = (first.covariance_px2 + second.covariance_px2).trace().sqrt();
+    // The copy's grey values are of 8 bits, stretched; the picture's may be of 16.
+    let per_grey_of_copy = (second.model.half_contrast / first.model.half_contrast).abs();
     second.model.corner.norm() < 5.0 * sigma + 0.05
-        && second.residual < 2.0 * first.residual + 1.0
+        && second.residual < per_grey_of_copy * (2.0 * first.residual + 1.0)
         && second.covariance_px2.trace() < 1.5 * first.covariance_px2.trace()
 }
