@@ -12,7 +12,7 @@ use super::bend::bends;
 use super::corner_fit::{Fit, Model, fit};
 use super::detect::Detected;
 use super::grid::{Grid, Places};
-use super::picture::Picture;
+use super::picture::{Picture, Pixels};
 use super::window::{Frame, Window};
 
 /// Half of the first window on the copy, px.
@@ -69,8 +69,12 @@ pub fn measure(picture: &Picture, detected: &Detected) -> Grid<Measured> {
     Grid::from_fn(columns, rows, |col, row| {
         let from = first.get(col, row)?;
         let cell = Cell::of(&places, col, row)?;
-        let start =
+        let mut start =
             Model { corner: Vector2::zeros(), bend: bends[row * columns + col], ..enlarged(&from.fit.model, k) };
+        if matches!(picture.pixels, Pixels::Sixteen(_)) {
+            // The copy's grey values are not the picture's: without contrast the fit finds levels of its own.
+            start.half_contrast = 0.0;
+        }
         let fitted = full_fit(picture, saturation, &cell, &start, &mut window);
         match fitted {
             // At full size the first fit is a measurement already, of a smaller window.

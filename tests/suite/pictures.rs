@@ -7,7 +7,10 @@
 use nalgebra::{Matrix3, Point2, Vector3};
 
 use stereocal::geometry::{Transform, transform};
+use stereocal::imaging::picture::{Picture, Pixels};
+use stereocal::imaging::{detect, refine};
 use stereocal::simulate::backdrop::Backdrop;
+use stereocal::simulate::draws::NormalTable;
 use stereocal::simulate::physical_board::{PhysicalBoard, Workmanship};
 use stereocal::simulate::psf::{Defocus, Optics};
 use stereocal::simulate::render::Renderer;
@@ -294,5 +297,32 @@ fn corners_without_a_model_of_blur_are_where_the_truth_says() {
         assert!(misses.len() == 200 && mean.amax() < 0.001, "{name}: {mean}");
         // Each corner too: the sum is exact but for the curvature of edges and single precision.
         assert!(rms < 0.002, "{name}: {rms}");
+    }
+}
+
+#[test]
+fn more_bits_see_the_same_corners() {
+    let (board, backdrop) = (board(Settings::small().check_workmanship), Backdrop::plain(0.3));
+    let optics = Optics { gaussian_px: 0.7, defocus: None, coma_px: 0.0 };
+    let scene = scene(true_rig(640).left, &board, &backdrop, optics, tilted());
+    let corners = |bits: u8| -> Vec<Point2<f64>> {
+        let sensor = Sensor { bits, full_well_e: 10_000.0, read_noise_e: 3.0, dark: 0.008 };
+        let rendered = Renderer::new(&Scene { sensor, ..scene }).picture(&NormalTable::new());
+        let pixels = match bits {
+            8 => Pixels::Eight(rendered.samples.iter().map(|&v| v as u8).collect()),
+            _ => Pixels::Sixteen(rendered.samples),
+        };
+        let picture = Picture { width: rendered.width, height: rendered.height, pixels };
+        let detected = detect::detect(&picture, board.drawing).unwrap();
+        refine::measure(&picture, &detected).iter().map(|(_, _, found)| found.px).collect()
+    };
+    let eight = corners(8);
+    assert_eq!(eight.len(), 19 * 19);
+    for bits in [12, 16] {
+        let more = corners(bits);
+        let sum: f64 = eight.iter().zip(&more).map(|(a, b)| (a - b).norm_squared()).sum();
+        let rms = (sum / (2 * eight.len()) as f64).sqrt();
+        // The noise is the same; rounding to 8 bits adds a tenth of it, and it moves a corner by some 0.005 px.
+        assert!(more.len() == eight.len() && rms < 0.002, "{bits} bits: {} corners, {rms} px", more.len());
     }
 }
