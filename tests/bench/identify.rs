@@ -2,6 +2,7 @@
 //!
 //! `cargo bench --bench identify [measurements.csv robot.toml]`; without files a robot like the paper's is measured on four spheres.
 //! Prints pose evaluations per second and core; `scripts/bench_identify.py` runs pyswarms and scipy on the same data.
+#![expect(clippy::print_stdout, reason = "a benchmark says what it measured")]
 
 use std::time::Instant;
 
