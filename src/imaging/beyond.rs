@@ -4,70 +4,120 @@
 //! whole line of corners looks just like those inside, the board goes on, and which part of it was found is
 //! chance: left and right would not show the same corners.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 
 use super::detect::Detected;
 use super::grid::Places;
-use super::refine::{Measured, measure_at};
+use super::picture::Picture;
 
 /// Share of a line beyond the border that must look like corners; the board's own outer edge shows none.
 const SHARE: f64 = 0.75;
+/// What of a square's contrast a corner beyond the border shows at least. An edge alone shows none, the end of an edge a half.
+const CONTRAST: f64 = 0.7;
 
 /// How many columns and rows of corners the board has beyond those found; counts one line on each side at the most.
 pub fn lines_beyond(detected: &Detected) -> (usize, usize) {
-    let grid = &detected.corners;
+    let (grid, copy) = (&detected.corners, &detected.copy);
     let (columns, rows) = (grid.columns as isize, grid.rows as isize);
-    let inside: Vec<Measured> = grid
-        .iter()
-        .step_by((grid.count() / 16).max(1))
-        .filter_map(|(col, row, _)| measure_at(detected, &local(grid, col as isize, row as isize)?))
-        .collect();
-    let mut contrasts: Vec<f64> = inside.iter().map(|m| m.fit.model.half_contrast.abs()).collect();
-    contrasts.sort_by(f64::total_cmp);
-    let Some(&usual) = contrasts.get(contrasts.len() / 2) else { return (0, 0) };
-    let goes_on = |line: Vec<(isize, isize)>| {
-        let alike = line.iter().filter(|&&(col, row)| {
-            local(grid, col, row).and_then(|cell| measure_at(detected, &cell)).is_some_and(|m| {
-                let contrast = m.fit.model.half_contrast.abs();
-                // An edge alone, or a T of edges, fits with half the contrast and a residual of that order.
-                contrast > 0.6 * usual && m.fit.residual < 0.25 * contrast
-            })
-        });
-        alike.count() as f64 >= SHARE * line.len() as f64
+    let mut inside: Vec<f64> =
+        grid.iter().filter_map(|(col, row, _)| contrast(copy, grid, col as isize, row as isize)).collect();
+    inside.sort_by(f64::total_cmp);
+    let Some(&usual) = inside.get(inside.len() / 2) else { return (0, 0) };
+    let goes_on = |line: &mut dyn Iterator<Item = (isize, isize)>, length: isize| {
+        let alike = line.filter_map(|(col, row)| contrast(copy, grid, col, row)).filter(|c| c / usual > CONTRAST);
+        alike.count() as f64 >= SHARE * length as f64
     };
-    let column = |col: isize| goes_on((0..rows).map(|row| (col, row)).collect());
-    let row = |row: isize| goes_on((0..columns).map(|col| (col, row)).collect());
+    let column = |col: isize| goes_on(&mut (0..rows).map(|row| (col, row)), rows);
+    let row = |row: isize| goes_on(&mut (0..columns).map(|col| (col, row)), columns);
     (usize::from(column(-1)) + usize::from(column(columns)), usize::from(row(-1)) + usize::from(row(rows)))
 }
 
-/// A corner of the grid, or one square beyond it, with its neighbours towards the middle: place, next column, next row.
-fn local(grid: &Places, col: isize, row: isize) -> Option<[Point2<f64>; 3]> {
+/// Contrast of the four squares round a corner of the grid, or round a place one square beyond it, with the sign that
+/// the order of colours gives it: the lesser of both differences between neighbours across an edge and their
+/// neighbours across the other. `None` outside of the picture.
+fn contrast(copy: &Picture, grid: &Places, col: isize, row: isize) -> Option<f64> {
+    let (place, along, across) = local(grid, col, row)?;
+    let at = |a: f64, b: f64| mean(copy, place + (along * a + across * b) * 0.4);
+    let (pp, pm, mp, mm) = (at(1.0, 1.0)?, at(1.0, -1.0)?, at(-1.0, 1.0)?, at(-1.0, -1.0)?);
+    let sign = if (col + row).rem_euclid(2) == 0 { 1.0 } else { -1.0 };
+    let differences = [pp - pm, pp - mp, mm - pm, mm - mp].map(|d| sign * d);
+    let mean = differences.iter().sum::<f64>() / 4.0;
+    let least = differences.into_iter().fold(f64::MAX, f64::min);
+    let most = differences.into_iter().fold(f64::MIN, f64::max);
+    Some(if mean > 0.0 { least } else { most })
+}
+
+/// Mean of the 3 x 3 pixels at a place; `None` at the picture's border.
+fn mean(copy: &Picture, at: Point2<f64>) -> Option<f64> {
+    let (x, y) = (at.x.round(), at.y.round());
+    if !(x >= 1.0 && y >= 1.0 && x + 1.0 < copy.width as f64 && y + 1.0 < copy.height as f64) {
+        return None;
+    }
+    let (x, y) = (x as usize, y as usize);
+    Some((y - 1..=y + 1).map(|y| (x - 1..=x + 1).map(|x| copy.at(x, y)).sum::<f64>()).sum::<f64>() / 9.0)
+}
+
+/// A corner of the grid or a place one square beyond it, and the steps to the next column and the next row there.
+fn local(grid: &Places, col: isize, row: isize) -> Option<(Point2<f64>, Vector2<f64>, Vector2<f64>)> {
     let (columns, rows) = (grid.columns as isize, grid.rows as isize);
-    // Steps of perspective change evenly enough from one square to the next.
-    let beyond = |at: isize, size: isize| {
-        if at < 0 {
-            1
-        } else if at >= size {
-            -1
-        } else {
-            0
-        }
+    let inward = |at: isize, size: isize| isize::from(at < 0) - isize::from(at >= size);
+    let (dc, dr) = (inward(col, columns), inward(row, rows));
+    let place = if (dc, dr) == (0, 0) {
+        *grid.around(col, row)?
+    } else {
+        // Steps of perspective change evenly enough from one square to the next.
+        let at = |k: isize| grid.around(col + k * dc, row + k * dr);
+        let (near, second) = (at(1)?, at(2)?);
+        let step = near - second;
+        near + step + at(3).map_or(Vector2::zeros(), |third| step - (second - third))
     };
-    let (dc, dr) = (beyond(col, columns), beyond(row, rows));
-    let place = match (dc, dr) {
-        (0, 0) => *grid.around(col, row)?,
-        _ => {
-            let near = grid.around(col + dc, row + dr)?;
-            let step = grid.around(col + dc, row + dr)? - grid.around(col + 2 * dc, row + 2 * dr)?;
-            let before = grid.around(col + 2 * dc, row + 2 * dr)? - grid.around(col + 3 * dc, row + 3 * dr)?;
-            near + step + (step - before)
-        }
+    let (c, r) = (col.clamp(0, columns - 1), row.clamp(0, rows - 1));
+    let step = |dc: isize, dr: isize| {
+        let here = grid.around(c, r)?;
+        let next = grid.around(c + dc, r + dr).map(|p| p - here);
+        next.or_else(|| grid.around(c - dc, r - dr).map(|p| here - p))
     };
-    let inner = |at: isize, size: isize| at.clamp(0, size - 1);
-    let (c, r) = (inner(col, columns), inner(row, rows));
-    let toward = |at: isize, size: isize| if at + 1 < size { 1 } else { -1 };
-    let (tc, tr) = (toward(c, columns), toward(r, rows));
-    let edge =
-        |dc: isize, dr: isize, sign: isize| Some((grid.around(c + dc, r + dr)? - grid.around(c, r)?) * sign as f64);
-    Some([place, place + edge(tc, 0, tc)?, place + edge(0, tr, tr)?])
+    Some((place, step(1, 0)?, step(0, 1)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::grid::Grid;
+    use super::super::picture::Pixels;
+    use super::*;
+
+    /// A board of 7x6 squares of 12 px in a light margin, of which the inner corners in the given ranges were found.
+    fn found(cols: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> Detected {
+        let colour = |x: usize, y: usize| {
+            let (i, j) = (x as isize / 12 - 1, y as isize / 12 - 1);
+            let black = (0..7).contains(&i) && (0..6).contains(&j) && (i + j) % 2 == 0;
+            if black { 40 } else { 200 }
+        };
+        let pixels = (0..108 * 96).map(|k| colour(k % 108, k / 108)).collect();
+        let copy = Picture { width: 108, height: 96, pixels: Pixels::Eight(pixels) };
+        let corners = Grid::from_fn(cols.len(), rows.len(), |col, row| {
+            let (x, y) = ((cols.start + col + 2) * 12, (rows.start + row + 2) * 12);
+            Some(Point2::new(x as f64 - 0.5, y as f64 - 0.5))
+        });
+        Detected { corners, copy, factor: 1 }
+    }
+
+    #[test]
+    fn a_whole_board_ends_where_its_corners_end() {
+        assert_eq!(lines_beyond(&found(0..6, 0..5)), (0, 0));
+    }
+
+    #[test]
+    fn a_part_goes_on_where_it_was_cut() {
+        assert_eq!(lines_beyond(&found(0..5, 0..5)), (1, 0));
+        assert_eq!(lines_beyond(&found(1..5, 0..5)), (2, 0));
+        assert_eq!(lines_beyond(&found(1..6, 1..4)), (1, 2));
+    }
+
+    #[test]
+    fn nothing_is_known_beyond_the_picture() {
+        let mut detected = found(0..5, 0..5);
+        detected.copy.width = 0;
+        assert_eq!(lines_beyond(&detected), (0, 0));
+    }
 }

@@ -7,15 +7,16 @@
 use nalgebra::{Matrix2, Point2};
 use xxhash_rust::xxh3::Xxh3Default;
 
+use super::detect::Refusal;
 use super::grid::Grid;
 use super::{Board, Corner};
 use crate::files::OutDir;
 
 /// Changed with every change of detection or refinement that moves a corner.
-const ALGORITHM: &str = concat!("corners 3 ", env!("CARGO_PKG_VERSION"));
+const ALGORITHM: &str = concat!("corners 4 ", env!("CARGO_PKG_VERSION"));
 
 /// What was found in a picture, or why nothing.
-pub type Look = Result<Grid<Corner>, String>;
+pub type Look = Result<Grid<Corner>, Refusal>;
 
 /// A place for what was found.
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +50,10 @@ impl Cache<'_> {
 fn text(look: &Look) -> String {
     let mut text = format!("{ALGORITHM}\n");
     match look {
-        Err(reason) => text.push_str(&format!("none {}\n", reason.replace('\n', " "))),
+        Err(Refusal { reason, seen }) => {
+            let seen = seen.map_or("-".to_owned(), |squares| squares.to_string());
+            text.push_str(&format!("none {seen} {}\n", reason.replace('\n', " ")));
+        }
         Ok(grid) => {
             for (_, _, c) in grid.iter() {
                 let s = c.covariance_px2.map_or([f64::NAN; 3], |s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]]);
@@ -67,8 +71,10 @@ fn text(look: &Look) -> String {
 
 fn parse(text: &str, board: Board) -> Option<Look> {
     let body = text.strip_prefix(ALGORITHM)?.strip_prefix('\n')?.strip_suffix("end\n")?;
-    if let Some(reason) = body.strip_prefix("none ") {
-        return Some(Err(reason.trim_end().to_owned()));
+    if let Some(refusal) = body.strip_prefix("none ") {
+        let (seen, reason) = refusal.split_once(' ')?;
+        let seen = if seen == "-" { None } else { Some(seen.parse().ok()?) };
+        return Some(Err(Refusal { reason: reason.trim_end().to_owned(), seen }));
     }
     let mut grid: Grid<Corner> = Grid::from_fn(board.columns(), board.rows(), |_, _| None);
     for line in body.lines() {
@@ -106,8 +112,10 @@ mod tests {
             assert_eq!(parse(&written[..cut], board()), None);
         }
         assert_eq!(parse(&written.replace("1 0 1.3", "9 0 1.3"), board()), None);
-        let none: Look = Err("no board found".to_owned());
-        assert_eq!(parse(&text(&none), board()), Some(none));
+        for seen in [None, Some("10x7".parse().unwrap())] {
+            let none: Look = Err(Refusal { reason: "no board found".to_owned(), seen });
+            assert_eq!(parse(&text(&none), board()), Some(none));
+        }
     }
 
     #[test]

@@ -25,6 +25,8 @@ use super::window::{Group, LANES, Window};
 
 /// Number of parameters: c (2), edge angles (2), blurs (2), m, A/2, g (2).
 const N: usize = 10;
+/// The parameters' derivatives and the residual.
+const COLUMNS: usize = N + 1;
 /// Steps after which a fit that still moves is given up; a good start needs three to six.
 const MAX_STEPS: usize = 40;
 /// Least blur, px: that of the box of a pixel alone, 1/sqrt(12). Sharpened pictures would fit less, with a slope that no pixel sees.
@@ -64,8 +66,12 @@ pub struct Fit {
     pub pixels: usize,
     /// Number of pixels that were left out as saturated.
     pub saturated: usize,
+    /// Number of steps to the end.
+    pub steps: usize,
 }
 
+/// A number for each pixel of a group.
+type Lanes = [f64; LANES];
 type Normal = SMatrix<f64, N, N>;
 type Column = SVector<f64, N>;
 
@@ -79,6 +85,15 @@ struct Shared {
     correlation_slope: f64,
     /// 1 / sqrt(1 - correlation^2).
     stretch: f64,
+    crossing: Crossing,
+}
+
+/// What [`Shared::cross`] needs of the correlation alone.
+struct Crossing {
+    /// sin of each node, -1 / (2 cos^2) of it, and the node's weight times 4 arcsin(correlation) / tau.
+    nodes: [(f64, f64, f64); 6],
+    /// The same for the correlation itself, with 4 / (tau cos).
+    top: (f64, f64, f64),
 }
 
 impl Model {
@@ -118,72 +133,65 @@ impl Model {
             correlation,
             correlation_slope: -turn.sin(),
             stretch: 1.0 / (1.0 - correlation * correlation).sqrt(),
+            crossing: Crossing::new(correlation),
         }
     }
 
     /// Grey values and their derivatives for a group of pixels.
     #[inline(always)]
-    fn evaluate(&self, shared: &Shared, group: &Group) -> ([f64; LANES], [[f64; LANES]; N]) {
+    fn evaluate(&self, shared: &Shared, group: &Group, grey: &mut Lanes, j: &mut [Lanes; COLUMNS]) {
         let zero = [[0.0; LANES]; 2];
         let (mut z, mut along, mut value, mut slope, mut other) = (zero, zero, zero, zero, zero);
-        let mut nearest = f64::MAX;
-        for l in 0..LANES {
-            let (dx, dy) = (group.x[l] - self.corner.x, group.y[l] - self.corner.y);
-            for k in 0..2 {
-                let v = shared.cos[k] * dx + shared.sin[k] * dy;
-                let u = shared.cos[k] * dy - shared.sin[k] * dx + 0.5 * self.bend[k] * v * v;
+        for k in 0..2 {
+            let (sin, cos, per_blur, bend) = (shared.sin[k], shared.cos[k], shared.per_blur[k], self.bend[k]);
+            for l in 0..LANES {
+                let (dx, dy) = (group.x[l] - self.corner.x, group.y[l] - self.corner.y);
+                let v = cos * dx + sin * dy;
                 along[k][l] = v;
-                z[k][l] = u * shared.per_blur[k];
-                let e = exp_negative(-0.5 * z[k][l] * z[k][l]);
-                value[k][l] = erf_from(z[k][l] * FRAC_1_SQRT_2, e);
-                slope[k][l] = e * shared.per_blur[k] * (FRAC_2_SQRT_PI * FRAC_1_SQRT_2);
+                z[k][l] = (cos * dy - sin * dx + 0.5 * bend * v * v) * per_blur;
+            }
+            for l in 0..LANES {
+                slope[k][l] = exp_negative(-0.5 * z[k][l] * z[k][l]);
+            }
+            for l in 0..LANES {
+                value[k][l] = erf_from(z[k][l] * FRAC_1_SQRT_2, slope[k][l]);
+                slope[k][l] *= per_blur * (FRAC_2_SQRT_PI * FRAC_1_SQRT_2);
             }
         }
-        for l in 0..LANES {
-            (other[0][l], other[1][l]) = (value[1][l], value[0][l]);
-            nearest = nearest.min(z[0][l].abs().max(z[1][l].abs()));
-        }
+        (other[0], other[1]) = (value[1], value[0]);
         let mut pattern = [0.0; LANES];
         for l in 0..LANES {
             pattern[l] = value[0][l] * value[1][l];
         }
         let mut by_correlation = [0.0; LANES];
-        if nearest < CROSSING_BLURS {
-            for l in 0..LANES {
-                let (more, by) = crossing(z[0][l], z[1][l], shared.correlation);
-                pattern[l] += more;
-                by_correlation[l] = by;
-                for k in 0..2 {
-                    let b = (z[1 - k][l] - shared.correlation * z[k][l]) * shared.stretch;
-                    other[k][l] = erf_from(b * FRAC_1_SQRT_2, exp_negative(-0.5 * b * b));
-                }
-            }
-        }
-        let mut grey = [0.0; LANES];
-        let mut j = [[0.0; LANES]; N];
+        shared.cross(&z, &mut pattern, &mut by_correlation, &mut other);
+        let mut half = [0.0; LANES];
         for l in 0..LANES {
-            let (x, y) = (group.x[l], group.y[l]);
-            let light = 1.0 + self.light_slope.x * x + self.light_slope.y * y;
+            let (x, y, weight) = (group.x[l], group.y[l], group.weight[l]);
+            let light = weight * (1.0 + self.light_slope.x * x + self.light_slope.y * y);
             let reflected = self.level + self.half_contrast * pattern[l];
             grey[l] = light * reflected;
-            let half = light * self.half_contrast;
-            let turn = half * by_correlation[l] * shared.correlation_slope;
-            for k in 0..2 {
-                let by_u = half * slope[k][l] * other[k][l];
-                let bent = self.bend[k] * along[k][l];
-                j[0][l] += by_u * (shared.sin[k] - bent * shared.cos[k]);
-                j[1][l] += by_u * (-shared.cos[k] - bent * shared.sin[k]);
-                j[2 + k][l] = -by_u * along[k][l];
-                j[4 + k][l] = -by_u * z[k][l];
-            }
-            j[2][l] += turn;
-            j[3][l] -= turn;
+            half[l] = light * self.half_contrast;
             j[6][l] = light;
             j[7][l] = light * pattern[l];
-            j[8][l] = x * reflected;
-            j[9][l] = y * reflected;
+            j[8][l] = weight * x * reflected;
+            j[9][l] = weight * y * reflected;
         }
-        (grey, j)
+        for k in 0..2 {
+            let turn = if k == 0 { shared.correlation_slope } else { -shared.correlation_slope };
+            for l in 0..LANES {
+                let by_u = half[l] * slope[k][l] * other[k][l];
+                let bent = self.bend[k] * along[k][l];
+                slope[k][l] = by_u * (shared.sin[k] - bent * shared.cos[k]);
+                other[k][l] = by_u * (-shared.cos[k] - bent * shared.sin[k]);
+                j[2 + k][l] = half[l] * by_correlation[l] * turn - by_u * along[k][l];
+                j[4 + k][l] = -by_u * z[k][l];
+            }
+        }
+        for l in 0..LANES {
+            j[0][l] = slope[0][l] + slope[1][l];
+            j[1][l] = other[0][l] + other[1][l];
+        }
     }
 
     /// Sum of squared residuals, normal matrix and gradient.
@@ -206,61 +214,80 @@ impl Model {
     #[inline(always)]
     fn normal_lanes(&self, window: &Window) -> (f64, Normal, Column) {
         let shared = self.shared();
-        let mut cost = [0.0; LANES];
-        let mut lower = [[0.0; LANES]; N * (N + 1) / 2];
-        let mut gradient = [[0.0; LANES]; N];
+        // One sum a lane: the loops stay plain enough for the compiler to make vector loops of them.
+        let mut sums = [[0.0; LANES]; COLUMNS * (COLUMNS + 1) / 2];
+        let (mut grey, mut j) = ([0.0; LANES], [[0.0; LANES]; COLUMNS]);
         for group in &window.groups {
-            let (grey, mut j) = self.evaluate(&shared, group);
-            let mut r = [0.0; LANES];
+            self.evaluate(&shared, group, &mut grey, &mut j);
             for l in 0..LANES {
-                r[l] = (group.grey[l] - grey[l]) * group.weight[l];
-                cost[l] += r[l] * r[l];
+                j[N][l] = group.grey[l] * group.weight[l] - grey[l];
             }
             let mut at = 0;
-            for a in 0..N {
-                for l in 0..LANES {
-                    j[a][l] *= group.weight[l];
-                    gradient[a][l] += j[a][l] * r[l];
-                }
+            for a in 0..COLUMNS {
                 for b in 0..=a {
                     for l in 0..LANES {
-                        lower[at][l] += j[a][l] * j[b][l];
+                        sums[at][l] += j[a][l] * j[b][l];
                     }
                     at += 1;
                 }
             }
         }
-        let total = |lanes: [f64; LANES]| lanes.iter().sum::<f64>();
-        let place = |a: usize, b: usize| a.max(b) * (a.max(b) + 1) / 2 + a.min(b);
-        let matrix = Normal::from_fn(|a, b| total(lower[place(a, b)]));
-        (total(cost), matrix, Column::from_fn(|a, _| total(gradient[a])))
+        let total = |a: usize, b: usize| sums[a.max(b) * (a.max(b) + 1) / 2 + a.min(b)].iter().sum::<f64>();
+        (total(N, N), Normal::from_fn(total), Column::from_fn(|a, _| total(N, a)))
     }
 }
 
-/// What correlation adds to the product of two error functions at (a, b), and the derivative by the correlation:
-/// the integral of 4 phi_2(a, b; r) over r from 0 to the correlation, with r = sin t, and 4 phi_2 itself.
-#[inline(always)]
-fn crossing(a: f64, b: f64, correlation: f64) -> (f64, f64) {
-    // Gauss-Legendre on [0, 1], six points: good to 1e-5 down to edges 45 degrees apart.
-    const NODES: [(f64, f64); 6] = [
-        (0.033_765_242_898_423_99, 0.085_662_246_189_585_17),
-        (0.169_395_306_766_867_74, 0.180_380_786_524_069_3),
-        (0.380_690_406_958_401_55, 0.233_956_967_286_345_52),
-        (0.619_309_593_041_598_5, 0.233_956_967_286_345_52),
-        (0.830_604_693_233_132_2, 0.180_380_786_524_069_3),
-        (0.966_234_757_101_576, 0.085_662_246_189_585_17),
-    ];
-    let top = correlation.asin();
-    let density = |sin: f64| {
-        let cos2 = 1.0 - sin * sin;
-        (exp_negative(-(a * a + b * b - 2.0 * a * b * sin) / (2.0 * cos2)), cos2)
-    };
-    let mut sum = 0.0;
-    for (node, weight) in NODES {
-        sum += weight * density((node * top).sin()).0;
+impl Crossing {
+    fn new(correlation: f64) -> Crossing {
+        // Gauss-Legendre on [0, 1], six points: good to 1e-5 down to edges 45 degrees apart.
+        const NODES: [(f64, f64); 6] = [
+            (0.033_765_242_898_423_99, 0.085_662_246_189_585_17),
+            (0.169_395_306_766_867_74, 0.180_380_786_524_069_3),
+            (0.380_690_406_958_401_55, 0.233_956_967_286_345_52),
+            (0.619_309_593_041_598_5, 0.233_956_967_286_345_52),
+            (0.830_604_693_233_132_2, 0.180_380_786_524_069_3),
+            (0.966_234_757_101_576, 0.085_662_246_189_585_17),
+        ];
+        let angle = correlation.asin();
+        let at = |sin: f64, weight: f64| (sin, -0.5 / (1.0 - sin * sin), weight);
+        let nodes = NODES.map(|(node, weight)| at((node * angle).sin(), weight * angle * 4.0 / TAU));
+        Crossing { nodes, top: at(correlation, 4.0 / (TAU * angle.cos())) }
     }
-    let (at_top, cos2) = density(correlation);
-    (4.0 / TAU * top * sum, 4.0 / TAU * at_top / cos2.sqrt())
+}
+
+impl Shared {
+    /// What the edges' correlation changes near their crossing, at places `z` (in blurs from each edge): adds to the product of two
+    /// error functions the integral of 4 phi_2(a, b; r) over r from 0 to the correlation, with r = sin t; gives its
+    /// derivative by the correlation, and for each edge the integral across the other.
+    #[inline(always)]
+    fn cross(&self, z: &[Lanes; 2], pattern: &mut Lanes, by_correlation: &mut Lanes, other: &mut [Lanes; 2]) {
+        let (mut near, mut count) = ([0; LANES], 0);
+        for l in 0..LANES {
+            near[count] = l;
+            count += usize::from(z[0][l].abs().max(z[1][l].abs()) < CROSSING_BLURS);
+        }
+        let (mut squares, mut product, mut more, mut by) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for (i, &l) in near[..count].iter().enumerate() {
+            (squares[i], product[i]) = (z[0][l] * z[0][l] + z[1][l] * z[1][l], 2.0 * z[0][l] * z[1][l]);
+        }
+        for (sin, scale, weight) in self.crossing.nodes {
+            for i in 0..count {
+                more[i] += weight * exp_negative((squares[i] - product[i] * sin) * scale);
+            }
+        }
+        let (sin, scale, weight) = self.crossing.top;
+        for i in 0..count {
+            by[i] = weight * exp_negative((squares[i] - product[i] * sin) * scale);
+        }
+        for (i, &l) in near[..count].iter().enumerate() {
+            pattern[l] += more[i];
+            by_correlation[l] = by[i];
+            for k in 0..2 {
+                let b = (z[1 - k][l] - self.correlation * z[k][l]) * self.stretch;
+                other[k][l] = erf_from(b * FRAC_1_SQRT_2, exp_negative(-0.5 * b * b));
+            }
+        }
+    }
 }
 
 /// Solves for level and contrast, where the start has none, with the rest as it is and even light. `None` where the pixels don't determine them.
@@ -285,8 +312,9 @@ pub fn fit(start: &Model, window: &Window) -> Option<Fit> {
     let mut model = with_levels(start, window)?;
     let (mut cost, mut matrix, mut gradient) = model.normal(window);
     let mut damping = 1e-3;
-    let mut settled = false;
-    for _ in 0..MAX_STEPS {
+    let (mut settled, mut steps) = (false, 0);
+    while steps < MAX_STEPS {
+        steps += 1;
         let mut damped = matrix;
         model.hold_least_blur(&mut damped, &mut gradient);
         for i in 0..N {
@@ -322,8 +350,8 @@ pub fn fit(start: &Model, window: &Window) -> Option<Fit> {
     model.hold_least_blur(&mut matrix, &mut gradient);
     let inverse = matrix.cholesky()?.inverse();
     let covariance_px2 = inverse.fixed_view::<2, 2>(0, 0) * variance;
-    let fit =
-        Fit { model, covariance_px2, residual: variance.sqrt(), pixels: window.count, saturated: window.saturated };
+    let (pixels, saturated) = (window.count, window.saturated);
+    let fit = Fit { model, covariance_px2, residual: variance.sqrt(), pixels, saturated, steps };
     (fit.covariance_px2.iter().all(|v| v.is_finite()) && cost.is_finite()).then_some(fit)
 }
 
@@ -350,17 +378,18 @@ mod tests {
         }
     }
 
+    fn at(model: &Model, x: f64, y: f64) -> (f64, [f64; N]) {
+        let group = Group { x: [x; LANES], y: [y; LANES], grey: [0.0; LANES], weight: [1.0; LANES] };
+        let (mut grey, mut j) = ([0.0; LANES], [[0.0; LANES]; COLUMNS]);
+        model.evaluate(&model.shared(), &group, &mut grey, &mut j);
+        (grey[0], std::array::from_fn(|i| j[i][0]))
+    }
+
     fn window(model: &Model, half: i32) -> Window {
         let mut window = Window::default();
         for y in -half..=half {
             for x in -half..=half {
-                let at = Group {
-                    x: [f64::from(x); LANES],
-                    y: [f64::from(y); LANES],
-                    grey: [0.0; LANES],
-                    weight: [1.0; LANES],
-                };
-                window.push(f64::from(x), f64::from(y), model.evaluate(&model.shared(), &at).0[0], 1.0);
+                window.push(f64::from(x), f64::from(y), at(model, f64::from(x), f64::from(y)).0, 1.0);
             }
         }
         window
@@ -370,9 +399,8 @@ mod tests {
     fn derivatives_match_central_differences() {
         let model = model();
         for (x, y) in [(0.0, 0.0), (1.0, 0.5), (-2.0, 1.0), (0.4, -3.0)] {
-            let at = Group { x: [x; LANES], y: [y; LANES], grey: [0.0; LANES], weight: [1.0; LANES] };
-            let grey = |m: &Model| m.evaluate(&m.shared(), &at).0[0];
-            let (_, j) = model.evaluate(&model.shared(), &at);
+            let grey = |m: &Model| at(m, x, y).0;
+            let (_, j) = at(&model, x, y);
             for (i, column) in j.iter().enumerate() {
                 let h = 1e-4;
                 let mut d = Column::zeros();
@@ -381,11 +409,7 @@ mod tests {
                 let numeric = (up - down) / (2.0 * h);
                 // The approximation of erf is good to 1.5e-7 of 70 grey values, over a step of 1e-4; the second-order
                 // part of a bend's turn is left out of the derivative by angle.
-                assert!(
-                    (numeric - column[0]).abs() < 0.15 + 5e-3 * numeric.abs(),
-                    "{i} at {x},{y}: {numeric} {}",
-                    column[0]
-                );
+                assert!((numeric - column).abs() < 0.15 + 5e-3 * numeric.abs(), "{i} at {x},{y}: {numeric} {column}");
             }
         }
     }

@@ -7,13 +7,19 @@
 
 use nalgebra::{Point2, Vector2};
 
-use super::Board;
 use super::grid::{Grid, Places};
+use super::grow::largest_grid;
 use super::picture::{Grey8, Picture, Pixels};
+use super::{Board, Squares};
 use crate::opencv::{Detector, find_board};
 
 /// Pixels of the copy on which the board is looked for first.
 pub const COARSE_PX: usize = 1_000_000;
+
+/// Grids of fewer corners than this are chance.
+const LEAST_SEEN: usize = 12;
+/// Place of the last attempt on the first copy.
+const FIRST_COPY: usize = 3;
 
 /// A board found in a picture.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,39 +40,201 @@ impl Detected {
     }
 }
 
+/// Why a picture gave no corners.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// For a person.
+    pub reason: String,
+    /// The board of another size that the picture shows instead.
+    pub seen: Option<Squares>,
+}
+
+impl From<String> for Refusal {
+    fn from(reason: String) -> Refusal {
+        Refusal { reason, seen: None }
+    }
+}
+
+/// One attempt: on which copy, in which way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Attempt {
+    copy: Copy,
+    way: Way,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Copy {
+    /// Reduced by a factor.
+    Reduced(usize),
+    /// Enlarged to twice the size, for squares of a few pixels.
+    Doubled,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    OpenCv(Detector),
+    /// Corner by corner, for boards that are not wholly there.
+    Grow,
+}
+
 /// Looks for the board; the reason where it was not found.
-pub fn detect(picture: &Picture, board: Board) -> Result<Detected, String> {
-    let first = factor_for(picture, COARSE_PX);
-    // Finer copies see small boards far away, coarser ones see through blur and noise.
-    let ladder = [
-        (first, Detector::Classic),
-        (first, Detector::ClassicEqualised),
-        (first, Detector::Sectors),
-        (first * 2, Detector::Classic),
-        (first * 2, Detector::Sectors),
-        (first.div_ceil(2), Detector::Classic),
-        (first.div_ceil(2), Detector::Sectors),
-    ];
-    let mut copy: Option<(usize, Grey8)> = None;
-    for (i, &(factor, detector)) in ladder.iter().enumerate() {
-        if ladder[..i].contains(&(factor, detector)) {
+pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
+    let (mut partial, mut seen) = (None::<Detected>, None::<Places>);
+    let mut last: Option<(Copy, Grey8)> = None;
+    let ladder = ladder(picture);
+    for (i, attempt) in ladder.iter().enumerate() {
+        if ladder[..i].contains(attempt) {
             continue;
         }
-        let small = match copy.take() {
-            Some((f, small)) if f == factor => small,
-            _ => picture.reduced(factor),
+        let small = match last.take() {
+            Some((copy, small)) if copy == attempt.copy => small,
+            _ => match attempt.copy {
+                Copy::Reduced(factor) => picture.reduced(factor),
+                Copy::Doubled => doubled(&picture.reduced(1)),
+            },
         };
-        let found = find_board(&small, board.columns(), board.rows(), detector).map_err(|e| e.to_string())?;
-        if let Some(corners) = found {
-            let grid =
-                Grid { columns: board.columns(), rows: board.rows(), cells: corners.into_iter().map(Some).collect() };
+        let found = match attempt.way {
+            Way::OpenCv(detector) => find_board(&small, board.columns(), board.rows(), detector)
+                .map_err(|e| e.to_string())?
+                .map(|corners| whole(board, corners)),
+            Way::Grow => largest_grid(&small).and_then(|grid| {
+                let fitting = of_size(&grid, board);
+                if fitting.is_none() && seen.as_ref().is_none_or(|s| tells(&grid) > tells(s)) {
+                    seen = Some(grid);
+                }
+                fitting
+            }),
+        };
+        if let Some(grid) = found {
+            let complete = grid.count() == board.corner_count();
             let grid = turn_by_colours(&small, right_handed(grid), board);
-            let copy = Picture { width: small.width, height: small.height, pixels: Pixels::Eight(small.pixels) };
-            return Ok(Detected { corners: grid, copy, factor });
+            let detected = on_a_copy(picture, attempt.copy, &small, grid);
+            if complete {
+                return Ok(detected);
+            }
+            if detected.corners.count() > partial.as_ref().map_or(0, |p| p.corners.count()) {
+                partial = Some(detected);
+            }
         }
-        copy = Some((factor, small));
+        last = Some((attempt.copy, small));
+        // Another board, seen whole: more looking would only find a part of it, or take long.
+        if seen.as_ref().is_some_and(|grid| tells(grid).0 && (i >= FIRST_COPY || holds(grid, board))) {
+            break;
+        }
     }
-    Err("no board found".to_owned())
+    // A part of a larger grid is not the board with corners missing.
+    let larger = seen.as_ref().map_or(0, Grid::count);
+    partial.filter(|p| p.corners.count() > larger).ok_or_else(|| refusal(seen, board))
+}
+
+/// How much a grid tells of the size of its board: first whether all its corners are there, then how many they are.
+fn tells(grid: &Places) -> (bool, usize) {
+    (grid.count() == grid.columns * grid.rows && grid.count() >= LEAST_SEEN, grid.count())
+}
+
+/// True where the board could be a part of the grid.
+fn holds(grid: &Places, board: Board) -> bool {
+    grid.columns.max(grid.rows) >= board.columns() && grid.columns.min(grid.rows) >= board.rows()
+}
+
+/// Attempts in their order. Finer copies see small boards far away, coarser ones see through blur and noise.
+fn ladder(picture: &Picture) -> Vec<Attempt> {
+    use Detector::{Classic, ClassicEqualised, Sectors};
+    let first = factor_for(picture, COARSE_PX);
+    let (opencv, copy) = (Way::OpenCv, Copy::Reduced);
+    let mut ladder = vec![
+        (copy(first), opencv(Classic)),
+        (copy(first), Way::Grow),
+        (copy(first), opencv(ClassicEqualised)),
+        (copy(first), opencv(Sectors)),
+        (copy(first * 2), Way::Grow),
+        (copy(first * 2), opencv(Classic)),
+        (copy(first * 2), opencv(Sectors)),
+        (copy(first.div_ceil(2)), opencv(Classic)),
+        (copy(first.div_ceil(2)), Way::Grow),
+        (copy(first.div_ceil(2)), opencv(Sectors)),
+    ];
+    if first == 1 {
+        ladder.extend([(Copy::Doubled, Way::Grow), (Copy::Doubled, opencv(Classic))]);
+    }
+    ladder.into_iter().map(|(copy, way)| Attempt { copy, way }).collect()
+}
+
+fn whole(board: Board, corners: Vec<Point2<f64>>) -> Places {
+    Grid { columns: board.columns(), rows: board.rows(), cells: corners.into_iter().map(Some).collect() }
+}
+
+/// A grid as the board's, where it is as long and as wide as the board: only then it is known which corners are missing.
+fn of_size(grid: &Places, board: Board) -> Option<Places> {
+    /// Share of the board's corners that makes a grid the board.
+    const LEAST: f64 = 0.5;
+    if (grid.count() as f64) < LEAST * board.corner_count() as f64 {
+        return None;
+    }
+    let size = (grid.columns, grid.rows);
+    if size == (board.columns(), board.rows()) {
+        Some(grid.clone())
+    } else if size == (board.rows(), board.columns()) {
+        Some(grid.quarter_turn())
+    } else {
+        None
+    }
+}
+
+/// What was found on a copy, on one that is no finer than the picture.
+fn on_a_copy(picture: &Picture, copy: Copy, small: &Grey8, grid: Places) -> Detected {
+    let of = |small: Grey8| Picture { width: small.width, height: small.height, pixels: Pixels::Eight(small.pixels) };
+    match copy {
+        Copy::Reduced(factor) => Detected { corners: grid, copy: of(small.clone()), factor },
+        Copy::Doubled => {
+            let corners = grid.map(|p| Point2::new((p.x + 0.5) / 2.0 - 0.5, (p.y + 0.5) / 2.0 - 0.5));
+            Detected { corners, copy: of(picture.reduced(1)), factor: 1 }
+        }
+    }
+}
+
+fn refusal(seen: Option<Places>, board: Board) -> Refusal {
+    let Some(grid) = seen.filter(|grid| grid.count() >= LEAST_SEEN) else { return "no board found".to_owned().into() };
+    let (long, short) = (grid.columns.max(grid.rows), grid.columns.min(grid.rows));
+    let (columns, rows) = (board.columns(), board.rows());
+    let seen = format!("{} corners in {long} columns and {short} rows", grid.count());
+    if long <= columns && short <= rows {
+        return format!("shows {seen}: which of the board's {columns}x{rows} they are cannot be told").into();
+    }
+    let complete = tells(&grid).0;
+    let squares = Squares { columns: long + 1, rows: short + 1 };
+    Refusal { reason: format!("shows {seen}, the board has {columns}x{rows}"), seen: complete.then_some(squares) }
+}
+
+/// The board that a picture shows, whatever was asked for, where all its corners are there.
+pub fn size_seen(detected: &Detected) -> Option<Squares> {
+    let Pixels::Eight(pixels) = &detected.copy.pixels else { return None };
+    let small = Grey8 { width: detected.copy.width, height: detected.copy.height, pixels: pixels.clone() };
+    let grid = largest_grid(&small)?;
+    let (columns, rows) = (grid.columns.max(grid.rows) + 1, grid.columns.min(grid.rows) + 1);
+    (grid.count() == grid.columns * grid.rows).then_some(Squares { columns, rows })
+}
+
+/// A copy of twice the size, linear between pixels. Pixel centres map by `x_double = (x + 0.5) * 2 - 0.5`.
+fn doubled(small: &Grey8) -> Grey8 {
+    let (w, h) = (small.width, small.height);
+    // A quarter of a pixel from its own pixel's centre towards the next one's.
+    let near = |i: usize, size: usize| {
+        let other = if i % 2 == 0 { (i / 2).saturating_sub(1) } else { (i / 2 + 1).min(size - 1) };
+        [(i / 2, 3u32), (other, 1u32)]
+    };
+    let mut pixels = Vec::with_capacity(4 * w * h);
+    for y in 0..2 * h {
+        let lines = near(y, h);
+        for x in 0..2 * w {
+            let columns = near(x, w);
+            let weigh = |(row, a): (usize, u32)| {
+                columns.iter().map(|&(col, b)| a * b * u32::from(small.pixels[row * w + col])).sum::<u32>()
+            };
+            pixels.push(((lines.into_iter().map(weigh).sum::<u32>() + 8) / 16) as u8);
+        }
+    }
+    Grey8 { width: 2 * w, height: 2 * h, pixels }
 }
 
 /// The whole factor that brings a picture closest to `pixels` from above.

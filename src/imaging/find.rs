@@ -9,10 +9,11 @@ use camino::Utf8Path;
 use rayon::prelude::*;
 
 use super::cache::{Cache, Look};
+use super::detect::Refusal;
 use super::folder::{self, PairFiles};
 use super::grid::{Grid, Places};
 use super::{
-    Board, Corner, Corners, Error, PairCorners, Side, Skipped, beyond, detect, order, overlay, picture, refine,
+    Board, Corner, Corners, Error, PairCorners, Side, Skipped, Squares, beyond, detect, order, overlay, picture, refine,
 };
 use crate::error::Result;
 use crate::files::OutDir;
@@ -39,7 +40,7 @@ pub fn find_corners(folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Corners> {
     let mut notes: Vec<String> = pairing.left_out().into_iter().collect();
     let sizes = majority_sizes(&pairing.pairs);
     let bar = progress::bar("looking for the board", 2 * pairing.pairs.len() as u64);
-    let seen: Vec<[Result<Grid<Corner>, String>; 2]> = pairing
+    let seen: Vec<[Look; 2]> = pairing
         .pairs
         .par_iter()
         .map(|files| {
@@ -51,6 +52,7 @@ pub fn find_corners(folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Corners> {
         })
         .collect();
     bar.finish_and_clear();
+    let other = other_size(&seen);
     let (found, skipped) = sort_out(&pairing.pairs, seen);
     let total = pairing.pairs.len();
     if found.len() < wanted.needed {
@@ -61,7 +63,7 @@ pub fn find_corners(folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Corners> {
             board: wanted.board,
             path: folder.to_owned(),
             skipped,
-            other: None,
+            other,
         }
         .into());
     }
@@ -80,9 +82,9 @@ fn look(path: &Utf8Path, wanted: &Wanted<'_>, size: (u32, u32), bar: &indicatif:
     bar.inc(1);
     // Depends on the other pictures, so it is not a matter for the cache.
     if let Some(found) = picture::size(path).filter(|found| *found != size) {
-        return Err(format!("is {}x{} px, most others are {}x{}", found.0, found.1, size.0, size.1));
+        return Err(format!("is {}x{} px, most others are {}x{}", found.0, found.1, size.0, size.1).into());
     }
-    std::fs::read(path).map_err(|e| format!("cannot be read: {e}")).and_then(|bytes| {
+    std::fs::read(path).map_err(|e| format!("cannot be read: {e}").into()).and_then(|bytes| {
         let Some(cache) = wanted.cache else { return look_at(bytes, path, wanted.board) };
         let entry = cache.entry(&bytes, wanted.board);
         cache.read(&entry, wanted.board).unwrap_or_else(|| {
@@ -100,11 +102,14 @@ fn look_at(bytes: Vec<u8>, path: &Utf8Path, board: Board) -> Look {
     let (columns, rows) = beyond::lines_beyond(&detected);
     if columns + rows > 0 {
         let squares = board.squares;
-        return Err(format!(
-            "shows a board larger than {squares} squares: its corners go on beyond those (at least {}x{} squares)",
-            squares.columns + columns,
-            squares.rows + rows
-        ));
+        return Err(Refusal {
+            reason: format!(
+                "shows a board larger than {squares} squares: its corners go on beyond those (at least {}x{} squares)",
+                squares.columns + columns,
+                squares.rows + rows
+            ),
+            seen: detect::size_seen(&detected).filter(|seen| *seen != squares),
+        });
     }
     Ok(refine::refine(&picture, &detected))
 }
@@ -137,20 +142,35 @@ fn majority_sizes(pairs: &[PairFiles]) -> [(u32, u32); 2] {
 
 type Found = (String, Grid<Corner>, Grid<Corner>);
 
-fn sort_out(files: &[PairFiles], seen: Vec<[Result<Grid<Corner>, String>; 2]>) -> (Vec<Found>, Vec<Skipped>) {
+/// The size of board that most of the refused pictures show instead.
+fn other_size(seen: &[[Look; 2]]) -> Option<Squares> {
+    let refused: Vec<&Refusal> = seen.iter().flatten().filter_map(|look| look.as_ref().err()).collect();
+    let mut counts: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+    for squares in refused.iter().filter_map(|refusal| refusal.seen) {
+        *counts.entry((squares.columns, squares.rows)).or_default() += 1;
+    }
+    let ((columns, rows), count) = counts.into_iter().max_by_key(|&(size, count)| (count, size))?;
+    (2 * count > refused.len()).then_some(Squares { columns, rows })
+}
+
+fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>) -> (Vec<Found>, Vec<Skipped>) {
     let (mut found, mut skipped) = (Vec::new(), Vec::new());
     for (files, sides) in files.iter().zip(seen) {
         let pair = files.pair.clone();
         match sides {
             [Ok(left), Ok(right)] => found.push((pair, left, right)),
-            [Err(left), Err(right)] if left == right => {
+            [Err(Refusal { reason: left, .. }), Err(Refusal { reason: right, .. })] if left == right => {
                 skipped.push(Skipped { pair, reason: format!("both pictures: {left}") });
             }
-            [Err(left), Err(right)] => {
+            [Err(Refusal { reason: left, .. }), Err(Refusal { reason: right, .. })] => {
                 skipped.push(Skipped { pair, reason: format!("left picture: {left}; right picture: {right}") });
             }
-            [Err(left), Ok(_)] => skipped.push(Skipped { pair, reason: format!("left picture: {left}") }),
-            [Ok(_), Err(right)] => skipped.push(Skipped { pair, reason: format!("right picture: {right}") }),
+            [Err(Refusal { reason: left, .. }), Ok(_)] => {
+                skipped.push(Skipped { pair, reason: format!("left picture: {left}") })
+            }
+            [Ok(_), Err(Refusal { reason: right, .. })] => {
+                skipped.push(Skipped { pair, reason: format!("right picture: {right}") })
+            }
         }
     }
     (found, skipped)

@@ -11,6 +11,7 @@ pub mod detect;
 pub mod find;
 pub mod folder;
 pub mod grid;
+pub mod grow;
 pub mod order;
 pub mod overlay;
 pub mod picture;

@@ -87,16 +87,6 @@ pub fn measure(picture: &Picture, detected: &Detected) -> Grid<Measured> {
     })
 }
 
-/// Measures one corner on the copy, from its place and the places one column and one row further, px of the copy.
-pub fn measure_at(detected: &Detected, [place, next_col, next_row]: &[Point2<f64>; 3]) -> Option<Measured> {
-    let cell = Cell { place: *place, edges: [next_col - place, next_row - place] };
-    if cell.side() * cell.skew() <= 2.0 {
-        return None;
-    }
-    let fit = first_fit(&detected.copy, &cell, &mut Window::default())?;
-    Some(Measured { px: fit.place(place), fit })
-}
-
 /// A corner's surroundings: vectors along the two edges, as long as to the nearer neighbour.
 struct Cell {
     place: Point2<f64>,

@@ -11,8 +11,8 @@ use super::picture::Picture;
 /// Side of a block in the flat parts of a window, px: small, so that few pixels near an edge are taken along.
 const BLOCK_PX: usize = 4;
 
-/// Pixels that are worked on side by side.
-pub const LANES: usize = 4;
+/// Pixels that are worked on side by side: enough that the compiler makes vector loops of them.
+pub const LANES: usize = 32;
 
 /// Observations of a window, places relative to its start.
 #[derive(Debug, Clone, Default)]

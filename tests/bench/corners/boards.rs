@@ -67,6 +67,11 @@ fn row(size: u32, sectors_too: bool) {
     let found: Vec<Point2<f64>> = fits.iter().map(|(_, _, fit)| fit.px).collect();
     let predicted = fits.iter().map(|(_, _, f)| f.fit.covariance_px2.trace() / 2.0).sum::<f64>() / fits.count() as f64;
     println!("{size} px: detect {detect_s:.3} s, refine {refine_s:.3} s, {} corners", fits.count());
+    let mean = |of: &dyn Fn(&refine::Measured) -> usize| {
+        fits.iter().map(|(_, _, m)| of(m) as f64).sum::<f64>() / fits.count() as f64
+    };
+    let (observations, steps) = (mean(&|m| m.fit.pixels), mean(&|m| m.fit.steps));
+    println!("   {observations:.0} observations a corner, {steps:.1} steps at full size");
     println!("   fit {} predicted {:.5}", rms(&found, &truth), predicted.sqrt());
     let grey = Grey8 { width: rendered.width, height: rendered.height, pixels };
     let (k, offset) = (detected.factor as f64, Vector2::new(0.5, 0.5));

@@ -1,18 +1,30 @@
 //! Benchmark of the corner measurement: `cargo bench --bench corners` (add `--profile dev` to reuse the test build).
 //!
 //! Single corners, drawn by supersampling, against the Cramer-Rao bound of the same window; whole boards, drawn by the
-//! simulator's renderer, with OpenCV's `cornerSubPix` and sector detector beside the fit on the same pictures.
+//! simulator's renderer, with OpenCV's `cornerSubPix` and sector detector beside the fit on the same pictures; boards at
+//! all tilts and turns. `-- single`, `-- boards` or `-- poses 300` makes one table alone.
 
 #![allow(clippy::print_stdout, reason = "a benchmark prints its table")]
 
 mod boards;
 mod corner_patch;
+mod poses;
 mod single;
 
 fn main() {
-    if std::env::args().all(|a| a != "boards") {
+    // One table alone where it is named; `poses N` draws N pairs.
+    let arguments: Vec<String> = std::env::args().collect();
+    let named = |name: &str| arguments.iter().position(|a| a == name);
+    let all = ["single", "boards", "poses"].into_iter().all(|name| named(name).is_none());
+    if all || named("single").is_some() {
         single::table();
         single::defocus();
     }
-    boards::table();
+    if all || named("boards").is_some() {
+        boards::table();
+    }
+    if all || named("poses").is_some() {
+        let count = named("poses").and_then(|at| arguments.get(at + 1)?.parse().ok());
+        poses::table(count.unwrap_or(1000));
+    }
 }

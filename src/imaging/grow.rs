@@ -1,0 +1,370 @@
+//! A board put together corner by corner, where no detector sees the whole of it: partly hidden, cut off, or of another size.
+//!
+//! In: a small grey picture. Out: the largest grid of checkerboard corners in it, whatever its size, with holes where corners are
+//! missing. Method: candidates are the local peaks of the ring response of Bennett and Lasenby (ChESS, 2014), each with
+//! the axis of its two bright quadrants; from a candidate and its nearest neighbours of the opposite colouring the grid grows by
+//! predicting each next place from the steps before it. Goes wrong: squares of less than about 8 px, blur of more than half a
+//! square.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{Point2, Vector2};
+
+use super::grid::{Grid, Places};
+use super::picture::Grey8;
+
+/// Offsets of the ring, px, in order round it: radius about 5.
+const RING: [(isize, isize); 16] = [
+    (5, 0),
+    (5, 2),
+    (4, 4),
+    (2, 5),
+    (0, 5),
+    (-2, 5),
+    (-4, 4),
+    (-5, 2),
+    (-5, 0),
+    (-5, -2),
+    (-4, -4),
+    (-2, -5),
+    (0, -5),
+    (2, -5),
+    (4, -4),
+    (5, -2),
+];
+/// The ring's reach, px.
+const REACH: usize = 5;
+/// The strongest candidates that are looked at; a picture full of texture has more.
+const MOST_CANDIDATES: usize = 4000;
+/// Seeds from which a grid is tried.
+const MOST_SEEDS: usize = 200;
+/// How far from its predicted place a corner may be, in steps of the grid.
+const STRAY: f64 = 0.3;
+/// How far the bright axes of neighbours may be from perpendicular, rad.
+const SLANT: f64 = 0.6;
+
+/// A place that looks like a checkerboard corner.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    at: Point2<f64>,
+    strength: i32,
+    /// Direction of the bright quadrants' axis, rad, modulo pi.
+    axis: f64,
+}
+
+/// The largest grid of corners in the picture; `None` where there is none of at least 3 x 3.
+pub fn largest_grid(picture: &Grey8) -> Option<Places> {
+    let candidates = candidates(picture);
+    let near = Near::new(&candidates);
+    let mut taken = vec![false; candidates.len()];
+    let mut best: Vec<((isize, isize), usize)> = Vec::new();
+    let mut seeds = 0;
+    for first in 0..candidates.len() {
+        if taken[first] || seeds == MOST_SEEDS {
+            continue;
+        }
+        seeds += 1;
+        let grown = grow(&candidates, &near, first);
+        if grown.len() >= 9 {
+            grown.iter().for_each(|&(_, i)| taken[i] = true);
+        }
+        if grown.len() > best.len() {
+            best = grown;
+        }
+        // What is left is less than what was found.
+        if best.len() > candidates.len() / 2 {
+            break;
+        }
+    }
+    as_grid(&best, &candidates).filter(|grid| grid.columns >= 3 && grid.rows >= 3)
+}
+
+/// Local peaks of the ring response, the strongest first.
+fn candidates(picture: &Grey8) -> Vec<Candidate> {
+    let (w, h) = (picture.width, picture.height);
+    if w <= 2 * REACH || h <= 2 * REACH {
+        return Vec::new();
+    }
+    let mut response = vec![0i32; w * h];
+    for y in REACH..h - REACH {
+        for x in REACH..w - REACH {
+            response[y * w + x] = ring_response(picture, x, y);
+        }
+    }
+    let mut found = Vec::new();
+    for y in REACH..h - REACH {
+        for x in REACH..w - REACH {
+            let here = response[y * w + x];
+            if here > 0 && is_peak(&response, w, x, y) {
+                found.push(candidate(picture, &response, x, y));
+            }
+        }
+    }
+    found.sort_by(|a: &Candidate, b| b.strength.cmp(&a.strength));
+    // Noise has peaks too; a board's own corners are of about one strength.
+    let least = found.get(20.min(found.len().saturating_sub(1))).map_or(0, |c| c.strength / 8);
+    found.retain(|c| c.strength >= least);
+    found.truncate(MOST_CANDIDATES);
+    found
+}
+
+fn ring_response(picture: &Grey8, x: usize, y: usize) -> i32 {
+    let w = picture.width as isize;
+    let middle = (y * picture.width + x) as isize;
+    let at = |dx: isize, dy: isize| i32::from(picture.pixels[(middle + dy * w + dx) as usize]);
+    let ring = RING.map(|(dx, dy)| at(dx, dy));
+    let (mut sum, mut difference) = (0, 0);
+    for n in 0..4 {
+        sum += (ring[n] + ring[n + 8] - ring[n + 4] - ring[n + 12]).abs();
+    }
+    for n in 0..8 {
+        difference += (ring[n] - ring[n + 8]).abs();
+    }
+    let local = at(0, 0) + at(1, 0) + at(-1, 0) + at(0, 1) + at(0, -1);
+    let mean = (ring.iter().sum::<i32>() - local * 16 / 5).abs();
+    sum - difference - mean
+}
+
+fn is_peak(response: &[i32], w: usize, x: usize, y: usize) -> bool {
+    const AROUND: usize = 3;
+    let here = response[y * w + x];
+    (y - AROUND..=y + AROUND).all(|v| {
+        (x - AROUND..=x + AROUND).all(|u| {
+            let other = response[v * w + u];
+            // Of equal neighbours the first is the peak.
+            other < here || (other == here && (v, u) >= (y, x))
+        })
+    })
+}
+
+fn candidate(picture: &Grey8, response: &[i32], x: usize, y: usize) -> Candidate {
+    let w = picture.width;
+    let (mut sum, mut weight) = (Vector2::zeros(), 0.0);
+    for v in y - 2..=y + 2 {
+        for u in x - 2..=x + 2 {
+            let r = f64::from(response[v * w + u].max(0));
+            sum += Vector2::new(u as f64, v as f64) * r;
+            weight += r;
+        }
+    }
+    let (mut cos, mut sin) = (0.0, 0.0);
+    for (dx, dy) in RING {
+        let grey = f64::from(picture.pixels[((y as isize + dy) as usize) * w + (x as isize + dx) as usize]);
+        let twice = 2.0 * (dy as f64).atan2(dx as f64);
+        cos += grey * twice.cos();
+        sin += grey * twice.sin();
+    }
+    Candidate { at: Point2::from(sum / weight), strength: response[y * w + x], axis: 0.5 * sin.atan2(cos) }
+}
+
+/// Candidates by cells of the picture.
+struct Near<'a> {
+    candidates: &'a [Candidate],
+    cells: BTreeMap<(i64, i64), Vec<usize>>,
+}
+
+/// Side of a cell, px.
+const CELL: f64 = 32.0;
+
+impl<'a> Near<'a> {
+    fn new(candidates: &'a [Candidate]) -> Near<'a> {
+        let mut cells: BTreeMap<(i64, i64), Vec<usize>> = BTreeMap::new();
+        for (i, c) in candidates.iter().enumerate() {
+            cells.entry(cell_of(&c.at)).or_default().push(i);
+        }
+        Near { candidates, cells }
+    }
+
+    /// Candidates within a distance, with it, the nearest first.
+    fn within(&self, at: &Point2<f64>, distance: f64) -> Vec<(f64, usize)> {
+        let (low, high) = (cell_of(&(at - Vector2::repeat(distance))), cell_of(&(at + Vector2::repeat(distance))));
+        let mut found: Vec<(f64, usize)> = Vec::new();
+        for x in low.0..=high.0 {
+            for (_, members) in self.cells.range((x, low.1)..=(x, high.1)) {
+                let distances = members.iter().map(|&i| ((self.candidates[i].at - at).norm(), i));
+                found.extend(distances.filter(|(d, _)| *d <= distance));
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        found
+    }
+}
+
+fn cell_of(p: &Point2<f64>) -> (i64, i64) {
+    ((p.x / CELL).floor() as i64, (p.y / CELL).floor() as i64)
+}
+
+/// True for corners whose colours are those of neighbours along an edge: the bright axes are perpendicular.
+fn opposite(a: &Candidate, b: &Candidate) -> bool {
+    let d = (a.axis - b.axis).rem_euclid(PI);
+    (d - FRAC_PI_2).abs() < SLANT
+}
+
+type Place = (isize, isize);
+
+/// A grid from one candidate on: places with the candidate there.
+fn grow(candidates: &[Candidate], near: &Near, first: usize) -> Vec<(Place, usize)> {
+    let Some(seed_steps) = seed_steps(candidates, near, first) else { return Vec::new() };
+    let mut placed: BTreeMap<Place, usize> = BTreeMap::from([((0, 0), first)]);
+    let mut used = vec![false; candidates.len()];
+    used[first] = true;
+    let mut queue = VecDeque::from([(0, 0)]);
+    while let Some((i, j)) = queue.pop_front() {
+        for (di, dj) in [(1, 0), (0, 1), (-1, 0), (0, -1)] {
+            let next = (i + di, j + dj);
+            if placed.contains_key(&next) {
+                continue;
+            }
+            let at = |place: Place| placed.get(&place).map(|&k| candidates[k].at);
+            let Some(here) = placed.get(&(i, j)).map(|&k| candidates[k]) else { continue };
+            let step = step_at(&at, (i, j), (di, dj))
+                .unwrap_or_else(|| if di != 0 { seed_steps[0] * di as f64 } else { seed_steps[1] * dj as f64 });
+            let stray = STRAY * step.norm();
+            let found = near
+                .within(&(here.at + step), stray)
+                .into_iter()
+                .find(|&(_, k)| !used[k] && opposite(&candidates[k], &here));
+            if let Some((_, k)) = found {
+                used[k] = true;
+                placed.insert(next, k);
+                queue.push_back(next);
+            }
+        }
+    }
+    placed.into_iter().collect()
+}
+
+/// The step from a place in a direction, from the steps before it or beside it.
+fn step_at(at: &dyn Fn(Place) -> Option<Point2<f64>>, (i, j): Place, (di, dj): Place) -> Option<Vector2<f64>> {
+    let here = at((i, j))?;
+    if let Some(back) = at((i - di, j - dj)) {
+        return Some(here - back);
+    }
+    [1, -1].into_iter().find_map(|side| {
+        let (i, j) = (i + side * dj, j + side * di);
+        Some(at((i + di, j + dj))? - at((i, j))?)
+    })
+}
+
+/// Steps to the neighbours of a corner along its two edges: the nearest of opposite colouring, and the nearest of those in
+/// another direction.
+fn seed_steps(candidates: &[Candidate], near: &Near, first: usize) -> Option<[Vector2<f64>; 2]> {
+    /// Edges nearer to each other than this are no board's, rad.
+    const LEAST_ANGLE: f64 = 0.35;
+    let here = &candidates[first];
+    let mut reach = 16.0;
+    while reach < 600.0 {
+        let steps: Vec<Vector2<f64>> = near
+            .within(&here.at, reach)
+            .into_iter()
+            .filter(|&(_, k)| k != first && opposite(&candidates[k], here))
+            .map(|(_, k)| candidates[k].at - here.at)
+            // Edges lie between bright and dark, never along the axis of either.
+            .filter(|step| {
+                let from_axis = (step.y.atan2(step.x) - here.axis).rem_euclid(FRAC_PI_2);
+                from_axis > 0.12 && from_axis < FRAC_PI_2 - 0.12
+            })
+            .collect();
+        if let Some(a) = steps.first()
+            && let Some(b) = steps.iter().find(|b| (a.perp(b).abs() / (a.norm() * b.norm())).asin() > LEAST_ANGLE)
+        {
+            return Some([*a, *b]);
+        }
+        reach *= 2.0;
+    }
+    None
+}
+
+fn as_grid(grown: &[(Place, usize)], candidates: &[Candidate]) -> Option<Places> {
+    let range = |of: &dyn Fn(&Place) -> isize| {
+        let values = grown.iter().map(|(place, _)| of(place));
+        Some((values.clone().min()?, values.max()?))
+    };
+    let ((left, right), (top, bottom)) = (range(&|p| p.0)?, range(&|p| p.1)?);
+    let (columns, rows) = ((right - left + 1) as usize, (bottom - top + 1) as usize);
+    let mut grid: Places = Grid::from_fn(columns, rows, |_, _| None);
+    for &((i, j), k) in grown {
+        grid.cells[(j - top) as usize * columns + (i - left) as usize] = Some(candidates[k].at);
+    }
+    Some(without_stragglers(grid))
+}
+
+/// Takes off outer lines in which few corners are: chance finds beside the board.
+fn without_stragglers(mut grid: Places) -> Places {
+    /// Share of a line's places.
+    const FEW: f64 = 0.4;
+    loop {
+        let in_column = |col: usize| (0..grid.rows).filter(|&row| grid.get(col, row).is_some()).count();
+        let in_row = |row: usize| (0..grid.columns).filter(|&col| grid.get(col, row).is_some()).count();
+        let few = |count: usize, size: usize| (count as f64) < FEW * size as f64;
+        let (columns, rows) = (grid.columns, grid.rows);
+        if columns < 2 || rows < 2 {
+            return grid;
+        }
+        let (c0, c1) = (few(in_column(0), rows), few(in_column(columns - 1), rows));
+        let (r0, r1) = (few(in_row(0), columns), few(in_row(rows - 1), columns));
+        if !(c0 || c1 || r0 || r1) {
+            return grid;
+        }
+        let (left, top) = (usize::from(c0), usize::from(r0));
+        let (wide, high) = (columns.saturating_sub(left + usize::from(c1)), rows.saturating_sub(top + usize::from(r1)));
+        grid = Grid::from_fn(wide, high, |col, row| grid.get(col + left, row + top).copied());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A board of 8x6 squares, skewed, with a part painted over.
+    fn picture(hidden: impl Fn(f64, f64) -> bool) -> Grey8 {
+        let (w, h) = (240, 200);
+        let pixels = (0..w * h)
+            .map(|k| {
+                let mut sum = 0.0;
+                for (a, b) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
+                    let (x, y) = ((k % w) as f64 + a - 30.0, (k / w) as f64 + b - 20.0);
+                    let (u, v) = ((x - 0.2 * y) / 20.0, (y - 0.1 * x) / 20.0);
+                    let inside = (0.0..8.0).contains(&u) && (0.0..6.0).contains(&v);
+                    let black = inside && (u.floor() + v.floor()) as i32 % 2 == 0;
+                    let grey = if hidden(u, v) {
+                        130.0
+                    } else if black {
+                        30.0
+                    } else {
+                        210.0
+                    };
+                    sum += grey / 4.0;
+                }
+                sum as u8
+            })
+            .collect();
+        Grey8 { width: w, height: h, pixels }
+    }
+
+    fn size(grid: &Places) -> (usize, usize) {
+        (grid.columns.max(grid.rows), grid.columns.min(grid.rows))
+    }
+
+    #[test]
+    fn a_whole_board_is_found_whole() {
+        let grid = largest_grid(&picture(|_, _| false)).unwrap();
+        assert_eq!((size(&grid), grid.count()), ((7, 5), 35));
+    }
+
+    #[test]
+    fn a_hidden_part_is_a_hole() {
+        let grid = largest_grid(&picture(|u, v| (2.5..4.5).contains(&u) && (1.5..3.5).contains(&v))).unwrap();
+        assert_eq!((size(&grid), grid.count()), ((7, 5), 31));
+        let cut = largest_grid(&picture(|u, _| u > 5.5)).unwrap();
+        assert_eq!((size(&cut), cut.count()), ((5, 5), 25));
+    }
+
+    #[test]
+    fn nothing_in_nothing() {
+        assert_eq!(largest_grid(&picture(|_, _| true)), None);
+        assert_eq!(largest_grid(&Grey8 { width: 3, height: 3, pixels: vec![0; 9] }), None);
+        assert_eq!(largest_grid(&Grey8 { width: 0, height: 0, pixels: vec![] }), None);
+    }
+}
