@@ -262,9 +262,9 @@ impl Shared {
     #[inline(always)]
     fn cross(&self, z: &[Lanes; 2], pattern: &mut Lanes, by_correlation: &mut Lanes, other: &mut [Lanes; 2]) {
         let (mut near, mut count) = ([0; LANES], 0);
-        for l in 0..LANES {
+        for (l, (a, b)) in z[0].iter().zip(&z[1]).enumerate() {
             near[count] = l;
-            count += usize::from(z[0][l].abs().max(z[1][l].abs()) < CROSSING_BLURS);
+            count += usize::from(a.abs().max(b.abs()) < CROSSING_BLURS);
         }
         let (mut squares, mut product, mut more, mut by) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for (i, &l) in near[..count].iter().enumerate() {

@@ -107,6 +107,10 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
         };
         if let Some(grid) = found {
             let complete = grid.count() == board.corner_count();
+            // The whole of a board is not less than what else hangs together in the picture.
+            if complete && seen.as_ref().is_some_and(|seen| seen.count() > grid.count()) {
+                break;
+            }
             let grid = turn_by_colours(&small, right_handed(grid), board);
             let detected = on_a_copy(picture, attempt.copy, &small, grid);
             if complete {
@@ -201,7 +205,8 @@ fn refusal(seen: Option<Places>, board: Board) -> Refusal {
     if long <= columns && short <= rows {
         return format!("shows {seen}: which of the board's {columns}x{rows} they are cannot be told").into();
     }
-    let complete = tells(&grid).0;
+    // A corner or two are lost easily; the size is but a hint.
+    let complete = 10 * grid.count() >= 9 * long * short;
     let squares = Squares { columns: long + 1, rows: short + 1 };
     Refusal { reason: format!("shows {seen}, the board has {columns}x{rows}"), seen: complete.then_some(squares) }
 }
@@ -220,7 +225,7 @@ fn doubled(small: &Grey8) -> Grey8 {
     let (w, h) = (small.width, small.height);
     // A quarter of a pixel from its own pixel's centre towards the next one's.
     let near = |i: usize, size: usize| {
-        let other = if i % 2 == 0 { (i / 2).saturating_sub(1) } else { (i / 2 + 1).min(size - 1) };
+        let other = if i.is_multiple_of(2) { (i / 2).saturating_sub(1) } else { (i / 2 + 1).min(size - 1) };
         [(i / 2, 3u32), (other, 1u32)]
     };
     let mut pixels = Vec::with_capacity(4 * w * h);

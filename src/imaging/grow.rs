@@ -101,7 +101,7 @@ fn candidates(picture: &Grey8) -> Vec<Candidate> {
             }
         }
     }
-    found.sort_by(|a: &Candidate, b| b.strength.cmp(&a.strength));
+    found.sort_by_key(|c: &Candidate| std::cmp::Reverse(c.strength));
     // Noise has peaks too; a board's own corners are of about one strength.
     let least = found.get(20.min(found.len().saturating_sub(1))).map_or(0, |c| c.strength / 8);
     found.retain(|c| c.strength >= least);

@@ -1,5 +1,6 @@
 //! The program as its users meet it, and the habits of its house.
 
+mod boards;
 mod pictures;
 mod run;
 mod worlds;
