@@ -60,9 +60,16 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
 }
 
 fn explanation(judged: &Judged) -> String {
+    let worst = &judged.accuracy.worst;
     format!(
-        "largest held-out length error {:.4} mm, expanded uncertainty {:.4} mm (k = 2), tolerance {} mm",
-        judged.accuracy.max_abs_error_mm, judged.accuracy.expanded_uncertainty_mm, judged.tolerance_mm
+        "largest held-out length error {:.4} mm, expanded uncertainty {:.4} mm (k = 2; standard deviations: corners {:.4}, calibration {:.4}, board \
+         {:.4}), tolerance {} mm",
+        worst.error_mm,
+        worst.expanded_uncertainty_mm(),
+        worst.corners_mm,
+        worst.calibration_mm,
+        worst.board_mm,
+        judged.tolerance_mm
     )
 }
 

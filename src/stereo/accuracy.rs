@@ -94,11 +94,8 @@ pub enum Verdict {
 /// The accuracy of a rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Accuracy {
-    /// Largest absolute error of any length, mm.
-    pub max_abs_error_mm: f64,
-    /// The expanded uncertainty (k = 2) of that length, mm: the corners at both its ends and the calibration that they share; the
-    /// board's own where it is known.
-    pub expanded_uncertainty_mm: f64,
+    /// The length that comes out most wrong.
+    pub worst: Worst,
     /// Number of folds.
     pub folds: usize,
     /// Lengths of the short and the long range, mm, along x and y alike where the board allows.
@@ -111,12 +108,43 @@ pub struct Accuracy {
     pub pairs: Vec<HeldOutPair>,
 }
 
+/// The length that comes out most wrong, and what makes its error uncertain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Worst {
+    /// Its absolute error, mm.
+    pub error_mm: f64,
+    /// Standard deviation through the corners at both its ends, mm.
+    pub corners_mm: f64,
+    /// Through the calibration that both ends share, mm.
+    pub calibration_mm: f64,
+    /// Of the board's own length; zero where nothing is known of it, mm.
+    pub board_mm: f64,
+}
+
+impl Worst {
+    /// Expanded uncertainty (k = 2) of the error, mm.
+    pub fn expanded_uncertainty_mm(&self) -> f64 {
+        self.expanded_without_corners_mm().hypot(COVERAGE * self.corners_mm)
+    }
+
+    /// The share that is not the corners': calibration and board, expanded (k = 2), mm.
+    pub fn expanded_without_corners_mm(&self) -> f64 {
+        COVERAGE * self.calibration_mm.hypot(self.board_mm)
+    }
+
+    /// With the uncertainty of the board's lengths as a certificate states it (expanded, k = 2), mm.
+    pub fn with_board(self, expanded_mm: f64) -> Worst {
+        Worst { board_mm: expanded_mm / COVERAGE, ..self }
+    }
+}
+
 impl Verdict {
-    /// Pass only where the uncertainty fits into the tolerance as well, fail only where it cannot help (ISO 14253-1).
-    pub fn of(max_abs_error_mm: f64, expanded_uncertainty_mm: f64, tolerance_mm: f64) -> Verdict {
-        if max_abs_error_mm + expanded_uncertainty_mm <= tolerance_mm {
+    /// Pass only where the uncertainty fits into the tolerance as well, fail only where it cannot help (ISO 14253-1). The corners'
+    /// scatter is the rig's own: it stands against a pass and does not excuse an error.
+    pub fn of(worst: &Worst, tolerance_mm: f64) -> Verdict {
+        if worst.error_mm + worst.expanded_uncertainty_mm() <= tolerance_mm {
             Verdict::Pass
-        } else if max_abs_error_mm - expanded_uncertainty_mm > tolerance_mm {
+        } else if worst.error_mm - worst.expanded_without_corners_mm() > tolerance_mm {
             Verdict::Fail
         } else {
             Verdict::Undecided
@@ -136,7 +164,7 @@ impl Verdict {
 impl Accuracy {
     /// What the held-out pairs say.
     pub fn verdict(&self, tolerance_mm: f64) -> Verdict {
-        Verdict::of(self.max_abs_error_mm, self.expanded_uncertainty_mm, tolerance_mm)
+        Verdict::of(&self.worst, tolerance_mm)
     }
 }
 
@@ -189,10 +217,11 @@ pub struct SecondBoard {
     pub pairs: usize,
     /// Pairs that were not, and why.
     pub pairs_skipped: Vec<Skipped>,
-    /// Largest absolute error of any length, mm.
+    /// The length that comes out most wrong.
+    #[serde(skip)]
+    pub worst: Worst,
+    /// Its absolute error, mm.
     pub max_abs_error_mm: f64,
-    /// The expanded uncertainty (k = 2) of that length, mm.
-    pub expanded_uncertainty_mm: f64,
     /// Measured lengths over nominal ones, minus one; both boards' pitch errors and the rig's scale together.
     pub scale_error: f64,
     /// Its standard deviation over the pairs.
@@ -230,12 +259,12 @@ pub fn second_board(calibration: &Calibration, corners: &Corners) -> Option<Seco
     let scale_error = mean(&scales)?;
     let spread: f64 = scales.iter().map(|s| (s - scale_error) * (s - scale_error)).sum();
     let n = scales.len() as f64;
-    let (max_abs_error_mm, expanded_uncertainty_mm) = worst(&measured, |_| calibration.rig())?;
+    let worst = worst(&measured, |_| calibration.rig())?;
     Some(SecondBoard {
         pairs: measured.len(),
         pairs_skipped: skipped,
-        max_abs_error_mm,
-        expanded_uncertainty_mm,
+        worst,
+        max_abs_error_mm: worst.error_mm,
         scale_error,
         scale_error_sigma: (spread / (n - 1.0).max(1.0) / n).sqrt(),
         ranges: all_ranges(board, &measured),
@@ -281,10 +310,8 @@ fn summarise(calibration: &Calibration, rigs: &[Rig], folds: &[usize], measured:
     let long = [largest(LONG_SQUARES, board.columns()), largest(LONG_SQUARES, board.rows())];
     let ranges = all_ranges(board, measured);
     let pairs = calibration.views.iter().zip(measured).map(|(view, m)| pair(view, m, short, long)).collect();
-    let (max_abs_error_mm, expanded_uncertainty_mm) = worst(measured, |i| &rigs[folds[i]])?;
     Some(Accuracy {
-        max_abs_error_mm,
-        expanded_uncertainty_mm,
+        worst: worst(measured, |i| &rigs[folds[i]])?,
         folds: rigs.len(),
         short_mm: short.map(|s| s as f64 * board.square_mm),
         long_mm: long.map(|s| s as f64 * board.square_mm),
@@ -293,8 +320,8 @@ fn summarise(calibration: &Calibration, rigs: &[Rig], folds: &[usize], measured:
     })
 }
 
-/// The largest absolute error of all lengths and the expanded uncertainty of that length, mm; `rig_of` is what measured a pair.
-fn worst<'a>(measured: &[Measured], rig_of: impl Fn(usize) -> &'a Rig) -> Option<(f64, f64)> {
+/// The length that comes out most wrong; `rig_of` is what measured a pair.
+fn worst<'a>(measured: &[Measured], rig_of: impl Fn(usize) -> &'a Rig) -> Option<Worst> {
     let (pair, length) = measured
         .iter()
         .enumerate()
@@ -303,8 +330,12 @@ fn worst<'a>(measured: &[Measured], rig_of: impl Fn(usize) -> &'a Rig) -> Option
     let points = &measured[pair].points;
     let (a, b) = (&points[length.ends.0], &points[length.ends.1]);
     let calibration = rig_of(pair).covariance.as_ref().map_or(0.0, |c| RigCovariance::new(c).length_variance_mm2(a, b));
-    let variance = a.corner_variance_mm2(b) + calibration;
-    Some((length.error_mm.abs(), COVERAGE * variance.max(0.0).sqrt()))
+    Some(Worst {
+        error_mm: length.error_mm.abs(),
+        corners_mm: a.corner_variance_mm2(b).max(0.0).sqrt(),
+        calibration_mm: calibration.max(0.0).sqrt(),
+        board_mm: 0.0,
+    })
 }
 
 fn all_ranges(board: &Board, measured: &[Measured]) -> Vec<Range> {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::accuracy::{Accuracy, Range, SecondBoard, Verdict};
+use super::accuracy::{Accuracy, Range, SecondBoard, Verdict, Worst};
 use super::calibrate::Calibration;
 use super::disagreement::{self, Disagreement};
 use super::lens_choice::LensScore;
@@ -54,9 +54,9 @@ impl Judged {
     ) -> Judged {
         let Demand { tolerance_mm, board_uncertainty_mm } = *demand;
         // An error is measured minus nominal: what the board's true length may differ from its nominal one adds to its uncertainty.
-        let with_board = |uncertainty_mm: &mut f64| *uncertainty_mm = uncertainty_mm.hypot(board_uncertainty_mm);
-        with_board(&mut accuracy.expanded_uncertainty_mm);
-        second.iter_mut().for_each(|second| with_board(&mut second.expanded_uncertainty_mm));
+        let with_board = |worst: &mut Worst| *worst = worst.with_board(board_uncertainty_mm);
+        with_board(&mut accuracy.worst);
+        second.iter_mut().for_each(|second| with_board(&mut second.worst));
         let whiteness = whiteness::check(calibration);
         let disagreements = disagreement::find(calibration);
         let advice = variety::advise(calibration, &whiteness);
@@ -64,12 +64,12 @@ impl Judged {
         warnings.extend(disagreement::describe(&disagreements));
         let held_out = accuracy.verdict(tolerance_mm);
         let verdict = second.as_ref().map_or(held_out, |second| {
-            let own = Verdict::of(second.max_abs_error_mm, second.expanded_uncertainty_mm, tolerance_mm);
+            let own = Verdict::of(&second.worst, tolerance_mm);
             if own != Verdict::Pass {
                 warnings.push(format!(
                     "the second board's lengths are off by up to {:.4} mm (+- {:.4} mm, k = 2), its scale by {:.1} +- {:.1} parts in a million",
-                    second.max_abs_error_mm,
-                    second.expanded_uncertainty_mm,
+                    second.worst.error_mm,
+                    second.worst.expanded_uncertainty_mm(),
                     1e6 * second.scale_error,
                     2e6 * second.scale_error_sigma
                 ));
@@ -89,6 +89,8 @@ pub struct CameraCheckFile {
     tolerance_mm: f64,
     max_abs_error_mm: f64,
     expanded_uncertainty_mm: f64,
+    /// Its standard deviations through the corners, the calibration, and the board's certificate, mm.
+    uncertainty_shares_mm: [f64; 3],
     reprojection_rms_px: f64,
     baseline_mm: f64,
     lens: String,
@@ -143,8 +145,9 @@ impl CameraCheckFile {
             passed: judged.verdict == Verdict::Pass,
             verdict: judged.verdict,
             tolerance_mm: judged.tolerance_mm,
-            max_abs_error_mm: accuracy.max_abs_error_mm,
-            expanded_uncertainty_mm: accuracy.expanded_uncertainty_mm,
+            max_abs_error_mm: accuracy.worst.error_mm,
+            expanded_uncertainty_mm: accuracy.worst.expanded_uncertainty_mm(),
+            uncertainty_shares_mm: [accuracy.worst.corners_mm, accuracy.worst.calibration_mm, accuracy.worst.board_mm],
             reprojection_rms_px: calibration.rms_px,
             baseline_mm: calibration.rig().baseline_mm(),
             lens: calibration.rig().left.lens.name().to_owned(),

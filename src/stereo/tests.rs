@@ -333,9 +333,16 @@ fn held_out_lengths_are_as_wrong_as_the_corners_make_them() {
     assert_eq!(accuracy.ranges.len(), 10 + 7);
     // 0.05 px is 0.056 mm of depth at 550 mm; boards tilted by 35 degrees turn it into 0.045 mm of length; the worst of 30 000
     // lies at four to six sigmas.
-    assert!((0.1..0.4).contains(&accuracy.max_abs_error_mm), "{}", accuracy.max_abs_error_mm);
+    assert!((0.1..0.4).contains(&accuracy.worst.error_mm), "{}", accuracy.worst.error_mm);
     assert_eq!(accuracy.verdict(1.0), accuracy::Verdict::Pass);
     assert_eq!(accuracy.verdict(0.01), accuracy::Verdict::Fail);
+    // The error itself as the tolerance leaves no room for any uncertainty.
+    assert_eq!(accuracy.verdict(accuracy.worst.error_mm), accuracy::Verdict::Undecided);
+    // Corners of 0.05 px leave what was said above; the calibration by twelve pairs a fraction of it.
+    let accuracy::Worst { corners_mm, calibration_mm, .. } = accuracy.worst;
+    assert!((0.01..0.1).contains(&corners_mm) && (0.001..corners_mm).contains(&calibration_mm), "{:?}", accuracy.worst);
+    // A certificate of 30 mm uncertainty decides nothing.
+    assert!(accuracy.worst.with_board(30.0).expanded_uncertainty_mm() > 30.0);
 }
 
 #[test]

@@ -36,7 +36,7 @@ fn main() {
     let (ladder, found) = median_s(|| calibrate(&corners, &Options::default()).expect("a calibration"));
     println!("the same with the ladder  {ladder:.3} s, lens {:?}", found.layout.left);
     let (held_out, accuracy) = median_s(|| accuracy::hold_out(&found).expect("an accuracy"));
-    println!("held-out accuracy         {held_out:.3} s, worst {:.5} mm", accuracy.max_abs_error_mm);
+    println!("held-out accuracy         {held_out:.3} s, worst {:.5} mm", accuracy.worst.error_mm);
     let start = Instant::now();
     let (rms, baseline) = stereocal::opencv::stereo_calibrate(&corners).expect("OpenCV works");
     let peer = start.elapsed().as_secs_f64();
