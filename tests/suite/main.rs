@@ -9,4 +9,5 @@ mod house;
 mod identify;
 mod messages;
 mod pipeline;
+mod published;
 mod real;
