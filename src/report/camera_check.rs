@@ -98,6 +98,7 @@ pub fn page(calibration: &Calibration, judged: &Judged) -> Result<String> {
     let content = html! {
         (page::verdict(tone, word(judged.verdict), &format!("{}. {}", explanation(judged), advice(judged))))
         @if !judged.advice.is_empty() { p { "What to photograph next, before anything below is relied on:" } (page::warnings(&judged.advice)) }
+        @if !judged.warnings.is_empty() { p { "What else to know:" } }
         (page::warnings(&judged.warnings))
         (scale(judged))
         h2 { "Lengths on pairs that the cameras had not seen" }

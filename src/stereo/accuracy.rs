@@ -96,6 +96,9 @@ pub enum Verdict {
 pub struct Accuracy {
     /// The length that comes out most wrong.
     pub worst: Worst,
+    /// Mean over all points of what both rays leave, chi-square with one degree of freedom: one where the pictures disagree as
+    /// much as the corners scatter, less where both see the same deviations from the board.
+    pub rays_chi_square: f64,
     /// Number of folds.
     pub folds: usize,
     /// Lengths of the short and the long range, mm, along x and y alike where the board allows.
@@ -312,6 +315,7 @@ fn summarise(calibration: &Calibration, rigs: &[Rig], folds: &[usize], measured:
     let pairs = calibration.views.iter().zip(measured).map(|(view, m)| pair(view, m, short, long)).collect();
     Some(Accuracy {
         worst: worst(measured, |i| &rigs[folds[i]])?,
+        rays_chi_square: mean(&measured.iter().flat_map(|m| &m.points).map(|p| p.chi_square).collect::<Vec<_>>())?,
         folds: rigs.len(),
         short_mm: short.map(|s| s as f64 * board.square_mm),
         long_mm: long.map(|s| s as f64 * board.square_mm),

@@ -62,6 +62,7 @@ impl Judged {
         let advice = variety::advise(calibration, &whiteness);
         let mut warnings = Vec::from_iter(whiteness.describe());
         warnings.extend(disagreement::describe(&disagreements));
+        warnings.extend(print_scatter(calibration, &accuracy));
         let held_out = accuracy.verdict(tolerance_mm);
         let verdict = second.as_ref().map_or(held_out, |second| {
             let own = Verdict::of(&second.worst, tolerance_mm);
@@ -79,6 +80,24 @@ impl Judged {
         let length_sigmas = volume::length_sigmas(calibration, accuracy.long_mm[0]);
         Judged { tolerance_mm, verdict, accuracy, second, whiteness, disagreements, length_sigmas, advice, warnings }
     }
+}
+
+/// Says where it is the board that scatters and not the corners: both pictures then see the same deviations.
+fn print_scatter(calibration: &Calibration, accuracy: &Accuracy) -> Option<String> {
+    /// Of independent corners the mean of thousands of points lies within a tenth of one.
+    const SHARED: f64 = 0.25;
+    if accuracy.rays_chi_square > SHARED {
+        return None;
+    }
+    let depths = calibration.values.poses.iter().map(|pose| pose.translation.vector.z);
+    let depth_mm = depths.sum::<f64>() / calibration.values.poses.len().max(1) as f64;
+    let sigma_px = calibration.noise.typical_px(&calibration.views);
+    Some(format!(
+        "left and right picture agree on the corners {:.0} times better than the residuals let expect: what scatters is the places of the corners on the \
+         board, by about {:.4} mm each, not what the cameras see of them. A better board, not more pictures, would lower the errors",
+        1.0 / accuracy.rays_chi_square.sqrt(),
+        sigma_px * depth_mm / calibration.rig().left.fx
+    ))
 }
 
 /// The content of `camera-check.json`. Lengths held out: no pair helped to calibrate the cameras that measured it.
@@ -102,6 +121,8 @@ pub struct CameraCheckFile {
     corners_used: usize,
     corners_rejected: usize,
     corner_sigma_px: f64,
+    /// Mean of what both rays of a corner leave of it, one where its pictures scatter independently.
+    rays_chi_square: f64,
     reduced_chi_square: Option<f64>,
     ranges: Vec<Range>,
     pairs: Vec<PairRecord>,
@@ -157,6 +178,7 @@ impl CameraCheckFile {
             folds: accuracy.folds,
             corners_used: all().filter(|o| o.active).count(),
             corners_rejected: all().filter(|o| !o.active).count(),
+            rays_chi_square: accuracy.rays_chi_square,
             corner_sigma_px: calibration.noise.typical_px(&calibration.views),
             reduced_chi_square: calibration.noise.reduced_chi_square,
             ranges: accuracy.ranges.clone(),

@@ -14,6 +14,8 @@ pub(crate) struct World {
     pub board: Board,
     /// Height of the board's paraboloids in its middle, mm.
     pub bow_mm: [f64; 2],
+    /// How far the board's corners lie from their places, mm, the same in every picture.
+    pub print_mm: f64,
     pub poses: Vec<Transform>,
     /// Standard deviation of a corner's coordinate, px.
     pub sigma_px: f64,
@@ -41,7 +43,7 @@ impl World {
                 transform(turn, Vector3::new(between(-55.0, 55.0), between(-45.0, 45.0), between(480.0, 640.0)))
             })
             .collect();
-        World { rig, board, bow_mm: [0.0; 2], poses, sigma_px: 0.05 }
+        World { rig, board, bow_mm: [0.0; 2], print_mm: 0.0, poses, sigma_px: 0.05 }
     }
 
     /// The paper's rig and ceramic board: 5120 px, 25 mm lens, 20x20 squares of 10 mm, corners measured to 0.005 px.
@@ -110,6 +112,10 @@ impl World {
     fn corner_mm(&self, col: usize, row: usize) -> nalgebra::Point3<f64> {
         let mut at = self.board.corner_mm(col, row);
         let edge = self.board.corner_mm(self.board.columns() - 1, self.board.rows() - 1);
+        // Any two numbers that neither corners nor axes share.
+        let place = (row * self.board.columns() + col) as f64;
+        at.x += self.print_mm * (1.7 + 12.9 * place).sin();
+        at.y += self.print_mm * (0.3 + 78.2 * place).sin();
         at.z = self.bow_mm[0] * (1.0 - (at.x / edge.x).powi(2)) + self.bow_mm[1] * (1.0 - (at.y / edge.y).powi(2));
         at
     }

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Point2, Vector2, Vector3, Vector6};
 
 use super::calibrate::{Calibration, Options, calibrate};
+use super::check_file::{Demand, Judged};
 use super::layout::Shared;
 use super::observations::View;
 use super::synthetic::World;
@@ -341,8 +342,24 @@ fn held_out_lengths_are_as_wrong_as_the_corners_make_them() {
     // Corners of 0.05 px leave what was said above; the calibration by twelve pairs a fraction of it.
     let accuracy::Worst { corners_mm, calibration_mm, .. } = accuracy.worst;
     assert!((0.01..0.1).contains(&corners_mm) && (0.001..corners_mm).contains(&calibration_mm), "{:?}", accuracy.worst);
+    // Some hundreds of points with corners that scatter independently know the mean to a tenth.
+    assert!((accuracy.rays_chi_square - 1.0).abs() < 0.2, "{}", accuracy.rays_chi_square);
     // A certificate of 30 mm uncertainty decides nothing.
     assert!(accuracy.worst.with_board(30.0).expanded_uncertainty_mm() > 30.0);
+}
+
+#[test]
+fn a_board_whose_print_scatters_is_told_from_corners_that_do() {
+    let mut world = World::new(12, 17);
+    world.sigma_px = 0.01;
+    world.print_mm = 0.03;
+    let found = calibrate(&world.corners(18), &BROWN4).unwrap();
+    let accuracy = accuracy::hold_out(&found).unwrap();
+    // 0.02 mm (root mean square) is 0.07 px here, seven times the corners' own scatter.
+    assert!(accuracy.rays_chi_square < 0.1, "{}", accuracy.rays_chi_square);
+    let demand = Demand { tolerance_mm: 0.05, board_uncertainty_mm: 0.0 };
+    let judged = Judged::new(&found, accuracy, None, &demand);
+    assert!(judged.warnings.iter().any(|w| w.contains("places of the corners on the board")), "{:?}", judged.warnings);
 }
 
 #[test]

@@ -28,6 +28,9 @@ pub struct SpacePoint {
     pub covariance_mm2: Matrix3<f64>,
     /// Distance between the two rays where they are nearest, mm, negative where the right ray passes below the left.
     pub gap_mm: f64,
+    /// Squared whitened residual that the best point leaves in both pictures: chi-square with one degree of freedom where the
+    /// corners scatter independently and as much as they say.
+    pub chi_square: f64,
     /// Derivatives by the rig's numbers.
     pub by_rig: [Vector3<f64>; RIG_NUMBERS],
 }
@@ -67,7 +70,8 @@ pub fn triangulate(rig: &Rig, left: &Observation, right: &Observation) -> Option
     }
     let gain = linear.inverse * linear.by_point.transpose();
     let by_rig = linear.by_rig.map(|column| -(gain * column));
-    Some(SpacePoint { point_mm: point, covariance_mm2: linear.inverse, gap_mm, by_rig })
+    let chi_square = linear.residual.norm_squared();
+    Some(SpacePoint { point_mm: point, covariance_mm2: linear.inverse, gap_mm, chi_square, by_rig })
 }
 
 /// Middle and length of the shortest connection of the two rays.
