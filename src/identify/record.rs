@@ -19,6 +19,9 @@ const AT_WALL: f64 = 1e-3;
 /// Orientations within this are one: a robot keeps an orientation to far less, and so small a turn shows nothing.
 const ONE_ORIENTATION_DEG: f64 = 1.0;
 
+/// Mean distance error of a nominal robot, mm, beyond which units or robots are mixed up: built robots are off by a few mm.
+const IMPLAUSIBLE_MM: f64 = 20.0;
+
 /// The file.
 #[derive(Debug, Clone, Serialize)]
 pub struct Record {
@@ -262,6 +265,12 @@ impl Record {
             list.push(
                 "the file has no verify rows: a fifth of the samples, drawn from the seed, was held out".to_owned(),
             );
+        }
+        if let Some(before) = self.before.verify.distance.mean_abs_mm.filter(|&mean| mean > IMPLAUSIBLE_MM) {
+            list.push(format!(
+                "the nominal robot is off by {before:.0} mm on the mean, which no built robot is: see whether the lengths are mm and \
+                 the angles deg, and whether this is the robot that was measured"
+            ));
         }
         let worse = |before: &Spread, after: &Spread| match (before.mean_abs_mm, after.mean_abs_mm) {
             (Some(before), Some(after)) if after > before => Some((before, after)),
