@@ -126,7 +126,7 @@ fn corners_that_share_edges_are_worth_less_and_no_fault() {
         }
     }
     // Without the allowance this ratio is near 0.7. 30 runs of correlated numbers know it to some 8 %.
-    let ratio = (predicted / squares as f64).sqrt();
+    let ratio = (predicted / squares).sqrt();
     assert!((0.85..1.2).contains(&ratio), "predicted / true sigma {ratio:.3}");
 }
 
