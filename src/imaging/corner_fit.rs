@@ -303,8 +303,9 @@ fn with_levels(start: &Model, window: &Window) -> Option<Model> {
 
 /// Fits the model to the window's pixels. `None` where the pixels don't determine it or the fit does not settle.
 pub fn fit(start: &Model, window: &Window) -> Option<Fit> {
-    /// A step that promises less than this share of one pixel's variance moves nothing by a hundredth of its sigma.
-    const SETTLED: f64 = 1e-4;
+    /// A step that promises less than this share of one pixel's variance moves nothing by more than a tenth of its sigma; it is
+    /// still taken, and steps shrink at least tenfold by then, so less than a hundredth is left.
+    const SETTLED: f64 = 1e-2;
     if window.count < 3 * N {
         return None;
     }

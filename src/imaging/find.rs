@@ -82,7 +82,7 @@ fn look(path: &Utf8Path, wanted: &Wanted<'_>, size: (u32, u32), bar: &indicatif:
     bar.inc(1);
     // Depends on the other pictures, so it is not a matter for the cache.
     if let Some(found) = picture::size(path).filter(|found| *found != size) {
-        return Err(format!("is {}x{} px, most others are {}x{}", found.0, found.1, size.0, size.1).into());
+        return Err(format!("{}x{} px, most others are {}x{}", found.0, found.1, size.0, size.1).into());
     }
     std::fs::read(path).map_err(|e| format!("cannot be read: {e}").into()).and_then(|bytes| {
         let Some(cache) = wanted.cache else { return look_at(bytes, path, wanted.board) };

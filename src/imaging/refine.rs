@@ -25,6 +25,8 @@ const MARGIN_BLURS: f64 = 3.0;
 /// Half of the largest window, px. The gain goes with the root of the window, the time with the window; beyond this a
 /// board's own making (1 um is 0.02 px at 0.05 mm a px) hides all gain.
 const MOST_HALF_PX: f64 = 80.0;
+/// Half of the window that brings a fit near its end where the squares are large, px.
+const NEAR_HALF_PX: f64 = 20.0;
 
 /// A corner and all that its fit tells.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -157,14 +159,29 @@ fn first_fit(copy: &Picture, cell: &Cell, window: &mut Window) -> Option<Fit> {
     }
 }
 
-/// A fit in the largest window that the squares allow.
+/// A fit in the largest window that the squares allow, from one near the corner where that is much smaller: most steps are
+/// taken there, and the blur it finds is that of the picture, not of the copy, so fewer pixels count as near an edge.
 fn full_fit(picture: &Picture, saturation: f64, cell: &Cell, start: &Model, window: &mut Window) -> Option<Fit> {
+    let wide = cell.side() > 2.0 * NEAR_HALF_PX;
+    let near = if wide { fit_within(NEAR_HALF_PX, picture, saturation, cell, start, window) } else { None };
+    fit_within(MOST_HALF_PX, picture, saturation, cell, &near.map_or(*start, |near| near.model), window)
+}
+
+/// A fit in a window that reaches up to `most_half_px` along each edge.
+fn fit_within(
+    most_half_px: f64,
+    picture: &Picture,
+    saturation: f64,
+    cell: &Cell,
+    start: &Model,
+    window: &mut Window,
+) -> Option<Fit> {
     let mut start = *start;
     loop {
         let blur = start.blur_px[0].max(start.blur_px[1]);
         // Oblique edges come nearer to each other.
         let margin = (MARGIN_BLURS * blur + 1.0) / cell.skew();
-        let halves = cell.edges.map(|e| e.normalize() * (e.norm() - margin).max(0.5 * e.norm()).min(MOST_HALF_PX));
+        let halves = cell.edges.map(|e| e.normalize() * (e.norm() - margin).max(0.5 * e.norm()).min(most_half_px));
         let band_px = BAND_BLURS * blur + 1.0;
         window.collect(picture, saturation, &Frame { start: cell.place, halves, band_px });
         let found = fit(&start, window)?;

@@ -210,7 +210,12 @@ fn gather(
     }
     // Where fewer than half agree there is no telling which of them are right.
     if 2 * views.len() <= judged && !bad.is_empty() {
-        return Err(Error::Contradiction { agreeing: views.len(), total: judged, bad });
+        let agreeing = views.len();
+        let lonely =
+            |view: View| Skipped { pair: view.pair, reason: "fits that rig, but too few do to trust it".into() };
+        bad.extend(views.into_iter().map(lonely));
+        bad.sort_by(|a, b| a.pair.cmp(&b.pair));
+        return Err(Error::Contradiction { agreeing, total: judged, bad });
     }
     skipped.extend(bad);
     skipped.sort_by(|a, b| a.pair.cmp(&b.pair));
