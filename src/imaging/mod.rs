@@ -12,12 +12,11 @@ pub mod find;
 pub mod folder;
 pub mod grid;
 pub mod grow;
+pub mod lighting;
 pub mod order;
 pub mod overlay;
 pub mod picture;
 pub mod refine;
-pub mod special;
-pub mod window;
 
 use camino::Utf8PathBuf;
 

@@ -2,18 +2,19 @@
 //!
 //! In: the picture and the board as detected. Out: corners with covariance. First each corner is fitted on the reduced copy
 //! in a small window that a coarse start can't lead astray; then at full size in the largest window that stays inside the
-//! four squares round it. Goes wrong: a corner without contrast, hidden, cut off by the border or saturated; it
+//! four squares round it; last, the board's corners share what they know of the light. Goes wrong: a corner without contrast, hidden, cut off by the border or saturated; it
 //! is dropped, the others stay.
 
 use nalgebra::{Point2, Vector2};
 
 use super::Corner;
 use super::bend::bends;
+use super::corner_fit::window::{Frame, Window};
 use super::corner_fit::{Fit, Model, fit};
 use super::detect::Detected;
 use super::grid::{Grid, Places};
+use super::lighting;
 use super::picture::{Picture, Pixels};
-use super::window::{Frame, Window};
 
 /// Half of the first window on the copy, px.
 const FIRST_HALF_PX: f64 = 6.0;
@@ -68,7 +69,7 @@ pub fn measure(picture: &Picture, detected: &Detected) -> Grid<Measured> {
         Some(detected.at_full_size(px))
     });
     let saturation = picture.saturation();
-    Grid::from_fn(columns, rows, |col, row| {
+    let mut measured = Grid::from_fn(columns, rows, |col, row| {
         let from = first.get(col, row)?;
         let cell = Cell::of(&places, col, row)?;
         let mut start =
@@ -77,19 +78,19 @@ pub fn measure(picture: &Picture, detected: &Detected) -> Grid<Measured> {
             // The copy's grey values are not the picture's: without contrast the fit finds levels of its own.
             start.half_contrast = 0.0;
         }
-        let fitted = full_fit(picture, saturation, &cell, &start, &mut window);
-        match fitted {
+        match full_fit(picture, saturation, &cell, &start, &mut window) {
             // At full size the first fit is a measurement already, of a smaller window.
-            Some(fit) if detected.factor > 1 || agrees(&from.fit, &fit) => {
-                Some(Measured { px: fit.place(&cell.place), fit })
-            }
+            Some(full) if detected.factor > 1 || agrees(from, &full) => Some(full),
             _ if detected.factor == 1 => Some(*from),
             _ => None,
         }
-    })
+    });
+    lighting::tie(&mut measured);
+    measured
 }
 
 /// A corner's surroundings: vectors along the two edges, as long as to the nearer neighbour.
+#[derive(Clone, Copy)]
 struct Cell {
     place: Point2<f64>,
     edges: [Vector2<f64>; 2],
@@ -161,10 +162,14 @@ fn first_fit(copy: &Picture, cell: &Cell, window: &mut Window) -> Option<Fit> {
 
 /// A fit in the largest window that the squares allow, from one near the corner where that is much smaller: most steps are
 /// taken there, and the blur it finds is that of the picture, not of the copy, so fewer pixels count as near an edge.
-fn full_fit(picture: &Picture, saturation: f64, cell: &Cell, start: &Model, window: &mut Window) -> Option<Fit> {
+fn full_fit(picture: &Picture, saturation: f64, cell: &Cell, start: &Model, window: &mut Window) -> Option<Measured> {
     let wide = cell.side() > 2.0 * NEAR_HALF_PX;
     let near = if wide { fit_within(NEAR_HALF_PX, picture, saturation, cell, start, window) } else { None };
-    fit_within(MOST_HALF_PX, picture, saturation, cell, &near.map_or(*start, |near| near.model), window)
+    let (place, start) = near.map_or((cell.place, *start), |near| {
+        // A window in the middle of which the corner is: what the light's gradient adds on one side it takes on the other.
+        (near.px, Model { corner: Vector2::zeros(), ..near.fit.model })
+    });
+    fit_within(MOST_HALF_PX, picture, saturation, &Cell { place, ..*cell }, &start, window)
 }
 
 /// A fit in a window that reaches up to `most_half_px` along each edge.
@@ -175,7 +180,7 @@ fn fit_within(
     cell: &Cell,
     start: &Model,
     window: &mut Window,
-) -> Option<Fit> {
+) -> Option<Measured> {
     let mut start = *start;
     loop {
         let blur = start.blur_px[0].max(start.blur_px[1]);
@@ -188,7 +193,8 @@ fn fit_within(
         let wider = found.model.blur_px[0].max(found.model.blur_px[1]);
         // The copy may have hidden how wide the blur is; the band must hold the whole edge.
         if BAND_BLURS * wider <= 1.2 * band_px {
-            return plausible(&found, &start, cell).then_some(found);
+            let fits = plausible(&found, &start, cell);
+            return fits.then(|| Measured { px: found.place(&cell.place), fit: found });
         }
         if wider > 0.5 * cell.side() {
             return None;
@@ -208,11 +214,12 @@ fn plausible(fit: &Fit, start: &Model, cell: &Cell) -> bool {
 }
 
 /// True where the large window tells the same as the small one: a hidden or unprinted neighbour square shows as misfit.
-fn agrees(first: &Fit, second: &Fit) -> bool {
+fn agrees(first: &Measured, second: &Measured) -> bool {
+    let (Measured { px: a, fit: first }, Measured { px: b, fit: second }) = (first, second);
     let sigma = (first.covariance_px2 + second.covariance_px2).trace().sqrt();
     // The copy's grey values are of 8 bits, stretched; the picture's may be of 16.
     let per_grey_of_copy = (second.model.half_contrast / first.model.half_contrast).abs();
-    second.model.corner.norm() < 5.0 * sigma + 0.05
+    (b - a).norm() < 5.0 * sigma + 0.05
         && second.residual < per_grey_of_copy * (2.0 * first.residual + 1.0)
         && second.covariance_px2.trace() < 1.5 * first.covariance_px2.trace()
 }

@@ -5,8 +5,9 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use stereocal::imaging::detect::Detected;
 use stereocal::imaging::grid::Grid;
+use stereocal::imaging::lighting;
 use stereocal::imaging::picture::{Grey8, Picture, Pixels};
-use stereocal::imaging::refine;
+use stereocal::imaging::refine::{self, Measured};
 use stereocal::opencv;
 
 use super::corner_patch::{Spread, draw};
@@ -79,6 +80,8 @@ fn measure(angle: f64, spread: Spread, noise: f64) -> Spot {
     let mut uniform = move || (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
     let mut spot = Spot { fit: Vec::new(), chi2: Vec::new(), sub_pix: Vec::new(), bound: 0.0, lost: 0 };
     let mut information = 0.0;
+    // The pictures stand side by side as the corners of one board, so that they share the light as a board's corners do.
+    let (mut board, mut truths) = (Vec::new(), Vec::new());
     for _ in 0..PLACES {
         let corner = (uniform() - 0.5, uniform() - 0.5);
         let turn = uniform() * std::f64::consts::PI;
@@ -104,15 +107,22 @@ fn measure(angle: f64, spread: Spread, noise: f64) -> Spot {
                 cells: vec![Some(start), Some(start + along[0]), Some(start + along[1]), None],
             };
             let fits = refine::measure(&picture, &Detected { corners, copy: picture.clone(), factor: 1 });
-            match fits.get(0, 0) {
-                Some(measured) => {
-                    let d = measured.px - truth;
-                    spot.fit.push(d);
-                    let inverse: Matrix2<f64> = measured.fit.covariance_px2.try_inverse().expect("a covariance");
-                    spot.chi2.push((d.transpose() * inverse * d)[0]);
-                }
-                None => spot.lost += 1,
+            let place = Vector2::new((board.len() % NOISES) as f64, (board.len() / NOISES) as f64) * f64::from(PATCH);
+            board.push(fits.get(0, 0).map(|m| Measured { px: m.px + place, ..*m }));
+            truths.push(truth + place);
+        }
+    }
+    let mut board = Grid { columns: NOISES, rows: PLACES, cells: board };
+    lighting::tie(&mut board);
+    for (measured, truth) in board.cells.iter().zip(&truths) {
+        match measured {
+            Some(measured) => {
+                let d = measured.px - truth;
+                spot.fit.push(d);
+                let inverse: Matrix2<f64> = measured.fit.covariance_px2.try_inverse().expect("a covariance");
+                spot.chi2.push((d.transpose() * inverse * d)[0]);
             }
+            None => spot.lost += 1,
         }
     }
     spot.bound = information.powf(-0.5);
