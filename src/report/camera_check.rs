@@ -47,8 +47,14 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
         }
     }
     let total = calibration.views.len() + calibration.skipped.len();
+    let [along_x, along_y] = calibration.values.shared.shape_mm;
+    let bow = if calibration.layout.shape {
+        format!(", board bowed by {along_x:.4} mm along x and {along_y:.4} mm along y")
+    } else {
+        String::new()
+    };
     format!(
-        "{}: {}\n{} of {total} pairs, {} lens, reprojection RMS {} px, baseline {} mm\n\n{table}\nreport: {}\n",
+        "{}: {}\n{} of {total} pairs, {} lens, reprojection RMS {} px, baseline {} mm{bow}\n\n{table}\nreport: {}\n",
         word(judged.verdict),
         explanation(judged),
         calibration.views.len(),
