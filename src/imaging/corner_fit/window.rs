@@ -160,6 +160,9 @@ fn push<T: Copy + Into<f64>>(
     saturated
 }
 
+/// Sums of a run that are kept side by side, so that one need not wait for the other.
+const SIDE_BY_SIDE: usize = 4;
+
 /// Adds a run of pixels to the sums of products of `(1, x, y, grey)`; `from` is the first one's place. Returns how
 /// many were saturated.
 fn add<T: Copy + Into<f64>>(
@@ -169,20 +172,16 @@ fn add<T: Copy + Into<f64>>(
     saturation: f64,
     from: (f64, f64),
 ) -> usize {
-    let length = run.len();
-    // Places from the run's start are whole numbers: these sums are exact.
-    let [mut n, mut x, mut xx, mut g, mut xg, mut gg] = [0.0_f64; 6];
-    for (i, &value) in row[run].iter().enumerate() {
-        let (grey, i): (f64, f64) = (value.into(), i as f64);
-        let seen = if grey < saturation { 1.0 } else { 0.0 };
-        let (seen_i, seen_grey) = (seen * i, seen * grey);
-        n += seen;
-        x += seen_i;
-        xx += seen_i * i;
-        g += seen_grey;
-        xg += seen_i * grey;
-        gg += seen_grey * grey;
-    }
+    let values = &row[run];
+    let [n, x, xx, g, xg, gg] = if values.iter().all(|&value| value.into() < saturation) {
+        run_sums(values)
+    } else {
+        let seen = values.iter().map(|&value| value.into()).enumerate().filter(|(_, grey)| *grey < saturation);
+        seen.fold([0.0; 6], |[n, x, xx, g, xg, gg], (i, grey)| {
+            let i = i as f64;
+            [n + 1.0, x + i, xx + i * i, g + grey, xg + i * grey, gg + grey * grey]
+        })
+    };
     let (x0, y) = from;
     let sum_x = x + n * x0;
     let sum_xx = xx + 2.0 * x0 * x + n * x0 * x0;
@@ -193,7 +192,33 @@ fn add<T: Copy + Into<f64>>(
         Vector4::new(n * y, sum_x * y, n * y * y, g * y),
         Vector4::new(g, sum_xg, g * y, gg),
     ]);
-    length - n as usize
+    values.len() - n as usize
+}
+
+/// Number, sums of x, x^2, grey, x grey and grey^2 of pixels side by side, the first at x = 0. Whole numbers, hence exact.
+fn run_sums<T: Copy + Into<f64>>(values: &[T]) -> [f64; 6] {
+    let n = values.len() as f64;
+    let (mut g, mut xg, mut gg) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
+    let blocks = values.chunks_exact(SIDE_BY_SIDE);
+    let rest = blocks.remainder();
+    let mut at: [f64; SIDE_BY_SIDE] = std::array::from_fn(|l| l as f64);
+    for block in blocks {
+        for l in 0..SIDE_BY_SIDE {
+            let grey: f64 = block[l].into();
+            g[l] += grey;
+            xg[l] += at[l] * grey;
+            gg[l] += grey * grey;
+            at[l] += SIDE_BY_SIDE as f64;
+        }
+    }
+    for ((value, at), ((g, xg), gg)) in rest.iter().zip(at).zip(g.iter_mut().zip(&mut xg).zip(&mut gg)) {
+        let grey: f64 = (*value).into();
+        *g += grey;
+        *xg += at * grey;
+        *gg += grey * grey;
+    }
+    let total = |sums: [f64; SIDE_BY_SIDE]| sums.iter().sum();
+    [n, n * (n - 1.0) / 2.0, n * (n - 1.0) * (2.0 * n - 1.0) / 6.0, total(g), total(xg), total(gg)]
 }
 
 /// The whole numbers from `low` to `high` that are at least zero and below `size`.
