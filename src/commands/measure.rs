@@ -21,7 +21,13 @@ use crate::stereo::{self, Rig};
 pub fn run(args: &Measure, config: &Config) -> Result<Outcome> {
     let board = config.target_board.board(args.squares, args.square_mm)?;
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
-    let rig = calibration_file::read(&args.calibration.clone().unwrap_or_else(|| out.join("calibration.json")))?;
+    let calibration = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
+    let rig = calibration_file::read(&calibration)?;
+    if rig.covariance.is_none() {
+        progress::warn(format!(
+            "{calibration} holds no covariance: the points' uncertainties leave out that of the calibration"
+        ));
+    }
     let poses = measurements::read_poses(&args.poses.join("poses.csv"))?;
 
     let (cache, overlays) = (Some(Cache { out: &out }), args.draw.then_some(&out));

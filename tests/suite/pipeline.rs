@@ -67,6 +67,41 @@ fn pictures_to_corrected_kinematics() {
     for file in ["camera-check.html", "measure.html", "identify.html", "identified.toml", "measure.json"] {
         assert!(world.join("out").join(file).is_file(), "{file}");
     }
+    exported_rigs_measure_the_same_points(world);
+}
+
+/// Each export is read back and measures the same points; that it holds no covariance is said.
+fn exported_rigs_measure_the_same_points(world: &Path) {
+    /// Digits that a rig loses on its way through a file are far below this, mm.
+    const SAME_MM: f64 = 1e-6;
+    let points = |out: &str| -> Vec<[f64; 3]> {
+        let mut rows = csv::Reader::from_path(world.join(out).join("measurements.csv")).expect("measurements");
+        let columns = rows.headers().expect("a header").clone();
+        let x = columns.iter().position(|c| c == "x_mm").expect("x_mm");
+        let number = |row: &csv::StringRecord, i: usize| row[i].parse::<f64>().expect("a measured pose");
+        rows.records().map(|row| row.expect("a row")).map(|row| [0, 1, 2].map(|k| number(&row, x + k))).collect()
+    };
+    let own = points("out");
+    for (format, file) in [
+        ("opencv", "stereo_opencv.yml"),
+        ("ros", "left.yaml"),
+        ("kalibr", "camchain.yaml"),
+        ("mrcal", "left.cameramodel"),
+    ] {
+        let rig = format!("{format}/{file}");
+        done(
+            world,
+            &["export", "calibration", "--format", format, "--calibration", "out/calibration.json", "--out", format],
+        );
+        let output = stereocal(world, &["measure", "poses/", "--calibration", &rig, "--out", format]);
+        assert_eq!(output.status.code(), Some(0), "{rig}: {}", stderr(&output));
+        assert!(stderr(&output).contains("holds no covariance"), "{}", stderr(&output));
+        let theirs = points(format);
+        assert_eq!(own.len(), theirs.len());
+        for (a, b) in own.iter().flatten().zip(theirs.iter().flatten()) {
+            assert!((a - b).abs() < SAME_MM, "{format}: {a} {b}");
+        }
+    }
 }
 
 #[test]
