@@ -25,6 +25,7 @@ pub mod csv_table;
 pub mod error;
 pub mod files;
 pub mod geometry;
+pub mod median;
 pub mod progress;
 
 pub mod imaging;

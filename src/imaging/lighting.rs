@@ -14,6 +14,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix2xX, Point2, Vector2};
 
 use super::grid::Grid;
 use super::refine::Measured;
+use crate::median::median;
 
 /// Fewest corners for a plane and for a second degree.
 const LEAST: [(usize, usize); 2] = [(30, 6), (12, 3)];
@@ -48,7 +49,8 @@ impl Smooth {
     /// Of gradients with variances `own`; `None` where the places don't determine it.
     fn through(design: &DMatrix<f64>, slopes: &[Vector2<f64>], own: &[f64]) -> Option<Smooth> {
         // Half of a two-dimensional normal deviation's square is below ln 2 in half of all cases.
-        let spread = |squares: Vec<f64>| median(squares).map(|square| square / (2.0 * std::f64::consts::LN_2));
+        let spread =
+            |squares: &[f64]| median(squares.iter().copied()).map(|square| square / (2.0 * std::f64::consts::LN_2));
         let given = Matrix2xX::from_columns(slopes).transpose();
         let mut rough = 0.0;
         let mut trust = vec![1.0; slopes.len()];
@@ -73,7 +75,7 @@ impl Smooth {
             for (i, square) in squares.iter().enumerate() {
                 trust[i] = (2.0 * (2.0 * (own[i] + rough) / square).sqrt()).min(1.0);
             }
-            rough = (spread(squares)? - median(own.to_vec())?).max(0.0);
+            rough = (spread(&squares)? - median(own.iter().copied())?).max(0.0);
         }
         smooth.filter(|s| s.variances.iter().all(|v| v.is_finite() && *v >= 0.0))
     }
@@ -101,12 +103,6 @@ fn draw(corner: &mut Measured, light: Vector2<f64>, variance: f64) {
     fit.covariance_px2 -= place * fit.place_by_light.transpose();
     fit.place_by_light -= place * fit.light_covariance;
     fit.light_covariance -= slope * fit.light_covariance;
-}
-
-/// The middle one of the numbers; `None` where there is none.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (middle < values.len()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, Matrix3, Point2, Point3, Vector3};
 
 use super::observations::Observation;
 use crate::geometry::{Transform, transform_from_matrix};
+use crate::median::median;
 
 /// Fewest corners that determine a homography with something to spare.
 pub const FEWEST_CORNERS: usize = 6;
@@ -28,12 +29,6 @@ pub fn homography(points: &[(Point3<f64>, Point2<f64>)]) -> Option<(Matrix3<f64>
     }
     let left = median(points.iter().map(|(board, picture)| (apply(&found, board) - picture).norm()))?;
     left.is_finite().then_some((found, left))
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// The direct linear transform of all points.

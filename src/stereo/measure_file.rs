@@ -9,6 +9,7 @@ use super::target::{TargetPose, nearest_half_turn};
 use crate::geometry::{Transform, rotation_vector};
 use crate::imaging::{Board, Corners};
 use crate::measurements::{RobotPose, Role, pose_fields, pose_header, quoted};
+use crate::median::median;
 
 /// A residual this many times the median's is worth a warning.
 const UNUSUAL: f64 = 3.0;
@@ -92,12 +93,6 @@ impl MeasureFile {
     pub fn sigma_mm(&self) -> Option<[f64; 3]> {
         self.sigma_mm
     }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// Poses that fit much worse than most.
