@@ -34,15 +34,17 @@ struct Spot {
 pub fn table() {
     println!("single corners, squares of {SQUARE_PX} px, {} pictures a row; px", PLACES * NOISES);
     println!("angle  blur noise |   bound  fit rms  ratio   bias | chi2  in95% | cornerSubPix(11)  lost");
-    let mut gains = Vec::new();
+    let (mut gains, mut chi2) = (Vec::new(), Vec::new());
     for angle in [90.0_f64, 75.0, 60.0, 45.0] {
         for blur in [0.6, 1.0, 1.6, 2.5] {
             for noise in [1.0, 2.0, 5.0] {
                 let spot = measure(angle.to_radians(), Spread::Gaussian(blur), noise);
                 gains.push(print(&format!("{angle:5} {blur:5.1} {noise:5.0}"), &spot));
+                chi2.extend(spot.chi2);
             }
         }
     }
+    println!("all rows: chi2 {:.3}, in95% {:.1}", mean_chi2(&chi2), inside_95(&chi2));
     gains.sort_by(f64::total_cmp);
     println!("cornerSubPix(11) over fit, median: {:.1}", gains[gains.len() / 2]);
 }
@@ -59,11 +61,21 @@ fn rms(values: &[Vector2<f64>]) -> f64 {
     (values.iter().map(Vector2::norm_squared).sum::<f64>() / (2 * values.len()) as f64).sqrt()
 }
 
+/// Mean square of a deviation in sigmas; each has two coordinates.
+fn mean_chi2(chi2: &[f64]) -> f64 {
+    chi2.iter().sum::<f64>() / (2 * chi2.len()) as f64
+}
+
+/// Share of deviations inside their 95 % ellipse, percent.
+fn inside_95(chi2: &[f64]) -> f64 {
+    /// The 95 % point of chi-squared with two degrees of freedom.
+    const LIMIT: f64 = 5.991;
+    100.0 * chi2.iter().filter(|&&q| q < LIMIT).count() as f64 / chi2.len() as f64
+}
+
 fn print(name: &str, spot: &Spot) -> f64 {
     let mean = spot.fit.iter().sum::<Vector2<f64>>() / spot.fit.len() as f64;
-    let chi2 = spot.chi2.iter().sum::<f64>() / (2 * spot.chi2.len()) as f64;
-    // 5.991: the 95 % point of chi-squared with two degrees of freedom.
-    let inside = 100.0 * spot.chi2.iter().filter(|&&q| q < 5.991).count() as f64 / spot.chi2.len() as f64;
+    let (chi2, inside) = (mean_chi2(&spot.chi2), inside_95(&spot.chi2));
     let (fit, sub_pix) = (rms(&spot.fit), rms(&spot.sub_pix));
     println!(
         "{name} | {:.5} {fit:.5} {:6.2} {:.5} | {chi2:.2} {inside:6.1} | {sub_pix:.5} {:6}",
