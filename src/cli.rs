@@ -138,6 +138,9 @@ pub struct Identify {
     /// Terms beyond MDH: parallel axes, gravity, harmonics [default: auto]
     #[arg(long, value_name = "NAME")]
     pub extensions: Option<crate::identify::settings::Extensions>,
+    /// Constants of the swarms [default: those of the settings file]
+    #[arg(long, value_name = "NAME")]
+    pub constants: Option<crate::identify::settings::Constants>,
     /// Seed of every random draw
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -227,14 +230,18 @@ pub struct Simulate {
     /// How far the check board's middle stands out, um [default: 0]
     #[arg(long, value_name = "UM", allow_negative_numbers = true, value_parser = finite)]
     pub bow_um: Option<f64>,
+    /// Standard deviation of the check board's crossings, um [default: 1]
+    #[arg(long, value_name = "UM", value_parser = not_negative)]
+    pub pitch_um: Option<f64>,
     /// How far black runs over each edge of both boards, um [default: 0]
     #[arg(long, value_name = "UM", value_parser = not_negative)]
     pub ink_um: Option<f64>,
     /// Stretch of both boards against their certificates, parts per million [default: 0]
     #[arg(long, value_name = "PPM", allow_negative_numbers = true, value_parser = finite)]
     pub thermal_ppm: Option<f64>,
-    /// The true robot, instead of one drawn from the seed
-    #[arg(long, value_name = "FILE")]
+    /// The true robot, instead of one drawn from the seed: a robot file, or `table-2` for what the paper identified; the
+    /// effects below are added to it
+    #[arg(long, value_name = "FILE|table-2")]
     pub true_robot: Option<Utf8PathBuf>,
     /// Largest misalignment of parallel axes, deg [default: 0]
     #[arg(long, value_name = "DEG", value_parser = not_negative)]

@@ -19,10 +19,10 @@ impl<'a> Table<'a> {
     /// Reads a whole file; `what` names it in the message when it is not there, `hint` says what makes it. A file without rows is refused.
     pub fn read(path: &'a Utf8Path, what: &'static str, hint: &str) -> Result<Table<'a>> {
         let text = files::read_text(path, what, Some(hint))?;
-        // Spreadsheets put a byte order mark first and, in half of Europe, semicolons between.
+        // Spreadsheets put a byte order mark first and, in half of Europe, semicolons between; instruments put tabs.
         let text = text.trim_start_matches('\u{feff}');
         let first = text.lines().next().unwrap_or_default();
-        let delimiter = if first.contains(';') && !first.contains(',') { b';' } else { b',' };
+        let delimiter = [b',', b';', b'\t'].into_iter().find(|&d| first.contains(char::from(d))).unwrap_or(b',');
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(delimiter)
             .trim(csv::Trim::All)
@@ -38,6 +38,10 @@ impl<'a> Table<'a> {
         };
         let header: Vec<String> = reader.headers().map_err(refuse)?.iter().map(str::to_owned).collect();
         let mut table = Table { path, header, rows: Vec::new() };
+        let twice = |&i: &usize| !table.header[i].is_empty() && table.header[..i].contains(&table.header[i]);
+        if let Some(twice) = (1..table.header.len()).find(twice) {
+            return Err(table.refuse(1, format!("two columns `{}`", table.header[twice])));
+        }
         for record in reader.records() {
             let record = record.map_err(refuse)?;
             let line = record.position().map_or(0, csv::Position::line);
@@ -58,8 +62,13 @@ impl<'a> Table<'a> {
 
     /// A complaint about a line.
     pub fn refuse(&self, line: u64, message: String) -> crate::Error {
+        self.refuse_with(line, message, None)
+    }
+
+    /// A complaint about a line, with what to do about it.
+    pub fn refuse_with(&self, line: u64, message: String, hint: Option<&str>) -> crate::Error {
         let place = Place { path: self.path.to_owned(), line: Some(line) };
-        files::Error::Format { message, place, hint: None }.into()
+        files::Error::Format { message, place, hint: hint.map(str::to_owned) }.into()
     }
 
     /// The place of a column, where the header has it.
@@ -77,7 +86,11 @@ impl<'a> Table<'a> {
     pub fn number(&self, line: u64, row: &[String], column: usize) -> Result<f64> {
         match row[column].parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(self.refuse(line, format!("`{}` is not a number: `{}`", self.header[column], row[column]))),
+            _ => {
+                let message = format!("`{}` is not a number: `{}`", self.header[column], row[column]);
+                let decimal_comma = row[column].replacen(',', ".", 1).parse::<f64>().is_ok();
+                Err(self.refuse_with(line, message, decimal_comma.then_some("write numbers with a decimal point")))
+            }
         }
     }
 }

@@ -65,7 +65,7 @@ pub fn read_text(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Res
     match std::fs::read(path) {
         Ok(bytes) => String::from_utf8(bytes).map_err(|_| {
             Error::Format {
-                message: format!("{what} is not UTF-8 text"),
+                message: format!("{what}: not UTF-8 text"),
                 place: Place { path: path.to_owned(), line: None },
                 hint: None,
             }

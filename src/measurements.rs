@@ -90,8 +90,14 @@ impl Table<'_> {
     /// The columns `j1_deg`, `j2_deg`, ... without a gap.
     fn joint_columns(&self) -> Result<Vec<usize>> {
         let columns: Vec<usize> = (1..).map_while(|i| self.column(&format!("j{i}_deg"))).collect();
-        if columns.is_empty() {
-            self.require("j1_deg")?;
+        let beyond = |name: &String| {
+            let number = name.strip_prefix('j').and_then(|rest| rest.strip_suffix("_deg"));
+            number.and_then(|n| n.parse::<usize>().ok()).is_some_and(|n| n > columns.len())
+        };
+        if columns.is_empty() || self.header.iter().any(beyond) {
+            let message = format!("no column `j{}_deg`; the header has: {}", columns.len() + 1, self.header.join(", "));
+            let hint = "one column a joint, j1_deg, j2_deg, ... without a gap, in deg";
+            return Err(self.refuse_with(1, message, Some(hint)));
         }
         Ok(columns)
     }
@@ -153,7 +159,8 @@ pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
     if position.is_none() && distance.is_none() {
         let message =
             format!("neither the columns x_mm,y_mm,z_mm nor distance_mm; the header has: {}", table.header.join(", "));
-        return Err(table.refuse(1, message));
+        let hint = "a point's columns are x_mm,y_mm,z_mm, a distance's is distance_mm, all in mm";
+        return Err(table.refuse_with(1, message, Some(hint)));
     }
     let mut rows = Vec::with_capacity(poses.len());
     for (at, (line, row)) in poses.into_iter().zip(&table.rows) {
@@ -241,6 +248,7 @@ mod tests {
             ("pose,group,role,j1_deg,distance_mm\na,1,start,0,1\n", 2, "role is `start`"),
             ("pose,group,role,j1_deg,distance_mm\na,1,center,0,1\nb,1,center,0,1\n", 3, "has a center in line 2"),
             ("pose,group,role,distance_mm\na,1,center,0\n", 1, "no column `j1_deg`"),
+            ("pose,group,role,j1_deg,j3_deg,distance_mm\na,1,sample,0,0,0\n", 1, "no column `j2_deg`"),
             ("pose,group,role,j1_deg,distance_mm\na,1,sample,nan,0\n", 2, "`j1_deg` is not a number"),
             ("pose,group,role,j1_deg,distance_mm\na,1,sample,0\n", 2, "4 fields"),
             ("pose,group,role,j1_deg,distance_mm\n", 1, "no rows"),

@@ -52,6 +52,7 @@ fn settings(args: &Identify, config: &Config) -> Settings {
         None => {}
     }
     settings.model = args.model.or(settings.model);
+    settings.constants = args.constants.or(settings.constants);
     settings.extensions = args.extensions.unwrap_or(settings.extensions);
     settings
 }

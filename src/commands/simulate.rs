@@ -9,18 +9,26 @@ use crate::robot;
 use crate::simulate::psf::{Defocus, Optics};
 use crate::simulate::rig::DISTANCE_MM;
 use crate::simulate::settings::{RobotDeviations, Settings};
+use crate::simulate::true_robot;
 use crate::simulate::truth_files;
 use crate::simulate::world::World;
 
 /// Entrance pupil of the paper's 25 mm lenses at f/16, mm.
 const PUPIL_MM: f64 = 25.0 / 16.0;
 
+/// Stands for Table 2 of the paper where a robot file is asked for.
+const TABLE_2: &str = "table-2";
+
 /// Comatic flare at the picture's corners, px.
 const COMA_PX: f64 = 1.0;
 
 /// Runs the command: settings, world, truth, pictures.
 pub fn run(args: &Simulate, config: &Config) -> Result<Outcome> {
-    let true_robot = args.true_robot.as_deref().map(robot::file::read).transpose()?;
+    let true_robot = match args.true_robot.as_deref() {
+        Some(name) if name == TABLE_2 => true_robot::table_2(&true_robot::nominal()),
+        Some(path) => Some(robot::file::read(path)?),
+        None => None,
+    };
     let world = World::new(settings(args, config)?, true_robot)?;
     let out = OutDir::open(args.out.as_ref().unwrap_or(&config.out))?;
     if args.points_only {
@@ -51,6 +59,7 @@ fn settings(args: &Simulate, config: &Config) -> Result<Settings> {
     replace(&mut s.point_noise_mm, args.point_noise_mm);
     replace(&mut s.sensor.bits, args.bits);
     replace(&mut s.check_workmanship.bow_um, args.bow_um.map(|bow| (bow / 2.0, bow / 2.0)));
+    replace(&mut s.check_workmanship.pitch_um, args.pitch_um);
     for board in [&mut s.check_workmanship, &mut s.target_workmanship] {
         replace(&mut board.ink_spread_um, args.ink_um);
         replace(&mut board.scale_ppm, args.thermal_ppm);

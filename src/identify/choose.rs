@@ -310,7 +310,7 @@ fn solve(prepared: &Prepared, method: Method, settings: &Settings, seed: u64) ->
     let fit = prepared.fit();
     match method {
         Method::TrustRegion => trust_region::solve(&fit, &vec![0.0; fit.dimension()], &settings.trust_region),
-        _ => swarm::solve(&fit, method, &settings.swarm, seed),
+        _ => swarm::solve(&fit, method, &settings.swarm(), seed),
     }
 }
 

@@ -97,6 +97,16 @@ pub enum Prior {
     Off,
 }
 
+/// Named constants of the swarms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Constants {
+    /// Those of this program: velocities limited, the best particle descends as soon as the swarm slows down
+    Shipped,
+    /// Section 3.2 of the paper to the letter: no limit of the velocity, every particle descends once nothing moves
+    Paper,
+}
+
 /// Section `[identify]`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -117,7 +127,9 @@ pub struct Settings {
     pub bound_deg: f64,
     /// Whether the box is doubled for a parameter until the trust region no longer ends at its wall.
     pub widen_bounds: bool,
-    /// Relative to the longest column, below which the poses don't determine a direction: 1e-6 mm a mm.
+    /// Relative to the longest column, below which the poses don't determine a direction. 1e-4: commands rounded to a thousandth of
+    /// a degree turn a flange that should keep its orientation by about so much, and what moves the target by a
+    /// ten-thousandth as far as the strongest parameter drowns in any instrument's noise.
     pub rank_tolerance: f64,
     /// Folds that choose between models.
     pub folds: usize,
@@ -127,6 +139,8 @@ pub struct Settings {
     pub outlier_sigmas: f64,
     /// The trust region's constants.
     pub trust_region: trust_region::Settings,
+    /// Named constants, in place of section `swarm`.
+    pub constants: Option<Constants>,
     /// The swarms' constants.
     pub swarm: SwarmSettings,
 }
@@ -142,17 +156,27 @@ impl Default for Settings {
             bound_mm: 1.0,
             bound_deg: 1.0,
             widen_bounds: true,
-            rank_tolerance: 1e-6,
+            rank_tolerance: 1e-4,
             folds: 5,
             wire_offset: true,
             outlier_sigmas: 7.0,
             trust_region: trust_region::Settings::default(),
+            constants: None,
             swarm: SwarmSettings::default(),
         }
     }
 }
 
 impl Settings {
+    /// The swarms' constants: the named ones where there is a name.
+    pub fn swarm(&self) -> SwarmSettings {
+        match self.constants {
+            Some(Constants::Shipped) => SwarmSettings::default(),
+            Some(Constants::Paper) => SwarmSettings::paper(),
+            None => self.swarm.clone(),
+        }
+    }
+
     /// Notes what makes no sense.
     pub fn validate(&self, problems: &mut Vec<String>) {
         positive(problems, "identify.bound_mm", self.bound_mm);
@@ -246,6 +270,21 @@ impl Default for StapsoSettings {
 }
 
 impl SwarmSettings {
+    /// Section 3.2 of the paper read to the letter. M, K, the stop after 50 iterations and a are given there and are the
+    /// default's too. Eq. (14) limits no velocity, so here the box's width does; step 5 moves every particle by the trust
+    /// region, whose settings are "traditional", so it runs until it converges; S and beta are not given: nothing but the
+    /// stop's 50 iterations and 1e-4 says what little change is, and S must be less than 50 for the choice ever to be made.
+    pub fn paper() -> SwarmSettings {
+        let stapso = StapsoSettings {
+            stagnation_iterations: 25,
+            stagnation_improvement: 1e-4,
+            trust_region_particles: 100,
+            trust_region_steps: trust_region::Settings::default().iterations,
+            ..StapsoSettings::default()
+        };
+        SwarmSettings { velocity_limit: 1.0, stapso, ..SwarmSettings::default() }
+    }
+
     fn validate(&self, problems: &mut Vec<String>) {
         if self.particles < 2 {
             problems.push(format!("identify.swarm.particles is {}; at least 2 are needed", self.particles));

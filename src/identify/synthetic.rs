@@ -6,7 +6,8 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::geometry::Transform;
 use crate::measurements::{Measurement, Observed, RobotPose, Role};
-use crate::robot::{Parameter, Robot, inverse};
+use crate::robot::{Robot, inverse};
+use crate::simulate::true_robot::table_2;
 
 /// A nominal robot, the true one, and what was measured.
 pub struct World {
@@ -20,23 +21,6 @@ pub struct World {
 
 /// Start points of section 4.2, mm in the base frame.
 const STARTS: [[f64; 3]; 4] = [[200.0, 0.0, 379.0], [-200.0, 0.0, 379.0], [0.0, 200.0, 379.0], [0.0, -230.0, 379.0]];
-
-/// Table 2 of the paper: deviations in deg and mm.
-pub fn table_2(nominal: &Robot) -> Robot {
-    let deg = |v: f64| 1000.0 * v.to_radians();
-    let alpha = [-0.1746, 0.6159, -0.7798, -0.5255, 0.9999, 0.6489];
-    let a = [0.0, 0.9999, 0.9999, -0.2770, 0.2263, 0.0];
-    let theta = [-0.3136, -0.9993, 0.9999, -0.6520, 0.1365, 0.0];
-    let d = [0.0, 0.0, 0.0, 0.5261, 0.2078, 0.1015];
-    let mut truth = nominal.clone();
-    for i in 0..6 {
-        truth.add(Parameter::Alpha(i), deg(alpha[i]));
-        truth.add(Parameter::A(i), a[i]);
-        truth.add(Parameter::Theta(i), deg(theta[i]));
-        truth.add(Parameter::D(i), d[i]);
-    }
-    truth
-}
 
 /// `samples` poses with orientations tilted up to 25 degrees, noise a coordinate in mm; an eighth as many again to verify.
 pub fn world(samples: usize, noise_mm: f64, seed: u64) -> World {
@@ -54,7 +38,7 @@ pub fn planned(
 ) -> World {
     let mut nominal = Robot::paper();
     nominal.tool_mm = Vector3::new(12.0, -8.0, 25.0);
-    let mut truth = table_2(&nominal);
+    let mut truth = table_2(&nominal).unwrap();
     spoil(&mut truth);
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut rows = Vec::new();

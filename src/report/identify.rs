@@ -77,6 +77,7 @@ pub fn page(
         h2 { "Verification" }
         (verification_figure(before, after)?)
         (verification_table(record))
+        (worst_table(set, before, after))
         h2 { "Parameters" }
         p { "Table 2 of the paper: the corrected parameters of each link and joint; alpha and a of link j - 1, theta and d of joint j." }
         (joint_table(record))
@@ -104,34 +105,79 @@ fn verdict(record: &Record) -> Markup {
         _ => Tone::Doubtful,
     };
     let headline = format!("mean distance error {} mm before, {} mm after", number(before, 4), number(after, 4));
-    page::verdict(tone, &headline, "on rows that took no part in the fit or in any choice")
+    let verify = |robot: Option<&PointSpread>| match robot.map(|s| (s.distance.max_abs_mm, s.point)) {
+        Some((largest, point)) => (number(largest, 4), number(point.and_then(|p| p.mean_abs_mm), 4)),
+        None => (number(None, 4), number(None, 4)),
+    };
+    let (largest_before, point_before) = verify(Some(&record.before.verify));
+    let (largest_after, point_after) = verify(record.chosen_method().map(|m| &m.verify));
+    let mut detail = format!("largest {largest_before} mm before, {largest_after} mm after");
+    if record.before.verify.point.is_some() {
+        detail.push_str(&format!("; position, mean: {point_before} mm before, {point_after} mm after"));
+    }
+    detail.push_str("; on rows that took no part in the fit or in any choice");
+    page::verdict(tone, &headline, &detail)
 }
 
 fn verification_figure(before: &[RowError], after: &[RowError]) -> Result<Markup> {
     let series = |errors: &[RowError]| -> Vec<(f64, f64)> {
-        errors.iter().enumerate().filter_map(|(i, e)| Some(((i + 1) as f64, e.distance_mm?.abs()))).collect()
+        let numbered = errors.iter().enumerate().filter_map(|(i, e)| Some(((i + 1) as f64, e.distance_mm?.abs())));
+        numbered.filter(|(_, error)| *error > 0.0).collect()
     };
-    let svg = Plot::new("Distance errors of the verify rows", "verify row", "absolute error, mm")
-        .points("before", &series(before))
-        .points("after", &series(after))
-        .svg()?;
+    let svg =
+        Plot::new("Distance errors of the verify rows", "verify row, in the order of the file", "absolute error, mm")
+            .points("before", &series(before))
+            .points("after", &series(after))
+            .log_y()
+            .svg()?;
     Ok(page::figure(
         &svg,
-        "Fig. 9 of the paper: each verification distance before and after. Points of `after` that stay as high as `before` \
-         are poses that the model cannot explain.",
+        "Fig. 9 of the paper: each verification distance before and after; a division of the scale is a factor of ten. A pose that is \
+         as far off after as before is one that the model cannot explain: see the table of the worst.",
     ))
 }
 
+/// Verify rows in the table of the worst.
+const WORST: usize = 10;
+
+/// The verify rows with the largest errors after identification.
+fn worst_table(set: &Dataset, before: &[RowError], after: &[RowError]) -> Markup {
+    let mut errors: Vec<(f64, &RowError, &RowError)> =
+        before.iter().zip(after).filter_map(|(b, a)| Some((a.distance_mm?, b, a))).collect();
+    errors.sort_by(|x, y| y.0.abs().total_cmp(&x.0.abs()));
+    let row = |(_, b, a): &(f64, &RowError, &RowError)| {
+        let pose = &set.poses[a.row];
+        let point = |e: &RowError| number(e.point_mm.map(|p| p.norm()), 4);
+        let distance = |e: &RowError| number(e.distance_mm, 4);
+        vec![pose.name.clone(), set.groups[pose.group].name.clone(), distance(b), distance(a), point(b), point(a)]
+    };
+    let rows: Vec<Vec<String>> = errors.iter().take(WORST).map(row).collect();
+    let header = ["verify row", "group", "distance before, mm", "after, mm", "point before, mm", "after, mm"];
+    html! {
+        p { "The worst after identification, predicted minus measured. One group among them: its cameras or its centre moved; one \
+             region of the workspace: the model is not enough there." }
+        (page::table(&header, &rows))
+    }
+}
+
 fn verification_table(record: &Record) -> Markup {
-    let row = |name: &str, s: &PointSpread| {
-        let mut row = distance_row(name, &s.distance, Some(&record.before.verify.distance));
+    let row = |name: &str, s: &PointSpread, before: Option<&Spread>| {
+        let mut row = distance_row(name, &s.distance, before);
         row.push(number(s.point.and_then(|p| p.mean_abs_mm), 4));
         row.push(number(s.point.and_then(|p| p.max_abs_mm), 4));
         row
     };
-    let mut rows = vec![row("before", &record.before.verify)];
-    rows.extend(record.methods.iter().map(|m| row(&format!("{}/{}", m.name, m.model), &m.verify)));
-    page::table(&["distances, mm", "mean", "std", "max", "min", "better by", "point mean", "point max"], &rows)
+    let before = &record.before.verify;
+    let mut rows = vec![row("before", before, None)];
+    rows.extend(record.methods.iter().map(|m| {
+        let name = format!("{}/{}", m.name, m.model);
+        let mark = if name == record.chosen { " (kept)" } else { "" };
+        row(&format!("{name}{mark}"), &m.verify, Some(&before.distance))
+    }));
+    html! {
+        p { "Table 3 of the paper, for every method and model. Methods that differ by less than their scatter have found the same robot." }
+        (page::table(&["distances, mm", "mean", "std", "max", "min", "better by", "point mean", "point max"], &rows))
+    }
 }
 
 fn parameter_table(record: &Record) -> Markup {
@@ -170,7 +216,11 @@ fn rank_table(record: &Record) -> Markup {
             rows.push(vec![name.to_owned(), format!("{value:.3e}")]);
         }
     }
-    page::table(&["", ""], &rows)
+    html! {
+        p { "Observability indices O1 to O5 of the base parameters (Sun and Hollerbach, 2008), mm a mm or mrad: the larger, the better the \
+             poses; a condition in the thousands asks for poses with more varied orientation." }
+        (page::table(&["", ""], &rows))
+    }
 }
 
 fn convergence_figure(record: &Record) -> Result<Markup> {

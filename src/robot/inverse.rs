@@ -87,6 +87,19 @@ pub fn from_start(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]
     (residual.norm() < REACHED_MM).then_some(q)
 }
 
+/// How freely the flange moves there: the least singular value of its Jacobian, mm a rad, angles of the flange times [`ARM_MM`].
+/// Zero in a singular posture, where small motions of the flange need large ones of the joints, and for fewer than six joints.
+pub fn freedom_mm(robot: &Robot, joints_rad: &[f64]) -> f64 {
+    let singular = jacobian(robot, joints_rad).singular_values();
+    if singular.len() < 6 { 0.0 } else { singular.min() }
+}
+
+/// Least way from a joint's angle to one of its limits, rad; infinite without limits.
+pub fn room_rad(robot: &Robot, joints_rad: &[f64]) -> f64 {
+    let limits = robot.joints.iter().zip(joints_rad).filter_map(|(joint, q)| Some((joint.limits_rad?, q)));
+    limits.map(|((low, high), q)| (q - low).min(high - q)).fold(f64::INFINITY, f64::min)
+}
+
 /// The first solution found from any of the starts, in their order.
 pub fn from_starts(robot: &Robot, base_from_flange: &Transform, starts_rad: &[Vec<f64>]) -> Option<Vec<f64>> {
     starts_rad.iter().find_map(|start| from_start(robot, base_from_flange, start))
@@ -131,6 +144,17 @@ mod tests {
         if let Some(q) = from_start(&robot, &wanted, &there) {
             assert!(q[0].abs() <= 0.3);
         }
+    }
+
+    #[test]
+    fn a_stretched_wrist_is_not_free() {
+        let robot = with_limits(Robot::paper());
+        let bent = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
+        let mut stretched = bent;
+        stretched[4] = 0.0;
+        assert!(freedom_mm(&robot, &bent) > 20.0, "{}", freedom_mm(&robot, &bent));
+        assert!(freedom_mm(&robot, &stretched) < 1e-9);
+        assert!((room_rad(&robot, &bent) - (2.8 - 1.1)).abs() < 1e-12);
     }
 
     #[test]

@@ -61,13 +61,19 @@ pub struct Shot {
 }
 
 impl World {
-    /// Draws a world. `true_robot` replaces the deviations drawn from the seed.
+    /// Draws a world. `true_robot` replaces the parameters drawn from the seed; effects beyond them are added to it.
     pub fn new(settings: Settings, true_robot: Option<Robot>) -> Result<World> {
         let rig = true_rig(settings.size_px);
         let check_board = PhysicalBoard::new(settings.check_board, settings.check_workmanship, settings.seed, 0);
         let target = PhysicalBoard::new(settings.target_board, settings.target_workmanship, settings.seed, 1);
         let nominal = true_robot::nominal();
-        let truth = true_robot.unwrap_or_else(|| true_robot::deviated(&nominal, &settings.robot, settings.seed));
+        let truth = match true_robot {
+            Some(mut robot) => {
+                true_robot::add_effects(&mut robot, &nominal, &settings.robot, settings.seed);
+                robot
+            }
+            None => true_robot::deviated(&nominal, &settings.robot, settings.seed),
+        };
         if truth.joints.len() != nominal.joints.len() {
             return Err(Error::Joints { found: truth.joints.len(), needed: nominal.joints.len() }.into());
         }

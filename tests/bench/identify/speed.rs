@@ -1,8 +1,7 @@
-//! Benchmark `identify`: STAPSO and the other swarms with 100 particles x 500 iterations x 262 poses, without early stop.
+//! STAPSO and the other swarms with 100 particles x 500 iterations x 262 poses, without early stop.
 //!
-//! `cargo bench --bench identify [measurements.csv robot.toml]`; without files a robot like the paper's is measured on four spheres.
-//! Prints pose evaluations per second and core; `scripts/bench_identify.py` runs pyswarms and scipy on the same data.
-#![expect(clippy::print_stdout, reason = "a benchmark says what it measured")]
+//! Without files a robot like the paper's is measured on four spheres. Prints pose evaluations per second and core;
+//! `scripts/bench_identify.py` runs pyswarms and scipy on the same data.
 
 use std::time::Instant;
 
@@ -19,9 +18,9 @@ const SEED: u64 = 1;
 /// Fitted poses of the paper's experiment, besides the four centres.
 const SAMPLES: usize = 262;
 
-fn main() {
-    let files: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    let (robot, rows) = match files.as_slice() {
+/// Times every solver on the files' data (measurements, robot), or on made-up data.
+pub fn table(files: &[String]) {
+    let (robot, rows) = match files {
         [rows, robot] => (
             robot::file::read(Utf8Path::new(robot)).expect("the robot"),
             measurements::read(Utf8Path::new(rows)).expect("the measurements"),

@@ -1,0 +1,124 @@
+//! How surely STAPSO ends at the least cost: the paper's constants and those shipped, with the paper's stop and without.
+//!
+//! The least cost is that of 50 starts of the trust region drawn in the box. "Below" counts the seeds whose best cost, at as
+//! many evaluations as the other swarm spent in 500 iterations, is less than that of each of PSO, CPSO, APSO and ARPSO.
+
+use camino::Utf8Path;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+use stereocal::identify::dataset::Dataset;
+use stereocal::identify::prepare::Prepared;
+use stereocal::identify::problem::{Problem, Solution};
+use stereocal::identify::settings::{Method, Prior, Settings, SwarmSettings};
+use stereocal::identify::{Model, swarm, trust_region};
+use stereocal::{measurements, robot};
+
+use crate::experiment;
+
+/// Starts of the trust region.
+const STARTS: usize = 50;
+
+/// Relative difference from the least cost that counts as having reached it.
+const REACHED: f64 = 1e-6;
+
+/// A table for each of the paper's plan in its own box, in the widened box, and for varied orientation.
+pub fn table(seeds: u64) {
+    for (plan, widen_bounds, orientation) in [
+        ("one orientation, box of 1 deg and 1 mm", false, "fixed"),
+        ("one orientation, box widened where the minimum lies beyond", true, "fixed"),
+        ("varied orientation, box widened", true, "varied"),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        experiment::simulate(folder.path(), orientation, "1", &[]);
+        let root = Utf8Path::from_path(folder.path()).expect("a path of letters");
+        let rows = measurements::read(&root.join("measurements.csv")).expect("the measurements");
+        let nominal = robot::file::read(&root.join("robot.toml")).expect("the robot");
+        let set = Dataset::new(&rows, 1).expect("rows to fit");
+        let settings = Settings { prior: Prior::Off, widen_bounds, ..Settings::default() };
+        let parameters = nominal.mdh_parameters();
+        let prepared = Prepared::new(&set, &nominal, &parameters, &set.fit_rows(), Model::CenterDistance, &settings)
+            .expect("enough poses");
+        compare(plan, &prepared.fit(), seeds);
+    }
+}
+
+fn compare(plan: &str, problem: &dyn Problem, seeds: u64) {
+    let least = least_of_starts(problem);
+    println!("\n{plan}: {} unknowns, least cost of {STARTS} starts {least:.6} mm2, {seeds} seeds", problem.dimension());
+    println!(
+        "{:34} {:>9} {:>9} {:>22} {:>14}",
+        "constants", "reached %", "below %", "evaluations to get there", "relative excess"
+    );
+    println!("{:34} {:>9} {:>9} {:>11} {:>10} {:>14}", "", "", "", "median", "most", "median, most");
+    let endless = SwarmSettings { patience: 0, ..SwarmSettings::default() };
+    let others: Vec<Vec<Solution>> = (0..seeds)
+        .into_par_iter()
+        .map(|seed| OTHERS.map(|method| swarm::solve(problem, method, &endless, seed)).to_vec())
+        .collect();
+    for (name, constants) in [
+        ("shipped", SwarmSettings::default()),
+        ("shipped, no stop", endless.clone()),
+        ("paper", SwarmSettings::paper()),
+        ("paper, no stop", SwarmSettings { patience: 0, ..SwarmSettings::paper() }),
+        ("paper, S = 50", with_patience(50)),
+    ] {
+        let ours: Vec<Solution> =
+            (0..seeds).into_par_iter().map(|seed| swarm::solve(problem, Method::Stapso, &constants, seed)).collect();
+        row(name, least, &ours, &others);
+    }
+    for (k, method) in OTHERS.iter().enumerate() {
+        let alone: Vec<Solution> = others.iter().map(|o| o[k].clone()).collect();
+        row(method.name(), least, &alone, &[]);
+    }
+}
+
+const OTHERS: [Method; 4] = [Method::Pso, Method::Cpso, Method::Apso, Method::Arpso];
+
+/// The paper's constants with the stop's 50 iterations as S too: the stop comes first.
+fn with_patience(iterations: usize) -> SwarmSettings {
+    let mut constants = SwarmSettings::paper();
+    constants.stapso.stagnation_iterations = iterations;
+    constants
+}
+
+fn row(name: &str, least: f64, ours: &[Solution], others: &[Vec<Solution>]) {
+    let end = least * (1.0 + REACHED);
+    let percent = |count: usize| 100.0 * count as f64 / ours.len() as f64;
+    let mut spent: Vec<usize> = ours
+        .iter()
+        .filter_map(|s| s.history.iter().zip(&s.history_evaluations).find(|(c, _)| **c <= end).map(|(_, e)| *e))
+        .collect();
+    spent.sort_unstable();
+    let mut excess: Vec<f64> = ours.iter().map(|s| s.cost / least - 1.0).collect();
+    excess.sort_by(f64::total_cmp);
+    let below =
+        ours.iter().zip(others).filter(|(s, theirs)| theirs.iter().all(|t| cost_after(s, t.evaluations) < t.cost));
+    let below = if others.is_empty() { "-".to_owned() } else { format!("{:.0}", percent(below.count())) };
+    let count = |at: Option<&usize>| at.map_or("-".to_owned(), usize::to_string);
+    println!(
+        "{name:34} {:9.0} {below:>9} {:>11} {:>10} {:>14}",
+        percent(spent.len()),
+        count(spent.get(spent.len() / 2)),
+        count(spent.last()),
+        format!("{:.1e} {:.1e}", excess[excess.len() / 2], excess[excess.len() - 1]),
+    );
+}
+
+/// Best cost when that many evaluations were spent.
+fn cost_after(solution: &Solution, evaluations: usize) -> f64 {
+    let history = solution.history.iter().zip(&solution.history_evaluations);
+    history.filter(|(_, e)| **e <= evaluations).map(|(c, _)| *c).fold(f64::INFINITY, f64::min)
+}
+
+fn least_of_starts(problem: &dyn Problem) -> f64 {
+    let mut random = Pcg64::seed_from_u64(99);
+    let settings = trust_region::Settings::default();
+    let starts: Vec<Vec<f64>> = (0..STARTS)
+        .map(|_| {
+            problem.lower().iter().zip(problem.upper()).map(|(l, u)| l + (u - l) * random.random::<f64>()).collect()
+        })
+        .collect();
+    let costs: Vec<f64> = starts.par_iter().map(|s| trust_region::solve(problem, s, &settings).cost).collect();
+    costs.into_iter().fold(f64::INFINITY, f64::min)
+}
