@@ -119,7 +119,7 @@ pub struct Corrections {
 
 impl Default for Corrections {
     fn default() -> Corrections {
-        Corrections { gravity_direction: -Vector3::z(), gravity: Vec::new(), harmonics: Vec::new() }
+        Corrections { gravity_direction: Vector3::new(0.0, 0.0, -1.0), gravity: Vec::new(), harmonics: Vec::new() }
     }
 }
 

@@ -26,6 +26,9 @@ struct RobotRecord {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct JointRecord {
+    /// `revolute`, the only kind there is; other programs write it.
+    #[serde(default, rename = "type", skip_serializing)]
+    kind: Option<String>,
     alpha_deg: f64,
     a_mm: f64,
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -112,6 +115,9 @@ impl RobotRecord {
         let tool_mm = Vector3::new(self.tool.x_mm, self.tool.y_mm, self.tool.z_mm);
         let mut joints = Vec::with_capacity(self.joint.len());
         for (i, j) in self.joint.iter().enumerate() {
+            if let Some(kind) = j.kind.as_deref().filter(|kind| *kind != "revolute") {
+                return Err(format!("joint {}: type is \"{kind}\"; only revolute joints are known", i + 1));
+            }
             let limits = j.limits_deg.unwrap_or([-1.0, 1.0]);
             let numbers = [j.alpha_deg, j.a_mm, j.beta_deg, j.theta_deg, j.d_mm, limits[0], limits[1]];
             if numbers.iter().any(|v| !v.is_finite()) {
@@ -206,6 +212,7 @@ impl From<&Robot> for RobotRecord {
                 .joints
                 .iter()
                 .map(|j| JointRecord {
+                    kind: None,
                     alpha_deg: j.alpha_rad.to_degrees(),
                     a_mm: j.a_mm,
                     beta_deg: j.beta_rad.to_degrees(),
@@ -239,6 +246,15 @@ mod tests {
         }
         assert_eq!(back.tool_mm, robot.tool_mm);
         assert_eq!(back.corrections, robot.corrections);
+    }
+
+    #[test]
+    fn a_joint_that_slides_is_refused() {
+        let sliding = to_toml(&Robot::paper()).replacen("[[joint]]", "[[joint]]\ntype = \"prismatic\"", 1);
+        let message = toml::from_str::<RobotRecord>(&sliding).unwrap().robot().unwrap_err();
+        assert!(message.contains("joint 1: type is \"prismatic\""), "{message}");
+        let turning = to_toml(&Robot::paper()).replacen("[[joint]]", "[[joint]]\ntype = \"revolute\"", 1);
+        assert!(toml::from_str::<RobotRecord>(&turning).unwrap().robot().is_ok());
     }
 
     #[test]
