@@ -39,7 +39,7 @@ pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
     judged.advice.iter().chain(&judged.warnings).for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
-    let page = report::camera_check::page(&calibration, &judged)?;
+    let page = report::camera_check::page(&calibration, &judged, &corners)?;
     out.write_json("calibration.json", &CalibrationFile::from(calibration.rig()))?;
     out.write("corners.csv", corners_file::to_csv(&calibration.mark(&corners)).as_bytes())?;
     out.write_json("camera-check.json", &file)?;

@@ -13,7 +13,7 @@ use super::{Board, Corner};
 use crate::files::OutDir;
 
 /// Changed with every change of detection or refinement that moves a corner.
-const ALGORITHM: &str = concat!("corners 6 ", env!("CARGO_PKG_VERSION"));
+const ALGORITHM: &str = concat!("corners 7 ", env!("CARGO_PKG_VERSION"));
 
 /// What was found in a picture, or why nothing.
 pub type Look = Result<Grid<Corner>, Refusal>;
@@ -59,8 +59,15 @@ fn text(look: &Look) -> String {
                 let s = c.covariance_px2.map_or([f64::NAN; 3], |s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]]);
                 let used = u8::from(c.used);
                 text.push_str(&format!(
-                    "{} {} {} {} {} {} {} {used}\n",
-                    c.col, c.row, c.px.x, c.px.y, s[0], s[1], s[2]
+                    "{} {} {} {} {} {} {} {} {used}\n",
+                    c.col,
+                    c.row,
+                    c.px.x,
+                    c.px.y,
+                    s[0],
+                    s[1],
+                    s[2],
+                    c.blur_px.unwrap_or(f64::NAN)
                 ));
             }
         }
@@ -79,13 +86,14 @@ fn parse(text: &str, board: Board) -> Option<Look> {
     let mut grid: Grid<Corner> = Grid::from_fn(board.columns(), board.rows(), |_, _| None);
     for line in body.lines() {
         let numbers: Vec<f64> = line.split(' ').map(|n| n.parse().ok()).collect::<Option<_>>()?;
-        let [col, row, x, y, xx, xy, yy, used] = numbers.try_into().ok()?;
+        let [col, row, x, y, xx, xy, yy, blur, used] = numbers.try_into().ok()?;
         let (col, row) = (col as usize, row as usize);
         if col >= board.columns() || row >= board.rows() || !x.is_finite() || !y.is_finite() {
             return None;
         }
         let covariance_px2 = xx.is_finite().then(|| Matrix2::new(xx, xy, xy, yy));
-        let corner = Corner { col, row, px: Point2::new(x, y), covariance_px2, used: used != 0.0 };
+        let blur_px = blur.is_finite().then_some(blur);
+        let corner = Corner { col, row, px: Point2::new(x, y), covariance_px2, blur_px, used: used != 0.0 };
         *grid.cells.get_mut(row * board.columns() + col)? = Some(corner);
     }
     Some(Ok(grid))
@@ -104,7 +112,8 @@ mod tests {
         let look: Look = Ok(Grid::from_fn(3, 2, |col, row| {
             let covariance_px2 = (col > 0).then(|| Matrix2::new(1.0 / 3e5, 1e-8, 1e-8, 2e-6));
             let px = Point2::new(1.0 / 3.0 + col as f64, row as f64);
-            (row + col < 3).then_some(Corner { col, row, px, covariance_px2, used: col > 0 })
+            let blur_px = (col > 0).then_some(1.0 / 3.0);
+            (row + col < 3).then_some(Corner { col, row, px, covariance_px2, blur_px, used: col > 0 })
         }));
         let written = text(&look);
         assert_eq!(parse(&written, board()), Some(look));

@@ -37,6 +37,8 @@ pub struct Corner {
     pub px: Point2<f64>,
     /// Covariance of the place, px^2, where the refinement gave one.
     pub covariance_px2: Option<Matrix2<f64>>,
+    /// Standard deviation of the blur across its edges, px, where the refinement gave one.
+    pub blur_px: Option<f64>,
     /// False for a corner that was found but is not to be relied on.
     pub used: bool,
 }

@@ -1,6 +1,6 @@
 //! `corners.csv`: corners of all pairs as text, from this program or from any other detector.
 //!
-//! In: a CSV file with the columns `pair,side,col,row,x_px,y_px` and optionally `sxx_px2,sxy_px2,syy_px2,used`, rows in
+//! In: a CSV file with the columns `pair,side,col,row,x_px,y_px` and optionally `sxx_px2,sxy_px2,syy_px2,used,blur_px`, rows in
 //! any order. Out: [`Corners`], and back. Raw (distorted) pixels, pixel (0, 0) is the centre of the top-left pixel.
 //!
 //! The size of the pictures is not in the file. A reader that knows it says so; otherwise it is guessed from where the
@@ -18,7 +18,7 @@ use crate::error::{Place, Result};
 use crate::files;
 
 /// The header of `corners.csv`.
-pub const HEADER: &str = "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,used";
+pub const HEADER: &str = "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,used,blur_px";
 
 /// The text of `corners.csv`. Numbers are written so that they read back exactly.
 pub fn to_csv(corners: &Corners) -> String {
@@ -29,8 +29,9 @@ pub fn to_csv(corners: &Corners) -> String {
             for c in list {
                 let s = c.covariance_px2.map(|s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]]);
                 let s = s.map_or_else(|| ",,".to_owned(), |[xx, xy, yy]| format!("{xx},{xy},{yy}"));
-                let (name, used) = (quoted(&pair.pair), u8::from(c.used));
-                let _ = writeln!(text, "{name},{},{},{},{},{},{s},{used}", side.name(), c.col, c.row, c.px.x, c.px.y);
+                let blur = c.blur_px.map_or_else(String::new, |blur| blur.to_string());
+                let (name, side, used) = (quoted(&pair.pair), side.name(), u8::from(c.used));
+                let _ = writeln!(text, "{name},{side},{},{},{},{},{s},{used},{blur}", c.col, c.row, c.px.x, c.px.y);
             }
         }
     }
@@ -93,6 +94,7 @@ fn parse(table: &Table) -> Result<Vec<Row>> {
     let (x, y) = (table.require("x_px")?, table.require("y_px")?);
     let covariance = ["sxx_px2", "sxy_px2", "syy_px2"].map(|name| table.column(name));
     let used = table.column("used");
+    let blur = table.column("blur_px");
     let mut rows = Vec::with_capacity(table.rows.len());
     let mut seen = BTreeMap::new();
     for (line, fields) in &table.rows {
@@ -133,7 +135,11 @@ fn parse(table: &Table) -> Result<Vec<Row>> {
             other => return Err(table.refuse(line, format!("used is `{other}`; it is 1 or 0"))),
         };
         let px = Point2::new(table.number(line, fields, x)?, table.number(line, fields, y)?);
-        rows.push(Row { line, pair: name, side, corner: Corner { col, row, px, covariance_px2, used } });
+        let blur_px = match blur.filter(|&c| !fields[c].is_empty()) {
+            Some(column) => Some(table.number(line, fields, column)?),
+            None => None,
+        };
+        rows.push(Row { line, pair: name, side, corner: Corner { col, row, px, covariance_px2, blur_px, used } });
     }
     Ok(rows)
 }
@@ -207,8 +213,10 @@ mod tests {
     #[test]
     fn what_is_written_reads_back_exactly() {
         let covariance_px2 = Some(Matrix2::new(1.0 / 3.0e4, 1e-7, 1e-7, 2.2e-5));
-        let corner = |col, row, x: f64| Corner { col, row, px: Point2::new(x, 2.0 / 7.0), covariance_px2, used: true };
-        let plain = |c: Corner| Corner { covariance_px2: None, used: false, ..c };
+        let blur_px = Some(2.0 / 3.0);
+        let px = |x: f64| Point2::new(x, 2.0 / 7.0);
+        let corner = |col, row, x: f64| Corner { col, row, px: px(x), covariance_px2, blur_px, used: true };
+        let plain = |c: Corner| Corner { covariance_px2: None, blur_px: None, used: false, ..c };
         let corners = Corners {
             board: Board { squares: "4x3".parse().unwrap(), square_mm: 10.0 },
             left_size: (640, 480),

@@ -43,11 +43,20 @@ pub fn refine(picture: &Picture, detected: &Detected) -> Grid<Corner> {
     let measured = measure(picture, detected);
     Grid::from_fn(measured.columns, measured.rows, |col, row| {
         if let Some(m) = measured.get(col, row) {
-            return Some(Corner { col, row, px: m.px, covariance_px2: Some(m.fit.covariance_px2), used: true });
+            let [a, b] = m.fit.model.blur_px;
+            let blur_px = Some((0.5 * (a * a + b * b)).sqrt());
+            return Some(Corner {
+                col,
+                row,
+                px: m.px,
+                covariance_px2: Some(m.fit.covariance_px2),
+                blur_px,
+                used: true,
+            });
         }
         // Kept where it was seen roughly, so that a picture in which nothing could be measured can still be judged.
         let px = detected.at_full_size(detected.corners.get(col, row)?);
-        Some(Corner { col, row, px, covariance_px2: None, used: false })
+        Some(Corner { col, row, px, covariance_px2: None, blur_px: None, used: false })
     })
 }
 

@@ -2,11 +2,13 @@
 
 use maud::{Markup, html};
 
+use super::blur;
 use super::figure::Plot;
 use super::page::{self, Tone};
 use super::table::{Table, number};
 use crate::error::Result;
 use crate::files::OutDir;
+use crate::imaging::Corners;
 use crate::stereo::Side;
 use crate::stereo::accuracy::{Accuracy, Axis, HeldOutPair, Range, Verdict};
 use crate::stereo::calibrate::Calibration;
@@ -95,7 +97,7 @@ fn advice(judged: &Judged) -> String {
 }
 
 /// The report.
-pub fn page(calibration: &Calibration, judged: &Judged) -> Result<String> {
+pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners) -> Result<String> {
     let tone = match judged.verdict {
         Verdict::Pass => Tone::Good,
         Verdict::Undecided => Tone::Doubtful,
@@ -113,6 +115,7 @@ pub fn page(calibration: &Calibration, judged: &Judged) -> Result<String> {
         (pairs(calibration, judged))
         h2 { "What the model leaves of the corners" }
         (residuals(calibration, judged)?)
+        (blur::section(corners))
         h2 { "The cameras and the rig" }
         (parameters(calibration))
         (lenses(calibration))

@@ -1,5 +1,6 @@
 //! What people look at: tables for the terminal, figures and HTML pages. Computes no metric of its own.
 
+pub mod blur;
 pub mod camera_check;
 pub mod figure;
 pub mod identify;

@@ -171,6 +171,7 @@ impl World {
                 row: k / columns,
                 px,
                 covariance_px2: None,
+                blur_px: None,
                 used: true,
             };
             at.into_iter().enumerate().map(corner).collect()

@@ -45,7 +45,8 @@ fn pictures_to_corrected_kinematics() {
     for key in ["pair", "mean_error_x10_mm", "mean_error_y10_mm", "mean_error_x70_mm", "mean_error_y70_mm"] {
         assert!(check.pointer(&format!("/pairs/0/{key}")).is_some(), "{key}");
     }
-    assert_eq!(header(&world.join("out/corners.csv")), "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,used");
+    let columns = "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,used,blur_px";
+    assert_eq!(header(&world.join("out/corners.csv")), columns);
 
     done(world, &["measure", "poses/"]);
     let columns = "pose,group,role,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,x_mm,y_mm,z_mm,\
