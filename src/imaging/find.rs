@@ -45,8 +45,8 @@ pub fn find_corners(folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Corners> {
         .par_iter()
         .map(|files| {
             let (left, right) = rayon::join(
-                || look(&files.left, wanted, sizes[0], &bar),
-                || look(&files.right, wanted, sizes[1], &bar),
+                || look(&files.left, wanted, sizes, &bar),
+                || look(&files.right, wanted, [sizes[1], sizes[0]], &bar),
             );
             [left, right]
         })
@@ -77,12 +77,18 @@ pub fn find_corners(folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Corners> {
     Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, notes })
 }
 
-/// One picture from file to corners; the reason where that fails.
-fn look(path: &Utf8Path, wanted: &Wanted<'_>, size: (u32, u32), bar: &indicatif::ProgressBar) -> Look {
+/// One picture from file to corners; the reason where that fails. `sizes` are those of this side's pictures and of the other's.
+fn look(path: &Utf8Path, wanted: &Wanted<'_>, sizes: [(u32, u32); 2], bar: &indicatif::ProgressBar) -> Look {
     bar.inc(1);
+    let [size, other] = sizes;
     // Depends on the other pictures, so it is not a matter for the cache.
     if let Some(found) = picture::size(path).filter(|found| *found != size) {
-        return Err(format!("{}x{} px, most others are {}x{}", found.0, found.1, size.0, size.1).into());
+        let why = match found {
+            _ if found == other => ", and those of the other side have its size: are left and right exchanged?",
+            _ if found == (size.1, size.0) => ": is it turned by 90 degrees?",
+            _ => "",
+        };
+        return Err(format!("{}x{} px, most others are {}x{}{why}", found.0, found.1, size.0, size.1).into());
     }
     std::fs::read(path).map_err(|e| format!("cannot be read: {e}").into()).and_then(|bytes| {
         let Some(cache) = wanted.cache else { return look_at(bytes, path, wanted.board) };

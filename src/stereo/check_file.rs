@@ -60,7 +60,8 @@ impl Judged {
         let whiteness = whiteness::check(calibration);
         let disagreements = disagreement::find(calibration);
         let advice = variety::advise(calibration, &whiteness);
-        let mut warnings = Vec::from_iter(whiteness.describe());
+        let mut warnings = Vec::from_iter(calibration.rig().unusual());
+        warnings.extend(whiteness.describe());
         warnings.extend(disagreement::describe(&disagreements));
         warnings.extend(print_scatter(calibration, &accuracy));
         let held_out = accuracy.verdict(tolerance_mm);

@@ -1,22 +1,24 @@
 //! Pairs that agree on one rig.
 //!
 //! In: corners. Out: the views that belong together with a first rig and poses, and the others with the reason. Method: each camera
-//! alone; the relative pose most pairs agree on (a half turn of a board that looks the same after one is undone); a robust
+//! alone; the relative pose most pairs agree on (turns of a board that looks the same after them are undone); a robust
 //! bundle; pairs that contradict it are taken out and asked again. Goes wrong: most pairs contradict each other.
 
 use super::bundle::{self, Search, Values};
 use super::calibrate::FEWEST_PAIRS;
 use super::homography::FEWEST_CORNERS;
 use super::layout::{Layout, Shared};
+use super::mixups::{self, Member, Series, renumbered};
 use super::noise::Noise;
 use super::observations::{Side, View};
 use super::residuals;
 use super::robust::Loss;
-use super::screening::{self, Look, Usual};
+use super::screening::{self, Usual};
 use super::start::{self, CAUCHY_WIDTH, OneCamera};
 use super::{Error, Lens, Rig};
 use crate::geometry::Transform;
-use crate::imaging::{Board, Corners, Skipped};
+use crate::imaging::order;
+use crate::imaging::{Board, Corner, Corners, PairCorners, Skipped};
 use rayon::prelude::*;
 
 /// Lens of the first rig.
@@ -47,7 +49,12 @@ pub fn find(corners: &Corners) -> Result<Consensus, Error> {
     let mut skipped = corners.skipped.clone();
     let mut views = Vec::new();
     let fewest = FEWEST_CORNERS.max(fewest_corners(&corners.board));
-    for pair in &corners.pairs {
+    for (i, pair) in corners.pairs.iter().enumerate() {
+        if let Some(first) = corners.pairs[..i].iter().find(|first| same_corners(first, pair)) {
+            let reason = format!("the same pictures as pair {}", first.pair);
+            skipped.push(Skipped { pair: pair.pair.clone(), reason });
+            continue;
+        }
         let view = View::new(&corners.board, pair, fewest);
         let [left, right] = Side::BOTH.map(|side| view.active(side).count());
         if left.min(right) < fewest {
@@ -78,12 +85,18 @@ pub fn find(corners: &Corners) -> Result<Consensus, Error> {
     gather(&corners.board, candidates, &shared, (&inside, &on_rig), skipped, &usual)
 }
 
+/// True for corners of the same pictures: no two pictures have the same noise.
+fn same_corners(a: &PairCorners, b: &PairCorners) -> bool {
+    let same = |a: &[Corner], b: &[Corner]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.px == b.px);
+    same(&a.left, &b.left) && same(&a.right, &b.right)
+}
+
 /// A quarter of the board tells its pose well enough.
 fn fewest_corners(board: &Board) -> usize {
     board.corner_count().div_ceil(4).min(12)
 }
 
-/// The rig that most pairs agree on, with half turns undone.
+/// The rig that most pairs agree on, with turns of a board that looks the same after them undone.
 fn first_rig(
     board: &Board,
     mut candidates: Vec<Candidate>,
@@ -92,33 +105,25 @@ fn first_rig(
 ) -> Result<(Vec<Candidate>, Shared), Error> {
     let both: Vec<Option<(Transform, Transform)>> =
         left.poses.iter().zip(&right.poses).map(|(l, r)| l.zip(*r)).collect();
-    let half_turn =
-        crate::geometry::transform(nalgebra::Vector3::z() * std::f64::consts::PI, nalgebra::Vector3::zeros());
+    // Numberings that the colours leave open.
+    let quarters: Vec<usize> = order::ambiguity(*board).map_or(vec![0], |step| (0..4).step_by(step).collect());
     let choices: Vec<Vec<Transform>> = both
         .iter()
         .flatten()
-        .map(|(l, r)| {
-            let mut all = vec![r * l.inverse()];
-            if board.looks_the_same_after_half_turn() {
-                all.push(r * half_turn * l.inverse());
-            }
-            all
-        })
+        .map(|(l, r)| quarters.iter().map(|&quarters| r * renumbered(quarters) * l.inverse()).collect())
         .collect();
     let mut distances: Vec<f64> = both.iter().flatten().map(|(l, _)| l.translation.vector.norm()).collect();
     distances.sort_by(f64::total_cmp);
     let distance_mm = distances.get(distances.len() / 2).copied().ok_or(Error::NoCamera { side: Side::Left })?;
     let right_from_left =
         start::agreed_transform(&choices, distance_mm).ok_or(Error::NoCamera { side: Side::Right })?;
-    if board.looks_the_same_after_half_turn() {
-        for (candidate, poses) in candidates.iter_mut().zip(&both) {
-            let Some((l, r)) = poses else { continue };
-            let [straight, turned] = [r * l.inverse(), r * half_turn * l.inverse()]
-                .map(|rig| start::deviation(&rig, &right_from_left, distance_mm));
-            if turned < straight {
-                candidate.view.turn_right(board);
-            }
-        }
+    for (candidate, poses) in candidates.iter_mut().zip(&both) {
+        let Some((l, r)) = poses else { continue };
+        let off = |quarters: &usize| {
+            start::deviation(&(r * renumbered(*quarters) * l.inverse()), &right_from_left, distance_mm)
+        };
+        let nearest = quarters.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)));
+        candidate.view.turn_right(board, nearest.unwrap_or(0));
     }
     let rig = Rig { left: left.camera, right: right.camera, right_from_left, covariance: None };
     Ok((candidates, Shared { rig, shape_mm: [0.0; 2] }))
@@ -195,16 +200,20 @@ fn gather(
 ) -> Result<Consensus, Error> {
     let total = candidates.len() + skipped.len();
     let judged = candidates.len();
+    let members = candidates.iter().zip(agreed.0);
+    let members =
+        members.map(|(c, &belongs)| Member { view: &c.view, alone_px: c.alone_px, belongs }).collect::<Vec<_>>();
+    let reasons = mixups::explain(&Series { shared, board, usual: *usual, members });
     let (mut views, mut poses, mut bad) = (Vec::new(), Vec::new(), Vec::new());
-    for (candidate, (inside, on_rig)) in candidates.into_iter().zip(agreed.0.iter().zip(agreed.1)) {
-        match on_rig {
-            Some((_, pose)) if *inside => {
+    for ((candidate, on_rig), reason) in candidates.into_iter().zip(agreed.1).zip(reasons) {
+        match (on_rig, reason) {
+            (Some((_, pose)), None) => {
                 views.push(candidate.view);
                 poses.push(*pose);
             }
-            misfit => {
-                let look = screening::look(shared, board, &candidate.view, candidate.alone_px, usual);
-                bad.push(Skipped { pair: candidate.view.pair, reason: reason(look, misfit.map(|m| m.0), usual.px) });
+            (on_rig, reason) => {
+                let reason = with_misfit(reason.unwrap_or_default(), on_rig.map(|m| m.0), usual.px);
+                bad.push(Skipped { pair: candidate.view.pair, reason });
             }
         }
     }
@@ -225,12 +234,8 @@ fn gather(
     Ok(Consensus { views, values: Values { shared: shared.clone(), poses }, skipped })
 }
 
-fn reason(look: Look, misfit_px: Option<f64>, usual_px: f64) -> String {
-    match misfit_px {
-        Some(px) => format!(
-            "{} (residual {px:.2} px on the common rig, {usual_px:.2} px in most single pictures)",
-            look.describe()
-        ),
-        None => look.describe().to_owned(),
-    }
+fn with_misfit(reason: String, misfit_px: Option<f64>, usual_px: f64) -> String {
+    misfit_px.map_or(reason.clone(), |px| {
+        format!("{reason} (residual {px:.2} px on the common rig, {usual_px:.2} px in most single pictures)")
+    })
 }

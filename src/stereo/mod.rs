@@ -19,6 +19,7 @@ pub mod layout;
 pub mod leave_out;
 pub mod lens_choice;
 pub mod measure_file;
+pub mod mixups;
 pub mod neighbours;
 pub mod noise;
 pub mod observations;

@@ -35,6 +35,13 @@ impl Observation {
         Point3::new(self.board_mm.x, self.board_mm.y, z)
     }
 
+    /// Makes it the corner at another place of the board.
+    pub fn renumber(&mut self, board: &Board, (col, row): (usize, usize)) {
+        (self.col, self.row) = (col, row);
+        self.board_mm = board.corner_mm(col, row);
+        self.lift = lift(board, &self.board_mm);
+    }
+
     /// The residual in units of its own standard deviation.
     pub fn whiten(&self, residual_px: Vector2<f64>) -> Vector2<f64> {
         self.whitener * residual_px
@@ -83,19 +90,44 @@ impl View {
         View { pair: self.pair.clone(), observations }
     }
 
-    /// Renames the right picture's corners as seen on a board turned by 180 degrees in its plane.
-    pub fn turn_right(&mut self, board: &Board) {
+    /// Renumbers the right picture's corners as on a board that is turned in its plane by so many quarter turns. A board with unequal
+    /// sides takes half turns only.
+    pub fn turn_right(&mut self, board: &Board, quarters: usize) {
         for o in self.observations.iter_mut().filter(|o| o.side == Side::Right) {
-            (o.col, o.row) = (board.columns() - 1 - o.col, board.rows() - 1 - o.row);
-            o.board_mm = board.corner_mm(o.col, o.row);
+            let (col, row) = (o.col, o.row);
+            let (last_col, last_row) = (board.columns() - 1, board.rows() - 1);
+            let place = match quarters % 4 {
+                0 => (col, row),
+                1 => (last_row - row, col),
+                2 => (last_col - col, last_row - row),
+                _ => (row, last_col - col),
+            };
+            o.renumber(board, place);
         }
+    }
+
+    /// The pair with its pictures exchanged.
+    pub fn exchanged(&self) -> View {
+        let mut exchanged = self.clone();
+        for o in &mut exchanged.observations {
+            o.side = if o.side == Side::Left { Side::Right } else { Side::Left };
+        }
+        exchanged
+    }
+
+    /// The pair with about `most` corners a picture, spread over the board.
+    pub fn thinned(&self, most: usize) -> View {
+        let some = |side| {
+            let all: Vec<&Observation> = self.active(side).collect();
+            let count = all.len().min(most);
+            (0..count).map(|k| *all[k * all.len() / count]).collect::<Vec<_>>()
+        };
+        View { pair: self.pair.clone(), observations: Side::BOTH.into_iter().flat_map(some).collect() }
     }
 }
 
 fn observation(board: &Board, side: Side, corner: &Corner) -> Observation {
     let board_mm = board.corner_mm(corner.col, corner.row);
-    let edge = board.corner_mm(board.columns() - 1, board.rows() - 1);
-    let lift = |at: f64, edge: f64| 1.0 - (at / edge) * (at / edge);
     // A covariance that isn't one (not positive, not finite) says nothing: as if none had been given.
     let covariance_px2 = corner
         .covariance_px2
@@ -106,10 +138,15 @@ fn observation(board: &Board, side: Side, corner: &Corner) -> Observation {
         col: corner.col,
         row: corner.row,
         board_mm,
-        lift: [lift(board_mm.x, edge.x), lift(board_mm.y, edge.y)],
+        lift: lift(board, &board_mm),
         px: corner.px,
         covariance_px2,
         whitener: Matrix2::identity(),
         active: true,
     }
+}
+
+fn lift(board: &Board, at: &Point3<f64>) -> [f64; 2] {
+    let edge = board.corner_mm(board.columns() - 1, board.rows() - 1);
+    [1.0 - (at.x / edge.x).powi(2), 1.0 - (at.y / edge.y).powi(2)]
 }

@@ -34,6 +34,30 @@ impl Rig {
         self.right_from_left.translation.vector.norm()
     }
 
+    /// What is unusual in how the cameras stand, where something is: the left one on the right side, one rolled against the other. Both
+    /// may be meant, and no residual tells: a rig whose folders are exchanged, or with all pictures of one side turned, is a rig.
+    pub fn unusual(&self) -> Option<String> {
+        let rotation = crate::geometry::rotation_matrix(&self.right_from_left);
+        let roll_deg = rotation[(1, 0)].atan2(rotation[(1, 1)]).to_degrees();
+        if roll_deg.abs() > 45.0 {
+            return Some(format!(
+                "the right camera is rolled by {:.0} degrees against the left one: were the pictures of one side turned? \
+                 Use the files as the cameras wrote them; if the cameras stand so, all is well",
+                roll_deg.abs()
+            ));
+        }
+        let right_mm = self.right_from_left.inverse().translation.vector;
+        // Of cameras one above the other, or one behind the other, neither is the left one.
+        let exchanged = right_mm.x < -right_mm.y.abs().max(right_mm.z.abs());
+        exchanged.then(|| {
+            format!(
+                "the left camera stands {:.1} mm to the right of the right one: are left and right exchanged? Exchange the folders' \
+                 names; if the cameras are only named so, all is well",
+                -right_mm.x
+            )
+        })
+    }
+
     /// Pictures of another size than the calibration's were binned, cut or taken by other cameras.
     pub fn check_size(&self, corners: &Corners) -> Result<(), Error> {
         for (side, camera, found) in
@@ -51,5 +75,33 @@ impl Rig {
     /// Raw picture points, left and right, of a point in the left camera's frame, px.
     pub fn project(&self, point_mm: &Point3<f64>) -> (Point2<f64>, Point2<f64>) {
         (self.left.project(point_mm), self.right.project(&(self.right_from_left * point_mm)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::geometry::transform;
+
+    fn unusual(turn: Vector3<f64>, right_mm: Vector3<f64>) -> Option<String> {
+        let camera = Camera::pinhole(640, 480, 800.0);
+        let left_from_right = transform(turn, right_mm);
+        Rig { left: camera, right: camera, right_from_left: left_from_right.inverse(), covariance: None }.unusual()
+    }
+
+    #[test]
+    fn exchanged_and_rolled_rigs_are_said_and_others_are_not() {
+        let inward = Vector3::new(0.02, -0.6, 0.05);
+        assert_eq!(unusual(inward, Vector3::new(200.0, 5.0, 60.0)), None);
+        assert!(unusual(-inward, Vector3::new(-200.0, 5.0, 60.0)).is_some_and(|w| w.contains("exchanged")));
+        // One above the other, and one that looks over the other's shoulder.
+        assert_eq!(unusual(Vector3::zeros(), Vector3::new(-20.0, 90.0, 0.0)), None);
+        assert_eq!(unusual(Vector3::zeros(), Vector3::new(-20.0, 0.0, -90.0)), None);
+        for roll in [1.6, -1.5, 3.1] {
+            let rolled = unusual(Vector3::new(0.0, 0.0, roll), Vector3::new(-200.0, 0.0, 0.0));
+            assert!(rolled.is_some_and(|w| w.contains("rolled")));
+        }
     }
 }

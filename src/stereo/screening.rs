@@ -1,8 +1,7 @@
-//! Which pairs belong to the same rig, and what is wrong with the others.
+//! Which pairs belong to the same rig.
 //!
-//! In: views with each picture's own fit, and a rig that most pairs agree on. Out: for each pair its residual on the common rig and,
-//! where it does not belong, what it looks like. A pair whose pictures fit a board one by one and not together was not taken at
-//! once (or the rig moved); one that fits after a half turn was ordered wrongly; one that fits no board at all was misread.
+//! In: a pair and a rig that most pairs agree on. Out: the pair's residual on the common rig, and the limit for it by what the
+//! pictures leave one by one. What is wrong with a pair beyond the limit is a matter for [`super::mixups`].
 
 use super::layout::Shared;
 use super::observations::{Side, View};
@@ -11,7 +10,6 @@ use super::residuals::residual_px;
 use super::robust::Loss;
 use super::start::CAUCHY_WIDTH;
 use crate::geometry::Transform;
-use crate::imaging::Board;
 
 /// A pair is out when its corners lie this many times farther off on the common rig than in each picture alone...
 const FACTOR: f64 = 4.0;
@@ -21,35 +19,6 @@ const LEAST_PX: f64 = 0.3;
 /// Whatever single pictures leave, a rig that misses the corners by more than this share of the picture's width measures nothing:
 /// pictures in motion, out of focus, or of another board fit badly one by one, too.
 const LARGEST_SHARE: f64 = 1e-3;
-
-/// What a pair that does not belong looks like.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Look {
-    /// The corners of one picture are no flat board: misread, in a wrong order, or blurred.
-    Misread(Side),
-    /// Fits when the right board is turned by 180 degrees.
-    Turned,
-    /// Each picture fits a board, but not the same one: not taken at the same time, or a camera moved.
-    NotSimultaneous,
-}
-
-impl Look {
-    /// The words for a person.
-    pub fn describe(self) -> &'static str {
-        match self {
-            Look::Misread(Side::Left) => {
-                "the left corners do not form a board: misread, in a wrong order, blurred or moving"
-            }
-            Look::Misread(Side::Right) => {
-                "the right corners do not form a board: misread, in a wrong order, blurred or moving"
-            }
-            Look::Turned => "the board is turned by 180 degrees between left and right",
-            Look::NotSimultaneous => {
-                "each picture fits a board, but not the same one: not taken at the same time, or a camera moved"
-            }
-        }
-    }
-}
 
 /// Median length of one picture's residuals, px.
 pub fn median_px(shared: &Shared, left_from_board: &Transform, view: &View, side: Side) -> Option<f64> {
@@ -86,20 +55,5 @@ impl Usual {
     /// The limit above which a pair does not belong; `alone_px` is what its pictures leave one by one.
     pub fn limit_px(&self, alone_px: f64) -> f64 {
         (FACTOR * alone_px.min(2.0 * self.px).max(self.px)).max(LEAST_PX).min(LARGEST_SHARE * f64::from(self.width_px))
-    }
-}
-
-/// What is wrong with a pair that does not belong. `alone_px` are its pictures' residuals one by one, left and right.
-pub fn look(shared: &Shared, board: &Board, view: &View, alone_px: [Option<f64>; 2], usual: &Usual) -> Look {
-    for (side, alone) in Side::BOTH.into_iter().zip(alone_px) {
-        if alone.is_none_or(|px| px > usual.limit_px(0.0)) {
-            return Look::Misread(side);
-        }
-    }
-    let mut turned = view.clone();
-    turned.turn_right(board);
-    match misfit_px(shared, &turned) {
-        Some((px, _)) if px <= usual.limit_px(0.0) => Look::Turned,
-        _ => Look::NotSimultaneous,
     }
 }
