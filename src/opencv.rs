@@ -21,25 +21,10 @@ impl From<opencv::Error> for Failure {
     }
 }
 
-/// Ways to look for a board.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Detector {
-    /// Adaptive threshold, then quads: fast, wants a light margin.
-    Classic,
-    /// The same on an equalised copy, for uneven light.
-    ClassicEqualised,
-    /// Sector based (Duda and Frese 2018): slower, holds against blur and noise.
-    Sectors,
-}
-
-/// Looks for a board with `columns` x `rows` inner corners. Gives all corners row by row, to about half a pixel, in a
-/// direction of OpenCV's choosing; `None` where the whole board was not found. At least three corners each way.
-pub fn find_board(
-    picture: &Grey8,
-    columns: usize,
-    rows: usize,
-    detector: Detector,
-) -> Result<Option<Vec<Point2<f64>>>, Failure> {
+/// Looks for a board with `columns` x `rows` inner corners by sectors (Duda and Frese 2018): slow, holds against blur and noise. Gives all
+/// corners row by row, to about half a pixel, in a direction of OpenCV's choosing; `None` where the whole board was not found.
+/// At least three corners each way.
+pub fn find_board(picture: &Grey8, columns: usize, rows: usize) -> Result<Option<Vec<Point2<f64>>>, Failure> {
     hold_to_one_thread();
     if columns < 3 || rows < 3 {
         return Ok(None);
@@ -47,19 +32,7 @@ pub fn find_board(
     let image = Mat::new_rows_cols_with_data(picture.height as i32, picture.width as i32, &picture.pixels)?;
     let size = Size::new(columns as i32, rows as i32);
     let mut corners = Vector::<Point2f>::new();
-    // No CALIB_CB_FAST_CHECK: it takes half of the boards in ordinary rooms for none.
-    let found = match detector {
-        Detector::Classic => {
-            calib3d::find_chessboard_corners(&image, size, &mut corners, calib3d::CALIB_CB_ADAPTIVE_THRESH)?
-        }
-        Detector::ClassicEqualised => {
-            let flags = calib3d::CALIB_CB_ADAPTIVE_THRESH | calib3d::CALIB_CB_NORMALIZE_IMAGE;
-            calib3d::find_chessboard_corners(&image, size, &mut corners, flags)?
-        }
-        Detector::Sectors => {
-            calib3d::find_chessboard_corners_sb(&image, size, &mut corners, calib3d::CALIB_CB_EXHAUSTIVE)?
-        }
-    };
+    let found = calib3d::find_chessboard_corners_sb(&image, size, &mut corners, calib3d::CALIB_CB_EXHAUSTIVE)?;
     if !found || corners.len() != columns * rows {
         return Ok(None);
     }

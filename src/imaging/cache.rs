@@ -13,7 +13,7 @@ use super::{Board, Corner};
 use crate::files::OutDir;
 
 /// Changed with every change of detection or refinement that moves a corner.
-const ALGORITHM: &str = concat!("corners 7 ", env!("CARGO_PKG_VERSION"));
+const ALGORITHM: &str = concat!("corners 9 ", env!("CARGO_PKG_VERSION"));
 
 /// What was found in a picture, or why nothing.
 pub type Look = Result<Grid<Corner>, Refusal>;

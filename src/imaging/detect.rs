@@ -3,24 +3,24 @@
 //! In: a picture and the board's size. Out: a grid of coarse corners at the picture's full size, right-handed, columns along
 //! the longer side, turned as far as the colours tell. The board is looked for on an area-averaged copy of about
 //! [`COARSE_PX`] pixels, because OpenCV's detectors need seconds and gigabytes on 26 Mpx; a ladder of attempts follows where the
-//! first fails. Goes wrong: no board, another board, or a board that is partly hidden; each is a reason in words.
+//! first fails. Its work is bounded by the pixels of the copies, whatever they show: no clock decides what is found, and OpenCV's
+//! classic detector is not among the attempts, because fine texture keeps it busy for minutes (and what it finds is found without
+//! it). Goes wrong: no board, another board, or a board of which too little is in view; each is a reason in words.
 
 use nalgebra::{Point2, Vector2};
 
+use super::cut;
 use super::grid::{Grid, Places};
 use super::grow::largest_grid;
 use super::picture::{Grey8, Picture, Pixels};
 use super::{Board, Squares};
-use crate::opencv::{Detector, find_board};
+use crate::opencv::find_board;
 
 /// Pixels of the copy on which the board is looked for first.
 pub const COARSE_PX: usize = 1_000_000;
 
 /// Grids of fewer corners than this are chance.
 const LEAST_SEEN: usize = 12;
-/// Place of the last attempt on the first copy.
-const FIRST_COPY: usize = 3;
-
 /// A board found in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detected {
@@ -72,19 +72,20 @@ enum Copy {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Way {
-    OpenCv(Detector),
-    /// Corner by corner, for boards that are not wholly there.
+    /// Corner by corner, for boards that need not be wholly there.
     Grow,
+    /// OpenCV's sector-based detector: slower, sees through more blur and noise.
+    Sectors,
 }
 
 /// Looks for the board; the reason where it was not found.
 pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     let (mut partial, mut seen) = (None::<Detected>, None::<Places>);
     let mut last: Option<(Copy, Grey8)> = None;
-    let ladder = ladder(picture);
-    for (i, attempt) in ladder.iter().enumerate() {
-        if ladder[..i].contains(attempt) {
-            continue;
+    for attempt in ladder(picture) {
+        // All of it was looked at corner by corner: more looking would only find a part of what is there.
+        if attempt.way == Way::Sectors && (partial.is_some() || seen.as_ref().is_some_and(|grid| tells(grid).0)) {
+            break;
         }
         let small = match last.take() {
             Some((copy, small)) if copy == attempt.copy => small,
@@ -94,11 +95,11 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
             },
         };
         let found = match attempt.way {
-            Way::OpenCv(detector) => find_board(&small, board.columns(), board.rows(), detector)
+            Way::Sectors => find_board(&small, board.columns(), board.rows())
                 .map_err(|e| e.to_string())?
                 .map(|corners| whole(board, corners)),
-            Way::Grow => largest_grid(&small).and_then(|grid| {
-                let fitting = of_size(&grid, board);
+            Way::Grow => grown(&small).and_then(|grid| {
+                let fitting = of_size(&small, &grid, board);
                 if fitting.is_none() && seen.as_ref().is_none_or(|s| tells(&grid) > tells(s)) {
                     seen = Some(grid);
                 }
@@ -107,8 +108,12 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
         };
         if let Some(grid) = found {
             let complete = grid.count() == board.corner_count();
-            // The whole of a board is not less than what else hangs together in the picture.
-            if complete && seen.as_ref().is_some_and(|seen| seen.count() > grid.count()) {
+            // The whole of a board is not less than what else hangs together in the picture; what was grown ends where the board ends.
+            let less = |seen: &Places| match attempt.way {
+                Way::Grow => tells(seen) > tells(&grid),
+                Way::Sectors => seen.count() > grid.count(),
+            };
+            if complete && seen.as_ref().is_some_and(less) {
                 break;
             }
             let grid = turn_by_colours(&small, right_handed(grid), board);
@@ -120,11 +125,11 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
                 partial = Some(detected);
             }
         }
-        last = Some((attempt.copy, small));
-        // Another board, seen whole: more looking would only find a part of it, or take long.
-        if seen.as_ref().is_some_and(|grid| tells(grid).0 && (i >= FIRST_COPY || holds(grid, board))) {
+        // Another board, seen whole, that this one could be a part of.
+        if seen.as_ref().is_some_and(|grid| tells(grid).0 && holds(grid, board)) {
             break;
         }
+        last = Some((attempt.copy, small));
     }
     // A part of a larger grid is not the board with corners missing.
     let larger = seen.as_ref().map_or(0, Grid::count);
@@ -143,46 +148,35 @@ fn holds(grid: &Places, board: Board) -> bool {
 
 /// Attempts in their order. Finer copies see small boards far away, coarser ones see through blur and noise.
 fn ladder(picture: &Picture) -> Vec<Attempt> {
-    use Detector::{Classic, ClassicEqualised, Sectors};
     let first = factor_for(picture, COARSE_PX);
-    let (opencv, copy) = (Way::OpenCv, Copy::Reduced);
-    let mut ladder = vec![
-        (copy(first), opencv(Classic)),
-        (copy(first), Way::Grow),
-        (copy(first), opencv(ClassicEqualised)),
-        (copy(first), opencv(Sectors)),
-        (copy(first * 2), Way::Grow),
-        (copy(first * 2), opencv(Classic)),
-        (copy(first * 2), opencv(Sectors)),
-        (copy(first.div_ceil(2)), opencv(Classic)),
-        (copy(first.div_ceil(2)), Way::Grow),
-        (copy(first.div_ceil(2)), opencv(Sectors)),
-    ];
-    if first == 1 {
-        ladder.extend([(Copy::Doubled, Way::Grow), (Copy::Doubled, opencv(Classic))]);
-    }
-    ladder.into_iter().map(|(copy, way)| Attempt { copy, way }).collect()
+    let finer = if first == 1 { Copy::Doubled } else { Copy::Reduced(first.div_ceil(2)) };
+    let (first, coarser) = (Copy::Reduced(first), Copy::Reduced(2 * first));
+    let grown = [first, coarser, finer].map(|copy| Attempt { copy, way: Way::Grow });
+    let sectors = [first, coarser].map(|copy| Attempt { copy, way: Way::Sectors });
+    grown.into_iter().chain(sectors).collect()
+}
+
+fn grown(small: &Grey8) -> Option<Places> {
+    Some(cut::without_chance_lines(small, largest_grid(small)?))
 }
 
 fn whole(board: Board, corners: Vec<Point2<f64>>) -> Places {
     Grid { columns: board.columns(), rows: board.rows(), cells: corners.into_iter().map(Some).collect() }
 }
 
-/// A grid as the board's, where it is as long and as wide as the board: only then it is known which corners are missing.
-fn of_size(grid: &Places, board: Board) -> Option<Places> {
+/// A grid as the board's, where it is known which of the board's corners are missing: it is as long and as wide as the board, or
+/// what it lacks can only lie beyond the picture's border.
+fn of_size(small: &Grey8, grid: &Places, board: Board) -> Option<Places> {
     /// Share of the board's corners that makes a grid the board.
     const LEAST: f64 = 0.5;
     if (grid.count() as f64) < LEAST * board.corner_count() as f64 {
         return None;
     }
-    let size = (grid.columns, grid.rows);
-    if size == (board.columns(), board.rows()) {
-        Some(grid.clone())
-    } else if size == (board.rows(), board.columns()) {
-        Some(grid.quarter_turn())
-    } else {
-        None
-    }
+    let quarter = grid.quarter_turn();
+    let ways = [Some(grid), (board.columns() != board.rows()).then_some(&quarter)];
+    let mut fitting = ways.into_iter().flatten().filter_map(|grid| cut::completed(small, grid, board));
+    let first = fitting.next()?;
+    fitting.next().is_none().then_some(first)
 }
 
 /// What was found on a copy, on one that is no finer than the picture.
@@ -201,21 +195,23 @@ fn refusal(seen: Option<Places>, board: Board) -> Refusal {
     let Some(grid) = seen.filter(|grid| grid.count() >= LEAST_SEEN) else { return "no board found".to_owned().into() };
     let (long, short) = (grid.columns.max(grid.rows), grid.columns.min(grid.rows));
     let (columns, rows) = (board.columns(), board.rows());
-    let seen = format!("{} corners in {long} columns and {short} rows", grid.count());
-    if long <= columns && short <= rows {
-        return format!("shows {seen}: which of the board's {columns}x{rows} they are cannot be told").into();
-    }
+    let shows = format!("shows {} corners in {long} columns and {short} rows", grid.count());
     // A corner or two are lost easily; the size is but a hint.
     let complete = 10 * grid.count() >= 9 * long * short;
-    let squares = Squares { columns: long + 1, rows: short + 1 };
-    Refusal { reason: format!("shows {seen}, the board has {columns}x{rows}"), seen: complete.then_some(squares) }
+    let seen = complete.then_some(Squares { columns: long + 1, rows: short + 1 });
+    let reason = if long <= columns && short <= rows {
+        format!("{shows}: which of the board's {columns}x{rows} they are cannot be told")
+    } else {
+        format!("{shows}, the board has {columns}x{rows}")
+    };
+    Refusal { reason, seen }
 }
 
 /// The board that a picture shows, whatever was asked for, where all its corners are there.
 pub fn size_seen(detected: &Detected) -> Option<Squares> {
     let Pixels::Eight(pixels) = &detected.copy.pixels else { return None };
     let small = Grey8 { width: detected.copy.width, height: detected.copy.height, pixels: pixels.clone() };
-    let grid = largest_grid(&small)?;
+    let grid = grown(&small)?;
     let (columns, rows) = (grid.columns.max(grid.rows) + 1, grid.columns.min(grid.rows) + 1);
     (grid.count() == grid.columns * grid.rows).then_some(Squares { columns, rows })
 }

@@ -3,7 +3,8 @@
 //! In: a small grey picture. Out: the largest grid of checkerboard corners in it, whatever its size, with holes where corners are
 //! missing. Method: candidates are the local peaks of the ring response of Bennett and Lasenby (ChESS, 2014), each with
 //! the axis of its two bright quadrants; from a candidate and its nearest neighbours of the opposite colouring the grid grows by
-//! predicting each next place from the steps before it. Goes wrong: squares of less than about 8 px, blur of more than half a
+//! predicting each next place from the steps before it. Between neighbours there must be an edge, bright on the side on which it is
+//! bright at both ends: that keeps clutter out. Goes wrong: squares of less than about 8 px, blur of more than half a
 //! square.
 
 use std::collections::{BTreeMap, VecDeque};
@@ -41,6 +42,10 @@ const MOST_CANDIDATES: usize = 4000;
 const MOST_SEEDS: usize = 200;
 /// How far from its predicted place a corner may be, in steps of the grid.
 const STRAY: f64 = 0.3;
+/// How many times weaker than its neighbour a corner may respond; where squares end at the board's margin it is far more.
+const WEAKER: i16 = 4;
+/// What of the contrast at its ends an edge shows at least, along each of its halves.
+const EDGE_CONTRAST: f64 = 0.25;
 /// How far the bright axes of neighbours may be from perpendicular, rad.
 const SLANT: f64 = 0.6;
 
@@ -48,15 +53,17 @@ const SLANT: f64 = 0.6;
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
     at: Point2<f64>,
-    strength: i32,
+    strength: i16,
     /// Direction of the bright quadrants' axis, rad, modulo pi.
     axis: f64,
+    /// Mean of the ring's brighter half less that of its darker half.
+    contrast: f64,
 }
 
 /// The largest grid of corners in the picture; `None` where there is none of at least 3 x 3.
 pub fn largest_grid(picture: &Grey8) -> Option<Places> {
     let candidates = candidates(picture);
-    let near = Near::new(&candidates);
+    let near = Near::new(picture, &candidates);
     let mut taken = vec![false; candidates.len()];
     let mut best: Vec<((isize, isize), usize)> = Vec::new();
     let mut seeds = 0;
@@ -86,12 +93,7 @@ fn candidates(picture: &Grey8) -> Vec<Candidate> {
     if w <= 2 * REACH || h <= 2 * REACH {
         return Vec::new();
     }
-    let mut response = vec![0i32; w * h];
-    for y in REACH..h - REACH {
-        for x in REACH..w - REACH {
-            response[y * w + x] = ring_response(picture, x, y);
-        }
-    }
+    let response = responses(picture);
     let mut found = Vec::new();
     for y in REACH..h - REACH {
         for x in REACH..w - REACH {
@@ -109,11 +111,28 @@ fn candidates(picture: &Grey8) -> Vec<Candidate> {
     found
 }
 
-fn ring_response(picture: &Grey8, x: usize, y: usize) -> i32 {
-    let w = picture.width as isize;
-    let middle = (y * picture.width + x) as isize;
-    let at = |dx: isize, dy: isize| i32::from(picture.pixels[(middle + dy * w + dx) as usize]);
-    let ring = RING.map(|(dx, dy)| at(dx, dy));
+/// Five times the ring response of every pixel, zero at the border. `REACH` px of it are none.
+fn responses(picture: &Grey8) -> Vec<i16> {
+    let (w, h) = (picture.width, picture.height);
+    let mut response = vec![0i16; w * h];
+    let wide = w - 2 * REACH;
+    for y in REACH..h - REACH {
+        let row = |(dx, dy): (isize, isize)| {
+            let start = ((y as isize + dy) * w as isize + REACH as isize + dx) as usize;
+            &picture.pixels[start..start + wide]
+        };
+        let (ring, local) = (RING.map(row), [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)].map(row));
+        for (x, here) in response[y * w + REACH..][..wide].iter_mut().enumerate() {
+            *here = ring_response(ring.map(|row| i16::from(row[x])), local.map(|row| i16::from(row[x])));
+        }
+    }
+    response
+}
+
+/// Five times the response, a whole number that fits: opposite pixels of the ring alike and a quarter turn on the other colour, less
+/// what a line or an edge shows, less what a spot shows.
+#[inline]
+fn ring_response(ring: [i16; 16], local: [i16; 5]) -> i16 {
     let (mut sum, mut difference) = (0, 0);
     for n in 0..4 {
         sum += (ring[n] + ring[n + 8] - ring[n + 4] - ring[n + 12]).abs();
@@ -121,12 +140,11 @@ fn ring_response(picture: &Grey8, x: usize, y: usize) -> i32 {
     for n in 0..8 {
         difference += (ring[n] - ring[n + 8]).abs();
     }
-    let local = at(0, 0) + at(1, 0) + at(-1, 0) + at(0, 1) + at(0, -1);
-    let mean = (ring.iter().sum::<i32>() - local * 16 / 5).abs();
-    sum - difference - mean
+    let spot = (5 * ring.iter().sum::<i16>() - 16 * local.iter().sum::<i16>()).abs();
+    5 * (sum - difference) - spot
 }
 
-fn is_peak(response: &[i32], w: usize, x: usize, y: usize) -> bool {
+fn is_peak(response: &[i16], w: usize, x: usize, y: usize) -> bool {
     const AROUND: usize = 3;
     let here = response[y * w + x];
     (y - AROUND..=y + AROUND).all(|v| {
@@ -138,7 +156,7 @@ fn is_peak(response: &[i32], w: usize, x: usize, y: usize) -> bool {
     })
 }
 
-fn candidate(picture: &Grey8, response: &[i32], x: usize, y: usize) -> Candidate {
+fn candidate(picture: &Grey8, response: &[i16], x: usize, y: usize) -> Candidate {
     let w = picture.width;
     let (mut sum, mut weight) = (Vector2::zeros(), 0.0);
     for v in y - 2..=y + 2 {
@@ -155,11 +173,16 @@ fn candidate(picture: &Grey8, response: &[i32], x: usize, y: usize) -> Candidate
         cos += grey * twice.cos();
         sin += grey * twice.sin();
     }
-    Candidate { at: Point2::from(sum / weight), strength: response[y * w + x], axis: 0.5 * sin.atan2(cos) }
+    let mut ring = RING.map(|(dx, dy)| picture.pixels[((y as isize + dy) as usize) * w + (x as isize + dx) as usize]);
+    ring.sort_unstable();
+    let mean = |half: &[u8]| half.iter().map(|&v| f64::from(v)).sum::<f64>() / half.len() as f64;
+    let contrast = mean(&ring[8..]) - mean(&ring[..8]);
+    Candidate { at: Point2::from(sum / weight), strength: response[y * w + x], axis: 0.5 * sin.atan2(cos), contrast }
 }
 
 /// Candidates by cells of the picture.
 struct Near<'a> {
+    picture: &'a Grey8,
     candidates: &'a [Candidate],
     cells: BTreeMap<(i64, i64), Vec<usize>>,
 }
@@ -168,12 +191,12 @@ struct Near<'a> {
 const CELL: f64 = 32.0;
 
 impl<'a> Near<'a> {
-    fn new(candidates: &'a [Candidate]) -> Near<'a> {
+    fn new(picture: &'a Grey8, candidates: &'a [Candidate]) -> Near<'a> {
         let mut cells: BTreeMap<(i64, i64), Vec<usize>> = BTreeMap::new();
         for (i, c) in candidates.iter().enumerate() {
             cells.entry(cell_of(&c.at)).or_default().push(i);
         }
-        Near { candidates, cells }
+        Near { picture, candidates, cells }
     }
 
     /// Candidates within a distance, with it, the nearest first.
@@ -188,6 +211,43 @@ impl<'a> Near<'a> {
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         found
+    }
+}
+
+impl Near<'_> {
+    /// True where two candidates are the ends of a square's edge: their colours are those of neighbours, and along both halves of the way
+    /// from one to the other it is bright on the side on which it is bright at the ends.
+    fn edge(&self, a: usize, b: usize) -> bool {
+        let (a, b) = (&self.candidates[a], &self.candidates[b]);
+        let alike = a.strength.max(b.strength) / WEAKER <= a.strength.min(b.strength);
+        if !alike || !opposite(a, b) {
+            return false;
+        }
+        let step = b.at - a.at;
+        let bright_left = (a.axis - step.y.atan2(step.x)).rem_euclid(PI) < FRAC_PI_2;
+        let sign = if bright_left { 1.0 } else { -1.0 };
+        let least = EDGE_CONTRAST * a.contrast.max(b.contrast);
+        [0.1, 0.5].into_iter().all(|from| sign * self.across(a.at + step * from, step * 0.4) > least)
+    }
+
+    /// Mean grey on the left of a way less that on its right.
+    fn across(&self, from: Point2<f64>, way: Vector2<f64>) -> f64 {
+        // To where the squares on both sides certainly are, even on an oblique board: the way is 0.4 of an edge.
+        let aside = Vector2::new(-way.y, way.x) * 0.4;
+        let samples = (way.norm().ceil() as usize).clamp(2, 32);
+        let sum: f64 = (0..samples)
+            .map(|k| {
+                let p = from + way * ((k as f64 + 0.5) / samples as f64);
+                self.grey(p + aside) - self.grey(p - aside)
+            })
+            .sum();
+        sum / samples as f64
+    }
+
+    fn grey(&self, p: Point2<f64>) -> f64 {
+        let inside = |v: f64, size: usize| (v.round().max(0.0) as usize).min(size - 1);
+        let (x, y) = (inside(p.x, self.picture.width), inside(p.y, self.picture.height));
+        f64::from(self.picture.pixels[y * self.picture.width + x])
     }
 }
 
@@ -221,10 +281,11 @@ fn grow(candidates: &[Candidate], near: &Near, first: usize) -> Vec<(Place, usiz
             let step = step_at(&at, (i, j), (di, dj))
                 .unwrap_or_else(|| if di != 0 { seed_steps[0] * di as f64 } else { seed_steps[1] * dj as f64 });
             let stray = STRAY * step.norm();
+            let around = [(1, 0), (0, 1), (-1, 0), (0, -1)].map(|(di, dj)| placed.get(&(next.0 + di, next.1 + dj)));
             let found = near
                 .within(&(here.at + step), stray)
                 .into_iter()
-                .find(|&(_, k)| !used[k] && opposite(&candidates[k], &here));
+                .find(|&(_, k)| !used[k] && around.iter().flatten().all(|&&neighbour| near.edge(neighbour, k)));
             if let Some((_, k)) = found {
                 used[k] = true;
                 placed.insert(next, k);
@@ -258,13 +319,8 @@ fn seed_steps(candidates: &[Candidate], near: &Near, first: usize) -> Option<[Ve
         let steps: Vec<Vector2<f64>> = near
             .within(&here.at, reach)
             .into_iter()
-            .filter(|&(_, k)| k != first && opposite(&candidates[k], here))
+            .filter(|&(_, k)| k != first && near.edge(first, k))
             .map(|(_, k)| candidates[k].at - here.at)
-            // Edges lie between bright and dark, never along the axis of either.
-            .filter(|step| {
-                let from_axis = (step.y.atan2(step.x) - here.axis).rem_euclid(FRAC_PI_2);
-                from_axis > 0.12 && from_axis < FRAC_PI_2 - 0.12
-            })
             .collect();
         if let Some(a) = steps.first()
             && let Some(b) = steps.iter().find(|b| (a.perp(b).abs() / (a.norm() * b.norm())).asin() > LEAST_ANGLE)
@@ -287,30 +343,7 @@ fn as_grid(grown: &[(Place, usize)], candidates: &[Candidate]) -> Option<Places>
     for &((i, j), k) in grown {
         grid.cells[(j - top) as usize * columns + (i - left) as usize] = Some(candidates[k].at);
     }
-    Some(without_stragglers(grid))
-}
-
-/// Takes off outer lines in which few corners are: chance finds beside the board.
-fn without_stragglers(mut grid: Places) -> Places {
-    /// Share of a line's places.
-    const FEW: f64 = 0.4;
-    loop {
-        let in_column = |col: usize| (0..grid.rows).filter(|&row| grid.get(col, row).is_some()).count();
-        let in_row = |row: usize| (0..grid.columns).filter(|&col| grid.get(col, row).is_some()).count();
-        let few = |count: usize, size: usize| (count as f64) < FEW * size as f64;
-        let (columns, rows) = (grid.columns, grid.rows);
-        if columns < 2 || rows < 2 {
-            return grid;
-        }
-        let (c0, c1) = (few(in_column(0), rows), few(in_column(columns - 1), rows));
-        let (r0, r1) = (few(in_row(0), columns), few(in_row(rows - 1), columns));
-        if !(c0 || c1 || r0 || r1) {
-            return grid;
-        }
-        let (left, top) = (usize::from(c0), usize::from(r0));
-        let (wide, high) = (columns.saturating_sub(left + usize::from(c1)), rows.saturating_sub(top + usize::from(r1)));
-        grid = Grid::from_fn(wide, high, |col, row| grid.get(col + left, row + top).copied());
-    }
+    Some(grid)
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ pub mod cache;
 pub mod corner_fit;
 pub mod corners;
 pub mod corners_file;
+pub mod cut;
 pub mod detect;
 pub mod find;
 pub mod folder;
@@ -140,6 +141,15 @@ impl Explain for Error {
                     .to_owned(),
             ),
             Error::SameName { .. } => Some("remove or rename one of them".to_owned()),
+            Error::TooFewPairs { skipped, .. }
+                if 2 * skipped.iter().filter(|s| s.reason.contains(picture::UNDECODABLE)).count() > skipped.len() =>
+            {
+                Some(
+                    "save the pictures as the camera gives them: PNG, TIFF, BMP, JPEG or PGM of 8 or 16 bits a pixel, up to 512 MiB \
+                     when decoded"
+                        .to_owned(),
+                )
+            }
             Error::TooFewPairs { other: Some(squares), .. } => {
                 let (columns, rows) = (squares.columns - 1, squares.rows - 1);
                 Some(format!("`--squares {squares}`: the pictures show a board with {columns}x{rows} inner corners"))

@@ -7,6 +7,9 @@
 use camino::Utf8Path;
 use image::{DynamicImage, ImageReader};
 
+/// What every reason for a file that is no picture says.
+pub const UNDECODABLE: &str = "cannot be decoded";
+
 /// Weights of red, green and blue in grey (ITU-R BT.601), in 1/65536.
 const LUMA: [u64; 3] = [19_595, 38_470, 7_471];
 
@@ -51,7 +54,7 @@ pub fn decode(bytes: &[u8], path: &Utf8Path) -> Result<Picture, String> {
     {
         reader.set_format(format);
     }
-    let decoded = reader.decode().map_err(|e| format!("cannot be decoded: {e}"))?;
+    let decoded = reader.decode().map_err(|e| format!("{UNDECODABLE}: {e}"))?;
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
     if width == 0 || height == 0 {
         return Err("has no pixels".to_owned());
@@ -65,7 +68,7 @@ pub fn decode(bytes: &[u8], path: &Utf8Path) -> Result<Picture, String> {
         DynamicImage::ImageRgba8(rgb) => Pixels::Eight(grey8(&rgb, 4)),
         DynamicImage::ImageRgb16(rgb) => Pixels::Sixteen(grey16(&rgb, 3)),
         DynamicImage::ImageRgba16(rgb) => Pixels::Sixteen(grey16(&rgb, 4)),
-        _ => return Err("has floating-point pixels; 8 or 16 bit are needed".to_owned()),
+        _ => return Err(format!("{UNDECODABLE}: floating-point pixels")),
     };
     Ok(Picture { width, height, pixels })
 }

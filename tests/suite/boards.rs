@@ -87,3 +87,75 @@ fn another_size_of_board_is_named() {
     assert_eq!(status, Some(2), "{said}");
     assert!(said.contains("--squares 20x20"), "{said}");
 }
+
+/// Gives a picture of one pair to another, and the other way round.
+fn exchange(pictures: &Path, one: &str, other: &str) {
+    let aside = pictures.join("aside");
+    std::fs::rename(pictures.join(one), &aside).unwrap();
+    std::fs::rename(pictures.join(other), pictures.join(one)).unwrap();
+    std::fs::rename(aside, pictures.join(other)).unwrap();
+}
+
+#[test]
+fn mixed_up_pictures_are_named_as_what_they_are() {
+    let folder = workplace();
+    let pictures = copied(folder.path());
+    exchange(&pictures, "left/02.png", "right/02.png");
+    exchange(&pictures, "right/05.png", "right/07.png");
+    image::open(pictures.join("right/04.png")).unwrap().rotate180().save(pictures.join("right/04.png")).unwrap();
+    for side in ["left", "right"] {
+        std::fs::copy(pictures.join(side).join("09.png"), pictures.join(side).join("11.png")).unwrap();
+    }
+    let (status, said) = check(folder.path(), &[]);
+    assert!(matches!(status, Some(0 | 1)), "{said}");
+    for (pair, reason) in [
+        ("02", "left and right picture are exchanged"),
+        ("04", "the right picture is turned by 180 degrees"),
+        ("05", "taken at the same time as the right one of pair 07"),
+        ("07", "taken at the same time as the right one of pair 05"),
+        ("11", "the same pictures as pair 09"),
+    ] {
+        let line = said.lines().find(|line| line.contains(&format!("pair {pair} is not used")));
+        assert!(line.is_some_and(|line| line.contains(reason)), "{pair}, {reason}: {said}");
+    }
+    assert!(said.contains("6 of 11 pairs"), "{said}");
+}
+
+#[test]
+fn exchanged_folders_are_a_rig_and_said() {
+    let folder = workplace();
+    let pictures = copied(folder.path());
+    let straight = check(folder.path(), &[]);
+    assert!(!straight.1.contains("are left and right exchanged"), "{}", straight.1);
+    exchange(&pictures, "left", "right");
+    let exchanged = check(folder.path(), &[]);
+    assert_eq!(straight.0, exchanged.0);
+    assert!(exchanged.1.contains("are left and right exchanged"), "{}", exchanged.1);
+}
+
+#[test]
+fn a_board_in_a_larger_or_smaller_one_is_named() {
+    let folder = workplace();
+    copied(folder.path());
+    for wrong in ["18x12", "22x21"] {
+        let (status, said) = check(folder.path(), &["--squares", wrong]);
+        assert_eq!(status, Some(2), "{said}");
+        assert!(said.contains("hint: `--squares 20x20`"), "{wrong}: {said}");
+    }
+}
+
+#[test]
+fn files_that_are_no_pictures_are_said_to_be_none() {
+    let folder = workplace();
+    for side in ["left", "right"] {
+        std::fs::create_dir_all(folder.path().join("pictures").join(side)).unwrap();
+        for name in ["1.png", "2.png", "3.pgm", "4.pgm", "5.jpg"] {
+            // What a header promises must not be believed: ten thousand million pixels.
+            let bytes: &[u8] = if name.ends_with("pgm") { b"P5 100000 100000 255\n" } else { b"GIF89a" };
+            std::fs::write(folder.path().join("pictures").join(side).join(name), bytes).unwrap();
+        }
+    }
+    let (status, said) = check(folder.path(), &[]);
+    assert_eq!(status, Some(2), "{said}");
+    assert!(said.contains("3: both pictures: cannot be decoded") && said.contains("hint: save the pictures"), "{said}");
+}

@@ -4,7 +4,7 @@ use nalgebra::{Point2, Vector2, Vector3};
 use stereocal::geometry::{Transform, transform};
 use stereocal::imaging::picture::{Grey8, Picture, Pixels};
 use stereocal::imaging::{Board, detect, refine};
-use stereocal::opencv::{self, Detector};
+use stereocal::opencv;
 use stereocal::simulate::backdrop::Backdrop;
 use stereocal::simulate::draws::NormalTable;
 use stereocal::simulate::physical_board::{PhysicalBoard, Workmanship};
@@ -85,7 +85,7 @@ fn row(size: u32, sectors_too: bool) {
     println!("   cornerSubPix(11) {} in {:.3} s", rms(&sub_pix, &truth), core_s() - clock);
     if sectors_too {
         let clock = core_s();
-        let found = opencv::find_board(&grey, 19, 19, Detector::Sectors).expect("OpenCV works");
+        let found = opencv::find_board(&grey, 19, 19).expect("OpenCV works");
         let text = found.map_or("not found".to_owned(), |f| rms(&f, &truth));
         println!("   findChessboardCornersSB {text} in {:.3} s", core_s() - clock);
     }
