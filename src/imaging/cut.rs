@@ -184,7 +184,8 @@ mod tests {
         // With two chance finds beside the board.
         let grid = Grid::from_fn(columns.len() + 1, rows.len(), |col, row| {
             if col == columns.len() {
-                return (row == 1 || row == 2).then(|| place(columns[col - 1] + 1, rows[row]));
+                let p = place(columns[col - 1] + 1, rows[row]);
+                return ((row == 1 || row == 2) && p.x < w as f64 - 7.0).then_some(p);
             }
             is(columns[col], rows[row]).then(|| place(columns[col], rows[row]))
         });
