@@ -68,8 +68,9 @@ pub fn without_chance_lines(small: &Grey8, grid: Places) -> Places {
     loop {
         let is_chance = |turned: &Places| {
             let lacks = next_places(turned, 1).into_iter().enumerate().filter(|(row, _)| turned.get(0, *row).is_none());
-            filled(turned) < FEW
-                && !lacks.into_iter().all(|(_, place)| place.is_some_and(|place| is_outside(small, &place)))
+            filled(turned) == 0.0
+                || filled(turned) < FEW
+                    && !lacks.into_iter().all(|(_, place)| place.is_some_and(|place| is_outside(small, &place)))
         };
         // The sparsest first: without it, lines across it are less sparse.
         let sides =
