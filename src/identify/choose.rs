@@ -322,6 +322,9 @@ fn root_mean(scores: &[(usize, f64)]) -> Option<f64> {
 /// Standard errors by which held-out errors must fall: chance does that in one case of forty.
 const CLEARLY: f64 = 2.0;
 
+/// Ratio of held-out errors up to which two methods are alike.
+const ALIKE: f64 = 1.02;
+
 /// Whether the mean of `new` is clearly below that of `old`, by the standard error of the paired differences.
 fn clearly_less(new: &[(usize, f64)], old: &[(usize, f64)]) -> bool {
     if new.len() != old.len() || new.len() < 2 {
@@ -333,7 +336,8 @@ fn clearly_less(new: &[(usize, f64)], old: &[(usize, f64)]) -> bool {
 }
 
 /// The first candidate that none beats by more than chance: the one of least held-out error, or a cheaper one whose
-/// errors differ from it by less than their paired standard error. Solvers of one problem mostly agree to rounding.
+/// errors differ from it by less than their paired standard error or by next to nothing. Solvers of one problem mostly agree to
+/// rounding, and what one leaves of the way can be alike at every pose without being worth anything.
 fn best(candidates: &[Candidate]) -> usize {
     let judged = |c: &&Candidate| c.held_out_mm.is_some();
     let least = candidates.iter().filter(judged).min_by(|a, b| {
@@ -341,5 +345,7 @@ fn best(candidates: &[Candidate]) -> usize {
         error(a).total_cmp(&error(b))
     });
     let Some(least) = least else { return 0 };
-    candidates.iter().position(|c| c.held_out_mm.is_some() && !clearly_less(&least.held_out, &c.held_out)).unwrap_or(0)
+    let alike = |c: &Candidate| c.held_out_mm <= least.held_out_mm.map(|mm| mm * ALIKE);
+    let equal = |c: &Candidate| alike(c) || !clearly_less(&least.held_out, &c.held_out);
+    candidates.iter().position(|c| c.held_out_mm.is_some() && equal(c)).unwrap_or(0)
 }

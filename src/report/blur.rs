@@ -49,7 +49,7 @@ fn medians<'a>(corners: impl Iterator<Item = &'a Corner>, (width, height): (u32,
 }
 
 fn grid(cells: &[Option<f64>]) -> Markup {
-    let header: Vec<String> = (1..=CELLS).map(|c| format!("column {c}")).collect();
+    let header: Vec<String> = (1..=CELLS).map(|c| c.to_string()).collect();
     let header: Vec<&str> = std::iter::once("").chain(header.iter().map(String::as_str)).collect();
     let row = |(r, cells): (usize, &[Option<f64>])| {
         let name = match r {

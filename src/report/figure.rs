@@ -13,6 +13,9 @@ const SCALE: u32 = 2;
 /// Size on the page, px.
 const SIZE: (u32, u32) = (640, 400);
 
+/// Height of a legend's row as a share of the plotting area's.
+const LEGEND_ROW: f64 = 0.055;
+
 /// Colours of the series in turn: distinct for the colour-blind (Okabe and Ito), dark enough on white.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
@@ -187,6 +190,11 @@ impl Plot {
         let guides = self.guides.iter().filter_map(|g| self.plotted((0.0, g.0))).map(|p| p.1);
         let mut x = padded(places.iter().map(|p| p.0));
         let mut y = padded(places.iter().map(|p| p.1).chain(guides));
+        // Room above for the legend, so that it covers no point.
+        let labels = self.series.iter().filter(|(label, _)| !label.is_empty()).count();
+        if labels > 0 {
+            y.1 += (y.1 - y.0) * LEGEND_ROW * (labels as f64 + 0.5);
+        }
         x = self.x_range.unwrap_or(x);
         if let Some((low, high)) = self.y_range {
             y = if self.log_y { (low.log10(), high.log10()) } else { (low, high) };
