@@ -182,11 +182,11 @@ mod tests {
         };
         let columns: Vec<usize> = (0..board.columns()).filter(|&c| (0..board.rows()).any(|r| is(c, r))).collect();
         let rows: Vec<usize> = (0..board.rows()).filter(|&r| (0..board.columns()).any(|c| is(c, r))).collect();
-        // With two chance finds beside the board.
+        // With a chance find beside the board.
         let grid = Grid::from_fn(columns.len() + 1, rows.len(), |col, row| {
             if col == columns.len() {
                 let p = place(columns[col - 1] + 1, rows[row]);
-                return ((row == 1 || row == 2) && p.x < w as f64 - 7.0).then_some(p);
+                return (row == 1 && p.x < w as f64 - 7.0).then_some(p);
             }
             is(columns[col], rows[row]).then(|| place(columns[col], rows[row]))
         });
