@@ -87,7 +87,7 @@ pub fn from_start(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]
     (residual.norm() < REACHED_MM).then_some(q)
 }
 
-/// How freely the flange moves there: the least singular value of its Jacobian, mm a rad, angles of the flange times [`ARM_MM`].
+/// How freely the flange moves there: the least singular value of its Jacobian, mm a rad, angles of the flange times the arm of 200 mm.
 /// Zero in a singular posture, where small motions of the flange need large ones of the joints, and for fewer than six joints.
 pub fn freedom_mm(robot: &Robot, joints_rad: &[f64]) -> f64 {
     let singular = jacobian(robot, joints_rad).singular_values();
