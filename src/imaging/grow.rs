@@ -94,54 +94,52 @@ fn candidates(picture: &Grey8) -> Vec<Candidate> {
         return Vec::new();
     }
     let response = responses(picture);
-    let mut found = Vec::new();
+    let mut peaks = Vec::new();
     for y in REACH..h - REACH {
         for x in REACH..w - REACH {
             let here = response[y * w + x];
             if here > 0 && is_peak(&response, w, x, y) {
-                found.push(candidate(picture, &response, x, y));
+                peaks.push((here, x, y));
             }
         }
     }
-    found.sort_by_key(|c: &Candidate| std::cmp::Reverse(c.strength));
+    peaks.sort_by_key(|&(strength, ..)| std::cmp::Reverse(strength));
     // Noise has peaks too; a board's own corners are of about one strength.
-    let least = found.get(20.min(found.len().saturating_sub(1))).map_or(0, |c| c.strength / 8);
-    found.retain(|c| c.strength >= least);
-    found.truncate(MOST_CANDIDATES);
-    found
+    let least = peaks.get(20.min(peaks.len().saturating_sub(1))).map_or(0, |&(strength, ..)| strength / 8);
+    peaks.retain(|&(strength, ..)| strength >= least);
+    peaks.truncate(MOST_CANDIDATES);
+    peaks.into_iter().map(|(_, x, y)| candidate(picture, &response, x, y)).collect()
 }
 
-/// Five times the ring response of every pixel, zero at the border. `REACH` px of it are none.
+/// Five times the ring response of every pixel, a whole number that fits: opposite pixels of the ring alike and a quarter turn on the
+/// other colour, less what a line or an edge shows, less what a spot shows. `REACH` px at the border have none.
 fn responses(picture: &Grey8) -> Vec<i16> {
     let (w, h) = (picture.width, picture.height);
     let mut response = vec![0i16; w * h];
     let wide = w - 2 * REACH;
+    let mut spot = vec![0i16; wide];
     for y in REACH..h - REACH {
         let row = |(dx, dy): (isize, isize)| {
             let start = ((y as isize + dy) * w as isize + REACH as isize + dx) as usize;
             &picture.pixels[start..start + wide]
         };
-        let (ring, local) = (RING.map(row), [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)].map(row));
-        for (x, here) in response[y * w + REACH..][..wide].iter_mut().enumerate() {
-            *here = ring_response(ring.map(|row| i16::from(row[x])), local.map(|row| i16::from(row[x])));
+        let here = &mut response[y * w + REACH..][..wide];
+        spot.fill(0);
+        // Row after row, so that the compiler makes vector loops of them.
+        for n in 0..4 {
+            let [a, b, c, d] = [0, 4, 8, 12].map(|quarter| row(RING[n + quarter]));
+            for (((((here, spot), a), b), c), d) in here.iter_mut().zip(&mut spot).zip(a).zip(b).zip(c).zip(d) {
+                let [a, b, c, d] = [*a, *b, *c, *d].map(i16::from);
+                *here += 5 * ((a + c - b - d).abs() - (a - c).abs() - (b - d).abs());
+                *spot += 5 * (a + b + c + d);
+            }
         }
+        for local in [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)].map(row) {
+            spot.iter_mut().zip(local).for_each(|(spot, grey)| *spot -= 16 * i16::from(*grey));
+        }
+        here.iter_mut().zip(&spot).for_each(|(here, spot)| *here -= spot.abs());
     }
     response
-}
-
-/// Five times the response, a whole number that fits: opposite pixels of the ring alike and a quarter turn on the other colour, less
-/// what a line or an edge shows, less what a spot shows.
-#[inline]
-fn ring_response(ring: [i16; 16], local: [i16; 5]) -> i16 {
-    let (mut sum, mut difference) = (0, 0);
-    for n in 0..4 {
-        sum += (ring[n] + ring[n + 8] - ring[n + 4] - ring[n + 12]).abs();
-    }
-    for n in 0..8 {
-        difference += (ring[n] - ring[n + 8]).abs();
-    }
-    let spot = (5 * ring.iter().sum::<i16>() - 16 * local.iter().sum::<i16>()).abs();
-    5 * (sum - difference) - spot
 }
 
 fn is_peak(response: &[i16], w: usize, x: usize, y: usize) -> bool {
@@ -169,9 +167,11 @@ fn candidate(picture: &Grey8, response: &[i16], x: usize, y: usize) -> Candidate
     let (mut cos, mut sin) = (0.0, 0.0);
     for (dx, dy) in RING {
         let grey = f64::from(picture.pixels[((y as isize + dy) as usize) * w + (x as isize + dx) as usize]);
-        let twice = 2.0 * (dy as f64).atan2(dx as f64);
-        cos += grey * twice.cos();
-        sin += grey * twice.sin();
+        // Cosine and sine of twice the direction.
+        let (dx, dy) = (dx as f64, dy as f64);
+        let square = dx * dx + dy * dy;
+        cos += grey * (dx * dx - dy * dy) / square;
+        sin += grey * 2.0 * dx * dy / square;
     }
     let mut ring = RING.map(|(dx, dy)| picture.pixels[((y as isize + dy) as usize) * w + (x as isize + dx) as usize]);
     ring.sort_unstable();
