@@ -370,7 +370,8 @@ fn tick(value: f64, range: (f64, f64)) -> String {
     if !(1e-4..=1e7).contains(&span) {
         return format!("{value:.1e}");
     }
-    let decimals = (1.5 - span.log10()).ceil().clamp(0.0, 6.0) as usize;
+    // Steps are at least a ninth of the span.
+    let decimals = (1.0 - span.log10()).ceil().clamp(0.0, 6.0) as usize;
     let text = format!("{value:.decimals$}");
     // Rounding leaves "-0.00" at the origin.
     if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
@@ -416,8 +417,9 @@ mod tests {
 
     #[test]
     fn axis_labels_have_the_decimals_they_need() {
-        assert_eq!(tick(0.05, (0.0, 0.1)), "0.050");
-        assert_eq!(tick(-0.0001, (-0.1, 0.1)), "0.000");
+        assert_eq!(tick(0.05, (0.0, 0.1)), "0.05");
+        assert_eq!(tick(-0.0001, (-0.1, 0.1)), "0.00");
+        assert_eq!(tick(2.0, (1.0, 17.0)), "2");
         assert_eq!(tick(500.0, (0.0, 1000.0)), "500");
         assert_eq!(power_of_ten(-6.0), "1e-6");
         assert_eq!(power_of_ten(-2.0), "0.01");
