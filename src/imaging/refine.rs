@@ -29,6 +29,9 @@ const MOST_HALF_PX: f64 = 80.0;
 /// Half of the window that brings a fit near its end where the squares are large, px.
 const NEAR_HALF_PX: f64 = 20.0;
 
+/// Share of the light that may change over a square. Light does not; a fit that says so has taken a neighbour's edge for its gradient.
+const MOST_LIGHT_CHANGE: f64 = 0.3;
+
 /// A corner and all that its fit tells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
@@ -219,6 +222,7 @@ fn plausible(fit: &Fit, start: &Model, cell: &Cell) -> bool {
         && turned < 0.35
         && fit.model.blur_px.iter().all(|&s| s < 0.5 * cell.side())
         && fit.model.half_contrast.abs() > fit.residual
+        && fit.model.light_slope.norm() * cell.side() < MOST_LIGHT_CHANGE
         && fit.covariance_px2.trace() < 0.25
 }
 

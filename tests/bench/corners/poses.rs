@@ -30,6 +30,8 @@ const WRONG_PX: f64 = 0.5;
 struct Count {
     pairs: usize,
     found: usize,
+    /// Corners of the boards found that could not be measured.
+    unmeasured: usize,
     wrong_order: usize,
     wrong_place: usize,
     refusals: Vec<String>,
@@ -38,14 +40,19 @@ struct Count {
 /// Draws `pairs` pairs of each board, looks for it, and prints what came of it.
 pub fn table(pairs: usize) {
     println!("boards at tilts to 60 degrees and all turns, blur 0.6 to 2.5 px, uneven light, clutter; {SIZE} px");
-    println!("board   pairs  found in both  wrong order  wrong place");
+    println!("board   pairs  found in both  wrong order  wrong place  corners not measured");
     for (squares, square_mm) in [("20x20", 10.0), ("10x7", 18.0), ("7x7", 20.0)] {
         let drawing = Board { squares: squares.parse().expect("a board"), square_mm };
         let count = run(drawing, pairs.div_ceil(3));
         let share = 100.0 * count.found as f64 / count.pairs as f64;
         let (order, place) = (count.wrong_order, count.wrong_place);
-        println!("{squares:6} {:6} {share:12.1} % {order:12} {place:12}", count.pairs);
-        count.refusals.iter().take(8).for_each(|line| println!("   {line}"));
+        println!(
+            "{squares:6} {:6} {share:12.1} % {order:12} {place:12} {:13} of {}",
+            count.pairs,
+            count.unmeasured,
+            2 * count.found * drawing.corner_count()
+        );
+        count.refusals.iter().take(12).for_each(|line| println!("   {line}"));
     }
 }
 
@@ -93,10 +100,12 @@ fn run(drawing: Board, pairs: usize) -> Count {
         }
         if let [Some(left), Some(right)] = sides {
             seen.push((left, right));
-            truths.push(truth);
+            truths.push((pair, truth));
         }
     }
     count.found = seen.len();
+    let lacks = |grid: &Places| drawing.corner_count() - grid.count();
+    count.unmeasured = seen.iter().map(|(left, right)| lacks(left) + lacks(right)).sum();
     judge(&seen, &truths, drawing, &mut count);
     count
 }
@@ -106,7 +115,11 @@ fn look(scene: &Scene, drawing: Board) -> Result<Places, String> {
     let pixels = Pixels::Eight(rendered.samples.iter().map(|&v| v as u8).collect());
     let picture = Picture { width: rendered.width, height: rendered.height, pixels };
     let detected = detect::detect(&picture, drawing).map_err(|refusal| refusal.reason)?;
-    Ok(refine::refine(&picture, &detected).map(|corner| corner.px))
+    // What could not be measured is kept at its rough place, marked as not used.
+    let corners = refine::refine(&picture, &detected);
+    Ok(Grid::from_fn(corners.columns, corners.rows, |col, row| {
+        corners.get(col, row).filter(|corner| corner.used).map(|corner| corner.px)
+    }))
 }
 
 /// A pose in which both cameras see the whole plate.
@@ -132,8 +145,8 @@ fn pose_in_view(rig: &Rig, board: &PhysicalBoard, uniform: &mut impl FnMut() -> 
 }
 
 /// Counts pairs whose sides are numbered differently, and those with a corner that is none.
-fn judge(seen: &[(Places, Places)], truths: &[[Vec<Point2<f64>>; 2]], drawing: Board, count: &mut Count) {
-    for (((left, right), truth), turns) in seen.iter().zip(truths).zip(order::agreed_turns(seen, drawing)) {
+fn judge(seen: &[(Places, Places)], truths: &[(usize, [Vec<Point2<f64>>; 2])], drawing: Board, count: &mut Count) {
+    for (((left, right), (pair, truth)), turns) in seen.iter().zip(truths).zip(order::agreed_turns(seen, drawing)) {
         let sides = [left.turned(turns.0), right.turned(turns.1)];
         // The simulated board's numbering is one of those that the colours allow.
         let fits: Vec<Vec<f64>> = (0..4)
@@ -145,8 +158,11 @@ fn judge(seen: &[(Places, Places)], truths: &[[Vec<Point2<f64>>; 2]], drawing: B
         let alone = |side: usize| fits.iter().any(|sides| sides[side] < WRONG_PX);
         if alone(0) && alone(1) {
             count.wrong_order += 1;
+            count.refusals.push(format!("pair {pair}: the sides are numbered differently"));
         } else {
             count.wrong_place += 1;
+            let least = |side: usize| fits.iter().map(|sides| sides[side]).fold(f64::MAX, f64::min);
+            count.refusals.push(format!("pair {pair}: worst corners off by {:.2} and {:.2} px", least(0), least(1)));
         }
     }
 }
