@@ -25,7 +25,7 @@ const COMA_PX: f64 = 1.0;
 /// Runs the command: settings, world, truth, pictures.
 pub fn run(args: &Simulate, config: &Config) -> Result<Outcome> {
     let true_robot = match args.true_robot.as_deref() {
-        Some(name) if name == TABLE_2 => true_robot::table_2(&true_robot::nominal()),
+        Some(name) if name == TABLE_2 => Some(true_robot::nominal().with_table_2()),
         Some(path) => Some(robot::file::read(path)?),
         None => None,
     };

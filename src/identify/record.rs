@@ -196,16 +196,7 @@ impl Record {
             scatter_mm: chosen.prepared.estimate.scatter.point_mm,
             prior: chosen.prepared.tolerance,
         };
-        record.warnings = record.warnings(set, found);
-        if tilt_deg(set, nominal, &found.fitted) < ONE_ORIENTATION_DEG {
-            record.warnings.insert(
-                0,
-                "the flange keeps one orientation within each group: such poses cannot tell the tool and parts of the wrist \
-                 from other parameters, and the identified robot is right for that orientation only; \
-                 vary it by 20 deg or more between poses"
-                    .to_owned(),
-            );
-        }
+        record.warnings = record.warnings(set, nominal, found);
         record
     }
 
@@ -214,8 +205,16 @@ impl Record {
         self.methods.iter().find(|m| self.chosen == format!("{}/{}", m.name, m.model))
     }
 
-    fn warnings(&self, set: &Dataset, found: &Identification) -> Vec<String> {
+    fn warnings(&self, set: &Dataset, nominal: &Robot, found: &Identification) -> Vec<String> {
         let mut list = Vec::new();
+        if tilt_deg(set, nominal, &found.fitted) < ONE_ORIENTATION_DEG {
+            list.push(
+                "the flange keeps one orientation within each group: such poses cannot tell the tool and parts of the wrist \
+                 from other parameters, and the identified robot is right for that orientation only; \
+                 vary it by 20 deg or more between poses"
+                    .to_owned(),
+            );
+        }
         let i = &self.identifiability;
         if !i.zero.is_empty() {
             list.push(format!("the poses cannot see {}: these stay nominal", i.zero.join(", ")));

@@ -7,7 +7,6 @@ use rand_pcg::Pcg64Mcg;
 use crate::geometry::Transform;
 use crate::measurements::{Measurement, Observed, RobotPose, Role};
 use crate::robot::{Robot, inverse};
-use crate::simulate::true_robot::table_2;
 
 /// A nominal robot, the true one, and what was measured.
 pub struct World {
@@ -38,7 +37,7 @@ pub fn planned(
 ) -> World {
     let mut nominal = Robot::paper();
     nominal.tool_mm = Vector3::new(12.0, -8.0, 25.0);
-    let mut truth = table_2(&nominal).unwrap_or_else(|| nominal.clone());
+    let mut truth = nominal.clone().with_table_2();
     spoil(&mut truth);
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut rows = Vec::new();

@@ -9,6 +9,7 @@ use nalgebra::{Point2, Vector2};
 use super::detect::Detected;
 use super::grid::Places;
 use super::picture::Picture;
+use crate::median::median;
 
 /// Share of a line beyond the border that must look like corners; the board's own outer edge shows none.
 const SHARE: f64 = 0.75;
@@ -19,10 +20,8 @@ const CONTRAST: f64 = 0.7;
 pub fn lines_beyond(detected: &Detected) -> (usize, usize) {
     let (grid, copy) = (&detected.corners, &detected.copy);
     let (columns, rows) = (grid.columns as isize, grid.rows as isize);
-    let mut inside: Vec<f64> =
-        grid.iter().filter_map(|(col, row, _)| contrast(copy, grid, col as isize, row as isize)).collect();
-    inside.sort_by(f64::total_cmp);
-    let Some(&usual) = inside.get(inside.len() / 2) else { return (0, 0) };
+    let inside = grid.iter().filter_map(|(col, row, _)| contrast(copy, grid, col as isize, row as isize));
+    let Some(usual) = median(inside) else { return (0, 0) };
     let goes_on = |line: &mut dyn Iterator<Item = (isize, isize)>, length: isize| {
         let alike = line.filter_map(|(col, row)| contrast(copy, grid, col, row)).filter(|c| c / usual > CONTRAST);
         alike.count() as f64 >= SHARE * length as f64
@@ -37,7 +36,7 @@ pub fn lines_beyond(detected: &Detected) -> (usize, usize) {
 /// neighbours across the other. `None` outside of the picture.
 fn contrast(copy: &Picture, grid: &Places, col: isize, row: isize) -> Option<f64> {
     let (place, along, across) = local(grid, col, row)?;
-    let at = |a: f64, b: f64| mean(copy, place + (along * a + across * b) * 0.4);
+    let at = |a: f64, b: f64| copy.mean_at(place + (along * a + across * b) * 0.4);
     let (pp, pm, mp, mm) = (at(1.0, 1.0)?, at(1.0, -1.0)?, at(-1.0, 1.0)?, at(-1.0, -1.0)?);
     let sign = if (col + row).rem_euclid(2) == 0 { 1.0 } else { -1.0 };
     let differences = [pp - pm, pp - mp, mm - pm, mm - mp].map(|d| sign * d);
@@ -47,30 +46,13 @@ fn contrast(copy: &Picture, grid: &Places, col: isize, row: isize) -> Option<f64
     Some(if mean > 0.0 { least } else { most })
 }
 
-/// Mean of the 3 x 3 pixels at a place; `None` at the picture's border.
-fn mean(copy: &Picture, at: Point2<f64>) -> Option<f64> {
-    let (x, y) = (at.x.round(), at.y.round());
-    if !(x >= 1.0 && y >= 1.0 && x + 1.0 < copy.width as f64 && y + 1.0 < copy.height as f64) {
-        return None;
-    }
-    let (x, y) = (x as usize, y as usize);
-    Some((y - 1..=y + 1).map(|y| (x - 1..=x + 1).map(|x| copy.at(x, y)).sum::<f64>()).sum::<f64>() / 9.0)
-}
-
 /// A corner of the grid or a place one square beyond it, and the steps to the next column and the next row there.
 fn local(grid: &Places, col: isize, row: isize) -> Option<(Point2<f64>, Vector2<f64>, Vector2<f64>)> {
     let (columns, rows) = (grid.columns as isize, grid.rows as isize);
     let inward = |at: isize, size: isize| isize::from(at < 0) - isize::from(at >= size);
     let (dc, dr) = (inward(col, columns), inward(row, rows));
-    let place = if (dc, dr) == (0, 0) {
-        *grid.around(col, row)?
-    } else {
-        // Steps of perspective change evenly enough from one square to the next.
-        let at = |k: isize| grid.around(col + k * dc, row + k * dr);
-        let (near, second) = (at(1)?, at(2)?);
-        let step = near - second;
-        near + step + at(3).map_or(Vector2::zeros(), |third| step - (second - third))
-    };
+    let place =
+        if (dc, dr) == (0, 0) { *grid.around(col, row)? } else { grid.next((col + dc, row + dr), (-dc, -dr))?.0 };
     let (c, r) = (col.clamp(0, columns - 1), row.clamp(0, rows - 1));
     let step = |dc: isize, dr: isize| {
         let here = grid.around(c, r)?;

@@ -17,6 +17,14 @@ impl Side {
     /// Both, left first.
     pub const BOTH: [Side; 2] = [Side::Left, Side::Right];
 
+    /// The other one.
+    pub fn other(self) -> Side {
+        match self {
+            Side::Left => Side::Right,
+            Side::Right => Side::Left,
+        }
+    }
+
     /// The word in files and messages.
     pub fn name(self) -> &'static str {
         match self {

@@ -82,14 +82,7 @@ pub fn without_chance_lines(small: &Grey8, grid: Places) -> Places {
 
 /// Where the corners of the line before a column are, as far as the grid goes on evenly; each with the step that leads there.
 fn next_places(grid: &Places, column: usize) -> Vec<Option<(Point2<f64>, Vector2<f64>)>> {
-    let of_row = |row| {
-        let (near, second) = (grid.get(column, row)?, grid.get(column + 1, row)?);
-        // Steps of perspective change evenly enough from one square to the next.
-        let step = near - second;
-        let change = grid.get(column + 2, row).map_or(step * 0.0, |third| step - (second - third));
-        Some((near + step + change, step + change))
-    };
-    (0..grid.rows).map(of_row).collect()
+    (0..grid.rows).map(|row| grid.next((column as isize, row as isize), (-1, 0))).collect()
 }
 
 /// True for a place so near to the picture's border, or beyond it, that a corner there is not seen.
@@ -111,7 +104,7 @@ fn end(small: &Grey8, grid: &Places) -> End {
         .map(|two| {
             let [Some((a, step_a)), Some((b, step_b))] = *two else { return None };
             let (middle, step) = (nalgebra::center(&a, &b), (step_a + step_b) / 2.0);
-            Some([mean(small, middle - step * 0.5)?, mean(small, middle + step * (IN_MARGIN - 1.0))?])
+            Some([small.mean_at(middle - step * 0.5)?, small.mean_at(middle + step * (IN_MARGIN - 1.0))?])
         })
         .collect();
     if is_board_end(&greys) { End::Board } else { End::Unknown }
@@ -133,20 +126,6 @@ fn is_board_end(greys: &[Option<[f64; 2]>]) -> bool {
     };
     let in_view = greys.iter().flatten().count() as f64;
     in_view >= LEAST_MARGIN * greys.len() as f64 && fitting(even).max(fitting(odd)) >= MOST * in_view
-}
-
-/// Mean of the 3 x 3 pixels at a place; `None` at the picture's border.
-fn mean(small: &Grey8, at: Point2<f64>) -> Option<f64> {
-    let (x, y) = (at.x.round(), at.y.round());
-    if !(x >= 1.0 && y >= 1.0 && x + 1.0 < small.width as f64 && y + 1.0 < small.height as f64) {
-        return None;
-    }
-    let (x, y) = (x as usize, y as usize);
-    let sum: u32 = (y - 1..=y + 1)
-        .flat_map(|y| small.pixels[y * small.width + x - 1..=y * small.width + x + 1].iter())
-        .map(|&v| u32::from(v))
-        .sum();
-    Some(f64::from(sum) / 9.0)
 }
 
 #[cfg(test)]

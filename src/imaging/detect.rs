@@ -1,8 +1,8 @@
 //! Where the board is, to about a pixel of a small copy.
 //!
-//! In: a picture and the board's size. Out: a grid of coarse corners at the picture's full size, right-handed, columns along
-//! the longer side, turned as far as the colours tell. The board is looked for on an area-averaged copy of about
-//! [`COARSE_PX`] pixels, because OpenCV's detectors need seconds and gigabytes on 26 Mpx; a ladder of attempts follows where the
+//! In: a picture and the board's size. Out: a reduced copy and a grid of coarse corners on it, right-handed, columns along
+//! the longer side, turned as far as the colours tell. The copy is an area average of about [`COARSE_PX`] pixels: the board is seen there
+//! as well as on 26 Mpx, in a twentieth of the time; a ladder of attempts on finer and coarser copies follows where the
 //! first fails. Its work is bounded by the pixels of the copies, whatever they show: no clock decides what is found, and OpenCV's
 //! classic detector is not among the attempts, because fine texture keeps it busy for minutes (and what it finds is found without
 //! it). Goes wrong: no board, another board, or a board of which too little is in view; each is a reason in words.

@@ -163,21 +163,17 @@ fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>) -> (Vec<Found>, Vec<Skipp
     let (mut found, mut skipped) = (Vec::new(), Vec::new());
     for (files, sides) in files.iter().zip(seen) {
         let pair = files.pair.clone();
-        match sides {
-            [Ok(left), Ok(right)] => found.push((pair, left, right)),
-            [Err(Refusal { reason: left, .. }), Err(Refusal { reason: right, .. })] if left == right => {
-                skipped.push(Skipped { pair, reason: format!("both pictures: {left}") });
+        let reason = match sides.map(|look| look.map_err(|refusal| refusal.reason)) {
+            [Ok(left), Ok(right)] => {
+                found.push((pair, left, right));
+                continue;
             }
-            [Err(Refusal { reason: left, .. }), Err(Refusal { reason: right, .. })] => {
-                skipped.push(Skipped { pair, reason: format!("left picture: {left}; right picture: {right}") });
-            }
-            [Err(Refusal { reason: left, .. }), Ok(_)] => {
-                skipped.push(Skipped { pair, reason: format!("left picture: {left}") })
-            }
-            [Ok(_), Err(Refusal { reason: right, .. })] => {
-                skipped.push(Skipped { pair, reason: format!("right picture: {right}") })
-            }
-        }
+            [Err(left), Err(right)] if left == right => format!("both pictures: {left}"),
+            [Err(left), Err(right)] => format!("left picture: {left}; right picture: {right}"),
+            [Err(left), Ok(_)] => format!("left picture: {left}"),
+            [Ok(_), Err(right)] => format!("right picture: {right}"),
+        };
+        skipped.push(Skipped { pair, reason });
     }
     (found, skipped)
 }

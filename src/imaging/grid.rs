@@ -1,6 +1,6 @@
 //! A rectangular grid of corners, some perhaps missing, and the turns it can be given.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 
 /// Corners (or anything that belongs to one) by column and row.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +15,18 @@ pub struct Grid<T> {
 
 /// Places in a picture, px.
 pub type Places = Grid<Point2<f64>>;
+
+impl Places {
+    /// Where a line of corners goes on beyond `(col, row)` in a direction, and the step that leads there: from the two or three corners
+    /// before it. Steps of perspective change evenly enough from one square to the next. `None` where two are missing.
+    pub fn next(&self, (col, row): (isize, isize), (dc, dr): (isize, isize)) -> Option<(Point2<f64>, Vector2<f64>)> {
+        let back = |k: isize| self.around(col - k * dc, row - k * dr);
+        let (near, second) = (back(0)?, back(1)?);
+        let step = near - second;
+        let step = back(2).map_or(step, |third| 2.0 * step - (second - third));
+        Some((near + step, step))
+    }
+}
 
 impl<T: Clone> Grid<T> {
     /// A grid filled by column and row, in order.

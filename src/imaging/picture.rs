@@ -6,6 +6,7 @@
 
 use camino::Utf8Path;
 use image::{DynamicImage, ImageReader};
+use nalgebra::Point2;
 
 /// What every reason for a file that is no picture says.
 pub const UNDECODABLE: &str = "cannot be decoded";
@@ -78,6 +79,22 @@ pub fn size(path: &Utf8Path) -> Option<(u32, u32)> {
     ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_dimensions().ok()
 }
 
+impl Grey8 {
+    /// Mean of the 3 x 3 pixels at a place; `None` at the picture's border.
+    pub fn mean_at(&self, at: Point2<f64>) -> Option<f64> {
+        mean_at((self.width, self.height), |x, y| f64::from(self.pixels[y * self.width + x]), at)
+    }
+}
+
+fn mean_at((width, height): (usize, usize), grey: impl Fn(usize, usize) -> f64, at: Point2<f64>) -> Option<f64> {
+    let (x, y) = (at.x.round(), at.y.round());
+    if !(x >= 1.0 && y >= 1.0 && x + 1.0 < width as f64 && y + 1.0 < height as f64) {
+        return None;
+    }
+    let (x, y) = (x as usize, y as usize);
+    Some((y - 1..=y + 1).map(|y| (x - 1..=x + 1).map(|x| grey(x, y)).sum::<f64>()).sum::<f64>() / 9.0)
+}
+
 fn luma(p: [u64; 3]) -> u64 {
     (LUMA[0] * p[0] + LUMA[1] * p[1] + LUMA[2] * p[2] + 32_768) >> 16
 }
@@ -113,6 +130,11 @@ impl Picture {
             Pixels::Eight(values) => f64::from(values[y * self.width + x]),
             Pixels::Sixteen(values) => f64::from(values[y * self.width + x]),
         }
+    }
+
+    /// Mean of the 3 x 3 pixels at a place; `None` at the picture's border.
+    pub fn mean_at(&self, at: Point2<f64>) -> Option<f64> {
+        mean_at((self.width, self.height), |x, y| self.at(x, y), at)
     }
 
     /// An 8-bit copy reduced by a whole factor, each pixel the mean of `factor` x `factor`; what is left over at the right

@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use super::page;
 use super::table::number;
 use crate::imaging::{Corner, Corners};
+use crate::median::median;
 
 /// Cells a side of a picture.
 const CELLS: usize = 5;
@@ -34,17 +35,13 @@ pub fn section(corners: &Corners) -> Markup {
 
 /// Median blur of each cell, row by row; `None` where no corner was seen.
 fn medians<'a>(corners: impl Iterator<Item = &'a Corner>, (width, height): (u32, u32)) -> Vec<Option<f64>> {
-    let mut cells = vec![Vec::new(); CELLS * CELLS];
+    let mut cells = vec![Vec::<f64>::new(); CELLS * CELLS];
     let index = |at: f64, size: u32| (((at + 0.5) / f64::from(size) * CELLS as f64).max(0.0) as usize).min(CELLS - 1);
     for corner in corners {
         if let Some(blur) = corner.blur_px {
             cells[index(corner.px.y, height) * CELLS + index(corner.px.x, width)].push(blur);
         }
     }
-    let median = |mut blurs: Vec<f64>| {
-        blurs.sort_by(f64::total_cmp);
-        blurs.get(blurs.len() / 2).copied()
-    };
     cells.into_iter().map(median).collect()
 }
 

@@ -93,6 +93,22 @@ impl Robot {
             corrections: Corrections::default(),
         }
     }
+
+    /// This robot, six joints of Table 1 of the paper, with what the paper identified (Table 2, deg and mm).
+    pub fn with_table_2(mut self) -> Robot {
+        const ALPHA_DEG: [f64; 6] = [-0.1746, 0.6159, -0.7798, -0.5255, 0.9999, 0.6489];
+        const A_MM: [f64; 6] = [0.0, 0.9999, 0.9999, -0.2770, 0.2263, 0.0];
+        const THETA_DEG: [f64; 6] = [-0.3136, -0.9993, 0.9999, -0.6520, 0.1365, 0.0];
+        const D_MM: [f64; 6] = [0.0, 0.0, 0.0, 0.5261, 0.2078, 0.1015];
+        let deviations = ALPHA_DEG.into_iter().zip(A_MM).zip(THETA_DEG.into_iter().zip(D_MM));
+        for (joint, ((alpha_deg, a_mm), (theta_deg, d_mm))) in self.joints.iter_mut().zip(deviations) {
+            joint.alpha_rad += alpha_deg.to_radians();
+            joint.a_mm += a_mm;
+            joint.theta_rad += theta_deg.to_radians();
+            joint.d_mm += d_mm;
+        }
+        self
+    }
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::draws::{Draws, Purpose};
 use super::settings::RobotDeviations;
+use crate::robot::Robot;
 use crate::robot::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
-use crate::robot::{Parameter, Robot};
 
 /// Ranges of the joints, deg. The paper gives none; these are a common arm's.
 const LIMITS_DEG: [f64; 6] = [175.0, 130.0, 150.0, 175.0, 175.0, 175.0];
@@ -26,7 +26,7 @@ pub fn nominal() -> Robot {
     robot
 }
 
-/// A robot that differs from the nominal one as drawn from the seed.
+/// A robot whose parameters differ from the nominal one's as drawn from the seed.
 pub fn deviated(nominal: &Robot, deviations: &RobotDeviations, seed: u64) -> Robot {
     let mut robot = nominal.clone();
     let mut draws = Draws::new(seed, Purpose::RobotErrors, 0);
@@ -40,29 +40,7 @@ pub fn deviated(nominal: &Robot, deviations: &RobotDeviations, seed: u64) -> Rob
     for k in 0..3 {
         robot.tool_mm[k] += draws.uniform(-deviations.length_mm, deviations.length_mm);
     }
-    add_effects(&mut robot, nominal, deviations, seed);
     robot
-}
-
-/// The robot of Table 2 of the paper: `nominal`, six joints of Table 1, with what the paper identified, deg and mm. `None` for
-/// another number of joints.
-pub fn table_2(nominal: &Robot) -> Option<Robot> {
-    const ALPHA_DEG: [f64; 6] = [-0.1746, 0.6159, -0.7798, -0.5255, 0.9999, 0.6489];
-    const A_MM: [f64; 6] = [0.0, 0.9999, 0.9999, -0.2770, 0.2263, 0.0];
-    const THETA_DEG: [f64; 6] = [-0.3136, -0.9993, 0.9999, -0.6520, 0.1365, 0.0];
-    const D_MM: [f64; 6] = [0.0, 0.0, 0.0, 0.5261, 0.2078, 0.1015];
-    if nominal.joints.len() != ALPHA_DEG.len() {
-        return None;
-    }
-    let mrad = |deg: f64| 1000.0 * deg.to_radians();
-    let mut robot = nominal.clone();
-    for i in 0..ALPHA_DEG.len() {
-        robot.add(Parameter::Alpha(i), mrad(ALPHA_DEG[i]));
-        robot.add(Parameter::A(i), A_MM[i]);
-        robot.add(Parameter::Theta(i), mrad(THETA_DEG[i]));
-        robot.add(Parameter::D(i), D_MM[i]);
-    }
-    Some(robot)
 }
 
 /// Effects outside of the plain model: parallel axes that are not, joints that sag, drives with periodic errors. Those of size

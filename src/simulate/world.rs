@@ -67,13 +67,9 @@ impl World {
         let check_board = PhysicalBoard::new(settings.check_board, settings.check_workmanship, settings.seed, 0);
         let target = PhysicalBoard::new(settings.target_board, settings.target_workmanship, settings.seed, 1);
         let nominal = true_robot::nominal();
-        let truth = match true_robot {
-            Some(mut robot) => {
-                true_robot::add_effects(&mut robot, &nominal, &settings.robot, settings.seed);
-                robot
-            }
-            None => true_robot::deviated(&nominal, &settings.robot, settings.seed),
-        };
+        let drawn = || true_robot::deviated(&nominal, &settings.robot, settings.seed);
+        let mut truth = true_robot.unwrap_or_else(drawn);
+        true_robot::add_effects(&mut truth, &nominal, &settings.robot, settings.seed);
         if truth.joints.len() != nominal.joints.len() {
             return Err(Error::Joints { found: truth.joints.len(), needed: nominal.joints.len() }.into());
         }

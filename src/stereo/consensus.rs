@@ -4,6 +4,8 @@
 //! alone; the relative pose most pairs agree on (turns of a board that looks the same after them are undone); a robust
 //! bundle; pairs that contradict it are taken out and asked again. Goes wrong: most pairs contradict each other.
 
+use rayon::prelude::*;
+
 use super::bundle::{self, Search, Values};
 use super::calibrate::FEWEST_PAIRS;
 use super::homography::FEWEST_CORNERS;
@@ -17,9 +19,8 @@ use super::screening::{self, Usual};
 use super::start::{self, CAUCHY_WIDTH, OneCamera};
 use super::{Error, Lens, Rig};
 use crate::geometry::Transform;
-use crate::imaging::order;
-use crate::imaging::{Board, Corner, Corners, PairCorners, Skipped};
-use rayon::prelude::*;
+use crate::imaging::{Board, Corner, Corners, PairCorners, Skipped, order};
+use crate::median::median;
 
 /// Lens of the first rig.
 const FIRST_LENS: Lens = Lens::Brown4;
@@ -112,9 +113,8 @@ fn first_rig(
         .flatten()
         .map(|(l, r)| quarters.iter().map(|&quarters| r * renumbered(quarters) * l.inverse()).collect())
         .collect();
-    let mut distances: Vec<f64> = both.iter().flatten().map(|(l, _)| l.translation.vector.norm()).collect();
-    distances.sort_by(f64::total_cmp);
-    let distance_mm = distances.get(distances.len() / 2).copied().ok_or(Error::NoCamera { side: Side::Left })?;
+    let distances = both.iter().flatten().map(|(l, _)| l.translation.vector.norm());
+    let distance_mm = median(distances).ok_or(Error::NoCamera { side: Side::Left })?;
     let right_from_left =
         start::agreed_transform(&choices, distance_mm).ok_or(Error::NoCamera { side: Side::Right })?;
     for (candidate, poses) in candidates.iter_mut().zip(&both) {
@@ -178,9 +178,7 @@ fn all_on_rig(candidates: &[Candidate], shared: &Shared, known: &[OnRig]) -> Vec
 
 /// Median of what pictures leave alone, px.
 fn usual_px(candidates: &[Candidate]) -> f64 {
-    let mut all: Vec<f64> = candidates.iter().flat_map(|c| c.alone_px).flatten().collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(0.0)
+    median(candidates.iter().flat_map(|c| c.alone_px).flatten()).unwrap_or(0.0)
 }
 
 /// A pair's residual on the rig as a share of its limit; above one it does not belong.

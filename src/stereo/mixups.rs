@@ -155,7 +155,7 @@ impl Scene<'_> {
             return Some("left and right picture are exchanged: give each the other's name".into());
         }
         for side in Side::BOTH {
-            let camera = if side == Side::Left { &shared.rig.left } else { &shared.rig.right };
+            let camera = shared.rig.camera(side);
             let (width, height) = (f64::from(camera.width), f64::from(camera.height));
             for change in &CHANGES {
                 let mut undone = view.clone();
@@ -182,7 +182,7 @@ impl Scene<'_> {
     /// The pair that one of the pictures belongs to.
     fn partner(&self, i: usize, alone: &[Alone]) -> Option<String> {
         Side::BOTH.into_iter().find_map(|side| {
-            let other = if side == Side::Left { Side::Right } else { Side::Left };
+            let other = side.other();
             let here = alone[i][side as usize]?.translation.vector;
             let mut others: Vec<(f64, usize)> = (0..self.views.len())
                 .filter(|&j| j != i)

@@ -7,6 +7,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::observations::{Observation, View};
+use crate::median::median;
 
 /// The noise model of all corners.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,13 +58,8 @@ impl Noise {
 
     /// Median over the corners of the standard deviation of a coordinate, px.
     pub fn typical_px(&self, views: &[View]) -> f64 {
-        let mut all: Vec<f64> = views
-            .iter()
-            .flat_map(|view| view.observations.iter().filter(|o| o.active))
-            .map(|o| (self.covariance(o).trace() / 2.0).sqrt())
-            .collect();
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() / 2).copied().unwrap_or(self.added_px)
+        let active = views.iter().flat_map(|view| view.observations.iter().filter(|o| o.active));
+        median(active.map(|o| (self.covariance(o).trace() / 2.0).sqrt())).unwrap_or(self.added_px)
     }
 }
 

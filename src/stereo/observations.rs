@@ -29,6 +29,21 @@ pub struct Observation {
 }
 
 impl Observation {
+    /// A point that belongs to no board, seen with this standard deviation of a coordinate.
+    pub fn of_point(side: Side, px: Point2<f64>, sigma_px: f64) -> Observation {
+        Observation {
+            side,
+            col: 0,
+            row: 0,
+            board_mm: Point3::origin(),
+            lift: [0.0; 2],
+            px,
+            covariance_px2: Matrix2::identity() * (sigma_px * sigma_px),
+            whitener: Matrix2::identity() / sigma_px,
+            active: true,
+        }
+    }
+
     /// Place on a board bent by `shape` (height of the paraboloids along x and y in the middle), mm.
     pub fn board_point(&self, shape_mm: &[f64; 2]) -> Point3<f64> {
         let z = self.lift[0] * shape_mm[0] + self.lift[1] * shape_mm[1];
@@ -110,7 +125,7 @@ impl View {
     pub fn exchanged(&self) -> View {
         let mut exchanged = self.clone();
         for o in &mut exchanged.observations {
-            o.side = if o.side == Side::Left { Side::Right } else { Side::Left };
+            o.side = o.side.other();
         }
         exchanged
     }

@@ -29,6 +29,14 @@ pub struct Covariance {
 }
 
 impl Rig {
+    /// The camera of a side.
+    pub fn camera(&self, side: Side) -> &Camera {
+        match side {
+            Side::Left => &self.left,
+            Side::Right => &self.right,
+        }
+    }
+
     /// Distance of the two cameras' centres, mm.
     pub fn baseline_mm(&self) -> f64 {
         self.right_from_left.translation.vector.norm()

@@ -10,6 +10,7 @@ use super::residuals::residual_px;
 use super::robust::Loss;
 use super::start::CAUCHY_WIDTH;
 use crate::geometry::Transform;
+use crate::median::median;
 
 /// A pair is out when its corners lie this many times farther off on the common rig than in each picture alone...
 const FACTOR: f64 = 4.0;
@@ -22,12 +23,11 @@ const LARGEST_SHARE: f64 = 1e-3;
 
 /// Median length of one picture's residuals, px.
 pub fn median_px(shared: &Shared, left_from_board: &Transform, view: &View, side: Side) -> Option<f64> {
-    let mut all = view
+    let all = view
         .active(side)
         .map(|o| residual_px(shared, left_from_board, o).map(|r| r.norm()))
         .collect::<Option<Vec<f64>>>()?;
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied()
+    median(all)
 }
 
 /// The larger of both pictures' median residuals of a pair on a rig, px, with the pose that makes it least.

@@ -17,6 +17,7 @@ use super::robust::Loss;
 use super::screening::median_px;
 use super::{Camera, Lens, Rig};
 use crate::geometry::{Transform, rotation_vector};
+use crate::median::median;
 
 /// Width of the robust loss in standard deviations: 95 % efficient for Gaussian noise (Holland & Welsch 1977).
 pub const CAUCHY_WIDTH: f64 = 2.385;
@@ -75,9 +76,7 @@ fn as_left(view: &View, side: Side) -> View {
 /// Pictures whose corners look like a board: those whose homography leaves no more than a few times the median.
 /// Lens distortion leaves something in all of them; corners in a wrong order leave tens of times more.
 fn well_formed(homographies: &[Option<(Matrix3<f64>, f64)>]) -> Vec<usize> {
-    let mut left: Vec<f64> = homographies.iter().flatten().map(|(_, rms)| *rms).collect();
-    left.sort_by(f64::total_cmp);
-    let limit = left.get(left.len() / 2).map_or(0.0, |median| 5.0 * median);
+    let limit = median(homographies.iter().flatten().map(|(_, rms)| *rms)).map_or(0.0, |usual| 5.0 * usual);
     (0..homographies.len()).filter(|&i| homographies[i].is_some_and(|(_, rms)| rms <= limit)).collect()
 }
 

@@ -3,7 +3,7 @@
 //! In: a calibrated rig with its covariance. Out: the standard deviation of a length along x, y and z on a lattice through the volume that
 //! the boards filled, from the corners' scatter at both ends and from the calibration they share.
 
-use nalgebra::{Matrix2, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 use super::Rig;
@@ -71,17 +71,7 @@ fn point(rig: &Rig, at: &Point3<f64>, sigma_px: f64) -> Option<SpacePoint> {
             && px.y >= -0.5
             && px.x <= f64::from(camera.width) - 0.5
             && px.y <= f64::from(camera.height) - 0.5;
-        inside.then(|| Observation {
-            side,
-            col: 0,
-            row: 0,
-            board_mm: Point3::origin(),
-            lift: [0.0; 2],
-            px,
-            covariance_px2: Matrix2::identity() * (sigma_px * sigma_px),
-            whitener: Matrix2::identity() / sigma_px,
-            active: true,
-        })
+        inside.then(|| Observation::of_point(side, px, sigma_px))
     };
     triangulate(rig, &seen(Side::Left, &rig.left, left)?, &seen(Side::Right, &rig.right, right)?)
 }

@@ -20,14 +20,36 @@ fn source_files() -> Vec<PathBuf> {
     files
 }
 
-/// The part of a file before its tests, line by line, without comments.
+/// A file line by line, without comments and without what is compiled for tests alone.
 fn code(path: &Path) -> Vec<(usize, String)> {
-    let text = std::fs::read_to_string(path).unwrap();
-    text.lines()
-        .enumerate()
-        .take_while(|(_, line)| line.trim() != "#[cfg(test)]")
-        .map(|(i, line)| (i + 1, line.split("//").next().unwrap_or_default().to_owned()))
-        .collect()
+    without_tests(&std::fs::read_to_string(path).unwrap())
+}
+
+fn without_tests(text: &str) -> Vec<(usize, String)> {
+    let mut kept = Vec::new();
+    // Braces that are open in an item under `#[cfg(test)]`; such an item ends with the last of them, or with a semicolon before any.
+    let mut open: Option<i32> = None;
+    for (i, line) in text.lines().enumerate() {
+        let code = line.split("//").next().unwrap_or_default();
+        match open {
+            None if code.trim() == "#[cfg(test)]" => open = Some(0),
+            None => kept.push((i + 1, code.to_owned())),
+            Some(depth) => {
+                let depth = depth + code.matches('{').count() as i32 - code.matches('}').count() as i32;
+                let ends = depth == 0 && (code.contains('}') || code.trim_end().ends_with(';'));
+                open = if ends { None } else { Some(depth) };
+            }
+        }
+    }
+    kept
+}
+
+#[test]
+fn code_after_a_test_item_is_looked_at() {
+    let text = "a\n#[cfg(test)]\nmod t;\nb\n#[cfg(test)]\nmod t {\n  fn f() { x }\n}\nc // d\n";
+    let lines: Vec<(usize, String)> = without_tests(text);
+    let kept: Vec<(usize, &str)> = lines.iter().map(|(i, line)| (*i, line.trim())).collect();
+    assert_eq!(kept, [(1, "a"), (4, "b"), (9, "c")]);
 }
 
 fn offenders(pattern: &str, allowed: &[&str]) -> Vec<String> {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use camino::Utf8PathBuf;
-use nalgebra::{Matrix2, Point2, Point3, Vector3};
+use nalgebra::{Point2, Point3, Vector3};
 use serde_json::Value;
 use stereocal::stereo::observations::{Observation, Side};
 use stereocal::stereo::triangulate::triangulate;
@@ -60,8 +60,8 @@ fn worst_step_mm(rig: &Rig, file: &Path) -> f64 {
         let values: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
         let point = triangulate(
             rig,
-            &seen(Side::Left, Point2::new(values[3], values[4])),
-            &seen(Side::Right, Point2::new(values[5], values[6])),
+            &Observation::of_point(Side::Left, Point2::new(values[3], values[4]), 1.0),
+            &Observation::of_point(Side::Right, Point2::new(values[5], values[6]), 1.0),
         );
         let step = steps.entry(values[0] as u32).or_insert_with(|| (values[1], BTreeMap::new()));
         step.1.insert(values[2] as u32, point.unwrap().point_mm);
@@ -73,20 +73,6 @@ fn worst_step_mm(rig: &Rig, file: &Path) -> f64 {
         ((moved.iter().sum::<Vector3<f64>>() / moved.len() as f64).norm() - stage_mm).abs()
     };
     steps.values().map(miss).fold(0.0, f64::max)
-}
-
-fn seen(side: Side, px: Point2<f64>) -> Observation {
-    Observation {
-        side,
-        col: 0,
-        row: 0,
-        board_mm: Point3::origin(),
-        lift: [0.0; 2],
-        px,
-        covariance_px2: Matrix2::zeros(),
-        whitener: Matrix2::identity(),
-        active: true,
-    }
 }
 
 #[test]

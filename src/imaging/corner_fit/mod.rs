@@ -166,18 +166,6 @@ mod tests {
     use super::*;
     use crate::imaging::picture::{Picture, Pixels};
 
-    fn truth() -> Model {
-        Model {
-            corner: Vector2::new(0.3, -0.2),
-            angles_rad: [0.1, 1.3],
-            blur_px: [0.9, 1.3],
-            level: 120.0,
-            half_contrast: 70.0,
-            light_slope: Vector2::new(-2e-3, 1.5e-3),
-            bend: [1e-3, -2e-3],
-        }
-    }
-
     /// A window of the model's own grey values, at 256 steps a grey value.
     fn window(model: &Model, half: usize, band_px: f64) -> Window {
         let side = 2 * half + 1;
@@ -193,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_fit_without_noise_recovers_the_model() {
-        let truth = truth();
+        let truth = Model::example();
         for band_px in [f64::MAX, 6.0] {
             let window = window(&truth, 20, band_px);
             let start = Model {
@@ -213,7 +201,7 @@ mod tests {
 
     #[test]
     fn a_flat_or_empty_window_has_no_corner() {
-        let start = truth();
+        let start = Model::example();
         assert_eq!(fit(&start, &Window::default()), None);
         let flat = window(&Model { half_contrast: 0.0, light_slope: Vector2::zeros(), ..start }, 10, f64::MAX);
         assert!(fit(&start, &flat).is_none_or(|f| f.covariance_px2[(0, 0)] > 1.0));

@@ -187,6 +187,19 @@ impl Model {
 
 #[cfg(test)]
 impl Model {
+    /// A corner between unequal edges that are not upright, under uneven light.
+    pub fn example() -> Model {
+        Model {
+            corner: Vector2::new(0.3, -0.2),
+            angles_rad: [0.1, 1.3],
+            blur_px: [0.9, 1.3],
+            level: 120.0,
+            half_contrast: 70.0,
+            light_slope: Vector2::new(-2e-3, 1.5e-3),
+            bend: [1e-3, -2e-3],
+        }
+    }
+
     /// The grey value at a place.
     pub fn grey(&self, (x, y): (f64, f64)) -> f64 {
         let mut columns = [[0.0; LANES]; COLUMNS];
@@ -201,18 +214,6 @@ mod tests {
 
     pub fn group(x: f64, y: f64) -> Group {
         Group { x: [x; LANES], y: [y; LANES], grey: [0.0; LANES], weight: [1.0; LANES] }
-    }
-
-    fn model() -> Model {
-        Model {
-            corner: Vector2::new(0.3, -0.2),
-            angles_rad: [0.1, 1.3],
-            blur_px: [0.9, 1.3],
-            level: 120.0,
-            half_contrast: 70.0,
-            light_slope: Vector2::new(-2e-3, 1.5e-3),
-            bend: [1e-3, -2e-3],
-        }
     }
 
     #[test]
@@ -232,11 +233,11 @@ mod tests {
         ];
         for (x, y) in [(0.0, 0.0), (1.0, 0.5), (-2.0, 1.0), (0.4, -3.0)] {
             let mut columns = [[0.0; LANES]; COLUMNS];
-            Crossing::new(&model()).columns(&model(), &group(x, y), &mut columns);
+            Crossing::new(&Model::example()).columns(&Model::example(), &group(x, y), &mut columns);
             for (i, (change, column)) in changes.iter().zip(&columns).enumerate() {
                 let h = 1e-4;
                 let at = |h: f64| {
-                    let mut changed = model();
+                    let mut changed = Model::example();
                     change(&mut changed, h);
                     changed.grey((x, y))
                 };
@@ -250,7 +251,7 @@ mod tests {
 
     #[test]
     fn pixels_far_from_an_edge_give_the_same_sums_by_the_shorter_way() {
-        let model = model();
+        let model = Model::example();
         let places = |from: (f64, f64)| (0..40).map(move |i| (from.0 + f64::from(i % 8), from.1 + f64::from(i / 8)));
         let grey = |(x, y): (f64, f64)| (100.0 + 3.0 * x - y).rem_euclid(50.0);
         let all = |from: (f64, f64)| {
