@@ -3,17 +3,33 @@
 use camino::Utf8PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::imaging::Squares;
+use crate::imaging::{Mosaic, Squares};
 use crate::simulate::settings::Orientation;
 use crate::stereo::Lens;
 
+/// What `--version` says of the build; `-V` says the version alone.
+const BUILD: &str = if cfg!(debug_assertions) {
+    concat!(env!("CARGO_PKG_VERSION"), "\n", "build: debug, checks on")
+} else {
+    concat!(env!("CARGO_PKG_VERSION"), "\n", "build: release")
+};
+
 /// Robot calibration with two cameras and a checkerboard.
 #[derive(Debug, Parser)]
-#[command(name = "stereocal", version, about, max_term_width = 100)]
+#[command(name = "stereocal", version, long_version = BUILD, about, max_term_width = 100)]
 pub struct Cli {
-    /// Settings file [default: stereocal.toml in the working directory, if there]
+    /// Settings file, with the keys that the flags name; `stereocal init` writes one [default: stereocal.toml in the working directory, if there]
     #[arg(long, global = true, value_name = "FILE")]
     pub config: Option<Utf8PathBuf>,
+    /// Warnings and errors only on stderr: no progress, no notes
+    #[arg(long, global = true)]
+    pub quiet: bool,
+    /// Threads to compute with, 1 to 1024; results don't depend on it [default: one a core]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Leave program, date, command line and inputs out of the files that are written
+    #[arg(long, global = true)]
+    pub no_provenance: bool,
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
@@ -28,21 +44,72 @@ pub enum Command {
     Measure(Measure),
     /// Identify the robot's kinematic parameters from measurements and joint angles
     Identify(Identify),
+    /// Judge robots by the verify rows of measurements, without fitting any
+    Verify(Verify),
     /// Make pictures and measurements whose truth is known
     Simulate(Simulate),
     /// Write a calibration for other programs
     Export(Export),
+    /// Make a nominal robot file: from a URDF, a table, or a common arm's published numbers
+    Robot(RobotCommand),
+    /// Write a commented stereocal.toml, a robot.toml and a poses.csv to start from
+    Init(Init),
+    /// Print a page of the guide: boards, cameras, pictures, poses, a day in the cell
+    Guide(Guide),
+    /// Print a shell's completions
+    Completions(Completions),
+    /// Write the manual's pages
+    Man(Man),
+}
+
+/// `stereocal init`
+#[derive(Debug, Args)]
+pub struct Init {
+    /// Folder for the files
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub out: Utf8PathBuf,
+    /// Replace files that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// `stereocal guide`
+#[derive(Debug, Args)]
+pub struct Guide {
+    /// Which page [default: the list of them]
+    pub topic: Option<String>,
+}
+
+/// `stereocal completions`
+#[derive(Debug, Args)]
+pub struct Completions {
+    /// Whose
+    pub shell: clap_complete::Shell,
+}
+
+/// `stereocal man`
+#[derive(Debug, Args)]
+pub struct Man {
+    /// Folder for the pages
+    #[arg(long, value_name = "DIR", default_value = "man")]
+    pub out: Utf8PathBuf,
+    /// Replace files that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Where results go and how they are shown.
 #[derive(Debug, Args)]
 pub struct Output {
-    /// Folder for results [default: out]
+    /// Folder for results; key `out` [default: out]
     #[arg(long, value_name = "DIR")]
     pub out: Option<Utf8PathBuf>,
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
+    /// Replace files in the results folder that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// `stereocal camera-check`
@@ -54,13 +121,13 @@ pub struct CameraCheck {
     /// Corners from a CSV file instead of pictures
     #[arg(long, value_name = "FILE")]
     pub corners: Option<Utf8PathBuf>,
-    /// Squares of the check board, not inner corners [default: 20x20]
+    /// Squares of the check board, not inner corners; key `check_board.squares` [default: 20x20]
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,
-    /// Side of a square, mm [default: 10]
+    /// Side of a square, mm; key `check_board.square_mm` [default: 10]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub square_mm: Option<f64>,
-    /// Largest length error that passes, mm [default: 0.05]
+    /// Largest length error that passes, mm; key `tolerance_mm` [default: 0.05]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub tolerance_mm: Option<f64>,
     /// Expanded uncertainty (k = 2) of the board's lengths, from its certificate, mm: widens the guard band of the verdict
@@ -73,10 +140,10 @@ pub struct CameraCheck {
     #[arg(long, value_name = "SHAPE")]
     pub board_shape: Option<BoardShape>,
     /// The board's temperature, deg C; with --expansion-ppm-per-k its squares grow from their size at 20 deg C
-    #[arg(long, value_name = "C", requires = "expansion_ppm_per_k", allow_negative_numbers = true)]
+    #[arg(long, value_name = "C", requires = "expansion_ppm_per_k", allow_negative_numbers = true, value_parser = between(-273.15, 1000.0))]
     pub board_temperature_c: Option<f64>,
     /// The board's coefficient of thermal expansion, 1e-6/K (alumina 7, glass 8, aluminium 23)
-    #[arg(long, value_name = "PPM", requires = "board_temperature_c")]
+    #[arg(long, value_name = "PPM", allow_negative_numbers = true, requires = "board_temperature_c", value_parser = between(-100.0, 1000.0))]
     pub expansion_ppm_per_k: Option<f64>,
     /// Pictures of a second, independent board: shows the scale
     #[arg(long, value_name = "DIR")]
@@ -87,9 +154,12 @@ pub struct CameraCheck {
     /// Side of the second board's squares, mm [default: as the first]
     #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "check_images")]
     pub check_square_mm: Option<f64>,
-    /// Width and height of the pictures that --corners come from, px [default: from the corners' extent]
+    /// Width and height of the pictures that --corners come from, px, where the file does not hold them
     #[arg(long, value_name = "WxH", requires = "corners", value_parser = picture_size)]
     pub picture_size: Option<(u32, u32)>,
+    /// Filters of pictures that are raw colour mosaics: RGGB, BGGR, GRBG or GBRG
+    #[arg(long, value_name = "PATTERN")]
+    pub bayer: Option<Mosaic>,
     /// Draw the corners found over each pair, into overlays/ in the results folder
     #[arg(long)]
     pub draw: bool,
@@ -106,12 +176,18 @@ pub struct Measure {
     /// The rig [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
-    /// Squares of the target, not inner corners [default: 7x6]
+    /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,
-    /// Side of a square, mm [default: 10]
+    /// Side of a square, mm; key `target_board.square_mm` [default: 10]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub square_mm: Option<f64>,
+    /// Filters of pictures that are raw colour mosaics: RGGB, BGGR, GRBG or GBRG
+    #[arg(long, value_name = "PATTERN")]
+    pub bayer: Option<Mosaic>,
+    /// Measure pictures as they arrive; ends when all of poses.csv are there, or on Ctrl-C
+    #[arg(long)]
+    pub watch: bool,
     /// Draw the corners found over each pair, into overlays/ in the results folder
     #[arg(long)]
     pub draw: bool,
@@ -129,16 +205,19 @@ pub struct Identify {
     /// The nominal robot [default: robot.toml in the working directory if there, else Table 1 of the paper]
     #[arg(long, value_name = "FILE")]
     pub robot: Option<Utf8PathBuf>,
-    /// Solver; `auto` runs all and keeps the best on samples held out [default: auto]
+    /// Distances between touched points: group_a,group_b,distance_mm and optionally sigma_mm
+    #[arg(long, value_name = "FILE")]
+    pub known_distances: Option<Utf8PathBuf>,
+    /// Solver; `auto` runs all and keeps the best; key `identify.method` [default: auto]
     #[arg(long, value_name = "NAME", value_parser = ["auto", "trust-region", "stapso", "pso", "cpso", "apso", "arpso"])]
     pub method: Option<String>,
-    /// Residual model [default: chosen on samples held out]
+    /// Residual model; key `identify.model` [default: chosen on samples held out]
     #[arg(long, value_name = "NAME")]
     pub model: Option<crate::identify::Model>,
-    /// Terms beyond MDH: parallel axes, gravity, harmonics [default: auto]
+    /// Terms beyond MDH: parallel axes, gravity, harmonics; key `identify.extensions` [default: auto]
     #[arg(long, value_name = "NAME")]
     pub extensions: Option<crate::identify::settings::Extensions>,
-    /// Constants of the swarms [default: those of the settings file]
+    /// Constants of the swarms; key `identify.constants` [default: those of the settings file]
     #[arg(long, value_name = "NAME")]
     pub constants: Option<crate::identify::settings::Constants>,
     /// Seed of every random draw
@@ -149,12 +228,106 @@ pub struct Identify {
     pub output: Output,
 }
 
+/// `stereocal verify`
+#[derive(Debug, Args)]
+pub struct Verify {
+    /// Measurements with verify rows (without any, a fifth of the samples is judged)
+    #[arg(long, value_name = "FILE")]
+    pub measurements: Utf8PathBuf,
+    /// A robot to judge; repeat for more
+    #[arg(long, value_name = "FILE", required = true)]
+    pub robot: Vec<Utf8PathBuf>,
+    /// Distances between touched points: group_a,group_b,distance_mm and optionally sigma_mm
+    #[arg(long, value_name = "FILE")]
+    pub known_distances: Option<Utf8PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// `stereocal export`
 #[derive(Debug, Args)]
 pub struct Export {
     /// What to write.
     #[command(subcommand)]
     pub what: ExportWhat,
+}
+
+/// `stereocal robot`
+#[derive(Debug, Args)]
+pub struct RobotCommand {
+    /// What to do.
+    #[command(subcommand)]
+    pub what: RobotWhat,
+}
+
+/// What `robot` can do.
+#[derive(Debug, Subcommand)]
+pub enum RobotWhat {
+    /// A robot file from a URDF, or from a table in CSV (alpha_deg,a_mm,theta_deg,d_mm a joint)
+    Import(RobotImport),
+    /// A robot file of a common arm
+    New(RobotNew),
+    /// Names of the common arms
+    List,
+    /// A robot in words, and its pose at given joint angles: hold it against the pendant
+    Show(RobotShow),
+}
+
+/// `stereocal robot import`
+#[derive(Debug, Args)]
+pub struct RobotImport {
+    /// A URDF (.urdf, .xml) or a table (.csv)
+    pub file: Utf8PathBuf,
+    /// Link of a URDF that carries the target [default: the end of the chain]
+    #[arg(long, value_name = "LINK")]
+    pub tip: Option<String>,
+    /// Where alpha and a of a table's row stand: behind the joint (classic) or before it
+    #[arg(long, value_enum, default_value = "modified")]
+    pub dh: DhConvention,
+    /// Where it goes.
+    #[command(flatten)]
+    pub place: RobotPlace,
+}
+
+/// `stereocal robot new`
+#[derive(Debug, Args)]
+pub struct RobotNew {
+    /// One of `stereocal robot list`
+    pub name: String,
+    /// Where it goes.
+    #[command(flatten)]
+    pub place: RobotPlace,
+}
+
+/// Where `robot.toml` goes.
+#[derive(Debug, Args)]
+pub struct RobotPlace {
+    /// Folder for robot.toml [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+    /// Overwrite a robot.toml that is there
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// `stereocal robot show`
+#[derive(Debug, Args)]
+pub struct RobotShow {
+    /// The robot file
+    pub file: Utf8PathBuf,
+    /// Joint angles, deg, with commas [default: all zero]
+    #[arg(long, value_name = "DEG,DEG,...", value_delimiter = ',', allow_negative_numbers = true)]
+    pub joints: Vec<f64>,
+}
+
+/// Conventions of Denavit-Hartenberg tables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum DhConvention {
+    /// alpha and a of the link behind the joint (Denavit and Hartenberg, Paul)
+    Classic,
+    /// alpha and a of the link before the joint (Craig)
+    Modified,
 }
 
 /// What `export` can write.
@@ -173,9 +346,12 @@ pub struct ExportCalibration {
     /// The rig [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
-    /// Folder for results [default: out]
+    /// Folder for results; key `out` [default: out]
     #[arg(long, value_name = "DIR")]
     pub out: Option<Utf8PathBuf>,
+    /// Replace files that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Programs that a calibration can be written for.
@@ -207,19 +383,19 @@ pub struct Simulate {
     #[arg(long, value_enum)]
     pub orientation: Option<Orientation>,
     /// Pairs of pictures of the check board [default: the preset's]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count(0, 10_000))]
     pub check_pairs: Option<usize>,
     /// Robot poses to identify from, besides the centres [default: the preset's]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count(0, 100_000))]
     pub samples: Option<usize>,
     /// Robot poses to verify with [default: the preset's]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count(0, 100_000))]
     pub verify: Option<usize>,
     /// No pictures: measurements.csv with noise
     #[arg(long)]
     pub points_only: bool,
     /// Noise of each coordinate with --points-only, mm [default: 0.01]
-    #[arg(long, value_name = "MM", value_parser = not_negative, requires = "points_only")]
+    #[arg(long, value_name = "MM", value_parser = between(0.0, 1e3), requires = "points_only")]
     pub point_noise_mm: Option<f64>,
     /// What the lens does to a point
     #[arg(long, value_enum, default_value = "gaussian")]
@@ -228,47 +404,55 @@ pub struct Simulate {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(8..=16))]
     pub bits: Option<u8>,
     /// How far the check board's middle stands out, um [default: 0]
-    #[arg(long, value_name = "UM", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long, value_name = "UM", allow_negative_numbers = true, value_parser = between(-1e5, 1e5))]
     pub bow_um: Option<f64>,
     /// Standard deviation of the check board's crossings, um [default: 1]
-    #[arg(long, value_name = "UM", value_parser = not_negative)]
+    #[arg(long, value_name = "UM", value_parser = between(0.0, 1e3))]
     pub pitch_um: Option<f64>,
     /// How far black runs over each edge of both boards, um [default: 0]
-    #[arg(long, value_name = "UM", value_parser = not_negative)]
+    #[arg(long, value_name = "UM", value_parser = between(0.0, 1e3))]
     pub ink_um: Option<f64>,
     /// Stretch of both boards against their certificates, parts per million [default: 0]
-    #[arg(long, value_name = "PPM", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long, value_name = "PPM", allow_negative_numbers = true, value_parser = between(-1e5, 1e5))]
     pub thermal_ppm: Option<f64>,
     /// The true robot, instead of one drawn from the seed: a robot file, or `table-2` for what the paper identified; the
     /// effects below are added to it
     #[arg(long, value_name = "FILE|table-2")]
     pub true_robot: Option<Utf8PathBuf>,
     /// Largest misalignment of parallel axes, deg [default: 0]
-    #[arg(long, value_name = "DEG", value_parser = not_negative)]
+    #[arg(long, value_name = "DEG", value_parser = between(0.0, 10.0))]
     pub beta_deg: Option<f64>,
     /// Sag of joints 2 and 3 under a unit weight, mrad a metre of lever [default: 0]
-    #[arg(long, value_name = "MRAD", value_parser = not_negative)]
+    #[arg(long, value_name = "MRAD", value_parser = between(0.0, 100.0))]
     pub gravity_mrad: Option<f64>,
     /// Amplitude of the drives' periodic errors, mrad [default: 0]
-    #[arg(long, value_name = "MRAD", value_parser = not_negative)]
+    #[arg(long, value_name = "MRAD", value_parser = between(0.0, 100.0))]
     pub harmonics_mrad: Option<f64>,
     /// Pose repeatability (ISO 9283 RP) [default: 0.02]
-    #[arg(long, value_name = "MM", value_parser = not_negative)]
+    #[arg(long, value_name = "MM", value_parser = between(0.0, 100.0))]
     pub repeatability_mm: Option<f64>,
-    /// Folder for the simulated world [default: out]
+    /// Folder for the simulated world; key `out` [default: out]
     #[arg(long, value_name = "DIR")]
     pub out: Option<Utf8PathBuf>,
+    /// Replace files that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
 }
 
-fn finite(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err("a finite number is needed".to_owned()),
+/// Reads a number of a range.
+fn between(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| match text.parse::<f64>() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("a number from {least} to {most} is needed")),
     }
 }
 
-fn not_negative(text: &str) -> Result<f64, String> {
-    finite(text).and_then(|value| if value < 0.0 { Err("it must not be negative".to_owned()) } else { Ok(value) })
+/// Reads a count of a range.
+fn count(least: usize, most: usize) -> impl Fn(&str) -> Result<usize, String> + Clone {
+    move |text| match text.parse::<usize>() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("a whole number from {least} to {most} is needed")),
+    }
 }
 
 /// Kinds of blur.
@@ -308,8 +492,8 @@ fn lens(name: &str) -> Result<Lens, String> {
 }
 
 fn picture_size(text: &str) -> Result<(u32, u32), String> {
-    let parse = |side: &str| side.trim().parse::<u32>().ok().filter(|n| *n > 0);
+    let parse = |side: &str| side.trim().parse::<u32>().ok().filter(|n| (1..=100_000).contains(n));
     text.split_once(['x', 'X'])
         .and_then(|(w, h)| Some((parse(w)?, parse(h)?)))
-        .ok_or_else(|| "a picture's size is WIDTHxHEIGHT in px, as in 2448x2048".to_owned())
+        .ok_or_else(|| "a picture's size is WIDTHxHEIGHT in px, each from 1 to 100000, as in 2448x2048".to_owned())
 }

@@ -1,19 +1,28 @@
 //! `stereocal.toml`: every default in one place. A flag beats the file, the file beats the default.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+
 use camino::{Utf8Path, Utf8PathBuf};
 use serde::Deserialize;
 
-use crate::error::{Explain, Result};
+use crate::diagnostic::Explain;
 use crate::files;
 use crate::imaging::board::{Board, Squares};
 
 /// The file that is read when none is named.
 pub const DEFAULT_FILE: &str = "stereocal.toml";
 
-/// Settings that make no sense.
+/// Result of reading settings.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Settings that cannot be read or make no sense.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// Reading or writing files.
+    #[error(transparent)]
+    Files(#[from] crate::files::Error),
     /// All that is wrong, at once.
     #[error("{} not possible: {}", if .problems.len() == 1 { "a setting is" } else { "settings are" }, .problems.join("; "))]
     Invalid {
@@ -22,7 +31,20 @@ pub enum Error {
     },
 }
 
-impl Explain for Error {}
+impl Explain for Error {
+    fn place(&self) -> Option<String> {
+        match self {
+            Error::Files(e) => e.place(),
+            Error::Invalid { .. } => None,
+        }
+    }
+    fn hint(&self) -> Option<String> {
+        match self {
+            Error::Files(e) => e.hint(),
+            Error::Invalid { .. } => None,
+        }
+    }
+}
 
 /// Everything that can be set.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -36,6 +58,8 @@ pub struct Config {
     pub target_board: BoardSettings,
     /// The accuracy the rig must have, mm (section 4 of the paper).
     pub tolerance_mm: f64,
+    /// Measuring the target on the robot.
+    pub measure: MeasureSettings,
     /// Identification: method, model, box, solvers.
     pub identify: crate::identify::Settings,
 }
@@ -50,12 +74,27 @@ pub struct BoardSettings {
     pub square_mm: f64,
 }
 
+/// What is known of the target on the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MeasureSettings {
+    /// Standard deviation of a crossing of the target against its drawing, by its certificate, mm: alumina is made to
+    /// 10 um (section 4 of the paper). It bounds the target's size as well.
+    pub crossing_mm: f64,
+}
+
+impl Default for MeasureSettings {
+    fn default() -> MeasureSettings {
+        MeasureSettings { crossing_mm: 0.01 }
+    }
+}
+
 impl BoardSettings {
     /// The board, with what was given on the command line instead of the file's values.
     pub fn board(&self, squares: Option<Squares>, square_mm: Option<f64>) -> Result<Board> {
         let board = Board { squares: squares.unwrap_or(self.squares), square_mm: square_mm.unwrap_or(self.square_mm) };
         let mut problems = Vec::new();
-        positive(&mut problems, "square_mm", board.square_mm);
+        within(&mut problems, "square_mm", board.square_mm, SQUARES_MM);
         reject(problems)?;
         Ok(board)
     }
@@ -68,19 +107,22 @@ impl Default for Config {
             check_board: BoardSettings { squares: Squares { columns: 20, rows: 20 }, square_mm: 10.0 },
             target_board: BoardSettings { squares: Squares { columns: 7, rows: 6 }, square_mm: 10.0 },
             tolerance_mm: 0.05,
+            measure: MeasureSettings::default(),
             identify: crate::identify::Settings::default(),
         }
     }
 }
 
 impl Config {
-    /// Reads the named file, or `stereocal.toml` in the working directory if it is there, and checks all of it.
+    /// The named file, or `stereocal.toml` in the working directory if it is there.
+    pub fn file(path: Option<&Utf8Path>) -> Option<Utf8PathBuf> {
+        path.or_else(|| Some(Utf8Path::new(DEFAULT_FILE)).filter(|file| file.is_file())).map(Utf8Path::to_owned)
+    }
+
+    /// Reads the file of settings, where there is one, and checks all of it.
     pub fn load(path: Option<&Utf8Path>) -> Result<Config> {
-        let config = match path {
-            Some(path) => files::read_toml(path, "the configuration", None)?,
-            None if Utf8Path::new(DEFAULT_FILE).is_file() => {
-                files::read_toml(Utf8Path::new(DEFAULT_FILE), "the configuration", None)?
-            }
+        let config = match Config::file(path) {
+            Some(path) => files::read_toml(&path, "the configuration", None)?,
             None => Config::default(),
         };
         config.validate()?;
@@ -89,24 +131,44 @@ impl Config {
 
     fn validate(&self) -> Result<()> {
         let mut problems = Vec::new();
-        positive(&mut problems, "tolerance_mm", self.tolerance_mm);
-        positive(&mut problems, "check_board.square_mm", self.check_board.square_mm);
-        positive(&mut problems, "target_board.square_mm", self.target_board.square_mm);
+        within(&mut problems, "tolerance_mm", self.tolerance_mm, TOLERANCES_MM);
+        within(&mut problems, "check_board.square_mm", self.check_board.square_mm, SQUARES_MM);
+        within(&mut problems, "target_board.square_mm", self.target_board.square_mm, SQUARES_MM);
+        positive(&mut problems, "measure.crossing_mm", self.measure.crossing_mm);
         self.identify.validate(&mut problems);
         reject(problems)
     }
 }
 
-/// Notes a problem unless the value is finite and above zero.
+/// Sides of squares, mm: from a wafer's to a car park's.
+pub const SQUARES_MM: RangeInclusive<f64> = 1e-3..=1e5;
+
+/// Tolerances and uncertainties of lengths, mm.
+pub const TOLERANCES_MM: RangeInclusive<f64> = 1e-6..=1e4;
+
+/// Notes a problem unless the value is in its range.
+pub fn within<T: PartialOrd + Display>(problems: &mut Vec<String>, name: &str, value: T, range: RangeInclusive<T>) {
+    if !range.contains(&value) {
+        let (least, most) = range.into_inner();
+        problems.push(format!("{name} is {value}; it must be from {least} to {most}"));
+    }
+}
+
+/// Notes a problem unless the value is above zero, and not beyond all use.
 pub fn positive(problems: &mut Vec<String>, name: &str, value: f64) {
-    if !(value.is_finite() && value > 0.0) {
-        problems.push(format!("{name} is {value}; it must be above zero"));
+    const RANGE: RangeInclusive<f64> = 1e-9..=1e9;
+    if !RANGE.contains(&value) {
+        problems.push(format!(
+            "{name} is {value}; it must be above zero, from {:e} to {:e}",
+            RANGE.start(),
+            RANGE.end()
+        ));
     }
 }
 
 /// An error where there are problems.
 pub fn reject(problems: Vec<String>) -> Result<()> {
-    if problems.is_empty() { Ok(()) } else { Err(Error::Invalid { problems }.into()) }
+    if problems.is_empty() { Ok(()) } else { Err(Error::Invalid { problems }) }
 }
 
 #[cfg(test)]

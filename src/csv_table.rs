@@ -1,9 +1,24 @@
 //! A CSV file with a header: columns by name, every row as long as the header, complaints with the line.
+//!
+//! Time and memory grow with the file's length alone, and there is an end to it: [`MOST_COLUMNS`], [`MOST_ROWS`].
+//!
+//! Text cells that a spreadsheet would run as a formula are written with an apostrophe before them and read without.
+
+use std::collections::BTreeMap;
 
 use camino::Utf8Path;
 
-use crate::error::{Place, Result};
-use crate::files;
+use crate::diagnostic::Place;
+use crate::files::{self, Result};
+
+/// Columns of the widest table that is read.
+pub const MOST_COLUMNS: usize = 100_000;
+
+/// Rows of the longest table that is read.
+pub const MOST_ROWS: usize = 3_000_000;
+
+/// The longest table that is read, bytes.
+const MOST_BYTES: u64 = 2 << 30;
 
 /// A CSV file with its header understood: fields by name, complaints with the line.
 pub struct Table<'a> {
@@ -12,13 +27,43 @@ pub struct Table<'a> {
     /// Names of the columns.
     pub header: Vec<String>,
     /// Line number in the file (from 1) and fields.
-    pub rows: Vec<(u64, Vec<String>)>,
+    pub rows: Vec<(u64, Fields)>,
+    columns: BTreeMap<String, usize>,
+}
+
+/// The fields of a row, in one piece.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fields {
+    text: Box<str>,
+    ends: Box<[u32]>,
+}
+
+impl Fields {
+    fn new(record: &csv::StringRecord) -> Fields {
+        let mut text = String::with_capacity(record.as_slice().len());
+        let mut ends = Vec::with_capacity(record.len());
+        for field in record {
+            text.push_str(unguarded(field));
+            // A file has less than 2^32 bytes.
+            ends.push(text.len() as u32);
+        }
+        Fields { text: text.into(), ends: ends.into() }
+    }
+}
+
+impl std::ops::Index<usize> for Fields {
+    type Output = str;
+
+    fn index(&self, column: usize) -> &str {
+        let start = if column == 0 { 0 } else { self.ends[column - 1] };
+        &self.text[start as usize..self.ends[column] as usize]
+    }
 }
 
 impl<'a> Table<'a> {
     /// Reads a whole file; `what` names it in the message when it is not there, `hint` says what makes it. A file without rows is refused.
     pub fn read(path: &'a Utf8Path, what: &'static str, hint: &str) -> Result<Table<'a>> {
-        let text = files::read_text(path, what, Some(hint))?;
+        let text = files::read_text_up_to(path, what, Some(hint), MOST_BYTES)?;
         // Spreadsheets put a byte order mark first and, in half of Europe, semicolons between; instruments put tabs.
         let text = text.trim_start_matches('\u{feff}');
         let first = text.lines().next().unwrap_or_default();
@@ -28,22 +73,10 @@ impl<'a> Table<'a> {
             .trim(csv::Trim::All)
             .flexible(true)
             .from_reader(text.as_bytes());
-        let refuse = |e: csv::Error| {
-            let line = e.position().map(csv::Position::line);
-            files::Error::Format {
-                message: format!("not readable as CSV: {e}"),
-                place: Place { path: path.to_owned(), line },
-                hint: None,
-            }
-        };
-        let header: Vec<String> = reader.headers().map_err(refuse)?.iter().map(str::to_owned).collect();
-        let mut table = Table { path, header, rows: Vec::new() };
-        let twice = |&i: &usize| !table.header[i].is_empty() && table.header[..i].contains(&table.header[i]);
-        if let Some(twice) = (1..table.header.len()).find(twice) {
-            return Err(table.refuse(1, format!("two columns `{}`", table.header[twice])));
-        }
-        for record in reader.records() {
-            let record = record.map_err(refuse)?;
+        let mut table = Table { path, header: Vec::new(), rows: Vec::new(), columns: BTreeMap::new() };
+        table.read_header(&mut reader)?;
+        let mut record = csv::StringRecord::new();
+        while reader.read_record(&mut record).map_err(|e| table.unreadable(&e))? {
             let line = record.position().map_or(0, csv::Position::line);
             if record.iter().all(str::is_empty) {
                 continue;
@@ -52,7 +85,10 @@ impl<'a> Table<'a> {
                 let message = format!("{} fields, but the header has {}", record.len(), table.header.len());
                 return Err(table.refuse(line, message));
             }
-            table.rows.push((line, record.iter().map(str::to_owned).collect()));
+            if table.rows.len() == MOST_ROWS {
+                return Err(table.refuse(line, format!("more than {MOST_ROWS} rows; that many are read at the most")));
+            }
+            table.rows.push((line, Fields::new(&record)));
         }
         if table.rows.is_empty() {
             return Err(table.refuse(1, "the file has no rows below its header".to_owned()));
@@ -60,34 +96,65 @@ impl<'a> Table<'a> {
         Ok(table)
     }
 
+    fn read_header(&mut self, reader: &mut csv::Reader<&[u8]>) -> Result<()> {
+        let header = reader.headers().map_err(|e| self.unreadable(&e))?;
+        if header.len() > MOST_COLUMNS {
+            let message = format!("{} columns; {MOST_COLUMNS} are read at the most", header.len());
+            return Err(self.refuse(1, message));
+        }
+        self.header = header.iter().map(|name| unguarded(name).to_owned()).collect();
+        for (i, name) in self.header.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
+            if self.columns.insert(name.clone(), i).is_some() {
+                return Err(self.refuse(1, format!("two columns `{name}`")));
+            }
+        }
+        Ok(())
+    }
+
+    fn unreadable(&self, e: &csv::Error) -> files::Error {
+        let line = e.position().map(csv::Position::line);
+        let place = Place { path: self.path.to_owned(), line };
+        files::Error::Format { message: format!("not readable as CSV: {e}"), place, hint: None }
+    }
+
+    /// The header as a message shows it: not all of a hundred thousand names.
+    pub fn header_in_short(&self) -> String {
+        const MOST: usize = 40;
+        let mut text = self.header.iter().take(MOST).map(String::as_str).collect::<Vec<_>>().join(", ");
+        if self.header.len() > MOST {
+            text.push_str(&format!(", ... ({} columns)", self.header.len()));
+        }
+        text
+    }
+
     /// A complaint about a line.
-    pub fn refuse(&self, line: u64, message: String) -> crate::Error {
+    pub fn refuse(&self, line: u64, message: String) -> files::Error {
         self.refuse_with(line, message, None)
     }
 
     /// A complaint about a line, with what to do about it.
-    pub fn refuse_with(&self, line: u64, message: String, hint: Option<&str>) -> crate::Error {
+    pub fn refuse_with(&self, line: u64, message: String, hint: Option<&str>) -> files::Error {
         let place = Place { path: self.path.to_owned(), line: Some(line) };
-        files::Error::Format { message, place, hint: hint.map(str::to_owned) }.into()
+        files::Error::Format { message, place, hint: hint.map(str::to_owned) }
     }
 
     /// The place of a column, where the header has it.
     pub fn column(&self, name: &str) -> Option<usize> {
-        self.header.iter().position(|h| h == name)
+        self.columns.get(name).copied()
     }
 
     /// The place of a column that must be there.
     pub fn require(&self, name: &str) -> Result<usize> {
         self.column(name)
-            .ok_or_else(|| self.refuse(1, format!("no column `{name}`; the header has: {}", self.header.join(", "))))
+            .ok_or_else(|| self.refuse(1, format!("no column `{name}`; the header has: {}", self.header_in_short())))
     }
 
     /// A field as a finite number.
-    pub fn number(&self, line: u64, row: &[String], column: usize) -> Result<f64> {
+    pub fn number(&self, line: u64, row: &Fields, column: usize) -> Result<f64> {
         match row[column].parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
             _ => {
-                let message = format!("`{}` is not a number: `{}`", self.header[column], row[column]);
+                let message = format!("`{}` is not a number: `{}`", self.header[column], &row[column]);
                 let decimal_comma = row[column].replacen(',', ".", 1).parse::<f64>().is_ok();
                 Err(self.refuse_with(line, message, decimal_comma.then_some("write numbers with a decimal point")))
             }
@@ -95,7 +162,78 @@ impl<'a> Table<'a> {
     }
 }
 
-/// A text as a field of a CSV file.
+/// A text as a field of a CSV file: quoted where it must be, and harmless to a spreadsheet.
 pub fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\n', ';']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.to_owned() }
+    let guarded = if is_formula(field.trim_start_matches('\'')) { format!("'{field}") } else { field.to_owned() };
+    let mut writer = csv::WriterBuilder::new().terminator(csv::Terminator::Any(b'\n')).from_writer(Vec::new());
+    // Semicolons and tabs are quoted too: this program's reader, and others, guess the delimiter from the header.
+    if guarded.contains([';', '\t']) {
+        return format!("\"{}\"", guarded.replace('"', "\"\""));
+    }
+    // The second field keeps an empty one from being written as a pair of quotes; writing into memory has no way to fail.
+    let bytes = writer.write_record([guarded.as_str(), ""]).ok().and_then(|()| writer.into_inner().ok());
+    let line = bytes.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
+    line.strip_suffix(",\n").unwrap_or_default().to_owned()
+}
+
+/// Whether a spreadsheet would compute this cell (OWASP, "CSV Injection"). A number, of either sign, is no formula.
+fn is_formula(text: &str) -> bool {
+    text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err()
+}
+
+/// A field without the apostrophe that [`quoted`] put before a formula.
+fn unguarded(field: &str) -> &str {
+    match field.strip_prefix('\'') {
+        Some(rest) if is_formula(rest.trim_start_matches('\'')) => rest,
+        _ => field,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn read_back(names: &[String]) -> Vec<String> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = Utf8Path::from_path(dir.path()).unwrap().join("t.csv");
+        let mut text = String::from("number,name\n");
+        names.iter().for_each(|name| text.push_str(&format!("1,{}\n", quoted(name))));
+        std::fs::write(&path, text).unwrap();
+        let table = Table::read(&path, "the table", "").unwrap();
+        table.rows.iter().map(|(_, row)| row[1].to_owned()).collect()
+    }
+
+    proptest! {
+        /// Whatever a name is made of, it reads back; blanks at its ends are lost, as they are in every cell that is read.
+        #[test]
+        fn names_read_back(names in prop::collection::vec("[-=+@',;\"\t\r\n a-c0\\\\é]{0,8}", 1..6)) {
+            let trimmed: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();
+            prop_assert_eq!(read_back(&trimmed), trimmed);
+        }
+    }
+
+    #[test]
+    fn formulas_are_made_harmless_and_numbers_left_alone() {
+        assert_eq!(quoted("=1+1"), "'=1+1");
+        assert_eq!(quoted("@SUM(A1)"), "'@SUM(A1)");
+        assert_eq!(quoted("'=1"), "''=1");
+        assert_eq!(quoted("-5"), "-5");
+        assert_eq!(quoted("p'1"), "p'1");
+        assert_eq!(quoted("a\rb"), "\"a\rb\"");
+        assert_eq!(quoted(""), "");
+    }
+
+    #[test]
+    fn wide_tables_take_time_in_proportion() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = Utf8Path::from_path(dir.path()).unwrap().join("t.csv");
+        let header = |n: usize| (0..n).map(|i| format!("c{i}")).collect::<Vec<_>>().join(",");
+        std::fs::write(&path, format!("{}\n{}\n", header(MOST_COLUMNS), vec!["1"; MOST_COLUMNS].join(","))).unwrap();
+        let table = Table::read(&path, "the table", "").unwrap();
+        assert_eq!(table.column("c99999"), Some(99_999));
+        std::fs::write(&path, format!("{}\n", header(MOST_COLUMNS + 1))).unwrap();
+        let message = Table::read(&path, "the table", "").err().unwrap().to_string();
+        assert!(message.contains("100001 columns; 100000"), "{message}");
+    }
 }

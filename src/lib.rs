@@ -22,15 +22,17 @@ pub mod cli;
 pub mod commands;
 pub mod config;
 pub mod csv_table;
-pub mod error;
+pub mod diagnostic;
 pub mod files;
 pub mod geometry;
-pub mod median;
 pub mod progress;
+pub mod statistics;
 
 pub mod imaging;
 pub mod opencv;
 pub mod stereo;
+
+pub mod formats;
 
 pub mod measurements;
 pub mod robot;
@@ -41,4 +43,6 @@ pub mod simulate;
 
 pub mod report;
 
-pub use error::{Error, Result};
+pub mod guide;
+
+pub use commands::{Error, Result};

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::csv_table::Table;
 pub use crate::csv_table::quoted;
-use crate::error::Result;
+use crate::files::Result;
 
 /// What a pose is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,14 +40,17 @@ pub struct RobotPose {
     pub group: String,
     /// What it is for.
     pub role: Role,
-    /// Commanded joint angles as the file has them, deg.
+    /// Commanded joint angles as the file has them, deg (mm of joints that slide).
     pub joints_deg: Vec<f64>,
+    /// Which joints slide (columns `jN_mm`), one a joint; empty where none does.
+    pub slides: Vec<bool>,
 }
 
 impl RobotPose {
-    /// Commanded joint angles, rad.
+    /// Commanded joint angles, rad (mm of joints that slide).
     pub fn joints_rad(&self) -> Vec<f64> {
-        self.joints_deg.iter().map(|deg| deg.to_radians()).collect()
+        let slides = |i: usize| self.slides.get(i).copied().unwrap_or(false);
+        self.joints_deg.iter().enumerate().map(|(i, &v)| if slides(i) { v } else { v.to_radians() }).collect()
     }
 }
 
@@ -87,30 +90,34 @@ pub struct Measurement {
 }
 
 impl Table<'_> {
-    /// The columns `j1_deg`, `j2_deg`, ... without a gap.
-    fn joint_columns(&self) -> Result<Vec<usize>> {
-        let columns: Vec<usize> = (1..).map_while(|i| self.column(&format!("j{i}_deg"))).collect();
+    /// The columns `j1_deg`, `j2_deg`, ... without a gap, and which of them are `jN_mm`.
+    fn joint_columns(&self) -> Result<(Vec<usize>, Vec<bool>)> {
+        let column = |i: usize| {
+            let turning = self.column(&format!("j{i}_deg")).map(|c| (c, false));
+            turning.or_else(|| self.column(&format!("j{i}_mm")).map(|c| (c, true)))
+        };
+        let (columns, slides): (Vec<usize>, Vec<bool>) = (1..).map_while(column).unzip();
         let beyond = |name: &String| {
-            let number = name.strip_prefix('j').and_then(|rest| rest.strip_suffix("_deg"));
+            let number = name.strip_prefix('j').and_then(|r| r.strip_suffix("_deg").or_else(|| r.strip_suffix("_mm")));
             number.and_then(|n| n.parse::<usize>().ok()).is_some_and(|n| n > columns.len())
         };
         if columns.is_empty() || self.header.iter().any(beyond) {
-            let message = format!("no column `j{}_deg`; the header has: {}", columns.len() + 1, self.header.join(", "));
-            let hint = "one column a joint, j1_deg, j2_deg, ... without a gap, in deg";
+            let message = format!("no column `j{}_deg`; the header has: {}", columns.len() + 1, self.header_in_short());
+            let hint = "one column a joint, j1_deg, j2_deg, ... without a gap, in deg (j3_mm for a joint that slides)";
             return Err(self.refuse_with(1, message, Some(hint)));
         }
-        Ok(columns)
+        Ok((columns, if slides.contains(&true) { slides } else { Vec::new() }))
     }
 
     fn poses(&self) -> Result<Vec<RobotPose>> {
         let (pose, group, role) = (self.require("pose")?, self.require("group")?, self.require("role")?);
-        let joints = self.joint_columns()?;
+        let (joints, slides) = self.joint_columns()?;
         let mut seen = std::collections::BTreeMap::new();
         let mut centers = std::collections::BTreeMap::new();
         let mut poses = Vec::with_capacity(self.rows.len());
         for (line, row) in &self.rows {
             let line = *line;
-            let role = match row[role].as_str() {
+            let role = match &row[role] {
                 "center" | "centre" => Role::Center,
                 "sample" => Role::Sample,
                 "verify" => Role::Verify,
@@ -121,17 +128,23 @@ impl Table<'_> {
             if row[pose].is_empty() {
                 return Err(self.refuse(line, "the pose has no name".to_owned()));
             }
-            if let Some(first) = seen.insert(row[pose].clone(), line) {
-                return Err(self.refuse(line, format!("pose `{}` stands in line {first} already", row[pose])));
+            if let Some(first) = seen.insert(&row[pose], line) {
+                return Err(self.refuse(line, format!("pose `{}` stands in line {first} already", &row[pose])));
             }
             if role == Role::Center
-                && let Some(first) = centers.insert(row[group].clone(), line)
+                && let Some(first) = centers.insert(&row[group], line)
             {
-                let message = format!("group `{}` has a center in line {first} already; a group has one", row[group]);
+                let message = format!("group `{}` has a center in line {first} already; a group has one", &row[group]);
                 return Err(self.refuse(line, message));
             }
             let joints_deg = joints.iter().map(|&c| self.number(line, row, c)).collect::<Result<Vec<f64>>>()?;
-            poses.push(RobotPose { pose: row[pose].clone(), group: row[group].clone(), role, joints_deg });
+            poses.push(RobotPose {
+                pose: row[pose].to_owned(),
+                group: row[group].to_owned(),
+                role,
+                joints_deg,
+                slides: slides.clone(),
+            });
         }
         Ok(poses)
     }
@@ -158,7 +171,7 @@ pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
     let sigma = table.column("sigma_mm");
     if position.is_none() && distance.is_none() {
         let message =
-            format!("neither the columns x_mm,y_mm,z_mm nor distance_mm; the header has: {}", table.header.join(", "));
+            format!("neither the columns x_mm,y_mm,z_mm nor distance_mm; the header has: {}", table.header_in_short());
         let hint = "a point's columns are x_mm,y_mm,z_mm, a distance's is distance_mm, all in mm";
         return Err(table.refuse_with(1, message, Some(hint)));
     }
@@ -171,16 +184,17 @@ pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
             Some(columns) if !columns.iter().all(|&c| row[c].is_empty()) => numbers(columns).map(Some),
             _ => Ok(None),
         };
-        let said = status.map_or("ok", |c| row[c].as_str());
+        let said = status.map_or("ok", |c| &row[c]);
         let observed = if !(said.is_empty() || said == "ok") {
             Observed::Missing { reason: said.to_owned() }
         } else if let Some(p) = optional(&position)? {
             let covariance_mm2 =
                 optional(&covariance)?.map(|s| Matrix3::new(s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5]));
             if let Some(s) = &covariance_mm2
-                && s.cholesky().is_none()
+                && !is_covariance(s)
             {
-                return Err(table.refuse(line, "the covariance sxx..szz is not positive definite".to_owned()));
+                let message = "the covariance sxx..szz is none: it has a negative eigenvalue";
+                return Err(table.refuse(line, message.to_owned()));
             }
             let rotation_rad = optional(&rotation)?.map(|r| Vector3::new(r[0], r[1], r[2]));
             Observed::Position { point_mm: Point3::new(p[0], p[1], p[2]), covariance_mm2, rotation_rad }
@@ -196,6 +210,12 @@ pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
         rows.push(Measurement { at, observed });
     }
     Ok(rows)
+}
+
+/// No eigenvalue is negative beyond what rounding the entries to five digits leaves; zeros are an instrument's resolution.
+fn is_covariance(matrix: &Matrix3<f64>) -> bool {
+    let eigen = matrix.symmetric_eigenvalues();
+    eigen.min() >= -1e-4 * eigen.max() && eigen.max() >= 0.0
 }
 
 /// The header's first columns: `pose,group,role,j1_deg,...`.
@@ -253,7 +273,7 @@ mod tests {
             ("pose,group,role,j1_deg,distance_mm\na,1,sample,0\n", 2, "4 fields"),
             ("pose,group,role,j1_deg,distance_mm\n", 1, "no rows"),
         ] {
-            let message = crate::error::report(&read_str(text).unwrap_err());
+            let message = crate::diagnostic::report(&read_str(text).unwrap_err());
             assert!(message.contains(part) && message.contains(&format!("m.csv:{line}")), "{message}");
         }
     }

@@ -8,7 +8,7 @@ use nalgebra::Point2;
 use opencv::core::{Mat, Point2f, Size, TermCriteria, Vector};
 use opencv::{calib3d, core, imgproc};
 
-use crate::imaging::picture::Grey8;
+use crate::imaging::image::Grey8;
 
 /// What OpenCV said where it could not work at all (not: where it found nothing).
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

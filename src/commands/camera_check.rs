@@ -1,31 +1,39 @@
 //! `stereocal camera-check`: Pictures of the check board to a calibrated rig and a verdict.
 
-use super::Outcome;
+use camino::Utf8Path;
+
+use super::{Outcome, Result};
 use crate::cli::{BoardShape, CameraCheck};
 use crate::config::{self, Config};
-use crate::error::{Result, Status};
-use crate::files::{OutDir, to_json};
-use crate::imaging::cache::Cache;
-use crate::imaging::{Board, Corners, Wanted, corners_file, find_corners};
-use crate::progress;
-use crate::report;
-use crate::stereo::accuracy::{self, SecondBoard, Verdict};
-use crate::stereo::calibrate::{Calibration, FEWEST_PAIRS, Options, calibrate};
-use crate::stereo::calibration_file::CalibrationFile;
-use crate::stereo::check_file::{CameraCheckFile, Demand, Judged};
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::Run;
+use crate::formats::calibration::CalibrationFile;
+use crate::formats::camera_check::CameraCheckFile;
+use crate::imaging::input::cache::Cache;
+use crate::imaging::input::corners_csv;
+use crate::imaging::{Board, Corners, Wanted, find_corners};
+use crate::stereo::calibrate::{Calibration, calibrate};
+use crate::stereo::judge::assessment::{Demand, Judged};
+use crate::stereo::judge::held_out;
+use crate::stereo::judge::second_board::{self, SecondBoard};
+use crate::stereo::judge::verdict::Verdict;
+use crate::stereo::pairs::FEWEST_PAIRS;
+use crate::stereo::select::lens_ladder::Options;
+use crate::{progress, report};
 
 /// Runs the command.
-pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
+pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let board = board(args, config)?;
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
     let mut problems = Vec::new();
-    config::positive(&mut problems, "tolerance_mm", tolerance_mm);
+    config::within(&mut problems, "tolerance_mm", tolerance_mm, config::TOLERANCES_MM);
     if let Some(mm) = args.board_uncertainty_mm {
-        config::positive(&mut problems, "board_uncertainty_mm", mm);
+        config::within(&mut problems, "board_uncertainty_mm", mm, config::TOLERANCES_MM);
     }
-    let demand = Demand { tolerance_mm, board_uncertainty_mm: args.board_uncertainty_mm.unwrap_or(0.0) };
+    let demand = Demand { tolerance_mm, board_uncertainty_mm: args.board_uncertainty_mm };
     config::reject(problems)?;
-    let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
+    let out = open(args, config, run)?;
 
     let corners = corners(args, board, &out)?;
     corners.notes.iter().for_each(progress::note);
@@ -33,22 +41,39 @@ pub fn run(args: &CameraCheck, config: &Config) -> Result<Outcome> {
     for skipped in &calibration.skipped {
         progress::warn(format!("pair {} is not used: {}", skipped.pair, skipped.reason));
     }
-    let accuracy = accuracy::hold_out(&calibration)?;
+    let accuracy = held_out::hold_out(&calibration, demand.board_uncertainty_mm)?;
     let second = second_board(args, board, &calibration, &out)?;
     let judged = Judged::new(&calibration, accuracy, second, &demand);
     judged.advice.iter().chain(&judged.warnings).for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
     let page = report::camera_check::page(&calibration, &judged, &corners)?;
-    out.write_json("calibration.json", &CalibrationFile::from(calibration.rig()))?;
-    out.write("corners.csv", corners_file::to_csv(&calibration.mark(&corners)).as_bytes())?;
-    out.write_json("camera-check.json", &file)?;
+    out.write_json("calibration.json", &CalibrationFile::from(calibration.rig()).with_noise(&calibration.own_noise))?;
+    if !out.is_input("corners.csv") {
+        out.write("corners.csv", corners_csv::to_csv(&calibration.mark(&corners)).as_bytes())?;
+    }
+    let json = out.write_json("camera-check.json", &file)?;
+    let page = report::page::signed(page, out.provenance().as_ref());
     out.write("camera-check.html", page.as_bytes())?;
 
-    let stdout =
-        if args.output.json { to_json(&file) } else { report::camera_check::summary(&calibration, &judged, &out) };
+    let stdout = if args.output.json { json } else { report::camera_check::summary(&calibration, &judged, &out) };
     let status = if judged.verdict == Verdict::Pass { Status::Done } else { Status::OutOfTolerance };
     Ok(Outcome { stdout, status })
+}
+
+/// The results folder, once nothing is in the way of what will be written.
+fn open(args: &CameraCheck, config: &Config, run: Run) -> Result<OutDir> {
+    let run = Run { force: args.output.force, ..run };
+    let inputs: Vec<&Utf8Path> =
+        [&args.images, &args.corners, &args.check_images].into_iter().flatten().map(|p| p.as_path()).collect();
+    let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &inputs);
+    out.check_free(&["calibration.json", "camera-check.json", "camera-check.html"])?;
+    if out.is_input("corners.csv") {
+        progress::note(format!("{} is read and stays as it is", out.join("corners.csv")));
+    } else {
+        out.check_free(&["corners.csv"])?;
+    }
+    Ok(out)
 }
 
 /// The check board, as large as its temperature makes it.
@@ -70,10 +95,10 @@ fn options(args: &CameraCheck) -> Options {
 
 fn corners(args: &CameraCheck, board: Board, out: &OutDir) -> Result<Corners> {
     match (&args.corners, &args.images) {
-        (Some(file), _) => corners_file::read(file, board, args.picture_size),
+        (Some(file), _) => Ok(corners_csv::read(file, board, args.picture_size)?),
         (None, Some(images)) => {
             let (cache, overlays) = (Some(Cache { out }), args.draw.then_some(out));
-            find_corners(images, &Wanted { board, needed: FEWEST_PAIRS, cache, overlays })
+            Ok(find_corners(images, &Wanted { board, needed: FEWEST_PAIRS, mosaic: args.bayer, cache, overlays })?)
         }
         // The command line asks for one of the two.
         (None, None) => {
@@ -95,9 +120,10 @@ fn second_board(
         square_mm: args.check_square_mm.unwrap_or(board.square_mm),
     };
     let mut problems = Vec::new();
-    config::positive(&mut problems, "check_square_mm", board.square_mm);
+    config::within(&mut problems, "check_square_mm", board.square_mm, config::SQUARES_MM);
     config::reject(problems)?;
-    let corners = find_corners(images, &Wanted { board, needed: 1, cache: Some(Cache { out }), overlays: None })?;
+    let (mosaic, cache) = (args.bayer, Some(Cache { out }));
+    let corners = find_corners(images, &Wanted { board, needed: 1, mosaic, cache, overlays: None })?;
     calibration.rig().check_size(&corners)?;
-    Ok(accuracy::second_board(calibration, &corners))
+    Ok(Some(second_board::second_board(calibration, &corners, args.board_uncertainty_mm)))
 }

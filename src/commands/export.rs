@@ -1,17 +1,21 @@
 //! `stereocal export`: A calibration in other programs' words.
 
-use super::Outcome;
+use super::{Outcome, Result};
 use crate::cli::{CalibrationFormat, Export, ExportWhat};
 use crate::config::Config;
-use crate::error::{Result, Status};
+use crate::diagnostic::Status;
 use crate::files::OutDir;
-use crate::stereo::{calibration_file, export};
+use crate::files::provenance::Run;
+use crate::formats::calibration;
+use crate::formats::export;
 
 /// Runs the command.
-pub fn run(args: &Export, config: &Config) -> Result<Outcome> {
+pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
     let ExportWhat::Calibration(args) = &args.what;
     let out = OutDir::open(args.out.as_deref().unwrap_or(&config.out))?;
-    let rig = calibration_file::read(&args.calibration.clone().unwrap_or_else(|| out.join("calibration.json")))?;
+    let rig_file = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
+    let rig = calibration::read(&rig_file)?;
+    let out = out.for_run(&Run { force: args.force, ..run }, &[&rig_file]);
     let files = match args.format {
         CalibrationFormat::Opencv => export::file_storage::files(&rig),
         CalibrationFormat::Ros => export::ros::files(&rig)?,

@@ -2,44 +2,56 @@
 
 use camino::{Utf8Path, Utf8PathBuf};
 
-use super::Outcome;
+use super::{Outcome, Result};
 use crate::cli::Identify;
 use crate::config::Config;
-use crate::error::{Result, Status};
-use crate::files::{self, OutDir};
-use crate::identify::choose::{Identification, identify};
-use crate::identify::dataset::Dataset;
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::{Digested, Provenance, Run};
+use crate::identify::data::dataset::Dataset;
+use crate::identify::data::{doctor, examine, known, sessions};
+use crate::identify::judge::choose::{Identification, identify, step_count};
 use crate::identify::record::{Record, quality};
-use crate::identify::{Error, Settings, sessions};
+use crate::identify::{Error, Settings};
 use crate::measurements::{self, Measurement};
 use crate::progress;
-use crate::report::identify as report;
+use crate::report;
 use crate::robot::{self, Robot};
 
 /// What `simulate` writes into the working directory.
 const DEFAULT_ROBOT: &str = "robot.toml";
 
 /// Runs the command.
-pub fn run(args: &Identify, config: &Config) -> Result<Outcome> {
+pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let settings = settings(args, config);
     let out = args.output.out.clone().unwrap_or_else(|| config.out.clone());
     let path = args.measurements.clone().unwrap_or_else(|| out.join("measurements.csv"));
     let rows = measurements::read(&path)?;
-    let nominal = nominal_robot(args.robot.as_deref())?;
-    check_joints(&nominal, &rows, &path)?;
-    let (set, sessions) = sessions::find(&Dataset::new(&rows, args.seed)?, &nominal, &settings)?;
-    let out = OutDir::open(&out)?;
-
-    let bar = progress::bar("identifying", 0);
-    let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.set_message(step.to_owned()))?;
+    let file = robot_file(args.robot.as_deref());
+    let given = nominal_robot(file.as_deref(), args.robot.is_some())?;
+    check_joints(&given, &rows, &path)?;
+    let mut set = Dataset::new(&rows, args.seed)?;
+    if let Some(path) = &args.known_distances {
+        set.known = known::read(path, &set)?;
+    }
+    let out = open(args, &out, run, &path, file.as_deref())?;
+    let bar = progress::bar("identifying", 2 + step_count(&settings));
+    bar.begin("units, signs and conventions");
+    let (set, nominal, mut findings) = match settings.examine {
+        true => examine::examine(&set, &given, &settings),
+        false => (set, given, Vec::new()),
+    };
+    bar.begin("sessions along the rows");
+    let (set, along) = sessions::find(&set, &nominal, &settings);
+    let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.begin(step))?;
     bar.finish_and_clear();
-
-    let record = Record::new(&set, &nominal, &found, &sessions, &settings, args.seed);
+    findings.extend(doctor::findings(&set, &found, &along));
+    let record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     for warning in &record.warnings {
         progress::warn(warning);
     }
-    write(&out, &set, &nominal, &found, &record, &settings)?;
-    let stdout = if args.output.json { files::to_json(&record) } else { report::summary(&record) };
+    let json = write(&out, &set, &nominal, &found, &record, &settings)?;
+    let stdout = if args.output.json { json } else { report::identify::summary(&record) };
     Ok(Outcome { stdout, status: Status::Done })
 }
 
@@ -57,24 +69,70 @@ fn settings(args: &Identify, config: &Config) -> Settings {
     settings
 }
 
-fn nominal_robot(path: Option<&Utf8Path>) -> Result<Robot> {
-    if let Some(path) = path {
-        return robot::file::read(path);
-    }
-    let default = Utf8PathBuf::from(DEFAULT_ROBOT);
-    if default.is_file() {
-        progress::note(format!("nominal robot: {default}"));
-        return robot::file::read(&default);
-    }
-    progress::note("nominal robot: Table 1 of the paper (no --robot, and no robot.toml here)");
-    Ok(Robot::paper())
+/// The results folder, once nothing is in the way of what will be written.
+fn open(
+    args: &Identify,
+    out: &Utf8Path,
+    run: Run,
+    measurements: &Utf8Path,
+    robot: Option<&Utf8Path>,
+) -> Result<OutDir> {
+    let run = Run { force: args.output.force, ..run };
+    let inputs: Vec<&Utf8Path> = [measurements].into_iter().chain(robot).collect();
+    let out = OutDir::open(out)?.for_run(&run, &inputs);
+    out.check_free(&["identification.json", "identified.toml", "identify.html"])?;
+    check_calibration(&out, measurements);
+    Ok(out)
 }
 
-fn check_joints(robot: &Robot, rows: &[Measurement], path: &Utf8Path) -> Result<()> {
+/// Says which calibration the measurements were made with, and warns where the one beside them is another.
+fn check_calibration(out: &OutDir, measurements: &Utf8Path) {
+    let folder = measurements.parent().unwrap_or(Utf8Path::new(""));
+    let Some(measured_by) = Provenance::of_json(&folder.join("measure.json")) else { return };
+    let (Some((csv, _)), calibration) = (Digested::read(measurements), folder.join("calibration.json")) else { return };
+    if !measured_by.outputs.iter().any(|output| output.sha256 == csv.sha256) {
+        // measure.json is about other measurements.
+        return;
+    }
+    let used = measured_by.inputs.last();
+    if let (Some(used), Some((here, _))) = (used, Digested::read(&calibration))
+        && !used.same_content(&here)
+    {
+        progress::warn(format!(
+            "the measurements were made with another calibration than {calibration} ({} of {}); run `stereocal measure` again",
+            used.file, measured_by.date
+        ));
+    }
+    out.measured_by(measured_by);
+}
+
+fn robot_file(path: Option<&Utf8Path>) -> Option<Utf8PathBuf> {
+    path.or_else(|| Some(Utf8Path::new(DEFAULT_ROBOT)).filter(|file| file.is_file())).map(Utf8Path::to_owned)
+}
+
+fn nominal_robot(file: Option<&Utf8Path>, named: bool) -> Result<Robot> {
+    let Some(file) = file else {
+        progress::note("nominal robot: Table 1 of the paper (no --robot, and no robot.toml here)");
+        return Ok(Robot::paper());
+    };
+    if !named {
+        progress::note(format!("nominal robot: {file}"));
+    }
+    Ok(robot::file::read(file)?)
+}
+
+/// Whether the measurements are of a robot with these joints.
+pub fn check_joints(robot: &Robot, rows: &[Measurement], path: &Utf8Path) -> Result<()> {
     let measured = rows.first().map_or(0, |r| r.at.joints_deg.len());
     if measured != robot.joints.len() {
         let place = path.to_string();
         return Err(Error::JointCount { robot: robot.joints.len(), measurements: measured, place }.into());
+    }
+    let slides = rows.first().map_or(&[][..], |r| &r.at.slides);
+    let differs = |i: &usize| slides.get(*i).copied().unwrap_or(false) != robot.joints[*i].slides;
+    if let Some(joint) = (0..measured).find(differs) {
+        let (slides, place) = (robot.joints[joint].slides, path.to_string());
+        return Err(Error::JointKind { joint: joint + 1, slides, place }.into());
     }
     Ok(())
 }
@@ -86,12 +144,13 @@ fn write(
     found: &Identification,
     record: &Record,
     settings: &Settings,
-) -> Result<()> {
+) -> Result<String> {
     let identified = &found.candidates[found.chosen].robot;
     let errors = |robot: &Robot| quality(set, robot, found, settings).1;
     let places: Vec<_> = set.poses.iter().map(|p| (p.role, nominal.target_mm(&p.joints_rad))).collect();
-    let page = report::page(set, record, &places, &errors(nominal), &errors(identified))?;
-    out.write_json("identification.json", record)?;
-    out.write("identified.toml", robot::file::to_toml(identified).as_bytes())?;
-    out.write("identify.html", page.as_bytes())
+    let page = report::identify::page(set, record, &places, &errors(nominal), &errors(identified))?;
+    out.write_toml("identified.toml", &robot::file::to_toml(identified))?;
+    let json = out.write_json("identification.json", record)?;
+    out.write("identify.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
+    Ok(json)
 }

@@ -1,10 +1,11 @@
 //! `stereocal simulate`: A world whose truth is known, as files.
 
-use super::Outcome;
+use super::{Outcome, Result};
 use crate::cli::{LensBlur, Preset, Simulate};
 use crate::config::Config;
-use crate::error::{Result, Status};
+use crate::diagnostic::Status;
 use crate::files::OutDir;
+use crate::files::provenance::Run;
 use crate::robot;
 use crate::simulate::psf::{Defocus, Optics};
 use crate::simulate::rig::DISTANCE_MM;
@@ -23,14 +24,24 @@ const TABLE_2: &str = "table-2";
 const COMA_PX: f64 = 1.0;
 
 /// Runs the command: settings, world, truth, pictures.
-pub fn run(args: &Simulate, config: &Config) -> Result<Outcome> {
+pub fn run(args: &Simulate, config: &Config, run: Run) -> Result<Outcome> {
     let true_robot = match args.true_robot.as_deref() {
         Some(name) if name == TABLE_2 => Some(true_robot::nominal().with_table_2()),
         Some(path) => Some(robot::file::read(path)?),
         None => None,
     };
     let world = World::new(settings(args, config)?, true_robot)?;
-    let out = OutDir::open(args.out.as_ref().unwrap_or(&config.out))?;
+    let true_file = args.true_robot.as_deref().filter(|name| *name != TABLE_2);
+    let run = Run { force: args.force, ..run };
+    let out = OutDir::open(args.out.as_ref().unwrap_or(&config.out))?
+        .for_run(&run, &true_file.into_iter().collect::<Vec<_>>());
+    out.check_free(&[
+        "robot.toml",
+        "measurements.csv",
+        "poses/poses.csv",
+        "truth/robot.toml",
+        "truth/calibration.json",
+    ])?;
     if args.points_only {
         truth_files::write_points_only(&world, &out)?;
     } else {

@@ -1,44 +1,27 @@
 //! From measurements and joint angles to the robot's kinematic parameters.
 //!
 //! ```text
-//!  dataset    rows by group and role; what is left out and why
-//!  sessions   rows of one wire cut where its anchor moved
-//!  kinematics the robot at those poses, with derivatives
-//!  blocks     residual models, the placement's own unknowns eliminated   pairwise
-//!  base       what the poses determine
-//!  prior      manufacturing tolerance, sized by the data
-//!  prepare    weights, prior, box: the problem that all solvers get      estimate, problem
-//!  trust_region, swarm                                                   the solvers; kernel, fast and placement are their hot loop
-//!  verify     errors on rows that were not fitted
-//!  choose     models, terms and methods judged on samples held out
+//!  data       rows by group and role; what is left out and why; sessions
+//!  model      the robot at those poses, with derivatives; ladder, base parameters, prior
+//!  residuals  predicted poses to white rows, the placement's own unknowns eliminated
+//!  solve      weights, prior and box: the problem that all solvers get, and the solvers
+//!  judge      errors on rows that were not fitted; models, terms and methods judged by them
+//!  record     identification.json
 //! ```
 
-pub mod base;
-pub mod blocks;
-pub mod choose;
-pub mod dataset;
-pub mod estimate;
-pub mod fast;
-pub mod kernel;
-pub mod kinematics;
-pub mod pairwise;
-pub mod placement;
-pub mod prepare;
-pub mod prior;
-pub mod problem;
+pub mod data;
+pub mod judge;
+pub mod model;
 pub mod record;
-pub mod sessions;
+pub mod residuals;
 pub mod settings;
-pub mod swarm;
+pub mod solve;
 #[cfg(test)]
 pub mod synthetic;
-pub mod terms;
 #[cfg(test)]
 mod tests;
-pub mod trust_region;
-pub mod verify;
 
-use crate::error::{Explain, Status};
+use crate::diagnostic::{Explain, Status};
 
 pub use settings::{Method, Model, Settings};
 
@@ -63,6 +46,19 @@ pub enum Error {
         robot: usize,
         /// Of the measurements.
         measurements: usize,
+        /// The measurements' file.
+        place: String,
+    },
+    /// A joint slides in one file and turns in the other.
+    #[error(
+        "joint {joint} {} in the robot's file; its readings are then in a column `j{joint}_{}`",
+        if *.slides { "slides" } else { "turns" }, if *.slides { "mm" } else { "deg" }
+    )]
+    JointKind {
+        /// The joint, from 1.
+        joint: usize,
+        /// Whether it slides in the robot's file.
+        slides: bool,
         /// The measurements' file.
         place: String,
     },
@@ -107,7 +103,7 @@ impl Explain for Error {
 
     fn place(&self) -> Option<String> {
         match self {
-            Error::JointCount { place, .. } => Some(place.clone()),
+            Error::JointCount { place, .. } | Error::JointKind { place, .. } => Some(place.clone()),
             _ => None,
         }
     }

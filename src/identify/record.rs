@@ -1,16 +1,20 @@
 //! `identification.json`: what was found, in numbers for other programs.
 
+use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::base::Observability;
-use super::choose::{Candidate, Identification, Judged};
-use super::dataset::{Dataset, Skipped};
-use super::estimate::Fit;
-use super::prior::Tolerance;
-use super::problem::{Problem, Stop};
-use super::sessions::Session;
+use super::data::dataset::{Dataset, Skipped};
+use super::data::doctor::Finding;
+use super::data::sessions::{Along, Session};
+use super::judge::choose::{Candidate, Identification, Judged};
+use super::judge::errors::{Judge, RowError, Spread};
+use super::model::base::Observability;
+use super::model::prior::Tolerance;
+use super::model::uncertainty::{Covariance, Expected};
+use super::residuals::weights::Extra;
 use super::settings::Settings;
-use super::verify::{RowError, Spread, errors};
+use super::solve::formulation::Formulation;
+use super::solve::problem::{Problem, Solution, Stop};
 use crate::robot::{Parameter, Robot, Unit};
 
 /// A box's wall counts as reached within this fraction of its width.
@@ -49,6 +53,14 @@ pub struct Record {
     pub skipped: Vec<Skipped>,
     /// Held-out errors of models and terms.
     pub judged: Vec<Judged>,
+    /// What is wrong with the data, and what was done about it.
+    pub doctor: Vec<Finding>,
+    /// Of the chosen method's identified parameters; `None` where nominal was kept.
+    pub covariance: Option<Covariance>,
+    /// The position error to expect of the chosen robot; `None` where nominal was kept.
+    pub expected: Option<Expected>,
+    /// Unknowns of the sensor that were found beside the robot: name and value (mm, thousandths, mrad, standard deviations).
+    pub sensor: Vec<(String, f64)>,
     /// Scatter of a point coordinate beyond the measurement's covariance, mm.
     pub scatter_mm: f64,
     /// The prior's standard deviations, where one was used.
@@ -73,6 +85,12 @@ pub struct PointSpread {
     /// Of points after the groups' rigid transforms.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub point: Option<Spread>,
+    /// Of touches: distance of the predicted points of a group to their mean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub consistency: Option<Spread>,
+    /// Of touches: predicted less known distances between groups.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<Spread>,
 }
 
 /// One method on one model.
@@ -91,13 +109,13 @@ pub struct MethodRecord {
     /// Root mean square held-out error that the choice went by, mm.
     pub held_out_mm: Option<f64>,
     /// Least cost, mm^2.
-    pub cost_mm2: f64,
+    pub cost_mm2: Option<f64>,
     /// Iterations.
     pub iterations: usize,
     /// Evaluations.
     pub evaluations: usize,
     /// Why it stopped.
-    pub stop: Stop,
+    pub stop: Option<Stop>,
     /// Best cost after each iteration, mm^2.
     pub history: Vec<f64>,
     /// Evaluations used by then.
@@ -144,9 +162,15 @@ pub struct Identifiability {
 
 /// Errors of rows under a robot, as they go into tables and figures.
 pub fn quality(set: &Dataset, robot: &Robot, found: &Identification, settings: &Settings) -> (Quality, Vec<RowError>) {
-    let of = |rows: &[usize]| errors(set, robot, &found.fitted, rows, found.scatter, settings.wire_offset);
-    let (fit, verify) = (of(&found.fitted), of(&set.verify_rows()));
-    (Quality { fit: spread(&fit), verify: spread(&verify) }, verify)
+    let (extras, values): (Vec<Extra>, Vec<f64>) = found.extras.iter().copied().unzip();
+    let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &found.fitted, settings.wire_offset) };
+    let verify_rows = set.verify_rows();
+    let (fit, verify) = (judge.errors(robot, &found.fitted), judge.errors(robot, &verify_rows));
+    let quality = Quality {
+        fit: spread(&judge, robot, &fit, &found.fitted),
+        verify: spread(&judge, robot, &verify, &verify_rows),
+    };
+    (quality, verify)
 }
 
 /// The largest turn of the nominal flange between two poses of a group (one of them the group's first), deg.
@@ -157,11 +181,16 @@ fn tilt_deg(set: &Dataset, nominal: &Robot, rows: &[usize]) -> f64 {
     rows.iter().map(turn).fold(0.0, f64::max).to_degrees()
 }
 
-fn spread(errors: &[RowError]) -> PointSpread {
+/// The figures of a list of errors of these rows.
+pub fn spread(judge: &Judge, robot: &Robot, errors: &[RowError], rows: &[usize]) -> PointSpread {
+    let touches = rows.iter().any(|&r| judge.set.touches(r));
     let points: Vec<f64> = errors.iter().filter_map(|e| e.point_mm.map(|p| p.norm())).collect();
+    let some = |errors: Vec<f64>| (!errors.is_empty()).then(|| Spread::new(errors));
     PointSpread {
         distance: Spread::new(errors.iter().filter_map(|e| e.distance_mm)),
-        point: (!points.is_empty()).then(|| Spread::new(points)),
+        point: some(if touches { Vec::new() } else { points.clone() }),
+        consistency: some(if touches { points } else { Vec::new() }),
+        distortion: some(judge.distortion_mm(robot, rows)),
     }
 }
 
@@ -171,30 +200,37 @@ impl Record {
         set: &Dataset,
         nominal: &Robot,
         found: &Identification,
-        sessions: &[Session],
+        along: &Along,
+        doctor: Vec<Finding>,
         settings: &Settings,
         seed: u64,
     ) -> Record {
         let chosen = &found.candidates[found.chosen];
-        let identifiability = identifiability(chosen);
+        // Nominal has nothing to say about what the poses determine; the fit that it was kept against has.
+        let fitted = chosen.found.as_ref().or(found.candidates.first().and_then(|c| c.found.as_ref()));
+        let identifiability = fitted.map_or_else(Identifiability::nothing, |(f, _)| identifiability(f));
         let names = |rows: &[usize]| rows.iter().map(|&i| set.poses[i].name.clone()).collect::<Vec<_>>();
         let methods: Vec<MethodRecord> =
             found.candidates.iter().map(|c| method_record(c, quality(set, &c.robot, found, settings).0)).collect();
         let before = quality(set, nominal, found, settings).0;
         let mut record = Record {
             seed,
-            chosen: format!("{}/{}", chosen.method.name(), chosen.model.name()),
+            chosen: format!("{}/{}", chosen.name, chosen.model.name()),
             terms: found.terms.name(),
             before,
             methods,
             identifiability,
             warnings: Vec::new(),
             outliers: names(&found.outliers),
-            sessions: sessions.to_vec(),
+            sessions: along.sessions.clone(),
             skipped: set.skipped.clone(),
             judged: found.judged.clone(),
-            scatter_mm: chosen.prepared.estimate.scatter.point_mm,
-            prior: chosen.prepared.tolerance,
+            scatter_mm: found.scatter.point_mm,
+            prior: fitted.filter(|(f, _)| f.held).map(|(f, _)| f.tolerance),
+            doctor,
+            covariance: chosen.found.as_ref().map(|(f, _)| Covariance::new(f)),
+            expected: chosen.found.as_ref().map(|(f, _)| Expected::new(f, set, &found.fitted)),
+            sensor: found.extras.iter().map(|(e, v)| (e.name(), *v)).collect(),
         };
         record.warnings = record.warnings(set, nominal, found);
         record
@@ -221,8 +257,8 @@ impl Record {
         }
         if !i.dependent.is_empty() {
             list.push(format!(
-                "the poses see only the combinations {}: the first of each takes the whole correction, the others stay nominal",
-                i.dependent.join("; ")
+                "the poses see only the combinations {}: each shares its correction out by tolerance",
+                shortened(&i.dependent)
             ));
         }
         if !i.weak.is_empty() {
@@ -231,7 +267,8 @@ impl Record {
                 i.weak.join(", ")
             ));
         }
-        let widened = &found.candidates[found.chosen].prepared.widened;
+        let chosen = found.candidates[found.chosen].found.as_ref();
+        let widened = chosen.map_or(&[][..], |(f, _)| &f.widened);
         if !widened.is_empty() {
             list.push(format!("the box was widened for {}: the nominal values are far off there", widened.join(", ")));
         }
@@ -242,15 +279,8 @@ impl Record {
         if !at_bound.is_empty() {
             list.push(format!("{} ended at the wall of the box and would have gone on", at_bound.join(", ")));
         }
-        if !self.outliers.is_empty() {
-            list.push(format!("left out because they fit far worse than the rest: {}", self.outliers.join(", ")));
-        }
-        if !self.sessions.is_empty() {
-            list.push(format!(
-                "the rows fall into {} sessions, between which the wire's anchor or its zero moved: {}",
-                self.sessions.len(),
-                self.sessions.iter().map(|s| format!("{}..{}", s.first, s.last)).collect::<Vec<_>>().join(", ")
-            ));
+        for finding in &self.doctor {
+            list.push(finding.sentence());
         }
         if !self.skipped.is_empty() {
             list.push(format!(
@@ -282,13 +312,46 @@ impl Record {
                 "on the verify rows the identified robot is worse than the nominal one ({after:.3} against {before:.3} mm): don't use it"
             ));
         }
+        if found.vetoed {
+            list.push(
+                "on the verify rows the robot that was found is worse than the nominal one: nominal is kept".to_owned(),
+            );
+        } else if chosen.is_none() {
+            list.push(
+                "no model predicts samples that were held out better than the nominal robot does: nominal is kept"
+                    .to_owned(),
+            );
+        }
         list
     }
 }
 
-fn identifiability(candidate: &Candidate) -> Identifiability {
-    let base = &candidate.prepared.base;
-    let names: Vec<String> = candidate.prepared.parameters().iter().map(|p| p.name()).collect();
+/// A list of which the first are said.
+fn shortened(list: &[String]) -> String {
+    const SAID: usize = 6;
+    match list.len() {
+        0..=SAID => list.join("; "),
+        n => format!("{}; and {} more", list[..SAID].join("; "), n - SAID),
+    }
+}
+
+impl Identifiability {
+    fn nothing() -> Identifiability {
+        Identifiability {
+            rank: 0,
+            parameters: 0,
+            zero: Vec::new(),
+            dependent: Vec::new(),
+            condition: None,
+            observability: None,
+            weak: Vec::new(),
+        }
+    }
+}
+
+fn identifiability(formulation: &Formulation) -> Identifiability {
+    let base = &formulation.base;
+    let names: Vec<String> = formulation.parameters().iter().map(|p| p.name()).collect();
     let pick = |list: &[usize]| list.iter().map(|&i| names[i].clone()).collect::<Vec<_>>();
     Identifiability {
         rank: base.rank(),
@@ -296,59 +359,61 @@ fn identifiability(candidate: &Candidate) -> Identifiability {
         zero: pick(&base.zero),
         dependent: base.groups(&names),
         condition: base.condition(),
-        observability: base.observability(candidate.prepared.estimate.rows.len()),
-        weak: pick(&candidate.prepared.unmoved(&candidate.solution.x)),
+        observability: base.observability(formulation.rows.rows.len()),
+        weak: pick(&formulation.unmoved()),
     }
 }
 
 fn method_record(candidate: &Candidate, quality: Quality) -> MethodRecord {
-    let fit = candidate.prepared.fit();
+    let solution = candidate.found.as_ref().map(|(_, s)| s);
     MethodRecord {
-        name: candidate.method.name(),
+        name: candidate.name,
         model: candidate.model.name(),
-        parameters: parameter_records(candidate, &fit),
+        parameters: candidate.found.as_ref().map_or_else(Vec::new, |(f, s)| parameter_records(f, s)),
         fit: quality.fit,
         verify: quality.verify,
         held_out_mm: candidate.held_out_mm,
-        cost_mm2: candidate.solution.cost,
-        iterations: candidate.solution.iterations,
-        evaluations: candidate.solution.evaluations,
-        stop: candidate.solution.stop,
-        history: candidate.solution.history.clone(),
-        history_evaluations: candidate.solution.history_evaluations.clone(),
+        cost_mm2: solution.map(|s| s.cost),
+        iterations: solution.map_or(0, |s| s.iterations),
+        evaluations: solution.map_or(0, |s| s.evaluations),
+        stop: solution.map(|s| s.stop),
+        history: solution.map_or_else(Vec::new, |s| s.history.clone()),
+        history_evaluations: solution.map_or_else(Vec::new, |s| s.history_evaluations.clone()),
     }
 }
 
-fn parameter_records(candidate: &Candidate, fit: &Fit) -> Vec<ParameterRecord> {
-    let prepared = &candidate.prepared;
-    let sigmas = prepared.sigmas(&candidate.solution.x);
+fn parameter_records(formulation: &Formulation, solution: &Solution) -> Vec<ParameterRecord> {
+    let fit = formulation.fit();
+    let covariance: DMatrix<f64> = formulation.robot_covariance();
+    let offsets = fit.offsets(&solution.x);
     let record = |(i, &parameter): (usize, &Parameter)| {
         let (unit, factor) = file_unit(parameter);
-        let free = prepared.base.free.iter().position(|&f| f == i);
-        let delta = free.map_or(0.0, |k| candidate.solution.x[k]);
+        let free = formulation.base.free.iter().position(|&f| f == i);
+        let determined = !formulation.base.zero.contains(&i);
         let wall = |k: usize| {
-            let (low, high) = (fit.lower()[k], fit.upper()[k]);
-            delta - low < AT_WALL * (high - low) || high - delta < AT_WALL * (high - low)
+            let (low, high, x) = (fit.lower()[k], fit.upper()[k], solution.x[k]);
+            x - low < AT_WALL * (high - low) || high - x < AT_WALL * (high - low)
         };
         ParameterRecord {
             name: parameter.name(),
             unit,
-            nominal: factor * prepared.estimate.kinematics.nominal().value(parameter),
-            delta: factor * delta,
-            sigma: free.map(|k| factor * sigmas[k]),
+            nominal: factor * formulation.rows.kinematics.nominal().value(parameter),
+            delta: factor * offsets[i],
+            sigma: determined.then(|| factor * covariance[(i, i)].max(0.0).sqrt()),
             identifiable: free.is_some(),
             at_bound: free.is_some_and(wall),
         }
     };
-    prepared.parameters().iter().enumerate().map(record).collect()
+    formulation.parameters().iter().enumerate().map(record).collect()
 }
 
 /// Unit in files, and what to multiply mm or mrad by.
-fn file_unit(parameter: Parameter) -> (&'static str, f64) {
+pub fn file_unit(parameter: Parameter) -> (&'static str, f64) {
     match (parameter, parameter.unit()) {
         (_, Unit::Mm) => ("mm", 1.0),
         (Parameter::Gravity(..), _) => ("mrad/m", 1.0),
         (Parameter::Harmonic(..), _) => ("mrad", 1.0),
+        (Parameter::Coupling(..), _) => ("1e-3", 1.0),
         _ => ("deg", (1e-3f64).to_degrees()),
     }
 }

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::trust_region;
-use crate::config::positive;
+use crate::config::within;
+use crate::identify::solve::trust_region;
 
 /// How the parameters are searched for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
@@ -131,8 +131,10 @@ pub struct Settings {
     /// a degree turn a flange that should keep its orientation by about so much, and what moves the target by a
     /// ten-thousandth as far as the strongest parameter drowns in any instrument's noise.
     pub rank_tolerance: f64,
-    /// Folds that choose between models.
+    /// Regions that are held out in turn where there are fewer than three placements, and placements held out together at the least.
     pub folds: usize,
+    /// Whether units, signs, exchanged columns and the robot's convention are examined, and mended where the residuals prove a fault.
+    pub examine: bool,
     /// Whether a wire's zero is unknown as well as its anchor.
     pub wire_offset: bool,
     /// Rows that fit worse than so many robust standard deviations are left out and named; 0 keeps all.
@@ -157,9 +159,10 @@ impl Default for Settings {
             bound_deg: 1.0,
             widen_bounds: true,
             rank_tolerance: 1e-4,
-            folds: 5,
+            folds: 10,
+            examine: true,
             wire_offset: true,
-            outlier_sigmas: 7.0,
+            outlier_sigmas: 6.0,
             trust_region: trust_region::Settings::default(),
             constants: None,
             swarm: SwarmSettings::default(),
@@ -179,15 +182,17 @@ impl Settings {
 
     /// Notes what makes no sense.
     pub fn validate(&self, problems: &mut Vec<String>) {
-        positive(problems, "identify.bound_mm", self.bound_mm);
-        positive(problems, "identify.bound_deg", self.bound_deg);
-        positive(problems, "identify.rank_tolerance", self.rank_tolerance);
-        positive(problems, "identify.trust_region.radius", self.trust_region.radius);
-        if self.folds < 2 {
-            problems.push(format!("identify.folds is {}; at least 2 are needed", self.folds));
-        }
-        if self.outlier_sigmas.is_nan() || self.outlier_sigmas < 0.0 {
-            problems.push(format!("identify.outlier_sigmas is {}; it must not be negative", self.outlier_sigmas));
+        within(problems, "identify.bound_mm", self.bound_mm, 1e-6..=1e4);
+        within(problems, "identify.bound_deg", self.bound_deg, 1e-6..=180.0);
+        within(problems, "identify.rank_tolerance", self.rank_tolerance, 1e-15..=0.1);
+        within(problems, "identify.folds", self.folds, 2..=1000);
+        within(problems, "identify.outlier_sigmas", self.outlier_sigmas, 0.0..=1e6);
+        let descent = &self.trust_region;
+        within(problems, "identify.trust_region.iterations", descent.iterations, 1..=100_000);
+        within(problems, "identify.trust_region.radius", descent.radius, 1e-9..=1e9);
+        for (name, value) in [("reduction", descent.reduction), ("step", descent.step), ("gradient", descent.gradient)]
+        {
+            within(problems, &format!("identify.trust_region.{name}"), value, 0.0..=1.0);
         }
         self.swarm.validate(problems);
     }
@@ -286,23 +291,28 @@ impl SwarmSettings {
     }
 
     fn validate(&self, problems: &mut Vec<String>) {
-        if self.particles < 2 {
-            problems.push(format!("identify.swarm.particles is {}; at least 2 are needed", self.particles));
+        let at = |name: &str| format!("identify.swarm.{name}");
+        within(problems, &at("particles"), self.particles, 2..=100_000);
+        within(problems, &at("iterations"), self.iterations, 1..=1_000_000);
+        within(problems, &at("patience"), self.patience, 0..=1_000_000);
+        within(problems, &at("improvement_mm2"), self.improvement_mm2, 0.0..=1e12);
+        within(problems, &at("velocity_limit"), self.velocity_limit, 1e-9..=1e3);
+        within(problems, &at("c1"), self.c1, 0.0..=1e3);
+        within(problems, &at("c2"), self.c2, 0.0..=1e3);
+        if !(self.cpso_c > 2.0 && self.cpso_c <= 1e3) {
+            problems.push(format!(
+                "identify.swarm.cpso_c is {}; constriction needs more than 2, 1000 at the most",
+                self.cpso_c
+            ));
         }
-        if self.iterations == 0 {
-            problems.push("identify.swarm.iterations is 0; at least 1 is needed".to_owned());
+        for (name, pair) in [("apso_inertia", self.apso_inertia), ("arpso_diversity", self.arpso_diversity)] {
+            pair.iter().for_each(|value| within(problems, &at(name), *value, 0.0..=1e3));
         }
-        positive(problems, "identify.swarm.velocity_limit", self.velocity_limit);
-        if self.cpso_c.is_nan() || self.cpso_c <= 2.0 {
-            problems.push(format!("identify.swarm.cpso_c is {}; constriction needs more than 2", self.cpso_c));
-        }
-        for (name, value) in [("c1", self.c1), ("c2", self.c2), ("improvement_mm2", self.improvement_mm2)] {
-            if !(value.is_finite() && value >= 0.0) {
-                problems.push(format!("identify.swarm.{name} is {value}; it must not be negative"));
-            }
-        }
-        if self.stapso.stagnation_iterations == 0 {
-            problems.push("identify.swarm.stapso.stagnation_iterations is 0; at least 1 is needed".to_owned());
-        }
+        let stapso = &self.stapso;
+        within(problems, &at("stapso.stagnation_iterations"), stapso.stagnation_iterations, 1..=1_000_000);
+        within(problems, &at("stapso.stagnation_improvement"), stapso.stagnation_improvement, 0.0..=1e3);
+        within(problems, &at("stapso.sine_cosine_a"), stapso.sine_cosine_a, 0.0..=1e3);
+        within(problems, &at("stapso.trust_region_particles"), stapso.trust_region_particles, 0..=100_000);
+        within(problems, &at("stapso.trust_region_steps"), stapso.trust_region_steps, 0..=100_000);
     }
 }

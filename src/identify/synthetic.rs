@@ -67,8 +67,13 @@ pub fn planned(
             let q_deg: Vec<f64> = q.iter().map(|r| r.to_degrees()).collect();
             let q_rad: Vec<f64> = q_deg.iter().map(|d| d.to_radians()).collect();
             let point = sensor(group) * truth.target_mm(&q_rad) + noise_mm * normal(&mut random);
-            let at =
-                RobotPose { pose: format!("p{}", rows.len()), group: format!("g{group}"), role, joints_deg: q_deg };
+            let at = RobotPose {
+                pose: format!("p{}", rows.len()),
+                group: format!("g{group}"),
+                role,
+                joints_deg: q_deg,
+                slides: vec![],
+            };
             let observed = Observed::Position { point_mm: point, covariance_mm2: None, rotation_rad: None };
             rows.push(Measurement { at, observed });
             break;

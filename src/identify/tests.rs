@@ -1,15 +1,25 @@
 //! The paper's experiment rebuilt: four spheres, 262 poses and 50 to verify, Table 2's values as truth.
 
-use super::choose::identify;
-use super::dataset::Dataset;
-use super::prepare::Prepared;
-use super::record::quality;
-use super::settings::{Extensions, Method, Model, Prior, Settings};
-use super::synthetic::{self, World};
+use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::choose::identify;
+use crate::identify::record::quality;
+use crate::identify::settings::{Extensions, Method, Model, Prior, Settings};
+use crate::identify::solve::formulation::{Formulation, Task};
+use crate::identify::synthetic::{self, World};
 use crate::robot::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
 
 /// Noise of a coordinate in the rebuilt experiment, mm.
 const NOISE_MM: f64 = 0.02;
+
+fn formulated(
+    set: &Dataset,
+    robot: &crate::robot::Robot,
+    parameters: &[crate::robot::Parameter],
+    model: Model,
+    settings: &Settings,
+) -> Formulation {
+    Formulation::new(&Task { set, robot, parameters, extras: &[], rows: &set.fit_rows(), model, settings }).unwrap()
+}
 
 fn settings(method: Method) -> Settings {
     Settings {
@@ -28,12 +38,11 @@ fn mean_errors(world: &World, method: Method, seed: u64) -> (f64, f64) {
     (mean(&world.nominal), mean(&found.candidates[found.chosen].robot))
 }
 
-fn base_names(world: &World) -> (Prepared, Vec<String>) {
+fn base_names(world: &World) -> (Formulation, Vec<String>) {
     let set = Dataset::new(&world.rows, 1).unwrap();
     let parameters = world.nominal.mdh_parameters();
     let off = Settings { prior: Prior::Off, ..Settings::default() };
-    let prepared =
-        Prepared::new(&set, &world.nominal, &parameters, &set.fit_rows(), Model::CenterDistance, &off).unwrap();
+    let prepared = formulated(&set, &world.nominal, &parameters, Model::CenterDistance, &off);
     (prepared, parameters.iter().map(|p| p.name()).collect())
 }
 
@@ -75,17 +84,19 @@ fn the_nineteen_of_the_paper_are_more_than_its_plan_determines() {
     let world = synthetic::planned(262, 0, 0.0, 0.0, 3, &|_| {});
     let set = Dataset::new(&world.rows, 1).unwrap();
     let parameters = world.nominal.mdh_parameters();
-    let settings =
-        Settings { redundancy: super::settings::Redundancy::Correlation, prior: Prior::Off, ..Settings::default() };
-    let prepared =
-        Prepared::new(&set, &world.nominal, &parameters, &set.fit_rows(), Model::CenterDistance, &settings).unwrap();
+    let settings = Settings {
+        redundancy: crate::identify::settings::Redundancy::Correlation,
+        prior: Prior::Off,
+        ..Settings::default()
+    };
+    let prepared = formulated(&set, &world.nominal, &parameters, Model::CenterDistance, &settings);
     assert!(prepared.base.rank() <= 14, "{}", prepared.base.rank());
 }
 
 #[test]
 fn unmodelled_effects_treat_all_methods_alike() {
     let spoil = |robot: &mut crate::robot::Robot| {
-        robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Wrist, k_rad_per_m: 2.5e-3 }];
+        robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Origin(4), k_rad_per_m: 2.5e-3 }];
         robot.corrections.harmonics = (0..6)
             .map(|joint| HarmonicTerm {
                 joint,
@@ -113,7 +124,9 @@ fn any_number_of_threads_gives_the_same_bytes() {
     settings.swarm.iterations = 40;
     let found = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| identify(&set, &world.nominal, &settings, 5, &|_| {}).unwrap().candidates[0].solution.clone())
+        pool.install(|| {
+            identify(&set, &world.nominal, &settings, 5, &|_| {}).unwrap().candidates[0].found.clone().unwrap().1
+        })
     };
     assert_eq!(found(1), found(2));
 }
@@ -135,10 +148,10 @@ fn truth_is_recovered_within_the_predicted_sigmas() {
         let set = Dataset::new(&world.rows, 1).unwrap();
         let parameters = world.nominal.mdh_parameters();
         let off = Settings { prior: Prior::Off, ..Settings::default() };
-        let prepared =
-            Prepared::new(&set, &world.nominal, &parameters, &set.fit_rows(), Model::Position, &off).unwrap();
-        let sigmas = prepared.sigmas(&prepared.free_fit.x);
-        for ((&i, x), sigma) in prepared.base.free.iter().zip(&prepared.free_fit.x).zip(&sigmas) {
+        let prepared = formulated(&set, &world.nominal, &parameters, Model::Position, &off);
+        let covariance = prepared.covariance();
+        for (k, (&i, x)) in prepared.base.free.iter().zip(&prepared.free_fit.x).enumerate() {
+            let sigma = covariance[(k, k)].sqrt();
             let deviation = world.truth.value(parameters[i]) - world.nominal.value(parameters[i]);
             total += 1;
             inside += usize::from((x - deviation).abs() < 2.0 * sigma);

@@ -8,14 +8,13 @@ use std::collections::BTreeMap;
 use camino::Utf8Path;
 use rayon::prelude::*;
 
-use super::cache::{Cache, Look};
-use super::detect::Refusal;
-use super::folder::{self, PairFiles};
-use super::grid::{Grid, Places};
-use super::{
-    Board, Corner, Corners, Error, PairCorners, Side, Skipped, Squares, beyond, detect, order, overlay, picture, refine,
-};
-use crate::error::Result;
+use super::detect::{self, Refusal, continuation};
+use super::image::{self, Claim, Header, Mosaic, Picture};
+use super::input::cache::{Cache, Look};
+use super::input::pairs::{self, PairFiles};
+use super::lattice::{Lattice, Places};
+use super::refine::fields;
+use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, Squares, order, overlay, refine};
 use crate::files::OutDir;
 use crate::progress;
 
@@ -26,6 +25,8 @@ pub struct Wanted<'a> {
     pub board: Board,
     /// The least number of pairs that is of use.
     pub needed: usize,
+    /// The pattern of pictures that are raw colour mosaics.
+    pub mosaic: Option<Mosaic>,
     /// Where corners of pictures that were measured before are kept.
     pub cache: Option<Cache<'a>>,
     /// Where an overlay picture of each pair goes.
@@ -36,17 +37,20 @@ pub struct Wanted<'a> {
 ///
 /// An error where the folder holds no pairs, or fewer than needed show the board.
 pub fn find_corners(folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Corners> {
-    let pairing = folder::pair_files(folder)?;
+    let pairing = pairs::pair_files(folder)?;
     let mut notes: Vec<String> = pairing.left_out().into_iter().collect();
-    let sizes = majority_sizes(&pairing.pairs);
+    let headers: Vec<[Announced; 2]> =
+        pairing.pairs.par_iter().map(|files| [&files.left, &files.right].map(|path| image::header(path))).collect();
+    let sizes = majority_sizes(&headers);
     let bar = progress::bar("looking for the board", 2 * pairing.pairs.len() as u64);
     let seen: Vec<[Look; 2]> = pairing
         .pairs
         .par_iter()
-        .map(|files| {
+        .zip(&headers)
+        .map(|(files, [left, right])| {
             let (left, right) = rayon::join(
-                || look(&files.left, wanted, sizes, &bar),
-                || look(&files.right, wanted, [sizes[1], sizes[0]], &bar),
+                || look(&files.left, left, wanted, sizes, &bar),
+                || look(&files.right, right, wanted, [sizes[1], sizes[0]], &bar),
             );
             [left, right]
         })
@@ -64,12 +68,11 @@ pub fn find_corners(folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Corners> {
             path: folder.to_owned(),
             skipped,
             other,
-        }
-        .into());
+        });
     }
     let pairs = number_alike(found, wanted.board);
     if let Some(out) = wanted.overlays {
-        draw(&pairs, &pairing.pairs, out)?;
+        draw(&pairs, &pairing.pairs, wanted.mosaic, out)?;
     }
     if !skipped.is_empty() {
         notes.push(format!("the board was found in {} of {total} pairs", pairs.len()));
@@ -77,12 +80,23 @@ pub fn find_corners(folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Corners> {
     Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, notes })
 }
 
+/// What a file's header says, or why it says nothing.
+type Announced = Result<Header, String>;
+
 /// One picture from file to corners; the reason where that fails. `sizes` are those of this side's pictures and of the other's.
-fn look(path: &Utf8Path, wanted: &Wanted<'_>, sizes: [(u32, u32); 2], bar: &indicatif::ProgressBar) -> Look {
+fn look(
+    path: &Utf8Path,
+    header: &Announced,
+    wanted: &Wanted<'_>,
+    sizes: [(u32, u32); 2],
+    bar: &progress::Step,
+) -> Look {
     bar.inc(1);
     let [size, other] = sizes;
+    let header = header.as_ref().map_err(String::clone)?;
     // Depends on the other pictures, so it is not a matter for the cache.
-    if let Some(found) = picture::size(path).filter(|found| *found != size) {
+    let found = (header.width, header.height);
+    if found != size {
         let why = match found {
             _ if found == other => ", and those of the other side have its size: are left and right exchanged?",
             _ if found == (size.1, size.0) => ": is it turned by 90 degrees?",
@@ -90,22 +104,51 @@ fn look(path: &Utf8Path, wanted: &Wanted<'_>, sizes: [(u32, u32); 2], bar: &indi
         };
         return Err(format!("{}x{} px, most others are {}x{}{why}", found.0, found.1, size.0, size.1).into());
     }
-    std::fs::read(path).map_err(|e| format!("cannot be read: {e}").into()).and_then(|bytes| {
-        let Some(cache) = wanted.cache else { return look_at(bytes, path, wanted.board) };
-        let entry = cache.entry(&bytes, wanted.board);
-        cache.read(&entry, wanted.board).unwrap_or_else(|| {
-            let look = look_at(bytes, path, wanted.board);
-            cache.write(&entry, &look);
-            look
-        })
+    read_and_look(path, header, wanted)
+}
+
+/// The board's corners in one pair, numbered alike in left and right as far as its colours tell; the reason where there are none.
+pub fn find_pair(files: &PairFiles, wanted: &Wanted<'_>) -> Result<PairCorners, String> {
+    let alone = |path: &Utf8Path| read_and_look(path, &image::header(path)?, wanted);
+    let looks = rayon::join(|| alone(&files.left), || alone(&files.right));
+    let (found, skipped) = sort_out(std::slice::from_ref(files), vec![[looks.0, looks.1]]);
+    let reason = || skipped.into_iter().next().map_or_else(|| "no board".to_owned(), |s| s.reason);
+    number_alike(found, wanted.board).into_iter().next().ok_or_else(reason)
+}
+
+/// What is in a picture file, from the cache where it was looked at before.
+fn read_and_look(path: &Utf8Path, header: &Header, wanted: &Wanted<'_>) -> Look {
+    let _claim = Claim::wait(header);
+    let bytes = image::read(path, header)?;
+    let Some(cache) = wanted.cache else { return look_at(bytes, path, wanted) };
+    let entry = cache.entry(&bytes, wanted.board, wanted.mosaic);
+    cache.read(&entry, wanted.board).unwrap_or_else(|| {
+        let look = look_at(bytes, path, wanted);
+        cache.write(&entry, &look);
+        look
     })
 }
 
-fn look_at(bytes: Vec<u8>, path: &Utf8Path, board: Board) -> Look {
-    let picture = picture::decode(&bytes, path)?;
+/// A picture decoded, by itself.
+pub(super) fn picture(path: &Utf8Path, mosaic: Option<Mosaic>) -> Result<Picture, String> {
+    let header = image::header(path)?;
+    let _claim = Claim::wait(&header);
+    image::decode(&image::read(path, &header)?, path, mosaic)
+}
+
+fn look_at(bytes: Vec<u8>, path: &Utf8Path, wanted: &Wanted<'_>) -> Look {
+    let board = wanted.board;
+    let picture = image::decode(&bytes, path, wanted.mosaic)?;
     drop(bytes);
     let detected = detect::detect(&picture, board)?;
-    let (columns, rows) = beyond::lines_beyond(&detected);
+    let places = detected.corners.map(|p| detected.level.to_picture(p));
+    if let Some(shift_px) = fields::shift_between_fields(&picture, &places) {
+        return Err(format!(
+            "is interlaced: its even and odd rows were taken at two moments, the board moved by {shift_px:.1} px or more between them"
+        )
+        .into());
+    }
+    let (columns, rows) = continuation::lines_beyond(&detected);
     if columns + rows > 0 {
         let squares = board.squares;
         return Err(Refusal {
@@ -120,11 +163,11 @@ fn look_at(bytes: Vec<u8>, path: &Utf8Path, board: Board) -> Look {
     Ok(refine::refine(&picture, &detected))
 }
 
-fn draw(pairs: &[PairCorners], files: &[PairFiles], out: &OutDir) -> Result<()> {
+fn draw(pairs: &[PairCorners], files: &[PairFiles], mosaic: Option<Mosaic>, out: &OutDir) -> Result<()> {
     let bar = progress::bar("drawing overlays", pairs.len() as u64);
     pairs.par_iter().try_for_each(|pair| {
         bar.inc(1);
-        let drawn = files.iter().find(|f| f.pair == pair.pair).and_then(|f| overlay::png(f, pair));
+        let drawn = files.iter().find(|f| f.pair == pair.pair).and_then(|f| overlay::png(f, pair, mosaic));
         drawn.map_or(Ok(()), |bytes| out.write(&format!("overlays/{}.png", pair.pair), &bytes))
     })?;
     bar.finish_and_clear();
@@ -132,21 +175,18 @@ fn draw(pairs: &[PairCorners], files: &[PairFiles], out: &OutDir) -> Result<()> 
 }
 
 /// The size that most left and most right pictures have; the larger one where two are equally frequent.
-fn majority_sizes(pairs: &[PairFiles]) -> [(u32, u32); 2] {
-    [Side::Left, Side::Right].map(|side| {
+fn majority_sizes(headers: &[[Announced; 2]]) -> [(u32, u32); 2] {
+    Side::BOTH.map(|side| {
         let mut counts: BTreeMap<(u32, u32), usize> = BTreeMap::new();
-        for files in pairs {
-            let path = if side == Side::Left { &files.left } else { &files.right };
-            // A file that can't be read is met again, and named, when it is decoded.
-            if let Some(size) = picture::size(path) {
-                *counts.entry(size).or_default() += 1;
-            }
+        // A file that can't be read is named when its turn comes.
+        for header in headers.iter().filter_map(|sides| sides[side as usize].as_ref().ok()) {
+            *counts.entry((header.width, header.height)).or_default() += 1;
         }
         counts.into_iter().max_by_key(|&(size, count)| (count, size)).map_or((0, 0), |(size, _)| size)
     })
 }
 
-type Found = (String, Grid<Corner>, Grid<Corner>);
+type Found = (String, Lattice<Corner>, Lattice<Corner>);
 
 /// The size of board that most of the refused pictures show instead.
 fn other_size(seen: &[[Look; 2]]) -> Option<Squares> {
@@ -179,7 +219,7 @@ fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>) -> (Vec<Found>, Vec<Skipp
 }
 
 fn number_alike(found: Vec<Found>, board: Board) -> Vec<PairCorners> {
-    let places = |grid: &Grid<Corner>| -> Places { grid.map(|c| c.px) };
+    let places = |grid: &Lattice<Corner>| -> Places { grid.map(|c| c.px) };
     let pairs: Vec<_> = found.iter().map(|(_, left, right)| (places(left), places(right))).collect();
     let turns = order::agreed_turns(&pairs, board);
     found
@@ -193,6 +233,6 @@ fn number_alike(found: Vec<Found>, board: Board) -> Vec<PairCorners> {
         .collect()
 }
 
-fn list(grid: &Grid<Corner>) -> Vec<Corner> {
+fn list(grid: &Lattice<Corner>) -> Vec<Corner> {
     grid.iter().map(|(col, row, corner)| Corner { col, row, ..*corner }).collect()
 }

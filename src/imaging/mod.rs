@@ -1,36 +1,36 @@
 //! From a folder of pictures to the corners of the board in each, in an order both cameras agree on.
 
-pub mod bend;
-pub mod beyond;
 pub mod board;
-pub mod cache;
-pub mod corner_fit;
 pub mod corners;
-pub mod corners_file;
-pub mod cut;
 pub mod detect;
 pub mod find;
-pub mod folder;
-pub mod grid;
-pub mod grow;
-pub mod lighting;
+pub mod image;
+pub mod input;
+pub mod lattice;
 pub mod order;
 pub mod overlay;
-pub mod picture;
+pub mod pyramid;
 pub mod refine;
 
 use camino::Utf8PathBuf;
 
-use crate::error::Explain;
+use crate::diagnostic::Explain;
 
+pub use self::image::Mosaic;
 pub use board::{Board, Squares};
 pub use corners::{Corner, Corners, PairCorners, Side, Skipped};
 pub use find::{Wanted, find_corners};
+
+/// Result of looking for corners.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// What can go wrong between a folder and its corners.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// Reading or writing files.
+    #[error(transparent)]
+    Files(#[from] crate::files::Error),
     /// A board's size was not understood.
     #[error("a board is given as COLUMNSxROWS squares, at least 3x3, got `{found}`")]
     BoardSize {
@@ -123,6 +123,7 @@ fn reasons(skipped: &[Skipped]) -> String {
 impl Explain for Error {
     fn place(&self) -> Option<String> {
         match self {
+            Error::Files(e) => e.place(),
             Error::BoardSize { .. } | Error::SameName { .. } => None,
             Error::NoFolder { path }
             | Error::NotAFolder { path }
@@ -134,6 +135,7 @@ impl Explain for Error {
 
     fn hint(&self) -> Option<String> {
         match self {
+            Error::Files(e) => e.hint(),
             Error::BoardSize { .. } => Some("`--squares 20x20` is a board with 19x19 inner corners".to_owned()),
             Error::NoPairs { deeper: Some(folder), .. } => Some(format!("name `{folder}`, which holds left/ and right/")),
             Error::NoFolder { .. } | Error::NotAFolder { .. } | Error::OneSide { .. } | Error::NoPairs { .. } => Some(
@@ -142,11 +144,11 @@ impl Explain for Error {
             ),
             Error::SameName { .. } => Some("remove or rename one of them".to_owned()),
             Error::TooFewPairs { skipped, .. }
-                if 2 * skipped.iter().filter(|s| s.reason.contains(picture::UNDECODABLE)).count() > skipped.len() =>
+                if 2 * skipped.iter().filter(|s| s.reason.contains(self::image::UNDECODABLE)).count() > skipped.len() =>
             {
                 Some(
-                    "save the pictures as the camera gives them: PNG, TIFF, BMP, JPEG or PGM of 8 or 16 bits a pixel, up to 512 MiB \
-                     when decoded"
+                    "save the pictures as the camera gives them: PNG, TIFF, BMP, JPEG or PGM of 8 or 16 bits a pixel, up to 300 \
+                     million px and 1 GiB when decoded"
                         .to_owned(),
                 )
             }

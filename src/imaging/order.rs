@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use nalgebra::Vector2;
 
 use super::Board;
-use super::grid::Places;
+use super::lattice::Places;
 
 /// The smallest turn, in quarter turns, after which the board looks the same; `None` where only a whole turn does.
 pub fn ambiguity(board: Board) -> Option<usize> {
@@ -76,7 +76,7 @@ pub fn angle_between(a: f64, b: f64) -> f64 {
 mod tests {
     use nalgebra::Point2;
 
-    use super::super::grid::Grid;
+    use super::super::lattice::Lattice;
     use super::*;
 
     fn board(squares: &str) -> Board {
@@ -85,7 +85,7 @@ mod tests {
 
     fn grid(board: Board, angle: f64) -> Places {
         let (sin, cos) = angle.sin_cos();
-        Grid::from_fn(board.columns(), board.rows(), |col, row| {
+        Lattice::from_fn(board.columns(), board.rows(), |col, row| {
             let p = board.corner_mm(col, row);
             Some(Point2::new(cos * p.x - sin * p.y, sin * p.x + cos * p.y))
         })

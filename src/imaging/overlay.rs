@@ -8,8 +8,10 @@ use image::{Rgb, RgbImage};
 use nalgebra::Point2;
 
 use super::detect::COARSE_PX;
-use super::folder::PairFiles;
-use super::{Corner, PairCorners, picture};
+use super::image::Mosaic;
+use super::input::pairs::PairFiles;
+use super::pyramid::{Level, factor_for};
+use super::{Corner, PairCorners};
 
 /// Standard deviations up to which a corner gets a colour, px, from the best.
 const COLOURS: [(f64, [u8; 3]); 4] =
@@ -20,9 +22,9 @@ const UNUSED: [u8; 3] = [60, 90, 255];
 const ORDER: [u8; 3] = [255, 0, 255];
 
 /// The pair's overlay as PNG; `None` where a picture can't be read any more.
-pub fn png(files: &PairFiles, corners: &PairCorners) -> Option<Vec<u8>> {
-    let left = drawn(&files.left, &corners.left)?;
-    let right = drawn(&files.right, &corners.right)?;
+pub fn png(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> Option<Vec<u8>> {
+    let left = drawn(&files.left, &corners.left, mosaic)?;
+    let right = drawn(&files.right, &corners.right, mosaic)?;
     let mut both = RgbImage::new(left.width() + right.width(), left.height().max(right.height()));
     image::imageops::replace(&mut both, &left, 0, 0);
     image::imageops::replace(&mut both, &right, i64::from(left.width()), 0);
@@ -31,15 +33,14 @@ pub fn png(files: &PairFiles, corners: &PairCorners) -> Option<Vec<u8>> {
     Some(bytes.into_inner())
 }
 
-fn drawn(path: &Utf8Path, corners: &[Corner]) -> Option<RgbImage> {
-    let picture = picture::decode(&std::fs::read(path).ok()?, path).ok()?;
-    let factor = ((picture.width * picture.height) as f64 / COARSE_PX as f64).sqrt().floor().max(1.0) as usize;
-    let small = picture.reduced(factor);
+fn drawn(path: &Utf8Path, corners: &[Corner], mosaic: Option<Mosaic>) -> Option<RgbImage> {
+    let picture = super::find::picture(path, mosaic).ok()?;
+    let level = Level::Reduced(factor_for(&picture, COARSE_PX));
+    let small = level.copy(&picture);
     let mut image = RgbImage::from_fn(small.width as u32, small.height as u32, |x, y| {
         Rgb([small.pixels[y as usize * small.width + x as usize]; 3])
     });
-    let k = factor as f64;
-    let down = |p: &Point2<f64>| Point2::new((p.x + 0.5) / k - 0.5, (p.y + 0.5) / k - 0.5);
+    let down = |p: &Point2<f64>| level.to_copy(p);
     let first = corners.iter().find(|c| c.col == 0 && c.row == 0);
     for (col, row) in [(2, 0), (0, 1)] {
         if let (Some(a), Some(b)) = (first, corners.iter().find(|c| c.col == col && c.row == row)) {

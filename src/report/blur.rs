@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::page;
 use super::table::number;
 use crate::imaging::{Corner, Corners};
-use crate::median::median;
+use crate::statistics::median;
 
 /// Cells a side of a picture.
 const CELLS: usize = 5;

@@ -2,18 +2,21 @@
 
 use maud::{Markup, html};
 
+use super::Result;
 use super::blur;
 use super::figure::Plot;
 use super::page::{self, Tone};
 use super::table::{Table, number};
-use crate::error::Result;
 use crate::files::OutDir;
 use crate::imaging::Corners;
 use crate::stereo::Side;
-use crate::stereo::accuracy::{Accuracy, Axis, HeldOutPair, Range, Verdict};
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::check_file::Judged;
-use crate::stereo::whiteness::Field;
+use crate::stereo::judge::assessment::Judged;
+use crate::stereo::judge::evidence;
+use crate::stereo::judge::held_out::{Accuracy, HeldOutPair};
+use crate::stereo::judge::lengths::{Axis, Range};
+use crate::stereo::judge::residual_correlation::Field;
+use crate::stereo::judge::verdict::{COVERAGE, Verdict};
 
 /// Rows of the table on stdout: more ranges are thinned out.
 const TABLE_ROWS: usize = 7;
@@ -49,36 +52,63 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
         }
     }
     let total = calibration.views.len() + calibration.skipped.len();
-    let [along_x, along_y] = calibration.values.shared.shape_mm;
+    let [along_x, along_y, twist] = calibration.values.shared.shape_mm;
     let bow = if calibration.layout.shape {
-        format!(", board bowed by {along_x:.4} mm along x and {along_y:.4} mm along y")
+        format!(", board bowed by {along_x:.4} mm along x and {along_y:.4} mm along y, twisted by {twist:.4} mm")
     } else {
         String::new()
     };
+    let epipolar = &accuracy.epipolar;
     format!(
-        "{}: {}\n{} of {total} pairs, {} lens, reprojection RMS {} px, baseline {} mm{bow}\n\n{table}\nreport: {}\n",
+        "{}: {}\n{}\n{}\n{} of {total} pairs, {} lens, reprojection RMS {} px, baseline {} mm{bow}\nepipolar error RMS {} px, largest \
+         {} px\n\n{table}\nreport: {}\n",
         word(judged.verdict),
         explanation(judged),
+        deciding(judged),
+        trusted(judged),
         calibration.views.len(),
         rig.left.lens.name(),
         number(Some(calibration.rms_px), 3),
         number(Some(rig.baseline_mm()), 3),
+        number(Some(epipolar.rms_px), 3),
+        number(Some(epipolar.max_px), 3),
         out.join("camera-check.html"),
     )
 }
 
 fn explanation(judged: &Judged) -> String {
-    let worst = &judged.accuracy.worst;
+    let extremes = &judged.accuracy.extremes;
+    let worst = &extremes.largest;
+    let board = worst.expansion.board_mm.map_or_else(String::new, |mm| format!(", board {:.4}", mm / COVERAGE));
     format!(
-        "largest held-out length error {:.4} mm, expanded uncertainty {:.4} mm (k = 2; standard deviations: corners {:.4}, calibration {:.4}, board \
-         {:.4}), tolerance {} mm",
-        worst.error_mm,
+        "largest held-out length error {:.4} mm, expanded uncertainty {:.4} mm (95 %; standard deviations: corners {:.4}, calibration \
+         {:.4}{board}), tolerance {} mm",
+        extremes.max_abs_error_mm,
         worst.expanded_uncertainty_mm(),
         worst.corners_mm,
         worst.calibration_mm,
-        worst.board_mm,
         judged.tolerance_mm
     )
+}
+
+/// The line of the ledger that decides, and how many others are below a pass.
+fn deciding(judged: &Judged) -> String {
+    let below = judged.evidence.iter().filter(|line| line.allows != Verdict::Pass).count();
+    let others = match below.saturating_sub(1) {
+        0 if below == 0 => format!("all {} lines of evidence allow a pass", judged.evidence.len()),
+        0 => "nothing else stands against a pass".to_owned(),
+        1 => "1 other line of evidence is below a pass".to_owned(),
+        others => format!("{others} other lines of evidence are below a pass"),
+    };
+    judged.deciding().map_or(others.clone(), |line| format!("decided by {}: {}; {others}", line.what, line.figure()))
+}
+
+/// What the rig can be trusted to, whatever the tolerance.
+fn trusted(judged: &Judged) -> String {
+    match judged.trusted_mm() {
+        Some(mm) => format!("lengths can be trusted to {mm:.4} mm"),
+        None => "lengths cannot be trusted to any tolerance before that is settled".to_owned(),
+    }
 }
 
 /// What the verdict means for somebody who must decide.
@@ -88,7 +118,8 @@ fn advice(judged: &Judged) -> String {
     match judged.verdict {
         Verdict::Pass => format!("Lengths can be trusted to {sure} mm in the volume where the boards stood."),
         Verdict::Undecided => format!(
-            "The tolerance lies inside the uncertainty: sharper corners or more pairs of the board may decide; until then do not rely on {sure} mm."
+            "The evidence does not decide: the lines below that are not a pass say what casts doubt and what would settle it; until \
+             then do not rely on {sure} mm."
         ),
         Verdict::Fail => format!(
             "Do not rely on {sure} mm: errors of lengths of {long} mm, the pairs and the residuals below say where it is lost."
@@ -105,6 +136,7 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners) -> Re
     };
     let content = html! {
         (page::verdict(tone, word(judged.verdict), &format!("{}. {}", explanation(judged), advice(judged))))
+        (ledger(judged))
         @if !judged.advice.is_empty() { p { "What to photograph next, before anything below is relied on:" } (page::warnings(&judged.advice)) }
         @if !judged.warnings.is_empty() { p { "What else to know:" } }
         (page::warnings(&judged.warnings))
@@ -136,15 +168,43 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners) -> Re
     Ok(page::page("Camera check", &lead, &content))
 }
 
+/// The ledger: what was looked at, what was found, up to where it allows a pass, and what it means.
+fn ledger(judged: &Judged) -> Markup {
+    let class = |verdict| match verdict {
+        Verdict::Pass => "allows good",
+        Verdict::Undecided => "allows doubtful",
+        Verdict::Fail => "allows bad",
+    };
+    let cell = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), evidence::number);
+    html! {
+        h2 { "What the verdict rests on" }
+        p { (format!("No verdict is better than its worst line; this one is {}; {}.", deciding(judged), trusted(judged))) }
+        div.wide { table.ledger {
+            thead { tr { th { "what" } th { "value" } th { "limit" } th { "unit" } th { "allows" } th { "detail" } } }
+            tbody { @for line in &judged.evidence { tr {
+                td { (line.what) }
+                td { (cell(line.value)) }
+                td { (cell(line.limit)) }
+                td { (line.unit) }
+                td { span class=(class(line.allows)) { (word(line.allows).to_lowercase()) } }
+                td.detail { (line.detail) }
+            } } }
+        } }
+    }
+}
+
 /// What the figures do not show: the scale.
 fn scale(judged: &Judged) -> Markup {
     html! {
         @match &judged.second {
             Some(second) => p {
-                (format!(
-                    "The second board, which calibrated nothing, comes out too large by {:.1} +- {:.1} parts in a million (k = 2); its worst length over \
-                     {} pairs is off by {:.4} mm.",
-                    1e6 * second.scale_error, 2e6 * second.scale_error_sigma, second.pairs, second.max_abs_error_mm))
+                @match (second.scale_error, second.scale_error_sigma, second.max_abs_error_mm) {
+                    (Some(scale), Some(sigma), Some(error)) => (format!(
+                        "The second board, which calibrated nothing, comes out too large by {:.1} +- {:.1} parts in a million (k = 2); its worst length over \
+                         {} pairs is off by {error:.4} mm.",
+                        1e6 * scale, 2e6 * sigma, second.pairs)),
+                    _ => "A second board was asked for, and no length on it could be measured.",
+                }
             }
             None => p {
                 "The scale of every length is the pitch of the board that calibrated: an error of its pitch is invisible in these figures. \
@@ -232,7 +292,12 @@ fn pairs(calibration: &Calibration, judged: &Judged) -> Markup {
             let pair = &judged.accuracy.pairs[i];
             let view = &calibration.views[i];
             let rms = |side| {
-                crate::stereo::residuals::rms_px(&calibration.values.shared, &calibration.values.poses[i], view, side)
+                crate::stereo::data::residuals::rms_px(
+                    &calibration.values.shared,
+                    &calibration.values.poses[i],
+                    view,
+                    side,
+                )
             };
             vec![
                 pair.pair.clone(),
@@ -271,13 +336,14 @@ fn pairs(calibration: &Calibration, judged: &Judged) -> Markup {
 fn residuals(calibration: &Calibration, judged: &Judged) -> Result<Markup> {
     let rig = calibration.rig();
     let mut figures = Vec::new();
-    for (field, camera) in judged.whiteness.fields.iter().zip([&rig.left, &rig.right]) {
+    for (field, camera) in judged.residual_pattern.fields.iter().zip([&rig.left, &rig.right]) {
         figures.push(field_figure(field, camera.width, camera.height)?);
     }
     let noise = &calibration.noise;
     let chi = match noise.reduced_chi_square {
         Some(chi) => format!(
-            "The corners' own covariances explain the residuals with a reduced chi-square of {chi:.2}; {:.4} px were added to each coordinate.",
+            "The corners' own covariances explain the residuals with a reduced chi-square of {chi:.2}; {:.4} px were added to each \
+             coordinate.",
             noise.added_px
         ),
         None => "The corners came without covariances; their scatter is that of the residuals.".to_owned(),
@@ -289,8 +355,8 @@ fn residuals(calibration: &Calibration, judged: &Judged) -> Result<Markup> {
                  Neighbouring corners' residuals correlate by {:.3} (chance: {:.3}).",
                 calibration.rms_px,
                 noise.typical_px(&calibration.views),
-                judged.whiteness.neighbours.along,
-                judged.whiteness.neighbours.standard_error))
+                judged.residual_pattern.neighbours.along,
+                judged.residual_pattern.neighbours.standard_error))
         }
         div.side { @for (svg, caption) in &figures { (page::figure(svg, caption)) } }
     })
@@ -363,22 +429,20 @@ fn disagreements(judged: &Judged) -> Markup {
         .map(|d| {
             let [x, y, z] = d.translation_change_mm;
             vec![
-                format!("{} instead of {}", d.other, d.chosen),
-                format!("{} by {:.4}", d.number, d.change),
-                format!("{:.0}", d.sigmas),
+                d.name(),
+                format!("{:.4}", d.length_change_mm),
+                format!("{:.0}", d.chi_square_fall),
+                format!("{:.0}", d.chance),
                 format!("{x:.3}, {y:.3}, {z:.3}"),
-                format!("{:.4}", d.length_on_board_change_mm),
-                format!("{:.4}", d.distance_of_boards_change_mm),
             ]
         })
         .collect();
-    let header =
-        ["lens", "moves most", "in its sigmas", "baseline vector mm", "lengths on a board mm", "between boards mm"];
+    let header = ["model", "lengths change by mm", "chi-squared falls by", "chance", "baseline vector mm"];
     html! {
         @if !rows.is_empty() {
             p {
-                "Lens models that explain the corners about as well and yet give another rig. The standard deviations above hold only if the lens \
-                 is what it was taken for; the truth may lie anywhere between these models, and lengths with it."
+                "Models that the corners admit and that measure other lengths. The standard deviations above hold only if lens and board are what they were taken \
+                 for; the truth may lie anywhere between these models, and lengths with it."
             }
             (page::table(&header, &rows))
         }
@@ -386,20 +450,22 @@ fn disagreements(judged: &Judged) -> Markup {
 }
 
 fn volume(judged: &Judged) -> Result<Markup> {
-    let along =
-        |i: usize| -> Vec<(f64, f64)> { judged.length_sigmas.iter().map(|l| (l.at_mm[2], l.sigma_mm[i])).collect() };
-    let [long, _] = judged.accuracy.long_mm;
-    let svg =
-        Plot::new(&format!("Standard deviation of a length of {long} mm"), "distance from the left camera, mm", "mm")
-            .points("along x", &along(0))
-            .points("along y", &along(1))
-            .points("along z", &along(2))
-            .svg()?;
-    let worst = |i: usize| judged.length_sigmas.iter().map(|l| l.sigma_mm[i]).fold(0.0, f64::max);
+    let lying = |axis: usize| judged.volume.lengths.iter().filter(move |l| l.direction[axis] > 0.99);
+    let along = |axis: usize| -> Vec<(f64, f64)> { lying(axis).map(|l| (l.at_mm.z, l.sigma_mm())).collect() };
+    let svg = Plot::new(
+        &format!("Standard deviation of a length of {} mm", judged.volume.length_mm),
+        "distance from the left camera, mm",
+        "mm",
+    )
+    .points("along x", &along(0))
+    .points("along y", &along(1))
+    .points("along z", &along(2))
+    .svg()?;
+    let worst = |axis: usize| lying(axis).map(|l| l.sigma_mm()).fold(0.0, f64::max);
     let caption = format!(
-        "At {} places of the volume in which the boards stood and which both cameras see; corner noise at both ends and the calibration together. The worst: \
+        "{} lengths in the volume in which the boards stood, as far as both cameras see them; corner noise at both ends and the calibration together. The worst: \
          {:.4} mm across, {:.4} mm along the line of sight.",
-        judged.length_sigmas.len(),
+        judged.volume.lengths.len(),
         worst(0).max(worst(1)),
         worst(2)
     );

@@ -6,7 +6,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::Error;
-use crate::error::Result;
+use super::Result;
 
 /// Drawn at twice the size it is shown, because the backend rounds to whole units.
 const SCALE: u32 = 2;

@@ -3,14 +3,14 @@
 use maud::{Markup, html};
 use nalgebra::Point3;
 
+use super::Result;
 use super::figure::Plot;
 use super::page::{self, Tone};
 use super::table::{Table, number};
-use crate::error::Result;
-use crate::identify::dataset::Dataset;
+use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::errors::{RowError, Spread};
 use crate::identify::record::{MethodRecord, PointSpread, Record};
-use crate::identify::swarm::halton;
-use crate::identify::verify::{RowError, Spread};
+use crate::identify::solve::swarm::halton;
 use crate::measurements::Role;
 
 /// What goes to stdout: before and after, method by method.
@@ -40,6 +40,20 @@ pub fn summary(record: &Record) -> String {
         ));
     }
     text
+}
+
+/// Table 3 for robots from anywhere.
+pub fn verified(robots: &[(&str, &PointSpread)]) -> String {
+    let mut table = Table::new(["verify rows, mm", "mean", "std", "max", "min", "point mean", "point max"]);
+    for (name, spread) in robots {
+        let mut row = distance_row(name, &spread.distance, None);
+        row.pop();
+        let points = spread.point.or(spread.distortion);
+        row.push(number(points.and_then(|p| p.mean_abs_mm), 4));
+        row.push(number(points.and_then(|p| p.max_abs_mm), 4));
+        table.row(row);
+    }
+    table.to_string()
 }
 
 fn distance_row(name: &str, spread: &Spread, before: Option<&Spread>) -> Vec<String> {
@@ -96,11 +110,16 @@ pub fn page(
     Ok(page::page("Identification", &lead, &content))
 }
 
+/// Scatter of a coordinate, mm, that says that robot and measurements don't belong together.
+const IMPLAUSIBLE_SCATTER_MM: f64 = 0.8;
+
 fn verdict(record: &Record) -> Markup {
     let before = record.before.verify.distance.mean_abs_mm;
     let after = record.chosen_method().and_then(|m| m.verify.distance.mean_abs_mm);
     let tone = match (before, after) {
-        (Some(before), Some(after)) if after < before => Tone::Good,
+        // Not good as long as more is left than a built robot scatters by.
+        (Some(before), Some(after)) if after < before && record.scatter_mm < IMPLAUSIBLE_SCATTER_MM => Tone::Good,
+        (Some(before), Some(after)) if after <= before => Tone::Doubtful,
         (Some(_), Some(_)) => Tone::Bad,
         _ => Tone::Doubtful,
     };
@@ -260,7 +279,9 @@ fn joint_table(record: &Record) -> Markup {
 }
 
 fn judged_table(record: &Record) -> Markup {
-    let row = |j: &crate::identify::choose::Judged| vec![j.model.to_owned(), j.terms.clone(), number(j.held_out_mm, 4)];
+    let row = |j: &crate::identify::judge::choose::Judged| {
+        vec![j.model.to_owned(), j.terms.clone(), number(j.held_out_mm, 4)]
+    };
     let mut rows: Vec<Vec<String>> = record.judged.iter().map(row).collect();
     rows.extend(
         record
@@ -309,7 +330,7 @@ fn start_figures(seed: u64) -> Result<Markup> {
         Plot::new(title, "first coordinate", "second coordinate").points("", &pairs(numbers)).equal_axes().svg()
     };
     let halton = plot("Halton sequence", &halton::points(START_POINTS, 2, seed))?;
-    let random = plot("Pseudo-random numbers", &crate::identify::swarm::uniform(2 * START_POINTS, seed))?;
+    let random = plot("Pseudo-random numbers", &crate::identify::solve::swarm::uniform(2 * START_POINTS, seed))?;
     Ok(html! { div.side {
         (page::figure(&halton, "Fig. 3 of the paper: Halton's points, where STAPSO starts, leave neither clusters nor holes."))
         (page::figure(&random, "Pseudo-random points, where the other swarms start, have both."))

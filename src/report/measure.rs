@@ -1,14 +1,55 @@
-//! `measure.html` and the table on stdout: where the target was, and how well that is known.
+//! `measure.html` and the table on stdout: where the target was, how well that is known, and whether the rig is the calibrated one.
 
-use maud::{Markup, html};
+use std::f64::consts::TAU;
 
+use maud::{Markup, PreEscaped, html};
+
+use super::Result;
 use super::figure::Plot;
 use super::page::{self, Tone};
 use super::table::number;
-use crate::error::Result;
 use crate::files::OutDir;
-use crate::stereo::measure_file::{MeasureFile, MeasuredPose};
+use crate::formats::measure::MeasureFile;
+use crate::measurements::Role;
 use crate::stereo::target::TargetPose;
+use crate::stereo::target::finish::Shape;
+use crate::stereo::target::judgement::Judgement;
+use crate::stereo::target::series::{MeasuredPose, Series};
+
+/// Poses in the table of the worst.
+const WORST: usize = 10;
+
+/// Standard deviations beyond which a pose's residual is none of chance.
+const LIMIT_SIGMAS: f64 = 5.0;
+
+/// A small picture of a pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thumbnail {
+    /// The pose.
+    pub pose: String,
+    /// What is to be seen.
+    pub caption: String,
+    /// A JPEG in base64; empty where the pictures could not be read.
+    pub jpeg_base64: String,
+}
+
+/// The distance of a pose to its group's centre.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Distance {
+    /// As the nominal robot was sent, mm.
+    pub commanded_mm: f64,
+    /// As measured, mm.
+    pub measured_mm: f64,
+}
+
+/// What the page shows beside the results.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Extras {
+    /// The worst poses and all failures.
+    pub thumbnails: Vec<Thumbnail>,
+    /// Distances to the centre; empty where no robot of so many joints is known.
+    pub distances: Vec<Distance>,
+}
 
 /// The short text on stdout.
 pub fn summary(file: &MeasureFile, out: &OutDir) -> String {
@@ -30,81 +71,255 @@ fn quality(file: &MeasureFile) -> String {
     let sigma = file.sigma_mm();
     let along = |i: usize| number(sigma.map(|s| s[i]), 4);
     format!(
-        "board fit {} mm, reprojection {} px RMS; median sigma of the mark point x {} y {} z {} mm",
+        "board fit {} mm, reprojection {} px RMS, chi-square a number {}; median sigma of the mark point x {} y {} z {} mm",
         number(fit_mm, 4),
         number(px, 3),
+        number(file.chi_square(), 2),
         along(0),
         along(1),
         along(2),
     )
 }
 
-/// Poses in the table of the worst.
-const WORST: usize = 10;
+/// Green only where every pose was measured and everything agrees with what was known before.
+fn tone(series: &Series, file: &MeasureFile) -> Tone {
+    let (poses, measured) = file.counts();
+    match &series.judgement {
+        judgement if judgement.ends_the_run() => Tone::Bad,
+        Judgement::Agrees if poses == measured && file.chi_square_is_usual() => Tone::Good,
+        _ => Tone::Doubtful,
+    }
+}
+
+/// The report.
+pub fn page(series: &Series, file: &MeasureFile, extras: &Extras) -> Result<String> {
+    let (poses, count) = file.counts();
+    let measured = &series.poses;
+    let missing: Vec<Vec<String>> = measured
+        .iter()
+        .filter_map(|m| {
+            let refusal = m.target.as_ref().err()?;
+            Some(vec![m.at.pose.clone(), refusal.status.to_owned(), refusal.reason.clone()])
+        })
+        .collect();
+    let content = html! {
+        (page::verdict(tone(series, file), &format!("{count} of {poses} poses measured"), &quality(file)))
+        (page::warnings(file.warnings()))
+        @if !missing.is_empty() {
+            h2 { "Poses without a measurement" }
+            (page::table(&["pose", "status", "why"], &missing))
+        }
+        (thumbnails(&extras.thumbnails))
+        @if count > 0 {
+            (rig(measured)?)
+            (residuals(measured)?)
+            @if let Some(shape) = &series.shape { (target(shape, file.columns())?) }
+            (places(measured)?)
+            (distances(&extras.distances)?)
+        }
+    };
+    Ok(page::page("Target measurements", &format!("{poses} poses"), &content))
+}
+
+/// The rig over the run: what a turn of the right camera against the left would leave in the pictures.
+fn rig(measured: &[MeasuredPose]) -> Result<Markup> {
+    let of = |figure: fn(&TargetPose) -> [f64; 2]| -> (Vec<(f64, f64, f64)>, f64) {
+        let milli = |rad: f64| 1e3 * rad.to_degrees();
+        let found = measured.iter().enumerate().filter_map(|(i, m)| Some((i as f64, figure(m.target.as_ref().ok()?))));
+        let bars: Vec<(f64, f64, f64)> = found.map(|(i, [at, sigma])| (i, milli(at), milli(sigma))).collect();
+        let limit = crate::statistics::median(bars.iter().map(|b| b.2)).unwrap_or(0.0) * LIMIT_SIGMAS;
+        (bars, limit)
+    };
+    let plot = |title: &str, (bars, limit): (Vec<(f64, f64, f64)>, f64)| {
+        Plot::new(title, "pose, in the order of the run", "turn of the right camera, mdeg")
+            .error_bars("", &bars)
+            .hline(limit, "limit")
+            .hline(-limit, "limit")
+            .size(520, 340)
+            .svg()
+    };
+    let pitch = plot("Rig: epipolar residual", of(|t| t.pitch_rad))?;
+    let yaw = plot("Rig: residual of the target's size", of(|t| t.yaw_rad))?;
+    Ok(html! {
+        h2 { "The rig during the run" }
+        div.side {
+            (page::figure(&pitch, "What each pose's height differences say of a nod of the right camera. A step is a rig that was pushed, a slope one that warms up."))
+            (page::figure(&yaw, "What the target's known size says of its yaw, which no epipolar line shows. Bars are one standard deviation."))
+        }
+    })
+}
+
+fn residuals(measured: &[MeasuredPose]) -> Result<Markup> {
+    let of = |figure: fn(&TargetPose) -> f64| -> Vec<(f64, f64)> {
+        measured.iter().enumerate().filter_map(|(i, m)| Some((i as f64, figure(m.target.as_ref().ok()?)))).collect()
+    };
+    let residual = Plot::new("Residual of every pose", "pose, in the order of the run", "RMS, px")
+        .points("", &of(|t| t.rms_px))
+        .size(520, 340)
+        .svg()?;
+    let sigma = Plot::new("Standard deviation of the mark point", "pose, in the order of the run", "mm")
+        .points("x", &of(|t| t.covariance[(3, 3)].sqrt()))
+        .points("y", &of(|t| t.covariance[(4, 4)].sqrt()))
+        .points("z", &of(|t| t.covariance[(5, 5)].sqrt()))
+        .size(520, 340)
+        .svg()?;
+    Ok(html! {
+        h2 { "Poses, the worst first" }
+        (worst_table(measured))
+        div.side {
+            (page::figure(&residual, "A pose far above the others was blurred, in motion, or partly hidden."))
+            (page::figure(&sigma, "From the corners, the calibration and the target together: most of it is the calibration's, which all poses share."))
+        }
+    })
+}
 
 /// The poses with the largest residuals.
 fn worst_table(measured: &[MeasuredPose]) -> Markup {
     let mut found: Vec<_> = measured.iter().filter_map(|m| Some((m, m.target.as_ref().ok()?))).collect();
-    found.sort_by(|a, b| b.1.rms_px.total_cmp(&a.1.rms_px));
+    found.sort_by(|a, b| b.1.chi_square.total_cmp(&a.1.chi_square));
     let row = |(m, t): &(&MeasuredPose, &TargetPose)| {
         let sigma = |k: usize| number(Some(t.covariance[(k, k)].sqrt()), 4);
-        let figures = [number(Some(t.rms_px), 3), number(Some(t.fit_rms_mm), 4), sigma(3), sigma(4), sigma(5)];
+        let figures = [
+            number(Some(t.chi_square), 2),
+            number(Some(t.rms_px), 4),
+            number(Some(t.fit_rms_mm), 4),
+            sigma(3),
+            sigma(4),
+            sigma(5),
+        ];
         let mut row = vec![m.at.pose.clone(), m.at.group.clone()];
         row.extend(figures);
-        row.push(t.corners.to_string());
+        row.extend([t.corners.to_string(), t.outliers.to_string()]);
         row
     };
     let rows: Vec<Vec<String>> = found.iter().take(WORST).map(row).collect();
-    page::table(
-        &["pose", "group", "reprojection, px", "board fit, mm", "sigma x, mm", "sigma y, mm", "sigma z, mm", "corners"],
-        &rows,
-    )
+    let header = [
+        "pose",
+        "group",
+        "chi-square",
+        "residual, px",
+        "board fit, mm",
+        "sigma x, mm",
+        "sigma y, mm",
+        "sigma z, mm",
+        "corners",
+        "outliers",
+    ];
+    page::table(&header, &rows)
 }
 
-/// The report.
-pub fn page(measured: &[MeasuredPose], file: &MeasureFile) -> Result<String> {
-    let (poses, count) = file.counts();
-    let tone = if count == poses { Tone::Good } else { Tone::Doubtful };
-    let of = |figure: fn(&TargetPose) -> f64| -> Vec<(f64, f64)> {
-        measured.iter().enumerate().filter_map(|(i, m)| Some((i as f64, figure(m.target.as_ref().ok()?)))).collect()
-    };
-    let place = |i: usize, j: usize| -> Vec<(f64, f64)> {
-        measured
+/// The target as a map of its crossings' deviations.
+fn target(shape: &Shape, columns: usize) -> Result<Markup> {
+    let largest = shape.deviations_mm.iter().map(|d| d.norm()).fold(1e-6, f64::max);
+    // The largest arrow is as long as a square.
+    let magnified = 1.0 / largest;
+    let arrows = |of: fn(&nalgebra::Vector3<f64>) -> [f64; 2]| -> Vec<[f64; 4]> {
+        let place = |k: usize| [(k % columns) as f64, (k / columns) as f64];
+        shape
+            .deviations_mm
             .iter()
-            .filter_map(|m| m.target.as_ref().ok())
-            .map(|t| (t.cam_from_board.translation.vector[i], t.cam_from_board.translation.vector[j]))
+            .enumerate()
+            .map(|(k, d)| {
+                let ([x, y], [dx, dy]) = (place(k), of(d));
+                [x, y, dx * magnified, dy * magnified]
+            })
             .collect()
     };
-    let residual = Plot::new("Residual of every pose", "pose, in the order of the list", "RMS, px")
-        .points("", &of(|t| t.rms_px))
-        .svg()?;
-    let sigma = Plot::new("Standard deviation of the mark point", "pose, in the order of the list", "mm")
-        .points("x", &of(|t| t.covariance[(3, 3)].sqrt()))
-        .points("y", &of(|t| t.covariance[(4, 4)].sqrt()))
-        .points("z", &of(|t| t.covariance[(5, 5)].sqrt()))
-        .svg()?;
-    let front = Plot::new("Mark points, as the left camera sees them", "x, mm", "y, mm")
-        .points("", &place(0, 1))
-        .equal_axes()
-        .y_down()
-        .svg()?;
-    let top = Plot::new("Mark points, from above", "x, mm", "z, mm").points("", &place(0, 2)).equal_axes().svg()?;
-    let missing: Vec<Vec<String>> =
-        measured.iter().filter_map(|m| Some(vec![m.at.pose.clone(), m.target.as_ref().err()?.clone()])).collect();
-    let content = html! {
-        (page::verdict(tone, &format!("{count} of {poses} poses measured"), &quality(file)))
-        (page::warnings(file.warnings()))
-        (page::figure(&residual, "A pose far above the others was blurred, moved between the two pictures, or shows another board. All poses \
-            far above the camera check's residual: the target's print is less true than the check board's (the board fit in mm says \
-            by how much), or the rig has changed since."))
-        h2 { "Poses, the worst first" }
-        (worst_table(measured))
-        (page::figure(&sigma, "From the corners and from the calibration together. z, away from the camera, is always the weakest."))
-        div.side { (page::figure(&front, "Where the target was in the pictures: a corner of the field that no pose visits says nothing about the lens there.")) (page::figure(&top, "Where the robot was sent: empty regions are not calibrated.")) }
-        @if !missing.is_empty() {
-            h2 { "Poses without a measurement" }
-            (page::table(&["pose", "why"], &missing))
-        }
+    let map = |title: &str, arrows: &[[f64; 4]]| {
+        Plot::new(title, "column", "row").vectors("", arrows).equal_axes().y_down().size(460, 400).svg()
     };
-    Ok(page::page("Target measurements", &format!("{poses} poses"), &content))
+    let flat = map("Target: crossings in the plane", &arrows(|d| [d.x, d.y]))?;
+    let deep = map("Target: crossings out of the plane", &arrows(|d| [0.0, d.z]))?;
+    let said = format!(
+        "An arrow as long as a square is {:.2} um. Crossings scatter by {:.2} um a coordinate in the plane and {:.2} um out of it; the \
+         target is {:+.1} ppm larger than its drawing, known to {:.1} ppm.",
+        1e3 * largest,
+        1e3 * shape.in_plane_mm,
+        1e3 * shape.out_of_plane_mm,
+        1e6 * shape.stretch[0],
+        1e6 * shape.stretch[1]
+    );
+    Ok(html! {
+        h2 { "The target as it is" }
+        div.side { (page::figure(&flat, &said)) (page::figure(&deep, "Down is away from the viewer, at the same scale. A bow shows as arrows that point one way in the middle and the other way at the rim.")) }
+    })
+}
+
+/// Mark points of each group from three sides, with the sphere about the centre.
+fn places(measured: &[MeasuredPose]) -> Result<Markup> {
+    let mut groups: Vec<&str> = Vec::new();
+    for m in measured {
+        if !groups.contains(&m.at.group.as_str()) {
+            groups.push(&m.at.group);
+        }
+    }
+    let mut rows = Vec::new();
+    for group in groups {
+        let of_group: Vec<&MeasuredPose> = measured.iter().filter(|m| m.at.group == group).collect();
+        rows.push((
+            group,
+            [[0, 1], [0, 2], [2, 1]].map(|axes| view(&of_group, axes)).into_iter().collect::<Result<Vec<_>>>()?,
+        ));
+    }
+    Ok(html! {
+        h2 { "Mark points of each group" }
+        @for (group, views) in &rows {
+            p.lead { "group " (group) ": from the left camera, from above, from the side; the circle is the sphere through the median distance to the centre" }
+            div.side { @for svg in views { figure style="flex: 1 1 280px" { (PreEscaped(svg.as_str())) } } }
+        }
+    })
+}
+
+fn view(group: &[&MeasuredPose], [a, b]: [usize; 2]) -> Result<String> {
+    const AXES: [&str; 3] = ["x, mm", "y, mm", "z, mm"];
+    let at = |m: &&MeasuredPose| m.target.as_ref().ok().map(|t| t.cam_from_board.translation.vector);
+    let center = group.iter().find(|m| m.at.role == Role::Center).and_then(at);
+    let points: Vec<(f64, f64)> = group.iter().filter_map(at).map(|p| (p[a], p[b])).collect();
+    let mut plot = Plot::new("", AXES[a], AXES[b]).equal_axes().size(330, 330);
+    if b == 1 {
+        plot = plot.y_down();
+    }
+    if let Some(center) = center {
+        let away = group.iter().filter(|m| m.at.role != Role::Center).filter_map(at).map(|p| (p - center).norm());
+        let radius = crate::statistics::median(away).unwrap_or(0.0);
+        let circle: Vec<(f64, f64)> = (0..=72)
+            .map(|k| (f64::from(k) * TAU / 72.0).sin_cos())
+            .map(|(sin, cos)| (center[a] + radius * cos, center[b] + radius * sin))
+            .collect();
+        plot = plot.line("", &circle).points("", &[(center[a], center[b])]);
+    }
+    plot.points("", &points).svg()
+}
+
+fn distances(distances: &[Distance]) -> Result<Markup> {
+    if distances.is_empty() {
+        return Ok(html! {});
+    }
+    let points: Vec<(f64, f64)> = distances.iter().map(|d| (d.commanded_mm, d.measured_mm - d.commanded_mm)).collect();
+    let svg = Plot::new("Distance to the group's centre", "commanded, mm", "measured minus commanded, mm")
+        .points("", &points)
+        .size(640, 340)
+        .svg()?;
+    Ok(html! {
+        h2 { "Distances" }
+        (page::figure(&svg, "Against the nominal robot (robot.toml here, else Table 1 of the paper): what identification will explain. A single point far from the others is a pose that the robot did not go to, or another pose's pictures."))
+    })
+}
+
+fn thumbnails(list: &[Thumbnail]) -> Markup {
+    html! {
+        @if !list.is_empty() {
+            h2 { "Pictures of failures and of the worst poses" }
+            div.side {
+                @for picture in list {
+                    figure {
+                        @if !picture.jpeg_base64.is_empty() {
+                            img alt={ "pose " (picture.pose) } style="max-width: 100%" src={ "data:image/jpeg;base64," (picture.jpeg_base64) };
+                        }
+                        figcaption { strong { (picture.pose) } ": " (picture.caption) }
+                    }
+                }
+            }
+        }
+    }
 }

@@ -6,9 +6,13 @@ pub mod figure;
 pub mod identify;
 pub mod measure;
 pub mod page;
+pub mod robot;
 pub mod table;
 
-use crate::error::Explain;
+use crate::diagnostic::Explain;
+
+/// Result of drawing.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// What can go wrong in a report.
 #[derive(Debug, thiserror::Error)]

@@ -5,9 +5,11 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::corrections::Corrections;
+use super::ends::Ends;
 use crate::geometry::Transform;
 
-/// One joint with the link before it: `Rx(alpha) Tx(a) Ry(beta) Rz(q + theta) Tz(d)`.
+/// One joint with the link before it: `Rx(alpha) Tx(a) Ry(beta) Rz(sign q + theta) Tz(d)`, or, where it slides,
+/// `Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d + sign q)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Joint {
     /// Twist of the link before, rad.
@@ -20,8 +22,28 @@ pub struct Joint {
     pub theta_rad: f64,
     /// Offset along the joint's axis, mm.
     pub d_mm: f64,
-    /// Range of the commanded angle, rad, where known.
+    /// Range of the commanded angle, rad (of a sliding joint: of its way, mm), where known.
     pub limits_rad: Option<(f64, f64)>,
+    /// Whether it slides along its axis instead of turning about it.
+    pub slides: bool,
+    /// How the controller counts it: 1, or -1 where it counts against the axis.
+    pub sign: f64,
+}
+
+/// A turning joint with all parameters zero, counted along its axis.
+impl Default for Joint {
+    fn default() -> Joint {
+        Joint {
+            alpha_rad: 0.0,
+            a_mm: 0.0,
+            beta_rad: 0.0,
+            theta_rad: 0.0,
+            d_mm: 0.0,
+            limits_rad: None,
+            slides: false,
+            sign: 1.0,
+        }
+    }
 }
 
 /// A serial robot with a target at its flange.
@@ -35,26 +57,38 @@ pub struct Robot {
     pub tool_mm: Vector3<f64>,
     /// What the joints do beyond the commanded angle; nothing by default.
     pub corrections: Corrections,
+    /// The constant transforms at both ends.
+    pub ends: Ends,
 }
 
 impl Joint {
-    /// Maps the joint's frame to the frame of the joint before, at the commanded angle `q_rad`.
-    pub fn previous_from_this(&self, q_rad: f64) -> Transform {
+    /// Turn about the joint's axis when `q` is commanded (rad, of a sliding joint mm), rad.
+    pub fn turn_rad(&self, q: f64) -> f64 {
+        if self.slides { self.theta_rad } else { self.sign * q + self.theta_rad }
+    }
+
+    /// Way along the joint's axis when `q` is commanded (rad, of a sliding joint mm), mm.
+    pub fn shift_mm(&self, q: f64) -> f64 {
+        if self.slides { self.sign * q + self.d_mm } else { self.d_mm }
+    }
+
+    /// Maps the joint's frame to the frame of the joint before when `q` is commanded (rad, of a sliding joint mm).
+    pub fn previous_from_this(&self, q: f64) -> Transform {
         let x = Vector3::x_axis();
         let link = Isometry3::from_parts(
             Translation3::new(self.a_mm, 0.0, 0.0),
             UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.beta_rad),
         );
         let joint = Isometry3::from_parts(
-            Translation3::new(0.0, 0.0, self.d_mm),
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), q_rad + self.theta_rad),
+            Translation3::new(0.0, 0.0, self.shift_mm(q)),
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.turn_rad(q)),
         );
         UnitQuaternion::from_axis_angle(&x, self.alpha_rad) * link * joint
     }
 }
 
 impl Robot {
-    /// The flange's frame (the last joint's) in the base frame. One commanded angle a joint, rad; corrections are applied.
+    /// The flange's frame (the last joint's) in the base frame. One commanded angle a joint, rad (mm where it slides); corrections are applied.
     pub fn base_from_flange(&self, joints_rad: &[f64]) -> Transform {
         debug_assert_eq!(joints_rad.len(), self.joints.len());
         let corrected_rad = self.corrected_rad(joints_rad);
@@ -74,10 +108,9 @@ impl Robot {
         let joint = |alpha_deg: f64, a_mm, theta_deg: f64, d_mm| Joint {
             alpha_rad: alpha_deg.to_radians(),
             a_mm,
-            beta_rad: 0.0,
             theta_rad: theta_deg.to_radians(),
             d_mm,
-            limits_rad: None,
+            ..Joint::default()
         };
         Robot {
             name: "six-axis robot of Table 1".to_owned(),
@@ -91,6 +124,7 @@ impl Robot {
             ],
             tool_mm: Vector3::zeros(),
             corrections: Corrections::default(),
+            ends: Ends::default(),
         }
     }
 

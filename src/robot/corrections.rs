@@ -1,9 +1,10 @@
 //! What the joints do beyond the commanded angle: sag under gravity, and once- and twice-a-turn errors of the drives.
 //!
 //! In: the commanded angles. Out: the small angle that is added to each of them.
-//! Sag of joint j is its compliance times the torque of unit weights at the elbow, the wrist and the tool about its axis,
-//! on the chain without corrections; the periodic errors are `a sin q + b cos q + c sin 2q + d cos 2q`.
-//! Both are linear in their coefficients, so a pose contributes constants (the features) and the coefficients are parameters.
+//! Sag of joint j is its compliance times the torque of unit weights at origins of the chain and at the tool about its axis,
+//! on the robot's own chain without corrections; the periodic errors are `a sin q + b cos q + c sin 2q + d cos 2q`; a coupling
+//! is a ratio times the angle of another joint, or of the joint itself (an error of its scale).
+//! All are linear in their coefficients, so a pose contributes constants (the features) and the coefficients are parameters.
 //! The direction of gravity must be known: a robot on a wall needs its own.
 
 use nalgebra::{Point3, Vector3};
@@ -13,34 +14,36 @@ use super::Robot;
 /// Where a unit weight hangs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LoadPoint {
-    /// The origin of the third joint's frame.
-    Elbow,
-    /// The origin of the last but one joint's frame.
-    Wrist,
+    /// The origin of a joint's frame, the joint counted from 0.
+    Origin(usize),
     /// The target's mark point.
     Tool,
 }
 
 impl LoadPoint {
-    /// Its name in files.
-    pub fn name(self) -> &'static str {
+    /// Its name in files: `joint_3`, `tool`.
+    pub fn name(self) -> String {
         match self {
-            LoadPoint::Elbow => "elbow",
-            LoadPoint::Wrist => "wrist",
-            LoadPoint::Tool => "tool",
+            LoadPoint::Origin(joint) => format!("joint_{}", joint + 1),
+            LoadPoint::Tool => "tool".to_owned(),
         }
     }
 
-    /// The point of that name.
-    pub fn from_name(name: &str) -> Option<LoadPoint> {
-        [LoadPoint::Elbow, LoadPoint::Wrist, LoadPoint::Tool].into_iter().find(|p| p.name() == name)
+    /// The point of that name on a robot of so many joints. `elbow` and `wrist` are the third and the last but one joint.
+    pub fn from_name(name: &str, joint_count: usize) -> Option<LoadPoint> {
+        let joint = match name {
+            "tool" => return Some(LoadPoint::Tool),
+            "elbow" => 2,
+            "wrist" => joint_count.checked_sub(2)?,
+            _ => name.strip_prefix("joint_")?.parse::<usize>().ok()?.checked_sub(1)?,
+        };
+        (joint < joint_count).then_some(LoadPoint::Origin(joint))
     }
 
     /// The joint whose frame's origin it is, or `None` for the tool.
-    fn joint(self, joint_count: usize) -> Option<usize> {
+    fn joint(self) -> Option<usize> {
         match self {
-            LoadPoint::Elbow => Some(2),
-            LoadPoint::Wrist => Some(joint_count.saturating_sub(2)),
+            LoadPoint::Origin(joint) => Some(joint),
             LoadPoint::Tool => None,
         }
     }
@@ -106,6 +109,17 @@ pub struct HarmonicTerm {
     pub amplitude_rad: f64,
 }
 
+/// A joint that moves by itself as another one moves, or that counts its own angle too long.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CouplingTerm {
+    /// The joint that moves, from 0.
+    pub joint: usize,
+    /// The joint that moves it, from 0; itself for an error of scale.
+    pub of: usize,
+    /// Way of the one over the commanded way of the other.
+    pub ratio: f64,
+}
+
 /// All corrections of a robot; none by default.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Corrections {
@@ -115,18 +129,25 @@ pub struct Corrections {
     pub gravity: Vec<GravityTerm>,
     /// Periodic errors.
     pub harmonics: Vec<HarmonicTerm>,
+    /// Scale and coupling.
+    pub couplings: Vec<CouplingTerm>,
 }
 
 impl Default for Corrections {
     fn default() -> Corrections {
-        Corrections { gravity_direction: Vector3::new(0.0, 0.0, -1.0), gravity: Vec::new(), harmonics: Vec::new() }
+        Corrections {
+            gravity_direction: Vector3::new(0.0, 0.0, -1.0),
+            gravity: Vec::new(),
+            harmonics: Vec::new(),
+            couplings: Vec::new(),
+        }
     }
 }
 
 impl Corrections {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.gravity.is_empty() && self.harmonics.is_empty()
+        self.gravity.is_empty() && self.harmonics.is_empty() && self.couplings.is_empty()
     }
 }
 
@@ -153,7 +174,7 @@ impl Torques {
 
     /// The lever of a unit weight at `point` about the axis of `joint` (from 0), m; zero where either does not exist.
     pub fn lever_m(&self, joint: usize, point: LoadPoint) -> f64 {
-        let place = match point.joint(self.axes.len()) {
+        let place = match point.joint() {
             Some(index) => self.axes.get(index).map(|(_, origin)| *origin),
             None => Some(self.tool_mm),
         };
@@ -167,18 +188,28 @@ impl Torques {
 impl Robot {
     /// The angles the joints really take when these are commanded, rad.
     pub fn corrected_rad(&self, joints_rad: &[f64]) -> Vec<f64> {
+        if self.corrections.is_empty() {
+            return joints_rad.to_vec();
+        }
+        self.corrected_with(joints_rad, &Torques::new(self, joints_rad))
+    }
+
+    /// The same with levers that are given.
+    pub fn corrected_with(&self, joints_rad: &[f64], torques: &Torques) -> Vec<f64> {
         let mut corrected = joints_rad.to_vec();
         for term in &self.corrections.harmonics {
             if let (Some(angle), Some(&q)) = (corrected.get_mut(term.joint), joints_rad.get(term.joint)) {
                 *angle += term.amplitude_rad * term.wave.at(q);
             }
         }
-        if !self.corrections.gravity.is_empty() {
-            let torques = Torques::new(self, joints_rad);
-            for term in &self.corrections.gravity {
-                if let Some(angle) = corrected.get_mut(term.joint) {
-                    *angle += term.k_rad_per_m * torques.lever_m(term.joint, term.point);
-                }
+        for term in &self.corrections.couplings {
+            if let (Some(angle), Some(&q)) = (corrected.get_mut(term.joint), joints_rad.get(term.of)) {
+                *angle += term.ratio * q;
+            }
+        }
+        for term in &self.corrections.gravity {
+            if let Some(angle) = corrected.get_mut(term.joint) {
+                *angle += term.k_rad_per_m * torques.lever_m(term.joint, term.point);
             }
         }
         corrected
@@ -192,7 +223,7 @@ mod tests {
     #[test]
     fn a_stretched_arm_sags_and_an_upright_one_does_not() {
         let mut robot = Robot::paper();
-        robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Elbow, k_rad_per_m: 1e-3 }];
+        robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Origin(2), k_rad_per_m: 1e-3 }];
         let upright = robot.corrected_rad(&[0.0; 6]);
         assert!(upright[1].abs() < 1e-15);
         // Lying flat, the elbow has a lever of 0.264 m; gravity lowers the target.

@@ -4,9 +4,10 @@ use camino::Utf8Path;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
-use super::{Corrections, Error, Joint, Robot};
-use crate::error::{Place, Result};
+use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
+use super::ends::PoseRecord;
+use super::{Corrections, Ends, Error, Joint, Result, Robot};
+use crate::diagnostic::Place;
 use crate::files;
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -14,6 +15,9 @@ use crate::files;
 struct RobotRecord {
     name: String,
     convention: String,
+    /// Unit vector along gravity in the base frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    gravity_direction: Option<[f64; 3]>,
     joint: Vec<JointRecord>,
     #[serde(default)]
     tool: ToolRecord,
@@ -21,13 +25,21 @@ struct RobotRecord {
     gravity: Option<GravityRecord>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     harmonics: Option<HarmonicsRecord>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    couplings: Option<CouplingsRecord>,
+    /// `root_from_frame0`
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    base: Option<PoseRecord>,
+    /// `last_frame_from_flange`
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    flange: Option<PoseRecord>,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct JointRecord {
-    /// `revolute`, the only kind there is; other programs write it.
-    #[serde(default, rename = "type", skip_serializing)]
+    /// `revolute` (the default) or `prismatic`.
+    #[serde(default, rename = "type", skip_serializing_if = "Option::is_none")]
     kind: Option<String>,
     alpha_deg: f64,
     a_mm: f64,
@@ -37,6 +49,11 @@ struct JointRecord {
     d_mm: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     limits_deg: Option<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    limits_mm: Option<[f64; 2]>,
+    /// 1 or -1: how the controller counts it.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    sign: f64,
 }
 
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -51,8 +68,9 @@ struct ToolRecord {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GravityRecord {
-    #[serde(default = "downwards")]
-    direction: [f64; 3],
+    /// Where older files say `gravity_direction`.
+    #[serde(default, skip_serializing)]
+    direction: Option<[f64; 3]>,
     #[serde(default)]
     terms: Vec<GravityTermRecord>,
 }
@@ -80,8 +98,27 @@ struct HarmonicTermRecord {
     amplitude_mrad: f64,
 }
 
-fn downwards() -> [f64; 3] {
-    [0.0, 0.0, -1.0]
+/// What a joint does by itself as another one moves, or as it moves itself (an error of its scale).
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CouplingsRecord {
+    terms: Vec<CouplingTermRecord>,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CouplingTermRecord {
+    joint: usize,
+    of: usize,
+    per_mille: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
 }
 
 fn is_zero(value: &f64) -> bool {
@@ -92,7 +129,7 @@ fn is_zero(value: &f64) -> bool {
 pub fn read(path: &Utf8Path) -> Result<Robot> {
     let hint = "`--robot FILE` names the robot's nominal parameters; `stereocal simulate` writes an example";
     let record: RobotRecord = files::read_toml(path, "the robot", Some(hint))?;
-    record.robot().map_err(|message| Error::File { message, place: Place { path: path.to_owned(), line: None } }.into())
+    record.robot().map_err(|message| Error::File { message, place: Place { path: path.to_owned(), line: None } })
 }
 
 /// The text of `robot.toml`.
@@ -102,7 +139,7 @@ pub fn to_toml(robot: &Robot) -> String {
 }
 
 impl RobotRecord {
-    fn robot(&self) -> std::result::Result<Robot, String> {
+    fn robot(&self) -> Result<Robot, String> {
         if self.convention != "mdh" {
             return Err(format!(
                 "convention is \"{}\"; only \"mdh\" is known (alpha and a of link i-1, theta and d of joint i)",
@@ -115,16 +152,30 @@ impl RobotRecord {
         let tool_mm = Vector3::new(self.tool.x_mm, self.tool.y_mm, self.tool.z_mm);
         let mut joints = Vec::with_capacity(self.joint.len());
         for (i, j) in self.joint.iter().enumerate() {
-            if let Some(kind) = j.kind.as_deref().filter(|kind| *kind != "revolute") {
-                return Err(format!("joint {}: type is \"{kind}\"; only revolute joints are known", i + 1));
+            let slides = match j.kind.as_deref() {
+                None | Some("revolute") => false,
+                Some("prismatic") => true,
+                Some(kind) => {
+                    return Err(format!("joint {}: type is \"{kind}\"; it is \"revolute\" or \"prismatic\"", i + 1));
+                }
+            };
+            if j.sign.abs() != 1.0 {
+                return Err(format!("joint {}: sign is {}; it is 1 or -1", i + 1, j.sign));
             }
-            let limits = j.limits_deg.unwrap_or([-1.0, 1.0]);
+            let (unit, given, other) = match slides {
+                true => ("limits_mm", j.limits_mm, j.limits_deg),
+                false => ("limits_deg", j.limits_deg, j.limits_mm),
+            };
+            if other.is_some() {
+                return Err(format!("joint {}: the limits of this joint are {unit}", i + 1));
+            }
+            let limits = given.unwrap_or([-1.0, 1.0]);
             let numbers = [j.alpha_deg, j.a_mm, j.beta_deg, j.theta_deg, j.d_mm, limits[0], limits[1]];
             if numbers.iter().any(|v| !v.is_finite()) {
                 return Err(format!("joint {}: every number must be finite", i + 1));
             }
             if limits[0] >= limits[1] {
-                return Err(format!("joint {}: limits_deg runs from {} to {}", i + 1, limits[0], limits[1]));
+                return Err(format!("joint {}: {unit} runs from {} to {}", i + 1, limits[0], limits[1]));
             }
             joints.push(Joint {
                 alpha_rad: j.alpha_deg.to_radians(),
@@ -132,31 +183,43 @@ impl RobotRecord {
                 beta_rad: j.beta_deg.to_radians(),
                 theta_rad: j.theta_deg.to_radians(),
                 d_mm: j.d_mm,
-                limits_rad: j.limits_deg.map(|[low, high]| (low.to_radians(), high.to_radians())),
+                limits_rad: given
+                    .map(|[low, high]| if slides { (low, high) } else { (low.to_radians(), high.to_radians()) }),
+                slides,
+                sign: j.sign,
             });
         }
         if tool_mm.iter().any(|v| !v.is_finite()) {
             return Err("[tool]: every number must be finite".to_owned());
         }
         let corrections = self.corrections(joints.len())?;
-        Ok(Robot { name: self.name.clone(), joints, tool_mm, corrections })
+        let end = |table: &str, pose: &Option<PoseRecord>| {
+            let finite = || format!("[{table}]: every number must be finite");
+            pose.unwrap_or_default().transform().ok_or_else(finite)
+        };
+        let ends =
+            Ends { root_from_frame0: end("base", &self.base)?, last_frame_from_flange: end("flange", &self.flange)? };
+        Ok(Robot { name: self.name.clone(), joints, tool_mm, corrections, ends })
     }
 
-    fn corrections(&self, joint_count: usize) -> std::result::Result<Corrections, String> {
+    fn corrections(&self, joint_count: usize) -> Result<Corrections, String> {
         let mut corrections = Corrections::default();
         let index = |table: &str, joint: usize| match joint {
             1.. if joint <= joint_count => Ok(joint - 1),
             _ => Err(format!("[{table}]: joint {joint} of a robot with {joint_count}")),
         };
-        if let Some(gravity) = &self.gravity {
-            let direction = Vector3::from(gravity.direction);
+        let direction = self.gravity_direction.or(self.gravity.as_ref().and_then(|g| g.direction));
+        if let Some(direction) = direction.map(Vector3::from) {
             if !(direction.norm().is_finite() && direction.norm() > 0.0) {
-                return Err("[gravity]: direction must be a vector that is finite and not zero".to_owned());
+                return Err("gravity_direction must be a vector that is finite and not zero".to_owned());
             }
             corrections.gravity_direction = direction.normalize();
+        }
+        if let Some(gravity) = &self.gravity {
             for term in &gravity.terms {
-                let point = LoadPoint::from_name(&term.point)
-                    .ok_or_else(|| format!("[gravity]: point \"{}\"; it is elbow, wrist or tool", term.point))?;
+                let point = LoadPoint::from_name(&term.point, joint_count).ok_or_else(|| {
+                    format!("[gravity]: point \"{}\"; it is joint_1 .. joint_{joint_count} or tool", term.point)
+                })?;
                 let joint = index("gravity", term.joint)?;
                 corrections.gravity.push(GravityTerm { joint, point, k_rad_per_m: term.k_mrad_per_m / 1000.0 });
             }
@@ -169,28 +232,29 @@ impl RobotRecord {
             let joint = index("harmonics", term.joint)?;
             corrections.harmonics.push(HarmonicTerm { joint, wave, amplitude_rad: term.amplitude_mrad / 1000.0 });
         }
+        for term in self.couplings.iter().flat_map(|c| &c.terms) {
+            let (joint, of) = (index("couplings", term.joint)?, index("couplings", term.of)?);
+            corrections.couplings.push(CouplingTerm { joint, of, ratio: term.per_mille / 1000.0 });
+        }
         let coefficients = corrections.gravity.iter().map(|t| t.k_rad_per_m);
-        if coefficients.chain(corrections.harmonics.iter().map(|t| t.amplitude_rad)).any(|v| !v.is_finite()) {
-            return Err("[gravity] and [harmonics]: every number must be finite".to_owned());
+        let coefficients = coefficients.chain(corrections.harmonics.iter().map(|t| t.amplitude_rad));
+        if coefficients.chain(corrections.couplings.iter().map(|t| t.ratio)).any(|v| !v.is_finite()) {
+            return Err("[gravity], [harmonics] and [couplings]: every number must be finite".to_owned());
         }
         Ok(corrections)
     }
 }
 
 fn gravity_record(corrections: &Corrections) -> Option<GravityRecord> {
-    let default = Corrections::default();
-    if corrections.gravity.is_empty() && corrections.gravity_direction == default.gravity_direction {
+    if corrections.gravity.is_empty() {
         return None;
     }
     let term = |t: &GravityTerm| GravityTermRecord {
         joint: t.joint + 1,
-        point: t.point.name().to_owned(),
+        point: t.point.name(),
         k_mrad_per_m: 1000.0 * t.k_rad_per_m,
     };
-    Some(GravityRecord {
-        direction: corrections.gravity_direction.into(),
-        terms: corrections.gravity.iter().map(term).collect(),
-    })
+    Some(GravityRecord { direction: None, terms: corrections.gravity.iter().map(term).collect() })
 }
 
 fn harmonics_record(corrections: &Corrections) -> Option<HarmonicsRecord> {
@@ -203,27 +267,41 @@ fn harmonics_record(corrections: &Corrections) -> Option<HarmonicsRecord> {
     if terms.is_empty() { None } else { Some(HarmonicsRecord { terms }) }
 }
 
+fn couplings_record(corrections: &Corrections) -> Option<CouplingsRecord> {
+    let term = |t: &CouplingTerm| CouplingTermRecord { joint: t.joint + 1, of: t.of + 1, per_mille: 1000.0 * t.ratio };
+    let terms: Vec<_> = corrections.couplings.iter().map(term).collect();
+    if terms.is_empty() { None } else { Some(CouplingsRecord { terms }) }
+}
+
 impl From<&Robot> for RobotRecord {
     fn from(robot: &Robot) -> RobotRecord {
+        let direction = robot.corrections.gravity_direction;
+        let degrees = |limits: Option<(f64, f64)>| limits.map(|(low, high)| [low.to_degrees(), high.to_degrees()]);
         RobotRecord {
             name: robot.name.clone(),
             convention: "mdh".to_owned(),
+            gravity_direction: (direction != Corrections::default().gravity_direction).then(|| direction.into()),
             joint: robot
                 .joints
                 .iter()
                 .map(|j| JointRecord {
-                    kind: None,
+                    kind: j.slides.then(|| "prismatic".to_owned()),
                     alpha_deg: j.alpha_rad.to_degrees(),
                     a_mm: j.a_mm,
                     beta_deg: j.beta_rad.to_degrees(),
                     theta_deg: j.theta_rad.to_degrees(),
                     d_mm: j.d_mm,
-                    limits_deg: j.limits_rad.map(|(low, high)| [low.to_degrees(), high.to_degrees()]),
+                    limits_deg: degrees(j.limits_rad.filter(|_| !j.slides)),
+                    limits_mm: j.limits_rad.filter(|_| j.slides).map(<[f64; 2]>::from),
+                    sign: j.sign,
                 })
                 .collect(),
             tool: ToolRecord { x_mm: robot.tool_mm.x, y_mm: robot.tool_mm.y, z_mm: robot.tool_mm.z },
             gravity: gravity_record(&robot.corrections),
             harmonics: harmonics_record(&robot.corrections),
+            couplings: couplings_record(&robot.corrections),
+            base: PoseRecord::of(&robot.ends.root_from_frame0),
+            flange: PoseRecord::of(&robot.ends.last_frame_from_flange),
         }
     }
 }
@@ -238,21 +316,36 @@ mod tests {
         robot.joints[2].beta_rad = 0.001;
         robot.joints[0].limits_rad = Some((-3.0, 3.0));
         robot.tool_mm = Vector3::new(1.5, -2.0, 30.0);
-        robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Wrist, k_rad_per_m: 0.25 }];
+        robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Origin(4), k_rad_per_m: 0.25 }];
         robot.corrections.harmonics = vec![HarmonicTerm { joint: 5, wave: Wave::Sin2, amplitude_rad: 0.5 }];
+        robot.ends.last_frame_from_flange =
+            crate::geometry::transform(Vector3::new(0.3, -3.0, 0.5), Vector3::new(1.0, 2.0, 3.0));
         let back = toml::from_str::<RobotRecord>(&to_toml(&robot)).unwrap().robot().unwrap();
         for (a, b) in back.joints.iter().zip(&robot.joints) {
             assert!((a.alpha_rad - b.alpha_rad).abs() < 1e-15 && (a.beta_rad - b.beta_rad).abs() < 1e-15);
         }
         assert_eq!(back.tool_mm, robot.tool_mm);
         assert_eq!(back.corrections, robot.corrections);
+        assert_eq!(back.ends.root_from_frame0, robot.ends.root_from_frame0);
+        let q = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
+        let off = back.root_from_flange(&q).inverse() * robot.root_from_flange(&q);
+        assert!(off.translation.vector.norm() < 1e-10 && off.rotation.angle() < 1e-12);
     }
 
     #[test]
-    fn a_joint_that_slides_is_refused() {
-        let sliding = to_toml(&Robot::paper()).replacen("[[joint]]", "[[joint]]\ntype = \"prismatic\"", 1);
-        let message = toml::from_str::<RobotRecord>(&sliding).unwrap().robot().unwrap_err();
-        assert!(message.contains("joint 1: type is \"prismatic\""), "{message}");
+    fn joints_turn_or_slide() {
+        let screwing = to_toml(&Robot::paper()).replacen("[[joint]]", "[[joint]]\ntype = \"screw\"", 1);
+        let message = toml::from_str::<RobotRecord>(&screwing).unwrap().robot().unwrap_err();
+        assert!(message.contains("joint 1: type is \"screw\""), "{message}");
+        let text = "[[joint]]\ntype = \"prismatic\"\nsign = -1.0\nlimits_mm = [0.0, 300.0]";
+        let sliding = to_toml(&Robot::paper()).replacen("[[joint]]", text, 1);
+        let robot = toml::from_str::<RobotRecord>(&sliding).unwrap().robot().unwrap();
+        assert!(robot.joints[0].slides && robot.joints[0].sign == -1.0);
+        assert_eq!(robot.joints[0].limits_rad, Some((0.0, 300.0)));
+        let lower = robot.target_mm(&[100.0, 0.0, 0.0, 0.0, 0.0, 0.0]) - robot.target_mm(&[0.0; 6]);
+        assert!((lower - Vector3::new(0.0, 0.0, -100.0)).norm() < 1e-9, "{lower}");
+        let back = toml::from_str::<RobotRecord>(&to_toml(&robot)).unwrap().robot().unwrap();
+        assert_eq!(back.joints, robot.joints);
         let turning = to_toml(&Robot::paper()).replacen("[[joint]]", "[[joint]]\ntype = \"revolute\"", 1);
         assert!(toml::from_str::<RobotRecord>(&turning).unwrap().robot().is_ok());
     }

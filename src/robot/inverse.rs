@@ -34,8 +34,12 @@ fn jacobian(robot: &Robot, joints_rad: &[f64]) -> DMatrix<f64> {
     let mut columns = DMatrix::zeros(6, robot.joints.len());
     for (k, (joint, &q)) in robot.joints.iter().zip(joints_rad).enumerate() {
         base_from_joint *= joint.previous_from_this(q);
-        let axis = base_from_joint.rotation * nalgebra::Vector3::z();
+        let axis = base_from_joint.rotation * nalgebra::Vector3::z() * joint.sign;
         let lever = flange - base_from_joint.translation.vector;
+        if joint.slides {
+            columns.fixed_view_mut::<3, 1>(0, k).copy_from(&axis);
+            continue;
+        }
         columns.fixed_view_mut::<3, 1>(0, k).copy_from(&axis.cross(&lever));
         columns.fixed_view_mut::<3, 1>(3, k).copy_from(&(axis * ARM_MM));
     }

@@ -30,6 +30,9 @@ struct JointScrews {
     /// Axis of theta and d; both this and `y` pass through `origin`.
     z: Vector3<f64>,
     origin: Point3<f64>,
+    /// What the joint does by itself goes along `z` or about it, counted like this.
+    sign: f64,
+    slides: bool,
 }
 
 impl Screws {
@@ -41,7 +44,7 @@ impl Screws {
         for (joint, &q) in robot.joints.iter().zip(corrected_rad) {
             let (sa, ca) = joint.alpha_rad.sin_cos();
             let (sb, cb) = joint.beta_rad.sin_cos();
-            let (st, ct) = (q + joint.theta_rad).sin_cos();
+            let (st, ct) = joint.turn_rad(q).sin_cos();
             let x: Vector3<f64> = rotation.column(0).into();
             let (y0, z0) = (rotation.column(1), rotation.column(2));
             let y: Vector3<f64> = ca * y0 + sa * z0;
@@ -50,8 +53,8 @@ impl Screws {
             origin += joint.a_mm * x;
             let x1 = cb * x - sb * z1;
             let z = sb * x + cb * z1;
-            joints.push(JointScrews { x, before, y, z, origin });
-            origin += joint.d_mm * z;
+            joints.push(JointScrews { x, before, y, z, origin, sign: joint.sign, slides: joint.slides });
+            origin += joint.shift_mm(q) * z;
             rotation = Matrix3::from_columns(&[ct * x1 + st * y, ct * y - st * x1, z]);
         }
         let target_mm = origin + rotation * robot.tool_mm;
@@ -72,11 +75,13 @@ impl Screws {
             Parameter::Alpha(i) => column(i, &|s| s.x.cross(&(p - s.before)) * RAD_PER_MRAD),
             Parameter::A(i) => column(i, &|s| s.x),
             Parameter::Beta(i) => column(i, &|s| s.y.cross(&(p - s.origin)) * RAD_PER_MRAD),
-            Parameter::Theta(i) | Parameter::Gravity(i, _) | Parameter::Harmonic(i, _) => {
-                column(i, &|s| s.z.cross(&(p - s.origin)) * (feature * RAD_PER_MRAD))
-            }
+            Parameter::Theta(i) => column(i, &|s| s.z.cross(&(p - s.origin)) * RAD_PER_MRAD),
             Parameter::D(i) => column(i, &|s| s.z),
             Parameter::V(axis) => self.base_from_flange.column(axis.min(2)).into(),
+            Parameter::Gravity(i, _) | Parameter::Harmonic(i, _) | Parameter::Coupling(i, _) => column(i, &|s| {
+                let way = if s.slides { s.z } else { s.z.cross(&(p - s.origin)) };
+                way * (s.sign * feature * RAD_PER_MRAD)
+            }),
         }
     }
 
@@ -87,10 +92,10 @@ impl Screws {
         match parameter {
             Parameter::Alpha(i) => column(i, &|s| s.x * RAD_PER_MRAD),
             Parameter::Beta(i) => column(i, &|s| s.y * RAD_PER_MRAD),
-            Parameter::Theta(i) | Parameter::Gravity(i, _) | Parameter::Harmonic(i, _) => {
-                column(i, &|s| s.z * (feature * RAD_PER_MRAD))
-            }
-            Parameter::A(_) | Parameter::D(_) | Parameter::V(_) => Vector3::zeros(),
+            Parameter::Theta(i) => column(i, &|s| s.z * RAD_PER_MRAD),
+            _ => parameter.corrected_joint().map_or(Vector3::zeros(), |i| {
+                column(i, &|s| if s.slides { Vector3::zeros() } else { s.z * (s.sign * feature * RAD_PER_MRAD) })
+            }),
         }
     }
 }
@@ -100,6 +105,7 @@ pub fn feature(parameter: Parameter, torques: &Torques, joints_rad: &[f64]) -> f
     match parameter {
         Parameter::Gravity(joint, point) => torques.lever_m(joint, point),
         Parameter::Harmonic(joint, wave) => joints_rad.get(joint).map_or(0.0, |&q| wave.at(q)),
+        Parameter::Coupling(_, of) => joints_rad.get(of).copied().unwrap_or(0.0),
         _ => 1.0,
     }
 }
@@ -122,11 +128,21 @@ mod tests {
         }
         bent.tool_mm = Vector3::new(11.0, -7.0, 40.0);
         let mut seven = bent.clone();
-        let limits_rad = None;
-        seven.joints.push(Joint { alpha_rad: 1.5, a_mm: 10.0, beta_rad: 0.0, theta_rad: 0.3, d_mm: 20.0, limits_rad });
+        seven.joints.push(Joint {
+            alpha_rad: 1.5,
+            a_mm: 10.0,
+            theta_rad: 0.3,
+            d_mm: 20.0,
+            sign: -1.0,
+            ..Joint::default()
+        });
+        let mut sliding = bent.clone();
+        sliding.joints[2].slides = true;
+        sliding.joints[4].slides = true;
+        sliding.joints[4].sign = -1.0;
         let mut two = bent.clone();
         two.joints.truncate(2);
-        vec![bent, seven, two]
+        vec![bent, seven, two, sliding]
     }
 
     #[test]
@@ -143,6 +159,7 @@ mod tests {
             let mut parameters = robot.mdh_parameters();
             parameters.extend((1..robot.joints.len()).map(Parameter::Beta));
             parameters.extend(robot.harmonic_parameters(2));
+            parameters.extend(robot.coupling_parameters(true));
             let q: Vec<f64> = (0..robot.joints.len()).map(|i| 0.7 * i as f64 - 1.1).collect();
             let screws = Screws::new(&robot, &q);
             let torques = Torques::new(&robot, &q);

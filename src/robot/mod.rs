@@ -1,22 +1,33 @@
 //! The robot: its kinematic parameters, where they put the target, and the file they live in.
 
+mod anatomy;
+pub mod axes;
+pub mod catalogue;
 pub mod chain;
 pub mod corrections;
+pub mod ends;
 pub mod file;
 pub mod inverse;
 pub mod jacobian;
 pub mod parameters;
 
-use crate::error::{Explain, Place};
+use crate::diagnostic::{Explain, Place};
 
 pub use chain::{Joint, Robot};
 pub use corrections::Corrections;
+pub use ends::Ends;
 pub use parameters::{Parameter, Unit};
+
+/// Result of reading a robot.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// What can go wrong with a robot.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// Reading or writing files.
+    #[error(transparent)]
+    Files(#[from] crate::files::Error),
     /// The file says something that is no robot.
     #[error("{message}")]
     File {
@@ -25,12 +36,49 @@ pub enum Error {
         /// Where.
         place: Place,
     },
+    /// No arm of this name is known.
+    #[error("no arm `{name}` is known")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The name most like it.
+        nearest: String,
+    },
+    /// A robot file is there already.
+    #[error("a robot file is there already")]
+    Occupied {
+        /// Where.
+        path: String,
+    },
+    /// As many angles as joints are needed.
+    #[error("{found} joint angles, but the robot has {needed} joints")]
+    AngleCount {
+        /// Given.
+        found: usize,
+        /// Joints.
+        needed: usize,
+    },
 }
 
 impl Explain for Error {
     fn place(&self) -> Option<String> {
         match self {
+            Error::Files(e) => e.place(),
             Error::File { place, .. } => Some(place.to_string()),
+            Error::Occupied { path } => Some(path.clone()),
+            _ => None,
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        match self {
+            Error::Unknown { nearest, .. } => {
+                Some(format!("`stereocal robot list` shows the names; the most similar one is {nearest}"))
+            }
+            Error::Occupied { .. } => Some("`--force` overwrites it, `--out DIR` puts it elsewhere".to_owned()),
+            Error::AngleCount { needed, .. } => Some(format!("{needed} angles in degrees with commas between")),
+            Error::File { .. } => None,
+            Error::Files(e) => e.hint(),
         }
     }
 }

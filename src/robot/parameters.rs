@@ -1,10 +1,11 @@
 //! The robot as a vector of parameters, in mm and mrad (about equal effect at a robot's reach), and their names.
 
 use super::Robot;
-use super::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
+use super::anatomy::Anatomy;
+use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
 
 /// |sin alpha| below which two neighbouring axes count as parallel: 3 degrees, far above any tolerance of manufacture.
-const PARALLEL_SIN: f64 = 0.05;
+pub(super) const PARALLEL_SIN: f64 = 0.05;
 
 /// One number of the robot. Joints count from 0 here and as in the paper in [`Parameter::name`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -25,6 +26,8 @@ pub enum Parameter {
     Gravity(usize, LoadPoint),
     /// Amplitude of a periodic error.
     Harmonic(usize, Wave),
+    /// What a joint does by itself as another joint moves (itself: an error of its scale).
+    Coupling(usize, usize),
 }
 
 /// Unit of a parameter in vectors.
@@ -60,10 +63,20 @@ impl Parameter {
             Parameter::V(_) => "v_z".to_owned(),
             Parameter::Gravity(i, point) => format!("k_{}_{}", i + 1, point.name()),
             Parameter::Harmonic(i, wave) => format!("{}_{}", wave.name(), i + 1),
+            Parameter::Coupling(i, of) if i == of => format!("scale_{}", i + 1),
+            Parameter::Coupling(i, of) => format!("coupling_{}_{}", i + 1, of + 1),
         }
     }
 
-    /// mm for lengths, mrad for angles (compliances: mrad a metre of lever).
+    /// The joint that a correction moves at a pose; `None` for the chain's own parameters and the target's.
+    pub fn corrected_joint(self) -> Option<usize> {
+        match self {
+            Parameter::Gravity(i, _) | Parameter::Harmonic(i, _) | Parameter::Coupling(i, _) => Some(i),
+            _ => None,
+        }
+    }
+
+    /// mm for lengths, mrad for angles (compliances: mrad a metre of lever; couplings: thousandths).
     pub fn unit(self) -> Unit {
         match self {
             Parameter::A(_) | Parameter::D(_) | Parameter::V(_) => Unit::Mm,
@@ -85,30 +98,42 @@ impl Robot {
         (1..self.joints.len()).filter(parallel).map(Parameter::Beta).collect()
     }
 
-    /// Compliances that matter on an upright arm: of the shoulder and the elbow under the arm's own weight, then (`tool`)
-    /// of shoulder, elbow and the last but one joint under the load's. Terms whose joints the robot lacks are left out.
+    /// Compliances under the arm's own weight, of the shoulder and the elbow, and of the base where its axis does not stand along
+    /// gravity, then (`tool`) of these and the wrist under the load's. The joints come from the chain's geometry (see `super::anatomy`).
     pub fn gravity_parameters(&self, tool: bool) -> Vec<Parameter> {
-        let count = self.joints.len();
-        let mut terms = Vec::new();
-        if count >= 4 {
-            terms.push(Parameter::Gravity(1, LoadPoint::Elbow));
-            terms.push(Parameter::Gravity(1, LoadPoint::Wrist));
-            terms.push(Parameter::Gravity(2, LoadPoint::Wrist));
+        let Some(anatomy) = Anatomy::of(self) else { return Vec::new() };
+        let (shoulder, elbow, wrist) = (anatomy.shoulder, anatomy.elbow, anatomy.wrist);
+        let of_origin = |joint: usize, at: usize| Parameter::Gravity(joint, LoadPoint::Origin(at));
+        let mut terms = vec![of_origin(shoulder, elbow), of_origin(shoulder, wrist), of_origin(elbow, wrist)];
+        let leaning = anatomy.base_leans(self);
+        if leaning {
+            terms.extend([of_origin(0, elbow), of_origin(0, wrist)]);
         }
         if tool {
-            let joints = [1, 2, count.saturating_sub(2)];
-            terms.extend(
-                joints.iter().filter(|&&j| j >= 1 && j < count).map(|&j| Parameter::Gravity(j, LoadPoint::Tool)),
-            );
+            let joints = [shoulder, elbow, wrist].into_iter().chain(leaning.then_some(0));
+            terms.extend(joints.map(|joint| Parameter::Gravity(joint, LoadPoint::Tool)));
         }
-        terms.dedup();
+        terms.retain(|t| t.corrected_joint().is_some_and(|j| !self.joints[j].slides));
+        terms
+    }
+
+    /// An error of scale of every joint, and with `neighbours` what each does by itself as the joint before it moves
+    /// (a parallelogram, a cable that runs over two joints).
+    pub fn coupling_parameters(&self, neighbours: bool) -> Vec<Parameter> {
+        let count = self.joints.len();
+        let mut terms: Vec<Parameter> = (0..count).map(|i| Parameter::Coupling(i, i)).collect();
+        if neighbours {
+            let same = |i: &usize| self.joints[*i].slides == self.joints[*i - 1].slides;
+            terms.extend((1..count).filter(same).map(|i| Parameter::Coupling(i, i - 1)));
+        }
         terms
     }
 
     /// Once-a-turn (`order` 1) or also twice-a-turn (`order` 2) errors of every joint.
     pub fn harmonic_parameters(&self, order: usize) -> Vec<Parameter> {
         let waves = &Wave::ALL[..(2 * order).min(4)];
-        (0..self.joints.len()).flat_map(|i| waves.iter().map(move |&w| Parameter::Harmonic(i, w))).collect()
+        let turning = (0..self.joints.len()).filter(|&i| !self.joints[i].slides);
+        turning.flat_map(|i| waves.iter().map(move |&w| Parameter::Harmonic(i, w))).collect()
     }
 
     /// The parameter's value, mm or mrad.
@@ -128,6 +153,10 @@ impl Robot {
             Parameter::Harmonic(joint, wave) => {
                 let terms = self.corrections.harmonics.iter();
                 1000.0 * terms.filter(|t| t.joint == joint && t.wave == wave).map(|t| t.amplitude_rad).sum::<f64>()
+            }
+            Parameter::Coupling(joint, of) => {
+                let terms = self.corrections.couplings.iter();
+                1000.0 * terms.filter(|t| t.joint == joint && t.of == of).map(|t| t.ratio).sum::<f64>()
             }
         }
     }
@@ -149,6 +178,13 @@ impl Robot {
                 match terms.iter_mut().find(|t| t.joint == joint && t.wave == wave) {
                     Some(term) => term.amplitude_rad += angle,
                     None => terms.push(HarmonicTerm { joint, wave, amplitude_rad: angle }),
+                }
+            }
+            Parameter::Coupling(joint, of) => {
+                let terms = &mut self.corrections.couplings;
+                match terms.iter_mut().find(|t| t.joint == joint && t.of == of) {
+                    Some(term) => term.ratio += angle,
+                    None => terms.push(CouplingTerm { joint, of, ratio: angle }),
                 }
             }
             Parameter::Alpha(i) | Parameter::A(i) | Parameter::Beta(i) | Parameter::Theta(i) | Parameter::D(i) => {
@@ -197,6 +233,7 @@ mod tests {
         parameters.extend(robot.beta_parameters());
         parameters.extend(robot.gravity_parameters(true));
         parameters.extend(robot.harmonic_parameters(2));
+        parameters.extend(robot.coupling_parameters(true));
         let delta: Vec<f64> = (0..parameters.len()).map(|i| 0.1 + i as f64).collect();
         let shifted = robot.shifted(&parameters, &delta);
         for (&p, d) in parameters.iter().zip(&delta) {

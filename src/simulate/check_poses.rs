@@ -9,15 +9,32 @@ use super::rig::left_from_field;
 use crate::geometry::{Transform, transform};
 use crate::stereo::Rig;
 
-/// Tilts out of the plane, deg: below, perspective says little about the focal length; above, squares get too thin.
-const TILT_DEG: (f64, f64) = (10.0, 30.0);
+/// How boards are held before the cameras.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Holding {
+    /// Tilts out of the field's plane, deg.
+    pub tilt_deg: (f64, f64),
+    /// Turn in the plane, deg, either way.
+    pub turn_deg: f64,
+    /// A turn that all boards have, deg.
+    pub upright_deg: f64,
+    /// Range of places round the middle of the field: sideways, mm.
+    pub sideways_mm: f64,
+    /// In depth, mm.
+    pub depth_mm: (f64, f64),
+}
 
-/// Turn in the plane, deg, either way. A square board looks the same after a quarter turn, so it stays clear of one.
-const TURN_DEG: f64 = 12.0;
-
-/// Range of places round the middle of the field: sideways and in depth, mm.
-const SIDEWAYS_MM: f64 = 35.0;
-const DEPTH_MM: (f64, f64) = (-30.0, 60.0);
+impl Holding {
+    /// As in the presets. Below 10 degrees perspective says little about the focal length; above 30, squares get too thin.
+    /// A square board looks the same after a quarter turn, so it stays clear of one.
+    pub const USUAL: Holding = Holding {
+        tilt_deg: (10.0, 30.0),
+        turn_deg: 12.0,
+        upright_deg: 0.0,
+        sideways_mm: 35.0,
+        depth_mm: (-30.0, 60.0),
+    };
+}
 
 /// Draws before a pose is given up.
 const ATTEMPTS: usize = 2000;
@@ -43,32 +60,53 @@ pub fn seen_by_both(rig: &Rig, board: &PhysicalBoard, left_from_board: &Transfor
     })
 }
 
-/// `left_from_board` of each pair.
+/// `left_from_board` of each pair of the presets' rig.
 pub fn poses(rig: &Rig, board: &PhysicalBoard, count: usize, seed: u64) -> Result<Vec<Transform>, Error> {
-    (0..count).map(|k| pose(rig, board, k, seed)).collect()
+    held(rig, &left_from_field(), board, &Holding::USUAL, count, seed)
 }
 
-fn pose(rig: &Rig, board: &PhysicalBoard, k: usize, seed: u64) -> Result<Transform, Error> {
+/// `left_from_board` of each pair, the boards held in a field before a rig; each wholly inside both pictures.
+pub fn held(
+    rig: &Rig,
+    left_from_field: &Transform,
+    board: &PhysicalBoard,
+    holding: &Holding,
+    count: usize,
+    seed: u64,
+) -> Result<Vec<Transform>, Error> {
+    let accept = |left_from_board: &Transform| seen_by_both(rig, board, left_from_board);
+    (0..count).map(|k| pose(left_from_field, holding, k, seed, &accept).ok_or_else(|| too_large(board))).collect()
+}
+
+fn too_large(board: &PhysicalBoard) -> Error {
+    Error::BoardTooLarge { squares: board.drawing.squares.to_string(), square_mm: board.drawing.square_mm }
+}
+
+/// One pose out of the draws, the first that is accepted.
+pub fn pose(
+    left_from_field: &Transform,
+    holding: &Holding,
+    k: usize,
+    seed: u64,
+    accept: &dyn Fn(&Transform) -> bool,
+) -> Option<Transform> {
     let mut draws = Draws::new(seed, Purpose::CheckPoses, k as u64);
     // Directions of tilt a golden angle apart leave no side out, however many pairs there are.
     let about = k as f64 * 2.399_963 + draws.uniform(-0.3, 0.3);
-    for attempt in 0..ATTEMPTS {
-        // A board that fills the picture has little room: later attempts stay nearer to the middle.
-        let room = 1.0 - attempt as f64 / ATTEMPTS as f64;
-        let tilt = draws.uniform(TILT_DEG.0, TILT_DEG.1).to_radians();
-        let turn = draws.uniform(-TURN_DEG, TURN_DEG).to_radians();
-        let place = Vector3::new(
-            room * draws.uniform(-SIDEWAYS_MM, SIDEWAYS_MM),
-            room * draws.uniform(-SIDEWAYS_MM, SIDEWAYS_MM),
-            draws.uniform(DEPTH_MM.0, DEPTH_MM.1),
-        );
-        let tilted = UnitQuaternion::from_scaled_axis(Vector3::new(about.cos(), about.sin(), 0.0) * tilt);
-        let field_from_board =
-            transform((tilted * UnitQuaternion::from_scaled_axis(Vector3::z() * turn)).scaled_axis(), place);
-        let left_from_board = left_from_field() * field_from_board;
-        if seen_by_both(rig, board, &left_from_board) {
-            return Ok(left_from_board);
-        }
-    }
-    Err(Error::BoardTooLarge { squares: board.drawing.squares.to_string(), square_mm: board.drawing.square_mm })
+    (0..ATTEMPTS)
+        .map(|attempt| {
+            // A board that fills the picture has little room: later attempts stay nearer to the middle.
+            let room = 1.0 - attempt as f64 / ATTEMPTS as f64;
+            let tilt = draws.uniform(holding.tilt_deg.0, holding.tilt_deg.1).to_radians();
+            let turn = draws.uniform(-holding.turn_deg, holding.turn_deg).to_radians();
+            let place = Vector3::new(
+                room * draws.uniform(-holding.sideways_mm, holding.sideways_mm),
+                room * draws.uniform(-holding.sideways_mm, holding.sideways_mm),
+                draws.uniform(holding.depth_mm.0, holding.depth_mm.1),
+            );
+            let tilted = UnitQuaternion::from_scaled_axis(Vector3::new(about.cos(), about.sin(), 0.0) * tilt);
+            let turned = UnitQuaternion::from_scaled_axis(Vector3::z() * (turn + holding.upright_deg.to_radians()));
+            left_from_field * transform((tilted * turned).scaled_axis(), place)
+        })
+        .find(|left_from_board| accept(left_from_board))
 }

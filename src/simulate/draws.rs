@@ -30,6 +30,8 @@ pub enum Purpose {
     Effects = 10,
     /// Roughness of what stands behind.
     Texture = 11,
+    /// What happens to a picture after the lens.
+    PictureFaults = 12,
 }
 
 /// A stream of draws.

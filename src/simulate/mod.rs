@@ -23,11 +23,13 @@
 
 pub mod backdrop;
 pub mod check_poses;
+pub mod check_series;
 pub mod clutter;
 pub mod coverage;
 pub mod draws;
 pub mod outline;
 pub mod physical_board;
+pub mod picture_faults;
 pub mod psf;
 pub mod render;
 pub mod rig;
@@ -41,12 +43,18 @@ pub mod world;
 
 use camino::Utf8PathBuf;
 
-use crate::error::Explain;
+use crate::diagnostic::Explain;
+
+/// Result of simulating.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// What can go wrong in a simulation.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// Reading or writing files.
+    #[error(transparent)]
+    Files(#[from] crate::files::Error),
     /// No pose shows the whole board in both pictures.
     #[error("a board of {squares} squares of {square_mm} mm does not fit into the field of both cameras")]
     BoardTooLarge {
@@ -90,12 +98,14 @@ pub enum Error {
 impl Explain for Error {
     fn place(&self) -> Option<String> {
         match self {
+            Error::Files(e) => e.place(),
             Error::Occupied { folder, .. } => Some(folder.to_string()),
             _ => None,
         }
     }
     fn hint(&self) -> Option<String> {
         match self {
+            Error::Files(e) => e.hint(),
             Error::BoardTooLarge { .. } => {
                 Some("the field is about 256 mm wide; take fewer or smaller squares".to_owned())
             }

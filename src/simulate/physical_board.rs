@@ -7,6 +7,7 @@
 use nalgebra::{Point2, Point3};
 
 use super::draws::{Draws, Purpose};
+use super::scene::Patch;
 use crate::imaging::Board;
 
 /// How a board deviates from its drawing.
@@ -24,6 +25,15 @@ pub struct Workmanship {
     pub margin_mm: f64,
 }
 
+/// How a board is bent beyond a bow, um.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Warp {
+    /// Height of two opposite corners over the other two, halved: the surface is `twist u v` over [-1, 1]^2.
+    pub twist_um: f64,
+    /// Height of the crest of an S along x: a full wave over the board.
+    pub s_um: f64,
+}
+
 /// A made board. Its frame is the drawing's: origin in the centre, x along columns, y along rows, z away from the viewer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalBoard {
@@ -33,6 +43,10 @@ pub struct PhysicalBoard {
     pub workmanship: Workmanship,
     /// All crossings of lines, outer ones included, row by row: `(columns + 1) x (rows + 1)` squares' corners, mm.
     lattice_mm: Vec<Point2<f64>>,
+    /// How it is bent beyond its bow.
+    pub warp: Warp,
+    /// What lies on it or stands before it, in its frame, from behind to before: stickers, misprints, a hand.
+    pub covers: Vec<Patch>,
 }
 
 impl PhysicalBoard {
@@ -50,7 +64,30 @@ impl PhysicalBoard {
                 lattice_mm.push(Point2::new(x, y));
             }
         }
-        PhysicalBoard { drawing, workmanship, lattice_mm }
+        let mut board = PhysicalBoard { drawing, workmanship, lattice_mm, warp: Warp::default(), covers: Vec::new() };
+        board.lay_frame();
+        board
+    }
+
+    /// Moves and turns the print so that the drawing, laid over the inner corners by least squares, is the board's frame: that is how
+    /// any instrument finds the frame of a real board.
+    fn lay_frame(&mut self) {
+        let (columns, rows) = (self.drawing.columns(), self.drawing.rows());
+        let all = || (0..columns * rows).map(|k| (k % columns, k / columns));
+        let drawn = |(col, row)| self.drawing.corner_mm(col, row).xy();
+        let made = |(col, row): (usize, usize)| self.crossing_mm(col + 1, row + 1);
+        let count = (columns * rows) as f64;
+        let shift = all().map(|at| made(at) - drawn(at)).sum::<nalgebra::Vector2<f64>>() / count;
+        let (mut cross, mut dot) = (0.0, 0.0);
+        for at in all() {
+            let (drawn, made) = (drawn(at).coords, made(at).coords - shift);
+            cross += drawn.perp(&made);
+            dot += drawn.dot(&made);
+        }
+        let back = nalgebra::Rotation2::new(-cross.atan2(dot));
+        for place in &mut self.lattice_mm {
+            *place = back * (*place - shift);
+        }
     }
 
     /// Crossing `(i, j)` of the lines between squares, counted from 0 at the outer edge, mm.
@@ -65,7 +102,8 @@ impl PhysicalBoard {
         let u = x_mm / half(self.drawing.squares.columns);
         let v = y_mm / half(self.drawing.squares.rows);
         // The middle stands out toward the viewer, who is on the side of negative z.
-        -1e-3 * (bow_x * (1.0 / 3.0 - u * u) + bow_y * (1.0 / 3.0 - v * v))
+        let bow = bow_x * (1.0 / 3.0 - u * u) + bow_y * (1.0 / 3.0 - v * v);
+        -1e-3 * (bow + self.warp.twist_um * u * v + self.warp.s_um * (std::f64::consts::PI * u).sin())
     }
 
     /// A place on the surface, mm.

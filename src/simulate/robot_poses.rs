@@ -197,6 +197,7 @@ impl<'a> Group<'a> {
             let Some(q) = inverse::from_start(&self.arm.nominal, &wanted, center_rad) else { continue };
             let joints_deg = q.iter().map(|q| (q.to_degrees() / COMMAND_STEP_DEG).round() * COMMAND_STEP_DEG);
             let commanded = RobotPose {
+                slides: Vec::new(),
                 pose: format!("g{}_{number:03}", self.index + 1),
                 group: self.name(),
                 role,

@@ -105,6 +105,7 @@ impl Scene<'_> {
         layers.extend(self.plate_layer(w + self.print.rim_mm, h + self.print.rim_mm, self.print.rim));
         layers.extend(self.plate_layer(w, h, self.print.white));
         layers.push(self.black_layer());
+        layers.extend(self.board.covers.iter().filter_map(|patch| self.patch_layer(patch)));
         layers
     }
 

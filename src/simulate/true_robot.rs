@@ -55,7 +55,7 @@ pub fn add_effects(robot: &mut Robot, nominal: &Robot, deviations: &RobotDeviati
     }
     let per_m = deviations.gravity_mrad_per_m * 1e-3;
     if per_m > 0.0 {
-        for (joint, point) in [(1, LoadPoint::Elbow), (1, LoadPoint::Wrist), (2, LoadPoint::Wrist)] {
+        for (joint, point) in [(1, LoadPoint::Origin(2)), (1, LoadPoint::Origin(4)), (2, LoadPoint::Origin(4))] {
             if joint < robot.joints.len() {
                 robot.corrections.gravity.push(GravityTerm {
                     joint,

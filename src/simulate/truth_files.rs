@@ -4,12 +4,12 @@ use std::fmt::Write as _;
 
 use super::draws::{Draws, Purpose};
 use super::world::World;
-use crate::error::Result;
-use crate::files::OutDir;
-use crate::imaging::corners_file;
+
+use crate::files::{OutDir, Result};
+use crate::formats::calibration::CalibrationFile;
+use crate::imaging::input::corners_csv;
 use crate::measurements::{RobotPose, pose_fields, pose_header};
 use crate::robot::file::to_toml;
-use crate::stereo::calibration_file::CalibrationFile;
 
 /// The columns of `measurements.csv` behind the pose.
 const MEASURED: &str =
@@ -21,8 +21,8 @@ pub fn write(world: &World, out: &OutDir) -> Result<()> {
     out.write("robot.toml", to_toml(&world.arm.nominal).as_bytes())?;
     out.write("truth/robot.toml", to_toml(&world.arm.truth).as_bytes())?;
     out.write_json("truth/calibration.json", &CalibrationFile::from(&world.rig))?;
-    out.write("truth/corners.csv", corners_file::to_csv(&world.check_corners()).as_bytes())?;
-    out.write("truth/pose-corners.csv", corners_file::to_csv(&world.pose_corners()).as_bytes())?;
+    out.write("truth/corners.csv", corners_csv::to_csv(&world.check_corners()).as_bytes())?;
+    out.write("truth/pose-corners.csv", corners_csv::to_csv(&world.pose_corners()).as_bytes())?;
     out.write("truth/measurements.csv", measurements_csv(world, 0.0).as_bytes())
 }
 

@@ -14,9 +14,9 @@ use super::render::{Picture, Renderer};
 use super::rig::true_rig;
 use super::robot_poses::{self, Arm, TruePose};
 use super::scene::{Patch, Scene};
+use super::sensor::Lighting;
 use super::settings::Settings;
-use super::{Error, true_robot, truth_files};
-use crate::error::Result;
+use super::{Error, Result, true_robot, truth_files};
 use crate::files::OutDir;
 use crate::geometry::Transform;
 use crate::imaging::{Corner, Corners, PairCorners, corners::Side};
@@ -71,7 +71,7 @@ impl World {
         let mut truth = true_robot.unwrap_or_else(drawn);
         true_robot::add_effects(&mut truth, &nominal, &settings.robot, settings.seed);
         if truth.joints.len() != nominal.joints.len() {
-            return Err(Error::Joints { found: truth.joints.len(), needed: nominal.joints.len() }.into());
+            return Err(Error::Joints { found: truth.joints.len(), needed: nominal.joints.len() });
         }
         let arm = Arm { nominal, truth };
         let check_poses = check_poses::poses(&rig, &check_board, settings.check_pairs, settings.seed)?;
@@ -124,13 +124,6 @@ impl World {
     /// The scene of one side of a pair. `backdrop` is what stands behind ([`World::backdrop`]), `holder` what carries the board.
     pub fn scene<'a>(&'a self, shot: &Shot, side: Side, backdrop: &'a Backdrop, holder: &'a [Patch]) -> Scene<'a> {
         let (camera, camera_from_left) = self.camera(side);
-        let mut lighting = self.settings.lighting;
-        // The two cameras see the light from two sides, and each pair a little differently.
-        let mut draws =
-            Draws::new(self.settings.seed, Purpose::Lighting, 2 * shot.number + u64::from(side == Side::Right));
-        lighting.gradient.0 += draws.uniform(-0.05, 0.05);
-        lighting.gradient.1 += draws.uniform(-0.05, 0.05);
-        lighting.exposure *= draws.uniform(0.93, 1.05);
         Scene {
             camera,
             optics: self.settings.optics,
@@ -139,7 +132,7 @@ impl World {
             print: self.settings.print,
             holder,
             backdrop,
-            lighting,
+            lighting: lighting(&self.settings, shot.number, side),
             sensor: self.settings.sensor,
             seed: self.settings.seed,
             picture: 2 * shot.number + u64::from(side == Side::Right),
@@ -191,7 +184,7 @@ impl World {
 
     /// Writes everything but pictures.
     pub fn write_truth(&self, out: &OutDir) -> Result<()> {
-        truth_files::write(self, out)
+        Ok(truth_files::write(self, out)?)
     }
 
     /// Refuses a folder that holds other pictures where this world's will stand: the commands would read them as well.
@@ -246,6 +239,16 @@ impl World {
     pub fn mark_point(pose: &TruePose) -> (Point3<f64>, Vector3<f64>) {
         (pose.left_from_target * Point3::origin(), pose.left_from_target.rotation.scaled_axis())
     }
+}
+
+/// The light of one side of a pair: the two cameras see it from two sides, and each pair a little differently.
+pub(super) fn lighting(settings: &Settings, pair: u64, side: Side) -> Lighting {
+    let mut lighting = settings.lighting;
+    let mut draws = Draws::new(settings.seed, Purpose::Lighting, 2 * pair + u64::from(side == Side::Right));
+    lighting.gradient.0 += draws.uniform(-0.05, 0.05);
+    lighting.gradient.1 += draws.uniform(-0.05, 0.05);
+    lighting.exposure *= draws.uniform(0.93, 1.05);
+    lighting
 }
 
 /// A picture as PNG. Noise does not compress: the fast way is as small as the slow one within a few percent.

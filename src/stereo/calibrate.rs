@@ -3,38 +3,26 @@
 //! In: the corners of all pairs. Out: the rig with its covariance, the pairs that were used with their residuals, the pairs that were
 //! not and why. Goes wrong: too few pairs, pairs that contradict each other, views too similar to tell the cameras.
 
-use nalgebra::DMatrix;
-
-use super::bundle::{self, Search, Stop, Uncertainty, Values};
-use super::consensus;
-use super::layout::{Layout, Shared};
-use super::lens_choice::{self, LensScore};
-use super::neighbours::NeighbourCorrelation;
-use super::noise::Noise;
-use super::observations::{Side, View};
-use super::residuals;
-use super::rig::Covariance;
-use super::robust::Loss;
-use super::{Error, Lens, Rig};
-use crate::imaging::{Board, Corners, Skipped};
-
-/// Fewest pairs for a calibration whose accuracy can be held out: three calibrate, the fourth judges.
-pub const FEWEST_PAIRS: usize = 4;
-
-/// Whitened residuals beyond this are outliers: of Gaussian corners one in a million lies there.
-const OUTLIER: f64 = 5.3;
-
-/// A focal length that is known no better than this share is not known.
-const WORST_FOCAL_SIGMA: f64 = 0.02;
-
-/// What may be forced.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Options {
-    /// The lens; chosen by held-out pairs where `None`.
-    pub lens: Option<Lens>,
-    /// Whether the board's shape is free; decided by held-out pairs where `None`.
-    pub shape: Option<bool>,
-}
+use crate::imaging::{Board, Corners, Side, Skipped};
+use crate::statistics::median;
+use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
+use crate::stereo::data::view::View;
+use crate::stereo::model::parameters::{Layout, Values};
+use crate::stereo::model::rig::Covariance;
+use crate::stereo::pairs::candidates::Candidates;
+use crate::stereo::pairs::consensus::{self, Consensus};
+use crate::stereo::pairs::discarded::too_few_pairs;
+use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, FEWEST_PAIRS, Standing};
+use crate::stereo::select::lens_ladder;
+use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::select::model_comparison::LensScore;
+use crate::stereo::select::pair_scatter::PairScatter;
+use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
+use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::uncertainty::Uncertainty;
+use crate::stereo::target::print_share::print_share;
+use crate::stereo::{Error, Lens, Rig};
 
 /// A calibrated rig with all that it was made from.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,12 +39,22 @@ pub struct Calibration {
     pub uncertainty: Uncertainty,
     /// How corners scatter.
     pub noise: Noise,
+    /// The same without the board's print: what pictures of another board scatter by.
+    pub own_noise: Noise,
     /// How neighbouring corners' residuals hang together; the covariance allows for the information that they share.
     pub neighbours: NeighbourCorrelation,
+    /// How the pairs scatter about the common rig; the covariance allows for more than the corners' noise lets expect.
+    pub pair_scatter: PairScatter,
+    /// Richer models whose additional terms are more than chance.
+    pub witnesses: Vec<Witness>,
     /// Root mean square of the length of the 2-D residuals of both pictures, px.
     pub rms_px: f64,
     /// Pairs that were not used.
     pub skipped: Vec<Skipped>,
+    /// The same with causes, and the corners that were rejected.
+    pub discarded: Discarded,
+    /// Which pairs the rig is that of.
+    pub standing: Standing,
     /// How the lenses that were tried predict held-out pairs; empty where the lens was forced.
     pub lens_scores: Vec<LensScore>,
 }
@@ -92,178 +90,93 @@ impl Calibration {
     }
 }
 
+/// The lens with which pairs are judged before there is another: what nearly all cameras need.
+const JUDGING_LENS: Lens = Lens::Brown5;
+
+/// A picture that loses more than this share of its corners, and this many times the share that pictures usually lose, is not what it
+/// seems: of Gaussian corners one in a million is lost.
+const LOST_SHARE: f64 = 0.1;
+const LOST_TIMES_USUAL: f64 = 3.0;
+
 /// Calibrates both cameras and the rig.
 pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Error> {
-    let consensus = consensus::find(corners)?;
-    let start = Problem { views: consensus.views, values: consensus.values };
-    let lens_choice::Choice { layout, near, scores: lens_scores } = lens_choice::choose(&start, options)?;
-    let solved = Problem { values: near.unwrap_or(start.values), ..start }.solve(&layout)?;
+    let candidates = Candidates::new(corners)?;
+    let mut consensus = consensus::find(&candidates, JUDGING_LENS.max(options.lens.unwrap_or(JUDGING_LENS)))?;
+    let mut choice = lens_ladder::choose(&consensus.problem(), options)?;
+    if let Some(richer) = choice.layout.left.filter(|lens| options.lens.is_none() && *lens > JUDGING_LENS) {
+        let again = consensus::find(&candidates, richer)?;
+        if again.names() != consensus.names() {
+            choice = lens_ladder::choose(&again.problem(), options)?;
+        }
+        consensus = again;
+    }
+    let lens_ladder::Choice { layout, near, scores: lens_scores } = choice;
+    let start = consensus.problem();
+    let near = near.filter(|near| near.poses.len() == start.views.len());
+    let mut solved = Problem { values: near.unwrap_or(start.values), ..start }.solve(&layout)?;
+    let Consensus { mut discarded, standing, .. } = consensus;
+    loop {
+        let lost = emptied(&solved.problem.views);
+        if lost.is_empty() {
+            break;
+        }
+        let kept = solved.problem.subset(|i| lost.iter().all(|(at, _)| *at != i));
+        discarded.extend(lost.into_iter().map(|(_, pair)| pair));
+        discarded.sort_by(|a, b| a.pair.cmp(&b.pair));
+        if kept.views.len() < FEWEST_PAIRS {
+            return Err(too_few_pairs(kept.views.len(), &discarded));
+        }
+        solved = kept.solve(&layout)?;
+    }
     let neighbours = solved.neighbours(&corners.board);
-    let uncertainty = solved.uncertainty(&layout)?.scaled(neighbours.inflation());
+    let by_noise = solved.uncertainty(&layout)?.scaled(neighbours.inflation());
+    let without_scatter = by_noise.shared.clone();
+    let Stated { mut uncertainty, pair_scatter, witnesses } =
+        stated_uncertainty::state(&solved, &layout, by_noise, &neighbours, &lens_scores);
     let Problem { views, mut values } = solved.problem;
+    let mut own_noise = solved.noise;
+    if let Some(print) = print_share(&views, &corners.board, &layout, &values, neighbours.inflation()) {
+        uncertainty.shared += print.covariance - without_scatter;
+        own_noise = own_noise.without_print(print.own_noise);
+    }
     values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: uncertainty.shared.clone() });
     Ok(Calibration {
         board: corners.board,
         layout,
         rms_px: solved.rms_px,
+        noise: solved.noise,
+        own_noise,
+        neighbours,
+        pair_scatter,
+        witnesses,
+        skipped: discarded.iter().map(DiscardedPair::skipped).collect(),
+        discarded: Discarded::new(&views, discarded),
+        standing,
+        lens_scores,
         views,
         values,
         uncertainty,
-        noise: solved.noise,
-        neighbours,
-        skipped: consensus.skipped,
-        lens_scores,
     })
 }
 
-/// Views that agree, with values to start from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Problem {
-    /// The pairs.
-    pub views: Vec<View>,
-    /// Values of all unknowns.
-    pub values: Values,
-}
-
-/// A problem at its minimum.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Solved {
-    /// Views with whitened corners, and the values reached.
-    pub problem: Problem,
-    /// How corners scatter.
-    pub noise: Noise,
-    /// Root mean square of the length of the 2-D residuals, px.
-    pub rms_px: f64,
-}
-
-impl Problem {
-    /// A start for this layout: both cameras with its lens, the shape zero unless free.
-    pub fn with_layout(&self, layout: &Layout) -> Problem {
-        let mut problem = self.clone();
-        let rig = &mut problem.values.shared.rig;
-        for (camera, lens) in [(&mut rig.left, layout.left), (&mut rig.right, layout.right)] {
-            if let Some(lens) = lens {
-                camera.lens = lens;
-                camera.distortion[lens.free_count()..].fill(0.0);
-            }
-        }
-        if !layout.shape {
-            problem.values.shared.shape_mm = [0.0; 2];
-        }
-        problem
-    }
-
-    /// Solves robustly, then by least squares over the corners that are no outliers, with the scatter fitted to what is left.
-    pub fn solve(&self, layout: &Layout) -> Result<Solved, Error> {
-        let Problem { mut views, mut values } = self.with_layout(layout);
-        let unknowns = layout.count() + 6 * views.len();
-        for o in views.iter_mut().flat_map(|v| &mut v.observations) {
-            o.active = true;
-        }
-        let mut noise = Noise::UNIT;
-        // Twice: the scatter is known only after the first solution.
-        for _ in 0..2 {
-            noise = Noise::from_median(&residuals::active(&views, &values).ok_or(Error::NotConverged { steps: 0 })?);
-            noise.apply(&mut views);
-            let loss = Loss::Cauchy(super::start::CAUCHY_WIDTH);
-            values = bundle::solve(&views, layout, values, loss, Search::ROUGH).values;
-        }
-        for _ in 0..4 {
-            let marked = mark_outliers(&mut views, &values);
-            let left = residuals::active(&views, &values).ok_or(Error::NotConverged { steps: 0 })?;
-            if 2 * left.len() <= unknowns {
-                return Err(Error::TooFewCorners { corners: left.len(), unknowns });
-            }
-            let before = noise;
-            noise = Noise::from_mean(&left, unknowns);
-            noise.apply(&mut views);
-            let solution = bundle::solve(&views, layout, values, Loss::Squared, Search::NEAR);
-            if solution.stop != Stop::Minimum {
-                return Err(Error::NotConverged { steps: solution.steps });
-            }
-            values = solution.values;
-            if !marked && (noise.added_px - before.added_px).abs() <= 1e-3 * noise.added_px {
-                break;
-            }
-        }
-        let left = residuals::active(&views, &values).ok_or(Error::NotConverged { steps: 0 })?;
-        noise = Noise::from_mean(&left, unknowns);
-        let squares: Vec<f64> = left.iter().map(|(_, r)| r.norm_squared()).collect();
-        let rms_px = residuals::root_mean_square(&squares).unwrap_or(0.0);
-        Ok(Solved { problem: Problem { views, values }, noise, rms_px })
-    }
-
-    /// The same without some pairs: `keep` says which stay.
-    pub fn subset(&self, keep: impl Fn(usize) -> bool) -> Problem {
-        let kept = |i: &usize| keep(*i);
-        let all = 0..self.views.len();
-        Problem {
-            views: all.clone().filter(kept).map(|i| self.views[i].clone()).collect(),
-            values: Values {
-                shared: self.values.shared.clone(),
-                poses: all.filter(kept).map(|i| self.values.poses[i]).collect(),
-            },
-        }
-    }
-
-    /// Solves again by least squares with the weights and outliers as they are: for folds. `None` where the search does not
-    /// end at a minimum: these pairs do not determine this lens.
-    pub fn refit(&self, layout: &Layout) -> Option<Values> {
-        let start = self.with_layout(layout);
-        let solution = bundle::solve(&start.views, layout, start.values, Loss::Squared, Search::TRIAL);
-        (solution.stop == Stop::Minimum).then_some(solution.values)
-    }
-}
-
-impl Solved {
-    fn neighbours(&self, board: &Board) -> NeighbourCorrelation {
-        let Problem { views, values } = &self.problem;
-        let of_view = |(view, pose)| residuals::of_view(&values.shared, view, pose);
-        NeighbourCorrelation::of(board, views.iter().zip(&values.poses).map(of_view))
-    }
-
-    /// Covariance of everything; an error where the views do not tell.
-    pub fn uncertainty(&self, layout: &Layout) -> Result<Uncertainty, Error> {
-        let Problem { views, values } = &self.problem;
-        let uncertainty =
-            bundle::uncertainty(views, layout, values).ok_or(Error::Undetermined { focal_sigma: None })?;
-        let worst = worst_focal_sigma(&uncertainty.shared, layout, &values.shared.rig);
-        let known = worst <= WORST_FOCAL_SIGMA;
-        if known { Ok(uncertainty) } else { Err(Error::Undetermined { focal_sigma: Some(worst) }) }
-    }
-
-    /// The shared values.
-    pub fn shared(&self) -> &Shared {
-        &self.problem.values.shared
-    }
-}
-
-/// Whether this covariance of the shared numbers tells the cameras.
-pub fn tells(shared: &DMatrix<f64>, layout: &Layout, rig: &Rig) -> bool {
-    worst_focal_sigma(shared, layout, rig) <= WORST_FOCAL_SIGMA
-}
-
-/// Largest relative standard deviation of a focal length.
-fn worst_focal_sigma(shared: &DMatrix<f64>, layout: &Layout, rig: &Rig) -> f64 {
-    let mut worst: f64 = 0.0;
-    for (side, camera) in Side::BOTH.into_iter().zip([&rig.left, &rig.right]) {
-        let at = layout.camera_start(side);
-        for (i, focal) in [camera.fx, camera.fy].into_iter().enumerate() {
-            worst = worst.max(shared[(at + i, at + i)].sqrt() / focal.abs());
-        }
-    }
-    worst
-}
-
-/// Marks corners beyond the limit. True where a mark changed.
-fn mark_outliers(views: &mut [View], values: &Values) -> bool {
-    let mut changed = false;
-    for (view, pose) in views.iter_mut().zip(&values.poses) {
-        for o in &mut view.observations {
-            let far = residuals::residual_px(&values.shared, pose, o).is_none_or(|r| o.whiten(r).norm() > OUTLIER);
-            changed |= far == o.active;
-            o.active = !far;
-        }
-    }
-    changed
+/// Pairs that lost a good part of the corners in one of their pictures, and their places.
+fn emptied(views: &[View]) -> Vec<(usize, DiscardedPair)> {
+    let lost = |view: &View, side: Side| {
+        let seen = view.observations.iter().filter(|o| o.side == side).count();
+        (seen - view.active(side).count(), seen)
+    };
+    let share = |view: &View, side: Side| lost(view, side).0 as f64 / lost(view, side).1.max(1) as f64;
+    let usual = median(views.iter().flat_map(|view| Side::BOTH.map(|side| share(view, side)))).unwrap_or(0.0);
+    let limit = LOST_SHARE.max(LOST_TIMES_USUAL * usual);
+    let of = |(i, view): (usize, &View)| {
+        let side = Side::BOTH.into_iter().find(|side| share(view, *side) > limit)?;
+        let (lost, seen) = lost(view, side);
+        let reason = format!(
+            "{lost} of {seen} corners in the {} picture lie farther from the rig's prediction than their scatter allows: \
+             partly covered, in motion, taken line by line (interlaced), or a light that moves edges",
+            side.name()
+        );
+        Some((i, DiscardedPair::new(&view.pair, Cause::CornersLost, reason)))
+    };
+    views.iter().enumerate().filter_map(of).collect()
 }

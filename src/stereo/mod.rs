@@ -1,178 +1,38 @@
 //! From corners to a calibrated rig, and from a rig to points in space.
 //!
-//! Corners become [`observations`]; [`start`] and [`consensus`] find a first rig and the pairs that agree on it; [`calibrate`]
-//! solves the [`bundle`] with the lens of [`lens_choice`]; [`accuracy`] judges the rig by pairs it has not seen; [`target`]
-//! measures a board's pose with it.
+//! Rooms in the order of the data; imports point up this list only: `model` and `data` say what is looked for and what was seen,
+//! `solve` finds the most likely rig, `init` where to start, `pairs` which pairs belong to it, `select` which lens;
+//! `calibrate()` is all of that in turn. `judge` measures boards with the rig and says what it is worth, `triangulate` and
+//! `target` measure points and a board's pose with it.
 
-pub mod accuracy;
-pub mod bundle;
+mod error;
+
+pub mod model;
+
+pub mod data;
+
+pub mod solve;
+
+pub mod init;
+
+pub mod pairs;
+
+pub mod select;
+
 pub mod calibrate;
-pub mod calibration_file;
-pub mod camera;
-pub mod check_file;
-pub mod consensus;
-pub mod disagreement;
-pub mod export;
-pub mod folds;
-pub mod homography;
-pub mod layout;
-pub mod leave_out;
-pub mod lens_choice;
-pub mod measure_file;
-pub mod mixups;
-pub mod neighbours;
-pub mod noise;
-pub mod observations;
-pub mod pose;
-pub mod products;
-pub mod projection;
-pub mod residuals;
-pub mod rig;
-pub mod robust;
-pub mod schur;
-pub mod screening;
-pub mod start;
+
+pub mod triangulate;
+
+pub mod judge;
+
+pub mod target;
+
 #[cfg(test)]
 pub(crate) mod synthetic;
-pub mod target;
 #[cfg(test)]
 mod tests;
-pub mod triangulate;
-pub mod variety;
-pub mod volume;
-pub mod whiteness;
 
-use crate::error::{Explain, Status};
-use crate::imaging::Skipped;
-
-pub use camera::{Camera, Lens};
-pub use observations::Side;
-pub use rig::Rig;
-
-/// What can go wrong between corners and points.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// Not enough pairs to calibrate and to hold one out.
-    #[error("only {found} of {total} pairs can be used; calibration needs {}{}", calibrate::FEWEST_PAIRS, list(.skipped))]
-    TooFewPairs {
-        /// Usable pairs.
-        found: usize,
-        /// Pairs there were.
-        total: usize,
-        /// The others.
-        skipped: Vec<Skipped>,
-    },
-    /// Too few corners for so many unknowns.
-    #[error("{corners} corners give {} numbers for {unknowns} unknowns", 2 * .corners)]
-    TooFewCorners {
-        /// Corners that are no outliers.
-        corners: usize,
-        /// Unknowns.
-        unknowns: usize,
-    },
-    /// One camera's pictures fit no camera.
-    #[error("the corners in the {} pictures fit no camera", side.name())]
-    NoCamera {
-        /// Whose.
-        side: Side,
-    },
-    /// Most pairs do not belong to one rig.
-    #[error("the pairs contradict each other: only {agreeing} of {total} fit one rig{}", list(.bad))]
-    Contradiction {
-        /// Pairs that fit one rig.
-        agreeing: usize,
-        /// Pairs that were compared.
-        total: usize,
-        /// The others.
-        bad: Vec<Skipped>,
-    },
-    /// The views do not tell the cameras.
-    #[error("the views are too similar to tell the cameras{}", focal(.focal_sigma))]
-    Undetermined {
-        /// Worst relative standard deviation of a focal length, where there is one.
-        focal_sigma: Option<f64>,
-    },
-    /// The search did not end at a minimum.
-    #[error("the calibration did not converge within {steps} steps")]
-    NotConverged {
-        /// Steps tried.
-        steps: usize,
-    },
-    /// Not one pose of a robot was measured.
-    #[error("the target was measured at none of {poses} poses")]
-    NothingMeasured {
-        /// Poses in the list.
-        poses: usize,
-    },
-    /// A lens that another program has no words for.
-    #[error("the {lens} lens cannot be said in {format}'s format; it goes up to {most}")]
-    LensNotExportable {
-        /// The format.
-        format: &'static str,
-        /// The lens of the rig.
-        lens: &'static str,
-        /// The richest lens of the format.
-        most: &'static str,
-    },
-    /// Pictures of another size than the calibration's.
-    #[error("the {} pictures are {found_width}x{found_height} px, the calibration is for {width}x{height}", side.name())]
-    PictureSize {
-        /// Whose.
-        side: Side,
-        /// Found.
-        found_width: u32,
-        /// Found.
-        found_height: u32,
-        /// Needed.
-        width: u32,
-        /// Needed.
-        height: u32,
-    },
-}
-
-fn list(pairs: &[Skipped]) -> String {
-    pairs.iter().map(|s| format!("\n  {}: {}", s.pair, s.reason)).collect()
-}
-
-fn focal(sigma: &Option<f64>) -> String {
-    sigma.map_or(String::new(), |s| format!(": a focal length is known to {:.0} % only", 100.0 * s))
-}
-
-impl Explain for Error {
-    fn status(&self) -> Status {
-        match self {
-            Error::TooFewPairs { .. } | Error::PictureSize { .. } | Error::LensNotExportable { .. } => Status::BadInput,
-            _ => Status::Undetermined,
-        }
-    }
-
-    fn hint(&self) -> Option<String> {
-        Some(
-            match self {
-                Error::TooFewPairs { .. } => {
-                    "photograph more pairs; `--squares CxR` must be the board's squares, not its inner corners"
-                }
-                Error::TooFewCorners { .. } => "photograph more pairs, or `--lens radial2` for fewer unknowns",
-                Error::NoCamera { .. } => "`--squares CxR` must be the board's squares, not its inner corners",
-                Error::Contradiction { .. } => {
-                    "trigger both cameras at once, clamp them and the board, and check that equal names belong together"
-                }
-                Error::Undetermined { .. } => {
-                    "photograph the board tilted by 20 to 45 degrees about both of its axes, at several distances"
-                }
-                Error::NotConverged { .. } => "`--lens radial2` has fewer unknowns; add pairs with the board tilted",
-                Error::NothingMeasured { .. } => {
-                    "`--squares CxR` and `--square-mm MM` describe the target on the robot"
-                }
-                Error::LensNotExportable { most, .. } => {
-                    return Some(format!("calibrate with `--lens {most}`, or `--format opencv`"));
-                }
-                Error::PictureSize { .. } => {
-                    "calibrate with pictures of the same size and cut: `stereocal camera-check IMAGES`"
-                }
-            }
-            .to_owned(),
-        )
-    }
-}
+pub use crate::imaging::Side;
+pub use error::Error;
+pub use model::camera::{Camera, Lens};
+pub use model::rig::Rig;

@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix2, Point2, Vector2, Vector3};
 
-use super::{Camera, Lens, Rig};
 use crate::geometry::{Transform, transform};
 use crate::imaging::{Board, Corner, Corners, PairCorners, Squares};
 use crate::simulate::draws::{Draws, Purpose};
+use crate::stereo::{Camera, Lens, Rig};
 
 /// A known world.
 #[derive(Debug, Clone)]
@@ -14,6 +14,8 @@ pub(crate) struct World {
     pub board: Board,
     /// Height of the board's paraboloids in its middle, mm.
     pub bow_mm: [f64; 2],
+    /// Height of its twist at the first and the last corner, mm.
+    pub twist_mm: f64,
     /// How far the board's corners lie from their places, mm, the same in every picture.
     pub print_mm: f64,
     pub poses: Vec<Transform>,
@@ -43,7 +45,7 @@ impl World {
                 transform(turn, Vector3::new(between(-55.0, 55.0), between(-45.0, 45.0), between(480.0, 640.0)))
             })
             .collect();
-        World { rig, board, bow_mm: [0.0; 2], print_mm: 0.0, poses, sigma_px: 0.05 }
+        World { rig, board, bow_mm: [0.0; 2], twist_mm: 0.0, print_mm: 0.0, poses, sigma_px: 0.05 }
     }
 
     /// The paper's rig and ceramic board: 5120 px, 25 mm lens, 20x20 squares of 10 mm, corners measured to 0.005 px.
@@ -116,7 +118,9 @@ impl World {
         let place = (row * self.board.columns() + col) as f64;
         at.x += self.print_mm * (1.7 + 12.9 * place).sin();
         at.y += self.print_mm * (0.3 + 78.2 * place).sin();
-        at.z = self.bow_mm[0] * (1.0 - (at.x / edge.x).powi(2)) + self.bow_mm[1] * (1.0 - (at.y / edge.y).powi(2));
+        at.z = self.bow_mm[0] * (1.0 - (at.x / edge.x).powi(2))
+            + self.bow_mm[1] * (1.0 - (at.y / edge.y).powi(2))
+            + self.twist_mm * at.x * at.y / (edge.x * edge.y);
         at
     }
 }

@@ -2,16 +2,20 @@
 
 use nalgebra::{Matrix2, Point2, Vector2, Vector3, Vector6};
 
-use super::calibrate::{Calibration, Options, calibrate};
-use super::check_file::{Demand, Judged};
-use super::layout::Shared;
-use super::observations::View;
-use super::synthetic::World;
-use super::triangulate::{RigCovariance, common, triangulate};
-use super::{Error, Lens, accuracy, disagreement, target};
-use crate::geometry::{rotation_vector, transform};
+use crate::geometry::transform;
 use crate::imaging::{Corners, PairCorners};
 use crate::simulate::draws::{Draws, Purpose};
+use crate::stereo::calibrate::{Calibration, calibrate};
+use crate::stereo::data::view::View;
+use crate::stereo::judge::assessment::{Demand, Judged};
+use crate::stereo::judge::held_out;
+use crate::stereo::judge::verdict::{LengthError, Verdict};
+use crate::stereo::model::parameters::Shared;
+use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::synthetic::World;
+use crate::stereo::target::series::{self, Knowledge, Seen};
+use crate::stereo::triangulate::{RigCovariance, common, triangulate};
+use crate::stereo::{Error, Lens};
 
 const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: Some(false) };
 
@@ -27,7 +31,7 @@ fn swapped(corners: &Corners) -> Corners {
 /// Deviations of the shared numbers from the truth, in the coordinates of the covariance.
 fn deviations(calibration: &Calibration, world: &World) -> Vec<f64> {
     let layout = calibration.layout;
-    let truth = Shared { rig: world.rig.clone(), shape_mm: world.bow_mm };
+    let truth = Shared { rig: world.rig.clone(), shape_mm: [world.bow_mm[0], world.bow_mm[1], world.twist_mm] };
     let found = layout.numbers(&calibration.values.shared);
     let mut off: Vec<f64> = found.iter().zip(layout.numbers(&truth)).map(|(a, b)| a - b).collect();
     // A rotation's covariance is that of the small turn on its left.
@@ -118,7 +122,7 @@ fn corners_that_share_edges_are_worth_less_and_no_fault() {
         // One half between the two ends of an edge, none along it; 11 x 8 corners have 1.78 neighbours each to the right or below.
         assert!((neighbours.across - 0.5).abs() < 0.08 && neighbours.along.abs() < 0.08, "{neighbours:?}");
         assert!((neighbours.inflation() - 1.9).abs() < 0.25, "{neighbours:?}");
-        assert!(super::whiteness::check(&found).white());
+        assert!(crate::stereo::judge::residual_correlation::check(&found).white());
         for (i, off) in deviations(&found, &exact).iter().enumerate() {
             let variance = found.uncertainty.shared[(i, i)];
             squares += off * off / variance;
@@ -262,6 +266,23 @@ fn a_bowed_board_is_seen_and_corrected() {
 }
 
 #[test]
+fn a_twisted_board_is_seen_and_corrected() {
+    for twist_mm in [0.05, 0.2, -0.2] {
+        let mut world = World::paper(12, 47);
+        world.twist_mm = twist_mm;
+        let found = calibrate(&world.corners(48), &Options::default()).unwrap();
+        assert!(found.layout.shape, "a twist of {twist_mm} mm was not noticed");
+        let worst = worst_point_mm(&found, &world);
+        let [kx, ky, kxy] = found.values.shared.shape_mm;
+        println!("twist {twist_mm} mm found as {kx:.4} {ky:.4} {kxy:.4}, worst point {worst:.4} mm");
+        assert!(
+            (kxy - twist_mm).abs() < 0.005 && kx.abs().max(ky.abs()) < 0.01 && worst < 0.015,
+            "{kx} {ky} {kxy} {worst}"
+        );
+    }
+}
+
+#[test]
 fn a_pair_that_was_not_taken_at_once_is_named_and_left_out() {
     let world = World::new(9, 11);
     let mut corners = world.corners(12);
@@ -329,23 +350,28 @@ fn boards_that_are_never_tilted_do_not_tell_the_cameras() {
 fn held_out_lengths_are_as_wrong_as_the_corners_make_them() {
     let world = World::new(12, 17);
     let found = calibrate(&world.corners(18), &BROWN4).unwrap();
-    let accuracy = accuracy::hold_out(&found).unwrap();
+    let accuracy = held_out::hold_out(&found, None).unwrap();
     assert_eq!(accuracy.pairs.len(), 12);
     assert_eq!(accuracy.ranges.len(), 10 + 7);
     // 0.05 px is 0.056 mm of depth at 550 mm; boards tilted by 35 degrees turn it into 0.045 mm of length; the worst of 30 000
     // lies at four to six sigmas.
-    assert!((0.1..0.4).contains(&accuracy.worst.error_mm), "{}", accuracy.worst.error_mm);
-    assert_eq!(accuracy.verdict(1.0), accuracy::Verdict::Pass);
-    assert_eq!(accuracy.verdict(0.01), accuracy::Verdict::Fail);
+    let extremes = accuracy.extremes;
+    assert!((0.1..0.4).contains(&extremes.max_abs_error_mm), "{}", extremes.max_abs_error_mm);
+    assert_eq!(accuracy.verdict(1.0), Verdict::Pass);
+    assert_eq!(accuracy.verdict(0.01), Verdict::Fail);
     // The error itself as the tolerance leaves no room for any uncertainty.
-    assert_eq!(accuracy.verdict(accuracy.worst.error_mm), accuracy::Verdict::Undecided);
+    assert_eq!(accuracy.verdict(extremes.max_abs_error_mm), Verdict::Undecided);
     // Corners of 0.05 px leave what was said above; the calibration by twelve pairs a fraction of it.
-    let accuracy::Worst { corners_mm, calibration_mm, .. } = accuracy.worst;
-    assert!((0.01..0.1).contains(&corners_mm) && (0.001..corners_mm).contains(&calibration_mm), "{:?}", accuracy.worst);
+    let LengthError { corners_mm, calibration_mm, .. } = extremes.largest;
+    assert!((0.01..0.1).contains(&corners_mm) && (0.001..corners_mm).contains(&calibration_mm), "{extremes:?}");
+    // Each length has its own uncertainty: the one that may be most wrong need not be the one that came out most wrong.
+    assert!(extremes.largest.at_most_mm() >= extremes.max_abs_error_mm);
     // Some hundreds of points with corners that scatter independently know the mean to a tenth.
     assert!((accuracy.rays_chi_square - 1.0).abs() < 0.2, "{}", accuracy.rays_chi_square);
     // A certificate of 30 mm uncertainty decides nothing.
-    assert!(accuracy.worst.with_board(30.0).expanded_uncertainty_mm() > 30.0);
+    let certified = held_out::hold_out(&found, Some(30.0)).unwrap();
+    assert!(certified.extremes.largest.expanded_uncertainty_mm() > 30.0);
+    assert_eq!(certified.verdict(1.0), Verdict::Undecided);
 }
 
 #[test]
@@ -354,42 +380,65 @@ fn a_board_whose_print_scatters_is_told_from_corners_that_do() {
     world.sigma_px = 0.01;
     world.print_mm = 0.03;
     let found = calibrate(&world.corners(18), &BROWN4).unwrap();
-    let accuracy = accuracy::hold_out(&found).unwrap();
+    let accuracy = held_out::hold_out(&found, None).unwrap();
     // 0.02 mm (root mean square) is 0.07 px here, seven times the corners' own scatter.
     assert!(accuracy.rays_chi_square < 0.1, "{}", accuracy.rays_chi_square);
-    let demand = Demand { tolerance_mm: 0.05, board_uncertainty_mm: 0.0 };
+    let demand = Demand { tolerance_mm: 0.05, board_uncertainty_mm: None };
     let judged = Judged::new(&found, accuracy, None, &demand);
     assert!(judged.warnings.iter().any(|w| w.contains("places of the corners on the board")), "{:?}", judged.warnings);
 }
 
-#[test]
-fn a_model_that_fits_nearly_as_well_and_moves_the_rig_is_reported() {
-    let found = calibrate(&World::new(14, 19).corners(20), &Options::default()).unwrap();
-    let disagreements = disagreement::find(&found);
-    // Without the tangential terms the principal points move, and the rig with them.
-    assert!(disagreements.iter().any(|d| d.other == "radial2" && d.sigmas > 4.0), "{disagreements:?}");
+fn judged(corners: &Corners, options: &Options, tolerance_mm: f64) -> Judged {
+    let found = calibrate(corners, options).unwrap();
+    let accuracy = held_out::hold_out(&found, None).unwrap();
+    Judged::new(&found, accuracy, None, &Demand { tolerance_mm, board_uncertainty_mm: None })
 }
 
 #[test]
-fn models_that_agree_are_not_reported() {
+fn a_lens_model_that_the_corners_refute_is_no_witness() {
+    // Without the tangential terms the principal points move by hundreds of their sigmas, and chi-squared with them.
+    let judged = judged(&World::new(14, 19).corners(20), &Options::default(), 1.0);
+    assert_eq!(judged.disagreements, []);
+}
+
+#[test]
+fn a_lens_term_too_weak_to_be_chosen_is_a_spread_of_lengths() {
     let mut world = World::new(14, 19);
     for camera in [&mut world.rig.left, &mut world.rig.right] {
-        camera.distortion[2..4].fill(0.0);
+        camera.lens = Lens::Brown5;
+        // A pixel at the border of the picture, 0.3 of the distance.
+        camera.distortion[4] = 1.0 / 2000.0 / 0.3_f64.powi(7);
     }
-    let found = calibrate(&world.corners(20), &Options::default()).unwrap();
-    assert_eq!(found.layout.left, Some(Lens::Radial2));
-    assert_eq!(disagreement::find(&found), []);
+    let corners = world.corners(20);
+    let judged = judged(&corners, &BROWN4, 1.0);
+    let spread = judged.disagreements.iter().find(|d| d.other == "brown5").expect("brown5 measures other lengths");
+    assert!(spread.chi_square_fall > spread.chance && spread.length_change_mm > 0.01, "{spread:?}");
+    let line = judged.evidence.iter().find(|line| line.what == "spread of admissible models").unwrap();
+    assert!(line.value.is_some_and(|mm| mm >= spread.length_change_mm), "{line:?}");
+}
+
+/// All poses of a world as a robot's run.
+fn run_of(corners: crate::imaging::Corners) -> Vec<Seen> {
+    let at = |pose: &str| crate::measurements::RobotPose {
+        pose: pose.to_owned(),
+        group: "1".to_owned(),
+        role: crate::measurements::Role::Sample,
+        joints_deg: vec![0.0],
+        slides: Vec::new(),
+    };
+    corners.pairs.into_iter().map(|pair| Seen { at: at(&pair.pair), corners: Ok(pair) }).collect()
 }
 
 #[test]
 fn the_targets_scatter_is_the_predicted_one() {
     let mut world = World::new(60, 23);
     world.board = crate::imaging::Board { squares: "7x6".parse().unwrap(), square_mm: 10.0 };
-    let corners = world.corners(24);
+    let known =
+        Knowledge { rig: world.rig.clone(), noise: None, board: world.board, crossing_mm: 0.01, tolerance_mm: 0.05 };
     let mut sums = Vector6::<f64>::zeros();
-    let measured = target::measure(&world.rig, &world.board, &corners.pairs);
-    for (pose, truth) in measured.iter().zip(&world.poses) {
-        let pose = pose.as_ref().unwrap();
+    let measured = series::measure(&known, run_of(world.corners(24)));
+    for (pose, truth) in measured.poses.iter().zip(&world.poses) {
+        let pose = pose.target.as_ref().unwrap();
         let turn = (pose.cam_from_board.rotation * truth.rotation.inverse()).scaled_axis();
         let shift = pose.cam_from_board.translation.vector - truth.translation.vector;
         for i in 0..3 {
@@ -398,15 +447,43 @@ fn the_targets_scatter_is_the_predicted_one() {
         }
     }
     for sum in sums.iter() {
-        // 60 poses: chi-square over its freedom is 1 +- 0.18; a robust pooled scatter adds a little.
+        // 60 poses: chi-square over its freedom is 1 +- 0.18; the target's shape is found as well and shared by all.
         assert!((0.5..1.7).contains(&(sum / 60.0)), "{sums}");
     }
-    assert!(rotation_vector(&measured[0].as_ref().unwrap().cam_from_board).norm() < std::f64::consts::PI);
+    assert_eq!(measured.judgement, crate::stereo::target::judgement::Judgement::Agrees);
+}
+
+#[test]
+fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
+    let mut world = World::new(30, 29);
+    world.board = crate::imaging::Board { squares: "7x6".parse().unwrap(), square_mm: 10.0 };
+    let corners = world.corners(30);
+    let judged = |rig: &crate::stereo::Rig, square_mm: f64| {
+        let board = crate::imaging::Board { square_mm, ..world.board };
+        let known = Knowledge { rig: rig.clone(), noise: None, board, crossing_mm: 0.01, tolerance_mm: 0.05 };
+        let judgement = series::measure(&known, run_of(corners.clone())).judgement;
+        judgement.describe(rig, square_mm).unwrap_or_default()
+    };
+    assert_eq!(judged(&world.rig, 10.0), "");
+    let pitch = judged(&world.rig, 12.0);
+    assert!(pitch.contains("squares are 10.0") || pitch.contains("squares are 9.99"), "{pitch}");
+    let mut turned = world.rig.clone();
+    turned.right_from_left =
+        transform(Vector3::new(0.0, 0.1_f64.to_radians(), 0.0), Vector3::zeros()) * turned.right_from_left;
+    let yaw = judged(&turned, 10.0);
+    assert!((yaw.contains("-0.10") || yaw.contains("-0.09")) && yaw.contains("yaw"), "{yaw}");
+    let exchanged = crate::stereo::Rig {
+        left: turned.right,
+        right: turned.left,
+        right_from_left: world.rig.right_from_left.inverse(),
+        covariance: None,
+    };
+    assert!(judged(&exchanged, 10.0).contains("exchanged"));
 }
 
 /// Largest deviation of points in the working volume, mm, measured from exact pixels.
 fn worst_point_mm(calibration: &Calibration, world: &World) -> f64 {
-    let exact = World { sigma_px: 1e-9, bow_mm: [0.0; 2], ..world.clone() };
+    let exact = World { sigma_px: 1e-9, bow_mm: [0.0; 2], twist_mm: 0.0, ..world.clone() };
     let mut worst: f64 = 0.0;
     for (pair, pose) in exact.corners(1).pairs.iter().zip(&exact.poses) {
         let view = View::new(&exact.board, pair, 0);
@@ -422,7 +499,7 @@ fn worst_point_mm(calibration: &Calibration, world: &World) -> f64 {
 fn the_papers_rig_measures_to_two_micrometres() {
     let world = World::paper(12, 41);
     let found = calibrate(&world.corners(42), &Options::default()).unwrap();
-    let accuracy = accuracy::hold_out(&found).unwrap();
+    let accuracy = held_out::hold_out(&found, None).unwrap();
     let to_70 = accuracy.ranges.iter().filter(|r| r.nominal_mm <= 70.0).map(|r| r.max_abs_error_mm).fold(0.0, f64::max);
     println!("held out up to 70 mm {to_70:.5} mm, points {:.5} mm, {:?}", worst_point_mm(&found, &world), found.layout);
     // Corners of 0.005 px scatter by 0.4 um across and 1 um in depth; the worst of 60 000 lengths lies at five sigmas.
@@ -455,5 +532,5 @@ fn a_lens_term_of_half_a_pixel_is_found_by_the_ladder() {
     println!("{lens:?}, worst point {:.5} mm", worst_point_mm(&found, &world));
     assert!(lens >= Lens::Brown5 && worst_point_mm(&found, &world) < 0.015, "{lens:?}");
     let forced = calibrate(&corners, &BROWN4).unwrap();
-    assert!(!super::whiteness::check(&forced).white(), "{:?}", forced.neighbours);
+    assert!(!crate::stereo::judge::residual_correlation::check(&forced).white(), "{:?}", forced.neighbours);
 }

@@ -6,12 +6,13 @@
 
 use nalgebra::{Matrix3, Matrix4x3, Point2, Point3, Vector2, Vector3, Vector4};
 
-use super::Rig;
-use super::layout::{CAMERA_NAMES, TRANSFORM_NAMES};
-use super::observations::{Observation, Side};
-use super::projection::CAMERA_NUMBERS;
-use super::rig::Covariance;
 use crate::geometry::{rotation_matrix, skew};
+use crate::imaging::Side;
+use crate::stereo::Rig;
+use crate::stereo::data::observation::Observation;
+use crate::stereo::model::parameters::{CAMERA_NAMES, TRANSFORM_NAMES};
+use crate::stereo::model::projection::CAMERA_NUMBERS;
+use crate::stereo::model::rig::Covariance;
 
 /// Numbers of a rig: both cameras, then `right_from_left`.
 pub const RIG_NUMBERS: usize = 2 * CAMERA_NUMBERS + 6;
@@ -53,6 +54,17 @@ pub fn rig_number(name: &str) -> Option<usize> {
         "right" => camera(CAMERA_NUMBERS),
         "right_from_left" => TRANSFORM_NAMES.iter().position(|n| *n == number).map(|i| 2 * CAMERA_NUMBERS + i),
         _ => None,
+    }
+}
+
+/// The name of a number of the rig in `calibration.json`.
+pub fn rig_number_name(number: usize) -> String {
+    match number.checked_sub(2 * CAMERA_NUMBERS) {
+        Some(i) => format!("right_from_left.{}", TRANSFORM_NAMES[i]),
+        None => {
+            let side = if number < CAMERA_NUMBERS { Side::Left } else { Side::Right };
+            format!("{}.{}", side.name(), CAMERA_NAMES[number % CAMERA_NUMBERS])
+        }
     }
 }
 
@@ -166,7 +178,7 @@ impl RigCovariance {
 }
 
 /// The corners both pictures show, by their place on the board, row by row.
-pub fn common(view: &super::observations::View) -> Vec<(&Observation, &Observation)> {
+pub fn common(view: &crate::stereo::data::view::View) -> Vec<(&Observation, &Observation)> {
     let key = |o: &Observation| (o.row, o.col);
     let right: std::collections::BTreeMap<(usize, usize), &Observation> =
         view.active(Side::Right).map(|o| (key(o), o)).collect();
@@ -178,7 +190,7 @@ pub fn common(view: &super::observations::View) -> Vec<(&Observation, &Observati
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stereo::observations::View;
+    use crate::stereo::data::view::View;
     use crate::stereo::synthetic::World;
 
     fn seen(sigma_px: f64, seed: u64) -> (World, View) {
@@ -223,8 +235,8 @@ mod tests {
         let (world, view) = seen(0.05, 3);
         let (left, right) = common(&view)[20];
         let found = triangulate(&world.rig, left, right).unwrap();
-        let layout = crate::stereo::layout::Layout::rig(crate::stereo::Lens::Brown4, false);
-        let shared = crate::stereo::layout::Shared { rig: world.rig.clone(), shape_mm: [0.0; 2] };
+        let layout = crate::stereo::model::parameters::Layout::rig(crate::stereo::Lens::Brown4, false);
+        let shared = crate::stereo::model::parameters::Shared { rig: world.rig.clone(), shape_mm: [0.0; 3] };
         for (i, name) in layout.names().iter().enumerate() {
             let h = if name.contains(".k") || name.contains(".p") || name.contains("rad") { 1e-6 } else { 1e-3 };
             let at = |h: f64| {

@@ -1,5 +1,12 @@
 //! Time of one picture on one core, before encoding: `cargo bench --bench render`.
-#![expect(clippy::print_stdout, reason = "a benchmark says what it measured")]
+#![allow(
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "a benchmark times, prints its table, and ends where its input is not as it should be"
+)]
 
 use std::time::Instant;
 

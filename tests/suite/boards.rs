@@ -75,6 +75,68 @@ fn a_second_run_reads_what_the_first_found_and_survives_a_torn_file() {
 }
 
 #[test]
+fn a_changed_entry_of_the_cache_is_not_believed() {
+    let folder = workplace();
+    copied(folder.path());
+    let corners = || std::fs::read(folder.path().join("out/corners.csv")).unwrap();
+    check(folder.path(), &[]);
+    let first = corners();
+    for entry in std::fs::read_dir(folder.path().join("out/cache")).unwrap() {
+        let path = entry.unwrap().path();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let corner = text.lines().nth(2).unwrap();
+        std::fs::write(&path, text.replace(corner, &corner.replace('1', "2"))).unwrap();
+    }
+    check(folder.path(), &[]);
+    assert_eq!(first, corners());
+}
+
+/// All files that a run wrote but the cache's, by name.
+fn results(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut files: Vec<(String, Vec<u8>)> = std::fs::read_dir(folder.join("out"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.is_file())
+        .map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&path).unwrap()))
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn first_and_second_run_and_any_number_of_threads_give_the_same_bytes() {
+    // The repository's pictures and four simulated worlds.
+    for seed in 0..5 {
+        let folder = workplace();
+        if seed == 0 {
+            copied(folder.path());
+        } else {
+            let arguments =
+                ["simulate", "--preset", "small", "--size", "640", "--seed", &seed.to_string(), "--out", "world"];
+            assert!(stereocal(folder.path(), &arguments).status.success());
+            std::fs::rename(folder.path().join("world/check"), folder.path().join("pictures")).unwrap();
+        }
+        let run = |threads: &str| {
+            std::process::Command::new(env!("CARGO_BIN_EXE_stereocal"))
+                .current_dir(folder.path())
+                .args(["camera-check", "pictures", "--lens", "radial2", "--no-provenance"])
+                .env("RAYON_NUM_THREADS", threads)
+                .output()
+                .unwrap();
+            results(folder.path())
+        };
+        let cold = run("2");
+        assert!(cold.iter().any(|(name, _)| name == "calibration.json"), "seed {seed}");
+        let warm = run("2");
+        std::fs::remove_dir_all(folder.path().join("out")).unwrap();
+        let one = run("1");
+        for ((name, bytes), others) in cold.iter().zip(warm.iter().zip(&one)) {
+            assert!(*bytes == others.0.1 && *bytes == others.1.1, "seed {seed}: {name}");
+        }
+    }
+}
+
+#[test]
 fn another_size_of_board_is_named() {
     let folder = workplace();
     let pictures = copied(folder.path());
@@ -157,5 +219,70 @@ fn files_that_are_no_pictures_are_said_to_be_none() {
     }
     let (status, said) = check(folder.path(), &[]);
     assert_eq!(status, Some(2), "{said}");
-    assert!(said.contains("3: both pictures: cannot be decoded") && said.contains("hint: save the pictures"), "{said}");
+    assert!(said.contains("1: both pictures: cannot be decoded") && said.contains("hint: save the pictures"), "{said}");
+    assert!(said.contains("3: both pictures: announces 100000x100000 px"), "{said}");
+}
+
+/// One line said about a pair.
+fn said_of<'a>(said: &'a str, pair: &str) -> &'a str {
+    said.lines().find(|line| line.contains(&format!("pair {pair} is not used"))).unwrap_or_default()
+}
+
+#[test]
+fn what_is_no_picture_to_measure_is_named() {
+    let folder = workplace();
+    let pictures = copied(folder.path());
+    let at = |name: &str| pictures.join(name);
+    let grey = |name: &str| image::open(pictures.join(name)).unwrap().to_luma8();
+    // A JPEG cut off at 70 %.
+    let mut jpeg = Vec::new();
+    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 95).encode_image(&grey("left/01.png")).unwrap();
+    std::fs::remove_file(at("left/01.png")).unwrap();
+    std::fs::write(at("left/01.jpg"), &jpeg[..jpeg.len() * 7 / 10]).unwrap();
+    // A header that announces 100 000 000 x 1 px.
+    std::fs::remove_file(at("left/02.png")).unwrap();
+    std::fs::write(at("left/02.pgm"), b"P5 100000000 1 255\n").unwrap();
+    // A raw mosaic: red and blue see less.
+    let mut mosaic = grey("right/03.png");
+    for (x, y, pixel) in mosaic.enumerate_pixels_mut() {
+        let gain = [[0.6, 1.0], [1.0, 0.5]][(y % 2) as usize][(x % 2) as usize];
+        pixel.0[0] = (f64::from(pixel.0[0]) * gain) as u8;
+    }
+    mosaic.save(at("right/03.png")).unwrap();
+    // Two fields: the odd rows were taken three pixels later.
+    let whole = grey("left/04.png");
+    let mut fields = whole.clone();
+    for (x, y, pixel) in fields.enumerate_pixels_mut() {
+        if y % 2 == 1 {
+            *pixel = *whole.get_pixel(x.saturating_sub(3), y);
+        }
+    }
+    fields.save(at("left/04.png")).unwrap();
+    let (status, said) = check(folder.path(), &[]);
+    assert!(matches!(status, Some(0..=3)), "{said}");
+    for (pair, reason) in [
+        ("01", "the JPEG is cut off or damaged"),
+        ("02", "announces 100000000x1 px"),
+        ("03", "raw colour mosaic"),
+        ("04", "interlaced"),
+    ] {
+        assert!(said_of(&said, pair).contains(reason), "{pair}, {reason}: {said}");
+    }
+    assert!(said_of(&said, "03").contains("--bayer RGGB"), "{said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_not_waited_for() {
+    let folder = workplace();
+    let pictures = copied(folder.path());
+    std::fs::remove_file(pictures.join("left/01.png")).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(pictures.join("left/01.png")).status();
+    if !made.is_ok_and(|status| status.success()) {
+        println!("skipped: no mkfifo here");
+        return;
+    }
+    let (status, said) = check(folder.path(), &[]);
+    assert!(matches!(status, Some(0 | 1)), "{said}");
+    assert!(said_of(&said, "01").contains("not a regular file"), "{said}");
 }

@@ -1,4 +1,4 @@
-//! What must not be in the source: each rule keeps a promise that the documentation makes.
+//! What must not be in the source and clippy cannot check (see clippy.toml and `[lints]` in Cargo.toml for the rest).
 
 use std::path::{Path, PathBuf};
 
@@ -73,38 +73,4 @@ fn one_file_names_opencv() {
     let found: Vec<String> =
         offenders("opencv::", &["src/opencv.rs"]).into_iter().filter(|l| !l.contains("crate::opencv::")).collect();
     assert!(found.is_empty(), "{found:#?}");
-}
-
-#[test]
-fn results_never_come_from_a_hash_map() {
-    // Its order changes from run to run, and the same input must give the same bytes.
-    for name in ["HashMap", "HashSet"] {
-        let found = offenders(name, &[]);
-        assert!(found.is_empty(), "{found:#?}");
-    }
-}
-
-#[test]
-fn stdout_belongs_to_main() {
-    for name in ["println!(", "print!(", "stdout()"] {
-        let found: Vec<String> =
-            offenders(name, &["src/main.rs"]).into_iter().filter(|l| !l.contains("eprint")).collect();
-        assert!(found.is_empty(), "{found:#?}");
-    }
-}
-
-#[test]
-fn every_random_draw_comes_from_the_seed() {
-    for name in ["thread_rng", "rand::rng()", "from_os_rng", "SystemTime", "Instant::now"] {
-        let found = offenders(name, &[]);
-        assert!(found.is_empty(), "{found:#?}");
-    }
-}
-
-#[test]
-fn nothing_panics_on_purpose() {
-    for name in [".unwrap()", ".expect(", "panic!(", "unreachable!("] {
-        let found = offenders(name, &[]);
-        assert!(found.is_empty(), "{found:#?}");
-    }
 }

@@ -116,3 +116,88 @@ fn robotcali_is_seen_to_be_several_sessions() {
     // Published: 0.62 mm root mean square.
     assert!(mean.hypot(std) < 0.62, "{verify}");
 }
+
+/// A small world without pictures: `measurements.csv` and `robot.toml` in a folder.
+fn simulated() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["simulate", "--points-only", "--preset", "small", "--seed", "3", "--out", "."];
+    Command::cargo_bin("stereocal")
+        .expect("the program is built")
+        .current_dir(folder.path())
+        .args(arguments)
+        .assert()
+        .success();
+    folder
+}
+
+/// What `identify` writes for the measurements after `change`, line by line (the header is line 0).
+fn identified(folder: &Path, change: impl Fn(usize, Vec<String>) -> Vec<String>) -> serde_json::Value {
+    let text = std::fs::read_to_string(folder.join("measurements.csv")).expect("measurements");
+    let lines =
+        text.lines().enumerate().map(|(i, line)| change(i, line.split(',').map(str::to_owned).collect()).join(","));
+    std::fs::write(folder.join("m.csv"), lines.collect::<Vec<_>>().join("\n")).expect("written");
+    let output = identify(folder)
+        .args(["--robot", "robot.toml", "--method", "trust-region", "--json", "--out", "out", "--force"])
+        .output()
+        .expect("it runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("stdout is JSON")
+}
+
+#[test]
+fn verify_says_of_the_written_robot_what_identify_said() {
+    let folder = simulated();
+    let record = identified(folder.path(), |_, fields| fields);
+    assert!(
+        record["outliers"].is_null() && record["sessions"].is_null(),
+        "{} {}",
+        record["outliers"],
+        record["doctor"]
+    );
+    let arguments =
+        ["verify", "--json", "--measurements", "m.csv", "--robot", "robot.toml", "--robot", "out/identified.toml"];
+    let output = Command::cargo_bin("stereocal")
+        .expect("built")
+        .current_dir(folder.path())
+        .args(arguments)
+        .output()
+        .expect("it runs");
+    let verified: serde_json::Value = serde_json::from_slice(&output.stdout).expect("stdout is JSON");
+    for (k, said) in [(0, &record["before"]), (1, &record["methods"][0])] {
+        let again = verified["robots"][k]["verify"]["mean_abs_mm"].as_f64().expect("a mean");
+        assert!((again - mean(said)).abs() < 1e-9, "{again} {}", mean(said));
+    }
+}
+
+#[test]
+fn a_centre_that_is_off_is_named() {
+    let folder = simulated();
+    let off = |i: usize, mut fields: Vec<String>| {
+        if i == 1 {
+            let x = fields
+                .iter()
+                .position(|f| f.parse::<f64>().is_err() && f == "center")
+                .map(|c| c + 7)
+                .expect("a centre");
+            fields[x] = (fields[x].parse::<f64>().expect("a number") + 5.0).to_string();
+        }
+        fields
+    };
+    let record = identified(folder.path(), off);
+    assert_eq!(record["outliers"], serde_json::json!(["g1_000"]), "{}", record["doctor"]);
+}
+
+#[test]
+fn exchanged_columns_are_named_as_that() {
+    let folder = simulated();
+    let exchanged = |i: usize, mut fields: Vec<String>| {
+        if i > 0 {
+            fields.swap(4, 5);
+        }
+        fields
+    };
+    let record = identified(folder.path(), exchanged);
+    let said = record["doctor"].to_string();
+    assert!(said.contains("joints 2 and 3 are exchanged"), "{said}");
+    assert!(record["scatter_mm"].as_f64().is_some_and(|s| s < 0.1), "{}", record["scatter_mm"]);
+}

@@ -1,18 +1,28 @@
 //! The program as its users meet it, and the habits of its house.
 #![allow(
     clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::disallowed_methods,
     clippy::print_stdout,
     reason = "a test ends where its world is not as it should be, and says what it skips"
 )]
 
 mod boards;
+mod corner_floors;
 mod pictures;
+mod planted_faults;
 mod run;
 mod worlds;
 
+mod faults;
+mod fuzz;
+mod guide;
 mod house;
 mod identify;
+mod measure;
 mod messages;
 mod pipeline;
+mod provenance;
 mod published;
 mod real;

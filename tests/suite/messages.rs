@@ -29,7 +29,12 @@ fn no_command_is_bad_usage() {
 #[test]
 fn a_board_that_is_none() {
     refused(&["camera-check", "x", "--squares", "20"], &[], 2, &["COLUMNSxROWS", "`20`"]);
-    refused(&["camera-check", "x", "--square-mm", "-3"], &[("x/a.txt", "")], 2, &["square_mm is -3", "above zero"]);
+    refused(
+        &["camera-check", "x", "--square-mm", "-3"],
+        &[("x/a.txt", "")],
+        2,
+        &["square_mm is -3", "from 0.001 to 100000"],
+    );
 }
 
 #[test]
@@ -39,4 +44,41 @@ fn settings_that_are_none() {
     refused(&["identify", "--config", "none.toml"], &[], 2, &["not found", "none.toml"]);
     let unknown = [("stereocal.toml", "\ntolerance = 1.0\n")];
     refused(&["identify"], &unknown, 2, &["unknown field `tolerance`", "stereocal.toml:2"]);
+}
+
+/// Every number that can be set has a range, and the message says it.
+#[test]
+fn numbers_beyond_their_range() {
+    for (key, value, range) in [
+        ("tolerance_mm", "1e9", "from 0.000001 to 10000"),
+        ("identify.folds", "9223372036854775807", "from 2 to 1000"),
+        ("identify.folds", "18446744073709551615", "from 2 to 1000"),
+        ("identify.swarm.particles", "1000000000", "from 2 to 100000"),
+        ("identify.swarm.iterations", "0", "from 1 to 1000000"),
+        ("identify.swarm.cpso_c", "2.0", "more than 2"),
+        ("identify.swarm.apso_inertia", "[0.4, nan]", "from 0 to 1000"),
+        ("identify.swarm.stapso.trust_region_steps", "1000000000", "from 0 to 100000"),
+        ("identify.trust_region.iterations", "1000000000", "from 1 to 100000"),
+        ("identify.trust_region.step", "inf", "from 0 to 1"),
+        ("identify.bound_deg", "1e300", "from 0.000001 to 180"),
+        ("identify.rank_tolerance", "nan", "to 0.1"),
+        ("check_board", "{ squares = \"20x20\", square_mm = 1e300 }", "from 0.001 to 100000"),
+        ("check_board", "{ squares = \"99999999999999999999x20\", square_mm = 10.0 }", "COLUMNSxROWS"),
+    ] {
+        let toml = format!("{key} = {value}\n");
+        refused(&["identify"], &[("stereocal.toml", &toml)], 2, &[range]);
+    }
+    for (flags, range) in [
+        (
+            &["camera-check", "x", "--board-temperature-c", "1e9", "--expansion-ppm-per-k", "7"][..],
+            "from -273.15 to 1000",
+        ),
+        (&["camera-check", "--corners", "x", "--picture-size", "0x7"], "from 1 to 100000"),
+        (&["simulate", "--check-pairs", "99999999"], "from 0 to 10000"),
+        (&["simulate", "--thermal-ppm", "nan"], "from -100000 to 100000"),
+        (&["simulate", "--bits", "17"], "8..=16"),
+        (&["identify", "--threads", "0"], "1..=1024"),
+    ] {
+        refused(flags, &[], 2, &[range]);
+    }
 }

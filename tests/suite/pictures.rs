@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Point2, Vector3};
 
 use stereocal::geometry::{Transform, transform};
-use stereocal::imaging::picture::{Picture, Pixels};
+use stereocal::imaging::image::{Image, Picture};
 use stereocal::imaging::{detect, refine};
 use stereocal::simulate::backdrop::Backdrop;
 use stereocal::simulate::draws::NormalTable;
@@ -308,11 +308,11 @@ fn more_bits_see_the_same_corners() {
     let corners = |bits: u8| -> Vec<Point2<f64>> {
         let sensor = Sensor { bits, full_well_e: 10_000.0, read_noise_e: 3.0, dark: 0.008 };
         let rendered = Renderer::new(&Scene { sensor, ..scene }).picture(&NormalTable::new());
-        let pixels = match bits {
-            8 => Pixels::Eight(rendered.samples.iter().map(|&v| v as u8).collect()),
-            _ => Pixels::Sixteen(rendered.samples),
+        let (width, height) = (rendered.width, rendered.height);
+        let picture = match bits {
+            8 => Picture::from(Image { width, height, pixels: rendered.samples.iter().map(|&v| v as u8).collect() }),
+            _ => Picture::from(Image { width, height, pixels: rendered.samples }),
         };
-        let picture = Picture { width: rendered.width, height: rendered.height, pixels };
         let detected = detect::detect(&picture, board.drawing).unwrap();
         refine::measure(&picture, &detected).iter().map(|(_, _, found)| found.px).collect()
     };

@@ -45,12 +45,13 @@ fn pictures_to_corrected_kinematics() {
     for key in ["pair", "mean_error_x10_mm", "mean_error_y10_mm", "mean_error_x70_mm", "mean_error_y70_mm"] {
         assert!(check.pointer(&format!("/pairs/0/{key}")).is_some(), "{key}");
     }
-    let columns = "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,used,blur_px";
+    let columns = "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,used,blur_px,width_px,height_px";
     assert_eq!(header(&world.join("out/corners.csv")), columns);
 
     done(world, &["measure", "poses/"]);
     let columns = "pose,group,role,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,x_mm,y_mm,z_mm,\
-                   sxx_mm2,sxy_mm2,sxz_mm2,syy_mm2,syz_mm2,szz_mm2,rx_rad,ry_rad,rz_rad,fit_rms_mm,corners,status";
+                   sxx_mm2,sxy_mm2,sxz_mm2,syy_mm2,syz_mm2,szz_mm2,rx_rad,ry_rad,rz_rad,fit_rms_mm,corners,status,\
+                   srxrx_rad2,srxry_rad2,srxrz_rad2,sryry_rad2,sryrz_rad2,srzrz_rad2";
     assert_eq!(header(&world.join("out/measurements.csv")), columns);
 
     done(world, &["identify"]);
@@ -69,6 +70,24 @@ fn pictures_to_corrected_kinematics() {
         assert!(world.join("out").join(file).is_file(), "{file}");
     }
     exported_rigs_measure_the_same_points(world);
+    another_calibration_is_noticed(world);
+}
+
+/// The robot's file says which calibration it came from, and measurements that were made with another one are warned of.
+fn another_calibration_is_noticed(world: &Path) {
+    let identified = json(&world.join("out/identification.json"));
+    let inputs = identified.pointer("/provenance/measured_by/inputs").and_then(Value::as_array).expect("inputs");
+    assert!(inputs.iter().any(|input| input["file"] == "out/calibration.json"), "{inputs:?}");
+    let said = || stderr(&stereocal(world, &["identify", "--method", "trust-region", "--extensions", "none"]));
+    // The same rig of another day is the same rig.
+    let path = world.join("out/calibration.json");
+    let mut rig = json(&path);
+    rig["provenance"]["date"] = "1999-01-01T00:00:00Z".into();
+    std::fs::write(&path, rig.to_string()).unwrap();
+    assert!(!said().contains("another calibration"));
+    rig["left"]["fx"] = (number(&rig, "/left/fx") + 0.001).into();
+    std::fs::write(&path, rig.to_string()).unwrap();
+    assert!(said().contains("made with another calibration than out/calibration.json"));
 }
 
 /// Each export is read back and measures the same points; that it holds no covariance is said.
@@ -82,7 +101,14 @@ fn exported_rigs_measure_the_same_points(world: &Path) {
         let number = |row: &csv::StringRecord, i: usize| row[i].parse::<f64>().expect("a measured pose");
         rows.records().map(|row| row.expect("a row")).map(|row| [0, 1, 2].map(|k| number(&row, x + k))).collect()
     };
-    let own = points("out");
+    // The other formats hold neither the covariance nor the corners' scatter, which are evidence to `measure`.
+    let mut plain = json(&world.join("out/calibration.json"));
+    let fields = plain.as_object_mut().expect("an object");
+    fields.retain(|key, _| key != "covariance" && key != "corner_noise");
+    std::fs::create_dir_all(world.join("plain")).expect("a folder");
+    std::fs::write(world.join("plain/rig.json"), plain.to_string()).expect("a file");
+    done(world, &["measure", "poses/", "--calibration", "plain/rig.json", "--out", "plain"]);
+    let own = points("plain");
     for (format, file) in [
         ("opencv", "stereo_opencv.yml"),
         ("ros", "left.yaml"),
@@ -120,6 +146,7 @@ fn one_thread_and_two_give_the_same_bytes() {
             let output = std::process::Command::new(env!("CARGO_BIN_EXE_stereocal"))
                 .current_dir(&world)
                 .env("RAYON_NUM_THREADS", threads)
+                .env("SOURCE_DATE_EPOCH", "1700000000")
                 .args(arguments)
                 .output()
                 .expect("the program starts");

@@ -8,13 +8,14 @@ pub fn workplace() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
 
+/// Where the program is.
+pub fn program() -> &'static str {
+    env!("CARGO_BIN_EXE_stereocal")
+}
+
 /// Runs the program in `folder` and returns what it said and how it ended.
 pub fn stereocal(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_stereocal"))
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .expect("the program starts")
+    Command::new(program()).current_dir(folder).args(arguments).output().expect("the program starts")
 }
 
 /// What the program wrote to stderr.

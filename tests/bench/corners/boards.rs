@@ -1,8 +1,8 @@
 //! Whole boards from the simulator's renderer: time, memory and deviation from the truth.
 
-use nalgebra::{Point2, Vector2, Vector3};
+use nalgebra::{Point2, Vector3};
 use stereocal::geometry::{Transform, transform};
-use stereocal::imaging::picture::{Grey8, Picture, Pixels};
+use stereocal::imaging::image::{Grey8, Image, Picture};
 use stereocal::imaging::{Board, detect, refine};
 use stereocal::opencv;
 use stereocal::simulate::backdrop::Backdrop;
@@ -61,7 +61,8 @@ fn row(size: u32, sectors_too: bool) {
     let truth = scene.corners_px();
     let rendered = Renderer::new(&scene).picture(&NormalTable::new());
     let pixels: Vec<u8> = rendered.samples.iter().map(|&v| v as u8).collect();
-    let picture = Picture { width: rendered.width, height: rendered.height, pixels: Pixels::Eight(pixels.clone()) };
+    let grey = Image { width: rendered.width, height: rendered.height, pixels };
+    let picture = Picture::from(grey.clone());
     let clock = core_s();
     let detected = detect::detect(&picture, drawing).expect("the board is in view");
     let detect_s = core_s() - clock;
@@ -77,18 +78,40 @@ fn row(size: u32, sectors_too: bool) {
     let (observations, steps) = (mean(&|m| m.fit.pixels), mean(&|m| m.fit.steps));
     println!("   {observations:.0} observations a corner, {steps:.1} steps at full size");
     println!("   fit {} predicted {:.5}", rms(&found, &truth), predicted.sqrt());
-    let grey = Grey8 { width: rendered.width, height: rendered.height, pixels };
-    let (k, offset) = (detected.factor as f64, Vector2::new(0.5, 0.5));
-    let start: Vec<Point2<f64>> = detected.corners.iter().map(|(_, _, p)| (p + offset) * k - offset).collect();
+    let start: Vec<Point2<f64>> = detected.corners.iter().map(|(_, _, p)| detected.level.to_picture(p)).collect();
     let clock = core_s();
     let sub_pix = opencv::corner_sub_pix(&grey, &start, 5).expect("OpenCV works");
     println!("   cornerSubPix(11) {} in {:.3} s", rms(&sub_pix, &truth), core_s() - clock);
+    peer(&grey, &truth);
     if sectors_too {
         let clock = core_s();
         let found = opencv::find_board(&grey, 19, 19).expect("OpenCV works");
         let text = found.map_or("not found".to_owned(), |f| rms(&f, &truth));
         println!("   findChessboardCornersSB {text} in {:.3} s", core_s() - clock);
     }
+}
+
+/// The crate `chess-corners` with its best refiner: it finds single corners, of which those nearest to the truth are judged.
+fn peer(grey: &Grey8, truth: &[Point2<f64>]) {
+    use chess_corners::{Detector, DetectorConfig, ImageRefiner};
+    /// A corner farther from the truth is another one, px.
+    const NEAR_PX: f64 = 1.5;
+    let clock = core_s();
+    let config = DetectorConfig::chess_multiscale().with_refiner(ImageRefiner::saddle_point());
+    let found = Detector::new(config)
+        .and_then(|mut detector| detector.detect_u8(&grey.pixels, grey.width as u32, grey.height as u32));
+    let seconds = core_s() - clock;
+    let Ok(found) = found else { return println!("   chess-corners refused the picture") };
+    let places: Vec<Point2<f64>> = found.iter().map(|c| Point2::new(f64::from(c.x), f64::from(c.y))).collect();
+    let nearest = |t: &Point2<f64>| {
+        places
+            .iter()
+            .copied()
+            .min_by(|a, b| (a - t).norm().total_cmp(&(b - t).norm()))
+            .filter(|p| (p - t).norm() < NEAR_PX)
+    };
+    let (near, theirs): (Vec<_>, Vec<_>) = truth.iter().filter_map(|t| Some((nearest(t)?, *t))).unzip();
+    println!("   chess-corners {} for {} corners in {seconds:.3} s", rms(&near, &theirs), near.len());
 }
 
 fn tilted() -> Transform {

@@ -1,10 +1,17 @@
 //! Benchmark of the corner measurement: `cargo bench --bench corners` (add `--profile dev` to reuse the test build).
 //!
 //! Single corners, drawn by supersampling, against the Cramer-Rao bound of the same window; whole boards, drawn by the
-//! simulator's renderer, with OpenCV's `cornerSubPix` and sector detector beside the fit on the same pictures; boards at
+//! simulator's renderer, with OpenCV's `cornerSubPix` and sector detector and the crate `chess-corners` beside the fit on the same pictures; boards at
 //! all tilts and turns. `-- single`, `-- boards` or `-- poses 300` makes one table alone.
 
-#![allow(clippy::print_stdout, reason = "a benchmark prints its table")]
+#![allow(
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "a benchmark times, prints its table, and ends where its input is not as it should be"
+)]
 
 mod boards;
 mod corner_patch;

@@ -6,8 +6,8 @@ use nalgebra::{Point2, Vector3};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use stereocal::geometry::{Transform, transform};
-use stereocal::imaging::grid::{Grid, Places};
-use stereocal::imaging::picture::{Picture, Pixels};
+use stereocal::imaging::image::{Image, Picture};
+use stereocal::imaging::lattice::{Lattice, Places};
 use stereocal::imaging::{Board, detect, order, refine};
 use stereocal::simulate::backdrop::Backdrop;
 use stereocal::simulate::clutter;
@@ -112,12 +112,12 @@ fn run(drawing: Board, pairs: usize) -> Count {
 
 fn look(scene: &Scene, drawing: Board) -> Result<Places, String> {
     let rendered = Renderer::new(scene).picture(&NormalTable::new());
-    let pixels = Pixels::Eight(rendered.samples.iter().map(|&v| v as u8).collect());
-    let picture = Picture { width: rendered.width, height: rendered.height, pixels };
+    let pixels: Vec<u8> = rendered.samples.iter().map(|&v| v as u8).collect();
+    let picture = Picture::from(Image { width: rendered.width, height: rendered.height, pixels });
     let detected = detect::detect(&picture, drawing).map_err(|refusal| refusal.reason)?;
     // What could not be measured is kept at its rough place, marked as not used.
     let corners = refine::refine(&picture, &detected);
-    Ok(Grid::from_fn(corners.columns, corners.rows, |col, row| {
+    Ok(Lattice::from_fn(corners.columns, corners.rows, |col, row| {
         corners.get(col, row).filter(|corner| corner.used).map(|corner| corner.px)
     }))
 }
@@ -171,7 +171,7 @@ fn worst(grid: &Places, truth: &[Point2<f64>]) -> f64 {
     if grid.columns * grid.rows != truth.len() {
         return f64::MAX;
     }
-    let truth = Grid { columns: grid.columns, rows: grid.rows, cells: truth.iter().map(|p| Some(*p)).collect() };
+    let truth = Lattice { columns: grid.columns, rows: grid.rows, cells: truth.iter().map(|p| Some(*p)).collect() };
     let distance = |col, row, p: &Point2<f64>| truth.get(col, row).map_or(f64::MAX, |t: &Point2<f64>| (t - p).norm());
     grid.iter().map(|(col, row, p)| distance(col, row, p)).fold(0.0, f64::max)
 }

@@ -4,9 +4,10 @@ use nalgebra::{Matrix2, Point2, Vector2};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use stereocal::imaging::detect::Detected;
-use stereocal::imaging::grid::Grid;
-use stereocal::imaging::lighting;
-use stereocal::imaging::picture::{Grey8, Picture, Pixels};
+use stereocal::imaging::image::{Grey8, Picture};
+use stereocal::imaging::lattice::Lattice;
+use stereocal::imaging::pyramid::Level;
+use stereocal::imaging::refine::illumination;
 use stereocal::imaging::refine::{self, Measured};
 use stereocal::opencv;
 
@@ -108,24 +109,24 @@ fn measure(angle: f64, spread: Spread, noise: f64) -> Spot {
             let truth = Point2::new(middle + corner.0, middle + corner.1);
             let start = truth + Vector2::new(uniform() - 0.5, uniform() - 0.5);
             let side = PATCH as usize;
-            let grey = Grey8 { width: side, height: side, pixels: pixels.clone() };
+            let grey = Grey8 { width: side, height: side, pixels };
             let sub_pix = opencv::corner_sub_pix(&grey, &[start], 5).expect("OpenCV works");
             spot.sub_pix.push(sub_pix[0] - truth);
-            let picture = Picture { width: side, height: side, pixels: Pixels::Eight(pixels) };
+            let picture = Picture::from(grey.clone());
             let along = angles.map(|a| Vector2::new(a.cos(), a.sin()) * SQUARE_PX);
-            let corners = Grid {
+            let corners = Lattice {
                 columns: 2,
                 rows: 2,
                 cells: vec![Some(start), Some(start + along[0]), Some(start + along[1]), None],
             };
-            let fits = refine::measure(&picture, &Detected { corners, copy: picture.clone(), factor: 1 });
+            let fits = refine::measure(&picture, &Detected { corners, copy: grey, level: Level::Reduced(1) });
             let place = Vector2::new((board.len() % NOISES) as f64, (board.len() / NOISES) as f64) * f64::from(PATCH);
             board.push(fits.get(0, 0).map(|m| Measured { px: m.px + place, ..*m }));
             truths.push(truth + place);
         }
     }
-    let mut board = Grid { columns: NOISES, rows: PLACES, cells: board };
-    lighting::tie(&mut board);
+    let mut board = Lattice { columns: NOISES, rows: PLACES, cells: board };
+    illumination::tie(&mut board);
     for (measured, truth) in board.cells.iter().zip(&truths) {
         match measured {
             Some(measured) => {

@@ -8,11 +8,12 @@ use camino::Utf8Path;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
-use stereocal::identify::dataset::Dataset;
-use stereocal::identify::prepare::Prepared;
-use stereocal::identify::problem::{Problem, Solution};
+use stereocal::identify::Model;
+use stereocal::identify::data::dataset::Dataset;
 use stereocal::identify::settings::{Method, Prior, Settings, SwarmSettings};
-use stereocal::identify::{Model, swarm, trust_region};
+use stereocal::identify::solve::formulation::{Formulation, Task};
+use stereocal::identify::solve::problem::{Problem, Solution};
+use stereocal::identify::solve::{swarm, trust_region};
 use stereocal::{measurements, robot};
 
 use crate::experiment;
@@ -40,8 +41,16 @@ pub fn table(seeds: u64) {
         let set = Dataset::new(&rows, 1).expect("rows to fit");
         let settings = Settings { prior: Prior::Off, widen_bounds, ..Settings::default() };
         let parameters = nominal.mdh_parameters();
-        let prepared = Prepared::new(&set, &nominal, &parameters, &set.fit_rows(), Model::CenterDistance, &settings)
-            .expect("enough poses");
+        let prepared = Formulation::new(&Task {
+            set: &set,
+            robot: &nominal,
+            parameters: &parameters,
+            extras: &[],
+            rows: &set.fit_rows(),
+            model: Model::CenterDistance,
+            settings: &settings,
+        })
+        .expect("enough poses");
         compare(plan, &prepared.fit(), seeds);
     }
 }

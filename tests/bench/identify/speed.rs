@@ -6,11 +6,12 @@
 use std::time::Instant;
 
 use camino::Utf8Path;
-use stereocal::identify::dataset::Dataset;
-use stereocal::identify::prepare::Prepared;
-use stereocal::identify::problem::Problem;
+use stereocal::identify::Model;
+use stereocal::identify::data::dataset::Dataset;
 use stereocal::identify::settings::{Method, Prior, Settings};
-use stereocal::identify::{Model, swarm, trust_region};
+use stereocal::identify::solve::formulation::{Formulation, Task};
+use stereocal::identify::solve::problem::Problem;
+use stereocal::identify::solve::{swarm, trust_region};
 use stereocal::measurements::{self, Measurement, Observed, RobotPose, Role};
 use stereocal::robot::{self, Robot};
 
@@ -30,11 +31,18 @@ pub fn table(files: &[String]) {
     let set = Dataset::new(&rows, SEED).expect("rows to fit");
     let mut settings = Settings { prior: Prior::Off, ..Settings::default() };
     settings.swarm.patience = 0;
-    let prepared =
-        Prepared::new(&set, &robot, &robot.mdh_parameters(), &set.fit_rows(), Model::CenterDistance, &settings)
-            .expect("enough poses");
+    let prepared = Formulation::new(&Task {
+        set: &set,
+        robot: &robot,
+        parameters: &robot.mdh_parameters(),
+        extras: &[],
+        rows: &set.fit_rows(),
+        model: Model::CenterDistance,
+        settings: &settings,
+    })
+    .expect("enough poses");
     let fit = prepared.fit();
-    let (poses, threads) = (prepared.estimate.rows.len(), rayon::current_num_threads());
+    let (poses, threads) = (prepared.rows.rows.len(), rayon::current_num_threads());
     println!("{poses} poses, {} parameters, {threads} threads", fit.dimension());
     for method in [Method::Stapso, Method::Pso, Method::Cpso, Method::Apso, Method::Arpso] {
         let mut times: Vec<f64> = Vec::new();
@@ -79,7 +87,7 @@ fn made_up() -> (Robot, Vec<Measurement>) {
         let (group, role) = (i % 4, if i < 4 { Role::Center } else { Role::Sample });
         let joints_deg: Vec<f64> =
             (0..6).map(|j| 40.0 * ((i * (2 * j + 3)) as f64 * 0.7).sin() + 90.0 * (group as f64 - 1.5)).collect();
-        let at = RobotPose { pose: format!("p{i}"), group: format!("g{group}"), role, joints_deg };
+        let at = RobotPose { pose: format!("p{i}"), group: format!("g{group}"), role, joints_deg, slides: Vec::new() };
         let point_mm = truth.target_mm(&at.joints_rad());
         rows.push(Measurement {
             at,

@@ -1,0 +1,79 @@
+//! `stereocal init`: the files that a new cell starts from.
+
+use super::{Outcome, Result};
+use crate::cli::Init;
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::Run;
+use crate::measurements::{RobotPose, Role, pose_fields, pose_header};
+use crate::robot::{self, Robot};
+
+/// Every key with its default and where it comes from.
+pub const SETTINGS: &str = include_str!("init.toml");
+
+/// Runs the command: `stereocal.toml`, `robot.toml`, `poses.csv`, none of them over another.
+pub fn run(args: &Init, run: Run) -> Result<Outcome> {
+    // The settings file would stand in its own way.
+    let run = Run { force: args.force, inputs: Vec::new(), ..run };
+    let out = OutDir::open(&args.out)?.for_run(&run, &[]);
+    let names = ["stereocal.toml", "robot.toml", "poses.csv"];
+    out.check_free(&names)?;
+    out.write(names[0], SETTINGS.as_bytes())?;
+    out.write(names[1], robot::file::to_toml(&Robot::paper()).as_bytes())?;
+    out.write(names[2], poses().as_bytes())?;
+    Ok(Outcome { stdout: names.map(|name| format!("{}\n", out.join(name))).concat(), status: Status::Done })
+}
+
+/// A list that shows the columns: a centre, a sample and a pose to verify with.
+fn poses() -> String {
+    let pose = |name: &str, role, joints_deg: [f64; 6]| RobotPose {
+        pose: name.to_owned(),
+        group: "1".to_owned(),
+        role,
+        joints_deg: joints_deg.to_vec(),
+        slides: Vec::new(),
+    };
+    let rows = [
+        pose("001", Role::Center, [0.0, -90.0, 90.0, -90.0, -90.0, 0.0]),
+        pose("002", Role::Sample, [5.0, -85.0, 92.0, -88.0, -85.0, 4.0]),
+        pose("003", Role::Verify, [-4.0, -92.0, 88.0, -86.0, -94.0, -6.0]),
+    ];
+    let mut text = format!("{}\n", pose_header(6));
+    rows.iter().for_each(|row| text.push_str(&format!("{}\n", pose_fields(row))));
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    /// The settings with the defaults' comment marks taken away.
+    fn uncommented() -> String {
+        let setting =
+            |line: &str| line.starts_with('[') || line.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
+        SETTINGS
+            .lines()
+            .filter_map(|line| line.strip_prefix("# "))
+            .filter(|line| setting(line))
+            .map(|line| format!("{line}\n"))
+            .collect()
+    }
+
+    #[test]
+    fn the_settings_file_says_the_defaults() {
+        let config: Config = toml::from_str(&uncommented()).unwrap();
+        assert_eq!(config, Config::default());
+        assert_eq!(toml::from_str::<Config>(SETTINGS).unwrap(), Config::default());
+    }
+
+    /// A key that is missing from the file is a key that nobody finds: those of the structs, as their `Debug` names them.
+    #[test]
+    fn the_settings_file_has_every_key() {
+        let shown = format!("{:#?}", Config::default());
+        let keys = shown.lines().filter_map(|line| line.trim().split_once(": ")).map(|(key, _)| key);
+        for key in keys.filter(|key| !["columns", "rows"].contains(key)) {
+            assert!(SETTINGS.contains(&format!(" {key} = ")) || SETTINGS.contains(&format!("{key}]")), "{key}");
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! What the page of `measure` shows beside the results: small pictures of what went wrong, and distances as the robot was sent.
+
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use camino::Utf8Path;
+use rayon::prelude::*;
+
+use super::super::Result;
+use crate::imaging::image::Mosaic;
+use crate::imaging::input::pairs::{self, PairFiles};
+use crate::imaging::{Corners, PairCorners, overlay};
+use crate::measurements::Role;
+use crate::report::measure::{Distance, Extras, Thumbnail};
+use crate::robot::{self, Robot};
+use crate::stereo::target::series::{MeasuredPose, Series};
+
+/// Failures that are shown at most, and poses that fit worst.
+const FAILURES: usize = 12;
+const WORST: usize = 3;
+
+/// Width of a small picture, both sides together, px.
+const WIDTH: u32 = 720;
+
+/// The robot that was sent, where none is named.
+const ROBOT: &str = "robot.toml";
+
+/// Gathers them. `folder` holds the pictures.
+pub(super) fn gather(series: &Series, corners: &Corners, folder: &Utf8Path, mosaic: Option<Mosaic>) -> Result<Extras> {
+    Ok(Extras { thumbnails: thumbnails(series, corners, folder, mosaic)?, distances: distances(series)? })
+}
+
+fn thumbnails(series: &Series, corners: &Corners, folder: &Utf8Path, mosaic: Option<Mosaic>) -> Result<Vec<Thumbnail>> {
+    let files = pairs::pair_files(folder)?.pairs;
+    let failures = series.poses.iter().filter_map(|m| Some((m, m.target.as_ref().err()?.reason.clone())));
+    let mut chosen: Vec<(&MeasuredPose, String)> = failures.take(FAILURES).collect();
+    let mut measured: Vec<(f64, &MeasuredPose)> =
+        series.poses.iter().filter_map(|m| Some((m.target.as_ref().ok()?.chi_square, m))).collect();
+    measured.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let worst = measured.into_iter().take(WORST);
+    chosen.extend(worst.map(|(chi, m)| (m, format!("measured; chi-square a number {chi:.2}"))));
+    let draw = |(m, caption): &(&MeasuredPose, String)| {
+        let found = files.iter().find(|f| f.pair == m.at.pose);
+        let none = PairCorners { pair: m.at.pose.clone(), ..PairCorners::default() };
+        let pair = corners.pairs.iter().find(|p| p.pair == m.at.pose).unwrap_or(&none);
+        let jpeg_base64 = found.and_then(|files| small(files, pair, mosaic)).unwrap_or_default();
+        Thumbnail { pose: m.at.pose.clone(), caption: caption.clone(), jpeg_base64 }
+    };
+    Ok(chosen.par_iter().map(draw).collect())
+}
+
+/// The overlay of a pair as a small JPEG in base64; `None` where a picture can't be read.
+fn small(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> Option<String> {
+    let drawn = image::load_from_memory(&overlay::png(files, corners, mosaic)?).ok()?;
+    let height = (drawn.height() * WIDTH / drawn.width().max(1)).max(1);
+    let reduced = drawn.resize_exact(WIDTH, height, image::imageops::FilterType::Triangle);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    reduced.to_rgb8().write_to(&mut bytes, image::ImageFormat::Jpeg).ok()?;
+    Some(BASE64_STANDARD.encode(bytes.into_inner()))
+}
+
+/// Distances to each group's centre, where a robot of so many joints is known.
+fn distances(series: &Series) -> Result<Vec<Distance>> {
+    let file = Utf8Path::new(ROBOT);
+    let robot = if file.is_file() { robot::file::read(file)? } else { Robot::paper() };
+    if series.poses.iter().any(|m| m.at.joints_deg.len() != robot.joints.len()) {
+        return Ok(Vec::new());
+    }
+    let of = |m: &MeasuredPose| {
+        let same_group = |c: &&MeasuredPose| c.at.group == m.at.group && c.at.role == Role::Center;
+        let center = series.poses.iter().find(same_group)?;
+        let at = |m: &MeasuredPose| m.target.as_ref().ok().map(|t| t.cam_from_board.translation.vector);
+        let measured_mm = (at(m)? - at(center)?).norm();
+        let commanded_mm = (robot.target_mm(&m.at.joints_rad()) - robot.target_mm(&center.at.joints_rad())).norm();
+        (m.at.role != Role::Center).then_some(Distance { commanded_mm, measured_mm })
+    };
+    Ok(series.poses.iter().filter_map(of).collect())
+}

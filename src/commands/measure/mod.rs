@@ -1,0 +1,124 @@
+//! `stereocal measure`: Pictures of the target on the robot to its point and orientation per pose.
+
+mod extras;
+mod watch;
+
+use std::collections::BTreeMap;
+
+use camino::Utf8Path;
+
+use super::{Outcome, Result};
+use crate::cli::Measure;
+use crate::config::Config;
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::Run;
+use crate::formats::calibration;
+use crate::formats::measure::{self, MeasureFile};
+use crate::imaging::input::cache::Cache;
+use crate::imaging::{Corners, PairCorners, Wanted, find_corners};
+use crate::measurements::{self, RobotPose};
+use crate::stereo;
+use crate::stereo::target::series::{self, Knowledge, Refusal, Seen, Series};
+use crate::{progress, report};
+
+/// Runs the command.
+pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
+    let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
+    let rig_file = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
+    let list = args.poses.join("poses.csv");
+    let known = knowledge(args, config, &rig_file)?;
+    let poses = measurements::read_poses(&list)?;
+    if args.watch {
+        let wanted = Wanted {
+            board: known.board,
+            needed: 1,
+            mosaic: args.bayer,
+            cache: Some(Cache { out: &out }),
+            overlays: None,
+        };
+        watch::wait(&args.poses, &poses, &known, &wanted)?;
+    }
+    let run = Run { force: args.output.force, ..run };
+    let out = out.for_run(&run, &[&args.poses, &list, &rig_file]);
+    out.check_free(&["measurements.csv", "measure.json", "measure.html"])?;
+
+    let (cache, overlays) = (Some(Cache { out: &out }), args.draw.then_some(&out));
+    let corners =
+        find_corners(&args.poses, &Wanted { board: known.board, needed: 1, mosaic: args.bayer, cache, overlays })?;
+    corners.notes.iter().for_each(progress::note);
+    known.rig.check_size(&corners)?;
+    let series = series::measure(&known, seen(poses, &corners));
+    let file = MeasureFile::new(&series, &corners, &known.board, &known.rig);
+    say(&series, &file);
+    let extras = extras::gather(&series, &corners, &args.poses, args.bayer)?;
+    out.write("measurements.csv", measure::to_csv(&series.poses).as_bytes())?;
+    let json = out.write_json("measure.json", &file)?;
+    let page = report::page::signed(report::measure::page(&series, &file, &extras)?, out.provenance().as_ref());
+    out.write("measure.html", page.as_bytes())?;
+    end(&series, &known)?;
+    let stdout = if args.output.json { json } else { report::measure::summary(&file, &out) };
+    Ok(Outcome { stdout, status: Status::Done })
+}
+
+/// The rig, the target and what is known of both.
+fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Knowledge> {
+    let board = config.target_board.board(args.squares, args.square_mm)?;
+    let (rig, noise) = calibration::read_with_noise(rig_file)?;
+    if rig.covariance.is_none() {
+        progress::warn(format!(
+            "{rig_file} holds no covariance: the points' uncertainties leave out that of the calibration"
+        ));
+    }
+    if noise.is_none() {
+        progress::warn(format!(
+            "{rig_file} does not say how corners scattered: whether these pictures scatter more is not judged"
+        ));
+    }
+    let (crossing_mm, tolerance_mm) = (config.measure.crossing_mm, config.tolerance_mm);
+    Ok(Knowledge { rig, noise, board, crossing_mm, tolerance_mm })
+}
+
+/// Every pose of the list with its corners, or why there are none.
+fn seen(poses: Vec<RobotPose>, corners: &Corners) -> Vec<Seen> {
+    let refused = |reason: &str| Err(Refusal { status: "not seen", reason: reason.to_owned() });
+    let mut by_name: BTreeMap<&str, std::result::Result<PairCorners, Refusal>> =
+        corners.pairs.iter().map(|pair| (pair.pair.as_str(), Ok(pair.clone()))).collect();
+    for skipped in &corners.skipped {
+        by_name.insert(&skipped.pair, refused(&skipped.reason));
+    }
+    let of = |at: RobotPose| {
+        let missing = || Err(Refusal { status: "no pictures", reason: "no pictures of this name".to_owned() });
+        let corners = by_name.remove(at.pose.as_str()).unwrap_or_else(missing);
+        Seen { at, corners }
+    };
+    let seen = poses.into_iter().map(of).collect();
+    for name in by_name.keys() {
+        progress::warn(format!("the pictures {name} belong to no pose of poses.csv"));
+    }
+    seen
+}
+
+/// What a person should know, on stderr.
+fn say(series: &Series, file: &MeasureFile) {
+    if !series.judgement.ends_the_run() {
+        for pose in &series.poses {
+            if let Err(refusal) = &pose.target {
+                progress::warn(format!("pose {} is not measured: {}", pose.at.pose, refusal.reason));
+            }
+        }
+        file.warnings().iter().for_each(progress::warn);
+    }
+}
+
+/// A rig that is not the calibrated one, or not one measured pose, is the end of the run; the files say so as well.
+fn end(series: &Series, known: &Knowledge) -> Result<()> {
+    let judgement = &series.judgement;
+    if let (true, Some(statement)) = (judgement.ends_the_run(), judgement.describe(&known.rig, known.board.square_mm)) {
+        return Err(stereo::Error::RigChanged { statement, hint: judgement.hint().unwrap_or_default() }.into());
+    }
+    if series.poses.iter().all(|pose| pose.target.is_err()) {
+        return Err(stereo::Error::NothingMeasured { poses: series.poses.len() }.into());
+    }
+    Ok(())
+}

@@ -1,0 +1,86 @@
+//! How an error is told, and which exit status it ends in. Imports nothing of this crate.
+//!
+//! Each stage has an error enum of its own whose variants carry the numbers; [`crate::commands::Error`] gathers them.
+//! A message says what was found and what was needed; [`Explain`] adds where, and what to try.
+
+use camino::Utf8PathBuf;
+
+/// Exit status of the program, as the contract has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// Done, and within tolerance where there is one.
+    Done,
+    /// Done, but out of tolerance.
+    OutOfTolerance,
+    /// Bad usage or bad input.
+    BadInput,
+    /// A computation did not converge, or the data cannot determine the answer.
+    Undetermined,
+}
+
+impl Status {
+    /// The number the process ends with.
+    pub fn code(self) -> u8 {
+        match self {
+            Status::Done => 0,
+            Status::OutOfTolerance => 1,
+            Status::BadInput => 2,
+            Status::Undetermined => 3,
+        }
+    }
+}
+
+/// What an error adds to its message.
+pub trait Explain: std::error::Error {
+    /// The exit status it ends in.
+    fn status(&self) -> Status {
+        Status::BadInput
+    }
+    /// The file, folder, pose or pair it is about.
+    fn place(&self) -> Option<String> {
+        None
+    }
+    /// A command or a change to try.
+    fn hint(&self) -> Option<String> {
+        None
+    }
+}
+
+/// The message as a person reads it on stderr: what, where, hint.
+pub fn report(error: &impl Explain) -> String {
+    let mut text = format!("error: {error}\n");
+    let mut source = error.source();
+    while let Some(cause) = source {
+        // Many messages quote their cause already.
+        let said = cause.to_string();
+        if !text.contains(&said) {
+            text.push_str(&format!("  cause: {said}\n"));
+        }
+        source = cause.source();
+    }
+    if let Some(place) = error.place() {
+        text.push_str(&format!("  in: {place}\n"));
+    }
+    if let Some(hint) = error.hint() {
+        text.push_str(&format!("  hint: {hint}\n"));
+    }
+    text
+}
+
+/// A line of a text file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// The file.
+    pub path: Utf8PathBuf,
+    /// Its line, counted from 1, where one is to blame.
+    pub line: Option<u64>,
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.line {
+            Some(line) => write!(f, "{}:{line}", self.path),
+            None => write!(f, "{}", self.path),
+        }
+    }
+}

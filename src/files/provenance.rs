@@ -1,0 +1,212 @@
+//! Where a result came from: program, date, command line, and the files it was made of, with their hashes.
+//!
+//! The hashes are SHA-256, so that `sha256sum` checks them. Everything but the date and the command line is the same for
+//! the same inputs; the date is that of `SOURCE_DATE_EPOCH` (reproducible-builds.org) where that is set.
+
+use std::time::{Duration, SystemTime};
+
+use camino::{Utf8Path, Utf8PathBuf};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+/// The key of a JSON file that holds its provenance.
+pub const KEY: &str = "provenance";
+
+/// Extensions of pictures: of a folder that is read, these files count as read.
+const PICTURES: [&str; 8] = ["png", "tif", "tiff", "bmp", "jpg", "jpeg", "pgm", "pnm"];
+
+/// What was typed, when, and what may be overwritten.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Run {
+    /// The command line as typed, `None` where no provenance is wanted.
+    pub command: Option<String>,
+    /// Whether foreign files may be replaced.
+    pub force: bool,
+    /// What every command reads: the settings file, where there is one.
+    pub inputs: Vec<Utf8PathBuf>,
+}
+
+/// The content of `provenance` in a JSON file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// "stereocal" and its version.
+    pub program: String,
+    /// UTC, to the second.
+    pub date: String,
+    /// The command line.
+    pub command: String,
+    /// What was read, in the order of the command's stages.
+    pub inputs: Vec<Digested>,
+    /// What the same run wrote before this file.
+    pub outputs: Vec<Digested>,
+    /// How the measurements came about that a robot was identified from, where `measure.json` stands beside them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured_by: Option<Box<Provenance>>,
+}
+
+impl Provenance {
+    /// That of a run which has read and written nothing yet.
+    pub fn new(command: String) -> Provenance {
+        Provenance {
+            program: program(),
+            date: date(),
+            command,
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+            measured_by: None,
+        }
+    }
+
+    /// That which a JSON file holds, if it is one and holds any.
+    pub fn of_json(path: &Utf8Path) -> Option<Provenance> {
+        let value: serde_json::Value = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
+        serde_json::from_value(value.get(KEY)?.clone()).ok()
+    }
+}
+
+/// Name and version.
+pub fn program() -> String {
+    format!("stereocal {}", env!("CARGO_PKG_VERSION"))
+}
+
+/// The date that results carry, UTC.
+fn date() -> String {
+    let given = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|text| text.trim().parse::<u32>().ok());
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "the date of a run is part of its provenance; nothing is computed from it"
+    )]
+    let time = given.map_or_else(SystemTime::now, |s| SystemTime::UNIX_EPOCH + Duration::from_secs(s.into()));
+    humantime::format_rfc3339_seconds(time).to_string()
+}
+
+/// A file or a folder of pictures, with its hash.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Digested {
+    /// Its name: as typed if read, below the results folder if written.
+    pub file: String,
+    /// Of a file, of its bytes; of a folder, of what `sha256sum` prints for its pictures in the order of their names.
+    pub sha256: String,
+    /// Pictures in the folder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pictures: Option<usize>,
+    /// Of a JSON file with a provenance, what its bytes would hash to without: equal for equal results of two dates.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub content_sha256: Option<String>,
+}
+
+impl Digested {
+    /// A file that was written.
+    pub fn written(name: &str, bytes: &[u8]) -> Digested {
+        Digested {
+            file: name.to_owned(),
+            sha256: sha256(bytes),
+            pictures: None,
+            content_sha256: content_sha256(name, bytes),
+        }
+    }
+
+    /// A file or folder that is read, with the files it stands for; `None` where it cannot be read: its reader will say why.
+    pub fn read(path: &Utf8Path) -> Option<(Digested, Vec<Utf8PathBuf>)> {
+        let kind = std::fs::metadata(path).ok()?;
+        if kind.is_dir() {
+            let files = pictures(path);
+            let mut lines = String::new();
+            for file in &files {
+                let name = file.strip_prefix(path).unwrap_or(file);
+                lines.push_str(&format!("{}  {name}\n", sha256_of_file(file)?));
+            }
+            let digested = Digested {
+                file: path.to_string(),
+                sha256: sha256(lines.as_bytes()),
+                pictures: Some(files.len()),
+                content_sha256: None,
+            };
+            return Some((digested, files));
+        }
+        if !kind.is_file() {
+            return None;
+        }
+        let content_sha256 = match path.extension() {
+            Some("json") => content_sha256(path.as_str(), &std::fs::read(path).ok()?),
+            _ => None,
+        };
+        let sha256 = sha256_of_file(path)?;
+        Some((Digested { file: path.to_string(), sha256, pictures: None, content_sha256 }, vec![path.to_owned()]))
+    }
+
+    /// Whether both were made of the same content, whatever their names and dates.
+    pub fn same_content(&self, other: &Digested) -> bool {
+        match (&self.content_sha256, &other.content_sha256) {
+            (Some(a), Some(b)) => a == b,
+            _ => self.sha256 == other.sha256,
+        }
+    }
+}
+
+/// The pictures of a folder and of its `left/` and `right/`, in the order of their names.
+fn pictures(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
+    let mut found = Vec::new();
+    for folder in [folder.to_owned(), folder.join("left"), folder.join("right")] {
+        for entry in folder.read_dir_utf8().into_iter().flatten().flatten() {
+            let path = entry.path();
+            let extension = path.extension().map(str::to_ascii_lowercase);
+            if extension.is_some_and(|e| PICTURES.contains(&e.as_str())) && path.is_file() {
+                found.push(path.to_owned());
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// SHA-256 in hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    format!("{:x}", Sha256::digest(bytes))
+}
+
+fn sha256_of_file(path: &Utf8Path) -> Option<String> {
+    let mut hash = Sha256::new();
+    std::io::copy(&mut std::fs::File::open(path).ok()?, &mut hash).ok()?;
+    Some(format!("{:x}", hash.finalize()))
+}
+
+fn content_sha256(name: &str, bytes: &[u8]) -> Option<String> {
+    if !name.ends_with(".json") {
+        return None;
+    }
+    let mut value: serde_json::Value = serde_json::from_slice(bytes).ok()?;
+    value.as_object_mut()?.shift_remove(KEY)?;
+    Some(sha256(value.to_string().as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn content_is_what_is_left_without_provenance() {
+        let a = Digested::written("a.json", br#"{"fx": 1.5, "provenance": {"date": "then"}}"#);
+        let b = Digested::written("b.json", br#"{"fx": 1.5, "provenance": {"date": "now"}}"#);
+        let c = Digested::written("c.json", br#"{"fx": 1.6, "provenance": {"date": "now"}}"#);
+        assert!(a.same_content(&b) && a.sha256 != b.sha256 && !b.same_content(&c));
+        let bare = Digested::written("d.json", br#"{"fx": 1.5}"#);
+        assert!(bare.content_sha256.is_none() && !bare.same_content(&a));
+    }
+
+    #[test]
+    fn a_folder_is_its_pictures() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = Utf8Path::from_path(folder.path()).unwrap();
+        std::fs::create_dir(root.join("left")).unwrap();
+        std::fs::write(root.join("left/b.png"), "b").unwrap();
+        std::fs::write(root.join("a.JPG"), "a").unwrap();
+        std::fs::write(root.join("poses.csv"), "x").unwrap();
+        let (first, files) = Digested::read(root).unwrap();
+        assert_eq!((first.pictures, files.len()), (Some(2), 2));
+        std::fs::write(root.join("poses.csv"), "y").unwrap();
+        assert_eq!(Digested::read(root).unwrap().0, first);
+        std::fs::write(root.join("left/b.png"), "c").unwrap();
+        assert_ne!(Digested::read(root).unwrap().0.sha256, first.sha256);
+    }
+}

@@ -1,0 +1,242 @@
+//! `calibration.json`: a rig as a file.
+
+use camino::Utf8Path;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::checked;
+use crate::diagnostic::Place;
+use crate::files::{self, Result};
+use crate::geometry::rotation_matrix;
+use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::model::rig::{Covariance, Rig};
+use crate::stereo::{Camera, Lens};
+
+/// Version of the format that this program writes.
+const VERSION: u32 = 1;
+
+/// What files made elsewhere call a lens whose model the number of its coefficients tells.
+const BY_LENGTH: &str = "opencv";
+
+/// A rig in the file's words.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct CalibrationFile {
+    version: u32,
+    left: CameraRecord,
+    right: CameraRecord,
+    right_from_left: RigRecord,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    covariance: Option<CovarianceRecord>,
+    /// How corners scattered at the calibration: what pictures that the rig measures later are compared with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    corner_noise: Option<NoiseRecord>,
+}
+
+/// `factor` times the covariance that the refinement gives a corner, plus the square of `added_px` on both axes.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct NoiseRecord {
+    factor: f64,
+    added_px: f64,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct CameraRecord {
+    width: u32,
+    height: u32,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    model: String,
+    distortion: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct RigRecord {
+    rotation: [[f64; 3]; 3],
+    translation_mm: [f64; 3],
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct CovarianceRecord {
+    order: Vec<String>,
+    matrix: Vec<Vec<f64>>,
+}
+
+impl From<&Camera> for CameraRecord {
+    fn from(camera: &Camera) -> CameraRecord {
+        CameraRecord {
+            width: camera.width,
+            height: camera.height,
+            fx: camera.fx,
+            fy: camera.fy,
+            cx: camera.cx,
+            cy: camera.cy,
+            model: camera.lens.name().to_owned(),
+            distortion: camera.distortion[..camera.lens.vector_length()].to_vec(),
+        }
+    }
+}
+
+impl CameraRecord {
+    fn camera(&self) -> Result<Camera, String> {
+        let lens = match Lens::from_name(&self.model) {
+            Some(lens) => lens,
+            None if self.model == BY_LENGTH => checked::lens_of_length(self.distortion.len())?,
+            None => {
+                let names = Lens::LADDER.map(Lens::name).join(", ");
+                return Err(format!("model is \"{}\"; it is one of {names}, or {BY_LENGTH}", self.model));
+            }
+        };
+        let count = self.distortion.len();
+        if count != lens.vector_length() && count != lens.free_count() {
+            let needed = lens.vector_length();
+            return Err(format!("distortion has {count} numbers; the {} model has {needed}", lens.name()));
+        }
+        let size = (f64::from(self.width), f64::from(self.height));
+        checked::camera(size, &[self.fx, self.fy, self.cx, self.cy], lens, &self.distortion)
+    }
+}
+
+impl From<&Rig> for CalibrationFile {
+    fn from(rig: &Rig) -> CalibrationFile {
+        let r = rotation_matrix(&rig.right_from_left);
+        let t = rig.right_from_left.translation.vector;
+        CalibrationFile {
+            version: VERSION,
+            left: (&rig.left).into(),
+            right: (&rig.right).into(),
+            right_from_left: RigRecord {
+                rotation: [0, 1, 2].map(|i| [r[(i, 0)], r[(i, 1)], r[(i, 2)]]),
+                translation_mm: [t.x, t.y, t.z],
+            },
+            covariance: rig.covariance.as_ref().map(|c| CovarianceRecord {
+                order: c.order.clone(),
+                matrix: c.matrix.row_iter().map(|row| row.iter().copied().collect()).collect(),
+            }),
+            corner_noise: None,
+        }
+    }
+}
+
+impl CalibrationFile {
+    /// The same with how corners scattered.
+    pub fn with_noise(mut self, noise: &Noise) -> CalibrationFile {
+        self.corner_noise = Some(NoiseRecord { factor: noise.factor, added_px: noise.added_px });
+        self
+    }
+
+    fn noise(&self) -> Option<Noise> {
+        let noise =
+            self.corner_noise.filter(|n| n.factor >= 0.0 && n.added_px >= 0.0 && n.factor + n.added_px > 0.0)?;
+        Some(Noise { factor: noise.factor, added_px: noise.added_px, reduced_chi_square: None })
+    }
+
+    fn rig(&self) -> Result<Rig, String> {
+        if self.version != VERSION {
+            return Err(format!("version {} of the format; this program reads version {VERSION}", self.version));
+        }
+        let left = self.left.camera().map_err(|e| format!("left camera: {e}"))?;
+        let right = self.right.camera().map_err(|e| format!("right camera: {e}"))?;
+        let rows = self.right_from_left.rotation;
+        let rotation = ("right_from_left.rotation", Matrix3::from_fn(|i, j| rows[i][j]));
+        let t = Vector3::from(self.right_from_left.translation_mm);
+        let covariance = self.covariance.as_ref().map(|c| c.covariance()).transpose()?;
+        checked::rig((left, right), rotation, t, covariance)
+    }
+}
+
+impl CovarianceRecord {
+    fn covariance(&self) -> Result<Covariance, String> {
+        let n = self.order.len();
+        if self.matrix.len() != n || self.matrix.iter().any(|row| row.len() != n) {
+            return Err(format!("covariance.matrix is not {n} by {n}, the length of covariance.order"));
+        }
+        Ok(Covariance { order: self.order.clone(), matrix: DMatrix::from_fn(n, n, |i, j| self.matrix[i][j]) })
+    }
+}
+
+/// Reads `calibration.json`, or one of the formats that [`crate::formats::export`] writes.
+pub fn read(path: &Utf8Path) -> Result<Rig> {
+    Ok(read_with_noise(path)?.0)
+}
+
+/// The same with how corners scattered at the calibration; files made elsewhere do not say that.
+pub fn read_with_noise(path: &Utf8Path) -> Result<(Rig, Option<Noise>)> {
+    const WHAT: &str = "the stereo calibration";
+    let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
+    let text = files::read_text(path, WHAT, Some(hint))?;
+    let (rig, noise) = match crate::formats::export::read(path, &text) {
+        Some(rig) => (rig, None),
+        None => {
+            let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
+            (file.rig(), file.noise())
+        }
+    };
+    let rig = rig.map_err(|message| files::Error::Format {
+        message,
+        place: Place { path: path.to_owned(), line: None },
+        hint: None,
+    })?;
+    Ok((rig, noise))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::transform;
+
+    #[test]
+    fn a_rig_survives_the_file() {
+        let mut left = Camera::pinhole(640, 480, 500.0);
+        left.distortion[0] = -0.25;
+        let mut right = left;
+        right.lens = Lens::Brown5;
+        right.distortion[4] = 0.125;
+        let rig = Rig {
+            left,
+            right,
+            right_from_left: transform(Vector3::new(0.01, -0.3, 0.02), Vector3::new(-120.0, 1.0, 20.0)),
+            covariance: Some(Covariance { order: vec!["left.fx".into()], matrix: DMatrix::from_element(1, 1, 0.5) }),
+        };
+        let text = files::to_json(&CalibrationFile::from(&rig));
+        let back = serde_json::from_str::<CalibrationFile>(&text).unwrap().rig().unwrap();
+        assert_eq!(back.left, rig.left);
+        assert_eq!(back.right, rig.right);
+        assert_eq!(back.covariance, rig.covariance);
+        assert!((back.right_from_left.to_matrix() - rig.right_from_left.to_matrix()).amax() < 1e-15);
+    }
+
+    #[test]
+    fn what_is_no_rig_is_refused_by_name() {
+        let good = Rig {
+            left: Camera::pinhole(640, 480, 500.0),
+            right: Camera::pinhole(640, 480, 500.0),
+            right_from_left: transform(Vector3::zeros(), Vector3::new(-120.0, 0.0, 0.0)),
+            covariance: Some(Covariance { order: vec!["left.fx".into()], matrix: DMatrix::from_element(1, 1, 0.5) }),
+        };
+        let good = serde_json::to_value(CalibrationFile::from(&good)).unwrap();
+        let refused = |pointer: &str, value: serde_json::Value| {
+            let mut changed = good.clone();
+            *changed.pointer_mut(pointer).unwrap() = value;
+            serde_json::from_value::<CalibrationFile>(changed).unwrap().rig().unwrap_err()
+        };
+        for (pointer, value, part) in [
+            ("/left/model", "fisheye".into(), "model is \"fisheye\""),
+            ("/left/model", "brown5".into(), "has 4 numbers; the brown5 model has 5"),
+            ("/right/distortion/2", 0.5.into(), "right camera: radial2 has 2 coefficients"),
+            ("/left/width", 0.into(), "width is 0"),
+            ("/right_from_left/rotation/0/0", 0.9.into(), "is not a rotation"),
+            ("/right_from_left/rotation/2/2", (-1.0).into(), "is not a rotation"),
+            ("/right_from_left/translation_mm/0", 0.0.into(), "0 mm apart"),
+            ("/covariance/matrix/0/0", 1e308.into(), "covariance of `left.fx` is 1e308"),
+            ("/version", 2.into(), "version 2"),
+        ] {
+            let said = refused(pointer, value);
+            assert!(said.contains(part), "{pointer}: {said}");
+        }
+        let mut named_elsewhere = good.clone();
+        named_elsewhere["left"]["model"] = "opencv".into();
+        assert!(serde_json::from_value::<CalibrationFile>(named_elsewhere).unwrap().rig().is_ok());
+    }
+}

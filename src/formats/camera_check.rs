@@ -1,0 +1,126 @@
+//! `camera-check.json`: the verdict and the figures it stands on, as a file.
+
+use serde::Serialize;
+
+use crate::imaging::Skipped;
+use crate::stereo::calibrate::Calibration;
+use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
+use crate::stereo::judge::assessment::Judged;
+use crate::stereo::judge::evidence::Evidence;
+use crate::stereo::judge::held_out::EpipolarError;
+use crate::stereo::judge::lengths::Range;
+use crate::stereo::judge::model_disagreement::Disagreement;
+use crate::stereo::judge::second_board::SecondBoard;
+use crate::stereo::judge::verdict::{COVERAGE, Verdict};
+use crate::stereo::select::model_comparison::LensScore;
+use crate::stereo::select::pair_scatter::PairScatter;
+
+/// The content of `camera-check.json`. Lengths held out: no pair helped to calibrate the cameras that measured it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CameraCheckFile {
+    passed: bool,
+    verdict: Verdict,
+    tolerance_mm: f64,
+    evidence: Vec<Evidence>,
+    /// The tolerance that the rig would meet, mm; null where something else than a length stands against it.
+    trusted_mm: Option<f64>,
+    max_abs_error_mm: f64,
+    /// Of the length whose error may be largest: its own.
+    expanded_uncertainty_mm: f64,
+    /// Its standard deviations through the corners, the calibration, and the board's certificate, mm; null without a certificate.
+    uncertainty_shares_mm: [Option<f64>; 3],
+    reprojection_rms_px: f64,
+    epipolar: EpipolarError,
+    baseline_mm: f64,
+    lens: String,
+    /// Height of the board's middle above its edges along x and y, mm; zero where it was taken as flat.
+    board_bow_mm: [f64; 2],
+    /// Height to which a twist lifts the board's first and last corner and lowers the others, mm.
+    board_twist_mm: f64,
+    pairs_used: usize,
+    pairs_skipped: Vec<Skipped>,
+    folds: usize,
+    corners_used: usize,
+    corners_rejected: usize,
+    corner_sigma_px: f64,
+    /// Mean of what both rays of a corner leave of it, one where its pictures scatter independently.
+    rays_chi_square: f64,
+    reduced_chi_square: Option<f64>,
+    ranges: Vec<Range>,
+    pairs: Vec<PairRecord>,
+    second_board: Option<SecondBoard>,
+    lens_scores: Vec<LensScore>,
+    disagreements: Vec<Disagreement>,
+    neighbour_correlation: NeighbourCorrelation,
+    pair_scatter: PairScatter,
+    warnings: Vec<String>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct PairRecord {
+    pair: String,
+    mean_error_x10_mm: Option<f64>,
+    mean_error_y10_mm: Option<f64>,
+    mean_error_x70_mm: Option<f64>,
+    mean_error_y70_mm: Option<f64>,
+    max_abs_error_mm: f64,
+    gap_rms_mm: f64,
+}
+
+impl CameraCheckFile {
+    /// Gathers the figures. `x10` and `x70` stand for one square and seven, or as many as the board has.
+    pub fn new(calibration: &Calibration, judged: &Judged) -> CameraCheckFile {
+        let accuracy = &judged.accuracy;
+        let worst = &accuracy.extremes.largest;
+        let all = || calibration.views.iter().flat_map(|view| &view.observations);
+        let pairs = accuracy
+            .pairs
+            .iter()
+            .map(|p| PairRecord {
+                pair: p.pair.clone(),
+                mean_error_x10_mm: p.mean_error_x_short_mm,
+                mean_error_y10_mm: p.mean_error_y_short_mm,
+                mean_error_x70_mm: p.mean_error_x_long_mm,
+                mean_error_y70_mm: p.mean_error_y_long_mm,
+                max_abs_error_mm: p.max_abs_error_mm,
+                gap_rms_mm: p.gap_rms_mm,
+            })
+            .collect();
+        CameraCheckFile {
+            passed: judged.verdict == Verdict::Pass,
+            verdict: judged.verdict,
+            tolerance_mm: judged.tolerance_mm,
+            evidence: judged.evidence.clone(),
+            trusted_mm: judged.trusted_mm(),
+            max_abs_error_mm: accuracy.extremes.max_abs_error_mm,
+            expanded_uncertainty_mm: worst.expanded_uncertainty_mm(),
+            uncertainty_shares_mm: [
+                Some(worst.corners_mm),
+                Some(worst.calibration_mm),
+                worst.expansion.board_mm.map(|mm| mm / COVERAGE),
+            ],
+            reprojection_rms_px: calibration.rms_px,
+            epipolar: accuracy.epipolar,
+            baseline_mm: calibration.rig().baseline_mm(),
+            lens: calibration.rig().left.lens.name().to_owned(),
+            board_bow_mm: [calibration.values.shared.shape_mm[0], calibration.values.shared.shape_mm[1]],
+            board_twist_mm: calibration.values.shared.shape_mm[2],
+            pairs_used: calibration.views.len(),
+            pairs_skipped: calibration.skipped.clone(),
+            folds: accuracy.folds,
+            corners_used: all().filter(|o| o.active).count(),
+            corners_rejected: all().filter(|o| !o.active).count(),
+            rays_chi_square: accuracy.rays_chi_square,
+            corner_sigma_px: calibration.noise.typical_px(&calibration.views),
+            reduced_chi_square: calibration.noise.reduced_chi_square,
+            ranges: accuracy.ranges.clone(),
+            pairs,
+            second_board: judged.second.clone(),
+            lens_scores: calibration.lens_scores.clone(),
+            disagreements: judged.disagreements.clone(),
+            neighbour_correlation: judged.residual_pattern.neighbours,
+            pair_scatter: calibration.pair_scatter.clone(),
+            warnings: judged.advice.iter().chain(&judged.warnings).cloned().collect(),
+        }
+    }
+}

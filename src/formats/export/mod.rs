@@ -1,0 +1,191 @@
+//! A rig in the words of other programs, written and read back.
+//!
+//! Angles and pixels mean the same in all of them (pixel (0, 0) is the centre of the top-left pixel); lengths are mm in OpenCV's file and
+//! metres in the others, as is usual there. A lens that a format cannot say is refused, never approximated.
+
+pub mod file_storage;
+pub mod kalibr;
+pub mod mrcal;
+pub mod ros;
+mod scan;
+
+use camino::Utf8Path;
+
+use super::checked;
+use crate::files;
+use crate::stereo::{Camera, Error, Lens, Rig};
+
+/// Metres in a millimetre.
+const METRE: f64 = 1e-3;
+
+/// A file to be written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExportedFile {
+    /// Its name in the results folder.
+    pub name: &'static str,
+    /// Its content.
+    pub text: String,
+}
+
+/// Reads a calibration in one of the formats that are written here; `None` where the text is none of them.
+/// Formats with a file a camera are named by the left one; the right one stands beside it.
+pub fn read(path: &Utf8Path, text: &str) -> Option<Result<Rig, String>> {
+    let beside = || -> Result<String, String> {
+        let name = path.file_name().unwrap_or_default();
+        let right = path.with_file_name(name.replacen("left", "right", 1));
+        if right == path {
+            return Err(
+                "name the left camera's file; the right camera's stands beside it with `right` for `left`".to_owned()
+            );
+        }
+        files::read_text(&right, "the right camera's file", None)
+            .map_err(|e| format!("the right camera's file {right}: {e}"))
+    };
+    if text.contains("'lensmodel'") {
+        return Some(beside().and_then(|right| mrcal::read(text, &right)));
+    }
+    if text.contains("camera_matrix:") && text.contains("projection_matrix:") {
+        return Some(beside().and_then(|right| ros::read(text, &right)));
+    }
+    if text.contains("T_cn_cnm1:") {
+        return Some(kalibr::read(text));
+    }
+    text.contains("!!opencv-matrix").then(|| file_storage::read(text))
+}
+
+/// Numbers as text that reads back to the same bits.
+fn numbers(values: impl IntoIterator<Item = f64>) -> String {
+    let all: Vec<String> = values.into_iter().map(|v| format!("{v:?}")).collect();
+    all.join(", ")
+}
+
+/// A camera whose format tells the lens by the number of its coefficients.
+fn camera(size: (f64, f64), pinhole: &[f64], distortion: &[f64]) -> Result<Camera, String> {
+    checked::camera(size, pinhole, checked::lens_of_length(distortion.len())?, distortion)
+}
+
+fn refuse(format: &'static str, lens: Lens, most: Lens) -> Error {
+    Error::LensNotExportable { format, lens: lens.name(), most: most.name() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::transform;
+    use crate::stereo::model::projection::tests::bent_camera;
+    use nalgebra::{Point3, Vector3};
+
+    pub(super) fn rig(lens: Lens) -> Rig {
+        let mut right = bent_camera(lens);
+        right.fx += 31.25;
+        Rig {
+            left: bent_camera(lens),
+            right,
+            right_from_left: transform(Vector3::new(0.02, -0.35, 0.013), Vector3::new(-180.5, 2.25, 33.0)),
+            covariance: None,
+        }
+    }
+
+    /// px; the files keep 17 digits, rotations pass through a matrix or a rotation vector once.
+    const ROUND_TRIP: f64 = 1e-8;
+
+    fn assert_same(a: &Rig, b: &Rig) {
+        for point in [Point3::new(0.0, 0.0, 600.0), Point3::new(-120.0, 90.0, 550.0), Point3::new(100.0, -80.0, 700.0)]
+        {
+            let (al, ar) = a.project(&point);
+            let (bl, br) = b.project(&point);
+            assert!((al - bl).norm() < ROUND_TRIP && (ar - br).norm() < ROUND_TRIP, "{al} {bl} {ar} {br}");
+        }
+        assert_eq!((a.left.width, a.right.height), (b.left.width, b.right.height));
+    }
+
+    #[test]
+    fn every_format_reads_back() {
+        for lens in Lens::LADDER {
+            let rig = rig(lens);
+            let mut written = vec![file_storage::files(&rig)];
+            written.extend(ros::files(&rig));
+            written.extend(kalibr::files(&rig));
+            written.extend(mrcal::files(&rig));
+            let expected = match lens {
+                Lens::Radial2 | Lens::Brown4 => 4,
+                Lens::Brown5 | Lens::Rational8 => 3,
+                Lens::ThinPrism12 => 2,
+                Lens::Tilted14 => 1,
+            };
+            assert_eq!(written.len(), expected, "{lens:?}");
+            for files in written {
+                let dir = tempfile::tempdir().unwrap();
+                let dir = Utf8Path::from_path(dir.path()).unwrap();
+                for file in &files {
+                    std::fs::write(dir.join(file.name), &file.text).unwrap();
+                }
+                let back = super::read(&dir.join(files[0].name), &files[0].text).unwrap().unwrap();
+                assert_same(&rig, &back);
+            }
+        }
+    }
+
+    #[test]
+    fn opencv_itself_reads_its_file() {
+        let rig = rig(Lens::Rational8);
+        let text = &file_storage::files(&rig)[0].text;
+        let (matrix, distortion) = crate::opencv::read_camera(text, "M1", "D1").unwrap();
+        assert_eq!(matrix, rig.left.matrix().transpose().as_slice());
+        assert_eq!(distortion, rig.left.distortion[..8]);
+    }
+
+    /// Every format is held to what `calibration.json` is: no rotation, no lens and no list that is not what it says.
+    #[test]
+    fn what_is_no_rig_is_refused_in_every_format() {
+        let rig = rig(Lens::Brown4);
+        let read = |files: &[ExportedFile], from: &str, to: &str| {
+            let dir = tempfile::tempdir().unwrap();
+            let dir = Utf8Path::from_path(dir.path()).unwrap();
+            let changed: Vec<String> = files.iter().map(|file| file.text.replacen(from, to, 1)).collect();
+            assert!(files.iter().zip(&changed).any(|(file, changed)| file.text != *changed), "{from}");
+            for (file, text) in files.iter().zip(&changed) {
+                std::fs::write(dir.join(file.name), text).unwrap();
+            }
+            super::read(&dir.join(files[0].name), &changed[0]).unwrap().unwrap_err()
+        };
+        let opencv = file_storage::files(&rig);
+        let (ros, kalibr, mrcal) =
+            (ros::files(&rig).unwrap(), kalibr::files(&rig).unwrap(), mrcal::files(&rig).unwrap());
+        let row = kalibr[0].text.lines().find(|line| line.starts_with("  - [")).unwrap().to_owned() + "\n";
+        let fx = format!("{:?}", rig.left.fx);
+        for (files, from, to, part) in [
+            (
+                &opencv,
+                "R: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 0.",
+                "R: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 1.",
+                "not a rotation",
+            ),
+            (&opencv, &fx, "1e300", "fx is"),
+            (&opencv, "image_width: ", "image_width: -", "width is -"),
+            (&ros, "plumb_bob", "equidistant", "`equidistant`"),
+            (
+                &ros,
+                "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [0.",
+                "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [2.",
+                "not a rotation",
+            ),
+            (&kalibr, "radtan", "equidistant", "`equidistant`"),
+            (&kalibr, "pinhole", "omni", "`omni`"),
+            (&kalibr, row.as_str(), &format!("{row}{row}"), "20 numbers, not 16"),
+            (&kalibr, "[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.0, 0.0, 2.0]", "last row"),
+            (&mrcal, "LENSMODEL_OPENCV4", "LENSMODEL_OPENCV5", "LENSMODEL_OPENCV5"),
+            (&mrcal, "LENSMODEL_OPENCV4", "LENSMODEL_SPLINED_STEREOGRAPHIC", "only LENSMODEL_PINHOLE"),
+        ] {
+            let said = read(files, from, to);
+            assert!(said.contains(part), "{from} -> {to}: {said}");
+        }
+        let emptied = |files: &[ExportedFile], key: &str| {
+            let start = files[0].text.find(key).unwrap() + key.len();
+            let list = &files[0].text[start..][..files[0].text[start..].find(']').unwrap() + 1];
+            read(files, &format!("{key}{list}"), &format!("{key}[ ]"))
+        };
+        assert!(emptied(&kalibr, "intrinsics: ").contains("has 0 numbers"));
+        assert!(emptied(&mrcal, "'extrinsics': ").contains("has 0 numbers"));
+    }
+}

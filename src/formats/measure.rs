@@ -1,0 +1,352 @@
+//! `measurements.csv` and `measure.json`: what was measured at every robot pose, as files.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use crate::geometry::rotation_vector;
+use crate::imaging::{Board, Corners};
+use crate::measurements::{pose_fields, pose_header, quoted};
+use crate::statistics::median;
+use crate::stereo::Rig;
+use crate::stereo::target::TargetPose;
+use crate::stereo::target::finish::{Shape, Shared};
+use crate::stereo::target::judgement::Judgement;
+use crate::stereo::target::series::{MeasuredPose, Series};
+
+/// Columns behind the joints.
+const COLUMNS: &str = "x_mm,y_mm,z_mm,sxx_mm2,sxy_mm2,sxz_mm2,syy_mm2,syz_mm2,szz_mm2,rx_rad,ry_rad,rz_rad,fit_rms_mm,corners,status,\
+srxrx_rad2,srxry_rad2,srxrz_rad2,sryry_rad2,sryrz_rad2,srzrz_rad2";
+
+/// Upper triangle of a 3x3 matrix, row by row.
+const UPPER: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+
+/// Order of the rows of a sensitivity, as in `measurements.csv`.
+const ORDER: [&str; 6] = ["x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad"];
+
+/// Corners that scatter this many times as far as at the calibration are worth a warning.
+const UNUSUAL_NOISE: f64 = 2.0;
+
+/// Poses that disagree with one rig by this many times chance are worth a warning.
+const UNUSUAL_EXCESS: f64 = 1.5;
+
+/// The content of `measure.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MeasureFile {
+    #[serde(skip)]
+    columns: usize,
+    board: String,
+    square_mm: f64,
+    poses: usize,
+    measured: usize,
+    /// "agrees", "allowed", "contradicts", "exchanged", "moved", "unexplained".
+    rig: RigRecord,
+    /// Chi-square a number over all poses, against the calibration's noise where that is known.
+    chi_square: Option<f64>,
+    /// Standard deviation of a corner's coordinate, here and at the calibration, px.
+    corner_noise_px: Option<f64>,
+    calibration_noise_px: Option<f64>,
+    /// Root mean square over the poses of the corners' distance from the fitted board, mm.
+    fit_rms_mm: Option<f64>,
+    /// Root mean square over the poses of the 2-D residuals, px.
+    reprojection_rms_px: Option<f64>,
+    /// Median standard deviation of the mark point along x, y, z, mm.
+    sigma_mm: Option<[f64; 3]>,
+    results: Vec<Row>,
+    missing: Vec<Missing>,
+    warnings: Vec<String>,
+    target_shape: Option<ShapeRecord>,
+    shared: Option<SharedRecord>,
+}
+
+/// What is found of the rig.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct RigRecord {
+    state: &'static str,
+    statement: Option<String>,
+    /// Chi-square of the calibration and of the target's size, and its degrees of freedom.
+    chi_square: Option<f64>,
+    degrees_of_freedom: Option<f64>,
+    /// How much larger the poses' disagreement with the common rig is than chance.
+    excess: f64,
+    changes: Vec<ChangeRecord>,
+    /// First pose after the rig moved.
+    moved_before: Option<String>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct ChangeRecord {
+    what: String,
+    amount: f64,
+    unit: &'static str,
+    sigma: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Row {
+    pose: String,
+    status: String,
+    reason: Option<String>,
+    chi_square: Option<f64>,
+    corners: usize,
+    outliers: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Missing {
+    pose: String,
+    reason: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct ShapeRecord {
+    /// How far crossings scatter, mm: a coordinate in the plane, and the height.
+    in_plane_mm: f64,
+    out_of_plane_mm: f64,
+    /// Size against the drawing, minus one.
+    scale_error: f64,
+    scale_error_sigma: f64,
+    crossings: Vec<CrossingRecord>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct CrossingRecord {
+    col: usize,
+    row: usize,
+    dx_mm: f64,
+    dy_mm: f64,
+    dz_mm: f64,
+    sigma_x_mm: f64,
+    sigma_y_mm: f64,
+    sigma_z_mm: f64,
+}
+
+/// `covariance` is `order by order` of `parameters`; a pose's part of it is `sensitivity * covariance * sensitivity'`, rows in the order
+/// of `rows`, columns in that of `parameters`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct SharedRecord {
+    parameters: Vec<String>,
+    /// Found, minus calibrated or drawn.
+    change: Vec<f64>,
+    covariance: Vec<Vec<f64>>,
+    rows: [&'static str; 6],
+    poses: Vec<SensitivityRecord>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct SensitivityRecord {
+    pose: String,
+    sensitivity: Vec<Vec<f64>>,
+}
+
+impl MeasureFile {
+    /// Gathers the figures.
+    pub fn new(series: &Series, corners: &Corners, board: &Board, rig: &Rig) -> MeasureFile {
+        let targets: Vec<&TargetPose> = series.poses.iter().filter_map(|m| m.target.as_ref().ok()).collect();
+        let rms = |of: fn(&TargetPose) -> f64| {
+            let squares: Vec<f64> = targets.iter().map(|t| of(t) * of(t)).collect();
+            crate::stereo::data::residuals::root_mean_square(&squares)
+        };
+        let sigma = |axis: usize| median(targets.iter().map(|t| t.covariance[(3 + axis, 3 + axis)].sqrt()));
+        let missing = |m: &MeasuredPose| {
+            Some(Missing { pose: m.at.pose.clone(), reason: m.target.as_ref().err()?.reason.clone() })
+        };
+        let mut warnings = corners.notes.clone();
+        warnings.extend(series.notes.iter().cloned());
+        warnings.extend(series.judgement.describe(rig, board.square_mm));
+        warnings.extend(scatter(series));
+        warnings.extend(grown(series));
+        MeasureFile {
+            columns: board.columns(),
+            board: board.squares.to_string(),
+            square_mm: board.square_mm,
+            poses: series.poses.len(),
+            measured: targets.len(),
+            rig: RigRecord::new(series, board, rig),
+            chi_square: series.chi_square,
+            corner_noise_px: series.noise_px,
+            calibration_noise_px: series.usual_px,
+            fit_rms_mm: rms(|t| t.fit_rms_mm),
+            reprojection_rms_px: rms(|t| t.rms_px),
+            sigma_mm: sigma(0).zip(sigma(1)).zip(sigma(2)).map(|((x, y), z)| [x, y, z]),
+            results: series.poses.iter().map(row).collect(),
+            missing: series.poses.iter().filter_map(missing).collect(),
+            warnings,
+            target_shape: series.shape.as_ref().map(|shape| shape_record(shape, board)),
+            shared: series.shared.as_ref().map(|shared| shared_record(shared, &series.poses)),
+        }
+    }
+
+    /// What a person should look at.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Chi-square a number over all poses, against the calibration's noise where that is known.
+    pub fn chi_square(&self) -> Option<f64> {
+        self.chi_square
+    }
+
+    /// True where neither the corners' scatter nor the poses' disagreement is beyond what was known before.
+    pub fn chi_square_is_usual(&self) -> bool {
+        self.chi_square.is_some_and(|chi| chi <= UNUSUAL_NOISE * UNUSUAL_NOISE) && self.rig.excess <= UNUSUAL_EXCESS
+    }
+
+    /// Crossings of the target in a row.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Poses in the list, and poses measured.
+    pub fn counts(&self) -> (usize, usize) {
+        (self.poses, self.measured)
+    }
+
+    /// Residuals: mm on the board, px in the pictures.
+    pub fn residuals(&self) -> (Option<f64>, Option<f64>) {
+        (self.fit_rms_mm, self.reprojection_rms_px)
+    }
+
+    /// Median standard deviation of the mark point, mm.
+    pub fn sigma_mm(&self) -> Option<[f64; 3]> {
+        self.sigma_mm
+    }
+}
+
+impl RigRecord {
+    fn new(series: &Series, board: &Board, rig: &Rig) -> RigRecord {
+        let (state, changes, moved_before) = match &series.judgement {
+            Judgement::Agrees => ("agrees", &[][..], None),
+            Judgement::Allowed(changed) => ("allowed", &changed.explanations[..], None),
+            Judgement::Contradicts(changed) => ("contradicts", &changed.explanations[..], None),
+            Judgement::Exchanged => ("exchanged", &[][..], None),
+            Judgement::Moved { since, .. } => ("moved", &[][..], Some(since.clone())),
+            Judgement::Unexplained { .. } => ("unexplained", &[][..], None),
+        };
+        let change = |e: &crate::stereo::target::cause::Explanation| ChangeRecord {
+            what: e.cause.describe(e.amount, rig, board.square_mm),
+            amount: e.amount,
+            unit: e.cause.unit(),
+            sigma: e.sigma,
+        };
+        RigRecord {
+            state,
+            statement: series.judgement.describe(rig, board.square_mm),
+            chi_square: series.prior_chi_square.map(|c| c[0]),
+            degrees_of_freedom: series.prior_chi_square.map(|c| c[1]),
+            excess: series.excess,
+            changes: changes.iter().map(change).collect(),
+            moved_before,
+        }
+    }
+}
+
+fn row(m: &MeasuredPose) -> Row {
+    let target = m.target.as_ref();
+    Row {
+        pose: m.at.pose.clone(),
+        status: target.map_or_else(|refusal| refusal.status.to_owned(), |_| "ok".to_owned()),
+        reason: target.err().map(|refusal| refusal.reason.clone()),
+        chi_square: target.ok().map(|t| t.chi_square),
+        corners: target.map_or(0, |t| t.corners),
+        outliers: target.map_or(0, |t| t.outliers),
+    }
+}
+
+fn shape_record(shape: &Shape, board: &Board) -> ShapeRecord {
+    let crossing = |(k, (d, s)): (usize, (&nalgebra::Vector3<f64>, &nalgebra::Vector3<f64>))| CrossingRecord {
+        col: k % board.columns(),
+        row: k / board.columns(),
+        dx_mm: d.x,
+        dy_mm: d.y,
+        dz_mm: d.z,
+        sigma_x_mm: s.x,
+        sigma_y_mm: s.y,
+        sigma_z_mm: s.z,
+    };
+    ShapeRecord {
+        in_plane_mm: shape.in_plane_mm,
+        out_of_plane_mm: shape.out_of_plane_mm,
+        scale_error: shape.stretch[0],
+        scale_error_sigma: shape.stretch[1],
+        crossings: shape.deviations_mm.iter().zip(&shape.sigma_mm).enumerate().map(crossing).collect(),
+    }
+}
+
+fn shared_record(shared: &Shared, poses: &[MeasuredPose]) -> SharedRecord {
+    let of = |m: &MeasuredPose| {
+        let by_shared = &m.target.as_ref().ok()?.sensitivity;
+        let mut sensitivity: Vec<Vec<f64>> = by_shared.row_iter().map(|row| row.iter().copied().collect()).collect();
+        // Turns stand first inside, points in files.
+        sensitivity.rotate_left(3);
+        Some(SensitivityRecord { pose: m.at.pose.clone(), sensitivity })
+    };
+    SharedRecord {
+        parameters: shared.parameters.clone(),
+        change: shared.change.clone(),
+        covariance: shared.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        rows: ORDER,
+        poses: poses.iter().filter_map(of).collect(),
+    }
+}
+
+/// Pictures whose corners scatter more than the calibration's did.
+fn scatter(series: &Series) -> Option<String> {
+    let (here, usual) = (series.noise_px?, series.usual_px?);
+    (here > UNUSUAL_NOISE * usual).then(|| {
+        format!("the corners scatter by {here:.4} px, {:.1} times as far as at the calibration ({usual:.4} px): out of focus, badly lit, or in motion", here / usual)
+    })
+}
+
+/// Poses that fit worse than chance allows.
+fn grown(series: &Series) -> Vec<String> {
+    /// Chi-square a number of some fifty: beyond chance, not beyond use.
+    const NOTED: f64 = 2.0;
+    let noted = |m: &MeasuredPose| {
+        let t = m.target.as_ref().ok()?;
+        (t.chi_square > NOTED).then(|| {
+            format!(
+                "pose {} fits {:.1} times as badly as the others: its covariance is larger for it",
+                m.at.pose,
+                t.chi_square.sqrt()
+            )
+        })
+    };
+    let mut all: Vec<String> = series.poses.iter().filter_map(noted).collect();
+    if series.excess > UNUSUAL_EXCESS {
+        all.push(format!(
+            "the poses disagree with one common rig {:.1} times as much as the corners' scatter allows: covariances are larger for it",
+            series.excess.sqrt()
+        ));
+    }
+    all
+}
+
+/// `measurements.csv`: one row a pose in the order of the list; numbers are empty where there is no measurement.
+pub fn to_csv(measured: &[MeasuredPose]) -> String {
+    let joints = measured.first().map_or(0, |m| m.at.joints_deg.len());
+    let mut text = format!("{},{COLUMNS}\n", pose_header(joints));
+    for m in measured {
+        text.push_str(&pose_fields(&m.at));
+        match &m.target {
+            Ok(t) => {
+                let p = t.cam_from_board.translation.vector;
+                let r = rotation_vector(&t.cam_from_board);
+                let point = UPPER.map(|(i, j)| t.covariance[(3 + i, 3 + j)]);
+                for number in [p.x, p.y, p.z].into_iter().chain(point).chain([r.x, r.y, r.z, t.fit_rms_mm]) {
+                    let _ = write!(text, ",{number}");
+                }
+                let _ = write!(text, ",{},ok", t.corners);
+                for (i, j) in UPPER {
+                    let _ = write!(text, ",{}", t.covariance[(i, j)]);
+                }
+                text.push('\n');
+            }
+            Err(refusal) => {
+                let said = format!("{}: {}", refusal.status, refusal.reason);
+                let _ = writeln!(text, "{},{}{}", ",".repeat(14), quoted(&said), ",".repeat(6));
+            }
+        }
+    }
+    text
+}

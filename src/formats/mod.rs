@@ -1,0 +1,9 @@
+//! Files that other stages and other programs read: what is written, apart from what is judged.
+
+pub mod calibration;
+pub mod camera_check;
+mod checked;
+pub mod dh_csv;
+pub mod export;
+pub mod measure;
+pub mod urdf;

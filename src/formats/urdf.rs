@@ -1,0 +1,341 @@
+//! URDF: a serial chain out of a robot description, and the same description with other joint origins.
+//!
+//! In: XML text. Out: the joints from the root link to a tip link, lengths in mm. Joints that no serial chain of motors has
+//! (mimic, floating, planar) are refused with the longest chain that does without them.
+
+use camino::Utf8Path;
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use roxmltree::{Document, Node};
+
+use crate::diagnostic::Place;
+use crate::files::{self, Result};
+use crate::geometry::{Transform, transform};
+use crate::robot::Robot;
+use crate::robot::axes::{self, Axis};
+
+/// Names that descriptions give to the flange, the best first: taken where several links end the same chain.
+const FLANGES: [&str; 5] = ["tool0", "flange", "ee_link", "link8", "link_ee"];
+
+/// What a joint does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Turns, with or without limits.
+    Revolute,
+    /// Slides.
+    Prismatic,
+    /// Holds.
+    Fixed,
+    /// Floating, planar, or anything else.
+    Other,
+}
+
+/// A joint as the file has it; lengths in mm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UrdfJoint {
+    /// Its name.
+    pub name: String,
+    /// What it does.
+    pub kind: Kind,
+    /// The word in the file.
+    pub word: String,
+    /// The joint that it follows, where it does.
+    pub mimics: Option<String>,
+    /// Link before.
+    pub parent: String,
+    /// Link behind.
+    pub child: String,
+    /// The joint's frame in the parent link's, at reading zero.
+    pub parent_from_joint: Transform,
+    /// Its axis in its own frame.
+    pub axis: Vector3<f64>,
+    /// Range: rad, of a sliding joint mm.
+    pub limits_rad: Option<(f64, f64)>,
+    /// Its line in the file.
+    pub line: u64,
+    /// Where its `<joint>` element's `<origin>` stands in the text, or where one would be put.
+    origin_at: Result<std::ops::Range<usize>, usize>,
+}
+
+/// A description.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Urdf {
+    /// The robot's name.
+    pub name: String,
+    /// All joints.
+    pub joints: Vec<UrdfJoint>,
+    /// The link that is no joint's child.
+    pub root: String,
+    text: String,
+    place: Place,
+}
+
+/// Joints from the root to a tip.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chain<'a> {
+    /// All of them, fixed ones too.
+    pub joints: Vec<&'a UrdfJoint>,
+    /// The link at its end.
+    pub tip: String,
+}
+
+impl Urdf {
+    /// Reads a file.
+    pub fn read(path: &Utf8Path) -> Result<Urdf> {
+        let text = files::read_text(path, "the robot description", None)?;
+        Urdf::parse(text, path)
+    }
+
+    /// Understands the text of a file.
+    pub fn parse(text: String, path: &Utf8Path) -> Result<Urdf> {
+        let place = |line| Place { path: path.to_owned(), line };
+        let refuse = |line, message: String, hint: Option<&str>| -> files::Error {
+            files::Error::Format { message, place: place(line), hint: hint.map(str::to_owned) }
+        };
+        let document = Document::parse(&text)
+            .map_err(|e| refuse(Some(u64::from(e.pos().row)), format!("not readable as XML: {e}"), None))?;
+        let root = document.root_element();
+        if root.tag_name().name() != "robot" {
+            let message = format!("the file's root is <{}>; a URDF has <robot>", root.tag_name().name());
+            return Err(refuse(None, message, None));
+        }
+        if document.descendants().any(|n| n.tag_name().namespace().is_some_and(|space| space.contains("xacro"))) {
+            let hint = "expand it first: `xacro FILE > robot.urdf`";
+            return Err(refuse(None, "the file is a xacro, a description with macros in it".to_owned(), Some(hint)));
+        }
+        let elements = root.children().filter(|n| n.has_tag_name("joint"));
+        let line = |node: &Node| u64::from(document.text_pos_at(node.range().start).row);
+        let mut joints = Vec::new();
+        for node in elements {
+            joints.push(joint(&node, line(&node)).map_err(|message| refuse(Some(line(&node)), message, None))?);
+        }
+        let links = root.children().filter(|n| n.has_tag_name("link")).filter_map(|n| n.attribute("name"));
+        let roots: Vec<&str> = links.filter(|link| !joints.iter().any(|j| j.child == *link)).collect();
+        let [root_link] = roots[..] else {
+            let message = format!("a robot has one root link; this one has {}: {}", roots.len(), roots.join(", "));
+            return Err(refuse(None, message, None));
+        };
+        let name = root.attribute("name").unwrap_or("robot").to_owned();
+        let (root, place) = (root_link.to_owned(), place(None));
+        Ok(Urdf { name, joints, root, text, place })
+    }
+
+    fn refuse(&self, line: Option<u64>, message: String, hint: Option<String>) -> files::Error {
+        files::Error::Format { message, place: Place { line, ..self.place.clone() }, hint }
+    }
+
+    /// The joints from the root to the link `tip`, or to the flange where none is named.
+    pub fn chain(&self, tip: Option<&str>) -> Result<Chain<'_>> {
+        let tip = match tip {
+            Some(tip) => tip.to_owned(),
+            None => self.flange()?,
+        };
+        let mut joints = Vec::new();
+        let mut link = tip.as_str();
+        while link != self.root {
+            let Some(joint) = self.joints.iter().find(|j| j.child == link) else {
+                let hint = format!("the links at the ends are {}", self.ends().join(", "));
+                return Err(self.refuse(None, format!("no link `{link}`"), Some(hint)));
+            };
+            if joints.len() > self.joints.len() {
+                return Err(self.refuse(Some(joint.line), format!("the joints before `{tip}` form a circle"), None));
+            }
+            joints.push(joint);
+            link = &joint.parent;
+        }
+        joints.reverse();
+        self.check(&joints, &tip)?;
+        Ok(Chain { joints, tip })
+    }
+
+    fn check(&self, joints: &[&UrdfJoint], tip: &str) -> Result<()> {
+        let bad = |j: &UrdfJoint| j.mimics.is_some() || j.kind == Kind::Other;
+        let moves = |j: &UrdfJoint| matches!(j.kind, Kind::Revolute | Kind::Prismatic);
+        let instead = |position: usize| match joints[..position].iter().filter(|j| moves(j)).count() {
+            0 => None,
+            moving => {
+                let link = &joints[position - 1].child;
+                Some(format!("`--tip {link}` ends the chain before it, with {moving} joints that move"))
+            }
+        };
+        if let Some(position) = joints.iter().position(|j| bad(j)) {
+            let joint = joints[position];
+            let what = match &joint.mimics {
+                Some(other) => format!("follows joint `{other}` (mimic)"),
+                None => format!("is {}", joint.word),
+            };
+            let message = format!("joint `{}` {what}; joints that turn or slide on their own were needed", joint.name);
+            return Err(self.refuse(Some(joint.line), message, instead(position)));
+        }
+        if !joints.iter().any(|j| moves(j)) {
+            let hint = format!("the links at the ends are {}", self.ends().join(", "));
+            let message = format!("no joint between `{}` and `{tip}` moves", self.root);
+            return Err(self.refuse(None, message, Some(hint)));
+        }
+        Ok(())
+    }
+
+    /// Links without a joint behind them.
+    fn ends(&self) -> Vec<String> {
+        let children = self.joints.iter().map(|j| &j.child);
+        children.filter(|link| !self.joints.iter().any(|j| j.parent == **link)).cloned().collect()
+    }
+
+    /// Names of the moving joints before a link.
+    fn moving(&self, tip: &str) -> Vec<&str> {
+        let mut link = tip;
+        let mut names = Vec::new();
+        while let Some(joint) = self.joints.iter().find(|j| j.child == link)
+            && names.len() <= self.joints.len()
+        {
+            if joint.kind != Kind::Fixed {
+                names.push(joint.name.as_str());
+            }
+            link = &joint.parent;
+        }
+        names
+    }
+
+    /// The end of the longest chain, where all other ends hang on it or a name tells.
+    fn flange(&self) -> Result<String> {
+        let ends = self.ends();
+        let longest = ends.iter().map(|e| self.moving(e).len()).max().unwrap_or(0);
+        let main: Vec<&String> = ends.iter().filter(|e| self.moving(e).len() == longest).collect();
+        let one_chain = main.windows(2).all(|w| self.moving(w[0]) == self.moving(w[1]));
+        let named = FLANGES.iter().find_map(|name| main.iter().find(|end| end.ends_with(name)));
+        match (main.as_slice(), named) {
+            ([only], _) => Ok((*only).clone()),
+            (_, Some(named)) if one_chain => Ok((*named).clone()),
+            _ => {
+                let list: Vec<String> = ends.iter().map(|e| format!("{e} ({} joints)", self.moving(e).len())).collect();
+                let message = format!("several links end a chain: {}", list.join(", "));
+                let usable = ends.iter().filter(|e| self.chain(Some(e)).is_ok());
+                let best = usable.max_by_key(|e| (self.moving(e).len(), FLANGES.iter().any(|f| e.ends_with(f))));
+                let example =
+                    best.map_or(String::new(), |e| format!("; `--tip {e}` has the most joints that move on their own"));
+                let hint = format!("`--tip LINK` names the one that carries the target{example}");
+                Err(self.refuse(None, message, Some(hint)))
+            }
+        }
+    }
+
+    /// The text with other origins for some joints: everything else stays as it is.
+    pub fn with_origins(&self, origins: &[(&UrdfJoint, Transform)]) -> String {
+        let mut edits: Vec<(std::ops::Range<usize>, String)> = origins
+            .iter()
+            .map(|(joint, origin)| match &joint.origin_at {
+                Ok(range) => (range.clone(), origin_element(origin)),
+                Err(at) => (*at..*at, format!("\n    {}", origin_element(origin))),
+            })
+            .collect();
+        edits.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
+        let mut text = self.text.clone();
+        for (range, element) in edits {
+            text.replace_range(range, &element);
+        }
+        text
+    }
+}
+
+impl Chain<'_> {
+    /// The joints that move.
+    pub fn moving(&self) -> impl Iterator<Item = &UrdfJoint> {
+        self.joints.iter().copied().filter(|j| j.kind != Kind::Fixed)
+    }
+
+    /// Frame of every joint of the chain in the root frame, all readings zero; the last one is the tip's.
+    pub fn frames(&self) -> Vec<Transform> {
+        let mut root_from_link = Transform::identity();
+        let step = |j: &&UrdfJoint| {
+            root_from_link *= j.parent_from_joint;
+            root_from_link
+        };
+        self.joints.iter().map(step).collect()
+    }
+
+    /// The same chain as a robot; its readings are the joints' angles.
+    pub fn robot(&self, name: &str) -> Robot {
+        let frames = self.frames();
+        let axis = |(joint, frame): (&&UrdfJoint, &Transform)| Axis {
+            point_mm: Point3::from(frame.translation.vector),
+            direction: frame.rotation * joint.axis,
+            limits_rad: joint.limits_rad,
+            slides: joint.kind == Kind::Prismatic,
+        };
+        let moving = self.joints.iter().zip(&frames).filter(|(j, _)| j.kind != Kind::Fixed);
+        let axes: Vec<Axis> = moving.map(axis).collect();
+        let flange = frames.last().copied().unwrap_or_else(Transform::identity);
+        axes::robot(name, &axes, &flange)
+    }
+}
+
+/// Roll, pitch and yaw of a rotation, rad: `Rz(yaw) Ry(pitch) Rx(roll)`. Each is taken after the one before was undone, so that
+/// a pitch near a right angle, where roll and yaw can't be told apart, costs no digits.
+pub fn roll_pitch_yaw(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
+    let m = rotation.to_rotation_matrix().into_inner();
+    let yaw = if m[(0, 0)].hypot(m[(1, 0)]) > 1e-9 { m[(1, 0)].atan2(m[(0, 0)]) } else { 0.0 };
+    let (sin, cos) = yaw.sin_cos();
+    let level = nalgebra::Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0) * m;
+    let pitch = (-level[(2, 0)]).atan2(level[(0, 0)]);
+    let roll = (-level[(1, 2)]).atan2(level[(1, 1)]);
+    [roll + 0.0, pitch + 0.0, yaw + 0.0]
+}
+
+/// An `<origin>` of a transform, metres and radians with all their digits.
+pub fn origin_element(parent_from_child: &Transform) -> String {
+    let t = parent_from_child.translation.vector / 1000.0;
+    let [roll, pitch, yaw] = roll_pitch_yaw(&parent_from_child.rotation);
+    format!("<origin xyz=\"{} {} {}\" rpy=\"{roll} {pitch} {yaw}\"/>", t.x + 0.0, t.y + 0.0, t.z + 0.0)
+}
+
+fn joint(node: &Node, line: u64) -> std::result::Result<UrdfJoint, String> {
+    let name = node.attribute("name").ok_or("a joint has no name")?.to_owned();
+    let word = node.attribute("type").ok_or_else(|| format!("joint `{name}` has no type"))?.to_owned();
+    let child_named = |tag: &str| node.children().find(|n| n.has_tag_name(tag));
+    let link = |tag: &str| {
+        let link = child_named(tag).and_then(|n| n.attribute("link"));
+        link.map(str::to_owned).ok_or_else(|| format!("joint `{name}` has no <{tag}>"))
+    };
+    let kind = match word.as_str() {
+        "revolute" | "continuous" => Kind::Revolute,
+        "prismatic" => Kind::Prismatic,
+        "fixed" => Kind::Fixed,
+        _ => Kind::Other,
+    };
+    let numbers = |tag: &str, attribute: &str, default: [f64; 3]| -> std::result::Result<[f64; 3], String> {
+        let Some(text) = child_named(tag).and_then(|n| n.attribute(attribute)) else { return Ok(default) };
+        let parsed: Vec<f64> = text.split_whitespace().filter_map(|t| t.parse().ok()).collect();
+        <[f64; 3]>::try_from(parsed)
+            .ok()
+            .filter(|v| v.iter().all(|v| v.is_finite()))
+            .ok_or_else(|| format!("joint `{name}`: {attribute}=\"{text}\" is not three numbers"))
+    };
+    let xyz = Vector3::from(numbers("origin", "xyz", [0.0; 3])?) * 1000.0;
+    let [roll, pitch, yaw] = numbers("origin", "rpy", [0.0; 3])?;
+    let turn = |axis: Vector3<f64>, angle: f64| UnitQuaternion::from_scaled_axis(axis * angle);
+    let rotation = turn(Vector3::z(), yaw) * turn(Vector3::y(), pitch) * turn(Vector3::x(), roll);
+    let axis = Vector3::from(numbers("axis", "xyz", [1.0, 0.0, 0.0])?);
+    if kind != Kind::Fixed && axis.norm() == 0.0 {
+        return Err(format!("joint `{name}` has an axis of length zero"));
+    }
+    let limit = child_named("limit");
+    let bound = |name: &str| limit.and_then(|n| n.attribute(name)).and_then(|v| v.trim().parse::<f64>().ok());
+    let limits_rad = match (word.as_str(), bound("lower"), bound("upper")) {
+        ("revolute", Some(low), Some(high)) if low < high => Some((low, high)),
+        ("prismatic", Some(low), Some(high)) if low < high => Some((1000.0 * low, 1000.0 * high)),
+        _ => None,
+    };
+    let start_tag_end = node.children().next().map_or(node.range().end, |first| first.range().start);
+    Ok(UrdfJoint {
+        kind,
+        word,
+        mimics: child_named("mimic").map(|n| n.attribute("joint").unwrap_or("another").to_owned()),
+        parent: link("parent")?,
+        child: link("child")?,
+        parent_from_joint: Transform::from_parts(transform(Vector3::zeros(), xyz).translation, rotation),
+        axis: if axis.norm() > 0.0 { axis.normalize() } else { Vector3::x() },
+        limits_rad,
+        line,
+        origin_at: child_named("origin").map(|n| n.range()).ok_or(start_tag_end),
+        name,
+    })
+}

@@ -1,0 +1,325 @@
+//! Measurements sorted for identification: by group and role, with what could not be used and why.
+//!
+//! In: rows of `measurements.csv`. Out: poses with joint angles in rad and one kind of reading for all of them.
+//! A group without a centre row takes the used pose nearest to the centroid of its points as its reference; distances
+//! in such a group are distances to a fixed point that is unknown. Without verify rows a fifth of the samples is held out.
+
+use nalgebra::{Matrix3, Matrix3xX, Point3, UnitQuaternion};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use crate::identify::Error;
+use crate::measurements::{Measurement, Observed, Role};
+
+/// One row in `HELD_OUT` is held out when the file names none.
+const HELD_OUT: usize = 5;
+
+/// Variance that singular covariances get on top, mm^2: a micrometre, the resolution of a good instrument.
+const FLOOR_MM2: f64 = 1e-6;
+
+/// What all readings of a set are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Points in the group's own frame.
+    Positions,
+    /// Distances to the group's centre, or to a fixed point that is unknown.
+    Distances,
+}
+
+/// What was read at a pose.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reading {
+    /// The mark point, and more where known.
+    Position {
+        /// In the group's frame, mm.
+        point_mm: Point3<f64>,
+        /// Its covariance, mm^2.
+        covariance_mm2: Option<Matrix3<f64>>,
+        /// `sensor_from_target`.
+        rotation: Option<UnitQuaternion<f64>>,
+    },
+    /// A distance.
+    Distance {
+        /// Its value, mm.
+        distance_mm: f64,
+        /// Its standard deviation, mm.
+        sigma_mm: Option<f64>,
+    },
+    /// The centre of a group of distances: the place itself, with nothing to read.
+    Reference,
+}
+
+/// A pose that can be used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pose {
+    /// Its name.
+    pub name: String,
+    /// Index of its group.
+    pub group: usize,
+    /// What it is for.
+    pub role: Role,
+    /// Commanded angles, rad.
+    pub joints_rad: Vec<f64>,
+    /// What was read.
+    pub reading: Reading,
+}
+
+/// One placement of the sensor.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Group {
+    /// Its name.
+    pub name: String,
+    /// Index of its centre pose, where it has a row.
+    pub center: Option<usize>,
+}
+
+/// A row that was left out.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Skipped {
+    /// The pose.
+    pub pose: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// All that can be used, in the order of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dataset {
+    /// What the readings are.
+    pub kind: Kind,
+    /// Placements, in order of appearance.
+    pub groups: Vec<Group>,
+    /// Poses.
+    pub poses: Vec<Pose>,
+    /// Rows without a usable reading.
+    pub skipped: Vec<Skipped>,
+    /// Whether the verify rows were chosen here, the file having none.
+    pub split_here: bool,
+    /// What each pose's point moves by with each shared error of the sensor, mm a standard deviation; empty without any.
+    pub shared: Vec<Matrix3xX<f64>>,
+    /// Which joints slide; empty where none does.
+    pub slides: Vec<bool>,
+    /// Rows whose covariance was singular and got a floor, by pose.
+    pub floored: Vec<String>,
+    /// Known distances between touched points.
+    pub known: Vec<KnownDistance>,
+}
+
+/// A known distance between the points that two groups touched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KnownDistance {
+    /// Index of one group.
+    pub a: usize,
+    /// Index of the other.
+    pub b: usize,
+    /// mm
+    pub distance_mm: f64,
+    /// mm
+    pub sigma_mm: f64,
+}
+
+impl Dataset {
+    /// Sorts the rows; `seed` draws the held-out fifth where the file names no verify rows.
+    pub fn new(rows: &[Measurement], seed: u64) -> Result<Dataset, Error> {
+        let positions = rows.iter().any(|r| matches!(r.observed, Observed::Position { .. }));
+        let kind = if positions { Kind::Positions } else { Kind::Distances };
+        let mut set = Dataset {
+            kind,
+            groups: Vec::new(),
+            poses: Vec::new(),
+            skipped: Vec::new(),
+            split_here: false,
+            shared: Vec::new(),
+            slides: Vec::new(),
+            floored: Vec::new(),
+            known: Vec::new(),
+        };
+        set.slides = rows.first().map_or_else(Vec::new, |r| r.at.slides.clone());
+        for row in rows {
+            let group = set.group(&row.at.group);
+            if let Observed::Position { covariance_mm2: Some(c), .. } = &row.observed
+                && is_singular(c)
+            {
+                set.floored.push(row.at.pose.clone());
+            }
+            match reading(kind, row) {
+                Ok(reading) => {
+                    if row.at.role == Role::Center {
+                        set.groups[group].center = Some(set.poses.len());
+                    }
+                    set.poses.push(Pose {
+                        name: row.at.pose.clone(),
+                        group,
+                        role: row.at.role,
+                        joints_rad: row.at.joints_rad(),
+                        reading,
+                    });
+                }
+                Err(reason) => set.skipped.push(Skipped { pose: row.at.pose.clone(), reason }),
+            }
+        }
+        if !set.poses.iter().any(|p| p.role == Role::Verify) {
+            set.hold_out(seed);
+        }
+        let samples = set.poses.iter().filter(|p| p.role == Role::Sample).count();
+        if samples == 0 {
+            return Err(Error::NoSamples { rows: rows.len(), skipped: set.skipped.len() });
+        }
+        Ok(set)
+    }
+
+    fn group(&mut self, name: &str) -> usize {
+        self.groups.iter().position(|g| g.name == name).unwrap_or_else(|| {
+            self.groups.push(Group { name: name.to_owned(), center: None });
+            self.groups.len() - 1
+        })
+    }
+
+    fn hold_out(&mut self, seed: u64) {
+        let mut samples: Vec<usize> = self.rows(|p| p.role == Role::Sample);
+        let count = samples.len() / HELD_OUT;
+        shuffle(&mut samples, seed);
+        for &i in samples.iter().take(count) {
+            self.poses[i].role = Role::Verify;
+        }
+        self.split_here = true;
+    }
+
+    /// Indices of the poses that `keep` likes.
+    pub fn rows(&self, keep: impl Fn(&Pose) -> bool) -> Vec<usize> {
+        (0..self.poses.len()).filter(|&i| keep(&self.poses[i])).collect()
+    }
+
+    /// Rows that may be fitted: centres and samples.
+    pub fn fit_rows(&self) -> Vec<usize> {
+        self.rows(|p| p.role != Role::Verify)
+    }
+
+    /// Rows kept for verification.
+    pub fn verify_rows(&self) -> Vec<usize> {
+        self.rows(|p| p.role == Role::Verify)
+    }
+
+    /// The pose that a group's verification distances are measured from: its centre, or of the fitted rows the one
+    /// nearest to the centroid of their points. `None` where no row of the group is fitted, and for wire lengths.
+    pub fn reference(&self, group: usize, fitted: &[usize]) -> Option<usize> {
+        if let Some(center) = self.groups[group].center {
+            return Some(center);
+        }
+        let points: Vec<(usize, Point3<f64>)> = fitted
+            .iter()
+            .filter(|&&i| self.poses[i].group == group)
+            .filter_map(|&i| match self.poses[i].reading {
+                Reading::Position { point_mm, .. } => Some((i, point_mm)),
+                _ => None,
+            })
+            .collect();
+        let count = points.len().max(1) as f64;
+        let centroid = points.iter().fold(nalgebra::Vector3::zeros(), |sum, (_, p)| sum + p.coords) / count;
+        let nearest = points.iter().min_by(|(_, a), (_, b)| {
+            (a.coords - centroid).norm_squared().total_cmp(&(b.coords - centroid).norm_squared())
+        });
+        nearest.map(|&(i, _)| i)
+    }
+
+    /// Whether a row's distance of zero says that the target was at its group's unknown point.
+    pub fn touches(&self, row: usize) -> bool {
+        let pose = &self.poses[row];
+        self.kind == Kind::Distances
+            && self.groups[pose.group].center.is_none()
+            && matches!(pose.reading, Reading::Distance { distance_mm, .. } if distance_mm == 0.0)
+    }
+
+    /// Whether every pose has a covariance.
+    pub fn has_covariances(&self) -> bool {
+        self.poses.iter().all(|p| matches!(p.reading, Reading::Position { covariance_mm2: Some(_), .. }))
+    }
+
+    /// Whether every pose that may be fitted has an orientation.
+    pub fn has_rotations(&self) -> bool {
+        self.poses.iter().all(|p| matches!(p.reading, Reading::Position { rotation: Some(_), .. }))
+    }
+}
+
+/// Whether a covariance has a direction without variance: rounded to zero, or an instrument's resolution taken for perfection.
+fn is_singular(covariance_mm2: &Matrix3<f64>) -> bool {
+    let eigen = covariance_mm2.symmetric_eigenvalues();
+    eigen.min() <= 1e-9 * eigen.max()
+}
+
+fn reading(kind: Kind, row: &Measurement) -> Result<Reading, String> {
+    match (&row.observed, kind) {
+        (Observed::Position { point_mm, covariance_mm2, rotation_rad }, Kind::Positions) => Ok(Reading::Position {
+            point_mm: *point_mm,
+            covariance_mm2: covariance_mm2
+                .map(|c| if is_singular(&c) { c + Matrix3::identity() * FLOOR_MM2 } else { c }),
+            rotation: rotation_rad.map(UnitQuaternion::from_scaled_axis),
+        }),
+        (_, Kind::Distances) if row.at.role == Role::Center => Ok(Reading::Reference),
+        (Observed::Distance { distance_mm, sigma_mm }, Kind::Distances) => {
+            Ok(Reading::Distance { distance_mm: *distance_mm, sigma_mm: *sigma_mm })
+        }
+        (Observed::Missing { reason }, _) => Err(reason.clone()),
+        (Observed::Distance { .. }, Kind::Positions) => Err("a distance among positions".to_owned()),
+        (Observed::Position { .. }, Kind::Distances) => Err("a position among distances".to_owned()),
+    }
+}
+
+/// Fisher and Yates' shuffle, from the seed.
+pub fn shuffle(items: &mut [usize], seed: u64) {
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    for i in (1..items.len()).rev() {
+        items.swap(i, random.random_range(0..=i));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurements::RobotPose;
+
+    fn row(name: usize, role: Role, observed: Observed) -> Measurement {
+        let at = RobotPose {
+            pose: format!("p{name}"),
+            group: "g".into(),
+            role,
+            joints_deg: vec![name as f64],
+            slides: vec![],
+        };
+        Measurement { at, observed }
+    }
+
+    fn point(x: f64) -> Observed {
+        Observed::Position { point_mm: Point3::new(x, 0.0, 0.0), covariance_mm2: None, rotation_rad: None }
+    }
+
+    #[test]
+    fn a_fifth_is_held_out_where_no_row_verifies() {
+        let rows: Vec<_> = (0..25).map(|i| row(i, Role::Sample, point(i as f64))).collect();
+        let set = Dataset::new(&rows, 1).unwrap();
+        assert!(set.split_here);
+        assert_eq!((set.verify_rows().len(), set.fit_rows().len()), (5, 20));
+        assert_ne!(set.verify_rows(), Dataset::new(&rows, 2).unwrap().verify_rows());
+        assert_eq!(set.reference(0, &(0..25).collect::<Vec<_>>()), Some(12));
+    }
+
+    #[test]
+    fn a_missing_row_is_named_and_a_centre_of_distances_needs_no_number() {
+        let missing = Observed::Missing { reason: "no board".into() };
+        let distance = Observed::Distance { distance_mm: 5.0, sigma_mm: None };
+        let rows = vec![
+            row(0, Role::Center, missing.clone()),
+            row(1, Role::Sample, distance.clone()),
+            row(2, Role::Sample, missing),
+            row(3, Role::Verify, distance),
+        ];
+        let set = Dataset::new(&rows, 1).unwrap();
+        assert_eq!(set.groups[0].center, Some(0));
+        assert_eq!(set.skipped, [Skipped { pose: "p2".into(), reason: "no board".into() }]);
+    }
+
+    #[test]
+    fn nothing_to_fit_is_said() {
+        assert!(Dataset::new(&[row(0, Role::Center, point(0.0)), row(1, Role::Verify, point(1.0))], 1).is_err());
+    }
+}

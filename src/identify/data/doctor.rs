@@ -1,0 +1,170 @@
+//! What is wrong with the data: each finding in words, with the rows it is about and what was done.
+
+use serde::Serialize;
+
+use super::dataset::{Dataset, Reading};
+use super::sessions::Along;
+use crate::identify::judge::choose::Identification;
+
+/// One finding.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// What it is.
+    pub finding: String,
+    /// The rows it is about, by pose; empty where it is about all of them.
+    pub rows: Vec<String>,
+    /// What was done: mended, left out, or nothing but this warning, and how to have it otherwise.
+    pub action: String,
+}
+
+/// Rows that a sentence names.
+const NAMED: usize = 40;
+
+impl Finding {
+    /// As a warning.
+    pub fn sentence(&self) -> String {
+        let mut text = self.finding.clone();
+        if !self.rows.is_empty() {
+            let named = self.rows.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+            let more = self.rows.len().saturating_sub(NAMED);
+            text.push_str(&format!(": {named}{}", if more > 0 { format!(" and {more} more") } else { String::new() }));
+        }
+        format!("{text}; {}", self.action)
+    }
+}
+
+/// What was found along the way: gross errors, sessions, drifts, covariances that are off.
+pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Finding> {
+    let names = |rows: &[usize]| rows.iter().map(|&r| set.poses[r].name.clone()).collect::<Vec<_>>();
+    let mut list = Vec::new();
+    let mut add = |finding: String, rows: Vec<String>, action: &str| {
+        list.push(Finding { finding, rows, action: action.to_owned() });
+    };
+    if !set.floored.is_empty() {
+        add(
+            "covariances with a direction of no variance".to_owned(),
+            set.floored.clone(),
+            "a micrometre was added to each coordinate",
+        );
+    }
+    if let Some((names, finding)) = repeated(set) {
+        add(finding, names, "all of them are used");
+    }
+    for joint in constant_joints(set) {
+        add(
+            format!("joint {} is the same in all rows: its parameters cannot be told from its neighbours'", joint + 1),
+            Vec::new(),
+            "nothing was done; move it between poses",
+        );
+    }
+    if let Some(finding) = stated_covariances(set, found) {
+        add(finding, Vec::new(), "the fit weighs by what it found");
+    }
+    if set.groups.iter().any(|g| g.center.is_none())
+        && (0..set.poses.len()).any(|r| set.touches(r))
+        && set.known.is_empty()
+    {
+        add(
+            "touches alone leave the scale of the robot unseen (zero lengths would fit perfectly)".to_owned(),
+            Vec::new(),
+            "the scale stays nominal; `--known-distances` gives it",
+        );
+    }
+    if !found.outliers.is_empty() {
+        let share = 100.0 * found.outliers.len() as f64 / (found.fitted.len() + found.outliers.len()) as f64;
+        add(
+            format!("{} rows ({share:.0} %) fit far worse than the rest", found.outliers.len()),
+            names(&found.outliers),
+            "left out of the fit (`outlier_sigmas = 0` in [identify] keeps them)",
+        );
+    }
+    if !found.verify_outliers.is_empty() {
+        add(
+            format!("{} verify rows fit far worse than the rest", found.verify_outliers.len()),
+            names(&found.verify_outliers),
+            "they are counted in the figures; measure them again",
+        );
+    }
+    if !along.sessions.is_empty() {
+        let ranges = along.sessions.iter().map(|s| format!("{}..{}", s.first, s.last)).collect();
+        add(
+            format!(
+                "the rows fall into {} sessions, between which the sensor, the wire's anchor or its zero, or the robot's base moved",
+                along.sessions.len()
+            ),
+            ranges,
+            "each session got a placement of its own",
+        );
+    }
+    if !along.drifting.is_empty() {
+        add(
+            "the sensor or the robot's base moves evenly along the rows of a group: a drift".to_owned(),
+            along.drifting.clone(),
+            "nothing was done: the errors of these groups are in the result",
+        );
+    }
+    list
+}
+
+/// Scatter over stated standard deviation beyond which it is worth a sentence.
+const FAR_ABOVE: f64 = 5.0;
+
+/// Whether the covariances of the file are far from what was seen.
+fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
+    let stated: Vec<f64> = set
+        .poses
+        .iter()
+        .filter_map(|p| match &p.reading {
+            Reading::Position { covariance_mm2: Some(c), .. } => Some(c.trace() / 3.0),
+            Reading::Distance { sigma_mm: Some(s), .. } => Some(s * s),
+            _ => None,
+        })
+        .collect();
+    if stated.is_empty() {
+        return None;
+    }
+    let stated_mm = (stated.iter().sum::<f64>() / stated.len() as f64).sqrt();
+    let scatter = &found.scatter;
+    if scatter.stated < 1.0 {
+        return Some(format!(
+            "the covariances are too large: the residuals are those of {:.1} times smaller standard deviations",
+            scatter.stated.sqrt().recip()
+        ));
+    }
+    let ratio = scatter.point_mm / stated_mm.max(1e-9);
+    (ratio > FAR_ABOVE).then(|| {
+        format!(
+            "the rows scatter by {:.4} mm a coordinate, {ratio:.0} times what the covariances say ({stated_mm:.4} mm): the robot's \
+             repeatability and what the model lacks, or covariances that are too small",
+            scatter.point_mm
+        )
+    })
+}
+
+/// Joints within this, rad or mm, are the same.
+const SAME_JOINT: f64 = 1e-9;
+
+/// Rows of the same group at the same joints.
+fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
+    let mut order: Vec<usize> = (0..set.poses.len()).collect();
+    let key = |i: usize| (set.poses[i].group, &set.poses[i].joints_rad);
+    order.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
+    let same = |a: usize, b: usize| {
+        let pairs = set.poses[a].joints_rad.iter().zip(&set.poses[b].joints_rad);
+        set.poses[a].group == set.poses[b].group && pairs.into_iter().all(|(p, q)| (p - q).abs() <= SAME_JOINT)
+    };
+    let mut rows: Vec<usize> = order.windows(2).filter(|w| same(w[0], w[1])).flat_map(|w| [w[0], w[1]]).collect();
+    rows.sort_unstable();
+    rows.dedup();
+    let names: Vec<String> = rows.iter().map(|&r| set.poses[r].name.clone()).collect();
+    (!names.is_empty()).then(|| {
+        (names, "poses that are repeated: they say how well the robot repeats, and nothing about its links".to_owned())
+    })
+}
+
+/// Joints that do not move.
+fn constant_joints(set: &Dataset) -> Vec<usize> {
+    let Some(first) = set.poses.first() else { return Vec::new() };
+    let constant = |j: &usize| set.poses.iter().all(|p| (p.joints_rad[*j] - first.joints_rad[*j]).abs() <= SAME_JOINT);
+    (0..first.joints_rad.len()).filter(constant).collect()
+}

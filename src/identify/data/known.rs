@@ -1,0 +1,38 @@
+//! `--known-distances`: distances between the points that two groups touched, `group_a,group_b,distance_mm[,sigma_mm]`.
+
+use camino::Utf8Path;
+
+use super::dataset::{Dataset, KnownDistance};
+use crate::csv_table::Table;
+use crate::files;
+
+/// Standard deviation of a distance that comes without one, mm: a caliper's.
+const SIGMA_MM: f64 = 0.05;
+
+/// Reads the distances between groups of `set`.
+pub fn read(path: &Utf8Path, set: &Dataset) -> files::Result<Vec<KnownDistance>> {
+    let hint = "a CSV with the columns group_a,group_b,distance_mm and optionally sigma_mm";
+    let table = Table::read(path, "the known distances", hint)?;
+    let (a, b) = (table.require("group_a")?, table.require("group_b")?);
+    let distance = table.require("distance_mm")?;
+    let sigma = table.column("sigma_mm");
+    let mut list = Vec::new();
+    for (line, row) in &table.rows {
+        let group = |column: usize| {
+            let place = set.groups.iter().position(|g| g.name == row[column]);
+            place.ok_or_else(|| table.refuse(*line, format!("no group `{}` among the measurements", &row[column])))
+        };
+        let distance_mm = table.number(*line, row, distance)?;
+        let sigma_mm = match sigma {
+            Some(column) if !row[column].is_empty() => table.number(*line, row, column)?,
+            _ => SIGMA_MM,
+        };
+        let (a, b) = (group(a)?, group(b)?);
+        if distance_mm <= 0.0 || sigma_mm <= 0.0 || a == b {
+            let message = "a known distance lies between two different groups, and it and its sigma_mm are above zero";
+            return Err(table.refuse(*line, message.to_owned()));
+        }
+        list.push(KnownDistance { a, b, distance_mm, sigma_mm });
+    }
+    Ok(list)
+}

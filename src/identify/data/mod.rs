@@ -1,0 +1,7 @@
+//! What was measured, sorted for identification: groups and roles, what is left out and why, sessions along the rows.
+
+pub mod dataset;
+pub mod doctor;
+pub mod examine;
+pub mod known;
+pub mod sessions;

@@ -1,0 +1,317 @@
+//! Sessions along the rows of a group: the sensor, the wire's anchor or the robot's base was moved, and nobody wrote it down.
+//!
+//! In: a set of points or of distances to unknown points, in the order of measurement. Out: the same set with each group cut where a
+//! new placement explains the rest of its rows better, and what drifts. Cuts are made one at a time at the row of greatest gain (binary
+//! segmentation: Vostrikova, 1981) as long as the Bayesian information criterion (Schwarz, 1978) pays for the cut's unknowns.
+//! Influence is bounded (weights of least absolute residuals), so that single gross errors make no session; for points, whose model
+//! errors are as smooth in the order of a grid as a drift is in time, the same rows sorted by each joint must not be cut as well.
+//! A verify row belongs to the session of the fitted row before it in the file; before all, to the first.
+//! What goes wrong: sessions shorter than [`SHORTEST`] rows are not seen.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use crate::identify::data::dataset::{Dataset, Group, Kind};
+use crate::identify::residuals::eliminate::{Block, Linear, product, pseudo_inverse};
+use crate::identify::settings::{Model, Settings};
+use crate::identify::solve::formulation::{Loss, Task};
+use crate::measurements::Role;
+use crate::robot::Robot;
+
+/// Fewest fitted rows of a session: twice its own unknowns.
+pub const SHORTEST: usize = 8;
+
+/// A cut of points must explain this share of what is left, and this many times what a cut along any joint explains.
+const SHARE: f64 = 0.1;
+const BEATS: f64 = 1.3;
+
+/// Most cuts; data that want more are no sessions.
+const MOST_CUTS: usize = 30;
+
+/// One session.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Session {
+    /// Its group in the file.
+    pub group: String,
+    /// First fitted pose.
+    pub first: String,
+    /// Last fitted pose.
+    pub last: String,
+    /// Fitted poses.
+    pub count: usize,
+}
+
+/// What was found along the rows.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Along {
+    /// Sessions; empty where none was cut.
+    pub sessions: Vec<Session>,
+    /// Names of the groups whose placement drifts.
+    pub drifting: Vec<String>,
+}
+
+/// Cuts the groups of `set` into sessions.
+pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Along) {
+    let mut cut = set.clone();
+    let mut along = Along::default();
+    let parameters = robot.mdh_parameters();
+    let model = if set.kind == Kind::Positions { Model::Position } else { Model::CenterDistance };
+    for cuts in 0..MOST_CUTS {
+        let rows = cut.fit_rows();
+        let task = Task { set: &cut, robot, parameters: &parameters, extras: &[], rows: &rows, model, settings };
+        let Some(search) = Search::new(&task) else { break };
+        let found = search.best_cut();
+        if let Some(row) = found {
+            split(&mut cut, row);
+            continue;
+        }
+        along.drifting = search.drifting();
+        if cuts > 0 {
+            along.sessions = list(&cut);
+        }
+        break;
+    }
+    (cut, along)
+}
+
+/// One placement as the search sees it.
+struct Placed {
+    /// Rows of the data set in their order, each with where its residuals start and end.
+    rows: Vec<(usize, std::ops::Range<usize>)>,
+    linear: Linear,
+    /// Inverse normal matrix of the robot's parameters and this placement's unknowns, the others' eliminated.
+    inverse: DMatrix<f64>,
+}
+
+struct Search<'a> {
+    set: &'a Dataset,
+    placed: Vec<Placed>,
+    /// Numbers measured, and the sum of their squares.
+    numbers: f64,
+    squares: f64,
+}
+
+impl<'a> Search<'a> {
+    fn new(task: &Task<'a>) -> Option<Search<'a>> {
+        let (rows, x, prior) = task.robust(Loss::Absolute).ok()?.linearised();
+        let places = rows.kinematics.places(rows.split(&x).0, true);
+        let count = x.len();
+        let (mut normal, mut parts) = (prior, Vec::new());
+        for block in &rows.blocks {
+            let linear = block.linear(&places, &[], &rows.scatter);
+            let along = product(&linear.design, &linear.jacobian);
+            let inverse = pseudo_inverse(product(&linear.design, &linear.design));
+            let own = product(&linear.jacobian, &linear.jacobian) - along.transpose() * inverse * &along;
+            normal += &own;
+            parts.push((block, linear, own));
+        }
+        let numbers: usize = parts.iter().map(|(b, ..)| b.row_count()).sum();
+        let squares = parts.iter().map(|(_, l, _)| l.residuals.norm_squared()).sum();
+        let mut placed = Vec::new();
+        for (block, linear, own) in parts {
+            if !matches!(block, Block::Wire(_) | Block::Points(_)) {
+                continue;
+            }
+            let unknowns = linear.design.ncols();
+            let mut whole = DMatrix::zeros(count + unknowns, count + unknowns);
+            let others = &normal - own + product(&linear.jacobian, &linear.jacobian);
+            whole.view_mut((0, 0), (count, count)).copy_from(&others);
+            let cross = product(&linear.jacobian, &linear.design);
+            whole.view_mut((0, count), (count, unknowns)).copy_from(&cross);
+            whole.view_mut((count, 0), (unknowns, count)).copy_from(&cross.transpose());
+            whole.view_mut((count, count), (unknowns, unknowns)).copy_from(&product(&linear.design, &linear.design));
+            let mut of_rows: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
+            for (i, pose) in block.row_poses().into_iter().enumerate() {
+                let row = rows.rows[pose?];
+                match of_rows.last_mut() {
+                    Some((last, range)) if *last == row => range.end = i + 1,
+                    _ => of_rows.push((row, i..i + 1)),
+                }
+            }
+            placed.push(Placed { rows: of_rows, linear, inverse: pseudo_inverse(whole) });
+        }
+        Some(Search { set: task.set, placed, numbers: numbers as f64, squares })
+    }
+
+    fn pays(&self, gain: f64, unknowns: usize) -> bool {
+        let left = (self.squares - gain).max(f64::MIN_POSITIVE);
+        self.numbers * (self.squares / left).ln() > (unknowns + 1) as f64 * self.numbers.ln()
+    }
+
+    /// The row of the set at which a new session pays most, if any does.
+    fn best_cut(&self) -> Option<usize> {
+        let mut best: Option<(f64, usize, &Placed)> = None;
+        for placed in &self.placed {
+            let order: Vec<usize> = (0..placed.rows.len()).collect();
+            if let Some((gain, k)) = placed.best_step(&order)
+                && best.is_none_or(|(g, ..)| gain > g)
+            {
+                best = Some((gain, placed.rows[k].0, placed));
+            }
+        }
+        let (gain, row, placed) = best?;
+        if !self.pays(gain, placed.linear.design.ncols()) {
+            return None;
+        }
+        if self.set.kind == Kind::Positions {
+            let rival = self.orders(placed).iter().filter_map(|o| Some(placed.best_step(o)?.0)).fold(0.0, f64::max);
+            if gain < SHARE * self.squares || gain < BEATS * rival {
+                return None;
+            }
+        }
+        Some(row)
+    }
+
+    /// The rows of a placement sorted by each joint.
+    fn orders(&self, placed: &Placed) -> Vec<Vec<usize>> {
+        let joints = self.set.poses.first().map_or(0, |p| p.joints_rad.len());
+        let sorted = |j: usize| {
+            let mut order: Vec<usize> = (0..placed.rows.len()).collect();
+            let angle = |k: &usize| self.set.poses[placed.rows[*k].0].joints_rad[j];
+            order.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+            order
+        };
+        (0..joints).map(sorted).collect()
+    }
+
+    /// Groups whose placement moves evenly along their rows.
+    fn drifting(&self) -> Vec<String> {
+        let drifts = |placed: &&Placed| {
+            let order: Vec<usize> = (0..placed.rows.len()).collect();
+            let gain = placed.ramp(&order);
+            let rival = self.orders(placed).iter().map(|o| placed.ramp(o)).fold(0.0, f64::max);
+            placed.rows.len() >= 2 * SHORTEST
+                && self.pays(gain, placed.linear.design.ncols())
+                && gain > SHARE * self.squares
+                && gain > BEATS * rival
+        };
+        let name = |p: &Placed| self.set.groups[self.set.poses[p.rows[0].0].group].name.clone();
+        self.placed.iter().filter(drifts).map(name).collect()
+    }
+}
+
+impl Placed {
+    /// Of one row: design times residuals, design times design, design times all columns.
+    fn products(&self, k: usize) -> (DVector<f64>, DMatrix<f64>, DMatrix<f64>) {
+        let range = self.rows[k].1.clone();
+        let design = self.linear.design.rows(range.start, range.len());
+        let jacobian = self.linear.jacobian.rows(range.start, range.len());
+        let residuals = self.linear.residuals.rows(range.start, range.len());
+        let own = design.tr_mul(&design);
+        let of_robot = design.tr_mul(&jacobian);
+        let count = of_robot.ncols();
+        let mut all = of_robot.resize_horizontally(count + own.ncols(), 0.0);
+        all.columns_mut(count, own.ncols()).copy_from(&own);
+        (design.tr_mul(&residuals), own, all)
+    }
+
+    fn gain(&self, pull: &DVector<f64>, own: &DMatrix<f64>, all: &DMatrix<f64>) -> f64 {
+        let fresh = own - all * &self.inverse * all.transpose();
+        pull.dot(&(pseudo_inverse(fresh) * pull))
+    }
+
+    /// The place in `order` from which on a new placement gains most, with what it gains.
+    fn best_step(&self, order: &[usize]) -> Option<(f64, usize)> {
+        let (unknowns, columns) = (self.linear.design.ncols(), self.inverse.nrows());
+        let mut pull = DVector::zeros(unknowns);
+        let (mut own, mut all) = (DMatrix::zeros(unknowns, unknowns), DMatrix::zeros(unknowns, columns));
+        let mut best: Option<(f64, usize)> = None;
+        for (late, &k) in order.iter().rev().enumerate() {
+            let (p, o, a) = self.products(k);
+            pull += p;
+            own += o;
+            all += a;
+            let early = order.len() - late - 1;
+            if late + 1 >= SHORTEST && early >= SHORTEST {
+                let gain = self.gain(&pull, &own, &all);
+                if best.is_none_or(|(g, _)| gain > g) {
+                    best = Some((gain, k));
+                }
+            }
+        }
+        best
+    }
+
+    /// What a placement that moves evenly along `order` gains.
+    fn ramp(&self, order: &[usize]) -> f64 {
+        let (unknowns, columns) = (self.linear.design.ncols(), self.inverse.nrows());
+        let mut pull = DVector::zeros(unknowns);
+        let (mut own, mut all) = (DMatrix::zeros(unknowns, unknowns), DMatrix::zeros(unknowns, columns));
+        for (i, &k) in order.iter().enumerate() {
+            let t = i as f64 / order.len() as f64 - 0.5;
+            let (p, o, a) = self.products(k);
+            pull += t * p;
+            own += t * t * o;
+            all += t * a;
+        }
+        self.gain(&pull, &own, &all)
+    }
+}
+
+/// Starts a new group at `row`: it and all later rows of its group move there.
+fn split(set: &mut Dataset, row: usize) {
+    let group = set.poses[row].group;
+    let name = set.groups[group].name.clone();
+    set.groups.push(Group { name, center: None });
+    let fresh = set.groups.len() - 1;
+    for pose in set.poses.iter_mut().skip(row).filter(|p| p.group == group) {
+        pose.group = fresh;
+    }
+}
+
+fn list(set: &Dataset) -> Vec<Session> {
+    let session = |(g, group): (usize, &Group)| {
+        let rows = set.rows(|p| p.group == g && p.role != Role::Verify);
+        let name = |row: Option<&usize>| row.map(|&r| set.poses[r].name.clone());
+        let (first, last) = (name(rows.first())?, name(rows.last())?);
+        Some((rows[0], Session { group: group.name.clone(), first, last, count: rows.len() }))
+    };
+    let mut sessions: Vec<(usize, Session)> = set.groups.iter().enumerate().filter_map(session).collect();
+    sessions.sort_by_key(|(row, _)| *row);
+    sessions.into_iter().map(|(_, s)| s).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::synthetic;
+    use crate::measurements::{Measurement, Observed};
+
+    /// Wire lengths to an anchor that moves by 5 mm after `moved` rows.
+    fn wire(moved: usize) -> (synthetic::World, Vec<Measurement>) {
+        let world = synthetic::planned(120, 20, 25.0, 0.0, 5, &|_| {});
+        let rows: Vec<Measurement> = world
+            .rows
+            .iter()
+            .filter(|r| r.at.role != Role::Center)
+            .enumerate()
+            .map(|(i, row)| {
+                let anchor = nalgebra::Point3::new(600.0, if i < moved { 300.0 } else { 305.0 }, 0.0);
+                // A ripple of 0.05 mm stands for noise.
+                let distance_mm =
+                    (world.truth.target_mm(&row.at.joints_rad()) - anchor).norm() + 0.05 * (1.7 * i as f64).sin();
+                let mut at = row.at.clone();
+                at.group = "wire".into();
+                Measurement { at, observed: Observed::Distance { distance_mm, sigma_mm: None } }
+            })
+            .collect();
+        (world, rows)
+    }
+
+    #[test]
+    fn an_anchor_that_moved_is_found_where_it_moved() {
+        let (world, rows) = wire(70);
+        let set = Dataset::new(&rows, 1).unwrap();
+        let (cut, Along { sessions, .. }) = find(&set, &world.nominal, &Settings::default());
+        assert_eq!(sessions.len(), 2, "{sessions:?}");
+        assert!(sessions[0].count.abs_diff(70) <= 1, "{sessions:?}");
+        assert_eq!(cut.groups.len(), 2);
+    }
+
+    #[test]
+    fn an_anchor_that_stayed_is_one_session() {
+        let (world, rows) = wire(1000);
+        let set = Dataset::new(&rows, 1).unwrap();
+        assert!(find(&set, &world.nominal, &Settings::default()).1.sessions.is_empty());
+    }
+}

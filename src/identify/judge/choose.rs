@@ -1,0 +1,373 @@
+//! The whole identification: gross errors named, models judged on samples that did not choose them, methods run and compared.
+//!
+//! 1. A robust fit names the rows that have no weight; they are left out. Verify rows are looked at too, named and kept.
+//! 2. Cells (see [`super::cells`]) choose the rung of the ladder, from the nominal robot upwards: more only where the held-out errors
+//!    fall by more than twice their paired standard error. Unknowns of the sensor are taken where the evidence asks for them.
+//! 3. Every method solves the same problem, so the least cost is the best; the cheapest of equals is kept.
+//! 4. Verify rows take no part in any choice but one: where the robot found is worse on them than the nominal one, nominal is kept.
+
+use super::cells::{Cells, HeldOut, clearly_less, root_mean};
+use super::errors::{Judge, RowError};
+use crate::identify::Error;
+use crate::identify::data::dataset::{Dataset, Kind};
+use crate::identify::model::ladder::Terms;
+use crate::identify::residuals::weights::{Extra, Scatter};
+use crate::identify::settings::{Extensions, Method, Model, Settings};
+use crate::identify::solve::formulation::{Formulation, Loss, Task};
+use crate::identify::solve::problem::{Problem, Solution};
+use crate::identify::solve::{swarm, trust_region};
+use crate::robot::Robot;
+
+/// One method on one model, fitted to all rows that may be fitted.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// How it was found: a method's name, or `nominal`.
+    pub name: &'static str,
+    /// What was minimised.
+    pub model: Model,
+    /// What the problem looked like, and what came out; nothing of the nominal robot.
+    pub found: Option<(Formulation, Solution)>,
+    /// The robot.
+    pub robot: Robot,
+    /// Root mean square held-out error of a number, mm; `None` where it was not judged.
+    pub held_out_mm: Option<f64>,
+}
+
+/// A rung of the ladder, or a model, and how it did.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Judged {
+    /// The model's name.
+    pub model: &'static str,
+    /// The terms in words.
+    pub terms: String,
+    /// Root mean square held-out error of a number, mm; `None` where it could not be judged.
+    pub held_out_mm: Option<f64>,
+}
+
+/// Everything that was found.
+#[derive(Debug, Clone)]
+pub struct Identification {
+    /// Methods and models, fitted.
+    pub candidates: Vec<Candidate>,
+    /// Index of the one to use.
+    pub chosen: usize,
+    /// The rung that was taken.
+    pub terms: Terms,
+    /// Rungs as they were judged.
+    pub judged: Vec<Judged>,
+    /// Rows that were left out because they fit far worse than the rest.
+    pub outliers: Vec<usize>,
+    /// Verify rows that are as far off; they are still counted.
+    pub verify_outliers: Vec<usize>,
+    /// Rows that were fitted.
+    pub fitted: Vec<usize>,
+    /// The scatter that is left of the chosen fit.
+    pub scatter: Scatter,
+    /// Unknowns of the sensor, and their values.
+    pub extras: Vec<(Extra, f64)>,
+    /// Whether the nominal robot was kept because the verify rows found the other one worse.
+    pub vetoed: bool,
+}
+
+/// What all steps share.
+struct Session<'a> {
+    set: &'a Dataset,
+    robot: &'a Robot,
+    settings: &'a Settings,
+    seed: u64,
+    rows: Vec<usize>,
+    extras: Vec<Extra>,
+    step: &'a (dyn Fn(&str) + Sync),
+}
+
+/// Logarithm of the evidence that an unknown of the sensor must bring: one in four hundred.
+const EVIDENCE: f64 = 6.0;
+
+/// Costs within this of each other are one: they come from different sums of the same squares.
+const SAME_COST: f64 = 1e-6;
+
+/// Evaluations of a pose that each swarm may spend in a comparison of all methods.
+const COMPARED_POSES: usize = 4_000_000;
+
+/// Iterations of a swarm in a comparison at the least.
+const LEAST_ITERATIONS: usize = 10;
+
+/// Verify rows from which on their verdict counts.
+const VERDICT_ROWS: usize = 5;
+
+/// How many steps [`identify`] tells of.
+pub fn step_count(settings: &Settings) -> u64 {
+    // Gross errors and the ladder come before the methods.
+    2 + if settings.method.is_none() { Method::ALL.len() as u64 } else { 1 }
+}
+
+/// Identifies the robot. `step` hears what is being done.
+pub fn identify(
+    set: &Dataset,
+    robot: &Robot,
+    settings: &Settings,
+    seed: u64,
+    step: &(dyn Fn(&str) + Sync),
+) -> Result<Identification, Error> {
+    let models = models(set, settings)?;
+    let model = models.first().copied().unwrap_or(Model::CenterDistance);
+    let extras: Vec<Extra> = match set.shared.first() {
+        Some(shared) if model != Model::PairwiseDistance => (0..shared.ncols()).map(Extra::Shared).collect(),
+        _ => Vec::new(),
+    };
+    let mut session = Session { set, robot, settings, seed, rows: set.fit_rows(), extras, step };
+    let by_points = if set.kind == Kind::Positions { Model::Position } else { model };
+    step("gross errors");
+    let (outliers, verify_outliers) = session.drop_outliers(by_points)?;
+    if model == Model::Pose {
+        session.extras.extend((0..3).map(Extra::Target));
+    }
+    step("models of the robot");
+    let (terms, judged) = match settings.extensions {
+        Extensions::None => (Terms::default(), Vec::new()),
+        Extensions::Auto => session.climb(by_points)?,
+    };
+    let methods = settings.method.map_or(Method::ALL.to_vec(), |m| vec![m]);
+    let fitted_terms = if terms == Terms::NOMINAL { Terms::default() } else { terms };
+    let mut candidates = session.run_methods(model, fitted_terms, &methods)?;
+    let held_out = |t: &Terms| judged.iter().find(|j| j.terms == t.name()).and_then(|j| j.held_out_mm);
+    let nominal_held_out_mm = held_out(&Terms::NOMINAL);
+    candidates.iter_mut().for_each(|c| c.held_out_mm = held_out(&fitted_terms));
+    let mut chosen = best(&candidates);
+    for &other in models.iter().filter(|&&m| m != model) {
+        if settings.method.is_none()
+            && let Ok(candidate) = session.run(other, fitted_terms, Method::TrustRegion)
+        {
+            candidates.push(candidate);
+        }
+    }
+    let (scatter, values) = match &candidates[chosen].found {
+        Some((formulation, _)) => (formulation.rows.scatter, formulation.extras().to_vec()),
+        None => (Scatter::of_point(1.0), Vec::new()),
+    };
+    let extras: Vec<(Extra, f64)> = session.extras.iter().copied().zip(values).collect();
+    let mut found = Identification {
+        candidates,
+        chosen,
+        terms,
+        judged,
+        outliers,
+        verify_outliers,
+        fitted: session.rows.clone(),
+        scatter,
+        extras,
+        vetoed: false,
+    };
+    found.vetoed = terms != Terms::NOMINAL
+        && settings.extensions == Extensions::Auto
+        && settings.method.is_none()
+        && found.worse_than_nominal(set, robot, settings);
+    if terms == Terms::NOMINAL || found.vetoed {
+        let held_out_mm = nominal_held_out_mm;
+        let robot = robot.clone();
+        found.candidates.push(Candidate { name: "nominal", model, found: None, robot, held_out_mm });
+        chosen = found.candidates.len() - 1;
+        found.chosen = chosen;
+        found.terms = Terms::NOMINAL;
+    }
+    Ok(found)
+}
+
+/// The models that the data allow, or the one that was asked for.
+fn models(set: &Dataset, settings: &Settings) -> Result<Vec<Model>, Error> {
+    let all = match set.kind {
+        Kind::Distances => vec![Model::CenterDistance],
+        Kind::Positions => vec![Model::Position, Model::CenterDistance, Model::PairwiseDistance],
+    };
+    match settings.model {
+        Some(Model::Pose) if !set.has_rotations() => {
+            Err(Error::ModelNeeds { model: "pose", needed: "orientations (rx_rad, ry_rad, rz_rad)" })
+        }
+        Some(Model::Pose) => Ok(vec![Model::Pose]),
+        Some(model) if !all.contains(&model) => {
+            Err(Error::ModelNeeds { model: model.name(), needed: "positions (x_mm, y_mm, z_mm)" })
+        }
+        Some(model) => Ok(vec![model]),
+        None => Ok(all),
+    }
+}
+
+impl Identification {
+    /// How robots are judged.
+    pub fn errors(&self, set: &Dataset, settings: &Settings, robot: &Robot, rows: &[usize]) -> Vec<RowError> {
+        let (extras, values): (Vec<Extra>, Vec<f64>) = self.extras.iter().copied().unzip();
+        let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &self.fitted, settings.wire_offset) };
+        judge.errors(robot, rows)
+    }
+
+    /// Whether the verify rows find the chosen robot worse than the nominal one.
+    fn worse_than_nominal(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> bool {
+        let rows: Vec<usize> = set.verify_rows().into_iter().filter(|r| !self.verify_outliers.contains(r)).collect();
+        let mean = |robot: &Robot| {
+            let errors = self.errors(set, settings, robot, &rows);
+            let size = |e: &RowError| e.point_mm.map(|p| p.norm()).or(e.distance_mm.map(f64::abs));
+            let sizes: Vec<f64> = errors.iter().filter_map(size).collect();
+            sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
+        };
+        rows.len() >= VERDICT_ROWS && mean(&self.candidates[self.chosen].robot) > mean(nominal)
+    }
+}
+
+impl Session<'_> {
+    fn task<'b>(&'b self, parameters: &'b [crate::robot::Parameter], model: Model) -> Task<'b> {
+        let Session { set, robot, settings, .. } = *self;
+        let extras = if model == Model::PairwiseDistance { &[] } else { self.extras.as_slice() };
+        Task { set, robot, parameters, extras, rows: &self.rows, model, settings }
+    }
+
+    /// Leaves out the rows that a robust fit gives no weight, and names them; and the verify rows that are as far off.
+    fn drop_outliers(&mut self, model: Model) -> Result<(Vec<usize>, Vec<usize>), Error> {
+        let sigmas = self.settings.outlier_sigmas;
+        if sigmas <= 0.0 {
+            return Ok((Vec::new(), Vec::new()));
+        }
+        let parameters = Terms::REFERENCE.parameters(self.robot);
+        let robust = self.task(&parameters, model).robust(Loss::Biweight)?;
+        let outliers: Vec<usize> = self.rows.iter().copied().filter(|&r| robust.scores[r] > sigmas).collect();
+        let rows: Vec<usize> = self.rows.iter().copied().filter(|r| !outliers.contains(r)).collect();
+        let values = robust.offsets[parameters.len()..].to_vec();
+        let judge = Judge {
+            set: self.set,
+            fitted: &rows,
+            scatter: robust.scatter,
+            wire_offset: self.settings.wire_offset,
+            extras: &self.extras,
+            values: &values,
+        };
+        // Fresh rows scatter more than fitted ones.
+        let far = |e: &RowError| e.score(&robust.scatter).is_some_and(|s| s > 1.5 * sigmas);
+        let verify = judge.errors(&robust.robot, &self.set.verify_rows());
+        let verify_outliers = verify.iter().filter(|e| far(e)).map(|e| e.row).collect();
+        self.rows = rows;
+        Ok((outliers, verify_outliers))
+    }
+
+    /// Up the ladder from the nominal robot: each time to the successor of least held-out error, as long as one is clearly better.
+    fn climb(&mut self, model: Model) -> Result<(Terms, Vec<Judged>), Error> {
+        let all = Terms::ALL.parameters(self.robot);
+        let reference = Terms::REFERENCE.parameters(self.robot);
+        let formulation = Formulation::new(&self.task(&reference, model))?;
+        let cells = self.cells(&all, &reference, &formulation, model);
+        let cells = self.take_sensor_unknowns(cells, &all, &reference, model)?;
+        let mut judged = Vec::new();
+        let judge = |terms: Terms, judged: &mut Vec<Judged>| -> Option<HeldOut> {
+            let held_out = cells.held_out(&terms.parameters(self.robot));
+            let held_out_mm = held_out.as_ref().and_then(root_mean);
+            judged.push(Judged { model: model.name(), terms: terms.name(), held_out_mm });
+            held_out
+        };
+        let mut best = Terms::NOMINAL;
+        let Some(mut reference) = judge(best, &mut judged) else { return Ok((Terms::default(), judged)) };
+        loop {
+            let mut next: Option<(Terms, HeldOut)> = None;
+            for terms in best.successors(self.robot, true) {
+                let Some(held_out) = judge(terms, &mut judged) else { continue };
+                let least = next.as_ref().is_none_or(|(_, h)| root_mean(&held_out) < root_mean(h));
+                if least && clearly_less(&held_out, &reference) {
+                    next = Some((terms, held_out));
+                }
+            }
+            let Some((terms, held_out)) = next else { break };
+            (best, reference) = (terms, held_out);
+        }
+        Ok((best, judged))
+    }
+
+    fn cells(
+        &self,
+        all: &[crate::robot::Parameter],
+        reference: &[crate::robot::Parameter],
+        at: &Formulation,
+        model: Model,
+    ) -> Cells {
+        let offsets = at.offsets_of();
+        let (of_robot, extras) = offsets.split_at(reference.len());
+        let mut wide: Vec<f64> =
+            all.iter().map(|p| reference.iter().position(|q| q == p).map_or(0.0, |i| of_robot[i])).collect();
+        wide.extend_from_slice(extras);
+        let levers = self.robot.shifted(reference, of_robot);
+        let rows = self.task(all, model).rows_at(at.rows.scatter, &levers);
+        Cells::new(self.set, &rows, &wide, self.settings.folds)
+    }
+
+    /// Takes the zero of distances and the scale of a camera rig where they make the data much more probable.
+    fn take_sensor_unknowns(
+        &mut self,
+        cells: Cells,
+        all: &[crate::robot::Parameter],
+        reference: &[crate::robot::Parameter],
+        model: Model,
+    ) -> Result<Cells, Error> {
+        let possible = match self.set.kind {
+            Kind::Distances if self.set.groups.iter().any(|g| g.center.is_some()) => Some(Extra::Zero),
+            Kind::Positions if self.set.has_rotations() && self.set.has_covariances() => Some(Extra::Scale),
+            _ => None,
+        };
+        let Some(extra) = possible else { return Ok(cells) };
+        let before = cells.tolerance(reference).1;
+        self.extras.push(extra);
+        let with = Formulation::new(&self.task(reference, model))?;
+        let richer = self.cells(all, reference, &with, model);
+        let richer = richer.same_scale(&cells);
+        if richer.tolerance(reference).1 > before + EVIDENCE {
+            return Ok(richer);
+        }
+        self.extras.pop();
+        Ok(cells)
+    }
+
+    fn run(&self, model: Model, terms: Terms, method: Method) -> Result<Candidate, Error> {
+        let parameters = terms.parameters(self.robot);
+        let formulation = Formulation::new(&self.task(&parameters, model))?;
+        self.solved(&formulation, method)
+    }
+
+    fn solved(&self, formulation: &Formulation, method: Method) -> Result<Candidate, Error> {
+        let fit = formulation.fit();
+        let solution = match method {
+            Method::TrustRegion => {
+                let start = &formulation.free_fit.x[..fit.dimension()];
+                trust_region::solve(&fit, start, &self.settings.trust_region)
+            }
+            _ => {
+                let mut swarm = self.settings.swarm();
+                if self.settings.method.is_none() {
+                    let evaluations = COMPARED_POSES / formulation.rows.rows.len().max(1);
+                    swarm.iterations = swarm.iterations.min((evaluations / swarm.particles).max(LEAST_ITERATIONS));
+                }
+                swarm::solve(&fit, method, &swarm, self.seed)
+            }
+        };
+        if !solution.cost.is_finite() {
+            return Err(Error::NotFinite);
+        }
+        let offsets = fit.offsets(&solution.x);
+        let robot = self.robot.shifted(formulation.parameters(), &offsets);
+        let model = formulation.model;
+        let found = Some((formulation.clone(), solution));
+        Ok(Candidate { name: method.name(), model, found, robot, held_out_mm: None })
+    }
+
+    /// All methods on one problem.
+    fn run_methods(&self, model: Model, terms: Terms, methods: &[Method]) -> Result<Vec<Candidate>, Error> {
+        let parameters = terms.parameters(self.robot);
+        let formulation = Formulation::new(&self.task(&parameters, model))?;
+        let run = |method: &Method| {
+            (self.step)(&format!("{} on {}", method.name(), model.name()));
+            self.solved(&formulation, *method)
+        };
+        methods.iter().map(run).collect()
+    }
+}
+
+/// The first candidate of least cost: the cheapest of equals.
+fn best(candidates: &[Candidate]) -> usize {
+    let cost = |c: &Candidate| c.found.as_ref().map_or(f64::INFINITY, |(_, s)| s.cost);
+    let least = candidates.iter().map(cost).fold(f64::INFINITY, f64::min);
+    candidates.iter().position(|c| cost(c) <= least * (1.0 + SAME_COST)).unwrap_or(0)
+}

@@ -1,0 +1,274 @@
+//! How far a robot's predictions are from what was measured, on rows that were not fitted.
+//!
+//! In: a robot, rows fitted (they place the sensor: rigid transforms, the wire's anchor, touched points), rows to judge.
+//! Out: signed distance errors to the group's reference and, with positions, point errors in the sensor's frame; for touches the
+//! distance of each predicted point to their mean. A group without fitted rows is placed by the rows that are judged.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use serde::Serialize;
+
+use crate::geometry::Transform;
+use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::residuals::eliminate::{Block, Unknowns};
+use crate::identify::residuals::rows::{Recipe, Rows};
+use crate::identify::residuals::weights::{Extra, Scatter};
+use crate::identify::settings::Model;
+use crate::robot::Robot;
+
+/// Fewest rows that a group without fitted rows is placed by.
+const PLACED_BY_ITSELF: usize = 4;
+
+/// Figures of absolute errors, as in Table 3 of the paper.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Number of errors.
+    pub count: usize,
+    /// Mean of their absolute values, mm.
+    pub mean_abs_mm: Option<f64>,
+    /// Standard deviation of their absolute values, mm.
+    pub std_mm: Option<f64>,
+    /// Largest, mm.
+    pub max_abs_mm: Option<f64>,
+    /// Smallest, mm.
+    pub min_abs_mm: Option<f64>,
+}
+
+impl Spread {
+    /// Of a list of errors, mm; undefined figures are `None`.
+    pub fn new(errors_mm: impl IntoIterator<Item = f64>) -> Spread {
+        let errors: Vec<f64> = errors_mm.into_iter().map(f64::abs).collect();
+        let count = errors.len();
+        if count == 0 {
+            return Spread { count, mean_abs_mm: None, std_mm: None, max_abs_mm: None, min_abs_mm: None };
+        }
+        let mean = errors.iter().sum::<f64>() / count as f64;
+        let squares: f64 = errors.iter().map(|e| (e - mean).powi(2)).sum();
+        Spread {
+            count,
+            mean_abs_mm: Some(mean),
+            std_mm: (count > 1).then(|| (squares / (count - 1) as f64).sqrt()),
+            max_abs_mm: errors.iter().copied().reduce(f64::max),
+            min_abs_mm: errors.iter().copied().reduce(f64::min),
+        }
+    }
+}
+
+/// The error of one row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RowError {
+    /// Row of the data set.
+    pub row: usize,
+    /// Predicted minus measured distance to the group's reference, mm; of a touch, to the mean of its group's predicted points.
+    /// `None` for the reference itself.
+    pub distance_mm: Option<f64>,
+    /// Predicted minus measured point, mm, in the sensor's frame; of a touch, from the mean.
+    pub point_mm: Option<Vector3<f64>>,
+    /// Variance of the measured distance, mm^2.
+    pub variance_mm2: f64,
+    /// Covariance of the measured point, mm^2.
+    pub covariance_mm2: Matrix3<f64>,
+}
+
+impl RowError {
+    /// The error in standard deviations of covariance and scatter, a point's as a coordinate's.
+    pub fn score(&self, scatter: &Scatter) -> Option<f64> {
+        if let Some(e) = self.point_mm {
+            let total = scatter.total(&self.covariance_mm2);
+            return Some((e.dot(&total.cholesky()?.solve(&e)) / 3.0).sqrt());
+        }
+        self.distance_mm.map(|e| e.abs() / (self.variance_mm2 + scatter.point_mm.powi(2)).sqrt())
+    }
+}
+
+/// Errors as all robots are judged in one run.
+#[derive(Debug, Clone)]
+pub struct Judge<'a> {
+    /// The measurements.
+    pub set: &'a Dataset,
+    /// Rows that place the sensor.
+    pub fitted: &'a [usize],
+    /// Scatter that points and lengths are weighed with.
+    pub scatter: Scatter,
+    /// Whether a wire's zero is unknown.
+    pub wire_offset: bool,
+    /// Unknowns of the sensor.
+    pub extras: &'a [Extra],
+    /// Their values.
+    pub values: &'a [f64],
+}
+
+/// Weight of the placement's points where no fit has said anything else: covariances matter where they are larger than this, mm.
+const PLACING_SCATTER_MM: f64 = 1.0;
+
+impl<'a> Judge<'a> {
+    /// Without any unknown of the sensor.
+    pub fn plain(set: &'a Dataset, fitted: &'a [usize], wire_offset: bool) -> Judge<'a> {
+        let scatter = Scatter::of_point(PLACING_SCATTER_MM);
+        Judge { set, fitted, scatter, wire_offset, extras: &[], values: &[] }
+    }
+}
+
+impl Judge<'_> {
+    /// Errors of `rows`. Rows of groups that cannot be placed are left out.
+    pub fn errors(&self, robot: &Robot, rows: &[usize]) -> Vec<RowError> {
+        let mut list = Vec::with_capacity(rows.len());
+        for group in 0..self.set.groups.len() {
+            let of = |all: &[usize]| -> Vec<usize> {
+                all.iter().copied().filter(|&i| self.set.poses[i].group == group).collect()
+            };
+            let judged = of(rows);
+            if judged.is_empty() {
+                continue;
+            }
+            let mut placing = of(self.fitted);
+            if !placing.iter().any(|&i| !matches!(self.set.poses[i].reading, Reading::Reference)) {
+                placing.extend(judged.iter().filter(|_| judged.len() >= PLACED_BY_ITSELF));
+                placing.sort_unstable();
+                placing.dedup();
+            }
+            match self.set.kind {
+                Kind::Positions => self.of_points(robot, group, &placing, &judged, &mut list),
+                Kind::Distances => self.of_distances(robot, group, &placing, &judged, &mut list),
+            }
+        }
+        list.sort_by_key(|e| e.row);
+        list
+    }
+
+    fn placed(&self, robot: &Robot, rows: &[usize], model: Model) -> Rows {
+        Rows::new(&Recipe {
+            set: self.set,
+            robot,
+            levers: robot,
+            parameters: &[],
+            extras: self.extras,
+            rows,
+            weights: &[],
+            model,
+            scatter: self.scatter,
+            wire_offset: self.wire_offset,
+        })
+    }
+
+    fn extra(&self, of: Extra) -> f64 {
+        self.extras.iter().zip(self.values).filter(|(e, _)| **e == of).map(|(_, v)| *v).sum()
+    }
+
+    /// A predicted and a measured point, the sensor's own errors taken off, and its covariance.
+    fn point(&self, robot: &Robot, row: usize) -> Option<(Point3<f64>, Point3<f64>, Matrix3<f64>)> {
+        let Reading::Position { point_mm, covariance_mm2, .. } = &self.set.poses[row].reading else { return None };
+        let mut measured = point_mm + point_mm.coords * (self.extra(Extra::Scale) / 1000.0);
+        if let Some(shared) = self.set.shared.get(row) {
+            for (k, column) in shared.column_iter().enumerate() {
+                measured -= column * self.extra(Extra::Shared(k));
+            }
+        }
+        let predicted = robot.target_mm(&self.set.poses[row].joints_rad);
+        Some((predicted, measured, covariance_mm2.unwrap_or_else(Matrix3::zeros)))
+    }
+
+    fn of_points(&self, robot: &Robot, group: usize, placing: &[usize], judged: &[usize], list: &mut Vec<RowError>) {
+        let rows = self.placed(robot, placing, Model::Position);
+        let frame: Option<Transform> = rows.unknowns(self.values).into_iter().find_map(|u| match u {
+            Unknowns::Frame(frame) => Some(frame),
+            _ => None,
+        });
+        let reference = self.set.reference(group, placing).and_then(|r| self.point(robot, r));
+        for &row in judged {
+            let Some((predicted, measured, covariance_mm2)) = self.point(robot, row) else { continue };
+            let (mut distance_mm, mut variance_mm2) = (None, 0.0);
+            if let Some((p0, x0, c0)) = &reference {
+                let apart = measured - x0;
+                if apart.norm() > 0.0 {
+                    let u = apart.normalize();
+                    distance_mm = Some((predicted - p0).norm() - apart.norm());
+                    variance_mm2 = (u.transpose() * (covariance_mm2 + c0) * u)[0];
+                }
+            }
+            let point_mm = frame.as_ref().map(|f| f * predicted - measured);
+            list.push(RowError { row, distance_mm, point_mm, variance_mm2, covariance_mm2 });
+        }
+    }
+
+    fn of_distances(&self, robot: &Robot, group: usize, placing: &[usize], judged: &[usize], list: &mut Vec<RowError>) {
+        let predicted = |row: usize| robot.target_mm(&self.set.poses[row].joints_rad);
+        let touches: Vec<usize> = judged.iter().copied().filter(|&r| self.set.touches(r)).collect();
+        if !touches.is_empty() {
+            self.of_touches(&touches, &predicted, list);
+            return;
+        }
+        let center = self.set.groups[group].center.map(|c| (predicted(c), self.extra(Extra::Zero)));
+        let placed = center.or_else(|| {
+            let rows = self.placed(robot, placing, Model::CenterDistance);
+            let wire = rows.blocks.iter().position(|b| matches!(b, Block::Wire(_)))?;
+            match rows.unknowns(self.values).get(wire) {
+                Some(Unknowns::Anchor(anchor, zero)) => Some((Point3::from(*anchor), *zero)),
+                _ => None,
+            }
+        });
+        let Some((from, zero_mm)) = placed else { return };
+        for &row in judged {
+            if let Reading::Distance { distance_mm, sigma_mm } = self.set.poses[row].reading {
+                list.push(RowError {
+                    row,
+                    distance_mm: Some((predicted(row) - from).norm() + zero_mm - distance_mm),
+                    point_mm: None,
+                    variance_mm2: sigma_mm.map_or(0.0, |s| s * s),
+                    covariance_mm2: Matrix3::zeros(),
+                });
+            }
+        }
+    }
+
+    /// Touches are judged by the mean of the judged rows themselves: the socket of a robot that is off is not where the fitted rows say.
+    fn of_touches(&self, rows: &[usize], predicted: &dyn Fn(usize) -> Point3<f64>, list: &mut Vec<RowError>) {
+        let mean = rows.iter().map(|&r| predicted(r).coords).sum::<Vector3<f64>>() / rows.len() as f64;
+        for &row in rows {
+            let off = predicted(row).coords - mean;
+            let variance_mm2 = match self.set.poses[row].reading {
+                Reading::Distance { sigma_mm: Some(s), .. } => s * s,
+                _ => 0.0,
+            };
+            list.push(RowError {
+                row,
+                distance_mm: Some(off.norm()),
+                point_mm: Some(off),
+                variance_mm2,
+                covariance_mm2: Matrix3::identity() * variance_mm2,
+            });
+        }
+    }
+
+    /// Predicted less known distances between touched points, of groups of which `rows` hold some, mm.
+    pub fn distortion_mm(&self, robot: &Robot, rows: &[usize]) -> Vec<f64> {
+        let mean = |group: usize| {
+            let points: Vec<Vector3<f64>> = rows
+                .iter()
+                .filter(|&&r| self.set.poses[r].group == group && self.set.touches(r))
+                .map(|&r| robot.target_mm(&self.set.poses[r].joints_rad).coords)
+                .collect();
+            (!points.is_empty()).then(|| points.iter().sum::<Vector3<f64>>() / points.len() as f64)
+        };
+        let off =
+            |k: &crate::identify::data::dataset::KnownDistance| Some((mean(k.a)? - mean(k.b)?).norm() - k.distance_mm);
+        self.set.known.iter().filter_map(off).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_of_three_errors() {
+        let spread = Spread::new([-1.0, 2.0, -3.0]);
+        assert_eq!((spread.count, spread.mean_abs_mm, spread.std_mm), (3, Some(2.0), Some(1.0)));
+        assert_eq!((spread.max_abs_mm, spread.min_abs_mm), (Some(3.0), Some(1.0)));
+    }
+
+    #[test]
+    fn figures_of_nothing_are_none() {
+        assert_eq!(Spread::new([]).mean_abs_mm, None);
+        assert_eq!(Spread::new([1.0]).std_mm, None);
+    }
+}

@@ -1,0 +1,5 @@
+//! Errors on rows that were not fitted, and the choice of model, terms and method by them.
+
+pub mod cells;
+pub mod choose;
+pub mod errors;

@@ -1,0 +1,113 @@
+//! The ladder of models: nominal, tool, joint offsets, MDH, and the terms beyond.
+
+use crate::robot::{Parameter, Robot};
+
+/// How much of the MDH chain may move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Chain {
+    /// Nothing.
+    Nominal,
+    /// The target point.
+    Tool,
+    /// The target point and the offsets of the joints.
+    Offsets,
+    /// All MDH parameters.
+    #[default]
+    Mdh,
+}
+
+/// A model of the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+pub struct Terms {
+    /// The chain's own parameters.
+    pub chain: Chain,
+    /// Hayati's rotation for parallel axes.
+    pub beta: bool,
+    /// 0 none, 1 the arm's own weight, 2 the load's too.
+    pub gravity: usize,
+    /// 0 none, 1 scale of each joint, 2 coupling to the joint before it too.
+    pub couplings: usize,
+    /// 0 none, 1 once a turn, 2 twice a turn too.
+    pub harmonics: usize,
+}
+
+impl Terms {
+    /// The nominal robot.
+    pub const NOMINAL: Terms = Terms { chain: Chain::Nominal, beta: false, gravity: 0, couplings: 0, harmonics: 0 };
+
+    /// All that there is.
+    pub const ALL: Terms = Terms { chain: Chain::Mdh, beta: true, gravity: 2, couplings: 2, harmonics: 2 };
+
+    /// What gross errors and sessions are looked for with.
+    pub const REFERENCE: Terms = Terms { chain: Chain::Mdh, beta: true, gravity: 1, couplings: 0, harmonics: 0 };
+
+    /// The parameters of the robot with these terms.
+    pub fn parameters(&self, robot: &Robot) -> Vec<Parameter> {
+        let mut parameters = robot.mdh_parameters();
+        parameters.retain(|p| match p {
+            Parameter::V(_) => self.chain >= Chain::Tool,
+            Parameter::Theta(i) if !robot.joints[*i].slides => self.chain >= Chain::Offsets,
+            Parameter::D(i) if robot.joints[*i].slides => self.chain >= Chain::Offsets,
+            _ => self.chain >= Chain::Mdh,
+        });
+        if self.beta {
+            parameters.extend(robot.beta_parameters());
+        }
+        if self.gravity > 0 {
+            parameters.extend(robot.gravity_parameters(self.gravity > 1));
+        }
+        if self.couplings > 0 {
+            parameters.extend(robot.coupling_parameters(self.couplings > 1));
+        }
+        if self.harmonics > 0 {
+            parameters.extend(robot.harmonic_parameters(self.harmonics));
+        }
+        parameters
+    }
+
+    /// In words.
+    pub fn name(&self) -> String {
+        let mut name = match self.chain {
+            Chain::Nominal => "nominal",
+            Chain::Tool => "tool",
+            Chain::Offsets => "tool + joint offsets",
+            Chain::Mdh => "MDH",
+        }
+        .to_owned();
+        if self.beta {
+            name.push_str(" + beta");
+        }
+        match self.gravity {
+            0 => {}
+            1 => name.push_str(" + gravity (arm)"),
+            _ => name.push_str(" + gravity (arm, load)"),
+        }
+        match self.couplings {
+            0 => {}
+            1 => name.push_str(" + joint scale"),
+            _ => name.push_str(" + joint scale and coupling"),
+        }
+        if self.harmonics > 0 {
+            name.push_str(&format!(" + harmonics ({})", self.harmonics));
+        }
+        name
+    }
+
+    /// What can be tried from here: every richer chain, and with the whole chain every term that is not taken yet. Rungs that failed
+    /// from a poorer model are tried again from a richer one.
+    pub fn successors(&self, robot: &Robot, beyond: bool) -> Vec<Terms> {
+        let chains = [Chain::Tool, Chain::Offsets, Chain::Mdh];
+        let mut next: Vec<Terms> =
+            chains.into_iter().filter(|c| *c > self.chain).map(|chain| Terms { chain, ..*self }).collect();
+        if self.chain == Chain::Mdh && beyond {
+            next.push(Terms { beta: true, ..*self });
+            next.extend((self.gravity + 1..=2).map(|gravity| Terms { gravity, ..*self }));
+            next.extend((self.couplings + 1..=2).map(|couplings| Terms { couplings, ..*self }));
+            next.extend((self.harmonics + 1..=2).map(|harmonics| Terms { harmonics, ..*self }));
+        }
+        let count = self.parameters(robot).len();
+        next.retain(|t| t.parameters(robot).len() > count);
+        next
+    }
+}

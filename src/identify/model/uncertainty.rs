@@ -1,0 +1,156 @@
+//! How far to trust the result: covariance of the parameters, the position error to expect, and what poses would tell.
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use serde::Serialize;
+
+use crate::identify::data::dataset::Dataset;
+use crate::identify::model::kinematics::Kinematics;
+use crate::identify::record::file_unit;
+use crate::identify::residuals::eliminate::pseudo_inverse;
+use crate::identify::solve::formulation::Formulation;
+use crate::robot::{Parameter, Robot};
+
+/// Covariance of the identified parameters, in the units of the file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Covariance {
+    /// Names of the parameters.
+    pub order: Vec<String>,
+    /// Row by row.
+    pub matrix: Vec<Vec<f64>>,
+}
+
+impl Covariance {
+    /// Of a fit: all parameters that were seen, those that act together included.
+    pub fn new(formulation: &Formulation) -> Covariance {
+        let covariance = formulation.robot_covariance();
+        let parameters = formulation.parameters();
+        let seen: Vec<usize> = (0..parameters.len()).filter(|i| !formulation.base.zero.contains(i)).collect();
+        let factor = |i: usize| file_unit(parameters[i]).1;
+        Covariance {
+            order: seen.iter().map(|&i| parameters[i].name()).collect(),
+            matrix: seen
+                .iter()
+                .map(|&r| seen.iter().map(|&c| factor(r) * factor(c) * covariance[(r, c)]).collect())
+                .collect(),
+        }
+    }
+}
+
+/// The position error to expect of the identified robot, after one rigid fit to each placement.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Expected {
+    /// Mean over the poses of the expected length of the error, mm.
+    pub mean_mm: f64,
+    /// 95 % of errors are below, mm.
+    pub p95_mm: f64,
+    /// Expected length of the error at the worst pose, mm.
+    pub max_mm: f64,
+    /// Mean of the expected length of the error that the parameters and the placement make, mm: against a truth without noise.
+    pub of_robot_mm: f64,
+    /// The part of the mean that the robot's own scatter makes, mm: a model that is not quite right, and repeatability.
+    pub scatter_mm: f64,
+    /// For which poses it is said.
+    pub poses: String,
+    /// Pose by pose of the file: name and expected length, mm.
+    pub map: Vec<(String, f64)>,
+}
+
+/// Mean length of a vector of three normal numbers over the root of the mean of its square.
+const MEAN_OVER_RMS: f64 = 0.921_317_731_923_561_3;
+
+/// 95 % quantile of the length of three equal normal numbers over the root of the mean of its square.
+const P95_OVER_RMS: f64 = 1.613_973;
+
+impl Expected {
+    /// At the poses of the set, the placements fitted to `fitted`.
+    pub fn new(formulation: &Formulation, set: &Dataset, fitted: &[usize]) -> Expected {
+        let joints: Vec<&[f64]> = set.poses.iter().map(|p| p.joints_rad.as_slice()).collect();
+        let kinematics = &formulation.rows.kinematics;
+        let nominal = kinematics.nominal();
+        let offsets = formulation.offsets_of();
+        let count = kinematics.parameters().len();
+        let robot = nominal.shifted(kinematics.parameters(), &offsets[..count]);
+        let places = Kinematics::new(nominal, &robot, kinematics.parameters(), &joints).places(&offsets[..count], true);
+        let covariance = formulation.robot_covariance();
+        let scatter = formulation.rows.scatter.point_mm;
+        let (mut squares, mut of_robots) = (vec![0.0; places.len()], vec![0.0; places.len()]);
+        for group in 0..set.groups.len() {
+            let placing: Vec<usize> = fitted.iter().copied().filter(|&i| set.poses[i].group == group).collect();
+            let motion = |i: usize| rigid(&places[i].point_mm.coords);
+            let mut normal = DMatrix::zeros(6, 6);
+            let mut cross = DMatrix::zeros(6, count);
+            for &i in &placing {
+                normal += motion(i).tr_mul(&motion(i));
+                cross += motion(i).tr_mul(&places[i].point_columns);
+            }
+            let inverse = pseudo_inverse(normal);
+            let follow = &inverse * cross;
+            for i in (0..places.len()).filter(|&i| set.poses[i].group == group) {
+                let columns = &places[i].point_columns - motion(i) * &follow;
+                let of_robot = (&columns * &covariance * columns.transpose()).trace();
+                // The placement itself is found through the scatter of the rows it is fitted to.
+                let of_frame = (motion(i) * &inverse * motion(i).transpose()).trace() * scatter * scatter;
+                of_robots[i] = of_robot;
+                squares[i] = of_robot + of_frame + 3.0 * scatter * scatter;
+            }
+        }
+        let lengths: Vec<f64> = squares.iter().map(|s| MEAN_OVER_RMS * s.sqrt()).collect();
+        let mean_square = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+        Expected {
+            mean_mm: lengths.iter().sum::<f64>() / lengths.len().max(1) as f64,
+            p95_mm: P95_OVER_RMS * mean_square.sqrt(),
+            max_mm: lengths.iter().copied().fold(0.0, f64::max),
+            of_robot_mm: of_robots.iter().map(|s: &f64| MEAN_OVER_RMS * s.sqrt()).sum::<f64>()
+                / of_robots.len().max(1) as f64,
+            scatter_mm: MEAN_OVER_RMS * scatter * 3f64.sqrt(),
+            poses: region(set),
+            map: set.poses.iter().map(|p| p.name.clone()).zip(lengths).collect(),
+        }
+    }
+}
+
+/// How a small rigid motion (turn, shift) moves a point.
+fn rigid(point: &Vector3<f64>) -> DMatrix<f64> {
+    let mut motion = DMatrix::zeros(3, 6);
+    motion.fixed_view_mut::<3, 3>(0, 0).copy_from(&-crate::geometry::skew(point));
+    motion.fixed_view_mut::<3, 3>(0, 3).copy_from(&Matrix3::identity());
+    motion
+}
+
+/// The ranges of the joints that were measured.
+pub fn region(set: &Dataset) -> String {
+    let count = set.poses.first().map_or(0, |p| p.joints_rad.len());
+    let range = |j: usize| {
+        let values = set.poses.iter().map(|p| p.joints_rad[j]);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        match set.slides.get(j) {
+            Some(true) => format!("j{} {low:.0}..{high:.0} mm", j + 1),
+            _ => format!("j{} {:.0}..{:.0} deg", j + 1, low.to_degrees(), high.to_degrees()),
+        }
+    };
+    (0..count).map(range).collect::<Vec<_>>().join(", ")
+}
+
+/// What measuring points at poses of one placement of the sensor would tell: the information matrix (inverse covariance, 1/mm^2 and
+/// the like in mm and mrad) about these parameters of the robot, the placement's rigid transform eliminated. Nothing needs to have
+/// been measured. `covariances_mm2` are those of the points in the robot's base frame, one a pose.
+pub fn information(
+    robot: &Robot,
+    parameters: &[Parameter],
+    joints_rad: &[&[f64]],
+    covariances_mm2: &[Matrix3<f64>],
+) -> DMatrix<f64> {
+    let places = Kinematics::new(robot, robot, parameters, joints_rad).places(&vec![0.0; parameters.len()], true);
+    let count = parameters.len();
+    let mut total = DMatrix::zeros(count + 6, count + 6);
+    for (place, covariance) in places.iter().zip(covariances_mm2) {
+        let Some(weight) = covariance.try_inverse() else { continue };
+        let mut columns = DMatrix::zeros(3, count + 6);
+        columns.columns_mut(0, count).copy_from(&place.point_columns);
+        columns.columns_mut(count, 6).copy_from(&rigid(&place.point_mm.coords));
+        total += columns.transpose() * weight * &columns;
+    }
+    let inverse = pseudo_inverse(total.view((count, count), (6, 6)).into_owned());
+    let cross = total.view((0, count), (count, 6)).into_owned();
+    total.view((0, 0), (count, count)).into_owned() - &cross * inverse * cross.transpose()
+}

@@ -1,0 +1,135 @@
+//! Distances: to a group's centre pose, or to a fixed point that is unknown (a draw wire's anchor).
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::eliminate::{Raw, direction};
+use super::weights::{Length, Scatter};
+use crate::identify::model::kinematics::Place;
+
+/// Distances to the group's centre pose.
+#[derive(Debug, Clone)]
+pub struct Center {
+    /// Index of the centre among the places.
+    pub center: usize,
+    /// The distances.
+    pub lengths: Vec<Length>,
+}
+
+/// Distances to a fixed point that is unknown.
+#[derive(Debug, Clone)]
+pub struct Wire {
+    /// The distances.
+    pub lengths: Vec<Length>,
+    /// Where the search for the point starts, base frame, mm.
+    pub anchor_mm: Vector3<f64>,
+    /// Whether the wire's zero is unknown too.
+    pub offset: bool,
+}
+
+fn gained(length: &Length, extras: &[f64]) -> f64 {
+    length.extra.iter().zip(extras).map(|(x, e)| x * e).sum()
+}
+
+fn place_extra(jacobian: &mut DMatrix<f64>, row: usize, length: &Length, by: f64) {
+    let first = jacobian.ncols() - length.extra.len();
+    for (k, x) in length.extra.iter().enumerate() {
+        jacobian[(row, first + k)] = x * by;
+    }
+}
+
+fn column_count(places: &[Place], extras: usize) -> usize {
+    places.first().map_or(0, |p| p.point_columns.ncols()) + extras
+}
+
+impl Center {
+    fn residual(&self, places: &[Place], extras: &[f64], l: &Length) -> f64 {
+        (places[l.pose].point_mm - places[self.center].point_mm).norm() - l.length_mm + gained(l, extras)
+    }
+
+    pub(super) fn inner(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> (DVector<f64>, DMatrix<f64>) {
+        let n = self.lengths.len();
+        let white = |l: &Length| l.weight * self.residual(places, extras, l) / scatter.sd(l, 2.0);
+        (DVector::from_iterator(n, self.lengths.iter().map(white)), DMatrix::zeros(n, 0))
+    }
+
+    pub(super) fn outer(&self, places: &[Place], extras: usize, scatter: &Scatter) -> DMatrix<f64> {
+        let center = &places[self.center];
+        let mut jacobian = DMatrix::zeros(self.lengths.len(), column_count(places, extras));
+        for (i, l) in self.lengths.iter().enumerate() {
+            let place = &places[l.pose];
+            let by = l.weight / scatter.sd(l, 2.0);
+            let u = direction(&(place.point_mm - center.point_mm)).0 * by;
+            let row = u.transpose() * (&place.point_columns - &center.point_columns);
+            jacobian.view_mut((i, 0), (1, row.ncols())).copy_from(&row);
+            place_extra(&mut jacobian, i, l, by);
+        }
+        jacobian
+    }
+
+    pub(super) fn raw(&self, places: &[Place], extras: &[f64]) -> Vec<(usize, f64, Raw)> {
+        let raw = |l: &Length| (l.pose, l.weight, Raw::Length(self.residual(places, extras, l), l.variance_mm2, 2.0));
+        self.lengths.iter().map(raw).collect()
+    }
+}
+
+impl Wire {
+    pub(super) fn unknown_count(&self) -> usize {
+        3 + usize::from(self.offset)
+    }
+
+    pub(super) fn inner(
+        &self,
+        places: &[Place],
+        extras: &[f64],
+        scatter: &Scatter,
+        anchor_mm: &Vector3<f64>,
+        zero_mm: f64,
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let mut design = DMatrix::zeros(self.lengths.len(), self.unknown_count());
+        let mut residuals = DVector::zeros(self.lengths.len());
+        for (i, l) in self.lengths.iter().enumerate() {
+            let (u, distance) = direction(&(places[l.pose].point_mm.coords - anchor_mm));
+            let by = l.weight / scatter.sd(l, 1.0);
+            residuals[i] = (distance + zero_mm - l.length_mm + gained(l, extras)) * by;
+            design.fixed_view_mut::<1, 3>(i, 0).copy_from(&(-u.transpose() * by));
+            if self.offset {
+                design[(i, 3)] = by;
+            }
+        }
+        (residuals, design)
+    }
+
+    pub(super) fn outer(
+        &self,
+        places: &[Place],
+        extras: usize,
+        scatter: &Scatter,
+        anchor_mm: &Vector3<f64>,
+    ) -> DMatrix<f64> {
+        let mut jacobian = DMatrix::zeros(self.lengths.len(), column_count(places, extras));
+        for (i, l) in self.lengths.iter().enumerate() {
+            let place = &places[l.pose];
+            let by = l.weight / scatter.sd(l, 1.0);
+            let u = direction(&(place.point_mm.coords - anchor_mm)).0 * by;
+            let row = u.transpose() * &place.point_columns;
+            jacobian.view_mut((i, 0), (1, row.ncols())).copy_from(&row);
+            place_extra(&mut jacobian, i, l, by);
+        }
+        jacobian
+    }
+
+    pub(super) fn raw(
+        &self,
+        places: &[Place],
+        extras: &[f64],
+        anchor_mm: &Vector3<f64>,
+        zero_mm: f64,
+    ) -> Vec<(usize, f64, Raw)> {
+        let raw = |l: &Length| {
+            let distance = (places[l.pose].point_mm.coords - anchor_mm).norm();
+            let residual = distance + zero_mm - l.length_mm + gained(l, extras);
+            (l.pose, l.weight, Raw::Length(residual, l.variance_mm2, 1.0))
+        };
+        self.lengths.iter().map(raw).collect()
+    }
+}

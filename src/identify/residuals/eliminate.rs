@@ -1,0 +1,293 @@
+//! Residuals of one placement of the sensor, with the placement's own unknowns solved for inside.
+//!
+//! In: the target's places in the base frame. Out: white residuals and their derivatives, from which the unknowns of
+//! the placement (a rigid transform, the wire's anchor and zero, touched points) are eliminated: variable projection (Golub and
+//! Pereyra, 1973) with Kaufman's derivative. A model without such unknowns is the special case.
+//! What goes wrong: poses on one line leave the transform's turn about it free; the pseudo-inverse leaves it where it is.
+
+use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
+
+use super::distances::{Center, Wire};
+use super::pairwise::Pairs;
+use super::points::Points;
+use super::touch::Touch;
+use super::weights::Scatter;
+use crate::geometry::Transform;
+use crate::identify::model::kinematics::Place;
+
+/// Steps of the inner problem at the most; it is nearly linear and mostly needs two or three.
+const INNER_STEPS: usize = 50;
+
+/// The inner problem is solved when its step's predicted gain falls below this fraction of its cost.
+const INNER_GAIN: f64 = 1e-14;
+
+/// Relative size below which an eigenvalue of the inner normal matrix counts as zero.
+const INNER_RANK: f64 = 1e-13;
+
+/// What one block measures.
+#[derive(Debug, Clone)]
+pub enum Block {
+    /// Distances to the group's centre: eq. (7) to (10), the centre computed anew with the same parameters.
+    Center(Center),
+    /// Distances to a fixed point that is unknown.
+    Wire(Wire),
+    /// Touches of fixed points that are unknown, some of them at known distances.
+    Touch(Touch),
+    /// Points, with a free rigid transform; orientations too where they are used.
+    Points(Points),
+    /// All distances within a group, whitened for the poses they share.
+    Pairwise(Pairs),
+}
+
+/// The unknowns of a placement.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Unknowns {
+    /// None.
+    Nothing,
+    /// The wire's fixed point, base frame, and its reading at length zero, mm.
+    Anchor(Vector3<f64>, f64),
+    /// Touched points, base frame, mm.
+    Sockets(Vec<Vector3<f64>>),
+    /// `sensor_from_base`
+    Frame(Transform),
+}
+
+/// A residual before whitening, and the variance that the measurement gives it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Raw {
+    /// A length; the scatter enters so many times.
+    Length(f64, f64, f64),
+    /// A point.
+    Point(Vector3<f64>, Matrix3<f64>),
+    /// An orientation, rad.
+    Turn(Vector3<f64>),
+}
+
+/// Residuals with the placement's unknowns at their best, and derivatives where asked.
+#[derive(Debug, Clone)]
+pub struct Evaluated {
+    /// White.
+    pub residuals: DVector<f64>,
+    /// White, the unknowns eliminated; no columns unless asked for.
+    pub jacobian: DMatrix<f64>,
+    /// The unknowns at their best.
+    pub unknowns: Unknowns,
+}
+
+/// White residuals with derivatives as they are, nothing eliminated.
+#[derive(Debug, Clone)]
+pub struct Linear {
+    /// White residuals.
+    pub residuals: DVector<f64>,
+    /// A column a parameter of the robot, then a column an extra unknown.
+    pub jacobian: DMatrix<f64>,
+    /// A column an unknown of the placement.
+    pub design: DMatrix<f64>,
+}
+
+impl Block {
+    /// Number of unknowns of its own.
+    pub fn unknown_count(&self) -> usize {
+        match self {
+            Block::Center(_) | Block::Pairwise(_) => 0,
+            Block::Wire(wire) => wire.unknown_count(),
+            Block::Touch(touch) => 3 * touch.sockets.len(),
+            Block::Points(_) => 6,
+        }
+    }
+
+    /// Number of residuals.
+    pub fn row_count(&self) -> usize {
+        match self {
+            Block::Center(center) => center.lengths.len(),
+            Block::Wire(wire) => wire.lengths.len(),
+            Block::Touch(touch) => touch.row_count(),
+            Block::Points(points) => points.rows_a_spot() * points.spots.len(),
+            Block::Pairwise(pairs) => pairs.row_count(),
+        }
+    }
+
+    /// Numbers that were measured with some weight, less the unknowns.
+    pub fn count(&self) -> usize {
+        let counted = |weights: &mut dyn Iterator<Item = f64>| weights.filter(|w| *w > 0.0).count();
+        let numbers = match self {
+            Block::Center(center) => counted(&mut center.lengths.iter().map(|l| l.weight)),
+            Block::Wire(wire) => counted(&mut wire.lengths.iter().map(|l| l.weight)),
+            Block::Touch(touch) => 3 * counted(&mut touch.contacts.iter().map(|c| c.weight)) + touch.known.len(),
+            Block::Points(points) => points.rows_a_spot() * counted(&mut points.spots.iter().map(|s| s.weight)),
+            Block::Pairwise(pairs) => pairs.count(),
+        };
+        numbers.saturating_sub(self.unknown_count())
+    }
+
+    /// Index among the places of the pose that each residual belongs to; `None` for what belongs to no pose.
+    pub fn row_poses(&self) -> Vec<Option<usize>> {
+        match self {
+            Block::Center(center) => center.lengths.iter().map(|l| Some(l.pose)).collect(),
+            Block::Wire(wire) => wire.lengths.iter().map(|l| Some(l.pose)).collect(),
+            Block::Touch(touch) => touch.row_poses(),
+            Block::Points(points) => {
+                let rows = points.rows_a_spot();
+                points.spots.iter().flat_map(|s| std::iter::repeat_n(Some(s.pose), rows)).collect()
+            }
+            Block::Pairwise(pairs) => vec![None; pairs.row_count()],
+        }
+    }
+
+    fn start(&self) -> Unknowns {
+        match self {
+            Block::Center(_) | Block::Pairwise(_) => Unknowns::Nothing,
+            Block::Wire(wire) => Unknowns::Anchor(wire.anchor_mm, 0.0),
+            Block::Touch(touch) => Unknowns::Sockets(touch.sockets.clone()),
+            Block::Points(points) => Unknowns::Frame(points.sensor_from_base),
+        }
+    }
+
+    /// White residuals and their derivatives with respect to the block's own unknowns.
+    fn inner(
+        &self,
+        places: &[Place],
+        extras: &[f64],
+        scatter: &Scatter,
+        at: &Unknowns,
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        match (self, at) {
+            (Block::Center(center), _) => center.inner(places, extras, scatter),
+            (Block::Wire(wire), Unknowns::Anchor(point, zero)) => wire.inner(places, extras, scatter, point, *zero),
+            (Block::Touch(touch), Unknowns::Sockets(sockets)) => touch.inner(places, scatter, sockets),
+            (Block::Points(points), Unknowns::Frame(frame)) => points.inner(places, extras, scatter, frame),
+            (Block::Pairwise(pairs), _) => {
+                let residuals = pairs.residuals(places);
+                let rows = residuals.len();
+                (residuals, DMatrix::zeros(rows, 0))
+            }
+            _ => (DVector::zeros(0), DMatrix::zeros(0, 0)),
+        }
+    }
+
+    /// White derivatives with respect to the robot's parameters and the extra unknowns, the block's own held.
+    fn outer(&self, places: &[Place], extras: &[f64], scatter: &Scatter, at: &Unknowns) -> DMatrix<f64> {
+        match (self, at) {
+            (Block::Center(center), _) => center.outer(places, extras.len(), scatter),
+            (Block::Wire(wire), Unknowns::Anchor(point, _)) => wire.outer(places, extras.len(), scatter, point),
+            (Block::Touch(touch), _) => touch.outer(places, extras.len(), scatter),
+            (Block::Points(points), Unknowns::Frame(frame)) => points.outer(places, extras, scatter, frame),
+            (Block::Pairwise(pairs), _) => {
+                let jacobian = pairs.derivatives(places);
+                let columns = jacobian.ncols() + extras.len();
+                jacobian.resize_horizontally(columns, 0.0)
+            }
+            _ => DMatrix::zeros(0, places.first().map_or(0, |p| p.point_columns.ncols()) + extras.len()),
+        }
+    }
+
+    /// The unknowns at their best.
+    pub fn solved(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> Unknowns {
+        self.solve(places, extras, scatter).0
+    }
+
+    fn solve(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> (Unknowns, DVector<f64>, DMatrix<f64>) {
+        let mut at = self.start();
+        let (mut residuals, mut design) = self.inner(places, extras, scatter, &at);
+        if self.unknown_count() == 0 {
+            return (at, residuals, design);
+        }
+        for _ in 0..INNER_STEPS {
+            let gradient = design.tr_mul(&residuals);
+            let step: DVector<f64> = -(pseudo_inverse(design.tr_mul(&design)) * &gradient);
+            let gain = -gradient.dot(&step);
+            let cost = residuals.norm_squared();
+            if gain.is_nan() || gain <= INNER_GAIN * cost {
+                break;
+            }
+            // Halved until the cost falls; where it does not, the place is as good as it gets.
+            let moved = (0..8).find_map(|halvings| {
+                let trial = at.moved(&(0.5f64.powi(halvings) * &step));
+                let (r, d) = self.inner(places, extras, scatter, &trial);
+                (r.norm_squared() <= cost).then_some((trial, r, d))
+            });
+            let Some(moved) = moved else { break };
+            (at, residuals, design) = moved;
+        }
+        (at, residuals, design)
+    }
+
+    /// Solves for the unknowns, then residuals and (where the places have columns and `derivatives`) the Jacobian.
+    pub fn evaluate(&self, places: &[Place], extras: &[f64], scatter: &Scatter, derivatives: bool) -> Evaluated {
+        let (unknowns, residuals, design) = self.solve(places, extras, scatter);
+        let mut jacobian = DMatrix::zeros(residuals.len(), 0);
+        if derivatives {
+            jacobian = self.outer(places, extras, scatter, &unknowns);
+            if self.unknown_count() > 0 {
+                let along = pseudo_inverse(design.tr_mul(&design)) * product(&design, &jacobian);
+                jacobian -= design * along;
+            }
+        }
+        Evaluated { residuals, jacobian, unknowns }
+    }
+
+    /// Residuals and all derivatives with the unknowns at their best, nothing eliminated.
+    pub fn linear(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> Linear {
+        let (unknowns, residuals, design) = self.solve(places, extras, scatter);
+        Linear { residuals, jacobian: self.outer(places, extras, scatter, &unknowns), design }
+    }
+
+    /// Residuals before whitening, for the estimate of the scatter and for lists of what fits badly; by pose, with the row's weight.
+    pub fn raw(&self, places: &[Place], extras: &[f64], at: &Unknowns) -> Vec<(usize, f64, Raw)> {
+        match (self, at) {
+            (Block::Center(center), _) => center.raw(places, extras),
+            (Block::Wire(wire), Unknowns::Anchor(point, zero)) => wire.raw(places, extras, point, *zero),
+            (Block::Touch(touch), Unknowns::Sockets(sockets)) => touch.raw(places, sockets),
+            (Block::Points(points), Unknowns::Frame(frame)) => points.raw(places, extras, frame),
+            (Block::Pairwise(pairs), _) => pairs.raw(places).into_iter().map(|(pose, raw)| (pose, 1.0, raw)).collect(),
+            _ => Vec::new(),
+        }
+    }
+}
+
+impl Unknowns {
+    /// Moved by a step in the coordinates of the block's design.
+    pub fn moved(&self, step: &DVector<f64>) -> Unknowns {
+        let three = |at: usize| Vector3::new(step[at], step[at + 1], step[at + 2]);
+        match self {
+            Unknowns::Nothing => Unknowns::Nothing,
+            Unknowns::Anchor(point, zero) => {
+                Unknowns::Anchor(point + three(0), zero + if step.len() > 3 { step[3] } else { 0.0 })
+            }
+            Unknowns::Sockets(sockets) => {
+                Unknowns::Sockets(sockets.iter().enumerate().map(|(k, c)| c + three(3 * k)).collect())
+            }
+            Unknowns::Frame(frame) => Unknowns::Frame(crate::geometry::perturb(frame, three(0), three(3))),
+        }
+    }
+}
+
+/// `A' B`, by way of the blocked product: `tr_mul` takes dot products one by one, at several times the time for matrices of this size.
+pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    a.transpose() * b
+}
+
+/// Unit vector and length; the zero vector where the length is zero.
+pub fn direction(v: &Vector3<f64>) -> (Vector3<f64>, f64) {
+    let length = v.norm();
+    if length > 0.0 { (v / length, length) } else { (Vector3::zeros(), 0.0) }
+}
+
+/// Of a symmetric matrix that may lack rank. Rows and columns are brought to a common size first: radians and mm mix.
+pub fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let n = matrix.nrows();
+    let scale = DVector::from_fn(n, |i, _| if matrix[(i, i)] > 0.0 { 1.0 / matrix[(i, i)].sqrt() } else { 0.0 });
+    let scaled = DMatrix::from_fn(n, n, |r, c| matrix[(r, c)] * scale[r] * scale[c]);
+    if scaled.iter().any(|v| !v.is_finite()) {
+        return DMatrix::zeros(n, n);
+    }
+    let eigen = SymmetricEigen::new(scaled);
+    let threshold = INNER_RANK * eigen.eigenvalues.amax();
+    let mut inverse = DMatrix::zeros(n, n);
+    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        if *value > threshold {
+            inverse += vector * vector.transpose() / *value;
+        }
+    }
+    DMatrix::from_fn(n, n, |r, c| inverse[(r, c)] * scale[r] * scale[c])
+}

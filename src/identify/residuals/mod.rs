@@ -1,0 +1,9 @@
+//! Predicted poses of the target to white residuals, with the unknowns of a sensor's placement eliminated.
+
+pub mod distances;
+pub mod eliminate;
+pub mod pairwise;
+pub mod points;
+pub mod rows;
+pub mod touch;
+pub mod weights;

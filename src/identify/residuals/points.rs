@@ -1,0 +1,138 @@
+//! Points in a placement's own frame, with a free rigid transform; orientations too where the model uses them.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
+
+use super::eliminate::Raw;
+use super::weights::{Extra, Scatter, Spot};
+use crate::geometry::{Transform, rotation_matrix, rotation_vector_of_matrix, skew};
+use crate::identify::model::kinematics::Place;
+
+/// Extra unknowns that turn the target are per mrad.
+const RAD_PER_MRAD: f64 = 1e-3;
+
+/// The points of one placement.
+#[derive(Debug, Clone)]
+pub struct Points {
+    /// What was measured.
+    pub spots: Vec<Spot>,
+    /// Where the search for the transform starts.
+    pub sensor_from_base: Transform,
+    /// The target's orientation on the flange before the extra unknowns turn it.
+    pub flange_from_target: Matrix3<f64>,
+    /// Whether orientations are used.
+    pub oriented: bool,
+    /// Which of the extra unknowns turn the target: index and axis.
+    pub target: Vec<(usize, usize)>,
+}
+
+impl Points {
+    /// Three residuals a point, three more an orientation.
+    pub fn rows_a_spot(&self) -> usize {
+        if self.oriented { 6 } else { 3 }
+    }
+
+    /// Indices and axes of the extra unknowns that turn the target.
+    pub fn target_extras(extras: &[Extra]) -> Vec<(usize, usize)> {
+        let axis = |(k, e): (usize, &Extra)| if let Extra::Target(axis) = e { Some((k, *axis)) } else { None };
+        extras.iter().enumerate().filter_map(axis).collect()
+    }
+
+    /// `flange_from_target` as the extra unknowns turn it.
+    pub fn turned_target(&self, extras: &[f64]) -> Matrix3<f64> {
+        let mut turn: Vector3<f64> = Vector3::zeros();
+        for &(k, axis) in &self.target {
+            turn[axis] += extras.get(k).copied().unwrap_or(0.0) * RAD_PER_MRAD;
+        }
+        Rotation3::from_scaled_axis(turn).into_inner() * self.flange_from_target
+    }
+
+    fn point_residual(&self, place: &Place, extras: &[f64], frame: &Transform, spot: &Spot) -> Vector3<f64> {
+        let mut residual = frame * place.point_mm - spot.point_mm;
+        for (column, e) in spot.extra.column_iter().zip(extras) {
+            residual += column * *e;
+        }
+        residual
+    }
+
+    pub(super) fn inner(
+        &self,
+        places: &[Place],
+        extras: &[f64],
+        scatter: &Scatter,
+        frame: &Transform,
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let rows = self.rows_a_spot();
+        let flange_from_target = self.turned_target(extras);
+        let mut residuals = DVector::zeros(rows * self.spots.len());
+        let mut design = DMatrix::zeros(rows * self.spots.len(), 6);
+        for (i, spot) in self.spots.iter().enumerate() {
+            let (place, row) = (&places[spot.pose], rows * i);
+            let turned = frame.rotation * place.point_mm.coords;
+            let whiten = scatter.whitener(&spot.covariance_mm2) * spot.weight;
+            let residual = self.point_residual(place, extras, frame, spot);
+            residuals.fixed_rows_mut::<3>(row).copy_from(&(whiten * residual));
+            design.fixed_view_mut::<3, 3>(row, 0).copy_from(&(-whiten * skew(&turned)));
+            design.fixed_view_mut::<3, 3>(row, 3).copy_from(&whiten);
+            if let (true, Some(measured)) = (self.oriented, &spot.rotation) {
+                let weight = spot.weight / scatter.rotation_rad;
+                let turn = turn(&(rotation_matrix(frame) * place.rotation), &flange_from_target, measured);
+                residuals.fixed_rows_mut::<3>(row + 3).copy_from(&(weight * turn));
+                design.fixed_view_mut::<3, 3>(row + 3, 0).copy_from(&(weight * Matrix3::identity()));
+            }
+        }
+        (residuals, design)
+    }
+
+    pub(super) fn outer(&self, places: &[Place], extras: &[f64], scatter: &Scatter, frame: &Transform) -> DMatrix<f64> {
+        let rows = self.rows_a_spot();
+        let robot = places.first().map_or(0, |p| p.point_columns.ncols());
+        let rotation = rotation_matrix(frame);
+        let mut jacobian = DMatrix::zeros(rows * self.spots.len(), robot + extras.len());
+        for (i, spot) in self.spots.iter().enumerate() {
+            let (place, row) = (&places[spot.pose], rows * i);
+            let whiten = scatter.whitener(&spot.covariance_mm2) * spot.weight;
+            jacobian.view_mut((row, 0), (3, robot)).copy_from(&(whiten * rotation * &place.point_columns));
+            for (k, column) in spot.extra.column_iter().enumerate() {
+                jacobian.fixed_view_mut::<3, 1>(row, robot + k).copy_from(&(whiten * column));
+            }
+            if self.oriented {
+                let weight = spot.weight / scatter.rotation_rad;
+                let turn = rotation * weight;
+                jacobian.view_mut((row + 3, 0), (3, robot)).copy_from(&(turn * &place.rotation_columns));
+                let sensor_from_flange = turn * place.rotation * RAD_PER_MRAD;
+                for &(k, axis) in &self.target {
+                    jacobian.fixed_view_mut::<3, 1>(row + 3, robot + k).copy_from(&sensor_from_flange.column(axis));
+                }
+            }
+        }
+        jacobian
+    }
+
+    pub(super) fn raw(&self, places: &[Place], extras: &[f64], frame: &Transform) -> Vec<(usize, f64, Raw)> {
+        let flange_from_target = self.turned_target(extras);
+        let mut list = Vec::new();
+        for spot in &self.spots {
+            let place = &places[spot.pose];
+            let residual = self.point_residual(place, extras, frame, spot);
+            list.push((spot.pose, spot.weight, Raw::Point(residual, spot.covariance_mm2)));
+            if let (true, Some(measured)) = (self.oriented, &spot.rotation) {
+                let sensor_from_flange = rotation_matrix(frame) * place.rotation;
+                list.push((
+                    spot.pose,
+                    spot.weight,
+                    Raw::Turn(turn(&sensor_from_flange, &flange_from_target, measured)),
+                ));
+            }
+        }
+        list
+    }
+}
+
+/// Predicted orientation after the measured one, as a rotation vector in the sensor's frame.
+pub fn turn(
+    sensor_from_flange: &Matrix3<f64>,
+    flange_from_target: &Matrix3<f64>,
+    measured: &Matrix3<f64>,
+) -> Vector3<f64> {
+    rotation_vector_of_matrix(&(sensor_from_flange * flange_from_target * measured.transpose()))
+}

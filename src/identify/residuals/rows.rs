@@ -1,0 +1,444 @@
+//! The rows of a data set under a residual model: the robot at their poses, and a block of residuals for each placement.
+//!
+//! In: the data set, the rows to use with their weights, the model, the parameters that may move, the sensor's extra unknowns.
+//! Out: white residuals and derivatives with respect to all parameters and extras, the placements' unknowns eliminated.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector, Vector3};
+
+use super::distances::{Center, Wire};
+use super::eliminate::{Block, Evaluated, Raw, Unknowns, pseudo_inverse};
+use super::pairwise::{CHUNK, Pairs};
+use super::points::Points;
+use super::touch::{Contact, Known, Touch};
+use super::weights::{Extra, Length, Scatter, Spot};
+use crate::geometry::{Transform, transform_from_matrix};
+use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::model::kinematics::{Kinematics, Place};
+use crate::identify::settings::Model;
+use crate::robot::{Parameter, Robot};
+
+/// What to build residuals from.
+#[derive(Debug, Clone, Copy)]
+pub struct Recipe<'a> {
+    /// The measurements.
+    pub set: &'a Dataset,
+    /// The robot whose parameters are offset.
+    pub robot: &'a Robot,
+    /// The robot on whose chain weights have their levers: where `robot` is going.
+    pub levers: &'a Robot,
+    /// The parameters that may move.
+    pub parameters: &'a [Parameter],
+    /// Unknowns of the sensor that may move.
+    pub extras: &'a [Extra],
+    /// Rows to use, ascending.
+    pub rows: &'a [usize],
+    /// Roots of the rows' weights, one a row of the data set; empty where all count fully.
+    pub weights: &'a [f64],
+    /// What counts as a residual.
+    pub model: Model,
+    /// Scatter beyond the measurement's covariance.
+    pub scatter: Scatter,
+    /// Whether a wire's zero is unknown.
+    pub wire_offset: bool,
+}
+
+/// The rows of a data set under a residual model, before it is known what they determine.
+#[derive(Debug, Clone)]
+pub struct Rows {
+    /// The robot at the rows' poses.
+    pub kinematics: Kinematics,
+    /// Which row of the data set each place is.
+    pub rows: Vec<usize>,
+    /// Residuals.
+    pub blocks: Vec<Block>,
+    /// Scatter beyond the measurement's covariance.
+    pub scatter: Scatter,
+    /// Unknowns of the sensor, after the robot's parameters in every vector of offsets.
+    pub extras: Vec<Extra>,
+}
+
+impl Rows {
+    /// Builds the blocks. Rows whose group has nothing to measure from are left out.
+    pub fn new(recipe: &Recipe) -> Rows {
+        let Recipe { set, robot, levers, parameters, rows, .. } = *recipe;
+        let mut used: Vec<usize> = rows.to_vec();
+        // A centre is a place that distances need, wherever its row went.
+        used.extend(set.groups.iter().filter_map(|g| g.center).filter(|c| !rows.contains(c)));
+        used.sort_unstable();
+        let joints: Vec<&[f64]> = used.iter().map(|&i| set.poses[i].joints_rad.as_slice()).collect();
+        let kinematics = Kinematics::new(robot, levers, parameters, &joints);
+        let places = kinematics.places(&vec![0.0; parameters.len()], false);
+        let blocks = Inputs { recipe, used: &used, places: &places, by_group: by_group(set, rows) }.blocks();
+        Rows { kinematics, rows: used, blocks, scatter: recipe.scatter, extras: recipe.extras.to_vec() }
+    }
+
+    /// Number of offsets: the robot's parameters, then the extra unknowns.
+    pub fn offset_count(&self) -> usize {
+        self.kinematics.parameters().len() + self.extras.len()
+    }
+
+    /// Numbers measured, less the unknowns of the placements.
+    pub fn count(&self) -> usize {
+        self.blocks.iter().map(Block::count).sum()
+    }
+
+    /// The robot's offsets and the extras' values in one vector of offsets.
+    pub fn split<'a>(&self, offsets: &'a [f64]) -> (&'a [f64], &'a [f64]) {
+        offsets.split_at(self.kinematics.parameters().len())
+    }
+
+    /// White residuals and derivatives with respect to all offsets.
+    pub fn evaluate(&self, offsets: &[f64], derivatives: bool) -> (DVector<f64>, DMatrix<f64>) {
+        let (of_robot, extras) = self.split(offsets);
+        let places = self.kinematics.places(of_robot, derivatives);
+        let parts: Vec<Evaluated> =
+            self.blocks.iter().map(|b| b.evaluate(&places, extras, &self.scatter, derivatives)).collect();
+        let rows = parts.iter().map(|p| p.residuals.len()).sum();
+        let columns = if derivatives { offsets.len() } else { 0 };
+        let (mut residuals, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, columns));
+        let mut row = 0;
+        for part in parts {
+            let count = part.residuals.len();
+            residuals.rows_mut(row, count).copy_from(&part.residuals);
+            jacobian.rows_mut(row, count).copy_from(&part.jacobian);
+            row += count;
+        }
+        (residuals, jacobian)
+    }
+
+    /// Residuals before whitening, by row of the data set, with the root of the row's weight.
+    pub fn raw(&self, offsets: &[f64]) -> Vec<(usize, f64, Raw)> {
+        let (of_robot, extras) = self.split(offsets);
+        let places = self.kinematics.places(of_robot, false);
+        let of_block = |b: &Block| b.raw(&places, extras, &b.solved(&places, extras, &self.scatter));
+        self.blocks.iter().flat_map(of_block).map(|(place, w, raw)| (self.rows[place], w, raw)).collect()
+    }
+
+    /// The unknowns of every placement at these offsets.
+    pub fn unknowns(&self, offsets: &[f64]) -> Vec<Unknowns> {
+        let (of_robot, extras) = self.split(offsets);
+        let places = self.kinematics.places(of_robot, false);
+        self.blocks.iter().map(|b| b.solved(&places, extras, &self.scatter)).collect()
+    }
+
+    /// The variance that stands for one, mm^2: costs are multiplied by it.
+    pub fn unit_variance_mm2(&self) -> f64 {
+        let mut precision = Vec::new();
+        let scatter = &self.scatter;
+        for block in &self.blocks {
+            match block {
+                Block::Center(c) => precision.extend(c.lengths.iter().map(|l| scatter.sd(l, 2.0).powi(-2))),
+                Block::Wire(w) => precision.extend(w.lengths.iter().map(|l| scatter.sd(l, 1.0).powi(-2))),
+                Block::Points(p) => {
+                    precision.extend(p.spots.iter().map(|s| 3.0 / scatter.total(&s.covariance_mm2).trace()));
+                }
+                Block::Touch(t) => precision.extend(
+                    t.contacts.iter().map(|c| 1.0 / (c.variance_mm2 * scatter.stated + scatter.point_mm.powi(2))),
+                ),
+                Block::Pairwise(_) => precision.push(1.0 / scatter.point_mm.powi(2).max(f64::MIN_POSITIVE)),
+            }
+        }
+        precision.len().max(1) as f64 / precision.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+    }
+
+    /// The same rows with the extra unknowns fixed at these values and taken off the readings.
+    pub fn with_extras_fixed(&self, extras: &[f64]) -> Rows {
+        let mut fixed = self.clone();
+        let off = |length: &mut Length| {
+            length.length_mm -= length.extra.iter().zip(extras).map(|(x, e)| x * e).sum::<f64>();
+            length.extra = RowDVector::zeros(0);
+        };
+        for block in &mut fixed.blocks {
+            match block {
+                Block::Center(c) => c.lengths.iter_mut().for_each(off),
+                Block::Wire(w) => w.lengths.iter_mut().for_each(off),
+                Block::Points(p) => {
+                    p.flange_from_target = p.turned_target(extras);
+                    p.target.clear();
+                    for spot in &mut p.spots {
+                        for (column, e) in spot.extra.column_iter().zip(extras) {
+                            spot.point_mm -= column * *e;
+                        }
+                        spot.extra = Matrix3xX::zeros(0);
+                    }
+                }
+                Block::Touch(_) | Block::Pairwise(_) => {}
+            }
+        }
+        fixed.extras.clear();
+        fixed
+    }
+}
+
+fn by_group(set: &Dataset, rows: &[usize]) -> Vec<Vec<usize>> {
+    let mut lists = vec![Vec::new(); set.groups.len()];
+    for &row in rows {
+        lists[set.poses[row].group].push(row);
+    }
+    lists
+}
+
+/// What a point of a placement gains with each extra unknown, mm (see [`Extra`]).
+fn point_extra(set: &Dataset, row: usize, point_mm: &Point3<f64>, extras: &[Extra]) -> Matrix3xX<f64> {
+    let column = |extra: &Extra| match extra {
+        Extra::Scale => -point_mm.coords / 1000.0,
+        Extra::Shared(k) => set.shared.get(row).map_or(Vector3::zeros(), |s| s.column(*k).into()),
+        Extra::Zero | Extra::Target(_) => Vector3::zeros(),
+    };
+    if extras.is_empty() {
+        return Matrix3xX::zeros(0);
+    }
+    Matrix3xX::from_columns(&extras.iter().map(column).collect::<Vec<_>>())
+}
+
+struct Inputs<'a> {
+    recipe: &'a Recipe<'a>,
+    used: &'a [usize],
+    places: &'a [Place],
+    by_group: Vec<Vec<usize>>,
+}
+
+impl Inputs<'_> {
+    fn place_of(&self, row: usize) -> Option<usize> {
+        self.used.binary_search(&row).ok()
+    }
+
+    fn weight(&self, row: usize) -> f64 {
+        self.recipe.weights.get(row).copied().unwrap_or(1.0)
+    }
+
+    fn blocks(&self) -> Vec<Block> {
+        let groups = 0..self.recipe.set.groups.len();
+        match (self.recipe.set.kind, self.recipe.model) {
+            (Kind::Distances, _) => groups.filter_map(|g| self.measured_distances(g)).chain(self.touches()).collect(),
+            (Kind::Positions, Model::CenterDistance) => groups.filter_map(|g| self.center_distances(g)).collect(),
+            (Kind::Positions, Model::PairwiseDistance) => groups.flat_map(|g| self.pairs(g)).collect(),
+            (Kind::Positions, Model::Position | Model::Pose) => self.points(self.recipe.model == Model::Pose),
+        }
+    }
+
+    fn measured_distances(&self, group: usize) -> Option<Block> {
+        let extras = self.recipe.extras;
+        let zero = |e: &Extra| if *e == Extra::Zero { 1.0 } else { 0.0 };
+        let length = |&i: &usize| match self.recipe.set.poses[i].reading {
+            Reading::Distance { distance_mm, sigma_mm } if distance_mm > 0.0 => Some(Length {
+                pose: self.place_of(i)?,
+                length_mm: distance_mm,
+                variance_mm2: sigma_mm.map_or(0.0, |s| s * s),
+                weight: self.weight(i),
+                extra: RowDVector::from_iterator(extras.len(), extras.iter().map(zero)),
+            }),
+            _ => None,
+        };
+        let lengths: Vec<Length> = self.by_group[group].iter().filter_map(length).collect();
+        if lengths.is_empty() {
+            return None;
+        }
+        match self.recipe.set.groups[group].center.and_then(|c| self.place_of(c)) {
+            Some(center) => Some(Block::Center(Center { center, lengths })),
+            None => {
+                let anchor_mm = first_anchor(self.places, &lengths);
+                Some(Block::Wire(Wire { lengths, anchor_mm, offset: self.recipe.wire_offset }))
+            }
+        }
+    }
+
+    /// One block for all sockets that known distances tie together.
+    fn touches(&self) -> Vec<Block> {
+        let set = self.recipe.set;
+        let touched: Vec<(usize, Vec<(usize, f64)>)> = (0..set.groups.len())
+            .filter_map(|g| {
+                let contact = |&i: &usize| match set.poses[i].reading {
+                    Reading::Distance { distance_mm, sigma_mm } if set.touches(i) && distance_mm == 0.0 => {
+                        Some((i, sigma_mm.map_or(0.0, |s| s * s)))
+                    }
+                    _ => None,
+                };
+                let list: Vec<(usize, f64)> = self.by_group[g].iter().filter_map(contact).collect();
+                (!list.is_empty()).then_some((g, list))
+            })
+            .collect();
+        // The lowest group that a group is tied to, by repeated lowering: there are few.
+        let mut tied: Vec<usize> = (0..set.groups.len()).collect();
+        for _ in 0..set.known.len() {
+            for known in &set.known {
+                let low = tied[known.a].min(tied[known.b]);
+                (tied[known.a], tied[known.b]) = (low, low);
+            }
+        }
+        let block = |root: usize| {
+            let members: Vec<&(usize, Vec<(usize, f64)>)> = touched.iter().filter(|(g, _)| tied[*g] == root).collect();
+            let (mut sockets, mut contacts) = (Vec::new(), Vec::new());
+            for (socket, (_, list)) in members.iter().enumerate() {
+                let points: Vec<Vector3<f64>> =
+                    list.iter().filter_map(|(i, _)| Some(self.places[self.place_of(*i)?].point_mm.coords)).collect();
+                sockets.push(middle(&points));
+                contacts.extend(list.iter().filter_map(|&(i, variance_mm2)| {
+                    Some(Contact { pose: self.place_of(i)?, socket, variance_mm2, weight: self.weight(i) })
+                }));
+            }
+            let at = |group: usize| members.iter().position(|(g, _)| *g == group);
+            let known = set.known.iter().filter_map(|k| {
+                Some(Known { a: at(k.a)?, b: at(k.b)?, distance_mm: k.distance_mm, sigma_mm: k.sigma_mm })
+            });
+            Block::Touch(Touch { sockets, contacts, known: known.collect() })
+        };
+        let mut roots: Vec<usize> = touched.iter().map(|(g, _)| tied[*g]).collect();
+        roots.sort_unstable();
+        roots.dedup();
+        roots.into_iter().map(block).collect()
+    }
+
+    fn spot(&self, row: usize) -> Option<Spot> {
+        let pose = self.place_of(row)?;
+        match &self.recipe.set.poses[row].reading {
+            Reading::Position { point_mm, covariance_mm2, rotation } => Some(Spot {
+                pose,
+                point_mm: *point_mm,
+                covariance_mm2: covariance_mm2.unwrap_or_else(Matrix3::zeros),
+                rotation: rotation.map(|r| r.to_rotation_matrix().into_inner()),
+                weight: self.weight(row),
+                extra: point_extra(self.recipe.set, row, point_mm, self.recipe.extras),
+            }),
+            _ => None,
+        }
+    }
+
+    fn center_distances(&self, group: usize) -> Option<Block> {
+        let reference = self.recipe.set.reference(group, self.recipe.rows)?;
+        let center = self.spot(reference)?;
+        let length = |&i: &usize| {
+            let spot = self.spot(i)?;
+            let apart = spot.point_mm - center.point_mm;
+            let length_mm = apart.norm();
+            if i == reference || length_mm <= 0.0 {
+                return None;
+            }
+            let u = apart / length_mm;
+            let variance_mm2 = (u.transpose() * (spot.covariance_mm2 + center.covariance_mm2) * u)[0];
+            let extra = u.transpose() * (&spot.extra - &center.extra);
+            Some(Length { pose: spot.pose, length_mm, variance_mm2, weight: spot.weight, extra })
+        };
+        let lengths: Vec<Length> = self.by_group[group].iter().filter_map(length).collect();
+        if lengths.is_empty() { None } else { Some(Block::Center(Center { center: center.pose, lengths })) }
+    }
+
+    fn pairs(&self, group: usize) -> Vec<Block> {
+        let spots: Vec<Spot> = self.by_group[group].iter().filter_map(|&i| self.spot(i)).collect();
+        let chunks = spots.len().div_ceil(CHUNK).max(1);
+        // Every chunk takes every so-manieth pose, so that each spans the group.
+        let chunk = |k: usize| spots.iter().skip(k).step_by(chunks).cloned().collect::<Vec<_>>();
+        (0..chunks)
+            .map(chunk)
+            .filter(|c| c.len() > 2)
+            .filter_map(|c| Pairs::new(c, &self.recipe.scatter))
+            .map(Block::Pairwise)
+            .collect()
+    }
+
+    fn points(&self, oriented: bool) -> Vec<Block> {
+        let lists: Vec<Vec<Spot>> = self
+            .by_group
+            .iter()
+            .map(|rows| rows.iter().filter_map(|&i| self.spot(i)).collect::<Vec<_>>())
+            .filter(|spots| spots.len() >= 3)
+            .collect();
+        let frames: Vec<Transform> = lists.iter().map(|spots| robust_frame(spots, self.places)).collect();
+        let flange_from_target = if oriented { mean_target(&lists, &frames, self.places) } else { Matrix3::identity() };
+        let target = if oriented { Points::target_extras(self.recipe.extras) } else { Vec::new() };
+        let block = |(spots, sensor_from_base): (Vec<Spot>, Transform)| {
+            Block::Points(Points { spots, sensor_from_base, flange_from_target, oriented, target: target.clone() })
+        };
+        lists.into_iter().zip(frames).map(block).collect()
+    }
+}
+
+/// Rounds of reweighting a first frame.
+const FRAME_ROUNDS: usize = 15;
+
+/// A frame that gross errors hardly move: least sum of distances, by reweighting (Weiszfeld's way).
+fn robust_frame(spots: &[Spot], places: &[Place]) -> Transform {
+    let mut weights: Vec<f64> = spots.iter().map(|s| s.weight * s.weight).collect();
+    let mut frame = Transform::identity();
+    for _ in 0..FRAME_ROUNDS {
+        frame = fitted_frame(spots.iter().zip(&weights).map(|(s, w)| (places[s.pose].point_mm, s.point_mm, *w)));
+        let misses: Vec<f64> = spots.iter().map(|s| (frame * places[s.pose].point_mm - s.point_mm).norm()).collect();
+        let mut sorted = misses.clone();
+        sorted.sort_by(f64::total_cmp);
+        let floor = (0.1 * sorted[sorted.len() / 2]).max(1e-9);
+        weights = misses.iter().zip(spots).map(|(m, s)| s.weight * s.weight / m.max(floor)).collect();
+    }
+    frame
+}
+
+/// The rigid transform `b_from_a` that brings pairs (a, b, weight) of points together best (Kabsch, 1976).
+pub fn fitted_frame(pairs: impl Iterator<Item = (Point3<f64>, Point3<f64>, f64)>) -> Transform {
+    let pairs: Vec<_> = pairs.collect();
+    let n = pairs.iter().map(|(_, _, w)| w).sum::<f64>().max(f64::MIN_POSITIVE);
+    let mean_a = pairs.iter().map(|(a, _, w)| a.coords * *w).sum::<Vector3<f64>>() / n;
+    let mean_b = pairs.iter().map(|(_, b, w)| b.coords * *w).sum::<Vector3<f64>>() / n;
+    let covariance: Matrix3<f64> =
+        pairs.iter().map(|(a, b, w)| (b.coords - mean_b) * (a.coords - mean_a).transpose() * *w).sum();
+    let rotation = nearest_rotation(&covariance);
+    transform_from_matrix(rotation, mean_b - rotation * mean_a)
+}
+
+/// The rotation R with the largest trace of R' M.
+pub fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
+    let svd = matrix.svd(true, true);
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Matrix3::identity() };
+    let mut sign = Matrix3::identity();
+    let smallest = svd.singular_values.imin();
+    sign[(smallest, smallest)] = (u * v_t).determinant().signum();
+    u * sign * v_t
+}
+
+/// Coordinate by coordinate the median.
+fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
+    Vector3::from_fn(|axis, _| {
+        let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(0.0)
+    })
+}
+
+/// Mean of `flange_from_target` over all poses.
+fn mean_target(lists: &[Vec<Spot>], frames: &[Transform], places: &[Place]) -> Matrix3<f64> {
+    let mut sum = Matrix3::zeros();
+    for (spots, frame) in lists.iter().zip(frames) {
+        let rotation = crate::geometry::rotation_matrix(frame);
+        for spot in spots {
+            if let Some(measured) = &spot.rotation {
+                sum += (rotation * places[spot.pose].rotation).transpose() * measured;
+            }
+        }
+    }
+    Rotation3::from_matrix_unchecked(nearest_rotation(&sum)).into_inner()
+}
+
+/// Rounds of reweighting a first anchor.
+const ANCHOR_ROUNDS: usize = 10;
+
+/// Where a wire's anchor may be: |p|^2 - 2 p.c + |c|^2 = L^2 is linear in c and |c|^2; reweighted against gross errors.
+fn first_anchor(places: &[Place], lengths: &[Length]) -> Vector3<f64> {
+    let n = lengths.len();
+    let mean = lengths.iter().map(|l| places[l.pose].point_mm.coords).sum::<Vector3<f64>>() / n.max(1) as f64;
+    let arm = |l: &Length| places[l.pose].point_mm.coords - mean;
+    let mut weights: Vec<f64> = lengths.iter().map(|l| l.weight).collect();
+    let mut anchor = mean;
+    for _ in 0..ANCHOR_ROUNDS {
+        let entry = |r: usize, c: usize| weights[r] * if c < 3 { 2.0 * arm(&lengths[r])[c] } else { 1.0 };
+        let design = DMatrix::from_fn(n, 4, entry);
+        let rhs =
+            DVector::from_fn(n, |r, _| weights[r] * (arm(&lengths[r]).norm_squared() - lengths[r].length_mm.powi(2)));
+        let solution = pseudo_inverse(design.tr_mul(&design)) * design.tr_mul(&rhs);
+        anchor = mean + solution.fixed_rows::<3>(0);
+        let misses: Vec<f64> =
+            lengths.iter().map(|l| ((places[l.pose].point_mm.coords - anchor).norm() - l.length_mm).abs()).collect();
+        let mut sorted = misses.clone();
+        sorted.sort_by(f64::total_cmp);
+        let floor = (0.1 * sorted[n / 2]).max(1e-9);
+        weights = misses.iter().zip(lengths).map(|(m, l)| l.weight / m.max(floor).sqrt()).collect();
+    }
+    anchor
+}

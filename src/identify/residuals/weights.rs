@@ -1,0 +1,101 @@
+//! How much a residual counts: the measurement's own covariance, the robot's scatter beyond it, and errors that poses share.
+//!
+//! A measured number is `value + own noise + extra' e`, where the extra unknowns `e` are common to many poses: the calibration of a
+//! rig, its scale, the zero of a wire. The fit finds them beside the robot.
+
+use nalgebra::{Matrix3, Matrix3xX, Point3, RowDVector};
+
+/// An unknown of the sensor that all placements share.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extra {
+    /// Reading of a distance when the target is at the centre, mm.
+    Zero,
+    /// Scale of the sensor less one, thousandths.
+    Scale,
+    /// Turn of the target on the flange about x, y or z (0, 1, 2), mrad.
+    Target(usize),
+    /// A parameter of the sensor's calibration, in units of its standard deviation (whitened).
+    Shared(usize),
+}
+
+impl Extra {
+    /// Its name in files.
+    pub fn name(self) -> String {
+        match self {
+            Extra::Zero => "distance_zero".to_owned(),
+            Extra::Scale => "sensor_scale".to_owned(),
+            Extra::Target(axis) => format!("target_r{}", ["x", "y", "z"][axis.min(2)]),
+            Extra::Shared(k) => format!("shared_{}", k + 1),
+        }
+    }
+}
+
+/// A measured length, mm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Length {
+    /// Index of the pose among the places.
+    pub pose: usize,
+    /// mm
+    pub length_mm: f64,
+    /// Its own variance, mm^2.
+    pub variance_mm2: f64,
+    /// Root of the row's weight, 0 to 1.
+    pub weight: f64,
+    /// What the residual gains with each extra unknown, mm.
+    pub extra: RowDVector<f64>,
+}
+
+/// A measured point in the sensor's frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spot {
+    /// Index of the pose among the places.
+    pub pose: usize,
+    /// mm
+    pub point_mm: Point3<f64>,
+    /// Its own covariance, mm^2.
+    pub covariance_mm2: Matrix3<f64>,
+    /// `sensor_from_target`, where the model uses it.
+    pub rotation: Option<Matrix3<f64>>,
+    /// Root of the row's weight, 0 to 1.
+    pub weight: f64,
+    /// What the residual gains with each extra unknown, mm.
+    pub extra: Matrix3xX<f64>,
+}
+
+/// How widely the robot scatters beyond the measurement's own covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scatter {
+    /// A coordinate of a point, mm.
+    pub point_mm: f64,
+    /// A component of the orientation, rad.
+    pub rotation_rad: f64,
+    /// What the stated covariances are multiplied by: less than one where they are larger than what was seen.
+    pub stated: f64,
+}
+
+impl Scatter {
+    /// Of a point, its covariance taken at its word.
+    pub fn of_point(point_mm: f64) -> Scatter {
+        Scatter { point_mm, rotation_rad: 1e-4, stated: 1.0 }
+    }
+
+    /// Whole covariance of a point, mm^2.
+    pub fn total(&self, covariance_mm2: &Matrix3<f64>) -> Matrix3<f64> {
+        covariance_mm2 * self.stated + Matrix3::identity() * (self.point_mm * self.point_mm)
+    }
+
+    /// The matrix W with W C W' = I, C the whole covariance.
+    pub fn whitener(&self, covariance_mm2: &Matrix3<f64>) -> Matrix3<f64> {
+        let total = self.total(covariance_mm2);
+        match total.cholesky().and_then(|c| c.l().try_inverse()) {
+            Some(inverse) => inverse,
+            None => Matrix3::identity() / (total.trace() / 3.0).max(f64::MIN_POSITIVE).sqrt(),
+        }
+    }
+
+    /// Standard deviation of a length in which the scatter enters so many times, mm.
+    pub fn sd(&self, length: &Length, times: f64) -> f64 {
+        let variance = length.variance_mm2 * self.stated + times * self.point_mm * self.point_mm;
+        variance.max(f64::MIN_POSITIVE).sqrt()
+    }
+}

@@ -1,0 +1,115 @@
+//! The identification as a least-squares problem: rows, base parameters, a box and a prior.
+//!
+//! A [`Problem`] whose vector holds the base parameters (mm, mrad), then the extra unknowns of the sensor, and whose residuals are
+//! white, the prior's rows below. Base parameters are spread over all parameters of the robot. Costs are scaled back to mm^2, so
+//! that unweighted data give eq. (12).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::batch::BatchCost;
+use super::problem::Problem;
+use crate::identify::model::base::Base;
+use crate::identify::residuals::eliminate::product;
+use crate::identify::residuals::rows::Rows;
+
+/// What the solvers minimise.
+#[derive(Debug, Clone)]
+pub struct Fit<'a> {
+    /// The residuals.
+    pub rows: std::borrow::Cow<'a, Rows>,
+    /// What can be determined.
+    pub base: &'a Base,
+    /// All parameters of the robot from the base parameters.
+    spread: DMatrix<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    /// Rows of the prior: `prior * (x - x0)` is white; a constant is added where the extras are fixed.
+    prior: DMatrix<f64>,
+    /// Root of the unit variance: residuals come out in mm.
+    unit_mm: f64,
+    /// The cost without matrices, where the blocks allow it.
+    batch: Option<BatchCost>,
+}
+
+impl<'a> Fit<'a> {
+    /// `bounds` are half-widths of the box, one an unknown; `prior` has a column an unknown.
+    pub fn new(
+        rows: std::borrow::Cow<'a, Rows>,
+        base: &'a Base,
+        spread: DMatrix<f64>,
+        bounds: &[f64],
+        prior: DMatrix<f64>,
+    ) -> Fit<'a> {
+        let lower = bounds.iter().map(|b| -b).collect();
+        let unit_mm = rows.unit_variance_mm2().sqrt();
+        let batch = if bounds.iter().all(|b| b.is_finite()) { BatchCost::new(&rows) } else { None };
+        Fit { rows, base, spread, lower, upper: bounds.to_vec(), prior, unit_mm, batch }
+    }
+
+    /// Offsets of all parameters of the robot, then of the extras.
+    pub fn offsets(&self, x: &[f64]) -> Vec<f64> {
+        let (of_base, extras) = x.split_at(self.base.rank());
+        let mut offsets: Vec<f64> = vec![0.0; self.spread.nrows()];
+        for (k, value) in of_base.iter().enumerate() {
+            for (offset, share) in offsets.iter_mut().zip(self.spread.column(k).iter()) {
+                *offset += share * value;
+            }
+        }
+        offsets.extend_from_slice(extras);
+        offsets
+    }
+
+    /// White residuals and Jacobian of the unknowns at `x`, without the prior.
+    pub fn white(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+        let (residuals, jacobian) = self.rows.evaluate(&self.offsets(x), true);
+        let (robot, extras) = (self.spread.nrows(), x.len() - self.base.rank());
+        let of_base = jacobian.columns(0, robot) * &self.spread;
+        let mut columns = of_base.resize_horizontally(x.len(), 0.0);
+        columns.columns_mut(x.len() - extras, extras).copy_from(&jacobian.columns(robot, extras));
+        (residuals, columns)
+    }
+
+    /// Product of the white Jacobian with itself and with the residuals at offset zero, to first order from `x`.
+    pub fn normal(&self, x: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+        let (residuals, jacobian) = self.white(x);
+        let at_zero = residuals - &jacobian * DVector::from_column_slice(x);
+        (product(&jacobian, &jacobian), jacobian.tr_mul(&at_zero))
+    }
+
+    fn with_prior(&self, residuals: DVector<f64>, x: &[f64]) -> DVector<f64> {
+        let count = residuals.len();
+        let mut all = residuals.resize_vertically(count + self.prior.nrows(), 0.0);
+        all.rows_mut(count, self.prior.nrows()).copy_from(&(&self.prior * DVector::from_column_slice(x)));
+        all * self.unit_mm
+    }
+}
+
+impl Problem for Fit<'_> {
+    fn cost(&self, x: &[f64]) -> f64 {
+        let Some(batch) = &self.batch else { return 0.5 * self.residuals(x).norm_squared() };
+        let of_prior: f64 =
+            self.prior.row_iter().map(|row| row.iter().zip(x).map(|(w, x)| w * x).sum::<f64>().powi(2)).sum();
+        0.5 * self.unit_mm * self.unit_mm * (batch.sum_of_squares(&self.offsets(x)) + of_prior)
+    }
+
+    fn lower(&self) -> &[f64] {
+        &self.lower
+    }
+
+    fn upper(&self) -> &[f64] {
+        &self.upper
+    }
+
+    fn residuals(&self, x: &[f64]) -> DVector<f64> {
+        let (residuals, _) = self.rows.evaluate(&self.offsets(x), false);
+        self.with_prior(residuals, x)
+    }
+
+    fn linearised(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+        let (residuals, jacobian) = self.white(x);
+        let count = residuals.len();
+        let mut all = jacobian.resize_vertically(count + self.prior.nrows(), 0.0);
+        all.rows_mut(count, self.prior.nrows()).copy_from(&self.prior);
+        (self.with_prior(residuals, x), all * self.unit_mm)
+    }
+}

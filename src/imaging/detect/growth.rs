@@ -1,0 +1,275 @@
+//! A board put together corner by corner, where no detector sees the whole of it: partly hidden, cut off, or of another size.
+//!
+//! In: a small grey picture. Out: the largest grid of checkerboard corners in it, whatever its size, with holes where corners are
+//! missing. Method: from a candidate and its nearest neighbours of the opposite colouring the grid grows by
+//! predicting each next place from the steps before it. Between neighbours there must be an edge, bright on the side on which it is
+//! bright at both ends: that keeps clutter out.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{Point2, Vector2};
+
+use super::saddles::{Candidate, candidates};
+use crate::imaging::image::Grey8;
+use crate::imaging::lattice::{Lattice, Places};
+
+/// Seeds from which a grid is tried.
+const MOST_SEEDS: usize = 600;
+/// How far from its predicted place a corner may be, in steps of the grid.
+const STRAY: f64 = 0.3;
+/// How many times weaker than its neighbour a corner may respond; where squares end at the board's margin it is far more.
+const WEAKER: i16 = 4;
+/// What of the contrast at its ends an edge shows at least, along each of its halves.
+const EDGE_CONTRAST: f64 = 0.25;
+/// How far the bright axes of neighbours may be from perpendicular, rad.
+const SLANT: f64 = 0.6;
+
+/// The largest grid of corners in the picture; `None` where there is none of at least 3 x 3.
+pub fn largest_grid(picture: &Grey8) -> Option<Places> {
+    let candidates = candidates(picture);
+    let near = Near::new(picture, &candidates);
+    let mut taken = vec![false; candidates.len()];
+    let mut best: Vec<((isize, isize), usize)> = Vec::new();
+    let mut seeds = 0;
+    for first in 0..candidates.len() {
+        if taken[first] || seeds == MOST_SEEDS {
+            continue;
+        }
+        seeds += 1;
+        let grown = grow(&candidates, &near, first);
+        if grown.len() >= 9 {
+            grown.iter().for_each(|&(_, i)| taken[i] = true);
+        }
+        if grown.len() > best.len() {
+            best = grown;
+        }
+        // What is left is less than what was found.
+        if best.len() > candidates.len() / 2 {
+            break;
+        }
+    }
+    as_grid(&best, &candidates).filter(|grid| grid.columns >= 3 && grid.rows >= 3)
+}
+
+/// Candidates by cells of the picture.
+struct Near<'a> {
+    picture: &'a Grey8,
+    candidates: &'a [Candidate],
+    cells: BTreeMap<(i64, i64), Vec<usize>>,
+}
+
+/// Side of a cell, px.
+const CELL: f64 = 32.0;
+
+impl<'a> Near<'a> {
+    fn new(picture: &'a Grey8, candidates: &'a [Candidate]) -> Near<'a> {
+        let mut cells: BTreeMap<(i64, i64), Vec<usize>> = BTreeMap::new();
+        for (i, c) in candidates.iter().enumerate() {
+            cells.entry(cell_of(&c.at)).or_default().push(i);
+        }
+        Near { picture, candidates, cells }
+    }
+
+    /// Candidates within a distance, with it, the nearest first.
+    fn within(&self, at: &Point2<f64>, distance: f64) -> Vec<(f64, usize)> {
+        let (low, high) = (cell_of(&(at - Vector2::repeat(distance))), cell_of(&(at + Vector2::repeat(distance))));
+        let mut found: Vec<(f64, usize)> = Vec::new();
+        for x in low.0..=high.0 {
+            for (_, members) in self.cells.range((x, low.1)..=(x, high.1)) {
+                let distances = members.iter().map(|&i| ((self.candidates[i].at - at).norm(), i));
+                found.extend(distances.filter(|(d, _)| *d <= distance));
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        found
+    }
+}
+
+impl Near<'_> {
+    /// True where two candidates are the ends of a square's edge: their colours are those of neighbours, and along both halves of the way
+    /// from one to the other it is bright on the side on which it is bright at the ends.
+    fn edge(&self, a: usize, b: usize) -> bool {
+        let (a, b) = (&self.candidates[a], &self.candidates[b]);
+        let alike = a.strength.max(b.strength) / WEAKER <= a.strength.min(b.strength);
+        if !alike || !opposite(a, b) {
+            return false;
+        }
+        let step = b.at - a.at;
+        let bright_left = (a.axis - step.y.atan2(step.x)).rem_euclid(PI) < FRAC_PI_2;
+        let sign = if bright_left { 1.0 } else { -1.0 };
+        let least = EDGE_CONTRAST * a.contrast.max(b.contrast);
+        [0.1, 0.5].into_iter().all(|from| sign * self.across(a.at + step * from, step * 0.4) > least)
+    }
+
+    /// Mean grey on the left of a way less that on its right.
+    fn across(&self, from: Point2<f64>, way: Vector2<f64>) -> f64 {
+        // To where the squares on both sides certainly are, even on an oblique board: the way is 0.4 of an edge.
+        let aside = Vector2::new(-way.y, way.x) * 0.4;
+        let samples = (way.norm().ceil() as usize).clamp(2, 32);
+        let sum: f64 = (0..samples)
+            .map(|k| {
+                let p = from + way * ((k as f64 + 0.5) / samples as f64);
+                self.grey(p + aside) - self.grey(p - aside)
+            })
+            .sum();
+        sum / samples as f64
+    }
+
+    fn grey(&self, p: Point2<f64>) -> f64 {
+        let inside = |v: f64, size: usize| (v.round().max(0.0) as usize).min(size - 1);
+        let (x, y) = (inside(p.x, self.picture.width), inside(p.y, self.picture.height));
+        f64::from(self.picture.pixels[y * self.picture.width + x])
+    }
+}
+
+fn cell_of(p: &Point2<f64>) -> (i64, i64) {
+    ((p.x / CELL).floor() as i64, (p.y / CELL).floor() as i64)
+}
+
+/// True for corners whose colours are those of neighbours along an edge: the bright axes are perpendicular.
+fn opposite(a: &Candidate, b: &Candidate) -> bool {
+    let d = (a.axis - b.axis).rem_euclid(PI);
+    (d - FRAC_PI_2).abs() < SLANT
+}
+
+type Place = (isize, isize);
+
+/// A grid from one candidate on: places with the candidate there.
+fn grow(candidates: &[Candidate], near: &Near, first: usize) -> Vec<(Place, usize)> {
+    let Some(seed_steps) = seed_steps(candidates, near, first) else { return Vec::new() };
+    let mut placed: BTreeMap<Place, usize> = BTreeMap::from([((0, 0), first)]);
+    let mut used = vec![false; candidates.len()];
+    used[first] = true;
+    let mut queue = VecDeque::from([(0, 0)]);
+    while let Some((i, j)) = queue.pop_front() {
+        for (di, dj) in [(1, 0), (0, 1), (-1, 0), (0, -1)] {
+            let next = (i + di, j + dj);
+            if placed.contains_key(&next) {
+                continue;
+            }
+            let at = |place: Place| placed.get(&place).map(|&k| candidates[k].at);
+            let Some(here) = placed.get(&(i, j)).map(|&k| candidates[k]) else { continue };
+            let step = step_at(&at, (i, j), (di, dj))
+                .unwrap_or_else(|| if di != 0 { seed_steps[0] * di as f64 } else { seed_steps[1] * dj as f64 });
+            let stray = STRAY * step.norm();
+            let around = [(1, 0), (0, 1), (-1, 0), (0, -1)].map(|(di, dj)| placed.get(&(next.0 + di, next.1 + dj)));
+            let found = near
+                .within(&(here.at + step), stray)
+                .into_iter()
+                .find(|&(_, k)| !used[k] && around.iter().flatten().all(|&&neighbour| near.edge(neighbour, k)));
+            if let Some((_, k)) = found {
+                used[k] = true;
+                placed.insert(next, k);
+                queue.push_back(next);
+            }
+        }
+    }
+    placed.into_iter().collect()
+}
+
+/// The step from a place in a direction, from the steps before it or beside it.
+fn step_at(at: &dyn Fn(Place) -> Option<Point2<f64>>, (i, j): Place, (di, dj): Place) -> Option<Vector2<f64>> {
+    let here = at((i, j))?;
+    if let Some(back) = at((i - di, j - dj)) {
+        return Some(here - back);
+    }
+    [1, -1].into_iter().find_map(|side| {
+        let (i, j) = (i + side * dj, j + side * di);
+        Some(at((i + di, j + dj))? - at((i, j))?)
+    })
+}
+
+/// Steps to the neighbours of a corner along its two edges: the nearest of opposite colouring, and the nearest of those in
+/// another direction.
+fn seed_steps(candidates: &[Candidate], near: &Near, first: usize) -> Option<[Vector2<f64>; 2]> {
+    /// Edges nearer to each other than this are no board's, rad.
+    const LEAST_ANGLE: f64 = 0.35;
+    let here = &candidates[first];
+    let mut reach = 16.0;
+    while reach < 600.0 {
+        let steps: Vec<Vector2<f64>> = near
+            .within(&here.at, reach)
+            .into_iter()
+            .filter(|&(_, k)| k != first && near.edge(first, k))
+            .map(|(_, k)| candidates[k].at - here.at)
+            .collect();
+        if let Some(a) = steps.first()
+            && let Some(b) = steps.iter().find(|b| (a.perp(b).abs() / (a.norm() * b.norm())).asin() > LEAST_ANGLE)
+        {
+            return Some([*a, *b]);
+        }
+        reach *= 2.0;
+    }
+    None
+}
+
+fn as_grid(grown: &[(Place, usize)], candidates: &[Candidate]) -> Option<Places> {
+    let range = |of: &dyn Fn(&Place) -> isize| {
+        let values = grown.iter().map(|(place, _)| of(place));
+        Some((values.clone().min()?, values.max()?))
+    };
+    let ((left, right), (top, bottom)) = (range(&|p| p.0)?, range(&|p| p.1)?);
+    let (columns, rows) = ((right - left + 1) as usize, (bottom - top + 1) as usize);
+    let mut grid: Places = Lattice::from_fn(columns, rows, |_, _| None);
+    for &((i, j), k) in grown {
+        grid.cells[(j - top) as usize * columns + (i - left) as usize] = Some(candidates[k].at);
+    }
+    Some(grid)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A board of 8x6 squares, skewed, with a part painted over.
+    fn picture(hidden: impl Fn(f64, f64) -> bool) -> Grey8 {
+        let (w, h) = (240, 200);
+        let pixels = (0..w * h)
+            .map(|k| {
+                let mut sum = 0.0;
+                for (a, b) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
+                    let (x, y) = ((k % w) as f64 + a - 30.0, (k / w) as f64 + b - 20.0);
+                    let (u, v) = ((x - 0.2 * y) / 20.0, (y - 0.1 * x) / 20.0);
+                    let inside = (0.0..8.0).contains(&u) && (0.0..6.0).contains(&v);
+                    let black = inside && (u.floor() + v.floor()) as i32 % 2 == 0;
+                    let grey = if hidden(u, v) {
+                        130.0
+                    } else if black {
+                        30.0
+                    } else {
+                        210.0
+                    };
+                    sum += grey / 4.0;
+                }
+                sum as u8
+            })
+            .collect();
+        Grey8 { width: w, height: h, pixels }
+    }
+
+    fn size(grid: &Places) -> (usize, usize) {
+        (grid.columns.max(grid.rows), grid.columns.min(grid.rows))
+    }
+
+    #[test]
+    fn a_whole_board_is_found_whole() {
+        let grid = largest_grid(&picture(|_, _| false)).unwrap();
+        assert_eq!((size(&grid), grid.count()), ((7, 5), 35));
+    }
+
+    #[test]
+    fn a_hidden_part_is_a_hole() {
+        let grid = largest_grid(&picture(|u, v| (2.5..4.5).contains(&u) && (1.5..3.5).contains(&v))).unwrap();
+        assert_eq!((size(&grid), grid.count()), ((7, 5), 31));
+        let cut = largest_grid(&picture(|u, _| u > 5.5)).unwrap();
+        assert_eq!((size(&cut), cut.count()), ((5, 5), 25));
+    }
+
+    #[test]
+    fn nothing_in_nothing() {
+        assert_eq!(largest_grid(&picture(|_, _| true)), None);
+        assert_eq!(largest_grid(&Grey8 { width: 3, height: 3, pixels: vec![0; 9] }), None);
+        assert_eq!(largest_grid(&Grey8 { width: 0, height: 0, pixels: vec![] }), None);
+    }
+}

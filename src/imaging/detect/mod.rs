@@ -1,0 +1,252 @@
+//! Where the board is, to about a pixel of a small copy.
+//!
+//! In: a picture and the board's size. Out: a reduced copy and a grid of coarse corners on it, right-handed, columns along
+//! the longer side, turned as far as the colours tell. The copy is an area average of about [`COARSE_PX`] pixels: the board is seen there
+//! as well as on 26 Mpx, in a twentieth of the time; a ladder of attempts on finer and coarser copies follows where the
+//! first fails. Its work is bounded by the pixels of the copies, whatever they show: no clock decides what is found, and OpenCV's
+//! classic detector is not among the attempts, because fine texture keeps it busy for minutes (and what it finds is found without
+//! it). Goes wrong: no board, another board, or a board of which too little is in view; each is a reason in words.
+
+mod colour;
+pub mod continuation;
+mod extent;
+mod growth;
+mod saddles;
+
+use nalgebra::Point2;
+
+use self::colour::{right_handed, turn_by_colours};
+use self::growth::largest_grid;
+use super::image::{Grey8, Picture};
+use super::lattice::{Lattice, Places};
+use super::pyramid::{Level, factor_for};
+use super::{Board, Squares};
+use crate::opencv::find_board;
+
+/// Pixels of the copy on which the board is looked for first.
+pub const COARSE_PX: usize = 1_000_000;
+
+/// Grids of fewer corners than this are chance.
+const LEAST_SEEN: usize = 12;
+/// How many times more of the board another copy must show to be worth more than the copy before it.
+const WORTH: f64 = 1.03;
+
+/// A board found in a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detected {
+    /// Coarse places of the inner corners on the copy, px, to about half a pixel.
+    pub corners: Places,
+    /// The reduced copy.
+    pub copy: Grey8,
+    /// Its size; never doubled.
+    pub level: Level,
+}
+
+/// Why a picture gave no corners.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// For a person.
+    pub reason: String,
+    /// The board of another size that the picture shows instead.
+    pub seen: Option<Squares>,
+}
+
+impl From<String> for Refusal {
+    fn from(reason: String) -> Refusal {
+        // One line: a reason is kept as a line of the cache.
+        Refusal { reason: reason.replace('\n', " "), seen: None }
+    }
+}
+
+/// One attempt: on which copy, in which way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Attempt {
+    level: Level,
+    way: Way,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// Corner by corner, for boards that need not be wholly there.
+    Grow,
+    /// OpenCV's sector-based detector: slower, sees through more blur and noise.
+    Sectors,
+}
+
+/// What was found so far.
+#[derive(Default)]
+struct Search {
+    /// The most of the board, where it is known which part.
+    partial: Option<Detected>,
+    /// The most telling grid that is not the board, and the copy it was seen on.
+    seen: Option<(Places, Level)>,
+}
+
+impl Search {
+    /// True where an attempt could only find less than is known.
+    fn is_pointless(&self, attempt: Attempt) -> bool {
+        /// Squares of this many pixels of a copy are not seen better on a finer one.
+        const ENOUGH_PX: f64 = 30.0;
+        match attempt.way {
+            // All of it was looked at corner by corner: more looking would only find a part of what is there.
+            Way::Sectors => self.partial.is_some() || self.seen.as_ref().is_some_and(|(grid, _)| tells(grid).0),
+            Way::Grow => {
+                let partial = self.partial.as_ref().map(|p| (&p.corners, p.level));
+                let known = [partial, self.seen.as_ref().map(|(grid, level)| (grid, *level))];
+                let is_enough = |(grid, level): &(&Places, Level)| {
+                    attempt.level.scale() < level.scale() && grid.step_px().is_some_and(|side| side > ENOUGH_PX)
+                };
+                known.iter().flatten().any(is_enough)
+            }
+        }
+    }
+}
+
+/// Looks for the board; the reason where it was not found.
+pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
+    let mut search = Search::default();
+    let mut last: Option<(Level, Grey8)> = None;
+    for attempt in ladder(picture) {
+        if search.is_pointless(attempt) {
+            continue;
+        }
+        let small = match last.take() {
+            Some((level, small)) if level == attempt.level => small,
+            _ => attempt.level.copy(picture),
+        };
+        if let Some(grid) = found(&small, attempt, board, &mut search) {
+            let complete = grid.count() == board.corner_count();
+            // The whole of a board is not less than what else hangs together in the picture; what was grown ends where the board ends.
+            let less = |(seen, _): &(Places, Level)| match attempt.way {
+                Way::Grow => tells(seen) > tells(&grid),
+                Way::Sectors => seen.count() > grid.count(),
+            };
+            if complete && search.seen.as_ref().is_some_and(less) {
+                break;
+            }
+            let grid = turn_by_colours(&small, right_handed(grid), board);
+            let detected = on_a_copy(picture, attempt.level, &small, grid);
+            if complete {
+                return Ok(detected);
+            }
+            // A few more corners are not worth a coarser start.
+            let worth = |p: &Detected| detected.corners.count() as f64 > WORTH * p.corners.count() as f64;
+            if search.partial.as_ref().is_none_or(worth) {
+                search.partial = Some(detected);
+            }
+        }
+        // Another board, seen whole, that this one could be a part of.
+        if search.seen.as_ref().is_some_and(|(grid, _)| tells(grid).0 && holds(grid, board)) {
+            break;
+        }
+        last = Some((attempt.level, small));
+    }
+    // A part of a larger grid is not the board with corners missing.
+    let seen = search.seen.map(|(grid, _)| grid);
+    let larger = seen.as_ref().map_or(0, Lattice::count);
+    search.partial.filter(|p| p.corners.count() > larger).ok_or_else(|| refusal(seen, board))
+}
+
+/// The board, or a part of it, by one attempt; another grid is kept as seen.
+fn found(small: &Grey8, attempt: Attempt, board: Board, search: &mut Search) -> Option<Places> {
+    if attempt.way == Way::Sectors {
+        // Where OpenCV cannot work at all, it has found nothing.
+        let corners = find_board(small, board.columns(), board.rows()).ok().flatten()?;
+        return Some(whole(board, corners));
+    }
+    let grid = grown(small)?;
+    let fitting = of_size(small, &grid, board);
+    if fitting.is_none() && search.seen.as_ref().is_none_or(|(seen, _)| tells(&grid) > tells(seen)) {
+        search.seen = Some((grid, attempt.level));
+    }
+    fitting
+}
+
+/// How much a grid tells of the size of its board: first whether all its corners are there, then how many they are.
+fn tells(grid: &Places) -> (bool, usize) {
+    (grid.count() == grid.columns * grid.rows && grid.count() >= LEAST_SEEN, grid.count())
+}
+
+/// True where the board could be a part of the grid.
+fn holds(grid: &Places, board: Board) -> bool {
+    grid.columns.max(grid.rows) >= board.columns() && grid.columns.min(grid.rows) >= board.rows()
+}
+
+/// Attempts in their order. Coarser copies see through blur and noise, finer ones see small boards far away, down to full size.
+fn ladder(picture: &Picture) -> Vec<Attempt> {
+    /// Shorter sides than this hold no board that sectors would show, px.
+    const LEAST_FOR_SECTORS_PX: usize = 48;
+    let first = factor_for(picture, COARSE_PX);
+    let mut finer = vec![];
+    let mut factor = first;
+    while factor > 1 {
+        factor = factor.div_ceil(2);
+        finer.push(Level::Reduced(factor));
+    }
+    if first == 1 {
+        finer.push(Level::Doubled);
+    }
+    let (first, coarser) = (Level::Reduced(first), Level::Reduced(2 * first));
+    let grown = [first, coarser].into_iter().chain(finer).map(|level| Attempt { level, way: Way::Grow });
+    let side = |level: &Level| picture.width().min(picture.height()) as f64 / level.scale();
+    let sectors = [first, coarser].into_iter().filter(|level| side(level) >= LEAST_FOR_SECTORS_PX as f64);
+    grown.chain(sectors.map(|level| Attempt { level, way: Way::Sectors })).collect()
+}
+
+fn grown(small: &Grey8) -> Option<Places> {
+    Some(extent::without_chance_lines(small, largest_grid(small)?))
+}
+
+fn whole(board: Board, corners: Vec<Point2<f64>>) -> Places {
+    Lattice { columns: board.columns(), rows: board.rows(), cells: corners.into_iter().map(Some).collect() }
+}
+
+/// A grid as the board's, where it is known which of the board's corners are missing: it is as long and as wide as the board, or
+/// what it lacks can only lie beyond the picture's border.
+fn of_size(small: &Grey8, grid: &Places, board: Board) -> Option<Places> {
+    /// Share of the board's corners that makes a grid the board.
+    const LEAST: f64 = 0.5;
+    if (grid.count() as f64) < LEAST * board.corner_count() as f64 {
+        return None;
+    }
+    let quarter = grid.quarter_turn();
+    let ways = [Some(grid), (board.columns() != board.rows()).then_some(&quarter)];
+    let mut fitting = ways.into_iter().flatten().filter_map(|grid| extent::completed(small, grid, board));
+    let first = fitting.next()?;
+    fitting.next().is_none().then_some(first)
+}
+
+/// What was found on a copy, on one that is no finer than the picture.
+fn on_a_copy(picture: &Picture, level: Level, small: &Grey8, corners: Places) -> Detected {
+    match level {
+        Level::Reduced(_) => Detected { corners, copy: small.clone(), level },
+        Level::Doubled => {
+            let level = Level::Reduced(1);
+            let corners = corners.map(|p| level.to_copy(&Level::Doubled.to_picture(p)));
+            Detected { corners, copy: level.copy(picture), level }
+        }
+    }
+}
+
+fn refusal(seen: Option<Places>, board: Board) -> Refusal {
+    let Some(grid) = seen.filter(|grid| grid.count() >= LEAST_SEEN) else { return "no board found".to_owned().into() };
+    let (long, short) = (grid.columns.max(grid.rows), grid.columns.min(grid.rows));
+    let (columns, rows) = (board.columns(), board.rows());
+    let shows = format!("shows {} corners in {long} columns and {short} rows", grid.count());
+    // A corner or two are lost easily; the size is but a hint.
+    let complete = 10 * grid.count() >= 9 * long * short;
+    let seen = complete.then_some(Squares { columns: long + 1, rows: short + 1 });
+    let reason = if long <= columns && short <= rows {
+        format!("{shows}: which of the board's {columns}x{rows} they are cannot be told")
+    } else {
+        format!("{shows}, the board has {columns}x{rows}")
+    };
+    Refusal { reason, seen }
+}
+
+/// The board that a picture shows, whatever was asked for, where all its corners are there.
+pub fn size_seen(detected: &Detected) -> Option<Squares> {
+    let grid = grown(&detected.copy)?;
+    let (columns, rows) = (grid.columns.max(grid.rows) + 1, grid.columns.min(grid.rows) + 1);
+    (grid.count() == grid.columns * grid.rows).then_some(Squares { columns, rows })
+}

@@ -1,0 +1,172 @@
+//! Places that look like a checkerboard corner: four sectors of alternating brightness, a saddle of the grey values.
+//!
+//! In: a small grey picture. Out: candidates, the local peaks of the ring response of Bennett and Lasenby (ChESS, 2014), each with the axis of
+//! its two bright quadrants. What is a candidate is decided on the spot: by the response against the contrast on the same ring and against
+//! the picture's noise. Nothing elsewhere in the picture, however bright, takes a dim board's corners away. Goes wrong: squares of less than
+//! about 8 px, blur of more than half a square.
+
+use nalgebra::{Point2, Vector2};
+
+use crate::imaging::image::Grey8;
+
+/// Offsets of the ring, px, in order round it: radius about 5.
+const RING: [(isize, isize); 16] = [
+    (5, 0),
+    (5, 2),
+    (4, 4),
+    (2, 5),
+    (0, 5),
+    (-2, 5),
+    (-4, 4),
+    (-5, 2),
+    (-5, 0),
+    (-5, -2),
+    (-4, -4),
+    (-2, -5),
+    (0, -5),
+    (2, -5),
+    (4, -4),
+    (5, -2),
+];
+/// The ring's reach, px.
+const REACH: usize = 5;
+/// Least response of a corner over the contrast on its ring; a saddle has 20 to 30, the outer corner of a board's square hardly any.
+const LEAST_SHAPE: f64 = 8.0;
+/// Least contrast on a ring, in standard deviations of the picture's noise.
+const LEAST_CONTRAST: f64 = 3.0;
+/// Least noise that is reckoned with, grey values: that of rounding.
+const LEAST_NOISE: f64 = 0.5;
+/// Tiles along the longer side of a picture. Each keeps as many candidates as it can hold corners of a board with the smallest squares.
+const TILES: usize = 16;
+/// Least distance of two corners, px.
+const LEAST_DISTANCE_PX: usize = 8;
+
+/// A place that looks like a checkerboard corner.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Candidate {
+    pub(super) at: Point2<f64>,
+    /// Five times the ring response.
+    pub(super) strength: i16,
+    /// Direction of the bright quadrants' axis, rad, modulo pi.
+    pub(super) axis: f64,
+    /// Mean of the ring's brighter half less that of its darker half.
+    pub(super) contrast: f64,
+}
+
+/// All candidates: first the strongest of each tile, then each tile's second, and so on, so that every part of the picture is soon looked at.
+pub(super) fn candidates(picture: &Grey8) -> Vec<Candidate> {
+    let (w, h) = (picture.width, picture.height);
+    if w <= 2 * REACH || h <= 2 * REACH {
+        return Vec::new();
+    }
+    let response = responses(picture);
+    let least_contrast = LEAST_CONTRAST * noise(picture);
+    let side = w.max(h).div_ceil(TILES).max(8 * LEAST_DISTANCE_PX);
+    let columns = w.div_ceil(side);
+    let mut tiles: Vec<Vec<Candidate>> = vec![Vec::new(); columns * h.div_ceil(side)];
+    for y in REACH..h - REACH {
+        for x in REACH..w - REACH {
+            let here = response[y * w + x];
+            if f64::from(here) > LEAST_SHAPE * least_contrast && is_peak(&response, w, x, y) {
+                let candidate = candidate(picture, &response, x, y);
+                if candidate.contrast > least_contrast && f64::from(here) > LEAST_SHAPE * candidate.contrast {
+                    tiles[(y / side) * columns + x / side].push(candidate);
+                }
+            }
+        }
+    }
+    let most = (side / LEAST_DISTANCE_PX).pow(2) / 2;
+    let mut ranked: Vec<(usize, Candidate)> = Vec::new();
+    for tile in &mut tiles {
+        tile.sort_by_key(|candidate| std::cmp::Reverse(candidate.strength));
+        ranked.extend(tile.iter().copied().take(most).enumerate());
+    }
+    // Stable, so that equal ones stay in the order of their places.
+    ranked.sort_by_key(|(rank, candidate)| (*rank, std::cmp::Reverse(candidate.strength)));
+    ranked.into_iter().map(|(_, candidate)| candidate).collect()
+}
+
+/// Standard deviation of the noise, grey values: from what neighbours differ by in three places of four. Half of a picture may be clipped and
+/// without noise, a quarter may be edges.
+fn noise(picture: &Grey8) -> f64 {
+    /// About this many places are looked at.
+    const LOOKED_AT: usize = 50_000;
+    /// The third quartile of the difference of two normal deviates, in standard deviations of one.
+    const THIRD_QUARTILE: f64 = 1.627;
+    let step = (picture.pixels.len() / LOOKED_AT).max(1) | 1;
+    let mut differences: Vec<u8> = picture.pixels.windows(2).step_by(step).map(|two| two[0].abs_diff(two[1])).collect();
+    let rank = 3 * differences.len() / 4;
+    if rank >= differences.len() {
+        return LEAST_NOISE;
+    }
+    (f64::from(*differences.select_nth_unstable(rank).1) / THIRD_QUARTILE).max(LEAST_NOISE)
+}
+
+/// Five times the ring response of every pixel, a whole number that fits: opposite pixels of the ring alike and a quarter turn on the
+/// other colour, less what a line or an edge shows, less what a spot shows. `REACH` px at the border have none.
+fn responses(picture: &Grey8) -> Vec<i16> {
+    let (w, h) = (picture.width, picture.height);
+    let mut response = vec![0i16; w * h];
+    let wide = w - 2 * REACH;
+    let mut spot = vec![0i16; wide];
+    for y in REACH..h - REACH {
+        let row = |(dx, dy): (isize, isize)| {
+            let start = ((y as isize + dy) * w as isize + REACH as isize + dx) as usize;
+            &picture.pixels[start..start + wide]
+        };
+        let here = &mut response[y * w + REACH..][..wide];
+        spot.fill(0);
+        // Row after row, so that the compiler makes vector loops of them.
+        for n in 0..4 {
+            let [a, b, c, d] = [0, 4, 8, 12].map(|quarter| row(RING[n + quarter]));
+            for (((((here, spot), a), b), c), d) in here.iter_mut().zip(&mut spot).zip(a).zip(b).zip(c).zip(d) {
+                let [a, b, c, d] = [*a, *b, *c, *d].map(i16::from);
+                *here += 5 * ((a + c - b - d).abs() - (a - c).abs() - (b - d).abs());
+                *spot += 5 * (a + b + c + d);
+            }
+        }
+        for local in [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)].map(row) {
+            spot.iter_mut().zip(local).for_each(|(spot, grey)| *spot -= 16 * i16::from(*grey));
+        }
+        here.iter_mut().zip(&spot).for_each(|(here, spot)| *here -= spot.abs());
+    }
+    response
+}
+
+fn is_peak(response: &[i16], w: usize, x: usize, y: usize) -> bool {
+    const AROUND: usize = 3;
+    let here = response[y * w + x];
+    (y - AROUND..=y + AROUND).all(|v| {
+        (x - AROUND..=x + AROUND).all(|u| {
+            let other = response[v * w + u];
+            // Of equal neighbours the first is the peak.
+            other < here || (other == here && (v, u) >= (y, x))
+        })
+    })
+}
+
+fn candidate(picture: &Grey8, response: &[i16], x: usize, y: usize) -> Candidate {
+    let w = picture.width;
+    let (mut sum, mut weight) = (Vector2::zeros(), 0.0);
+    for v in y - 2..=y + 2 {
+        for u in x - 2..=x + 2 {
+            let r = f64::from(response[v * w + u].max(0));
+            sum += Vector2::new(u as f64, v as f64) * r;
+            weight += r;
+        }
+    }
+    let (mut cos, mut sin) = (0.0, 0.0);
+    for (dx, dy) in RING {
+        let grey = f64::from(picture.pixels[((y as isize + dy) as usize) * w + (x as isize + dx) as usize]);
+        // Cosine and sine of twice the direction.
+        let (dx, dy) = (dx as f64, dy as f64);
+        let square = dx * dx + dy * dy;
+        cos += grey * (dx * dx - dy * dy) / square;
+        sin += grey * 2.0 * dx * dy / square;
+    }
+    let mut ring = RING.map(|(dx, dy)| picture.pixels[((y as isize + dy) as usize) * w + (x as isize + dx) as usize]);
+    ring.sort_unstable();
+    let mean = |half: &[u8]| half.iter().map(|&v| f64::from(v)).sum::<f64>() / half.len() as f64;
+    let contrast = mean(&ring[8..]) - mean(&ring[..8]);
+    Candidate { at: Point2::from(sum / weight), strength: response[y * w + x], axis: 0.5 * sin.atan2(cos), contrast }
+}

@@ -1,0 +1,164 @@
+//! From a file's bytes to grey values.
+
+use camino::Utf8Path;
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+use super::{Image, Mosaic, Picture, UNDECODABLE, channels, integrity, limits, mosaic};
+
+/// Decodes the bytes of a file; the reason where that is not possible or the file is cut or damaged. `path` only helps to tell the
+/// format. A grey picture that is a raw colour mosaic needs its pattern.
+pub fn decode(bytes: &[u8], path: &Utf8Path, pattern: Option<Mosaic>) -> Result<Picture, String> {
+    let format = image::guess_format(bytes).ok().or_else(|| ImageFormat::from_path(path).ok());
+    integrity::check(bytes, format)?;
+    let decoded = if format == Some(ImageFormat::Jpeg) { jpeg(bytes)? } else { other(bytes, format)? };
+    let size = (decoded.width() as usize, decoded.height() as usize);
+    match decoded {
+        DynamicImage::ImageLuma8(grey) => mosaic::grey(image(size, grey.into_raw()), pattern),
+        DynamicImage::ImageLuma16(grey) => mosaic::grey(image(size, grey.into_raw()), pattern),
+        DynamicImage::ImageLumaA8(grey) => mosaic::grey(image(size, without_alpha(&grey)), pattern),
+        DynamicImage::ImageLumaA16(grey) => mosaic::grey(image(size, without_alpha(&grey)), pattern),
+        _ if pattern.is_some() => Err("is in colour already: a raw mosaic is grey".to_owned()),
+        DynamicImage::ImageRgb8(rgb) => Ok(channels::grey(&rgb, 3, size).into()),
+        DynamicImage::ImageRgba8(rgb) => Ok(channels::grey(&rgb, 4, size).into()),
+        DynamicImage::ImageRgb16(rgb) => Ok(channels::grey(&rgb, 3, size).into()),
+        DynamicImage::ImageRgba16(rgb) => Ok(channels::grey(&rgb, 4, size).into()),
+        _ => Err(format!("{UNDECODABLE}: floating-point pixels")),
+    }
+}
+
+fn image<T>((width, height): (usize, usize), pixels: Vec<T>) -> Image<T> {
+    Image { width, height, pixels }
+}
+
+fn without_alpha<T: Copy>(samples: &[T]) -> Vec<T> {
+    samples.chunks_exact(2).map(|p| p[0]).collect()
+}
+
+fn other(bytes: &[u8], format: Option<ImageFormat>) -> Result<DynamicImage, String> {
+    let mut reader = ImageReader::new(std::io::Cursor::new(bytes));
+    match format {
+        Some(format) => reader.set_format(format),
+        None => return Err(format!("{UNDECODABLE}: neither PNG, TIFF, BMP, JPEG nor PGM")),
+    }
+    // What the header announces is checked before anything of that size is allocated.
+    reader.limits(Limits::no_limits());
+    let decoder = reader.into_decoder().map_err(undecodable)?;
+    limits::check(image::ImageDecoder::dimensions(&decoder), image::ImageDecoder::total_bytes(&decoder))?;
+    DynamicImage::from_decoder(decoder).map_err(undecodable)
+}
+
+fn undecodable(e: image::ImageError) -> String {
+    format!("{UNDECODABLE}: {e}")
+}
+
+/// Decodes a JPEG by the letter: the decoder of the `image` crate, told not to fill in what is missing.
+fn jpeg(bytes: &[u8]) -> Result<DynamicImage, String> {
+    let undecodable = |e: zune_jpeg::errors::DecodeErrors| format!("{UNDECODABLE}: {e}");
+    let options = DecoderOptions::default()
+        .set_strict_mode(true)
+        .set_max_width(usize::from(u16::MAX))
+        .set_max_height(usize::from(u16::MAX));
+    let mut decoder = zune_jpeg::JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    decoder.decode_headers().map_err(undecodable)?;
+    let grey = decoder.input_colorspace() == Some(ColorSpace::Luma);
+    let (width, height) = decoder.dimensions().ok_or_else(|| UNDECODABLE.to_owned())?;
+    let (width, height) = (width as u32, height as u32);
+    limits::check((width, height), u64::from(width) * u64::from(height) * if grey { 1 } else { 3 })?;
+    let colours = if grey { ColorSpace::Luma } else { ColorSpace::RGB };
+    decoder.set_options(options.jpeg_set_out_colorspace(colours));
+    let samples = decoder.decode().map_err(|e| integrity::cut_or_damaged("JPEG", &e.to_string()))?;
+    let image = if grey {
+        image::GrayImage::from_raw(width, height, samples).map(DynamicImage::ImageLuma8)
+    } else {
+        image::RgbImage::from_raw(width, height, samples).map(DynamicImage::ImageRgb8)
+    };
+    image.ok_or_else(|| UNDECODABLE.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Grey;
+    use super::*;
+
+    fn encoded(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image.write_to(&mut bytes, format).unwrap();
+        bytes.into_inner()
+    }
+
+    fn png(image: &DynamicImage) -> Vec<u8> {
+        encoded(image, ImageFormat::Png)
+    }
+
+    #[test]
+    fn grey_and_sixteen_bit_come_back_as_they_are() {
+        let grey = image::ImageBuffer::from_fn(5, 4, |x, y| image::Luma([(x * 40 + y) as u8]));
+        let picture = decode(&png(&DynamicImage::ImageLuma8(grey.clone())), "a.png".into(), None).unwrap();
+        assert_eq!(picture.grey, Grey::Eight(image((5, 4), grey.into_raw())));
+        let grey = image::ImageBuffer::from_fn(5, 4, |x, y| image::Luma([(x * 900 + y) as u16]));
+        let picture = decode(&png(&DynamicImage::ImageLuma16(grey.clone())), "a.png".into(), None).unwrap();
+        assert_eq!(picture.grey, Grey::Sixteen(image((5, 4), grey.into_raw())));
+    }
+
+    #[test]
+    fn grey_stored_as_colour_is_the_same_grey() {
+        let rgb = image::ImageBuffer::from_fn(256, 1, |x, _| image::Rgb([x as u8; 3]));
+        let picture = decode(&png(&DynamicImage::ImageRgb8(rgb)), "a.png".into(), None).unwrap();
+        assert_eq!(picture.grey, Grey::Eight(image((256, 1), (0..=255).collect())));
+    }
+
+    /// Something with enough detail that no part of its file is dispensable.
+    fn textured(colour: bool) -> DynamicImage {
+        let value = |x: u32, y: u32| ((x * x * 7 + y * 13 + x * y * 3) % 251) as u8;
+        let rgb = image::RgbImage::from_fn(96, 80, |x, y| image::Rgb([value(x, y), value(y, x), value(x, x + y)]));
+        if colour { rgb.into() } else { DynamicImage::ImageRgb8(rgb).to_luma8().into() }
+    }
+
+    #[test]
+    fn a_cut_file_is_said_to_be_cut() {
+        for colour in [false, true] {
+            for (format, name) in [
+                (ImageFormat::Png, "a.png"),
+                (ImageFormat::Jpeg, "a.jpg"),
+                (ImageFormat::Bmp, "a.bmp"),
+                (ImageFormat::Pnm, "a.pgm"),
+                (ImageFormat::Tiff, "a.tif"),
+            ] {
+                let bytes = encoded(&textured(colour), format);
+                decode(&bytes, name.into(), None).unwrap();
+                for percent in [5, 30, 50, 70, 90, 98] {
+                    let cut = &bytes[..bytes.len() * percent / 100];
+                    let reason = decode(cut, name.into(), None).expect_err(name);
+                    assert!(percent < 30 || reason.contains("cut") || reason.contains(UNDECODABLE), "{name}: {reason}");
+                }
+                for bytes_less in 1..4 {
+                    decode(&bytes[..bytes.len() - bytes_less], name.into(), None).expect_err(name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_changed_byte_of_a_png_is_noticed() {
+        let bytes = png(&textured(false));
+        for at in (8..bytes.len()).step_by(37) {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0x10;
+            assert!(decode(&damaged, "a.png".into(), None).is_err(), "{at}");
+        }
+    }
+
+    #[test]
+    fn no_more_is_decoded_than_a_camera_takes() {
+        for header in ["P5 100000 100000 255\n", "P5 100000000 1 255\n", "P5 1 50000000 255\n", "P5 65000 65000 255\n"]
+        {
+            let reason = decode(header.as_bytes(), "a.pgm".into(), None).unwrap_err();
+            assert!(reason.contains("announces") && reason.contains("at most"), "{reason}");
+        }
+        assert!(decode(b"", "a.png".into(), None).is_err());
+        assert!(decode(b"", "a".into(), None).is_err());
+    }
+}

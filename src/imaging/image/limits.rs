@@ -1,0 +1,134 @@
+//! What is looked at before a file is decoded: what kind of file it is, how large, and what its header announces.
+//!
+//! A header of a few bytes can announce any number of pixels, and a name can lead to a pipe that never ends. Nothing is read or
+//! allocated before it is known to be bounded; all workers together hold no more than a fixed number of bytes.
+
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::sync::{Condvar, Mutex, PoisonError};
+
+use camino::Utf8Path;
+use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
+
+use super::UNDECODABLE;
+
+/// Longest side, px: what a JPEG can say, and three times the longest side of any area sensor.
+const MOST_SIDE_PX: u32 = 65_535;
+/// Most pixels: the largest area sensors have 250 million.
+const MOST_PIXELS: u64 = 300_000_000;
+/// Most bytes of decoded samples (colour and depth as in the file).
+const MOST_DECODED_BYTES: u64 = 1 << 30;
+/// Most bytes of a file: samples that do not compress, and what cameras write beside them.
+const MOST_FILE_BYTES: u64 = MOST_DECODED_BYTES + (64 << 20);
+/// Bytes that all workers together may hold for pictures. One picture is always let in.
+const MOST_HELD_BYTES: u64 = 3 << 30;
+
+/// What a file announces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Header {
+    /// Width, px.
+    pub width: u32,
+    /// Height, px.
+    pub height: u32,
+    /// Length of the file, bytes.
+    file_bytes: u64,
+    /// Bytes of its samples once decoded.
+    decoded_bytes: u64,
+}
+
+/// Reads a picture's header; the reason where it is none that may be decoded. Pipes and devices are not opened.
+pub fn header(path: &Utf8Path) -> Result<Header, String> {
+    let unreadable = |e: std::io::Error| format!("cannot be read: {e}");
+    let metadata = std::fs::metadata(path).map_err(unreadable)?;
+    if !metadata.is_file() {
+        return Err("is not a regular file".to_owned());
+    }
+    let file_bytes = metadata.len();
+    if file_bytes > MOST_FILE_BYTES {
+        return Err(format!(
+            "has {} MiB, more than any picture that can be read ({} MiB)",
+            mib(file_bytes),
+            mib(MOST_FILE_BYTES)
+        ));
+    }
+    let file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let (size, decoded_bytes) = announced(file, path)?;
+    check(size, decoded_bytes)?;
+    Ok(Header { width: size.0, height: size.1, file_bytes, decoded_bytes })
+}
+
+/// Width, height and bytes of the samples that an encoded picture announces.
+fn announced<R: Read + Seek + std::io::BufRead>(source: R, path: &Utf8Path) -> Result<((u32, u32), u64), String> {
+    let undecodable = |e: image::ImageError| format!("{UNDECODABLE}: {e}");
+    let mut reader = ImageReader::new(source).with_guessed_format().map_err(|e| format!("cannot be read: {e}"))?;
+    if reader.format().is_none()
+        && let Ok(format) = ImageFormat::from_path(path)
+    {
+        reader.set_format(format);
+    }
+    // Sizes are checked by `check`, with a reason that says what was found.
+    reader.limits(Limits::no_limits());
+    let decoder = reader.into_decoder().map_err(undecodable)?;
+    Ok((decoder.dimensions(), decoder.total_bytes()))
+}
+
+/// Checks what is about to be decoded.
+pub(super) fn check((width, height): (u32, u32), decoded_bytes: u64) -> Result<(), String> {
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels == 0 {
+        return Err("has no pixels".to_owned());
+    }
+    if width.max(height) > MOST_SIDE_PX {
+        return Err(format!("announces {width}x{height} px; at most {MOST_SIDE_PX} px a side are decoded"));
+    }
+    if pixels > MOST_PIXELS || decoded_bytes > MOST_DECODED_BYTES {
+        return Err(format!(
+            "announces {width}x{height} px, {} MiB when decoded; at most {} million px and {} MiB are decoded",
+            mib(decoded_bytes),
+            MOST_PIXELS / 1_000_000,
+            mib(MOST_DECODED_BYTES)
+        ));
+    }
+    Ok(())
+}
+
+fn mib(bytes: u64) -> u64 {
+    bytes.div_ceil(1 << 20)
+}
+
+/// Reads a file whose header was looked at, no more of it than it had then.
+pub fn read(path: &Utf8Path, header: &Header) -> Result<Vec<u8>, String> {
+    let unreadable = |e: std::io::Error| format!("cannot be read: {e}");
+    let file = File::open(path).map_err(unreadable)?;
+    let mut bytes = Vec::with_capacity(header.file_bytes as usize);
+    file.take(header.file_bytes).read_to_end(&mut bytes).map_err(unreadable)?;
+    Ok(bytes)
+}
+
+/// The right to hold a picture in memory, given back when dropped.
+#[derive(Debug)]
+pub struct Claim(u64);
+
+static HELD: Mutex<u64> = Mutex::new(0);
+static RELEASED: Condvar = Condvar::new();
+
+impl Claim {
+    /// Waits until the picture's bytes fit beside what other workers hold. A worker must hold one claim at a time.
+    pub fn wait(header: &Header) -> Claim {
+        // The file, its samples, and the grey made of them with the copies that are looked at.
+        let bytes = header.file_bytes + 2 * header.decoded_bytes;
+        let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
+        while *held > 0 && *held + bytes > MOST_HELD_BYTES {
+            held = RELEASED.wait(held).unwrap_or_else(PoisonError::into_inner);
+        }
+        *held += bytes;
+        Claim(bytes)
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        *HELD.lock().unwrap_or_else(PoisonError::into_inner) -= self.0;
+        RELEASED.notify_all();
+    }
+}

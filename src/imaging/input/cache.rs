@@ -1,0 +1,197 @@
+//! Corners of pictures that were measured before, by what is in the picture.
+//!
+//! In: a picture file's bytes, the board, and how the file is read. Out: what a former run found, to the bit, if it is the same
+//! algorithm's. The name of an entry is a hash of all that the result depends on, so a changed picture, board or program makes a new
+//! entry; its first line is a hash of the rest, so a changed entry is none. An entry that can't be read is as good as none,
+//! and one that can't be written costs only time.
+
+use nalgebra::{Matrix2, Point2};
+use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
+
+use crate::files::OutDir;
+use crate::imaging::detect::Refusal;
+use crate::imaging::lattice::Lattice;
+use crate::imaging::{Board, Corner, Mosaic};
+
+/// Names the algorithm by what it finds: a hash of the corners of the golden pictures below. A change that moves a corner fails the test
+/// `the_algorithm_is_named_by_what_it_finds`, which says the new name.
+const ALGORITHM: &str = "corners 5cc32b1c0bd94bf3";
+
+/// What was found in a picture, or why nothing.
+pub type Look = Result<Lattice<Corner>, Refusal>;
+
+/// A place for what was found.
+#[derive(Debug, Clone, Copy)]
+pub struct Cache<'a> {
+    /// The results folder.
+    pub out: &'a OutDir,
+}
+
+impl Cache<'_> {
+    /// The entry of a picture file.
+    pub fn entry(&self, bytes: &[u8], board: Board, mosaic: Option<Mosaic>) -> String {
+        let mut hash = Xxh3Default::new();
+        hash.update(ALGORITHM.as_bytes());
+        hash.update(board.squares.to_string().as_bytes());
+        hash.update(mosaic.map_or("grey", Mosaic::name).as_bytes());
+        hash.update(bytes);
+        format!("cache/{:032x}.txt", hash.digest128())
+    }
+
+    /// What a former run found.
+    pub fn read(&self, entry: &str, board: Board) -> Option<Look> {
+        parse(&std::fs::read_to_string(self.out.join(entry)).ok()?, board)
+    }
+
+    /// Keeps what was found.
+    pub fn write(&self, entry: &str, look: &Look) {
+        // Without the entry the next run is slower, nothing else.
+        let _ = self.out.write_scratch(entry, text(look).as_bytes());
+    }
+}
+
+/// The entry: a checksum of the rest, the algorithm, the corners.
+fn text(look: &Look) -> String {
+    let mut body = format!("{ALGORITHM}\n");
+    match look {
+        Err(Refusal { reason, seen }) => {
+            let seen = seen.map_or("-".to_owned(), |squares| squares.to_string());
+            body.push_str(&format!("none {seen} {}\n", reason.replace('\n', " ")));
+        }
+        Ok(grid) => {
+            for (_, _, c) in grid.iter() {
+                let [xx, xy, yy] = c.covariance_px2.map_or([f64::NAN; 3], |s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]]);
+                let (x, y, blur, used) = (c.px.x, c.px.y, c.blur_px.unwrap_or(f64::NAN), u8::from(c.used));
+                body.push_str(&format!("{} {} {x} {y} {xx} {xy} {yy} {blur} {used}\n", c.col, c.row));
+            }
+        }
+    }
+    format!("{:032x}\n{body}", xxh3_128(body.as_bytes()))
+}
+
+fn parse(text: &str, board: Board) -> Option<Look> {
+    let (checksum, body) = text.split_once('\n')?;
+    if checksum != format!("{:032x}", xxh3_128(body.as_bytes())) {
+        return None;
+    }
+    let body = body.strip_prefix(ALGORITHM)?.strip_prefix('\n')?;
+    if let Some(refusal) = body.strip_prefix("none ") {
+        let (seen, reason) = refusal.split_once(' ')?;
+        let seen = if seen == "-" { None } else { Some(seen.parse().ok()?) };
+        return Some(Err(Refusal { reason: reason.strip_suffix('\n')?.to_owned(), seen }));
+    }
+    let mut grid: Lattice<Corner> = Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
+    for line in body.lines() {
+        let numbers: Vec<f64> = line.split(' ').map(|n| n.parse().ok()).collect::<Option<_>>()?;
+        let [col, row, x, y, xx, xy, yy, blur, used] = numbers.try_into().ok()?;
+        let (col, row) = (col as usize, row as usize);
+        if col >= board.columns() || row >= board.rows() || !x.is_finite() || !y.is_finite() {
+            return None;
+        }
+        let covariance_px2 = xx.is_finite().then(|| Matrix2::new(xx, xy, xy, yy));
+        let blur_px = blur.is_finite().then_some(blur);
+        let corner = Corner { col, row, px: Point2::new(x, y), covariance_px2, blur_px, used: used != 0.0 };
+        *grid.cells.get_mut(row * board.columns() + col)? = Some(corner);
+    }
+    Some(Ok(grid))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::image::{Image, Picture};
+    use crate::imaging::{detect, refine};
+
+    fn board() -> Board {
+        Board { squares: "4x3".parse().unwrap(), square_mm: 10.0 }
+    }
+
+    #[test]
+    fn entries_read_back_exactly_and_broken_ones_not_at_all() {
+        let look: Look = Ok(Lattice::from_fn(3, 2, |col, row| {
+            let covariance_px2 = (col > 0).then(|| Matrix2::new(1.0 / 3e5, 1e-8, 1e-8, 2e-6));
+            let px = Point2::new(1.0 / 3.0 + col as f64, row as f64);
+            let blur_px = (col > 0).then_some(1.0 / 3.0);
+            (row + col < 3).then_some(Corner { col, row, px, covariance_px2, blur_px, used: col > 0 })
+        }));
+        let written = text(&look);
+        assert_eq!(parse(&written, board()), Some(look));
+        for cut in 0..written.len() {
+            assert_eq!(parse(&written[..cut], board()), None);
+        }
+        assert_eq!(parse(&written.replace("1 0 1.3", "1 0 1.4"), board()), None);
+        for seen in [None, Some("10x7".parse().unwrap())] {
+            let none: Look = Err(Refusal { reason: "no board found".to_owned(), seen });
+            assert_eq!(parse(&text(&none), board()), Some(none));
+        }
+    }
+
+    #[test]
+    fn the_entry_follows_picture_and_board() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = OutDir::open(camino::Utf8Path::from_path(dir.path()).unwrap()).unwrap();
+        let cache = Cache { out: &out };
+        let other = Board { squares: "5x3".parse().unwrap(), square_mm: 10.0 };
+        let entry = |bytes: &[u8], board, mosaic| cache.entry(bytes, board, mosaic);
+        let first = entry(b"a", board(), None);
+        assert_eq!(first, entry(b"a", board(), None));
+        for other in [entry(b"b", board(), None), entry(b"a", other, None), entry(b"a", board(), Some(Mosaic::Rggb))] {
+            assert_ne!(first, other);
+        }
+    }
+
+    /// A board of 9x7 squares of `side` px in perspective, a part of it hidden, with a little noise; `top` is white.
+    fn golden_picture(size: usize, side: f64, top: f64) -> Vec<f64> {
+        const FINE: usize = 3;
+        let light = |x: f64, y: f64| {
+            let (x, y) = (x - 0.12 * size as f64, y - 0.1 * size as f64);
+            let depth = 1.0 + (0.1 * x - 0.07 * y) / size as f64;
+            let (u, v) = ((0.97 * x + 0.21 * y) / (depth * side), (0.98 * y - 0.17 * x) / (depth * side) - 0.1);
+            if (4.4..5.2).contains(&u) && (2.3..3.4).contains(&v) {
+                return 0.4;
+            }
+            let inside = (0.0..9.0).contains(&u) && (0.0..7.0).contains(&v);
+            if inside && (u.floor() + v.floor()) as i64 % 2 == 0 { 0.12 } else { 0.8 }
+        };
+        let mut state = 7u64;
+        (0..size * size)
+            .map(|k| {
+                let (x, y) = ((k % size) as f64, (k / size) as f64);
+                let at = |i: usize| (i as f64 + 0.5) / FINE as f64 - 0.5;
+                let sum: f64 = (0..FINE * FINE).map(|i| light(x + at(i % FINE), y + at(i / FINE))).sum();
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                let noise = (state >> 40) as f64 / f64::from(1u32 << 24) - 0.5;
+                (top * (sum / (FINE * FINE) as f64 + 0.02 * noise)).round()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_algorithm_is_named_by_what_it_finds() {
+        let board = Board { squares: "9x7".parse().unwrap(), square_mm: 10.0 };
+        let eight = |size: usize, side: f64| {
+            let pixels = golden_picture(size, side, 255.0).into_iter().map(|v| v as u8).collect();
+            Picture::from(Image { width: size, height: size, pixels })
+        };
+        let sixteen = golden_picture(600, 50.0, 4000.0).into_iter().map(|v| v as u16).collect();
+        let sixteen = Picture::from(Image { width: 600, height: 600, pixels: sixteen });
+        let mut hash = Xxh3Default::new();
+        // Full size, reduced by two, squares that are seen on a finer copy only, and 16 bits.
+        for picture in [eight(640, 52.0), eight(2048, 170.0), eight(2600, 12.0), sixteen] {
+            let detected = detect::detect(&picture, board).unwrap();
+            for (col, row, c) in refine::refine(&picture, &detected).iter() {
+                let s =
+                    c.covariance_px2.map_or([0.0; 3], |s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]].map(|v| v.abs().sqrt()));
+                // Coarser than what another computer's sine may change, finer than what matters.
+                for value in [col as f64, row as f64, c.px.x, c.px.y, s[0], s[1], s[2], f64::from(u8::from(c.used))] {
+                    hash.update(&((value * 1e8).round() as i64).to_le_bytes());
+                }
+            }
+        }
+        let name = format!("corners {:016x}", hash.digest());
+        assert_eq!(
+            ALGORITHM, name,
+            "corners have changed: name the algorithm so, and former entries of the cache are not used"
+        );
+    }
+}

@@ -1,0 +1,325 @@
+//! `corners.csv`: corners of all pairs as text, from this program or from any other detector.
+//!
+//! In: a CSV file with the columns `pair,side,col,row,x_px,y_px` and optionally
+//! `sxx_px2,sxy_px2,syy_px2,used,blur_px,width_px,height_px`, rows in any order. Out: [`Corners`], and back. Raw (distorted)
+//! pixels, pixel (0, 0) is the centre of the top-left pixel. Width and height are those of the picture, one size for each side; a
+//! file without them needs them said.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use camino::Utf8Path;
+use nalgebra::{Matrix2, Point2};
+
+use super::pairs::natural_order;
+use crate::csv_table::{Table, quoted};
+use crate::diagnostic::Place;
+use crate::files::{self, Result};
+use crate::imaging::{Board, Corner, Corners, PairCorners, Side, Skipped};
+
+/// The header of `corners.csv`.
+pub const HEADER: &str = "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,used,blur_px,width_px,height_px";
+
+/// The text of `corners.csv`. Numbers are written so that they read back exactly.
+pub fn to_csv(corners: &Corners) -> String {
+    let mut text = String::from(HEADER);
+    text.push('\n');
+    for pair in &corners.pairs {
+        let sides = [(Side::Left, &pair.left, corners.left_size), (Side::Right, &pair.right, corners.right_size)];
+        for (side, list, (w, h)) in sides {
+            for c in list {
+                let s = c.covariance_px2.map(|s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]]);
+                let s = s.map_or_else(|| ",,".to_owned(), |[xx, xy, yy]| format!("{xx},{xy},{yy}"));
+                let blur = c.blur_px.map_or_else(String::new, |blur| blur.to_string());
+                let (name, side, used) = (quoted(&pair.pair), side.name(), u8::from(c.used));
+                let (col, row, x, y) = (c.col, c.row, c.px.x, c.px.y);
+                let _ = writeln!(text, "{name},{side},{col},{row},{x},{y},{s},{used},{blur},{w},{h}");
+            }
+        }
+    }
+    text
+}
+
+/// Reads `corners.csv`. `size` is the width and height of the pictures, px, for a file that does not hold them.
+///
+/// Refused with the line: bad numbers, an unknown side, a corner that stands there twice or does not exist on the board or in the
+/// picture, a size that differs from that of the side's other pictures or from `size`.
+/// A file whose columns run along the shorter side is turned by 90 degrees. Pairs seen by one camera only are skipped.
+pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<Corners> {
+    let hint = "`stereocal camera-check IMAGES` writes corners.csv beside its report";
+    let table = Table::read(path, "the file of corners", hint)?;
+    let mut rows = parse(&table)?;
+    let mut notes = Vec::new();
+    if fit_to_board(&table, &mut rows, board)? {
+        notes.push("the columns of the corners file run along the shorter side: turned by 90 degrees".to_owned());
+    }
+    let [left_size, right_size] =
+        [size_of(&table, &rows, Side::Left, size)?, size_of(&table, &rows, Side::Right, size)?];
+    let (pairs, skipped) = gather(rows);
+    Ok(Corners { board, left_size, right_size, pairs, skipped, notes })
+}
+
+struct Row {
+    line: u64,
+    pair: String,
+    side: Side,
+    corner: Corner,
+    /// Width and height of the picture, px, where the file holds them.
+    size: Option<(u32, u32)>,
+}
+
+/// The size of one side's pictures: what the file holds, or else what was said. All of its corners lie inside.
+fn size_of(table: &Table, rows: &[Row], side: Side, said: Option<(u32, u32)>) -> Result<(u32, u32)> {
+    let of_side = || rows.iter().filter(|row| row.side == side);
+    let Some(size) = of_side().find_map(|row| row.size).or(said) else {
+        // A side without corners has no pictures whose size could matter.
+        let Some(row) = of_side().next() else { return Ok((0, 0)) };
+        return Err(files::Error::Format {
+            message: "the corners file does not hold the pictures' size".to_owned(),
+            place: Place { path: table.path.to_owned(), line: Some(row.line) },
+            hint: Some("`--picture-size WxH`, or columns width_px and height_px".to_owned()),
+        });
+    };
+    let (w, h) = size;
+    for row in of_side() {
+        if let Some((width, height)) = row.size.into_iter().chain(said).find(|other| *other != size) {
+            let message = format!("a {} picture of {width}x{height} px, another has {w}x{h}", side.name());
+            return Err(table.refuse(row.line, message));
+        }
+        if !inside(&row.corner.px, size) {
+            let (x, y) = (row.corner.px.x, row.corner.px.y);
+            let message = format!("a corner at ({x:.2}, {y:.2}) lies outside of a picture of {w}x{h}");
+            return Err(table.refuse(row.line, message));
+        }
+    }
+    Ok(size)
+}
+
+fn inside(px: &Point2<f64>, (w, h): (u32, u32)) -> bool {
+    (-0.5..=f64::from(w) - 0.5).contains(&px.x) && (-0.5..=f64::from(h) - 0.5).contains(&px.y)
+}
+
+fn parse(table: &Table) -> Result<Vec<Row>> {
+    let (pair, side) = (table.require("pair")?, table.require("side")?);
+    let (col, row) = (table.require("col")?, table.require("row")?);
+    let (x, y) = (table.require("x_px")?, table.require("y_px")?);
+    let covariance = ["sxx_px2", "sxy_px2", "syy_px2"].map(|name| table.column(name));
+    let used = table.column("used");
+    let blur = table.column("blur_px");
+    let size = ["width_px", "height_px"].map(|name| table.column(name));
+    let mut rows = Vec::with_capacity(table.rows.len());
+    let mut seen = BTreeMap::new();
+    for (line, fields) in &table.rows {
+        let line = *line;
+        let name = fields[pair].to_owned();
+        if name.is_empty() {
+            return Err(table.refuse(line, "the pair has no name".to_owned()));
+        }
+        let side = match fields[side].to_ascii_lowercase().as_str() {
+            "left" => Side::Left,
+            "right" => Side::Right,
+            other => return Err(table.refuse(line, format!("side is `{other}`; it is left or right"))),
+        };
+        let count = |column: usize| {
+            fields[column].parse::<usize>().map_err(|_| {
+                table.refuse(line, format!("`{}` is not a count: `{}`", table.header[column], &fields[column]))
+            })
+        };
+        let (col, row) = (count(col)?, count(row)?);
+        if let Some(first) = seen.insert((name.clone(), side, col, row), line) {
+            let message = format!("corner {col},{row} of the {} picture of {name} stands in line {first}", side.name());
+            return Err(table.refuse(line, message));
+        }
+        let covariance_px2 = match covariance {
+            [Some(xx), Some(xy), Some(yy)] if [xx, xy, yy].iter().any(|&c| !fields[c].is_empty()) => {
+                let number = |c| table.number(line, fields, c);
+                Some(Matrix2::new(number(xx)?, number(xy)?, number(xy)?, number(yy)?))
+            }
+            _ => None,
+        };
+        if covariance_px2.is_some_and(|s| s.cholesky().is_none()) {
+            let message = "the covariance sxx, sxy, syy is not positive definite".to_owned();
+            return Err(table.refuse(line, message));
+        }
+        let used = match used.map_or("", |c| &fields[c]).to_ascii_lowercase().as_str() {
+            "" | "1" | "true" | "yes" => true,
+            "0" | "false" | "no" => false,
+            other => return Err(table.refuse(line, format!("used is `{other}`; it is 1 or 0"))),
+        };
+        let px = Point2::new(table.number(line, fields, x)?, table.number(line, fields, y)?);
+        let blur_px = match blur.filter(|&c| !fields[c].is_empty()) {
+            Some(column) => Some(table.number(line, fields, column)?),
+            None => None,
+        };
+        let size = match size {
+            [Some(width), Some(height)] if !fields[width].is_empty() || !fields[height].is_empty() => {
+                let side_px = |column| count(column).map(|n| n.clamp(1, 1 << 24) as u32);
+                Some((side_px(width)?, side_px(height)?))
+            }
+            _ => None,
+        };
+        let corner = Corner { col, row, px, covariance_px2, blur_px, used };
+        rows.push(Row { line, pair: name, side, corner, size });
+    }
+    Ok(rows)
+}
+
+/// Checks that every corner exists on the board; true where the file's columns ran along the shorter side and were turned.
+fn fit_to_board(table: &Table, rows: &mut [Row], board: Board) -> Result<bool> {
+    let (columns, lines) = (board.columns(), board.rows());
+    if rows.iter().all(|r| r.corner.col < columns && r.corner.row < lines) {
+        return Ok(false);
+    }
+    if rows.iter().all(|r| r.corner.col < lines && r.corner.row < columns) {
+        for row in rows {
+            // A quarter turn, not a transposition: a mirrored board would lie behind the camera.
+            (row.corner.col, row.corner.row) = (row.corner.row, lines - 1 - row.corner.col);
+        }
+        return Ok(true);
+    }
+    let col = rows.iter().map(|r| r.corner.col).max().unwrap_or(0);
+    let row = rows.iter().map(|r| r.corner.row).max().unwrap_or(0);
+    let line = rows.iter().find(|r| r.corner.col >= columns || r.corner.row >= lines).map_or(1, |r| r.line);
+    Err(files::Error::Format {
+        message: format!(
+            "corners reach col {col} and row {row}, but a board of {} squares has {columns}x{lines} inner corners",
+            board.squares
+        ),
+        place: Place { path: table.path.to_owned(), line: Some(line) },
+        hint: Some(format!("`--squares {}x{}` if the board has that many squares", col + 2, row + 2)),
+    })
+}
+
+fn gather(rows: Vec<Row>) -> (Vec<PairCorners>, Vec<Skipped>) {
+    let mut pairs: BTreeMap<String, PairCorners> = BTreeMap::new();
+    for row in rows {
+        let pair =
+            pairs.entry(row.pair.clone()).or_insert_with(|| PairCorners { pair: row.pair, ..PairCorners::default() });
+        match row.side {
+            Side::Left => pair.left.push(row.corner),
+            Side::Right => pair.right.push(row.corner),
+        }
+    }
+    let (mut kept, mut skipped) = (Vec::new(), Vec::new());
+    // In the order of a folder's pairs.
+    let mut pairs: Vec<PairCorners> = pairs.into_values().collect();
+    pairs.sort_by(|a, b| natural_order(&a.pair, &b.pair));
+    for mut pair in pairs {
+        for (list, side) in [(&pair.left, Side::Left), (&pair.right, Side::Right)] {
+            if list.is_empty() {
+                let reason = format!("no corners in the {} picture", side.name());
+                skipped.push(Skipped { pair: pair.pair.clone(), reason });
+            }
+        }
+        if pair.left.is_empty() || pair.right.is_empty() {
+            continue;
+        }
+        pair.left.sort_by_key(|c| (c.row, c.col));
+        pair.right.sort_by_key(|c| (c.row, c.col));
+        kept.push(pair);
+    }
+    (kept, skipped)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_str(text: &str, squares: &str, size: Option<(u32, u32)>) -> Result<Corners> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = Utf8Path::from_path(dir.path()).unwrap().join("corners.csv");
+        std::fs::write(&path, text).unwrap();
+        read(&path, Board { squares: squares.parse().unwrap(), square_mm: 10.0 }, size)
+    }
+
+    #[test]
+    fn what_is_written_reads_back_exactly() {
+        let covariance_px2 = Some(Matrix2::new(1.0 / 3.0e4, 1e-7, 1e-7, 2.2e-5));
+        let blur_px = Some(2.0 / 3.0);
+        let px = |x: f64| Point2::new(x, 2.0 / 7.0);
+        let corner = |col, row, x: f64| Corner { col, row, px: px(x), covariance_px2, blur_px, used: true };
+        let plain = |c: Corner| Corner { covariance_px2: None, blur_px: None, used: false, ..c };
+        let corners = Corners {
+            board: Board { squares: "4x3".parse().unwrap(), square_mm: 10.0 },
+            left_size: (640, 480),
+            right_size: (320, 240),
+            pairs: vec![PairCorners {
+                pair: "a,b".to_owned(),
+                left: vec![corner(0, 0, 0.1), corner(2, 1, 639.0)],
+                right: vec![plain(corner(1, 1, 3.0))],
+            }],
+            skipped: Vec::new(),
+            notes: Vec::new(),
+        };
+        let back = read_str(&to_csv(&corners), "4x3", None).unwrap();
+        assert_eq!(back, corners);
+    }
+
+    #[test]
+    fn complaints_name_the_line() {
+        let top = "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,used\na,left,0,0,1,2,,,,1\n";
+        for (row, part) in [
+            ("a,left,0,0,1,2,,,,1", "stands in line 2"),
+            ("a,middle,0,0,1,2,,,,1", "side is `middle`"),
+            ("a,left,-1,0,1,2,,,,1", "`col` is not a count"),
+            ("a,left,1,0,x,2,,,,1", "`x_px` is not a number"),
+            ("a,left,1,0,1,2,1,,,1", "`sxy_px2` is not a number"),
+            ("a,left,1,0,1,2,1,2,1,1", "not positive definite"),
+            ("a,left,1,0,1,2,,,,maybe", "used is `maybe`"),
+            ("a,left,1,7,1,2,,,,1", "`--squares 3x9`"),
+            ("a,left,1,0,700,2,,,,1", "outside of a picture of 640x480"),
+        ] {
+            let error = read_str(&format!("{top}{row}\n"), "4x3", Some((640, 480))).unwrap_err();
+            let message = crate::diagnostic::report(&error);
+            assert!(message.contains(part) && message.contains("corners.csv:3"), "{message}");
+        }
+    }
+
+    #[test]
+    fn sizes_are_said_once_and_alike() {
+        let bare = "pair,side,col,row,x_px,y_px\na,left,0,0,1,2\na,right,0,0,1,2\n";
+        let message = crate::diagnostic::report(&read_str(bare, "4x3", None).unwrap_err());
+        assert!(
+            message.contains("does not hold the pictures' size") && message.contains("--picture-size"),
+            "{message}"
+        );
+        let top = "pair,side,col,row,x_px,y_px,width_px,height_px\na,left,0,0,1,2,640,480\na,right,0,0,1,2,320,240\n";
+        let corners = read_str(top, "4x3", None).unwrap();
+        assert_eq!((corners.left_size, corners.right_size), ((640, 480), (320, 240)));
+        let other = format!("{top}b,left,0,0,1,2,1280,960\n");
+        let message = read_str(&other, "4x3", None).unwrap_err().to_string();
+        assert!(message.contains("1280x960") && message.contains("640x480"), "{message}");
+        assert!(read_str(top, "4x3", Some((640, 480))).is_err(), "the right pictures are smaller");
+    }
+
+    #[test]
+    fn pairs_stand_in_the_order_of_a_folder() {
+        let both = |p: &str| format!("{p},left,0,0,1,2\n{p},right,0,0,1,2\n");
+        let rows: String = ["10", "9", "a2", "a10"].into_iter().map(both).collect();
+        let text = format!("pair,side,col,row,x_px,y_px\n{rows}");
+        let corners = read_str(&text, "4x3", Some((640, 480))).unwrap();
+        let names: Vec<&str> = corners.pairs.iter().map(|p| p.pair.as_str()).collect();
+        assert_eq!(names, ["9", "10", "a2", "a10"]);
+    }
+
+    #[test]
+    fn columns_along_the_shorter_side_are_turned() {
+        let text = "pair,side,col,row,x_px,y_px\na,left,0,0,0,0\na,left,0,2,0,20\na,left,1,0,10,0\na,right,0,0,0,0\n";
+        let corners = read_str(text, "4x3", Some((640, 480))).unwrap();
+        let at = |col, row| corners.pairs[0].left.iter().find(|c| c.col == col && c.row == row).unwrap().px;
+        // x now runs down the picture and y to the left: still right-handed.
+        assert_eq!(
+            (at(0, 1), at(2, 1), at(0, 0)),
+            (Point2::new(0.0, 0.0), Point2::new(0.0, 20.0), Point2::new(10.0, 0.0))
+        );
+        assert_eq!(corners.notes.len(), 1);
+    }
+
+    #[test]
+    fn a_pair_with_one_side_is_skipped() {
+        let text = "pair,side,col,row,x_px,y_px\nb,left,0,0,5,6\nb,right,0,0,5,6\na,left,0,0,0,0\n";
+        let corners = read_str(text, "4x3", Some((640, 480))).unwrap();
+        assert_eq!(corners.pairs.len(), 1);
+        assert_eq!(corners.skipped[0].reason, "no corners in the right picture");
+    }
+}

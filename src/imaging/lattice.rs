@@ -1,0 +1,135 @@
+//! A rectangular grid of corners, some perhaps missing, and the turns it can be given.
+
+use nalgebra::{Point2, Vector2};
+
+use crate::statistics::median;
+
+/// Corners (or anything that belongs to one) by column and row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lattice<T> {
+    /// Number of columns.
+    pub columns: usize,
+    /// Number of rows.
+    pub rows: usize,
+    /// Row by row; `None` where the corner is missing.
+    pub cells: Vec<Option<T>>,
+}
+
+/// Places in a picture, px.
+pub type Places = Lattice<Point2<f64>>;
+
+impl Places {
+    /// The median distance of neighbours along the rows and the columns, px; `None` without neighbours.
+    pub fn step_px(&self) -> Option<f64> {
+        let to = |col: usize, row: usize, p: &Point2<f64>| self.get(col, row).map(|next| (next - p).norm());
+        median(self.iter().flat_map(|(col, row, p)| [to(col + 1, row, p), to(col, row + 1, p)]).flatten())
+    }
+
+    /// Where a line of corners goes on beyond `(col, row)` in a direction, and the step that leads there: from the two or three corners
+    /// before it. Steps of perspective change evenly enough from one square to the next. `None` where two are missing.
+    pub fn next(&self, (col, row): (isize, isize), (dc, dr): (isize, isize)) -> Option<(Point2<f64>, Vector2<f64>)> {
+        let back = |k: isize| self.around(col - k * dc, row - k * dr);
+        let (near, second) = (back(0)?, back(1)?);
+        let step = near - second;
+        let step = back(2).map_or(step, |third| 2.0 * step - (second - third));
+        Some((near + step, step))
+    }
+}
+
+impl<T: Clone> Lattice<T> {
+    /// A grid filled by column and row, in order.
+    pub fn from_fn(columns: usize, rows: usize, mut at: impl FnMut(usize, usize) -> Option<T>) -> Lattice<T> {
+        let cells = (0..columns * rows).map(|i| at(i % columns, i / columns)).collect();
+        Lattice { columns, rows, cells }
+    }
+
+    /// All places, with what is there.
+    pub fn iter_all(&self) -> impl Iterator<Item = (usize, usize, Option<&T>)> {
+        let columns = self.columns;
+        self.cells.iter().enumerate().map(move |(i, c)| (i % columns, i / columns, c.as_ref()))
+    }
+
+    /// The corner at a place; `None` where it is missing or outside of the grid.
+    pub fn get(&self, col: usize, row: usize) -> Option<&T> {
+        if col < self.columns && row < self.rows { self.cells[row * self.columns + col].as_ref() } else { None }
+    }
+
+    /// The corner at a place that may lie outside of the grid.
+    pub fn around(&self, col: isize, row: isize) -> Option<&T> {
+        self.get(usize::try_from(col).ok()?, usize::try_from(row).ok()?)
+    }
+
+    /// Number of corners that are there.
+    pub fn count(&self) -> usize {
+        self.cells.iter().flatten().count()
+    }
+
+    /// Corners that are there, with column and row.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, usize, &T)> {
+        let columns = self.columns;
+        self.cells.iter().enumerate().filter_map(move |(i, c)| c.as_ref().map(|c| (i % columns, i / columns, c)))
+    }
+
+    /// The same corners numbered from the opposite corner of the board.
+    pub fn half_turn(&self) -> Lattice<T> {
+        Lattice::from_fn(self.columns, self.rows, |col, row| {
+            self.get(self.columns - 1 - col, self.rows - 1 - row).cloned()
+        })
+    }
+
+    /// The same corners with columns along the former rows; handedness stays.
+    pub fn quarter_turn(&self) -> Lattice<T> {
+        Lattice::from_fn(self.rows, self.columns, |col, row| self.get(row, self.rows - 1 - col).cloned())
+    }
+
+    /// The same corners with the rows numbered backwards: the other handedness.
+    pub fn flip_rows(&self) -> Lattice<T> {
+        Lattice::from_fn(self.columns, self.rows, |col, row| self.get(col, self.rows - 1 - row).cloned())
+    }
+
+    /// The grid turned `quarters` times by 90 degrees.
+    pub fn turned(&self, quarters: usize) -> Lattice<T> {
+        match quarters % 4 {
+            0 => self.clone(),
+            1 => self.quarter_turn(),
+            2 => self.half_turn(),
+            _ => self.half_turn().quarter_turn(),
+        }
+    }
+
+    /// The grid with something else at each corner.
+    pub fn map<U: Clone>(&self, to: impl Fn(&T) -> U) -> Lattice<U> {
+        Lattice {
+            columns: self.columns,
+            rows: self.rows,
+            cells: self.cells.iter().map(|c| c.as_ref().map(&to)).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbered() -> Lattice<(usize, usize)> {
+        Lattice::from_fn(4, 3, |col, row| (row != 2).then_some((col, row)))
+    }
+
+    #[test]
+    fn four_quarter_turns_are_none_and_two_are_a_half() {
+        let grid = numbered();
+        assert_eq!(grid.quarter_turn().quarter_turn(), grid.half_turn());
+        assert_eq!(grid.turned(3).turned(1), grid);
+        assert_eq!(grid.flip_rows().flip_rows(), grid);
+    }
+
+    #[test]
+    fn a_quarter_turn_keeps_handedness() {
+        let turned = numbered().quarter_turn();
+        let at = |col, row| *turned.get(col, row).unwrap_or(&(9, 9));
+        let (o, x, y) = (at(1, 0), at(2, 0), at(1, 1));
+        let cross = (x.0 as i32 - o.0 as i32) * (y.1 as i32 - o.1 as i32)
+            - (x.1 as i32 - o.1 as i32) * (y.0 as i32 - o.0 as i32);
+        assert_eq!(cross, 1, "{o:?} {x:?} {y:?}");
+    }
+}

@@ -1,0 +1,156 @@
+//! Copies of a picture at other sizes, and where their pixels lie.
+//!
+//! In: a picture. Out: an 8-bit copy for looking, each of its pixels the mean of a block of the picture's, or twice as large. How a
+//! place on a copy becomes one in the picture and back is said here and nowhere else. 16-bit values are stretched over the range that
+//! all but a few in a thousand use, so that a hot pixel or a lamp does not flatten the board.
+
+use nalgebra::Point2;
+
+use super::image::{Grey, Grey8, Image, Picture};
+
+/// The size of a copy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    /// Reduced by a whole factor.
+    Reduced(usize),
+    /// Enlarged to twice the size, for squares of a few pixels.
+    Doubled,
+}
+
+impl Level {
+    /// Pixels of the picture along one pixel of the copy.
+    pub fn scale(self) -> f64 {
+        match self {
+            Level::Reduced(factor) => factor as f64,
+            Level::Doubled => 0.5,
+        }
+    }
+
+    /// A place on the copy as one in the picture, px.
+    pub fn to_picture(self, p: &Point2<f64>) -> Point2<f64> {
+        p.map(|v| (v + 0.5) * self.scale() - 0.5)
+    }
+
+    /// A place in the picture as one on the copy, px.
+    pub fn to_copy(self, p: &Point2<f64>) -> Point2<f64> {
+        p.map(|v| (v + 0.5) / self.scale() - 0.5)
+    }
+
+    /// The copy of a picture at this level.
+    pub fn copy(self, picture: &Picture) -> Grey8 {
+        match self {
+            Level::Reduced(factor) => reduced(picture, factor),
+            Level::Doubled => doubled(&reduced(picture, 1)),
+        }
+    }
+}
+
+/// The whole factor that brings a picture closest to `pixels` from above.
+pub fn factor_for(picture: &Picture, pixels: usize) -> usize {
+    let ratio = (picture.width() * picture.height()) as f64 / pixels as f64;
+    ratio.sqrt().floor().max(1.0) as usize
+}
+
+/// A copy reduced by a whole factor; what is left over at the right and lower border is dropped.
+fn reduced(picture: &Picture, factor: usize) -> Grey8 {
+    let factor = factor.clamp(1, picture.width().min(picture.height()).max(1));
+    match &picture.grey {
+        Grey::Eight(image) => means(image, factor, u32::from, (0.0, 255.0)),
+        Grey::Sixteen(image) => {
+            let (low, high) = range(image);
+            // A hot pixel must not shine over its block.
+            means(image, factor, |v| u32::from(v.min(high)), (f64::from(low), f64::from(high)))
+        }
+    }
+}
+
+/// Means of `factor` x `factor` pixels, `low..high` stretched to 0..255.
+fn means<T: Copy>(image: &Image<T>, factor: usize, value: impl Fn(T) -> u32, (low, high): (f64, f64)) -> Grey8 {
+    let (w, h) = (image.width / factor, image.height / factor);
+    let mut pixels = Vec::with_capacity(w * h);
+    let mut sums = vec![0u32; w];
+    let scale = 255.0 / (high - low).max(1.0);
+    // 2^16 values of 16 bits just fit; no picture is reduced by more than 256.
+    let unit = scale / (factor * factor) as f64;
+    for y in 0..h {
+        sums.fill(0);
+        for line in image.pixels[y * factor * image.width..].chunks_exact(image.width).take(factor) {
+            for (sum, group) in sums.iter_mut().zip(line.chunks_exact(factor)) {
+                *sum += group.iter().map(|&v| value(v)).sum::<u32>();
+            }
+        }
+        pixels.extend(sums.iter().map(|&sum| (f64::from(sum) * unit - low * scale + 0.5) as u8));
+    }
+    Grey8 { width: w, height: h, pixels }
+}
+
+/// The values below and above which only a few pixels in a thousand lie.
+fn range(image: &Image<u16>) -> (u16, u16) {
+    /// Share of the pixels that may lie outside on either side.
+    const OUTSIDE: f64 = 2e-3;
+    /// About this many pixels are looked at.
+    const LOOKED_AT: usize = 1 << 18;
+    let step = (image.pixels.len() / LOOKED_AT).max(1) | 1;
+    let mut values: Vec<u16> = image.pixels.iter().step_by(step).copied().collect();
+    if values.is_empty() {
+        return (0, u16::MAX);
+    }
+    let rank = (OUTSIDE * values.len() as f64) as usize;
+    let last = values.len() - 1;
+    let low = *values.select_nth_unstable(rank).1;
+    let high = *values.select_nth_unstable(last - rank).1;
+    (low, high)
+}
+
+/// A copy of twice the size, linear between pixels.
+fn doubled(small: &Grey8) -> Grey8 {
+    let (w, h) = (small.width, small.height);
+    // A quarter of a pixel from its own pixel's centre towards the next one's.
+    let near = |i: usize, size: usize| {
+        let other = if i.is_multiple_of(2) { (i / 2).saturating_sub(1) } else { (i / 2 + 1).min(size - 1) };
+        [(i / 2, 3u32), (other, 1u32)]
+    };
+    let mut pixels = Vec::with_capacity(4 * w * h);
+    for y in 0..2 * h {
+        let lines = near(y, h);
+        for x in 0..2 * w {
+            let columns = near(x, w);
+            let weigh = |(row, a): (usize, u32)| {
+                columns.iter().map(|&(col, b)| a * b * u32::from(small.pixels[row * w + col])).sum::<u32>()
+            };
+            pixels.push(((lines.into_iter().map(weigh).sum::<u32>() + 8) / 16) as u8);
+        }
+    }
+    Grey8 { width: 2 * w, height: 2 * h, pixels }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reduced_pixels_are_means() {
+        let picture = Picture::from(Image { width: 5, height: 4, pixels: (0..20u8).collect() });
+        assert_eq!(Level::Reduced(2).copy(&picture).pixels, [3, 5, 13, 15]);
+        let picture = Picture::from(Image { width: 2, height: 1, pixels: vec![1000u16, 3000] });
+        assert_eq!(Level::Reduced(1).copy(&picture).pixels, [0, 255]);
+    }
+
+    #[test]
+    fn one_hot_pixel_does_not_flatten_a_picture() {
+        let mut pixels: Vec<u16> = (0..10_000).map(|k| if k % 2 == 0 { 1000 } else { 3000 }).collect();
+        pixels[5000] = 65_535;
+        let copy = Level::Reduced(1).copy(&Picture::from(Image { width: 100, height: 100, pixels }));
+        assert_eq!((copy.pixels[0], copy.pixels[1], copy.pixels[5000]), (0, 255, 255));
+    }
+
+    #[test]
+    fn places_go_there_and_back() {
+        for level in [Level::Reduced(1), Level::Reduced(5), Level::Doubled] {
+            let p = Point2::new(12.25, 7.5);
+            assert!((level.to_copy(&level.to_picture(&p)) - p).norm() < 1e-12);
+        }
+        // The first pixel of a copy reduced by four covers pixels 0 to 3.
+        assert_eq!(Level::Reduced(4).to_picture(&Point2::origin()), Point2::new(1.5, 1.5));
+    }
+}

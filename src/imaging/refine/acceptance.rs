@@ -1,0 +1,96 @@
+//! Every gate that a corner passes before it counts, with its unit and its reason.
+//!
+//! A corner that is off by many of its sigmas is worse than a missing one. Three kinds of gates: what no corner does
+//! ([`plausible`]), what a larger window must tell as a smaller one does ([`agrees`]), and what the four arms of a corner must
+//! tell alike, measured by the board's other corners ([`Board`]).
+
+use super::Measured;
+use super::cell::Cell;
+use super::saddle_fit::{Fit, Model};
+use crate::statistics::median;
+
+/// Farthest a fit may go from its start, px, and as a share of a square: the start is better than that.
+const MOST_MOVE_PX: f64 = 3.0;
+const MOST_MOVE_SQUARES: f64 = 0.4;
+/// Most by which an edge may turn from where the neighbours say it runs, rad (20 degrees): more is another edge.
+const MOST_TURN_RAD: f64 = 0.35;
+/// Widest blur, as a share of a square: beyond it no square has a level of its own.
+const MOST_BLUR_SQUARES: f64 = 0.5;
+/// Share of the light that may change over a square. Light does not; a fit that says so has taken a neighbour's edge for its gradient.
+const MOST_LIGHT_CHANGE: f64 = 0.3;
+/// Largest variance (both axes together) of a corner, px^2: half a pixel is what the eye sees.
+const MOST_VARIANCE_PX2: f64 = 0.25;
+
+/// Sigmas of the smaller window's place that two windows may differ by, and what blurs that are no Gaussian add, px.
+const AGREE_SIGMAS: f64 = 5.0;
+const AGREE_PX: f64 = 0.02;
+/// How many times larger the residual of the larger window may be, and by what share of the contrast (one grey value of 8 bits):
+/// light and dark away from the edges are noisier than the edges by this much at most.
+const AGREE_RESIDUAL: f64 = 1.4;
+const AGREE_CONTRAST: f64 = 0.007;
+
+/// Chi-squared (two degrees of freedom) of one arm against the common model, in units of what is usual on the board. Among the
+/// 4000 arms of the largest boards the largest by chance is 17; something that hides a tenth of an arm makes hundreds.
+const MOST_ARM_MISFIT: f64 = 30.0;
+/// How many times less certain than the board's usual corner one may be, in standard deviations. The smallest window costs a factor of
+/// four; what is left of a corner behind something has no contrast of its own.
+const MOST_SIGMAS: f64 = 10.0;
+/// How many times the board's usual residual (as a share of the contrast) a corner may have that was measured in a smaller window for
+/// want of a better.
+const MOST_ROUGHNESS: f64 = 1.5;
+
+/// False for a fit that wandered off, turned away, or found no contrast.
+pub(super) fn plausible(fit: &Fit, start: &Model, cell: &Cell) -> bool {
+    let turned = (0..2).map(|k| (fit.model.angles_rad[k] - start.angles_rad[k]).abs()).fold(0.0, f64::max);
+    fit.model.corner.norm() < (MOST_MOVE_SQUARES * cell.side()).min(MOST_MOVE_PX)
+        && turned < MOST_TURN_RAD
+        && fit.model.blur_px.iter().all(|&s| s < MOST_BLUR_SQUARES * cell.side())
+        && fit.model.half_contrast.abs() > fit.residual
+        && fit.model.light_slope.norm() * cell.side() < MOST_LIGHT_CHANGE
+        && fit.covariance_px2.trace() < MOST_VARIANCE_PX2
+}
+
+/// True where a larger window tells the same as a smaller one: a hidden or unprinted neighbour square shows as a shift or as misfit.
+pub(super) fn agrees(small: &Measured, large: &Measured) -> bool {
+    // The larger window holds the smaller one's pixels, so the variance of the difference is that of the smaller less that of the larger.
+    let variance = (small.fit.covariance_px2 - large.fit.covariance_px2).trace().max(0.0);
+    (large.px - small.px).norm() < AGREE_SIGMAS * variance.sqrt() + AGREE_PX
+        && roughness(&large.fit) < AGREE_RESIDUAL * roughness(&small.fit) + AGREE_CONTRAST
+}
+
+/// Residual as a share of the contrast: the same number for copies of 8 bits and pictures of 16.
+fn roughness(fit: &Fit) -> f64 {
+    fit.residual / fit.model.half_contrast.abs()
+}
+
+/// What is usual on a board.
+pub(super) struct Board {
+    arm_misfit: f64,
+    roughness: f64,
+    variance_px2: f64,
+}
+
+impl Board {
+    /// Of the corners measured in their full windows.
+    pub(super) fn of(corners: &[Measured]) -> Board {
+        Board {
+            // An arm's two numbers have a chi-squared of two, of which the common model takes a half.
+            arm_misfit: median(corners.iter().map(|m| m.fit.arm_misfit.iter().flatten().sum::<f64>() / 4.0))
+                .unwrap_or(1.0)
+                .max(1.0),
+            roughness: median(corners.iter().map(|m| roughness(&m.fit))).unwrap_or(f64::INFINITY),
+            variance_px2: median(corners.iter().map(|m| m.fit.covariance_px2.trace())).unwrap_or(f64::INFINITY),
+        }
+    }
+
+    /// True where the four arms of a corner tell the same, and it is not far less certain than the others.
+    pub(super) fn accepts(&self, corner: &Measured) -> bool {
+        corner.fit.arm_misfit.iter().flatten().all(|&misfit| misfit < MOST_ARM_MISFIT * self.arm_misfit)
+            && corner.fit.covariance_px2.trace() < MOST_SIGMAS.powi(2) * self.variance_px2
+    }
+
+    /// True for a corner that only a smaller window shows, if what is in that window is as good as elsewhere on the board.
+    pub(super) fn holds_in_small_window(&self, corner: &Measured) -> bool {
+        self.accepts(corner) && roughness(&corner.fit) < MOST_ROUGHNESS * self.roughness + AGREE_CONTRAST
+    }
+}

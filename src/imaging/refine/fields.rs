@@ -1,0 +1,132 @@
+//! Were all rows of a picture taken at one moment? Interlaced video takes the even rows first, then the odd ones.
+//!
+//! In: a picture and where its corners are. Out: how far its two fields lie apart where the board moved between them; corners measured in
+//! such a picture are those of two boards. Method: at each edge a row is compared with the mean of the rows above and below; what
+//! they differ by, over the grey value's slope along the row, is a shift. Between fields it alternates from row to row. The
+//! same sums with a sign that alternates every two rows hold noise, slanted edges and blur just as well, and no fields. Goes wrong: a
+//! motion that is all along the columns shifts nothing along the rows.
+
+use nalgebra::{Matrix3, Point2, Vector2, Vector3};
+
+use crate::imaging::image::{Grey, Image, Picture};
+use crate::imaging::lattice::Places;
+
+/// Corners whose surroundings are looked at.
+const CORNERS: usize = 60;
+/// Fewest that tell anything.
+const FEWEST: usize = 6;
+/// How many times larger than the control a shift is that is none by chance.
+const BEYOND_CHANCE: f64 = 4.0;
+/// Share of the shifts' squares that is a motion of the whole board. Colours that were interpolated from a mosaic leave shifts
+/// between rows too, of either sign from edge to edge.
+const COMMON: f64 = 0.5;
+/// Least shift that matters, px. Sensors with two read-out paths have rows of unequal gain, which shifts nothing; colours that a camera
+/// interpolates from its mosaic leave up to 0.05 px in pictures of one moment.
+const LEAST_SHIFT_PX: f64 = 0.06;
+/// Half of what is looked at round a corner, px and in squares.
+const HALF_PX: f64 = 40.0;
+const HALF_SQUARES: f64 = 0.45;
+
+/// How far the rows of one field lie from those of the other, px; `None` where they were taken together. `places` are in the picture.
+pub fn shift_between_fields(picture: &Picture, places: &Places) -> Option<f64> {
+    match &picture.grey {
+        Grey::Eight(image) => shift(image, places),
+        Grey::Sixteen(image) => shift(image, places),
+    }
+}
+
+fn shift<T: Copy + Into<f64>>(image: &Image<T>, places: &Places) -> Option<f64> {
+    let half = (HALF_SQUARES * places.step_px()?).min(HALF_PX).ceil();
+    let corners: Vec<Point2<f64>> = places.iter().map(|(_, _, p)| *p).collect();
+    let every = corners.len().div_ceil(CORNERS).max(1);
+    let seen: Vec<(Point2<f64>, [f64; 2])> =
+        corners.into_iter().step_by(every).filter_map(|p| Some((p, around(image, &p, half)?))).collect();
+    if seen.len() < FEWEST {
+        return None;
+    }
+    let square = |which: usize| seen.iter().map(|(_, s)| s[which] * s[which]).sum::<f64>();
+    let (fields, control) = (square(0), square(1));
+    let shift_px = (fields / seen.len() as f64).sqrt();
+    let moved = shift_px > LEAST_SHIFT_PX && fields > BEYOND_CHANCE.powi(2) * control;
+    (moved && common_square(&seen) > COMMON * fields).then_some(shift_px)
+}
+
+/// What a motion of the whole board, a linear function of the place, makes of the shifts' sum of squares.
+fn common_square(seen: &[(Point2<f64>, [f64; 2])]) -> f64 {
+    let middle = seen.iter().map(|(p, _)| p.coords).sum::<Vector2<f64>>() / seen.len() as f64;
+    let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for (p, shift) in seen {
+        let d = p.coords - middle;
+        let basis = Vector3::new(1.0, d.x, d.y);
+        matrix += basis * basis.transpose();
+        right += basis * shift[0];
+    }
+    // On one line of corners there is no slope across it.
+    matrix.cholesky().map_or(right.x * right.x / seen.len() as f64, |cholesky| right.dot(&cholesky.solve(&right)))
+}
+
+/// The shift between fields round a corner, px, and the control's; `None` without an edge across the rows.
+fn around<T: Copy + Into<f64>>(image: &Image<T>, corner: &Point2<f64>, half: f64) -> Option<[f64; 2]> {
+    let range = |at: f64, size: usize| {
+        let low = (at - half).max(1.0) as usize;
+        low..((at + half).max(0.0) as usize).min(size.saturating_sub(2)).max(low)
+    };
+    let at = |x: usize, y: usize| -> f64 { image.pixels[y * image.width + x].into() };
+    let (mut sums, mut weight, mut most) = ([0.0; 2], 0.0, 0.0f64);
+    for y in range(corner.y, image.height) {
+        let (fields, control) = (if y % 2 == 0 { 1.0 } else { -1.0 }, if y % 4 < 2 { 1.0 } else { -1.0 });
+        for x in range(corner.x, image.width) {
+            let slope = (at(x + 1, y - 1) - at(x - 1, y - 1) + at(x + 1, y + 1) - at(x - 1, y + 1)) / 4.0;
+            let differs = slope * (at(x, y) - (at(x, y - 1) + at(x, y + 1)) / 2.0);
+            sums[0] += fields * differs;
+            sums[1] += control * differs;
+            weight += slope * slope;
+            most = most.max(slope.abs());
+        }
+    }
+    (most > 0.0 && weight > 0.0).then(|| sums.map(|sum| -sum / weight))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point2;
+
+    use super::*;
+    use crate::imaging::lattice::Lattice;
+
+    /// Squares of 30 px, turned, blurred by a linear ramp, with noise; odd rows are taken `shift` px later.
+    fn picture(turn: f64, moved: f64) -> (Picture, Places) {
+        let (sin, cos) = turn.sin_cos();
+        let grey = |k: usize| {
+            let (x, y) =
+                ((k % 300) as f64 - if (k / 300) % 2 == 1 { moved } else { 0.0 } - 150.0, (k / 300) as f64 - 150.0);
+            let saw = |v: f64| ((((v / 30.0).rem_euclid(2.0) - 1.0).abs() - 0.5) * 30.0 / 1.5).clamp(-1.0, 1.0);
+            let noise = (k * 7919 % 13) as f64 / 3.0 - 2.0;
+            120.0 + 80.0 * saw(cos * x + sin * y) * saw(cos * y - sin * x) + noise
+        };
+        let pixels = (0..300 * 300).map(|k| grey(k).round() as u8).collect();
+        let places = Lattice::from_fn(7, 7, |col, row| {
+            let (u, v) = (30.0 * (col as f64 - 3.0) + 15.0, 30.0 * (row as f64 - 3.0) + 15.0);
+            Some(Point2::new(150.0 + cos * u - sin * v, 150.0 + sin * u + cos * v))
+        });
+        (Picture::from(Image { width: 300, height: 300, pixels }), places)
+    }
+
+    #[test]
+    fn a_picture_of_one_moment_has_no_fields() {
+        for turn in [0.0, 0.1, 0.4, 0.78] {
+            let (picture, places) = picture(turn, 0.0);
+            assert_eq!(shift_between_fields(&picture, &places), None, "{turn}");
+        }
+    }
+
+    #[test]
+    fn fields_of_two_moments_are_seen() {
+        for turn in [0.0, 0.1, 0.4, 0.78] {
+            for moved in [0.1, 0.5, 2.0, 6.0] {
+                let (picture, places) = picture(turn, moved);
+                assert!(shift_between_fields(&picture, &places).is_some(), "{turn} {moved}");
+            }
+        }
+    }
+}

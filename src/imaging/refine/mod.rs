@@ -1,0 +1,248 @@
+//! Coarse corners to measured ones: a fit of the blurred corner to the raw pixels at full size, for each corner.
+//!
+//! In: the picture and the board as detected. Out: corners with covariance. First each corner is fitted on the reduced copy
+//! in a small window that a coarse start can't lead astray (coarse); then at full size in a small window (near) and in the
+//! largest that stays inside the four squares round it (full). Where the larger window does not agree with the smaller one, or the four
+//! arms of a corner not with each other, something hides a part of it, and the largest window that is free of it is kept. Last,
+//! the board's corners share what they know of the light. Goes wrong: a corner without contrast, hidden, cut off by the border or
+//! saturated; it is dropped, the others stay.
+
+mod acceptance;
+mod cell;
+mod curvature;
+pub mod fields;
+pub mod illumination;
+pub mod saddle_fit;
+
+use nalgebra::{Matrix2, Point2, Vector2};
+
+use self::acceptance::{agrees, plausible};
+use self::cell::Cell;
+use self::curvature::bends;
+use self::saddle_fit::window::{Frame, Window};
+use self::saddle_fit::{Fit, Model, fit};
+use super::Corner;
+use super::detect::Detected;
+use super::image::{Grey, Image, Picture};
+use super::lattice::{Lattice, Places};
+
+/// Half of the first window on the copy, px.
+const FIRST_HALF_PX: f64 = 6.0;
+/// Pixels farther than this many blurs from both edges tell only the two grey levels.
+const BAND_BLURS: f64 = 3.5;
+/// The next edge's blur reaches this many blurs into the square.
+const MARGIN_BLURS: f64 = 3.0;
+
+/// Half of the largest window, px. The gain goes with the root of the window, the time with the window; beyond this a
+/// board's own making (1 um is 0.02 px at 0.05 mm a px) hides all gain.
+const MOST_HALF_PX: f64 = 80.0;
+/// Half of the near window, px and in blurs: the least that holds an arm on each side of the crossing.
+const NEAR_HALF_PX: f64 = 10.0;
+const NEAR_HALF_BLURS: f64 = 7.0;
+/// Half of the window that is tried where the full one is not free, as a multiple of the near one's.
+const BETWEEN: f64 = 2.8;
+/// A near window that is not smaller than this share of the full one would tell nothing of its own.
+const NEAR_SHARE: f64 = 0.7;
+
+/// A corner and all that its fit tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// Raw place in the picture, px.
+    pub px: Point2<f64>,
+    /// The fit it comes from.
+    pub fit: Fit,
+}
+
+/// Measures all corners of a board.
+pub fn refine(picture: &Picture, detected: &Detected) -> Lattice<Corner> {
+    let measured = measure(picture, detected);
+    Lattice::from_fn(measured.columns, measured.rows, |col, row| {
+        if let Some(m) = measured.get(col, row) {
+            let [a, b] = m.fit.model.blur_px;
+            let blur_px = Some((0.5 * (a * a + b * b)).sqrt());
+            // Symmetric to the last bit, so that three numbers hold it.
+            let s = &m.fit.covariance_px2;
+            let across = 0.5 * (s[(0, 1)] + s[(1, 0)]);
+            let covariance_px2 = Some(Matrix2::new(s[(0, 0)], across, across, s[(1, 1)]));
+            return Some(Corner { col, row, px: m.px, covariance_px2, blur_px, used: true });
+        }
+        // Kept where it was seen roughly, so that a picture in which nothing could be measured can still be judged.
+        let px = detected.level.to_picture(detected.corners.get(col, row)?);
+        Some(Corner { col, row, px, covariance_px2: None, blur_px: None, used: false })
+    })
+}
+
+/// Measures all corners of a board, with what else the fits tell.
+pub fn measure(picture: &Picture, detected: &Detected) -> Lattice<Measured> {
+    match &picture.grey {
+        Grey::Eight(image) => Full { image, clip_level: picture.clip_level(), as_copied: true }.measure(detected),
+        Grey::Sixteen(image) => Full { image, clip_level: picture.clip_level(), as_copied: false }.measure(detected),
+    }
+}
+
+/// The picture at full size.
+struct Full<'a, T> {
+    image: &'a Image<T>,
+    clip_level: f64,
+    /// Whether its grey values are those of the reduced copy.
+    as_copied: bool,
+}
+
+/// What a corner's windows told.
+#[derive(Clone)]
+struct Windows {
+    cell: Cell,
+    start: Model,
+    near: Option<Measured>,
+    full: Option<Measured>,
+}
+
+impl<T: Copy + Into<f64>> Full<'_, T> {
+    fn measure(&self, detected: &Detected) -> Lattice<Measured> {
+        let mut window = Window::default();
+        let coarse = coarse(detected, &mut window);
+        let bends = bends(&coarse.map(|m| detected.level.to_picture(&m.px)));
+        let columns = coarse.columns;
+        // A neighbour that could not be measured still says how far the squares reach.
+        let places: Places = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            let px = coarse.get(col, row).map_or(detected.corners.get(col, row), |m| Some(&m.px))?;
+            Some(detected.level.to_picture(px))
+        });
+        let scale = detected.level.scale();
+        let seen: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            let from = coarse.get(col, row)?;
+            let cell = Cell::of(&places, col, row)?;
+            let mut start = Model {
+                corner: Vector2::zeros(),
+                bend: bends[row * columns + col],
+                ..enlarged(&from.fit.model, scale)
+            };
+            if !self.as_copied {
+                // The copy's grey values are not the picture's: without contrast the fit finds levels of its own.
+                start.half_contrast = 0.0;
+            }
+            // On a copy of full size the first fit is a measurement already.
+            Some(self.windows(cell, start, (scale == 1.0).then_some(*from), &mut window))
+        });
+        let full: Vec<Measured> = seen.iter().filter_map(|(_, _, windows)| windows.full).collect();
+        let board = acceptance::Board::of(&full);
+        let mut measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            self.largest_free(seen.get(col, row)?, &board, &mut window)
+        });
+        illumination::tie(&mut measured);
+        measured
+    }
+
+    /// Fits in the near window, then in the full one, each started where the one before it ended: most steps are taken where they are
+    /// cheap, and the blur is that of the picture, not of the copy, so fewer pixels count as near an edge.
+    fn windows(&self, cell: Cell, start: Model, coarse: Option<Measured>, window: &mut Window) -> Windows {
+        let full_px = (cell.side() - margin_px(&start, &cell)).max(0.5 * cell.side()).min(MOST_HALF_PX);
+        let near_px = near_half_px(&start);
+        if near_px > NEAR_SHARE * full_px {
+            let full = self.fit_within(MOST_HALF_PX, &cell, &start, window);
+            return Windows { cell, start, near: coarse, full };
+        }
+        let near = self.fit_within(near_px, &cell, &start, window);
+        let full = near.as_ref().and_then(|near| self.fit_from(near, MOST_HALF_PX, &cell, window));
+        Windows { cell, start, near, full }
+    }
+
+    /// The largest window that nothing reaches into: the full one, one between, the near one, or none.
+    fn largest_free(&self, seen: &Windows, board: &acceptance::Board, window: &mut Window) -> Option<Measured> {
+        if let Some(full) = &seen.full
+            && seen.near.as_ref().is_none_or(|near| agrees(near, full))
+            && board.accepts(full)
+        {
+            return seen.full;
+        }
+        let near = seen.near.as_ref()?;
+        let between = self.fit_from(near, BETWEEN * near_half_px(&seen.start), &seen.cell, window);
+        let between = between.filter(|between| agrees(near, between) && board.holds_in_small_window(between));
+        between.or_else(|| board.holds_in_small_window(near).then_some(*near))
+    }
+
+    /// A fit in a larger window, from what a smaller one told.
+    fn fit_from(&self, near: &Measured, most_half_px: f64, cell: &Cell, window: &mut Window) -> Option<Measured> {
+        // A window in the middle of which the corner is: what the light's gradient adds on one side it takes on the other.
+        let start = Model { corner: Vector2::zeros(), ..near.fit.model };
+        self.fit_within(most_half_px, &Cell { place: near.px, ..*cell }, &start, window)
+    }
+
+    /// A fit in a window that reaches up to `most_half_px` along each edge.
+    fn fit_within(&self, most_half_px: f64, cell: &Cell, start: &Model, window: &mut Window) -> Option<Measured> {
+        let mut start = *start;
+        loop {
+            let blur = start.blur_px[0].max(start.blur_px[1]);
+            let margin = margin_px(&start, cell);
+            let halves = cell.edges.map(|e| e.normalize() * (e.norm() - margin).max(0.5 * e.norm()).min(most_half_px));
+            let band_px = BAND_BLURS * blur + 1.0;
+            window.collect(self.image, self.clip_level, &Frame { start: cell.place, halves, band_px });
+            let found = fit(&start, window)?;
+            let wider = found.model.blur_px[0].max(found.model.blur_px[1]);
+            // The copy may have hidden how wide the blur is; the band must hold the whole edge.
+            if BAND_BLURS * wider <= 1.2 * band_px {
+                let fits = plausible(&found, &start, cell);
+                return fits.then(|| Measured { px: found.place(&cell.place), fit: found });
+            }
+            if wider > 0.5 * cell.side() {
+                return None;
+            }
+            start = Model { blur_px: found.model.blur_px, ..start };
+        }
+    }
+}
+
+/// How far a window stays off the next edges, px. Oblique edges come nearer to each other.
+fn margin_px(start: &Model, cell: &Cell) -> f64 {
+    (MARGIN_BLURS * start.blur_px[0].max(start.blur_px[1]) + 1.0) / cell.skew()
+}
+
+fn near_half_px(start: &Model) -> f64 {
+    NEAR_HALF_PX.max(NEAR_HALF_BLURS * start.blur_px[0].max(start.blur_px[1]))
+}
+
+/// A first fit of each corner on the reduced copy.
+fn coarse(detected: &Detected, window: &mut Window) -> Lattice<Measured> {
+    Lattice::from_fn(detected.corners.columns, detected.corners.rows, |col, row| {
+        let cell = Cell::of(&detected.corners, col, row)?;
+        let fit = coarse_fit(&detected.copy, &cell, window)?;
+        Some(Measured { px: fit.place(&cell.place), fit })
+    })
+}
+
+/// A fit in a small window, or in larger ones where a wide blur fills it.
+fn coarse_fit(copy: &Image<u8>, cell: &Cell, window: &mut Window) -> Option<Fit> {
+    let most = 0.6 * cell.side();
+    let mut half = FIRST_HALF_PX.min(most);
+    loop {
+        let start = Model {
+            corner: Vector2::zeros(),
+            angles_rad: cell.edges.map(|e| e.y.atan2(e.x)),
+            blur_px: [(0.15 * half).max(0.8); 2],
+            level: 0.0,
+            half_contrast: 0.0,
+            light_slope: Vector2::zeros(),
+            bend: [0.0; 2],
+        };
+        let halves = cell.edges.map(|e| e.normalize() * half);
+        // A stretched copy reaches 255 without being clipped.
+        window.collect(copy, f64::MAX, &Frame { start: cell.place, halves, band_px: f64::MAX });
+        if let Some(first) = fit(&start, window)
+            && plausible(&first, &start, cell)
+            && (first.model.blur_px.iter().all(|&s| s < 0.4 * half) || half >= most)
+        {
+            return Some(first);
+        }
+        if half >= most {
+            return None;
+        }
+        half = (2.0 * half).min(most);
+    }
+}
+
+/// A model of the copy as one of the picture it was reduced from by `k`.
+fn enlarged(model: &Model, k: f64) -> Model {
+    // The copy's pixel adds the variance of its own box.
+    let blur = |s: f64| if k > 1.0 { (k * k * (s * s - 1.0 / 12.0)).max(0.25).sqrt() } else { s };
+    Model { blur_px: model.blur_px.map(blur), light_slope: model.light_slope / k, ..*model }
+}

@@ -1,0 +1,225 @@
+//! One corner fitted to raw pixels, at the limit that noise allows.
+//!
+//! In: pixels and a start good to a few blurs. Out: place, covariance (residual variance times inverse normal matrix), blur,
+//! contrast, residual. Method: [`model`]'s ten parameters by Levenberg-Marquardt (Marquardt 1963), analytic derivatives.
+//! Two blurs, the edges' directions, both grey levels and the gradient of the light are fitted with the corner; the edges' bend
+//! (lens distortion) is given. Goes wrong: too few pixels, no contrast, an edge that is not there; all end in `None`.
+
+mod crossing;
+pub mod model;
+mod products;
+mod special;
+pub mod window;
+
+use nalgebra::{Matrix2, Point2, SMatrix, SVector, Vector2};
+
+pub use model::Model;
+use model::{Evaluation, N};
+use window::Window;
+
+/// Steps after which a fit that still moves is given up; a good start needs three to six.
+const MAX_STEPS: usize = 40;
+/// Least blur, px: that of the box of a pixel alone, 1/sqrt(12). Sharpened pictures would fit less, with a slope that no pixel sees.
+const LEAST_BLUR_PX: f64 = 0.3;
+
+/// Sum of squared residuals at a model, with its normal matrix and gradient.
+struct Equations {
+    cost: f64,
+    matrix: Normal,
+    gradient: Column,
+    arm_gains: [[f64; 2]; 2],
+}
+
+type Normal = SMatrix<f64, N, N>;
+type Column = SVector<f64, N>;
+
+/// What a fit found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fit {
+    /// The parameters.
+    pub model: Model,
+    /// Covariance of the corner's place, px^2.
+    pub covariance_px2: Matrix2<f64>,
+    /// Standard deviation of the residuals, grey values.
+    pub residual: f64,
+    /// Covariance of the corner's place (rows, px) with the light's slope (columns, 1/px).
+    pub place_by_light: Matrix2<f64>,
+    /// Covariance of the light's slope, 1/px^2.
+    pub light_covariance: Matrix2<f64>,
+    /// For each edge, on either side of the crossing: chi-squared (two degrees of freedom) of that arm's edge against the common model.
+    pub arm_misfit: [[f64; 2]; 2],
+    /// Number of pixels.
+    pub pixels: usize,
+    /// Number of pixels that were left out as saturated.
+    pub saturated: usize,
+    /// Number of steps to the end.
+    pub steps: usize,
+}
+
+impl Model {
+    fn add(&self, d: &Column) -> Model {
+        Model {
+            corner: self.corner + Vector2::new(d[0], d[1]),
+            angles_rad: [self.angles_rad[0] + d[2], self.angles_rad[1] + d[3]],
+            blur_px: [(self.blur_px[0] + d[4]).max(LEAST_BLUR_PX), (self.blur_px[1] + d[5]).max(LEAST_BLUR_PX)],
+            level: self.level + d[6],
+            half_contrast: self.half_contrast + d[7],
+            light_slope: self.light_slope + Vector2::new(d[8], d[9]),
+            bend: self.bend,
+        }
+    }
+
+    /// Takes a blur at its bound out of the equations where they would push it below.
+    fn hold_least_blur(&self, matrix: &mut Normal, gradient: &mut Column) {
+        for k in [0, 1] {
+            if self.blur_px[k] <= LEAST_BLUR_PX && gradient[4 + k] <= 0.0 {
+                matrix.fill_row(4 + k, 0.0);
+                matrix.fill_column(4 + k, 0.0);
+                matrix[(4 + k, 4 + k)] = 1.0;
+                gradient[4 + k] = 0.0;
+            }
+        }
+    }
+
+    /// The equations of a least-squares step.
+    fn equations(&self, window: &Window) -> Equations {
+        let Evaluation { sums, arm_gains } = self.evaluate(window);
+        Equations {
+            cost: sums[(N, N)],
+            matrix: sums.fixed_view::<N, N>(0, 0).into_owned(),
+            gradient: sums.fixed_view::<N, 1>(0, N).into_owned(),
+            arm_gains,
+        }
+    }
+}
+
+/// Solves for level and contrast, where the start has none, with the rest as it is and even light. `None` where the pixels don't determine them.
+fn with_levels(start: &Model, window: &Window) -> Option<Model> {
+    if start.half_contrast != 0.0 {
+        return Some(*start);
+    }
+    let even = Model { level: 0.0, half_contrast: 0.0, light_slope: Vector2::zeros(), ..*start };
+    let Equations { matrix, gradient, .. } = even.equations(window);
+    let d = matrix.fixed_view::<2, 2>(6, 6).into_owned().cholesky()?.solve(&gradient.fixed_rows::<2>(6).into_owned());
+    Some(Model { level: d[0], half_contrast: d[1], ..even })
+}
+
+/// Fits the model to the window's pixels. `None` where the pixels don't determine it or the fit does not settle.
+pub fn fit(start: &Model, window: &Window) -> Option<Fit> {
+    let count = window.count();
+    if window.near() < 3 * N {
+        return None;
+    }
+    let freedom = (count - N) as f64;
+    let (model, mut last, steps) = settled(with_levels(start, window)?, window, freedom)?;
+    // Rounding to whole grey values alone leaves 1/12.
+    let variance = (last.cost / freedom).max(1.0 / 12.0);
+    model.hold_least_blur(&mut last.matrix, &mut last.gradient);
+    let inverse = last.matrix.cholesky()?.inverse();
+    let part = |row: usize, column: usize| inverse.fixed_view::<2, 2>(row, column) * variance;
+    let fit = Fit {
+        model,
+        covariance_px2: part(0, 0),
+        residual: variance.sqrt(),
+        place_by_light: part(0, 8),
+        light_covariance: part(8, 8),
+        arm_misfit: last.arm_gains.map(|sides| sides.map(|gain| gain / variance)),
+        pixels: count,
+        saturated: window.saturated,
+        steps,
+    };
+    (fit.covariance_px2.iter().all(|v| v.is_finite()) && last.cost.is_finite()).then_some(fit)
+}
+
+/// The model at the end of all steps, the equations a hundredth of a sigma before it, and the number of steps.
+fn settled(start: Model, window: &Window, freedom: f64) -> Option<(Model, Equations, usize)> {
+    /// Where the undamped step would gain less than this share of one pixel's variance, nothing moves by more than a tenth of its sigma;
+    /// that step is still taken, and steps shrink at least tenfold by then, so less than a hundredth is left.
+    const SETTLED: f64 = 1e-2;
+    let mut model = start;
+    let mut at = model.equations(window);
+    let mut damping = 1e-3;
+    for steps in 1..=MAX_STEPS {
+        model.hold_least_blur(&mut at.matrix, &mut at.gradient);
+        // A damped step gains little because it is short: only the undamped one tells how far the end is.
+        let whole = at.matrix.cholesky()?.solve(&at.gradient);
+        if !whole.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        if at.gradient.dot(&whole) < SETTLED * (at.cost / freedom).max(1e-6) {
+            return Some((model.add(&whole), at, steps));
+        }
+        let mut damped = at.matrix;
+        for i in 0..N {
+            damped[(i, i)] *= 1.0 + damping;
+        }
+        let next = model.add(&damped.cholesky()?.solve(&at.gradient));
+        let there = next.equations(window);
+        // The gain that counts is the one that came out.
+        if there.cost <= at.cost {
+            (model, at) = (next, there);
+            damping = (damping * 0.1).max(1e-9);
+        } else {
+            damping *= 10.0;
+        }
+        if damping > 1e9 {
+            break;
+        }
+    }
+    None
+}
+
+impl Fit {
+    /// The corner in the picture whose window started at `start`, px.
+    pub fn place(&self, start: &Point2<f64>) -> Point2<f64> {
+        start + self.model.corner
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::window::Frame;
+    use super::*;
+    use crate::imaging::image::Image;
+
+    /// A window of the model's own grey values, at 256 steps a grey value.
+    fn window(model: &Model, half: usize, band_px: f64) -> Window {
+        let side = 2 * half + 1;
+        let place = |k: usize| ((k % side) as f64 - half as f64, (k / side) as f64 - half as f64);
+        let pixels = (0..side * side).map(|k| (256.0 * model.grey(place(k))).round() as u16).collect();
+        let picture = Image { width: side, height: side, pixels };
+        let halves = model.angles_rad.map(|a| Vector2::new(a.cos(), a.sin()) * half as f64);
+        let start = Point2::new(half as f64, half as f64);
+        let mut window = Window::default();
+        window.collect(&picture, 65_535.0, &Frame { start, halves, band_px });
+        window
+    }
+
+    #[test]
+    fn a_fit_without_noise_recovers_the_model() {
+        let truth = Model::example();
+        for band_px in [f64::MAX, 6.0] {
+            let window = window(&truth, 20, band_px);
+            let start = Model {
+                corner: Vector2::new(-1.0, 1.2),
+                angles_rad: [0.0, 1.4],
+                blur_px: [2.0, 2.0],
+                half_contrast: 0.0,
+                ..truth
+            };
+            let fit = fit(&start, &window).unwrap();
+            // Limited by the stop rule, not by the pixels.
+            assert!((fit.model.corner - truth.corner).norm() < 1e-4, "{:?}", fit.model);
+            assert!((fit.model.blur_px[1] - 1.3).abs() < 1e-3 && (fit.model.angles_rad[0] - 0.1).abs() < 1e-3);
+            assert!((fit.model.light_slope - truth.light_slope).norm() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn a_flat_or_empty_window_has_no_corner() {
+        let start = Model::example();
+        assert_eq!(fit(&start, &Window::default()), None);
+        let flat = window(&Model { half_contrast: 0.0, light_slope: Vector2::zeros(), ..start }, 10, f64::MAX);
+        assert!(fit(&start, &flat).is_none_or(|f| f.covariance_px2[(0, 0)] > 1.0));
+    }
+}

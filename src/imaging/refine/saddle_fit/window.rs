@@ -1,0 +1,361 @@
+//! The pixels that one corner is fitted to, sorted by what they can tell.
+//!
+//! A window is a parallelogram along the corner's two edges. Pixels near both edges, at the crossing, see all of the model;
+//! those near one edge alone, on an arm of the cross, see that edge; those away from both see only the two
+//! grey levels and the light, and enter as sums. Saturated pixels are left out.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix2, Matrix4, Point2, Vector2, Vector4};
+
+use crate::imaging::image::Image;
+
+/// Pixels that are worked on side by side: enough that the compiler makes vector loops of them.
+pub const LANES: usize = 32;
+
+/// A number for each pixel of a group.
+pub type Lanes = [f64; LANES];
+
+/// A few pixels side by side, places relative to the window's start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Group {
+    /// x - x0, px.
+    pub x: Lanes,
+    /// y - y0, px.
+    pub y: Lanes,
+    /// Grey value.
+    pub grey: Lanes,
+    /// One for a pixel, zero for none: the last group is filled up.
+    pub weight: Lanes,
+}
+
+/// Any number of pixels in groups.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Groups {
+    /// The groups.
+    pub groups: Vec<Group>,
+    /// Number of pixels.
+    pub count: usize,
+}
+
+/// The pixels of a window.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Window {
+    /// Near both edges.
+    pub crossing: Groups,
+    /// Near edge `k` alone, on the side of the other edge where its normal's product is negative, then where it is positive.
+    pub arms: [[Groups; 2]; 2],
+    /// Away from both edges, where the product of both normals' products is negative, then where it is positive: the
+    /// sums of all products of `(1, x, y, grey)`.
+    pub flat: [Matrix4<f64>; 2],
+    /// Number of pixels that were left out as saturated.
+    pub saturated: usize,
+}
+
+/// Where a window lies and what is near.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    /// Its middle, px; places in the window are relative to it.
+    pub start: Point2<f64>,
+    /// From the middle to the middles of two sides, along the two edges, px.
+    pub halves: [Vector2<f64>; 2],
+    /// Distance from an edge up to which pixels see it, px.
+    pub band_px: f64,
+}
+
+impl Groups {
+    /// Adds a pixel.
+    #[inline]
+    pub fn push(&mut self, x: f64, y: f64, grey: f64) {
+        let lane = self.count % LANES;
+        if lane == 0 {
+            let zero = [0.0; LANES];
+            self.groups.push(Group { x: zero, y: zero, grey: zero, weight: zero });
+        }
+        if let Some(group) = self.groups.last_mut() {
+            (group.x[lane], group.y[lane], group.grey[lane], group.weight[lane]) = (x, y, grey, 1.0);
+        }
+        self.count += 1;
+    }
+
+    fn clear(&mut self) {
+        self.groups.clear();
+        self.count = 0;
+    }
+}
+
+impl Window {
+    /// Number of pixels that see an edge.
+    pub fn near(&self) -> usize {
+        self.crossing.count + self.arms.iter().flatten().map(|arm| arm.count).sum::<usize>()
+    }
+
+    /// Number of pixels.
+    pub fn count(&self) -> usize {
+        self.near() + self.flat.iter().map(|sums| sums[(0, 0)] as usize).sum::<usize>()
+    }
+
+    /// Fills the window anew; grey values from `clip_level` on are left out. Nothing is in a window without area.
+    pub fn collect<T: Copy + Into<f64>>(&mut self, image: &Image<T>, clip_level: f64, frame: &Frame) {
+        self.crossing.clear();
+        self.arms.iter_mut().flatten().for_each(Groups::clear);
+        (self.flat, self.saturated) = ([Matrix4::zeros(); 2], 0);
+        let Some(cut) = Cut::new(frame) else { return };
+        let Image { width, height, pixels } = image;
+        let (width, height, saturation) = (*width, *height, clip_level);
+        for y in whole(cut.start.y - cut.reach, cut.start.y + cut.reach, height) {
+            let dy = y as f64 - cut.start.y;
+            let row = &pixels[y * width..(y + 1) * width];
+            let inside = cut.columns(&cut.inside, dy, width);
+            let near = cut.bands.map(|band| cut.columns(&[band], dy, width));
+            // Each of these is where one run of equal pixels ends and the next begins.
+            let mut ends = [inside.start, near[0].start, near[0].end, near[1].start, near[1].end, inside.end];
+            ends.iter_mut().for_each(|end| *end = (*end).clamp(inside.start, inside.end.max(inside.start)));
+            ends.sort_unstable();
+            for run in ends.windows(2).map(|ends| ends[0]..ends[1]).filter(|run| !run.is_empty()) {
+                let dx = run.start as f64 - cut.start.x;
+                let side = cut.bands.map(|band| usize::from(band.at(dx, dy) > 0.0));
+                match [0, 1].map(|k| near[k].contains(&run.start)) {
+                    [true, true] => self.saturated += push(&mut self.crossing, row, run, saturation, (dx, dy)),
+                    [true, false] => self.saturated += push(&mut self.arms[0][side[1]], row, run, saturation, (dx, dy)),
+                    [false, true] => self.saturated += push(&mut self.arms[1][side[0]], row, run, saturation, (dx, dy)),
+                    [false, false] => {
+                        let alike = usize::from(side[0] == side[1]);
+                        self.saturated += add(&mut self.flat[alike], row, run, saturation, (dx, dy));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Adds a run of pixels one by one; `from` is the first one's place. Returns how many were saturated.
+fn push<T: Copy + Into<f64>>(
+    to: &mut Groups,
+    row: &[T],
+    run: Range<usize>,
+    saturation: f64,
+    from: (f64, f64),
+) -> usize {
+    let mut saturated = 0;
+    for (i, &value) in row[run].iter().enumerate() {
+        let grey: f64 = value.into();
+        if grey < saturation {
+            to.push(from.0 + i as f64, from.1, grey);
+        } else {
+            saturated += 1;
+        }
+    }
+    saturated
+}
+
+/// Sums of a run that are kept side by side, so that one need not wait for the other.
+const SIDE_BY_SIDE: usize = 4;
+
+/// Adds a run of pixels to the sums of products of `(1, x, y, grey)`; `from` is the first one's place. Returns how
+/// many were saturated.
+fn add<T: Copy + Into<f64>>(
+    to: &mut Matrix4<f64>,
+    row: &[T],
+    run: Range<usize>,
+    saturation: f64,
+    from: (f64, f64),
+) -> usize {
+    let values = &row[run];
+    let [n, x, xx, g, xg, gg] = if values.iter().all(|&value| value.into() < saturation) {
+        run_sums(values)
+    } else {
+        let seen = values.iter().map(|&value| value.into()).enumerate().filter(|(_, grey)| *grey < saturation);
+        seen.fold([0.0; 6], |[n, x, xx, g, xg, gg], (i, grey)| {
+            let i = i as f64;
+            [n + 1.0, x + i, xx + i * i, g + grey, xg + i * grey, gg + grey * grey]
+        })
+    };
+    let (x0, y) = from;
+    let sum_x = x + n * x0;
+    let sum_xx = xx + 2.0 * x0 * x + n * x0 * x0;
+    let sum_xg = xg + x0 * g;
+    *to += Matrix4::from_columns(&[
+        Vector4::new(n, sum_x, n * y, g),
+        Vector4::new(sum_x, sum_xx, sum_x * y, sum_xg),
+        Vector4::new(n * y, sum_x * y, n * y * y, g * y),
+        Vector4::new(g, sum_xg, g * y, gg),
+    ]);
+    values.len() - n as usize
+}
+
+/// Number, sums of x, x^2, grey, x grey and grey^2 of pixels side by side, the first at x = 0. Whole numbers, hence exact.
+fn run_sums<T: Copy + Into<f64>>(values: &[T]) -> [f64; 6] {
+    let n = values.len() as f64;
+    let (mut g, mut xg, mut gg) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
+    let blocks = values.chunks_exact(SIDE_BY_SIDE);
+    let rest = blocks.remainder();
+    let mut at: [f64; SIDE_BY_SIDE] = std::array::from_fn(|l| l as f64);
+    for block in blocks {
+        for l in 0..SIDE_BY_SIDE {
+            let grey: f64 = block[l].into();
+            g[l] += grey;
+            xg[l] += at[l] * grey;
+            gg[l] += grey * grey;
+            at[l] += SIDE_BY_SIDE as f64;
+        }
+    }
+    for ((value, at), ((g, xg), gg)) in rest.iter().zip(at).zip(g.iter_mut().zip(&mut xg).zip(&mut gg)) {
+        let grey: f64 = (*value).into();
+        *g += grey;
+        *xg += at * grey;
+        *gg += grey * grey;
+    }
+    let total = |sums: [f64; SIDE_BY_SIDE]| sums.iter().sum();
+    [n, n * (n - 1.0) / 2.0, n * (n - 1.0) * (2.0 * n - 1.0) / 6.0, total(g), total(xg), total(gg)]
+}
+
+/// The whole numbers from `low` to `high` that are at least zero and below `size`.
+fn whole(low: f64, high: f64, size: usize) -> Range<usize> {
+    let start = low.ceil().max(0.0) as usize;
+    let end = ((high.floor() + 1.0).max(0.0) as usize).min(size);
+    start.min(end)..end
+}
+
+/// Places `d` with `|across . d| <= limit`.
+#[derive(Clone, Copy)]
+struct Strip {
+    across: Vector2<f64>,
+    limit: f64,
+}
+
+impl Strip {
+    fn at(&self, dx: f64, dy: f64) -> f64 {
+        self.across.x * dx + self.across.y * dy
+    }
+
+    /// The values of dx in a row.
+    fn interval(&self, dy: f64) -> (f64, f64) {
+        let offset = self.across.y * dy;
+        if self.across.x.abs() < 1e-12 {
+            return if offset.abs() <= self.limit { (f64::NEG_INFINITY, f64::INFINITY) } else { (0.0, -1.0) };
+        }
+        let (a, b) = ((-self.limit - offset) / self.across.x, (self.limit - offset) / self.across.x);
+        (a.min(b), a.max(b))
+    }
+}
+
+/// A frame as strips.
+struct Cut {
+    start: Point2<f64>,
+    /// Rows farther than this from the start are outside, px.
+    reach: f64,
+    inside: [Strip; 2],
+    bands: [Strip; 2],
+}
+
+impl Cut {
+    fn new(frame: &Frame) -> Option<Cut> {
+        let [a, b] = frame.halves;
+        let inverse = Matrix2::from_columns(&[a, b]).try_inverse()?;
+        let inside = [0, 1].map(|k| Strip { across: inverse.row(k).transpose(), limit: 1.0 });
+        let bands = [a, b].map(|v| Strip { across: Vector2::new(-v.y, v.x).normalize(), limit: frame.band_px });
+        Some(Cut { start: frame.start, reach: a.y.abs() + b.y.abs(), inside, bands })
+    }
+
+    /// The columns of a row that are in all strips.
+    fn columns(&self, strips: &[Strip], dy: f64, width: usize) -> Range<usize> {
+        let (low, high) = strips.iter().fold((f64::NEG_INFINITY, f64::INFINITY), |(low, high), strip| {
+            let (a, b) = strip.interval(dy);
+            (low.max(a), high.min(b))
+        });
+        whole(self.start.x + low, self.start.x + high, width)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ramp() -> Image<u8> {
+        let pixels = (0..100 * 100).map(|k| (k % 100 + k / 100) as u8).collect();
+        Image { width: 100, height: 100, pixels }
+    }
+
+    /// Sums of all products of `(1, x, y, grey)` over the whole window.
+    fn total(window: &Window) -> Matrix4<f64> {
+        let near = window.arms.iter().flatten().chain([&window.crossing]);
+        let mut sum = window.flat[0] + window.flat[1];
+        for group in near.flat_map(|groups| &groups.groups) {
+            for l in 0..LANES {
+                let v = Vector4::new(1.0, group.x[l], group.y[l], group.grey[l]);
+                sum += v * v.transpose() * group.weight[l];
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn every_pixel_inside_is_counted_once() {
+        let (picture, mut window) = (ramp(), Window::default());
+        for halves in [
+            [Vector2::new(30.0, 8.0), Vector2::new(-8.0, 30.0)],
+            [Vector2::new(30.0, 0.0), Vector2::new(0.0, 30.0)],
+            [Vector2::new(-20.0, 20.0), Vector2::new(25.0, 14.0)],
+        ] {
+            let start = Point2::new(49.3, 50.2);
+            let inverse = Matrix2::from_columns(&halves).try_inverse().unwrap();
+            let mut expected = Matrix4::zeros();
+            for (x, y) in (0..100 * 100).map(|k| (k % 100, k / 100)) {
+                let d = Vector2::new(f64::from(x), f64::from(y)) - start.coords;
+                if (inverse * d).amax() <= 1.0 {
+                    let v = Vector4::new(1.0, d.x, d.y, f64::from(x + y));
+                    expected += v * v.transpose();
+                }
+            }
+            for band_px in [f64::MAX, 6.0, 0.4] {
+                window.collect(&picture, 256.0, &Frame { start, halves, band_px });
+                // Sums of a few thousand products, in another order.
+                assert!((total(&window) - expected).amax() < 1e-9 * expected.amax(), "{halves:?} {band_px}");
+                assert_eq!(window.count(), expected[(0, 0)] as usize);
+            }
+            assert!(window.near() < window.count() / 4);
+        }
+    }
+
+    #[test]
+    fn pixels_are_sorted_by_the_edges_they_see() {
+        let (picture, mut window) = (ramp(), Window::default());
+        let halves = [Vector2::new(30.0, 3.0), Vector2::new(-9.0, 28.0)];
+        window.collect(&picture, 256.0, &Frame { start: Point2::new(50.0, 50.0), halves, band_px: 5.0 });
+        let normals = halves.map(|v| Vector2::new(-v.y, v.x).normalize());
+        let across = |group: &Group, l: usize| normals.map(|n| n.dot(&Vector2::new(group.x[l], group.y[l])));
+        let each = |groups: &Groups, holds: &dyn Fn([f64; 2]) -> bool| {
+            assert!(groups.count > 50);
+            groups.groups.iter().all(|g| (0..LANES).all(|l| g.weight[l] == 0.0 || holds(across(g, l))))
+        };
+        assert!(each(&window.crossing, &|u| u.iter().all(|u| u.abs() <= 5.0)));
+        for (k, arms) in window.arms.iter().enumerate() {
+            assert!(each(&arms[0], &|u| u[k].abs() <= 5.0 && u[1 - k] < -5.0));
+            assert!(each(&arms[1], &|u| u[k].abs() <= 5.0 && u[1 - k] > 5.0));
+        }
+        let middle = |sums: &Matrix4<f64>| Vector2::new(sums[(0, 1)], sums[(0, 2)]) / sums[(0, 0)];
+        assert!(window.flat.iter().all(|sums| middle(sums).norm() < 1.0 && sums[(0, 0)] > 100.0));
+    }
+
+    #[test]
+    fn a_window_over_the_border_keeps_what_is_there() {
+        let picture = Image { width: 10, height: 10, pixels: vec![255u8; 100] };
+        let frame = Frame {
+            start: Point2::new(0.0, 0.0),
+            halves: [Vector2::new(5.0, 0.0), Vector2::new(0.0, 5.0)],
+            band_px: f64::MAX,
+        };
+        let mut window = Window::default();
+        window.collect(&picture, 256.0, &frame);
+        assert_eq!((window.count(), window.saturated), (36, 0));
+        window.collect(&picture, 255.0, &frame);
+        assert_eq!((window.count(), window.saturated), (0, 36));
+        window.collect(&picture, 255.0, &Frame { band_px: 1.5, ..frame });
+        assert_eq!((window.count(), window.saturated), (0, 36));
+        for start in [Point2::new(-50.0, 1e6), Point2::new(f64::NAN, f64::NAN), Point2::new(f64::INFINITY, 0.0)] {
+            window.collect(&picture, 256.0, &Frame { start, ..frame });
+            assert_eq!(window.count(), 0);
+        }
+    }
+}

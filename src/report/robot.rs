@@ -1,0 +1,133 @@
+//! A robot in words: the common arms, a chain as a person would describe it, a pose to hold against the pendant.
+
+use std::fmt::Write as _;
+
+use nalgebra::Vector3;
+
+use super::table::Table;
+use crate::formats::urdf::roll_pitch_yaw;
+use crate::geometry::{Transform, rotation_vector};
+use crate::robot::catalogue::{ARMS, Arm, PAPER};
+use crate::robot::{Joint, Robot};
+
+/// Angles that count as none, rad, and lengths, mm: a table's last digits.
+const NO_ANGLE_RAD: f64 = 1e-9;
+const NO_LENGTH_MM: f64 = 1e-6;
+
+/// All names with makers and sources.
+pub fn list() -> String {
+    let width = ARMS.iter().map(|a| a.name.len()).max().unwrap_or(0);
+    let mut text = String::new();
+    for arm in ARMS {
+        let _ = writeln!(text, "{:width$}  {}, {} joints; {}", arm.name, arm.title, arm.rows.len(), arm.source);
+    }
+    let _ = writeln!(text, "{PAPER:width$}  the robot of Table 1 of the paper, 6 joints; limits of a common arm");
+    text
+}
+
+/// Where an arm's numbers come from, and what to know about them.
+pub fn provenance(arm: &Arm) -> String {
+    let note = if arm.note.is_empty() { String::new() } else { format!("note: {}\n", arm.note) };
+    format!(
+        "source: {}\n{note}check: `stereocal robot show` at a few angles against the pendant, before anything is measured\n",
+        arm.source
+    )
+}
+
+/// The chain joint by joint.
+pub fn chain(robot: &Robot) -> String {
+    let mut text = format!("{}: {} joints\n", robot.name, robot.joints.len());
+    let mut table = Table::new(["joint", "alpha deg", "a mm", "beta deg", "theta deg", "d mm", "range deg"]);
+    let number = |v: f64| format!("{:.4}", v + 0.0);
+    for (i, j) in robot.joints.iter().enumerate() {
+        let range = j.limits_rad.map_or("any".to_owned(), |(low, high)| match j.slides {
+            true => format!("{low:.1} to {high:.1} mm"),
+            false => format!("{:.1} to {:.1}", low.to_degrees(), high.to_degrees()),
+        });
+        let angles = [j.alpha_rad, j.beta_rad, j.theta_rad].map(|a| number(a.to_degrees()));
+        let [alpha, beta, theta] = angles;
+        table.row([format!("{}", i + 1), alpha, number(j.a_mm), beta, theta, number(j.d_mm), range]);
+    }
+    let _ = write!(text, "{table}");
+    for (i, j) in robot.joints.iter().enumerate() {
+        let _ = writeln!(text, "joint {}: {}", i + 1, sentence(i, j));
+    }
+    for c in &robot.corrections.couplings {
+        let share = format!("{} times joint {}'s reading is added to joint {}'s", c.ratio, c.of + 1, c.joint + 1);
+        let _ = writeln!(text, "coupling: {share}");
+    }
+    let constant = |what: &str, t: &Transform| {
+        let place = t.translation.vector;
+        let turn = rotation_vector(t) * 1.0f64.to_degrees();
+        format!("{what}: ({:.4}, {:.4}, {:.4}) mm, turned by {:.4} deg\n", place.x, place.y, place.z, turn.norm())
+    };
+    if robot.ends.root_from_frame0 != Transform::identity() {
+        text += &constant("base (frame 0 in the root frame)", &robot.ends.root_from_frame0);
+    }
+    if robot.ends.last_frame_from_flange != Transform::identity() {
+        text += &constant("flange (in the last joint's frame)", &robot.ends.last_frame_from_flange);
+    }
+    text
+}
+
+fn sentence(index: usize, joint: &Joint) -> String {
+    let alpha = joint.alpha_rad;
+    let before = if index == 0 { "the base's z".to_owned() } else { format!("axis {index}") };
+    let lean = match (alpha.sin().abs() < NO_ANGLE_RAD && joint.beta_rad.abs() < NO_ANGLE_RAD, alpha.cos() > 0.0) {
+        (true, true) => format!("parallel to {before}"),
+        (true, false) => format!("opposite to {before}"),
+        (false, _) => {
+            let angle = (alpha.cos() * joint.beta_rad.cos()).clamp(-1.0, 1.0).acos().to_degrees();
+            let square = (angle - 90.0).abs() < 1e-6;
+            if square { format!("square to {before}") } else { format!("{angle:.3} deg from {before}") }
+        }
+    };
+    let offset = match joint.a_mm.abs() > NO_LENGTH_MM {
+        true => format!(", {:.3} mm off it", joint.a_mm.abs()),
+        false => String::new(),
+    };
+    let along = match joint.d_mm.abs() > NO_LENGTH_MM {
+        true => format!("; the next part starts {:.3} mm along it", joint.d_mm),
+        false => String::new(),
+    };
+    let kind = if joint.slides { "slides along an axis" } else { "turns about an axis" };
+    let sign = if joint.sign < 0.0 { ", counted against it" } else { "" };
+    format!("{kind} {lean}{offset}{sign}{along}")
+}
+
+/// Where the flange and the target point are at joint angles in degrees.
+pub fn pose(robot: &Robot, joints_deg: &[f64]) -> String {
+    let reading = |(joint, value): (&Joint, &f64)| if joint.slides { *value } else { value.to_radians() };
+    let joints: Vec<f64> = robot.joints.iter().zip(joints_deg).map(reading).collect();
+    let flange = robot.root_from_flange(&joints);
+    let tool = robot.ends.root_from_frame0 * robot.base_from_flange(&joints) * nalgebra::Point3::from(robot.tool_mm);
+    let angles: Vec<String> = joints_deg.iter().map(|d| format!("{d}")).collect();
+    let mut text =
+        format!("at joint readings {} (deg; mm where a joint slides), in the root frame:\n", angles.join(", "));
+    let place = |v: Vector3<f64>| format!("x {:.4}  y {:.4}  z {:.4} mm", v.x + 0.0, v.y + 0.0, v.z + 0.0);
+    let _ = writeln!(text, "flange   {}", place(flange.translation.vector));
+    let r = rotation_vector(&flange);
+    let _ = writeln!(text, "  rotation vector      rx {:.6}  ry {:.6}  rz {:.6} rad", r.x + 0.0, r.y + 0.0, r.z + 0.0);
+    let [roll, pitch, yaw] = roll_pitch_yaw(&flange.rotation).map(|a| a.to_degrees() + 0.0);
+    let _ = writeln!(
+        text,
+        "  about fixed x, y, z  {roll:.4}, {pitch:.4}, {yaw:.4} deg (KUKA: A {yaw:.4}, B {pitch:.4}, C {roll:.4})"
+    );
+    let q = flange.rotation.quaternion();
+    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+    let _ = writeln!(
+        text,
+        "  quaternion           w {:.6}  x {:.6}  y {:.6}  z {:.6}",
+        sign * q.w,
+        sign * q.i + 0.0,
+        sign * q.j + 0.0,
+        sign * q.k + 0.0
+    );
+    let _ = writeln!(text, "target   {}", place(tool.coords));
+    let past = robot.joints.iter().zip(&joints).enumerate().filter_map(|(i, (joint, q))| {
+        let (low, high) = joint.limits_rad?;
+        (*q < low || *q > high).then(|| format!("joint {} is outside of its range", i + 1))
+    });
+    past.for_each(|line| text += &format!("{line}\n"));
+    text
+}

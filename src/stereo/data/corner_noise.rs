@@ -1,0 +1,146 @@
+//! How far corners scatter: the refinement's own covariances, corrected by what the residuals say.
+//!
+//! `Sigma_i = s C_i + tau^2 I`: `C_i` is the refinement's covariance (zero where it gave none), `tau` covers what it does not
+//! know (blur, print, lens), `s < 1` shrinks covariances that were too large. One of the two is fitted, so that the
+//! reduced chi-square is one; then the covariance of every result needs no further factor.
+
+use nalgebra::{Matrix2, Vector2};
+
+use crate::statistics::median;
+use crate::stereo::data::observation::Observation;
+use crate::stereo::data::view::View;
+
+/// The noise model of all corners.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Factor on the refinement's covariances, at most 1.
+    pub factor: f64,
+    /// Standard deviation added to each coordinate, px.
+    pub added_px: f64,
+    /// Reduced chi-square with the refinement's covariances alone; `None` where there were none.
+    pub reduced_chi_square: Option<f64>,
+}
+
+/// Median of chi-square with two degrees of freedom, the squared length of a whitened 2-D residual.
+const MEDIAN_CHI_SQUARE_2: f64 = 2.0 * std::f64::consts::LN_2;
+
+/// Residuals below this are exact: synthetic corners without noise. It keeps weights finite.
+const FLOOR_PX: f64 = 1e-9;
+
+impl Noise {
+    /// Every corner alike, one px.
+    pub const UNIT: Noise = Noise { factor: 0.0, added_px: 1.0, reduced_chi_square: None };
+
+    /// Covariance of a corner, px^2.
+    pub fn covariance(&self, o: &Observation) -> Matrix2<f64> {
+        o.covariance_px2 * self.factor + Matrix2::identity() * (self.added_px * self.added_px)
+    }
+
+    /// The noise of corners whose variance is only in this share their own.
+    pub fn without_print(&self, own_share: f64) -> Noise {
+        Noise { factor: self.factor * own_share, added_px: self.added_px * own_share.sqrt(), ..*self }
+    }
+
+    /// Sets the whiteners of all corners.
+    pub fn apply(&self, views: &mut [View]) {
+        for o in views.iter_mut().flat_map(|view| &mut view.observations) {
+            o.whitener = whitener(&self.covariance(o));
+        }
+    }
+
+    /// Fitted to the median, so that up to half of the corners may be wrong. `residuals` are the active corners' in px.
+    pub fn from_median(residuals: &[(Observation, Vector2<f64>)]) -> Noise {
+        fit(residuals, |chi| {
+            let middle = chi.len() / 2;
+            *chi.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN_CHI_SQUARE_2
+        })
+    }
+
+    /// Fitted to the mean, with `unknowns` numbers fitted to the same residuals.
+    pub fn from_mean(residuals: &[(Observation, Vector2<f64>)], unknowns: usize) -> Noise {
+        let freedom = (2 * residuals.len()).saturating_sub(unknowns).max(1) as f64;
+        fit(residuals, |chi| chi.iter().sum::<f64>() / freedom)
+    }
+
+    /// Median over the corners of the standard deviation of a coordinate, px.
+    pub fn typical_px(&self, views: &[View]) -> f64 {
+        let active = views.iter().flat_map(|view| view.observations.iter().filter(|o| o.active));
+        median(active.map(|o| (self.covariance(o).trace() / 2.0).sqrt())).unwrap_or(self.added_px)
+    }
+}
+
+/// A residual along the axes of its corner's own covariance: squares, px^2, and the variances they come with.
+struct Aligned {
+    squares: [f64; 2],
+    variances: [f64; 2],
+}
+
+impl Aligned {
+    fn new(o: &Observation, residual: &Vector2<f64>) -> Aligned {
+        let eigen = o.covariance_px2.symmetric_eigen();
+        let along = eigen.eigenvectors.tr_mul(residual);
+        Aligned {
+            squares: [along.x * along.x, along.y * along.y],
+            variances: [eigen.eigenvalues[0], eigen.eigenvalues[1]],
+        }
+    }
+
+    /// Squared length in units of the covariance with `added` to both variances, px^2.
+    fn chi(&self, added: f64) -> f64 {
+        let floor = FLOOR_PX * FLOOR_PX;
+        self.squares[0] / (self.variances[0] + added).max(floor)
+            + self.squares[1] / (self.variances[1] + added).max(floor)
+    }
+}
+
+/// Finds the model whose `reduced` chi-square is one.
+fn fit(residuals: &[(Observation, Vector2<f64>)], reduced: impl Fn(&mut [f64]) -> f64) -> Noise {
+    if residuals.is_empty() {
+        return Noise::UNIT;
+    }
+    let mut plain: Vec<f64> = residuals.iter().map(|(_, r)| r.norm_squared()).collect();
+    let plain = reduced(&mut plain).max(FLOOR_PX * FLOOR_PX);
+    if residuals.iter().all(|(o, _)| o.covariance_px2.m11 == 0.0) {
+        return Noise { factor: 1.0, added_px: plain.sqrt(), reduced_chi_square: None };
+    }
+    let aligned: Vec<Aligned> = residuals.iter().map(|(o, r)| Aligned::new(o, r)).collect();
+    let with = |added: f64| reduced(&mut aligned.iter().map(|a| a.chi(added)).collect::<Vec<f64>>());
+    let known = residuals.iter().all(|(o, _)| o.covariance_px2.m11 > 0.0);
+    let own = known.then(|| with(0.0));
+    if let Some(own) = own.filter(|own| *own <= 1.0) {
+        let factor = own.max(f64::MIN_POSITIVE.sqrt());
+        return Noise { factor, added_px: 0.0, reduced_chi_square: Some(own) };
+    }
+    // With the covariances in, less than the plain scatter is missing: the root lies between zero and it. The inverse of the
+    // reduced chi-square is nearly a straight line in the added variance, which the secant follows; halving guards it.
+    let (mut low, mut high) = (0.0, plain);
+    let miss = |added: f64| 1.0 / with(added) - 1.0;
+    let (mut at_low, mut at_high) = (own.map_or(-1.0, |own| 1.0 / own - 1.0), miss(plain));
+    for round in 0..60 {
+        if at_high <= 0.0 || high - low <= 1e-9 * high {
+            break;
+        }
+        let secant = low - at_low * (high - low) / (at_high - at_low);
+        let middle = if round % 3 == 2 { 0.5 * (low + high) } else { secant.clamp(low, high) };
+        let at = miss(middle);
+        if at < 0.0 {
+            (low, at_low) = (middle, at)
+        } else {
+            (high, at_high) = (middle, at)
+        }
+        if at == 0.0 || (at.abs() < 1e-9) {
+            high = middle;
+            break;
+        }
+    }
+    Noise { factor: 1.0, added_px: high.sqrt().max(FLOOR_PX), reduced_chi_square: own }
+}
+
+/// `W` with `W' W = Sigma^-1`, from the Cholesky factor.
+fn whitener(covariance: &Matrix2<f64>) -> Matrix2<f64> {
+    let l11 = covariance.m11.sqrt();
+    let l21 = covariance.m12 / l11;
+    let l22 = (covariance.m22 - l21 * l21).max(0.0).sqrt();
+    let w = Matrix2::new(1.0 / l11, 0.0, -l21 / (l11 * l22), 1.0 / l22);
+    if w.iter().all(|v| v.is_finite()) { w } else { Matrix2::identity() / FLOOR_PX }
+}

@@ -1,0 +1,59 @@
+//! What a rig and its poses leave of the corners.
+
+use nalgebra::Vector2;
+
+use crate::geometry::Transform;
+use crate::imaging::Side;
+use crate::statistics::median;
+use crate::stereo::data::observation::Observation;
+use crate::stereo::data::view::View;
+use crate::stereo::model::parameters::{Shared, Values};
+
+/// Predicted minus seen, px. `None` for a corner behind its camera.
+pub fn residual_px(shared: &Shared, left_from_board: &Transform, o: &Observation) -> Option<Vector2<f64>> {
+    let in_left = left_from_board * o.board_point(&shared.shape_mm);
+    let (camera, point) = match o.side {
+        Side::Left => (&shared.rig.left, in_left),
+        Side::Right => (&shared.rig.right, shared.rig.right_from_left * in_left),
+    };
+    let in_front = point.z > 0.0;
+    in_front.then(|| camera.project(&point) - o.px).filter(|r| r.x.is_finite() && r.y.is_finite())
+}
+
+/// Residuals of all active corners, in the order of the views. `None` where one lies behind its camera.
+pub fn active(views: &[View], values: &Values) -> Option<Vec<(Observation, Vector2<f64>)>> {
+    views
+        .iter()
+        .zip(&values.poses)
+        .flat_map(|(view, pose)| view.observations.iter().filter(|o| o.active).map(move |o| (pose, o)))
+        .map(|(pose, o)| residual_px(&values.shared, pose, o).map(|r| (*o, r)))
+        .collect()
+}
+
+/// Residuals (px) of one pair's active corners, where they can be predicted.
+pub fn of_view(shared: &Shared, view: &View, pose: &Transform) -> Vec<(Observation, Vector2<f64>)> {
+    view.observations.iter().filter(|o| o.active).filter_map(|o| Some((*o, residual_px(shared, pose, o)?))).collect()
+}
+
+/// Root mean square of the length of the 2-D residuals of one picture's active corners, px, as OpenCV defines it.
+pub fn rms_px(shared: &Shared, left_from_board: &Transform, view: &View, side: Side) -> Option<f64> {
+    let squares = view
+        .active(side)
+        .map(|o| residual_px(shared, left_from_board, o).map(|r| r.norm_squared()))
+        .collect::<Option<Vec<f64>>>()?;
+    root_mean_square(&squares)
+}
+
+/// Median length of one picture's residuals, px.
+pub fn median_px(shared: &Shared, left_from_board: &Transform, view: &View, side: Side) -> Option<f64> {
+    let all = view
+        .active(side)
+        .map(|o| residual_px(shared, left_from_board, o).map(|r| r.norm()))
+        .collect::<Option<Vec<f64>>>()?;
+    median(all)
+}
+
+/// Root of the mean of squares; `None` of nothing.
+pub fn root_mean_square(squares: &[f64]) -> Option<f64> {
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}

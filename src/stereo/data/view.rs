@@ -1,0 +1,105 @@
+//! What one pair of pictures shows of the board.
+
+use nalgebra::Matrix2;
+
+use crate::imaging::{Board, Corner, PairCorners, Side};
+use crate::stereo::data::observation::Observation;
+use crate::stereo::model::board_shape::lift;
+
+/// How far a corner that was found but could not be measured may be off, px.
+const COARSE_PX: f64 = 1.0;
+
+/// What one pair of pictures shows of the board: left corners first, then right.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// Name of the pair.
+    pub pair: String,
+    /// Its corners.
+    pub observations: Vec<Observation>,
+}
+
+impl View {
+    /// The corners of a pair: those that imaging relies on, or, in a picture with fewer than `fewest` of them, all that it found.
+    /// A whole picture out of focus is judged by how it fits, with the covariances it has.
+    pub fn new(board: &Board, corners: &PairCorners, fewest: usize) -> View {
+        let of = |side, list: &[Corner]| -> Vec<Observation> {
+            let inside =
+                |c: &&Corner| c.col < board.columns() && c.row < board.rows() && c.px.iter().all(|v| v.is_finite());
+            let relied = list.iter().filter(|c| c.used).count();
+            list.iter()
+                .filter(inside)
+                .filter(|c| c.used || relied < fewest)
+                .map(|c| observation(board, side, c))
+                .collect()
+        };
+        let mut observations = of(Side::Left, &corners.left);
+        observations.extend(of(Side::Right, &corners.right));
+        View { pair: corners.pair.clone(), observations }
+    }
+
+    /// Active corners of one picture.
+    pub fn active(&self, side: Side) -> impl Iterator<Item = &Observation> + Clone {
+        self.observations.iter().filter(move |o| o.active && o.side == side)
+    }
+
+    /// Only the corners of one picture.
+    pub fn only(&self, side: Side) -> View {
+        let observations = self.observations.iter().copied().filter(|o| o.side == side).collect();
+        View { pair: self.pair.clone(), observations }
+    }
+
+    /// Renumbers the right picture's corners as on a board that is turned in its plane by so many quarter turns. A board with unequal
+    /// sides takes half turns only.
+    pub fn turn_right(&mut self, board: &Board, quarters: usize) {
+        for o in self.observations.iter_mut().filter(|o| o.side == Side::Right) {
+            let (col, row) = (o.col, o.row);
+            let (last_col, last_row) = (board.columns() - 1, board.rows() - 1);
+            let place = match quarters % 4 {
+                0 => (col, row),
+                1 => (last_row - row, col),
+                2 => (last_col - col, last_row - row),
+                _ => (row, last_col - col),
+            };
+            o.renumber(board, place);
+        }
+    }
+
+    /// The pair with its pictures exchanged.
+    pub fn exchanged(&self) -> View {
+        let mut exchanged = self.clone();
+        for o in &mut exchanged.observations {
+            o.side = o.side.other();
+        }
+        exchanged
+    }
+
+    /// The pair with about `most` corners a picture, spread over the board.
+    pub fn thinned(&self, most: usize) -> View {
+        let some = |side| {
+            let all: Vec<&Observation> = self.active(side).collect();
+            let count = all.len().min(most);
+            (0..count).map(|k| *all[k * all.len() / count]).collect::<Vec<_>>()
+        };
+        View { pair: self.pair.clone(), observations: Side::BOTH.into_iter().flat_map(some).collect() }
+    }
+}
+
+fn observation(board: &Board, side: Side, corner: &Corner) -> Observation {
+    let board_mm = board.corner_mm(corner.col, corner.row);
+    // A covariance that isn't one (not positive, not finite) says nothing: as if none had been given.
+    let covariance_px2 = corner
+        .covariance_px2
+        .filter(|c| c.iter().all(|v| v.is_finite()) && c.m11 > 0.0 && c.determinant() > 0.0)
+        .unwrap_or_else(|| if corner.used { Matrix2::zeros() } else { Matrix2::identity() * (COARSE_PX * COARSE_PX) });
+    Observation {
+        side,
+        col: corner.col,
+        row: corner.row,
+        board_mm,
+        lift: lift(board, &board_mm),
+        px: corner.px,
+        covariance_px2,
+        whitener: Matrix2::identity(),
+        active: true,
+    }
+}

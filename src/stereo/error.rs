@@ -1,0 +1,158 @@
+//! What can go wrong between corners and points.
+
+use crate::diagnostic::{Explain, Status};
+use crate::imaging::{Side, Skipped};
+
+/// What can go wrong between corners and points.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Not enough pairs to calibrate and to hold one out.
+    #[error("only {found} of {total} pairs can be used; calibration needs {needed}{}", list(.skipped))]
+    TooFewPairs {
+        /// Usable pairs.
+        found: usize,
+        /// Fewest pairs for a calibration.
+        needed: usize,
+        /// Pairs there were.
+        total: usize,
+        /// The others.
+        skipped: Vec<Skipped>,
+    },
+    /// Too few corners for so many unknowns.
+    #[error("{corners} corners give {} numbers for {unknowns} unknowns", 2 * .corners)]
+    TooFewCorners {
+        /// Corners that are no outliers.
+        corners: usize,
+        /// Unknowns.
+        unknowns: usize,
+    },
+    /// One camera's pictures fit no camera.
+    #[error("the corners in the {} pictures fit no camera", side.name())]
+    NoCamera {
+        /// Whose.
+        side: Side,
+    },
+    /// Most pairs do not belong to one rig.
+    #[error("the pairs contradict each other: only {agreeing} of {total} fit one rig{}", list(.bad))]
+    Contradiction {
+        /// Pairs that fit one rig.
+        agreeing: usize,
+        /// Pairs that were compared.
+        total: usize,
+        /// The others.
+        bad: Vec<Skipped>,
+    },
+    /// The rig changed, and too few pairs show the one that stands.
+    #[error("the rig changed: from pair {since} on it is another one, which {after} pairs show; calibration needs {needed}{}", list(.bad))]
+    SeriesChanged {
+        /// First pair of the rig that stands.
+        since: String,
+        /// Its pairs.
+        after: usize,
+        /// Fewest pairs for a calibration.
+        needed: usize,
+        /// The others.
+        bad: Vec<Skipped>,
+    },
+    /// The views do not tell the cameras.
+    #[error("the views are too similar to tell the cameras{}", focal(.focal_sigma))]
+    Undetermined {
+        /// Worst relative standard deviation of a focal length, where there is one.
+        focal_sigma: Option<f64>,
+    },
+    /// The search did not end at a minimum.
+    #[error("the calibration did not converge within {steps} steps")]
+    NotConverged {
+        /// Steps tried.
+        steps: usize,
+    },
+    /// Not one pose of a robot was measured.
+    #[error("the target was measured at none of {poses} poses")]
+    NothingMeasured {
+        /// Poses in the list.
+        poses: usize,
+    },
+    /// The rig is not the one that was calibrated, or the target not the one described.
+    #[error("{statement}")]
+    RigChanged {
+        /// What changed, and by how much.
+        statement: String,
+        /// What to do.
+        hint: &'static str,
+    },
+    /// A lens that another program has no words for.
+    #[error("the {lens} lens cannot be said in {format}'s format; it goes up to {most}")]
+    LensNotExportable {
+        /// The format.
+        format: &'static str,
+        /// The lens of the rig.
+        lens: &'static str,
+        /// The richest lens of the format.
+        most: &'static str,
+    },
+    /// Pictures of another size than the calibration's.
+    #[error("the {} pictures are {found_width}x{found_height} px, the calibration is for {width}x{height}", side.name())]
+    PictureSize {
+        /// Whose.
+        side: Side,
+        /// Found.
+        found_width: u32,
+        /// Found.
+        found_height: u32,
+        /// Needed.
+        width: u32,
+        /// Needed.
+        height: u32,
+    },
+}
+
+fn list(pairs: &[Skipped]) -> String {
+    pairs.iter().map(|s| format!("\n  {}: {}", s.pair, s.reason)).collect()
+}
+
+fn focal(sigma: &Option<f64>) -> String {
+    sigma.map_or(String::new(), |s| format!(": a focal length is known to {:.0} % only", 100.0 * s))
+}
+
+impl Explain for Error {
+    fn status(&self) -> Status {
+        match self {
+            Error::TooFewPairs { .. } | Error::PictureSize { .. } | Error::LensNotExportable { .. } => Status::BadInput,
+            _ => Status::Undetermined,
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        Some(
+            match self {
+                Error::TooFewPairs { .. } => {
+                    "photograph more pairs; `--squares CxR` must be the board's squares, not its inner corners"
+                }
+                Error::TooFewCorners { .. } => "photograph more pairs, or `--lens radial2` for fewer unknowns",
+                Error::NoCamera { .. } => "`--squares CxR` must be the board's squares, not its inner corners",
+                Error::Contradiction { .. } => {
+                    "trigger both cameras at once, clamp them and the board, and check that equal names belong together"
+                }
+                Error::SeriesChanged { .. } => {
+                    "photograph more pairs with the rig as it stands; pairs from before are another rig's and need a folder of their own"
+                }
+                Error::Undetermined { .. } => {
+                    "photograph the board tilted by 20 to 45 degrees about both of its axes, at several distances"
+                }
+                Error::NotConverged { .. } => "`--lens radial2` has fewer unknowns; add pairs with the board tilted",
+                Error::RigChanged { hint, .. } => hint,
+                Error::NothingMeasured { .. } => {
+                    "`--squares CxR` and `--square-mm MM` describe the target on the robot"
+                }
+                Error::LensNotExportable { most, .. } => {
+                    return Some(format!("calibrate with `--lens {most}`, or `--format opencv`"));
+                }
+                Error::PictureSize { .. } => {
+                    "calibrate with pictures of the same size and cut: `stereocal camera-check IMAGES`"
+                }
+            }
+            .to_owned(),
+        )
+    }
+}

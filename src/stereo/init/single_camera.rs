@@ -1,0 +1,147 @@
+//! Starting values: each camera alone, then where they stand to each other.
+//!
+//! In: views. Out: two cameras, `right_from_left`, a pose a pair, and each picture's own residual. Method: Zhang's focal length from
+//! the homographies, a bundle of one camera with a robust loss, the relative pose that most pairs agree with.
+//! Goes wrong: no picture tells the focal length (fronto-parallel boards only); then a few usual focal lengths are tried and
+//! the best fit is kept, and the covariance at the end says what it is worth.
+
+use nalgebra::{Matrix3, Point2};
+
+use crate::geometry::Transform;
+use crate::imaging::Side;
+use crate::statistics::median;
+use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::data::residuals::{self, median_px};
+use crate::stereo::data::view::View;
+use crate::stereo::init::board_pose;
+use crate::stereo::init::homography::{focal_lengths, homography, pixel_pairs, pose};
+use crate::stereo::model::board_shape::FLAT;
+use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::solve::levenberg_marquardt::{self, Search};
+use crate::stereo::solve::robust_loss::CAUCHY_WIDTH;
+use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::{Camera, Lens, Rig};
+
+/// Lens of the first fit: distortion that any picture determines.
+const FIRST_LENS: Lens = Lens::Radial2;
+
+/// Usual focal lengths as shares of the picture's longer side, for views that do not tell.
+const USUAL_FOCAL_SHARES: [f64; 4] = [0.6, 1.0, 2.0, 4.0];
+
+/// One camera, calibrated by itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OneCamera {
+    /// The camera.
+    pub camera: Camera,
+    /// `camera_from_board` of every view; `None` where the picture's corners are no board.
+    pub poses: Vec<Option<Transform>>,
+    /// Median length of the residuals of every view, px.
+    pub median_px: Vec<Option<f64>>,
+}
+
+/// Calibrates one camera from its pictures alone. `None` where no start leads anywhere.
+pub fn one_camera(views: &[View], side: Side, size: (u32, u32)) -> Option<OneCamera> {
+    // Seen by itself, either camera is the left one of a rig without a right one.
+    let pictures: Vec<View> = views.iter().map(|view| as_left(view, side)).collect();
+    let center = Point2::new((f64::from(size.0) - 1.0) / 2.0, (f64::from(size.1) - 1.0) / 2.0);
+    let homographies: Vec<Option<(Matrix3<f64>, f64)>> =
+        pictures.iter().map(|view| homography(&pixel_pairs(view.active(Side::Left)))).collect();
+    let good = well_formed(&homographies);
+    let chosen: Vec<Matrix3<f64>> = good.iter().filter_map(|&i| homographies[i].map(|(h, _)| h)).collect();
+    let longer = f64::from(size.0.max(size.1));
+    let mut focals: Vec<(f64, f64)> = focal_lengths(&chosen, &center).into_iter().collect();
+    if !focals.iter().any(|(fx, fy)| (0.2..50.0).contains(&(fx / longer)) && (0.5..2.0).contains(&(fx / fy))) {
+        focals.extend(USUAL_FOCAL_SHARES.map(|share| (share * longer, share * longer)));
+    }
+    focals
+        .into_iter()
+        .filter_map(|(fx, fy)| {
+            let mut camera = Camera::pinhole(size.0, size.1, fx);
+            camera.fy = fy;
+            camera.lens = FIRST_LENS;
+            from_focal_length(&pictures, &homographies, &good, camera)
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, one)| one)
+}
+
+/// The corners of one picture as those of a left one: seen by itself, either camera is the left one of a rig without a right one.
+pub fn as_left(view: &View, side: Side) -> View {
+    let mut picture = view.only(side);
+    for o in &mut picture.observations {
+        o.side = Side::Left;
+    }
+    picture
+}
+
+/// Pictures whose corners look like a board: those whose homography leaves no more than a few times the median.
+/// Lens distortion leaves something in all of them; corners in a wrong order leave tens of times more.
+fn well_formed(homographies: &[Option<(Matrix3<f64>, f64)>]) -> Vec<usize> {
+    let limit = median(homographies.iter().flatten().map(|(_, rms)| *rms)).map_or(0.0, |usual| 5.0 * usual);
+    (0..homographies.len()).filter(|&i| homographies[i].is_some_and(|(_, rms)| rms <= limit)).collect()
+}
+
+/// The bundle of one camera from this start; with its cost, to compare starts.
+fn from_focal_length(
+    pictures: &[View],
+    homographies: &[Option<(Matrix3<f64>, f64)>],
+    good: &[usize],
+    camera: Camera,
+) -> Option<(f64, OneCamera)> {
+    let inverse = camera.matrix().try_inverse()?;
+    let start_of = |i: usize| homographies[i].and_then(|(h, _)| pose(&(inverse * h)));
+    let mut chosen: Vec<(usize, Transform)> = good.iter().filter_map(|&i| Some((i, start_of(i)?))).collect();
+    let mut views: Vec<View> = chosen.iter().map(|&(i, _)| pictures[i].clone()).collect();
+    let rig = Rig { left: camera, right: camera, right_from_left: Transform::identity(), covariance: None };
+    let poses = chosen.iter().map(|(_, pose)| *pose).collect();
+    let mut values = Values { shared: Shared { rig, shape_mm: FLAT }, poses };
+    let mut cost = f64::INFINITY;
+    for lens in [FIRST_LENS, FIRST_LENS, Lens::Brown4] {
+        values.shared.rig.left.lens = lens;
+        let noise = Noise::from_median(&residuals::active(&views, &values)?);
+        noise.apply(&mut views);
+        let loss = Loss::Cauchy(CAUCHY_WIDTH);
+        values = levenberg_marquardt::solve(&views, &Layout::one_camera(lens), values, loss, Search::ROUGH).values;
+        cost = residuals::active(&views, &values).map(|r| Noise::from_median(&r).added_px)?;
+    }
+    (views, values) = with_the_others(pictures, &mut chosen, views, values);
+    cost = residuals::active(&views, &values).map(|r| Noise::from_median(&r).added_px).unwrap_or(cost);
+    let camera = values.shared.rig.left;
+    let mut poses = vec![None; pictures.len()];
+    for ((i, _), pose) in chosen.iter().zip(&values.poses) {
+        poses[*i] = Some(*pose);
+    }
+    let median_px = (0..pictures.len())
+        .map(|i| poses[i].and_then(|pose| median_px(&values.shared, &pose, &pictures[i], Side::Left)))
+        .collect();
+    Some((cost, OneCamera { camera, poses, median_px }))
+}
+
+/// The camera on all pictures: those that bend too much for a homography have one once the lens is known. Nothing is rejected here; the
+/// loss is robust.
+fn with_the_others(
+    pictures: &[View],
+    chosen: &mut Vec<(usize, Transform)>,
+    mut views: Vec<View>,
+    mut values: Values,
+) -> (Vec<View>, Values) {
+    let others: Vec<usize> = (0..pictures.len()).filter(|i| chosen.iter().all(|(known, _)| known != i)).collect();
+    if others.is_empty() {
+        return (views, values);
+    }
+    for i in others {
+        if let Some(fit) = board_pose::fit(&values.shared, &pictures[i], Loss::Cauchy(CAUCHY_WIDTH)) {
+            chosen.push((i, fit.left_from_board));
+            views.push(pictures[i].clone());
+            values.poses.push(fit.left_from_board);
+        }
+    }
+    for _ in 0..2 {
+        let Some(left) = residuals::active(&views, &values) else { break };
+        Noise::from_median(&left).apply(&mut views);
+        let layout = Layout::one_camera(values.shared.rig.left.lens);
+        let loss = Loss::Cauchy(CAUCHY_WIDTH);
+        values = levenberg_marquardt::solve(&views, &layout, values, loss, Search::ROUGH).values;
+    }
+    (views, values)
+}

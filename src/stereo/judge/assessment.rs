@@ -1,0 +1,128 @@
+//! All that was asked of a calibration: held-out lengths, a second board, residuals, models, coverage, and the verdict.
+
+use crate::stereo::calibrate::Calibration;
+use crate::stereo::judge::evidence::{self, Evidence, Facts};
+use crate::stereo::judge::held_out::Accuracy;
+use crate::stereo::judge::length_uncertainty::Volume;
+use crate::stereo::judge::model_disagreement::{self, Disagreement};
+use crate::stereo::judge::residual_correlation::{self, ResidualPattern};
+use crate::stereo::judge::second_board::SecondBoard;
+use crate::stereo::judge::verdict::{Expansion, Verdict};
+use crate::stereo::judge::view_coverage::Coverage;
+
+/// A calibration with everything that was asked of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    /// The tolerance, mm.
+    pub tolerance_mm: f64,
+    /// Pass, fail or undecided: the worst line of the evidence.
+    pub verdict: Verdict,
+    /// Every fact with its limit; the held-out lengths first.
+    pub evidence: Vec<Evidence>,
+    /// Held-out accuracy.
+    pub accuracy: Accuracy,
+    /// A second board.
+    pub second: Option<SecondBoard>,
+    /// Whether the residuals are noise.
+    pub residual_pattern: ResidualPattern,
+    /// Lens models that disagree.
+    pub disagreements: Vec<Disagreement>,
+    /// Lengths of the long range over the working volume.
+    pub volume: Volume,
+    /// What to photograph next, where the views are too few or too much alike.
+    pub advice: Vec<String>,
+    /// What else a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// What lengths are judged by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Demand {
+    /// The largest error that passes, mm.
+    pub tolerance_mm: f64,
+    /// Expanded uncertainty (k = 2) of the boards' own lengths, as certified, mm.
+    pub board_uncertainty_mm: Option<f64>,
+}
+
+impl Judged {
+    /// Judges.
+    pub fn new(calibration: &Calibration, accuracy: Accuracy, second: Option<SecondBoard>, demand: &Demand) -> Judged {
+        let tolerance_mm = demand.tolerance_mm;
+        let residual_pattern = residual_correlation::check(calibration);
+        let volume = Volume::new(calibration, accuracy.long_mm[0]);
+        let disagreements = model_disagreement::find(calibration, &volume);
+        let coverage = Coverage::of(calibration, &residual_pattern);
+        let evidence = evidence::ledger(&Facts {
+            calibration,
+            accuracy: &accuracy,
+            second: second.as_ref(),
+            volume: &volume,
+            residual_pattern: &residual_pattern,
+            disagreements: &disagreements,
+            coverage: &coverage,
+            tolerance_mm,
+            expansion: Expansion::new(calibration.pair_scatter.groups, demand.board_uncertainty_mm),
+        });
+        let mut warnings = Vec::from_iter(calibration.rig().unusual());
+        // The held-out lengths are the result itself and stand in its first line.
+        let doubts = evidence.iter().skip(1).filter(|line| line.allows != Verdict::Pass);
+        warnings.extend(doubts.map(|line| format!("{}: {}. {}", line.what, line.figure(), capital(&line.detail))));
+        warnings.extend(print_scatter(calibration, &accuracy));
+        Judged {
+            tolerance_mm,
+            verdict: evidence::verdict(&evidence),
+            evidence,
+            accuracy,
+            second,
+            residual_pattern,
+            disagreements,
+            volume,
+            advice: coverage.advice(),
+            warnings,
+        }
+    }
+
+    /// The line of the ledger that decides: the worst, and of several that are equally bad the one farthest beyond its limit.
+    pub fn deciding(&self) -> Option<&Evidence> {
+        let beyond = |line: &Evidence| line.value.zip(line.limit).map_or(f64::INFINITY, |(value, limit)| value / limit);
+        let worst = self.evidence.iter().filter(|line| line.allows == self.verdict);
+        match self.verdict {
+            // Nothing speaks against it: the lengths themselves decide.
+            Verdict::Pass => self.evidence.first(),
+            _ => worst.max_by(|a, b| beyond(a).total_cmp(&beyond(b))),
+        }
+    }
+
+    /// The tolerance that this rig would meet as far as lengths go, mm; `None` where something else than a length stands against it.
+    pub fn trusted_mm(&self) -> Option<f64> {
+        let (lengths, others): (Vec<&Evidence>, Vec<&Evidence>) =
+            self.evidence.iter().filter(|line| line.limit.is_some()).partition(|line| line.unit == "mm");
+        let bounds = lengths.iter().map(|line| line.value).collect::<Option<Vec<f64>>>()?;
+        let epipolar = |line: &Evidence| line.unit == "px";
+        let free = others.iter().all(|line| line.allows == Verdict::Pass || epipolar(line));
+        free.then(|| bounds.into_iter().fold(0.0, f64::max)).filter(|mm| mm.is_finite())
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or_else(String::new, |first| first.to_uppercase().chain(chars).collect())
+}
+
+/// Says where it is the board that scatters and not the corners: both pictures then see the same deviations.
+fn print_scatter(calibration: &Calibration, accuracy: &Accuracy) -> Option<String> {
+    /// Of independent corners the mean of thousands of points lies within a tenth of one.
+    const SHARED: f64 = 0.25;
+    if accuracy.rays_chi_square > SHARED {
+        return None;
+    }
+    let depths = calibration.values.poses.iter().map(|pose| pose.translation.vector.z);
+    let depth_mm = depths.sum::<f64>() / calibration.values.poses.len().max(1) as f64;
+    let sigma_px = calibration.noise.typical_px(&calibration.views);
+    Some(format!(
+        "left and right picture agree on the corners {:.0} times better than the residuals let expect: what scatters is the places of the corners on the \
+         board, by about {:.4} mm each, not what the cameras see of them. A better board, not more pictures, would lower the errors",
+        1.0 / accuracy.rays_chi_square.sqrt(),
+        sigma_px * depth_mm / calibration.rig().left.fx
+    ))
+}

@@ -1,0 +1,186 @@
+//! How far lengths on the board come out wrong, measured by cameras that have not seen the pair (Fig. 6 of the paper).
+//!
+//! In: a calibration. Out: the errors of every range, a pair and in all, and the largest of them. Method: k folds over the pairs; each
+//! fold's rig triangulates the corners of the pairs it was not calibrated with. The board's pitch sets the scale, so that a wrong
+//! pitch is invisible here: only a second board shows it.
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::stereo::calibrate::Calibration;
+use crate::stereo::data::view::View;
+use crate::stereo::judge::doubtful_corners::{self, DoubtfulCorners};
+use crate::stereo::judge::lengths::{self, Axis, Measured, Range, all_ranges, mean, measure};
+use crate::stereo::judge::verdict::{Expansion, Extremes, Verdict};
+use crate::stereo::model::rig::Covariance;
+use crate::stereo::select::cross_validation::{self, FOLDS, Without};
+use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::solve::{levenberg_marquardt, uncertainty};
+use crate::stereo::triangulate::RigCovariance;
+use crate::stereo::{Error, Rig};
+
+/// The short and the long range of Fig. 6 (b), in squares: 10 and 70 mm on the paper's board.
+const SHORT_SQUARES: usize = 1;
+const LONG_SQUARES: usize = 7;
+
+/// One pair as measured by cameras that have not seen it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldOutPair {
+    /// Its name.
+    pub pair: String,
+    /// Mean error of the short range along x, mm; `None` where no such length was seen.
+    pub mean_error_x_short_mm: Option<f64>,
+    /// Along y.
+    pub mean_error_y_short_mm: Option<f64>,
+    /// Mean error of the long range along x, mm.
+    pub mean_error_x_long_mm: Option<f64>,
+    /// Along y.
+    pub mean_error_y_long_mm: Option<f64>,
+    /// Largest absolute error of any range, mm.
+    pub max_abs_error_mm: f64,
+    /// Root mean square of the distance between the two rays of a corner, mm.
+    pub gap_rms_mm: f64,
+    /// Errors of the long range, x then y, mm: Fig. 6 (a).
+    pub long_errors_mm: Vec<f64>,
+}
+
+/// The accuracy of a rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Accuracy {
+    /// The length errors that decide.
+    pub extremes: Extremes,
+    /// Mean over all points of what both rays leave, chi-square with one degree of freedom: one where the pictures disagree as
+    /// much as the corners scatter, less where both see the same deviations from the board.
+    pub rays_chi_square: f64,
+    /// Distance of corners from the epipolar lines of their partners.
+    pub epipolar: EpipolarError,
+    /// Corners that say less than the others.
+    pub doubtful: DoubtfulCorners,
+    /// Number of folds.
+    pub folds: usize,
+    /// What leaving out each fold does to the shared numbers.
+    pub fold_steps: Vec<DVector<f64>>,
+    /// Lengths of the short and the long range, mm, along x and y alike where the board allows.
+    pub short_mm: [f64; 2],
+    /// Long range along x and y, mm.
+    pub long_mm: [f64; 2],
+    /// Every range, x first, from the shortest.
+    pub ranges: Vec<Range>,
+    /// Every pair.
+    pub pairs: Vec<HeldOutPair>,
+}
+
+impl Accuracy {
+    /// What the held-out pairs say.
+    pub fn verdict(&self, tolerance_mm: f64) -> Verdict {
+        self.extremes.verdict(tolerance_mm)
+    }
+}
+
+/// Distance of corners from the epipolar lines of their partners.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct EpipolarError {
+    /// Root mean square, px.
+    pub rms_px: f64,
+    /// Largest, px.
+    pub max_px: f64,
+}
+
+/// The rigs that measured: one a fold.
+struct Folds {
+    of_pair: Vec<usize>,
+    rigs: Vec<Rig>,
+    covariances: Vec<RigCovariance>,
+    steps: Vec<DVector<f64>>,
+}
+
+/// Holds out every pair once, together with those of similar poses, and measures it. `board_mm` is the expanded uncertainty of the board's lengths.
+///
+/// An error where the pairs without some of them do not determine the cameras.
+pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accuracy, Error> {
+    let undetermined = || Error::Undetermined { focal_sigma: None };
+    let folds = folds(calibration).ok_or_else(undetermined)?;
+    let mut measured: Vec<Measured> = calibration
+        .views
+        .par_iter()
+        .enumerate()
+        .map(|(i, view)| measure(&folds.rigs[folds.of_pair[i]], &calibration.board, view))
+        .collect();
+    let names: Vec<&str> = calibration.views.iter().map(|view| view.pair.as_str()).collect();
+    let usual_px = calibration.noise.typical_px(&calibration.views);
+    let doubtful = doubtful_corners::leave_out(&mut measured, &names, usual_px);
+    summarise(calibration, folds, &measured, doubtful, board_mm).ok_or_else(undetermined)
+}
+
+/// The rigs without each fold, with covariances that allow for the same as the final one's.
+fn folds(calibration: &Calibration) -> Option<Folds> {
+    let Calibration { views, values, layout, .. } = calibration;
+    let blocks = levenberg_marquardt::blocks(views, layout, values, Loss::Squared)?;
+    let of_pair = cross_validation::folds(views, &values.poses, FOLDS);
+    let without = cross_validation::leave_out(&blocks, layout, &values.shared, &of_pair);
+    let without = without.into_iter().collect::<Option<Vec<Without>>>()?;
+    let inflation = calibration.neighbours.inflation();
+    let by_noise = uncertainty::of_blocks(&blocks, layout)?.shared * inflation;
+    let more = &calibration.uncertainty.shared - by_noise;
+    let covariance = |w: &Without| {
+        let matrix = &w.covariance * inflation + &more;
+        RigCovariance::new(&Covariance { order: layout.names(), matrix })
+    };
+    Some(Folds {
+        of_pair,
+        covariances: without.iter().map(covariance).collect(),
+        rigs: without.iter().map(|w| w.shared.rig.clone()).collect(),
+        steps: without.into_iter().map(|w| w.step).collect(),
+    })
+}
+
+fn summarise(
+    calibration: &Calibration,
+    folds: Folds,
+    measured: &[Measured],
+    doubtful: DoubtfulCorners,
+    board_mm: Option<f64>,
+) -> Option<Accuracy> {
+    let board = &calibration.board;
+    let largest = |squares: usize, corners: usize| squares.min(corners - 1);
+    let short = [SHORT_SQUARES; 2];
+    let long = [largest(LONG_SQUARES, board.columns()), largest(LONG_SQUARES, board.rows())];
+    let pairs = calibration.views.iter().zip(measured).map(|(view, m)| pair(view, m, short, long)).collect();
+    let expansion = Expansion::new(calibration.pair_scatter.groups, board_mm);
+    Some(Accuracy {
+        extremes: lengths::extremes(measured, |i| folds.covariances.get(folds.of_pair[i]), expansion)?,
+        rays_chi_square: mean(&measured.iter().flat_map(|m| &m.points).map(|p| p.chi_square).collect::<Vec<_>>())?,
+        epipolar: epipolar(calibration.rig(), measured)?,
+        doubtful,
+        folds: folds.rigs.len(),
+        fold_steps: folds.steps,
+        short_mm: short.map(|s| s as f64 * board.square_mm),
+        long_mm: long.map(|s| s as f64 * board.square_mm),
+        ranges: all_ranges(board, measured),
+        pairs,
+    })
+}
+
+/// From the gap between two rays, as large as it looks from the left camera; doubtful corners are left out.
+fn epipolar(rig: &Rig, measured: &[Measured]) -> Option<EpipolarError> {
+    let sure = measured.iter().flat_map(|m| m.points.iter().zip(&m.doubtful)).filter(|(_, doubtful)| !**doubtful);
+    let misses: Vec<f64> = sure.map(|(p, _)| p.gap_mm.abs() * rig.left.fx / p.point_mm.z).collect();
+    let squares: Vec<f64> = misses.iter().map(|px| px * px).collect();
+    Some(EpipolarError { rms_px: mean(&squares)?.sqrt(), max_px: misses.into_iter().fold(0.0, f64::max) })
+}
+
+fn pair(view: &View, measured: &Measured, short: [usize; 2], long: [usize; 2]) -> HeldOutPair {
+    let mean_of = |axis, squares| mean(&measured.errors(axis, squares).collect::<Vec<_>>());
+    let gaps: Vec<f64> = measured.points.iter().map(|p| p.gap_mm * p.gap_mm).collect();
+    HeldOutPair {
+        pair: view.pair.clone(),
+        mean_error_x_short_mm: mean_of(Axis::X, short[0]),
+        mean_error_y_short_mm: mean_of(Axis::Y, short[1]),
+        mean_error_x_long_mm: mean_of(Axis::X, long[0]),
+        mean_error_y_long_mm: mean_of(Axis::Y, long[1]),
+        max_abs_error_mm: measured.worst_mm(),
+        gap_rms_mm: mean(&gaps).unwrap_or(0.0).sqrt(),
+        long_errors_mm: measured.errors(Axis::X, long[0]).chain(measured.errors(Axis::Y, long[1])).collect(),
+    }
+}

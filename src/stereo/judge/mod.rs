@@ -1,0 +1,16 @@
+//! How good the rig is: lengths that were held out, a second board, what the residuals show, what the views lack, and the verdict.
+
+pub mod assessment;
+pub mod doubtful_corners;
+pub mod evidence;
+pub mod field_of_corners;
+pub mod held_out;
+pub mod length_uncertainty;
+pub mod lengths;
+pub mod model_disagreement;
+pub mod residual_correlation;
+pub mod second_board;
+#[cfg(test)]
+mod tests;
+pub mod verdict;
+pub mod view_coverage;

@@ -1,0 +1,158 @@
+//! Faults planted in corners of known worlds: each must be noticed and named by a line of the ledger, and clean corners by none.
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use crate::geometry::transform;
+use crate::imaging::{Corner, Corners};
+use crate::stereo::calibrate::calibrate;
+use crate::stereo::judge::assessment::{Demand, Judged};
+use crate::stereo::judge::held_out;
+use crate::stereo::judge::second_board::second_board;
+use crate::stereo::judge::verdict::Verdict;
+use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::synthetic::World;
+
+/// Corners of 0.004 px on this rig: lengths to some 0.03 mm.
+const SIGMA_PX: f64 = 0.004;
+const TOLERANCE_MM: f64 = 0.05;
+
+fn world(pairs: usize, seed: u64) -> World {
+    World { sigma_px: SIGMA_PX, ..World::new(pairs, seed) }
+}
+
+fn judge_with(corners: &Corners, second: Option<&Corners>) -> Judged {
+    let found = calibrate(corners, &Options::default()).unwrap();
+    let accuracy = held_out::hold_out(&found, None).unwrap();
+    let second = second.map(|corners| second_board(&found, corners, None));
+    let demand = Demand { tolerance_mm: TOLERANCE_MM, board_uncertainty_mm: None };
+    Judged::new(&found, accuracy, second, &demand)
+}
+
+fn judge(corners: &Corners) -> Judged {
+    judge_with(corners, None)
+}
+
+fn line<'a>(judged: &'a Judged, what: &str) -> &'a super::evidence::Evidence {
+    judged.evidence.iter().find(|line| line.what == what).unwrap()
+}
+
+/// Moves every corner by what `change` says, given the pair, whether it is left, and the corner.
+fn changed(mut corners: Corners, change: impl Fn(usize, bool, &mut Corner)) -> Corners {
+    for (i, pair) in corners.pairs.iter_mut().enumerate() {
+        pair.left.iter_mut().for_each(|corner| change(i, true, corner));
+        pair.right.iter_mut().for_each(|corner| change(i, false, corner));
+    }
+    corners
+}
+
+#[test]
+fn clean_corners_pass_without_a_warning() {
+    for (pairs, seed) in [(12, 51), (20, 52), (7, 53)] {
+        let judged = judge(&world(pairs, seed).corners(seed));
+        assert_eq!(judged.verdict, Verdict::Pass, "{pairs} pairs: {:#?}", judged.evidence);
+        assert!(judged.warnings.is_empty(), "{:?}", judged.warnings);
+        assert!(judged.trusted_mm().is_some_and(|mm| mm <= TOLERANCE_MM));
+    }
+}
+
+#[test]
+fn an_s_shaped_board_does_not_pass() {
+    let world = world(14, 54);
+    let edge = world.board.corner_mm(world.board.columns() - 1, 0).x;
+    for height_mm in [0.05, 0.2] {
+        let corners = changed(world.corners(55), |i, left, corner| {
+            let flat = world.board.corner_mm(corner.col, corner.row);
+            let u = flat.x / edge;
+            let bent = flat + Vector3::new(0.0, 0.0, 2.6 * height_mm * (u.powi(3) - u));
+            let seen = |p| world.rig.project(&(world.poses[i] * p));
+            let (a, b) = (seen(flat), seen(bent));
+            corner.px += if left { b.0 - a.0 } else { b.1 - a.1 };
+        });
+        let judged = judge(&corners);
+        assert_ne!(judged.verdict, Verdict::Pass, "{height_mm} mm: {:#?}", judged.evidence);
+        assert!(line(&judged, "residual correlation").value.is_some_and(|mm| mm > 0.02), "{:#?}", judged.evidence);
+    }
+}
+
+#[test]
+fn boards_that_are_hardly_tilted_do_not_pass() {
+    let mut world = world(12, 56);
+    for (i, pose) in world.poses.iter_mut().enumerate() {
+        let turn = Vector3::new(0.004 * (i % 3) as f64, 0.17 + 0.003 * (i % 4) as f64, 0.05 * i as f64 - 0.3);
+        *pose = transform(turn, pose.translation.vector);
+    }
+    let judged = judge(&world.corners(57));
+    assert_eq!(line(&judged, "tilts of the boards").allows, Verdict::Undecided);
+    assert_eq!(judged.verdict, Verdict::Undecided, "{:#?}", judged.evidence);
+}
+
+#[test]
+fn few_pairs_are_said_to_be_few() {
+    let judged = judge(&world(4, 58).corners(59));
+    assert_eq!(line(&judged, "pairs with poses of their own").allows, Verdict::Undecided);
+    assert_eq!(judged.verdict, Verdict::Undecided);
+}
+
+#[test]
+fn a_hand_in_two_pictures_is_named_and_no_error_of_the_rig() {
+    let world = world(12, 60);
+    // Imaging may know how bad these corners are, or not.
+    for said_px in [0.3, SIGMA_PX] {
+        let corners = changed(world.corners(61), |i, left, corner| {
+            if !left && (i == 2 || i == 5) && corner.row < 2 && corner.col < 4 {
+                let place = (corner.row * 7 + corner.col) as f64;
+                corner.px += 0.4 * Vector2::new((3.0 * place).sin(), (5.0 * place + 1.0).sin());
+                corner.covariance_px2 = Some(Matrix2::identity() * said_px * said_px);
+            }
+        });
+        let judged = judge(&corners);
+        assert_eq!(judged.verdict, Verdict::Pass, "{said_px}: {:#?}", judged.evidence);
+        let said = judged.evidence.iter().map(|line| line.detail.as_str()).collect::<Vec<_>>().join("\n");
+        assert!(said.contains("02 (") && said.contains("05 ("), "{said}");
+    }
+}
+
+#[test]
+fn a_second_board_of_another_pitch_fails_and_one_that_cannot_be_measured_does_not_pass() {
+    let world = world(12, 62);
+    let corners = world.corners(63);
+    let fresh = World { poses: World::new(5, 64).poses, ..world.clone() };
+    let of_pitch = |factor: f64| {
+        let mut second = fresh.corners(65);
+        second.board.square_mm *= factor;
+        second
+    };
+    assert_eq!(judge_with(&corners, Some(&of_pitch(1.0))).verdict, Verdict::Pass);
+    // 0.2 % of the board's width of 150 mm is 0.3 mm.
+    for factor in [1.002, 1.005, 1.01] {
+        let judged = judge_with(&corners, Some(&of_pitch(factor)));
+        assert_eq!(line(&judged, "second board").allows, Verdict::Fail, "{factor}: {:#?}", judged.evidence);
+    }
+    // A camera that was turned by 0.2 degrees since.
+    let mut moved = fresh.clone();
+    moved.rig.right_from_left = transform(Vector3::new(0.0, 0.0035, 0.0), Vector3::zeros()) * moved.rig.right_from_left;
+    let judged = judge_with(&corners, Some(&moved.corners(66)));
+    assert_eq!(line(&judged, "second board").allows, Verdict::Fail, "{:#?}", judged.evidence);
+    let mut nothing = of_pitch(1.0);
+    nothing.pairs.iter_mut().for_each(|pair| pair.right.clear());
+    let judged = judge_with(&corners, Some(&nothing));
+    assert_eq!(line(&judged, "second board").allows, Verdict::Undecided);
+    assert_eq!(judged.verdict, Verdict::Undecided);
+}
+
+#[test]
+fn last_pairs_that_contradict_the_rig_leave_open_whether_it_stands() {
+    let world = world(10, 67);
+    let mut corners = world.corners(68);
+    let mut moved = world.clone();
+    moved.rig.right_from_left = transform(Vector3::new(0.0, 0.01, 0.0), Vector3::zeros()) * moved.rig.right_from_left;
+    corners.pairs[9].right = moved.corners(68).pairs[9].right.clone();
+    let judged = judge(&corners);
+    assert_eq!(
+        line(&judged, "last pairs that contradict the rig").allows,
+        Verdict::Undecided,
+        "{:#?}",
+        judged.evidence
+    );
+    assert_ne!(judged.verdict, Verdict::Pass);
+}

@@ -1,0 +1,116 @@
+//! Do the views differ enough to tell the cameras, and what should be photographed next?
+//!
+//! In: a calibration. Out: how the views are spread, and advice where something is missing. Tilt separates the focal length from the distance; corners near
+//! the borders determine the lens; different distances separate the lens from the focal length.
+
+use nalgebra::Vector3;
+
+use crate::imaging::Side;
+use crate::stereo::calibrate::Calibration;
+use crate::stereo::judge::residual_correlation::{CELLS, Field, ResidualPattern};
+
+/// Tilts between the boards below this leave the focal length to the distortion, deg.
+const LEAST_TILT_DEG: f64 = 15.0;
+
+/// Distances that differ by less than this share are one distance.
+const LEAST_DEPTH_SHARE: f64 = 0.05;
+
+/// Share of the cells of a picture that should have seen a corner.
+const LEAST_COVERAGE: f64 = 0.6;
+
+/// Corners in a cell that make it seen.
+const SEEN: usize = 3;
+
+/// Pairs below which a calibration's own uncertainty rests on too little: a fold then leaves out a tenth or more of all views.
+pub const ENOUGH_PAIRS: usize = 10;
+
+/// How the views are spread.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coverage {
+    /// Pairs that were used.
+    pub pairs: usize,
+    /// Range of the boards' tilts about the horizontal and the vertical axis, deg.
+    pub tilts_deg: [f64; 2],
+    /// Nearest and farthest board, mm.
+    pub depths_mm: [f64; 2],
+    /// Share of each picture that corners reached, left and right.
+    pub field_shares: [f64; 2],
+    /// Where most of each picture's empty cells lie.
+    empty: [&'static str; 2],
+}
+
+impl Coverage {
+    /// Looks how the views are spread.
+    pub fn of(calibration: &Calibration, residual_pattern: &ResidualPattern) -> Coverage {
+        let poses = &calibration.values.poses;
+        let range = |values: &mut dyn Iterator<Item = f64>| {
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], t| [l.min(t), h.max(t)])
+        };
+        let normals: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.rotation * Vector3::z()).collect();
+        let tilts_deg = [1usize, 0].map(|axis| {
+            let [low, high] = range(&mut normals.iter().map(|n| n[axis].atan2(n.z).to_degrees()));
+            high - low
+        });
+        let fields = [&residual_pattern.fields[0], &residual_pattern.fields[1]];
+        let field_shares = fields.map(|field| {
+            let seen = field.cells.iter().filter(|c| c.corners >= SEEN).count();
+            seen as f64 / field.cells.len().max(1) as f64
+        });
+        Coverage {
+            pairs: calibration.views.len(),
+            tilts_deg,
+            depths_mm: range(&mut poses.iter().map(|pose| pose.translation.vector.z)),
+            field_shares,
+            empty: fields.map(empty_region),
+        }
+    }
+
+    /// What should be photographed next; empty where the views suffice.
+    pub fn advice(&self) -> Vec<String> {
+        let mut advice = Vec::new();
+        let pairs = self.pairs;
+        if pairs < ENOUGH_PAIRS {
+            advice.push(format!(
+                "only {pairs} pairs could be used: {} more make the held-out figures reliable",
+                ENOUGH_PAIRS - pairs
+            ));
+        }
+        for (name, tilt) in [("horizontal", self.tilts_deg[0]), ("vertical", self.tilts_deg[1])] {
+            if tilt < LEAST_TILT_DEG {
+                advice.push(format!(
+                    "the boards' tilts about the {name} axis differ by {tilt:.0} degrees only: add pairs tilted by 20 to 45 degrees both ways"
+                ));
+            }
+        }
+        let [near, far] = self.depths_mm;
+        if far - near < LEAST_DEPTH_SHARE * far {
+            advice.push(format!(
+                "all boards stand {near:.0} to {far:.0} mm away: add pairs nearer and farther by a tenth"
+            ));
+        }
+        for (side, (share, empty)) in Side::BOTH.into_iter().zip(self.field_shares.into_iter().zip(self.empty)) {
+            if share < LEAST_COVERAGE {
+                advice.push(format!(
+                    "corners reach {:.0} % of the {} picture: add pairs with the board {empty}",
+                    100.0 * share,
+                    side.name(),
+                ));
+            }
+        }
+        advice
+    }
+}
+
+/// Where most of the empty cells lie.
+fn empty_region(field: &Field) -> &'static str {
+    let empty = |inside: fn(usize, usize) -> bool| {
+        field.cells.iter().enumerate().filter(|(i, cell)| inside(i % CELLS, i / CELLS) && cell.corners < SEEN).count()
+    };
+    let regions: [(&'static str, usize); 4] = [
+        ("at the left border", empty(|x, _| 3 * x < CELLS)),
+        ("at the right border", empty(|x, _| 3 * (CELLS - 1 - x) < CELLS)),
+        ("at the upper border", empty(|_, y| 3 * y < CELLS)),
+        ("at the lower border", empty(|_, y| 3 * (CELLS - 1 - y) < CELLS)),
+    ];
+    regions.into_iter().max_by_key(|(_, count)| *count).map_or("at the borders", |(name, _)| name)
+}

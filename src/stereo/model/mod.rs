@@ -1,0 +1,7 @@
+//! What is looked for: cameras with their lenses, the rig, the board's shape, and which of their numbers are free.
+
+pub mod board_shape;
+pub mod camera;
+pub mod parameters;
+pub mod projection;
+pub mod rig;

@@ -1,0 +1,115 @@
+//! Two cameras and where they stand to each other.
+
+use nalgebra::{DMatrix, Point2, Point3};
+
+use crate::geometry::Transform;
+use crate::imaging::{Corners, Side};
+use crate::stereo::{Camera, Error};
+
+/// A calibrated pair of cameras.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rig {
+    /// The left camera, the reference frame of every point.
+    pub left: Camera,
+    /// The right camera.
+    pub right: Camera,
+    /// Maps the left camera's frame to the right camera's.
+    pub right_from_left: Transform,
+    /// Joint covariance of the rig's parameters, where known.
+    pub covariance: Option<Covariance>,
+}
+
+/// A covariance matrix with names: `left.fx`, `right.k1`, `right_from_left.rx_rad`, ...
+#[derive(Debug, Clone, PartialEq)]
+pub struct Covariance {
+    /// Names of rows and columns.
+    pub order: Vec<String>,
+    /// The matrix, in the squares of the parameters' units.
+    pub matrix: DMatrix<f64>,
+}
+
+impl Rig {
+    /// The camera of a side.
+    pub fn camera(&self, side: Side) -> &Camera {
+        match side {
+            Side::Left => &self.left,
+            Side::Right => &self.right,
+        }
+    }
+
+    /// Distance of the two cameras' centres, mm.
+    pub fn baseline_mm(&self) -> f64 {
+        self.right_from_left.translation.vector.norm()
+    }
+
+    /// What is unusual in how the cameras stand, where something is: the left one on the right side, one rolled against the other. Both
+    /// may be meant, and no residual tells: a rig whose folders are exchanged, or with all pictures of one side turned, is a rig.
+    pub fn unusual(&self) -> Option<String> {
+        let rotation = crate::geometry::rotation_matrix(&self.right_from_left);
+        let roll_deg = rotation[(1, 0)].atan2(rotation[(1, 1)]).to_degrees();
+        if roll_deg.abs() > 45.0 {
+            return Some(format!(
+                "the right camera is rolled by {:.0} degrees against the left one: were the pictures of one side turned? \
+                 Use the files as the cameras wrote them; if the cameras stand so, all is well",
+                roll_deg.abs()
+            ));
+        }
+        let right_mm = self.right_from_left.inverse().translation.vector;
+        // Of cameras one above the other, or one behind the other, neither is the left one.
+        let exchanged = right_mm.x < -right_mm.y.abs().max(right_mm.z.abs());
+        exchanged.then(|| {
+            format!(
+                "the left camera stands {:.1} mm to the right of the right one: are left and right exchanged? Exchange the folders' \
+                 names; if the cameras are only named so, all is well",
+                -right_mm.x
+            )
+        })
+    }
+
+    /// Pictures of another size than the calibration's were binned, cut or taken by other cameras.
+    pub fn check_size(&self, corners: &Corners) -> Result<(), Error> {
+        for (side, camera, found) in
+            [(Side::Left, &self.left, corners.left_size), (Side::Right, &self.right, corners.right_size)]
+        {
+            let (width, height) = (camera.width, camera.height);
+            if found != (width, height) {
+                let (found_width, found_height) = found;
+                return Err(Error::PictureSize { side, found_width, found_height, width, height });
+            }
+        }
+        Ok(())
+    }
+
+    /// Raw picture points, left and right, of a point in the left camera's frame, px.
+    pub fn project(&self, point_mm: &Point3<f64>) -> (Point2<f64>, Point2<f64>) {
+        (self.left.project(point_mm), self.right.project(&(self.right_from_left * point_mm)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::geometry::transform;
+
+    fn unusual(turn: Vector3<f64>, right_mm: Vector3<f64>) -> Option<String> {
+        let camera = Camera::pinhole(640, 480, 800.0);
+        let left_from_right = transform(turn, right_mm);
+        Rig { left: camera, right: camera, right_from_left: left_from_right.inverse(), covariance: None }.unusual()
+    }
+
+    #[test]
+    fn exchanged_and_rolled_rigs_are_said_and_others_are_not() {
+        let inward = Vector3::new(0.02, -0.6, 0.05);
+        assert_eq!(unusual(inward, Vector3::new(200.0, 5.0, 60.0)), None);
+        assert!(unusual(-inward, Vector3::new(-200.0, 5.0, 60.0)).is_some_and(|w| w.contains("exchanged")));
+        // One above the other, and one that looks over the other's shoulder.
+        assert_eq!(unusual(Vector3::zeros(), Vector3::new(-20.0, 90.0, 0.0)), None);
+        assert_eq!(unusual(Vector3::zeros(), Vector3::new(-20.0, 0.0, -90.0)), None);
+        for roll in [1.6, -1.5, 3.1] {
+            let rolled = unusual(Vector3::new(0.0, 0.0, roll), Vector3::new(-200.0, 0.0, 0.0));
+            assert!(rolled.is_some_and(|w| w.contains("rolled")));
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! The pairs that may make up a rig: those with a board in both pictures, each once.
+
+use rayon::prelude::*;
+
+use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
+use crate::stereo::Error;
+use crate::stereo::data::view::View;
+use crate::stereo::init::homography::FEWEST_CORNERS;
+use crate::stereo::init::single_camera::{self, OneCamera};
+use crate::stereo::pairs::discarded::too_few_pairs;
+use crate::stereo::pairs::{Cause, DiscardedPair, FEWEST_PAIRS};
+
+/// Pairs to choose from, in the order in which they were taken, with each camera on its own pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidates {
+    /// The board.
+    pub board: Board,
+    /// The pairs as they were read.
+    pub views: Vec<View>,
+    /// The left and the right camera on their own pictures.
+    pub cameras: [OneCamera; 2],
+    /// Width of the wider picture, px.
+    pub width_px: u32,
+    /// Pairs that are none.
+    pub discarded: Vec<DiscardedPair>,
+}
+
+impl Candidates {
+    /// Gathers them.
+    pub fn new(corners: &Corners) -> Result<Candidates, Error> {
+        let not_found = |s: &crate::imaging::Skipped| DiscardedPair::new(&s.pair, Cause::NoBoard, s.reason.clone());
+        let mut discarded: Vec<DiscardedPair> = corners.skipped.iter().map(not_found).collect();
+        let mut views = Vec::new();
+        let fewest = FEWEST_CORNERS.max(fewest_corners(&corners.board));
+        for (i, pair) in corners.pairs.iter().enumerate() {
+            if let Some(first) = corners.pairs[..i].iter().find(|first| same_corners(first, pair)) {
+                let reason = format!("the same pictures as pair {}", first.pair);
+                discarded.push(DiscardedPair::new(&pair.pair, Cause::Duplicate, reason));
+                continue;
+            }
+            let view = View::new(&corners.board, pair, fewest);
+            let [left, right] = Side::BOTH.map(|side| view.active(side).count());
+            if left.min(right) < fewest {
+                let reason = format!("too few corners: {left} left, {right} right");
+                discarded.push(DiscardedPair::new(&view.pair, Cause::NoBoard, reason));
+            } else {
+                views.push(view);
+            }
+        }
+        if views.len() < FEWEST_PAIRS {
+            return Err(too_few_pairs(views.len(), &discarded));
+        }
+        let sizes = [corners.left_size, corners.right_size];
+        let cameras: Vec<Option<OneCamera>> = Side::BOTH
+            .into_par_iter()
+            .map(|side| single_camera::one_camera(&views, side, sizes[side as usize]))
+            .collect();
+        let of = |side: Side| cameras[side as usize].clone().ok_or(Error::NoCamera { side });
+        let cameras = [of(Side::Left)?, of(Side::Right)?];
+        Ok(Candidates { board: corners.board, views, cameras, width_px: sizes[0].0.max(sizes[1].0), discarded })
+    }
+}
+
+/// True for corners of the same pictures: no two pictures have the same noise.
+fn same_corners(a: &PairCorners, b: &PairCorners) -> bool {
+    let same = |a: &[Corner], b: &[Corner]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.px == b.px);
+    same(&a.left, &b.left) && same(&a.right, &b.right)
+}
+
+/// A quarter of the board tells its pose well enough.
+fn fewest_corners(board: &Board) -> usize {
+    board.corner_count().div_ceil(4).min(12)
+}

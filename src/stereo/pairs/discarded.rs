@@ -1,0 +1,135 @@
+//! What was seen and is no part of the calibration, with its causes.
+
+use serde::Serialize;
+
+use crate::imaging::{Side, Skipped};
+use crate::stereo::Error;
+use crate::stereo::data::view::View;
+use crate::stereo::pairs::FEWEST_PAIRS;
+
+/// What happened to a pair that is not used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Cause {
+    /// No board was found in one of its pictures, or too little of it.
+    NoBoard,
+    /// It is another pair once more.
+    Duplicate,
+    /// A picture's corners form no board: misread, blurred, or taken in motion or line by line.
+    Misshapen,
+    /// Many of its corners contradict the rig although the others fit.
+    CornersLost,
+    /// Its corners are numbered from another end of the board in one picture than in the other.
+    Numbering,
+    /// Left and right are exchanged, or a picture is turned or mirrored.
+    Altered,
+    /// Its pictures belong to different pairs.
+    Mismatched,
+    /// The board or a camera moved between its two pictures.
+    NotSimultaneous,
+    /// The board is another one, of another pitch.
+    OtherBoard,
+    /// Before or after this pair a camera was moved.
+    CameraMoved,
+    /// Before or after this pair the focal length of a camera changed.
+    Zoomed,
+}
+
+/// A pair that is not used.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DiscardedPair {
+    /// Its name.
+    pub pair: String,
+    /// What happened to it.
+    pub cause: Cause,
+    /// The same for a person, with figures.
+    pub reason: String,
+}
+
+impl DiscardedPair {
+    /// A pair and what happened to it.
+    pub fn new(pair: &str, cause: Cause, reason: String) -> DiscardedPair {
+        DiscardedPair { pair: pair.to_owned(), cause, reason }
+    }
+
+    /// Without the cause.
+    pub fn skipped(&self) -> Skipped {
+        Skipped { pair: self.pair.clone(), reason: self.reason.clone() }
+    }
+}
+
+/// Corners of one picture of a pair that is used.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PictureCorners {
+    /// The pair.
+    pub pair: String,
+    /// Which of its pictures.
+    #[serde(skip)]
+    pub side: Side,
+    /// Corners that imaging relies on.
+    pub seen: usize,
+    /// How many of them lie too far from the rig's prediction for their own scatter.
+    pub rejected: usize,
+}
+
+/// All that was seen and is not used.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Discarded {
+    /// Pairs in all, used or not.
+    pub pairs_in_all: usize,
+    /// Pairs that are not used, by name.
+    pub pairs: Vec<DiscardedPair>,
+    /// The pictures of the pairs that are used.
+    pub pictures: Vec<PictureCorners>,
+}
+
+impl Discarded {
+    /// What is not used beside the views that are.
+    pub fn new(used: &[View], pairs: Vec<DiscardedPair>) -> Discarded {
+        let pictures = used.iter().flat_map(|view| {
+            Side::BOTH.map(|side| {
+                let seen = view.observations.iter().filter(|o| o.side == side).count();
+                PictureCorners { pair: view.pair.clone(), side, seen, rejected: seen - view.active(side).count() }
+            })
+        });
+        Discarded { pairs_in_all: used.len() + pairs.len(), pictures: pictures.collect(), pairs }
+    }
+
+    /// Share of the corners in the used pairs that were rejected.
+    pub fn corner_share(&self) -> f64 {
+        let (seen, rejected) = self.pictures.iter().fold((0, 0), |(s, r), p| (s + p.seen, r + p.rejected));
+        rejected as f64 / seen.max(1) as f64
+    }
+
+    /// The picture that lost the largest share of its corners, where one lost any.
+    pub fn worst_picture(&self) -> Option<&PictureCorners> {
+        let share = |p: &PictureCorners| p.rejected as f64 / p.seen.max(1) as f64;
+        self.pictures.iter().filter(|p| p.rejected > 0).max_by(|a, b| share(a).total_cmp(&share(b)))
+    }
+
+    /// Share of the pairs that were seen, with a board in both pictures, and contradict the others.
+    pub fn contradicting_share(&self) -> f64 {
+        let contradicts = |p: &&DiscardedPair| {
+            !matches!(p.cause, Cause::NoBoard | Cause::Duplicate | Cause::CameraMoved | Cause::Zoomed)
+        };
+        self.pairs.iter().filter(contradicts).count() as f64 / self.pairs_in_all.max(1) as f64
+    }
+}
+
+/// Which pairs the rig is that of. A rig that changed while it was photographed is two rigs; the one that stands now is the last.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Standing {
+    /// The first pair of the rig that stands now, where there was another before it.
+    pub since: Option<String>,
+    /// Pairs of rigs that stood before.
+    pub pairs_before: usize,
+    /// The last pairs, where they contradict the rig: it may no longer stand.
+    pub unconfirmed: Vec<String>,
+}
+
+/// Too few pairs, with what happened to the others.
+pub fn too_few_pairs(found: usize, discarded: &[DiscardedPair]) -> Error {
+    let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
+    Error::TooFewPairs { found, needed: FEWEST_PAIRS, total: found + skipped.len(), skipped }
+}

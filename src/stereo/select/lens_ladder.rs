@@ -1,0 +1,102 @@
+//! Which lens model, and whether the board is flat: what predicts pairs that it has not seen.
+//!
+//! In: views that agree. Out: the layout to solve, and how each lens of the ladder predicts held-out pairs. Method: k folds over the
+//! pairs ([`crate::stereo::select::cross_validation`]); the rig of a fold measures the pose of each pair it has not seen, and what is left counts. The simplest model whose
+//! loss is within two standard errors of the best wins (after Breiman et al. 1984), since a richer one extrapolates worse.
+//! Goes wrong: pairs too few or too alike to tell models apart; then the simplest that fits wins, and
+//! [`crate::stereo::judge::model_disagreement`] says what is at stake.
+
+use crate::stereo::model::parameters::{Layout, Values};
+use crate::stereo::select::model_comparison::{LensScore, score, simplest};
+use crate::stereo::solve::levenberg_marquardt;
+use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::solve::uncertainty;
+use crate::stereo::{Error, Lens};
+
+/// What may be forced.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Options {
+    /// The lens; chosen by held-out pairs where `None`.
+    pub lens: Option<Lens>,
+    /// Whether the board's shape is free; decided by held-out pairs where `None`.
+    pub shape: Option<bool>,
+}
+
+/// What was chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// What is free.
+    pub layout: Layout,
+    /// Values near the minimum of that model, where it was tried.
+    pub near: Option<Values>,
+    /// Every lens of the ladder; empty where the lens was forced.
+    pub scores: Vec<LensScore>,
+}
+
+/// Chooses what is free, where it is not forced.
+pub fn choose(start: &Problem, options: &Options) -> Result<Choice, Error> {
+    let forced_shape = options.shape.or(options.lens.map(|_| false));
+    if let (Some(lens), Some(shape)) = (options.lens, forced_shape) {
+        return Ok(Choice { layout: Layout::rig(lens, shape), near: None, scores: Vec::new() });
+    }
+    // Weights and outliers from a model that is at least as rich as most need; the comparison uses the same for all.
+    let rich_fit = |shape| start.solve(&Layout::rig(Lens::Brown5, shape));
+    let solved = rich_fit(forced_shape.unwrap_or(true))
+        .or_else(|_| rich_fit(forced_shape.unwrap_or(false)))
+        .or_else(|_| start.solve(&Layout::rig(Lens::Brown4, false)))
+        .map_err(|e| match e {
+            // Not even the simplest search ends: the pairs leave a valley, not a minimum.
+            Error::NotConverged { .. } => Error::Undetermined { focal_sigma: None },
+            other => other,
+        })?;
+    // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
+    let bent = forced_shape.unwrap_or(true);
+    let mut scores = ladder(&solved.problem, bent);
+    if forced_shape.is_none() && scores.iter().all(|s| s.trial.is_none()) {
+        scores = ladder(&solved.problem, false);
+    }
+    let chosen = simplest(&scores).ok_or(Error::Undetermined { focal_sigma: None })?;
+    if forced_shape.is_none() && chosen.layout.shape {
+        let flat = chosen.layout.left.and_then(|lens| score(&solved.problem, lens, false).trial);
+        let bends = flat.is_none_or(|flat| flat.excess_over(chosen) > 0.0);
+        if !bends {
+            scores = ladder(&solved.problem, false);
+        }
+    }
+    let chosen = simplest(&scores).ok_or(Error::Undetermined { focal_sigma: None })?;
+    Ok(Choice { layout: chosen.layout, near: Some(chosen.values.clone()), scores })
+}
+
+/// Every lens from the simplest, each from where the one before it ended: a richer lens begins as the simpler one. Above a lens that
+/// the pairs do not determine there is none that they do, and one that is expected to gain no more than chance cannot predict better.
+fn ladder(problem: &Problem, shape: bool) -> Vec<LensScore> {
+    let mut problem = problem.clone();
+    let (mut determined, mut simpler) = (true, None);
+    let mut scores = Vec::new();
+    for lens in Lens::LADDER {
+        let layout = Layout::rig(lens, shape);
+        let rich = lens > Lens::Brown5;
+        let tried = determined && !(rich && simpler.is_some_and(|simpler| !expects_gain(&problem, &layout, &simpler)));
+        let score = if tried { score(&problem, lens, shape) } else { LensScore::untried(lens) };
+        match &score.trial {
+            Some(trial) => {
+                problem.values = trial.values.clone();
+                simpler = Some(layout);
+            }
+            None => determined = determined && !tried,
+        }
+        scores.push(score);
+    }
+    scores
+}
+
+/// Whether a richer lens can be expected to explain more than noise would let it: more than two standard deviations above the mean of
+/// a chi-square with as many degrees of freedom as it adds. Of a lens that cannot be determined nothing is expected.
+fn expects_gain(problem: &Problem, layout: &Layout, simpler: &Layout) -> bool {
+    let start = problem.with_layout(layout);
+    let expected = levenberg_marquardt::blocks(&start.views, layout, &start.values, Loss::Squared)
+        .and_then(|blocks| uncertainty::expected_decrease(&blocks, layout));
+    let added = (layout.count() - simpler.count()) as f64;
+    expected.is_some_and(|expected| expected > added + 2.0 * (2.0 * added).sqrt())
+}

@@ -1,0 +1,7 @@
+//! Which model: what predicts pairs that it has not seen, and how much the pairs differ about it.
+
+pub mod cross_validation;
+pub mod lens_ladder;
+pub mod model_comparison;
+pub mod pair_scatter;
+pub mod stated_uncertainty;

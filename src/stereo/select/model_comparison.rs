@@ -1,0 +1,149 @@
+//! Models calibrated with all pairs, and compared by how they predict pairs that they have not seen.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::geometry::Transform;
+use crate::stereo::Lens;
+use crate::stereo::data::residuals::residual_px;
+use crate::stereo::data::view::View;
+use crate::stereo::init::board_pose;
+use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::select::cross_validation::{self, FOLDS};
+use crate::stereo::solve::levenberg_marquardt;
+use crate::stereo::solve::normal_equations::Block;
+use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::solve::uncertainty::{self, determines_cameras};
+
+/// Standard errors by which a richer model must predict better: one is what half of the useless terms reach by chance when the
+/// best of several is taken.
+const STANDARD_ERRORS: f64 = 2.0;
+
+/// How a model predicts pairs it has not seen.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct LensScore {
+    /// The lens.
+    pub model: &'static str,
+    /// Root mean square of the held-out 2-D residuals, px; `None` where the pairs do not determine the lens, or it promised nothing.
+    pub held_out_rms_px: Option<f64>,
+    /// Mean over the pairs of the squared whitened residual a corner.
+    pub loss: Option<f64>,
+    /// Calibrated with all pairs, where they determine it.
+    #[serde(skip)]
+    pub trial: Option<Trial>,
+}
+
+/// A model calibrated with all pairs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// What was free.
+    pub layout: Layout,
+    /// Rig, shape and poses.
+    pub values: Values,
+    /// Covariance of rig and shape.
+    pub covariance: DMatrix<f64>,
+    /// Sum of the squared whitened residuals of the pairs it was fitted to.
+    chi_square: f64,
+    /// The held-out loss of each pair.
+    by_pair: Vec<f64>,
+}
+
+impl LensScore {
+    /// A lens that was not tried, or that the pairs do not determine.
+    pub fn untried(lens: Lens) -> LensScore {
+        LensScore { model: lens.name(), held_out_rms_px: None, loss: None, trial: None }
+    }
+}
+
+/// The simplest model within two standard errors of the best.
+pub fn simplest(scores: &[LensScore]) -> Option<&Trial> {
+    let trials = || scores.iter().filter_map(|s| s.trial.as_ref());
+    let best = trials().min_by(|a, b| a.loss().total_cmp(&b.loss()))?;
+    trials().find(|trial| trial.excess_over(best) <= 0.0)
+}
+
+impl Trial {
+    /// A model calibrated with all pairs and held against none. `None` where the pairs do not determine it.
+    pub fn new(problem: &Problem, layout: Layout) -> Option<Trial> {
+        Some(Trial::with_blocks(problem, layout)?.0)
+    }
+
+    /// The model at its minimum, with the normal equations there.
+    fn with_blocks(problem: &Problem, layout: Layout) -> Option<(Trial, Vec<Block>)> {
+        let values = problem.refit(&layout)?;
+        let views = &problem.views;
+        let blocks = levenberg_marquardt::blocks(views, &layout, &values, Loss::Squared)?;
+        let covariance = uncertainty::of_blocks(&blocks, &layout)?.shared;
+        if !determines_cameras(&covariance, &layout, &values.shared.rig) {
+            return None;
+        }
+        let chi_square = 2.0 * blocks.iter().map(|block| block.cost).sum::<f64>();
+        Some((Trial { layout, values, covariance, chi_square, by_pair: Vec::new() }, blocks))
+    }
+
+    /// Sum of the squared whitened residuals of the pairs it was fitted to.
+    pub fn chi_square(&self) -> f64 {
+        self.chi_square
+    }
+
+    fn loss(&self) -> f64 {
+        self.by_pair.iter().sum::<f64>() / self.by_pair.len() as f64
+    }
+
+    /// How much worse than `best` beyond what chance makes of the pairs' differences; no number where pairs were not held out.
+    pub fn excess_over(&self, best: &Trial) -> f64 {
+        let differences: Vec<f64> = self.by_pair.iter().zip(&best.by_pair).map(|(a, b)| a - b).collect();
+        let n = differences.len() as f64;
+        let mean = differences.iter().sum::<f64>() / n;
+        let variance = differences.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>() / (n - 1.0).max(1.0);
+        mean - STANDARD_ERRORS * (variance / n).sqrt()
+    }
+}
+
+/// A lens calibrated with all pairs, and how it predicts pairs that it has not seen.
+pub fn score(problem: &Problem, lens: Lens, shape: bool) -> LensScore {
+    hold_out(problem, Layout::rig(lens, shape)).map_or(LensScore::untried(lens), |(trial, rms_px)| LensScore {
+        held_out_rms_px: Some(rms_px),
+        loss: Some(trial.loss()),
+        trial: Some(trial),
+        ..LensScore::untried(lens)
+    })
+}
+
+/// The model with all pairs and, fold by fold, on those it has not seen. `None` where the pairs do not determine it.
+fn hold_out(problem: &Problem, layout: Layout) -> Option<(Trial, f64)> {
+    // A lens that all pairs together do not determine is none.
+    let (trial, blocks) = Trial::with_blocks(problem, layout)?;
+    let views = &problem.views;
+    let fold_of = cross_validation::folds(views, &trial.values.poses, FOLDS);
+    let rigs = cross_validation::leave_out(&blocks, &layout, &trial.values.shared, &fold_of);
+    let rigs = rigs.into_iter().map(|without| Some(without?.shared)).collect::<Option<Vec<Shared>>>()?;
+    let misses: Vec<Option<Miss>> =
+        views.par_iter().enumerate().map(|(i, view)| miss(&rigs[fold_of[i]], view, trial.values.poses[i])).collect();
+    let misses = misses.into_iter().collect::<Option<Vec<Miss>>>()?;
+    let squares: f64 = misses.iter().map(|miss| miss.squares_px2).sum();
+    let corners: u32 = misses.iter().map(|miss| miss.corners).sum();
+    let by_pair = misses.iter().map(|miss| miss.loss).collect();
+    Some((Trial { by_pair, ..trial }, (squares / f64::from(corners.max(1))).sqrt()))
+}
+
+struct Miss {
+    squares_px2: f64,
+    corners: u32,
+    loss: f64,
+}
+
+/// What a rig leaves of a pair that it has not seen; `near` is a pose close to the pair's.
+fn miss(shared: &Shared, view: &View, near: Transform) -> Option<Miss> {
+    let fit = board_pose::follow(shared, view, near)?;
+    let mut sum = Miss { squares_px2: 0.0, corners: 0, loss: 0.0 };
+    for o in view.observations.iter().filter(|o| o.active) {
+        let r = residual_px(shared, &fit.left_from_board, o)?;
+        sum.squares_px2 += r.norm_squared();
+        sum.loss += o.whiten(r).norm_squared();
+        sum.corners += 1;
+    }
+    sum.loss /= f64::from(sum.corners.max(1));
+    sum.loss.is_finite().then_some(sum)
+}

@@ -1,0 +1,115 @@
+//! Do the pairs scatter about the common rig as much as their corners' noise lets expect, and the covariance that allows for more.
+//!
+//! In: the normal equations of all pairs at their minimum, the groups of pairs with nearly the same pose, and the covariance by the corners'
+//! noise. Out: the ratio of the scatter found to the one expected, and the covariance. Method: the jackknife over groups (the
+//! group-clustered sandwich with its small-sample correction, CR3 of Bell and McCaffrey 2002) holds whatever hangs together within
+//! a pair: a lens, a board or light that the model lacks. Some ten groups know a scatter in some twenty directions badly, so that it is
+//! shrunk towards its mean (Ledoit and Wolf 2004), and taken only where it is larger than what the corners' noise gives.
+//! Goes wrong: groups without which the others do not determine the cameras; then there is no ratio, and nothing is enlarged.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use crate::stereo::select::cross_validation::Without;
+use crate::stereo::solve::normal_equations::Block;
+
+/// How the pairs scatter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PairScatter {
+    /// Groups of pairs with poses of their own.
+    pub groups: usize,
+    /// Variance of the shared numbers by the groups' scatter over the one by the corners' noise, mean over all directions; `None` where
+    /// not every group can be left out.
+    pub ratio: Option<f64>,
+}
+
+/// The covariance of the shared numbers that allows for how the groups scatter; `by_noise` is the one by the corners' noise, `inflation` the
+/// factor in it over the normal equations' own.
+pub fn covariance(
+    by_noise: &DMatrix<f64>,
+    inflation: f64,
+    blocks: &[Block],
+    group_of: &[usize],
+    without: &[Option<Without>],
+) -> (DMatrix<f64>, PairScatter) {
+    let unknown = PairScatter { groups: without.len(), ratio: None };
+    let all: Option<Vec<&Without>> = without.iter().map(Option::as_ref).collect();
+    match all.and_then(|all| enlarge(by_noise, inflation, blocks, group_of, &all)) {
+        Some((covariance, ratio)) => (covariance, PairScatter { groups: without.len(), ratio: Some(ratio) }),
+        None => (by_noise.clone(), unknown),
+    }
+}
+
+fn enlarge(
+    by_noise: &DMatrix<f64>,
+    inflation: f64,
+    blocks: &[Block],
+    group_of: &[usize],
+    without: &[&Without],
+) -> Option<(DMatrix<f64>, f64)> {
+    let (n, groups) = (by_noise.nrows(), without.len());
+    if groups < 2 || n == 0 {
+        return None;
+    }
+    let (root, inverse_root) = roots(by_noise)?;
+    let correction = (groups - 1) as f64 / groups as f64;
+    // What the noise alone makes of the jackknife: groups that weigh much in a direction stretch it.
+    let mut expected = 0.0;
+    let own = by_noise / inflation;
+    let steps: Vec<DVector<f64>> =
+        without.iter().map(|w| &inverse_root * &w.step * (groups as f64 * correction).sqrt()).collect();
+    for (group, without) in without.iter().enumerate() {
+        let mut information = DMatrix::zeros(n, n);
+        for (block, _) in blocks.iter().zip(group_of).filter(|(_, of)| **of == group) {
+            information += block.reduced(0.0)?.0;
+        }
+        let gradient = &information - &information * &own * &information;
+        let step = &inverse_root * &without.covariance;
+        expected += inflation * correction * (&step * gradient * step.transpose()).trace();
+    }
+    let scatter = steps.iter().fold(DMatrix::zeros(n, n), |sum, x| sum + x * x.transpose()) / groups as f64;
+    let stretch = (expected / n as f64).max(1.0);
+    let ratio = scatter.trace() / n as f64 / stretch;
+    let shrunk = shrunk(&scatter, &steps) / stretch;
+    let eigen = shrunk.symmetric_eigen();
+    let larger = eigen.eigenvalues.map(|v| v.max(1.0));
+    let factor = &eigen.eigenvectors * DMatrix::from_diagonal(&larger) * eigen.eigenvectors.transpose();
+    let covariance = &root * factor * root.transpose();
+    (ratio.is_finite() && covariance.iter().all(|v| v.is_finite()))
+        .then(|| (0.5 * (&covariance + covariance.transpose()), ratio))
+}
+
+/// The scatter matrix of some samples shrunk towards the multiple of the identity with the same trace, by as much as its own scatter says.
+fn shrunk(scatter: &DMatrix<f64>, samples: &[DVector<f64>]) -> DMatrix<f64> {
+    let n = scatter.nrows();
+    let mean = scatter.trace() / n as f64;
+    let target = DMatrix::identity(n, n) * mean;
+    let distance = (scatter - &target).norm_squared();
+    let count = samples.len() as f64;
+    let noise = samples.iter().map(|x| (x * x.transpose() - scatter).norm_squared()).sum::<f64>() / (count * count);
+    let share = if distance > 0.0 { (noise / distance).min(1.0) } else { 1.0 };
+    target * share + scatter * (1.0 - share)
+}
+
+/// The symmetric square root of a covariance whose rows have different units, and its inverse: `root root'` is the
+/// covariance.
+fn roots(covariance: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    let scale = covariance.diagonal().map(f64::sqrt);
+    if !scale.iter().all(|s| s.is_finite() && *s > 0.0) {
+        return None;
+    }
+    let n = covariance.nrows();
+    let unit = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (scale[i] * scale[j]));
+    let eigen = unit.symmetric_eigen();
+    if eigen.eigenvalues.min() <= 0.0 {
+        return None;
+    }
+    let power = |p: f64| {
+        let values = DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| v.powf(p)));
+        &eigen.eigenvectors * values * eigen.eigenvectors.transpose()
+    };
+    let scaled = |m: DMatrix<f64>, of: &dyn Fn(f64) -> f64| DMatrix::from_diagonal(&scale.map(of)) * m;
+    let root = scaled(power(0.5), &|s| s);
+    let inverse = power(-0.5) * DMatrix::from_diagonal(&scale.map(|s| 1.0 / s));
+    Some((root, inverse))
+}

@@ -1,0 +1,143 @@
+//! The covariance that is stated: by the corners' noise, by how the pairs scatter, and by what richer models say.
+//!
+//! In: a problem at its minimum, the model, how the lenses that were tried predict held-out pairs. Out: the covariance, how the pairs scatter, and the
+//! richer models that are witnesses of another rig. A covariance assumes that its model is right. A richer model (a lens with more
+//! terms, a board that is not flat) that was not chosen, because it predicts no better, may yet be right: where its additional terms are more
+//! than chance at the level of an ordinary test, the step from the chosen model to it is taken as a bias that is known to its own size,
+//! and the square of that step is added (GUM, F.2.4.5). Goes wrong: models that are not among those asked.
+
+use nalgebra::DVector;
+
+use crate::statistics::{NORMAL_95, chi_square_quantile};
+use crate::stereo::Lens;
+use crate::stereo::Rig;
+use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
+use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::select::cross_validation;
+use crate::stereo::select::model_comparison::{LensScore, Trial};
+use crate::stereo::select::pair_scatter::{self, PairScatter};
+use crate::stereo::solve::levenberg_marquardt;
+use crate::stereo::solve::problem::{Problem, Solved};
+use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::solve::uncertainty::Uncertainty;
+
+/// A richer model whose additional terms are more than chance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Witness {
+    /// What is free in it.
+    pub layout: Layout,
+    /// Its rig.
+    pub rig: Rig,
+    /// How many terms it adds.
+    pub added: usize,
+    /// By how much chi-squared falls for them, neighbours and pairs that scatter allowed for.
+    pub chi_square_fall: f64,
+    /// From the chosen model's shared numbers to its.
+    step: DVector<f64>,
+}
+
+/// What is stated of a solution.
+pub struct Stated {
+    /// Covariance of the shared numbers and of each pose.
+    pub uncertainty: Uncertainty,
+    /// How the pairs scatter.
+    pub pair_scatter: PairScatter,
+    /// Richer models that are witnesses of another rig.
+    pub witnesses: Vec<Witness>,
+}
+
+/// Enlarges the covariance `by_noise`, which allows for what neighbours share.
+pub fn state(
+    solved: &Solved,
+    layout: &Layout,
+    by_noise: Uncertainty,
+    neighbours: &NeighbourCorrelation,
+    scores: &[LensScore],
+) -> Stated {
+    let Problem { views, values } = &solved.problem;
+    let inflation = neighbours.inflation();
+    let groups = cross_validation::groups(views, &values.poses);
+    let Some(blocks) = levenberg_marquardt::blocks(views, layout, values, Loss::Squared) else {
+        let pair_scatter = PairScatter { groups: cross_validation::count(&groups), ratio: None };
+        return Stated { uncertainty: by_noise, pair_scatter, witnesses: Vec::new() };
+    };
+    let without = cross_validation::leave_out(&blocks, layout, &values.shared, &groups);
+    let (mut shared, pair_scatter) = pair_scatter::covariance(&by_noise.shared, inflation, &blocks, &groups, &without);
+    let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(1.0);
+    let witnesses = witnesses(&solved.problem, layout, scores, factor);
+    // Lenses contain each other: the steps to two of them are not two biases, and Akaike's criterion names the likeliest. The board's is another.
+    let gain = |w: &&Witness| w.chi_square_fall - 2.0 * w.added as f64;
+    let lenses = witnesses.iter().filter(|w| w.layout.left != layout.left);
+    let likeliest = lenses.max_by(|a, b| gain(a).total_cmp(&gain(b)));
+    for witness in likeliest.into_iter().chain(witnesses.iter().filter(|w| w.layout.left == layout.left)) {
+        shared += &witness.step * witness.step.transpose();
+    }
+    Stated { uncertainty: by_noise.with_shared(shared, &blocks), pair_scatter, witnesses }
+}
+
+fn witnesses(problem: &Problem, layout: &Layout, scores: &[LensScore], factor: f64) -> Vec<Witness> {
+    let Some(chosen) = Trial::new(problem, *layout) else { return Vec::new() };
+    richer(layout, scores)
+        .into_iter()
+        .filter_map(|richer| {
+            let trial = Trial::new(problem, richer)?;
+            let added = richer.count().checked_sub(layout.count())?;
+            let chi_square_fall = (chosen.chi_square() - trial.chi_square()) / factor;
+            let step = step(layout, &chosen.values.shared, &trial.values.shared);
+            let rig = trial.values.shared.rig;
+            (chi_square_fall > chi_square_quantile(added as f64, NORMAL_95)).then_some(Witness {
+                layout: richer,
+                rig,
+                added,
+                chi_square_fall,
+                step,
+            })
+        })
+        .collect()
+}
+
+/// The richer models that are asked: lenses that the pairs determine and that do not predict held-out pairs worse, or, where the lens was
+/// forced, the ladder up to eight terms; and a board that is not flat.
+fn richer(layout: &Layout, scores: &[LensScore]) -> Vec<Layout> {
+    let Some(own) = layout.left else { return Vec::new() };
+    let trial = |lens: Lens| scores.iter().filter_map(|s| s.trial.as_ref()).find(|t| t.layout.left == Some(lens));
+    let asked = |lens: Lens| match (trial(lens), trial(own)) {
+        (Some(other), Some(own)) => other.excess_over(own).partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater),
+        _ => scores.is_empty() && lens <= Lens::Rational8,
+    };
+    let lenses = Lens::LADDER.into_iter().filter(|lens| *lens > own && asked(*lens));
+    let lenses = lenses.map(|lens| Layout { left: Some(lens), right: Some(lens), ..*layout });
+    lenses.chain((!layout.shape).then_some(Layout { shape: true, ..*layout })).collect()
+}
+
+/// From one model's shared numbers to those of a richer one, in the coordinates of the covariance.
+fn step(layout: &Layout, from: &Shared, to: &Shared) -> DVector<f64> {
+    let (from_numbers, to_numbers) = (layout.numbers(from), layout.numbers(to));
+    let mut step =
+        DVector::from_iterator(layout.count(), to_numbers.iter().zip(&from_numbers).map(|(to, from)| to - from));
+    // A rotation's covariance is that of the small turn on its left.
+    let turn = to.rig.right_from_left.rotation * from.rig.right_from_left.rotation.inverse();
+    step.rows_mut(layout.transform_start(), 3).copy_from(&turn.scaled_axis());
+    step
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stereo::calibrate::calibrate;
+    use crate::stereo::select::lens_ladder::Options;
+    use crate::stereo::synthetic::World;
+
+    #[test]
+    fn a_bow_that_was_ruled_out_is_a_witness_and_widens_the_covariance() {
+        let flat = Options { lens: Some(Lens::Brown4), shape: Some(false) };
+        let mut world = World::new(12, 3);
+        let clean = calibrate(&world.corners(4), &flat).unwrap();
+        assert!(clean.witnesses.iter().all(|w| !w.layout.shape), "{:?}", clean.witnesses);
+        world.bow_mm[0] = 0.1;
+        let bowed = calibrate(&world.corners(4), &flat).unwrap();
+        assert!(bowed.witnesses.iter().any(|w| w.layout.shape), "{:?}", bowed.witnesses);
+        let off = (bowed.rig().left.fx - world.rig.left.fx).abs();
+        assert!(off < 2.0 * bowed.uncertainty.shared[(0, 0)].sqrt(), "{off}");
+    }
+}

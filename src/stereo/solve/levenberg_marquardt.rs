@@ -1,0 +1,156 @@
+//! The bundle: one weighted, robust least squares over the shared numbers and a pose a pair.
+//!
+//! In: views with whitened corners, starting values. Out: the values at the minimum, why the search stopped, and the
+//! covariance. Method: Levenberg-Marquardt with Marquardt's scaling; the poses are eliminated (see [`crate::stereo::solve::normal_equations`]).
+//! Blocks are computed in parallel and summed in the order of the pairs, so that the bytes do not depend on the threads.
+//! Goes wrong: a start so far off that a board would have to pass through a camera; unknowns that the views do not determine
+//! (no covariance then).
+
+use nalgebra::{DVector, Vector3, Vector6};
+use rayon::prelude::*;
+
+use crate::geometry::perturb;
+use crate::stereo::data::view::View;
+use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::parameters::Values;
+use crate::stereo::solve::normal_equations::{self, Block};
+use crate::stereo::solve::robust_loss::Loss;
+
+/// The search is done when even a strongly damped step does not lower the cost.
+const MAX_DAMPING: f64 = 1e12;
+
+/// How far a search goes, and how carefully it begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Search {
+    /// Damping of the first step: near the minimum hardly any is needed, and any slows the weak directions down.
+    first_damping: f64,
+    /// The search is done when a step is predicted to lower the cost by less than this share; that step is still taken.
+    cost_share: f64,
+    /// Steps that are tried at most.
+    most_steps: usize,
+}
+
+impl Search {
+    /// A start for another search: from afar, to about a tenth of a standard deviation.
+    pub const ROUGH: Search = Search { first_damping: 1e-4, cost_share: 1e-7, most_steps: 50 };
+    /// From afar to the limit of rounding.
+    pub const EXACT: Search = Search { first_damping: 1e-4, cost_share: 1e-13, most_steps: 100 };
+    /// From a minimum of nearly the same problem to the limit of rounding.
+    pub const NEAR: Search = Search { first_damping: 1e-9, cost_share: 1e-13, most_steps: 100 };
+    /// From a minimum of nearly the same problem to a hundredth of a standard deviation: a model on trial. What creeps on for longer
+    /// than this is a valley, and no model that these views determine.
+    pub const TRIAL: Search = Search { first_damping: 1e-9, cost_share: 1e-8, most_steps: 30 };
+}
+
+/// Why a search stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    /// At a minimum: no step lowers the cost noticeably.
+    Minimum,
+    /// After the largest number of steps.
+    Steps,
+    /// A corner lies behind its camera at the start, or the views do not determine the poses.
+    NoStart,
+}
+
+/// The end of a search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// The values reached.
+    pub values: Values,
+    /// Half the (robust) sum of squares there.
+    pub cost: f64,
+    /// Why it stopped.
+    pub stop: Stop,
+    /// Steps tried.
+    pub steps: usize,
+}
+
+/// Minimises. Views and `start.poses` correspond by place.
+pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss, search: Search) -> Solution {
+    let Some(mut blocks) = blocks(views, layout, &start, loss) else {
+        return Solution { values: start, cost: f64::INFINITY, stop: Stop::NoStart, steps: 0 };
+    };
+    let mut values = start;
+    let mut cost = total_cost(&blocks);
+    let mut damping = search.first_damping;
+    // Grows while steps fail: the way up from hardly any damping would be long otherwise.
+    let mut rise = 10.0;
+    for steps in 1..=search.most_steps {
+        let mut accepted = false;
+        if let Some((trial, predicted_gain)) = try_step(layout, &values, &blocks, damping) {
+            let next = self::blocks(views, layout, &trial, loss);
+            let gain = next.as_ref().map_or(f64::NEG_INFINITY, |b| cost - total_cost(b));
+            if let Some(next) = next.filter(|_| gain >= 0.0) {
+                values = trial;
+                blocks = next;
+                cost -= gain;
+                damping = (damping * damping_change(gain / predicted_gain)).max(1e-10);
+                rise = 10.0;
+                accepted = true;
+            }
+            // Rounding in the sum of the costs hides gains smaller than this: the prediction decides.
+            if predicted_gain <= search.cost_share * cost {
+                return Solution { values, cost, stop: Stop::Minimum, steps };
+            }
+        }
+        if !accepted {
+            damping *= rise;
+            rise *= 10.0;
+            if damping > MAX_DAMPING {
+                return Solution { values, cost, stop: Stop::Minimum, steps };
+            }
+        }
+    }
+    Solution { values, cost, stop: Stop::Steps, steps: search.most_steps }
+}
+
+/// How the damping changes after a step that gained this share of its prediction. Gauss-Newton overshoots along weak directions
+/// where the residuals bend: the gain is small then, and more damping converges faster.
+fn damping_change(share: f64) -> f64 {
+    match share {
+        s if s > 0.75 => 0.1,
+        s if s < 0.25 => 8.0,
+        _ => 1.0,
+    }
+}
+
+/// The blocks of all pairs, in their order. `None` where a corner would lie behind its camera.
+pub fn blocks(views: &[View], layout: &Layout, values: &Values, loss: Loss) -> Option<Vec<Block>> {
+    views
+        .par_iter()
+        .zip(&values.poses)
+        .map(|(view, pose)| normal_equations::block(&values.shared, layout, pose, view, loss))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
+}
+
+fn total_cost(blocks: &[Block]) -> f64 {
+    blocks.iter().map(|b| b.cost).sum()
+}
+
+/// The damped step and the gain that the linear equations predict. `None` where the damped system is still singular.
+fn try_step(layout: &Layout, values: &Values, blocks: &[Block], damping: f64) -> Option<(Values, f64)> {
+    let count = layout.count();
+    let step = if count == 0 {
+        DVector::zeros(0)
+    } else {
+        let (matrix, gradient) = normal_equations::eliminate(blocks, damping, count)?;
+        -normal_equations::solve_scaled(&matrix, &gradient)?
+    };
+    let mut predicted_gain = 0.0;
+    let mut poses = Vec::with_capacity(blocks.len());
+    for (block, pose) in blocks.iter().zip(&values.poses) {
+        let right = block.pose_gradient + block.mixed.tr_mul(&step);
+        let pose_step: Vector6<f64> = -(block.pose_inverse(damping)? * right);
+        predicted_gain -= 0.5 * block.pose_gradient.dot(&pose_step);
+        poses.push(perturb(
+            pose,
+            Vector3::new(pose_step[0], pose_step[1], pose_step[2]),
+            Vector3::new(pose_step[3], pose_step[4], pose_step[5]),
+        ));
+        predicted_gain -= 0.5 * block.shared_gradient.dot(&step);
+    }
+    Some((Values { shared: layout.step(&values.shared, step.as_slice()), poses }, predicted_gain))
+}

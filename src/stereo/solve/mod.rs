@@ -1,0 +1,8 @@
+//! The search for the most likely rig: one weighted, robust least squares over the rig, the board's shape and a pose a pair.
+
+mod gram_matrix;
+pub mod levenberg_marquardt;
+pub mod normal_equations;
+pub mod problem;
+pub mod robust_loss;
+pub mod uncertainty;

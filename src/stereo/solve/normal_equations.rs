@@ -1,0 +1,350 @@
+//! The normal equations of the bundle, with each board's pose eliminated.
+//!
+//! The matrix is an arrow: every pair touches the shared numbers and its own pose, never another's. With
+//! `H = [A B; B' C]` a pair contributes `A - B C^-1 B'` to the shared system (Triggs et al. 2000, section 6.1), so that a
+//! dense system of some forty unknowns remains however many pairs there are.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, RowVector3, Vector2, Vector3, Vector6};
+
+use crate::geometry::{Transform, rotation_matrix};
+use crate::imaging::Side;
+use crate::stereo::Camera;
+use crate::stereo::data::observation::Observation;
+use crate::stereo::data::view::View;
+use crate::stereo::model::board_shape;
+use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::solve::gram_matrix::{Products, WIDEST};
+use crate::stereo::solve::robust_loss::Loss;
+
+/// One pair's share of the normal equations.
+#[derive(Debug, Clone)]
+pub struct Block {
+    /// Shared by shared.
+    pub shared: DMatrix<f64>,
+    /// Shared by pose.
+    pub mixed: DMatrix<f64>,
+    /// Pose by pose.
+    pub pose: Matrix6<f64>,
+    /// Gradient of the shared numbers, `J' r`.
+    pub shared_gradient: DVector<f64>,
+    /// Gradient of the pose.
+    pub pose_gradient: Vector6<f64>,
+    /// Half the robust sum of squares.
+    pub cost: f64,
+}
+
+/// Where the packed columns of a picture go among the shared numbers; the pose's six and the residual follow them.
+struct Packing {
+    camera: usize,
+    transform: bool,
+    shape: bool,
+    shared: Vec<usize>,
+}
+
+impl Packing {
+    fn new(layout: &Layout, side: Side) -> Packing {
+        let camera = layout.camera_count(side);
+        let transform = layout.transform && side == Side::Right;
+        let mut shared: Vec<usize> = (0..camera).map(|i| layout.camera_start(side) + i).collect();
+        if transform {
+            shared.extend((0..6).map(|i| layout.transform_start() + i));
+        }
+        if layout.shape {
+            shared.extend((0..board_shape::NUMBERS).map(|i| layout.shape_start() + i));
+        }
+        Packing { camera, transform, shape: layout.shape, shared }
+    }
+
+    /// Columns with the pose and the residual.
+    fn width(&self) -> usize {
+        self.shared.len() + 7
+    }
+}
+
+/// A picture's camera and the ways there from the board, as matrices.
+struct Way<'a> {
+    camera: &'a Camera,
+    left_turn: Matrix3<f64>,
+    left_shift: Vector3<f64>,
+    /// `right_from_left` for the right picture.
+    on: Option<(Matrix3<f64>, Vector3<f64>)>,
+}
+
+impl<'a> Way<'a> {
+    fn new(shared: &'a Shared, left_from_board: &Transform, side: Side) -> Way<'a> {
+        let rig = &shared.rig;
+        let right = &rig.right_from_left;
+        let (camera, on) = match side {
+            Side::Left => (&rig.left, None),
+            Side::Right => (&rig.right, Some((rotation_matrix(right), right.translation.vector))),
+        };
+        let (left_turn, left_shift) = (rotation_matrix(left_from_board), left_from_board.translation.vector);
+        Way { camera, left_turn, left_shift, on }
+    }
+
+    /// Writes the whitened residual `predicted - seen` and its derivatives: two rows of the Jacobian. `None` where the corner would lie behind its camera.
+    fn rows(
+        &self,
+        packing: &Packing,
+        shape_mm: &[f64; board_shape::NUMBERS],
+        o: &Observation,
+        rows: &mut [[f64; WIDEST]],
+    ) -> Option<Vector2<f64>> {
+        let turned = self.left_turn * o.board_point(shape_mm).coords;
+        let in_left = turned + self.left_shift;
+        let (turned_on, in_camera) = match &self.on {
+            None => (in_left, in_left),
+            Some((turn, shift)) => {
+                let turned_on = turn * in_left;
+                (turned_on, turned_on + shift)
+            }
+        };
+        let projection = self.camera.project_with_derivatives(&in_camera.into())?;
+        let residual = o.whiten(projection.px - o.px);
+        // A lens model can overflow far outside the picture.
+        if !(residual.x.is_finite() && residual.y.is_finite()) {
+            return None;
+        }
+        let by_point = o.whitener * projection.by_point;
+        for (k, row) in rows.iter_mut().enumerate() {
+            let by_point: RowVector3<f64> = by_point.row(k).into();
+            let by_left = self.on.as_ref().map_or(by_point, |(turn, _)| by_point * turn);
+            let (w0, w1) = (o.whitener[(k, 0)], o.whitener[(k, 1)]);
+            let (camera, rest) = row.split_at_mut(packing.camera);
+            for (column, by) in camera.iter_mut().zip(&projection.by_camera) {
+                *column = w0 * by.x + w1 * by.y;
+            }
+            let mut rest = rest;
+            if packing.transform {
+                rest = write_turn_and_shift(rest, &turned_on, &by_point);
+            }
+            if packing.shape {
+                let by_height = (by_left * self.left_turn)[2];
+                for (column, lift) in rest.iter_mut().zip(&o.lift) {
+                    *column = by_height * lift;
+                }
+                rest = &mut rest[board_shape::NUMBERS..];
+            }
+            let end = write_turn_and_shift(rest, &turned, &by_left);
+            end[0] = residual[k];
+        }
+        Some(residual)
+    }
+}
+
+/// Derivatives by a small turn of `turned` and by a shift, from the derivative by the point; what is left of the row.
+/// A turn moves the point by `turn x turned`, so that its slope is `turned x by_point`.
+fn write_turn_and_shift<'a>(row: &'a mut [f64], turned: &Vector3<f64>, by_point: &RowVector3<f64>) -> &'a mut [f64] {
+    let by = by_point.transpose();
+    let by_turn = turned.cross(&by);
+    let (here, rest) = row.split_at_mut(6);
+    here[..3].copy_from_slice(by_turn.as_slice());
+    here[3..].copy_from_slice(by.as_slice());
+    rest
+}
+
+/// One pair's share at these values. `None` where a corner would lie behind its camera.
+pub fn block(shared: &Shared, layout: &Layout, left_from_board: &Transform, view: &View, loss: Loss) -> Option<Block> {
+    let n = layout.count();
+    let mut block = Block {
+        shared: DMatrix::zeros(n, n),
+        mixed: DMatrix::zeros(n, 6),
+        pose: Matrix6::zeros(),
+        shared_gradient: DVector::zeros(n),
+        pose_gradient: Vector6::zeros(),
+        cost: 0.0,
+    };
+    for side in Side::BOTH {
+        let packing = Packing::new(layout, side);
+        let way = Way::new(shared, left_from_board, side);
+        let mut products = Products::new(packing.width());
+        for o in view.active(side) {
+            let rows = products.next_two();
+            let residual = way.rows(&packing, &shared.shape_mm, o, rows)?;
+            let (cost, weight) = loss.cost_and_weight(residual.norm_squared());
+            block.cost += cost;
+            if weight != 1.0 {
+                let root = weight.sqrt();
+                rows.iter_mut().flatten().for_each(|v| *v *= root);
+            }
+        }
+        products.finish();
+        block.unpack(&packing, &products);
+    }
+    Some(block)
+}
+
+impl Block {
+    fn unpack(&mut self, packing: &Packing, products: &Products) {
+        let pose = packing.shared.len();
+        let residual = pose + 6;
+        for (i, &to) in packing.shared.iter().enumerate() {
+            self.shared_gradient[to] += products.upper(i, residual);
+            for (j, &to_j) in packing.shared.iter().enumerate().skip(i) {
+                self.shared[(to, to_j)] += products.upper(i, j);
+                if i != j {
+                    self.shared[(to_j, to)] += products.upper(i, j);
+                }
+            }
+            for j in 0..6 {
+                self.mixed[(to, j)] += products.upper(i, pose + j);
+            }
+        }
+        for i in 0..6 {
+            self.pose_gradient[i] += products.upper(pose + i, residual);
+            for j in i..6 {
+                let product = products.upper(pose + i, pose + j);
+                self.pose[(i, j)] += product;
+                if i != j {
+                    self.pose[(j, i)] += product;
+                }
+            }
+        }
+    }
+
+    /// What the pair says about the shared numbers with its own pose eliminated: `A - B C^-1 B'` and the gradient that goes with it.
+    pub fn reduced(&self, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let through = &self.mixed * self.pose_inverse(damping)?;
+        Some((&self.shared - &through * self.mixed.transpose(), &self.shared_gradient - &through * self.pose_gradient))
+    }
+
+    /// `C^-1`, the pose's own diagonal stretched by `1 + damping`. `None` where the corners do not determine the pose.
+    pub fn pose_inverse(&self, damping: f64) -> Option<Matrix6<f64>> {
+        let mut damped = self.pose;
+        for i in 0..6 {
+            damped[(i, i)] *= 1.0 + damping;
+        }
+        inverse6(&damped)
+    }
+}
+
+/// Inverse of a positive definite matrix whose rows have different units: scaled to a unit diagonal first.
+pub fn inverse6(matrix: &Matrix6<f64>) -> Option<Matrix6<f64>> {
+    let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());
+    if !scale.iter().all(|s| s.is_finite()) {
+        return None;
+    }
+    let scaled = Matrix6::from_fn(|i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let inverse = scaled.cholesky()?.inverse();
+    Some(Matrix6::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+/// The shared system with all poses eliminated: matrix and right-hand side. Summed in the order of the pairs.
+pub fn eliminate(blocks: &[Block], damping: f64, count: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    let mut matrix = DMatrix::zeros(count, count);
+    let mut gradient = DVector::zeros(count);
+    let mut diagonal = DVector::zeros(count);
+    for block in blocks {
+        let (own, own_gradient) = block.reduced(damping)?;
+        matrix += own;
+        gradient += own_gradient;
+        diagonal += block.shared.diagonal();
+    }
+    for i in 0..count {
+        matrix[(i, i)] += damping * diagonal[i];
+    }
+    Some((matrix, gradient))
+}
+
+/// Solves a symmetric positive definite system after scaling it to a unit diagonal.
+pub fn solve_scaled(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());
+    if !scale.iter().all(|s| s.is_finite()) {
+        return None;
+    }
+    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let solution = scaled.cholesky()?.solve(&right.component_mul(&scale));
+    Some(solution.component_mul(&scale))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::perturb;
+    use crate::stereo::Lens;
+    use crate::stereo::synthetic::World;
+    use nalgebra::Vector3;
+
+    fn cost(shared: &Shared, layout: &Layout, pose: &Transform, view: &View) -> f64 {
+        block(shared, layout, pose, view, Loss::Cauchy(2.0)).unwrap().cost
+    }
+
+    #[test]
+    fn gradients_equal_central_differences() {
+        let world = World::new(1, 3);
+        let layout = Layout::rig(Lens::Brown4, true);
+        let mut view = View::new(&world.board, &world.corners(4).pairs[0], 0);
+        for o in &mut view.observations {
+            o.whitener = nalgebra::Matrix2::new(9.0, 0.0, 2.0, 11.0);
+        }
+        let shared = Shared { rig: world.rig.clone(), shape_mm: [0.1, -0.2, 0.15] };
+        let pose = &world.poses[0];
+        let analytic = block(&shared, &layout, pose, &view, Loss::Cauchy(2.0)).unwrap();
+        // A cost of some thousands is known to 1e-12; halved by steps that move pixels by about 1e-4.
+        let close = |numeric: f64, analytic: f64, what: &str| {
+            assert!((numeric - analytic).abs() < 1e-4 * (1.0 + analytic.abs()), "{what}: {numeric} and {analytic}");
+        };
+        for (i, name) in layout.names().iter().enumerate() {
+            let h = if name.contains('k') || name.contains(".p") || name.contains("rad") { 1e-6 } else { 1e-4 };
+            let mut step = vec![0.0; layout.count()];
+            step[i] = h;
+            let plus = cost(&layout.step(&shared, &step), &layout, pose, &view);
+            step[i] = -h;
+            let minus = cost(&layout.step(&shared, &step), &layout, pose, &view);
+            close((plus - minus) / (2.0 * h), analytic.shared_gradient[i], name);
+        }
+        for i in 0..6 {
+            let at = |h: f64| {
+                let mut step = Vector6::zeros();
+                step[i] = h;
+                let moved =
+                    perturb(pose, Vector3::new(step[0], step[1], step[2]), Vector3::new(step[3], step[4], step[5]));
+                cost(&shared, &layout, &moved, &view)
+            };
+            let h = if i < 3 { 1e-6 } else { 1e-4 };
+            close((at(h) - at(-h)) / (2.0 * h), analytic.pose_gradient[i], "pose");
+        }
+    }
+
+    #[test]
+    fn elimination_solves_the_whole_system() {
+        let world = World::new(3, 3);
+        let layout = Layout::rig(Lens::Radial2, false);
+        let shared = Shared { rig: world.rig.clone(), shape_mm: [0.0; 3] };
+        let blocks: Vec<Block> = world
+            .corners(4)
+            .pairs
+            .iter()
+            .zip(&world.poses)
+            .map(|(pair, pose)| {
+                block(&shared, &layout, pose, &View::new(&world.board, pair, 0), Loss::Squared).unwrap()
+            })
+            .collect();
+        let n = layout.count();
+        let size = n + 6 * blocks.len();
+        let (mut whole, mut right) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        for (i, b) in blocks.iter().enumerate() {
+            let at = n + 6 * i;
+            let mut add = |row: usize, col: usize, value: f64| whole[(row, col)] += value;
+            for r in 0..n {
+                (0..n).for_each(|c| add(r, c, b.shared[(r, c)]));
+                for c in 0..6 {
+                    add(r, at + c, b.mixed[(r, c)]);
+                    add(at + c, r, b.mixed[(r, c)]);
+                }
+                right[r] += b.shared_gradient[r];
+            }
+            for r in 0..6 {
+                (0..6).for_each(|c| add(at + r, at + c, b.pose[(r, c)]));
+                right[at + r] += b.pose_gradient[r];
+            }
+        }
+        let (matrix, gradient) = eliminate(&blocks, 0.0, n).unwrap();
+        let eliminated = solve_scaled(&matrix, &gradient).unwrap();
+        let direct = solve_scaled(&whole, &right).unwrap();
+        for i in 0..n {
+            // Both solve a system whose condition is about 1e8.
+            assert!((eliminated[i] - direct[i]).abs() <= 1e-6 * direct[i].abs().max(1e-9), "{i}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! What the normal equations at a minimum say about uncertainty: covariances, and whether the views determine the cameras.
+//!
+//! In: the blocks of all pairs at a minimum. Out: the covariance of the shared numbers and of each pose, with unit variance of the
+//! whitened residuals. Goes wrong: numbers that the views do not determine; then there is no covariance.
+
+use nalgebra::{DMatrix, Matrix6};
+
+use crate::stereo::data::view::View;
+use crate::stereo::model::parameters::{Layout, Values};
+use crate::stereo::solve::levenberg_marquardt::blocks;
+use crate::stereo::solve::normal_equations::{self, Block};
+use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::{Rig, Side};
+
+/// A focal length that is known no better than this share is not known.
+pub const WORST_FOCAL_SIGMA: f64 = 0.02;
+
+/// By how much chi-square (twice the cost) would fall if the equations were straight from here to the minimum: what a richer
+/// model is expected to gain at a simpler one's minimum (Rao's score). `None` where the views do not determine the unknowns.
+pub fn expected_decrease(blocks: &[Block], layout: &Layout) -> Option<f64> {
+    let (matrix, gradient) = normal_equations::eliminate(blocks, 0.0, layout.count())?;
+    Some(gradient.dot(&(invert(&matrix)? * &gradient)))
+}
+
+/// Covariance of the shared numbers and of each pose (its own block), with unit variance of the whitened residuals.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Uncertainty {
+    /// Of the shared numbers, in the layout's order.
+    pub shared: DMatrix<f64>,
+    /// Of each pose: rotation (rad), then translation (mm); the share of the shared numbers included.
+    pub poses: Vec<Matrix6<f64>>,
+}
+
+impl Uncertainty {
+    /// All covariances times a factor.
+    pub fn scaled(mut self, factor: f64) -> Uncertainty {
+        self.shared *= factor;
+        self.poses.iter_mut().for_each(|pose| *pose *= factor);
+        self
+    }
+
+    /// With another covariance of the shared numbers; what changes reaches the poses through the normal equations of their pairs.
+    pub fn with_shared(mut self, shared: DMatrix<f64>, blocks: &[Block]) -> Uncertainty {
+        let change = &shared - &self.shared;
+        for (pose, block) in self.poses.iter_mut().zip(blocks) {
+            let Some(inverse) = block.pose_inverse(0.0) else { continue };
+            let through = inverse * block.mixed.transpose();
+            let spread = &through * &change * through.transpose();
+            *pose += Matrix6::from_fn(|i, j| spread[(i, j)]);
+        }
+        self.shared = shared;
+        self
+    }
+}
+
+/// Covariance at a minimum. `None` where the views do not determine the unknowns.
+pub fn of_solution(views: &[View], layout: &Layout, values: &Values) -> Option<Uncertainty> {
+    of_blocks(&blocks(views, layout, values, Loss::Squared)?, layout)
+}
+
+/// The same from the blocks at the minimum.
+pub fn of_blocks(blocks: &[Block], layout: &Layout) -> Option<Uncertainty> {
+    let count = layout.count();
+    let shared =
+        if count == 0 { DMatrix::zeros(0, 0) } else { invert(&normal_equations::eliminate(blocks, 0.0, count)?.0)? };
+    let poses = blocks
+        .iter()
+        .map(|block| {
+            let inverse = block.pose_inverse(0.0)?;
+            let through = inverse * block.mixed.transpose();
+            let spread = &through * &shared * through.transpose();
+            Some(inverse + Matrix6::from_fn(|i, j| spread[(i, j)]))
+        })
+        .collect::<Option<Vec<_>>>()?;
+    Some(Uncertainty { shared, poses })
+}
+
+/// Inverse of a symmetric positive definite matrix with rows of different units; `None` where it is singular to rounding.
+pub fn invert(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    /// Smallest share of its scaled eigenvalues that double precision still tells from a dependence.
+    const SMALLEST: f64 = 1e-13;
+    let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());
+    if !scale.iter().all(|s| s.is_finite()) {
+        return None;
+    }
+    let n = matrix.nrows();
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let eigen = scaled.clone().symmetric_eigen();
+    if eigen.eigenvalues.min() <= SMALLEST * eigen.eigenvalues.max() {
+        return None;
+    }
+    let inverse = scaled.cholesky()?.inverse();
+    Some(DMatrix::from_fn(n, n, |i, j| 0.5 * (inverse[(i, j)] + inverse[(j, i)]) * scale[i] * scale[j]))
+}
+
+/// Whether this covariance of the shared numbers determines both focal lengths.
+pub fn determines_cameras(shared: &DMatrix<f64>, layout: &Layout, rig: &Rig) -> bool {
+    worst_focal_sigma(shared, layout, rig) <= WORST_FOCAL_SIGMA
+}
+
+/// Largest relative standard deviation of a focal length.
+pub fn worst_focal_sigma(shared: &DMatrix<f64>, layout: &Layout, rig: &Rig) -> f64 {
+    let mut worst: f64 = 0.0;
+    for (side, camera) in Side::BOTH.into_iter().zip([&rig.left, &rig.right]) {
+        let at = layout.camera_start(side);
+        for (i, focal) in [camera.fx, camera.fy].into_iter().enumerate() {
+            worst = worst.max(shared[(at + i, at + i)].sqrt() / focal.abs());
+        }
+    }
+    worst
+}

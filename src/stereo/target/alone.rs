@@ -1,0 +1,144 @@
+//! One pose with everything shared held: the poses that the bundle did without, and the figures of those that it had.
+
+use nalgebra::{DMatrix, Point3, Vector2, Vector3, Vector6};
+
+use crate::geometry::{Transform, perturb};
+use crate::imaging::{Board, Side};
+use crate::stereo::Rig;
+use crate::stereo::data::observation::Observation;
+use crate::stereo::data::residuals::root_mean_square;
+use crate::stereo::data::view::View;
+use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::target::estimate::{Estimate, OUTLIER};
+use crate::stereo::target::pose_block::{Eliminated, PoseBlock, crossings, residual};
+use crate::stereo::target::start::enough;
+use crate::stereo::triangulate::{common, triangulate};
+
+/// Steps of the search; the start is within a pixel.
+const STEPS: usize = 20;
+
+/// Rounds of leaving outliers out.
+const ROUNDS: usize = 3;
+
+/// The shared values as a pose sees them.
+pub(super) struct Known<'a> {
+    rig: Rig,
+    crossings: Vec<Point3<f64>>,
+    board: &'a Board,
+    basis: &'a DMatrix<f64>,
+    inflation: f64,
+}
+
+/// A pose on them.
+pub(super) struct Alone {
+    /// `left_from_board`.
+    pub pose: Transform,
+    /// Its corners; outliers are inactive.
+    pub view: View,
+    /// Its part of the normal equations.
+    pub part: Eliminated,
+    /// Chi-square of the active corners over its degrees of freedom.
+    pub chi_square: f64,
+    /// Degrees of freedom.
+    pub freedom: f64,
+    /// Root mean square of the length of the 2-D residuals, px.
+    pub rms_px: f64,
+    /// Root mean square distance of the triangulated corners from the target, mm.
+    pub fit_rms_mm: f64,
+}
+
+impl<'a> Known<'a> {
+    /// The values of an estimate.
+    pub fn new(found: &'a Estimate<'_>) -> Known<'a> {
+        Known {
+            rig: found.bundle.rig_at(&found.values),
+            crossings: crossings(found.bundle.board, &found.values.deviations_mm),
+            board: found.bundle.board,
+            basis: &found.bundle.rig.basis,
+            inflation: found.inflation,
+        }
+    }
+
+    /// Fits a pose. The whiteners are the estimate's. `None` where the corners do not determine it or most of them are outliers.
+    pub fn fit(&self, view: &View, start: &Transform) -> Option<Alone> {
+        let mut view = view.clone();
+        view.observations.iter_mut().for_each(|o| o.active = true);
+        let mut pose = self.search(&view, *start, Loss::Cauchy(CAUCHY_WIDTH))?;
+        for _ in 0..ROUNDS {
+            for o in &mut view.observations {
+                o.active =
+                    self.residual(&pose, o).is_some_and(|r| o.whiten(r).norm() * self.inflation.sqrt() <= OUTLIER);
+            }
+            if !enough(&view) {
+                return None;
+            }
+            pose = self.search(&view, pose, Loss::Squared)?;
+        }
+        let part = self.block(&view, &pose, Loss::Squared)?.eliminate(self.basis)?;
+        let active: Vec<(&Observation, Vector2<f64>)> =
+            view.observations.iter().filter(|o| o.active).filter_map(|o| Some((o, self.residual(&pose, o)?))).collect();
+        let freedom = 2.0 * active.len() as f64 - 6.0;
+        let sum: f64 = active.iter().map(|(o, r)| o.whiten(*r).norm_squared()).sum();
+        let squares: Vec<f64> = active.iter().map(|(_, r)| r.norm_squared()).collect();
+        Some(Alone {
+            part,
+            chi_square: sum * self.inflation / freedom.max(1.0),
+            freedom,
+            rms_px: root_mean_square(&squares)?,
+            fit_rms_mm: self.fit_rms_mm(&view, &pose).unwrap_or(f64::NAN),
+            pose,
+            view,
+        })
+    }
+
+    fn residual(&self, pose: &Transform, o: &Observation) -> Option<Vector2<f64>> {
+        residual(&self.rig, &self.crossings, self.board, pose, o)
+    }
+
+    fn block(&self, view: &View, pose: &Transform, loss: Loss) -> Option<PoseBlock> {
+        PoseBlock::new(&self.rig, &self.crossings, self.board, pose, view, loss)
+    }
+
+    /// Gauss-Newton with halved steps.
+    fn search(&self, view: &View, start: Transform, loss: Loss) -> Option<Transform> {
+        let mut pose = start;
+        let mut block = self.block(view, &pose, loss)?;
+        for _ in 0..STEPS {
+            let (step, promise) = block.pose_step()?;
+            let mut share = 1.0;
+            let better = loop {
+                let s: Vector6<f64> = step * share;
+                let trial = perturb(&pose, Vector3::new(s[0], s[1], s[2]), Vector3::new(s[3], s[4], s[5]));
+                match self.block(view, &trial, loss) {
+                    Some(next) if next.cost <= block.cost => break Some((trial, next)),
+                    _ if share < 1e-3 => break None,
+                    _ => share *= 0.5,
+                }
+            };
+            let Some((trial, next)) = better else { break };
+            (pose, block) = (trial, next);
+            if promise < 1e-9 {
+                break;
+            }
+        }
+        Some(pose)
+    }
+
+    fn fit_rms_mm(&self, view: &View, pose: &Transform) -> Option<f64> {
+        let squares: Vec<f64> = common(view)
+            .into_iter()
+            .filter_map(|(l, r)| {
+                let place = pose * self.crossings[self.board.index(l.col, l.row)];
+                Some((triangulate(&self.rig, l, r)?.point_mm - place).norm_squared())
+            })
+            .collect();
+        root_mean_square(&squares)
+    }
+
+    /// The pictures of two poses as one pair: the left one of the first, the right one of the second.
+    pub fn mixed(&self, left: &View, right: &View) -> View {
+        let mut mixed = left.only(Side::Left);
+        mixed.observations.extend(right.only(Side::Right).observations);
+        mixed
+    }
+}

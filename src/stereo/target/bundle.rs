@@ -1,0 +1,240 @@
+//! One weighted least squares over all poses: the rig within its calibration, the target's crossings within their certificate.
+//!
+//! In: views with whitened corners, what is known before, a start for every pose. Out: the values at the minimum and the normal
+//! equations there. Method: Gauss-Newton with the poses eliminated (Triggs et al. 2000, section 6.1); a step that does not lower the cost
+//! is halved. Poses are worked on in parallel and summed in their order, so that the bytes do not depend on the threads.
+
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector3, Vector6};
+use rayon::prelude::*;
+
+use crate::geometry::{Transform, perturb};
+use crate::imaging::Board;
+use crate::stereo::Rig;
+use crate::stereo::data::view::View;
+use crate::stereo::solve::normal_equations::solve_scaled;
+use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::solve::uncertainty::invert;
+use crate::stereo::target::pose_block::{Eliminated, PoseBlock, TRANSFORM, crossings, residual};
+use crate::stereo::target::prior::{RigPrior, ShapePrior, weights};
+use crate::stereo::triangulate::RIG_NUMBERS;
+
+/// Poses whose matrices are held at a time.
+const AT_ONCE: usize = 16;
+
+/// Steps of one search at most; each squares what is left.
+const STEPS: usize = 12;
+
+/// The search is done when a step promises to lower the cost by less than this share of a squared residual.
+const PROMISE: f64 = 1e-6;
+
+/// Values of all unknowns.
+#[derive(Debug, Clone)]
+pub(super) struct Values {
+    /// Of the rig's prior.
+    pub rig: DVector<f64>,
+    /// The crossings' deviations from the drawing, mm.
+    pub deviations_mm: Vec<Vector3<f64>>,
+    /// `left_from_board` of every pose that takes part.
+    pub poses: Vec<Option<Transform>>,
+}
+
+/// The problem: what was seen and what is known before.
+#[derive(Debug, Clone)]
+pub(super) struct Bundle<'a> {
+    /// The target as drawn.
+    pub board: &'a Board,
+    /// Every pose's corners.
+    pub views: Vec<View>,
+    /// The calibration.
+    pub rig: RigPrior,
+    /// The certificate.
+    pub shape: ShapePrior,
+}
+
+/// A pose's part of the normal equations at the minimum.
+#[derive(Debug, Clone)]
+pub(super) struct PosePart {
+    /// Covariance from its own corners, everything shared held.
+    pub own: Matrix6<f64>,
+    /// Derivative of the pose by the shared unknowns.
+    pub by_shared: Matrix6xX<f64>,
+    /// A change of `right_from_left` at this pose alone: curvature with the pose eliminated.
+    pub change: Matrix6<f64>,
+    /// The same by the shared unknowns.
+    pub change_shared: DMatrix<f64>,
+    /// Its gradient.
+    pub change_gradient: Vector6<f64>,
+    step_to: Vector6<f64>,
+}
+
+/// The normal equations.
+#[derive(Debug, Clone)]
+pub(super) struct Normal {
+    /// What the corners say of the shared unknowns.
+    pub data: DMatrix<f64>,
+    /// What is known before.
+    pub weights: DMatrix<f64>,
+    /// Gradient of the corners' cost by the shared unknowns.
+    pub gradient: DVector<f64>,
+    /// The rig's raw numbers with the poses eliminated, by themselves and by the shared unknowns, and their gradient.
+    pub rig: DMatrix<f64>,
+    /// See above.
+    pub rig_shared: DMatrix<f64>,
+    /// See above.
+    pub rig_gradient: DVector<f64>,
+    /// A part a pose that takes part.
+    pub poses: Vec<Option<PosePart>>,
+}
+
+impl Bundle<'_> {
+    /// The shared unknowns as one vector.
+    pub fn shared(values: &Values) -> DVector<f64> {
+        let all = values.rig.iter().copied().chain(values.deviations_mm.iter().flat_map(|d| [d.x, d.y, d.z]));
+        DVector::from_iterator(values.rig.len() + 3 * values.deviations_mm.len(), all)
+    }
+
+    /// The rig at these values.
+    pub fn rig_at(&self, values: &Values) -> Rig {
+        self.rig.rig_at(&values.rig)
+    }
+
+    /// Linearises. `None` where a corner would lie behind its camera or no pose takes part.
+    pub fn normal(&self, values: &Values, loss: Loss) -> Option<Normal> {
+        let rig = self.rig_at(values);
+        let crossings = crossings(self.board, &values.deviations_mm);
+        let count = values.rig.len() + 3 * crossings.len();
+        let mut normal = Normal {
+            data: DMatrix::zeros(count, count),
+            weights: DMatrix::zeros(0, 0),
+            gradient: DVector::zeros(count),
+            rig: DMatrix::zeros(RIG_NUMBERS, RIG_NUMBERS),
+            rig_shared: DMatrix::zeros(RIG_NUMBERS, count),
+            rig_gradient: DVector::zeros(RIG_NUMBERS),
+            poses: vec![None; values.poses.len()],
+        };
+        let present: Vec<(usize, &Transform)> =
+            values.poses.iter().enumerate().filter_map(|(i, pose)| Some((i, pose.as_ref()?))).collect();
+        for some in present.chunks(AT_ONCE) {
+            let blocks: Vec<Option<Eliminated>> = some
+                .par_iter()
+                .map(|&(i, pose)| {
+                    PoseBlock::new(&rig, &crossings, self.board, pose, &self.views[i], loss)?.eliminate(&self.rig.basis)
+                })
+                .collect();
+            for (&(i, _), block) in some.iter().zip(blocks) {
+                normal.add(i, block?);
+            }
+        }
+        normal.weights = weights(&self.rig, &self.shape, self.board, &normal.data);
+        (!present.is_empty()).then_some(normal)
+    }
+
+    /// Cost of the corners at these values; infinite where a corner would lie behind its camera.
+    fn cost(&self, values: &Values, weights: &DMatrix<f64>, loss: Loss) -> f64 {
+        let rig = self.rig_at(values);
+        let crossings = crossings(self.board, &values.deviations_mm);
+        let of = |(view, pose): (&View, &Option<Transform>)| -> f64 {
+            let Some(pose) = pose else { return 0.0 };
+            let costs = view.observations.iter().filter(|o| o.active).map(|o| {
+                residual(&rig, &crossings, self.board, pose, o)
+                    .map_or(f64::INFINITY, |r| loss.cost_and_weight(o.whiten(r).norm_squared()).0)
+            });
+            costs.sum()
+        };
+        let corners: Vec<f64> = self.views.par_iter().zip(&values.poses).map(of).collect();
+        let shared = Self::shared(values);
+        corners.iter().sum::<f64>() + 0.5 * shared.dot(&(weights * &shared))
+    }
+
+    /// Minimises from these values. `None` where the corners do not determine the poses.
+    pub fn solve(&self, start: Values, loss: Loss) -> Option<(Values, Normal)> {
+        let mut values = start;
+        for _ in 0..STEPS {
+            let normal = self.normal(&values, loss)?;
+            let before = self.cost(&values, &normal.weights, loss);
+            let (step, promise) = normal.step(&Self::shared(&values))?;
+            let mut share = 1.0;
+            let better = loop {
+                let trial = values.moved(&step, &normal, share);
+                if self.cost(&trial, &normal.weights, loss) <= before {
+                    break Some(trial);
+                }
+                share *= 0.5;
+                if share < 1e-3 {
+                    break None;
+                }
+            };
+            let Some(trial) = better else { break };
+            values = trial;
+            if promise < PROMISE {
+                break;
+            }
+        }
+        let normal = self.normal(&values, loss)?;
+        Some((values, normal))
+    }
+}
+
+impl Values {
+    /// A share of a step.
+    fn moved(&self, step: &DVector<f64>, normal: &Normal, share: f64) -> Values {
+        let n = self.rig.len();
+        let deviations = self.deviations_mm.iter().enumerate();
+        Values {
+            rig: &self.rig + step.rows(0, n) * share,
+            deviations_mm: deviations
+                .map(|(k, d)| d + Vector3::from_iterator((0..3).map(|i| share * step[n + 3 * k + i])))
+                .collect(),
+            poses: self
+                .poses
+                .iter()
+                .zip(&normal.poses)
+                .map(|(pose, part)| {
+                    let (pose, part) = (pose.as_ref()?, part.as_ref()?);
+                    let shared = &part.by_shared * step;
+                    let s = (part.step_to + shared) * share;
+                    Some(perturb(pose, Vector3::new(s[0], s[1], s[2]), Vector3::new(s[3], s[4], s[5])))
+                })
+                .collect(),
+        }
+    }
+}
+
+impl Normal {
+    fn add(&mut self, i: usize, block: Eliminated) {
+        self.data += &block.matrix;
+        self.gradient += &block.gradient;
+        self.rig += &block.rig;
+        self.rig_shared += &block.rig_shared;
+        self.rig_gradient += &block.rig_gradient;
+        self.poses[i] = Some(PosePart {
+            own: block.pose_inverse,
+            by_shared: -(block.pose_inverse * block.mixed.transpose()),
+            change: Matrix6::from_fn(|i, j| block.rig[(TRANSFORM + i, TRANSFORM + j)]),
+            change_shared: block.rig_shared.rows(TRANSFORM, 6).into_owned(),
+            change_gradient: Vector6::from_fn(|i, _| block.rig_gradient[TRANSFORM + i]),
+            step_to: -(block.pose_inverse * block.pose_gradient),
+        });
+    }
+
+    /// The step of the shared unknowns from these values, and by how much the cost would fall if the equations were straight.
+    fn step(&self, shared: &DVector<f64>) -> Option<(DVector<f64>, f64)> {
+        let gradient = &self.gradient + &self.weights * shared;
+        let step = -solve_scaled(&(&self.data + &self.weights), &gradient)?;
+        let own = self.poses.iter().flatten().map(|part| {
+            let s = &part.step_to;
+            invert6(&part.own).map_or(0.0, |curvature| 0.5 * s.dot(&(curvature * s)))
+        });
+        let promise = -0.5 * gradient.dot(&step) + own.sum::<f64>();
+        Some((step, promise))
+    }
+
+    /// Covariance of the shared unknowns.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        invert(&(&self.data + &self.weights))
+    }
+}
+
+fn invert6(matrix: &Matrix6<f64>) -> Option<Matrix6<f64>> {
+    crate::stereo::solve::normal_equations::inverse6(matrix)
+}

@@ -1,0 +1,205 @@
+//! What may have happened to the rig or to the target's description, one number each, and how well each explains the poses.
+//!
+//! In: the common minimum. Out: for every cause its amount and the fall of chi-square it would bring. The rig's causes are physical: the
+//! right camera turns about its own centre or is pushed, a lens is refocused. A longer baseline and smaller squares explain the same:
+//! pictures have no scale of their own, so both are named.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use crate::stereo::Rig;
+use crate::stereo::data::observation::Side;
+use crate::stereo::model::projection::CAMERA_NUMBERS;
+use crate::stereo::target::estimate::Estimate;
+use crate::stereo::target::pose_block::TRANSFORM;
+use crate::stereo::target::prior::{stretch_length_mm, stretch_mode};
+use crate::stereo::triangulate::RIG_NUMBERS;
+
+/// One thing that may have changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// The right camera turned about its own axis x (pitch), y (yaw) or z (roll); the amount is in rad.
+    Turn(usize),
+    /// The right camera was pushed along its own x, y or z; mm.
+    Shift(usize),
+    /// A focal length; relative.
+    Focal(Side),
+    /// Both focal lengths by the same share; relative.
+    BothFocal,
+    /// The target's squares are not as long as said; relative.
+    Pitch,
+}
+
+impl Cause {
+    /// All that are tried.
+    pub const ALL: [Cause; 10] = [
+        Cause::Turn(0),
+        Cause::Turn(1),
+        Cause::Turn(2),
+        Cause::Shift(0),
+        Cause::Shift(1),
+        Cause::Shift(2),
+        Cause::Focal(Side::Left),
+        Cause::Focal(Side::Right),
+        Cause::BothFocal,
+        Cause::Pitch,
+    ];
+
+    /// The change of the rig's numbers by one unit; `None` for the target's pitch.
+    pub(super) fn direction(self, rig: &Rig) -> Option<DVector<f64>> {
+        let mut direction = DVector::zeros(RIG_NUMBERS);
+        let mut focal = |side: Side| {
+            let camera = rig.camera(side);
+            let at = if side == Side::Left { 0 } else { CAMERA_NUMBERS };
+            direction[at] = camera.fx;
+            direction[at + 1] = camera.fy;
+        };
+        match self {
+            Cause::Pitch => return None,
+            Cause::Focal(side) => focal(side),
+            Cause::BothFocal => Side::BOTH.into_iter().for_each(focal),
+            Cause::Shift(axis) => direction[TRANSFORM + 3 + axis] = 1.0,
+            Cause::Turn(axis) => {
+                let mut about = Vector3::zeros();
+                about[axis] = 1.0;
+                direction[TRANSFORM + axis] = 1.0;
+                let moved = about.cross(&rig.right_from_left.translation.vector);
+                direction.rows_mut(TRANSFORM + 3, 3).copy_from(&moved);
+            }
+        }
+        Some(direction)
+    }
+
+    /// Unit of its amount; a share has none.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Cause::Turn(_) => "rad",
+            Cause::Shift(_) => "mm",
+            Cause::Focal(_) | Cause::BothFocal | Cause::Pitch => "1",
+        }
+    }
+
+    /// In words, with its amount.
+    pub fn describe(self, amount: f64, rig: &Rig, square_mm: f64) -> String {
+        const AXES: [&str; 3] = ["x", "y", "z"];
+        let percent = 100.0 * amount;
+        match self {
+            Cause::Turn(axis) => {
+                let kind = ["pitch", "yaw", "roll"][axis];
+                format!(
+                    "the right camera turned by {:.4} deg about its {} axis ({kind}) against the left",
+                    amount.to_degrees(),
+                    AXES[axis]
+                )
+            }
+            Cause::Shift(axis) => {
+                let t = rig.right_from_left.translation.vector;
+                let mut moved = t;
+                moved[axis] += amount;
+                format!(
+                    "the right camera moved by {amount:.4} mm along its {} axis (baseline {:.3} mm instead of {:.3})",
+                    AXES[axis],
+                    moved.norm(),
+                    t.norm()
+                )
+            }
+            Cause::Focal(side) => format!("the {} camera's focal length changed by {percent:.3} %", side.name()),
+            Cause::BothFocal => format!("both focal lengths changed by {percent:.3} %"),
+            Cause::Pitch => {
+                format!(
+                    "the target's squares are {:.4} mm, not {square_mm} mm, on this rig",
+                    square_mm * (1.0 + amount)
+                )
+            }
+        }
+    }
+}
+
+/// How a cause would explain what is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Explanation {
+    /// What.
+    pub cause: Cause,
+    /// By how much: rad, mm, or a share.
+    pub amount: f64,
+    /// Standard deviation of that.
+    pub sigma: f64,
+    /// By how much chi-square falls with it.
+    pub fall: f64,
+}
+
+/// Every cause at the common minimum, by its score.
+pub(super) fn explanations(found: &Estimate<'_>) -> Vec<Explanation> {
+    let rig = found.bundle.rig_at(&found.values);
+    Cause::ALL
+        .into_iter()
+        .filter_map(|cause| match cause.direction(&rig) {
+            Some(direction) => of_rig(found, cause, &direction),
+            None => of_pitch(found),
+        })
+        .collect()
+}
+
+fn of_rig(found: &Estimate<'_>, cause: Cause, direction: &DVector<f64>) -> Option<Explanation> {
+    let normal = &found.normal;
+    let shared = normal.rig_shared.tr_mul(direction);
+    let own = direction.dot(&(&normal.rig * direction));
+    let curvature = own - shared.dot(&(&found.covariance * &shared));
+    let gradient = direction.dot(&normal.rig_gradient);
+    // What nothing tells apart from the poses or from what was unknown before leaves only rounding.
+    (curvature > 1e-9 * own).then(|| Explanation {
+        cause,
+        amount: -gradient / curvature,
+        sigma: 1.0 / curvature.sqrt(),
+        fall: gradient * gradient / curvature,
+    })
+}
+
+fn of_pitch(found: &Estimate<'_>) -> Option<Explanation> {
+    let [amount, sigma] = stretch(found);
+    let before = (found.bundle.shape.stretch_mm / stretch_length_mm(found.bundle.board)).powi(2);
+    let told = before - sigma * sigma;
+    // With the certificate's word taken away, the amount is what the pictures alone say.
+    (told.is_finite() && told > 1e-9 * before).then(|| Explanation {
+        cause: Cause::Pitch,
+        amount: amount * before / told,
+        sigma: sigma * (before / told).sqrt(),
+        fall: amount * amount / told,
+    })
+}
+
+/// The target's size against the drawing, minus one, and its standard deviation.
+pub(super) fn stretch(found: &Estimate<'_>) -> [f64; 2] {
+    let n = found.values.rig.len();
+    let mode = stretch_mode(found.bundle.board);
+    let m = mode.len();
+    let deviations = DVector::from_iterator(m, found.values.deviations_mm.iter().flat_map(|d| [d.x, d.y, d.z]));
+    let length = stretch_length_mm(found.bundle.board);
+    let variance = mode.dot(&(found.covariance.view((n, n), (m, m)) * &mode));
+    [mode.dot(&deviations) / length, variance.max(0.0).sqrt() / length]
+}
+
+/// Change of the mark points between two minima: the root of the mean square over the poses, mm.
+pub(super) fn moved_mm(a: &Estimate<'_>, b: &Estimate<'_>) -> f64 {
+    let squares: Vec<f64> = a
+        .values
+        .poses
+        .iter()
+        .zip(&b.values.poses)
+        .filter_map(|(a, b)| Some((a.as_ref()?.translation.vector - b.as_ref()?.translation.vector).norm_squared()))
+        .collect();
+    crate::stereo::data::residuals::root_mean_square(&squares).unwrap_or(0.0)
+}
+
+/// The matrix that takes the shared unknowns to the rig's named numbers and the crossings' deviations.
+pub(super) fn named(found: &Estimate<'_>) -> DMatrix<f64> {
+    let rig = &found.bundle.rig;
+    let (n, m) = (found.values.rig.len(), 3 * found.values.deviations_mm.len());
+    let mut matrix = DMatrix::zeros(rig.places.len() + m, n + m);
+    for (row, &place) in rig.places.iter().enumerate() {
+        matrix.view_mut((row, 0), (1, n)).copy_from(&rig.basis.row(place));
+    }
+    for i in 0..m {
+        matrix[(rig.places.len() + i, n + i)] = 1.0;
+    }
+    matrix
+}

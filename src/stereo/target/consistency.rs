@@ -1,0 +1,82 @@
+//! Whether every pose fits what all of them share, and from where on they no longer do.
+//!
+//! A pose whose two pictures were taken at two moments, and a rig that moved during the run, look alike: at some poses
+//! `right_from_left` is not the one of the others. Six numbers of such a change are tested by Rao's score at the common minimum, for
+//! every pose by itself and for all poses from one on; nothing is fitted again for it. Chi-square falls by the score, with
+//! six degrees of freedom where nothing is wrong.
+
+use nalgebra::{DMatrix, Matrix6, Vector6};
+
+use crate::statistics::median;
+use crate::stereo::solve::normal_equations::inverse6;
+use crate::stereo::target::bundle::{Normal, PosePart};
+use crate::stereo::target::pose_block::{Eliminated, TRANSFORM};
+
+/// Median of chi-square with six degrees of freedom.
+const MEDIAN_CHI_SQUARE_6: f64 = 5.348;
+
+/// A change of `right_from_left`, rotation (rad) and translation (mm), and by how much it would lower chi-square.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Change {
+    /// The change.
+    pub change: Vector6<f64>,
+    /// Fall of chi-square.
+    pub fall: f64,
+}
+
+/// What a change at each pose alone would gain.
+pub(super) fn at_each(normal: &Normal, covariance: &DMatrix<f64>) -> Vec<Option<Change>> {
+    let of = |part: &PosePart| score(&part.change, &part.change_shared, &part.change_gradient, covariance);
+    normal.poses.iter().map(|part| of(part.as_ref()?)).collect()
+}
+
+/// What a change would gain at a pose that had no part in the minimum.
+pub(super) fn of_outsider(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change> {
+    let own = Matrix6::from_fn(|i, j| part.rig[(TRANSFORM + i, TRANSFORM + j)]);
+    let gradient = Vector6::from_fn(|i, _| part.rig_gradient[TRANSFORM + i]);
+    // The gradient scatters with the pose's own corners and with the shared values, which its corners did not help to find.
+    let shared = part.rig_shared.rows(TRANSFORM, 6).into_owned();
+    score(&own, &shared, &gradient, &-covariance)
+}
+
+/// Where a change from one pose on gains most, and what: the index of its first pose, and how much of the gain a change before the
+/// whole run does not have as well.
+pub(super) fn from_one_on(normal: &Normal, covariance: &DMatrix<f64>) -> Option<(usize, Change, f64)> {
+    let mut best: Option<(usize, Change)> = None;
+    let mut own = Matrix6::zeros();
+    let mut shared = DMatrix::zeros(6, covariance.nrows());
+    let mut gradient = Vector6::zeros();
+    let first = normal.poses.iter().position(Option::is_some)?;
+    let mut whole = 0.0;
+    for (i, part) in normal.poses.iter().enumerate().skip(first).rev() {
+        let Some(part) = part else { continue };
+        own += part.change;
+        shared += &part.change_shared;
+        gradient += part.change_gradient;
+        if i == first {
+            whole = score(&own, &shared, &gradient, covariance).map_or(0.0, |change| change.fall);
+        } else if let Some(change) = score(&own, &shared, &gradient, covariance)
+            && best.is_none_or(|(_, b)| change.fall > b.fall)
+        {
+            best = Some((i, change));
+        }
+    }
+    best.map(|(i, change)| (i, change, change.fall - whole))
+}
+
+/// How much larger the usual score of a pose is than chance: one where the model holds.
+pub(super) fn usual_excess(each: &[Option<Change>]) -> f64 {
+    median(each.iter().flatten().map(|c| c.fall)).map_or(1.0, |m| (m / MEDIAN_CHI_SQUARE_6).max(1.0))
+}
+
+fn score(
+    own: &Matrix6<f64>,
+    shared: &DMatrix<f64>,
+    gradient: &Vector6<f64>,
+    covariance: &DMatrix<f64>,
+) -> Option<Change> {
+    let through = shared * covariance * shared.transpose();
+    let curvature = own - Matrix6::from_fn(|i, j| 0.5 * (through[(i, j)] + through[(j, i)]));
+    let change = -(inverse6(&curvature)? * gradient);
+    Some(Change { change, fall: -gradient.dot(&change) })
+}

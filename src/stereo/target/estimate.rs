@@ -1,0 +1,193 @@
+//! The bundle with its weights: how far corners scatter and how far the target's crossings deviate are found with the values.
+//!
+//! In: a bundle and a start. Out: the minimum with weights that its own residuals bear out. Method: robust rounds first; then least
+//! squares without outliers, in turn with the corners' noise (reduced chi-square one) and with the variance components of the crossings
+//! (MacKay's fixed point, the same as restricted maximum likelihood at its end). Goes wrong: one or two poses cannot tell print from
+//! noise; then the calibration's noise is taken.
+
+use nalgebra::{DMatrix, DVector, Vector2};
+
+use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
+use crate::stereo::data::observation::Observation;
+use crate::stereo::data::view::View;
+use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::solve::uncertainty::invert;
+use crate::stereo::target::bundle::{Bundle, Normal, Values};
+use crate::stereo::target::pose_block::{crossings, residual};
+use crate::stereo::target::prior::{stretch_mode, weights};
+use crate::stereo::target::start::enough;
+
+/// Whitened residuals beyond this are outliers.
+pub(super) const OUTLIER: f64 = 5.3;
+
+/// Rounds of least squares with new weights.
+const ROUNDS: usize = 6;
+
+/// Weights that change by less than this share have settled.
+const SETTLED: f64 = 0.01;
+
+/// Fewest poses that tell a target's print from noise.
+const TELLING_POSES: usize = 3;
+
+/// The certificate counts as much as this many crossings' worth of evidence on how far crossings deviate.
+const CERTIFICATE_COUNT: f64 = 0.1;
+
+/// Smallest deviation that is told from none, mm.
+const SMALLEST_MM: f64 = 1e-6;
+
+/// Steps of the fixed point.
+const FIXED_POINT_STEPS: usize = 30;
+
+/// A minimum with its weights.
+#[derive(Debug, Clone)]
+pub(super) struct Estimate<'a> {
+    /// The problem with the whiteners, the outliers and the shape's prior that were found.
+    pub bundle: Bundle<'a>,
+    /// The values.
+    pub values: Values,
+    /// The normal equations there.
+    pub normal: Normal,
+    /// Covariance of the shared unknowns.
+    pub covariance: DMatrix<f64>,
+    /// How corners scatter.
+    pub noise: Noise,
+    /// Factor on covariances for the information that neighbouring corners share; the whiteners hold it.
+    pub inflation: f64,
+}
+
+/// Finds the minimum. `usual` is the noise of the calibration's corners, where known. `None` where the corners do not determine the poses.
+pub(super) fn estimate<'a>(mut bundle: Bundle<'a>, start: Values, usual: Option<Noise>) -> Option<Estimate<'a>> {
+    let mut values = start;
+    let certificate = bundle.shape;
+    for _ in 0..2 {
+        let noise = Noise::from_median(&residuals(&bundle, &values, |_| true));
+        noise.apply(&mut bundle.views);
+        values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH))?.0;
+    }
+    let poses = values.poses.iter().flatten().count();
+    let mut noise = Noise::from_median(&residuals(&bundle, &values, |_| true));
+    let mut inflation: f64 = 1.0;
+    let mut normal = bundle.normal(&values, Loss::Squared)?;
+    for round in 0..ROUNDS {
+        noise.apply(&mut bundle.views);
+        bundle.mark_outliers(&mut values);
+        inflate(&mut bundle.views, inflation);
+        (values, normal) = bundle.solve(values, Loss::Squared)?;
+        let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm);
+        if poses >= TELLING_POSES {
+            settle_shape(&mut bundle, &values, &normal, certificate.in_plane_mm)?;
+        }
+        let told = told_by_data(&normal)?;
+        let active = residuals(&bundle, &values, |o| o.active);
+        noise = match usual {
+            Some(usual) if poses < TELLING_POSES => usual,
+            _ => Noise::from_mean(&active, (told + 6.0 * poses as f64).round() as usize),
+        };
+        inflation = neighbours(&bundle, &values).inflation();
+        let close = |a: f64, b: f64| (a - b).abs() <= SETTLED * b.abs().max(1e-5);
+        let settled = close(before.0.added_px, noise.added_px)
+            && close(before.0.factor, noise.factor)
+            && close(before.1, bundle.shape.in_plane_mm)
+            && close(before.2, bundle.shape.out_of_plane_mm);
+        if settled && round > 0 {
+            break;
+        }
+    }
+    let covariance = normal.covariance()?;
+    Some(Estimate { bundle, values, normal, covariance, noise, inflation })
+}
+
+/// Residuals in px of the corners that are wanted, where they can be predicted, in the order of the poses.
+fn residuals(
+    bundle: &Bundle<'_>,
+    values: &Values,
+    wanted: impl Fn(&Observation) -> bool,
+) -> Vec<(Observation, Vector2<f64>)> {
+    by_pose(bundle, values, wanted).into_iter().flatten().collect()
+}
+
+fn by_pose(
+    bundle: &Bundle<'_>,
+    values: &Values,
+    wanted: impl Fn(&Observation) -> bool,
+) -> Vec<Vec<(Observation, Vector2<f64>)>> {
+    let rig = bundle.rig_at(values);
+    let crossings = crossings(bundle.board, &values.deviations_mm);
+    let of = |(view, pose): (&View, &Option<_>)| {
+        let Some(pose) = pose else { return Vec::new() };
+        let wanted = view.observations.iter().filter(|o| wanted(o));
+        wanted.filter_map(|o| Some((*o, residual(&rig, &crossings, bundle.board, pose, o)?))).collect()
+    };
+    bundle.views.iter().zip(&values.poses).map(of).collect()
+}
+
+fn inflate(views: &mut [View], inflation: f64) {
+    let by = 1.0 / inflation.sqrt();
+    views.iter_mut().flat_map(|view| &mut view.observations).for_each(|o| o.whitener *= by);
+}
+
+fn neighbours(bundle: &Bundle<'_>, values: &Values) -> NeighbourCorrelation {
+    NeighbourCorrelation::of(bundle.board, by_pose(bundle, values, |o| o.active).into_iter())
+}
+
+/// How many of the shared unknowns the corners determine rather than what was known before.
+fn told_by_data(normal: &Normal) -> Option<f64> {
+    let covariance = normal.covariance()?;
+    Some(covariance.component_mul(&normal.data).sum())
+}
+
+impl Bundle<'_> {
+    /// Corners that miss their prediction by more than chance allows are out; the whiteners hold the noise alone.
+    /// A pose with too few left takes no part.
+    fn mark_outliers(&mut self, values: &mut Values) {
+        let rig = self.rig_at(values);
+        let crossings = crossings(self.board, &values.deviations_mm);
+        for (view, place) in self.views.iter_mut().zip(&mut values.poses) {
+            let Some(pose) = place else { continue };
+            for o in &mut view.observations {
+                o.active =
+                    residual(&rig, &crossings, self.board, pose, o).is_some_and(|r| o.whiten(r).norm() <= OUTLIER);
+            }
+            if !enough(view) {
+                *place = None;
+            }
+        }
+    }
+}
+
+/// Finds how far the crossings deviate in the plane and out of it, everything else as linearised.
+fn settle_shape(bundle: &mut Bundle<'_>, values: &Values, normal: &Normal, certificate_mm: f64) -> Option<()> {
+    let n = values.rig.len();
+    let m = 3 * values.deviations_mm.len();
+    let stretch = stretch_mode(bundle.board);
+    let crossings = values.deviations_mm.len() as f64;
+    // Shifts, turns, tilts and the stretch are not the print's.
+    let free = [2.0 * crossings - 4.0, crossings - 3.0];
+    let right = &normal.data * Bundle::shared(values) - &normal.gradient;
+    for _ in 0..FIXED_POINT_STEPS {
+        let before = [bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm];
+        let weights = weights(&bundle.rig, &bundle.shape, bundle.board, &normal.data);
+        let covariance = invert(&(&normal.data + weights))?;
+        let shape: DVector<f64> = (&covariance * &right).rows(n, m).into_owned();
+        let block = covariance.view((n, n), (m, m));
+        let along = stretch.dot(&shape);
+        let mut squares = [-along * along, 0.0];
+        let mut traces = [-stretch.dot(&(block * &stretch)), 0.0];
+        for i in 0..m {
+            squares[usize::from(i % 3 == 2)] += shape[i] * shape[i];
+            traces[usize::from(i % 3 == 2)] += block[(i, i)];
+        }
+        let settle = |k: usize| {
+            let told = (free[k] - traces[k] / before[k].powi(2)).clamp(0.0, free[k].max(0.0));
+            let sum = squares[k].max(0.0) + CERTIFICATE_COUNT * certificate_mm.powi(2);
+            (sum / (told + CERTIFICATE_COUNT)).sqrt().max(SMALLEST_MM)
+        };
+        let next = [settle(0), settle(1)];
+        (bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm) = (next[0], next[1]);
+        if next.iter().zip(before).all(|(next, before)| (next / before - 1.0).abs() < SETTLED) {
+            break;
+        }
+    }
+    Some(())
+}

@@ -1,0 +1,301 @@
+//! From the common minimum to an answer a pose: covariances in two parts, and the reason where there is no answer.
+
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector3, Vector6};
+use rayon::prelude::*;
+
+use crate::geometry::Transform;
+use crate::imaging::Side;
+use crate::statistics::median;
+use crate::stereo::data::view::View;
+use crate::stereo::target::alone::{Alone, Known};
+use crate::stereo::target::bundle::Bundle;
+use crate::stereo::target::cause::{named, stretch};
+use crate::stereo::target::consistency::{self, Change, usual_excess};
+use crate::stereo::target::estimate::Estimate;
+use crate::stereo::target::judgement::Judgement;
+use crate::stereo::target::pose_block::TRANSFORM;
+use crate::stereo::target::series::{MeasuredPose, POSE_LIMIT, Refusal, Run, Series};
+use crate::stereo::target::start::{Start, enough};
+use crate::stereo::target::{FEWEST_CORNERS, TargetPose};
+
+/// Standard deviations by which a pose's own chi-square may exceed one before its covariance grows.
+const POSE_SIGMAS: f64 = 3.0;
+
+/// Chi-square a number above which a pose that takes no part in the common minimum is not believed.
+const OUTSIDER_LIMIT: f64 = 4.0;
+
+/// A crossing that is off bends the edges that lead to it, so that windows of several sizes see different shares of it: this share of the
+/// print's deviation is left at each pose (measured on rendered targets: 0.025 at 1.2 Mpx, 0.06 at 26 Mpx).
+const BENT_EDGES: f64 = 0.1;
+
+/// Chi-square a number up to which two pictures belong together.
+const PARTNER_LIMIT: f64 = 2.0;
+
+/// The target as it was found to be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// Each crossing against the drawing, row by row, mm; without shift, turn and tilt.
+    pub deviations_mm: Vec<Vector3<f64>>,
+    /// Standard deviation of each.
+    pub sigma_mm: Vec<Vector3<f64>>,
+    /// How far crossings scatter in the plane, a coordinate, mm.
+    pub in_plane_mm: f64,
+    /// How far they scatter out of it, mm.
+    pub out_of_plane_mm: f64,
+    /// Its size against the drawing, minus one, and the standard deviation.
+    pub stretch: [f64; 2],
+}
+
+/// What all poses share.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shared {
+    /// Names: the rig's numbers with a covariance, then the crossings' deviations.
+    pub parameters: Vec<String>,
+    /// Their change against calibration and drawing.
+    pub change: Vec<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+}
+
+impl Run<'_> {
+    /// Every pose on the common values.
+    pub(super) fn finish(self, found: &Estimate<'_>, judgement: Judgement) -> Series {
+        let known = Known::new(found);
+        let each = consistency::at_each(&found.normal, &found.covariance);
+        let excess = usual_excess(&each);
+        let names = named(found);
+        let covariance = &names * &found.covariance * names.transpose();
+        let alone: Vec<Option<Alone>> = {
+            self.starts
+                .par_iter()
+                .enumerate()
+                .map(|(i, start)| known.fit(&found.bundle.views[i], start.pose.as_ref()?))
+                .collect()
+        };
+        let ended = match &judgement {
+            Judgement::Contradicts(_) | Judgement::Unexplained { .. } => {
+                judgement.describe(&self.known.rig, self.known.board.square_mm)
+            }
+            _ => None,
+        };
+        let finisher = Finisher { run: &self, found, known: &known, alone: &alone, excess };
+        let targets: Vec<Result<TargetPose, Refusal>> = (0..self.at.len())
+            .map(|i| match (&self.refusals[i], &ended) {
+                (Some(refusal), _) => Err(refusal.clone()),
+                (None, Some(reason)) => Err(Refusal { status: "rig changed", reason: reason.clone() }),
+                (None, None) => finisher.pose(i, each[i].as_ref()),
+            })
+            .collect();
+        let sums: (f64, f64) = alone
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| self.taking_part[*i])
+            .filter_map(|(_, a)| a.as_ref())
+            .fold((0.0, 0.0), |s, a| (s.0 + a.chi_square * a.freedom, s.1 + a.freedom));
+        let noise_px = found.noise.typical_px(&found.bundle.views);
+        let bent_px = BENT_EDGES * found.bundle.shape.in_plane_mm * px_per_mm(found);
+        let usual_px = self.known.noise.map(|noise| noise.typical_px(&found.bundle.views).hypot(bent_px));
+        let against = usual_px.map_or(1.0, |usual| (noise_px / usual).powi(2));
+        let poses = self.at.iter().cloned().zip(targets).map(|(at, target)| MeasuredPose { at, target }).collect();
+        Series {
+            poses,
+            shape: Some(shape(found)),
+            shared: Some(shared(found, &names, covariance)),
+            judgement,
+            noise_px: Some(noise_px),
+            usual_px,
+            prior_chi_square: Some(prior_chi_square(found)),
+            chi_square: Some(sums.0 / sums.1.max(1.0) * against),
+            excess,
+            notes: self.notes,
+        }
+    }
+}
+
+/// What turns a pose into an answer.
+struct Finisher<'a> {
+    run: &'a Run<'a>,
+    found: &'a Estimate<'a>,
+    known: &'a Known<'a>,
+    alone: &'a [Option<Alone>],
+    excess: f64,
+}
+
+impl Finisher<'_> {
+    fn pose(&self, i: usize, change: Option<&Change>) -> Result<TargetPose, Refusal> {
+        let start = &self.run.starts[i];
+        let Some(alone) = &self.alone[i] else {
+            return Err(self.no_pose(i, start));
+        };
+        let change = match change {
+            Some(change) => Some(*change),
+            None => consistency::of_outsider(&alone.part, &self.found.covariance),
+        };
+        if let Some(change) =
+            change.filter(|c| c.fall > POSE_LIMIT * self.excess * alone.chi_square.clamp(1.0, OUTSIDER_LIMIT))
+        {
+            return Err(self.two_moments(i, alone, &change));
+        }
+        if !self.run.taking_part[i] && alone.chi_square > OUTSIDER_LIMIT * self.excess {
+            let times = alone.chi_square.sqrt();
+            return Err(Refusal {
+                status: "does not fit",
+                reason: format!("its corners miss the common rig and target {times:.1} times as far as at other poses"),
+            });
+        }
+        Ok(self.answer(alone))
+    }
+
+    fn answer(&self, alone: &Alone) -> TargetPose {
+        let by_shared = -(alone.part.pose_inverse * alone.part.mixed.transpose());
+        let through = &by_shared * &self.found.covariance * by_shared.transpose();
+        let chance = 1.0 + POSE_SIGMAS * (2.0 / alone.freedom.max(1.0)).sqrt();
+        let grown = if alone.chi_square > chance { alone.chi_square } else { 1.0 };
+        let own_covariance = alone.part.pose_inverse * grown * self.excess;
+        let sensitivity = self.sensitivity(alone);
+        let change = Matrix6::from_fn(|i, j| alone.part.rig[(TRANSFORM + i, TRANSFORM + j)]);
+        let gradient = Vector6::from_fn(|i, _| alone.part.rig_gradient[TRANSFORM + i]);
+        let t = self.run.known.rig.right_from_left.translation.vector;
+        let turn = |axis: Vector3<f64>| {
+            let moved = axis.cross(&t);
+            let d = Vector6::new(axis.x, axis.y, axis.z, moved.x, moved.y, moved.z);
+            let curvature = d.dot(&(change * d));
+            [-d.dot(&gradient) / curvature, 1.0 / curvature.sqrt()]
+        };
+        TargetPose {
+            cam_from_board: alone.pose,
+            covariance: own_covariance + Matrix6::from_fn(|i, j| 0.5 * (through[(i, j)] + through[(j, i)])),
+            own_covariance,
+            sensitivity,
+            fit_rms_mm: alone.fit_rms_mm,
+            rms_px: alone.rms_px,
+            corners: alone.view.observations.iter().filter(|o| o.active).count(),
+            outliers: alone.view.observations.iter().filter(|o| !o.active).count(),
+            chi_square: alone.chi_square,
+            pitch_rad: turn(Vector3::x()),
+            yaw_rad: turn(Vector3::y()),
+        }
+    }
+
+    /// By the rig's named numbers and the crossings.
+    fn sensitivity(&self, alone: &Alone) -> Matrix6xX<f64> {
+        let n = self.found.values.rig.len();
+        let places = &self.found.bundle.rig.places;
+        let crossings = alone.part.mixed.rows_range(n..);
+        let mut mixed = DMatrix::zeros(places.len() + crossings.nrows(), 6);
+        for (row, &place) in places.iter().enumerate() {
+            mixed.row_mut(row).copy_from(&alone.part.rig_mixed.row(place));
+        }
+        mixed.rows_mut(places.len(), crossings.nrows()).copy_from(&crossings);
+        -(alone.part.pose_inverse * mixed.transpose())
+    }
+
+    fn no_pose(&self, i: usize, start: &Start) -> Refusal {
+        let [left, right] = Side::BOTH.map(|side| start.view.only(side).observations.len());
+        if start.pose.is_none() && !enough(&start.view) {
+            let reason = format!("too few corners: {left} left, {right} right, at least {} each", FEWEST_CORNERS);
+            return Refusal { status: "too few corners", reason };
+        }
+        if let Some(partner) = self.partner(i) {
+            return partner;
+        }
+        let reason =
+            "left and right do not show the same target at the same place: most corners miss the rig's prediction; \
+                      taken at two moments, or a picture of another pose"
+                .to_owned();
+        Refusal { status: "two moments", reason }
+    }
+
+    fn two_moments(&self, i: usize, alone: &Alone, change: &Change) -> Refusal {
+        if let Some(partner) = self.partner(i) {
+            return partner;
+        }
+        let seen = self.run.known.rig.right_from_left * alone.pose.translation.vector;
+        let c = &change.change;
+        let moved = Vector3::new(c[0], c[1], c[2]).cross(&seen) + Vector3::new(c[3], c[4], c[5]);
+        let reason = format!(
+            "the two pictures do not belong to one moment: between them the target moved by about {:.3} mm against the cameras",
+            moved.norm()
+        );
+        Refusal { status: "two moments", reason }
+    }
+
+    /// The pose that one of the pictures belongs to.
+    fn partner(&self, i: usize) -> Option<Refusal> {
+        let view = &self.found.bundle.views[i];
+        let fits = |mixed: View, pose: &Transform| {
+            let alone = self.known.fit(&mixed, pose);
+            alone.is_some_and(|a| {
+                a.chi_square < PARTNER_LIMIT * self.excess
+                    && 2 * mixed.observations.len() < 3 * a.view.observations.iter().filter(|o| o.active).count()
+            })
+        };
+        (0..self.alone.len()).filter(|&j| j != i).find_map(|j| {
+            let other = &self.found.bundle.views[j];
+            let pose = self.run.starts[j].pose?;
+            let mine = self.run.starts[i].pose.unwrap_or(pose);
+            for pose in [pose, mine] {
+                if fits(self.known.mixed(view, other), &pose) {
+                    return Some(self.mixed_up("left", "right", j));
+                }
+                if fits(self.known.mixed(other, view), &pose) {
+                    return Some(self.mixed_up("right", "left", j));
+                }
+            }
+            None
+        })
+    }
+
+    fn mixed_up(&self, mine: &str, other: &str, j: usize) -> Refusal {
+        let pose = &self.run.at[j].pose;
+        let reason = format!("its {mine} picture belongs to the {other} one of pose {pose}");
+        Refusal { status: "another pose's pictures", reason }
+    }
+}
+
+/// How large a millimetre of the target is in the left picture, px.
+fn px_per_mm(found: &Estimate<'_>) -> f64 {
+    let depths = found.values.poses.iter().flatten().map(|pose| pose.translation.vector.z);
+    median(depths).filter(|z| *z > 0.0).map_or(0.0, |z| found.bundle.rig.rig.left.fx / z)
+}
+
+/// The target as the minimum has it.
+fn shape(found: &Estimate<'_>) -> Shape {
+    let n = found.values.rig.len();
+    let sigma = |k: usize| Vector3::from_fn(|i, _| found.covariance[(n + 3 * k + i, n + 3 * k + i)].max(0.0).sqrt());
+    Shape {
+        deviations_mm: found.values.deviations_mm.clone(),
+        sigma_mm: (0..found.values.deviations_mm.len()).map(sigma).collect(),
+        in_plane_mm: found.bundle.shape.in_plane_mm,
+        out_of_plane_mm: found.bundle.shape.out_of_plane_mm,
+        stretch: stretch(found),
+    }
+}
+
+fn shared(found: &Estimate<'_>, names: &DMatrix<f64>, covariance: DMatrix<f64>) -> Shared {
+    let board = found.bundle.board;
+    let mut parameters = found.bundle.rig.names.clone();
+    for i in 0..board.corner_count() {
+        let place = format!("target.{}.{}", i % board.columns(), i / board.columns());
+        parameters.extend(["x_mm", "y_mm", "z_mm"].map(|axis| format!("{place}.{axis}")));
+    }
+    let change: DVector<f64> = names * Bundle::shared(&found.values);
+    Shared { parameters, change: change.as_slice().to_vec(), covariance }
+}
+
+/// Chi-square of the calibration and of the target's size, with the degrees of freedom that the pictures tell of them.
+fn prior_chi_square(found: &Estimate<'_>) -> [f64; 2] {
+    let rig = &found.bundle.rig;
+    let (mut chi, mut freedom) = (0.0, 0.0);
+    for (i, variance) in rig.variances.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+        chi += found.values.rig[i].powi(2) / variance;
+        freedom += 1.0 - found.covariance[(i, i)] / variance;
+    }
+    let [amount, sigma] = stretch(found);
+    let before = found.bundle.shape.stretch_mm / super::prior::stretch_length_mm(found.bundle.board);
+    if before.is_finite() {
+        chi += (amount / before).powi(2);
+        freedom += 1.0 - (sigma / before).powi(2);
+    }
+    [chi, freedom]
+}

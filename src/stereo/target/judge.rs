@@ -1,0 +1,157 @@
+//! Whether the rig is the one that was calibrated and the target the one that was described; what changed if not, and how far that
+//! reaches into the points.
+//!
+//! Every [`Cause`] is fitted with nothing known of it beforehand; the most likely one is named with its equals. A change that moves the
+//! points by less than the tolerance goes into their covariance: the calibration is believed only as far as the change reaches. A larger
+//! one ends the run.
+
+use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::target::bundle::{Bundle, Values};
+use crate::stereo::target::cause::{Cause, Explanation, explanations, moved_mm, stretch};
+use crate::stereo::target::estimate::{Estimate, estimate};
+use crate::stereo::target::pose_block::{crossings, residual};
+use crate::stereo::target::prior::stretch_length_mm;
+
+/// A cause that lowers chi-square by less than this is chance: four standard deviations.
+const CHANCE: f64 = 16.0;
+
+/// Causes whose score reaches this share of the best one's are fitted.
+const COMPETES: f64 = 0.05;
+
+/// Causes whose likelihood is this near to the best one's (twice its logarithm) explain as well.
+const AS_LIKELY: f64 = 9.0;
+
+/// Poses on which causes are compared: enough for any, and cheap.
+const COMPARED_ON: usize = 48;
+
+/// Whitened squares beyond this count as this much in the likelihood: outliers.
+const MOST_SQUARE: f64 = 28.0;
+
+/// What is found of the rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Changed {
+    /// What explains it, the most likely first; the others are as likely.
+    pub explanations: Vec<Explanation>,
+    /// By how much the points move with it, root mean square, mm.
+    pub moves_mm: f64,
+    /// How many times less unlikely it makes what is seen: the fall of chi-square.
+    pub fall: f64,
+}
+
+/// Names what changed, where more than chance did; and the estimate to go on with, in which the change is allowed for.
+pub(super) fn judge<'a>(found: Estimate<'a>, usual: Option<Noise>) -> (Estimate<'a>, Option<Changed>) {
+    let scores = explanations(&found);
+    let best = scores.iter().map(|e| e.fall).fold(0.0, f64::max);
+    if best <= CHANCE {
+        return (found, None);
+    }
+    let some = subset(&found);
+    let mut fitted: Vec<(f64, Explanation)> = scores
+        .iter()
+        .filter(|e| e.fall >= COMPETES * best)
+        .filter_map(|score| {
+            let fit = with_cause(&some, score, f64::INFINITY, usual)?;
+            let amount = amount_of(&fit, score.cause)?;
+            Some((deviance(&fit), Explanation { amount, ..*score }))
+        })
+        .collect();
+    fitted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let Some(&(least, first)) = fitted.first() else { return (found, None) };
+    let equals = fitted.iter().filter(|(d, _)| d - least <= AS_LIKELY).map(|(_, e)| *e).collect();
+    // The change is allowed for as something of the rig: with a pitch that is off instead, the points stay where they are.
+    let on_rig = fitted.iter().map(|(_, e)| e).find(|e| e.cause != Cause::Pitch).unwrap_or(&first);
+    let known = on_rig.amount.powi(2).max(f64::MIN_POSITIVE);
+    let Some(free) = with_cause(&found, on_rig, f64::INFINITY, usual) else { return (found, None) };
+    let changed = Changed { explanations: equals, moves_mm: moved_mm(&found, &free), fall: best };
+    match with_cause(&found, on_rig, known, usual) {
+        Some(allowed) => (allowed, Some(changed)),
+        None => (free, Some(changed)),
+    }
+}
+
+/// Some of the poses, evenly spread.
+fn subset<'a>(found: &Estimate<'a>) -> Estimate<'a> {
+    let present: Vec<usize> = (0..found.values.poses.len()).filter(|&i| found.values.poses[i].is_some()).collect();
+    if present.len() <= COMPARED_ON {
+        return found.clone();
+    }
+    let mut some = found.clone();
+    some.values.poses.iter_mut().for_each(|pose| *pose = None);
+    for k in 0..COMPARED_ON {
+        let i = present[k * present.len() / COMPARED_ON];
+        some.values.poses[i] = found.values.poses[i];
+    }
+    some
+}
+
+/// The minimum with a cause that has this variance before.
+fn with_cause<'a>(
+    found: &Estimate<'a>,
+    cause: &Explanation,
+    variance: f64,
+    usual: Option<Noise>,
+) -> Option<Estimate<'a>> {
+    let mut bundle = found.bundle.clone();
+    let mut values = found.values.clone();
+    match cause.cause.direction(&bundle.rig_at(&values)) {
+        Some(direction) => {
+            bundle.rig = bundle.rig.with_change(&direction, variance);
+            let n = values.rig.len();
+            values.rig = values.rig.insert_row(n, 0.0);
+        }
+        None => {
+            bundle.shape.stretch_mm = bundle.shape.stretch_mm.hypot(variance.sqrt() * stretch_length_mm(bundle.board));
+        }
+    }
+    estimate(bundle, values, usual)
+}
+
+/// How much of a cause a fit with it found.
+fn amount_of(fit: &Estimate<'_>, cause: Cause) -> Option<f64> {
+    match cause {
+        Cause::Pitch => Some(stretch(fit)[0]),
+        _ => fit.values.rig.as_slice().last().copied(),
+    }
+}
+
+/// Minus twice the logarithm of the likelihood, but for a constant: corners and what was known before.
+fn deviance(fit: &Estimate<'_>) -> f64 {
+    let rig = fit.bundle.rig_at(&fit.values);
+    let places = crossings(fit.bundle.board, &fit.values.deviations_mm);
+    let mut sum = 0.0;
+    for (view, pose) in fit.bundle.views.iter().zip(&fit.values.poses) {
+        let Some(pose) = pose else { continue };
+        for o in &view.observations {
+            let square =
+                residual(&rig, &places, fit.bundle.board, pose, o).map_or(MOST_SQUARE, |r| o.whiten(r).norm_squared());
+            sum += square.min(MOST_SQUARE) - 2.0 * o.whitener.determinant().abs().ln();
+        }
+    }
+    let shared = Bundle::shared(&fit.values);
+    sum + shared.dot(&(&fit.normal.weights * &shared)) + shape_evidence(fit)
+}
+
+/// What the width of the crossings' prior costs: without it a print that is assumed to be rough would explain anything.
+fn shape_evidence(fit: &Estimate<'_>) -> f64 {
+    let (n, m) = (fit.values.rig.len(), 3 * fit.values.deviations_mm.len());
+    let block = (&fit.normal.data + &fit.normal.weights).view((n, n), (m, m)).into_owned();
+    let mut values: Vec<f64> = block.symmetric_eigenvalues().iter().copied().collect();
+    values.sort_by(f64::total_cmp);
+    // The largest six hold the frame.
+    let told: f64 = values[..m.saturating_sub(6)].iter().map(|v| v.max(f64::MIN_POSITIVE).ln()).sum();
+    let (flat, deep) = (fit.bundle.shape.in_plane_mm, fit.bundle.shape.out_of_plane_mm);
+    told + 2.0 * (2.0 * flat.ln() + deep.ln()) * (m as f64 / 3.0)
+}
+
+/// Values for a target whose size is off by a large factor: every pose scaled with it.
+pub(super) fn scaled(values: &Values, bundle: &Bundle<'_>, factor: f64) -> Values {
+    let mut next = values.clone();
+    let board = bundle.board;
+    for (i, deviation) in next.deviations_mm.iter_mut().enumerate() {
+        *deviation = board.corner_mm(i % board.columns(), i / board.columns()).coords * (factor - 1.0);
+    }
+    for pose in next.poses.iter_mut().flatten() {
+        pose.translation.vector *= factor;
+    }
+    next
+}

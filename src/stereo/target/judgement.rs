@@ -1,0 +1,101 @@
+//! What is found of the rig as a whole, and how it is said.
+
+use crate::stereo::Rig;
+use crate::stereo::target::cause::{Cause, Explanation};
+use crate::stereo::target::judge::Changed;
+
+/// What is found of the rig as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Judgement {
+    /// It agrees with its calibration.
+    Agrees,
+    /// It changed by less than the tolerance; covariances allow for it.
+    Allowed(Changed),
+    /// It is not the rig that was calibrated, or the target is not the one described.
+    Contradicts(Changed),
+    /// Left and right pictures are exchanged.
+    Exchanged,
+    /// It moved during the run.
+    Moved {
+        /// First pose after it.
+        since: String,
+        /// By how much the right camera turned, deg, and how far it went, mm.
+        turned_deg: f64,
+        /// See above.
+        moved_mm: f64,
+    },
+    /// Nothing that is known of explains the pictures.
+    Unexplained {
+        /// Median over the poses of what is left, px.
+        misfit_px: f64,
+    },
+}
+
+impl Judgement {
+    /// True where the poses cannot be used.
+    pub fn ends_the_run(&self) -> bool {
+        !matches!(self, Judgement::Agrees | Judgement::Allowed(_))
+    }
+
+    /// What is wrong, for a person; `None` where nothing is.
+    pub fn describe(&self, rig: &Rig, square_mm: f64) -> Option<String> {
+        Some(match self {
+            Judgement::Agrees => return None,
+            Judgement::Allowed(changed) => format!(
+                "the rig is not quite the one that was calibrated: {}; the points move by {:.4} mm with it, and their covariance allows for that",
+                causes(changed, rig, square_mm),
+                changed.moves_mm
+            ),
+            Judgement::Contradicts(changed) => format!(
+                "the calibration does not suit these pictures: {}; the points are off by {:.3} mm with it",
+                causes(changed, rig, square_mm),
+                changed.moves_mm
+            ),
+            Judgement::Exchanged => {
+                "left and right pictures are exchanged: they fit this rig the other way round".to_owned()
+            }
+            Judgement::Moved { since, turned_deg, moved_mm } => format!(
+                "the rig moved before pose {since}: the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the left"
+            ),
+            Judgement::Unexplained { misfit_px } => format!(
+                "the calibration does not suit these pictures: the target's corners miss it by {misfit_px:.2} px, and no single change of \
+                 the rig or of the target explains that"
+            ),
+        })
+    }
+
+    /// What to do about it.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            Judgement::Agrees | Judgement::Allowed(_) => None,
+            Judgement::Contradicts(changed) if changed.explanations.iter().any(|e| e.cause == Cause::Pitch) => Some(
+                "check `--square-mm` and `--squares` against the target; if they are right, the rig changed: `stereocal camera-check IMAGES`",
+            ),
+            Judgement::Exchanged => Some("exchange the names of left/ and right/"),
+            Judgement::Moved { .. } => Some(
+                "clamp the cameras, calibrate again with `stereocal camera-check IMAGES`, and take the poses from there on again",
+            ),
+            _ => Some(
+                "calibrate again with `stereocal camera-check IMAGES`; `--calibration FILE` names another calibration",
+            ),
+        }
+    }
+}
+
+fn causes(changed: &Changed, rig: &Rig, square_mm: f64) -> String {
+    let one = |e: &Explanation| unit_of(e, rig).unwrap_or_else(|| e.cause.describe(e.amount, rig, square_mm));
+    let all: Vec<String> = changed.explanations.iter().map(one).collect();
+    all.join(", or ")
+}
+
+/// A size that is off by the ratio of two units of length: not the target's squares, but the baseline's number.
+fn unit_of(e: &Explanation, rig: &Rig) -> Option<String> {
+    /// Shares by which a ratio may miss a unit's.
+    const NEAR: f64 = 0.03;
+    const UNITS: [(f64, &str); 4] = [(1000.0, "m"), (10.0, "cm"), (25.4, "inches"), (1e-3, "um")];
+    if e.cause != Cause::Pitch {
+        return None;
+    }
+    let (_, unit) = UNITS.iter().find(|(mm, _)| ((1.0 + e.amount) * mm - 1.0).abs() < NEAR)?;
+    Some(format!("the baseline of {:.4} mm seems to be in {unit}, not in mm", rig.baseline_mm()))
+}

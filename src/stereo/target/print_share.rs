@@ -1,0 +1,119 @@
+//! What the calibration board's own print does to the calibration.
+//!
+//! A crossing that is off its drawing is off in every pair, so that more pairs do not average it away; a bundle that takes every corner
+//! for independent says a covariance that is too small. In: a calibration's views and values. Out: how far the board's crossings
+//! deviate, and the covariance of the shared numbers with that in it. Method: the score of each crossing's place at the minimum, in
+//! units of what the corners say of it, exceeds chance by the print (a variance component by moments); the print then goes
+//! through the normal equations to the shared numbers.
+
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
+
+use crate::imaging::Board;
+use crate::stereo::data::view::View;
+use crate::stereo::model::board_shape::{NUMBERS, lift};
+use crate::stereo::model::parameters::{Layout, Values};
+use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::solve::uncertainty::invert;
+use crate::stereo::target::pose_block::{PoseBlock, crossings};
+use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
+
+/// The print of a calibration board, and what it does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PrintShare {
+    /// Standard deviation of a crossing along x and along y, mm.
+    pub crossing_mm: f64,
+    /// Share of the corners' variance that is not the print's but their own.
+    pub own_noise: f64,
+    /// Covariance of the shared numbers, in the layout's order: the corners' own noise and the print.
+    pub covariance: DMatrix<f64>,
+}
+
+/// Finds the print. `inflation` is that of [`crate::stereo::data::neighbour_correlation`]. `None` where the views do not determine the
+/// shared numbers.
+pub fn print_share(
+    views: &[View],
+    board: &Board,
+    layout: &Layout,
+    values: &Values,
+    inflation: f64,
+) -> Option<PrintShare> {
+    let m = board.corner_count();
+    let lifts: Vec<[f64; NUMBERS]> =
+        (0..m).map(|i| lift(board, &board.corner_mm(i % board.columns(), i / board.columns()))).collect();
+    let shape = values.shared.shape_mm;
+    let heights = lifts.iter().map(|l| Vector3::new(0.0, 0.0, l.iter().zip(&shape).map(|(l, s)| l * s).sum()));
+    let places = crossings(board, &heights.collect::<Vec<_>>());
+    let names = layout.names();
+    let rig_count = names.iter().filter(|name| rig_number(name).is_some()).count();
+    let mut basis = DMatrix::zeros(RIG_NUMBERS, rig_count);
+    for (column, number) in names.iter().filter_map(|name| rig_number(name)).enumerate() {
+        basis[(number, column)] = 1.0;
+    }
+    let size = rig_count + 3 * m;
+    let mut sums = Sums { matrix: DMatrix::zeros(size, size), gradient: DVector::zeros(size), told: 0.0, numbers: 0.0 };
+    // One after the other: for a board of a thousand crossings each is large.
+    for (view, pose) in views.iter().zip(&values.poses) {
+        let block = PoseBlock::new(&values.shared.rig, &places, board, pose, view, Loss::Squared)?;
+        sums.told += block.told_in_plane();
+        sums.numbers += 2.0 * view.observations.iter().filter(|o| o.active).count() as f64;
+        let part = block.eliminate(&basis)?;
+        sums.matrix += part.matrix;
+        sums.gradient += part.gradient;
+    }
+    let variance = sums.print_variance(rig_count, m);
+    let own_noise = 1.0 - variance * sums.told / sums.numbers;
+    // The board's paraboloids are heights of its crossings.
+    let mut to_shared = DMatrix::zeros(size, names.len());
+    for i in 0..rig_count {
+        to_shared[(i, i)] = 1.0;
+    }
+    for (k, lift) in lifts.iter().enumerate() {
+        for (column, by) in (rig_count..names.len()).zip(lift) {
+            to_shared[(rig_count + 3 * k + 2, column)] = *by;
+        }
+    }
+    let by_all = to_shared.tr_mul(&sums.matrix);
+    let inverse = invert(&(&by_all * &to_shared))?;
+    let by_print = &inverse * by_all;
+    let mut covariance = &inverse * (own_noise * inflation);
+    for k in 0..m {
+        for axis in 0..2 {
+            let column = by_print.column(rig_count + 3 * k + axis);
+            covariance.ger(variance, &column, &column, 1.0);
+        }
+    }
+    Some(PrintShare { crossing_mm: variance.sqrt(), own_noise, covariance })
+}
+
+struct Sums {
+    /// Rig and crossings with all poses eliminated.
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+    /// What the corners say of their crossings' places in the plane, summed; and how many numbers they are.
+    told: f64,
+    numbers: f64,
+}
+
+impl Sums {
+    /// Variance of a crossing's coordinate, mm^2. The expected sum of squared scores is a straight line in it.
+    fn print_variance(&self, rig_count: usize, crossings: usize) -> f64 {
+        let (mut scores, mut slope, mut count) = (0.0, 0.0, 0.0);
+        for k in 0..crossings {
+            let at = rig_count + 3 * k;
+            let own = Matrix2::from_fn(|i, j| self.matrix[(at + i, at + j)]);
+            let Some(inverse) = own.try_inverse().filter(|i| i.iter().all(|v| v.is_finite())) else { continue };
+            let gradient = Vector2::new(self.gradient[at], self.gradient[at + 1]);
+            scores += gradient.dot(&(inverse * gradient));
+            let mut through = Matrix2::zeros();
+            for j in 0..crossings {
+                let block = self.matrix.fixed_view::<2, 2>(at, rig_count + 3 * j);
+                through += block * block.transpose();
+            }
+            slope += (inverse * through).trace();
+            count += 2.0;
+        }
+        let chance = self.told / self.numbers.max(1.0);
+        let variance = (scores - count) / (slope - count * chance);
+        if variance.is_finite() { variance.clamp(0.0, 0.999 / chance) } else { 0.0 }
+    }
+}

@@ -1,0 +1,180 @@
+//! What is known before the target is seen: the rig by its calibration, the target by its certificate.
+//!
+//! The rig's numbers are `calibrated + basis * u` with independent `u` of unit variance, so that a calibration with strongly dependent
+//! numbers stays well conditioned; further columns of the basis are changes that nothing is known about. The crossings deviate from
+//! their drawing by independent amounts in the plane and out of it; the board's frame is the drawing laid over the crossings by least
+//! squares, so that their deviations hold no shift, no turn and no tilt.
+
+use nalgebra::{DMatrix, DVector, Point3, Vector3};
+
+use crate::geometry::perturb;
+use crate::imaging::Board;
+use crate::stereo::Rig;
+use crate::stereo::model::projection::CAMERA_NUMBERS;
+use crate::stereo::model::rig::Covariance;
+use crate::stereo::target::pose_block::TRANSFORM;
+use crate::stereo::triangulate::{RIG_NUMBERS, rig_number, rig_number_name};
+
+/// How tightly the deviations are held free of shift, turn and tilt, as a multiple of what the corners say about them.
+const HELD: f64 = 1e4;
+
+/// What the calibration says.
+#[derive(Debug, Clone)]
+pub(super) struct RigPrior {
+    /// The rig as calibrated.
+    pub rig: Rig,
+    /// Names of the numbers with a covariance.
+    pub names: Vec<String>,
+    /// Their places among the rig's numbers.
+    pub places: Vec<usize>,
+    /// Maps the unknowns to the rig's numbers.
+    pub basis: DMatrix<f64>,
+    /// Variance of each unknown before; infinite for a change that nothing is known about.
+    pub variances: Vec<f64>,
+}
+
+impl RigPrior {
+    /// From the calibration's covariance; without one the rig is taken as it is.
+    pub fn new(rig: &Rig) -> RigPrior {
+        let known = |c: &Covariance| -> Vec<(usize, String, usize)> {
+            let named = c.order.iter().enumerate();
+            let with_place = named.filter_map(|(at, name)| Some((at, name.clone(), rig_number(name)?)));
+            with_place.filter(|(at, _, _)| c.matrix[(*at, *at)] > 0.0).collect()
+        };
+        let known: Vec<_> = rig.covariance.as_ref().map_or_else(Vec::new, known);
+        let at: Vec<usize> = known.iter().map(|(at, _, _)| *at).collect();
+        let places: Vec<usize> = known.iter().map(|(_, _, place)| *place).collect();
+        let covariance = rig.covariance.as_ref().map_or_else(
+            || DMatrix::zeros(0, 0),
+            |c| {
+                DMatrix::from_fn(at.len(), at.len(), |i, j| 0.5 * (c.matrix[(at[i], at[j])] + c.matrix[(at[j], at[i])]))
+            },
+        );
+        let root = root(&covariance);
+        let mut basis = DMatrix::zeros(RIG_NUMBERS, root.ncols());
+        for (row, &place) in places.iter().enumerate() {
+            basis.row_mut(place).copy_from(&root.row(row));
+        }
+        let names = known.into_iter().map(|(_, name, _)| name).collect();
+        RigPrior { rig: rig.clone(), names, places, variances: vec![1.0; basis.ncols()], basis }
+    }
+
+    /// The same with a change of the rig that has this variance before.
+    pub fn with_change(&self, direction: &DVector<f64>, variance: f64) -> RigPrior {
+        let mut prior = self.clone();
+        let at = prior.basis.ncols();
+        prior.basis = prior.basis.insert_column(at, 0.0);
+        prior.basis.set_column(at, direction);
+        prior.variances.push(variance);
+        for (place, _) in direction.iter().enumerate().filter(|(_, by)| **by != 0.0) {
+            if !prior.places.contains(&place) {
+                prior.places.push(place);
+                prior.names.push(rig_number_name(place));
+            }
+        }
+        prior
+    }
+
+    /// The rig at these unknowns.
+    pub fn rig_at(&self, unknowns: &DVector<f64>) -> Rig {
+        let step = &self.basis * unknowns;
+        let mut rig = self.rig.clone();
+        for (camera, start) in [(&mut rig.left, 0), (&mut rig.right, CAMERA_NUMBERS)] {
+            camera.fx += step[start];
+            camera.fy += step[start + 1];
+            camera.cx += step[start + 2];
+            camera.cy += step[start + 3];
+            for (number, change) in camera.distortion.iter_mut().zip(&step.as_slice()[start + 4..]) {
+                *number += change;
+            }
+        }
+        let t = &step.as_slice()[TRANSFORM..];
+        rig.right_from_left =
+            perturb(&rig.right_from_left, Vector3::new(t[0], t[1], t[2]), Vector3::new(t[3], t[4], t[5]));
+        rig
+    }
+}
+
+/// `L` with `L L'` the covariance; directions without any variance are left out.
+fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    /// Share of the largest eigenvalue below which rounding, not knowledge, decides.
+    const SMALLEST: f64 = 1e-14;
+    let n = covariance.nrows();
+    if n == 0 {
+        return DMatrix::zeros(0, 0);
+    }
+    let scale = covariance.diagonal().map(f64::sqrt);
+    let correlation = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (scale[i] * scale[j]));
+    let eigen = correlation.symmetric_eigen();
+    let kept: Vec<usize> = (0..n).filter(|&k| eigen.eigenvalues[k] > SMALLEST * eigen.eigenvalues.max()).collect();
+    DMatrix::from_fn(n, kept.len(), |i, k| {
+        scale[i] * eigen.eigenvectors[(i, kept[k])] * eigen.eigenvalues[kept[k]].sqrt()
+    })
+}
+
+/// What is known of the target, as standard deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ShapePrior {
+    /// Of a crossing along x and along y, mm.
+    pub in_plane_mm: f64,
+    /// Of a crossing's height, mm.
+    pub out_of_plane_mm: f64,
+    /// Of the common stretch, as the length of the vector of all deviations, mm; infinite where nothing is known of the size.
+    pub stretch_mm: f64,
+}
+
+/// Unit vectors in the space of all deviations (x, y, z of every crossing): shifts, turn and tilts, which the frame takes up.
+pub(super) fn frame_modes(board: &Board) -> Vec<DVector<f64>> {
+    type Way = fn(&Point3<f64>) -> Vector3<f64>;
+    let ways: [Way; 6] = [
+        |_| Vector3::x(),
+        |_| Vector3::y(),
+        |_| Vector3::z(),
+        |p| Vector3::new(-p.y, p.x, 0.0),
+        |p| Vector3::new(0.0, 0.0, p.x),
+        |p| Vector3::new(0.0, 0.0, p.y),
+    ];
+    ways.iter().map(|way| mode(board, way)).collect()
+}
+
+/// The unit vector of a common stretch.
+pub(super) fn stretch_mode(board: &Board) -> DVector<f64> {
+    mode(board, |p| p.coords)
+}
+
+/// Length of the vector of all deviations when the board is stretched by the whole of its size, mm.
+pub(super) fn stretch_length_mm(board: &Board) -> f64 {
+    let places = (0..board.corner_count()).map(|i| board.corner_mm(i % board.columns(), i / board.columns()));
+    places.map(|p| p.coords.norm_squared()).sum::<f64>().sqrt()
+}
+
+fn mode(board: &Board, way: impl Fn(&Point3<f64>) -> Vector3<f64>) -> DVector<f64> {
+    let mut all = DVector::zeros(3 * board.corner_count());
+    for i in 0..board.corner_count() {
+        all.rows_mut(3 * i, 3).copy_from(&way(&board.corner_mm(i % board.columns(), i / board.columns())));
+    }
+    all.normalize()
+}
+
+/// The weights of all that is known before, as a matrix over the shared unknowns. `data` is what the corners say.
+pub(super) fn weights(rig: &RigPrior, shape: &ShapePrior, board: &Board, data: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = rig.basis.ncols();
+    let m = 3 * board.corner_count();
+    let mut weights = DMatrix::zeros(n + m, n + m);
+    for (i, variance) in rig.variances.iter().enumerate() {
+        weights[(i, i)] = 1.0 / variance;
+    }
+    for i in 0..m {
+        let sigma = if i % 3 == 2 { shape.out_of_plane_mm } else { shape.in_plane_mm };
+        weights[(n + i, n + i)] = 1.0 / (sigma * sigma);
+    }
+    let largest = data.diagonal().rows(n, m).max().max(1.0 / shape.in_plane_mm.powi(2));
+    let mut add = |mode: &DVector<f64>, weight: f64| {
+        weights.view_mut((n, n), (m, m)).ger(weight, mode, mode, 1.0);
+    };
+    for mode in frame_modes(board) {
+        add(&mode, HELD * largest);
+    }
+    add(&stretch_mode(board), shape.stretch_mm.powi(-2) - shape.in_plane_mm.powi(-2));
+    weights
+}

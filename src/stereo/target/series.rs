@@ -1,0 +1,337 @@
+//! All poses of a run: measured together, each with its answer or the reason why there is none.
+
+use nalgebra::Vector3;
+
+use crate::geometry::{Transform, perturb};
+use crate::imaging::{Board, Corner, PairCorners, Side};
+use crate::measurements::RobotPose;
+use crate::statistics::median;
+use crate::stereo::Rig;
+use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::data::view::View;
+use crate::stereo::target::TargetPose;
+use crate::stereo::target::alone::Known;
+use crate::stereo::target::bundle::{Bundle, Values};
+use crate::stereo::target::cause::{Cause, Explanation, stretch};
+use crate::stereo::target::consistency::{self, Change, usual_excess};
+use crate::stereo::target::estimate::{Estimate, estimate};
+use crate::stereo::target::judge::{Changed, judge, scaled};
+
+use crate::stereo::target::finish::{Shape, Shared};
+use crate::stereo::target::judgement::Judgement;
+use crate::stereo::target::prior::{RigPrior, ShapePrior};
+use crate::stereo::target::start::{Start, baseline_ratio, starts};
+use crate::stereo::target::turns;
+
+/// A change of the rig at one pose that lowers chi-square by more than this is none of chance: one pose in twenty million.
+pub(super) const POSE_LIMIT: f64 = 45.0;
+
+/// The same for a change from one pose on, which is looked for at every pose.
+const MOVED_LIMIT: f64 = 60.0;
+
+/// The least that a pose after a change contributes to its score where the calibration holds no covariance.
+const EACH_POSE: f64 = 20.0;
+
+/// Poses that stray this far beyond the limit in relation to the worst are left out together with it.
+const TOGETHER: f64 = 0.2;
+
+/// Rounds of leaving poses out.
+const ROUNDS: usize = 8;
+
+/// Corners that the rig misses by more than this share of the picture's width belong to another rig, or to another target.
+const GROSS_SHARE: f64 = 1e-3;
+
+/// The pictures of one pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    /// Where the robot was.
+    pub at: RobotPose,
+    /// Its corners, or why there are none.
+    pub corners: Result<PairCorners, Refusal>,
+}
+
+/// Why a pose has no measurement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refusal {
+    /// In one or two words.
+    pub status: &'static str,
+    /// For a person.
+    pub reason: String,
+}
+
+/// A robot pose and what was measured there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredPose {
+    /// Where the robot was.
+    pub at: RobotPose,
+    /// The target's pose, or why there is none.
+    pub target: Result<TargetPose, Refusal>,
+}
+
+/// What is known before, and what counts as too much.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Knowledge {
+    /// The rig as calibrated.
+    pub rig: Rig,
+    /// How its corners scattered, where that is known.
+    pub noise: Option<Noise>,
+    /// The target as drawn.
+    pub board: Board,
+    /// Standard deviation of a crossing against the drawing, by the certificate, mm.
+    pub crossing_mm: f64,
+    /// Points that are wrong by more than this are of no use, mm.
+    pub tolerance_mm: f64,
+}
+
+/// Everything about a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// A row a pose, in the order of the run.
+    pub poses: Vec<MeasuredPose>,
+    /// The target, where any pose was measured.
+    pub shape: Option<Shape>,
+    /// What the poses share.
+    pub shared: Option<Shared>,
+    /// What is found of the rig.
+    pub judgement: Judgement,
+    /// How corners scatter here, px.
+    pub noise_px: Option<f64>,
+    /// How they scattered at the calibration, px.
+    pub usual_px: Option<f64>,
+    /// Chi-square of the rig's numbers and the target's size against what was known before, and its degrees of freedom.
+    pub prior_chi_square: Option<[f64; 2]>,
+    /// Chi-square a number over all poses, against the calibration's noise where that is known.
+    pub chi_square: Option<f64>,
+    /// How much larger the poses' disagreement with the common rig is than chance; covariances hold it.
+    pub excess: f64,
+    /// What nothing could tell.
+    pub notes: Vec<String>,
+}
+
+/// Measures all poses; `seen` is in the order of the run.
+pub fn measure(known: &Knowledge, seen: Vec<Seen>) -> Series {
+    let mut run = Run::new(known, seen);
+    if run.present().count() == 0 {
+        return run.nothing(Judgement::Agrees);
+    }
+    if let Some(gross) = run.gross() {
+        return run.nothing(gross);
+    }
+    let Some(found) = run.consistent() else {
+        let misfit_px = run.misfit_px();
+        return run.nothing(Judgement::Unexplained { misfit_px });
+    };
+    let moved = run.moved.clone();
+    let (found, changed) = judge(found, known.noise);
+    let judgement = match (moved, changed) {
+        (Some(moved), _) => moved,
+        (None, Some(changed)) if changed.moves_mm > known.tolerance_mm => Judgement::Contradicts(changed),
+        (None, Some(changed)) => Judgement::Allowed(changed),
+        (None, None) => Judgement::Agrees,
+    };
+    run.finish(&found, judgement)
+}
+
+/// A run while it is worked on.
+pub(super) struct Run<'a> {
+    pub(super) known: &'a Knowledge,
+    pub(super) at: Vec<RobotPose>,
+    pub(super) refusals: Vec<Option<Refusal>>,
+    pub(super) starts: Vec<Start>,
+    /// Poses that take part in the bundle.
+    pub(super) taking_part: Vec<bool>,
+    pub(super) moved: Option<Judgement>,
+    pub(super) notes: Vec<String>,
+    /// Left and right corners the other way round.
+    exchanged_pairs: Vec<PairCorners>,
+}
+
+impl<'a> Run<'a> {
+    fn new(known: &'a Knowledge, seen: Vec<Seen>) -> Run<'a> {
+        let mut refusals: Vec<Option<Refusal>> = seen.iter().map(|s| s.corners.as_ref().err().cloned()).collect();
+        let empty = |at: &RobotPose| PairCorners { pair: at.pose.clone(), ..PairCorners::default() };
+        let pairs: Vec<PairCorners> = seen.iter().map(|s| s.corners.clone().unwrap_or_else(|_| empty(&s.at))).collect();
+        let at: Vec<RobotPose> = seen.into_iter().map(|s| s.at).collect();
+        for (i, refusal) in refusals.iter_mut().enumerate() {
+            let twin =
+                (0..pairs.len()).find(|&j| j != i && !pairs[i].left.is_empty() && same_pictures(&pairs[i], &pairs[j]));
+            if let Some(j) = twin.filter(|_| refusal.is_none()) {
+                let reason =
+                    format!("a picture is the same as at pose {}: one of the two poses has the other's", at[j].pose);
+                *refusal = Some(Refusal { status: "another pose's pictures", reason });
+            }
+        }
+        let mut starts = starts(&known.rig, &known.board, &pairs);
+        let mut views: Vec<View> = starts.iter().map(|s| s.view.clone()).collect();
+        let mut poses: Vec<Option<Transform>> =
+            starts.iter().zip(&refusals).map(|(s, refusal)| s.pose.filter(|_| refusal.is_none())).collect();
+        let rows: Vec<&RobotPose> = at.iter().collect();
+        let notes = turns::settle(&known.board, &rows, &mut views, &mut poses);
+        let taking_part = poses.iter().map(Option::is_some).collect();
+        for ((start, view), pose) in starts.iter_mut().zip(views).zip(poses) {
+            (start.view, start.pose) = (view, pose);
+        }
+        let exchange = |p: PairCorners| PairCorners { pair: p.pair, left: p.right, right: p.left };
+        let exchanged_pairs = pairs.into_iter().map(exchange).collect();
+        Run { known, at, refusals, starts, taking_part, moved: None, notes, exchanged_pairs }
+    }
+
+    fn present(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.starts.len()).filter(|&i| self.starts[i].pose.is_some())
+    }
+
+    fn misfit_px(&self) -> f64 {
+        median(self.present().map(|i| self.starts[i].misfit_px)).unwrap_or(0.0)
+    }
+
+    fn bundle(&self) -> Bundle<'a> {
+        let crossing = self.known.crossing_mm;
+        let shape = ShapePrior { in_plane_mm: crossing, out_of_plane_mm: crossing, stretch_mm: crossing };
+        let views = self.starts.iter().map(|s| s.view.clone()).collect();
+        Bundle { board: &self.known.board, views, rig: RigPrior::new(&self.known.rig), shape }
+    }
+
+    fn values(&self, bundle: &Bundle<'_>) -> Values {
+        let poses = self.starts.iter().zip(&self.taking_part).map(|(s, part)| s.pose.filter(|_| *part)).collect();
+        let rig = nalgebra::DVector::zeros(bundle.rig.basis.ncols());
+        Values { rig, deviations_mm: vec![Vector3::zeros(); self.known.board.corner_count()], poses }
+    }
+
+    /// Faults so large that no pose can be measured: exchanged pictures, another size of squares, another unit of the baseline.
+    fn gross(&self) -> Option<Judgement> {
+        let limit = GROSS_SHARE * f64::from(self.known.rig.left.width);
+        let misfit_px = self.misfit_px();
+        if misfit_px <= limit {
+            return None;
+        }
+        let better = |px: f64| px < 0.3 * misfit_px;
+        let present: Vec<usize> = self.present().collect();
+        let others = starts(&self.known.rig, &self.known.board, &self.exchanged_pairs);
+        if better(median(others.iter().map(|s| s.misfit_px)).unwrap_or(f64::INFINITY)) {
+            return Some(Judgement::Exchanged);
+        }
+        let views: Vec<View> = present.iter().map(|&i| self.starts[i].view.clone()).collect();
+        let factor = 1.0 / baseline_ratio(&self.known.rig, &views)?;
+        let mut bundle = self.bundle();
+        bundle.shape.stretch_mm = f64::INFINITY;
+        let start = scaled(&self.values(&bundle), &bundle, factor);
+        let found = estimate(bundle, start, self.known.noise)?;
+        let left = Known::new(&found);
+        let misfits = present.iter().filter_map(|&i| {
+            left.fit(&found.bundle.views[i], found.values.poses[i].as_ref()?).map(|alone| alone.rms_px)
+        });
+        if !better(median(misfits).unwrap_or(f64::INFINITY)) {
+            return None;
+        }
+        let [amount, sigma] = stretch(&found);
+        let moves: Vec<f64> = present
+            .iter()
+            .filter_map(|&i| {
+                Some((found.values.poses[i]?.translation.vector - self.starts[i].pose?.translation.vector).norm())
+            })
+            .collect();
+        let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY };
+        let moves_mm = median(moves).unwrap_or(0.0);
+        Some(Judgement::Contradicts(Changed { explanations: vec![explanation], moves_mm, fall: f64::INFINITY }))
+    }
+
+    /// The bundle over the poses that fit together; the others are left out, and a rig that moved ends the run before it.
+    fn consistent(&mut self) -> Option<Estimate<'a>> {
+        let mut last = None;
+        for _ in 0..ROUNDS {
+            let bundle = self.bundle();
+            let values = self.values(&bundle);
+            let found = estimate(bundle, values, self.known.noise)?;
+            // The estimate does without poses of which too few corners fit.
+            for (part, pose) in self.taking_part.iter_mut().zip(&found.values.poses) {
+                *part = *part && pose.is_some();
+            }
+            let each = consistency::at_each(&found.normal, &found.covariance);
+            let excess = usual_excess(&each);
+            let worst = each.iter().flatten().map(|c| c.fall).fold(0.0, f64::max);
+            let tail = consistency::from_one_on(&found.normal, &found.covariance);
+            if let Some((k, change, _)) = tail.filter(|(k, change, gain)| {
+                let after = (*k..self.taking_part.len()).filter(|&i| self.taking_part[i]).count();
+                after >= 2 && *gain > self.moved_limit(after) * excess && change.fall > 1.5 * worst
+            }) {
+                self.end_at(k, &change);
+                continue;
+            }
+            let limit = (POSE_LIMIT * excess).max(TOGETHER * worst);
+            let strays: Vec<usize> = (0..each.len()).filter(|&i| each[i].is_some_and(|c| c.fall > limit)).collect();
+            let remain = self.taking_part.iter().filter(|part| **part).count() - strays.len();
+            if strays.is_empty() || remain == 0 {
+                return Some(found);
+            }
+            strays.iter().for_each(|&i| self.taking_part[i] = false);
+            last = Some(found);
+        }
+        last
+    }
+
+    /// A calibration that does not say how well it is known is a little wrong everywhere, which many poses together would show: then
+    /// every pose after the change must show it.
+    fn moved_limit(&self, after: usize) -> f64 {
+        let each = if self.known.rig.covariance.is_none() { EACH_POSE * after as f64 } else { 0.0 };
+        MOVED_LIMIT + each
+    }
+
+    /// The rig moved before pose `k`: nothing from there on counts.
+    fn end_at(&mut self, k: usize, change: &Change) {
+        let since = self.at[k].pose.clone();
+        let [turned_deg, moved_mm] = size_of(change, &self.known.rig);
+        let reason = format!(
+            "the rig moved before pose {since}: the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the left"
+        );
+        for i in k..self.at.len() {
+            self.taking_part[i] = false;
+            if self.refusals[i].is_none() {
+                self.refusals[i] = Some(Refusal { status: "rig moved", reason: reason.clone() });
+            }
+        }
+        self.moved = Some(Judgement::Moved { since, turned_deg, moved_mm });
+    }
+
+    /// No pose is measured.
+    fn nothing(self, judgement: Judgement) -> Series {
+        let status = "rig changed";
+        let reason = judgement.describe(&self.known.rig, self.known.board.square_mm);
+        let too_few = |start: &Start| {
+            let [left, right] = Side::BOTH.map(|side| start.view.active(side).count());
+            Refusal { status: "too few corners", reason: format!("too few corners: {left} left, {right} right") }
+        };
+        let poses = self.at.into_iter().zip(self.refusals).zip(&self.starts).map(|((at, refusal), start)| {
+            let refusal = refusal.unwrap_or_else(|| match &reason {
+                Some(reason) if start.pose.is_some() => Refusal { status, reason: reason.clone() },
+                _ => too_few(start),
+            });
+            MeasuredPose { at, target: Err(refusal) }
+        });
+        Series {
+            poses: poses.collect(),
+            shape: None,
+            shared: None,
+            judgement,
+            noise_px: None,
+            usual_px: None,
+            prior_chi_square: None,
+            chi_square: None,
+            excess: 1.0,
+            notes: self.notes,
+        }
+    }
+}
+
+fn same_pictures(a: &PairCorners, b: &PairCorners) -> bool {
+    let same =
+        |a: &[Corner], b: &[Corner]| !a.is_empty() && a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.px == b.px);
+    same(&a.left, &b.left) || same(&a.right, &b.right)
+}
+
+/// Turn of the right camera, deg, and way of its centre, mm.
+fn size_of(change: &Change, rig: &Rig) -> [f64; 2] {
+    let c = &change.change;
+    let moved = perturb(&rig.right_from_left, Vector3::new(c[0], c[1], c[2]), Vector3::new(c[3], c[4], c[5]));
+    let way = moved.inverse().translation.vector - rig.right_from_left.inverse().translation.vector;
+    [Vector3::new(c[0], c[1], c[2]).norm().to_degrees(), way.norm()]
+}

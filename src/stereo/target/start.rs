@@ -1,0 +1,89 @@
+//! Where every pose's search begins: each pose by itself on the calibrated rig, and how its corners are numbered.
+//!
+//! A target that looks the same after a quarter or a half turn is numbered by the picture's direction; cameras that are rolled against each
+//! other make that wrong in one of them. The rig decides: of the numberings that the colours leave open, the right picture gets the one
+//! that fits it best.
+
+use nalgebra::Vector2;
+use rayon::prelude::*;
+
+use crate::geometry::Transform;
+use crate::imaging::{Board, PairCorners, Side};
+use crate::statistics::median;
+use crate::stereo::Rig;
+use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::data::observation::Observation;
+use crate::stereo::data::residuals::of_view;
+use crate::stereo::data::view::View;
+use crate::stereo::init::board_pose::{self, PoseFit};
+use crate::stereo::model::board_shape::FLAT;
+use crate::stereo::model::parameters::Shared;
+use crate::stereo::pairs::numbering;
+use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::target::FEWEST_CORNERS;
+
+/// A pose before anything is known of the others.
+#[derive(Debug, Clone)]
+pub(super) struct Start {
+    /// Its corners, the right ones renumbered where that was needed.
+    pub view: View,
+    /// `left_from_board`, where the corners determine it.
+    pub pose: Option<Transform>,
+    /// Median length of the residuals there, px.
+    pub misfit_px: f64,
+}
+
+/// A start for every pair, in the same order.
+pub(super) fn starts(rig: &Rig, board: &Board, pairs: &[PairCorners]) -> Vec<Start> {
+    let shared = Shared { rig: rig.clone(), shape_mm: FLAT };
+    let mut views: Vec<View> = pairs.par_iter().map(|pair| View::new(board, pair, FEWEST_CORNERS)).collect();
+    let mut poses: Vec<Option<Transform>> = Vec::new();
+    // Twice: the scatter is known only after the first fit.
+    for round in 0..2 {
+        if round == 0 {
+            views.par_iter_mut().for_each(|view| {
+                if let Some(quarters) = numbering::on_rig(&shared, board, view) {
+                    view.turn_right(board, quarters);
+                }
+            });
+        }
+        poses = views.par_iter().map(|view| Some(robust(&shared, view)?.left_from_board)).collect();
+        let left: Vec<(Observation, Vector2<f64>)> = views
+            .iter()
+            .zip(&poses)
+            .filter_map(|(view, pose)| Some((view, (*pose)?)))
+            .flat_map(|(view, pose)| of_view(&shared, view, &pose))
+            .collect();
+        Noise::from_median(&left).apply(&mut views);
+    }
+    let misfit = |view: &View, pose: &Option<Transform>| {
+        let all = pose.map_or_else(Vec::new, |pose| of_view(&shared, view, &pose));
+        median(all.iter().map(|(_, r)| r.norm())).unwrap_or(f64::INFINITY)
+    };
+    let misfits: Vec<f64> = views.iter().zip(&poses).map(|(view, pose)| misfit(view, pose)).collect();
+    let together = views.into_iter().zip(poses).zip(misfits);
+    together.map(|((view, pose), misfit_px)| Start { view, pose, misfit_px }).collect()
+}
+
+/// True where both pictures show enough corners.
+pub(super) fn enough(view: &View) -> bool {
+    Side::BOTH.iter().all(|side| view.active(*side).count() >= FEWEST_CORNERS)
+}
+
+fn robust(shared: &Shared, view: &View) -> Option<PoseFit> {
+    if enough(view) { board_pose::fit(shared, view, Loss::Cauchy(CAUCHY_WIDTH)) } else { None }
+}
+
+/// Median over the poses of the length of `right_from_left` as each camera alone sees the target, over the calibrated one: what the
+/// target's size, or the baseline's unit, is off by.
+pub(super) fn baseline_ratio(rig: &Rig, views: &[View]) -> Option<f64> {
+    let shared = Shared { rig: rig.clone(), shape_mm: FLAT };
+    let ratio = |view: &View| {
+        let alone = Side::BOTH.map(|side| board_pose::fit(&shared, &view.only(side), Loss::Cauchy(CAUCHY_WIDTH)));
+        let [left, right] = alone;
+        let right_from_left = rig.right_from_left * right?.left_from_board * left?.left_from_board.inverse();
+        Some(right_from_left.translation.vector.norm() / rig.baseline_mm())
+    };
+    let ratios: Vec<Option<f64>> = views.par_iter().map(ratio).collect();
+    median(ratios.into_iter().flatten())
+}

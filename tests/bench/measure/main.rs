@@ -1,0 +1,31 @@
+//! Benchmark `measure`: is what `measure` says true, does it notice what is wrong, and what does it cost.
+//!
+//! `cargo bench --bench measure -- coverage|faults|speed`; without a word all three. `coverage` and `faults` work on the simulator's true
+//! corners with Gaussian noise, so that hundreds of poses cost seconds; `speed` runs the program on rendered pictures of 26 Mpx.
+#![allow(
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "a benchmark prints its tables, and ends where its input is not as it should be"
+)]
+
+mod coverage;
+mod faults;
+mod speed;
+mod worlds;
+
+fn main() {
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    let runs = |name: &str| wanted.is_empty() || wanted.iter().any(|word| word == name);
+    if runs("coverage") {
+        coverage::run();
+    }
+    if runs("faults") {
+        faults::run();
+    }
+    if runs("speed") {
+        speed::run_all();
+    }
+}

@@ -1,0 +1,138 @@
+//! 40 pairs of 26 Mpx: the program beside decoding alone, its memory, and what a pair costs as the run grows.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use rayon::prelude::*;
+use stereocal::files::OutDir;
+use stereocal::imaging::image;
+use stereocal::simulate::settings::Settings;
+use stereocal::simulate::world::World;
+
+/// Robot poses besides the four centres.
+const SAMPLES: usize = 36;
+
+/// Each is run this often, the fastest counts.
+const RUNS: usize = 3;
+
+/// Pairs of the longest run: links to the same pictures would be the same poses, so it repeats the corners instead.
+const LONG: usize = 1000;
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("measure-26-mpx")
+}
+
+/// Renders the pictures unless a former run left them.
+fn pictures() -> PathBuf {
+    let folder = folder();
+    if !folder.join("done").is_file() {
+        let settings = Settings { check_pairs: 8, samples: SAMPLES, verify: 0, ..Settings::paper() };
+        let world = World::new(settings, None).expect("the preset is possible");
+        let out = OutDir::open(camino::Utf8Path::from_path(&folder).unwrap()).expect("a folder");
+        world.write_truth(&out).expect("the truth");
+        world.write_pictures(&out).expect("the pictures");
+        run(&folder, &["camera-check", "check", "--out", "rig"]);
+        std::fs::write(folder.join("done"), b"").expect("a file");
+    }
+    folder
+}
+
+/// Runs the program; wall time in seconds and the largest memory in MB.
+fn run(folder: &Path, args: &[&str]) -> (f64, f64) {
+    let start = Instant::now();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_stereocal"))
+        .args(args)
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program");
+    let status = PathBuf::from(format!("/proc/{}/status", child.id()));
+    let mut peak_kb: f64 = 0.0;
+    while child.try_wait().expect("a child").is_none() {
+        if let Ok(text) = std::fs::read_to_string(&status) {
+            let line = text.lines().find(|line| line.starts_with("VmHWM"));
+            let kb = line.and_then(|line| line.split_whitespace().nth(1)).and_then(|kb| kb.parse().ok());
+            peak_kb = peak_kb.max(kb.unwrap_or(0.0));
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    (start.elapsed().as_secs_f64(), peak_kb / 1024.0)
+}
+
+/// Reads and decodes every picture with the program's decoder and threads, and does nothing with it.
+fn decode_s(folder: &Path) -> f64 {
+    let paths: Vec<camino::Utf8PathBuf> = ["left", "right"]
+        .iter()
+        .flat_map(|side| std::fs::read_dir(folder.join("poses").join(side)).expect("pictures"))
+        .map(|entry| camino::Utf8PathBuf::from_path_buf(entry.expect("an entry").path()).expect("a name"))
+        .collect();
+    let start = Instant::now();
+    paths.par_iter().for_each(|path| {
+        let bytes = std::fs::read(path).expect("a picture");
+        image::decode(&bytes, path, None).expect("a picture");
+    });
+    start.elapsed().as_secs_f64()
+}
+
+fn best(work: impl Fn() -> f64) -> f64 {
+    (0..RUNS).map(|_| work()).fold(f64::INFINITY, f64::min)
+}
+
+fn run_speed() {
+    let folder = pictures();
+    let pairs = (SAMPLES + 4) as f64;
+    let decoding = best(|| decode_s(&folder));
+    let mut memory: f64 = 0.0;
+    let mut walls = Vec::new();
+    for _ in 0..RUNS {
+        let fresh = tempfile::tempdir().expect("a folder");
+        let out = fresh.path().to_str().unwrap();
+        let (wall, mb) =
+            self::run(&folder, &["measure", "poses", "--calibration", "rig/calibration.json", "--out", out]);
+        walls.push(wall);
+        memory = memory.max(mb);
+    }
+    let wall = walls.into_iter().fold(f64::INFINITY, f64::min);
+    println!(
+        "\n{pairs} pairs of 26 Mpx: measure {:.3} s a pair, decoding alone {:.3}, ratio {:.2}; memory {memory:.0} MB",
+        wall / pairs,
+        decoding / pairs,
+        wall / decoding
+    );
+    for python in ["/tmp/peers/bin/python", "python3"] {
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/bench_measure.py");
+        let ran = ["sb", "classic"].map(|way| {
+            Command::new(python).args([script, "poses", "rig/calibration.json", way, "6"]).current_dir(&folder).output()
+        });
+        if ran.iter().all(|out| out.as_ref().is_ok_and(|o| o.status.success())) {
+            for out in ran.iter().flatten() {
+                print!("plain OpenCV script, {}", String::from_utf8_lossy(&out.stdout));
+            }
+            return;
+        }
+    }
+    println!("no python with cv2: scripts/bench_measure.py says how to get one");
+}
+
+/// What a pair costs beyond its pictures as the run grows: the solver alone, from corners.
+fn growth() {
+    for samples in [36, 146, LONG - 4] {
+        let world = crate::worlds::world(1280, 10.0, samples, 7);
+        let (known, seen) = (crate::worlds::knowledge(&world), crate::worlds::run(&world));
+        let count = seen.len() as f64;
+        let start = Instant::now();
+        let series = stereocal::stereo::target::series::measure(&known, seen);
+        let ok = series.poses.iter().filter(|p| p.target.is_ok()).count();
+        println!(
+            "solver, {count:5} pairs: {:.2} ms a pair, {ok} measured",
+            1e3 * start.elapsed().as_secs_f64() / count
+        );
+    }
+}
+
+pub fn run_all() {
+    growth();
+    run_speed();
+}

@@ -1,0 +1,53 @@
+//! Worlds at the level of corners: a rig calibrated from noisy corners, and a run of noisy poses.
+
+use nalgebra::{Matrix2, Vector2};
+use stereocal::imaging::Corners;
+use stereocal::simulate::draws::{Draws, Purpose};
+use stereocal::simulate::settings::Settings;
+use stereocal::simulate::world::World;
+use stereocal::stereo::Lens;
+use stereocal::stereo::calibrate::calibrate;
+use stereocal::stereo::select::lens_ladder::Options;
+use stereocal::stereo::target::series::{Knowledge, Seen};
+
+/// Standard deviation of a corner's coordinate at 1280 px, as rendered pictures give it; at 5120 px the same corner is as sharp.
+pub const SIGMA_PX: f64 = 0.002;
+
+/// A world of a size, with a target whose crossings are off by so much.
+pub fn world(size_px: u32, target_um: f64, samples: usize, seed: u64) -> World {
+    let mut settings = Settings { size_px, samples, verify: 0, seed, ..Settings::small() };
+    settings.target_workmanship.pitch_um = target_um;
+    World::new(settings, None).expect("the preset is possible")
+}
+
+/// What the calibration of a world's check pairs leaves `measure` with.
+pub fn knowledge(world: &World) -> Knowledge {
+    let corners = noisy(world.check_corners(), 2 * world.settings.seed);
+    let forced = Options { lens: Some(Lens::Brown4), shape: Some(false) };
+    let found = calibrate(&corners, &forced).expect("a calibration");
+    Knowledge {
+        rig: found.rig().clone(),
+        noise: Some(found.own_noise),
+        board: world.target.drawing,
+        crossing_mm: 0.01,
+        tolerance_mm: 0.05,
+    }
+}
+
+/// The run of a world's poses.
+pub fn run(world: &World) -> Vec<Seen> {
+    let corners = noisy(world.pose_corners(), 2 * world.settings.seed + 1);
+    let poses = world.poses.iter().zip(corners.pairs);
+    poses.map(|(pose, pair)| Seen { at: pose.commanded.clone(), corners: Ok(pair) }).collect()
+}
+
+fn noisy(mut corners: Corners, seed: u64) -> Corners {
+    let mut draws = Draws::new(seed, Purpose::Points, 7);
+    for pair in &mut corners.pairs {
+        for corner in pair.left.iter_mut().chain(&mut pair.right) {
+            corner.px += Vector2::new(draws.normal(), draws.normal()) * SIGMA_PX;
+            corner.covariance_px2 = Some(Matrix2::identity() * SIGMA_PX * SIGMA_PX);
+        }
+    }
+    corners
+}

@@ -1,0 +1,118 @@
+//! Simulated arms: a nominal robot, a true one, and points that a tracker would see.
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use stereocal::geometry::Transform;
+use stereocal::measurements::{Measurement, Observed, RobotPose, Role};
+use stereocal::robot::{Joint, Robot};
+
+/// What a simulated robot is measured with.
+#[derive(Debug, Clone, Copy)]
+pub struct Plan {
+    /// Poses to fit.
+    pub samples: usize,
+    /// Poses to verify.
+    pub verify: usize,
+    /// Noise of a coordinate, mm.
+    pub noise_mm: f64,
+    /// Standard deviation of the truth's lengths, mm.
+    pub error_mm: f64,
+    /// Standard deviation of the truth's angles, mrad.
+    pub error_mrad: f64,
+}
+
+/// Names and nominal robots.
+pub fn arms() -> Vec<(&'static str, Robot)> {
+    let mut large = Robot::paper();
+    for joint in &mut large.joints {
+        joint.a_mm *= 4.5;
+        joint.d_mm *= 4.5;
+    }
+    vec![
+        ("Table 1", Robot::paper()),
+        (
+            "UR-like",
+            arm(&[
+                (0.0, 0.0, 89.0),
+                (90.0, 0.0, 0.0),
+                (0.0, -425.0, 0.0),
+                (0.0, -392.0, 109.0),
+                (90.0, 0.0, 95.0),
+                (-90.0, 0.0, 82.0),
+            ]),
+        ),
+        (
+            "seven axes",
+            arm(&[
+                (0.0, 0.0, 333.0),
+                (-90.0, 0.0, 0.0),
+                (90.0, 0.0, 316.0),
+                (90.0, 82.5, 0.0),
+                (-90.0, -82.5, 384.0),
+                (90.0, 0.0, 0.0),
+                (90.0, 88.0, 107.0),
+            ]),
+        ),
+        ("SCARA", scara()),
+        ("2.5 m", large),
+    ]
+}
+
+fn arm(rows: &[(f64, f64, f64)]) -> Robot {
+    let mut robot = Robot::paper();
+    let joint = |&(alpha_deg, a_mm, d_mm): &(f64, f64, f64)| Joint {
+        alpha_rad: alpha_deg.to_radians(),
+        a_mm,
+        d_mm,
+        ..Joint::default()
+    };
+    robot.joints = rows.iter().map(joint).collect();
+    robot
+}
+
+fn scara() -> Robot {
+    let mut robot = arm(&[(0.0, 0.0, 200.0), (0.0, 325.0, 0.0), (180.0, 275.0, 0.0), (0.0, 0.0, 50.0)]);
+    robot.joints[2].slides = true;
+    robot
+}
+
+/// A truth, and rows measured in one placement of a tracker.
+pub fn measured(nominal: &Robot, plan: Plan, seed: u64) -> (Robot, Robot, Vec<Measurement>) {
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let mut nominal = nominal.clone();
+    nominal.tool_mm = Vector3::new(30.0, -20.0, 60.0);
+    let parameters = nominal.mdh_parameters();
+    let errors: Vec<f64> = parameters
+        .iter()
+        .map(|p| normal(&mut random) * if p.unit().name() == "mm" { plan.error_mm } else { plan.error_mrad })
+        .collect();
+    let truth = nominal.shifted(&parameters, &errors);
+    let sensor = Transform::from_parts(
+        Vector3::new(1200.0, -700.0, 400.0).into(),
+        UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -0.8, 1.9)),
+    );
+    let rows = (0..plan.samples + plan.verify)
+        .map(|i| {
+            let joints: Vec<f64> = truth.joints.iter().map(|j| drawn(j, &mut random)).collect();
+            let noise = Vector3::from_fn(|_, _| plan.noise_mm * normal(&mut random));
+            let point_mm: Point3<f64> = sensor * truth.target_mm(&joints) + noise;
+            let slides: Vec<bool> = truth.joints.iter().map(|j| j.slides).collect();
+            let joints_deg = joints.iter().zip(&slides).map(|(q, s)| if *s { *q } else { q.to_degrees() }).collect();
+            let role = if i < plan.samples { Role::Sample } else { Role::Verify };
+            let at = RobotPose { pose: format!("p{i}"), group: "g".to_owned(), role, joints_deg, slides };
+            Measurement { at, observed: Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None } }
+        })
+        .collect();
+    (nominal, truth, rows)
+}
+
+fn drawn(joint: &Joint, random: &mut Pcg64Mcg) -> f64 {
+    let u = 2.0 * random.random::<f64>() - 1.0;
+    if joint.slides { 100.0 + 80.0 * u } else { 1.6 * u }
+}
+
+fn normal(random: &mut Pcg64Mcg) -> f64 {
+    let (u, v): (f64, f64) = (random.random(), random.random());
+    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+}

@@ -1,0 +1,52 @@
+//! The guide's pages: the commands in their `sh` blocks are run one after the other in one clean folder.
+
+use stereocal::guide::PAGES;
+
+use crate::run::{stderr, stdout, stereocal, workplace};
+
+/// The commands of a page, without the program's name.
+fn commands(text: &str) -> Vec<Vec<&str>> {
+    let mut found = Vec::new();
+    let mut inside = false;
+    for line in text.lines() {
+        match line {
+            "```sh" => inside = true,
+            "```" => inside = false,
+            command if inside => {
+                let mut words = command.split_whitespace();
+                assert_eq!(words.next(), Some("stereocal"), "{command}");
+                found.push(words.collect());
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+#[test]
+fn every_command_of_the_guide_does_what_it_says() {
+    let folder = workplace();
+    let mut count = 0;
+    for page in PAGES {
+        for command in commands(page.text) {
+            let output = stereocal(folder.path(), &command);
+            let status = output.status.code();
+            assert_eq!(status, Some(0), "{}: {command:?}: {}{}", page.topic, stdout(&output), stderr(&output));
+            count += 1;
+        }
+    }
+    assert!(count >= 5, "{count} commands");
+}
+
+#[test]
+fn a_page_that_is_not_there_is_said_with_those_that_are() {
+    let folder = workplace();
+    let list = stdout(&stereocal(folder.path(), &["guide"]));
+    for page in PAGES {
+        assert!(list.contains(page.topic) && list.contains(page.title()), "{list}");
+        assert_eq!(stdout(&stereocal(folder.path(), &["guide", page.topic])), page.text);
+    }
+    let output = stereocal(folder.path(), &["guide", "nothing"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("no page nothing") && stderr(&output).contains("boards"), "{}", stderr(&output));
+}

@@ -1,0 +1,106 @@
+//! `measure` as its users meet it: what it says of a rig or a target that is another, of bad poses, and of pictures that arrive late.
+
+use std::path::Path;
+use std::time::Duration;
+
+use predicates::prelude::*;
+use serde_json::Value;
+
+use crate::run::{stderr, stereocal, workplace};
+
+/// A small world, calibrated.
+fn calibrated(folder: &Path, seed: &str) {
+    let world =
+        ["simulate", "--preset", "small", "--size", "640", "--samples", "12", "--verify", "0", "--check-pairs", "10"];
+    let made = stereocal(folder, &[&world[..], &["--seed", seed, "--out", "."]].concat());
+    assert_eq!(made.status.code(), Some(0), "{}", stderr(&made));
+    // What so few pairs allow to say of the rig is not the matter here.
+    stereocal(folder, &["camera-check", "check/", "--lens", "brown4", "--tolerance-mm", "0.5"]);
+    assert!(folder.join("out/calibration.json").is_file());
+}
+
+fn json(path: &Path) -> Value {
+    let mut value: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    // It holds the date and the command line.
+    value.as_object_mut().unwrap().remove("provenance");
+    value
+}
+
+fn column(path: &Path, name: &str) -> Vec<String> {
+    let mut rows = csv::Reader::from_path(path).unwrap();
+    let at = rows.headers().unwrap().iter().position(|c| c == name).unwrap();
+    rows.records().map(|row| row.unwrap()[at].to_owned()).collect()
+}
+
+#[test]
+fn another_size_of_squares_and_exchanged_pictures_end_the_run() {
+    let folder = workplace();
+    let world = folder.path();
+    calibrated(world, "3");
+    let good = stereocal(world, &["measure", "poses/"]);
+    assert_eq!(good.status.code(), Some(0), "{}", stderr(&good));
+    assert!(!stderr(&good).contains("warning"), "{}", stderr(&good));
+    let found = json(&world.join("out/measure.json"));
+    assert_eq!(found.pointer("/rig/state").and_then(Value::as_str), Some("agrees"));
+    let parameters = found.pointer("/shared/parameters").and_then(Value::as_array).unwrap().len();
+    let rows = found.pointer("/shared/poses/0/sensitivity").and_then(Value::as_array).unwrap();
+    assert!(rows.len() == 6 && rows.iter().all(|row| row.as_array().unwrap().len() == parameters));
+    assert!(column(&world.join("out/measurements.csv"), "status").iter().all(|s| s == "ok"));
+
+    let large = stereocal(
+        world,
+        &["measure", "poses/", "--square-mm", "12", "--calibration", "out/calibration.json", "--out", "large"],
+    );
+    assert_eq!(large.status.code(), Some(3));
+    let said = predicate::str::is_match(r"squares are (9\.99|10\.00)\d* mm, not 12 mm").unwrap();
+    assert!(said.eval(&stderr(&large)), "{}", stderr(&large));
+    assert!(column(&world.join("large/measurements.csv"), "status").iter().all(|s| s.contains("rig changed")));
+
+    for (from, to) in [("left", "aside"), ("right", "left"), ("aside", "right")] {
+        std::fs::rename(world.join("poses").join(from), world.join("poses").join(to)).unwrap();
+    }
+    let exchanged =
+        stereocal(world, &["measure", "poses/", "--calibration", "out/calibration.json", "--out", "exchanged"]);
+    assert_eq!(exchanged.status.code(), Some(3));
+    assert!(stderr(&exchanged).contains("exchanged"), "{}", stderr(&exchanged));
+}
+
+#[test]
+fn pictures_that_arrive_late_give_the_same_bytes() {
+    let folder = workplace();
+    let world = folder.path().to_owned();
+    calibrated(&world, "4");
+    let late = world.join("late");
+    for side in ["left", "right"] {
+        std::fs::create_dir_all(late.join(side)).unwrap();
+    }
+    std::fs::copy(world.join("poses/poses.csv"), late.join("poses.csv")).unwrap();
+    let arrive = {
+        let (world, late) = (world.clone(), late.clone());
+        std::thread::spawn(move || {
+            let names = column(&late.join("poses.csv"), "pose");
+            // Backwards, the right one first, and every third in two parts.
+            for (k, name) in names.iter().rev().enumerate() {
+                for side in ["right", "left"] {
+                    let file = format!("{side}/{name}.png");
+                    let bytes = std::fs::read(world.join("poses").join(&file)).unwrap();
+                    if k % 3 == 0 {
+                        std::fs::write(late.join(&file), &bytes[..bytes.len() / 2]).unwrap();
+                        std::thread::sleep(Duration::from_millis(150));
+                    }
+                    std::fs::write(late.join(&file), &bytes).unwrap();
+                }
+                std::thread::sleep(Duration::from_millis(40));
+            }
+        })
+    };
+    let rig = ["--calibration", "out/calibration.json", "--out"];
+    let watched = stereocal(&world, &[&["measure", "late", "--watch"], &rig[..], &["watched"]].concat());
+    arrive.join().unwrap();
+    assert_eq!(watched.status.code(), Some(0), "{}", stderr(&watched));
+    let after = stereocal(&world, &[&["measure", "late"], &rig[..], &["after"]].concat());
+    assert_eq!(after.status.code(), Some(0), "{}", stderr(&after));
+    let bytes = |out: &str| std::fs::read(world.join(out).join("measurements.csv")).unwrap();
+    assert!(bytes("watched") == bytes("after"));
+    assert_eq!(json(&world.join("watched/measure.json")), json(&world.join("after/measure.json")));
+}
