@@ -102,18 +102,23 @@ const LOST_TIMES_USUAL: f64 = 3.0;
 pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Error> {
     let candidates = Candidates::new(corners)?;
     let mut consensus = consensus::find(&candidates, JUDGING_LENS.max(options.lens.unwrap_or(JUDGING_LENS)))?;
-    let mut choice = lens_ladder::choose(&consensus.problem(), options)?;
+    let choose = |consensus: &Consensus| {
+        lens_ladder::choose(&consensus.problem(), &corners.board, options).map_err(|e| e.without(&consensus.skipped()))
+    };
+    let mut choice = choose(&consensus)?;
     if let Some(richer) = choice.layout.left.filter(|lens| options.lens.is_none() && *lens > JUDGING_LENS) {
         let again = consensus::find(&candidates, richer)?;
         if again.names() != consensus.names() {
-            choice = lens_ladder::choose(&again.problem(), options)?;
+            choice = choose(&again)?;
         }
         consensus = again;
     }
     let lens_ladder::Choice { layout, near, scores: lens_scores } = choice;
     let start = consensus.problem();
     let near = near.filter(|near| near.poses.len() == start.views.len());
-    let mut solved = Problem { values: near.unwrap_or(start.values), ..start }.solve(&layout)?;
+    let mut solved = Problem { values: near.unwrap_or(start.values), ..start }
+        .solve(&layout)
+        .map_err(|e| e.without(&consensus.skipped()))?;
     let Consensus { mut discarded, standing, .. } = consensus;
     loop {
         let lost = emptied(&solved.problem.views);
@@ -126,7 +131,8 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
         if kept.views.len() < FEWEST_PAIRS {
             return Err(too_few_pairs(kept.views.len(), &discarded));
         }
-        solved = kept.solve(&layout)?;
+        let skipped = || discarded.iter().map(DiscardedPair::skipped).collect::<Vec<Skipped>>();
+        solved = kept.solve(&layout).map_err(|e| e.without(&skipped()))?;
     }
     let neighbours = solved.neighbours(&corners.board);
     let by_noise = solved.uncertainty(&layout)?.scaled(neighbours.inflation());

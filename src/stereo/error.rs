@@ -56,10 +56,12 @@ pub enum Error {
         bad: Vec<Skipped>,
     },
     /// The views do not tell the cameras.
-    #[error("the views are too similar to tell the cameras{}", focal(.focal_sigma))]
+    #[error("the views are too similar to tell the cameras{}{}", focal(.focal_sigma), list(.skipped))]
     Undetermined {
         /// Worst relative standard deviation of a focal length, where there is one.
         focal_sigma: Option<f64>,
+        /// Pairs that were left out before: what they show may be missing now.
+        skipped: Vec<Skipped>,
     },
     /// The search did not end at a minimum.
     #[error("the calibration did not converge within {steps} steps")]
@@ -113,6 +115,21 @@ fn list(pairs: &[Skipped]) -> String {
 
 fn focal(sigma: &Option<f64>) -> String {
     sigma.map_or(String::new(), |s| format!(": a focal length is known to {:.0} % only", 100.0 * s))
+}
+
+impl Error {
+    /// The views do not tell the cameras, and no focal length can be named.
+    pub fn undetermined() -> Error {
+        Error::Undetermined { focal_sigma: None, skipped: Vec::new() }
+    }
+
+    /// The same error, naming the pairs that were left out before where too little was left after.
+    pub fn without(self, left_out: &[Skipped]) -> Error {
+        match self {
+            Error::Undetermined { focal_sigma, .. } => Error::Undetermined { focal_sigma, skipped: left_out.to_vec() },
+            other => other,
+        }
+    }
 }
 
 impl Explain for Error {

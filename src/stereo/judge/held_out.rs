@@ -99,7 +99,7 @@ struct Folds {
 ///
 /// An error where the pairs without some of them do not determine the cameras.
 pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accuracy, Error> {
-    let undetermined = || Error::Undetermined { focal_sigma: None };
+    let undetermined = || Error::undetermined().without(&calibration.skipped);
     let folds = folds(calibration).ok_or_else(undetermined)?;
     let mut measured: Vec<Measured> = calibration
         .views

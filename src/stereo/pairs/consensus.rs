@@ -47,6 +47,11 @@ impl Consensus {
         Problem { views: self.views.clone(), values: self.values.clone() }
     }
 
+    /// The other pairs with what happened to them.
+    pub fn skipped(&self) -> Vec<Skipped> {
+        self.discarded.iter().map(DiscardedPair::skipped).collect()
+    }
+
     /// Names of the pairs.
     pub fn names(&self) -> Vec<&str> {
         self.views.iter().map(|view| view.pair.as_str()).collect()
@@ -185,7 +190,8 @@ impl<'a> Scene<'a> {
     /// other their scatter is no measure.
     fn without_gross(&self, grouping: &mut Grouping) {
         let alone = self.candidates.cameras.iter().flat_map(|camera| camera.median_px.iter().flatten().copied());
-        let limit = screening::gross_px(median(alone).unwrap_or(0.0));
+        let px = median(alone).unwrap_or(0.0);
+        let limit = Usual { px, width_px: self.candidates.width_px }.limit_px(px);
         for group in 0..consistency::groups(grouping) {
             let members: Vec<usize> = (0..grouping.len()).filter(|&i| grouping[i] == Some(group)).collect();
             let shared = self.start(&members).shared;

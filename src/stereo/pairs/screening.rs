@@ -41,11 +41,6 @@ pub struct Usual {
     pub width_px: u32,
 }
 
-/// A median residual beyond this is no matter of scatter where single pictures leave `usual_px`, px.
-pub fn gross_px(usual_px: f64) -> f64 {
-    (FACTOR * usual_px).max(LEAST_PX)
-}
-
 impl Usual {
     /// The limit above which a pair does not belong; `alone_px` is what its pictures leave one by one.
     pub fn limit_px(&self, alone_px: f64) -> f64 {

@@ -2,12 +2,15 @@
 //!
 //! In: views that agree. Out: the layout to solve, and how each lens of the ladder predicts held-out pairs. Method: k folds over the
 //! pairs ([`crate::stereo::select::cross_validation`]); the rig of a fold measures the pose of each pair it has not seen, and what is left counts. The simplest model whose
-//! loss is within two standard errors of the best wins (after Breiman et al. 1984), since a richer one extrapolates worse.
+//! loss is within two standard errors of the best wins (after Breiman et al. 1984), since a richer one extrapolates worse; unless the corners
+//! refute it: chi-squared falls by more than chance for a richer one that predicts no worse.
 //! Goes wrong: pairs too few or too alike to tell models apart; then the simplest that fits wins, and
 //! [`crate::stereo::judge::model_disagreement`] says what is at stake.
 
+use crate::imaging::Board;
 use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::select::model_comparison::{LensScore, score, simplest};
+use crate::stereo::select::stated_uncertainty;
 use crate::stereo::solve::levenberg_marquardt;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::robust_loss::Loss;
@@ -35,36 +38,40 @@ pub struct Choice {
 }
 
 /// Chooses what is free, where it is not forced.
-pub fn choose(start: &Problem, options: &Options) -> Result<Choice, Error> {
+pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choice, Error> {
     let forced_shape = options.shape.or(options.lens.map(|_| false));
     if let (Some(lens), Some(shape)) = (options.lens, forced_shape) {
         return Ok(Choice { layout: Layout::rig(lens, shape), near: None, scores: Vec::new() });
     }
     // Weights and outliers from a model that is at least as rich as most need; the comparison uses the same for all.
-    let rich_fit = |shape| start.solve(&Layout::rig(Lens::Brown5, shape));
-    let solved = rich_fit(forced_shape.unwrap_or(true))
-        .or_else(|_| rich_fit(forced_shape.unwrap_or(false)))
-        .or_else(|_| start.solve(&Layout::rig(Lens::Brown4, false)))
+    let fit = |lens, shape| {
+        let layout = Layout::rig(lens, shape);
+        start.solve(&layout).map(|solved| (solved, layout))
+    };
+    let (solved, layout) = fit(Lens::Brown5, forced_shape.unwrap_or(true))
+        .or_else(|_| fit(Lens::Brown5, forced_shape.unwrap_or(false)))
+        .or_else(|_| fit(Lens::Brown4, false))
         .map_err(|e| match e {
             // Not even the simplest search ends: the pairs leave a valley, not a minimum.
-            Error::NotConverged { .. } => Error::Undetermined { focal_sigma: None },
+            Error::NotConverged { .. } => Error::undetermined(),
             other => other,
         })?;
+    let scatter = stated_uncertainty::excess_scatter(&solved, &layout, board);
     // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
     let bent = forced_shape.unwrap_or(true);
     let mut scores = ladder(&solved.problem, bent);
     if forced_shape.is_none() && scores.iter().all(|s| s.trial.is_none()) {
         scores = ladder(&solved.problem, false);
     }
-    let chosen = simplest(&scores).ok_or(Error::Undetermined { focal_sigma: None })?;
+    let chosen = simplest(&scores, scatter).ok_or_else(Error::undetermined)?;
     if forced_shape.is_none() && chosen.layout.shape {
         let flat = chosen.layout.left.and_then(|lens| score(&solved.problem, lens, false).trial);
-        let bends = flat.is_none_or(|flat| flat.excess_over(chosen) > 0.0);
+        let bends = flat.is_none_or(|flat| flat.excess_over(chosen) > 0.0 || flat.is_refuted_by(chosen, scatter));
         if !bends {
             scores = ladder(&solved.problem, false);
         }
     }
-    let chosen = simplest(&scores).ok_or(Error::Undetermined { focal_sigma: None })?;
+    let chosen = simplest(&scores, scatter).ok_or_else(Error::undetermined)?;
     Ok(Choice { layout: chosen.layout, near: Some(chosen.values.clone()), scores })
 }
 

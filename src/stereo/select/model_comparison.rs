@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::geometry::Transform;
+use crate::statistics::{NORMAL_999, chi_square_quantile};
 use crate::stereo::Lens;
 use crate::stereo::data::residuals::residual_px;
 use crate::stereo::data::view::View;
@@ -56,11 +57,13 @@ impl LensScore {
     }
 }
 
-/// The simplest model within two standard errors of the best.
-pub fn simplest(scores: &[LensScore]) -> Option<&Trial> {
+/// The simplest model within two standard errors of the best that no richer one refutes. `scatter` is the variance of what the pairs leave
+/// over what their corners' noise lets expect.
+pub fn simplest(scores: &[LensScore], scatter: f64) -> Option<&Trial> {
     let trials = || scores.iter().filter_map(|s| s.trial.as_ref());
     let best = trials().min_by(|a, b| a.loss().total_cmp(&b.loss()))?;
-    trials().find(|trial| trial.excess_over(best) <= 0.0)
+    trials()
+        .find(|trial| trial.excess_over(best) <= 0.0 && !trials().any(|richer| trial.is_refuted_by(richer, scatter)))
 }
 
 impl Trial {
@@ -89,6 +92,16 @@ impl Trial {
 
     fn loss(&self) -> f64 {
         self.by_pair.iter().sum::<f64>() / self.by_pair.len() as f64
+    }
+
+    /// Whether a richer model predicts unseen pairs no worse and lowers chi-squared by more than chance does once in a thousand calibrations: a
+    /// few pairs that miss terms only at their edges differ too much among themselves for their mean loss to tell.
+    pub fn is_refuted_by(&self, richer: &Trial, scatter: f64) -> bool {
+        let Some(added) = richer.layout.count().checked_sub(self.layout.count()).filter(|added| *added > 0) else {
+            return false;
+        };
+        let fall = (self.chi_square - richer.chi_square) / scatter;
+        richer.loss() < self.loss() && fall > chi_square_quantile(added as f64, NORMAL_999)
     }
 
     /// How much worse than `best` beyond what chance makes of the pairs' differences; no number where pairs were not held out.

@@ -6,8 +6,9 @@
 //! than chance at the level of an ordinary test, the step from the chosen model to it is taken as a bias that is known to its own size,
 //! and the square of that step is added (GUM, F.2.4.5). Goes wrong: models that are not among those asked.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
+use crate::imaging::Board;
 use crate::statistics::{NORMAL_95, chi_square_quantile};
 use crate::stereo::Lens;
 use crate::stereo::Rig;
@@ -17,6 +18,7 @@ use crate::stereo::select::cross_validation;
 use crate::stereo::select::model_comparison::{LensScore, Trial};
 use crate::stereo::select::pair_scatter::{self, PairScatter};
 use crate::stereo::solve::levenberg_marquardt;
+use crate::stereo::solve::normal_equations::Block;
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::Uncertainty;
@@ -54,15 +56,12 @@ pub fn state(
     neighbours: &NeighbourCorrelation,
     scores: &[LensScore],
 ) -> Stated {
-    let Problem { views, values } = &solved.problem;
     let inflation = neighbours.inflation();
-    let groups = cross_validation::groups(views, &values.poses);
-    let Some(blocks) = levenberg_marquardt::blocks(views, layout, values, Loss::Squared) else {
-        let pair_scatter = PairScatter { groups: cross_validation::count(&groups), ratio: None };
+    let Some((blocks, mut shared, pair_scatter)) = scattered(&solved.problem, layout, &by_noise.shared, inflation)
+    else {
+        let pair_scatter = PairScatter { groups: solved.problem.views.len(), ratio: None };
         return Stated { uncertainty: by_noise, pair_scatter, witnesses: Vec::new() };
     };
-    let without = cross_validation::leave_out(&blocks, layout, &values.shared, &groups);
-    let (mut shared, pair_scatter) = pair_scatter::covariance(&by_noise.shared, inflation, &blocks, &groups, &without);
     let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(1.0);
     let witnesses = witnesses(&solved.problem, layout, scores, factor);
     // Lenses contain each other: the steps to two of them are not two biases, and Akaike's criterion names the likeliest. The board's is another.
@@ -73,6 +72,31 @@ pub fn state(
         shared += &witness.step * witness.step.transpose();
     }
     Stated { uncertainty: by_noise.with_shared(shared, &blocks), pair_scatter, witnesses }
+}
+
+/// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs tell; at least one.
+pub fn excess_scatter(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
+    let inflation = solved.neighbours(board).inflation();
+    let ratio = || {
+        let by_noise = solved.uncertainty(layout).ok()?.scaled(inflation);
+        scattered(&solved.problem, layout, &by_noise.shared, inflation)?.2.ratio
+    };
+    inflation * ratio().unwrap_or(1.0).max(1.0)
+}
+
+/// The normal equations, the covariance of the shared numbers that allows for the pairs' scatter, and that scatter.
+fn scattered(
+    problem: &Problem,
+    layout: &Layout,
+    by_noise: &DMatrix<f64>,
+    inflation: f64,
+) -> Option<(Vec<Block>, DMatrix<f64>, PairScatter)> {
+    let Problem { views, values } = problem;
+    let groups = cross_validation::groups(views, &values.poses);
+    let blocks = levenberg_marquardt::blocks(views, layout, values, Loss::Squared)?;
+    let without = cross_validation::leave_out(&blocks, layout, &values.shared, &groups);
+    let (shared, pair_scatter) = pair_scatter::covariance(by_noise, inflation, &blocks, &groups, &without);
+    Some((blocks, shared, pair_scatter))
 }
 
 fn witnesses(problem: &Problem, layout: &Layout, scores: &[LensScore], factor: f64) -> Vec<Witness> {

@@ -131,11 +131,10 @@ impl Solved {
     /// Covariance of everything; an error where the views do not tell.
     pub fn uncertainty(&self, layout: &Layout) -> Result<Uncertainty, Error> {
         let Problem { views, values } = &self.problem;
-        let uncertainty =
-            uncertainty::of_solution(views, layout, values).ok_or(Error::Undetermined { focal_sigma: None })?;
+        let uncertainty = uncertainty::of_solution(views, layout, values).ok_or_else(Error::undetermined)?;
         let worst = worst_focal_sigma(&uncertainty.shared, layout, &values.shared.rig);
         let known = worst <= WORST_FOCAL_SIGMA;
-        if known { Ok(uncertainty) } else { Err(Error::Undetermined { focal_sigma: Some(worst) }) }
+        if known { Ok(uncertainty) } else { Err(Error::Undetermined { focal_sigma: Some(worst), skipped: Vec::new() }) }
     }
 
     /// The shared values.
