@@ -20,6 +20,9 @@ const LEAST_PX: f64 = 0.3;
 /// pictures in motion, out of focus, or of another board fit badly one by one, too.
 const LARGEST_SHARE: f64 = 1e-3;
 
+/// Small pictures with much noise leave more than that share; a rig that fits them leaves no more than single pictures do, or little.
+const NOISE_FACTOR: f64 = 2.0;
+
 /// The larger of both pictures' median residuals of a pair on a rig, px, with the pose that makes it least.
 pub fn misfit_px(shared: &Shared, view: &View) -> Option<(f64, Transform)> {
     let fit = board_pose::fit(shared, view, Loss::Cauchy(CAUCHY_WIDTH))?;
@@ -44,6 +47,7 @@ pub struct Usual {
 impl Usual {
     /// The limit above which a pair does not belong; `alone_px` is what its pictures leave one by one.
     pub fn limit_px(&self, alone_px: f64) -> f64 {
-        (FACTOR * alone_px.min(2.0 * self.px).max(self.px)).max(LEAST_PX).min(LARGEST_SHARE * f64::from(self.width_px))
+        let usual = FACTOR * alone_px.min(2.0 * self.px).max(self.px);
+        usual.max(LEAST_PX).min((LARGEST_SHARE * f64::from(self.width_px)).max(NOISE_FACTOR * self.px))
     }
 }
