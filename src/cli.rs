@@ -46,6 +46,8 @@ pub enum Command {
     Identify(Identify),
     /// Judge robots by the verify rows of measurements, without fitting any
     Verify(Verify),
+    /// Undistort and rectify pairs of pictures, for eyes and for dense stereo
+    Rectify(Rectify),
     /// Make pictures and measurements whose truth is known
     Simulate(Simulate),
     /// Write a calibration for other programs
@@ -173,7 +175,7 @@ pub struct CameraCheck {
 pub struct Measure {
     /// Folder with left/ and right/ pictures and poses.csv
     pub poses: Utf8PathBuf,
-    /// The rig [default: calibration.json in the results folder]
+    /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
     /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
@@ -243,6 +245,35 @@ pub struct Verify {
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// `stereocal rectify`
+#[derive(Debug, Args)]
+pub struct Rectify {
+    /// Folder with left/ and right/ pictures, or with left*/right* names
+    pub images: Utf8PathBuf,
+    /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<Utf8PathBuf>,
+    /// Straighten each picture by itself, in its own camera matrix; do not turn the cameras
+    #[arg(long, conflicts_with_all = ["alpha", "zero_disparity"])]
+    pub undistort_only: bool,
+    /// How much is kept: 0 only what both lenses saw, 1 every raw pixel [default: OpenCV's own choice between]
+    #[arg(long, value_name = "A", value_parser = between(0.0, 1.0))]
+    pub alpha: Option<f64>,
+    /// Give both pictures one principal point: points at infinity then have no disparity, but cameras that are turned towards
+    /// each other lose what is near from view
+    #[arg(long)]
+    pub zero_disparity: bool,
+    /// Squares of the board that shows how well rows agree; keys `check_board.squares`, `target_board.squares` [default: both are tried]
+    #[arg(long, value_name = "CxR")]
+    pub squares: Option<Squares>,
+    /// Filters of pictures that are raw colour mosaics: RGGB, BGGR, GRBG or GBRG
+    #[arg(long, value_name = "PATTERN")]
+    pub bayer: Option<Mosaic>,
+    /// Results.
+    #[command(flatten)]
+    pub output: Output,
 }
 
 /// `stereocal export`
@@ -343,7 +374,7 @@ pub struct ExportCalibration {
     /// For which program
     #[arg(long)]
     pub format: CalibrationFormat,
-    /// The rig [default: calibration.json in the results folder]
+    /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
     /// Folder for results; key `out` [default: out]

@@ -13,11 +13,11 @@ use crate::formats::export;
 pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
     let ExportWhat::Calibration(args) = &args.what;
     let out = OutDir::open(args.out.as_deref().unwrap_or(&config.out))?;
-    let rig_file = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
+    let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
     let rig = calibration::read(&rig_file)?;
     let out = out.for_run(&Run { force: args.force, ..run }, &[&rig_file]);
     let files = match args.format {
-        CalibrationFormat::Opencv => export::file_storage::files(&rig),
+        CalibrationFormat::Opencv => export::file_storage::files(&rig)?,
         CalibrationFormat::Ros => export::ros::files(&rig)?,
         CalibrationFormat::Kalibr => export::kalibr::files(&rig)?,
         CalibrationFormat::Mrcal => export::mrcal::files(&rig)?,

@@ -7,6 +7,7 @@ pub mod guide;
 pub mod identify;
 pub mod init;
 pub mod measure;
+pub mod rectify;
 pub mod robot;
 pub mod shell;
 pub mod simulate;
@@ -48,6 +49,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Measure(args) => measure::run(&args, &config, run),
         Command::Identify(args) => identify::run(&args, &config, run),
         Command::Verify(args) => verify::run(&args, &config.identify),
+        Command::Rectify(args) => rectify::run(&args, &config, run),
         Command::Simulate(args) => simulate::run(&args, &config, run),
         Command::Export(args) => export::run(&args, &config, run),
         Command::Init(args) => init::run(&args, run),

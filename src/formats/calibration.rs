@@ -1,12 +1,12 @@
 //! `calibration.json`: a rig as a file.
 
-use camino::Utf8Path;
+use camino::{Utf8Path, Utf8PathBuf};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::checked;
+use super::{checked, export};
 use crate::diagnostic::Place;
-use crate::files::{self, Result};
+use crate::files::{self, OutDir, Result};
 use crate::geometry::rotation_matrix;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::model::rig::{Covariance, Rig};
@@ -156,6 +156,34 @@ impl CovarianceRecord {
     }
 }
 
+/// The own format's name in a results folder.
+const OWN_NAME: &str = "calibration.json";
+
+/// The file that a command reads its rig from: what was named, else `calibration.json` of the results folder. Of a folder, the own file
+/// or else the one that another format goes by; an error where there is none, or where it could be either of two.
+pub fn file(named: Option<&Utf8Path>, out: &OutDir) -> Result<Utf8PathBuf> {
+    let Some(named) = named else { return Ok(out.join(OWN_NAME)) };
+    if !named.is_dir() {
+        return Ok(named.to_owned());
+    }
+    let there = |name: &&str| named.join(name).is_file();
+    let found: Vec<&str> = match [OWN_NAME].iter().copied().find(there) {
+        Some(own) => vec![own],
+        None => export::NAMES.into_iter().filter(there).collect(),
+    };
+    match found[..] {
+        [one] => Ok(named.join(one)),
+        _ => Err(files::Error::Format {
+            message: match found[..] {
+                [] => format!("no calibration in this folder: neither {OWN_NAME} nor {}", export::NAMES.join(", ")),
+                _ => format!("this folder holds several calibrations: {}", found.join(", ")),
+            },
+            place: Place { path: named.to_owned(), line: None },
+            hint: Some("name the file: `--calibration FILE`".to_owned()),
+        }),
+    }
+}
+
 /// Reads `calibration.json`, or one of the formats that [`crate::formats::export`] writes.
 pub fn read(path: &Utf8Path) -> Result<Rig> {
     Ok(read_with_noise(path)?.0)
@@ -166,7 +194,7 @@ pub fn read_with_noise(path: &Utf8Path) -> Result<(Rig, Option<Noise>)> {
     const WHAT: &str = "the stereo calibration";
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
     let text = files::read_text(path, WHAT, Some(hint))?;
-    let (rig, noise) = match crate::formats::export::read(path, &text) {
+    let (rig, noise) = match export::read(path, &text) {
         Some(rig) => (rig, None),
         None => {
             let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
@@ -205,6 +233,25 @@ mod tests {
         assert_eq!(back.right, rig.right);
         assert_eq!(back.covariance, rig.covariance);
         assert!((back.right_from_left.to_matrix() - rig.right_from_left.to_matrix()).amax() < 1e-15);
+    }
+
+    #[test]
+    fn a_folder_stands_for_the_one_calibration_in_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = Utf8Path::from_path(folder.path()).unwrap();
+        let out = OutDir::open(&path.join("out")).unwrap();
+        let put = |name: &str| std::fs::write(path.join(name), "").unwrap();
+        let found = || file(Some(path), &out).map_err(|e| e.to_string());
+        assert_eq!(file(None, &out).unwrap(), path.join("out/calibration.json"));
+        assert_eq!(file(Some(&path.join("a.json")), &out).unwrap(), path.join("a.json"));
+        assert!(found().unwrap_err().contains("no calibration in this folder"));
+        put("left.yaml");
+        put("right.yaml");
+        assert_eq!(found(), Ok(path.join("left.yaml")));
+        put("camchain.yaml");
+        assert!(found().unwrap_err().contains("several calibrations: left.yaml, camchain.yaml"));
+        put("calibration.json");
+        assert_eq!(found(), Ok(path.join("calibration.json")));
     }
 
     #[test]

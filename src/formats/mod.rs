@@ -6,4 +6,5 @@ mod checked;
 pub mod dh_csv;
 pub mod export;
 pub mod measure;
+pub mod rectified;
 pub mod urdf;

@@ -81,6 +81,14 @@ pub enum Error {
         /// The other.
         second: Utf8PathBuf,
     },
+    /// Not one pair of pictures could be read.
+    #[error("not one pair of pictures can be read{}", reasons(.skipped))]
+    NoneReadable {
+        /// The folder.
+        path: Utf8PathBuf,
+        /// The pairs, and why.
+        skipped: Vec<Skipped>,
+    },
     /// The board was not found often enough.
     #[error("only {found} of {total} pairs show the whole {} board; {needed} are needed{}", .board.squares, reasons(.skipped))]
     TooFewPairs {
@@ -100,6 +108,10 @@ pub enum Error {
         other: Option<Squares>,
     },
 }
+
+/// What pictures are read.
+const SAVED_AS: &str = "save the pictures as the camera gives them: PNG, TIFF, BMP, JPEG or PGM of 8 or 16 bits a pixel, up to 300 million \
+                        px and 1 GiB when decoded";
 
 fn no_pairs(single: usize, sideless: usize) -> String {
     match (single, sideless) {
@@ -129,6 +141,7 @@ impl Explain for Error {
             | Error::NotAFolder { path }
             | Error::OneSide { path, .. }
             | Error::NoPairs { path, .. }
+            | Error::NoneReadable { path, .. }
             | Error::TooFewPairs { path, .. } => Some(path.to_string()),
         }
     }
@@ -143,14 +156,11 @@ impl Explain for Error {
                     .to_owned(),
             ),
             Error::SameName { .. } => Some("remove or rename one of them".to_owned()),
+            Error::NoneReadable { .. } => Some(SAVED_AS.to_owned()),
             Error::TooFewPairs { skipped, .. }
                 if 2 * skipped.iter().filter(|s| s.reason.contains(self::image::UNDECODABLE)).count() > skipped.len() =>
             {
-                Some(
-                    "save the pictures as the camera gives them: PNG, TIFF, BMP, JPEG or PGM of 8 or 16 bits a pixel, up to 300 \
-                     million px and 1 GiB when decoded"
-                        .to_owned(),
-                )
+                Some(SAVED_AS.to_owned())
             }
             Error::TooFewPairs { other: Some(squares), .. } => {
                 let (columns, rows) = (squares.columns - 1, squares.rows - 1);

@@ -6,6 +6,8 @@ pub mod figure;
 pub mod identify;
 pub mod measure;
 pub mod page;
+pub mod picture;
+pub mod rectify;
 pub mod robot;
 pub mod table;
 

@@ -93,6 +93,15 @@ pub enum Error {
         /// The richest lens of the format.
         most: &'static str,
     },
+    /// Cameras whose pictures cannot be brought onto common rows.
+    #[error("the cameras' pictures have no common rows: {reason}")]
+    NoCommonRows {
+        /// Why.
+        reason: String,
+    },
+    /// OpenCV refused what it was asked.
+    #[error(transparent)]
+    OpenCv(#[from] crate::opencv::Failure),
     /// Pictures of another size than the calibration's.
     #[error("the {} pictures are {found_width}x{found_height} px, the calibration is for {width}x{height}", side.name())]
     PictureSize {
@@ -165,6 +174,8 @@ impl Explain for Error {
                 Error::LensNotExportable { most, .. } => {
                     return Some(format!("calibrate with `--lens {most}`, or `--format opencv`"));
                 }
+                Error::NoCommonRows { .. } => "`--undistort-only` straightens each picture by itself",
+                Error::OpenCv(_) => return None,
                 Error::PictureSize { .. } => {
                     "calibrate with pictures of the same size and cut: `stereocal camera-check IMAGES`"
                 }

@@ -26,3 +26,4 @@ mod pipeline;
 mod provenance;
 mod published;
 mod real;
+mod rectify;

@@ -112,6 +112,7 @@ fn exported_rigs_measure_the_same_points(world: &Path) {
     for (format, file) in [
         ("opencv", "stereo_opencv.yml"),
         ("ros", "left.yaml"),
+        ("ros", ""),
         ("kalibr", "camchain.yaml"),
         ("mrcal", "left.cameramodel"),
     ] {

@@ -1,15 +1,14 @@
 //! What the page of `measure` shows beside the results: small pictures of what went wrong, and distances as the robot was sent.
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
 use camino::Utf8Path;
 use rayon::prelude::*;
 
 use super::super::Result;
 use crate::imaging::image::Mosaic;
-use crate::imaging::input::pairs::{self, PairFiles};
-use crate::imaging::{Corners, PairCorners, overlay};
+use crate::imaging::input::pairs;
+use crate::imaging::{Corners, PairCorners};
 use crate::measurements::Role;
+use crate::report;
 use crate::report::measure::{Distance, Extras, Thumbnail};
 use crate::robot::{self, Robot};
 use crate::stereo::target::series::{MeasuredPose, Series};
@@ -42,20 +41,12 @@ fn thumbnails(series: &Series, corners: &Corners, folder: &Utf8Path, mosaic: Opt
         let found = files.iter().find(|f| f.pair == m.at.pose);
         let none = PairCorners { pair: m.at.pose.clone(), ..PairCorners::default() };
         let pair = corners.pairs.iter().find(|p| p.pair == m.at.pose).unwrap_or(&none);
-        let jpeg_base64 = found.and_then(|files| small(files, pair, mosaic)).unwrap_or_default();
+        let jpeg_base64 = found
+            .and_then(|files| report::picture::pair(files, pair, mosaic, WIDTH))
+            .map_or_else(String::new, |jpeg| jpeg.base64);
         Thumbnail { pose: m.at.pose.clone(), caption: caption.clone(), jpeg_base64 }
     };
     Ok(chosen.par_iter().map(draw).collect())
-}
-
-/// The overlay of a pair as a small JPEG in base64; `None` where a picture can't be read.
-fn small(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> Option<String> {
-    let drawn = image::load_from_memory(&overlay::png(files, corners, mosaic)?).ok()?;
-    let height = (drawn.height() * WIDTH / drawn.width().max(1)).max(1);
-    let reduced = drawn.resize_exact(WIDTH, height, image::imageops::FilterType::Triangle);
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    reduced.to_rgb8().write_to(&mut bytes, image::ImageFormat::Jpeg).ok()?;
-    Some(BASE64_STANDARD.encode(bytes.into_inner()))
 }
 
 /// Distances to each group's centre, where a robot of so many joints is known.

@@ -25,7 +25,7 @@ use crate::{progress, report};
 /// Runs the command.
 pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
-    let rig_file = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
+    let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
     let list = args.poses.join("poses.csv");
     let known = knowledge(args, config, &rig_file)?;
     let poses = measurements::read_poses(&list)?;

@@ -1,4 +1,8 @@
 //! OpenCV's FileStorage, YAML, with the names of its own stereo example: `M1 D1 M2 D2 R T`. Lengths in mm.
+//!
+//! What follows from them stands there too, for programs that read it: `E F` as `stereoCalibrate` gives them, and `R1 R2 P1 P2 Q` as
+//! `stereoRectify` gives them with its own defaults (`rectify_flags` 1024 is `CALIB_ZERO_DISPARITY`, `rectify_alpha` -1) for pictures of
+//! `image_width` x `image_height`. It is written, not read back.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -6,10 +10,12 @@ use super::scan::{list, number};
 use super::{ExportedFile, camera, numbers};
 use crate::formats::checked;
 use crate::geometry::rotation_matrix;
-use crate::stereo::Rig;
+use crate::stereo::model::rectification::{Matrices, Scaling, essential, fundamental};
+use crate::stereo::{Error, Rig};
 
-/// One file for the rig.
-pub fn files(rig: &Rig) -> Vec<ExportedFile> {
+/// One file for the rig. An error where OpenCV cannot rectify it.
+pub fn files(rig: &Rig) -> Result<Vec<ExportedFile>, Error> {
+    // By rows, as OpenCV stores matrices; nalgebra's are transposed for that.
     let matrix = |name: &str, rows: usize, columns: usize, data: &[f64]| {
         format!(
             "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {} ]\n",
@@ -20,14 +26,27 @@ pub fn files(rig: &Rig) -> Vec<ExportedFile> {
     text.push_str(&format!("image_width: {}\nimage_height: {}\n", rig.left.width, rig.left.height));
     text.push_str(&format!("right_image_width: {}\nright_image_height: {}\n", rig.right.width, rig.right.height));
     for (i, camera) in [(1, &rig.left), (2, &rig.right)] {
-        // nalgebra stores by columns, OpenCV by rows.
         text.push_str(&matrix(&format!("M{i}"), 3, 3, camera.matrix().transpose().as_slice()));
         let n = camera.lens.vector_length();
         text.push_str(&matrix(&format!("D{i}"), 1, n, &camera.distortion[..n]));
     }
     text.push_str(&matrix("R", 3, 3, rotation_matrix(&rig.right_from_left).transpose().as_slice()));
     text.push_str(&matrix("T", 3, 1, rig.right_from_left.translation.vector.as_slice()));
-    vec![ExportedFile { name: "stereo_opencv.yml", text }]
+    text.push_str(&matrix("E", 3, 3, essential(rig).transpose().as_slice()));
+    if let Some(f) = fundamental(rig) {
+        text.push_str(&matrix("F", 3, 3, f.transpose().as_slice()));
+    }
+    let scaling = Scaling::OPENCV;
+    let rectified = Matrices::new(rig, scaling)?;
+    for (i, r) in rectified.rotations.iter().enumerate() {
+        text.push_str(&matrix(&format!("R{}", i + 1), 3, 3, r.transpose().as_slice()));
+    }
+    for (i, p) in rectified.projections.iter().enumerate() {
+        text.push_str(&matrix(&format!("P{}", i + 1), 3, 4, p.transpose().as_slice()));
+    }
+    text.push_str(&matrix("Q", 4, 4, rectified.disparity_to_depth.transpose().as_slice()));
+    text.push_str(&format!("rectify_flags: {}\nrectify_alpha: {:?}\n", scaling.flags(), scaling.alpha));
+    Ok(vec![ExportedFile { name: "stereo_opencv.yml", text }])
 }
 
 /// Reads the same back.

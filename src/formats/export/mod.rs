@@ -18,6 +18,9 @@ use crate::stereo::{Camera, Error, Lens, Rig};
 /// Metres in a millimetre.
 const METRE: f64 = 1e-3;
 
+/// The files that [`read`] is given, by the names under which they are written: of two, the left camera's.
+pub const NAMES: [&str; 4] = ["stereo_opencv.yml", "left.yaml", "camchain.yaml", "left.cameramodel"];
+
 /// A file to be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExportedFile {
@@ -73,6 +76,7 @@ mod tests {
     use super::*;
     use crate::geometry::transform;
     use crate::stereo::model::projection::tests::bent_camera;
+    use crate::stereo::model::rectification::{Matrices, Scaling, essential, fundamental};
     use nalgebra::{Point3, Vector3};
 
     pub(super) fn rig(lens: Lens) -> Rig {
@@ -103,7 +107,7 @@ mod tests {
     fn every_format_reads_back() {
         for lens in Lens::LADDER {
             let rig = rig(lens);
-            let mut written = vec![file_storage::files(&rig)];
+            let mut written = vec![file_storage::files(&rig).unwrap()];
             written.extend(ros::files(&rig));
             written.extend(kalibr::files(&rig));
             written.extend(mrcal::files(&rig));
@@ -126,13 +130,41 @@ mod tests {
         }
     }
 
+    /// What OpenCV reads is what it would say itself of the rig it reads: 1e-9 of each number's size (at least one).
     #[test]
-    fn opencv_itself_reads_its_file() {
-        let rig = rig(Lens::Rational8);
-        let text = &file_storage::files(&rig)[0].text;
-        let (matrix, distortion) = crate::opencv::read_camera(text, "M1", "D1").unwrap();
-        assert_eq!(matrix, rig.left.matrix().transpose().as_slice());
-        assert_eq!(distortion, rig.left.distortion[..8]);
+    fn opencv_reads_its_file_and_says_the_same_of_it() {
+        const SAME: f64 = 1e-9;
+        for lens in Lens::LADDER {
+            let rig = rig(lens);
+            let text = &file_storage::files(&rig).unwrap()[0].text;
+            let read = |name: &str| crate::opencv::read_matrix(text, name).unwrap();
+            assert_eq!(read("M1"), rig.left.matrix().transpose().as_slice());
+            assert_eq!(read("D1"), rig.left.distortion[..lens.vector_length()]);
+            let back = file_storage::read(text).unwrap();
+            let said = Matrices::new(&back, Scaling::OPENCV).unwrap();
+            let e = essential(&back);
+            let f = fundamental(&back).unwrap();
+            let others = Matrices::new(&back, Scaling { zero_disparity: false, ..Scaling::OPENCV }).unwrap();
+            let off = |name: &str, said: &[f64]| {
+                let read = read(name);
+                assert_eq!(read.len(), said.len(), "{name}");
+                read.iter().zip(said).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs() / b.abs().max(1.0)))
+            };
+            for (name, said) in [
+                ("R1", said.rotations[0].transpose().as_slice()),
+                ("R2", said.rotations[1].transpose().as_slice()),
+                ("P1", said.projections[0].transpose().as_slice()),
+                ("P2", said.projections[1].transpose().as_slice()),
+                ("Q", said.disparity_to_depth.transpose().as_slice()),
+                ("E", e.transpose().as_slice()),
+                ("F", f.transpose().as_slice()),
+            ] {
+                let off = off(name, said);
+                assert!(off < SAME, "{lens:?} {name}: {off}");
+            }
+            // Matrices for other flags would not have passed.
+            assert!(off("P1", others.projections[0].transpose().as_slice()) > SAME);
+        }
     }
 
     /// Every format is held to what `calibration.json` is: no rotation, no lens and no list that is not what it says.
@@ -149,7 +181,7 @@ mod tests {
             }
             super::read(&dir.join(files[0].name), &changed[0]).unwrap().unwrap_err()
         };
-        let opencv = file_storage::files(&rig);
+        let opencv = file_storage::files(&rig).unwrap();
         let (ros, kalibr, mrcal) =
             (ros::files(&rig).unwrap(), kalibr::files(&rig).unwrap(), mrcal::files(&rig).unwrap());
         let row = kalibr[0].text.lines().find(|line| line.starts_with("  - [")).unwrap().to_owned() + "\n";

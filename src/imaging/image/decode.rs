@@ -6,35 +6,37 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::{Image, Mosaic, Picture, UNDECODABLE, channels, integrity, limits, mosaic};
+use super::{Mosaic, Picture, UNDECODABLE, channels, integrity, limits, mosaic};
 
 /// Decodes the bytes of a file; the reason where that is not possible or the file is cut or damaged. `path` only helps to tell the
 /// format. A grey picture that is a raw colour mosaic needs its pattern.
 pub fn decode(bytes: &[u8], path: &Utf8Path, pattern: Option<Mosaic>) -> Result<Picture, String> {
-    let format = image::guess_format(bytes).ok().or_else(|| ImageFormat::from_path(path).ok());
-    integrity::check(bytes, format)?;
-    let decoded = if format == Some(ImageFormat::Jpeg) { jpeg(bytes)? } else { other(bytes, format)? };
+    let decoded = decoded(bytes, path)?;
     let size = (decoded.width() as usize, decoded.height() as usize);
     match decoded {
-        DynamicImage::ImageLuma8(grey) => mosaic::grey(image(size, grey.into_raw()), pattern),
-        DynamicImage::ImageLuma16(grey) => mosaic::grey(image(size, grey.into_raw()), pattern),
-        DynamicImage::ImageLumaA8(grey) => mosaic::grey(image(size, without_alpha(&grey)), pattern),
-        DynamicImage::ImageLumaA16(grey) => mosaic::grey(image(size, without_alpha(&grey)), pattern),
-        _ if pattern.is_some() => Err("is in colour already: a raw mosaic is grey".to_owned()),
+        _ if !decoded.color().has_color() => mosaic::of_grey(decoded, pattern),
+        _ if pattern.is_some() => Err(mosaic::IN_COLOUR.to_owned()),
         DynamicImage::ImageRgb8(rgb) => Ok(channels::grey(&rgb, 3, size).into()),
         DynamicImage::ImageRgba8(rgb) => Ok(channels::grey(&rgb, 4, size).into()),
         DynamicImage::ImageRgb16(rgb) => Ok(channels::grey(&rgb, 3, size).into()),
         DynamicImage::ImageRgba16(rgb) => Ok(channels::grey(&rgb, 4, size).into()),
-        _ => Err(format!("{UNDECODABLE}: floating-point pixels")),
+        _ => Err(floating_point()),
     }
 }
 
-fn image<T>((width, height): (usize, usize), pixels: Vec<T>) -> Image<T> {
-    Image { width, height, pixels }
+/// Decodes the bytes of a file to its own colours and depth, whole numbers only.
+pub(super) fn decoded(bytes: &[u8], path: &Utf8Path) -> Result<DynamicImage, String> {
+    let format = image::guess_format(bytes).ok().or_else(|| ImageFormat::from_path(path).ok());
+    integrity::check(bytes, format)?;
+    let decoded = if format == Some(ImageFormat::Jpeg) { jpeg(bytes)? } else { other(bytes, format)? };
+    match decoded {
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => Err(floating_point()),
+        decoded => Ok(decoded),
+    }
 }
 
-fn without_alpha<T: Copy>(samples: &[T]) -> Vec<T> {
-    samples.chunks_exact(2).map(|p| p[0]).collect()
+fn floating_point() -> String {
+    format!("{UNDECODABLE}: floating-point pixels")
 }
 
 fn other(bytes: &[u8], format: Option<ImageFormat>) -> Result<DynamicImage, String> {
@@ -80,8 +82,12 @@ fn jpeg(bytes: &[u8]) -> Result<DynamicImage, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Grey;
+    use super::super::{Grey, Image};
     use super::*;
+
+    fn image<T>((width, height): (usize, usize), pixels: Vec<T>) -> Image<T> {
+        Image { width, height, pixels }
+    }
 
     fn encoded(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
         let mut bytes = std::io::Cursor::new(Vec::new());

@@ -11,6 +11,7 @@ mod integrity;
 mod jpeg_scan;
 mod limits;
 mod mosaic;
+pub mod raster;
 
 use nalgebra::Point2;
 

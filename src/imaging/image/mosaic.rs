@@ -10,6 +10,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use image::DynamicImage;
+
 use super::clipping::{self, Value};
 use super::{Image, Picture};
 use crate::statistics::median;
@@ -75,6 +77,25 @@ const COLOURED: f64 = 0.04;
 const GREENS_ALIKE: f64 = 0.03;
 /// Fewest flat cells that tell anything.
 const FEWEST: usize = 200;
+
+/// Why a picture in colour is no mosaic.
+pub(super) const IN_COLOUR: &str = "is in colour already: a raw mosaic is grey";
+
+/// [`grey`] of a decoded picture without colours; transparency is left away.
+pub(super) fn of_grey(decoded: DynamicImage, pattern: Option<Mosaic>) -> Result<Picture, String> {
+    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+    match decoded {
+        DynamicImage::ImageLuma8(samples) => grey(Image { width, height, pixels: samples.into_raw() }, pattern),
+        DynamicImage::ImageLuma16(samples) => grey(Image { width, height, pixels: samples.into_raw() }, pattern),
+        DynamicImage::ImageLumaA8(samples) => grey(Image { width, height, pixels: without_alpha(&samples) }, pattern),
+        DynamicImage::ImageLumaA16(samples) => grey(Image { width, height, pixels: without_alpha(&samples) }, pattern),
+        _ => Err(IN_COLOUR.to_owned()),
+    }
+}
+
+fn without_alpha<T: Copy>(samples: &[T]) -> Vec<T> {
+    samples.chunks_exact(2).map(|p| p[0]).collect()
+}
 
 /// The picture, read by its pattern where one is named; a reason where it is a mosaic without one, or not of the one named.
 pub(super) fn grey<T: Value>(image: Image<T>, pattern: Option<Mosaic>) -> Result<Picture, String>

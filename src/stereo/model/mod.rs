@@ -4,4 +4,5 @@ pub mod board_shape;
 pub mod camera;
 pub mod parameters;
 pub mod projection;
+pub mod rectification;
 pub mod rig;

@@ -68,16 +68,17 @@ impl Rig {
 
     /// Pictures of another size than the calibration's were binned, cut or taken by other cameras.
     pub fn check_size(&self, corners: &Corners) -> Result<(), Error> {
-        for (side, camera, found) in
-            [(Side::Left, &self.left, corners.left_size), (Side::Right, &self.right, corners.right_size)]
-        {
-            let (width, height) = (camera.width, camera.height);
-            if found != (width, height) {
-                let (found_width, found_height) = found;
-                return Err(Error::PictureSize { side, found_width, found_height, width, height });
-            }
+        self.check_picture_size(Side::Left, corners.left_size)?;
+        self.check_picture_size(Side::Right, corners.right_size)
+    }
+
+    /// The same for one picture's width and height, px.
+    pub fn check_picture_size(&self, side: Side, (found_width, found_height): (u32, u32)) -> Result<(), Error> {
+        let Camera { width, height, .. } = *self.camera(side);
+        if (found_width, found_height) == (width, height) {
+            return Ok(());
         }
-        Ok(())
+        Err(Error::PictureSize { side, found_width, found_height, width, height })
     }
 
     /// Raw picture points, left and right, of a point in the left camera's frame, px.

@@ -75,7 +75,7 @@ fn rig() -> Rig {
 pub fn exported(format: &str) -> Files {
     let rig = rig();
     let files = match format {
-        "opencv" => file_storage::files(&rig),
+        "opencv" => file_storage::files(&rig).unwrap_or_default(),
         "ros" => ros::files(&rig).expect("a lens that ROS knows"),
         "kalibr" => kalibr::files(&rig).expect("a lens that Kalibr knows"),
         _ => mrcal::files(&rig).expect("a lens that mrcal knows"),

@@ -1,0 +1,224 @@
+//! `stereocal rectify`: pairs of pictures undistorted, on common rows, for eyes and for dense stereo.
+
+use camino::Utf8Path;
+use nalgebra::Matrix3;
+use rayon::prelude::*;
+
+use super::{Outcome, Result};
+use crate::cli::Rectify;
+use crate::config::Config;
+use crate::diagnostic::Status;
+use crate::files::provenance::Run;
+use crate::files::{self, OutDir};
+use crate::formats::calibration;
+use crate::formats::rectified::{Coverage, RectifiedFile, RectifiedPair};
+use crate::imaging::find::find_pair;
+use crate::imaging::image::raster::Raster;
+use crate::imaging::image::{self, Claim, Header};
+use crate::imaging::input::pairs::{self, PairFiles};
+use crate::imaging::{self, Board, PairCorners, Skipped, Wanted};
+use crate::opencv::{self, Map};
+use crate::stereo::model::rectification::{Matrices, Scaling, row_differences, row_residual};
+use crate::stereo::{self, Rig, Side};
+use crate::{progress, report};
+
+/// Share of a rectified picture below which it shows too little to be of use.
+const LITTLE: f64 = 0.25;
+
+/// Pairs on which each board is looked for before it is taken as not there: on pictures of something else the search takes seconds.
+const FIRST_LOOKED_AT: usize = 4;
+
+/// Runs the command.
+pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
+    let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
+    let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
+    let rig = calibration::read(&rig_file)?;
+    let run = Run { force: args.output.force, ..run };
+    let out = out.for_run(&run, &[&args.images, &rig_file]);
+    let pairing = pairs::pair_files(&args.images)?;
+    pairing.left_out().iter().for_each(progress::note);
+    let headers = headers(&pairing.pairs, &rig)?;
+    let names: Vec<[String; 2]> = pairing.pairs.iter().map(names).collect();
+    let written: Vec<&str> = names.iter().flatten().map(String::as_str).collect();
+    out.check_free(&written)?;
+    out.check_free(&["rectified.json", "rectify.html"])?;
+
+    let (mut file, maps) = plan(args, &rig)?;
+    let bar = progress::bar("rectifying", pairing.pairs.len() as u64);
+    let done: Vec<std::result::Result<(), String>> = (pairing.pairs.par_iter(), &headers, &names)
+        .into_par_iter()
+        .map(|(files, headers, names)| {
+            bar.inc(1);
+            let both = match rectified(files, headers, &maps, args.bayer) {
+                Ok(both) => both,
+                Err(reason) => return Ok(Err(reason)),
+            };
+            names.iter().zip(both).try_for_each(|(name, png)| out.write(name, &png)).map(Ok)
+        })
+        .collect::<Result<_, files::Error>>()?;
+    bar.finish_and_clear();
+    let mut kept = Vec::new();
+    for ((files, names), outcome) in pairing.pairs.iter().zip(names).zip(done) {
+        match outcome {
+            Ok(()) => kept.push((files.pair.clone(), names)),
+            Err(reason) => {
+                progress::warn(format!("pair {} is not rectified: {reason}", files.pair));
+                file.pairs_skipped.push(Skipped { pair: files.pair.clone(), reason });
+            }
+        }
+    }
+    if kept.is_empty() {
+        return Err(imaging::Error::NoneReadable { path: args.images.clone(), skipped: file.pairs_skipped }.into());
+    }
+    let rectified: Vec<PairFiles> = kept
+        .iter()
+        .map(|(pair, [left, right])| PairFiles { pair: pair.clone(), left: out.join(left), right: out.join(right) })
+        .collect();
+    let boards = boards(args, config)?;
+    let found = if args.undistort_only { None } else { look_for(&rectified, &boards) };
+    let (file, shown) = judge(file, kept, found);
+    let json = out.write_json("rectified.json", &file)?;
+    let page = report::rectify::page(&file, &rectified, shown.as_ref())?;
+    out.write("rectify.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
+    let stdout = if args.output.json { json } else { report::rectify::summary(&file, &out) };
+    Ok(Outcome { stdout, status: Status::Done })
+}
+
+/// The headers of all pictures. Another size than the calibration's ends the run before anything is written; a picture
+/// that is none is told from the others later.
+fn headers(pairs: &[PairFiles], rig: &Rig) -> Result<Vec<[std::result::Result<Header, String>; 2]>> {
+    let headers: Vec<_> = pairs.par_iter().map(|p| [&p.left, &p.right].map(|path| image::header(path))).collect();
+    for of_pair in &headers {
+        for (side, header) in Side::BOTH.into_iter().zip(of_pair) {
+            if let Ok(header) = header {
+                rig.check_picture_size(side, (header.width, header.height))?;
+            }
+        }
+    }
+    Ok(headers)
+}
+
+/// Names of a pair's rectified pictures below the results folder: the raw ones', as PNG.
+fn names(files: &PairFiles) -> [String; 2] {
+    let name = |side: Side, path: &Utf8Path| {
+        format!("rectified/{}/{}.png", side.name(), path.file_stem().unwrap_or(&files.pair))
+    };
+    [name(Side::Left, &files.left), name(Side::Right, &files.right)]
+}
+
+/// What will be done to the pictures, and what is said of it.
+fn plan(args: &Rectify, rig: &Rig) -> Result<(RectifiedFile, [Map; 2])> {
+    let (width, height) = (rig.left.width, rig.left.height);
+    let map = |side: Side, r: &Matrix3<f64>, p: &Matrix3<f64>, size| {
+        opencv::undistort_rectify_map(rig.camera(side), r, p, size).map_err(stereo::Error::from)
+    };
+    let raw = Side::BOTH.map(|side| (rig.camera(side).width, rig.camera(side).height));
+    let coverage = |maps: &[Map; 2]| Coverage { left: maps[0].coverage(raw[0]), right: maps[1].coverage(raw[1]) };
+    if args.undistort_only {
+        let alone = |side: Side| map(side, &Matrix3::identity(), &rig.camera(side).matrix(), raw[side as usize]);
+        let maps = [alone(Side::Left)?, alone(Side::Right)?];
+        return Ok((RectifiedFile::undistorted(rig, coverage(&maps)), maps));
+    }
+    let alpha = args.alpha.unwrap_or(Scaling::OPENCV.alpha);
+    let scaling = Scaling { alpha, zero_disparity: args.zero_disparity };
+    let matrices = Matrices::new(rig, scaling).map_err(stereo::Error::from)?;
+    let both = |side: Side| {
+        let (r, p) = matrices.of(side);
+        map(side, r, &p.fixed_view::<3, 3>(0, 0).into_owned(), (width, height))
+    };
+    let maps = [both(Side::Left)?, both(Side::Right)?];
+    let coverage = coverage(&maps);
+    let least = coverage.left.min(coverage.right);
+    if least == 0.0 || least.is_nan() {
+        let reason = "one of the rectified pictures would show nothing of the raw one".to_owned();
+        return Err(stereo::Error::NoCommonRows { reason }.into());
+    }
+    if least < LITTLE {
+        progress::warn(format!(
+            "a rectified picture shows something in {:.0} % of its area only: `--alpha 1` keeps all of the raw one, and without \
+             `--zero-disparity` each picture is centred on what its camera sees",
+            100.0 * least
+        ));
+    }
+    Ok((RectifiedFile::rectified(rig, &matrices, scaling, coverage), maps))
+}
+
+/// Both pictures of a pair through the maps, as PNG; the reason where one cannot be read.
+fn rectified(
+    files: &PairFiles,
+    headers: &[std::result::Result<Header, String>; 2],
+    maps: &[Map; 2],
+    mosaic: Option<image::Mosaic>,
+) -> std::result::Result<[Vec<u8>; 2], String> {
+    let one = |side: Side, path: &Utf8Path| {
+        let say = |reason: String| format!("{} picture: {reason}", side.name());
+        let header = headers[side as usize].as_ref().map_err(|reason| say(reason.clone()))?;
+        let _claim = Claim::wait(header);
+        let raw = Raster::read(path, header, mosaic).map_err(say)?;
+        let size = (header.width as usize, header.height as usize);
+        if (raw.width, raw.height) != size {
+            return Err(say("is not of the size that its header announces".to_owned()));
+        }
+        let rectified = opencv::remap(&raw, &maps[side as usize]).map_err(|e| say(e.to_string()))?;
+        rectified.png().ok_or_else(|| say("cannot be written as PNG".to_owned()))
+    };
+    Ok([one(Side::Left, &files.left)?, one(Side::Right, &files.right)?])
+}
+
+/// The boards that may be in the pictures.
+fn boards(args: &Rectify, config: &Config) -> Result<Vec<Board>> {
+    let check = config.check_board.board(args.squares, None)?;
+    let target = config.target_board.board(args.squares, None)?;
+    Ok(if check.squares == target.squares { vec![check] } else { vec![check, target] })
+}
+
+/// The first of the boards that the pictures show, and its corners in the rectified pictures.
+fn look_for(pairs: &[PairFiles], boards: &[Board]) -> Option<(Board, Vec<PairCorners>)> {
+    let find = |board: Board, pairs: &[PairFiles]| -> Vec<PairCorners> {
+        let bar = progress::bar("looking for the board", pairs.len() as u64);
+        let wanted = Wanted { board, needed: 1, mosaic: None, cache: None, overlays: None };
+        let look = |files: &PairFiles| {
+            bar.inc(1);
+            find_pair(files, &wanted).ok()
+        };
+        pairs.par_iter().filter_map(look).collect()
+    };
+    let (first, others) = pairs.split_at(pairs.len().min(FIRST_LOOKED_AT));
+    boards.iter().find_map(|&board| {
+        let mut found = find(board, first);
+        if found.is_empty() {
+            return None;
+        }
+        found.extend(find(board, others));
+        Some((board, found))
+    })
+}
+
+/// The pairs with how well their rows agree, and the one that agrees worst.
+fn judge(
+    file: RectifiedFile,
+    kept: Vec<(String, [String; 2])>,
+    found: Option<(Board, Vec<PairCorners>)>,
+) -> (RectifiedFile, Option<PairCorners>) {
+    let (board, found) = found.map_or((None, Vec::new()), |(board, found)| (Some(board), found));
+    let in_columns = file.common == Some("columns");
+    let differences = |pair: &PairCorners| -> Vec<f64> {
+        row_differences(pair, in_columns).into_iter().map(|(_, difference)| difference).collect()
+    };
+    let residual = |name: &str| row_residual(&differences(found.iter().find(|p| p.pair == name)?));
+    let pairs: Vec<RectifiedPair> = kept
+        .into_iter()
+        .map(|(pair, [left, right])| RectifiedPair { residual: residual(&pair), pair, left, right })
+        .collect();
+    let all: Vec<f64> = found.iter().flat_map(&differences).collect();
+    let worst = pairs
+        .iter()
+        .filter_map(|p| Some((p.residual?.rms_px, &p.pair)))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .and_then(|(_, name)| found.iter().find(|p| p.pair == *name).cloned());
+    let file = file.with_pairs(pairs);
+    match board {
+        Some(board) => (file.with_residual(board, row_residual(&all)), worst),
+        None => (file, None),
+    }
+}

@@ -1,0 +1,134 @@
+//! `rectified.json`: the matrices of rectified pictures as OpenCV has them, and how well their rows agree.
+
+use nalgebra::{Matrix, Matrix3, Matrix3x4, RawStorage, Storage};
+use serde::Serialize;
+
+use crate::imaging::{Board, Skipped};
+use crate::stereo::model::rectification::{Matrices, RowResidual, Scaling};
+use crate::stereo::{Rig, Side};
+
+/// The content of `rectified.json`. Matrices row by row, px and mm.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RectifiedFile {
+    /// "rectify", or "undistort" where each picture was straightened by itself.
+    pub mode: &'static str,
+    /// Width of the pictures written, px.
+    pub width: u32,
+    /// Height of the pictures written, px.
+    pub height: u32,
+    /// `stereoRectify`'s `alpha`; null where pictures were only straightened.
+    pub alpha: Option<f64>,
+    /// `stereoRectify`'s `CALIB_ZERO_DISPARITY`.
+    pub zero_disparity: Option<bool>,
+    #[serde(rename = "R1")]
+    r1: Vec<Vec<f64>>,
+    #[serde(rename = "R2")]
+    r2: Vec<Vec<f64>>,
+    #[serde(rename = "P1")]
+    p1: Vec<Vec<f64>>,
+    #[serde(rename = "P2")]
+    p2: Vec<Vec<f64>>,
+    #[serde(rename = "Q", skip_serializing_if = "Option::is_none")]
+    q: Option<Vec<Vec<f64>>>,
+    /// Share of each rectified picture that shows something.
+    pub coverage: Coverage,
+    /// "rows", or "columns" for cameras one above the other: what corresponding points have in common.
+    pub common: Option<&'static str>,
+    /// How far the rows differ over all corners of the board that was found; null without a board.
+    pub residual: Option<RowResidual>,
+    /// That board.
+    pub board: Option<String>,
+    /// The pairs written.
+    pub pairs: Vec<RectifiedPair>,
+    /// The pairs not written, and why.
+    pub pairs_skipped: Vec<Skipped>,
+}
+
+/// Share of each picture that shows something.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Coverage {
+    /// Of the left one.
+    pub left: f64,
+    /// Of the right one.
+    pub right: f64,
+}
+
+/// A pair in the file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RectifiedPair {
+    /// Its name.
+    pub pair: String,
+    /// The left picture, below the results folder.
+    pub left: String,
+    /// The right picture.
+    pub right: String,
+    /// How far its rows differ; null where the board was not found.
+    pub residual: Option<RowResidual>,
+}
+
+impl RectifiedFile {
+    /// Of pictures on common rows.
+    pub fn rectified(rig: &Rig, matrices: &Matrices, scaling: Scaling, coverage: Coverage) -> RectifiedFile {
+        let common = if matrices.in_columns() { "columns" } else { "rows" };
+        let ((r1, p1), (r2, p2)) = (matrices.of(Side::Left), matrices.of(Side::Right));
+        RectifiedFile {
+            mode: "rectify",
+            alpha: Some(scaling.alpha),
+            zero_disparity: Some(scaling.zero_disparity),
+            q: Some(rows(&matrices.disparity_to_depth)),
+            common: Some(common),
+            ..RectifiedFile::of(rig, [r1, r2], [p1, p2], coverage)
+        }
+    }
+
+    /// Of pictures that were straightened, each in its own camera's matrix.
+    pub fn undistorted(rig: &Rig, coverage: Coverage) -> RectifiedFile {
+        let one = Matrix3::identity();
+        let [p1, p2] = [&rig.left, &rig.right].map(|camera| camera.matrix().insert_column(3, 0.0));
+        RectifiedFile::of(rig, [&one, &one], [&p1, &p2], coverage)
+    }
+
+    fn of(
+        rig: &Rig,
+        [r1, r2]: [&Matrix3<f64>; 2],
+        [p1, p2]: [&Matrix3x4<f64>; 2],
+        coverage: Coverage,
+    ) -> RectifiedFile {
+        RectifiedFile {
+            mode: "undistort",
+            width: rig.left.width,
+            height: rig.left.height,
+            alpha: None,
+            zero_disparity: None,
+            r1: rows(r1),
+            r2: rows(r2),
+            p1: rows(p1),
+            p2: rows(p2),
+            q: None,
+            coverage,
+            common: None,
+            residual: None,
+            board: None,
+            pairs: Vec::new(),
+            pairs_skipped: Vec::new(),
+        }
+    }
+
+    /// The same with the pairs that were written.
+    pub fn with_pairs(self, pairs: Vec<RectifiedPair>) -> RectifiedFile {
+        RectifiedFile { pairs, ..self }
+    }
+
+    /// The same with how well the rows of a board's corners agree.
+    pub fn with_residual(mut self, board: Board, residual: Option<RowResidual>) -> RectifiedFile {
+        self.board = Some(board.squares.to_string());
+        self.residual = residual;
+        self
+    }
+}
+
+fn rows<R: nalgebra::Dim, C: nalgebra::Dim, S: Storage<f64, R, C> + RawStorage<f64, R, C>>(
+    m: &Matrix<f64, R, C, S>,
+) -> Vec<Vec<f64>> {
+    m.row_iter().map(|row| row.iter().copied().collect()).collect()
+}

@@ -1,0 +1,167 @@
+//! `rectify.html` and the lines on stdout: what was done to the pictures, and how well their rows agree.
+
+use maud::{Markup, html};
+
+use super::Result;
+use super::figure::Plot;
+use super::page::{self, Tone};
+use super::picture::{self, Jpeg};
+use super::table::number;
+use crate::files::OutDir;
+use crate::formats::rectified::{RectifiedFile, RectifiedPair};
+use crate::imaging::PairCorners;
+use crate::imaging::input::pairs::PairFiles;
+use crate::stereo::model::rectification::row_differences;
+
+/// Width of the pair on the page, both pictures together, px.
+const WIDTH: u32 = 1200;
+
+/// Lines over the height of the pictures.
+const LINES: u32 = 24;
+
+/// Length at which the largest difference is drawn, as a share of the picture's width.
+const LONGEST_ARROW: f64 = 0.06;
+
+/// The lines on stdout.
+pub fn summary(file: &RectifiedFile, out: &OutDir) -> String {
+    let skipped = match file.pairs_skipped.len() {
+        0 => String::new(),
+        n => format!(", {n} skipped"),
+    };
+    let what = if file.mode == "rectify" { "rectified" } else { "undistorted" };
+    format!(
+        "{} pairs {what}{skipped}, {}x{} px, in {}\n{}report: {}\n",
+        file.pairs.len(),
+        file.width,
+        file.height,
+        out.join("rectified"),
+        agreement(file).map_or_else(String::new, |text| format!("{text}\n")),
+        out.join("rectify.html"),
+    )
+}
+
+/// How well the rows agree, where that is a question.
+fn agreement(file: &RectifiedFile) -> Option<String> {
+    let common = file.common?;
+    Some(match (&file.residual, &file.board) {
+        (Some(r), Some(board)) => format!(
+            "{common} of corresponding corners differ by {} px RMS, at most {} px ({} corners of the {board} board in {} pairs)",
+            number(Some(r.rms_px), 3),
+            number(Some(r.max_px), 3),
+            r.corners,
+            file.pairs.iter().filter(|p| p.residual.is_some()).count(),
+        ),
+        _ => format!("no board was seen in the rectified pictures: how well their {common} agree was not measured"),
+    })
+}
+
+/// The report. `rectified` are the pictures written, `shown` the corners of the pair that agrees worst.
+pub fn page(file: &RectifiedFile, rectified: &[PairFiles], shown: Option<&PairCorners>) -> Result<String> {
+    let name = shown.map(|pair| pair.pair.clone()).or_else(|| rectified.first().map(|p| p.pair.clone()));
+    let files = name.as_ref().and_then(|name| rectified.iter().find(|files| files.pair == *name));
+    let none = PairCorners::default();
+    let drawn = files.and_then(|files| picture::pair(files, shown.unwrap_or(&none), None, WIDTH));
+    let rectify = file.mode == "rectify";
+    let content = html! {
+        @if let Some(text) = agreement(file) {
+            @let tone = if file.residual.is_some() { Tone::Good } else { Tone::Doubtful };
+            (page::verdict(tone, &figure_of(file), &format!("{text}.")))
+        }
+        @if let (Some(jpeg), Some(name)) = (&drawn, &name) {
+            h2 { (if rectify { "Epipolar lines" } else { "A pair" }) }
+            (page::figure(&lined(jpeg, file.common), &caption(name, file)))
+        }
+        @if let Some(pair) = shown { (differences(file, pair)?) }
+        h2 { "Pairs" }
+        div.scroll { (pairs(&file.pairs)) }
+        @if !file.pairs_skipped.is_empty() {
+            p { "Not written:" }
+            ul { @for skipped in &file.pairs_skipped { li { (skipped.pair) ": " (skipped.reason) } } }
+        }
+        p { "The matrices R1, R2, P1, P2" @if rectify { " and Q" } " stand in " code { "rectified.json" } ", row by row, as OpenCV has them." }
+    };
+    let title = if rectify { "Rectified pictures" } else { "Undistorted pictures" };
+    let lead = format!("{} pairs of {}x{} px", file.pairs.len(), file.width, file.height);
+    Ok(page::page(title, &lead, &content))
+}
+
+fn figure_of(file: &RectifiedFile) -> String {
+    match &file.residual {
+        Some(r) => format!("{} px RMS", number(Some(r.rms_px), 3)),
+        None => "not measured".to_owned(),
+    }
+}
+
+fn caption(name: &str, file: &RectifiedFile) -> String {
+    match (file.common, &file.residual) {
+        (Some(common), Some(_)) => format!(
+            "Pair {name}, the one whose {common} agree worst: each line passes through the same points in both pictures."
+        ),
+        (Some(_), None) => format!("Pair {name}: each line passes through the same points in both pictures."),
+        (None, _) => format!("Pair {name}: straight edges are straight."),
+    }
+}
+
+/// The picture with epipolar lines over it, as SVG.
+fn lined(jpeg: &Jpeg, common: Option<&str>) -> String {
+    let (w, h) = (jpeg.width, jpeg.height);
+    let line =
+        |[x1, y1, x2, y2]: [f64; 4]| format!("<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>");
+    let (full_w, full_h) = (f64::from(w), f64::from(h));
+    let places = (1..LINES).map(|k| f64::from(k) / f64::from(LINES));
+    let lines: String = match common {
+        Some("rows") => places.map(|s| line([0.0, s * full_h, full_w, s * full_h])).collect(),
+        Some(_) => {
+            places.flat_map(|s| [s, 1.0 + s].map(|s| line([s * full_w / 2.0, 0.0, s * full_w / 2.0, full_h]))).collect()
+        }
+        None => String::new(),
+    };
+    format!(
+        "<svg viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\" role=\"img\" aria-label=\"the pair side by side\">\
+         <image width=\"{w}\" height=\"{h}\" href=\"data:image/jpeg;base64,{}\"/>\
+         <g stroke=\"#ff3b30\" stroke-width=\"0.8\" stroke-opacity=\"0.75\">{lines}</g></svg>",
+        jpeg.base64
+    )
+}
+
+/// The differences of a pair's corners as arrows over the left picture.
+fn differences(file: &RectifiedFile, pair: &PairCorners) -> Result<Markup> {
+    let in_columns = file.common == Some("columns");
+    let found = row_differences(pair, in_columns);
+    let most = found.iter().fold(0.0_f64, |most, (_, d)| most.max(d.abs()));
+    if most == 0.0 {
+        return Ok(html! {});
+    }
+    let scale = LONGEST_ARROW * f64::from(file.width) / most;
+    let arrow = |&(at, d): &(nalgebra::Point2<f64>, f64)| {
+        let (dx, dy) = if in_columns { (d * scale, 0.0) } else { (0.0, d * scale) };
+        [at.x, at.y, dx, dy]
+    };
+    let arrows: Vec<[f64; 4]> = found.iter().map(arrow).collect();
+    let svg = Plot::new(&format!("Pair {}: differences of the corners", pair.pair), "x, px", "y, px")
+        .vectors("", &arrows)
+        .equal_axes()
+        .y_down()
+        .svg()?;
+    let caption = format!(
+        "Left minus right, in the left rectified picture, {scale:.0} times enlarged; the longest is {most:.3} px. Arrows without order are \
+         the corners' noise and that of the interpolation; a common direction over a part of the picture is an error of the calibration."
+    );
+    Ok(page::figure(&svg, &caption))
+}
+
+fn pairs(pairs: &[RectifiedPair]) -> Markup {
+    let rows: Vec<Vec<String>> = pairs
+        .iter()
+        .map(|p| {
+            let of = |value: Option<f64>| number(value, 3);
+            vec![
+                p.pair.clone(),
+                p.residual.map_or_else(|| "-".to_owned(), |r| r.corners.to_string()),
+                of(p.residual.map(|r| r.rms_px)),
+                of(p.residual.map(|r| r.max_px)),
+            ]
+        })
+        .collect();
+    page::table(&["pair", "corners", "RMS, px", "largest, px"], &rows)
+}

@@ -1,0 +1,185 @@
+//! Pictures as two cameras side by side would have taken them: corresponding points on one row.
+//!
+//! In: a rig. Out: what OpenCV's `stereoRectify` says of it (Bouguet's method: each camera takes half of the turn between them, then both
+//! turn until x lies along the baseline), where a raw point falls, and how far the rows of measured points differ. Goes wrong: cameras
+//! that look at each other, or one that stands in front of the other, have no common rows.
+
+use nalgebra::{Matrix3, Matrix3x4, Matrix4, Point2, Vector3};
+use serde::Serialize;
+
+use crate::geometry::rotation_matrix;
+use crate::imaging::PairCorners;
+use crate::opencv::{self, Failure};
+use crate::stereo::{Rig, Side};
+
+/// How much of the raw pictures is kept, in OpenCV's words.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scaling {
+    /// 0: only pixels that both lenses saw; 1: every raw pixel; -1: OpenCV's own choice, which neither cuts nor shrinks much.
+    pub alpha: f64,
+    /// True: both principal points are the same, so that points at infinity have no disparity. Cameras that look at one near
+    /// place then lose it from view.
+    pub zero_disparity: bool,
+}
+
+impl Scaling {
+    /// `stereoRectify`'s own defaults.
+    pub const OPENCV: Scaling = Scaling { alpha: -1.0, zero_disparity: true };
+
+    /// `stereoRectify`'s `flags`.
+    pub fn flags(self) -> i32 {
+        if self.zero_disparity { opencv::ZERO_DISPARITY } else { 0 }
+    }
+}
+
+/// What `stereoRectify` gives. The left camera is the first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matrices {
+    /// `R1`, `R2`: `rectified_from_camera`.
+    pub rotations: [Matrix3<f64>; 2],
+    /// `P1`, `P2`: projections of points in the rectified left camera's frame (mm) to rectified pixels.
+    pub projections: [Matrix3x4<f64>; 2],
+    /// `Q`: maps `(x, y, disparity, 1)` to a point in the rectified left camera's frame, times its weight.
+    pub disparity_to_depth: Matrix4<f64>,
+}
+
+impl Matrices {
+    /// Asks OpenCV.
+    pub fn new(rig: &Rig, scaling: Scaling) -> Result<Matrices, Failure> {
+        opencv::stereo_rectify(rig, scaling)
+    }
+
+    /// `R1`, `P1` for the left side, `R2`, `P2` for the right one.
+    pub fn of(&self, side: Side) -> (&Matrix3<f64>, &Matrix3x4<f64>) {
+        (&self.rotations[side as usize], &self.projections[side as usize])
+    }
+
+    /// True for cameras one above the other: OpenCV then puts corresponding points into one column.
+    pub fn in_columns(&self) -> bool {
+        let right = &self.projections[1];
+        right[(1, 3)].abs() > right[(0, 3)].abs()
+    }
+}
+
+/// `E = [t]x R` of normalised points, as OpenCV's `stereoCalibrate` gives it, mm.
+pub fn essential(rig: &Rig) -> Matrix3<f64> {
+    let t: &Vector3<f64> = &rig.right_from_left.translation.vector;
+    t.cross_matrix() * rotation_matrix(&rig.right_from_left)
+}
+
+/// `F` of undistorted pixels, its last element one, as OpenCV's `stereoCalibrate` gives it. `None` where a matrix of a camera cannot be inverted.
+pub fn fundamental(rig: &Rig) -> Option<Matrix3<f64>> {
+    let f = rig.right.matrix().try_inverse()?.transpose() * essential(rig) * rig.left.matrix().try_inverse()?;
+    let last = f[(2, 2)];
+    Some(if last == 0.0 { f } else { f / last })
+}
+
+/// How far the rows of corresponding points differ in rectified pictures (columns, where the cameras stand one above the other).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct RowResidual {
+    /// Points seen in both pictures.
+    pub corners: usize,
+    /// RMS of the differences, px.
+    pub rms_px: f64,
+    /// The largest, px.
+    pub max_px: f64,
+}
+
+/// Row differences, left minus right, px, of a pair's corners: the place in the left picture and the difference.
+pub fn row_differences(pair: &PairCorners, in_columns: bool) -> Vec<(Point2<f64>, f64)> {
+    let right = |col, row| pair.right.iter().find(|c| (c.col, c.row) == (col, row) && c.used);
+    let along = |p: Point2<f64>| if in_columns { p.x } else { p.y };
+    let of = |left: &crate::imaging::Corner| Some((left.px, along(left.px) - along(right(left.col, left.row)?.px)));
+    pair.left.iter().filter(|c| c.used).filter_map(of).collect()
+}
+
+/// The residual of differences; `None` without any.
+pub fn row_residual(differences: &[f64]) -> Option<RowResidual> {
+    if differences.is_empty() {
+        return None;
+    }
+    let square_sum: f64 = differences.iter().map(|d| d * d).sum();
+    Some(RowResidual {
+        corners: differences.len(),
+        rms_px: (square_sum / differences.len() as f64).sqrt(),
+        max_px: differences.iter().fold(0.0, |most, d| most.max(d.abs())),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::transform;
+    use crate::stereo::Lens;
+    use crate::stereo::model::projection::tests::bent_camera;
+    use nalgebra::Point3;
+
+    /// Cameras that look at one place 600 mm away.
+    fn rig(lens: Lens, right_mm: Vector3<f64>) -> Rig {
+        let mut right = bent_camera(lens);
+        right.fx += 31.25;
+        let left_from_right = transform(Vector3::new(0.02, -0.3, 0.013), right_mm);
+        Rig { left: bent_camera(lens), right, right_from_left: left_from_right.inverse(), covariance: None }
+    }
+
+    /// px: rounding, at coordinates of about 1000 px.
+    const ROUNDING: f64 = 1e-9;
+
+    fn rectified(rig: &Rig, matrices: &Matrices, point: Point3<f64>) -> [Point2<f64>; 2] {
+        let in_right = rig.right_from_left * point;
+        [(Side::Left, point), (Side::Right, in_right)].map(|(side, p)| {
+            let (r, projection) = matrices.of(side);
+            let seen = projection.fixed_view::<3, 3>(0, 0) * (r * p.coords);
+            Point2::new(seen.x / seen.z, seen.y / seen.z)
+        })
+    }
+
+    #[test]
+    fn points_fall_on_one_row_and_q_takes_them_back() {
+        for lens in Lens::LADDER {
+            for (right_mm, in_columns) in
+                [(Vector3::new(180.0, 2.0, -5.0), false), (Vector3::new(3.0, 150.0, 4.0), true)]
+            {
+                for scaling in [Scaling::OPENCV, Scaling { alpha: 0.5, zero_disparity: false }] {
+                    let rig = rig(lens, right_mm);
+                    let matrices = Matrices::new(&rig, scaling).unwrap();
+                    assert_eq!(matrices.in_columns(), in_columns);
+                    for point in [Point3::new(0.0, 0.0, 600.0), Point3::new(-70.0, 40.0, 500.0)] {
+                        let [left, right] = rectified(&rig, &matrices, point);
+                        let (across, along) = (left.y - right.y, left.x - right.x);
+                        let (across, along) = if in_columns { (along, across) } else { (across, along) };
+                        assert!(across.abs() < ROUNDING, "{lens:?}: {across}");
+                        let back = matrices.disparity_to_depth * nalgebra::Vector4::new(left.x, left.y, along, 1.0);
+                        let in_left = matrices.rotations[0].transpose() * back.xyz() / back.w;
+                        assert!((in_left - point.coords).norm() < 1e-7, "{in_left} {point}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn corresponding_points_meet_the_epipolar_constraint() {
+        let rig = rig(Lens::Brown5, Vector3::new(180.0, 2.0, -5.0));
+        let (e, f) = (essential(&rig), fundamental(&rig).unwrap());
+        assert_eq!(f[(2, 2)], 1.0);
+        let point = Point3::new(-70.0, 40.0, 500.0);
+        let in_right = rig.right_from_left * point;
+        let (left, right) = (point.coords / point.z, in_right.coords / in_right.z);
+        assert!(right.dot(&(e * left)).abs() < 1e-10);
+        let (left_px, right_px) = (rig.left.matrix() * left, rig.right.matrix() * right);
+        let line = f * left_px;
+        // Distance of the point from its epipolar line, px; a rig whose translation is turned about misses it by far.
+        assert!((right_px.dot(&line) / line.xy().norm()).abs() < ROUNDING);
+        let swapped = f.transpose() * left_px;
+        assert!((right_px.dot(&swapped) / swapped.xy().norm()).abs() > 1.0);
+    }
+
+    #[test]
+    fn residuals_of_rows() {
+        assert_eq!(row_residual(&[]), None);
+        let found = row_residual(&[3.0, -4.0]).unwrap();
+        assert_eq!((found.corners, found.max_px), (2, 4.0));
+        assert!((found.rms_px - 12.5_f64.sqrt()).abs() < 1e-15);
+    }
+}
