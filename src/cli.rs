@@ -50,7 +50,9 @@ pub enum Command {
     Rectify(Rectify),
     /// Make pictures and measurements whose truth is known
     Simulate(Simulate),
-    /// Write a calibration for other programs
+    /// Readings that bring the real robot where targets were meant: CSV, or joint targets of a robot program
+    Compensate(Compensate),
+    /// Write a calibration or a robot for other programs
     Export(Export),
     /// Make a nominal robot file: from a URDF, a table, or a common arm's published numbers
     Robot(RobotCommand),
@@ -276,6 +278,29 @@ pub struct Rectify {
     pub output: Output,
 }
 
+/// `stereocal compensate`
+#[derive(Debug, Args)]
+pub struct Compensate {
+    /// Targets written for the nominal robot: a CSV of name and j1_deg.. or x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad (root_from_tool), or a
+    /// program (.script, .mod, .src, .dat, .ls, .jbi)
+    pub targets: Utf8PathBuf,
+    /// The nominal robot that the targets were written for
+    #[arg(long, value_name = "FILE")]
+    pub robot: Utf8PathBuf,
+    /// The robot as `identify` found it
+    #[arg(long, value_name = "FILE")]
+    pub identified: Utf8PathBuf,
+    /// The tool in the last frame, mm, instead of both files' [tool]
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true)]
+    pub tool: Vec<f64>,
+    /// Pulses a degree of each joint, for Yaskawa jobs in pulses
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true)]
+    pub pulses_per_deg: Vec<f64>,
+    /// Results.
+    #[command(flatten)]
+    pub output: Output,
+}
+
 /// `stereocal export`
 #[derive(Debug, Args)]
 pub struct Export {
@@ -366,6 +391,49 @@ pub enum DhConvention {
 pub enum ExportWhat {
     /// The stereo calibration
     Calibration(ExportCalibration),
+    /// The robot
+    Robot(ExportRobot),
+}
+
+/// `stereocal export robot`
+#[derive(Debug, Args)]
+pub struct ExportRobot {
+    /// The robot file, as `identify` wrote it
+    #[arg(long, value_name = "FILE")]
+    pub robot: Utf8PathBuf,
+    /// For which program
+    #[arg(long)]
+    pub format: RobotFormat,
+    /// The maker's URDF: its links, meshes and names are kept, joint origins corrected (--format urdf)
+    #[arg(long, value_name = "FILE")]
+    pub nominal_urdf: Option<Utf8PathBuf>,
+    /// Link of that URDF that is the flange [default: the end of the chain]
+    #[arg(long, value_name = "LINK", requires = "nominal_urdf")]
+    pub tip: Option<String>,
+    /// The nominal robot that deviations are counted from (--format ur-calibration) [default: the common arm of the same name]
+    #[arg(long, value_name = "FILE")]
+    pub nominal: Option<Utf8PathBuf>,
+    /// Folder for results; key `out` [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+    /// Replace files that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Programs that a robot can be written for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RobotFormat {
+    /// A URDF: the maker's own with corrected joint origins, or one built from the parameters
+    Urdf,
+    /// A table of modified Denavit-Hartenberg parameters
+    DhCsv,
+    /// stereocal's own file, all terms in it
+    Toml,
+    /// The kinematics file of ROS's ur_description and its like
+    RosKinematicsYaml,
+    /// Universal Robots' calibration.conf
+    UrCalibration,
 }
 
 /// `stereocal export calibration`

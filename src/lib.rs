@@ -39,6 +39,9 @@ pub mod robot;
 
 pub mod identify;
 
+pub mod compensate;
+pub mod programs;
+
 pub mod simulate;
 
 pub mod report;

@@ -90,8 +90,8 @@ pub struct Measurement {
 }
 
 impl Table<'_> {
-    /// The columns `j1_deg`, `j2_deg`, ... without a gap, and which of them are `jN_mm`.
-    fn joint_columns(&self) -> Result<(Vec<usize>, Vec<bool>)> {
+    /// The columns `j1_deg`, `j2_deg`, ... without a gap, and which of them are `jN_mm`; no list where none is.
+    pub fn joint_columns(&self) -> Result<(Vec<usize>, Vec<bool>)> {
         let column = |i: usize| {
             let turning = self.column(&format!("j{i}_deg")).map(|c| (c, false));
             turning.or_else(|| self.column(&format!("j{i}_mm")).map(|c| (c, true)))

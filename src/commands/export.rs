@@ -1,20 +1,26 @@
-//! `stereocal export`: A calibration in other programs' words.
+//! `stereocal export`: a calibration or a robot in other programs' words.
 
-use super::{Outcome, Result};
-use crate::cli::{CalibrationFormat, Export, ExportWhat};
+use super::{Outcome, Result, export_robot};
+use crate::cli::{CalibrationFormat, Export, ExportCalibration, ExportWhat};
 use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::calibration;
+use crate::formats::calibration as rig;
 use crate::formats::export;
 
 /// Runs the command.
 pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
-    let ExportWhat::Calibration(args) = &args.what;
+    match &args.what {
+        ExportWhat::Calibration(args) => calibration(args, config, run),
+        ExportWhat::Robot(args) => export_robot::run(args, config, run),
+    }
+}
+
+fn calibration(args: &ExportCalibration, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.out.as_deref().unwrap_or(&config.out))?;
-    let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
-    let rig = calibration::read(&rig_file)?;
+    let rig_file = rig::file(args.calibration.as_deref(), &out)?;
+    let rig = rig::read(&rig_file)?;
     let out = out.for_run(&Run { force: args.force, ..run }, &[&rig_file]);
     let files = match args.format {
         CalibrationFormat::Opencv => export::file_storage::files(&rig)?,

@@ -1,8 +1,10 @@
 //! One file a command; each reads as the list of its stages, and nothing else knows their order.
 
 pub mod camera_check;
+pub mod compensate;
 pub mod error;
 pub mod export;
+pub mod export_robot;
 pub mod guide;
 pub mod identify;
 pub mod init;
@@ -51,6 +53,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Verify(args) => verify::run(&args, &config.identify),
         Command::Rectify(args) => rectify::run(&args, &config, run),
         Command::Simulate(args) => simulate::run(&args, &config, run),
+        Command::Compensate(args) => compensate::run(&args, &config, run),
         Command::Export(args) => export::run(&args, &config, run),
         Command::Init(args) => init::run(&args, run),
         Command::Guide(args) => guide::run(&args),

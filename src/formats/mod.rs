@@ -7,4 +7,6 @@ pub mod dh_csv;
 pub mod export;
 pub mod measure;
 pub mod rectified;
+pub mod robots;
+pub mod targets;
 pub mod urdf;

@@ -1,6 +1,6 @@
 //! Inverse kinematics of any serial robot: joint angles that bring the flange to a pose.
 //!
-//! In: a robot, the pose wanted in the base frame, angles to start from. Out: angles within the joints' limits.
+//! In: a robot with all of its terms, the pose wanted in the base frame, angles to start from. Out: angles within the joints' limits.
 //! Method: damped least squares (Levenberg-Marquardt) on the pose's six residuals; angles stay inside the limits by clamping each
 //! step. It finds the solution near its start, so callers pass several. What goes wrong: out of reach, a
 //! singular wrist, or a start on the wrong side of a limit all end in `None`.
@@ -27,21 +27,34 @@ fn miss(robot: &Robot, wanted: &Transform, joints_rad: &[f64]) -> Vector6<f64> {
     Vector6::new(t.x, t.y, t.z, r.x, r.y, r.z)
 }
 
-/// Change of the flange's pose with each joint, in the units of [`miss`]: columns `z_j x (p - o_j)` and `z_j`.
+/// Change of the flange's pose with each joint, in the units of [`miss`]: columns `z_j x (p - o_j)` and `z_j` at the angles that the
+/// joints really take. A coupling moves a joint with another one's column; the slopes of sag and waves, thousandths, are left out: they
+/// cost a step, not the answer.
 fn jacobian(robot: &Robot, joints_rad: &[f64]) -> DMatrix<f64> {
-    let flange = robot.base_from_flange(joints_rad).translation.vector;
+    let corrected_rad = robot.corrected_rad(joints_rad);
+    let mut screws = Vec::with_capacity(robot.joints.len());
     let mut base_from_joint = Transform::identity();
-    let mut columns = DMatrix::zeros(6, robot.joints.len());
-    for (k, (joint, &q)) in robot.joints.iter().zip(joints_rad).enumerate() {
+    for (joint, &q) in robot.joints.iter().zip(&corrected_rad) {
         base_from_joint *= joint.previous_from_this(q);
-        let axis = base_from_joint.rotation * nalgebra::Vector3::z() * joint.sign;
-        let lever = flange - base_from_joint.translation.vector;
+        screws
+            .push((base_from_joint.rotation * nalgebra::Vector3::z() * joint.sign, base_from_joint.translation.vector));
+    }
+    let flange = base_from_joint.translation.vector;
+    let mut columns = DMatrix::zeros(6, robot.joints.len());
+    for (k, (joint, (axis, origin))) in robot.joints.iter().zip(&screws).enumerate() {
         if joint.slides {
-            columns.fixed_view_mut::<3, 1>(0, k).copy_from(&axis);
+            columns.fixed_view_mut::<3, 1>(0, k).copy_from(axis);
             continue;
         }
-        columns.fixed_view_mut::<3, 1>(0, k).copy_from(&axis.cross(&lever));
+        columns.fixed_view_mut::<3, 1>(0, k).copy_from(&axis.cross(&(flange - origin)));
         columns.fixed_view_mut::<3, 1>(3, k).copy_from(&(axis * ARM_MM));
+    }
+    let alone = columns.clone();
+    for term in &robot.corrections.couplings {
+        if term.joint < columns.ncols() && term.of < columns.ncols() {
+            let moved = columns.column(term.of) + alone.column(term.joint) * term.ratio;
+            columns.set_column(term.of, &moved);
+        }
     }
     columns
 }
@@ -54,27 +67,40 @@ fn clamp_to_limits(robot: &Robot, joints_rad: &mut [f64]) {
     }
 }
 
-/// Angles (rad) that bring the flange to `base_from_flange`, searched from `start_rad`. `None` when the search does not arrive.
-pub fn from_start(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]) -> Option<Vec<f64>> {
-    if start_rad.len() != robot.joints.len() {
-        return None;
+/// Where a search ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Approach {
+    /// Readings there, rad (mm where a joint slides), inside the limits.
+    pub joints_rad: Vec<f64>,
+    /// What is missing to the pose, mm: the flange's place and its turn times an arm of 200 mm.
+    pub miss_mm: f64,
+}
+
+impl Approach {
+    /// Whether the pose is reached.
+    pub fn arrived(&self) -> bool {
+        self.miss_mm < REACHED_MM
     }
+}
+
+/// Goes from `start_rad` (a reading a joint) as near to `base_from_flange` as it gets.
+pub fn approach(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]) -> Approach {
     let mut q = start_rad.to_vec();
     clamp_to_limits(robot, &mut q);
     let mut residual = miss(robot, base_from_flange, &q);
     let mut damping = 1e-2;
     for _ in 0..MAX_STEPS {
-        if residual.norm() < REACHED_MM {
-            return Some(q);
+        if residual.norm() < REACHED_MM || damping > 1e6 {
+            break;
         }
         let j = jacobian(robot, &q);
-        let normal = j.tr_mul(&j);
+        let mut damped = j.tr_mul(&j);
         let gradient = j.tr_mul(&DVector::from_column_slice(residual.as_slice()));
-        let mut damped = normal.clone();
         for k in 0..damped.nrows() {
             damped[(k, k)] += damping * (ARM_MM * ARM_MM);
         }
-        let step = damped.cholesky()?.solve(&gradient);
+        let Some(factor) = damped.cholesky() else { break };
+        let step = factor.solve(&gradient);
         let mut next: Vec<f64> = q.iter().zip(step.iter()).map(|(q, s)| q - s).collect();
         clamp_to_limits(robot, &mut next);
         let next_residual = miss(robot, base_from_flange, &next);
@@ -83,12 +109,24 @@ pub fn from_start(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]
             damping = (damping * 0.1).max(1e-14);
         } else {
             damping *= 10.0;
-            if damping > 1e6 {
-                return None;
-            }
         }
     }
-    (residual.norm() < REACHED_MM).then_some(q)
+    Approach { joints_rad: q, miss_mm: residual.norm() }
+}
+
+/// Angles (rad) that bring the flange to `base_from_flange`, searched from `start_rad`. `None` when the search does not arrive.
+pub fn from_start(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]) -> Option<Vec<f64>> {
+    if start_rad.len() != robot.joints.len() {
+        return None;
+    }
+    let found = approach(robot, base_from_flange, start_rad);
+    found.arrived().then_some(found.joints_rad)
+}
+
+/// On which side of its singular postures a six-axis arm is there: the sign of its Jacobian's determinant. Zero for other arms.
+pub fn side(robot: &Robot, joints_rad: &[f64]) -> f64 {
+    let columns = jacobian(robot, joints_rad);
+    if columns.is_square() { columns.determinant().signum() } else { 0.0 }
 }
 
 /// How freely the flange moves there: the least singular value of its Jacobian, mm a rad, angles of the flange times the arm of 200 mm.
@@ -104,6 +142,33 @@ pub fn room_rad(robot: &Robot, joints_rad: &[f64]) -> f64 {
     limits.map(|((low, high), q)| (q - low).min(high - q)).fold(f64::INFINITY, f64::min)
 }
 
+/// Way that the joints should have to their limits, rad: those of neighbouring poses differ by about so much.
+const ROOM_RAD: f64 = 0.7;
+
+/// How good a posture is to work round: the freedom of the flange, less where a joint is near its limit.
+pub fn merit(robot: &Robot, joints_rad: &[f64]) -> f64 {
+    freedom_mm(robot, joints_rad) * (room_rad(robot, joints_rad) / ROOM_RAD).min(1.0)
+}
+
+/// Start `k` of a sequence that fills the joints' ranges evenly (multiples of irrational numbers: Weyl's sequence).
+pub fn spread_start(robot: &Robot, k: usize) -> Vec<f64> {
+    const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
+    let share = |j: usize| ((k + 1) as f64 * PRIMES[j % PRIMES.len()].sqrt() * (1 + j / PRIMES.len()) as f64).fract();
+    let place = |(j, joint): (usize, &super::Joint)| {
+        let unlimited = if joint.slides { (-ARM_MM, ARM_MM) } else { (-std::f64::consts::PI, std::f64::consts::PI) };
+        let (low, high) = joint.limits_rad.unwrap_or(unlimited);
+        low + (high - low) * (0.1 + 0.8 * share(j))
+    };
+    robot.joints.iter().enumerate().map(place).collect()
+}
+
+/// Of the postures found from so many starts spread over the joints' ranges, the best one ([`merit`]).
+pub fn best_posture(robot: &Robot, base_from_flange: &Transform, starts: usize) -> Option<Vec<f64>> {
+    let found = (0..starts).filter_map(|k| from_start(robot, base_from_flange, &spread_start(robot, k)));
+    let judged = found.map(|q| (merit(robot, &q), q));
+    judged.reduce(|best, next| if next.0 > best.0 { next } else { best }).map(|(_, q)| q)
+}
+
 /// The first solution found from any of the starts, in their order.
 pub fn from_starts(robot: &Robot, base_from_flange: &Transform, starts_rad: &[Vec<f64>]) -> Option<Vec<f64>> {
     starts_rad.iter().find_map(|start| from_start(robot, base_from_flange, start))
@@ -113,6 +178,7 @@ pub fn from_starts(robot: &Robot, base_from_flange: &Transform, starts_rad: &[Ve
 mod tests {
     use super::*;
     use crate::robot::Joint;
+    use crate::robot::corrections::CouplingTerm;
 
     fn with_limits(mut robot: Robot) -> Robot {
         robot.joints.iter_mut().for_each(|j: &mut Joint| j.limits_rad = Some((-2.8, 2.8)));
@@ -174,7 +240,10 @@ mod tests {
 
     #[test]
     fn the_jacobian_agrees_with_differences() {
-        let robot = Robot::paper();
+        let mut robot = Robot::paper();
+        let coupling = |joint, of, ratio| CouplingTerm { joint, of, ratio };
+        robot.corrections.couplings = vec![coupling(2, 1, 1.0), coupling(4, 4, 0.01), coupling(5, 4, -0.5)];
+        robot.joints[3].slides = true;
         let q = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
         let wanted = robot.base_from_flange(&q);
         let j = jacobian(&robot, &q);

@@ -10,6 +10,7 @@ pub mod file;
 pub mod inverse;
 pub mod jacobian;
 pub mod parameters;
+pub mod refit;
 
 use crate::diagnostic::{Explain, Place};
 
@@ -50,6 +51,22 @@ pub enum Error {
         /// Where.
         path: String,
     },
+    /// Two robots of different joints.
+    #[error("the identified robot has {identified} joints, the nominal one {nominal}")]
+    Different {
+        /// Joints of the identified one.
+        identified: String,
+        /// Joints of the nominal one.
+        nominal: String,
+    },
+    /// A format that does not fit this robot.
+    #[error("{message}")]
+    NotExportable {
+        /// Why.
+        message: String,
+        /// What would do.
+        hint: String,
+    },
     /// As many angles as joints are needed.
     #[error("{found} joint angles, but the robot has {needed} joints")]
     AngleCount {
@@ -77,6 +94,10 @@ impl Explain for Error {
             }
             Error::Occupied { .. } => Some("`--force` overwrites it, `--out DIR` puts it elsewhere".to_owned()),
             Error::AngleCount { needed, .. } => Some(format!("{needed} angles in degrees with commas between")),
+            Error::Different { .. } => {
+                Some("both files are of one robot, before and after `stereocal identify`".to_owned())
+            }
+            Error::NotExportable { hint, .. } => Some(hint.clone()),
             Error::File { .. } => None,
             Error::Files(e) => e.hint(),
         }

@@ -29,9 +29,6 @@ const COMMAND_STEP_DEG: f64 = 1e-4;
 /// Starts from which the postures of a group's centre are looked for: a six-axis arm has up to eight.
 const POSTURE_STARTS: usize = 200;
 
-/// Way that the joints of a centre should have to their limits, rad: those on the sphere differ by about so much.
-const ROOM_RAD: f64 = 0.7;
-
 /// Draws a pose before it is given up.
 const ATTEMPTS: usize = 4000;
 
@@ -139,7 +136,7 @@ impl<'a> Group<'a> {
         let wanted = self.base_from_flange(self.sphere.center_mm, UnitQuaternion::identity());
         let nominal = &self.arm.nominal;
         let mut starts = Draws::new(0, Purpose::RobotPoses, self.index as u64);
-        let merit = |q: &[f64]| inverse::freedom_mm(nominal, q) * (inverse::room_rad(nominal, q) / ROOM_RAD).min(1.0);
+        let merit = |q: &[f64]| inverse::merit(nominal, q);
         let mut best: Option<(f64, Vec<f64>)> = None;
         for attempt in 0..ATTEMPTS {
             if attempt >= POSTURE_STARTS && best.is_some() {

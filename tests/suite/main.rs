@@ -15,6 +15,8 @@ mod planted_faults;
 mod run;
 mod worlds;
 
+mod compensate;
+mod export_robot;
 mod faults;
 mod fuzz;
 mod guide;

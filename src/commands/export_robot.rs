@@ -1,0 +1,131 @@
+//! `stereocal export robot`: the identified robot for other programs, and what they cannot have of it.
+
+use super::{Outcome, Result};
+use crate::cli::{ExportRobot, RobotFormat};
+use crate::config::Config;
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::Run;
+use crate::formats::dh_csv;
+use crate::formats::robots::{ExportedRobot, ros_kinematics, ur_calibration, urdf_corrected, urdf_plain};
+use crate::formats::urdf::Urdf;
+use crate::geometry::Transform;
+use crate::robot::refit::Residual;
+use crate::robot::{Error, Robot, axes, catalogue, file};
+
+/// Deviations below this are rounding, mm.
+const ROUNDING_MM: f64 = 1e-6;
+
+/// Runs the command.
+pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
+    let robot = file::read(&args.robot)?;
+    let out = OutDir::open(args.out.as_deref().unwrap_or(&config.out))?;
+    let inputs = [Some(&args.robot), args.nominal_urdf.as_ref(), args.nominal.as_ref()];
+    let inputs: Vec<&camino::Utf8Path> = inputs.into_iter().flatten().map(|path| path.as_path()).collect();
+    let out = out.for_run(&Run { force: args.force, ..run }, &inputs);
+    let exported = export(args, &robot)?;
+    match args.format {
+        RobotFormat::Toml => out.write_toml(exported.name, &exported.text)?,
+        _ => out.write(exported.name, exported.text.as_bytes())?,
+    }
+    let mut stdout = format!("{}\n{}\n", out.join(exported.name), fidelity(&robot, &exported.carried));
+    exported.notes.iter().for_each(|note| stdout.push_str(&format!("note: {note}\n")));
+    Ok(Outcome { stdout, status: Status::Done })
+}
+
+fn export(args: &ExportRobot, robot: &Robot) -> Result<ExportedRobot> {
+    let plain = || robot.without_corrections();
+    Ok(match (args.format, &args.nominal_urdf) {
+        (RobotFormat::Toml, _) => {
+            ExportedRobot { name: "robot.toml", text: file::to_toml(robot), carried: robot.clone(), notes: Vec::new() }
+        }
+        (RobotFormat::Urdf, None) => urdf_plain::build(&plain()),
+        (RobotFormat::Urdf, Some(path)) => {
+            let urdf = Urdf::read(path)?;
+            let chain = urdf.chain(args.tip.as_deref())?;
+            let hint = format!(
+                "`stereocal robot import {path}` makes the robot file that belongs to it: identify with that, or leave --nominal-urdf out"
+            );
+            urdf_corrected::correct(&urdf, &chain, &plain())
+                .map_err(|message| Error::NotExportable { message, hint })?
+        }
+        (RobotFormat::DhCsv, _) => table(&along_axes(plain())),
+        (RobotFormat::RosKinematicsYaml, _) => {
+            let robot = along_axes(plain());
+            turning(&robot, "kinematics files know turning joints alone")?;
+            ros_kinematics::build(&robot)
+        }
+        (RobotFormat::UrCalibration, _) => {
+            let nominal = nominal(args, robot)?;
+            turning(robot, "a UR's joints all turn")?;
+            ur_calibration::build(&plain(), &nominal.without_corrections())
+        }
+    })
+}
+
+/// The same robot with all joints counted along their axes.
+fn along_axes(robot: Robot) -> Robot {
+    if robot.joints.iter().all(|j| j.sign > 0.0) {
+        return robot;
+    }
+    let flange = robot.root_from_flange(&vec![0.0; robot.joints.len()]);
+    axes::robot(&robot.name, &robot.axes(), &flange)
+}
+
+fn table(robot: &Robot) -> ExportedRobot {
+    let ends = [("[base]", robot.ends.root_from_frame0), ("[flange]", robot.ends.last_frame_from_flange)];
+    let missing = ends.iter().filter(|(_, t)| *t != Transform::identity());
+    let notes =
+        missing.map(|(name, _)| format!("the constant {name} of the robot file has no place in a table: add it"));
+    ExportedRobot { name: "robot.csv", text: dh_csv::to_csv(robot), carried: robot.clone(), notes: notes.collect() }
+}
+
+fn turning(robot: &Robot, why: &str) -> Result<()> {
+    let Some(joint) = robot.joints.iter().position(|j| j.slides) else { return Ok(()) };
+    let message = format!("joint {} slides; {why}", joint + 1);
+    Err(Error::NotExportable { message, hint: "`--format urdf` carries it".to_owned() }.into())
+}
+
+/// The robot that deviations are counted from.
+fn nominal(args: &ExportRobot, robot: &Robot) -> Result<Robot> {
+    let nominal = match &args.nominal {
+        Some(path) => file::read(path)?,
+        None => {
+            let arm = catalogue::ARMS.iter().find(|arm| arm.title == robot.name);
+            arm.map(catalogue::Arm::robot).ok_or_else(|| Error::NotExportable {
+                message: format!("no common arm is called `{}`: deviations from what?", robot.name),
+                hint: "`--nominal FILE` names the nominal robot file".to_owned(),
+            })?
+        }
+    };
+    if nominal.joints.len() != robot.joints.len() {
+        let count = |robot: &Robot| robot.joints.len().to_string();
+        return Err(Error::Different { identified: count(robot), nominal: count(&nominal) }.into());
+    }
+    Ok(nominal)
+}
+
+/// How well the file carries the robot.
+fn fidelity(robot: &Robot, carried: &Robot) -> String {
+    let off = Residual::between(robot, carried);
+    if off.max_mm < ROUNDING_MM {
+        return format!("flange poses equal to {:.0e} mm over the joints' ranges", off.max_mm.max(1e-12));
+    }
+    let terms = [
+        ("gravity", !robot.corrections.gravity.is_empty() && carried.corrections.gravity.is_empty()),
+        ("harmonics", !robot.corrections.harmonics.is_empty() && carried.corrections.harmonics.is_empty()),
+        ("couplings", !robot.corrections.couplings.is_empty() && carried.corrections.couplings.is_empty()),
+    ];
+    let lost: Vec<&str> = terms.iter().filter(|(_, lost)| *lost).map(|(name, _)| *name).collect();
+    let why = if lost.is_empty() {
+        "the format has no place for all of the robot's constants".to_owned()
+    } else {
+        format!("the format has no place for {}: refitted over the joints' ranges", lost.join(" and "))
+    };
+    format!(
+        "{why}; what is left: {:.4} mm in the mean, {:.4} mm and {:.4} mrad at the most",
+        off.mean_mm,
+        off.max_mm,
+        1e3 * off.max_rad
+    )
+}

@@ -1,0 +1,336 @@
+//! What to tell the robot so that it goes where it was meant to go.
+//!
+//! In: the nominal robot, for which targets were written, the identified one, and targets: readings or poses of the tool. Out: readings
+//! that bring the real tool there, or why there are none. Method: numeric inverse kinematics on the identified model with all of its
+//! terms, started from the given readings, so that the posture is kept. A target that is out of reach, needs a joint beyond its limits or
+//! lies at a singular posture (where the small correction is a large turn) is refused and nothing about it changes.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use crate::geometry::{Transform, transform};
+use crate::robot::{Robot, inverse};
+
+/// Largest turn of a joint that is still a correction, rad: more of it is another posture, or the side of a singular one.
+const MOST_TURN_RAD: f64 = std::f64::consts::FRAC_PI_4;
+
+/// Rows that are looked at to find a posture where none is given.
+const POSTURE_ROWS: usize = 20;
+
+/// Starts that a posture is looked for from, and those of a row that the common posture does not reach.
+const POSTURE_STARTS: usize = 64;
+const ROW_STARTS: usize = 8;
+
+/// A target as it was written for the nominal robot.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Target {
+    /// Readings, rad (mm where a joint slides).
+    Readings(Vec<f64>),
+    /// Where the tool is to be, and readings near which, where known.
+    Pose {
+        /// `root_from_tool`, the tool's frame being the last one moved to the tool.
+        root_from_tool: Transform,
+        /// Readings that say the posture, rad.
+        near_rad: Option<Vec<f64>>,
+    },
+}
+
+/// Why a target has no compensated readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Refusal {
+    /// The real robot does not get there.
+    OutOfReach {
+        /// What is missing, mm.
+        short_mm: f64,
+    },
+    /// A joint would have to leave its range; deg or mm.
+    Limit {
+        /// The joint, from 1.
+        joint: usize,
+        /// The reading needed.
+        needed: f64,
+        /// Its range.
+        range: (f64, f64),
+    },
+    /// The correction would turn a joint far: the posture is next to a singular one.
+    Singular {
+        /// The joint that turns most, from 1.
+        joint: usize,
+        /// By how much, deg.
+        turn_deg: f64,
+    },
+}
+
+impl std::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Refusal::OutOfReach { short_mm } => write!(f, "out of reach by {short_mm:.2} mm"),
+            Refusal::Limit { joint, needed, range: (low, high) } => {
+                write!(f, "joint {joint} would need {needed:.3}; its range is {low:.3} to {high:.3}")
+            }
+            Refusal::Singular { joint, turn_deg } => {
+                write!(f, "next to a singular posture: joint {joint} would turn by {turn_deg:.1} deg")
+            }
+        }
+    }
+}
+
+/// A target with its outcome.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Compensated {
+    /// Readings for the real robot, rad (mm), or why there are none.
+    pub readings: Result<Vec<f64>, Refusal>,
+    /// How far the real tool would have been off with the given readings, mm; `None` where there were none.
+    pub miss_mm: Option<f64>,
+}
+
+/// The two robots.
+#[derive(Debug, Clone)]
+pub struct Compensator {
+    nominal: Robot,
+    identified: Robot,
+    /// The identified robot with joints that go anywhere.
+    unlimited: Robot,
+    /// The tools in the last frames. Weights hang where the files say, whichever tool is compensated.
+    nominal_tool: Transform,
+    identified_tool: Transform,
+    reach_mm: f64,
+}
+
+impl Compensator {
+    /// Both have the same joints; a tool (mm, last frame) replaces those of their files. The identified robot's limits count, or the
+    /// nominal one's where it has none.
+    pub fn new(nominal: &Robot, identified: &Robot, tool_mm: Option<Vector3<f64>>) -> Compensator {
+        let (nominal, mut identified) = (nominal.clone(), identified.clone());
+        let tool = |robot: &Robot| Transform::from(tool_mm.unwrap_or(robot.tool_mm));
+        let (nominal_tool, identified_tool) = (tool(&nominal), tool(&identified));
+        for (joint, drawn) in identified.joints.iter_mut().zip(&nominal.joints) {
+            joint.limits_rad = joint.limits_rad.or(drawn.limits_rad);
+        }
+        let mut unlimited = identified.clone();
+        unlimited.joints.iter_mut().for_each(|joint| joint.limits_rad = None);
+        let slides = identified.joints.iter().any(|j| j.slides);
+        let links = identified.joints.iter().map(|j| j.a_mm.hypot(j.d_mm)).sum::<f64>();
+        let reach_mm = if slides { f64::INFINITY } else { links };
+        Compensator { nominal, identified, unlimited, nominal_tool, identified_tool, reach_mm }
+    }
+
+    /// Where the nominal robot's tool is, `root_from_tool`.
+    fn meant(&self, readings: &[f64]) -> Transform {
+        self.nominal.ends.root_from_frame0 * self.nominal.base_from_flange(readings) * self.nominal_tool
+    }
+
+    /// Where the real robot's tool is, `root_from_tool`.
+    pub fn reached(&self, readings: &[f64]) -> Transform {
+        self.identified.ends.root_from_frame0 * self.identified.base_from_flange(readings) * self.identified_tool
+    }
+
+    /// All targets, in their order, whatever the number of threads.
+    pub fn compensate(&self, targets: &[Target]) -> Vec<Compensated> {
+        let posture = self.posture(targets);
+        targets.par_iter().map(|target| self.one(target, posture.as_deref())).collect()
+    }
+
+    /// The frame that inverse kinematics knows, from the tool's.
+    fn base_from_flange(&self, root_from_tool: &Transform) -> Transform {
+        self.identified.ends.root_from_frame0.inverse() * root_from_tool * self.identified_tool.inverse()
+    }
+
+    /// A posture for poses without any: the best one at the first of them that is reached.
+    fn posture(&self, targets: &[Target]) -> Option<Vec<f64>> {
+        let poses = targets.iter().filter_map(|target| match target {
+            Target::Pose { root_from_tool, near_rad: None } => Some(self.base_from_flange(root_from_tool)),
+            _ => None,
+        });
+        poses.take(POSTURE_ROWS).find_map(|pose| inverse::best_posture(&self.identified, &pose, POSTURE_STARTS))
+    }
+
+    fn one(&self, target: &Target, posture: Option<&[f64]>) -> Compensated {
+        match target {
+            Target::Readings(given) => {
+                let meant = self.meant(given);
+                let there = self.reached(given);
+                let miss_mm = Some((meant.translation.vector - there.translation.vector).norm());
+                Compensated { readings: self.kept(&self.base_from_flange(&meant), given), miss_mm }
+            }
+            Target::Pose { root_from_tool, near_rad: Some(near) } => {
+                Compensated { readings: self.near(&self.base_from_flange(root_from_tool), near), miss_mm: None }
+            }
+            Target::Pose { root_from_tool, near_rad: None } => {
+                let wanted = self.base_from_flange(root_from_tool);
+                Compensated { readings: self.anywhere(&wanted, posture), miss_mm: None }
+            }
+        }
+    }
+
+    /// Readings for the pose in the posture of `given`, where the nominal robot is at the pose.
+    fn kept(&self, wanted: &Transform, given: &[f64]) -> Result<Vec<f64>, Refusal> {
+        let found = self.near(wanted, given)?;
+        let joints = self.identified.joints.iter().zip(found.iter().zip(given)).enumerate();
+        let turns = joints.filter(|(_, (joint, _))| !joint.slides).map(|(j, (_, (a, b)))| (j, (a - b).abs()));
+        let most = turns.reduce(|most, next| if next.1 > most.1 { next } else { most });
+        let flipped = inverse::side(&self.identified, &found) != inverse::side(&self.nominal, given);
+        match most {
+            Some((j, turn)) if flipped || turn > MOST_TURN_RAD => {
+                Err(Refusal::Singular { joint: j + 1, turn_deg: turn.to_degrees() })
+            }
+            _ => Ok(found),
+        }
+    }
+
+    /// Readings for the pose, searched from `start`.
+    fn near(&self, wanted: &Transform, start: &[f64]) -> Result<Vec<f64>, Refusal> {
+        let found = inverse::approach(&self.identified, wanted, start);
+        if found.arrived() { Ok(found.joints_rad) } else { Err(self.refusal(wanted, start, found.miss_mm)) }
+    }
+
+    fn anywhere(&self, wanted: &Transform, posture: Option<&[f64]>) -> Result<Vec<f64>, Refusal> {
+        let beyond = wanted.translation.vector.norm() - self.reach_mm;
+        if beyond > 0.0 {
+            return Err(Refusal::OutOfReach { short_mm: beyond });
+        }
+        let starts = posture.map(<[f64]>::to_vec).into_iter();
+        let starts = starts.chain((0..ROW_STARTS).map(|k| inverse::spread_start(&self.identified, k)));
+        let mut nearest: Option<(f64, Vec<f64>)> = None;
+        for start in starts {
+            let found = inverse::approach(&self.identified, wanted, &start);
+            if found.arrived() {
+                return Ok(found.joints_rad);
+            }
+            if nearest.as_ref().is_none_or(|(miss, _)| found.miss_mm < *miss) {
+                nearest = Some((found.miss_mm, start));
+            }
+        }
+        let (miss_mm, start) = nearest.unwrap_or((f64::INFINITY, Vec::new()));
+        Err(self.refusal(wanted, &start, miss_mm))
+    }
+
+    /// What is in the way of the pose: a limit, where the robot would get there without its limits.
+    fn refusal(&self, wanted: &Transform, start: &[f64], short_mm: f64) -> Refusal {
+        let free = inverse::approach(&self.unlimited, wanted, start);
+        let beyond = |(j, (joint, q)): (usize, (&crate::robot::Joint, &f64))| {
+            let (low, high) = joint.limits_rad?;
+            let in_file = |v: f64| if joint.slides { v } else { v.to_degrees() };
+            let range = (in_file(low), in_file(high));
+            (*q < low || *q > high).then(|| Refusal::Limit { joint: j + 1, needed: in_file(*q), range })
+        };
+        let limit = self.identified.joints.iter().zip(&free.joints_rad).enumerate().find_map(beyond);
+        limit.filter(|_| free.arrived()).unwrap_or(Refusal::OutOfReach { short_mm })
+    }
+}
+
+/// The pose of a row `x y z` (mm), `rx ry rz` (rad).
+pub fn pose(numbers: &[f64; 6]) -> Transform {
+    let [x, y, z, rx, ry, rz] = *numbers;
+    transform(Vector3::new(rx, ry, rz), Vector3::new(x, y, z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::catalogue;
+    use crate::robot::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
+
+    /// The contract's round trip.
+    const SAME_MM: f64 = 1e-3;
+    const SAME_RAD: f64 = 1e-6;
+
+    /// An arm that is off as machines are, with every kind of term.
+    fn real(nominal: &Robot) -> Robot {
+        let mut robot = nominal.clone();
+        for (k, joint) in robot.joints.iter_mut().enumerate() {
+            let s = (1.7 * k as f64).sin();
+            joint.alpha_rad += 2e-3 * s;
+            joint.beta_rad += 1e-3 * (1.0 - s);
+            joint.a_mm += 0.6 * s;
+            joint.theta_rad -= 4e-3 * s;
+            joint.d_mm += 0.4;
+        }
+        robot.tool_mm += Vector3::new(0.3, -0.2, 0.5);
+        robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Origin(2), k_rad_per_m: 1e-3 }];
+        robot.corrections.harmonics = vec![HarmonicTerm { joint: 2, wave: Wave::Cos2, amplitude_rad: 5e-4 }];
+        robot
+    }
+
+    fn named(name: &str) -> Robot {
+        let mut robot = catalogue::robot(name).unwrap();
+        robot.tool_mm = Vector3::new(10.0, -20.0, 80.0);
+        robot
+    }
+
+    #[test]
+    fn the_real_tool_goes_where_the_nominal_one_was_meant_to_be() {
+        for name in ["ur5e", "abb-irb120", "kuka-iiwa14", "fanuc-lrmate200id", "paper"] {
+            let Some(_) = catalogue::robot(name) else { panic!("no {name}") };
+            let nominal = named(name);
+            let identified = real(&nominal);
+            let targets: Vec<Target> = (0..200)
+                .map(|k| inverse::spread_start(&nominal, k))
+                .filter(|q| inverse::freedom_mm(&nominal, q) > 15.0)
+                .map(Target::Readings)
+                .collect();
+            let compensator = Compensator::new(&nominal, &identified, None);
+            let compensated = compensator.compensate(&targets);
+            let mut done = 0;
+            for (target, found) in targets.iter().zip(&compensated) {
+                let Target::Readings(given) = target else { continue };
+                let Ok(readings) = &found.readings else { continue };
+                done += 1;
+                let off = compensator.meant(given).inverse() * compensator.reached(readings);
+                assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD);
+                assert!(found.miss_mm.unwrap() > 0.1);
+                assert!(readings.iter().zip(given).all(|(a, b)| (a - b).abs() < MOST_TURN_RAD));
+            }
+            assert!(done > targets.len() * 9 / 10 && done > 50, "{name}: {done} of {}", targets.len());
+        }
+    }
+
+    #[test]
+    fn poses_find_their_posture_and_the_posture_that_is_named_is_kept() {
+        let nominal = named("ur5e");
+        let identified = real(&nominal);
+        let compensator = Compensator::new(&nominal, &identified, None);
+        let q = [0.3, -1.2, 1.4, -0.9, -1.3, 0.4];
+        let root_from_tool = compensator.reached(&q);
+        let near_rad = Some(q.iter().map(|v| v + 0.1).collect::<Vec<f64>>());
+        let named = compensator.compensate(&[Target::Pose { root_from_tool, near_rad }]);
+        let readings = named[0].readings.as_ref().unwrap();
+        assert!(readings.iter().zip(&q).all(|(a, b)| (a - b).abs() < 1e-6));
+        let free = compensator.compensate(&[Target::Pose { root_from_tool, near_rad: None }]);
+        let there = compensator.reached(free[0].readings.as_ref().unwrap());
+        assert!((there.translation.vector - root_from_tool.translation.vector).norm() < SAME_MM);
+    }
+
+    #[test]
+    fn what_is_in_the_way_is_named() {
+        let nominal = named("ur5e");
+        let mut identified = real(&nominal);
+        let said = |identified: &Robot, target: Target| {
+            Compensator::new(&nominal, identified, None).compensate(&[target])[0].readings.clone().unwrap_err()
+        };
+        let far = transform(Vector3::zeros(), Vector3::new(5000.0, 0.0, 0.0));
+        let there = said(&identified, Target::Pose { root_from_tool: far, near_rad: None });
+        assert!(matches!(there, Refusal::OutOfReach { short_mm } if short_mm > 1000.0), "{there}");
+        let stretched = said(&identified, Target::Readings(vec![0.3, -1.2, 0.0, -0.9, -1.3, 0.4]));
+        assert!(matches!(stretched, Refusal::OutOfReach { .. } | Refusal::Singular { .. }), "{stretched}");
+        let q = vec![0.3, -1.2, 1.4, -0.9, -1.3, 0.4];
+        identified.joints[3].limits_rad = Some((-0.5, 0.5));
+        let limited = said(&identified, Target::Readings(q));
+        assert!(matches!(limited, Refusal::Limit { joint: 4, .. }), "{limited}");
+    }
+
+    /// A tool of its own replaces both; without it each file's own counts.
+    #[test]
+    fn one_tool_for_both() {
+        let nominal = named("ur5e");
+        let identified = real(&nominal);
+        let tool_mm = Vector3::new(0.0, 0.0, 150.0);
+        let q = vec![0.3, -1.2, 1.4, -0.9, -1.3, 0.4];
+        let compensator = Compensator::new(&nominal, &identified, Some(tool_mm));
+        let readings = compensator.compensate(&[Target::Readings(q.clone())])[0].readings.clone().unwrap();
+        let tool = Transform::from(tool_mm);
+        let at = |robot: &Robot, q: &[f64]| robot.base_from_flange(q) * tool;
+        let off = at(&nominal, &q).inverse() * at(&identified, &readings);
+        assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD);
+    }
+}

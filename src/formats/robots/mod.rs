@@ -1,0 +1,23 @@
+//! A robot in other programs' words: URDF, tables, the kinematics of ROS and of Universal Robots.
+//!
+//! Each format carries the robot as far as it can; what it can carry is a [`Robot`] again, so that the rest is measured and said.
+
+pub mod ros_kinematics;
+pub mod ur_calibration;
+pub mod urdf_corrected;
+pub mod urdf_plain;
+
+use crate::robot::Robot;
+
+/// A robot in some format.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExportedRobot {
+    /// Name of the file.
+    pub name: &'static str,
+    /// Its text.
+    pub text: String,
+    /// The robot that a reader of the file has, constant transforms added that the notes ask for.
+    pub carried: Robot,
+    /// What the reader must know.
+    pub notes: Vec<String>,
+}

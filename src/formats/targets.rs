@@ -1,0 +1,110 @@
+//! Targets of `compensate` as CSV: `name` and readings, or poses of the tool.
+//!
+//! Readings are `j1_deg..jN_deg` (`jN_mm` where a joint slides); poses `x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad`, with readings beside them
+//! that say the posture where they are not empty.
+
+use std::fmt::Write as _;
+
+use camino::Utf8Path;
+
+use crate::compensate::{Target, pose};
+use crate::csv_table::{Fields, Table, quoted};
+use crate::files::Result;
+use crate::robot::Robot;
+
+const HINT: &str =
+    "a row a target: name,j1_deg,...,jN_deg, or name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad (optionally j1_deg,...)";
+
+/// A row of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Its name.
+    pub name: String,
+    /// Its line in the file.
+    pub line: u64,
+    /// What it asks for.
+    pub target: Target,
+    /// The readings that were given, as the file has them, deg (mm).
+    pub given: Option<Vec<f64>>,
+}
+
+/// Reads targets for a robot.
+pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
+    let table = Table::read(path, "the targets", HINT)?;
+    let name = table.require("name")?;
+    let columns = ["x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad"];
+    let poses: Vec<usize> = columns.iter().filter_map(|c| table.column(c)).collect();
+    if !(poses.is_empty() || poses.len() == columns.len()) {
+        let missing: Vec<&str> = columns.into_iter().filter(|c| table.column(c).is_none()).collect();
+        let message = format!("a pose has the columns {}; there is no {}", columns.join(","), missing.join(", "));
+        return Err(table.refuse_with(1, message, Some(HINT)));
+    }
+    let joints = if poses.is_empty() || table.column("j1_deg").or(table.column("j1_mm")).is_some() {
+        joint_columns(&table, robot)?
+    } else {
+        Vec::new()
+    };
+    let row = |(line, row): &(u64, Fields)| {
+        let given = !joints.is_empty() && (poses.is_empty() || joints.iter().any(|&c| !row[c].is_empty()));
+        let numbers =
+            |columns: &[usize]| columns.iter().map(|&c| table.number(*line, row, c)).collect::<Result<Vec<_>>>();
+        let given = if given { Some(numbers(&joints)?) } else { None };
+        let near_rad = given.as_ref().map(|readings| radians(readings, robot));
+        let target = match (poses.is_empty(), near_rad) {
+            (true, readings) => Target::Readings(readings.unwrap_or_default()),
+            (false, near_rad) => {
+                let mut numbers = [0.0; 6];
+                for (number, &column) in numbers.iter_mut().zip(&poses) {
+                    *number = table.number(*line, row, column)?;
+                }
+                Target::Pose { root_from_tool: pose(&numbers), near_rad }
+            }
+        };
+        Ok(Row { name: row[name].to_owned(), line: *line, target, given })
+    };
+    table.rows.iter().map(row).collect()
+}
+
+fn joint_columns(table: &Table, robot: &Robot) -> Result<Vec<usize>> {
+    let (columns, slides) = table.joint_columns()?;
+    if columns.len() != robot.joints.len() {
+        let message = format!("{} columns of readings, but the robot has {} joints", columns.len(), robot.joints.len());
+        return Err(table.refuse_with(1, message, Some(HINT)));
+    }
+    for (i, joint) in robot.joints.iter().enumerate() {
+        if slides.get(i).copied().unwrap_or(false) != joint.slides {
+            let needed = reading_name(robot, i);
+            return Err(table.refuse(1, format!("no column `{needed}`, as the robot's joint {} needs", i + 1)));
+        }
+    }
+    Ok(columns)
+}
+
+/// Readings as a file has them, deg (mm), in rad (mm).
+pub fn radians(readings: &[f64], robot: &Robot) -> Vec<f64> {
+    let reading = |(value, joint): (&f64, &crate::robot::Joint)| if joint.slides { *value } else { value.to_radians() };
+    readings.iter().zip(&robot.joints).map(reading).collect()
+}
+
+/// `j1_deg`, or `j1_mm` of a joint that slides.
+fn reading_name(robot: &Robot, joint: usize) -> String {
+    format!("j{}_{}", joint + 1, if robot.joints[joint].slides { "mm" } else { "deg" })
+}
+
+/// `compensated.csv`: a row a target with its readings, deg (mm), where there are any, and `ok` or the reason.
+pub fn to_csv<'a>(robot: &Robot, rows: impl Iterator<Item = (&'a str, Option<Vec<f64>>, String)>) -> String {
+    let mut text = String::from("name");
+    (0..robot.joints.len()).for_each(|j| text.push_str(&format!(",{}", reading_name(robot, j))));
+    text.push_str(",status\n");
+    for (name, readings, status) in rows {
+        text.push_str(&quoted(name));
+        for j in 0..robot.joints.len() {
+            text.push(',');
+            if let Some(reading) = readings.as_ref().and_then(|r| r.get(j)) {
+                let _ = write!(text, "{reading}");
+            }
+        }
+        let _ = writeln!(text, ",{}", quoted(&status));
+    }
+    text
+}

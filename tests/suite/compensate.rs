@@ -1,0 +1,178 @@
+//! `compensate` as a command: the files it writes, what it refuses, and the round trip through the real robot.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use camino::Utf8Path;
+use stereocal::robot::{Robot, catalogue, file, inverse};
+
+use crate::run::{stderr, stdout, stereocal, workplace};
+
+/// The contract's round trip.
+const SAME_MM: f64 = 1e-3;
+const SAME_RAD: f64 = 1e-6;
+
+fn robots(folder: &Path) -> (Robot, Robot) {
+    let nominal = catalogue::robot("ur5e").unwrap();
+    let mut real = nominal.clone();
+    for (k, joint) in real.joints.iter_mut().enumerate() {
+        joint.alpha_rad += 2e-3 * (k as f64).sin();
+        joint.theta_rad += 3e-3 * (k as f64).cos();
+        joint.a_mm += 0.5;
+    }
+    std::fs::write(folder.join("robot.toml"), file::to_toml(&nominal)).unwrap();
+    std::fs::write(folder.join("identified.toml"), file::to_toml(&real)).unwrap();
+    let read = |name: &str| file::read(Utf8Path::from_path(&folder.join(name)).unwrap()).unwrap();
+    (read("robot.toml"), read("identified.toml"))
+}
+
+/// Readings of well-bent postures, deg.
+fn postures(robot: &Robot, count: usize) -> Vec<Vec<f64>> {
+    let all = (0..).map(|k| inverse::spread_start(robot, k));
+    let bent = all.filter(|q| inverse::freedom_mm(robot, q) > 20.0).take(count);
+    bent.map(|q| q.iter().map(|v| v.to_degrees()).collect()).collect()
+}
+
+fn csv(postures: &[Vec<f64>]) -> String {
+    let mut text = String::from("name,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg\n");
+    for (k, q) in postures.iter().enumerate() {
+        let fields: Vec<String> = q.iter().map(f64::to_string).collect();
+        let _ = writeln!(text, "p{k},{}", fields.join(","));
+    }
+    text
+}
+
+fn rows(path: &Path) -> Vec<(Vec<f64>, String)> {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let row = |r: csv::StringRecord| ((1..7).filter_map(|c| r[c].parse().ok()).collect(), r[7].to_owned());
+    reader.records().map(|r| row(r.unwrap())).collect()
+}
+
+fn run(folder: &Path, arguments: &[&str], status: i32) -> String {
+    let all = [&["compensate"], arguments, &["--robot", "robot.toml", "--identified", "identified.toml"]].concat();
+    let output = stereocal(folder, &all);
+    assert_eq!(output.status.code(), Some(status), "{arguments:?}: {}{}", stdout(&output), stderr(&output));
+    stdout(&output) + &stderr(&output)
+}
+
+fn radians(q: &[f64]) -> Vec<f64> {
+    q.iter().map(|v| v.to_radians()).collect()
+}
+
+#[test]
+fn targets_come_back_where_they_were_meant() {
+    let folder = workplace();
+    let (nominal, real) = robots(folder.path());
+    let postures = postures(&nominal, 300);
+    std::fs::write(folder.path().join("targets.csv"), csv(&postures)).unwrap();
+    let said = run(folder.path(), &["targets.csv"], 0);
+    assert!(said.contains("300 of 300 targets compensated"), "{said}");
+    for (q, (found, status)) in postures.iter().zip(rows(&folder.path().join("out/compensated.csv"))) {
+        assert_eq!(status, "ok");
+        let (q, found) = (radians(q), radians(&found));
+        let off = nominal.base_from_flange(&q).inverse() * real.base_from_flange(&found);
+        assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD, "{q:?}");
+        // Without compensation it is far more: the test would see a command that copies.
+        let before = nominal.base_from_flange(&q).inverse() * real.base_from_flange(&q);
+        assert!(before.translation.vector.norm() > 100.0 * SAME_MM);
+    }
+    // As poses, the postures named beside them: the same readings.
+    let mut poses =
+        String::from("name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg\n");
+    for (k, q) in postures.iter().enumerate() {
+        let there = nominal.base_from_flange(&radians(q));
+        let (t, r) = (there.translation.vector, there.rotation.scaled_axis());
+        let near: Vec<String> = q.iter().map(f64::to_string).collect();
+        let _ = writeln!(poses, "p{k},{},{},{},{},{},{},{}", t.x, t.y, t.z, r.x, r.y, r.z, near.join(","));
+    }
+    std::fs::write(folder.path().join("poses.csv"), poses).unwrap();
+    run(folder.path(), &["poses.csv", "--out", "poses"], 0);
+    let (a, b) = (rows(&folder.path().join("out/compensated.csv")), rows(&folder.path().join("poses/compensated.csv")));
+    for ((a, _), (b, _)) in a.iter().zip(&b) {
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5), "{a:?} {b:?}");
+    }
+    for threads in ["1", "2"] {
+        run(folder.path(), &["targets.csv", "--out", threads, "--threads", threads, "--no-provenance"], 0);
+    }
+    for file in ["compensated.csv", "compensate.json"] {
+        let read = |threads: &str| std::fs::read(folder.path().join(threads).join(file)).unwrap();
+        assert!(read("1") == read("2"), "{file}");
+    }
+}
+
+#[test]
+fn what_cannot_be_reached_is_named_and_left_alone() {
+    let folder = workplace();
+    let (nominal, _) = robots(folder.path());
+    let mut list = postures(&nominal, 5);
+    list[2] = vec![0.0, -90.0, 0.0, -90.0, 60.0, 0.0];
+    list[3][0] = -360.0;
+    std::fs::write(folder.path().join("targets.csv"), csv(&list)).unwrap();
+    let said = run(folder.path(), &["targets.csv"], 1);
+    assert!(said.contains("3 of 5 targets compensated") && said.contains("p2 (line 4): "), "{said}");
+    assert!(said.contains("p3 (line 5): joint 1 would need -360.") && said.contains("range is -360"), "{said}");
+    let rows = rows(&folder.path().join("out/compensated.csv"));
+    assert_eq!((&rows[2].0, &rows[3].0), (&list[2], &list[3]));
+    assert!(rows[0].1 == "ok" && rows[4].1 == "ok" && rows[2].1 != "ok");
+    let far = "name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad\na,9000,0,0,0,0,0\nb,300,200,400,0,3,0\n";
+    std::fs::write(folder.path().join("far.csv"), far).unwrap();
+    let said = run(folder.path(), &["far.csv", "--out", "far"], 1);
+    assert!(said.contains("a (line 2): out of reach by"), "{said}");
+    let text = std::fs::read_to_string(folder.path().join("far/compensated.csv")).unwrap();
+    assert!(text.contains("a,,,,,,,out of reach"), "{text}");
+}
+
+#[test]
+fn programs_keep_everything_but_their_joint_targets() {
+    let folder = workplace();
+    let (nominal, real) = robots(folder.path());
+    let q = postures(&nominal, 2);
+    let rad = |q: &[f64]| radians(q).iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+    let text = format!(
+        "def main():\n  movej([{}], a=1.4, v=1.05) # there\n  movej([{}])\n  movel(p[0.1,0.2,0.3,0,0,0])\nend\n",
+        rad(&q[0]),
+        rad(&q[1])
+    );
+    std::fs::write(folder.path().join("main.script"), &text).unwrap();
+    run(folder.path(), &["main.script"], 0);
+    let changed = std::fs::read_to_string(folder.path().join("out/compensated/main.script")).unwrap();
+    assert!(
+        changed.contains("], a=1.4, v=1.05) # there\n") && changed.contains("  movel(p[0.1,0.2,0.3,0,0,0])\nend\n")
+    );
+    let list = changed.split_once("movej([").unwrap().1.split_once(']').unwrap().0;
+    let found: Vec<f64> = list.split(',').map(|v| v.trim().parse().unwrap()).collect();
+    let off = nominal.base_from_flange(&radians(&q[0])).inverse() * real.base_from_flange(&found);
+    assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD);
+    std::fs::write(folder.path().join("none.script"), "movel(p[0.1,0.2,0.3,0,0,0])\n").unwrap();
+    let said = run(folder.path(), &["none.script", "--out", "x"], 2);
+    assert!(
+        said.contains("no joint target of 6 numbers in this URScript program") && said.contains("as CSV"),
+        "{said}"
+    );
+    std::fs::write(folder.path().join("job.jbi"), "///POSTYPE PULSE\n///PULSE\nC00000=1,2,3,4,5,6\n").unwrap();
+    let said = run(folder.path(), &["job.jbi", "--out", "x"], 2);
+    assert!(said.contains("pulses a degree") && said.contains("--pulses-per-deg"), "{said}");
+}
+
+#[test]
+fn bad_targets_are_refused() {
+    let folder = workplace();
+    robots(folder.path());
+    for (text, part) in [
+        ("name,x_mm,y_mm\na,1,2\n", "there is no z_mm, rx_rad"),
+        ("name,j1_deg\na,1\n", "1 columns of readings, but the robot has 6 joints"),
+        ("j1_deg\n1\n", "no column `name`"),
+        ("name,j1_deg,j2_deg,j3_mm,j4_deg,j5_deg,j6_deg\na,1,2,3,4,5,6\n", "no column `j3_deg`"),
+        ("name,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg\na,1,2,x,4,5,6\n", "`j3_deg` is not a number"),
+    ] {
+        std::fs::write(folder.path().join("t.csv"), text).unwrap();
+        let said = run(folder.path(), &["t.csv"], 2);
+        assert!(said.contains(part), "{said}");
+    }
+    let said = run(folder.path(), &["t.csv", "--tool", "1,2"], 2);
+    assert!(said.contains("--tool has 2 numbers"), "{said}");
+    std::fs::write(folder.path().join("identified.toml"), file::to_toml(&catalogue::robot("franka-panda").unwrap()))
+        .unwrap();
+    let said = run(folder.path(), &["t.csv"], 2);
+    assert!(said.contains("the identified robot has 7 joints, the nominal one 6"), "{said}");
+}

@@ -1,0 +1,128 @@
+//! `export robot` as a command: the maker's description corrected, the formats, and what is said of terms that they cannot carry.
+
+use std::path::Path;
+
+use camino::Utf8Path;
+use stereocal::formats::urdf::Urdf;
+use stereocal::robot::refit::Residual;
+use stereocal::robot::{Robot, file};
+
+use crate::run::{stderr, stdout, stereocal, workplace};
+
+fn run(folder: &Path, arguments: &[&str], status: i32) -> String {
+    let output = stereocal(folder, arguments);
+    assert_eq!(output.status.code(), Some(status), "{arguments:?}: {}{}", stdout(&output), stderr(&output));
+    stdout(&output) + &stderr(&output)
+}
+
+fn read(folder: &Path, name: &str) -> Robot {
+    file::read(Utf8Path::from_path(&folder.join(name)).unwrap()).unwrap()
+}
+
+fn chain(folder: &Path, name: &str, tip: Option<&str>) -> Robot {
+    let path = folder.join(name);
+    let urdf = Urdf::read(Utf8Path::from_path(&path).unwrap()).unwrap();
+    urdf.chain(tip).unwrap().robot("read back")
+}
+
+/// A robot file with deviations in every number and, where wanted, terms that only this program's own format has.
+fn deviated(folder: &Path, from: &str, to: &str, terms: bool) {
+    let mut robot = read(folder, from);
+    for (k, joint) in robot.joints.iter_mut().enumerate().skip(1) {
+        joint.alpha_rad += 1e-3 * (k as f64).sin();
+        joint.theta_rad += 2e-3 * (k as f64).cos();
+        joint.d_mm += 0.4;
+    }
+    let mut text = file::to_toml(&robot);
+    if terms {
+        text += "\n[gravity]\nterms = [{ joint = 2, point = \"joint_3\", k_mrad_per_m = 1.0 }]\n";
+    }
+    std::fs::write(folder.join(to), text).unwrap();
+}
+
+#[test]
+fn a_description_goes_in_and_comes_out_corrected() {
+    let folder = workplace();
+    let at = folder.path();
+    run(at, &["robot", "new", "kuka-iiwa14", "--out", "new"], 0);
+    run(at, &["export", "robot", "--robot", "new/robot.toml", "--format", "urdf", "--out", "maker"], 0);
+    run(at, &["robot", "import", "maker/robot.urdf", "--out", "."], 0);
+    deviated(at, "robot.toml", "identified.toml", false);
+    let arguments =
+        ["export", "robot", "--robot", "identified.toml", "--format", "urdf", "--nominal-urdf", "maker/robot.urdf"];
+    let said = run(at, &arguments, 0);
+    assert!(said.contains("flange poses equal to") && said.contains("7 joint origins"), "{said}");
+    let (identified, corrected) = (read(at, "identified.toml"), chain(at, "out/robot.urdf", None));
+    let off = Residual::between(&identified, &corrected);
+    assert!(off.max_mm < 1e-9, "{off:?}");
+    assert!(Residual::between(&identified, &read(at, "robot.toml")).mean_mm > 0.1);
+    // Another arm's description is not this robot's.
+    run(at, &["robot", "new", "franka-panda", "--out", "panda"], 0);
+    run(at, &["export", "robot", "--robot", "panda/robot.toml", "--format", "urdf", "--out", "panda"], 0);
+    let arguments = [
+        "export",
+        "robot",
+        "--robot",
+        "identified.toml",
+        "--format",
+        "urdf",
+        "--nominal-urdf",
+        "panda/robot.urdf",
+        "--out",
+        "x",
+    ];
+    let said = run(at, &arguments, 2);
+    assert!(said.contains("off joint") && said.contains("robot import panda/robot.urdf"), "{said}");
+}
+
+#[test]
+fn what_a_format_cannot_carry_is_said_in_mm() {
+    let folder = workplace();
+    let at = folder.path();
+    run(at, &["robot", "new", "ur5e", "--out", "."], 0);
+    deviated(at, "robot.toml", "plain.toml", false);
+    deviated(at, "robot.toml", "sagging.toml", true);
+    for (format, file) in [
+        ("urdf", "robot.urdf"),
+        ("dh-csv", "robot.csv"),
+        ("ros-kinematics-yaml", "kinematics.yaml"),
+        ("ur-calibration", "calibration.conf"),
+        ("toml", "robot.toml"),
+    ] {
+        let export = |robot: &str, out: &str| {
+            run(at, &["export", "robot", "--robot", robot, "--format", format, "--out", out], 0)
+        };
+        let plain = export("plain.toml", &format!("plain-{format}"));
+        assert!(plain.contains(file) && plain.contains("flange poses equal to"), "{plain}");
+        let sagging = export("sagging.toml", &format!("sagging-{format}"));
+        let lost = sagging.contains("no place for gravity: refitted") && sagging.contains("mm in the mean");
+        assert_eq!(lost, format != "toml", "{sagging}");
+    }
+    // The residual that is printed is that of the file.
+    let back = chain(at, "sagging-urdf/robot.urdf", None);
+    let off = Residual::between(&read(at, "sagging.toml"), &back);
+    let said = run(at, &["export", "robot", "--robot", "sagging.toml", "--format", "urdf", "--out", "again"], 0);
+    assert!(said.contains(&format!("{:.4} mm in the mean", off.mean_mm)), "{said} {off:?}");
+    run(at, &["robot", "import", "plain-dh-csv/robot.csv", "--out", "table"], 0);
+    let off = Residual::between(&read(at, "plain.toml"), &read(at, "table/robot.toml"));
+    assert!(off.max_mm < 1e-9, "{off:?}");
+}
+
+#[test]
+fn robots_that_a_format_is_not_for_are_refused() {
+    let folder = workplace();
+    let at = folder.path();
+    run(at, &["robot", "new", "ur5e", "--out", "."], 0);
+    let text = std::fs::read_to_string(at.join("robot.toml")).unwrap();
+    std::fs::write(at.join("own.toml"), text.replacen("Universal Robots UR5e", "our arm", 1)).unwrap();
+    let said = run(at, &["export", "robot", "--robot", "own.toml", "--format", "ur-calibration"], 2);
+    assert!(said.contains("no common arm is called `our arm`") && said.contains("--nominal FILE"), "{said}");
+    let sliding = text.replacen("[[joint]]", "[[joint]]\ntype = \"prismatic\"", 1);
+    let lines: Vec<&str> = sliding.lines().collect();
+    let first_limits = lines.iter().position(|l| l.starts_with("limits_deg")).unwrap();
+    let kept: Vec<&str> = lines.iter().enumerate().filter(|(i, _)| *i != first_limits).map(|(_, l)| *l).collect();
+    std::fs::write(at.join("sliding.toml"), kept.join("\n")).unwrap();
+    let said = run(at, &["export", "robot", "--robot", "sliding.toml", "--format", "ros-kinematics-yaml"], 2);
+    assert!(said.contains("joint 1 slides") && said.contains("--format urdf"), "{said}");
+    run(at, &["export", "robot", "--robot", "sliding.toml", "--format", "urdf", "--out", "sliding"], 0);
+}
