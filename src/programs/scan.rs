@@ -4,8 +4,11 @@ use std::ops::Range;
 
 use super::Target;
 
+/// A value and where it stands.
+pub type Number = (f64, Range<usize>);
+
 /// A number at `at`, blanks before it allowed: its value, its place, and what follows it.
-pub fn number(text: &str, at: usize) -> Option<(f64, Range<usize>)> {
+pub fn number(text: &str, at: usize) -> Option<Number> {
     let start = at + text.get(at..)?.chars().take_while(|c| c.is_whitespace()).map(char::len_utf8).sum::<usize>();
     let part = |c: &char| c.is_ascii_digit() || "+-.eE".contains(*c);
     let length: usize = text[start..].chars().take_while(part).count();
@@ -23,7 +26,7 @@ pub fn word(text: &str, at: usize, word: &str) -> Option<usize> {
 }
 
 /// Numbers from `at` with commas between, up to `most` of them, and the place behind the last.
-pub fn list(text: &str, at: usize, most: usize) -> (Vec<(f64, Range<usize>)>, usize) {
+pub fn list(text: &str, at: usize, most: usize) -> (Vec<Number>, usize) {
     let (mut numbers, mut end) = (Vec::new(), at);
     while numbers.len() < most {
         let from = if numbers.is_empty() { Some(end) } else { word(text, end, ",") };
@@ -35,12 +38,7 @@ pub fn list(text: &str, at: usize, most: usize) -> (Vec<(f64, Range<usize>)>, us
 }
 
 /// Numbers behind `labels` in their order, each label with blanks and signs of `between` behind it; the place behind the last.
-pub fn labelled(
-    text: &str,
-    at: usize,
-    labels: &[String],
-    between: &[&str],
-) -> Option<(Vec<(f64, Range<usize>)>, usize)> {
+pub fn labelled(text: &str, at: usize, labels: &[String], between: &[&str]) -> Option<(Vec<Number>, usize)> {
     let (mut numbers, mut end) = (Vec::new(), at);
     for label in labels {
         for skipped in between {
@@ -56,7 +54,7 @@ pub fn labelled(
 }
 
 /// A target of these numbers; named by its line where it has no name.
-pub fn target(text: &str, name: Option<String>, numbers: Vec<(f64, Range<usize>)>) -> Option<Target> {
+pub fn target(text: &str, name: Option<String>, numbers: Vec<Number>) -> Option<Target> {
     let line = line(text, numbers.first()?.1.start);
     let (readings, places) = numbers.into_iter().unzip();
     Some(Target { name: name.unwrap_or_else(|| format!("line {line}")), line, readings, places, pulses: false })

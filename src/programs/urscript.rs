@@ -9,7 +9,7 @@ use super::{Motion, Target, Written};
 const MOVES: [&str; 4] = ["movej(", "movel(", "movep(", "servoj("];
 
 /// Full speed of a joint, rad/s.
-const FULL_SPEED: f64 = 3.14;
+const FULL_SPEED: f64 = std::f64::consts::PI;
 
 /// Lists of angles that a move takes, or that a variable with a name ending in `q` holds, as PolyScope writes them.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {

@@ -9,7 +9,7 @@ use crate::robot::{Joint, Robot};
 
 /// URDF wants a largest effort and speed of every joint with limits; the table has none.
 const EFFORT: f64 = 1000.0;
-const VELOCITY: f64 = 3.14;
+const VELOCITY: f64 = std::f64::consts::PI;
 
 /// Builds the description. The robot has no corrections ([`Robot::without_corrections`]).
 pub fn build(robot: &Robot) -> ExportedRobot {
