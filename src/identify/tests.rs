@@ -4,7 +4,8 @@ use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::choose::identify;
 use crate::identify::record::quality;
 use crate::identify::settings::{Extensions, Method, Model, Prior, Settings};
-use crate::identify::solve::formulation::{Formulation, Task};
+use crate::identify::solve::formulation::Formulation;
+use crate::identify::solve::task::Task;
 use crate::identify::synthetic::{self, World};
 use crate::robot::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
 

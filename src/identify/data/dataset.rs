@@ -201,9 +201,12 @@ impl Dataset {
     }
 
     /// The pose that a group's verification distances are measured from: its centre, or of the fitted rows the one
-    /// nearest to the centroid of their points. `None` where no row of the group is fitted, and for wire lengths.
+    /// nearest to the centroid of their points. A centre that is not fitted, being a gross error, is no reference where other rows of its
+    /// group are. `None` where no row of the group is fitted, and for wire lengths.
     pub fn reference(&self, group: usize, fitted: &[usize]) -> Option<usize> {
-        if let Some(center) = self.groups[group].center {
+        if let Some(center) = self.groups[group].center
+            && (fitted.contains(&center) || !fitted.iter().any(|&i| self.poses[i].group == group))
+        {
             return Some(center);
         }
         let points: Vec<(usize, Point3<f64>)> = fitted

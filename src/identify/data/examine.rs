@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use super::dataset::{Dataset, Kind, Reading};
 use super::doctor::Finding;
 use crate::identify::settings::{Model, Settings};
-use crate::identify::solve::formulation::{Loss, Task};
+use crate::identify::solve::robust::Loss;
+use crate::identify::solve::task::Task;
 use crate::robot::Robot;
 
 /// Robust scatter of a coordinate, mm, that no built robot has after a fit.

@@ -14,7 +14,8 @@ use serde::Serialize;
 use crate::identify::data::dataset::{Dataset, Group, Kind};
 use crate::identify::residuals::eliminate::{Block, Linear, product, pseudo_inverse};
 use crate::identify::settings::{Model, Settings};
-use crate::identify::solve::formulation::{Loss, Task};
+use crate::identify::solve::robust::Loss;
+use crate::identify::solve::task::Task;
 use crate::measurements::Role;
 use crate::robot::Robot;
 

@@ -13,8 +13,10 @@ use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::model::ladder::Terms;
 use crate::identify::residuals::weights::{Extra, Scatter};
 use crate::identify::settings::{Extensions, Method, Model, Settings};
-use crate::identify::solve::formulation::{Formulation, Loss, Task};
+use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::problem::{Problem, Solution};
+use crate::identify::solve::robust::Loss;
+use crate::identify::solve::task::Task;
 use crate::identify::solve::{swarm, trust_region};
 use crate::robot::Robot;
 
@@ -227,8 +229,8 @@ impl Session<'_> {
             return Ok((Vec::new(), Vec::new()));
         }
         let parameters = Terms::REFERENCE.parameters(self.robot);
-        let robust = self.task(&parameters, model).robust(Loss::Biweight)?;
-        let outliers: Vec<usize> = self.rows.iter().copied().filter(|&r| robust.scores[r] > sigmas).collect();
+        let mut robust = self.task(&parameters, model).robust(Loss::Biweight)?;
+        let outliers = robust.gross_errors(sigmas);
         let rows: Vec<usize> = self.rows.iter().copied().filter(|r| !outliers.contains(r)).collect();
         let values = robust.offsets[parameters.len()..].to_vec();
         let judge = Judge {

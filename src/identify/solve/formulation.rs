@@ -1,10 +1,7 @@
 //! From a data set to the problem that the solvers get: base parameters, row weights, scatter, prior and box.
 //!
-//! In: rows, model, parameters. Out: [`Rows`] whose scatter makes the white residuals as large as they should be, base
-//! parameters, the prior of greatest evidence, and a box. Gross errors are held down by iteratively reweighted least squares with
-//! Tukey's biweight, its scale from the median of the residuals, after a start by least absolute residuals (Holland and Welsch,
-//! 1977); the chain on which weights have their levers follows the fit, so that fit and written robot are one.
-//! What goes wrong: fewer numbers than needed, or poses that determine nothing; both are errors with the counts.
+//! In: a [`Task`]. Out: [`Rows`] whose scatter makes the white residuals as large as they should be, base parameters, the prior of
+//! greatest evidence, and a box. The chain on which weights have their levers follows the fit, so that fit and written robot are one.
 
 use std::borrow::Cow;
 
@@ -12,41 +9,23 @@ use nalgebra::{Cholesky, DMatrix};
 
 use super::fit::Fit;
 use super::problem::Solution;
+use super::scatter::estimate_scatter;
+use super::task::{FIRST_SCATTER_MM, Task, prior_rows, with_scale_held};
 use super::trust_region;
 use crate::identify::Error;
-use crate::identify::data::dataset::Dataset;
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::Tolerance;
-use crate::identify::residuals::eliminate::{Raw, product, pseudo_inverse};
-use crate::identify::residuals::rows::{Recipe, Rows};
+use crate::identify::residuals::eliminate::{product, pseudo_inverse};
+use crate::identify::residuals::rows::Rows;
 use crate::identify::residuals::weights::{Extra, Scatter};
-use crate::identify::settings::{Model, Prior, Redundancy, Settings};
-use crate::robot::{Parameter, Robot, Unit};
+use crate::identify::settings::{Model, Prior, Settings};
+use crate::robot::{Parameter, Unit};
 
 /// Rounds of fitting and of estimating scatter and prior from the residuals.
 const ROUNDS: usize = 4;
 
-/// Rounds of reweighting from the start by least absolute residuals.
-const ROBUST_ROUNDS: usize = 12;
-
-/// Steps of the trust region between two estimates of weights.
-const STEPS_A_ROUND: usize = 2;
-
-/// Scatter before anything is known, mm: about a good robot's after calibration.
-const FIRST_SCATTER_MM: f64 = 0.1;
-
-/// Least scatter, mm and rad: far below any instrument; keeps weights finite for exact data.
-const LEAST_MM: f64 = 1e-7;
-const LEAST_RAD: f64 = 1e-10;
-
-/// Stated covariances count as too large where the residuals ask for less than this share of them.
-const OVERSTATED: f64 = 0.7;
-
 /// A fit may end so far into the box before the box is widened.
 const NEAR_WALL: f64 = 0.95;
-
-/// Tukey's constant, in standard deviations: 95 % efficient for one normal number.
-const BIWEIGHT: f64 = 4.685;
 
 /// The written robot is the fitted one when moving the levers' chain moves no parameter by more, mm or mrad.
 const SAME_CHAIN: f64 = 1e-11;
@@ -74,183 +53,6 @@ pub struct Formulation {
     pub effective: f64,
     /// Whether the data see the robot's size.
     pub scale_seen: bool,
-}
-
-/// Of what a formulation is made.
-#[derive(Debug, Clone, Copy)]
-pub struct Task<'a> {
-    /// The measurements.
-    pub set: &'a Dataset,
-    /// The nominal robot.
-    pub robot: &'a Robot,
-    /// The parameters that may move.
-    pub parameters: &'a [Parameter],
-    /// Unknowns of the sensor that may move.
-    pub extras: &'a [Extra],
-    /// Rows to fit.
-    pub rows: &'a [usize],
-    /// What counts as a residual.
-    pub model: Model,
-    /// Settings.
-    pub settings: &'a Settings,
-}
-
-impl<'a> Task<'a> {
-    fn recipe(&self, scatter: Scatter, weights: &'a [f64], levers: &'a Robot) -> Recipe<'a> {
-        Recipe {
-            set: self.set,
-            robot: self.robot,
-            levers,
-            parameters: self.parameters,
-            extras: self.extras,
-            rows: self.rows,
-            weights,
-            model: self.model,
-            scatter,
-            wire_offset: self.settings.wire_offset,
-        }
-    }
-
-    /// Whether anything that was measured sees the robot's size.
-    fn scale_is_seen(&self) -> bool {
-        let set = self.set;
-        let touched = |group: usize| self.rows.iter().any(|&r| set.poses[r].group == group);
-        !self.rows.iter().all(|&r| set.touches(r)) || set.known.iter().any(|k| touched(k.a) && touched(k.b))
-    }
-
-    /// The rows with a scatter that is known.
-    pub fn rows_at(&self, scatter: Scatter, levers: &Robot) -> Rows {
-        Rows::new(&self.recipe(scatter, &[], levers))
-    }
-
-    fn base(&self, rows: &Rows) -> Result<Base, Error> {
-        if self.parameters.is_empty() {
-            return Ok(Base::new(&DMatrix::zeros(1, 0), self.settings.rank_tolerance));
-        }
-        let (_, jacobian) = rows.evaluate(&vec![0.0; rows.offset_count()], true);
-        let jacobian = jacobian.columns(0, self.parameters.len()).into_owned();
-        let base = match self.settings.redundancy {
-            Redundancy::Qr => Base::new(&jacobian, self.settings.rank_tolerance),
-            Redundancy::Correlation => Base::by_correlation(&jacobian, self.settings.rank_tolerance),
-        };
-        // Identical poses leave columns of rounding errors, whose rank means nothing: judge their size in mm a mm or mrad.
-        let largest = jacobian.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
-        let strength = largest * rows.unit_variance_mm2().sqrt() / (jacobian.nrows().max(1) as f64).sqrt();
-        if base.rank() == 0 || strength <= self.settings.rank_tolerance {
-            return Err(Error::NothingDetermined { poses: self.rows.len() });
-        }
-        Ok(base)
-    }
-
-    /// Too few numbers to calibrate anything: not more than offsets of all joints, a tool and three more to judge by; without
-    /// a prior, not more than base parameters.
-    fn check_count(&self, rows: &Rows, base: &Base) -> Result<(), Error> {
-        let numbers = rows.count();
-        let least = match self.settings.prior {
-            Prior::Off => base.rank(),
-            Prior::Evidence => base.rank().min(self.robot.joints.len() + 6),
-        };
-        if numbers <= least {
-            return Err(Error::TooFew { numbers, parameters: base.rank(), poses: self.rows.len() });
-        }
-        Ok(())
-    }
-
-    /// A fit that gross errors cannot get past. `start` is where it begins; nominal by default.
-    pub fn robust(&self, loss: Loss) -> Result<Robust<'a>, Error> {
-        let unit = Scatter::of_point(FIRST_SCATTER_MM);
-        let mut weights = vec![1.0; self.set.poses.len()];
-        let rows = Rows::new(&self.recipe(unit, &[], self.robot));
-        let base = self.base(&rows)?;
-        self.check_count(&rows, &base)?;
-        let tolerance = Tolerance { lengths_mm: 3.0, angles_mrad: 10.0, target_mm: 100.0, ..Tolerance::default() };
-        let prior = prior_rows(&tolerance, &base, self, true);
-        let spread = tolerance.spread(&base, self.parameters);
-        let mut x = vec![0.0; base.rank() + self.extras.len()];
-        let mut offsets = vec![0.0; rows.offset_count()];
-        let mut robot = self.robot.clone();
-        let mut scatter = unit;
-        let mut scores = Vec::new();
-        for round in 0..ROBUST_ROUNDS {
-            let probe = Rows::new(&Recipe { weights: &weights, ..self.recipe(scatter, &[], &robot) });
-            let raw = probe.raw(&offsets);
-            scores = sizes(&raw, &scatter, self.set.poses.len());
-            let median = median_size(&scores, self.rows).max(1e-12);
-            let late = round >= ROBUST_ROUNDS / 2 && loss == Loss::Biweight;
-            for &row in self.rows {
-                let u = scores[row] / median;
-                weights[row] = if late { biweight(u) } else { (1.0 / u.max(1.0)).sqrt() };
-                scores[row] = u;
-            }
-            scatter = rescaled(&raw, self.rows, self.set.poses.len(), scatter);
-            let rows = Rows::new(&Recipe { weights: &weights, ..self.recipe(scatter, &[], &robot) });
-            let free = vec![f64::INFINITY; x.len()];
-            let fit = Fit::new(Cow::Borrowed(&rows), &base, spread.clone(), &free, prior.clone());
-            let settings = trust_region::Settings { iterations: STEPS_A_ROUND, ..self.settings.trust_region };
-            x = trust_region::solve(&fit, &x, &settings).x;
-            offsets = fit.offsets(&x);
-            robot = self.robot.shifted(self.parameters, &offsets[..self.parameters.len()]);
-        }
-        Ok(Robust { task: *self, weights, scores, offsets, robot, scatter })
-    }
-}
-
-/// How large residuals are held down.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Loss {
-    /// Their influence is bounded: absolute values beyond one robust standard deviation (Huber).
-    Absolute,
-    /// Those beyond some standard deviations have none.
-    Biweight,
-}
-
-/// A robust fit.
-#[derive(Debug, Clone)]
-pub struct Robust<'a> {
-    task: Task<'a>,
-    /// Roots of the rows' weights, one a row of the data set.
-    pub weights: Vec<f64>,
-    /// Sizes of the fitted rows' residuals in robust standard deviations, one a row of the data set.
-    pub scores: Vec<f64>,
-    /// Offsets of parameters and extras.
-    pub offsets: Vec<f64>,
-    /// The robot found.
-    pub robot: Robot,
-    /// Robust scatter.
-    pub scatter: Scatter,
-}
-
-impl Robust<'_> {
-    /// The rows with their weights, the offsets, and the normal matrix of a loose prior on all parameters.
-    pub fn linearised(&self) -> (Rows, Vec<f64>, DMatrix<f64>) {
-        let recipe = self.task.recipe(self.scatter, &[], &self.robot);
-        let rows = Rows::new(&Recipe { weights: &self.weights, ..recipe });
-        let tolerance = Tolerance { lengths_mm: 3.0, angles_mrad: 10.0, target_mm: 100.0, ..Tolerance::default() };
-        let count = self.offsets.len();
-        let mut prior = DMatrix::zeros(count, count);
-        for (i, &parameter) in self.task.parameters.iter().enumerate() {
-            prior[(i, i)] = tolerance.of(parameter).powi(-2);
-        }
-        for i in self.task.parameters.len()..count {
-            prior[(i, i)] = 1.0;
-        }
-        (rows, self.offsets.clone(), prior)
-    }
-}
-
-/// The scatter at which the median residual of these rows has the size that it should have.
-fn rescaled(raw: &[(usize, f64, Raw)], rows: &[usize], count: usize, before: Scatter) -> Scatter {
-    let mut scatter = Scatter { stated: 1.0, ..before };
-    let (mut low, mut high) = (LEAST_MM, 1e5);
-    for _ in 0..40 {
-        scatter.point_mm = f64::sqrt(low * high);
-        if median_size(&sizes(raw, &scatter, count), rows) > 1.0 {
-            low = scatter.point_mm
-        } else {
-            high = scatter.point_mm
-        }
-    }
-    scatter
 }
 
 impl Formulation {
@@ -391,78 +193,6 @@ impl Formulation {
     }
 }
 
-fn prior_rows(tolerance: &Tolerance, base: &Base, task: &Task, held: bool) -> DMatrix<f64> {
-    let rows = match held {
-        true => tolerance.rows(base, task.parameters, task.extras),
-        false => DMatrix::zeros(0, base.rank() + task.extras.len()),
-    };
-    if task.scale_is_seen() { rows } else { with_scale_held(rows, tolerance, base, task.parameters, task.robot) }
-}
-
-/// Standard deviation of the mean relative change of all lengths where nothing measured sees it.
-const HELD_SCALE: f64 = 1e-7;
-
-/// One more row below the prior's: the robot as a whole neither grows nor shrinks. Touches of unknown points fit the better the smaller
-/// all lengths are, and a weak prior would let them collapse.
-fn with_scale_held(
-    rows: DMatrix<f64>,
-    tolerance: &Tolerance,
-    base: &Base,
-    parameters: &[Parameter],
-    robot: &Robot,
-) -> DMatrix<f64> {
-    let spread = tolerance.spread(base, parameters);
-    let length = |p: &Parameter| if p.unit() == Unit::Mm { robot.value(*p) } else { 0.0 };
-    let lengths = nalgebra::RowDVector::from_iterator(parameters.len(), parameters.iter().map(length));
-    let square = lengths.norm_squared().max(f64::MIN_POSITIVE);
-    let of_base = &lengths * spread / (square * HELD_SCALE);
-    let (count, columns) = rows.shape();
-    let mut held = rows.resize_vertically(count + 1, 0.0);
-    held.view_mut((count, 0), (1, of_base.ncols().min(columns))).copy_from(&of_base);
-    held
-}
-
-/// Root of Tukey's weight for a residual of `u` robust standard deviations.
-fn biweight(u: f64) -> f64 {
-    let inside = 1.0 - (u / BIWEIGHT).powi(2);
-    inside.max(0.0)
-}
-
-/// White size of each row's residual, brought to the size of one normal number; zero for rows without one.
-pub fn sizes(raw: &[(usize, f64, Raw)], scatter: &Scatter, count: usize) -> Vec<f64> {
-    let mut squares = vec![0.0; count];
-    for (row, _, raw) in raw {
-        let square = match raw {
-            Raw::Length(r, variance, times) => {
-                r * r / (variance * scatter.stated + times * scatter.point_mm * scatter.point_mm)
-            }
-            Raw::Point(r, covariance) => as_one_number(whitened(r, covariance, scatter)),
-            Raw::Turn(_) => continue,
-        };
-        squares[*row] = f64::max(squares[*row], square);
-    }
-    squares.into_iter().map(f64::sqrt).collect()
-}
-
-fn whitened(r: &nalgebra::Vector3<f64>, covariance: &nalgebra::Matrix3<f64>, scatter: &Scatter) -> f64 {
-    scatter.total(covariance).cholesky().map_or(f64::INFINITY, |c| r.dot(&c.solve(r)))
-}
-
-/// A chi-squared of three degrees of freedom as one of a single degree that is exceeded as often (Wilson and Hilferty, 1931).
-fn as_one_number(square: f64) -> f64 {
-    let (three, one) = (2.0 / 27.0, 2.0 / 9.0);
-    let z = ((square / 3.0).cbrt() - (1.0 - three)) / f64::sqrt(three);
-    // Not zero: a residual that is very small is still one.
-    (1.0 - one + z * f64::sqrt(one)).max(1e-3).powi(3)
-}
-
-/// Robust standard deviation of the sizes of these rows: their median over that of a normal number's absolute value.
-pub fn median_size(sizes: &[f64], rows: &[usize]) -> f64 {
-    let mut sorted: Vec<f64> = rows.iter().map(|&r| sizes[r]).filter(|s| *s > 0.0).collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0) / 0.6745
-}
-
 /// Number of unknowns that the data, and not the prior, have determined.
 fn determined(fit: &Fit, x: &[f64], prior: &DMatrix<f64>) -> f64 {
     let (_, jacobian) = fit.white(x);
@@ -471,48 +201,6 @@ fn determined(fit: &Fit, x: &[f64], prior: &DMatrix<f64>) -> f64 {
         Some(total) => total.solve(&normal).trace(),
         None => x.len() as f64,
     }
-}
-
-/// The scatter at which the white sum of squares equals the degrees of freedom (Pearson's equation); for points and orientations
-/// apart. Covariances that are larger than what was seen are taken down.
-fn estimate_scatter(rows: &Rows, offsets: &[f64], effective: f64, before: Scatter) -> Scatter {
-    let raw = rows.raw(offsets);
-    let turns: Vec<f64> =
-        raw.iter().filter_map(|(_, _, r)| if let Raw::Turn(t) = r { Some(t.norm_squared()) } else { None }).collect();
-    let total: f64 = raw.iter().map(|(_, _, r)| if matches!(r, Raw::Length(..)) { 1.0 } else { 3.0 }).sum();
-    // Each number loses the same share to parameters and placements.
-    let share = ((rows.count() as f64 - effective) / total.max(1.0)).max(1.0 / total.max(1.0));
-    let sum = |scatter: &Scatter| -> f64 {
-        raw.iter()
-            .map(|(_, w, raw)| match raw {
-                Raw::Length(r, variance, times) => {
-                    w * w * r * r / (variance * scatter.stated + times * scatter.point_mm * scatter.point_mm)
-                }
-                Raw::Point(r, covariance) => w * w * whitened(r, covariance, scatter),
-                Raw::Turn(_) => 0.0,
-            })
-            .sum()
-    };
-    let wanted = share * (total - 3.0 * turns.len() as f64);
-    let turn_square = turns.iter().sum::<f64>() / (3.0 * share * turns.len().max(1) as f64);
-    let mut scatter = Scatter {
-        point_mm: LEAST_MM,
-        rotation_rad: if turns.is_empty() { before.rotation_rad } else { turn_square.sqrt().max(LEAST_RAD) },
-        stated: 1.0,
-    };
-    let least = sum(&scatter);
-    if least <= wanted {
-        if least < OVERSTATED * wanted {
-            scatter.stated = (least / wanted).max(1e-12);
-        }
-        return scatter;
-    }
-    let (mut low, mut high) = (LEAST_MM, 1e5);
-    for _ in 0..80 {
-        scatter.point_mm = f64::sqrt(low * high);
-        if sum(&scatter) > wanted { low = scatter.point_mm } else { high = scatter.point_mm }
-    }
-    scatter
 }
 
 fn bounds(base: &Base, parameters: &[Parameter], x: &[f64], settings: &Settings) -> (Vec<f64>, Vec<String>) {

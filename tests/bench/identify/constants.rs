@@ -11,8 +11,9 @@ use rayon::prelude::*;
 use stereocal::identify::Model;
 use stereocal::identify::data::dataset::Dataset;
 use stereocal::identify::settings::{Method, Prior, Settings, SwarmSettings};
-use stereocal::identify::solve::formulation::{Formulation, Task};
+use stereocal::identify::solve::formulation::Formulation;
 use stereocal::identify::solve::problem::{Problem, Solution};
+use stereocal::identify::solve::task::Task;
 use stereocal::identify::solve::{swarm, trust_region};
 use stereocal::{measurements, robot};
 

@@ -225,7 +225,8 @@ mod tests {
     use super::*;
     use crate::identify::data::dataset::Dataset;
     use crate::identify::settings::{Model, Prior, Settings};
-    use crate::identify::solve::formulation::{Formulation, Task};
+    use crate::identify::solve::formulation::Formulation;
+    use crate::identify::solve::task::Task;
     use crate::identify::solve::trust_region;
     use crate::identify::synthetic;
 

@@ -1,0 +1,178 @@
+//! A fit that gross errors cannot get past: iteratively reweighted least squares with Tukey's biweight, its scale from the median of
+//! the residuals, after a start by least absolute residuals (Holland and Welsch, 1977).
+//!
+//! In: a [`Task`]. Out: weights, sizes of residuals in robust standard deviations, the robot and the scatter of the rest.
+
+use std::borrow::Cow;
+
+use nalgebra::DMatrix;
+
+use super::fit::Fit;
+use super::scatter::{LEAST_MM, median_size, sizes};
+use super::task::{FIRST_SCATTER_MM, Task, prior_rows};
+use super::trust_region;
+use crate::identify::Error;
+use crate::identify::model::base::Base;
+use crate::identify::model::prior::Tolerance;
+use crate::identify::residuals::eliminate::Raw;
+use crate::identify::residuals::rows::{Recipe, Rows};
+use crate::identify::residuals::weights::Scatter;
+use crate::robot::Robot;
+
+/// Rounds of reweighting, and how many of them only bound the influence of large residuals.
+const ROBUST_ROUNDS: usize = 14;
+const BOUNDED_ROUNDS: usize = 8;
+
+/// Steps of the trust region between two estimates of weights.
+const STEPS_A_ROUND: usize = 2;
+
+/// Tukey's constant, in standard deviations: 95 % efficient for one normal number.
+const BIWEIGHT: f64 = 4.685;
+
+/// At least one number in so many counts as a degree of freedom, however many parameters there are: the prior holds them.
+const LEAST_FREEDOM: usize = 4;
+
+impl<'a> Task<'a> {
+    /// A fit that gross errors cannot get past, from the nominal robot. The scale that a residual is held against follows the median
+    /// while influence is only bounded, and stays as it is while large residuals lose all weight (Yohai, "High breakdown-point and high
+    /// efficiency robust estimates for regression", 1987): a scale that followed would shrink around the rows that happen to fit.
+    pub fn robust(&self, loss: Loss) -> Result<Robust<'a>, Error> {
+        let mut scatter = Scatter::of_point(FIRST_SCATTER_MM);
+        let mut weights = vec![1.0; self.set.poses.len()];
+        let rows = Rows::new(&self.recipe(scatter, &[], self.robot));
+        let base = self.base(&rows)?;
+        self.check_count(&rows, &base)?;
+        let mut robust = Robust {
+            task: *self,
+            x: vec![0.0; base.rank() + self.extras.len()],
+            offsets: vec![0.0; rows.offset_count()],
+            robot: self.robot.clone(),
+            weights: Vec::new(),
+            scores: Vec::new(),
+            scatter,
+            scale: 1.0,
+            base,
+        };
+        let bounded = if loss == Loss::Biweight { BOUNDED_ROUNDS } else { ROBUST_ROUNDS };
+        let mut scale = 1.0;
+        for round in 0..ROBUST_ROUNDS {
+            let probe = self.recipe(scatter, &weights, &robust.robot);
+            let raw = Rows::new(&probe).raw(&robust.offsets);
+            let count = self.set.poses.len();
+            if round <= bounded {
+                let freedom = robust.freedom(&raw, &rows);
+                scatter = rescaled(&raw, self.rows, count, scatter, freedom);
+                scale = (median_size(&sizes(&raw, &scatter, count), self.rows) * freedom).max(1e-12);
+            }
+            let mut scores = sizes(&raw, &scatter, count);
+            for &row in self.rows {
+                scores[row] /= scale;
+                let u = scores[row];
+                weights[row] = if round >= bounded { biweight(u) } else { (1.0 / u.max(1.0)).sqrt() };
+            }
+            robust = Robust { scores, scatter, scale, weights: weights.clone(), ..robust };
+            robust.step(STEPS_A_ROUND);
+        }
+        Ok(robust)
+    }
+}
+
+/// How large residuals are held down.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Loss {
+    /// Their influence is bounded: absolute values beyond one robust standard deviation (Huber).
+    Absolute,
+    /// Those beyond some standard deviations have none.
+    Biweight,
+}
+
+/// A robust fit.
+#[derive(Debug, Clone)]
+pub struct Robust<'a> {
+    pub(super) task: Task<'a>,
+    base: Base,
+    x: Vec<f64>,
+    /// Roots of the rows' weights, one a row of the data set.
+    pub weights: Vec<f64>,
+    /// Sizes of the fitted rows' residuals in robust standard deviations, one a row of the data set.
+    pub scores: Vec<f64>,
+    /// Offsets of parameters and extras.
+    pub offsets: Vec<f64>,
+    /// The robot found.
+    pub robot: Robot,
+    /// Robust scatter.
+    pub scatter: Scatter,
+    /// Robust standard deviation of white residuals: one, or less where the stated covariances are too large.
+    pub(super) scale: f64,
+}
+
+/// The prior of robust fits, where its size is not yet known from the data.
+const LOOSE: Tolerance = Tolerance {
+    lengths_mm: 3.0,
+    angles_mrad: 10.0,
+    target_mm: 100.0,
+    gravity_mrad_per_m: 1.0,
+    harmonics_mrad: 1.0,
+    couplings_per_mille: 1.0,
+    zero_mm: 1.0,
+    scale_per_mille: 1.0,
+};
+
+impl Robust<'_> {
+    /// Some steps of the trust region with the weights as they are.
+    pub(super) fn step(&mut self, iterations: usize) {
+        let task = self.task;
+        let rows = Rows::new(&Recipe { weights: &self.weights, ..task.recipe(self.scatter, &[], &self.robot) });
+        let free = vec![f64::INFINITY; self.x.len()];
+        let prior = prior_rows(&LOOSE, &self.base, &task, true);
+        let spread = LOOSE.spread(&self.base, task.parameters);
+        let fit = Fit::new(Cow::Owned(rows), &self.base, spread, &free, prior);
+        let settings = trust_region::Settings { iterations, ..task.settings.trust_region };
+        self.x = trust_region::solve(&fit, &self.x, &settings).x;
+        self.offsets = fit.offsets(&self.x);
+        self.robot = task.robot.shifted(task.parameters, &self.offsets[..task.parameters.len()]);
+    }
+
+    /// What residuals that were fitted have lost: root of numbers over degrees of freedom.
+    fn freedom(&self, raw: &[(usize, f64, Raw)], rows: &Rows) -> f64 {
+        let numbers: usize = raw.iter().map(|(_, _, r)| if matches!(r, Raw::Length(..)) { 1 } else { 3 }).sum();
+        let left = rows.count().saturating_sub(self.x.len()).max(numbers.div_ceil(LEAST_FREEDOM));
+        (numbers as f64 / left.max(1) as f64).sqrt()
+    }
+
+    /// The rows with their weights, the offsets, and the normal matrix of a loose prior on all parameters.
+    pub fn linearised(&self) -> (Rows, Vec<f64>, DMatrix<f64>) {
+        let recipe = self.task.recipe(self.scatter, &[], &self.robot);
+        let rows = Rows::new(&Recipe { weights: &self.weights, ..recipe });
+        let count = self.offsets.len();
+        let mut prior = DMatrix::zeros(count, count);
+        for (i, &parameter) in self.task.parameters.iter().enumerate() {
+            prior[(i, i)] = LOOSE.of(parameter).powi(-2);
+        }
+        for i in self.task.parameters.len()..count {
+            prior[(i, i)] = 1.0;
+        }
+        (rows, self.offsets.clone(), prior)
+    }
+}
+
+/// The scatter at which the median residual of these rows has the size that it should have, `freedom` times what the fit left.
+fn rescaled(raw: &[(usize, f64, Raw)], rows: &[usize], count: usize, before: Scatter, freedom: f64) -> Scatter {
+    let mut scatter = Scatter { stated: 1.0, ..before };
+    let (mut low, mut high) = (LEAST_MM, 1e5);
+    for _ in 0..40 {
+        scatter.point_mm = f64::sqrt(low * high);
+        if freedom * median_size(&sizes(raw, &scatter, count), rows) > 1.0 {
+            low = scatter.point_mm
+        } else {
+            high = scatter.point_mm
+        }
+    }
+    scatter
+}
+
+/// Root of Tukey's weight for a residual of `u` robust standard deviations.
+fn biweight(u: f64) -> f64 {
+    let inside = 1.0 - (u / BIWEIGHT).powi(2);
+    inside.max(0.0)
+}

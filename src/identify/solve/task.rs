@@ -1,0 +1,131 @@
+//! What a formulation is made of: which rows of which measurements, what may move, and what the poses can determine.
+//!
+//! In: rows, model, parameters. Out: residual rows at some scatter and weights, base parameters, rows of the prior.
+//! What goes wrong: fewer numbers than needed, or poses that determine nothing; both are errors with the counts.
+
+use nalgebra::DMatrix;
+
+use crate::identify::Error;
+use crate::identify::data::dataset::Dataset;
+use crate::identify::model::base::Base;
+use crate::identify::model::prior::Tolerance;
+use crate::identify::residuals::rows::{Recipe, Rows};
+use crate::identify::residuals::weights::{Extra, Scatter};
+use crate::identify::settings::{Model, Prior, Redundancy, Settings};
+use crate::robot::{Parameter, Robot, Unit};
+
+/// Scatter before anything is known, mm: about a good robot's after calibration.
+pub const FIRST_SCATTER_MM: f64 = 0.1;
+
+/// Of what a formulation is made.
+#[derive(Debug, Clone, Copy)]
+pub struct Task<'a> {
+    /// The measurements.
+    pub set: &'a Dataset,
+    /// The nominal robot.
+    pub robot: &'a Robot,
+    /// The parameters that may move.
+    pub parameters: &'a [Parameter],
+    /// Unknowns of the sensor that may move.
+    pub extras: &'a [Extra],
+    /// Rows to fit.
+    pub rows: &'a [usize],
+    /// What counts as a residual.
+    pub model: Model,
+    /// Settings.
+    pub settings: &'a Settings,
+}
+
+impl<'a> Task<'a> {
+    pub(super) fn recipe(&self, scatter: Scatter, weights: &'a [f64], levers: &'a Robot) -> Recipe<'a> {
+        Recipe {
+            set: self.set,
+            robot: self.robot,
+            levers,
+            parameters: self.parameters,
+            extras: self.extras,
+            rows: self.rows,
+            weights,
+            model: self.model,
+            scatter,
+            wire_offset: self.settings.wire_offset,
+        }
+    }
+
+    /// Whether anything that was measured sees the robot's size.
+    pub(super) fn scale_is_seen(&self) -> bool {
+        let set = self.set;
+        let touched = |group: usize| self.rows.iter().any(|&r| set.poses[r].group == group);
+        !self.rows.iter().all(|&r| set.touches(r)) || set.known.iter().any(|k| touched(k.a) && touched(k.b))
+    }
+
+    /// The rows with a scatter that is known.
+    pub fn rows_at(&self, scatter: Scatter, levers: &Robot) -> Rows {
+        Rows::new(&self.recipe(scatter, &[], levers))
+    }
+
+    pub(super) fn base(&self, rows: &Rows) -> Result<Base, Error> {
+        if self.parameters.is_empty() {
+            return Ok(Base::new(&DMatrix::zeros(1, 0), self.settings.rank_tolerance));
+        }
+        let (_, jacobian) = rows.evaluate(&vec![0.0; rows.offset_count()], true);
+        let jacobian = jacobian.columns(0, self.parameters.len()).into_owned();
+        let base = match self.settings.redundancy {
+            Redundancy::Qr => Base::new(&jacobian, self.settings.rank_tolerance),
+            Redundancy::Correlation => Base::by_correlation(&jacobian, self.settings.rank_tolerance),
+        };
+        // Identical poses leave columns of rounding errors, whose rank means nothing: judge their size in mm a mm or mrad.
+        let largest = jacobian.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
+        let strength = largest * rows.unit_variance_mm2().sqrt() / (jacobian.nrows().max(1) as f64).sqrt();
+        if base.rank() == 0 || strength <= self.settings.rank_tolerance {
+            return Err(Error::NothingDetermined { poses: self.rows.len() });
+        }
+        Ok(base)
+    }
+
+    /// Too few numbers to calibrate anything: not more than offsets of all joints, a tool and three more to judge by; without
+    /// a prior, not more than base parameters.
+    pub(super) fn check_count(&self, rows: &Rows, base: &Base) -> Result<(), Error> {
+        let numbers = rows.count();
+        let least = match self.settings.prior {
+            Prior::Off => base.rank(),
+            Prior::Evidence => base.rank().min(self.robot.joints.len() + 6),
+        };
+        if numbers <= least {
+            return Err(Error::TooFew { numbers, parameters: base.rank(), poses: self.rows.len() });
+        }
+        Ok(())
+    }
+}
+
+/// Rows of the prior of all unknowns; none where it is not `held`, but for a scale that nothing sees.
+pub(super) fn prior_rows(tolerance: &Tolerance, base: &Base, task: &Task, held: bool) -> DMatrix<f64> {
+    let rows = match held {
+        true => tolerance.rows(base, task.parameters, task.extras),
+        false => DMatrix::zeros(0, base.rank() + task.extras.len()),
+    };
+    if task.scale_is_seen() { rows } else { with_scale_held(rows, tolerance, base, task.parameters, task.robot) }
+}
+
+/// Standard deviation of the mean relative change of all lengths where nothing measured sees it.
+const HELD_SCALE: f64 = 1e-7;
+
+/// One more row below the prior's: the robot as a whole neither grows nor shrinks. Touches of unknown points fit the better the smaller
+/// all lengths are, and a weak prior would let them collapse.
+pub(super) fn with_scale_held(
+    rows: DMatrix<f64>,
+    tolerance: &Tolerance,
+    base: &Base,
+    parameters: &[Parameter],
+    robot: &Robot,
+) -> DMatrix<f64> {
+    let spread = tolerance.spread(base, parameters);
+    let length = |p: &Parameter| if p.unit() == Unit::Mm { robot.value(*p) } else { 0.0 };
+    let lengths = nalgebra::RowDVector::from_iterator(parameters.len(), parameters.iter().map(length));
+    let square = lengths.norm_squared().max(f64::MIN_POSITIVE);
+    let of_base = &lengths * spread / (square * HELD_SCALE);
+    let (count, columns) = rows.shape();
+    let mut held = rows.resize_vertically(count + 1, 0.0);
+    held.view_mut((count, 0), (1, of_base.ncols().min(columns))).copy_from(&of_base);
+    held
+}
