@@ -9,7 +9,7 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::{Digested, Provenance, Run};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::{doctor, examine, known, sessions};
+use crate::identify::data::{doctor, examine, known, sessions, shared};
 use crate::identify::judge::choose::{Identification, identify, step_count};
 use crate::identify::record::{Record, quality};
 use crate::identify::{Error, Settings};
@@ -34,7 +34,10 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
-    let out = open(args, &out, run, &path, file.as_deref())?;
+    let (out, measured) = open(args, &out, run, &path, file.as_deref())?;
+    if let Some(record) = &measured {
+        shared::take(record, &mut set);
+    }
     let bar = progress::bar("identifying", 2 + step_count(&settings));
     bar.begin("units, signs and conventions");
     let (set, nominal, mut findings) = match settings.examine {
@@ -69,31 +72,34 @@ fn settings(args: &Identify, config: &Config) -> Settings {
     settings
 }
 
-/// The results folder, once nothing is in the way of what will be written.
+/// The results folder, once nothing is in the way of what will be written, and the `measure.json` that is about the measurements.
 fn open(
     args: &Identify,
     out: &Utf8Path,
     run: Run,
     measurements: &Utf8Path,
     robot: Option<&Utf8Path>,
-) -> Result<OutDir> {
+) -> Result<(OutDir, Option<Utf8PathBuf>)> {
     let run = Run { force: args.output.force, ..run };
     let inputs: Vec<&Utf8Path> = [measurements].into_iter().chain(robot).collect();
     let out = OutDir::open(out)?.for_run(&run, &inputs);
     out.check_free(&["identification.json", "identified.toml", "identify.html"])?;
-    check_calibration(&out, measurements);
-    Ok(out)
+    let measured = check_calibration(&out, measurements);
+    Ok((out, measured))
 }
 
-/// Says which calibration the measurements were made with, and warns where the one beside them is another.
-fn check_calibration(out: &OutDir, measurements: &Utf8Path) {
+/// The `measure.json` beside the measurements, where it is about them. Says which calibration they were made with, and warns where the one
+/// beside them is another.
+fn check_calibration(out: &OutDir, measurements: &Utf8Path) -> Option<Utf8PathBuf> {
     let folder = measurements.parent().unwrap_or(Utf8Path::new(""));
-    let Some(measured_by) = Provenance::of_json(&folder.join("measure.json")) else { return };
-    let (Some((csv, _)), calibration) = (Digested::read(measurements), folder.join("calibration.json")) else { return };
+    let record = folder.join("measure.json");
+    // Without provenance nothing says that they belong together but what they hold.
+    let Some(measured_by) = Provenance::of_json(&record) else { return Some(record) };
+    let (csv, _) = Digested::read(measurements)?;
     if !measured_by.outputs.iter().any(|output| output.sha256 == csv.sha256) {
-        // measure.json is about other measurements.
-        return;
+        return None;
     }
+    let calibration = folder.join("calibration.json");
     let used = measured_by.inputs.last();
     if let (Some(used), Some((here, _))) = (used, Digested::read(&calibration))
         && !used.same_content(&here)
@@ -104,6 +110,7 @@ fn check_calibration(out: &OutDir, measurements: &Utf8Path) {
         ));
     }
     out.measured_by(measured_by);
+    Some(record)
 }
 
 fn robot_file(path: Option<&Utf8Path>) -> Option<Utf8PathBuf> {

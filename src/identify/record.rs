@@ -162,7 +162,9 @@ pub struct Identifiability {
 
 /// Errors of rows under a robot, as they go into tables and figures.
 pub fn quality(set: &Dataset, robot: &Robot, found: &Identification, settings: &Settings) -> (Quality, Vec<RowError>) {
-    let (extras, values): (Vec<Extra>, Vec<f64>) = found.extras.iter().copied().unzip();
+    // Shared errors are held against the points as they were read, as `verify` does, which knows nothing of them.
+    let of_sensor = found.extras.iter().copied().filter(|(e, _)| !matches!(e, Extra::Shared(_)));
+    let (extras, values): (Vec<Extra>, Vec<f64>) = of_sensor.unzip();
     let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &found.fitted, settings.wire_offset) };
     let verify_rows = set.verify_rows();
     let (fit, verify) = (judge.errors(robot, &found.fitted), judge.errors(robot, &verify_rows));

@@ -5,3 +5,4 @@ pub mod doctor;
 pub mod examine;
 pub mod known;
 pub mod sessions;
+pub mod shared;

@@ -106,25 +106,6 @@ impl Cells {
         }
     }
 
-    /// The same cells in the units of others that have another variance for one.
-    pub fn same_scale(mut self, others: &Cells) -> Cells {
-        self.scale_to(others.unit_mm);
-        self
-    }
-
-    /// White numbers count in units of the variance that stands for one: brings it to another.
-    fn scale_to(&mut self, unit_mm: f64) {
-        let by = (self.unit_mm / unit_mm).powi(2);
-        for cell in &mut self.cells {
-            cell.normal *= by;
-        }
-        for fold in self.folds.iter_mut().chain(std::iter::once(&mut self.whole)) {
-            fold.normal *= by;
-            fold.gradient *= by;
-        }
-        self.unit_mm = unit_mm;
-    }
-
     fn columns(&self, parameters: &[Parameter]) -> Vec<usize> {
         let of_robot = parameters.iter().filter_map(|p| self.parameters.iter().position(|q| q == p));
         of_robot.chain(self.parameters.len()..self.parameters.len() + self.extras.len()).collect()

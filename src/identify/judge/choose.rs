@@ -11,7 +11,7 @@ use super::errors::{Judge, RowError};
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::model::ladder::Terms;
-use crate::identify::residuals::weights::{Extra, Scatter};
+use crate::identify::residuals::weights::{EVIDENCE, Extra, Scatter, WARPS};
 use crate::identify::settings::{Extensions, Method, Model, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::problem::{Problem, Solution};
@@ -81,9 +81,6 @@ struct Session<'a> {
     extras: Vec<Extra>,
     step: &'a (dyn Fn(&str) + Sync),
 }
-
-/// Logarithm of the evidence that an unknown of the sensor must bring: one in four hundred.
-const EVIDENCE: f64 = 6.0;
 
 /// Costs within this of each other are one: they come from different sums of the same squares.
 const SAME_COST: f64 = 1e-6;
@@ -254,8 +251,9 @@ impl Session<'_> {
         let all = Terms::ALL.parameters(self.robot);
         let reference = Terms::REFERENCE.parameters(self.robot);
         let formulation = Formulation::new(&self.task(&reference, model))?;
-        let cells = self.cells(&all, &reference, &formulation, model);
-        let cells = self.take_sensor_unknowns(cells, &all, &reference, model)?;
+        let scatter = formulation.rows.scatter;
+        let cells = self.cells(&all, &reference, &formulation, scatter, model);
+        let cells = self.take_sensor_unknowns(cells, &all, &reference, scatter, model)?;
         let mut judged = Vec::new();
         let judge = |terms: Terms, judged: &mut Vec<Judged>| -> Option<HeldOut> {
             let held_out = cells.held_out(&terms.parameters(self.robot));
@@ -280,11 +278,13 @@ impl Session<'_> {
         Ok((best, judged))
     }
 
+    /// Cells linearised where a formulation ended, at a scatter that need not be its own.
     fn cells(
         &self,
         all: &[crate::robot::Parameter],
         reference: &[crate::robot::Parameter],
         at: &Formulation,
+        scatter: Scatter,
         model: Model,
     ) -> Cells {
         let offsets = at.offsets_of();
@@ -293,33 +293,43 @@ impl Session<'_> {
             all.iter().map(|p| reference.iter().position(|q| q == p).map_or(0.0, |i| of_robot[i])).collect();
         wide.extend_from_slice(extras);
         let levers = self.robot.shifted(reference, of_robot);
-        let rows = self.task(all, model).rows_at(at.rows.scatter, &levers);
+        let rows = self.task(all, model).rows_at(scatter, &levers);
         Cells::new(self.set, &rows, &wide, self.settings.folds)
     }
 
-    /// Takes the zero of distances and the scale of a camera rig where they make the data much more probable.
+    /// Unknowns of the sensor that the readings may have, each richer list after the poorer one.
+    fn possible_unknowns(&self) -> Vec<Vec<Extra>> {
+        match self.set.kind {
+            Kind::Distances if self.set.groups.iter().any(|g| g.center.is_some()) => vec![vec![Extra::Zero]],
+            // What `measure` says of its cameras' errors is better than what any cameras may have.
+            Kind::Positions if self.set.has_rotations() && self.set.has_covariances() && self.set.shared.is_empty() => {
+                vec![vec![Extra::Scale], (0..WARPS.len()).map(Extra::Warp).collect()]
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// Takes the zero of distances, and scale and warps of a camera rig, where they make the data much more probable at one and the
+    /// same scatter.
     fn take_sensor_unknowns(
         &mut self,
-        cells: Cells,
+        mut cells: Cells,
         all: &[crate::robot::Parameter],
         reference: &[crate::robot::Parameter],
+        scatter: Scatter,
         model: Model,
     ) -> Result<Cells, Error> {
-        let possible = match self.set.kind {
-            Kind::Distances if self.set.groups.iter().any(|g| g.center.is_some()) => Some(Extra::Zero),
-            Kind::Positions if self.set.has_rotations() && self.set.has_covariances() => Some(Extra::Scale),
-            _ => None,
-        };
-        let Some(extra) = possible else { return Ok(cells) };
-        let before = cells.tolerance(reference).1;
-        self.extras.push(extra);
-        let with = Formulation::new(&self.task(reference, model))?;
-        let richer = self.cells(all, reference, &with, model);
-        let richer = richer.same_scale(&cells);
-        if richer.tolerance(reference).1 > before + EVIDENCE {
-            return Ok(richer);
+        let mut kept = self.extras.len();
+        for list in self.possible_unknowns() {
+            let before = cells.tolerance(reference).1;
+            self.extras.extend(list);
+            let with = Formulation::new(&self.task(reference, model))?;
+            let richer = self.cells(all, reference, &with, scatter, model);
+            if richer.tolerance(reference).1 > before + EVIDENCE {
+                (cells, kept) = (richer, self.extras.len());
+            }
         }
-        self.extras.pop();
+        self.extras.truncate(kept);
         Ok(cells)
     }
 

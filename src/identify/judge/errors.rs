@@ -157,11 +157,9 @@ impl Judge<'_> {
     /// A predicted and a measured point, the sensor's own errors taken off, and its covariance.
     fn point(&self, robot: &Robot, row: usize) -> Option<(Point3<f64>, Point3<f64>, Matrix3<f64>)> {
         let Reading::Position { point_mm, covariance_mm2, .. } = &self.set.poses[row].reading else { return None };
-        let mut measured = point_mm + point_mm.coords * (self.extra(Extra::Scale) / 1000.0);
-        if let Some(shared) = self.set.shared.get(row) {
-            for (k, column) in shared.column_iter().enumerate() {
-                measured -= column * self.extra(Extra::Shared(k));
-            }
+        let mut measured = *point_mm;
+        for (extra, value) in self.extras.iter().zip(self.values) {
+            measured -= extra.of_point(point_mm, self.set.shared.get(row)) * *value;
         }
         let predicted = robot.target_mm(&self.set.poses[row].joints_rad);
         Some((predicted, measured, covariance_mm2.unwrap_or_else(Matrix3::zeros)))

@@ -44,7 +44,7 @@ pub struct Tolerance {
     pub couplings_per_mille: f64,
     /// Of the zero of distances, mm.
     pub zero_mm: f64,
-    /// Of the sensor's scale, thousandths.
+    /// Of the sensor's scale and warps, thousandths.
     pub scale_per_mille: f64,
 }
 
@@ -78,7 +78,7 @@ fn kind(parameter: Parameter) -> usize {
 fn extra_kind(extra: Extra) -> Option<usize> {
     match extra {
         Extra::Zero => Some(6),
-        Extra::Scale => Some(7),
+        Extra::Scale | Extra::Warp(_) => Some(7),
         Extra::Target(_) | Extra::Shared(_) => None,
     }
 }

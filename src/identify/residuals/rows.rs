@@ -180,11 +180,7 @@ fn by_group(set: &Dataset, rows: &[usize]) -> Vec<Vec<usize>> {
 
 /// What a point of a placement gains with each extra unknown, mm (see [`Extra`]).
 fn point_extra(set: &Dataset, row: usize, point_mm: &Point3<f64>, extras: &[Extra]) -> Matrix3xX<f64> {
-    let column = |extra: &Extra| match extra {
-        Extra::Scale => -point_mm.coords / 1000.0,
-        Extra::Shared(k) => set.shared.get(row).map_or(Vector3::zeros(), |s| s.column(*k).into()),
-        Extra::Zero | Extra::Target(_) => Vector3::zeros(),
-    };
+    let column = |extra: &Extra| extra.of_point(point_mm, set.shared.get(row));
     if extras.is_empty() {
         return Matrix3xX::zeros(0);
     }

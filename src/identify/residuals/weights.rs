@@ -3,7 +3,7 @@
 //! A measured number is `value + own noise + extra' e`, where the extra unknowns `e` are common to many poses: the calibration of a
 //! rig, its scale, the zero of a wire. The fit finds them beside the robot.
 
-use nalgebra::{Matrix3, Matrix3xX, Point3, RowDVector};
+use nalgebra::{Matrix3, Matrix3xX, Point3, RowDVector, Vector3};
 
 /// An unknown of the sensor that all placements share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,23 +12,53 @@ pub enum Extra {
     Zero,
     /// Scale of the sensor less one, thousandths.
     Scale,
+    /// What else wrongly calibrated cameras do to space, which they see through a projective map (Hartley and Zisserman, "Multiple view
+    /// geometry", section 10.2): thousandths of stretch along z and y (0, 1), of shear in xy, xz, yz (2 to 4), and of scale a metre
+    /// along x, y, z (5 to 7).
+    Warp(usize),
     /// Turn of the target on the flange about x, y or z (0, 1, 2), mrad.
     Target(usize),
     /// A parameter of the sensor's calibration, in units of its standard deviation (whitened).
     Shared(usize),
 }
 
+/// Names of [`Extra::Warp`].
+pub const WARPS: [&str; 8] =
+    ["stretch_z", "stretch_y", "shear_xy", "shear_xz", "shear_yz", "perspective_x", "perspective_y", "perspective_z"];
+
 impl Extra {
+    /// What the residual (predicted minus measured) of a point that was measured there gains with this unknown, mm; `shared` are the
+    /// columns of its shared errors.
+    pub fn of_point(self, point_mm: &Point3<f64>, shared: Option<&Matrix3xX<f64>>) -> Vector3<f64> {
+        let p = point_mm.coords;
+        let moved = match self {
+            Extra::Zero | Extra::Target(_) => Vector3::zeros(),
+            Extra::Shared(k) => return shared.map_or(Vector3::zeros(), |s| s.column(k).into()),
+            Extra::Scale => p,
+            Extra::Warp(0) => Vector3::new(0.0, 0.0, p.z),
+            Extra::Warp(1) => Vector3::new(0.0, p.y, 0.0),
+            Extra::Warp(2) => Vector3::new(p.y, p.x, 0.0),
+            Extra::Warp(3) => Vector3::new(p.z, 0.0, p.x),
+            Extra::Warp(4) => Vector3::new(0.0, p.z, p.y),
+            Extra::Warp(k) => p * (p[(k - 5).min(2)] / 1000.0),
+        };
+        -moved / 1000.0
+    }
+
     /// Its name in files.
     pub fn name(self) -> String {
         match self {
             Extra::Zero => "distance_zero".to_owned(),
             Extra::Scale => "sensor_scale".to_owned(),
+            Extra::Warp(k) => format!("sensor_{}", WARPS[k.min(WARPS.len() - 1)]),
             Extra::Target(axis) => format!("target_r{}", ["x", "y", "z"][axis.min(2)]),
             Extra::Shared(k) => format!("shared_{}", k + 1),
         }
     }
 }
+
+/// Logarithm of the evidence that an unknown of the sensor, or another reading of its covariances, must bring: one in four hundred.
+pub const EVIDENCE: f64 = 6.0;
 
 /// A measured length, mm.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,7 +99,7 @@ pub struct Scatter {
     pub point_mm: f64,
     /// A component of the orientation, rad.
     pub rotation_rad: f64,
-    /// What the stated covariances are multiplied by: less than one where they are larger than what was seen.
+    /// What the stated covariances are multiplied by: one, where the residuals do not clearly say otherwise.
     pub stated: f64,
 }
 

@@ -3,11 +3,11 @@
 //! In: a robust fit. Out: the rows that are gross errors. A row far from all others pulls the fit towards itself, and a fit that lets it
 //! go may leave it by more than its own error: the variance of the prediction counts as well as the row's own ("deletion residuals":
 //! Cook and Weisberg, "Residuals and influence in regression", 1982). A row goes back
-//! where the others predict it: within half of the standard deviations that it was left out for.
+//! where the others predict it: within two thirds of the standard deviations that it was left out for, their size that of the other rows' residuals.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::robust::Robust;
+use super::robust::{LEAST_FREEDOM, Robust};
 use super::scatter::as_one_number;
 use crate::identify::residuals::eliminate::{product, pseudo_inverse};
 
@@ -15,7 +15,7 @@ use crate::identify::residuals::eliminate::{product, pseudo_inverse};
 const UNHEARD: f64 = 1e-5;
 
 /// Share of the standard deviations that a row is left out for, within which it goes back.
-const GOES_BACK: f64 = 0.5;
+const GOES_BACK: f64 = 2.0 / 3.0;
 
 /// Times that rows may go back.
 const ROUNDS: usize = 4;
@@ -46,7 +46,8 @@ impl Robust<'_> {
         out
     }
 
-    /// Sizes of these rows' residuals, as of one normal number, with the variance of what the others predict.
+    /// Sizes of these rows' residuals, as of one normal number and in standard deviations of the others, with the variance of what the others
+    /// predict.
     fn deleted(&self, out: &[usize]) -> Vec<f64> {
         let (rows, offsets, mut normal) = self.linearised();
         let (of_robot, extras) = rows.split(&offsets);
@@ -61,6 +62,15 @@ impl Robust<'_> {
             parts.push((block.row_poses(), linear, own, jacobian));
         }
         let covariance = pseudo_inverse(normal);
+        let (mut squares, mut numbers, mut unknowns) = (0.0, 0usize, offsets.len());
+        for (poses, linear, own, _) in &parts {
+            let kept = |i: &usize| poses[*i].is_some_and(|p| !out.contains(&rows.rows[p]));
+            squares += (0..poses.len()).filter(kept).map(|i| linear.residuals[i].powi(2)).sum::<f64>();
+            numbers += (0..poses.len()).filter(kept).count();
+            unknowns += own.nrows();
+        }
+        let freedom = numbers.saturating_sub(unknowns).max(numbers.div_ceil(LEAST_FREEDOM)).max(1);
+        let scale = (squares / freedom as f64).sqrt().max(f64::MIN_POSITIVE);
         let mut sizes = vec![0.0; out.len()];
         for (poses, linear, own, jacobian) in &parts {
             for (size, &row) in sizes.iter_mut().zip(out) {
@@ -74,7 +84,7 @@ impl Robust<'_> {
                     let square = residual.dot(&total.solve(&residual));
                     let square =
                         if at.len() == 1 { square } else { as_one_number(square * 3.0 / at.len().max(1) as f64) };
-                    *size = f64::max(*size, square.sqrt() / self.scale);
+                    *size = f64::max(*size, square.sqrt() / scale);
                 }
             }
         }

@@ -8,13 +8,12 @@ use std::borrow::Cow;
 use nalgebra::DMatrix;
 
 use super::fit::Fit;
-use super::scatter::{LEAST_MM, median_size, sizes};
+use super::scatter::{Residual, median_size, robust_scatter, sizes};
 use super::task::{FIRST_SCATTER_MM, Task, prior_rows};
 use super::trust_region;
 use crate::identify::Error;
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::Tolerance;
-use crate::identify::residuals::eliminate::Raw;
 use crate::identify::residuals::rows::{Recipe, Rows};
 use crate::identify::residuals::weights::Scatter;
 use crate::robot::Robot;
@@ -26,11 +25,14 @@ const BOUNDED_ROUNDS: usize = 8;
 /// Steps of the trust region between two estimates of weights.
 const STEPS_A_ROUND: usize = 2;
 
+/// The factor of the stated covariances is looked for every so many rounds.
+const ROUNDS_A_FACTOR: usize = 4;
+
 /// Tukey's constant, in standard deviations: 95 % efficient for one normal number.
 const BIWEIGHT: f64 = 4.685;
 
 /// At least one number in so many counts as a degree of freedom, however many parameters there are: the prior holds them.
-const LEAST_FREEDOM: usize = 4;
+pub(super) const LEAST_FREEDOM: usize = 4;
 
 impl<'a> Task<'a> {
     /// A fit that gross errors cannot get past, from the nominal robot. The scale that a residual is held against follows the median
@@ -50,27 +52,27 @@ impl<'a> Task<'a> {
             weights: Vec::new(),
             scores: Vec::new(),
             scatter,
-            scale: 1.0,
             base,
         };
         let bounded = if loss == Loss::Biweight { BOUNDED_ROUNDS } else { ROBUST_ROUNDS };
         let mut scale = 1.0;
         for round in 0..ROBUST_ROUNDS {
             let probe = self.recipe(scatter, &weights, &robust.robot);
-            let raw = Rows::new(&probe).raw(&robust.offsets);
+            let residuals = Residual::all(&Rows::new(&probe).raw(&robust.offsets));
             let count = self.set.poses.len();
             if round <= bounded {
-                let freedom = robust.freedom(&raw, &rows);
-                scatter = rescaled(&raw, self.rows, count, scatter, freedom);
-                scale = (median_size(&sizes(&raw, &scatter, count), self.rows) * freedom).max(1e-12);
+                let freedom = robust.freedom(&residuals, &rows);
+                let both = round > 0 && round % ROUNDS_A_FACTOR == 0;
+                scatter = robust_scatter(&residuals, self.rows, count, freedom, scatter, both);
+                scale = (median_size(&sizes(&residuals, &scatter, count), self.rows) * freedom).max(1e-12);
             }
-            let mut scores = sizes(&raw, &scatter, count);
+            let mut scores = sizes(&residuals, &scatter, count);
             for &row in self.rows {
                 scores[row] /= scale;
                 let u = scores[row];
                 weights[row] = if round >= bounded { biweight(u) } else { (1.0 / u.max(1.0)).sqrt() };
             }
-            robust = Robust { scores, scatter, scale, weights: weights.clone(), ..robust };
+            robust = Robust { scores, scatter, weights: weights.clone(), ..robust };
             robust.step(STEPS_A_ROUND);
         }
         Ok(robust)
@@ -102,8 +104,6 @@ pub struct Robust<'a> {
     pub robot: Robot,
     /// Robust scatter.
     pub scatter: Scatter,
-    /// Robust standard deviation of white residuals: one, or less where the stated covariances are too large.
-    pub(super) scale: f64,
 }
 
 /// The prior of robust fits, where its size is not yet known from the data.
@@ -134,8 +134,8 @@ impl Robust<'_> {
     }
 
     /// What residuals that were fitted have lost: root of numbers over degrees of freedom.
-    fn freedom(&self, raw: &[(usize, f64, Raw)], rows: &Rows) -> f64 {
-        let numbers: usize = raw.iter().map(|(_, _, r)| if matches!(r, Raw::Length(..)) { 1 } else { 3 }).sum();
+    fn freedom(&self, residuals: &[Residual], rows: &Rows) -> f64 {
+        let numbers: usize = residuals.iter().map(Residual::count).sum();
         let left = rows.count().saturating_sub(self.x.len()).max(numbers.div_ceil(LEAST_FREEDOM));
         (numbers as f64 / left.max(1) as f64).sqrt()
     }
@@ -154,21 +154,6 @@ impl Robust<'_> {
         }
         (rows, self.offsets.clone(), prior)
     }
-}
-
-/// The scatter at which the median residual of these rows has the size that it should have, `freedom` times what the fit left.
-fn rescaled(raw: &[(usize, f64, Raw)], rows: &[usize], count: usize, before: Scatter, freedom: f64) -> Scatter {
-    let mut scatter = Scatter { stated: 1.0, ..before };
-    let (mut low, mut high) = (LEAST_MM, 1e5);
-    for _ in 0..40 {
-        scatter.point_mm = f64::sqrt(low * high);
-        if freedom * median_size(&sizes(raw, &scatter, count), rows) > 1.0 {
-            low = scatter.point_mm
-        } else {
-            high = scatter.point_mm
-        }
-    }
-    scatter
 }
 
 /// Root of Tukey's weight for a residual of `u` robust standard deviations.

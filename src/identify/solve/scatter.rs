@@ -1,37 +1,103 @@
 //! How large residuals are: the size of a row as that of one normal number, and the scatter that explains them.
 //!
-//! In: residuals before whitening. Out: sizes of rows, their robust standard deviation, the scatter at which the white sum of squares
-//! equals the degrees of freedom.
+//! In: residuals before whitening. Out: sizes of rows, their robust standard deviation, and the scatter at which the white sum of squares
+//! equals the degrees of freedom. The covariance of a row is `stated * C + point^2 I`, C the one of the file. Of all pairs with the
+//! right sum of squares the one of least determinant is the most probable; where the data do not tell the two apart, C is taken at
+//! its word.
 
 use crate::identify::residuals::eliminate::Raw;
 use crate::identify::residuals::rows::Rows;
-use crate::identify::residuals::weights::Scatter;
+use crate::identify::residuals::weights::{EVIDENCE, Scatter};
 
 /// Least scatter, mm and rad: far below any instrument; keeps weights finite for exact data.
 pub(super) const LEAST_MM: f64 = 1e-7;
 const LEAST_RAD: f64 = 1e-10;
 
+/// Largest scatter, mm.
+const LARGEST_MM: f64 = 1e5;
+
+/// Factors of the stated covariances that are tried.
+const STATED: [f64; 10] = [1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3, 3.0, 10.0, 30.0, 100.0];
+
 /// Stated covariances count as too large where the residuals ask for less than this share of them.
 const OVERSTATED: f64 = 0.7;
 
-/// White size of each row's residual, brought to the size of one normal number; zero for rows without one.
-pub fn sizes(raw: &[(usize, f64, Raw)], scatter: &Scatter, count: usize) -> Vec<f64> {
-    let mut squares = vec![0.0; count];
-    for (row, _, raw) in raw {
-        let square = match raw {
-            Raw::Length(r, variance, times) => {
-                r * r / (variance * scatter.stated + times * scatter.point_mm * scatter.point_mm)
-            }
-            Raw::Point(r, covariance) => as_one_number(whitened(r, covariance, scatter)),
-            Raw::Turn(_) => continue,
-        };
-        squares[*row] = f64::max(squares[*row], square);
-    }
-    squares.into_iter().map(f64::sqrt).collect()
+/// Halvings of the range of scatters, in its logarithm.
+const HALVINGS: usize = 40;
+
+/// One number of a residual, along an axis of its covariance.
+#[derive(Debug, Clone, Copy, Default)]
+struct Number {
+    square: f64,
+    variance: f64,
+    /// How many times the scatter enters.
+    times: f64,
 }
 
-fn whitened(r: &nalgebra::Vector3<f64>, covariance: &nalgebra::Matrix3<f64>, scatter: &Scatter) -> f64 {
-    scatter.total(covariance).cholesky().map_or(f64::INFINITY, |c| r.dot(&c.solve(r)))
+/// The residual of a row: a length, or a point along the axes of its covariance.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Residual {
+    row: usize,
+    weight: f64,
+    numbers: [Number; 3],
+    count: usize,
+}
+
+impl Number {
+    fn variance(&self, scatter: &Scatter) -> f64 {
+        self.variance * scatter.stated + self.times * scatter.point_mm * scatter.point_mm
+    }
+}
+
+impl Residual {
+    /// Of all rows; orientations are left out.
+    pub(super) fn all(raw: &[(usize, f64, Raw)]) -> Vec<Residual> {
+        raw.iter().filter_map(|(row, weight, raw)| Residual::new(*row, *weight, raw)).collect()
+    }
+
+    fn new(row: usize, weight: f64, raw: &Raw) -> Option<Residual> {
+        let mut numbers = [Number::default(); 3];
+        let count = match raw {
+            Raw::Length(r, variance, times) => {
+                numbers[0] = Number { square: r * r, variance: *variance, times: *times };
+                1
+            }
+            Raw::Point(r, covariance) => {
+                let eigen = covariance.symmetric_eigen();
+                for (k, number) in numbers.iter_mut().enumerate() {
+                    let square = eigen.eigenvectors.column(k).dot(r).powi(2);
+                    *number = Number { square, variance: eigen.eigenvalues[k].max(0.0), times: 1.0 };
+                }
+                3
+            }
+            Raw::Turn(_) => return None,
+        };
+        Some(Residual { row, weight, numbers, count })
+    }
+
+    /// Numbers that it has.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    fn numbers(&self) -> &[Number] {
+        &self.numbers[..self.count]
+    }
+
+    fn white_square(&self, scatter: &Scatter) -> f64 {
+        self.numbers().iter().map(|n| n.square / n.variance(scatter)).sum()
+    }
+}
+
+/// White size of each row's residual, brought to the size of one normal number; zero for rows without one.
+pub(super) fn sizes(residuals: &[Residual], scatter: &Scatter, count: usize) -> Vec<f64> {
+    let mut squares = vec![0.0; count];
+    for residual in residuals {
+        let white = residual.white_square(scatter);
+        let square = if residual.count == 1 { white } else { as_one_number(white) };
+        squares[residual.row] = f64::max(squares[residual.row], square);
+    }
+    squares.into_iter().map(f64::sqrt).collect()
 }
 
 /// A chi-squared of three degrees of freedom as one of a single degree that is exceeded as often (Wilson and Hilferty, 1931).
@@ -43,50 +109,126 @@ pub(super) fn as_one_number(square: f64) -> f64 {
 }
 
 /// Robust standard deviation of the sizes of these rows: their median over that of a normal number's absolute value.
-pub fn median_size(sizes: &[f64], rows: &[usize]) -> f64 {
-    let mut sorted: Vec<f64> = rows.iter().map(|&r| sizes[r]).filter(|s| *s > 0.0).collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0) / 0.6745
+pub(super) fn median_size(sizes: &[f64], rows: &[usize]) -> f64 {
+    let mut list: Vec<f64> = rows.iter().map(|&r| sizes[r]).filter(|s| *s > 0.0).collect();
+    if list.is_empty() {
+        return 0.0;
+    }
+    let middle = list.len() / 2;
+    *list.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745
 }
 
-/// The scatter at which the white sum of squares equals the degrees of freedom (Pearson's equation); for points and orientations
-/// apart. Covariances that are larger than what was seen are taken down.
+/// The scatter at which the median residual of these rows has the size that it should have, `freedom` times what the fit left. With
+/// `both` the factor of the stated covariances is looked for as well.
+pub(super) fn robust_scatter(
+    residuals: &[Residual],
+    rows: &[usize],
+    count: usize,
+    freedom: f64,
+    before: Scatter,
+    both: bool,
+) -> Scatter {
+    let excess = |scatter: &Scatter| (freedom * median_size(&sizes(residuals, scatter, count), rows)).powi(2) - 1.0;
+    match both {
+        true => most_probable(residuals, before, &excess),
+        false => with_point(before, &excess),
+    }
+}
+
+/// The scatter at which the white sum of squares equals the degrees of freedom (Pearson's equation); for points and orientations apart.
 pub(super) fn estimate_scatter(rows: &Rows, offsets: &[f64], effective: f64, before: Scatter) -> Scatter {
     let raw = rows.raw(offsets);
     let turns: Vec<f64> =
         raw.iter().filter_map(|(_, _, r)| if let Raw::Turn(t) = r { Some(t.norm_squared()) } else { None }).collect();
-    let total: f64 = raw.iter().map(|(_, _, r)| if matches!(r, Raw::Length(..)) { 1.0 } else { 3.0 }).sum();
+    let residuals = Residual::all(&raw);
+    let of_points: f64 = residuals.iter().map(|r| r.count as f64).sum();
+    let total = of_points + 3.0 * turns.len() as f64;
     // Each number loses the same share to parameters and placements.
     let share = ((rows.count() as f64 - effective) / total.max(1.0)).max(1.0 / total.max(1.0));
-    let sum = |scatter: &Scatter| -> f64 {
-        raw.iter()
-            .map(|(_, w, raw)| match raw {
-                Raw::Length(r, variance, times) => {
-                    w * w * r * r / (variance * scatter.stated + times * scatter.point_mm * scatter.point_mm)
-                }
-                Raw::Point(r, covariance) => w * w * whitened(r, covariance, scatter),
-                Raw::Turn(_) => 0.0,
-            })
-            .sum()
-    };
-    let wanted = share * (total - 3.0 * turns.len() as f64);
     let turn_square = turns.iter().sum::<f64>() / (3.0 * share * turns.len().max(1) as f64);
-    let mut scatter = Scatter {
-        point_mm: LEAST_MM,
-        rotation_rad: if turns.is_empty() { before.rotation_rad } else { turn_square.sqrt().max(LEAST_RAD) },
-        stated: 1.0,
+    let rotation_rad = if turns.is_empty() { before.rotation_rad } else { turn_square.sqrt().max(LEAST_RAD) };
+    let wanted = share * of_points;
+    let excess = |scatter: &Scatter| {
+        let sum: f64 = residuals.iter().map(|r| r.weight * r.weight * r.white_square(scatter)).sum();
+        sum / wanted.max(f64::MIN_POSITIVE) - 1.0
     };
-    let least = sum(&scatter);
-    if least <= wanted {
-        if least < OVERSTATED * wanted {
-            scatter.stated = (least / wanted).max(1e-12);
-        }
-        return scatter;
-    }
-    let (mut low, mut high) = (LEAST_MM, 1e5);
-    for _ in 0..80 {
+    Scatter { rotation_rad, ..most_probable(&residuals, before, &excess) }
+}
+
+/// The scatter of a coordinate at which nothing is in excess, the factor of the stated covariances held.
+fn with_point(before: Scatter, excess: &dyn Fn(&Scatter) -> f64) -> Scatter {
+    let mut scatter = before;
+    let (mut low, mut high) = (LEAST_MM, LARGEST_MM);
+    for _ in 0..HALVINGS {
         scatter.point_mm = f64::sqrt(low * high);
-        if sum(&scatter) > wanted { low = scatter.point_mm } else { high = scatter.point_mm }
+        if excess(&scatter) > 0.0 { low = scatter.point_mm } else { high = scatter.point_mm }
     }
     scatter
+}
+
+/// Of the pairs of factor and scatter that leave nothing in excess the one of least determinant, where it is clearly less than that of
+/// covariances taken at their word.
+fn most_probable(residuals: &[Residual], before: Scatter, excess: &dyn Fn(&Scatter) -> f64) -> Scatter {
+    let at = |stated: f64| Scatter { point_mm: LEAST_MM, stated, ..before };
+    if residuals.iter().all(|r| r.numbers().iter().all(|n| n.variance <= 0.0)) {
+        return with_point(at(1.0), excess);
+    }
+    let half_log_determinant = |scatter: &Scatter| -> f64 {
+        residuals.iter().flat_map(|r| r.numbers()).map(|n| 0.5 * n.variance(scatter).ln()).sum()
+    };
+    let word = match excess(&at(1.0)) {
+        above if above > 0.0 => with_point(at(1.0), excess),
+        above if above < OVERSTATED - 1.0 => at((1.0 + above).max(1e-12)),
+        _ => at(1.0),
+    };
+    let tried = STATED.iter().filter(|s| excess(&at(**s)) > 0.0).map(|&s| with_point(at(s), excess));
+    let best = tried.map(|s| (half_log_determinant(&s), s)).min_by(|a, b| a.0.total_cmp(&b.0));
+    match best {
+        Some((least, scatter)) if least < half_log_determinant(&word) - EVIDENCE => scatter,
+        _ => word,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Vector3};
+
+    /// Residuals of unit directions in turn, as large as `sd` of the stated standard deviations along x, y, z.
+    fn points(stated: Vector3<f64>, sd: Vector3<f64>) -> Vec<Residual> {
+        let raw: Vec<(usize, f64, Raw)> = (0..60)
+            .map(|i| {
+                let sign = |k: usize| if (i >> k) & 1 == 0 { 1.0 } else { -1.0 };
+                let r = Vector3::new(sign(0) * sd.x, sign(1) * sd.y, sign(2) * sd.z);
+                (i, 1.0, Raw::Point(r, Matrix3::from_diagonal(&stated.component_mul(&stated))))
+            })
+            .collect();
+        Residual::all(&raw)
+    }
+
+    fn found(residuals: &[Residual]) -> Scatter {
+        let wanted = 3.0 * residuals.len() as f64;
+        let excess = |s: &Scatter| residuals.iter().map(|r| r.white_square(s)).sum::<f64>() / wanted - 1.0;
+        most_probable(residuals, Scatter::of_point(1.0), &excess)
+    }
+
+    #[test]
+    fn covariances_that_are_right_are_taken_at_their_word() {
+        let sd = Vector3::new(0.05, 0.04, 0.3);
+        let scatter = found(&points(sd, sd));
+        assert_eq!(scatter.stated, 1.0);
+    }
+
+    #[test]
+    fn covariances_too_small_by_one_factor_are_multiplied() {
+        let sd = Vector3::new(0.05, 0.04, 0.3);
+        let scatter = found(&points(sd, 3.2 * sd));
+        assert!((3.0..=10.5).contains(&scatter.stated) && scatter.point_mm < 0.1, "{scatter:?}");
+    }
+
+    #[test]
+    fn scatter_alike_in_all_directions_is_not_the_instruments() {
+        let scatter = found(&points(Vector3::new(0.006, 0.004, 0.001), Vector3::repeat(0.006)));
+        assert!(scatter.stated <= 0.1 && (scatter.point_mm - 0.006).abs() < 1e-3, "{scatter:?}");
+    }
 }
