@@ -196,7 +196,7 @@ mod tests {
 
     /// Residuals of unit directions in turn, as large as `sd` of the stated standard deviations along x, y, z.
     fn points(stated: Vector3<f64>, sd: Vector3<f64>) -> Vec<Residual> {
-        let raw: Vec<(usize, f64, Raw)> = (0..60)
+        let raw: Vec<(usize, f64, Raw)> = (0..200)
             .map(|i| {
                 let sign = |k: usize| if (i >> k) & 1 == 0 { 1.0 } else { -1.0 };
                 let r = Vector3::new(sign(0) * sd.x, sign(1) * sd.y, sign(2) * sd.z);

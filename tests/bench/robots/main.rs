@@ -1,12 +1,14 @@
 //! Benchmark of the identification on robots: the real sets where they are, and simulated arms whose truth is known.
 //!
-//! `cargo bench --bench robots` prints both; `-- real` and `-- simulated [RUNS]` one of them.
+//! `cargo bench --bench robots` prints all; `-- real`, `-- simulated [RUNS]`, `-- faults [RUNS]` and `-- speed` one of them.
 #![allow(clippy::print_stdout, reason = "a benchmark says what it measured")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a benchmark that cannot run has nothing to say")]
 #![allow(clippy::disallowed_methods, reason = "a benchmark looks at the clock")]
 
+mod faults;
 mod real;
 mod simulated;
+mod speed;
 mod worlds;
 
 /// Runs of every simulated case.
@@ -15,12 +17,18 @@ const RUNS: u64 = 20;
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let runs = arguments.get(1).and_then(|n| n.parse().ok()).unwrap_or(RUNS);
-    match arguments.first().map(String::as_str) {
-        Some("real") => real::table(),
-        Some("simulated") => simulated::table(runs),
-        _ => {
-            real::table();
-            simulated::table(runs);
-        }
+    let wanted = arguments.first().map(String::as_str);
+    let asked = |name: &str| wanted.is_none_or(|w| w == name);
+    if asked("real") {
+        real::table();
+    }
+    if asked("simulated") {
+        simulated::table(runs);
+    }
+    if asked("faults") {
+        faults::table(runs);
+    }
+    if asked("speed") {
+        speed::table();
     }
 }

@@ -1,75 +1,127 @@
-//! Simulated arms: is the promised accuracy the realised one, and is the result ever worse than nominal?
+//! Simulated arms: do intervals hold, is the promised accuracy the realised one, and is the result ever worse than nominal?
 
+use rayon::prelude::*;
 use stereocal::identify::Settings;
 use stereocal::identify::data::dataset::{Dataset, Reading};
-use stereocal::identify::judge::choose::identify;
+use stereocal::identify::judge::choose::{Identification, identify};
 use stereocal::identify::judge::errors::Judge;
 use stereocal::identify::model::uncertainty::Expected;
 use stereocal::identify::settings::Method;
 use stereocal::robot::Robot;
 
-use crate::worlds::{Plan, arms, measured};
+use crate::worlds::{Beyond, Plan, arms, measured};
+
+/// Normal numbers lie within so many standard deviations in 95 of 100 cases.
+const SIGMAS: f64 = 1.96;
 
 /// One line a case.
 pub fn table(runs: u64) {
+    println!("\npoint errors against the truth, mm, over {runs} runs a line, and how far the promises hold");
     println!(
-        "\npoint errors against the truth, mm, over {runs} runs: nominal, identified, promised / realised, worse than nominal, than 1.1 times nominal"
+        "{:12} {:26} {:>8} {:>8} {:>9} {:>9} {:>9} {:>6} {:>6} {:>8}",
+        "", "", "nominal", "found", "promised", "95 % par", "95 % pts", "worse", "1.1x", "refused"
     );
+    let few = Plan { noise_mm: 0.1, error_mm: 0.3, error_mrad: 0.3, ..Plan::default() };
+    let perfect = Plan { error_mm: 0.0, error_mrad: 0.0, ..few };
     for (name, nominal) in arms() {
         for (what, plan) in [
-            ("60 poses", Plan { samples: 60, verify: 100, noise_mm: 0.02, error_mm: 0.5, error_mrad: 1.0 }),
-            ("20 poses, 0.1 mm", Plan { samples: 20, verify: 100, noise_mm: 0.1, error_mm: 0.3, error_mrad: 0.3 }),
-            ("8 poses, 0.1 mm", Plan { samples: 8, verify: 100, noise_mm: 0.1, error_mm: 0.3, error_mrad: 0.3 }),
-            (
-                "20 poses, perfect robot",
-                Plan { samples: 20, verify: 100, noise_mm: 0.1, error_mm: 0.0, error_mrad: 0.0 },
-            ),
-            (
-                "12 poses, perfect robot",
-                Plan { samples: 12, verify: 100, noise_mm: 0.1, error_mm: 0.0, error_mrad: 0.0 },
-            ),
+            ("60 poses", Plan::default()),
+            ("60 poses, gravity", Plan { beyond: Beyond::Gravity, ..Plan::default() }),
+            ("60 poses, harmonics", Plan { beyond: Beyond::Harmonics, ..Plan::default() }),
+            ("60 poses, 4 placements off", Plan { groups: 4, beyond: Beyond::Common, ..Plan::default() }),
+            ("20 poses, 0.1 mm", Plan { samples: 20, ..few }),
+            ("12 poses, 0.1 mm", Plan { samples: 12, ..few }),
+            ("8 poses, 0.1 mm", Plan { samples: 8, ..few }),
+            ("20 poses, perfect robot", Plan { samples: 20, ..perfect }),
+            ("12 poses, perfect robot", Plan { samples: 12, ..perfect }),
+            ("8 poses, perfect robot", Plan { samples: 8, ..perfect }),
         ] {
             line(name, what, &nominal, plan, runs);
         }
     }
 }
 
+/// What one run says.
+#[derive(Debug, Default, Clone, Copy)]
+struct Outcome {
+    errors_mm: [f64; 2],
+    promised_mm: Option<f64>,
+    parameters: [usize; 2],
+    points: [usize; 2],
+}
+
 fn line(name: &str, what: &str, nominal: &Robot, plan: Plan, runs: u64) {
-    let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
-    let (mut before, mut after, mut ratio, mut promised) = (0.0, 0.0, 0.0, 0);
-    let (mut worse, mut much_worse, mut refused) = (0, 0, 0);
-    for seed in 1..=runs {
-        let (nominal, truth, rows) = measured(nominal, plan, seed);
-        let set = Dataset::new(&rows, 1).expect("rows");
-        let Ok(found) = identify(&set, &nominal, &settings, 1, &|_| {}) else {
-            refused += 1;
-            continue;
-        };
-        let robot = &found.candidates[found.chosen].robot;
-        let errors = [&nominal, robot].map(|robot| against_truth(&set, &truth, robot));
-        before += errors[0];
-        after += errors[1];
-        worse += usize::from(errors[1] > errors[0] * (1.0 + 1e-9));
-        much_worse += usize::from(errors[1] > 1.1 * errors[0]);
-        if let Some((formulation, _)) = &found.candidates[found.chosen].found {
-            let expected = Expected::new(formulation, &set, &found.fitted);
-            ratio += expected.of_robot_mm / errors[1];
-            promised += 1;
-        }
-    }
-    let done = (runs as usize - refused).max(1) as f64;
+    let outcomes: Vec<Option<Outcome>> = (1..=runs).into_par_iter().map(|seed| outcome(nominal, plan, seed)).collect();
+    let done: Vec<Outcome> = outcomes.iter().flatten().copied().collect();
+    let mean = |of: &dyn Fn(&Outcome) -> f64| done.iter().map(of).sum::<f64>() / done.len().max(1) as f64;
+    let share = |of: &dyn Fn(&Outcome) -> [usize; 2]| {
+        let sums = done.iter().map(of).fold([0, 0], |s, c| [s[0] + c[0], s[1] + c[1]]);
+        if sums[1] == 0 { "n/a".to_owned() } else { format!("{:.1}", 100.0 * sums[0] as f64 / sums[1] as f64) }
+    };
+    let promised: Vec<&Outcome> = done.iter().filter(|o| o.promised_mm.is_some()).collect();
+    let realised: f64 = promised.iter().map(|o| o.errors_mm[1]).sum();
+    let ratio = promised.iter().filter_map(|o| o.promised_mm).sum::<f64>() / realised;
+    let worse = |by: f64| done.iter().filter(|o| o.errors_mm[1] > o.errors_mm[0] * by * (1.0 + 1e-9)).count();
     println!(
-        "{name:12} {what:26} {:8.4} {:8.4} {:8.2} {worse:4} {much_worse:4}  refused {refused}",
-        before / done,
-        after / done,
-        ratio / f64::from(promised.max(1)),
+        "{name:12} {what:26} {:8.4} {:8.4} {ratio:9.2} {:>9} {:>9} {:6} {:6} {:8}",
+        mean(&|o| o.errors_mm[0]),
+        mean(&|o| o.errors_mm[1]),
+        share(&|o| o.parameters),
+        share(&|o| o.points),
+        worse(1.0),
+        worse(1.1),
+        outcomes.len() - done.len(),
     );
 }
 
+fn outcome(nominal: &Robot, plan: Plan, seed: u64) -> Option<Outcome> {
+    let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+    let (nominal, truth, rows) = measured(nominal, plan, seed);
+    let set = Dataset::new(&rows, 1).expect("rows");
+    let found = identify(&set, &nominal, &settings, 1, &|_| {}).ok()?;
+    let robot = &found.candidates[found.chosen].robot;
+    let errors_mm = [&nominal, robot].map(|robot| against_truth(&set, &truth, robot));
+    let mut outcome = Outcome { errors_mm, ..Outcome::default() };
+    if let Some((formulation, _)) = &found.candidates[found.chosen].found {
+        let expected = Expected::new(formulation, &set, &found.fitted);
+        outcome.promised_mm = Some(expected.of_robot_mm);
+        let verify = set.verify_rows();
+        let errors = Judge::plain(&set, &found.fitted, true).errors(robot, &verify);
+        let sizes: Vec<f64> = errors.iter().filter_map(|e| e.point_mm).map(|p| p.norm()).collect();
+        outcome.points = [sizes.iter().filter(|s| **s <= expected.p95_mm).count(), sizes.len()];
+        outcome.parameters = intervals(&found, &nominal, &truth);
+    }
+    Some(outcome)
+}
+
+/// How many base parameters of the chosen fit have the truth in their interval, and how many there are; none where the truth has
+/// parameters that the model lacks.
+fn intervals(found: &Identification, nominal: &Robot, truth: &Robot) -> [usize; 2] {
+    let Some((formulation, _)) = &found.candidates[found.chosen].found else { return [0, 0] };
+    let (parameters, base) = (formulation.parameters(), &formulation.base);
+    let offset = |i: usize| truth.value(parameters[i]) - nominal.value(parameters[i]);
+    let all: Vec<f64> = (0..parameters.len()).map(offset).collect();
+    let lacks = |p: &stereocal::robot::Parameter| {
+        !parameters.contains(p) && (truth.value(*p) - nominal.value(*p)).abs() > 1e-12
+    };
+    let beyond = [nominal.mdh_parameters(), nominal.gravity_parameters(true), nominal.harmonic_parameters(2)].concat();
+    if beyond.iter().any(lacks) {
+        return [0, 0];
+    }
+    let covariance = formulation.covariance();
+    let holds = |k: &usize| {
+        let others = (0..base.dependent.len()).map(|c| base.coefficients[(*k, c)] * all[base.dependent[c]]);
+        let is = all[base.free[*k]] + others.sum::<f64>();
+        (formulation.free_fit.x[*k] - is).abs() <= SIGMAS * covariance[(*k, *k)].sqrt()
+    };
+    [(0..base.rank()).filter(holds).count(), base.rank()]
+}
+
 /// Mean error of points at the verify rows with no noise, after one rigid fit of the robot to the truth at all of them.
-fn against_truth(set: &Dataset, truth: &Robot, robot: &Robot) -> f64 {
+pub fn against_truth(set: &Dataset, truth: &Robot, robot: &Robot) -> f64 {
     let mut exact = set.clone();
     for pose in &mut exact.poses {
+        pose.group = 0;
         if let Reading::Position { point_mm, .. } = &mut pose.reading {
             *point_mm = truth.target_mm(&pose.joints_rad);
         }

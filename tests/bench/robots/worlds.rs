@@ -5,11 +5,28 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use stereocal::geometry::Transform;
 use stereocal::measurements::{Measurement, Observed, RobotPose, Role};
-use stereocal::robot::{Joint, Robot};
+use stereocal::robot::{Joint, Parameter, Robot, Unit};
+
+/// What the truth has beyond MDH, or the readings beyond white noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Beyond {
+    /// Nothing.
+    Nothing,
+    /// Joints that give way under the arm's weight.
+    Gravity,
+    /// Errors once and twice a turn.
+    Harmonics,
+    /// A smooth error of 0.03 mm common to a placement.
+    Common,
+}
 
 /// What a simulated robot is measured with.
 #[derive(Debug, Clone, Copy)]
 pub struct Plan {
+    /// Placements of the sensor.
+    pub groups: usize,
+    /// What the model lacks.
+    pub beyond: Beyond,
     /// Poses to fit.
     pub samples: usize,
     /// Poses to verify.
@@ -20,6 +37,21 @@ pub struct Plan {
     pub error_mm: f64,
     /// Standard deviation of the truth's angles, mrad.
     pub error_mrad: f64,
+}
+
+impl Default for Plan {
+    /// 60 poses of one placement, a robot as it leaves the factory, a good tracker.
+    fn default() -> Plan {
+        Plan {
+            groups: 1,
+            beyond: Beyond::Nothing,
+            samples: 60,
+            verify: 100,
+            noise_mm: 0.02,
+            error_mm: 0.5,
+            error_mrad: 1.0,
+        }
+    }
 }
 
 /// Names and nominal robots.
@@ -77,34 +109,54 @@ fn scara() -> Robot {
     robot
 }
 
-/// A truth, and rows measured in one placement of a tracker.
+/// A nominal robot, a truth, and the rows that a tracker would read.
 pub fn measured(nominal: &Robot, plan: Plan, seed: u64) -> (Robot, Robot, Vec<Measurement>) {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut nominal = nominal.clone();
     nominal.tool_mm = Vector3::new(30.0, -20.0, 60.0);
-    let parameters = nominal.mdh_parameters();
-    let errors: Vec<f64> = parameters
-        .iter()
-        .map(|p| normal(&mut random) * if p.unit().name() == "mm" { plan.error_mm } else { plan.error_mrad })
-        .collect();
-    let truth = nominal.shifted(&parameters, &errors);
-    let sensor = Transform::from_parts(
-        Vector3::new(1200.0, -700.0, 400.0).into(),
-        UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -0.8, 1.9)),
-    );
+    let truth = truth(&nominal, plan, &mut random);
     let rows = (0..plan.samples + plan.verify)
         .map(|i| {
             let joints: Vec<f64> = truth.joints.iter().map(|j| drawn(j, &mut random)).collect();
             let noise = Vector3::from_fn(|_, _| plan.noise_mm * normal(&mut random));
-            let point_mm: Point3<f64> = sensor * truth.target_mm(&joints) + noise;
+            let group = i % plan.groups;
+            let seen: Point3<f64> = sensor(group) * truth.target_mm(&joints);
+            let common = match plan.beyond {
+                Beyond::Common => seen.coords.map(|c| 0.03 * (c / 300.0 + group as f64).sin()),
+                _ => Vector3::zeros(),
+            };
             let slides: Vec<bool> = truth.joints.iter().map(|j| j.slides).collect();
             let joints_deg = joints.iter().zip(&slides).map(|(q, s)| if *s { *q } else { q.to_degrees() }).collect();
             let role = if i < plan.samples { Role::Sample } else { Role::Verify };
-            let at = RobotPose { pose: format!("p{i}"), group: "g".to_owned(), role, joints_deg, slides };
+            let at = RobotPose { pose: format!("p{i}"), group: format!("g{group}"), role, joints_deg, slides };
+            let point_mm = seen + common + noise;
             Measurement { at, observed: Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None } }
         })
         .collect();
     (nominal, truth, rows)
+}
+
+fn truth(nominal: &Robot, plan: Plan, random: &mut Pcg64Mcg) -> Robot {
+    let mut parameters = nominal.mdh_parameters();
+    let size = |p: &Parameter| if p.unit() == Unit::Mm { plan.error_mm } else { plan.error_mrad };
+    let mut errors: Vec<f64> = parameters.iter().map(|p| normal(random) * size(p)).collect();
+    let more = match plan.beyond {
+        Beyond::Gravity => nominal.gravity_parameters(false),
+        Beyond::Harmonics => nominal.harmonic_parameters(2),
+        Beyond::Nothing | Beyond::Common => Vec::new(),
+    };
+    let size = if plan.beyond == Beyond::Gravity { 1.0 } else { 0.3 };
+    errors.extend(more.iter().map(|_| size * normal(random)));
+    parameters.extend(more);
+    nominal.shifted(&parameters, &errors)
+}
+
+fn sensor(group: usize) -> Transform {
+    let turn = 0.7 * group as f64;
+    Transform::from_parts(
+        Vector3::new(1200.0 * turn.cos(), -700.0 + 300.0 * turn.sin(), 400.0).into(),
+        UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -0.8 + turn, 1.9)),
+    )
 }
 
 fn drawn(joint: &Joint, random: &mut Pcg64Mcg) -> f64 {
@@ -112,7 +164,7 @@ fn drawn(joint: &Joint, random: &mut Pcg64Mcg) -> f64 {
     if joint.slides { 100.0 + 80.0 * u } else { 1.6 * u }
 }
 
-fn normal(random: &mut Pcg64Mcg) -> f64 {
+pub fn normal(random: &mut Pcg64Mcg) -> f64 {
     let (u, v): (f64, f64) = (random.random(), random.random());
     (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
