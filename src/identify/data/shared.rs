@@ -43,12 +43,18 @@ struct PoseSensitivity {
     sensitivity: Vec<Vec<f64>>,
 }
 
+/// What a series' covariances are made of, row by row.
+struct Parts {
+    columns: Vec<Matrix3xX<f64>>,
+    own: Vec<Matrix3<f64>>,
+}
+
 /// Takes the shared errors of the `measure.json` at `path` out of the rows' covariances and puts them beside the rows. Nothing is
 /// changed where the file has none, or has them for other poses.
 pub fn take(path: &Utf8Path, set: &mut Dataset) {
     let Ok(bytes) = std::fs::read(path) else { return };
     let Ok(Measured { shared: Some(shared) }) = serde_json::from_slice(&bytes) else { return };
-    if let Some((columns, own)) = split(&shared, set) {
+    if let Some(Parts { columns, own }) = split(&shared, set) {
         for (pose, own) in set.poses.iter_mut().zip(own) {
             if let Reading::Position { covariance_mm2, .. } = &mut pose.reading {
                 *covariance_mm2 = Some(own);
@@ -59,7 +65,7 @@ pub fn take(path: &Utf8Path, set: &mut Dataset) {
 }
 
 /// Columns of the leading shared errors and own covariance, row by row.
-fn split(shared: &Shared, set: &Dataset) -> Option<(Vec<Matrix3xX<f64>>, Vec<Matrix3<f64>>)> {
+fn split(shared: &Shared, set: &Dataset) -> Option<Parts> {
     let count = shared.covariance.len();
     if count == 0 || shared.covariance.iter().any(|row| row.len() != count) {
         return None;
@@ -91,7 +97,7 @@ fn split(shared: &Shared, set: &Dataset) -> Option<(Vec<Matrix3xX<f64>>, Vec<Mat
         own.push(positive(rest));
         columns.push(Matrix3xX::from_fn(leading.len(), |r, c| of_row[(r, c)]));
     }
-    Some((columns, own))
+    Some(Parts { columns, own })
 }
 
 /// A matrix R with R R' the covariance.
@@ -137,7 +143,7 @@ mod tests {
     #[test]
     fn what_is_shared_leaves_the_rows_own_covariance() {
         let (set, shared) = set_and_shared();
-        let (columns, own) = split(&shared, &set).unwrap();
+        let Parts { columns, own } = split(&shared, &set).unwrap();
         assert_eq!((columns.len(), columns[0].ncols()), (set.poses.len(), 2));
         for (columns, (own, pose)) in columns.iter().zip(own.iter().zip(&set.poses)) {
             let Reading::Position { covariance_mm2: Some(whole), .. } = &pose.reading else { panic!() };
