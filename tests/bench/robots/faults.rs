@@ -27,7 +27,7 @@ const FAULTS: [(&str, Plant, &str); 18] = [
     ("negated joint", |rows, _| joints(rows, |_, j| j[2] = -j[2]), "sign is flipped"),
     ("joint off by 90 deg", |rows, _| joints(rows, |_, j| j[1] += 90.0), "offset by"),
     ("joint off by 180 deg", |rows, _| joints(rows, |_, j| j[3] += 180.0), "offset by"),
-    ("joints a row late", late, "lag"),
+    ("joints a row late", |rows, _| late(rows), "lag"),
     ("standard DH", |_, robot| *robot = as_standard(robot), "standard DH"),
     ("mirrored", |rows, _| points(rows, |_, p| p.y = -p.y), "mirrored"),
     ("one point off by 5 mm", |rows, _| points(rows, |i, p| p.x += if i == 7 { 5.0 } else { 0.0 }), "far worse"),
@@ -39,7 +39,7 @@ const FAULTS: [(&str, Plant, &str); 18] = [
     ("base moved by 0.5 mm", |rows, _| points(rows, |i, p| p.x += if i >= 30 { 0.5 } else { 0.0 }), "sessions"),
     ("drift of 0.5 mm", |rows, _| points(rows, |i, p| p.x += 0.5 * i.min(60) as f64 / 60.0), "drift"),
     ("constant joint", |rows, _| joints(rows, |_, j| j[4] = 20.0), "same in all rows"),
-    ("repeated poses", repeated, "repeated"),
+    ("repeated poses", |rows, _| repeated(rows), "repeated"),
     ("another robot", |_, robot| robot.joints[2].a_mm += 60.0, ""),
 ];
 
@@ -76,14 +76,14 @@ fn points(rows: &mut [Measurement], change: fn(usize, &mut Point3<f64>)) {
     }
 }
 
-fn late(rows: &mut Vec<Measurement>, _: &mut Robot) {
+fn late(rows: &mut [Measurement]) {
     let joints: Vec<Vec<f64>> = rows.iter().map(|r| r.at.joints_deg.clone()).collect();
     for (row, joints) in rows.iter_mut().skip(1).zip(joints) {
         row.at.joints_deg = joints;
     }
 }
 
-fn repeated(rows: &mut Vec<Measurement>, _: &mut Robot) {
+fn repeated(rows: &mut Vec<Measurement>) {
     let again: Vec<Measurement> = rows.iter().take(5).cloned().collect();
     rows.extend(again);
 }
