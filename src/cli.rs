@@ -46,6 +46,8 @@ pub enum Command {
     Identify(Identify),
     /// Judge robots by the verify rows of measurements, without fitting any
     Verify(Verify),
+    /// Join camera check, measurements and robot into one page to sign
+    Report(Report),
     /// Undistort and rectify pairs of pictures, for eyes and for dense stereo
     Rectify(Rectify),
     /// Make pictures and measurements whose truth is known
@@ -247,6 +249,17 @@ pub struct Verify {
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// `stereocal report`
+#[derive(Debug, Args)]
+pub struct Report {
+    /// Folder of the results, and of the page; key `out` [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+    /// Replace a report.html that stereocal did not write, or that was changed since
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// `stereocal rectify`

@@ -11,9 +11,13 @@ use crate::files::provenance::Run;
 use crate::formats::calibration::CalibrationFile;
 use crate::formats::camera_check::CameraCheckFile;
 use crate::imaging::input::cache::Cache;
-use crate::imaging::input::corners_csv;
+use crate::imaging::input::{corners_csv, pairs};
+use crate::imaging::overlay::SideBySide;
 use crate::imaging::{Board, Corners, Wanted, find_corners};
+use crate::report::pair_picture::PairPicture;
+use crate::report::picture::PairJpeg;
 use crate::stereo::calibrate::{Calibration, calibrate};
+use crate::stereo::data::residuals;
 use crate::stereo::judge::assessment::{Demand, Judged};
 use crate::stereo::judge::held_out;
 use crate::stereo::judge::second_board::{self, SecondBoard};
@@ -47,7 +51,8 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     judged.advice.iter().chain(&judged.warnings).for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
-    let page = report::camera_check::page(&calibration, &judged, &corners)?;
+    let pictures = pictures(args, &calibration, &judged);
+    let page = report::camera_check::page(&calibration, &judged, &corners, &pictures)?;
     out.write_json("calibration.json", &CalibrationFile::from(calibration.rig()).with_noise(&calibration.own_noise))?;
     if !out.is_input("corners.csv") {
         out.write("corners.csv", corners_csv::to_csv(&calibration.mark(&corners)).as_bytes())?;
@@ -59,6 +64,26 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let stdout = if args.output.json { json } else { report::camera_check::summary(&calibration, &judged, &out) };
     let status = if judged.verdict == Verdict::Pass { Status::Done } else { Status::OutOfTolerance };
     Ok(Outcome { stdout, status })
+}
+
+/// The worst and the best pair for the page; none where corners came without pictures.
+fn pictures(args: &CameraCheck, calibration: &Calibration, judged: &Judged) -> Vec<PairPicture> {
+    /// Width of a pair on the page, both pictures together, px.
+    const WIDTH: u32 = 960;
+    let Some(files) = args.images.as_deref().and_then(|images| pairs::pair_files(images).ok()) else {
+        return Vec::new();
+    };
+    let order = report::camera_check::worst_first(judged);
+    let chosen = [("worst by its largest length error", order.first()), ("best", order.last())];
+    let picture = |(role, index): (&'static str, Option<&usize>)| {
+        let view = &calibration.views[*index?];
+        let pose = &calibration.values.poses[*index?];
+        let files = files.pairs.iter().find(|files| files.pair == view.pair)?;
+        let jpeg = PairJpeg::new(SideBySide::read(files, args.bayer)?, WIDTH)?;
+        let residuals = residuals::of_view(&calibration.values.shared, view, pose);
+        Some(PairPicture { pair: view.pair.clone(), role, jpeg, residuals })
+    };
+    chosen.into_iter().filter_map(picture).collect()
 }
 
 /// The results folder, once nothing is in the way of what will be written.

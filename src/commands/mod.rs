@@ -10,6 +10,7 @@ pub mod identify;
 pub mod init;
 pub mod measure;
 pub mod rectify;
+pub mod report;
 pub mod robot;
 pub mod shell;
 pub mod simulate;
@@ -52,6 +53,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Identify(args) => identify::run(&args, &config, run),
         Command::Verify(args) => verify::run(&args, &config.identify),
         Command::Rectify(args) => rectify::run(&args, &config, run),
+        Command::Report(args) => report::run(&args, &config, run),
         Command::Simulate(args) => simulate::run(&args, &config, run),
         Command::Compensate(args) => compensate::run(&args, &config, run),
         Command::Export(args) => export::run(&args, &config, run),

@@ -17,7 +17,7 @@ use crate::imaging::image::raster::Raster;
 use crate::imaging::image::{self, Claim, Header};
 use crate::imaging::input::pairs::{self, PairFiles};
 use crate::imaging::{self, Board, PairCorners, Skipped, Wanted};
-use crate::opencv::{self, Map};
+use crate::opencv::{Map, remap, undistort_rectify_map};
 use crate::stereo::model::rectification::{Matrices, Scaling, row_differences, row_residual};
 use crate::stereo::{self, Rig, Side};
 use crate::{progress, report};
@@ -110,7 +110,7 @@ fn names(files: &PairFiles) -> [String; 2] {
 fn plan(args: &Rectify, rig: &Rig) -> Result<(RectifiedFile, [Map; 2])> {
     let (width, height) = (rig.left.width, rig.left.height);
     let map = |side: Side, r: &Matrix3<f64>, p: &Matrix3<f64>, size| {
-        opencv::undistort_rectify_map(rig.camera(side), r, p, size).map_err(stereo::Error::from)
+        undistort_rectify_map(rig.camera(side), r, p, size).map_err(stereo::Error::from)
     };
     let raw = Side::BOTH.map(|side| (rig.camera(side).width, rig.camera(side).height));
     let coverage = |maps: &[Map; 2]| Coverage { left: maps[0].coverage(raw[0]), right: maps[1].coverage(raw[1]) };
@@ -159,7 +159,7 @@ fn rectified(
         if (raw.width, raw.height) != size {
             return Err(say("is not of the size that its header announces".to_owned()));
         }
-        let rectified = opencv::remap(&raw, &maps[side as usize]).map_err(|e| say(e.to_string()))?;
+        let rectified = remap(&raw, &maps[side as usize]).map_err(|e| say(e.to_string()))?;
         rectified.png().ok_or_else(|| say("cannot be written as PNG".to_owned()))
     };
     Ok([one(Side::Left, &files.left)?, one(Side::Right, &files.right)?])

@@ -11,7 +11,7 @@ use super::detect::COARSE_PX;
 use super::image::Mosaic;
 use super::input::pairs::PairFiles;
 use super::pyramid::{Level, factor_for};
-use super::{Corner, PairCorners};
+use super::{Corner, PairCorners, Side};
 
 /// Standard deviations up to which a corner gets a colour, px, from the best.
 const COLOURS: [(f64, [u8; 3]); 4] =
@@ -21,36 +21,70 @@ const UNUSED: [u8; 3] = [60, 90, 255];
 /// The lines from corner (0, 0).
 const ORDER: [u8; 3] = [255, 0, 255];
 
-/// The pair's overlay as PNG; `None` where a picture can't be read any more.
+/// Both pictures of a pair, reduced, and where their pixels lie.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SideBySide {
+    /// Left, then right.
+    pub image: RgbImage,
+    levels: [Level; 2],
+    left_width: u32,
+}
+
+impl SideBySide {
+    /// Reads both; `None` where a picture can't be read.
+    pub fn read(files: &PairFiles, mosaic: Option<Mosaic>) -> Option<SideBySide> {
+        let (left, left_level) = small(&files.left, mosaic)?;
+        let (right, right_level) = small(&files.right, mosaic)?;
+        let mut image = RgbImage::new(left.width() + right.width(), left.height().max(right.height()));
+        image::imageops::replace(&mut image, &left, 0, 0);
+        image::imageops::replace(&mut image, &right, i64::from(left.width()), 0);
+        Some(SideBySide { image, levels: [left_level, right_level], left_width: left.width() })
+    }
+
+    /// Where a place in a raw picture lies, px.
+    pub fn place(&self, side: Side, px: &Point2<f64>) -> Point2<f64> {
+        let at = self.levels[side as usize].to_copy(px);
+        if side == Side::Right { Point2::new(at.x + f64::from(self.left_width), at.y) } else { at }
+    }
+
+    fn draw(&mut self, side: Side, corners: &[Corner]) {
+        let first = corners.iter().find(|c| c.col == 0 && c.row == 0);
+        for (col, row) in [(2, 0), (0, 1)] {
+            if let (Some(a), Some(b)) = (first, corners.iter().find(|c| c.col == col && c.row == row)) {
+                let (from, to) = (self.place(side, &a.px), self.place(side, &b.px));
+                line(&mut self.image, from, to);
+            }
+        }
+        for corner in corners {
+            let at = self.place(side, &corner.px);
+            ring(&mut self.image, at, colour(corner));
+        }
+    }
+}
+
+/// The pair with its corners; `None` where a picture can't be read any more.
+pub fn drawn(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> Option<SideBySide> {
+    let mut both = SideBySide::read(files, mosaic)?;
+    both.draw(Side::Left, &corners.left);
+    both.draw(Side::Right, &corners.right);
+    Some(both)
+}
+
+/// The same as PNG.
 pub fn png(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> Option<Vec<u8>> {
-    let left = drawn(&files.left, &corners.left, mosaic)?;
-    let right = drawn(&files.right, &corners.right, mosaic)?;
-    let mut both = RgbImage::new(left.width() + right.width(), left.height().max(right.height()));
-    image::imageops::replace(&mut both, &left, 0, 0);
-    image::imageops::replace(&mut both, &right, i64::from(left.width()), 0);
     let mut bytes = std::io::Cursor::new(Vec::new());
-    both.write_to(&mut bytes, image::ImageFormat::Png).ok()?;
+    drawn(files, corners, mosaic)?.image.write_to(&mut bytes, image::ImageFormat::Png).ok()?;
     Some(bytes.into_inner())
 }
 
-fn drawn(path: &Utf8Path, corners: &[Corner], mosaic: Option<Mosaic>) -> Option<RgbImage> {
+fn small(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<(RgbImage, Level)> {
     let picture = super::find::picture(path, mosaic).ok()?;
     let level = Level::Reduced(factor_for(&picture, COARSE_PX));
     let small = level.copy(&picture);
-    let mut image = RgbImage::from_fn(small.width as u32, small.height as u32, |x, y| {
+    let image = RgbImage::from_fn(small.width as u32, small.height as u32, |x, y| {
         Rgb([small.pixels[y as usize * small.width + x as usize]; 3])
     });
-    let down = |p: &Point2<f64>| level.to_copy(p);
-    let first = corners.iter().find(|c| c.col == 0 && c.row == 0);
-    for (col, row) in [(2, 0), (0, 1)] {
-        if let (Some(a), Some(b)) = (first, corners.iter().find(|c| c.col == col && c.row == row)) {
-            line(&mut image, down(&a.px), down(&b.px));
-        }
-    }
-    for corner in corners {
-        ring(&mut image, down(&corner.px), colour(corner));
-    }
-    Some(image)
+    Some((image, level))
 }
 
 fn colour(corner: &Corner) -> [u8; 3] {

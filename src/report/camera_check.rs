@@ -6,7 +6,10 @@ use super::Result;
 use super::blur;
 use super::figure::Plot;
 use super::page::{self, Tone};
-use super::table::{Table, number};
+use super::pair_picture::{self, PairPicture};
+use super::rig;
+use super::scene::{Ink, Scene};
+use super::table::{Table, number, with_sigma};
 use crate::files::OutDir;
 use crate::imaging::Corners;
 use crate::stereo::Side;
@@ -127,8 +130,16 @@ fn advice(judged: &Judged) -> String {
     }
 }
 
-/// The report.
-pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners) -> Result<String> {
+/// The pairs by their largest held-out error, the worst first.
+pub fn worst_first(judged: &Judged) -> Vec<usize> {
+    let pairs = &judged.accuracy.pairs;
+    let mut order: Vec<usize> = (0..pairs.len()).collect();
+    order.sort_by(|&a, &b| pairs[b].max_abs_error_mm.total_cmp(&pairs[a].max_abs_error_mm));
+    order
+}
+
+/// The report, with pictures of some pairs.
+pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictures: &[PairPicture]) -> Result<String> {
     let tone = match judged.verdict {
         Verdict::Pass => Tone::Good,
         Verdict::Undecided => Tone::Doubtful,
@@ -145,10 +156,12 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners) -> Re
         (lengths(judged)?)
         h2 { "Pairs, the worst first" }
         (pairs(calibration, judged))
+        (pair_picture::section(pictures))
         h2 { "What the model leaves of the corners" }
         (residuals(calibration, judged)?)
         (blur::section(corners))
         h2 { "The cameras and the rig" }
+        (in_space(calibration, judged))
         (parameters(calibration))
         (lenses(calibration))
         (disagreements(judged))
@@ -282,11 +295,7 @@ fn every_length(accuracy: &Accuracy) -> Vec<(f64, f64)> {
 }
 
 fn pairs(calibration: &Calibration, judged: &Judged) -> Markup {
-    let mut order: Vec<usize> = (0..judged.accuracy.pairs.len()).collect();
-    order.sort_by(|&a, &b| {
-        judged.accuracy.pairs[b].max_abs_error_mm.total_cmp(&judged.accuracy.pairs[a].max_abs_error_mm)
-    });
-    let rows: Vec<Vec<String>> = order
+    let rows: Vec<Vec<String>> = worst_first(judged)
         .iter()
         .map(|&i| {
             let pair = &judged.accuracy.pairs[i];
@@ -392,6 +401,25 @@ fn field_figure(field: &Field, width: u32, height: u32) -> Result<(String, Strin
     Ok((svg, caption))
 }
 
+/// Cameras and boards as they stood.
+fn in_space(calibration: &Calibration, judged: &Judged) -> Markup {
+    let mut scene = Scene::default();
+    rig::cameras(&mut scene, calibration.rig(), calibration.rig().baseline_mm() / 2.0);
+    let order = worst_first(judged);
+    for (i, pose) in calibration.values.poses.iter().enumerate() {
+        let ink = match i {
+            _ if order.first() == Some(&i) => Ink::Bad,
+            _ if order.last() == Some(&i) => Ink::Good,
+            _ => Ink::Plain,
+        };
+        rig::board(&mut scene, ink, &calibration.board, pose);
+    }
+    scene.figure(
+        "cameras and boards",
+        "Both cameras and the boards of all pairs; the worst pair's in red, the best one's in green. Where no board stood, nothing was checked.",
+    )
+}
+
 fn parameters(calibration: &Calibration) -> Markup {
     let layout = &calibration.layout;
     let values = layout.numbers(&calibration.values.shared);
@@ -400,7 +428,7 @@ fn parameters(calibration: &Calibration) -> Markup {
         .names()
         .into_iter()
         .enumerate()
-        .map(|(i, name)| vec![name, format!("{:.6}", values[i]), format!("{:.2e}", covariance[(i, i)].sqrt())])
+        .map(|(i, name)| std::iter::once(name).chain(with_sigma(values[i], covariance[(i, i)].sqrt())).collect())
         .collect();
     html! { div.scroll { (page::table(&["number", "value", "standard deviation"], &rows)) } }
 }

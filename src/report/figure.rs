@@ -11,10 +11,10 @@ use super::Result;
 /// Drawn at twice the size it is shown, because the backend rounds to whole units.
 const SCALE: u32 = 2;
 /// Size on the page, px.
-const SIZE: (u32, u32) = (640, 400);
+const SIZE: (u32, u32) = (520, 350);
 
 /// Height of a legend's row as a share of the plotting area's.
-const LEGEND_ROW: f64 = 0.055;
+const LEGEND_ROW: f64 = 0.075;
 
 /// Colours of the series in turn: distinct for the colour-blind (Okabe and Ito), dark enough on white.
 const COLOURS: [RGBColor; 7] = [
@@ -136,7 +136,7 @@ impl Plot {
         self
     }
 
-    /// Size on the page, px, instead of 640x400.
+    /// Size on the page, px, instead of 520x350.
     pub fn size(mut self, width: u32, height: u32) -> Plot {
         self.size = (width, height);
         self
@@ -173,7 +173,9 @@ impl Plot {
         let (shown_width, shown_height) = self.size;
         Ok(text.replacen(
             &format!("<svg width=\"{}\" height=\"{}\"", size.0, size.1),
-            &format!("<svg width=\"{shown_width}\" height=\"{shown_height}\" font-family=\"sans-serif\""),
+            &format!(
+                "<svg width=\"{shown_width}\" height=\"{shown_height}\" class=\"plot\" font-family=\"sans-serif\""
+            ),
             1,
         ))
     }
@@ -219,8 +221,8 @@ impl Plot {
         let mut chart = ChartBuilder::on(root)
             .caption(&self.title, font(16))
             .margin(10 * SCALE)
-            .x_label_area_size(40 * SCALE)
-            .y_label_area_size(62 * SCALE)
+            .x_label_area_size(44 * SCALE)
+            .y_label_area_size(74 * SCALE)
             .build_cartesian_2d(x.0..x.1, y.0..y.1)
             .map_err(say)?;
         let y_text = |v: &f64| if self.log_y { power_of_ten(*v) } else { tick(*v, y) };
@@ -230,10 +232,10 @@ impl Plot {
             .y_desc(&self.y_label)
             .x_label_formatter(&|v| tick(*v, x))
             .y_label_formatter(&y_text)
-            .x_labels(9)
-            .y_labels(8)
-            .label_style(font(12))
-            .axis_desc_style(font(13))
+            .x_labels(7)
+            .y_labels(7)
+            .label_style(font(13))
+            .axis_desc_style(font(14))
             .light_line_style(TRANSPARENT)
             .bold_line_style(BLACK.mix(0.1))
             .draw()
@@ -248,7 +250,7 @@ impl Plot {
                 .position(SeriesLabelPosition::UpperRight)
                 .background_style(WHITE.mix(0.85))
                 .border_style(BLACK.mix(0.2))
-                .label_font(font(12))
+                .label_font(font(13))
                 .margin(6 * SCALE)
                 .legend_area_size(22 * SCALE)
                 .draw()

@@ -6,6 +6,7 @@ use nalgebra::Point3;
 use super::Result;
 use super::figure::Plot;
 use super::page::{self, Tone};
+use super::scene::{Ink, Scene};
 use super::table::{Table, number};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::{RowError, Spread};
@@ -69,11 +70,12 @@ fn distance_row(name: &str, spread: &Spread, before: Option<&Spread>) -> Vec<Str
 }
 
 /// The page. `before` and `after` are the errors of the verify rows under the nominal and the identified robot.
-/// `places` are the target's points in the nominal base frame, row by row.
+/// `places` are the target's points in the nominal base frame, row by row; `arm` is the arm's line at the first centre pose.
 pub fn page(
     set: &Dataset,
     record: &Record,
     places: &[(Role, Point3<f64>)],
+    arm: &[Point3<f64>],
     before: &[RowError],
     after: &[RowError],
 ) -> Result<String> {
@@ -103,6 +105,7 @@ pub fn page(
         h2 { "How it was chosen" }
         (judged_table(record))
         h2 { "Where was measured" }
+        (in_space(places, arm))
         (layout_figures(places)?)
         h2 { "How the swarms start" }
         (start_figures(record.seed)?)
@@ -297,6 +300,23 @@ fn judged_table(record: &Record) -> Markup {
         p { "Root mean square error on samples that were held out of the fit, mm. More terms, another model or a dearer method are taken only where this falls by more than two standard errors." }
         (page::table(&["model", "terms or method", "held-out error, mm"], &rows))
     }
+}
+
+/// The arm and the points at which it was measured.
+fn in_space(places: &[(Role, Point3<f64>)], arm: &[Point3<f64>]) -> Markup {
+    let mut scene = Scene::default();
+    scene.line(Ink::Frame, arm.to_vec());
+    for &(role, at) in places {
+        let ink = match role {
+            Role::Sample => Ink::Plain,
+            Role::Verify => Ink::Bad,
+            Role::Center => Ink::Good,
+        };
+        scene.line(ink, vec![at]);
+    }
+    scene.word(Point3::origin(), "base");
+    let caption = "The arm at the first centre pose and the points of the target in the base frame: samples in blue, verify rows in red, centres in green.";
+    scene.upright().figure("the arm and where it was measured", caption)
 }
 
 /// Fig. 7: the poses from above and from the side.

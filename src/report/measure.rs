@@ -7,6 +7,8 @@ use maud::{Markup, PreEscaped, html};
 use super::Result;
 use super::figure::Plot;
 use super::page::{self, Tone};
+use super::rig;
+use super::scene::{Ink, Scene};
 use super::table::number;
 use crate::files::OutDir;
 use crate::formats::measure::MeasureFile;
@@ -14,7 +16,7 @@ use crate::measurements::Role;
 use crate::stereo::target::TargetPose;
 use crate::stereo::target::finish::Shape;
 use crate::stereo::target::judgement::Judgement;
-use crate::stereo::target::series::{MeasuredPose, Series};
+use crate::stereo::target::series::{Knowledge, MeasuredPose, Series};
 
 /// Poses in the table of the worst.
 const WORST: usize = 10;
@@ -92,7 +94,7 @@ fn tone(series: &Series, file: &MeasureFile) -> Tone {
 }
 
 /// The report.
-pub fn page(series: &Series, file: &MeasureFile, extras: &Extras) -> Result<String> {
+pub fn page(series: &Series, file: &MeasureFile, known: &Knowledge, extras: &Extras) -> Result<String> {
     let (poses, count) = file.counts();
     let measured = &series.poses;
     let missing: Vec<Vec<String>> = measured
@@ -114,6 +116,7 @@ pub fn page(series: &Series, file: &MeasureFile, extras: &Extras) -> Result<Stri
             (rig(measured)?)
             (residuals(measured)?)
             @if let Some(shape) = &series.shape { (target(shape, file.columns())?) }
+            (in_space(measured, known))
             (places(measured)?)
             (distances(&extras.distances)?)
         }
@@ -243,6 +246,22 @@ fn target(shape: &Shape, columns: usize) -> Result<Markup> {
         h2 { "The target as it is" }
         div.side { (page::figure(&flat, &said)) (page::figure(&deep, "Down is away from the viewer, at the same scale. A bow shows as arrows that point one way in the middle and the other way at the rim.")) }
     })
+}
+
+/// Cameras and targets as they stood to each other.
+fn in_space(measured: &[MeasuredPose], known: &Knowledge) -> Markup {
+    let mut scene = Scene::default();
+    rig::cameras(&mut scene, &known.rig, known.rig.baseline_mm() / 2.0);
+    for m in measured {
+        if let Ok(target) = &m.target {
+            let ink = if m.at.role == Role::Center { Ink::Good } else { Ink::Plain };
+            rig::board(&mut scene, ink, &known.board, &target.cam_from_board);
+        }
+    }
+    html! {
+        h2 { "The poses as the cameras saw them" }
+        (scene.figure("cameras and targets", "Both cameras and the target at each pose, the groups' centres in green, in the left camera's frame."))
+    }
 }
 
 /// Mark points of each group from three sides, with the sphere about the centre.

@@ -1,5 +1,6 @@
-//! The frame of every HTML report: one file, no scripts, no network, readable on paper.
+//! The frame of every HTML report: one file, no network, readable on paper, on a phone and in the dark; a script only to turn a view in space.
 
+use super::scene;
 use crate::files::provenance::{Digested, Provenance};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -24,36 +25,58 @@ impl Tone {
     }
 }
 
+/// A browser that obeys it lets no request leave the page, whatever stands in it.
+const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+
 const STYLE: &str = "
-:root { color-scheme: light; }
-body { font: 15px/1.5 system-ui, 'DejaVu Sans', sans-serif; color: #1c2430; background: #f4f5f7; margin: 0; }
-main { max-width: 1040px; margin: 0 auto; padding: 28px 32px 64px; background: #fff; }
-h1 { font-size: 24px; margin: 0 0 4px; } h2 { font-size: 18px; margin: 36px 0 8px; border-bottom: 1px solid #d9dde3; padding-bottom: 4px; }
-p.lead { color: #5a6472; margin: 0 0 16px; }
+:root { color-scheme: light; --ink: #1c2430; --soft: #5a6472; --ground: #fff; --around: #f4f5f7; --rule: #d9dde3; --hair: #eceef1;
+  --good: #2e8b57; --good-bg: #eaf6ef; --doubt: #d39b00; --doubt-bg: #fdf6e3; --bad: #c0392b; --bad-bg: #fbebe9; --plain: #0072b2; }
+@media screen and (prefers-color-scheme: dark) {
+  :root { color-scheme: dark; --ink: #e3e6ea; --soft: #a3acb8; --ground: #1a1a1a; --around: #101010; --rule: #3c424b; --hair: #2a2e34;
+    --good: #4cbf82; --good-bg: #16281f; --doubt: #e0b030; --doubt-bg: #2b2515; --bad: #ee6a5c; --bad-bg: #301b19; --plain: #56b4e9; }
+  svg.plot { filter: invert(0.9) hue-rotate(180deg); }
+}
+body { font: 15px/1.5 system-ui, 'DejaVu Sans', sans-serif; color: var(--ink); background: var(--around); margin: 0; }
+main { max-width: 1040px; margin: 0 auto; padding: 28px 32px 64px; background: var(--ground); }
+h1 { font-size: 24px; margin: 0 0 4px; } h2 { font-size: 18px; margin: 36px 0 8px; border-bottom: 1px solid var(--rule); padding-bottom: 4px; }
+p, li, figcaption { max-width: 80ch; overflow-wrap: anywhere; } p.lead { color: var(--soft); margin: 0 0 16px; }
 .verdict { border-left: 8px solid; padding: 12px 16px; margin: 16px 0; border-radius: 4px; }
 .verdict strong { display: block; font-size: 20px; }
-.good { border-color: #2e8b57; background: #eaf6ef; } .doubtful { border-color: #d39b00; background: #fdf6e3; } .bad { border-color: #c0392b; background: #fbebe9; }
+.good { border-color: var(--good); background: var(--good-bg); } .doubtful { border-color: var(--doubt); background: var(--doubt-bg); }
+.bad { border-color: var(--bad); background: var(--bad-bg); }
 table { border-collapse: collapse; margin: 8px 0 16px; font-variant-numeric: tabular-nums; font-size: 14px; }
-th { text-align: right; color: #5a6472; font-weight: 600; border-bottom: 1px solid #b8bfc9; padding: 3px 12px; }
-td { text-align: right; padding: 2px 12px; border-bottom: 1px solid #eceef1; } th:first-child, td:first-child { text-align: left; }
-.wide { overflow-x: auto; } table.ledger td { vertical-align: top; } table.ledger td.detail { text-align: left; font-size: 13px; color: #404a57; min-width: 320px; }
+th { text-align: right; color: var(--soft); font-weight: 600; border-bottom: 1px solid var(--rule); padding: 3px 12px; }
+td { text-align: right; padding: 2px 12px; border-bottom: 1px solid var(--hair); } th:first-child, td:first-child { text-align: left; padding-left: 4px; }
+.wide { overflow-x: auto; } table.ledger td { vertical-align: top; } table.ledger td.detail { text-align: left; font-size: 13px; min-width: 320px; }
 table.ledger td:first-child { min-width: 120px; } .allows { border-left-style: solid; border-left-width: 4px; padding: 0 6px; border-radius: 3px; }
 table.ledger th:last-child { text-align: left; }
-.scroll { max-height: 420px; overflow: auto; border: 1px solid #eceef1; }
-figure { margin: 12px 0 20px; } figure svg { max-width: 100%; height: auto; } figcaption { color: #404a57; font-size: 14px; max-width: 860px; }
-.side { display: flex; flex-wrap: wrap; gap: 16px; } .side > * { flex: 1 1 460px; min-width: 0; }
+.scroll { max-height: 420px; overflow: auto; border: 1px solid var(--hair); }
+figure { margin: 12px 0 20px; break-inside: avoid; } figure svg, figure img { max-width: 100%; height: auto; }
+figcaption { color: var(--soft); font-size: 14px; }
+.side { display: flex; flex-wrap: wrap; gap: 16px; } .side > * { flex: 1 1 440px; min-width: 0; }
+svg.scene { cursor: grab; touch-action: none; border: 1px solid var(--hair); } svg.scene path { fill: none; stroke-width: 1.3; stroke-linejoin: round; stroke-linecap: round; }
+svg.scene text { font: 14px sans-serif; fill: var(--ink); } .i-frame { stroke: var(--ink); } .i-plain { stroke: var(--plain); }
+.i-good { stroke: var(--good); } .i-bad { stroke: var(--bad); } svg.scene .i-good, svg.scene .i-bad { stroke-width: 2.6; }
+svg.scene .dots { stroke-width: 5; }
 ul.warnings li { margin: 4px 0; }
-footer { color: #5a6472; font-size: 13px; overflow-wrap: anywhere; }
-@media print { body { background: #fff; } main { padding: 0; } .scroll { max-height: none; } }
+footer { color: var(--soft); font-size: 13px; overflow-wrap: anywhere; }
+@media (max-width: 600px) { main { padding: 16px 12px 40px; } td, th { padding-left: 6px; padding-right: 6px; } .side > * { flex-basis: 100%; }
+  table.ledger, table.ledger tbody { display: block; } table.ledger thead { display: none; } table.ledger td { border: 0; }
+  table.ledger tr { display: grid; grid-template-columns: 1fr repeat(4, auto); padding: 4px 0; border-bottom: 1px solid var(--hair); }
+  table.ledger td.detail { grid-column: 1 / -1; min-width: 0; padding-left: 4px; } h1 { font-size: 21px; } }
+@media print { body { background: #fff; font-size: 12px; } main { padding: 0; max-width: none; } .scroll { max-height: none; overflow: visible; border: 0; }
+  .wide { overflow: visible; } table { font-size: 11px; } td, th { padding-left: 5px; padding-right: 5px; } tr { break-inside: avoid; } h2 { break-after: avoid; } }
 ";
 
 /// A whole page. `lead` is a line under the title that says from what it was made.
 pub fn page(title: &str, lead: &str, content: &Markup) -> String {
+    let content = content.clone().into_string();
     html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (title) }
                 style { (PreEscaped(STYLE)) }
@@ -61,8 +84,9 @@ pub fn page(title: &str, lead: &str, content: &Markup) -> String {
             body { main {
                 h1 { (title) }
                 p.lead { (lead) }
-                (content)
-            } }
+                (PreEscaped(content.as_str()))
+            }
+            @if content.contains("<svg class=\"scene\"") { script { (PreEscaped(scene::SCRIPT)) } } }
         }
     }
     .into_string()
@@ -105,14 +129,34 @@ pub fn figure(svg: &str, caption: &str) -> Markup {
 /// A table; the first column is text, the others numbers.
 pub fn table(header: &[&str], rows: &[Vec<String>]) -> Markup {
     html! {
-        table {
+        div.wide { table {
             thead { tr { @for cell in header { th { (cell) } } } }
             tbody { @for row in rows { tr { @for cell in row { td { (cell) } } } } }
-        }
+        } }
     }
 }
 
 /// Warnings, where there are any.
 pub fn warnings(list: &[String]) -> Markup {
     html! { @if !list.is_empty() { ul.warnings { @for warning in list { li { (warning) } } } } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::scene::{Ink, Scene};
+    use nalgebra::Point3;
+
+    #[test]
+    fn a_page_asks_nobody_for_anything_and_has_a_script_only_where_something_turns() {
+        let plain = page("a <b>", "lead", &html! { p { "text" } });
+        assert!(plain.contains("a &lt;b&gt;") && plain.contains("default-src 'none'") && !plain.contains("<script"));
+        let mut scene = Scene::default();
+        scene.line(Ink::Plain, vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0)]);
+        let turning = page("t", "lead", &scene.figure("a line", "A line."));
+        assert_eq!(turning.matches("<script").count(), 1);
+        for text in [plain, turning] {
+            assert!(!text.contains("http://") && !text.contains("https://") && !text.contains("src=\"/"), "{text}");
+        }
+    }
 }

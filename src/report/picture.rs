@@ -2,28 +2,39 @@
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
+use nalgebra::Point2;
 
-use crate::imaging::image::Mosaic;
-use crate::imaging::input::pairs::PairFiles;
-use crate::imaging::{PairCorners, overlay};
+use crate::imaging::Side;
+use crate::imaging::overlay::SideBySide;
 
-/// A JPEG for a page: its bytes in base64 and its size, px.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Jpeg {
-    /// The bytes.
+/// Both pictures of a pair side by side as a JPEG for a page.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairJpeg {
+    /// Its bytes in base64.
     pub base64: String,
     /// Width, px.
     pub width: u32,
     /// Height, px.
     pub height: u32,
+    scale: f64,
+    /// What was made smaller, without its pixels.
+    places: SideBySide,
 }
 
-/// Both pictures of a pair side by side with the corners drawn over them, `width` px together; `None` where a picture can't be read.
-pub fn pair(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>, width: u32) -> Option<Jpeg> {
-    let drawn = image::load_from_memory(&overlay::png(files, corners, mosaic)?).ok()?;
-    let height = (drawn.height() * width / drawn.width().max(1)).max(1);
-    let reduced = drawn.resize_exact(width, height, image::imageops::FilterType::Triangle);
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    reduced.to_rgb8().write_to(&mut bytes, image::ImageFormat::Jpeg).ok()?;
-    Some(Jpeg { base64: BASE64_STANDARD.encode(bytes.into_inner()), width, height })
+impl PairJpeg {
+    /// A pair, `width` px wide, both pictures together; `None` where it cannot be encoded.
+    pub fn new(mut both: SideBySide, width: u32) -> Option<PairJpeg> {
+        let image = std::mem::take(&mut both.image);
+        let scale = f64::from(width) / f64::from(image.width().max(1));
+        let height = ((f64::from(image.height()) * scale) as u32).max(1);
+        let reduced = image::imageops::resize(&image, width, height, image::imageops::FilterType::Triangle);
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        reduced.write_to(&mut bytes, image::ImageFormat::Jpeg).ok()?;
+        Some(PairJpeg { base64: BASE64_STANDARD.encode(bytes.into_inner()), width, height, scale, places: both })
+    }
+
+    /// Where a place in a raw picture lies, px.
+    pub fn place(&self, side: Side, px: &Point2<f64>) -> Point2<f64> {
+        self.places.place(side, px).map(|v| (v + 0.5) * self.scale - 0.5)
+    }
 }

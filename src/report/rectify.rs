@@ -5,12 +5,12 @@ use maud::{Markup, html};
 use super::Result;
 use super::figure::Plot;
 use super::page::{self, Tone};
-use super::picture::{self, Jpeg};
+use super::picture::PairJpeg;
 use super::table::number;
 use crate::files::OutDir;
 use crate::formats::rectified::{RectifiedFile, RectifiedPair};
-use crate::imaging::PairCorners;
 use crate::imaging::input::pairs::PairFiles;
+use crate::imaging::{PairCorners, overlay};
 use crate::stereo::model::rectification::row_differences;
 
 /// Width of the pair on the page, both pictures together, px.
@@ -60,7 +60,7 @@ pub fn page(file: &RectifiedFile, rectified: &[PairFiles], shown: Option<&PairCo
     let name = shown.map(|pair| pair.pair.clone()).or_else(|| rectified.first().map(|p| p.pair.clone()));
     let files = name.as_ref().and_then(|name| rectified.iter().find(|files| files.pair == *name));
     let none = PairCorners::default();
-    let drawn = files.and_then(|files| picture::pair(files, shown.unwrap_or(&none), None, WIDTH));
+    let drawn = files.and_then(|files| PairJpeg::new(overlay::drawn(files, shown.unwrap_or(&none), None)?, WIDTH));
     let rectify = file.mode == "rectify";
     let content = html! {
         @if let Some(text) = agreement(file) {
@@ -103,7 +103,7 @@ fn caption(name: &str, file: &RectifiedFile) -> String {
 }
 
 /// The picture with epipolar lines over it, as SVG.
-fn lined(jpeg: &Jpeg, common: Option<&str>) -> String {
+fn lined(jpeg: &PairJpeg, common: Option<&str>) -> String {
     let (w, h) = (jpeg.width, jpeg.height);
     let line =
         |[x1, y1, x2, y2]: [f64; 4]| format!("<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>");
@@ -117,7 +117,7 @@ fn lined(jpeg: &Jpeg, common: Option<&str>) -> String {
         None => String::new(),
     };
     format!(
-        "<svg viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\" role=\"img\" aria-label=\"the pair side by side\">\
+        "<svg class=\"photo\" viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\" role=\"img\" aria-label=\"the pair side by side\">\
          <image width=\"{w}\" height=\"{h}\" href=\"data:image/jpeg;base64,{}\"/>\
          <g stroke=\"#ff3b30\" stroke-width=\"0.8\" stroke-opacity=\"0.75\">{lines}</g></svg>",
         jpeg.base64

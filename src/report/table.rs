@@ -46,9 +46,26 @@ pub fn number(value: Option<f64>, decimals: usize) -> String {
     }
 }
 
+/// A value and its standard deviation with two digits of the latter, and the same decimals of the former.
+pub fn with_sigma(value: f64, sigma: f64) -> [String; 2] {
+    if !(sigma.is_finite() && sigma > 0.0) {
+        return [number(Some(value), 6), "n/a".to_owned()];
+    }
+    let decimals = (1.0 - sigma.log10().floor()).clamp(0.0, 12.0) as usize;
+    [number(Some(value), decimals), number(Some(sigma), decimals)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn as_many_digits_as_the_sigma_deserves() {
+        assert_eq!(with_sigma(2504.98948, 0.0736), ["2504.989", "0.074"]);
+        assert_eq!(with_sigma(-0.0799888, 7.44e-5), ["-0.079989", "0.000074"]);
+        assert_eq!(with_sigma(1234.5, 123.0), ["1234", "123"]);
+        assert_eq!(with_sigma(1.0, f64::NAN)[1], "n/a");
+    }
 
     #[test]
     fn numbers_line_up() {

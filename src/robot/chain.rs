@@ -98,6 +98,19 @@ impl Robot {
             .fold(Transform::identity(), |base, (joint, &q)| base * joint.previous_from_this(q))
     }
 
+    /// Origins of the base and of every joint's frame and the target, in the base frame, mm: the arm as a line.
+    pub fn skeleton_mm(&self, joints_rad: &[f64]) -> Vec<Point3<f64>> {
+        let corrected_rad = self.corrected_rad(joints_rad);
+        let mut base_from_this = Transform::identity();
+        let mut places = vec![Point3::origin()];
+        for (joint, &q) in self.joints.iter().zip(&corrected_rad) {
+            base_from_this *= joint.previous_from_this(q);
+            places.push(base_from_this * Point3::origin());
+        }
+        places.push(base_from_this * Point3::from(self.tool_mm));
+        places
+    }
+
     /// The target's mark point in the base frame, mm.
     pub fn target_mm(&self, joints_rad: &[f64]) -> Point3<f64> {
         self.base_from_flange(joints_rad) * Point3::from(self.tool_mm)
@@ -148,6 +161,16 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_skeleton_goes_from_the_base_to_the_target() {
+        let robot = Robot { tool_mm: nalgebra::Vector3::new(1.0, 2.0, 30.0), ..Robot::paper() };
+        let joints = [0.1, -0.2, 0.3, -0.4, 0.5, 0.6];
+        let places = robot.skeleton_mm(&joints);
+        assert_eq!((places.len(), places[0]), (8, Point3::origin()));
+        assert!((places[7] - robot.target_mm(&joints)).norm() < 1e-9);
+        assert!((places[6].coords - robot.base_from_flange(&joints).translation.vector).norm() < 1e-9);
+    }
     use approx::assert_relative_eq;
     use nalgebra::Matrix4;
 

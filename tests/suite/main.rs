@@ -29,3 +29,4 @@ mod provenance;
 mod published;
 mod real;
 mod rectify;
+mod report;

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 use super::super::Result;
 use crate::imaging::image::Mosaic;
 use crate::imaging::input::pairs;
-use crate::imaging::{Corners, PairCorners};
+use crate::imaging::{Corners, PairCorners, overlay};
 use crate::measurements::Role;
-use crate::report;
 use crate::report::measure::{Distance, Extras, Thumbnail};
+use crate::report::picture::PairJpeg;
 use crate::robot::{self, Robot};
 use crate::stereo::target::series::{MeasuredPose, Series};
 
@@ -42,7 +42,7 @@ fn thumbnails(series: &Series, corners: &Corners, folder: &Utf8Path, mosaic: Opt
         let none = PairCorners { pair: m.at.pose.clone(), ..PairCorners::default() };
         let pair = corners.pairs.iter().find(|p| p.pair == m.at.pose).unwrap_or(&none);
         let jpeg_base64 = found
-            .and_then(|files| report::picture::pair(files, pair, mosaic, WIDTH))
+            .and_then(|files| PairJpeg::new(overlay::drawn(files, pair, mosaic)?, WIDTH))
             .map_or_else(String::new, |jpeg| jpeg.base64);
         Thumbnail { pose: m.at.pose.clone(), caption: caption.clone(), jpeg_base64 }
     };

@@ -54,7 +54,8 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let extras = extras::gather(&series, &corners, &args.poses, args.bayer)?;
     out.write("measurements.csv", measure::to_csv(&series.poses).as_bytes())?;
     let json = out.write_json("measure.json", &file)?;
-    let page = report::page::signed(report::measure::page(&series, &file, &extras)?, out.provenance().as_ref());
+    let page = report::measure::page(&series, &file, &known, &extras)?;
+    let page = report::page::signed(page, out.provenance().as_ref());
     out.write("measure.html", page.as_bytes())?;
     end(&series, &known)?;
     let stdout = if args.output.json { json } else { report::measure::summary(&file, &out) };

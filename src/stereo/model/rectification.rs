@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::geometry::rotation_matrix;
 use crate::imaging::PairCorners;
-use crate::opencv::{self, Failure};
+use crate::opencv::{Failure, ZERO_DISPARITY, stereo_rectify};
 use crate::stereo::{Rig, Side};
 
 /// How much of the raw pictures is kept, in OpenCV's words.
@@ -28,7 +28,7 @@ impl Scaling {
 
     /// `stereoRectify`'s `flags`.
     pub fn flags(self) -> i32 {
-        if self.zero_disparity { opencv::ZERO_DISPARITY } else { 0 }
+        if self.zero_disparity { ZERO_DISPARITY } else { 0 }
     }
 }
 
@@ -46,7 +46,7 @@ pub struct Matrices {
 impl Matrices {
     /// Asks OpenCV.
     pub fn new(rig: &Rig, scaling: Scaling) -> Result<Matrices, Failure> {
-        opencv::stereo_rectify(rig, scaling)
+        stereo_rectify(rig, scaling)
     }
 
     /// `R1`, `P1` for the left side, `R2`, `P2` for the right one.

@@ -1,0 +1,241 @@
+//! `report.html`: rig, measurements and robot of one day on a page that a quality department can sign.
+//!
+//! It repeats what the commands wrote and computes nothing. Figures stand beside the terms of VDI/VDE 2634 part 1 and ISO 9283, and it is
+//! said what a test by those standards asks for beyond them.
+
+use maud::{Markup, html};
+use serde_json::Value;
+
+use super::page::{self, Tone};
+use super::table::number;
+use crate::files::OutDir;
+
+/// What the commands wrote, as far as it is there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Day {
+    /// `camera-check.json`.
+    pub check: Option<Value>,
+    /// `measure.json`.
+    pub measured: Option<Value>,
+    /// `identification.json`.
+    pub robot: Option<Value>,
+    /// Where these were not made of each other.
+    pub breaks: Vec<String>,
+}
+
+impl Day {
+    /// True where nothing stands against the results: the rig's verdict is a pass, and each was made of the one before it.
+    pub fn is_good(&self) -> bool {
+        self.breaks.is_empty() && self.check.as_ref().is_none_or(|check| text(check, "/verdict") == "pass")
+    }
+}
+
+fn text<'a>(value: &'a Value, pointer: &str) -> &'a str {
+    value.pointer(pointer).and_then(Value::as_str).unwrap_or("n/a")
+}
+
+fn mm(value: &Value, pointer: &str) -> String {
+    number(value.pointer(pointer).and_then(Value::as_f64), 4)
+}
+
+fn count(value: &Value, pointer: &str) -> String {
+    value.pointer(pointer).and_then(Value::as_u64).map_or_else(|| "n/a".to_owned(), |n| n.to_string())
+}
+
+fn warnings(value: &Value) -> Vec<String> {
+    let list = value.get("warnings").and_then(Value::as_array);
+    list.into_iter().flatten().filter_map(|w| w.as_str().map(str::to_owned)).collect()
+}
+
+/// The method of `identification.json` that was kept.
+fn chosen(robot: &Value) -> Option<&Value> {
+    let wanted = text(robot, "/chosen");
+    let methods = robot.get("methods")?.as_array()?;
+    methods.iter().find(|m| format!("{}/{}", text(m, "/name"), text(m, "/model")) == wanted)
+}
+
+/// The lines on stdout.
+pub fn summary(day: &Day, out: &OutDir) -> String {
+    let line = |part: &Option<Value>, say: &dyn Fn(&Value) -> String| part.as_ref().map_or("not done".to_owned(), say);
+    format!(
+        "rig: {}\nmeasurements: {}\nrobot: {}\nreport: {}\n",
+        line(&day.check, &rig_words),
+        line(&day.measured, &measured_words),
+        line(&day.robot, &robot_words),
+        out.join("report.html"),
+    )
+}
+
+fn rig_words(check: &Value) -> String {
+    format!("{}, {}", text(check, "/verdict").to_uppercase(), length_words(check))
+}
+
+fn length_words(check: &Value) -> String {
+    format!(
+        "largest length error {} mm, expanded uncertainty {} mm, tolerance {} mm",
+        mm(check, "/max_abs_error_mm"),
+        mm(check, "/expanded_uncertainty_mm"),
+        mm(check, "/tolerance_mm")
+    )
+}
+
+fn measured_words(measured: &Value) -> String {
+    format!("{} of {} poses measured", count(measured, "/measured"), count(measured, "/poses"))
+}
+
+fn robot_words(robot: &Value) -> String {
+    let after = chosen(robot).map_or_else(|| "n/a".to_owned(), |m| mm(m, "/verify/mean_abs_mm"));
+    format!("mean distance error {} mm before, {after} mm after", mm(robot, "/before/verify/mean_abs_mm"))
+}
+
+/// The page.
+pub fn page(day: &Day) -> String {
+    let tone = match (day.is_good(), &day.check) {
+        (true, Some(_)) => Tone::Good,
+        _ if day.check.as_ref().is_some_and(|check| text(check, "/verdict") == "fail") => Tone::Bad,
+        _ => Tone::Doubtful,
+    };
+    let headline = match &day.check {
+        _ if !day.breaks.is_empty() => "The parts do not belong together".to_owned(),
+        Some(check) => format!("Rig: {}", text(check, "/verdict").to_uppercase()),
+        None => "Without a camera check".to_owned(),
+    };
+    let words: Vec<String> = [
+        (&day.check, length_words as fn(&Value) -> String),
+        (&day.measured, measured_words),
+        (&day.robot, robot_words),
+    ]
+    .into_iter()
+    .filter_map(|(part, say)| part.as_ref().map(say))
+    .collect();
+    let content = html! {
+        (page::verdict(tone, &headline, &format!("{}.", words.join("; "))))
+        (page::warnings(&day.breaks))
+        h2 { "1. The stereo rig" }
+        @match &day.check { Some(check) => (rig(check)), None => p { "Not done: there is no camera-check.json." } }
+        h2 { "2. The measurements" }
+        @match &day.measured { Some(measured) => (measurements(measured)), None => p { "Not done: there is no measure.json." } }
+        h2 { "3. The robot" }
+        @match &day.robot { Some(robot) => (arm(robot)), None => p { "Not done: there is no identification.json." } }
+        h2 { "Signatures" }
+        (page::table(&["", "name", "date", "signature"], &["measured by", "checked by", "released by"].map(|who| {
+            vec![who.to_owned(), "\u{2003}".repeat(10), "\u{2003}".repeat(6), "\u{2003}".repeat(12)]
+        })))
+    };
+    page::page("Calibration report", "Stereo rig, measurements and robot", &content)
+}
+
+fn rig(check: &Value) -> Markup {
+    let ranges = check.get("ranges").and_then(Value::as_array);
+    let lengths: u64 = ranges.into_iter().flatten().filter_map(|r| r.get("count")?.as_u64()).sum();
+    let nominal = ranges.into_iter().flatten().filter_map(|r| r.get("nominal_mm")?.as_f64());
+    let (least, most) = nominal.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
+    let rows = [
+        ("length measurement error E, largest", mm(check, "/max_abs_error_mm"), "mm"),
+        ("its expanded uncertainty (k = 2)", mm(check, "/expanded_uncertainty_mm"), "mm"),
+        ("limit (tolerance)", mm(check, "/tolerance_mm"), "mm"),
+        ("lengths can be trusted to", mm(check, "/trusted_mm"), "mm"),
+        ("reprojection residual, RMS", mm(check, "/reprojection_rms_px"), "px"),
+        ("epipolar error, RMS", mm(check, "/epipolar/rms_px"), "px"),
+        ("baseline", mm(check, "/baseline_mm"), "mm"),
+        ("pairs used", count(check, "/pairs_used"), ""),
+    ];
+    let second = check.get("second_board").is_some_and(|board| !board.is_null());
+    html! {
+        (quantities(&rows))
+        p { (format!(
+            "E is the largest deviation of {lengths} lengths of {} to {} mm between corners of the board, on pairs that did not help to calibrate the cameras that \
+             measured them. The verdict keeps the uncertainty as a guard band, as ISO 14253-1 asks: a pass needs E and its uncertainty together within the limit.",
+            number(Some(least).filter(|v| v.is_finite()), 1), number(Some(most), 1))) }
+        p {
+            "A test by VDI/VDE 2634 part 1 takes lengths of an artefact calibrated by others, on at least seven lines through the measuring volume. "
+            @if second { "Here a second board was measured that calibrated nothing; it stands in camera-check.html." }
+            @else { "Here the lengths are those of the calibrating board itself: an error of its pitch does not show. A second board (--check-images) shows it." }
+        }
+        (page::warnings(&warnings(check)))
+    }
+}
+
+fn measurements(measured: &Value) -> Markup {
+    let rows = [
+        ("poses measured", count(measured, "/measured"), ""),
+        ("poses", count(measured, "/poses"), ""),
+        ("board fit, RMS", mm(measured, "/fit_rms_mm"), "mm"),
+        ("standard deviation of the mark point, x", mm(measured, "/sigma_mm/0"), "mm"),
+        ("y", mm(measured, "/sigma_mm/1"), "mm"),
+        ("z", mm(measured, "/sigma_mm/2"), "mm"),
+    ];
+    html! {
+        (quantities(&rows))
+        p { "Compared with its calibration, the rig " (match text(measured, "/rig/state") { "agrees" => "agrees".to_owned(), other => format!("does not simply agree ({other})") }) "." }
+        (page::warnings(&warnings(measured)))
+    }
+}
+
+fn arm(robot: &Value) -> Markup {
+    let none = Value::Null;
+    let (before, after) = (robot.pointer("/before").unwrap_or(&none), chosen(robot).unwrap_or(&none));
+    let row = |term: &str, pointer: &str| vec![term.to_owned(), mm(before, pointer), mm(after, pointer)];
+    let rows = [
+        row("distance accuracy (AD): mean |error|, mm", "/verify/mean_abs_mm"),
+        row("distance accuracy: largest |error|, mm", "/verify/max_abs_mm"),
+        row("distance accuracy: standard deviation, mm", "/verify/std_mm"),
+        row("positioning accuracy (AP): mean error, mm", "/verify/point/mean_abs_mm"),
+        row("positioning accuracy: largest error, mm", "/verify/point/max_abs_mm"),
+    ];
+    html! {
+        (page::table(&["on verify poses, which fitted nothing", "before", "after"], &rows))
+        p { (format!(
+            "{} verify poses; {} kept; {} of {} parameters determined. To expect at other poses of the same range: {} mm in the mean, {} mm at 95 %.",
+            count(after, "/verify/count"), text(robot, "/chosen"), count(robot, "/identifiability/rank"),
+            count(robot, "/identifiability/parameters"), mm(robot, "/expected/mean_mm"), mm(robot, "/expected/p95_mm"))) }
+        p {
+            "The terms are those of ISO 9283; a test by it visits each of five poses thirty times at rated load and speed and reports pose repeatability (RP) as well. Here each \
+             pose was visited once: repeatability is part of the errors above and was not separated. Positions are compared after a rigid fit of each camera placement."
+        }
+        (page::warnings(&warnings(robot)))
+    }
+}
+
+fn quantities(rows: &[(&str, String, &str)]) -> Markup {
+    let cells: Vec<Vec<String>> =
+        rows.iter().map(|(what, value, unit)| vec![(*what).to_owned(), value.clone(), (*unit).to_owned()]).collect();
+    page::table(&["quantity", "value", "unit"], &cells)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn day(verdict: &str) -> Day {
+        let check = json!({"verdict": verdict, "max_abs_error_mm": 0.0123, "tolerance_mm": 0.05, "second_board": null,
+            "ranges": [{"nominal_mm": 10.0, "count": 7}, {"nominal_mm": 70.0, "count": 5}]});
+        let verify = |mm: f64| json!({"verify": {"count": 16, "mean_abs_mm": mm}});
+        let mut kept = verify(0.0456);
+        kept["name"] = "stapso".into();
+        kept["model"] = "position".into();
+        let robot = json!({"chosen": "stapso/position", "before": verify(1.5), "methods": [verify(9.0), kept]});
+        Day { check: Some(check), measured: None, robot: Some(robot), breaks: Vec::new() }
+    }
+
+    #[test]
+    fn figures_of_the_method_kept_and_parts_not_done() {
+        let page = page(&day("pass"));
+        for part in
+            ["PASS", "0.0123", "12 lengths of 10.0 to 70.0 mm", "1.5000", "0.0456", "there is no measure.json", "n/a"]
+        {
+            assert!(page.contains(part), "{part}");
+        }
+        assert!(!page.contains("9.0000"));
+    }
+
+    #[test]
+    fn nothing_is_good_without_a_pass_or_with_parts_of_another_day() {
+        assert!(day("pass").is_good());
+        assert!(!day("undecided").is_good());
+        let broken = Day { breaks: vec!["measure.json was made with another rig".to_owned()], ..day("pass") };
+        assert!(!broken.is_good());
+        assert!(page(&broken).contains("do not belong together"));
+    }
+}

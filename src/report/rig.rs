@@ -1,0 +1,40 @@
+//! The cameras and what they saw, in space.
+
+use nalgebra::{Point2, Point3};
+
+use super::scene::{Ink, Scene};
+use crate::geometry::Transform;
+use crate::imaging::Board;
+use crate::stereo::{Camera, Rig};
+
+/// Both cameras as pyramids of this depth, mm, in the left camera's frame.
+pub fn cameras(scene: &mut Scene, rig: &Rig, depth_mm: f64) {
+    let left_from_right = rig.right_from_left.inverse();
+    for (name, camera, left_from_camera) in
+        [("left", &rig.left, Transform::identity()), ("right", &rig.right, left_from_right)]
+    {
+        let tip = left_from_camera * Point3::origin();
+        let corners: Vec<Point3<f64>> =
+            field(camera).into_iter().map(|ray| left_from_camera * (ray * depth_mm)).collect();
+        let ring: Vec<Point3<f64>> = corners.iter().copied().chain(corners.first().copied()).collect();
+        scene.line(Ink::Frame, ring);
+        for corner in corners {
+            scene.line(Ink::Frame, vec![tip, corner]);
+        }
+        scene.word(tip, name);
+    }
+}
+
+/// Rays through the corners of a picture, at depth one.
+fn field(camera: &Camera) -> Vec<Point3<f64>> {
+    let (right, bottom) = (f64::from(camera.width) - 0.5, f64::from(camera.height) - 0.5);
+    let corners = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom)].map(|(x, y)| Point2::new(x, y));
+    corners.iter().filter_map(|px| camera.undistort(px)).map(|ray| Point3::new(ray.x, ray.y, 1.0)).collect()
+}
+
+/// A board's outermost corners as a rectangle.
+pub fn board(scene: &mut Scene, ink: Ink, board: &Board, left_from_board: &Transform) {
+    let (last_col, last_row) = (board.columns() - 1, board.rows() - 1);
+    let ring = [(0, 0), (last_col, 0), (last_col, last_row), (0, last_row), (0, 0)];
+    scene.line(ink, ring.map(|(col, row)| left_from_board * board.corner_mm(col, row)).to_vec());
+}
