@@ -8,13 +8,15 @@ use nalgebra::{Point2, Vector2};
 
 use super::Detected;
 use crate::imaging::image::Grey8;
-use crate::imaging::lattice::Places;
+use crate::imaging::lattice::{Lattice, Places};
 use crate::statistics::median;
 
 /// Share of a line beyond the border that must look like corners; the board's own outer edge shows none.
 const SHARE: f64 = 0.75;
 /// What of a square's contrast a corner beyond the border shows at least. An edge alone shows none, the end of an edge a half.
 const CONTRAST: f64 = 0.7;
+/// What of the contrast of most corners one of the grid shows at least: a corner of one square shows none, one in half a shadow a half.
+const END_CONTRAST: f64 = 0.25;
 
 /// How many columns and rows of corners the board has beyond those found; counts one line on each side at the most.
 pub fn lines_beyond(detected: &Detected) -> (usize, usize) {
@@ -29,6 +31,19 @@ pub fn lines_beyond(detected: &Detected) -> (usize, usize) {
     let column = |col: isize| goes_on(&mut (0..rows).map(|row| (col, row)), rows);
     let row = |row: isize| goes_on(&mut (0..columns).map(|col| (col, row)), columns);
     (usize::from(column(-1)) + usize::from(column(columns)), usize::from(row(-1)) + usize::from(row(rows)))
+}
+
+/// The grid without what is no crossing of four squares: at a board's end the outer corners of its dark squares on a light margin.
+pub(super) fn without_ends(copy: &Grey8, grid: Places) -> Places {
+    let seen = grid.iter().filter_map(|(col, row, _)| contrast(copy, &grid, col as isize, row as isize));
+    let mut seen: Vec<f64> = seen.map(f64::abs).collect();
+    seen.sort_by(f64::total_cmp);
+    // On a board of nine corners those at its end may be nearly as many.
+    let Some(usual) = seen.get(3 * seen.len() / 4).copied() else { return grid };
+    Lattice::from_fn(grid.columns, grid.rows, |col, row| {
+        let crosses = contrast(copy, &grid, col as isize, row as isize).is_none_or(|c| c.abs() > END_CONTRAST * usual);
+        grid.get(col, row).copied().filter(|_| crosses)
+    })
 }
 
 /// Contrast of the four squares round a corner of the grid, or round a place one square beyond it, with the sign that
@@ -65,7 +80,6 @@ fn local(grid: &Places, col: isize, row: isize) -> Option<(Point2<f64>, Vector2<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::lattice::Lattice;
     use crate::imaging::pyramid::Level;
 
     /// A board of 7x6 squares of 12 px in a light margin, of which the inner corners in the given ranges were found.
@@ -94,6 +108,17 @@ mod tests {
         assert_eq!(lines_beyond(&found(0..5, 0..5)), (1, 0));
         assert_eq!(lines_beyond(&found(1..5, 0..5)), (2, 0));
         assert_eq!(lines_beyond(&found(1..6, 1..4)), (1, 2));
+    }
+
+    #[test]
+    fn corners_of_single_squares_are_no_crossings() {
+        let Detected { corners, copy, .. } = found(0..8, 0..7);
+        // The same board with the outline of its squares taken for corners, too.
+        let outline = Lattice::from_fn(8, 7, |c, r| corners.get(c, r).map(|p| Point2::new(p.x - 12.0, p.y - 12.0)));
+        let kept = without_ends(&copy, outline);
+        let inner = |col: usize, row: usize| (1..7).contains(&col) && (1..6).contains(&row);
+        assert!(kept.iter().all(|(col, row, _)| inner(col, row)));
+        assert_eq!(kept.count(), 30);
     }
 
     #[test]

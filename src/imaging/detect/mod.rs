@@ -194,7 +194,7 @@ fn ladder(picture: &Picture) -> Vec<Attempt> {
 }
 
 fn grown(small: &Grey8) -> Option<Places> {
-    Some(extent::without_chance_lines(small, largest_grid(small)?))
+    Some(extent::without_chance_lines(small, continuation::without_ends(small, largest_grid(small)?)))
 }
 
 fn whole(board: Board, corners: Vec<Point2<f64>>) -> Places {

@@ -38,6 +38,8 @@ const MOST_SIGMAS: f64 = 10.0;
 /// How many times the board's usual residual (as a share of the contrast) a corner may have that was measured in a smaller window for
 /// want of a better.
 const MOST_ROUGHNESS: f64 = 1.5;
+/// The same for a corner in whose window pixels may be that do not belong: noise alone scatters less.
+const ROUGH: f64 = 1.15;
 
 /// False for a fit that wandered off, turned away, or found no contrast.
 pub(super) fn plausible(fit: &Fit, start: &Model, cell: &Cell) -> bool {
@@ -81,6 +83,16 @@ impl Board {
             roughness: median(corners.iter().map(|m| roughness(&m.fit))).unwrap_or(f64::INFINITY),
             variance_px2: median(corners.iter().map(|m| m.fit.covariance_px2.trace())).unwrap_or(f64::INFINITY),
         }
+    }
+
+    /// The usual residual as a share of half the contrast.
+    pub(super) fn roughness(&self) -> f64 {
+        self.roughness
+    }
+
+    /// True for a corner whose pixels miss the model by more than is usual.
+    pub(super) fn is_rough(&self, corner: &Measured) -> bool {
+        roughness(&corner.fit) > ROUGH * self.roughness
     }
 
     /// True where the four arms of a corner tell the same, and it is not far less certain than the others.

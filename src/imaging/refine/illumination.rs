@@ -134,7 +134,7 @@ mod tests {
                 residual: 1.0,
                 arm_misfit: [[1.0; 2]; 2],
                 pixels: 100,
-                saturated: 0,
+                left_out: 0,
                 steps: 3,
             };
             Some(Measured { px: at + wrong * -4.0, fit })

@@ -4,7 +4,7 @@
 //! in a small window that a coarse start can't lead astray (coarse); then at full size in a small window (near) and in the
 //! largest that stays inside the four squares round it (full). Where the larger window does not agree with the smaller one, or the four
 //! arms of a corner not with each other, something hides a part of it, and the largest window that is free of it is kept. Last,
-//! the board's corners share what they know of the light. Goes wrong: a corner without contrast, hidden, cut off by the border or
+//! the board's corners share what they know of the light, which counts from the picture's veil ([`veil`]). Goes wrong: a corner without contrast, hidden, cut off by the border or
 //! saturated; it is dropped, the others stay.
 
 mod acceptance;
@@ -12,14 +12,17 @@ mod cell;
 mod curvature;
 pub mod fields;
 pub mod illumination;
+mod outlying_pixels;
 pub mod saddle_fit;
+mod veil;
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
 use self::acceptance::{agrees, plausible};
 use self::cell::Cell;
 use self::curvature::bends;
-use self::saddle_fit::window::{Frame, Window};
+use self::outlying_pixels::{Explained, few};
+use self::saddle_fit::window::{Below, Frame, Keep, Window};
 use self::saddle_fit::{Fit, Model, fit};
 use super::Corner;
 use super::detect::Detected;
@@ -75,8 +78,8 @@ pub fn refine(picture: &Picture, detected: &Detected) -> Lattice<Corner> {
 /// Measures all corners of a board, with what else the fits tell.
 pub fn measure(picture: &Picture, detected: &Detected) -> Lattice<Measured> {
     match &picture.grey {
-        Grey::Eight(image) => Full { image, clip_level: picture.clip_level(), as_copied: true }.measure(detected),
-        Grey::Sixteen(image) => Full { image, clip_level: picture.clip_level(), as_copied: false }.measure(detected),
+        Grey::Eight(image) => Full::of(image, picture.clip_level(), detected).measure(detected),
+        Grey::Sixteen(image) => Full::of(image, picture.clip_level(), detected).measure(detected),
     }
 }
 
@@ -84,8 +87,8 @@ pub fn measure(picture: &Picture, detected: &Detected) -> Lattice<Measured> {
 struct Full<'a, T> {
     image: &'a Image<T>,
     clip_level: f64,
-    /// Whether its grey values are those of the reduced copy.
-    as_copied: bool,
+    /// The grey value from which light counts; the fits see what is above it.
+    veil: f64,
 }
 
 /// What a corner's windows told.
@@ -98,6 +101,11 @@ struct Windows {
 }
 
 impl<T: Copy + Into<f64>> Full<'_, T> {
+    fn of<'a>(image: &'a Image<T>, clip_level: f64, detected: &Detected) -> Full<'a, T> {
+        let places = detected.corners.map(|px| detected.level.to_picture(px));
+        Full { image, clip_level, veil: veil::level(image, clip_level, &places) }
+    }
+
     fn measure(&self, detected: &Detected) -> Lattice<Measured> {
         let mut window = Window::default();
         let coarse = coarse(detected, &mut window);
@@ -112,15 +120,13 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
         let seen: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
             let from = coarse.get(col, row)?;
             let cell = Cell::of(&places, col, row)?;
-            let mut start = Model {
+            let start = Model {
                 corner: Vector2::zeros(),
                 bend: bends[row * columns + col],
+                // The copy's grey values are not those above the veil: without contrast the fit finds levels of its own.
+                half_contrast: 0.0,
                 ..enlarged(&from.fit.model, scale)
             };
-            if !self.as_copied {
-                // The copy's grey values are not the picture's: without contrast the fit finds levels of its own.
-                start.half_contrast = 0.0;
-            }
             // On a copy of full size the first fit is a measurement already.
             Some(self.windows(cell, start, (scale == 1.0).then_some(*from), &mut window))
         });
@@ -147,8 +153,44 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
         Windows { cell, start, near, full }
     }
 
+    /// A corner whose pixels lie farther from the model than is usual on the board, fitted again without those that it cannot explain, where
+    /// they are few.
+    fn without_outlying(
+        &self,
+        first: &Measured,
+        most_half_px: f64,
+        cell: &Cell,
+        board: &acceptance::Board,
+        window: &mut Window,
+    ) -> Measured {
+        let clips = first.fit.left_out > 0;
+        if !clips && !board.is_rough(first) {
+            return *first;
+        }
+        let mut best = *first;
+        // The first fit was pulled by what the second one leaves out: a third one sees that, too.
+        for _ in 0..2 {
+            let keep = Explained::by(&best, board.roughness(), self.clip_level - self.veil, clips);
+            let start = Model { corner: Vector2::zeros(), ..best.fit.model };
+            let again = self.fit_kept(most_half_px, &Cell { place: best.px, ..*cell }, &start, &keep, window);
+            let dropped = |again: &Measured| again.fit.left_out.saturating_sub(first.fit.left_out);
+            match again {
+                Some(again) if clips || few(dropped(&again), again.fit.pixels) => best = again,
+                _ => break,
+            }
+        }
+        best
+    }
+
     /// The largest window that nothing reaches into: the full one, one between, the near one, or none.
     fn largest_free(&self, seen: &Windows, board: &acceptance::Board, window: &mut Window) -> Option<Measured> {
+        let seen = Windows {
+            near: seen
+                .near
+                .map(|near| self.without_outlying(&near, near_half_px(&seen.start), &seen.cell, board, window)),
+            full: seen.full.map(|full| self.without_outlying(&full, MOST_HALF_PX, &seen.cell, board, window)),
+            ..*seen
+        };
         if let Some(full) = &seen.full
             && seen.near.as_ref().is_none_or(|near| agrees(near, full))
             && board.accepts(full)
@@ -170,13 +212,25 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
 
     /// A fit in a window that reaches up to `most_half_px` along each edge.
     fn fit_within(&self, most_half_px: f64, cell: &Cell, start: &Model, window: &mut Window) -> Option<Measured> {
+        self.fit_kept(most_half_px, cell, start, &Below(self.clip_level - self.veil), window)
+    }
+
+    /// The same with the pixels that are to be kept.
+    fn fit_kept(
+        &self,
+        most_half_px: f64,
+        cell: &Cell,
+        start: &Model,
+        keep: &impl Keep,
+        window: &mut Window,
+    ) -> Option<Measured> {
         let mut start = *start;
         loop {
             let blur = start.blur_px[0].max(start.blur_px[1]);
             let margin = margin_px(&start, cell);
             let halves = cell.edges.map(|e| e.normalize() * (e.norm() - margin).max(0.5 * e.norm()).min(most_half_px));
             let band_px = BAND_BLURS * blur + 1.0;
-            window.collect(self.image, self.clip_level, &Frame { start: cell.place, halves, band_px });
+            window.collect(self.image, self.veil, keep, &Frame { start: cell.place, halves, band_px });
             let found = fit(&start, window)?;
             let wider = found.model.blur_px[0].max(found.model.blur_px[1]);
             // The copy may have hidden how wide the blur is; the band must hold the whole edge.
@@ -226,7 +280,7 @@ fn coarse_fit(copy: &Image<u8>, cell: &Cell, window: &mut Window) -> Option<Fit>
         };
         let halves = cell.edges.map(|e| e.normalize() * half);
         // A stretched copy reaches 255 without being clipped.
-        window.collect(copy, f64::MAX, &Frame { start: cell.place, halves, band_px: f64::MAX });
+        window.collect(copy, 0.0, &Below(f64::MAX), &Frame { start: cell.place, halves, band_px: f64::MAX });
         if let Some(first) = fit(&start, window)
             && plausible(&first, &start, cell)
             && (first.model.blur_px.iter().all(|&s| s < 0.4 * half) || half >= most)

@@ -76,6 +76,7 @@ pub fn find(candidates: &Candidates, lens: Lens) -> Result<Consensus, Error> {
     let scene = Scene::new(candidates, lens)?;
     let mut grouping = consistency::group(&scene.pairs);
     scene.without_gross(&mut grouping);
+    consistency::dissolve_single(&mut grouping);
     let changes = changes::of(&scene.pairs, &scene.layout, &scene.shared.rig, &grouping);
     let standing = changes.standing;
     let members: Vec<usize> = (0..grouping.len()).filter(|&i| standing.is_some() && grouping[i] == standing).collect();

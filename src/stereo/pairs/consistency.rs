@@ -126,6 +126,15 @@ pub fn groups(grouping: &Grouping) -> usize {
     grouping.iter().flatten().max().map_or(0, |last| last + 1)
 }
 
+/// A group of one pair is no rig: nothing confirms it.
+pub fn dissolve_single(grouping: &mut Grouping) {
+    let single: Vec<usize> =
+        (0..groups(grouping)).filter(|g| grouping.iter().flatten().filter(|of| *of == g).count() < 2).collect();
+    for of in grouping.iter_mut() {
+        *of = of.filter(|g| !single.contains(g)).map(|g| g - single.iter().filter(|s| **s < g).count());
+    }
+}
+
 /// Finds the pairs that share a rig. Pairs that could not be linearised are in none.
 pub fn group(pairs: &[Option<Linearised>]) -> Grouping {
     let mut grouping: Grouping = pairs.iter().map(|p| p.as_ref().map(|_| 0)).collect();

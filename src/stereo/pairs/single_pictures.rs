@@ -5,6 +5,7 @@
 //! where the other camera stands. Goes wrong: pictures that do not determine so rich a lens; a simpler one is taken then.
 
 use crate::geometry::Transform;
+use crate::statistics::median;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::residuals;
 use crate::stereo::data::view::View;
@@ -17,6 +18,9 @@ use crate::stereo::{Camera, Lens, Rig, Side};
 /// A picture that loses more than this share of its corners shows no board of the series: of Gaussian corners one in a million is lost,
 /// of a picture taken line by line, in motion, or of numbers in a wrong order nearly all.
 const LOST_SHARE: f64 = 0.25;
+/// The same where the board itself is the reason, because columns of it are printed off their places: then all pictures lose these.
+const LOST_TIMES_USUAL: f64 = 1.5;
+const LARGEST_LOST_SHARE: f64 = 0.6;
 
 /// One camera on its own pictures.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,9 +54,11 @@ impl SinglePictures {
 
     fn of(mut pictures: Vec<View>, known: &[usize], Problem { views, values }: Problem) -> SinglePictures {
         let mut poses = vec![None; pictures.len()];
+        let lost = |view: &View| 1.0 - view.active(Side::Left).count() as f64 / view.observations.len() as f64;
+        let usual = median(views.iter().map(lost)).unwrap_or(0.0);
+        let limit = LOST_SHARE.max(LOST_TIMES_USUAL * usual).min(LARGEST_LOST_SHARE);
         for ((&i, view), pose) in known.iter().zip(views).zip(values.poses) {
-            let lost = view.observations.len() - view.active(Side::Left).count();
-            if lost as f64 <= LOST_SHARE * view.observations.len() as f64 {
+            if lost(&view) <= limit {
                 poses[i] = Some(pose);
             }
             pictures[i] = view;

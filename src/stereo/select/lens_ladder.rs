@@ -75,23 +75,20 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     Ok(Choice { layout: chosen.layout, near: Some(chosen.values.clone()), scores })
 }
 
-/// Every lens from the simplest, each from where the one before it ended: a richer lens begins as the simpler one. Above a lens that
-/// the pairs do not determine there is none that they do, and one that is expected to gain no more than chance cannot predict better.
+/// Every lens from the simplest, each from where the one before it that has a minimum ended: a richer lens begins as a simpler one. One that is
+/// expected to gain no more than chance cannot predict better, and is not tried.
 fn ladder(problem: &Problem, shape: bool) -> Vec<LensScore> {
     let mut problem = problem.clone();
-    let (mut determined, mut simpler) = (true, None);
+    let mut simpler = None;
     let mut scores = Vec::new();
     for lens in Lens::LADDER {
         let layout = Layout::rig(lens, shape);
         let rich = lens > Lens::Brown5;
-        let tried = determined && !(rich && simpler.is_some_and(|simpler| !expects_gain(&problem, &layout, &simpler)));
+        let tried = !rich || simpler.is_some_and(|simpler| expects_gain(&problem, &layout, &simpler));
         let score = if tried { score(&problem, lens, shape) } else { LensScore::untried(lens) };
-        match &score.trial {
-            Some(trial) => {
-                problem.values = trial.values.clone();
-                simpler = Some(layout);
-            }
-            None => determined = determined && !tried,
+        if let Some(trial) = &score.trial {
+            problem.values = trial.values.clone();
+            simpler = Some(layout);
         }
         scores.push(score);
     }

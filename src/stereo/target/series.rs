@@ -132,6 +132,9 @@ pub fn measure(known: &Knowledge, seen: Vec<Seen>) -> Series {
     run.finish(&found, judgement)
 }
 
+/// Of two poses with the same picture, the one whose pictures miss the rig by more than this many times what is usual has the other's.
+const TWIN_MISFIT: f64 = 10.0;
+
 /// A run while it is worked on.
 pub(super) struct Run<'a> {
     pub(super) known: &'a Knowledge,
@@ -152,16 +155,19 @@ impl<'a> Run<'a> {
         let empty = |at: &RobotPose| PairCorners { pair: at.pose.clone(), ..PairCorners::default() };
         let pairs: Vec<PairCorners> = seen.iter().map(|s| s.corners.clone().unwrap_or_else(|_| empty(&s.at))).collect();
         let at: Vec<RobotPose> = seen.into_iter().map(|s| s.at).collect();
+        let mut starts = starts(&known.rig, &known.board, &pairs);
+        let usual = median(starts.iter().filter(|s| s.pose.is_some()).map(|s| s.misfit_px)).unwrap_or(0.0);
+        let fits = |i: usize| starts[i].pose.is_some() && starts[i].misfit_px <= TWIN_MISFIT * usual;
         for (i, refusal) in refusals.iter_mut().enumerate() {
             let twin =
                 (0..pairs.len()).find(|&j| j != i && !pairs[i].left.is_empty() && same_pictures(&pairs[i], &pairs[j]));
-            if let Some(j) = twin.filter(|_| refusal.is_none()) {
+            // Where one of the two fits the rig and the other does not, the picture is that one's.
+            if let Some(j) = twin.filter(|&j| refusal.is_none() && !(fits(i) && !fits(j))) {
                 let reason =
                     format!("a picture is the same as at pose {}: one of the two poses has the other's", at[j].pose);
                 *refusal = Some(Refusal { status: "another pose's pictures", reason });
             }
         }
-        let mut starts = starts(&known.rig, &known.board, &pairs);
         let mut views: Vec<View> = starts.iter().map(|s| s.view.clone()).collect();
         let mut poses: Vec<Option<Transform>> =
             starts.iter().zip(&refusals).map(|(s, refusal)| s.pose.filter(|_| refusal.is_none())).collect();

@@ -97,9 +97,14 @@ fn main() {
         *counts.entry(judgement).or_insert(0) += 1;
     }
     println!();
-    for judgement in
-        [Judgement::Right, Judgement::FalsePass, Judgement::Silent, Judgement::FalseFail, Judgement::FalseAlarm]
-    {
+    for judgement in [
+        Judgement::Right,
+        Judgement::Undecided,
+        Judgement::FalsePass,
+        Judgement::Silent,
+        Judgement::FalseFail,
+        Judgement::FalseAlarm,
+    ] {
         println!("{:4} {}", counts.get(&judgement).unwrap_or(&0), judgement.name());
     }
 }

@@ -50,8 +50,8 @@ pub struct Fit {
     pub arm_misfit: [[f64; 2]; 2],
     /// Number of pixels.
     pub pixels: usize,
-    /// Number of pixels that were left out as saturated.
-    pub saturated: usize,
+    /// Number of pixels in the window that were left out: saturated, or not explained by a first fit.
+    pub left_out: usize,
     /// Number of steps to the end.
     pub steps: usize,
 }
@@ -125,7 +125,7 @@ pub fn fit(start: &Model, window: &Window) -> Option<Fit> {
         light_covariance: part(8, 8),
         arm_misfit: last.arm_gains.map(|sides| sides.map(|gain| gain / variance)),
         pixels: count,
-        saturated: window.saturated,
+        left_out: window.left_out,
         steps,
     };
     (fit.covariance_px2.iter().all(|v| v.is_finite()) && last.cost.is_finite()).then_some(fit)
@@ -178,7 +178,7 @@ impl Fit {
 
 #[cfg(test)]
 mod tests {
-    use super::window::Frame;
+    use super::window::{Below, Frame};
     use super::*;
     use crate::imaging::image::Image;
 
@@ -191,7 +191,7 @@ mod tests {
         let halves = model.angles_rad.map(|a| Vector2::new(a.cos(), a.sin()) * half as f64);
         let start = Point2::new(half as f64, half as f64);
         let mut window = Window::default();
-        window.collect(&picture, 65_535.0, &Frame { start, halves, band_px });
+        window.collect(&picture, 0.0, &Below(65_535.0), &Frame { start, halves, band_px });
         window
     }
 

@@ -2,7 +2,7 @@
 //!
 //! A window is a parallelogram along the corner's two edges. Pixels near both edges, at the crossing, see all of the model;
 //! those near one edge alone, on an arm of the cross, see that edge; those away from both see only the two
-//! grey levels and the light, and enter as sums. Saturated pixels are left out.
+//! grey levels and the light, and enter as sums. Saturated pixels, and what else is not to be kept, are left out.
 
 use std::ops::Range;
 
@@ -48,8 +48,8 @@ pub struct Window {
     /// Away from both edges, where the product of both normals' products is negative, then where it is positive: the
     /// sums of all products of `(1, x, y, grey)`.
     pub flat: [Matrix4<f64>; 2],
-    /// Number of pixels that were left out as saturated.
-    pub saturated: usize,
+    /// Number of pixels that were not kept.
+    pub left_out: usize,
 }
 
 /// Where a window lies and what is near.
@@ -61,6 +61,22 @@ pub struct Frame {
     pub halves: [Vector2<f64>; 2],
     /// Distance from an edge up to which pixels see it, px.
     pub band_px: f64,
+}
+
+/// Which pixels a window takes.
+pub trait Keep {
+    /// Whether it takes a pixel at a place relative to the window's start.
+    fn keeps(&self, x: f64, y: f64, grey: f64) -> bool;
+}
+
+/// Takes every pixel below a level.
+pub struct Below(pub f64);
+
+impl Keep for Below {
+    #[inline(always)]
+    fn keeps(&self, _: f64, _: f64, grey: f64) -> bool {
+        grey < self.0
+    }
 }
 
 impl Groups {
@@ -95,14 +111,14 @@ impl Window {
         self.near() + self.flat.iter().map(|sums| sums[(0, 0)] as usize).sum::<usize>()
     }
 
-    /// Fills the window anew; grey values from `clip_level` on are left out. Nothing is in a window without area.
-    pub fn collect<T: Copy + Into<f64>>(&mut self, image: &Image<T>, clip_level: f64, frame: &Frame) {
+    /// Fills the window anew with the pixels that are to be kept, as grey values above a whole number `veil`. Nothing is in a window without area.
+    pub fn collect<T: Copy + Into<f64>>(&mut self, image: &Image<T>, veil: f64, keep: &impl Keep, frame: &Frame) {
         self.crossing.clear();
         self.arms.iter_mut().flatten().for_each(Groups::clear);
-        (self.flat, self.saturated) = ([Matrix4::zeros(); 2], 0);
+        (self.flat, self.left_out) = ([Matrix4::zeros(); 2], 0);
         let Some(cut) = Cut::new(frame) else { return };
         let Image { width, height, pixels } = image;
-        let (width, height, saturation) = (*width, *height, clip_level);
+        let (width, height) = (*width, *height);
         for y in whole(cut.start.y - cut.reach, cut.start.y + cut.reach, height) {
             let dy = y as f64 - cut.start.y;
             let row = &pixels[y * width..(y + 1) * width];
@@ -116,12 +132,16 @@ impl Window {
                 let dx = run.start as f64 - cut.start.x;
                 let side = cut.bands.map(|band| usize::from(band.at(dx, dy) > 0.0));
                 match [0, 1].map(|k| near[k].contains(&run.start)) {
-                    [true, true] => self.saturated += push(&mut self.crossing, row, run, saturation, (dx, dy)),
-                    [true, false] => self.saturated += push(&mut self.arms[0][side[1]], row, run, saturation, (dx, dy)),
-                    [false, true] => self.saturated += push(&mut self.arms[1][side[0]], row, run, saturation, (dx, dy)),
+                    [true, true] => self.left_out += push(&mut self.crossing, row, run, (veil, keep), (dx, dy)),
+                    [true, false] => {
+                        self.left_out += push(&mut self.arms[0][side[1]], row, run, (veil, keep), (dx, dy))
+                    }
+                    [false, true] => {
+                        self.left_out += push(&mut self.arms[1][side[0]], row, run, (veil, keep), (dx, dy))
+                    }
                     [false, false] => {
                         let alike = usize::from(side[0] == side[1]);
-                        self.saturated += add(&mut self.flat[alike], row, run, saturation, (dx, dy));
+                        self.left_out += add(&mut self.flat[alike], row, run, (veil, keep), (dx, dy));
                     }
                 }
             }
@@ -129,43 +149,47 @@ impl Window {
     }
 }
 
-/// Adds a run of pixels one by one; `from` is the first one's place. Returns how many were saturated.
+/// Adds a run of pixels one by one; `from` is the first one's place. Returns how many were not kept.
+#[inline(always)]
 fn push<T: Copy + Into<f64>>(
     to: &mut Groups,
     row: &[T],
     run: Range<usize>,
-    saturation: f64,
+    (veil, keep): (f64, &impl Keep),
     from: (f64, f64),
 ) -> usize {
-    let mut saturated = 0;
+    let mut left_out = 0;
     for (i, &value) in row[run].iter().enumerate() {
-        let grey: f64 = value.into();
-        if grey < saturation {
-            to.push(from.0 + i as f64, from.1, grey);
+        let (x, grey) = (from.0 + i as f64, value.into() - veil);
+        if keep.keeps(x, from.1, grey) {
+            to.push(x, from.1, grey);
         } else {
-            saturated += 1;
+            left_out += 1;
         }
     }
-    saturated
+    left_out
 }
 
 /// Sums of a run that are kept side by side, so that one need not wait for the other.
 const SIDE_BY_SIDE: usize = 4;
 
 /// Adds a run of pixels to the sums of products of `(1, x, y, grey)`; `from` is the first one's place. Returns how
-/// many were saturated.
+/// many were not kept.
+#[inline(always)]
 fn add<T: Copy + Into<f64>>(
     to: &mut Matrix4<f64>,
     row: &[T],
     run: Range<usize>,
-    saturation: f64,
+    (veil, keep): (f64, &impl Keep),
     from: (f64, f64),
 ) -> usize {
     let values = &row[run];
-    let [n, x, xx, g, xg, gg] = if values.iter().all(|&value| value.into() < saturation) {
-        run_sums(values)
+    let kept = |(i, grey): &(usize, f64)| keep.keeps(from.0 + *i as f64, from.1, *grey);
+    let [n, x, xx, g, xg, gg] = if values.iter().map(|&value| value.into() - veil).enumerate().all(|pixel| kept(&pixel))
+    {
+        run_sums(values, veil)
     } else {
-        let seen = values.iter().map(|&value| value.into()).enumerate().filter(|(_, grey)| *grey < saturation);
+        let seen = values.iter().map(|&value| value.into() - veil).enumerate().filter(kept);
         seen.fold([0.0; 6], |[n, x, xx, g, xg, gg], (i, grey)| {
             let i = i as f64;
             [n + 1.0, x + i, xx + i * i, g + grey, xg + i * grey, gg + grey * grey]
@@ -185,7 +209,7 @@ fn add<T: Copy + Into<f64>>(
 }
 
 /// Number, sums of x, x^2, grey, x grey and grey^2 of pixels side by side, the first at x = 0. Whole numbers, hence exact.
-fn run_sums<T: Copy + Into<f64>>(values: &[T]) -> [f64; 6] {
+fn run_sums<T: Copy + Into<f64>>(values: &[T], veil: f64) -> [f64; 6] {
     let n = values.len() as f64;
     let (mut g, mut xg, mut gg) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
     let blocks = values.chunks_exact(SIDE_BY_SIDE);
@@ -193,7 +217,7 @@ fn run_sums<T: Copy + Into<f64>>(values: &[T]) -> [f64; 6] {
     let mut at: [f64; SIDE_BY_SIDE] = std::array::from_fn(|l| l as f64);
     for block in blocks {
         for l in 0..SIDE_BY_SIDE {
-            let grey: f64 = block[l].into();
+            let grey = block[l].into() - veil;
             g[l] += grey;
             xg[l] += at[l] * grey;
             gg[l] += grey * grey;
@@ -201,7 +225,7 @@ fn run_sums<T: Copy + Into<f64>>(values: &[T]) -> [f64; 6] {
         }
     }
     for ((value, at), ((g, xg), gg)) in rest.iter().zip(at).zip(g.iter_mut().zip(&mut xg).zip(&mut gg)) {
-        let grey: f64 = (*value).into();
+        let grey = (*value).into() - veil;
         *g += grey;
         *xg += at * grey;
         *gg += grey * grey;
@@ -309,7 +333,7 @@ mod tests {
                 }
             }
             for band_px in [f64::MAX, 6.0, 0.4] {
-                window.collect(&picture, 256.0, &Frame { start, halves, band_px });
+                window.collect(&picture, 0.0, &Below(256.0), &Frame { start, halves, band_px });
                 // Sums of a few thousand products, in another order.
                 assert!((total(&window) - expected).amax() < 1e-9 * expected.amax(), "{halves:?} {band_px}");
                 assert_eq!(window.count(), expected[(0, 0)] as usize);
@@ -322,7 +346,7 @@ mod tests {
     fn pixels_are_sorted_by_the_edges_they_see() {
         let (picture, mut window) = (ramp(), Window::default());
         let halves = [Vector2::new(30.0, 3.0), Vector2::new(-9.0, 28.0)];
-        window.collect(&picture, 256.0, &Frame { start: Point2::new(50.0, 50.0), halves, band_px: 5.0 });
+        window.collect(&picture, 0.0, &Below(256.0), &Frame { start: Point2::new(50.0, 50.0), halves, band_px: 5.0 });
         let normals = halves.map(|v| Vector2::new(-v.y, v.x).normalize());
         let across = |group: &Group, l: usize| normals.map(|n| n.dot(&Vector2::new(group.x[l], group.y[l])));
         let each = |groups: &Groups, holds: &dyn Fn([f64; 2]) -> bool| {
@@ -347,14 +371,14 @@ mod tests {
             band_px: f64::MAX,
         };
         let mut window = Window::default();
-        window.collect(&picture, 256.0, &frame);
-        assert_eq!((window.count(), window.saturated), (36, 0));
-        window.collect(&picture, 255.0, &frame);
-        assert_eq!((window.count(), window.saturated), (0, 36));
-        window.collect(&picture, 255.0, &Frame { band_px: 1.5, ..frame });
-        assert_eq!((window.count(), window.saturated), (0, 36));
+        window.collect(&picture, 0.0, &Below(256.0), &frame);
+        assert_eq!((window.count(), window.left_out), (36, 0));
+        window.collect(&picture, 0.0, &Below(255.0), &frame);
+        assert_eq!((window.count(), window.left_out), (0, 36));
+        window.collect(&picture, 0.0, &Below(255.0), &Frame { band_px: 1.5, ..frame });
+        assert_eq!((window.count(), window.left_out), (0, 36));
         for start in [Point2::new(-50.0, 1e6), Point2::new(f64::NAN, f64::NAN), Point2::new(f64::INFINITY, 0.0)] {
-            window.collect(&picture, 256.0, &Frame { start, ..frame });
+            window.collect(&picture, 0.0, &Below(256.0), &Frame { start, ..frame });
             assert_eq!(window.count(), 0);
         }
     }

@@ -28,6 +28,8 @@ pub enum Judgement {
     Silent,
     /// No pass where one was to be had.
     FalseFail,
+    /// Neither pass nor fail where a pass was to be had, with the line of evidence that is missing.
+    Undecided,
     /// Words about nothing.
     FalseAlarm,
 }
@@ -39,6 +41,7 @@ impl Judgement {
             Judgement::FalsePass => "FALSE PASS",
             Judgement::Silent => "SILENT",
             Judgement::FalseFail => "FALSE FAIL",
+            Judgement::Undecided => "undecided",
             Judgement::FalseAlarm => "FALSE ALARM",
         }
     }
@@ -63,6 +66,9 @@ pub fn judge(set: &Set, right: Right, said: Said) -> Judged {
     let judgement = match &deviation {
         Some(d) if passed && out(d) => Judgement::FalsePass,
         Some(d) if passed && said.words.is_empty() && silent(d) => Judgement::Silent,
+        Some(_) if said.verdict == "undecided" && !said.words.is_empty() && right != Right::Truth => {
+            Judgement::Undecided
+        }
         _ if !passed && right != Right::Truth => Judgement::FalseFail,
         _ if right == Right::Clean && !said.words.is_empty() => Judgement::FalseAlarm,
         _ => Judgement::Right,
