@@ -182,9 +182,9 @@ impl MeasureFile {
         &self.warnings
     }
 
-    /// Chi-square a number over all poses, against the calibration's noise where that is known.
-    pub fn chi_square(&self) -> Option<f64> {
-        self.chi_square
+    /// How far corners scatter, and up to how far the calibration and the target's print let expect, px.
+    pub fn scatter_px(&self) -> (Option<f64>, Option<f64>) {
+        (self.corner_noise_px, self.calibration_noise_px)
     }
 
     /// True where neither the corners' scatter nor the poses' disagreement is beyond what was known before.

@@ -72,11 +72,13 @@ fn quality(file: &MeasureFile) -> String {
     let (fit_mm, px) = file.residuals();
     let sigma = file.sigma_mm();
     let along = |i: usize| number(sigma.map(|s| s[i]), 4);
+    let (scatter_px, usual_px) = file.scatter_px();
+    let usual = usual_px.map_or(String::new(), |px| format!(" (the calibration allows {px:.4})"));
     format!(
-        "board fit {} mm, reprojection {} px RMS, chi-square a number {}; median sigma of the mark point x {} y {} z {} mm",
+        "board fit {} mm, reprojection {} px RMS, corners scatter by {} px{usual}; median sigma of the mark point x {} y {} z {} mm",
         number(fit_mm, 4),
         number(px, 3),
-        number(file.chi_square(), 2),
+        number(scatter_px, 4),
         along(0),
         along(1),
         along(2),
