@@ -118,7 +118,7 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
     let near = near.filter(|near| near.poses.len() == start.views.len());
     let mut solved = Problem { values: near.unwrap_or(start.values), ..start }
         .solve(&layout)
-        .map_err(|e| e.without(&consensus.skipped()))?;
+        .map_err(|e| e.without(&consensus.skipped()).of_lens(options.lens))?;
     let Consensus { mut discarded, standing, .. } = consensus;
     loop {
         let lost = emptied(&solved.problem.views);
@@ -135,7 +135,7 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
         solved = kept.solve(&layout).map_err(|e| e.without(&skipped()))?;
     }
     let neighbours = solved.neighbours(&corners.board);
-    let by_noise = solved.uncertainty(&layout)?.scaled(neighbours.inflation());
+    let by_noise = solved.uncertainty(&layout).map_err(|e| e.of_lens(options.lens))?.scaled(neighbours.inflation());
     let without_scatter = by_noise.shared.clone();
     let Stated { mut uncertainty, pair_scatter, witnesses } =
         stated_uncertainty::state(&solved, &layout, by_noise, &neighbours, &lens_scores);

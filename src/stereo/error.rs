@@ -2,6 +2,7 @@
 
 use crate::diagnostic::{Explain, Status};
 use crate::imaging::{Side, Skipped};
+use crate::stereo::Lens;
 
 /// What can go wrong between corners and points.
 #[derive(Debug, thiserror::Error)]
@@ -62,6 +63,14 @@ pub enum Error {
         focal_sigma: Option<f64>,
         /// Pairs that were left out before: what they show may be missing now.
         skipped: Vec<Skipped>,
+    },
+    /// A lens that was asked for has numbers that the views do not tell apart.
+    #[error(
+        "the pairs do not determine a {lens} lens: several of its numbers can be exchanged for each other without moving any corner"
+    )]
+    LensUndetermined {
+        /// The lens.
+        lens: &'static str,
     },
     /// The search did not end at a minimum.
     #[error("the calibration did not converge within {steps} steps")]
@@ -139,6 +148,18 @@ impl Error {
             other => other,
         }
     }
+
+    /// The same error, of a rich lens that was asked for: it is the lens then, not the views.
+    pub fn of_lens(self, asked: Option<Lens>) -> Error {
+        match (self, asked) {
+            (Error::Undetermined { focal_sigma: None, .. } | Error::NotConverged { .. }, Some(lens))
+                if lens > Lens::Brown5 =>
+            {
+                Error::LensUndetermined { lens: lens.name() }
+            }
+            (other, _) => other,
+        }
+    }
 }
 
 impl Explain for Error {
@@ -165,6 +186,9 @@ impl Explain for Error {
                 }
                 Error::Undetermined { .. } => {
                     "photograph the board tilted by 20 to 45 degrees about both of its axes, at several distances"
+                }
+                Error::LensUndetermined { .. } => {
+                    "without `--lens` the simplest lens that the corners bear out is taken; a richer one needs corners out to the pictures' corners"
                 }
                 Error::NotConverged { .. } => "`--lens radial2` has fewer unknowns; add pairs with the board tilted",
                 Error::RigChanged { hint, .. } => hint,

@@ -6,6 +6,8 @@
 //! Goes wrong: a start so far off that a board would have to pass through a camera; unknowns that the views do not determine
 //! (no covariance then).
 
+use std::collections::VecDeque;
+
 use nalgebra::{DVector, Vector3, Vector6};
 use rayon::prelude::*;
 
@@ -18,6 +20,14 @@ use crate::stereo::solve::robust_loss::Loss;
 
 /// The search is done when even a strongly damped step does not lower the cost.
 const MAX_DAMPING: f64 = 1e12;
+
+/// Numbers of a rich lens that only the corners farthest out tell apart are eleven orders of magnitude weaker than the others: more damping
+/// than this would slow them down, less is lost in rounding.
+const LEAST_DAMPING: f64 = 1e-14;
+
+/// So many last steps that together lower half of chi-squared by less than this have moved nothing by a seventh of its standard deviation.
+const LATELY: usize = 20;
+const NO_MATTER: f64 = 0.01;
 
 /// How far a search goes, and how carefully it begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,6 +57,8 @@ impl Search {
 pub enum Stop {
     /// At a minimum: no step lowers the cost noticeably.
     Minimum,
+    /// After the largest number of steps, the last of which lowered the cost by nothing that matters.
+    Valley,
     /// After the largest number of steps.
     Steps,
     /// A corner lies behind its camera at the start, or the views do not determine the poses.
@@ -76,6 +88,7 @@ pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss, search:
     let mut damping = search.first_damping;
     // Grows while steps fail: the way up from hardly any damping would be long otherwise.
     let mut rise = 10.0;
+    let mut lately = VecDeque::from([cost]);
     for steps in 1..=search.most_steps {
         let mut accepted = false;
         if let Some((trial, predicted_gain)) = try_step(layout, &values, &blocks, damping) {
@@ -85,7 +98,7 @@ pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss, search:
                 values = trial;
                 blocks = next;
                 cost -= gain;
-                damping = (damping * damping_change(gain / predicted_gain)).max(1e-10);
+                damping = (damping * damping_change(gain / predicted_gain)).max(LEAST_DAMPING);
                 rise = 10.0;
                 accepted = true;
             }
@@ -93,6 +106,10 @@ pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss, search:
             if predicted_gain <= search.cost_share * cost {
                 return Solution { values, cost, stop: Stop::Minimum, steps };
             }
+        }
+        lately.push_back(cost);
+        if lately.len() > LATELY + 1 {
+            lately.pop_front();
         }
         if !accepted {
             damping *= rise;
@@ -102,7 +119,10 @@ pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss, search:
             }
         }
     }
-    Solution { values, cost, stop: Stop::Steps, steps: search.most_steps }
+    // Numbers of a rich lens that nothing tells apart make a valley without an end; along it nothing changes that matters.
+    let gained = lately.front().map_or(f64::INFINITY, |before| before - cost);
+    let stop = if lately.len() > LATELY && gained < NO_MATTER { Stop::Valley } else { Stop::Steps };
+    Solution { values, cost, stop, steps: search.most_steps }
 }
 
 /// How the damping changes after a step that gained this share of its prediction. Gauss-Newton overshoots along weak directions
