@@ -52,6 +52,8 @@ pub enum Command {
     Rectify(Rectify),
     /// Make pictures and measurements whose truth is known
     Simulate(Simulate),
+    /// Choose the poses that determine the robot best, and write them as poses.csv and robot programs
+    Plan(Plan),
     /// Readings that bring the real robot where targets were meant: CSV, or joint targets of a robot program
     Compensate(Compensate),
     /// Write a calibration or a robot for other programs
@@ -289,6 +291,86 @@ pub struct Rectify {
     /// Results.
     #[command(flatten)]
     pub output: Output,
+}
+
+/// `stereocal plan`
+#[derive(Debug, Args)]
+pub struct Plan {
+    /// The nominal robot [default: robot.toml in the working directory if there, else the paper's]
+    #[arg(long, value_name = "FILE")]
+    pub robot: Option<Utf8PathBuf>,
+    /// The rig [default: calibration.json in the results folder]
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<Utf8PathBuf>,
+    /// Poses to identify from; centres come on top [default: 60; 262 with --plan paper]
+    #[arg(long, value_name = "N", value_parser = count(4, 2000))]
+    pub poses: Option<usize>,
+    /// Poses to verify with [default: 20; 50 with --plan paper]
+    #[arg(long, value_name = "N", value_parser = count(0, 2000))]
+    pub verify: Option<usize>,
+    /// Which plan
+    #[arg(long, value_enum, default_value = "optimal")]
+    pub plan: PlanKind,
+    /// Only so many poses a placement, near its middle, to find out where the cameras stand
+    #[arg(long, value_name = "N", value_parser = count(2, 50), conflicts_with = "after")]
+    pub first: Option<usize>,
+    /// measurements.csv of the first poses: says where the cameras stand and what is known already
+    #[arg(long, value_name = "MEASUREMENTS")]
+    pub after: Option<Utf8PathBuf>,
+    /// Seed of the candidates
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Candidates to choose from
+    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = count(200, 200_000))]
+    pub pool: usize,
+    /// Middle of a sphere, base frame, mm; repeat for more [default: the paper's four, scaled by the robot's reach]
+    #[arg(long, value_name = "X,Y,Z", allow_negative_numbers = true, value_parser = point)]
+    pub center: Vec<[f64; 3]>,
+    /// Radius of the spheres, mm
+    #[arg(long, value_name = "MM", default_value_t = 100.0, value_parser = between(1.0, 1e4))]
+    pub radius_mm: f64,
+    /// Largest tilt of the target out of the field's plane, deg
+    #[arg(long, value_name = "DEG", default_value_t = 35.0, value_parser = between(0.0, 70.0))]
+    pub tilt_deg: f64,
+    /// Depth of field: largest distance of the target before or behind the field's middle, mm
+    #[arg(long, value_name = "MM", default_value_t = 120.0, value_parser = between(1.0, 1e4))]
+    pub depth_mm: f64,
+    /// How far off its place the target may be and still be seen whole, mm
+    #[arg(long, value_name = "MM", default_value_t = 8.0, value_parser = between(0.0, 1e3))]
+    pub margin_mm: f64,
+    /// Standard deviation of a coordinate of the measured point, mm [default: from the rig's corners and the repeatability]
+    #[arg(long, value_name = "MM", value_parser = between(1e-6, 100.0))]
+    pub noise_mm: Option<f64>,
+    /// Pose repeatability (ISO 9283 RP), mm
+    #[arg(long, value_name = "MM", default_value_t = 0.02, value_parser = between(0.0, 100.0))]
+    pub repeatability_mm: f64,
+    /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
+    #[arg(long, value_name = "CxR")]
+    pub squares: Option<Squares>,
+    /// Side of a square, mm; key `target_board.square_mm` [default: 10]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub square_mm: Option<f64>,
+    /// Speed of the programs, per cent of the joints' own
+    #[arg(long, value_name = "PERCENT", default_value_t = 20.0, value_parser = between(1.0, 100.0))]
+    pub speed_percent: f64,
+    /// Rest before the pictures, s
+    #[arg(long, value_name = "S", default_value_t = 1.5, value_parser = between(0.0, 60.0))]
+    pub dwell_s: f64,
+    /// Pulses a degree of each joint: the Yaskawa job is then in pulses
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true)]
+    pub pulses_per_deg: Vec<f64>,
+    /// Results.
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// Kinds of plans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PlanKind {
+    /// The poses that make the target's place over the spheres most certain
+    Optimal,
+    /// Section 4.2 of the paper: points on the spheres, one orientation of the flange
+    Paper,
 }
 
 /// `stereocal compensate`
@@ -557,6 +639,13 @@ fn between(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clon
         Ok(value) if (least..=most).contains(&value) => Ok(value),
         _ => Err(format!("a number from {least} to {most} is needed")),
     }
+}
+
+/// Reads a point.
+fn point(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> =
+        text.split(',').filter_map(|v| v.trim().parse().ok()).filter(|v: &f64| v.is_finite()).collect();
+    <[f64; 3]>::try_from(numbers).map_err(|_| "three numbers X,Y,Z in mm are needed".to_owned())
 }
 
 /// Reads a count of a range.

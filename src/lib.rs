@@ -40,6 +40,7 @@ pub mod robot;
 pub mod identify;
 
 pub mod compensate;
+pub mod plan;
 pub mod programs;
 
 pub mod simulate;

@@ -27,6 +27,9 @@ pub enum Error {
     /// Measurements and identification.
     #[error(transparent)]
     Identify(#[from] crate::identify::Error),
+    /// Planning poses.
+    #[error(transparent)]
+    Plan(#[from] crate::plan::Error),
     /// The simulator.
     #[error(transparent)]
     Simulate(#[from] crate::simulate::Error),
@@ -44,6 +47,7 @@ impl Error {
             Error::Stereo(e) => e,
             Error::Robot(e) => e,
             Error::Identify(e) => e,
+            Error::Plan(e) => e,
             Error::Simulate(e) => e,
             Error::Report(e) => e,
         }

@@ -113,7 +113,8 @@ fn check_calibration(out: &OutDir, measurements: &Utf8Path) -> Option<Utf8PathBu
     Some(record)
 }
 
-fn robot_file(path: Option<&Utf8Path>) -> Option<Utf8PathBuf> {
+/// The robot file that is named, or `robot.toml` in the working directory where it is there.
+pub fn robot_file(path: Option<&Utf8Path>) -> Option<Utf8PathBuf> {
     path.or_else(|| Some(Utf8Path::new(DEFAULT_ROBOT)).filter(|file| file.is_file())).map(Utf8Path::to_owned)
 }
 

@@ -9,6 +9,7 @@ pub mod guide;
 pub mod identify;
 pub mod init;
 pub mod measure;
+pub mod plan;
 pub mod rectify;
 pub mod report;
 pub mod robot;
@@ -55,6 +56,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Rectify(args) => rectify::run(&args, &config, run),
         Command::Report(args) => report::run(&args, &config, run),
         Command::Simulate(args) => simulate::run(&args, &config, run),
+        Command::Plan(args) => plan::run(&args, &config, run),
         Command::Compensate(args) => compensate::run(&args, &config, run),
         Command::Export(args) => export::run(&args, &config, run),
         Command::Init(args) => init::run(&args, run),

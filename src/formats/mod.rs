@@ -6,6 +6,7 @@ mod checked;
 pub mod dh_csv;
 pub mod export;
 pub mod measure;
+pub mod plan;
 pub mod rectified;
 pub mod robots;
 pub mod targets;

@@ -9,6 +9,7 @@ pub mod measure;
 pub mod page;
 pub mod pair_picture;
 pub mod picture;
+pub mod plan;
 pub mod rectify;
 pub mod rig;
 pub mod robot;

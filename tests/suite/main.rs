@@ -25,6 +25,7 @@ mod identify;
 mod measure;
 mod messages;
 mod pipeline;
+mod plan;
 mod provenance;
 mod published;
 mod real;

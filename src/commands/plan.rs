@@ -1,0 +1,137 @@
+//! `stereocal plan`: robot, rig and spheres to poses, and robot programs that visit them.
+
+use nalgebra::Vector3;
+
+use super::identify::robot_file;
+use super::{Outcome, Result};
+use crate::cli::{Plan as Arguments, PlanKind};
+use crate::config::{self, Config};
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::Run;
+use crate::formats::calibration;
+use crate::formats::plan::{PlanFile, poses_csv};
+use crate::measurements::{self, Measurement};
+use crate::plan::scene::Scene;
+use crate::plan::{PAPER_SAMPLES, Plan, Planned, Settings, plan};
+use crate::programs::{Joints, Language, Motion, Stop, program};
+use crate::robot::{self, Robot, catalogue};
+use crate::{progress, report};
+
+/// Standard deviation of a corner where the calibration does not say, px.
+const CORNER_PX: f64 = 0.03;
+
+/// Samples and poses to verify with, of the best plan; the paper's has 50 of the latter.
+const SAMPLES: usize = 60;
+const VERIFY: usize = 20;
+const PAPER_VERIFY: usize = 50;
+
+/// How far every joint stands off before it approaches its reading from below, deg (mm).
+const APPROACH: f64 = 2.0;
+
+/// Name of the programs.
+const PROGRAM: &str = "stereocal_plan";
+
+/// Runs the command.
+pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
+    let out = args.output.out.clone().unwrap_or_else(|| config.out.clone());
+    let rig_file = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
+    let (rig, noise) = calibration::read_with_noise(&rig_file)?;
+    let robot_file = robot_file(args.robot.as_deref());
+    let robot = match &robot_file {
+        Some(path) => robot::file::read(path)?,
+        None => {
+            progress::note("nominal robot: Table 1 of the paper (no --robot, and no robot.toml here)");
+            catalogue::robot(catalogue::PAPER).unwrap_or_else(Robot::paper)
+        }
+    };
+    check(args, &robot)?;
+    let earlier = args.after.as_deref().map(measurements::read).transpose()?;
+    let out = OutDir::open(&out)?;
+    let inputs = [Some(&rig_file), robot_file.as_ref(), args.after.as_ref()];
+    let inputs: Vec<&camino::Utf8Path> = inputs.into_iter().flatten().map(|path| path.as_path()).collect();
+    let out = out.for_run(&Run { force: args.output.force, ..run }, &inputs);
+    out.check_free(&["poses.csv", "plan.json", "plan.html"])?;
+    let board = config.target_board.board(args.squares, args.square_mm)?;
+    let corner_px = noise.map_or(CORNER_PX, |n| n.added_px.max(CORNER_PX / 3.0));
+    let scene = Scene::new(rig, board, corner_px, args.tilt_deg.to_radians(), args.depth_mm, args.margin_mm)?;
+    let measured = earlier.as_deref().zip(args.after.as_ref().map(|path| path.as_str()));
+    let found = plan(&robot, &scene, &settings(args), measured)?;
+    found.warnings.iter().for_each(progress::warn);
+    let record = PlanFile::new(&found);
+    out.write("poses.csv", poses_csv(&robot, &found.poses).as_bytes())?;
+    for (name, text) in programs(args, &robot, &found.poses) {
+        out.write(&format!("programs/{name}"), text.as_bytes())?;
+    }
+    let json = out.write_json("plan.json", &record)?;
+    let page = report::plan::page(&scene, &robot, &found, &record)?;
+    out.write("plan.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
+    let stdout = if args.output.json { json } else { said(args, &found, &record, &out, earlier.as_deref()) };
+    Ok(Outcome { stdout, status: Status::Done })
+}
+
+fn check(args: &Arguments, robot: &Robot) -> Result<()> {
+    let (pulses, count) = (&args.pulses_per_deg, robot.joints.len());
+    let mut problems = Vec::new();
+    if !pulses.is_empty() && (pulses.len() != count || pulses.iter().any(|p| !p.is_finite() || *p == 0.0)) {
+        problems.push(format!("--pulses-per-deg has {} numbers; {count} that are not zero are needed", pulses.len()));
+    }
+    Ok(config::reject(problems)?)
+}
+
+fn settings(args: &Arguments) -> Settings {
+    let paper = args.plan == PlanKind::Paper;
+    Settings {
+        samples: args.poses.unwrap_or(if paper { PAPER_SAMPLES } else { SAMPLES }),
+        verify: args.verify.unwrap_or(if paper { PAPER_VERIFY } else { VERIFY }),
+        paper,
+        first: args.first,
+        pool: args.pool,
+        seed: args.seed,
+        centers_mm: args.center.iter().map(|c| Vector3::from(*c)).collect(),
+        radius_mm: args.radius_mm,
+        noise_mm: args.noise_mm,
+        repeatability_mm: args.repeatability_mm,
+    }
+}
+
+/// One program a controller, plain CSV among them.
+fn programs(args: &Arguments, robot: &Robot, poses: &[Planned]) -> Vec<(String, String)> {
+    let slides: Vec<bool> = robot.joints.iter().map(|j| j.slides).collect();
+    let joints = Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg };
+    let motion = Motion { speed_percent: args.speed_percent, dwell_s: args.dwell_s };
+    let stop = |pose: &Planned| {
+        let from = pose.at.joints_deg.iter().zip(&robot.joints).map(|(reading, joint)| {
+            let low = joint.limits_rad.map_or(f64::NEG_INFINITY, |l| if joint.slides { l.0 } else { l.0.to_degrees() });
+            (reading - APPROACH).max(low)
+        });
+        Stop { name: pose.at.pose.clone(), readings: pose.at.joints_deg.clone(), approach: from.collect() }
+    };
+    let stops: Vec<Stop> = poses.iter().map(stop).collect();
+    let mut files: Vec<(String, String)> =
+        Language::ALL.into_iter().flat_map(|language| program(language, PROGRAM, &stops, &motion, joints)).collect();
+    let header: Vec<String> =
+        (1..=slides.len()).map(|j| format!("j{j}_{}", if slides[j - 1] { "mm" } else { "deg" })).collect();
+    let mut csv = format!("name,step,{}\n", header.join(","));
+    for stop in &stops {
+        for (step, readings) in [("approach", &stop.approach), ("stop", &stop.readings)] {
+            let fields: Vec<String> = readings.iter().map(|r| format!("{r:.4}")).collect();
+            csv += &format!("{},{step},{}\n", crate::csv_table::quoted(&stop.name), fields.join(","));
+        }
+    }
+    files.push((format!("{PROGRAM}.csv"), csv));
+    files
+}
+
+fn said(args: &Arguments, found: &Plan, record: &PlanFile, out: &OutDir, earlier: Option<&[Measurement]>) -> String {
+    let mut text =
+        format!("{} poses in {} groups: {}\n", found.poses.len(), found.placements.len(), out.join("poses.csv"));
+    if args.first.is_some() {
+        text += "measure them, then `stereocal plan --after out/measurements.csv` plans the rest where the cameras really stand\n";
+        return text;
+    }
+    if let Some(rows) = earlier {
+        text += &format!("{} rows were measured before and count\n", rows.len());
+    }
+    text + &report::plan::summary(record)
+}

@@ -1,0 +1,127 @@
+//! `plan.json` and `poses.csv`: a plan as files.
+
+use serde::Serialize;
+
+use crate::geometry::rotation_matrix;
+use crate::identify::model::base::Observability;
+use crate::measurements::pose_fields;
+use crate::plan::predict::Accuracy;
+use crate::plan::{Plan, Planned};
+use crate::robot::Robot;
+
+/// The accuracy with so many samples.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Expected {
+    /// Samples; the centres come on top.
+    pub poses: usize,
+    /// Position error of the target over the spheres, root mean square, mm.
+    pub rms_mm: f64,
+}
+
+/// What poses determine.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Determined {
+    /// Independent parameters.
+    pub rank: usize,
+    /// Largest over smallest singular value.
+    pub condition: Option<f64>,
+    /// O1 to O5.
+    pub observability: Option<Observability>,
+    /// Parameters that nothing shows.
+    pub zero: Vec<String>,
+    /// Parameters that act together.
+    pub dependent: Vec<String>,
+    /// Accuracy to expect.
+    pub expected: Vec<Expected>,
+}
+
+/// The placement of the cameras that a group was planned for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Group {
+    /// Its name.
+    pub group: String,
+    /// Middle of its sphere, base frame, mm.
+    pub center_mm: [f64; 3],
+    /// Where the left camera was assumed.
+    pub cam_from_base: CamFromBase,
+    /// Poses.
+    pub poses: usize,
+}
+
+/// A rigid transform.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CamFromBase {
+    /// Three rows of three.
+    pub rotation: [[f64; 3]; 3],
+    /// mm
+    pub translation_mm: [f64; 3],
+}
+
+/// `plan.json`
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlanFile {
+    /// This plan.
+    #[serde(flatten)]
+    pub plan: Determined,
+    /// Standard deviation of a coordinate that was reckoned with, mm.
+    pub noise_mm: f64,
+    /// The paper's plan for this robot and rig.
+    pub paper: Option<Determined>,
+    /// Candidates that were chosen from.
+    pub pool: usize,
+    /// The placements.
+    pub groups: Vec<Group>,
+    /// What is not checked or only assumed.
+    pub warnings: Vec<String>,
+}
+
+impl PlanFile {
+    /// Of a plan.
+    pub fn new(plan: &Plan) -> PlanFile {
+        let group = |(k, placement): (usize, &crate::plan::scene::Placement)| {
+            let r = rotation_matrix(&placement.left_from_base);
+            Group {
+                group: placement.name.clone(),
+                center_mm: placement.center_mm.into(),
+                cam_from_base: CamFromBase {
+                    rotation: [0, 1, 2].map(|i| [r[(i, 0)], r[(i, 1)], r[(i, 2)]]),
+                    translation_mm: placement.left_from_base.translation.vector.into(),
+                },
+                poses: plan.poses.iter().filter(|p| p.group == k).count(),
+            }
+        };
+        PlanFile {
+            plan: determined(&plan.accuracy, &plan.expected),
+            noise_mm: plan.noise_mm,
+            paper: plan.paper.as_ref().map(|(accuracy, expected)| determined(accuracy, expected)),
+            pool: plan.pool,
+            groups: plan.placements.iter().enumerate().map(group).collect(),
+            warnings: plan.warnings.clone(),
+        }
+    }
+}
+
+fn determined(accuracy: &Accuracy, expected: &[(usize, f64)]) -> Determined {
+    Determined {
+        rank: accuracy.rank,
+        condition: accuracy.condition,
+        observability: accuracy.observability.clone(),
+        zero: accuracy.zero.clone(),
+        dependent: accuracy.groups.clone(),
+        expected: expected.iter().map(|&(poses, rms_mm)| Expected { poses, rms_mm }).collect(),
+    }
+}
+
+/// `poses.csv` as `measure` reads it.
+pub fn poses_csv(robot: &Robot, poses: &[Planned]) -> String {
+    let mut text = String::from("pose,group,role");
+    for (j, joint) in robot.joints.iter().enumerate() {
+        text.push_str(&format!(",j{}_{}", j + 1, if joint.slides { "mm" } else { "deg" }));
+    }
+    text.push('\n');
+    for pose in poses {
+        text.push_str(&pose_fields(&pose.at));
+        text.push('\n');
+    }
+    text
+}

@@ -1,0 +1,234 @@
+//! Candidates: places and turns of the target in the field of a placement, with the readings that bring it there.
+//!
+//! Draws come from Weyl's sequence, shifted by the seed: the same candidates whatever the number of threads. Inverse kinematics starts
+//! from the postures found at the placement's middle, so that each candidate is near one of them.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+
+use super::scene::{self, Placement, PoseNoise, Scene};
+use super::{Error, Result, Settings};
+use crate::geometry::{Transform, transform};
+use crate::robot::{Robot, inverse};
+
+/// Flange poses with less freedom are too near a singular posture, mm a rad.
+const LEAST_FREEDOM_MM: f64 = 15.0;
+
+/// Way that every joint keeps to its limits, rad.
+const ROOM_RAD: f64 = 0.035;
+
+/// Draws a candidate that is wanted, at the most.
+const DRAWS: usize = 12;
+
+/// Draws as for so many candidates, where fewer are wanted.
+const LEAST_DRAWN: usize = 24;
+
+/// Starts that postures at a middle are looked for from.
+const STARTS: usize = 200;
+
+/// Tilt and turn of fresh poses, rad: as `simulate` varies them.
+const FRESH_RAD: f64 = 25.0 * std::f64::consts::PI / 180.0;
+
+/// Fresh poses a group, at which the accuracy is said.
+const FRESH: usize = 50;
+
+/// Turn about the flange's axis of candidates, rad.
+const SPIN_RAD: f64 = std::f64::consts::PI;
+
+/// A pose that could be planned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Index of its placement.
+    pub group: usize,
+    /// Readings, rad (mm).
+    pub joints_rad: Vec<f64>,
+    /// Where the target is.
+    pub left_from_target: Transform,
+    /// Covariance of the measured point, base frame, mm^2.
+    pub covariance_mm2: Matrix3<f64>,
+}
+
+/// What kind of candidates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The spheres' middles.
+    Center,
+    /// The paper's: on the sphere, one orientation; so many in all.
+    Paper(usize),
+    /// A handful round the middle, a group.
+    First(usize),
+    /// All over the field, at all turns; so many in all.
+    Pool(usize),
+    /// On the sphere, tilted and turned; so many in all.
+    Verify(usize),
+    /// The same, other ones, for judging.
+    Fresh,
+}
+
+/// Whether a posture is one to plan: away from singular ones and from the joints' limits.
+pub fn safe(robot: &Robot, joints_rad: &[f64]) -> bool {
+    inverse::freedom_mm(robot, joints_rad) > LEAST_FREEDOM_MM && inverse::room_rad(robot, joints_rad) > ROOM_RAD
+}
+
+/// What candidates are drawn from.
+pub struct Pool<'a> {
+    /// The nominal robot.
+    pub robot: &'a Robot,
+    /// The cameras.
+    pub scene: &'a Scene,
+    /// What to plan.
+    pub settings: &'a Settings,
+    /// The placements.
+    pub placements: &'a [Placement],
+    /// Noise.
+    pub noise: PoseNoise,
+}
+
+/// A draw's numbers in [0, 1).
+struct Draw {
+    number: usize,
+    shift: f64,
+}
+
+impl Draw {
+    fn at(&self, dimension: usize) -> f64 {
+        const PRIMES: [f64; 6] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0];
+        let root = PRIMES[dimension % PRIMES.len()].sqrt();
+        ((self.number + 1) as f64 * root + self.shift * (1.0 + root)).fract()
+    }
+
+    fn between(&self, dimension: usize, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.at(dimension)
+    }
+
+    /// A direction, uniform on the sphere.
+    fn direction(&self) -> Vector3<f64> {
+        let z = self.between(0, -1.0, 1.0);
+        let (sin, cos) = (std::f64::consts::TAU * self.at(1)).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        Vector3::new(r * cos, r * sin, z)
+    }
+
+    /// A tilt of up to so much any way (even over the area), then a turn of up to so much either way.
+    fn turn(&self, tilt_rad: f64, spin_rad: f64) -> UnitQuaternion<f64> {
+        let (sin, cos) = (std::f64::consts::TAU * self.at(3)).sin_cos();
+        let tilt = Vector3::new(cos, sin, 0.0) * (tilt_rad * self.at(4).sqrt());
+        let spin = Vector3::z() * self.between(5, -spin_rad, spin_rad);
+        UnitQuaternion::from_scaled_axis(tilt) * UnitQuaternion::from_scaled_axis(spin)
+    }
+}
+
+impl Pool<'_> {
+    /// Candidates of a kind, in their order.
+    pub fn candidates(&self, kind: Kind) -> Result<Vec<Candidate>> {
+        let groups = self.placements.len();
+        let share = |total: usize, group: usize| total / groups + usize::from(group < total % groups);
+        let mut all = Vec::new();
+        for (group, placement) in self.placements.iter().enumerate() {
+            let wanted = match kind {
+                Kind::Center => 1,
+                Kind::First(count) => count,
+                Kind::Fresh => FRESH,
+                Kind::Paper(total) | Kind::Pool(total) | Kind::Verify(total) => share(total, group),
+            };
+            let postures = self.postures(placement)?;
+            let postures = if matches!(kind, Kind::Pool(_)) { postures.as_slice() } else { &postures[..1] };
+            let most = DRAWS * wanted.max(LEAST_DRAWN);
+            let tries: Vec<usize> = (0..most).collect();
+            // In slices of the number wanted, so that no more is searched than needed; the order decides what is kept.
+            let mut found: Vec<Candidate> = Vec::new();
+            for slice in tries.chunks(wanted.max(LEAST_DRAWN)) {
+                let drawn: Vec<Candidate> =
+                    slice.par_iter().filter_map(|&k| self.candidate(kind, group, k, postures)).collect();
+                found.extend(drawn.into_iter().take(wanted - found.len()));
+                if found.len() == wanted {
+                    break;
+                }
+            }
+            let needed = match kind {
+                Kind::Pool(_) => (2 * share(self.settings.samples, group)).min(wanted),
+                _ => wanted,
+            };
+            if found.len() < needed {
+                let group = placement.name.clone();
+                return Err(Error::TooFew { group, found: found.len(), tried: most, needed });
+            }
+            all.extend(found);
+        }
+        Ok(all)
+    }
+
+    /// Postures at the placement's middle, the best first.
+    fn postures(&self, placement: &Placement) -> Result<Vec<Vec<f64>>> {
+        let wanted = scene::base_from_flange(self.robot, &placement.base_from_field);
+        let mut found: Vec<(f64, Vec<f64>)> = Vec::new();
+        for k in 0..STARTS {
+            let start = inverse::spread_start(self.robot, k);
+            let Some(q) = inverse::from_start(self.robot, &wanted, &start) else { continue };
+            let known = |other: &(f64, Vec<f64>)| other.1.iter().zip(&q).all(|(a, b)| (a - b).abs() < 0.1);
+            if !found.iter().any(known) && safe(self.robot, &q) {
+                found.push((inverse::merit(self.robot, &q), q));
+            }
+        }
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        found.truncate(MOST_POSTURES);
+        if found.is_empty() {
+            let group = placement.name.clone();
+            return Err(Error::TooFew { group, found: 0, tried: STARTS, needed: 1 });
+        }
+        Ok(found.into_iter().map(|(_, q)| q).collect())
+    }
+
+    fn candidate(&self, kind: Kind, group: usize, k: usize, postures: &[Vec<f64>]) -> Option<Candidate> {
+        let placement = &self.placements[group];
+        let field_from_target = self.drawn(kind, k, group);
+        if kind != Kind::Center && !self.scene.accepts(&field_from_target) {
+            return None;
+        }
+        let wanted = scene::base_from_flange(self.robot, &(placement.base_from_field * field_from_target));
+        let joints_rad = inverse::from_start(self.robot, &wanted, &postures[k % postures.len()])?;
+        if !safe(self.robot, &joints_rad) {
+            return None;
+        }
+        let left_from_target = self.scene.left_from_field * field_from_target;
+        let covariance = self.scene.covariance_mm2(&left_from_target, &self.noise)?;
+        Some(Candidate { group, joints_rad, left_from_target, covariance_mm2: placement.in_base(&covariance) })
+    }
+
+    /// `field_from_target` of a draw.
+    fn drawn(&self, kind: Kind, k: usize, group: usize) -> Transform {
+        let stream = match kind {
+            Kind::Center | Kind::First(_) => 0,
+            Kind::Pool(_) => 1,
+            Kind::Paper(_) => 2,
+            Kind::Verify(_) => 3,
+            Kind::Fresh => 4,
+        };
+        let shift = (self.settings.seed % 1_000_003) as f64 * 0.618_033_988_749_895;
+        let draw = Draw { number: k, shift: (shift + 0.137 * (5 * group + stream) as f64).fract() };
+        let radius = self.settings.radius_mm;
+        let at = |turn: UnitQuaternion<f64>, place: Vector3<f64>| transform(turn.scaled_axis(), place);
+        match kind {
+            Kind::Center => Transform::identity(),
+            Kind::Paper(_) => at(UnitQuaternion::identity(), draw.direction() * radius),
+            Kind::Verify(_) | Kind::Fresh => at(draw.turn(FRESH_RAD, FRESH_RAD), draw.direction() * radius),
+            Kind::First(_) => {
+                let reach = 0.5 * radius;
+                at(draw.turn(0.5 * FRESH_RAD, 0.5 * FRESH_RAD), draw.direction() * reach)
+            }
+            Kind::Pool(_) => {
+                let half = self.scene.width_mm() / 2.0;
+                let depth = self.scene.depth_mm;
+                let place = Vector3::new(
+                    draw.between(0, -half, half),
+                    draw.between(1, -half, half),
+                    draw.between(2, -depth, depth),
+                );
+                at(draw.turn(self.scene.tilt_rad, SPIN_RAD), place)
+            }
+        }
+    }
+}
+
+/// Postures of the arm that candidates are taken from: all of a six-axis arm.
+const MOST_POSTURES: usize = 8;

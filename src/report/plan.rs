@@ -1,0 +1,162 @@
+//! A plan for people: what it determines, the accuracy to expect, what the cameras will see.
+
+use maud::html;
+use nalgebra::{Point3, Vector3};
+
+use super::Result;
+use super::figure::Plot;
+use super::page;
+use super::table::{Table, number};
+use crate::formats::plan::{Determined, PlanFile};
+use crate::measurements::Role;
+use crate::plan::Plan;
+use crate::plan::scene::Scene;
+use crate::robot::Robot;
+
+/// The figures on the terminal.
+pub fn summary(record: &PlanFile) -> String {
+    let mut table = Table::new(["samples", "this plan, mm", "the paper's, mm"]);
+    let at = |of: &Determined, poses: usize| of.expected.iter().find(|e| e.poses == poses).map(|e| e.rms_mm);
+    for poses in counts(record) {
+        let paper = record.paper.as_ref().and_then(|p| at(p, poses));
+        table.row([poses.to_string(), number(at(&record.plan, poses), 4), number(paper, 4)]);
+    }
+    let of = |d: &Determined| {
+        let o = d.observability.as_ref();
+        format!(
+            "rank {}, condition {}, O1 {}, O2 {}, O3 {}, O4 {}, O5 {}",
+            d.rank,
+            number(d.condition, 0),
+            number(o.map(|o| o.o1), 2),
+            number(o.map(|o| o.o2), 5),
+            number(o.map(|o| o.o3), 3),
+            number(o.map(|o| o.o4), 5),
+            number(o.map(|o| o.o5), 3)
+        )
+    };
+    let mut text = format!("this plan:   {}\n", of(&record.plan));
+    if let Some(paper) = &record.paper {
+        text += &format!("the paper's: {}\n", of(paper));
+    }
+    if !record.plan.zero.is_empty() {
+        text += &format!("never seen: {}\n", record.plan.zero.join(", "));
+    }
+    text += &format!(
+        "expected error of the target over the spheres (root mean square, {:.4} mm noise a coordinate):\n{table}",
+        record.noise_mm
+    );
+    text
+}
+
+fn counts(record: &PlanFile) -> Vec<usize> {
+    let of = |d: &Determined| d.expected.iter().map(|e| e.poses).collect::<Vec<_>>();
+    let mut all = of(&record.plan);
+    all.extend(record.paper.iter().flat_map(of));
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// The page.
+pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Result<String> {
+    let rows: Vec<Vec<String>> = counts(record)
+        .into_iter()
+        .map(|poses| {
+            let at = |of: &Determined| of.expected.iter().find(|e| e.poses == poses).map(|e| e.rms_mm);
+            vec![poses.to_string(), number(at(&record.plan), 4), number(record.paper.as_ref().and_then(at), 4)]
+        })
+        .collect();
+    let content = html! {
+        (page::verdict(page::Tone::Doubtful, "Collisions are not checked",
+            "Neither the arm with itself, nor with the cameras or the cell. Run the program slowly, hand on the stop."))
+        (page::warnings(&record.warnings))
+        h2 { "Accuracy to expect" }
+        (page::table(&["samples", "this plan, mm", "the paper's plan, mm"], &rows))
+        p { "Root mean square of the target's position error over the spheres, tilts to 25 degrees, after one rigid fit; "
+            (format!("{:.4}", record.noise_mm)) " mm noise a coordinate. Rank " (record.plan.rank) ", condition " (number(record.plan.condition, 0)) "." }
+        (curve(record)?)
+        (map(plan)?)
+        h2 { "Where the target goes" }
+        div.side { @for figure in sides(robot, plan)? { (figure) } }
+        h2 { "What the cameras will see" }
+        div.side { @for figure in pictures(scene, plan)? { (figure) } }
+    };
+    let lead =
+        format!("{} poses in {} groups, chosen from {} candidates", plan.poses.len(), plan.placements.len(), plan.pool);
+    Ok(page::page("Planned poses", &lead, &content))
+}
+
+fn curve(record: &PlanFile) -> Result<maud::Markup> {
+    let line = |d: &Determined| d.expected.iter().map(|e| (e.poses as f64, e.rms_mm)).collect::<Vec<_>>();
+    let mut plot = Plot::new("Error by the number of poses", "samples", "expected error, mm").log_y();
+    plot = plot.line("this plan", &line(&record.plan)).points("", &line(&record.plan));
+    if let Some(paper) = &record.paper {
+        plot = plot.line("the paper's plan", &line(paper)).points("", &line(paper));
+    }
+    Ok(page::figure(&plot.svg()?, "A plan whose line falls no more is limited by what it does not vary, not by noise."))
+}
+
+/// Places of the spheres by thirds of the expected error.
+fn map(plan: &Plan) -> Result<maud::Markup> {
+    let mut errors: Vec<f64> = plan.map.iter().map(|m| m.1).collect();
+    errors.sort_by(f64::total_cmp);
+    let third = |k: usize| errors.get(k * errors.len() / 3).copied().unwrap_or(0.0);
+    let limits = [third(1), third(2), f64::INFINITY];
+    let mut plot = Plot::new("Expected error over the workspace, from above", "x, mm", "y, mm").equal_axes();
+    let mut low = 0.0;
+    for high in limits {
+        let within = plan.map.iter().filter(|m| m.1 >= low && m.1 < high);
+        let points: Vec<(f64, f64)> = within.map(|m| (m.0.x, m.0.y)).collect();
+        let label =
+            if high.is_finite() { format!("{low:.4} to {high:.4} mm") } else { format!("{low:.4} mm and more") };
+        plot = plot.points(&label, &points);
+        low = high;
+    }
+    Ok(page::figure(&plot.svg()?, "The position error to expect at fresh poses, base frame; a third of them each."))
+}
+
+/// Target points from three sides.
+fn sides(robot: &Robot, plan: &Plan) -> Result<Vec<maud::Markup>> {
+    let axes = ["x, mm", "y, mm", "z, mm"];
+    let figure = |(title, across, up): (&str, usize, usize)| {
+        let flat = |p: Vector3<f64>| (p[across], p[up]);
+        let (x, y) = (axes[across], axes[up]);
+        let mut plot = Plot::new(title, x, y).equal_axes().size(460, 400);
+        for (role, label) in [(Role::Sample, "samples"), (Role::Verify, "verify"), (Role::Center, "centres")] {
+            let of = plan.poses.iter().filter(|p| p.at.role == role);
+            let points: Vec<_> = of.map(|p| flat(robot.target_mm(&p.at.joints_rad()).coords)).collect();
+            if !points.is_empty() {
+                plot = plot.points(label, &points);
+            }
+        }
+        Ok(page::figure(&plot.svg()?, "The target's mark point in the base frame."))
+    };
+    [("From above", 0, 1), ("From the front", 1, 2), ("From the side", 0, 2)].into_iter().map(figure).collect()
+}
+
+/// Outlines of the target's squares in both pictures.
+fn pictures(scene: &Scene, plan: &Plan) -> Result<Vec<maud::Markup>> {
+    let board = scene.board;
+    let half = |squares: usize| squares as f64 * board.square_mm / 2.0;
+    let (w, h) = (half(board.squares.columns), half(board.squares.rows));
+    let corners = [(-w, -h), (w, -h), (w, h), (-w, h), (-w, -h)];
+    let figure = |left: bool| {
+        let camera = if left { scene.rig.left } else { scene.rig.right };
+        let title = if left { "Left picture" } else { "Right picture" };
+        let mut plot = Plot::new(title, "x, px", "y, px").equal_axes().y_down().size(460, 460);
+        plot = plot.x_range(0.0, f64::from(camera.width)).y_range(0.0, f64::from(camera.height));
+        for pose in &plan.poses {
+            let outline: Vec<(f64, f64)> = corners
+                .iter()
+                .map(|&(x, y)| scene.rig.project(&(pose.left_from_target * Point3::new(x, y, 0.0))))
+                .map(|(l, r)| if left { (l.x, l.y) } else { (r.x, r.y) })
+                .collect();
+            plot = plot.line("", &outline);
+        }
+        Ok(page::figure(
+            &plot.svg()?,
+            "Outlines of the target at all poses, the cameras standing where plan.json says.",
+        ))
+    };
+    [true, false].into_iter().map(figure).collect()
+}

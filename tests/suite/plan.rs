@@ -1,0 +1,139 @@
+//! `plan` as a command: its files, what it says, and what it refuses.
+
+use std::path::Path;
+
+use camino::Utf8Path;
+use serde_json::Value;
+use stereocal::formats::calibration::CalibrationFile;
+use stereocal::measurements::{Role, read_poses};
+use stereocal::robot::{catalogue, file};
+use stereocal::simulate::rig::true_rig;
+
+use crate::run::{stderr, stdout, stereocal, workplace};
+
+/// Enough candidates for a test.
+const QUICK: [&str; 4] = ["--pool", "600", "--noise-mm", "0.02"];
+
+fn world(folder: &Path) {
+    let rig = CalibrationFile::from(&true_rig(1280));
+    std::fs::create_dir_all(folder.join("out")).unwrap();
+    std::fs::write(folder.join("out/calibration.json"), serde_json::to_string(&rig).unwrap()).unwrap();
+    let mut robot = catalogue::robot("paper").unwrap();
+    robot.tool_mm = nalgebra::Vector3::new(12.0, -8.0, 25.0);
+    std::fs::write(folder.join("robot.toml"), file::to_toml(&robot)).unwrap();
+}
+
+fn run(folder: &Path, arguments: &[&str], status: i32) -> String {
+    let output = stereocal(folder, &[&["plan"], arguments].concat());
+    assert_eq!(output.status.code(), Some(status), "{arguments:?}: {}{}", stdout(&output), stderr(&output));
+    stdout(&output) + &stderr(&output)
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+#[test]
+fn the_files_are_those_of_the_contract() {
+    let folder = workplace();
+    let at = folder.path();
+    world(at);
+    let said = run(at, &[&["--poses", "24", "--verify", "6"], &QUICK[..]].concat(), 0);
+    assert!(said.contains("34 poses in 4 groups") && said.contains("are not checked"), "{said}");
+    let poses = read_poses(Utf8Path::from_path(&at.join("out/poses.csv")).unwrap()).unwrap();
+    let count = |role| poses.iter().filter(|p| p.role == role).count();
+    assert_eq!([Role::Center, Role::Sample, Role::Verify].map(count), [4, 24, 6]);
+    let plan = json(&at.join("out/plan.json"));
+    for key in [
+        "/rank",
+        "/condition",
+        "/observability/O1",
+        "/observability/O5",
+        "/noise_mm",
+        "/paper/rank",
+        "/paper/expected/0/rms_mm",
+    ] {
+        assert!(plan.pointer(key).is_some_and(Value::is_number), "{key}: {plan}");
+    }
+    for key in ["/groups/0/cam_from_base/rotation/2/2", "/groups/3/cam_from_base/translation_mm/0"] {
+        assert!(plan.pointer(key).is_some_and(Value::is_number), "{key}");
+    }
+    let counts: Vec<u64> = plan["expected"].as_array().unwrap().iter().map(|e| e["poses"].as_u64().unwrap()).collect();
+    assert_eq!(counts, [10, 20, 24, 40, 80]);
+    assert!(std::fs::read_to_string(at.join("out/plan.html")).unwrap().contains("What the cameras will see"));
+    for ending in ["csv", "script", "mod", "src", "dat", "ls", "jbi"] {
+        let path = at.join(format!("out/programs/stereocal_plan.{ending}"));
+        let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        assert!(text.len() > 40, "{ending}");
+    }
+    // The program is one that compensate understands: approach and stop of every pose.
+    let output = stereocal(
+        at,
+        &[
+            "compensate",
+            "out/programs/stereocal_plan.mod",
+            "--robot",
+            "robot.toml",
+            "--identified",
+            "robot.toml",
+            "--out",
+            "c",
+        ],
+    );
+    assert!(stdout(&output).contains("of 68 targets compensated"), "{}{}", stdout(&output), stderr(&output));
+    for threads in ["1", "2"] {
+        let more = ["--out", threads, "--threads", threads, "--no-provenance", "--calibration", "out/calibration.json"];
+        run(at, &[&more[..], &QUICK[..]].concat(), 0);
+    }
+    for name in ["poses.csv", "plan.json", "plan.html", "programs/stereocal_plan.jbi"] {
+        let read = |threads: &str| std::fs::read(at.join(threads).join(name)).unwrap();
+        assert!(read("1") == read("2"), "{name}");
+    }
+}
+
+#[test]
+fn the_papers_plan_and_the_first_poses() {
+    let folder = workplace();
+    let at = folder.path();
+    world(at);
+    let said = run(
+        at,
+        &["--plan", "paper", "--noise-mm", "0.02", "--calibration", "out/calibration.json", "--out", "paper"],
+        0,
+    );
+    assert!(said.contains("316 poses in 4 groups"), "{said}");
+    let said = run(at, &["--first", "3", "--calibration", "out/calibration.json", "--out", "first"], 0);
+    assert!(said.contains("16 poses in 4 groups") && said.contains("--after"), "{said}");
+    std::fs::write(at.join("m.csv"), "pose,group,role,j1_deg,x_mm,y_mm,z_mm\na,1,sample,0,1,2,3\n").unwrap();
+    let said = run(at, &["--after", "m.csv"], 2);
+    assert!(
+        said.contains("the rows have 1 joint readings, the robot has 6 joints") && said.contains("m.csv"),
+        "{said}"
+    );
+}
+
+#[test]
+fn plans_that_nobody_can_run_are_refused() {
+    let folder = workplace();
+    let at = folder.path();
+    world(at);
+    let said = run(at, &["--center", "1500,0,300"], 2);
+    assert!(said.contains("does not reach (1500, 0, 300) mm") && said.contains("`--center "), "{said}");
+    let said = run(at, &["--squares", "40x40"], 2);
+    assert!(said.contains("never sees a target of 412 x 412 mm") && said.contains("smaller target"), "{said}");
+    let text = std::fs::read_to_string(at.join("robot.toml")).unwrap();
+    let lines = text.lines().map(|l| if l.starts_with("limits_deg") { "limits_deg = [-1.0, 1.0]" } else { l });
+    std::fs::write(at.join("stiff.toml"), lines.collect::<Vec<_>>().join("\n")).unwrap();
+    let said = run(at, &["--robot", "stiff.toml"], 2);
+    assert!(said.contains("does not reach") && said.contains("within its limits"), "{said}");
+    for (flags, part) in [
+        (&["--center", "1,2"][..], "three numbers X,Y,Z"),
+        (&["--poses", "2"], "from 4 to 2000"),
+        (&["--first", "3", "--after", "m.csv"], "cannot be used with"),
+        (&["--calibration", "none.json"], "none.json"),
+        (&["--pulses-per-deg", "1,2"], "--pulses-per-deg has 2 numbers; 6"),
+    ] {
+        let said = run(at, flags, 2);
+        assert!(said.contains(part), "{flags:?}: {said}");
+    }
+}
