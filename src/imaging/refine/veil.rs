@@ -110,7 +110,7 @@ fn pairs<T: Copy + Into<f64>>(image: &Image<T>, clip_level: f64, places: &Places
     let of_corner = |col: usize, row: usize| -> Option<Pair> {
         let falling = (at(col, row)? + at(col + 1, row + 1)?) / 2.0;
         let rising = (at(col + 1, row)? + at(col, row + 1)?) / 2.0;
-        Some(if (col + row) % 2 == 0 {
+        Some(if (col + row).is_multiple_of(2) {
             Pair { even: falling, odd: rising }
         } else {
             Pair { even: rising, odd: falling }
@@ -154,7 +154,7 @@ mod tests {
         let grey = |x: usize, y: usize| {
             let light = 1.0 - fall * (x as f64 / width as f64) - 0.5 * fall * (y as f64 / height as f64);
             let noise = ((x * 7919 + y * 104_729) % 17) as f64 - 8.0;
-            let reflectance = if (x / 20 + y / 20) % 2 == 0 { 0.85 } else { 0.08 };
+            let reflectance = if (x / 20 + y / 20).is_multiple_of(2) { 0.85 } else { 0.08 };
             (veil + gain * light * reflectance + noise).round() as u16
         };
         let pixels = (0..width * height).map(|k| grey(k % width, k / width)).collect();

@@ -162,7 +162,7 @@ impl<'a> Run<'a> {
             let twin =
                 (0..pairs.len()).find(|&j| j != i && !pairs[i].left.is_empty() && same_pictures(&pairs[i], &pairs[j]));
             // Where one of the two fits the rig and the other does not, the picture is that one's.
-            if let Some(j) = twin.filter(|&j| refusal.is_none() && !(fits(i) && !fits(j))) {
+            if let Some(j) = twin.filter(|&j| refusal.is_none() && (!fits(i) || fits(j))) {
                 let reason =
                     format!("a picture is the same as at pose {}: one of the two poses has the other's", at[j].pose);
                 *refusal = Some(Refusal { status: "another pose's pictures", reason });
