@@ -1,7 +1,7 @@
 //! The guide for the practitioner: how to make boards, mount cameras, take pictures and choose poses.
 //!
 //! The pages stand here as part of the documentation; `stereocal guide TOPIC` prints them without a network. The commands in their
-//! `sh` blocks are run by a test.
+//! `sh` blocks are run by a test, with the files that stand in `csv NAME` blocks.
 
 #[doc = include_str!("boards.md")]
 pub mod boards {}
@@ -13,6 +13,10 @@ pub mod pictures {}
 pub mod poses {}
 #[doc = include_str!("day.md")]
 pub mod day {}
+#[doc = include_str!("robot.md")]
+pub mod robot {}
+#[doc = include_str!("warnings.md")]
+pub mod warnings {}
 
 /// A page of the guide.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,12 +28,14 @@ pub struct Page {
 }
 
 /// All pages, in the order in which they are needed.
-pub const PAGES: [Page; 6] = [
+pub const PAGES: [Page; 8] = [
     Page { topic: "day", text: include_str!("day.md") },
     Page { topic: "boards", text: include_str!("boards.md") },
     Page { topic: "cameras", text: include_str!("cameras.md") },
     Page { topic: "pictures", text: include_str!("pictures.md") },
     Page { topic: "poses", text: include_str!("poses.md") },
+    Page { topic: "robot", text: include_str!("robot.md") },
+    Page { topic: "warnings", text: include_str!("warnings.md") },
     Page { topic: "conventions", text: include_str!("../CONVENTIONS.md") },
 ];
 

@@ -54,7 +54,7 @@ table.ledger th:last-child { text-align: left; }
 figure { margin: 12px 0 20px; break-inside: avoid; } figure svg, figure img { max-width: 100%; height: auto; }
 figcaption { color: var(--soft); font-size: 14px; }
 .side { display: flex; flex-wrap: wrap; gap: 16px; } .side > * { flex: 1 1 440px; min-width: 0; }
-svg.scene { cursor: grab; touch-action: none; border: 1px solid var(--hair); } svg.scene path { fill: none; stroke-width: 1.3; stroke-linejoin: round; stroke-linecap: round; }
+svg.scene { cursor: grab; touch-action: none; user-select: none; border: 1px solid var(--hair); } svg.scene path { fill: none; stroke-width: 1.3; stroke-linejoin: round; stroke-linecap: round; }
 svg.scene text { font: 14px sans-serif; fill: var(--ink); } .i-frame { stroke: var(--ink); } .i-plain { stroke: var(--plain); }
 .i-good { stroke: var(--good); } .i-bad { stroke: var(--bad); } svg.scene .i-good, svg.scene .i-bad { stroke-width: 2.6; }
 svg.scene .dots { stroke-width: 5; }
