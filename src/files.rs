@@ -153,6 +153,11 @@ pub enum Durability {
 /// How the names of files begin that are being written.
 const TEMPORARY: &str = ".stereocal-";
 
+/// Whether a file of this name was being written.
+pub fn is_temporary(name: &str) -> bool {
+    name.starts_with(TEMPORARY)
+}
+
 /// Writes a file whole or not at all, making its folder where needed: to a temporary name beside it, then renamed.
 pub fn write_atomically(path: &Utf8Path, bytes: &[u8], durability: Durability) -> Result<()> {
     let io = |source| Error::Io { action: "write", path: path.to_owned(), source };

@@ -14,7 +14,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 use serde::Serialize;
 
 use super::provenance::{Digested, KEY, Provenance, Run, sha256};
-use super::{Durability, Error, Result, TEMPORARY, to_json, write_atomically};
+use super::{Durability, Error, Result, is_temporary, to_json, write_atomically};
 use crate::progress;
 
 /// The program's own folder in a results folder.
@@ -198,7 +198,7 @@ impl OutDir {
         };
         state.swept.insert(folder.to_owned());
         for entry in folder.read_dir_utf8().into_iter().flatten().flatten() {
-            if entry.file_name().starts_with(TEMPORARY) && entry.path().is_file() {
+            if is_temporary(entry.file_name()) && entry.path().is_file() {
                 let _ = std::fs::remove_file(entry.path());
             }
         }

@@ -17,7 +17,7 @@ use super::scene::{Patch, Scene};
 use super::sensor::Lighting;
 use super::settings::Settings;
 use super::{Error, Result, true_robot, truth_files};
-use crate::files::OutDir;
+use crate::files::{OutDir, is_temporary};
 use crate::geometry::Transform;
 use crate::imaging::{Corner, Corners, PairCorners, corners::Side};
 use crate::progress;
@@ -196,7 +196,8 @@ impl World {
             let Ok(entries) = path.read_dir_utf8() else { continue };
             for entry in entries.flatten() {
                 let name = entry.file_name().to_owned();
-                if !names.iter().any(|(f, n)| *f == folder && *n == name) {
+                // What a killed run had half written is swept away by the next one.
+                if !is_temporary(&name) && !names.iter().any(|(f, n)| *f == folder && *n == name) {
                     return Err(Error::Occupied { name, folder: path });
                 }
             }

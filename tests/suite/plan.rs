@@ -61,8 +61,16 @@ fn the_files_are_those_of_the_contract() {
     let counts: Vec<u64> = plan["expected"].as_array().unwrap().iter().map(|e| e["poses"].as_u64().unwrap()).collect();
     assert_eq!(counts, [10, 20, 24, 40, 80]);
     assert!(std::fs::read_to_string(at.join("out/plan.html")).unwrap().contains("What the cameras will see"));
-    for ending in ["csv", "script", "mod", "src", "dat", "ls", "jbi"] {
-        let path = at.join(format!("out/programs/stereocal_plan.{ending}"));
+    // Fanuc's and Yaskawa's controllers take names in capitals.
+    for (stem, ending) in
+        [("stereocal_plan", "csv"), ("stereocal_plan", "script"), ("stereocal_plan", "mod")].into_iter().chain([
+            ("stereocal_plan", "src"),
+            ("stereocal_plan", "dat"),
+            ("STEREOCAL_PLAN", "ls"),
+            ("STEREOCAL_PLAN", "jbi"),
+        ])
+    {
+        let path = at.join(format!("out/programs/{stem}.{ending}"));
         let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         assert!(text.len() > 40, "{ending}");
     }

@@ -85,7 +85,8 @@ mod tests {
             .collect();
         let read = from_rows("read", Convention::Classic, &rows);
         let off = Residual::between(&real, &read);
-        assert!(off.max_mm < 1e-6 && off.max_rad < 1e-9, "{off:?}\n{}", exported.text);
-        assert!(Residual::between(&real, &exported.carried).max_mm < 1e-6);
+        // Offsets of half a kilometre that cancel, along axes known to 1e-10 rad.
+        assert!(off.max_mm < 1e-3 && off.max_rad < 1e-9, "{off:?}\n{}", exported.text);
+        assert!(Residual::between(&real, &exported.carried).max_mm < 1e-3);
     }
 }

@@ -67,7 +67,7 @@ impl Judged {
         // The held-out lengths are the result itself and stand in its first line.
         let doubts = evidence.iter().skip(1).filter(|line| line.allows != Verdict::Pass);
         warnings.extend(doubts.map(|line| format!("{}: {}. {}", line.what, line.figure(), capital(&line.detail))));
-        warnings.extend(print_scatter(calibration, &accuracy));
+        warnings.extend(print_scatter(calibration, &accuracy, tolerance_mm));
         Judged {
             tolerance_mm,
             verdict: evidence::verdict(&evidence),
@@ -109,20 +109,23 @@ fn capital(text: &str) -> String {
     chars.next().map_or_else(String::new, |first| first.to_uppercase().chain(chars).collect())
 }
 
-/// Says where it is the board that scatters and not the corners: both pictures then see the same deviations.
-fn print_scatter(calibration: &Calibration, accuracy: &Accuracy) -> Option<String> {
+/// Says where it is the board that scatters and not the corners, by enough to matter: both pictures then see the same deviations.
+fn print_scatter(calibration: &Calibration, accuracy: &Accuracy, tolerance_mm: f64) -> Option<String> {
     /// Of independent corners the mean of thousands of points lies within a tenth of one.
     const SHARED: f64 = 0.25;
+    /// At both ends, at 95 %, a place that scatters by this share of the tolerance takes a sixth of it.
+    const MATTERS: f64 = 0.05;
     if accuracy.rays_chi_square > SHARED {
         return None;
     }
     let depths = calibration.values.poses.iter().map(|pose| pose.translation.vector.z);
     let depth_mm = depths.sum::<f64>() / calibration.values.poses.len().max(1) as f64;
     let sigma_px = calibration.noise.typical_px(&calibration.views);
-    Some(format!(
+    let place_mm = sigma_px * depth_mm / calibration.rig().left.fx;
+    (place_mm > MATTERS * tolerance_mm).then(|| format!(
         "left and right picture agree on the corners {:.0} times better than the residuals let expect: what scatters is the places of the corners on the \
          board, by about {:.4} mm each, not what the cameras see of them. A better board, not more pictures, would lower the errors",
         1.0 / accuracy.rays_chi_square.sqrt(),
-        sigma_px * depth_mm / calibration.rig().left.fx
+        place_mm
     ))
 }

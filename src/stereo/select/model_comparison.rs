@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::geometry::Transform;
-use crate::statistics::{NORMAL_999, chi_square_quantile};
+use crate::statistics::chi_square_quantile;
 use crate::stereo::Lens;
 use crate::stereo::data::residuals::residual_px;
 use crate::stereo::data::view::View;
@@ -20,6 +20,10 @@ use crate::stereo::solve::uncertainty::{self, determines_cameras};
 /// Standard errors by which a richer model must predict better: one is what half of the useless terms reach by chance when the
 /// best of several is taken.
 const STANDARD_ERRORS: f64 = 2.0;
+
+/// Quantile of the normal distribution (one draw in twenty thousand) at whose level of chi-squared a simpler model is refuted: there are several
+/// rungs, and a board's print, the same in all pairs, adds a little to every fall.
+const REFUTED: f64 = 3.8906;
 
 /// How a model predicts pairs it has not seen.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -94,14 +98,14 @@ impl Trial {
         self.by_pair.iter().sum::<f64>() / self.by_pair.len() as f64
     }
 
-    /// Whether a richer model predicts unseen pairs no worse and lowers chi-squared by more than chance does once in a thousand calibrations: a
+    /// Whether a richer model predicts unseen pairs no worse and lowers chi-squared by more than chance does ([`REFUTED`]): a
     /// few pairs that miss terms only at their edges differ too much among themselves for their mean loss to tell.
     pub fn is_refuted_by(&self, richer: &Trial, scatter: f64) -> bool {
         let Some(added) = richer.layout.count().checked_sub(self.layout.count()).filter(|added| *added > 0) else {
             return false;
         };
         let fall = (self.chi_square - richer.chi_square) / scatter;
-        richer.loss() < self.loss() && fall > chi_square_quantile(added as f64, NORMAL_999)
+        richer.loss() < self.loss() && fall > chi_square_quantile(added as f64, REFUTED)
     }
 
     /// How much worse than `best` beyond what chance makes of the pairs' differences; no number where pairs were not held out.
