@@ -5,6 +5,8 @@ use serde::Serialize;
 use super::dataset::{Dataset, Reading};
 use super::sessions::Along;
 use crate::identify::judge::choose::Identification;
+use crate::identify::record::file_unit;
+use crate::robot::Parameter;
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -85,6 +87,13 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "they are counted in the figures; measure them again",
         );
     }
+    if let Some(far) = far_from_nominal(found) {
+        add(
+            format!("{far}: more than any workshop gets wrong, so the robot file may be of another robot"),
+            Vec::new(),
+            "the robot that was found is used; see whether the file is the right one",
+        );
+    }
     if !along.sessions.is_empty() {
         let ranges = along.sessions.iter().map(|s| format!("{}..{}", s.first, s.last)).collect();
         add(
@@ -106,6 +115,37 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
     list
 }
 
+/// Corrections beyond which a link is not the one of the robot's file, mm and rad, and how many standard deviations they must have.
+const FAR_MM: f64 = 10.0;
+const FAR_RAD: f64 = 0.06;
+const FAR_SIGMAS: f64 = 5.0;
+
+/// The determined links whose correction is too large for a robot that was built after its file.
+fn far_from_nominal(found: &Identification) -> Option<String> {
+    let candidate = &found.candidates[found.chosen];
+    let (formulation, _) = candidate.found.as_ref()?;
+    let (covariance, nominal) = (formulation.robot_covariance(), formulation.rows.kinematics.nominal());
+    let parameters = formulation.parameters();
+    let far = |i: &usize| {
+        let p = parameters[*i];
+        let limit = match p {
+            Parameter::A(_) | Parameter::D(_) => FAR_MM,
+            Parameter::Alpha(_) | Parameter::Theta(_) => 1000.0 * FAR_RAD,
+            _ => return false,
+        };
+        let moved = (candidate.robot.value(p) - nominal.value(p)).abs();
+        moved > limit && moved > FAR_SIGMAS * covariance[(*i, *i)].max(0.0).sqrt()
+    };
+    let alone = formulation.base.free.iter().filter(|i| !formulation.base.in_group(**i));
+    let name = |i: &usize| {
+        let (unit, factor) = file_unit(parameters[*i]);
+        let delta = factor * (candidate.robot.value(parameters[*i]) - nominal.value(parameters[*i]));
+        format!("{} {delta:+.1} {unit}", parameters[*i].name())
+    };
+    let list: Vec<String> = alone.filter(|i| far(i)).map(name).collect();
+    (!list.is_empty()).then(|| format!("the links found are far from the nominal ones ({})", list.join(", ")))
+}
+
 /// Scatter over stated standard deviation beyond which it is worth a sentence.
 const FAR_ABOVE: f64 = 5.0;
 
@@ -125,10 +165,17 @@ fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
     }
     let stated_mm = (stated.iter().sum::<f64>() / stated.len() as f64).sqrt();
     let scatter = &found.scatter;
-    if scatter.stated < 1.0 {
+    let whole_mm = (stated_mm.powi(2) * scatter.stated + scatter.point_mm.powi(2)).sqrt();
+    if whole_mm < 0.8 * stated_mm {
         return Some(format!(
             "the covariances are too large: the residuals are those of {:.1} times smaller standard deviations",
-            scatter.stated.sqrt().recip()
+            stated_mm / whole_mm
+        ));
+    }
+    if scatter.stated > 1.0 {
+        return Some(format!(
+            "the covariances are too small: the residuals are those of {:.1} times larger standard deviations",
+            scatter.stated.sqrt()
         ));
     }
     let ratio = scatter.point_mm / stated_mm.max(1e-9);

@@ -9,6 +9,7 @@
 //! metre leave some hundredths.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::identify::data::dataset::Dataset;
 use crate::identify::model::prior::Tolerance;
@@ -254,18 +255,29 @@ fn divide(set: &Dataset, rows: &Rows, mut poses: Vec<usize>, regions: usize, nex
     divide(set, rows, right, regions - first, next, label);
 }
 
-/// Standard errors by which held-out errors must fall: chance does that in one case of forty.
-const CLEARLY: f64 = 2.0;
+/// Chance with which a model that is no better may seem so: several are tried on every rung.
+const CHANCE: f64 = 0.01;
 
-/// Whether the mean of `new` is clearly below that of `old`, by the standard error of the paired differences of cells.
+/// Whether `new` is clearly below `old`: its mean square is less, and by Student's test of the paired cells either the squares fall or
+/// their logarithms do. Squares say what a few bad regions gain; logarithms see that all regions gain where the old errors are of very
+/// different size.
 pub fn clearly_less(new: &HeldOut, old: &HeldOut) -> bool {
-    let gains: Vec<f64> = new.iter().zip(old).filter(|((_, n), _)| *n > 0.0).map(|(n, o)| o.0 - n.0).collect();
-    if gains.len() < 2 || new.len() != old.len() {
+    let pairs: Vec<(f64, f64)> = new.iter().zip(old).filter(|((_, n), _)| *n > 0.0).map(|(n, o)| (n.0, o.0)).collect();
+    if pairs.len() < 2 || new.len() != old.len() || root_mean(new) >= root_mean(old) {
         return false;
     }
+    let squares = pairs.iter().map(|(n, o)| o - n).collect();
+    let logarithms = pairs.iter().map(|(n, o)| (o.max(f64::MIN_POSITIVE) / n.max(f64::MIN_POSITIVE)).ln()).collect();
+    clearly_positive(squares) || clearly_positive(logarithms)
+}
+
+/// Whether the mean of these gains is more than chance.
+fn clearly_positive(gains: Vec<f64>) -> bool {
     let gains = DVector::from_vec(gains);
-    let standard_error = (gains.variance() / (gains.len() - 1) as f64).sqrt();
-    gains.mean() > CLEARLY * standard_error
+    let freedom = (gains.len() - 1) as f64;
+    let standard_error = (gains.variance() / freedom).sqrt();
+    let Ok(student) = StudentsT::new(0.0, 1.0, freedom) else { return false };
+    gains.mean() > student.inverse_cdf(1.0 - CHANCE) * standard_error
 }
 
 /// Root mean square of held-out errors, mm a number.
@@ -273,4 +285,27 @@ pub fn root_mean(held_out: &HeldOut) -> Option<f64> {
     let numbers: f64 = held_out.iter().map(|(_, n)| n).sum();
     let squares: f64 = held_out.iter().map(|(s, n)| s * n).sum();
     (numbers > 0.0).then(|| (squares / numbers).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn held_out(squares: &[f64]) -> HeldOut {
+        squares.iter().map(|&s| (s, 3.0)).collect()
+    }
+
+    #[test]
+    fn a_gain_in_every_region_counts_however_unlike_the_regions_are() {
+        let old = held_out(&[0.1, 0.2, 9.0, 0.3, 30.0, 0.2, 0.1, 4.0]);
+        let new = held_out(&[1e-4, 2e-4, 1e-4, 3e-4, 2e-4, 1e-4, 2e-4, 1e-4]);
+        assert!(clearly_less(&new, &old) && !clearly_less(&old, &new));
+    }
+
+    #[test]
+    fn a_gain_here_and_a_loss_there_is_chance() {
+        let old = held_out(&[1.0, 1.1, 0.9, 1.0, 1.2, 0.8]);
+        let new = held_out(&[0.9, 1.2, 0.8, 1.05, 1.0, 0.85]);
+        assert!(root_mean(&new) < root_mean(&old) && !clearly_less(&new, &old));
+    }
 }

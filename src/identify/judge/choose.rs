@@ -10,7 +10,7 @@ use super::cells::{Cells, HeldOut, clearly_less, root_mean};
 use super::errors::{Judge, RowError};
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
-use crate::identify::model::ladder::Terms;
+use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::residuals::weights::{EVIDENCE, Extra, Scatter, WARPS};
 use crate::identify::settings::{Extensions, Method, Model, Settings};
 use crate::identify::solve::formulation::Formulation;
@@ -81,6 +81,12 @@ struct Session<'a> {
     extras: Vec<Extra>,
     step: &'a (dyn Fn(&str) + Sync),
 }
+
+/// Numbers a parameter that a model needs to tell gross errors by: with fewer, a fit follows them.
+const ROWS_TELL: f64 = 2.0;
+
+/// Numbers a parameter that terms beyond MDH need at the least.
+const MOST_PARAMETERS: f64 = 1.5;
 
 /// Costs within this of each other are one: they come from different sums of the same squares.
 const SAME_COST: f64 = 1e-6;
@@ -219,13 +225,32 @@ impl Session<'_> {
         Task { set, robot, parameters, extras, rows: &self.rows, model, settings }
     }
 
+    /// Numbers that were measured, less the unknowns of the placements.
+    fn numbers(&self) -> f64 {
+        let (a_row, a_group) = match self.set.kind {
+            Kind::Positions => (3, 6),
+            Kind::Distances if self.rows.iter().any(|&r| self.set.touches(r)) => (3, 3),
+            Kind::Distances => (1, 4),
+        };
+        let groups = (0..self.set.groups.len()).filter(|&g| self.rows.iter().any(|&r| self.set.poses[r].group == g));
+        (a_row * self.rows.len()) as f64 - (a_group * groups.count()) as f64
+    }
+
+    /// The richest model that has so many times more numbers to tell by than parameters.
+    fn reference(&self, times: f64) -> Terms {
+        let poorer = |chain: Chain| Terms { chain, ..Terms::NOMINAL };
+        let rich = [Terms::REFERENCE, Terms::default(), poorer(Chain::Offsets)];
+        let enough = |t: &Terms| t.parameters(self.robot).len() as f64 * times <= self.numbers();
+        rich.into_iter().find(enough).unwrap_or(poorer(Chain::Tool))
+    }
+
     /// Leaves out the rows that a robust fit gives no weight, and names them; and the verify rows that are as far off.
     fn drop_outliers(&mut self, model: Model) -> Result<(Vec<usize>, Vec<usize>), Error> {
         let sigmas = self.settings.outlier_sigmas;
         if sigmas <= 0.0 {
             return Ok((Vec::new(), Vec::new()));
         }
-        let parameters = Terms::REFERENCE.parameters(self.robot);
+        let parameters = self.reference(ROWS_TELL).parameters(self.robot);
         let mut robust = self.task(&parameters, model).robust(Loss::Biweight)?;
         let outliers = robust.gross_errors(sigmas);
         let rows: Vec<usize> = self.rows.iter().copied().filter(|r| !outliers.contains(r)).collect();
@@ -249,7 +274,9 @@ impl Session<'_> {
     /// Up the ladder from the nominal robot: each time to the successor of least held-out error, as long as one is clearly better.
     fn climb(&mut self, model: Model) -> Result<(Terms, Vec<Judged>), Error> {
         let all = Terms::ALL.parameters(self.robot);
-        let reference = Terms::REFERENCE.parameters(self.robot);
+        let numbers = self.numbers();
+        let reference = self.reference(MOST_PARAMETERS);
+        let reference = Terms { chain: Chain::Mdh, ..reference }.parameters(self.robot);
         let formulation = Formulation::new(&self.task(&reference, model))?;
         let scatter = formulation.rows.scatter;
         let cells = self.cells(&all, &reference, &formulation, scatter, model);
@@ -266,6 +293,10 @@ impl Session<'_> {
         loop {
             let mut next: Option<(Terms, HeldOut)> = None;
             for terms in best.successors(self.robot, true) {
+                let beyond = terms.chain == Chain::Mdh && terms != Terms::default();
+                if beyond && terms.parameters(self.robot).len() as f64 * MOST_PARAMETERS > numbers {
+                    continue;
+                }
                 let Some(held_out) = judge(terms, &mut judged) else { continue };
                 let least = next.as_ref().is_none_or(|(_, h)| root_mean(&held_out) < root_mean(h));
                 if least && clearly_less(&held_out, &reference) {

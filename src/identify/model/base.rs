@@ -66,6 +66,12 @@ impl Base {
         Base { free, zero, dependent, coefficients, singular_values }
     }
 
+    /// Whether a base parameter stands for others too.
+    pub fn in_group(&self, parameter: usize) -> bool {
+        let row = self.free.iter().position(|&i| i == parameter);
+        row.is_some_and(|k| self.coefficients.row(k).iter().any(|c| c.abs() > NAMED))
+    }
+
     /// The paper's way (section 3.1): zero columns go, then, while two columns are as good as parallel or the rest lacks rank,
     /// the one with the largest correlation with another; of a pair the later goes. It cannot see a dependence of three columns before
     /// the last two of it correlate, so it may drop more than it must.

@@ -49,7 +49,8 @@ impl Robust<'_> {
     /// Sizes of these rows' residuals, as of one normal number and in standard deviations of the others, with the variance of what the others
     /// predict.
     fn deleted(&self, out: &[usize]) -> Vec<f64> {
-        let (rows, offsets, mut normal) = self.linearised();
+        let (rows, offsets, prior) = self.linearised();
+        let mut normal = prior.clone();
         let (of_robot, extras) = rows.split(&offsets);
         let places = rows.kinematics.places(of_robot, true);
         let mut parts = Vec::with_capacity(rows.blocks.len());
@@ -62,15 +63,18 @@ impl Robust<'_> {
             parts.push((block.row_poses(), linear, own, jacobian));
         }
         let covariance = pseudo_inverse(normal);
-        let (mut squares, mut numbers, mut unknowns) = (0.0, 0usize, offsets.len());
+        let (mut squares, mut numbers, mut unknowns) = (0.0, 0usize, 0);
         for (poses, linear, own, _) in &parts {
             let kept = |i: &usize| poses[*i].is_some_and(|p| !out.contains(&rows.rows[p]));
             squares += (0..poses.len()).filter(kept).map(|i| linear.residuals[i].powi(2)).sum::<f64>();
             numbers += (0..poses.len()).filter(kept).count();
             unknowns += own.nrows();
         }
-        let freedom = numbers.saturating_sub(unknowns).max(numbers.div_ceil(LEAST_FREEDOM)).max(1);
-        let scale = (squares / freedom as f64).sqrt().max(f64::MIN_POSITIVE);
+        // What the prior holds costs the data nothing.
+        let determined = offsets.len() as f64 - (&covariance * prior).trace();
+        let freedom =
+            (numbers as f64 - unknowns as f64 - determined).max(numbers.div_ceil(LEAST_FREEDOM).max(1) as f64);
+        let scale = (squares / freedom).sqrt().max(f64::MIN_POSITIVE);
         let mut sizes = vec![0.0; out.len()];
         for (poses, linear, own, jacobian) in &parts {
             for (size, &row) in sizes.iter_mut().zip(out) {

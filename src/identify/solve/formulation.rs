@@ -24,6 +24,10 @@ use crate::robot::{Parameter, Unit};
 /// Rounds of fitting and of estimating scatter and prior from the residuals.
 const ROUNDS: usize = 4;
 
+/// Rounds of estimating scatter and prior from the residuals at the most, and the change of the scatter's logarithm that ends them.
+const ESTIMATES: usize = 10;
+const SAME_SCATTER: f64 = 0.01;
+
 /// A fit may end so far into the box before the box is widened.
 const NEAR_WALL: f64 = 0.95;
 
@@ -70,7 +74,18 @@ impl Formulation {
         let mut tolerance = Tolerance::default();
         let mut x = vec![0.0; count];
         let mut effective = 0.0;
-        for round in 0..ROUNDS {
+        // From the side of noise: what the parameters have not explained yet counts as scatter, so that a few rows are not followed
+        // to the last digit by a prior that makes room for it.
+        scatter = estimate_scatter(&rows, &vec![0.0; rows.offset_count()], effective, scatter);
+        for round in 0..ESTIMATES {
+            let before = scatter;
+            rows = Rows::new(&task.recipe(scatter, &[], &levers));
+            let spread = tolerance.spread(&base, task.parameters);
+            if held {
+                let (normal, gradient) =
+                    Fit::new(Cow::Borrowed(&rows), &base, spread, &free, DMatrix::zeros(0, count)).normal(&x);
+                tolerance = Tolerance::from_evidence(&base, task.parameters, task.extras, &normal, &gradient);
+            }
             let prior = prior_rows(&tolerance, &base, task, held || round == 0);
             let spread = tolerance.spread(&base, task.parameters);
             let fit = Fit::new(Cow::Borrowed(&rows), &base, spread, &free, prior.clone());
@@ -79,14 +94,12 @@ impl Formulation {
             effective = determined(&fit, &x, &prior);
             scatter = estimate_scatter(&rows, &offsets, effective, scatter);
             levers = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
-            rows = Rows::new(&task.recipe(scatter, &[], &levers));
-            if held && round + 1 < ROUNDS {
-                let spread = tolerance.spread(&base, task.parameters);
-                let (normal, gradient) =
-                    Fit::new(Cow::Borrowed(&rows), &base, spread, &free, DMatrix::zeros(0, count)).normal(&x);
-                tolerance = Tolerance::from_evidence(&base, task.parameters, task.extras, &normal, &gradient);
+            let change = (scatter.point_mm / before.point_mm).ln().abs() + (scatter.stated / before.stated).ln().abs();
+            if round + 1 >= ROUNDS && change < SAME_SCATTER {
+                break;
             }
         }
+        rows = Rows::new(&task.recipe(scatter, &[], &levers));
         let prior = prior_rows(&tolerance, &base, task, held);
         let spread = tolerance.spread(&base, task.parameters);
         let mut free_fit = None;

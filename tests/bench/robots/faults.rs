@@ -40,7 +40,7 @@ const FAULTS: [(&str, Plant, &str); 18] = [
     ("drift of 0.5 mm", |rows, _| points(rows, |i, p| p.x += 0.5 * i.min(60) as f64 / 60.0), "drift"),
     ("constant joint", |rows, _| joints(rows, |_, j| j[4] = 20.0), "same in all rows"),
     ("repeated poses", |rows, _| repeated(rows), "repeated"),
-    ("another robot", |_, robot| robot.joints[2].a_mm += 60.0, ""),
+    ("another robot", |_, robot| robot.joints[2].a_mm += 60.0, "another robot"),
 ];
 
 /// One line a fault, then gross errors.
