@@ -93,7 +93,7 @@ fn the_files_are_those_of_the_contract() {
         let more = ["--out", threads, "--threads", threads, "--no-provenance", "--calibration", "out/calibration.json"];
         run(at, &[&more[..], &QUICK[..]].concat(), 0);
     }
-    for name in ["poses.csv", "plan.json", "plan.html", "programs/stereocal_plan.jbi"] {
+    for name in ["poses.csv", "plan.json", "plan.html", "programs/STEREOCAL_PLAN.jbi"] {
         let read = |threads: &str| std::fs::read(at.join(threads).join(name)).unwrap();
         assert!(read("1") == read("2"), "{name}");
     }

@@ -21,9 +21,9 @@ use crate::stereo::solve::uncertainty::{self, determines_cameras};
 /// best of several is taken.
 const STANDARD_ERRORS: f64 = 2.0;
 
-/// Quantile of the normal distribution (one draw in twenty thousand) at whose level of chi-squared a simpler model is refuted: there are several
+/// Quantile of the normal distribution (one draw in four thousand) at whose level of chi-squared a simpler model is refuted: there are several
 /// rungs, and a board's print, the same in all pairs, adds a little to every fall.
-const REFUTED: f64 = 3.8906;
+const REFUTED: f64 = 3.5;
 
 /// How a model predicts pairs it has not seen.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
