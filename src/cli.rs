@@ -385,7 +385,7 @@ pub struct Compensate {
     /// The robot as `identify` found it
     #[arg(long, value_name = "FILE")]
     pub identified: Utf8PathBuf,
-    /// The tool in the last frame, mm, instead of both files' [tool]
+    /// The tool in the last frame, mm, instead of both files' `[tool]`
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true)]
     pub tool: Vec<f64>,
     /// Pulses a degree of each joint, for Yaskawa jobs in pulses

@@ -148,7 +148,7 @@ fn seen(p: &Vector3<f64>, scale: f64) -> (f64, f64) {
     (SIZE.0 / 2.0 + scale * x, SIZE.1 / 2.0 + scale * (p.y * cos_p - z * sin_p))
 }
 
-/// Turns every view of a page; the same formulas as [`seen`].
+/// Turns every view of a page; the same formulas as `seen`.
 pub const SCRIPT: &str = "
 for (const s of document.querySelectorAll('svg.scene')) {
   let yaw = +s.dataset.yaw, pitch = +s.dataset.pitch, from = null;

@@ -4,7 +4,7 @@
 //! in a small window that a coarse start can't lead astray (coarse); then at full size in a small window (near) and in the
 //! largest that stays inside the four squares round it (full). Where the larger window does not agree with the smaller one, or the four
 //! arms of a corner not with each other, something hides a part of it, and the largest window that is free of it is kept. Last,
-//! the board's corners share what they know of the light, which counts from the picture's veil ([`veil`]). Goes wrong: a corner without contrast, hidden, cut off by the border or
+//! the board's corners share what they know of the light, which counts from the picture's veil (`veil`). Goes wrong: a corner without contrast, hidden, cut off by the border or
 //! saturated; it is dropped, the others stay.
 
 mod acceptance;

@@ -98,7 +98,7 @@ impl Trial {
         self.by_pair.iter().sum::<f64>() / self.by_pair.len() as f64
     }
 
-    /// Whether a richer model predicts unseen pairs no worse and lowers chi-squared by more than chance does ([`REFUTED`]): a
+    /// Whether a richer model predicts unseen pairs no worse and lowers chi-squared by more than chance does (`REFUTED`): a
     /// few pairs that miss terms only at their edges differ too much among themselves for their mean loss to tell.
     pub fn is_refuted_by(&self, richer: &Trial, scatter: f64) -> bool {
         let Some(added) = richer.layout.count().checked_sub(self.layout.count()).filter(|added| *added > 0) else {
