@@ -55,7 +55,9 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     }
     let json = write(&out, &set, &nominal, &found, &record, &settings)?;
     let stdout = if args.output.json { json } else { report::identify::summary(&record) };
-    Ok(Outcome { stdout, status: Status::Done })
+    // A method or model that was asked for is kept whatever it is worth; that it is worth less than nothing is no success.
+    let worse = found.worse_than_nominal(&set, &nominal, &settings);
+    Ok(Outcome { stdout, status: if worse { Status::OutOfTolerance } else { Status::Done } })
 }
 
 /// What was typed beats the file.

@@ -205,16 +205,18 @@ impl Identification {
         judge.errors(robot, rows)
     }
 
-    /// Whether the verify rows find the chosen robot worse than the nominal one.
-    fn worse_than_nominal(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> bool {
+    /// Whether the verify rows find the chosen robot worse than the nominal one, by their points or by their distances.
+    pub fn worse_than_nominal(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> bool {
         let rows: Vec<usize> = set.verify_rows().into_iter().filter(|r| !self.verify_outliers.contains(r)).collect();
-        let mean = |robot: &Robot| {
-            let errors = self.errors(set, settings, robot, &rows);
-            let size = |e: &RowError| e.point_mm.map(|p| p.norm()).or(e.distance_mm.map(f64::abs));
+        let [chosen, nominal] =
+            [&self.candidates[self.chosen].robot, nominal].map(|robot| self.errors(set, settings, robot, &rows));
+        let mean = |errors: &[RowError], size: fn(&RowError) -> Option<f64>| {
             let sizes: Vec<f64> = errors.iter().filter_map(size).collect();
             sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
         };
-        rows.len() >= VERDICT_ROWS && mean(&self.candidates[self.chosen].robot) > mean(nominal)
+        let sizes: [fn(&RowError) -> Option<f64>; 2] =
+            [|e| e.point_mm.map(|p| p.norm()), |e| e.distance_mm.map(f64::abs)];
+        rows.len() >= VERDICT_ROWS && sizes.into_iter().any(|size| mean(&chosen, size) > mean(&nominal, size))
     }
 }
 
