@@ -113,8 +113,8 @@ fn capital(text: &str) -> String {
 fn print_scatter(calibration: &Calibration, accuracy: &Accuracy, tolerance_mm: f64) -> Option<String> {
     /// Of independent corners the mean of thousands of points lies within a tenth of one.
     const SHARED: f64 = 0.25;
-    /// At both ends, at 95 %, a place that scatters by this share of the tolerance takes a sixth of it.
-    const MATTERS: f64 = 0.05;
+    /// At both ends, at 95 %, a place that scatters by this share of the tolerance takes a twelfth of it.
+    const MATTERS: f64 = 0.03;
     if accuracy.rays_chi_square > SHARED {
         return None;
     }
