@@ -227,12 +227,14 @@ fn number_alike(found: Vec<Found>, board: Board) -> Vec<PairCorners> {
         .zip(turns)
         .map(|((pair, left, right), (turn_left, turn_right))| PairCorners {
             pair,
-            left: list(&left.turned(turn_left)),
-            right: list(&right.turned(turn_right)),
+            left: turned(&left, turn_left),
+            right: turned(&right, turn_right),
         })
         .collect()
 }
 
-fn list(grid: &Lattice<Corner>) -> Vec<Corner> {
-    grid.iter().map(|(col, row, corner)| Corner { col, row, ..*corner }).collect()
+fn turned(grid: &Lattice<Corner>, quarters: usize) -> Vec<Corner> {
+    let reach =
+        |c: &Corner| c.reach.map(|[rows, columns]| if quarters % 2 == 1 { [columns, rows] } else { [rows, columns] });
+    grid.turned(quarters).iter().map(|(col, row, c)| Corner { col, row, reach: reach(c), ..*c }).collect()
 }

@@ -184,6 +184,9 @@ pub struct Plan {
     pub warnings: Vec<String>,
 }
 
+/// What every plan's user must know.
+pub const COLLISIONS: &str = "collisions of the arm with itself, the cameras and the cell are not checked: run the program slowly, hand on the stop";
+
 /// Plans. `measured` are rows of earlier poses, and the file they come from.
 pub fn plan(
     robot: &Robot,
@@ -192,9 +195,7 @@ pub fn plan(
     measured: Option<(&[Measurement], &str)>,
 ) -> Result<Plan> {
     let mut placements = scene::placements(robot, scene, settings)?;
-    let mut warnings = vec![
-        "collisions of the arm with itself, the cameras and the cell are not checked: run the program slowly, hand on the stop".to_owned(),
-    ];
+    let mut warnings = vec![COLLISIONS.to_owned()];
     let earlier = match measured {
         Some((rows, place)) => after::place(robot, scene, &mut placements, rows, place)?,
         None => Vec::new(),

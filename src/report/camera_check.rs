@@ -119,7 +119,10 @@ fn advice(judged: &Judged) -> String {
     let [long, _] = judged.accuracy.long_mm;
     let sure = judged.tolerance_mm;
     match judged.verdict {
-        Verdict::Pass => format!("Lengths can be trusted to {sure} mm in the volume where the boards stood."),
+        Verdict::Pass => {
+            let trusted = judged.trusted_mm().unwrap_or(sure);
+            format!("Lengths can be trusted to {trusted:.4} mm in the volume where the boards stood.")
+        }
         Verdict::Undecided => format!(
             "The evidence does not decide: the lines below that are not a pass say what casts doubt and what would settle it; until \
              then do not rely on {sure} mm."
@@ -200,7 +203,7 @@ fn ledger(judged: &Judged) -> Markup {
                 td { (cell(line.limit)) }
                 td { (line.unit) }
                 td { span class=(class(line.allows)) { (word(line.allows).to_lowercase()) } }
-                td.detail { (line.detail) }
+                td.detail { (page::text(&line.detail)) }
             } } }
         } }
     }

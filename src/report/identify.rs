@@ -206,6 +206,7 @@ fn parameter_table(record: &Record) -> Markup {
     let Some(method) = record.chosen_method() else { return html! {} };
     let row = |p: &crate::identify::record::ParameterRecord| {
         let state = match (p.identifiable, p.at_bound) {
+            (false, _) if p.delta != 0.0 => "its share of a sum",
             (false, _) => "stays nominal",
             (true, true) => "at the wall",
             (true, false) => "",

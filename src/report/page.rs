@@ -53,14 +53,14 @@ table.ledger th:last-child { text-align: left; }
 .scroll { max-height: 420px; overflow: auto; border: 1px solid var(--hair); }
 figure { margin: 12px 0 20px; break-inside: avoid; } figure svg, figure img { max-width: 100%; height: auto; }
 figcaption { color: var(--soft); font-size: 14px; }
-.side { display: flex; flex-wrap: wrap; gap: 16px; } .side > * { flex: 1 1 440px; min-width: 0; }
+.side { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(440px, 100%), 1fr)); gap: 16px; } .side > * { min-width: 0; }
 svg.scene { cursor: grab; touch-action: none; user-select: none; border: 1px solid var(--hair); } svg.scene path { fill: none; stroke-width: 1.3; stroke-linejoin: round; stroke-linecap: round; }
 svg.scene text { font: 14px sans-serif; fill: var(--ink); } .i-frame { stroke: var(--ink); } .i-plain { stroke: var(--plain); }
 .i-good { stroke: var(--good); } .i-bad { stroke: var(--bad); } svg.scene .i-good, svg.scene .i-bad { stroke-width: 2.6; }
 svg.scene .dots { stroke-width: 5; }
 ul.warnings li { margin: 4px 0; }
 footer { color: var(--soft); font-size: 13px; overflow-wrap: anywhere; }
-@media (max-width: 600px) { main { padding: 16px 12px 40px; } td, th { padding-left: 6px; padding-right: 6px; } .side > * { flex-basis: 100%; }
+@media (max-width: 600px) { main { padding: 16px 12px 40px; } td, th { padding-left: 6px; padding-right: 6px; }
   table.ledger, table.ledger tbody { display: block; } table.ledger thead { display: none; } table.ledger td { border: 0; }
   table.ledger tr { display: grid; grid-template-columns: 1fr repeat(4, auto); padding: 4px 0; border-bottom: 1px solid var(--hair); }
   table.ledger td.detail { grid-column: 1 / -1; min-width: 0; padding-left: 4px; } h1 { font-size: 21px; } }
@@ -118,7 +118,7 @@ pub fn signed(page: String, provenance: Option<&Provenance>) -> String {
 
 /// The box that says first what the reader came for.
 pub fn verdict(tone: Tone, headline: &str, explanation: &str) -> Markup {
-    html! { div class={ "verdict " (tone.class()) } { strong { (headline) } span { (explanation) } } }
+    html! { div class={ "verdict " (tone.class()) } { strong { (headline) } span { (text(explanation)) } } }
 }
 
 /// A figure with what to conclude from it beneath.
@@ -131,19 +131,38 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> Markup {
     html! {
         div.wide { table {
             thead { tr { @for cell in header { th { (cell) } } } }
-            tbody { @for row in rows { tr { @for cell in row { td { (cell) } } } } }
+            tbody { @for row in rows { tr { @for cell in row { td { (text(cell)) } } } } }
         } }
     }
 }
 
 /// Warnings, where there are any.
 pub fn warnings(list: &[String]) -> Markup {
-    html! { @if !list.is_empty() { ul.warnings { @for warning in list { li { (warning) } } } } }
+    html! { @if !list.is_empty() { ul.warnings { @for warning in list { li { (text(warning)) } } } } }
+}
+
+/// A sentence of the terminal: what stands there between backticks is code here.
+pub fn text(sentence: &str) -> Markup {
+    let parts: Vec<&str> = sentence.split('`').collect();
+    // An odd backtick is one that somebody wrote, in a name of a file.
+    if parts.len().is_multiple_of(2) {
+        return html! { (sentence) };
+    }
+    html! { @for (i, part) in parts.iter().enumerate() { @if i % 2 == 1 { code { (part) } } @else { (part) } } }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn backticks_become_code_where_they_come_in_pairs() {
+        assert_eq!(
+            text("give `--first <N>` or `-v`").into_string(),
+            "give <code>--first &lt;N&gt;</code> or <code>-v</code>"
+        );
+        assert_eq!(text("a`b").into_string(), "a`b");
+    }
     use crate::report::scene::{Ink, Scene};
     use nalgebra::Point3;
 

@@ -9,8 +9,8 @@ use super::page;
 use super::table::{Table, number};
 use crate::formats::plan::{Determined, PlanFile};
 use crate::measurements::Role;
-use crate::plan::Plan;
 use crate::plan::scene::Scene;
+use crate::plan::{COLLISIONS, Plan};
 use crate::robot::Robot;
 
 /// The figures on the terminal.
@@ -66,10 +66,11 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
             vec![poses.to_string(), number(at(&record.plan), 4), number(record.paper.as_ref().and_then(at), 4)]
         })
         .collect();
+    let others: Vec<String> = record.warnings.iter().filter(|warning| *warning != COLLISIONS).cloned().collect();
     let content = html! {
         (page::verdict(page::Tone::Doubtful, "Collisions are not checked",
             "Neither the arm with itself, nor with the cameras or the cell. Run the program slowly, hand on the stop."))
-        (page::warnings(&record.warnings))
+        (page::warnings(&others))
         h2 { "Accuracy to expect" }
         (page::table(&["samples", "this plan, mm", "the paper's plan, mm"], &rows))
         p { "Root mean square of the target's position error over the spheres, tilts to 25 degrees, after one rigid fit; "

@@ -76,7 +76,7 @@ pub fn page(file: &RectifiedFile, rectified: &[PairFiles], shown: Option<&PairCo
         div.scroll { (pairs(&file.pairs)) }
         @if !file.pairs_skipped.is_empty() {
             p { "Not written:" }
-            ul { @for skipped in &file.pairs_skipped { li { (skipped.pair) ": " (skipped.reason) } } }
+            ul { @for skipped in &file.pairs_skipped { li { (skipped.pair) ": " (page::text(&skipped.reason)) } } }
         }
         p { "The matrices R1, R2, P1, P2" @if rectify { " and Q" } " stand in " code { "rectified.json" } ", row by row, as OpenCV has them." }
     };

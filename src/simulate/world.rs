@@ -161,6 +161,7 @@ impl World {
                 px,
                 covariance_px2: None,
                 blur_px: None,
+                reach: None,
                 used: true,
             };
             at.into_iter().enumerate().map(corner).collect()

@@ -21,7 +21,7 @@ use crate::stereo::select::pair_scatter::PairScatter;
 use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::uncertainty::Uncertainty;
-use crate::stereo::target::print_share::print_share;
+use crate::stereo::target::print_share::PrintShare;
 use crate::stereo::{Error, Lens, Rig};
 
 /// A calibrated rig with all that it was made from.
@@ -137,11 +137,13 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
     let neighbours = solved.neighbours(&corners.board);
     let by_noise = solved.uncertainty(&layout).map_err(|e| e.of_lens(options.lens))?.scaled(neighbours.inflation());
     let without_scatter = by_noise.shared.clone();
+    let print = PrintShare::of(&solved, &corners.board, &layout);
+    let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
     let Stated { mut uncertainty, pair_scatter, witnesses } =
-        stated_uncertainty::state(&solved, &layout, by_noise, &neighbours, &lens_scores);
+        stated_uncertainty::state(&solved, &layout, by_noise, &neighbours, &lens_scores, print_excess);
     let Problem { views, mut values } = solved.problem;
     let mut own_noise = solved.noise;
-    if let Some(print) = print_share(&views, &corners.board, &layout, &values, neighbours.inflation()) {
+    if let Some(print) = print {
         uncertainty.shared += print.covariance - without_scatter;
         own_noise = own_noise.without_print(print.own_noise);
     }

@@ -93,7 +93,15 @@ impl World {
                                 && px.y < f64::from(camera.height)
                             {
                                 let covariance_px2 = Some(Matrix2::identity() * self.sigma_px * self.sigma_px);
-                                list.push(Corner { col, row, px, covariance_px2, blur_px: None, used: true });
+                                list.push(Corner {
+                                    col,
+                                    row,
+                                    px,
+                                    covariance_px2,
+                                    blur_px: None,
+                                    reach: None,
+                                    used: true,
+                                });
                             }
                         }
                     }

@@ -51,9 +51,10 @@ fn matlabs_calibration_of_duodic() {
     assert!((rich.right_from_left.translation.vector.z - rig.right_from_left.translation.vector.z).abs() > 3.0);
     assert!(check["evidence"].as_array().is_some_and(|all| all.len() > 10), "{check}");
     assert!(!said.contains("radial2"), "{said}");
-    // A tenth of a micrometre for the rounding of the figure that was published.
+    // This board's crossings are off by 0.02 mm. What a fifth term gains is no more than that print would let it gain, so that four are kept;
+    // they miss the stage by 0.2 um more.
     let worst = worst_step_mm(&rich, &shared("stereo/duodic_corners/rbm_points.csv").unwrap());
-    assert!(worst <= 0.0038, "{worst}");
+    assert!(worst <= 0.0040, "{worst}");
 }
 
 /// Largest difference between the stage's reading and the mean displacement of the points, mm.

@@ -62,7 +62,9 @@ fn text(look: &Look) -> String {
             for (_, _, c) in grid.iter() {
                 let [xx, xy, yy] = c.covariance_px2.map_or([f64::NAN; 3], |s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]]);
                 let (x, y, blur, used) = (c.px.x, c.px.y, c.blur_px.unwrap_or(f64::NAN), u8::from(c.used));
-                body.push_str(&format!("{} {} {x} {y} {xx} {xy} {yy} {blur} {used}\n", c.col, c.row));
+                let [along_rows, along_columns] = c.reach.unwrap_or([f64::NAN; 2]);
+                let reach = format!("{along_rows} {along_columns}");
+                body.push_str(&format!("{} {} {x} {y} {xx} {xy} {yy} {blur} {reach} {used}\n", c.col, c.row));
             }
         }
     }
@@ -83,14 +85,16 @@ fn parse(text: &str, board: Board) -> Option<Look> {
     let mut grid: Lattice<Corner> = Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
     for line in body.lines() {
         let numbers: Vec<f64> = line.split(' ').map(|n| n.parse().ok()).collect::<Option<_>>()?;
-        let [col, row, x, y, xx, xy, yy, blur, used] = numbers.try_into().ok()?;
+        let [col, row, x, y, xx, xy, yy, blur, along_rows, along_columns, used] = numbers.try_into().ok()?;
         let (col, row) = (col as usize, row as usize);
         if col >= board.columns() || row >= board.rows() || !x.is_finite() || !y.is_finite() {
             return None;
         }
         let covariance_px2 = xx.is_finite().then(|| Matrix2::new(xx, xy, xy, yy));
         let blur_px = blur.is_finite().then_some(blur);
-        let corner = Corner { col, row, px: Point2::new(x, y), covariance_px2, blur_px, used: used != 0.0 };
+        let reach = along_rows.is_finite().then_some([along_rows, along_columns]);
+        let px = Point2::new(x, y);
+        let corner = Corner { col, row, px, covariance_px2, blur_px, reach, used: used != 0.0 };
         *grid.cells.get_mut(row * board.columns() + col)? = Some(corner);
     }
     Some(Ok(grid))
@@ -112,7 +116,8 @@ mod tests {
             let covariance_px2 = (col > 0).then(|| Matrix2::new(1.0 / 3e5, 1e-8, 1e-8, 2e-6));
             let px = Point2::new(1.0 / 3.0 + col as f64, row as f64);
             let blur_px = (col > 0).then_some(1.0 / 3.0);
-            (row + col < 3).then_some(Corner { col, row, px, covariance_px2, blur_px, used: col > 0 })
+            let reach = (col > 0).then_some([0.1, 2.0 / 3.0]);
+            (row + col < 3).then_some(Corner { col, row, px, covariance_px2, blur_px, reach, used: col > 0 })
         }));
         let written = text(&look);
         assert_eq!(parse(&written, board()), Some(look));

@@ -158,7 +158,7 @@ fn parse(table: &Table) -> Result<Vec<Row>> {
             }
             _ => None,
         };
-        let corner = Corner { col, row, px, covariance_px2, blur_px, used };
+        let corner = Corner { col, row, px, covariance_px2, blur_px, reach: None, used };
         rows.push(Row { line, pair: name, side, corner, size });
     }
     Ok(rows)
@@ -237,7 +237,8 @@ mod tests {
         let covariance_px2 = Some(Matrix2::new(1.0 / 3.0e4, 1e-7, 1e-7, 2.2e-5));
         let blur_px = Some(2.0 / 3.0);
         let px = |x: f64| Point2::new(x, 2.0 / 7.0);
-        let corner = |col, row, x: f64| Corner { col, row, px: px(x), covariance_px2, blur_px, used: true };
+        let corner =
+            |col, row, x: f64| Corner { col, row, px: px(x), covariance_px2, blur_px, reach: None, used: true };
         let plain = |c: Corner| Corner { covariance_px2: None, blur_px: None, used: false, ..c };
         let corners = Corners {
             board: Board { squares: "4x3".parse().unwrap(), square_mm: 10.0 },

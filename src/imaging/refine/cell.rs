@@ -37,6 +37,11 @@ impl Cell {
         self.edges[0].norm().min(self.edges[1].norm())
     }
 
+    /// A window's halves along the edges, as shares of them.
+    pub(super) fn reach(&self, halves: &[Vector2<f64>; 2]) -> [f64; 2] {
+        [0, 1].map(|k| halves[k].norm() / self.edges[k].norm())
+    }
+
     /// Sine of the angle between the edges.
     pub(super) fn skew(&self) -> f64 {
         let [a, b] = self.edges;

@@ -137,7 +137,7 @@ mod tests {
                 left_out: 0,
                 steps: 3,
             };
-            Some(Measured { px: at + wrong * -4.0, fit })
+            Some(Measured { px: at + wrong * -4.0, fit, reach: [0.7; 2] })
         })
     }
 

@@ -54,6 +54,8 @@ pub struct Measured {
     pub px: Point2<f64>,
     /// The fit it comes from.
     pub fit: Fit,
+    /// How far the window reaches along the two edges, as a share of the square's side.
+    pub reach: [f64; 2],
 }
 
 /// Measures all corners of a board.
@@ -67,11 +69,11 @@ pub fn refine(picture: &Picture, detected: &Detected) -> Lattice<Corner> {
             let s = &m.fit.covariance_px2;
             let across = 0.5 * (s[(0, 1)] + s[(1, 0)]);
             let covariance_px2 = Some(Matrix2::new(s[(0, 0)], across, across, s[(1, 1)]));
-            return Some(Corner { col, row, px: m.px, covariance_px2, blur_px, used: true });
+            return Some(Corner { col, row, px: m.px, covariance_px2, blur_px, reach: Some(m.reach), used: true });
         }
         // Kept where it was seen roughly, so that a picture in which nothing could be measured can still be judged.
         let px = detected.level.to_picture(detected.corners.get(col, row)?);
-        Some(Corner { col, row, px, covariance_px2: None, blur_px: None, used: false })
+        Some(Corner { col, row, px, covariance_px2: None, blur_px: None, reach: None, used: false })
     })
 }
 
@@ -236,7 +238,7 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
             // The copy may have hidden how wide the blur is; the band must hold the whole edge.
             if BAND_BLURS * wider <= 1.2 * band_px {
                 let fits = plausible(&found, &start, cell);
-                return fits.then(|| Measured { px: found.place(&cell.place), fit: found });
+                return fits.then(|| Measured { px: found.place(&cell.place), fit: found, reach: cell.reach(&halves) });
             }
             if wider > 0.5 * cell.side() {
                 return None;
@@ -259,13 +261,13 @@ fn near_half_px(start: &Model) -> f64 {
 fn coarse(detected: &Detected, window: &mut Window) -> Lattice<Measured> {
     Lattice::from_fn(detected.corners.columns, detected.corners.rows, |col, row| {
         let cell = Cell::of(&detected.corners, col, row)?;
-        let fit = coarse_fit(&detected.copy, &cell, window)?;
-        Some(Measured { px: fit.place(&cell.place), fit })
+        let (fit, reach) = coarse_fit(&detected.copy, &cell, window)?;
+        Some(Measured { px: fit.place(&cell.place), fit, reach })
     })
 }
 
-/// A fit in a small window, or in larger ones where a wide blur fills it.
-fn coarse_fit(copy: &Image<u8>, cell: &Cell, window: &mut Window) -> Option<Fit> {
+/// A fit in a small window, or in larger ones where a wide blur fills it; and how far that reaches.
+fn coarse_fit(copy: &Image<u8>, cell: &Cell, window: &mut Window) -> Option<(Fit, [f64; 2])> {
     let most = 0.6 * cell.side();
     let mut half = FIRST_HALF_PX.min(most);
     loop {
@@ -285,7 +287,7 @@ fn coarse_fit(copy: &Image<u8>, cell: &Cell, window: &mut Window) -> Option<Fit>
             && plausible(&first, &start, cell)
             && (first.model.blur_px.iter().all(|&s| s < 0.4 * half) || half >= most)
         {
-            return Some(first);
+            return Some((first, cell.reach(&halves)));
         }
         if half >= most {
             return None;

@@ -137,7 +137,7 @@ fn fit(residuals: &[(Observation, Vector2<f64>)], reduced: impl Fn(&mut [f64]) -
 }
 
 /// `W` with `W' W = Sigma^-1`, from the Cholesky factor.
-fn whitener(covariance: &Matrix2<f64>) -> Matrix2<f64> {
+pub fn whitener(covariance: &Matrix2<f64>) -> Matrix2<f64> {
     let l11 = covariance.m11.sqrt();
     let l21 = covariance.m12 / l11;
     let l22 = (covariance.m22 - l21 * l21).max(0.0).sqrt();

@@ -1,6 +1,6 @@
 //! Corners as the bundle sees them: a point of the board, a pixel, a weight.
 
-use nalgebra::{Matrix2, Point2, Point3, Vector2};
+use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 
 use crate::imaging::Board;
 pub use crate::imaging::Side;
@@ -23,6 +23,11 @@ pub struct Observation {
     pub px: Point2<f64>,
     /// The refinement's own covariance, px^2; zero where it gave none.
     pub covariance_px2: Matrix2<f64>,
+    /// How far the corner's window reaches along the edges that run along the rows and along the columns, as a share of a square's side;
+    /// zero where nothing is known of it.
+    pub reach: [f64; 2],
+    /// By how much what the window sees lies off the crossing itself, on the board, mm.
+    pub seen_off_mm: Vector3<f64>,
     /// Whitener of the residual: `whitener * (px - predicted)` has unit covariance. Set by the noise model.
     pub whitener: Matrix2<f64>,
     /// False for an outlier: it stays in the list, so that it can be reported, and counts for nothing.
@@ -40,6 +45,8 @@ impl Observation {
             lift: [0.0; NUMBERS],
             px,
             covariance_px2: Matrix2::identity() * (sigma_px * sigma_px),
+            reach: [0.0; 2],
+            seen_off_mm: Vector3::zeros(),
             whitener: Matrix2::identity() / sigma_px,
             active: true,
         }

@@ -1,6 +1,6 @@
 //! What one pair of pictures shows of the board.
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Vector3};
 
 use crate::imaging::{Board, Corner, PairCorners, Side};
 use crate::stereo::data::observation::Observation;
@@ -61,6 +61,9 @@ impl View {
                 _ => (row, last_col - col),
             };
             o.renumber(board, place);
+            if !quarters.is_multiple_of(2) {
+                o.reach.reverse();
+            }
         }
     }
 
@@ -99,6 +102,8 @@ fn observation(board: &Board, side: Side, corner: &Corner) -> Observation {
         lift: lift(board, &board_mm),
         px: corner.px,
         covariance_px2,
+        reach: corner.reach.unwrap_or([0.0; 2]),
+        seen_off_mm: Vector3::zeros(),
         whitener: Matrix2::identity(),
         active: true,
     }

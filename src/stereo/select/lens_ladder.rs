@@ -3,18 +3,20 @@
 //! In: views that agree. Out: the layout to solve, and how each lens of the ladder predicts held-out pairs. Method: k folds over the
 //! pairs ([`crate::stereo::select::cross_validation`]); the rig of a fold measures the pose of each pair it has not seen, and what is left counts. The simplest model whose
 //! loss is within two standard errors of the best wins (after Breiman et al. 1984), since a richer one extrapolates worse; unless the corners
-//! refute it: chi-squared falls by more than chance for a richer one that predicts no worse.
+//! refute it: chi-squared falls by more than chance for a richer one that predicts no worse. What the board's print alone would let a term of no
+//! worth gain is allowed for in both.
 //! Goes wrong: pairs too few or too alike to tell models apart; then the simplest that fits wins, and
 //! [`crate::stereo::judge::model_disagreement`] says what is at stake.
 
 use crate::imaging::Board;
 use crate::stereo::model::parameters::{Layout, Values};
-use crate::stereo::select::model_comparison::{LensScore, score, simplest};
+use crate::stereo::select::model_comparison::{Chance, LensScore, score, simplest};
 use crate::stereo::select::stated_uncertainty;
 use crate::stereo::solve::levenberg_marquardt;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty;
+use crate::stereo::target::print_share::PrintShare;
 use crate::stereo::{Error, Lens};
 
 /// What may be forced.
@@ -56,22 +58,25 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
             Error::NotConverged { .. } => Error::undetermined(),
             other => other,
         })?;
-    let scatter = stated_uncertainty::excess_scatter(&solved, &layout, board);
+    let chance = Chance {
+        scatter: stated_uncertainty::excess_scatter(&solved, &layout, board),
+        print: PrintShare::of(&solved, board, &layout).map_or(1.0, |print| print.excess),
+    };
     // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
     let bent = forced_shape.unwrap_or(true);
     let mut scores = ladder(&solved.problem, bent);
     if forced_shape.is_none() && scores.iter().all(|s| s.trial.is_none()) {
         scores = ladder(&solved.problem, false);
     }
-    let chosen = simplest(&scores, scatter).ok_or_else(Error::undetermined)?;
+    let chosen = simplest(&scores, &chance).ok_or_else(Error::undetermined)?;
     if forced_shape.is_none() && chosen.layout.shape {
         let flat = chosen.layout.left.and_then(|lens| score(&solved.problem, lens, false).trial);
-        let bends = flat.is_none_or(|flat| flat.excess_over(chosen) > 0.0 || flat.is_refuted_by(chosen, scatter));
+        let bends = flat.is_none_or(|flat| flat.is_worse_than(chosen, &chance) || flat.is_refuted_by(chosen, &chance));
         if !bends {
             scores = ladder(&solved.problem, false);
         }
     }
-    let chosen = simplest(&scores, scatter).ok_or_else(Error::undetermined)?;
+    let chosen = simplest(&scores, &chance).ok_or_else(Error::undetermined)?;
     Ok(Choice { layout: chosen.layout, near: Some(chosen.values.clone()), scores })
 }
 

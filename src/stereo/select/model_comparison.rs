@@ -22,8 +22,30 @@ use crate::stereo::solve::uncertainty::{self, determines_cameras};
 const STANDARD_ERRORS: f64 = 2.0;
 
 /// Quantile of the normal distribution (one draw in four thousand) at whose level of chi-squared a simpler model is refuted: there are several
-/// rungs, and a board's print, the same in all pairs, adds a little to every fall.
+/// rungs.
 const REFUTED: f64 = 3.5;
+
+/// By how much more than the corners' noise chance moves chi-squared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Chance {
+    /// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs tell; at least one.
+    pub scatter: f64,
+    /// Variance of the shared numbers with the board's print in it over that without; at least one. The print is the same in all pairs, so
+    /// that a term that takes it up predicts unseen pairs better, too.
+    pub print: f64,
+}
+
+impl Chance {
+    /// By how much chi-squared may fall for so many terms of no worth.
+    fn fall(&self, added: usize) -> f64 {
+        self.scatter * self.print * chi_square_quantile(added as f64, REFUTED)
+    }
+
+    /// How much of that is the print's, and the same in held-out pairs.
+    fn print_fall(&self, added: usize) -> f64 {
+        self.fall(added) * (1.0 - 1.0 / self.print)
+    }
+}
 
 /// How a model predicts pairs it has not seen.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -50,6 +72,8 @@ pub struct Trial {
     pub covariance: DMatrix<f64>,
     /// Sum of the squared whitened residuals of the pairs it was fitted to.
     chi_square: f64,
+    /// How many corners they are.
+    corners: usize,
     /// The held-out loss of each pair.
     by_pair: Vec<f64>,
 }
@@ -61,13 +85,12 @@ impl LensScore {
     }
 }
 
-/// The simplest model within two standard errors of the best that no richer one refutes. `scatter` is the variance of what the pairs leave
-/// over what their corners' noise lets expect.
-pub fn simplest(scores: &[LensScore], scatter: f64) -> Option<&Trial> {
+/// The simplest model within two standard errors, and what print may feign, of the best that no richer one refutes.
+pub fn simplest<'a>(scores: &'a [LensScore], chance: &Chance) -> Option<&'a Trial> {
     let trials = || scores.iter().filter_map(|s| s.trial.as_ref());
     let best = trials().min_by(|a, b| a.loss().total_cmp(&b.loss()))?;
     trials()
-        .find(|trial| trial.excess_over(best) <= 0.0 && !trials().any(|richer| trial.is_refuted_by(richer, scatter)))
+        .find(|trial| !trial.is_worse_than(best, chance) && !trials().any(|richer| trial.is_refuted_by(richer, chance)))
 }
 
 impl Trial {
@@ -86,7 +109,8 @@ impl Trial {
             return None;
         }
         let chi_square = 2.0 * blocks.iter().map(|block| block.cost).sum::<f64>();
-        Some((Trial { layout, values, covariance, chi_square, by_pair: Vec::new() }, blocks))
+        let corners = views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count();
+        Some((Trial { layout, values, covariance, chi_square, corners, by_pair: Vec::new() }, blocks))
     }
 
     /// Sum of the squared whitened residuals of the pairs it was fitted to.
@@ -100,12 +124,18 @@ impl Trial {
 
     /// Whether a richer model predicts unseen pairs no worse and lowers chi-squared by more than chance does (`REFUTED`): a
     /// few pairs that miss terms only at their edges differ too much among themselves for their mean loss to tell.
-    pub fn is_refuted_by(&self, richer: &Trial, scatter: f64) -> bool {
+    pub fn is_refuted_by(&self, richer: &Trial, chance: &Chance) -> bool {
         let Some(added) = richer.layout.count().checked_sub(self.layout.count()).filter(|added| *added > 0) else {
             return false;
         };
-        let fall = (self.chi_square - richer.chi_square) / scatter;
-        richer.loss() < self.loss() && fall > chi_square_quantile(added as f64, REFUTED)
+        richer.loss() < self.loss() && self.chi_square - richer.chi_square > chance.fall(added)
+    }
+
+    /// Whether it predicts unseen pairs worse than another model by more than chance and, where the other has more terms, print account for.
+    pub fn is_worse_than(&self, other: &Trial, chance: &Chance) -> bool {
+        let added = other.layout.count().saturating_sub(self.layout.count());
+        let by_print = if added > 0 { chance.print_fall(added) / self.corners.max(1) as f64 } else { 0.0 };
+        self.excess_over(other) > by_print
     }
 
     /// How much worse than `best` beyond what chance makes of the pairs' differences; no number where pairs were not held out.

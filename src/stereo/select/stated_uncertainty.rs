@@ -32,7 +32,7 @@ pub struct Witness {
     pub rig: Rig,
     /// How many terms it adds.
     pub added: usize,
-    /// By how much chi-squared falls for them, neighbours and pairs that scatter allowed for.
+    /// By how much chi-squared falls for them; neighbours, pairs that scatter and print allowed for.
     pub chi_square_fall: f64,
     /// From the chosen model's shared numbers to its.
     step: DVector<f64>,
@@ -48,13 +48,15 @@ pub struct Stated {
     pub witnesses: Vec<Witness>,
 }
 
-/// Enlarges the covariance `by_noise`, which allows for what neighbours share.
+/// Enlarges the covariance `by_noise`, which allows for what neighbours share. `print_excess`: see
+/// [`Chance::print`](crate::stereo::select::model_comparison::Chance).
 pub fn state(
     solved: &Solved,
     layout: &Layout,
     by_noise: Uncertainty,
     neighbours: &NeighbourCorrelation,
     scores: &[LensScore],
+    print_excess: f64,
 ) -> Stated {
     let inflation = neighbours.inflation();
     let Some((blocks, mut shared, pair_scatter)) = scattered(&solved.problem, layout, &by_noise.shared, inflation)
@@ -63,7 +65,7 @@ pub fn state(
         return Stated { uncertainty: by_noise, pair_scatter, witnesses: Vec::new() };
     };
     let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(1.0);
-    let witnesses = witnesses(&solved.problem, layout, scores, factor);
+    let witnesses = witnesses(&solved.problem, layout, scores, factor * print_excess);
     // Lenses contain each other: the steps to two of them are not two biases, and Akaike's criterion names the likeliest. The board's is another.
     let gain = |w: &&Witness| w.chi_square_fall - 2.0 * w.added as f64;
     let lenses = witnesses.iter().filter(|w| w.layout.left != layout.left);

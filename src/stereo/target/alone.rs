@@ -128,7 +128,9 @@ impl<'a> Known<'a> {
         let squares: Vec<f64> = common(view)
             .into_iter()
             .filter_map(|(l, r)| {
-                let place = pose * self.crossings[self.board.index(l.col, l.row)];
+                // Both pictures see the crossing through windows of their own.
+                let seen_off_mm = 0.5 * (l.seen_off_mm + r.seen_off_mm);
+                let place = pose * (self.crossings[self.board.index(l.col, l.row)] + seen_off_mm);
                 Some((triangulate(&self.rig, l, r)?.point_mm - place).norm_squared())
             })
             .collect();

@@ -49,6 +49,8 @@ pub(super) struct Bundle<'a> {
     pub rig: RigPrior,
     /// The certificate.
     pub shape: ShapePrior,
+    /// Standard deviation of what bent edges add to the corners of each crossing, mm.
+    pub edge_bends_mm: Vec<f64>,
 }
 
 /// A pose's part of the normal equations at the minimum.

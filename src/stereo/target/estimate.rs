@@ -7,13 +7,16 @@
 
 use nalgebra::{DMatrix, DVector, Vector2};
 
-use crate::stereo::data::corner_noise::Noise;
+use crate::geometry::Transform;
+use crate::statistics::median;
+use crate::stereo::data::corner_noise::{Noise, whitener};
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::solve::uncertainty::invert;
 use crate::stereo::target::bundle::{Bundle, Normal, Values};
+use crate::stereo::target::edge_bend::edge_bends_mm;
 use crate::stereo::target::pose_block::{crossings, residual};
 use crate::stereo::target::prior::{stretch_mode, weights};
 use crate::stereo::target::start::enough;
@@ -62,7 +65,7 @@ pub(super) fn estimate<'a>(mut bundle: Bundle<'a>, start: Values, usual: Option<
     let certificate = bundle.shape;
     for _ in 0..2 {
         let noise = Noise::from_median(&residuals(&bundle, &values, |_| true));
-        noise.apply(&mut bundle.views);
+        bundle.weigh(&values, &noise);
         values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH))?.0;
     }
     let poses = values.poses.iter().flatten().count();
@@ -70,13 +73,17 @@ pub(super) fn estimate<'a>(mut bundle: Bundle<'a>, start: Values, usual: Option<
     let mut inflation: f64 = 1.0;
     let mut normal = bundle.normal(&values, Loss::Squared)?;
     for round in 0..ROUNDS {
-        noise.apply(&mut bundle.views);
+        if round > 0 && poses >= TELLING_POSES {
+            bundle.unbend(&mut values);
+        }
+        bundle.weigh(&values, &noise);
         bundle.mark_outliers(&mut values);
         inflate(&mut bundle.views, inflation);
         (values, normal) = bundle.solve(values, Loss::Squared)?;
         let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm);
         if poses >= TELLING_POSES {
             settle_shape(&mut bundle, &values, &normal, certificate.in_plane_mm)?;
+            bundle.edge_bends_mm = edge_bends_mm(&bundle, &values, &noise);
         }
         let told = told_by_data(&normal)?;
         let active = residuals(&bundle, &values, |o| o.active);
@@ -114,10 +121,14 @@ fn by_pose(
 ) -> Vec<Vec<(Observation, Vector2<f64>)>> {
     let rig = bundle.rig_at(values);
     let crossings = crossings(bundle.board, &values.deviations_mm);
-    let of = |(view, pose): (&View, &Option<_>)| {
+    let of = |(view, pose): (&View, &Option<Transform>)| {
         let Some(pose) = pose else { return Vec::new() };
         let wanted = view.observations.iter().filter(|o| wanted(o));
-        wanted.filter_map(|o| Some((*o, residual(&rig, &crossings, bundle.board, pose, o)?))).collect()
+        let with_residual = |o: &Observation| {
+            let depth_mm = (pose * crossings[bundle.board.index(o.col, o.row)]).z;
+            Some((bundle.with_edge_bend(&rig, depth_mm, o), residual(&rig, &crossings, bundle.board, pose, o)?))
+        };
+        wanted.filter_map(with_residual).collect()
     };
     bundle.views.iter().zip(&values.poses).map(of).collect()
 }
@@ -138,6 +149,23 @@ fn told_by_data(normal: &Normal) -> Option<f64> {
 }
 
 impl Bundle<'_> {
+    /// Sets the whiteners of all corners: their noise and what bent edges add.
+    fn weigh(&mut self, values: &Values, noise: &Noise) {
+        let rig = self.rig_at(values);
+        let crossings = crossings(self.board, &values.deviations_mm);
+        // A pose that takes no part is about as far away as the others.
+        let usual_mm =
+            median(values.poses.iter().flatten().map(|pose| pose.translation.vector.z)).unwrap_or(f64::INFINITY);
+        let mut views = std::mem::take(&mut self.views);
+        for (view, pose) in views.iter_mut().zip(&values.poses) {
+            for o in &mut view.observations {
+                let depth_mm = pose.map_or(usual_mm, |pose| (pose * crossings[self.board.index(o.col, o.row)]).z);
+                o.whitener = whitener(&noise.covariance(&self.with_edge_bend(&rig, depth_mm, o)));
+            }
+        }
+        self.views = views;
+    }
+
     /// Corners that miss their prediction by more than chance allows are out; the whiteners hold the noise alone.
     /// A pose with too few left takes no part.
     fn mark_outliers(&mut self, values: &mut Values) {

@@ -1,11 +1,12 @@
 //! From the common minimum to an answer a pose: covariances in two parts, and the reason where there is no answer.
 
+use std::ops::AddAssign;
+
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector3, Vector6};
 use rayon::prelude::*;
 
 use crate::geometry::Transform;
 use crate::imaging::Side;
-use crate::statistics::median;
 use crate::stereo::data::view::View;
 use crate::stereo::target::alone::{Alone, Known};
 use crate::stereo::target::bundle::Bundle;
@@ -14,6 +15,7 @@ use crate::stereo::target::consistency::{self, Change, usual_excess};
 use crate::stereo::target::estimate::Estimate;
 use crate::stereo::target::judgement::Judgement;
 use crate::stereo::target::pose_block::TRANSFORM;
+use crate::stereo::target::prior::frame_modes;
 use crate::stereo::target::series::{MeasuredPose, POSE_LIMIT, Refusal, Run, Series};
 use crate::stereo::target::start::{Start, enough};
 use crate::stereo::target::{FEWEST_CORNERS, TargetPose};
@@ -23,10 +25,6 @@ const POSE_SIGMAS: f64 = 3.0;
 
 /// Chi-square a number above which a pose that takes no part in the common minimum is not believed.
 const OUTSIDER_LIMIT: f64 = 4.0;
-
-/// A crossing that is off bends the edges that lead to it, so that windows of several sizes see different shares of it: this share of the
-/// print's deviation is left at each pose (measured on rendered targets: 0.025 at 1.2 Mpx, 0.06 at 26 Mpx).
-const BENT_EDGES: f64 = 0.1;
 
 /// Chi-square a number up to which two pictures belong together.
 const PARTNER_LIMIT: f64 = 2.0;
@@ -64,7 +62,8 @@ impl Run<'_> {
         let each = consistency::at_each(&found.normal, &found.covariance);
         let excess = usual_excess(&each);
         let names = named(found);
-        let covariance = &names * &found.covariance * names.transpose();
+        let shared_covariance = with_rim(found);
+        let covariance = &names * &shared_covariance * names.transpose();
         let alone: Vec<Option<Alone>> = {
             self.starts
                 .par_iter()
@@ -78,7 +77,8 @@ impl Run<'_> {
             }
             _ => None,
         };
-        let finisher = Finisher { run: &self, found, known: &known, alone: &alone, excess };
+        let finisher =
+            Finisher { run: &self, found, shared_covariance: &shared_covariance, known: &known, alone: &alone, excess };
         let targets: Vec<Result<TargetPose, Refusal>> = (0..self.at.len())
             .map(|i| match (&self.refusals[i], &ended) {
                 (Some(refusal), _) => Err(refusal.clone()),
@@ -93,13 +93,12 @@ impl Run<'_> {
             .filter_map(|(_, a)| a.as_ref())
             .fold((0.0, 0.0), |s, a| (s.0 + a.chi_square * a.freedom, s.1 + a.freedom));
         let noise_px = found.noise.typical_px(&found.bundle.views);
-        let bent_px = BENT_EDGES * found.bundle.shape.in_plane_mm * px_per_mm(found);
-        let usual_px = self.known.noise.map(|noise| noise.typical_px(&found.bundle.views).hypot(bent_px));
+        let usual_px = self.known.noise.map(|noise| noise.typical_px(&found.bundle.views));
         let against = usual_px.map_or(1.0, |usual| (noise_px / usual).powi(2));
         let poses = self.at.iter().cloned().zip(targets).map(|(at, target)| MeasuredPose { at, target }).collect();
         Series {
             poses,
-            shape: Some(shape(found)),
+            shape: Some(shape(found, &shared_covariance)),
             shared: Some(shared(found, &names, covariance)),
             judgement,
             noise_px: Some(noise_px),
@@ -116,6 +115,8 @@ impl Run<'_> {
 struct Finisher<'a> {
     run: &'a Run<'a>,
     found: &'a Estimate<'a>,
+    /// Of what all poses share.
+    shared_covariance: &'a DMatrix<f64>,
     known: &'a Known<'a>,
     alone: &'a [Option<Alone>],
     excess: f64,
@@ -148,7 +149,7 @@ impl Finisher<'_> {
 
     fn answer(&self, alone: &Alone) -> TargetPose {
         let by_shared = -(alone.part.pose_inverse * alone.part.mixed.transpose());
-        let through = &by_shared * &self.found.covariance * by_shared.transpose();
+        let through = &by_shared * self.shared_covariance * by_shared.transpose();
         let chance = 1.0 + POSE_SIGMAS * (2.0 / alone.freedom.max(1.0)).sqrt();
         let grown = if alone.chi_square > chance { alone.chi_square } else { 1.0 };
         let own_covariance = alone.part.pose_inverse * grown * self.excess;
@@ -253,16 +254,22 @@ impl Finisher<'_> {
     }
 }
 
-/// How large a millimetre of the target is in the left picture, px.
-fn px_per_mm(found: &Estimate<'_>) -> f64 {
-    let depths = found.values.poses.iter().flatten().map(|pose| pose.translation.vector.z);
-    median(depths).filter(|z| *z > 0.0).map_or(0.0, |z| found.bundle.rig.rig.left.fx / z)
+/// Covariance of the shared unknowns, with what the target's rim, which no corner shows, leaves open: where corners are seen is known all the
+/// same, but not where the target's frame lies among them.
+fn with_rim(found: &Estimate<'_>) -> DMatrix<f64> {
+    let modes = DMatrix::from_columns(&frame_modes(found.bundle.board));
+    let variances = DMatrix::from_diagonal(&DVector::from_vec(found.bundle.rim_variances_mm2()));
+    let through = &modes * (modes.transpose() * variances * &modes) * modes.transpose();
+    let (n, m) = (found.values.rig.len(), modes.nrows());
+    let mut covariance = found.covariance.clone();
+    covariance.view_mut((n, n), (m, m)).add_assign(&through);
+    covariance
 }
 
 /// The target as the minimum has it.
-fn shape(found: &Estimate<'_>) -> Shape {
+fn shape(found: &Estimate<'_>, covariance: &DMatrix<f64>) -> Shape {
     let n = found.values.rig.len();
-    let sigma = |k: usize| Vector3::from_fn(|i, _| found.covariance[(n + 3 * k + i, n + 3 * k + i)].max(0.0).sqrt());
+    let sigma = |k: usize| Vector3::from_fn(|i, _| covariance[(n + 3 * k + i, n + 3 * k + i)].max(0.0).sqrt());
     Shape {
         deviations_mm: found.values.deviations_mm.clone(),
         sigma_mm: (0..found.values.deviations_mm.len()).map(sigma).collect(),

@@ -10,6 +10,7 @@ mod alone;
 mod bundle;
 pub mod cause;
 mod consistency;
+mod edge_bend;
 mod estimate;
 pub mod finish;
 pub mod judge;

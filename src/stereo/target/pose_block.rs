@@ -30,7 +30,7 @@ pub(super) fn crossings(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Po
     deviations_mm.iter().enumerate().map(|(i, deviation)| at(i) + deviation).collect()
 }
 
-/// Predicted minus seen, px. `None` for a corner behind its camera.
+/// Predicted minus seen, px; what is seen of a misprinted crossing is in [`Observation::seen_off_mm`]. `None` for a corner behind its camera.
 pub(super) fn residual(
     rig: &Rig,
     crossings: &[Point3<f64>],
@@ -38,7 +38,7 @@ pub(super) fn residual(
     pose: &Transform,
     o: &Observation,
 ) -> Option<Vector2<f64>> {
-    let in_left = pose * crossings[board.index(o.col, o.row)];
+    let in_left = pose * (crossings[board.index(o.col, o.row)] + o.seen_off_mm);
     let (camera, point) = match o.side {
         Side::Left => (&rig.left, in_left),
         Side::Right => (&rig.right, rig.right_from_left * in_left),
@@ -108,7 +108,7 @@ impl PoseBlock {
         for side in Side::BOTH {
             for o in view.active(side) {
                 let at = board.index(o.col, o.row);
-                let mut rows = rows(rig, &turns, pose, &crossings[at], o)?;
+                let mut rows = rows(rig, &turns, pose, &(crossings[at] + o.seen_off_mm), o)?;
                 let squared: f64 = rows.iter().map(|row| row.residual * row.residual).sum();
                 let (cost, weight) = loss.cost_and_weight(squared);
                 block.cost += cost;

@@ -4,7 +4,8 @@
 //! for independent says a covariance that is too small. In: a calibration's views and values. Out: how far the board's crossings
 //! deviate, and the covariance of the shared numbers with that in it. Method: the score of each crossing's place at the minimum, in
 //! units of what the corners say of it, exceeds chance by the print (a variance component by moments); the print then goes
-//! through the normal equations to the shared numbers.
+//! through the normal equations to the shared numbers. Windows see a part of each crossing's deviation and of its neighbours' (`edge_bend`):
+//! what is smooth over the board reaches the lens and the rig whole, though crossings are seen to scatter less than they do.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
 
@@ -12,8 +13,10 @@ use crate::imaging::Board;
 use crate::stereo::data::view::View;
 use crate::stereo::model::board_shape::{NUMBERS, lift};
 use crate::stereo::model::parameters::{Layout, Values};
+use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
+use crate::stereo::target::edge_bend::seen_shares;
 use crate::stereo::target::pose_block::{PoseBlock, crossings};
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
@@ -26,17 +29,19 @@ pub struct PrintShare {
     pub own_noise: f64,
     /// Covariance of the shared numbers, in the layout's order: the corners' own noise and the print.
     pub covariance: DMatrix<f64>,
+    /// Variance of the shared numbers over what it were if all scatter were the corners' own, the mean over them; at least one.
+    pub excess: f64,
 }
 
-/// Finds the print. `inflation` is that of [`crate::stereo::data::neighbour_correlation`]. `None` where the views do not determine the
-/// shared numbers.
-pub fn print_share(
-    views: &[View],
-    board: &Board,
-    layout: &Layout,
-    values: &Values,
-    inflation: f64,
-) -> Option<PrintShare> {
+impl PrintShare {
+    /// Finds the print. `None` where the views do not determine the shared numbers.
+    pub fn of(solved: &Solved, board: &Board, layout: &Layout) -> Option<PrintShare> {
+        let Problem { views, values } = &solved.problem;
+        print_share(views, board, layout, values, solved.neighbours(board).inflation())
+    }
+}
+
+fn print_share(views: &[View], board: &Board, layout: &Layout, values: &Values, inflation: f64) -> Option<PrintShare> {
     let m = board.corner_count();
     let lifts: Vec<[f64; NUMBERS]> =
         (0..m).map(|i| lift(board, &board.corner_mm(i % board.columns(), i / board.columns()))).collect();
@@ -50,6 +55,7 @@ pub fn print_share(
         basis[(number, column)] = 1.0;
     }
     let size = rig_count + 3 * m;
+    let seen = Seen::of(views, board);
     let mut sums = Sums { matrix: DMatrix::zeros(size, size), gradient: DVector::zeros(size), told: 0.0, numbers: 0.0 };
     // One after the other: for a board of a thousand crossings each is large.
     for (view, pose) in views.iter().zip(&values.poses) {
@@ -60,7 +66,8 @@ pub fn print_share(
         sums.matrix += part.matrix;
         sums.gradient += part.gradient;
     }
-    let variance = sums.print_variance(rig_count, m);
+    sums.told *= seen.usual_variance();
+    let variance = sums.print_variance(rig_count, &seen);
     let own_noise = 1.0 - variance * sums.told / sums.numbers;
     // The board's paraboloids are heights of its crossings.
     let mut to_shared = DMatrix::zeros(size, names.len());
@@ -74,15 +81,12 @@ pub fn print_share(
     }
     let by_all = to_shared.tr_mul(&sums.matrix);
     let inverse = invert(&(&by_all * &to_shared))?;
-    let by_print = &inverse * by_all;
+    let by_print = &inverse * &by_all;
     let mut covariance = &inverse * (own_noise * inflation);
-    for k in 0..m {
-        for axis in 0..2 {
-            let column = by_print.column(rig_count + 3 * k + axis);
-            covariance.ger(variance, &column, &column, 1.0);
-        }
-    }
-    Some(PrintShare { crossing_mm: variance.sqrt(), own_noise, covariance })
+    let add = |column: DVector<f64>| covariance.ger(variance, &column, &column, 1.0);
+    seen.columns(&by_print, rig_count).into_iter().for_each(add);
+    let excess = (&by_all * to_shared).component_mul(&covariance).sum() / (inflation * names.len() as f64);
+    Some(PrintShare { crossing_mm: variance.sqrt(), own_noise, covariance, excess: excess.max(1.0) })
 }
 
 struct Sums {
@@ -94,21 +98,70 @@ struct Sums {
     numbers: f64,
 }
 
+/// What the windows see of the crossings' deviations: each coordinate of a crossing as shares of deviations.
+struct Seen {
+    /// For each crossing, for x and y: see `seen_shares`.
+    shares: Vec<[[(Option<usize>, f64); 3]; 2]>,
+}
+
+impl Seen {
+    /// On the average over the views.
+    fn of(views: &[View], board: &Board) -> Seen {
+        let mut sums = vec![(0.0, [0.0; 2]); board.corner_count()];
+        for o in views.iter().flat_map(|view| &view.observations).filter(|o| o.active) {
+            let (count, reach) = &mut sums[board.index(o.col, o.row)];
+            *count += 1.0;
+            (0..2).for_each(|i| reach[i] += o.reach[i]);
+        }
+        let shares = |(k, (count, reach)): (usize, (f64, [f64; 2]))| {
+            let (place, reach) = ((k % board.columns(), k / board.columns()), reach.map(|sum| sum / count.max(1.0)));
+            [0, 1].map(|axis| seen_shares(board, place, axis, reach))
+        };
+        Seen { shares: sums.into_iter().enumerate().map(shares).collect() }
+    }
+
+    /// Mean variance of what is seen of a crossing's coordinate, for a unit variance of the deviations.
+    fn usual_variance(&self) -> f64 {
+        let all = self.shares.iter().flatten();
+        all.map(|seen| seen.iter().map(|(_, share)| share * share).sum::<f64>()).sum::<f64>()
+            / (2 * self.shares.len()) as f64
+    }
+
+    /// A matrix with a column for each coordinate of each crossing, from `first` on and three a crossing, as columns for each independent
+    /// deviation in the plane: those of the crossings, then those at the rim.
+    fn columns(&self, matrix: &DMatrix<f64>, first: usize) -> Vec<DVector<f64>> {
+        let m = self.shares.len();
+        let mut columns = vec![DVector::zeros(matrix.nrows()); 2 * m];
+        for (k, of_crossing) in self.shares.iter().enumerate() {
+            for (axis, seen) in of_crossing.iter().enumerate() {
+                let column = matrix.column(first + 3 * k + axis);
+                for (from, share) in seen.iter().filter(|(_, share)| *share != 0.0) {
+                    match from {
+                        Some(j) => columns[2 * j + axis].axpy(*share, &column, 1.0),
+                        None => columns.push(column * *share),
+                    }
+                }
+            }
+        }
+        columns
+    }
+}
+
 impl Sums {
     /// Variance of a crossing's coordinate, mm^2. The expected sum of squared scores is a straight line in it.
-    fn print_variance(&self, rig_count: usize, crossings: usize) -> f64 {
+    fn print_variance(&self, rig_count: usize, seen: &Seen) -> f64 {
         let (mut scores, mut slope, mut count) = (0.0, 0.0, 0.0);
-        for k in 0..crossings {
+        let columns = seen.columns(&self.matrix, rig_count);
+        for k in 0..seen.shares.len() {
             let at = rig_count + 3 * k;
             let own = Matrix2::from_fn(|i, j| self.matrix[(at + i, at + j)]);
             let Some(inverse) = own.try_inverse().filter(|i| i.iter().all(|v| v.is_finite())) else { continue };
             let gradient = Vector2::new(self.gradient[at], self.gradient[at + 1]);
             scores += gradient.dot(&(inverse * gradient));
-            let mut through = Matrix2::zeros();
-            for j in 0..crossings {
-                let block = self.matrix.fixed_view::<2, 2>(at, rig_count + 3 * j);
-                through += block * block.transpose();
-            }
+            let through = columns.iter().fold(Matrix2::zeros(), |sum: Matrix2<f64>, column| {
+                let here = Vector2::new(column[at], column[at + 1]);
+                sum + here * here.transpose()
+            });
             slope += (inverse * through).trace();
             count += 2.0;
         }

@@ -194,7 +194,8 @@ impl<'a> Run<'a> {
         let crossing = self.known.crossing_mm;
         let shape = ShapePrior { in_plane_mm: crossing, out_of_plane_mm: crossing, stretch_mm: crossing };
         let views = self.starts.iter().map(|s| s.view.clone()).collect();
-        Bundle { board: &self.known.board, views, rig: RigPrior::new(&self.known.rig), shape }
+        let edge_bends_mm = vec![0.0; self.known.board.corner_count()];
+        Bundle { board: &self.known.board, views, rig: RigPrior::new(&self.known.rig), shape, edge_bends_mm }
     }
 
     fn values(&self, bundle: &Bundle<'_>) -> Values {

@@ -1,7 +1,8 @@
 //! Benchmark `measure`: is what `measure` says true, does it notice what is wrong, and what does it cost.
 //!
-//! `cargo bench --bench measure -- coverage|faults|speed`; without a word all three. `coverage` and `faults` work on the simulator's true
-//! corners with Gaussian noise, so that hundreds of poses cost seconds; `speed` runs the program on rendered pictures of 26 Mpx.
+//! `cargo bench --bench measure -- coverage|pictures|faults|speed`; without a word all of them. `coverage` and `faults` work on the
+//! simulator's true corners with Gaussian noise, so that hundreds of poses cost seconds; `pictures` and `speed` run the program on rendered
+//! pictures.
 #![allow(
     clippy::print_stdout,
     clippy::unwrap_used,
@@ -13,6 +14,7 @@
 
 mod coverage;
 mod faults;
+mod pictures;
 mod speed;
 mod worlds;
 
@@ -21,6 +23,9 @@ fn main() {
     let runs = |name: &str| wanted.is_empty() || wanted.iter().any(|word| word == name);
     if runs("coverage") {
         coverage::run();
+    }
+    if runs("pictures") {
+        pictures::run_all();
     }
     if runs("faults") {
         faults::run();

@@ -39,7 +39,7 @@ fn pictures() -> PathBuf {
 }
 
 /// Runs the program; wall time in seconds and the largest memory in MB.
-fn run(folder: &Path, args: &[&str]) -> (f64, f64) {
+pub fn run(folder: &Path, args: &[&str]) -> (f64, f64) {
     let start = Instant::now();
     let mut child = Command::new(env!("CARGO_BIN_EXE_stereocal"))
         .args(args)

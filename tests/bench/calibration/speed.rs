@@ -1,14 +1,4 @@
-//! Benchmark `calibration`: 40 pairs of 361 corners, the bundle beside OpenCV's `stereoCalibrate` on the same corners.
-//!
-//! `cargo bench --bench calibration`. The corners are the simulator's true ones of the paper's rig, with Gaussian noise.
-#![allow(
-    clippy::print_stdout,
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::disallowed_methods,
-    reason = "a benchmark times, prints its table, and ends where its input is not as it should be"
-)]
+//! 40 pairs of 361 corners: the bundle beside OpenCV's `stereoCalibrate` on the same corners, the simulator's true ones with Gaussian noise.
 
 use std::time::Instant;
 
@@ -26,7 +16,7 @@ const PAIRS: usize = 40;
 const SIGMA_PX: f64 = 0.02;
 const RUNS: usize = 5;
 
-fn main() {
+pub fn run() {
     let settings = Settings { check_pairs: PAIRS, samples: 4, verify: 0, ..Settings::paper() };
     let world = World::new(settings, None).expect("the preset is possible");
     let corners = noisy(world.check_corners());
