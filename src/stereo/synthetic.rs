@@ -18,6 +18,11 @@ pub(crate) struct World {
     pub twist_mm: f64,
     /// How far the board's corners lie from their places, mm, the same in every picture.
     pub print_mm: f64,
+    /// Which print it is.
+    pub print_seed: u64,
+    /// How far the windows reach along the edges, which run straight from crossing to crossing, as a share of a square; 0 sees the
+    /// crossings themselves.
+    pub reach: f64,
     pub poses: Vec<Transform>,
     /// Standard deviation of a corner's coordinate, px.
     pub sigma_px: f64,
@@ -45,7 +50,17 @@ impl World {
                 transform(turn, Vector3::new(between(-55.0, 55.0), between(-45.0, 45.0), between(480.0, 640.0)))
             })
             .collect();
-        World { rig, board, bow_mm: [0.0; 2], twist_mm: 0.0, print_mm: 0.0, poses, sigma_px: 0.05 }
+        World {
+            rig,
+            board,
+            bow_mm: [0.0; 2],
+            twist_mm: 0.0,
+            print_mm: 0.0,
+            print_seed: 0,
+            reach: 0.0,
+            poses,
+            sigma_px: 0.05,
+        }
     }
 
     /// The paper's rig and ceramic board: 5120 px, 25 mm lens, 20x20 squares of 10 mm, corners measured to 0.005 px.
@@ -92,16 +107,9 @@ impl World {
                                 && px.x < f64::from(camera.width)
                                 && px.y < f64::from(camera.height)
                             {
+                                let reach = (self.reach > 0.0).then_some([self.reach; 2]);
                                 let covariance_px2 = Some(Matrix2::identity() * self.sigma_px * self.sigma_px);
-                                list.push(Corner {
-                                    col,
-                                    row,
-                                    px,
-                                    covariance_px2,
-                                    blur_px: None,
-                                    reach: None,
-                                    used: true,
-                                });
+                                list.push(Corner { col, row, px, covariance_px2, blur_px: None, reach, used: true });
                             }
                         }
                     }
@@ -122,13 +130,20 @@ impl World {
     fn corner_mm(&self, col: usize, row: usize) -> nalgebra::Point3<f64> {
         let mut at = self.board.corner_mm(col, row);
         let edge = self.board.corner_mm(self.board.columns() - 1, self.board.rows() - 1);
-        // Any two numbers that neither corners nor axes share.
-        let place = (row * self.board.columns() + col) as f64;
-        at.x += self.print_mm * (1.7 + 12.9 * place).sin();
-        at.y += self.print_mm * (0.3 + 78.2 * place).sin();
+        let (c, r) = (col as f64, row as f64);
+        let [own, before, after] = [1.0 - 0.5 * self.reach, 0.25 * self.reach, 0.25 * self.reach];
+        at.x += own * self.print(c, r)[0] + before * self.print(c, r - 1.0)[0] + after * self.print(c, r + 1.0)[0];
+        at.y += own * self.print(c, r)[1] + before * self.print(c - 1.0, r)[1] + after * self.print(c + 1.0, r)[1];
         at.z = self.bow_mm[0] * (1.0 - (at.x / edge.x).powi(2))
             + self.bow_mm[1] * (1.0 - (at.y / edge.y).powi(2))
             + self.twist_mm * at.x * at.y / (edge.x * edge.y);
         at
+    }
+
+    /// How far a crossing lies from its place, mm.
+    fn print(&self, col: f64, row: f64) -> [f64; 2] {
+        // Any two numbers that neither corners nor axes share.
+        let place = row * self.board.columns() as f64 + col + 1000.0 * self.print_seed as f64;
+        [self.print_mm * (1.7 + 12.9 * place).sin(), self.print_mm * (0.3 + 78.2 * place).sin()]
     }
 }

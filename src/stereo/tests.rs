@@ -1,6 +1,6 @@
 //! The calibration as a whole against known truth: recovery, predicted scatter, symmetry, and what must be refused.
 
-use nalgebra::{Matrix2, Point2, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix2, Matrix4, Point2, Vector2, Vector3, Vector4, Vector6};
 
 use crate::geometry::transform;
 use crate::imaging::{Corners, PairCorners};
@@ -386,6 +386,40 @@ fn a_board_whose_print_scatters_is_told_from_corners_that_do() {
     let demand = Demand { tolerance_mm: 0.05, board_uncertainty_mm: None };
     let judged = Judged::new(&found, accuracy, None, &demand);
     assert!(judged.warnings.iter().any(|w| w.contains("places of the corners on the board")), "{:?}", judged.warnings);
+}
+
+#[test]
+fn the_rigs_covariance_holds_for_print_that_is_seen_through_windows() {
+    // Squared distance from the truth in units of the covariance, a number, the mean over rigs.
+    let chi_square = |windows_known: bool| {
+        let of = |seed: u64| {
+            let mut world = World::new(10, seed);
+            (world.sigma_px, world.print_mm, world.print_seed, world.reach) = (0.01, 0.02, seed, 0.8);
+            let mut corners = world.corners(100 + seed);
+            if !windows_known {
+                let pairs = corners.pairs.iter_mut();
+                pairs.flat_map(|p| p.left.iter_mut().chain(&mut p.right)).for_each(|corner| corner.reach = None);
+            }
+            let found = calibrate(&corners, &BROWN4).unwrap();
+            let off = Vector4::new(
+                found.rig().left.fx - world.rig.left.fx,
+                found.rig().left.cx - world.rig.left.cx,
+                found.rig().right.fx - world.rig.right.fx,
+                found.rig().right.cx - world.rig.right.cx,
+            );
+            let names = ["left.fx", "left.cx", "right.fx", "right.cx"];
+            let order = &found.rig().covariance.as_ref().unwrap().order;
+            let at = names.map(|name| order.iter().position(|n| n == name).unwrap());
+            let covariance = Matrix4::from_fn(|i, j| found.uncertainty.shared[(at[i], at[j])]);
+            off.dot(&(covariance.try_inverse().unwrap() * off)) / 4.0
+        };
+        (0..30).map(of).sum::<f64>() / 30.0
+    };
+    let known = chi_square(true);
+    assert!((0.6..1.4).contains(&known), "{known}");
+    // As if each corner were its crossing's own: what is smooth over the board is then taken for less than it is.
+    let unknown = chi_square(false);
+    assert!(unknown > 1.3 * known, "{known} {unknown}");
 }
 
 fn judged(corners: &Corners, options: &Options, tolerance_mm: f64) -> Judged {

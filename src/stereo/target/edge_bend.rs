@@ -173,3 +173,81 @@ impl Sums {
         if tells { (self.excess_mm2 / self.count).max(0.0).sqrt() } else { 0.0 }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::Squares;
+    use crate::stereo::data::view::View;
+    use crate::stereo::synthetic::World;
+    use crate::stereo::target::prior::{RigPrior, ShapePrior};
+
+    fn board() -> Board {
+        Board { squares: Squares { columns: 7, rows: 6 }, square_mm: 10.0 }
+    }
+
+    /// Deviations without any at the rim, 0.01 mm, from numbers that no line fits.
+    fn deviations() -> Vec<Vector3<f64>> {
+        let of = |k: usize| {
+            let k = k as f64;
+            Vector3::new(0.01 * (3.1 * k).sin(), 0.01 * (1.7 + 5.3 * k).sin(), 0.0)
+        };
+        (0..board().corner_count()).map(of).collect()
+    }
+
+    #[test]
+    fn a_window_sees_as_much_of_straight_lines_as_there_is() {
+        for axis in 0..2 {
+            for reach in [[0.0, 0.0], [0.3, 0.8]] {
+                let shares = seen_shares(&board(), (2, 0), axis, reach);
+                assert!((shares.iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-12);
+            }
+        }
+        // The edge along the column of a crossing of the first row begins at the rim.
+        assert_eq!(seen_shares(&board(), (2, 0), 0, [0.4, 0.8])[1], (None, 0.2));
+        assert_eq!(seen_shares(&board(), (2, 0), 1, [0.4, 0.8])[1], (Some(1), 0.1));
+        let slanted: Vec<Vector3<f64>> =
+            (0..board().corner_count()).map(|k| board().corner_mm(k % 6, k / 6).coords * 0.2).collect();
+        let straight = straight_part(&board(), &slanted);
+        assert!(slanted.iter().zip(&straight).all(|(a, b)| (a - b).norm() < 1e-12));
+    }
+
+    #[test]
+    fn crossings_are_found_through_windows_of_any_reach() {
+        let (board, truth) = (board(), deviations());
+        let straight = straight_part(&board, &truth);
+        let bent: Vec<Vector3<f64>> = truth.iter().zip(&straight).map(|(d, s)| d - s).collect();
+        for reach in [0.2, 0.6, 0.8] {
+            let observation = |k: usize| {
+                let (col, row) = (k % board.columns(), k / board.columns());
+                let mut o = Observation::of_point(Side::Left, nalgebra::Point2::origin(), 0.01);
+                (o.col, o.row, o.reach) = (col, row, [reach; 2]);
+                o
+            };
+            let view = View { pair: String::new(), observations: (0..truth.len()).map(observation).collect() };
+            let mut bundle = Bundle {
+                board: &board,
+                views: vec![view],
+                rig: RigPrior::new(&World::new(1, 1).rig),
+                shape: ShapePrior { in_plane_mm: 0.01, out_of_plane_mm: 0.01, stretch_mm: 0.01 },
+                edge_bends_mm: vec![0.0; truth.len()],
+            };
+            let seen = (0..truth.len())
+                .map(|k| truth[k] + seen_off(&board, &bent, (k % board.columns(), k / board.columns()), [reach; 2]))
+                .collect();
+            let mut values = Values { rig: nalgebra::DVector::zeros(0), deviations_mm: seen, poses: Vec::new() };
+            bundle.unbend(&mut values);
+            let left = |found: &[Vector3<f64>]| {
+                found.iter().zip(&truth).map(|(f, t)| (f - t).norm_squared()).sum::<f64>().sqrt()
+            };
+            assert!(left(&values.deviations_mm) < 0.05 * left(&vec![Vector3::zeros(); truth.len()]), "{reach}");
+            // Every corner is told what its window sees: crossing and offset together are what was seen.
+            let o = &bundle.views[0].observations[8];
+            assert!(
+                (values.deviations_mm[8] + o.seen_off_mm - truth[8] - seen_off(&board, &bent, (2, 1), [reach; 2]))
+                    .norm()
+                    < 1e-4
+            );
+        }
+    }
+}
