@@ -1,0 +1,191 @@
+//! Commands from pictures to points: `camera-check`, `measure`, `rectify`, `export`.
+
+use camino::Utf8PathBuf;
+use clap::{Args, Subcommand, ValueEnum};
+
+use super::{ExportRobot, Output, between};
+use crate::imaging::{Mosaic, Squares};
+use crate::stereo::Lens;
+
+/// `stereocal camera-check`
+#[derive(Debug, Args)]
+pub struct CameraCheck {
+    /// Folder with left/ and right/ pictures, or with left*/right* names
+    #[arg(required_unless_present = "corners", conflicts_with = "corners")]
+    pub images: Option<Utf8PathBuf>,
+    /// Corners from a CSV file instead of pictures
+    #[arg(long, value_name = "FILE")]
+    pub corners: Option<Utf8PathBuf>,
+    /// Squares of the check board, not inner corners; key `check_board.squares` [default: 20x20]
+    #[arg(long, value_name = "CxR")]
+    pub squares: Option<Squares>,
+    /// Side of a square, mm; key `check_board.square_mm` [default: 10]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub square_mm: Option<f64>,
+    /// Largest length error that passes, mm; key `tolerance_mm` [default: 0.05]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub tolerance_mm: Option<f64>,
+    /// Expanded uncertainty (k = 2) of the board's lengths, from its certificate, mm: widens the guard band of the verdict
+    #[arg(long, value_name = "MM")]
+    pub board_uncertainty_mm: Option<f64>,
+    /// Lens model: radial2, brown4, brown5, rational8, thin-prism12 or tilted14 [default: chosen by held-out pairs]
+    #[arg(long, value_name = "NAME", value_parser = lens)]
+    pub lens: Option<Lens>,
+    /// Whether the board may be bowed [default: as held-out pairs say; flat where --lens is given]
+    #[arg(long, value_name = "SHAPE")]
+    pub board_shape: Option<BoardShape>,
+    /// The board's temperature, deg C; with --expansion-ppm-per-k its squares grow from their size at 20 deg C
+    #[arg(long, value_name = "C", requires = "expansion_ppm_per_k", allow_negative_numbers = true, value_parser = between(-273.15, 1000.0))]
+    pub board_temperature_c: Option<f64>,
+    /// The board's coefficient of thermal expansion, 1e-6/K (alumina 7, glass 8, aluminium 23)
+    #[arg(long, value_name = "PPM", allow_negative_numbers = true, requires = "board_temperature_c", value_parser = between(-100.0, 1000.0))]
+    pub expansion_ppm_per_k: Option<f64>,
+    /// Pictures of a second, independent board: shows the scale
+    #[arg(long, value_name = "DIR")]
+    pub check_images: Option<Utf8PathBuf>,
+    /// Squares of the second board [default: as the first]
+    #[arg(long, value_name = "CxR", requires = "check_images")]
+    pub check_squares: Option<Squares>,
+    /// Side of the second board's squares, mm [default: as the first]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "check_images")]
+    pub check_square_mm: Option<f64>,
+    /// Width and height of the pictures that --corners come from, px, where the file does not hold them
+    #[arg(long, value_name = "WxH", requires = "corners", value_parser = picture_size)]
+    pub picture_size: Option<(u32, u32)>,
+    /// Filters of pictures that are raw colour mosaics: RGGB, BGGR, GRBG or GBRG
+    #[arg(long, value_name = "PATTERN")]
+    pub bayer: Option<Mosaic>,
+    /// Draw the corners found over each pair, into overlays/ in the results folder
+    #[arg(long)]
+    pub draw: bool,
+    /// Results.
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// What is assumed about the check board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BoardShape {
+    /// A plane
+    Flat,
+    /// Paraboloids along both axes, found with the rig
+    Bowed,
+}
+
+/// `stereocal measure`
+#[derive(Debug, Args)]
+pub struct Measure {
+    /// Folder with left/ and right/ pictures and poses.csv
+    pub poses: Utf8PathBuf,
+    /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<Utf8PathBuf>,
+    /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
+    #[arg(long, value_name = "CxR")]
+    pub squares: Option<Squares>,
+    /// Side of a square, mm; key `target_board.square_mm` [default: 10]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub square_mm: Option<f64>,
+    /// Filters of pictures that are raw colour mosaics: RGGB, BGGR, GRBG or GBRG
+    #[arg(long, value_name = "PATTERN")]
+    pub bayer: Option<Mosaic>,
+    /// Measure pictures as they arrive; ends when all of poses.csv are there, or on Ctrl-C
+    #[arg(long)]
+    pub watch: bool,
+    /// Draw the corners found over each pair, into overlays/ in the results folder
+    #[arg(long)]
+    pub draw: bool,
+    /// Results.
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// `stereocal rectify`
+#[derive(Debug, Args)]
+pub struct Rectify {
+    /// Folder with left/ and right/ pictures, or with left*/right* names
+    pub images: Utf8PathBuf,
+    /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<Utf8PathBuf>,
+    /// Straighten each picture by itself, in its own camera matrix; do not turn the cameras
+    #[arg(long, conflicts_with_all = ["alpha", "zero_disparity"])]
+    pub undistort_only: bool,
+    /// How much is kept: 0 only what both lenses saw, 1 every raw pixel [default: OpenCV's own choice between]
+    #[arg(long, value_name = "A", value_parser = between(0.0, 1.0))]
+    pub alpha: Option<f64>,
+    /// Give both pictures one principal point: points at infinity then have no disparity, but cameras that are turned towards
+    /// each other lose what is near from view
+    #[arg(long)]
+    pub zero_disparity: bool,
+    /// Squares of the board that shows how well rows agree; keys `check_board.squares`, `target_board.squares` [default: both are tried]
+    #[arg(long, value_name = "CxR")]
+    pub squares: Option<Squares>,
+    /// Filters of pictures that are raw colour mosaics: RGGB, BGGR, GRBG or GBRG
+    #[arg(long, value_name = "PATTERN")]
+    pub bayer: Option<Mosaic>,
+    /// Results.
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// `stereocal export`
+#[derive(Debug, Args)]
+pub struct Export {
+    /// What to write.
+    #[command(subcommand)]
+    pub what: ExportWhat,
+}
+
+/// What `export` can write.
+#[derive(Debug, Subcommand)]
+pub enum ExportWhat {
+    /// The stereo calibration
+    Calibration(ExportCalibration),
+    /// The robot
+    Robot(ExportRobot),
+}
+
+/// `stereocal export calibration`
+#[derive(Debug, Args)]
+pub struct ExportCalibration {
+    /// For which program
+    #[arg(long)]
+    pub format: CalibrationFormat,
+    /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<Utf8PathBuf>,
+    /// Folder for results; key `out` [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+    /// Replace files that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Programs that a calibration can be written for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CalibrationFormat {
+    /// OpenCV's FileStorage (YAML)
+    Opencv,
+    /// ROS camera_info, one file a camera
+    Ros,
+    /// Kalibr's camchain
+    Kalibr,
+    /// mrcal's cameramodel, one file a camera
+    Mrcal,
+}
+
+fn lens(name: &str) -> Result<Lens, String> {
+    Lens::from_name(name).ok_or_else(|| {
+        let names = Lens::LADDER.map(Lens::name).join(", ");
+        format!("no lens of this name; there are {names}")
+    })
+}
+
+fn picture_size(text: &str) -> Result<(u32, u32), String> {
+    let parse = |side: &str| side.trim().parse::<u32>().ok().filter(|n| (1..=100_000).contains(n));
+    text.split_once(['x', 'X'])
+        .and_then(|(w, h)| Some((parse(w)?, parse(h)?)))
+        .ok_or_else(|| "a picture's size is WIDTHxHEIGHT in px, each from 1 to 100000, as in 2448x2048".to_owned())
+}

@@ -1,0 +1,157 @@
+//! The command line as typed. What it means is decided in [`crate::commands`].
+
+mod cameras;
+mod robot;
+mod simulate;
+
+use camino::Utf8PathBuf;
+use clap::{Args, Parser, Subcommand};
+
+pub use self::cameras::{
+    BoardShape, CalibrationFormat, CameraCheck, Export, ExportCalibration, ExportWhat, Measure, Rectify,
+};
+pub use self::robot::{
+    Compensate, DhConvention, ExportRobot, Identify, Plan, PlanKind, RobotCommand, RobotFormat, RobotImport, RobotNew,
+    RobotPlace, RobotShow, RobotWhat, Verify,
+};
+pub use self::simulate::{LensBlur, Preset, Simulate};
+
+/// What `--version` says of the build; `-V` says the version alone.
+const BUILD: &str = if cfg!(debug_assertions) {
+    concat!(env!("CARGO_PKG_VERSION"), "\n", "build: debug, checks on")
+} else {
+    concat!(env!("CARGO_PKG_VERSION"), "\n", "build: release")
+};
+
+/// Robot calibration with two cameras and a checkerboard.
+#[derive(Debug, Parser)]
+#[command(name = "stereocal", version, long_version = BUILD, about, max_term_width = 100)]
+pub struct Cli {
+    /// Settings file, with the keys that the flags name; `stereocal init` writes one [default: stereocal.toml in the working directory, if there]
+    #[arg(long, global = true, value_name = "FILE")]
+    pub config: Option<Utf8PathBuf>,
+    /// Warnings and errors only on stderr: no progress, no notes
+    #[arg(long, global = true)]
+    pub quiet: bool,
+    /// Threads to compute with, 1 to 1024; results don't depend on it [default: one a core]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Leave program, date, command line and inputs out of the files that are written
+    #[arg(long, global = true)]
+    pub no_provenance: bool,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands, in the order of the data.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Calibrate both cameras from pictures of the check board, and judge the rig's accuracy
+    CameraCheck(CameraCheck),
+    /// Measure the target's point and orientation for each robot pose
+    Measure(Measure),
+    /// Identify the robot's kinematic parameters from measurements and joint angles
+    Identify(Identify),
+    /// Judge robots by the verify rows of measurements, without fitting any
+    Verify(Verify),
+    /// Join camera check, measurements and robot into one page to sign
+    Report(Report),
+    /// Undistort and rectify pairs of pictures, for eyes and for dense stereo
+    Rectify(Rectify),
+    /// Make pictures and measurements whose truth is known
+    Simulate(Simulate),
+    /// Choose the poses that determine the robot best, and write them as poses.csv and robot programs
+    Plan(Plan),
+    /// Readings that bring the real robot where targets were meant: CSV, or joint targets of a robot program
+    Compensate(Compensate),
+    /// Write a calibration or a robot for other programs
+    Export(Export),
+    /// Make a nominal robot file: from a URDF, a table, or a common arm's published numbers
+    Robot(RobotCommand),
+    /// Write a commented stereocal.toml, a robot.toml and a poses.csv to start from
+    Init(Init),
+    /// Print a page of the guide: boards, cameras, pictures, poses, a day in the cell, a robot's way, warnings
+    Guide(Guide),
+    /// Print a shell's completions
+    Completions(Completions),
+    /// Write the manual's pages
+    Man(Man),
+}
+
+/// `stereocal init`
+#[derive(Debug, Args)]
+pub struct Init {
+    /// Folder for the files
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub out: Utf8PathBuf,
+    /// Replace files that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// `stereocal guide`
+#[derive(Debug, Args)]
+pub struct Guide {
+    /// Which page [default: the list of them]
+    pub topic: Option<String>,
+}
+
+/// `stereocal completions`
+#[derive(Debug, Args)]
+pub struct Completions {
+    /// Whose
+    pub shell: clap_complete::Shell,
+}
+
+/// `stereocal man`
+#[derive(Debug, Args)]
+pub struct Man {
+    /// Folder for the pages
+    #[arg(long, value_name = "DIR", default_value = "man")]
+    pub out: Utf8PathBuf,
+    /// Replace files that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Where results go and how they are shown.
+#[derive(Debug, Args)]
+pub struct Output {
+    /// Folder for results; key `out` [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Replace files in the results folder that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// `stereocal report`
+#[derive(Debug, Args)]
+pub struct Report {
+    /// Folder of the results, and of the page; key `out` [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+    /// Replace a report.html that stereocal did not write, or that was changed since
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Reads a number of a range.
+fn between(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| match text.parse::<f64>() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("a number from {least} to {most} is needed")),
+    }
+}
+
+/// Reads a count of a range.
+fn count(least: usize, most: usize) -> impl Fn(&str) -> Result<usize, String> + Clone {
+    move |text| match text.parse::<usize>() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("a whole number from {least} to {most} is needed")),
+    }
+}
