@@ -7,7 +7,7 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::robot;
-use crate::simulate::psf::{Defocus, Optics};
+use crate::simulate::picture::psf::{Defocus, Optics};
 use crate::simulate::rig::DISTANCE_MM;
 use crate::simulate::settings::{RobotDeviations, Settings};
 use crate::simulate::true_robot;

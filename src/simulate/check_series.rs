@@ -6,17 +6,17 @@ use std::sync::Arc;
 
 use nalgebra::Point2;
 
-use super::backdrop::Backdrop;
 use super::check_poses::{self, Holding};
 use super::clutter;
 use super::draws::NormalTable;
 use super::physical_board::PhysicalBoard;
-use super::picture_faults::{FileForm, PictureFault, Shares};
-use super::psf::Optics;
-use super::render::Renderer;
+use super::picture::backdrop::Backdrop;
+use super::picture::picture_faults::{FileForm, PictureFault, Shares};
+use super::picture::psf::Optics;
+use super::picture::render::Renderer;
+use super::picture::scene::{Patch, Print, Scene};
+use super::picture::sensor::{Lighting, Sensor};
 use super::rig::RigDrawing;
-use super::scene::{Patch, Print, Scene};
-use super::sensor::{Lighting, Sensor};
 use super::settings::Settings;
 use super::{Error, world};
 use crate::geometry::Transform;

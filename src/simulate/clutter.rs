@@ -4,8 +4,8 @@ use nalgebra::{Point2, Vector3};
 
 use super::draws::{Draws, Purpose};
 use super::physical_board::PhysicalBoard;
+use super::picture::scene::{Patch, Tone};
 use super::rig::left_from_field;
-use super::scene::{Patch, Tone};
 use crate::geometry::transform;
 
 /// Shapes in front of the wall.

@@ -1,7 +1,7 @@
 //! The truth that everything else is tested against: a rig, boards, a robot with hidden errors, and their pictures.
 //!
 //! In: [`settings::Settings`], plain data; the presets are values of it. Out: a [`world::World`] and, where wanted, its
-//! files in the formats that the commands read and write. One picture is a [`scene::Scene`] given to [`render::Renderer`].
+//! files in the formats that the commands read and write. One picture is a [`picture::scene::Scene`] given to [`picture::render::Renderer`].
 //!
 //! The renderer shares no formula with the corner fit that it judges: areas are exact by Green's theorem, the lens's spread is
 //! summed numerically, and both are compared with rays. What it leaves out: reflexes, motion blur, rolling shutters, and
@@ -9,7 +9,7 @@
 //!
 //! ```
 //! use stereocal::imaging::corners::Side;
-//! use stereocal::simulate::{draws::NormalTable, render::Renderer, settings::Settings, world::World};
+//! use stereocal::simulate::{draws::NormalTable, picture::render::Renderer, settings::Settings, world::World};
 //!
 //! let settings = Settings { size_px: 320, check_pairs: 1, samples: 0, verify: 0, ..Settings::small() };
 //! let world = World::new(settings, None)?;
@@ -21,21 +21,14 @@
 //! # Ok::<(), stereocal::Error>(())
 //! ```
 
-pub mod backdrop;
 pub mod check_poses;
 pub mod check_series;
 pub mod clutter;
-pub mod coverage;
 pub mod draws;
-pub mod outline;
 pub mod physical_board;
-pub mod picture_faults;
-pub mod psf;
-pub mod render;
+pub mod picture;
 pub mod rig;
 pub mod robot_poses;
-pub mod scene;
-pub mod sensor;
 pub mod settings;
 pub mod true_robot;
 pub mod truth_files;

@@ -7,7 +7,7 @@
 use nalgebra::{Point2, Point3};
 
 use super::draws::{Draws, Purpose};
-use super::scene::Patch;
+use super::picture::scene::Patch;
 use crate::imaging::Board;
 
 /// How a board deviates from its drawing.

@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use super::physical_board::Workmanship;
-use super::psf::Optics;
-use super::scene::Print;
-use super::sensor::{Lighting, Sensor};
+use super::picture::psf::Optics;
+use super::picture::scene::Print;
+use super::picture::sensor::{Lighting, Sensor};
 use crate::imaging::Board;
 use crate::imaging::Squares;
 

@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use stereocal::imaging::corners::Side;
 use stereocal::simulate::draws::NormalTable;
-use stereocal::simulate::render::Renderer;
+use stereocal::simulate::picture::render::Renderer;
 use stereocal::simulate::settings::Settings;
 use stereocal::simulate::world::{World, png};
 

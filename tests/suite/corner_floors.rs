@@ -7,14 +7,14 @@ use stereocal::geometry::transform;
 use stereocal::imaging::image::{Image, Picture, decode};
 use stereocal::imaging::lattice::Lattice;
 use stereocal::imaging::{Board, Corner, detect, refine};
-use stereocal::simulate::backdrop::Backdrop;
 use stereocal::simulate::draws::{Draws, NormalTable, Purpose};
 use stereocal::simulate::physical_board::{PhysicalBoard, Workmanship};
-use stereocal::simulate::psf::Optics;
-use stereocal::simulate::render::Renderer;
+use stereocal::simulate::picture::backdrop::Backdrop;
+use stereocal::simulate::picture::psf::Optics;
+use stereocal::simulate::picture::render::Renderer;
+use stereocal::simulate::picture::scene::{Print, Scene};
+use stereocal::simulate::picture::sensor::{Lighting, Sensor};
 use stereocal::simulate::rig::true_rig;
-use stereocal::simulate::scene::{Print, Scene};
-use stereocal::simulate::sensor::{Lighting, Sensor};
 
 /// Sides of the pictures: detection looks at copies reduced by 1, 2 and 5.
 const SIZES: [u32; 3] = [1280, 2200, 5120];

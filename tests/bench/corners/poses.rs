@@ -9,15 +9,15 @@ use stereocal::geometry::{Transform, transform};
 use stereocal::imaging::image::{Image, Picture};
 use stereocal::imaging::lattice::{Lattice, Places};
 use stereocal::imaging::{Board, detect, order, refine};
-use stereocal::simulate::backdrop::Backdrop;
 use stereocal::simulate::clutter;
 use stereocal::simulate::draws::NormalTable;
 use stereocal::simulate::physical_board::{PhysicalBoard, Workmanship};
-use stereocal::simulate::psf::Optics;
-use stereocal::simulate::render::Renderer;
+use stereocal::simulate::picture::backdrop::Backdrop;
+use stereocal::simulate::picture::psf::Optics;
+use stereocal::simulate::picture::render::Renderer;
+use stereocal::simulate::picture::scene::{Print, Scene};
+use stereocal::simulate::picture::sensor::{Lighting, Sensor};
 use stereocal::simulate::rig::true_rig;
-use stereocal::simulate::scene::{Print, Scene};
-use stereocal::simulate::sensor::{Lighting, Sensor};
 use stereocal::stereo::Rig;
 
 /// Side of the pictures, px.

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use stereocal::simulate::check_poses::Holding;
-use stereocal::simulate::picture_faults::PictureFault;
+use stereocal::simulate::picture::picture_faults::PictureFault;
 use stereocal::simulate::rig::RigDrawing;
 
 use super::set::Plan;

@@ -1,7 +1,7 @@
 //! Benign pictures: dim, noisy, blurred, with another scale of grey.
 
-use stereocal::simulate::picture_faults::{FileForm, PictureFault};
-use stereocal::simulate::scene::Print;
+use stereocal::simulate::picture::picture_faults::{FileForm, PictureFault};
+use stereocal::simulate::picture::scene::Print;
 
 use super::set::Plan;
 use super::{Case, Right, case};
@@ -70,7 +70,7 @@ pub fn cases() -> Vec<Case> {
         }),
         benign("defocus", "", |plan| {
             plan.settings.optics.defocus =
-                Some(stereocal::simulate::psf::Defocus { pupil_mm: 25.0 / 8.0, focus_mm: 525.0 });
+                Some(stereocal::simulate::picture::psf::Defocus { pupil_mm: 25.0 / 8.0, focus_mm: 525.0 });
         }),
     ]
 }

@@ -8,10 +8,10 @@
 use nalgebra::{Point2, Point3};
 
 use super::coverage::Coverage;
-use super::draws::NormalTable;
 use super::psf::{FINE, Spot, Taps, pupil};
 use super::scene::{Layer, Scene};
 use super::sensor::Exposer;
+use crate::simulate::draws::NormalTable;
 
 /// Side of a tile, px. The spot is one and the same within a tile.
 const TILE: usize = 16;

@@ -4,10 +4,10 @@ use nalgebra::{Point2, Point3};
 
 use super::backdrop::Backdrop;
 use super::outline::{self, Outline};
-use super::physical_board::PhysicalBoard;
 use super::psf::Optics;
 use super::sensor::{Lighting, Sensor};
 use crate::geometry::Transform;
+use crate::simulate::physical_board::PhysicalBoard;
 use crate::stereo::Camera;
 
 /// Brightness of a surface: at its first corner and how it changes per mm along its x and y. 1 is the board's white.

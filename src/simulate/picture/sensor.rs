@@ -2,7 +2,7 @@
 
 use nalgebra::Point2;
 
-use super::draws::{Draws, NormalTable, Purpose};
+use crate::simulate::draws::{Draws, NormalTable, Purpose};
 use crate::stereo::Camera;
 
 /// How the light falls. Everything here is smooth over the whole picture and applied after the lens's spread.

@@ -5,10 +5,10 @@
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::Error;
-use super::draws::{Draws, Purpose};
 use super::render::Picture;
-use super::world::png;
+use crate::simulate::Error;
+use crate::simulate::draws::{Draws, Purpose};
+use crate::simulate::world::png;
 
 /// A picture of shares of the range, row by row.
 #[derive(Debug, Clone, PartialEq)]

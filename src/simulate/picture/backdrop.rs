@@ -6,10 +6,10 @@
 use nalgebra::Point2;
 
 use super::coverage::Coverage;
-use super::draws::{Draws, Purpose};
 use super::outline;
 use super::scene::Patch;
 use crate::geometry::Transform;
+use crate::simulate::draws::{Draws, Purpose};
 use crate::stereo::Camera;
 
 /// Grid points across a picture.
