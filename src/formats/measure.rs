@@ -28,7 +28,7 @@ const ORDER: [&str; 6] = ["x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad"];
 const UNUSUAL_NOISE: f64 = 2.0;
 
 /// Poses that disagree with one rig by this many times chance are worth a warning.
-const UNUSUAL_EXCESS: f64 = 1.5;
+const UNUSUAL_EXCESS: f64 = 2.25;
 
 /// The content of `measure.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]

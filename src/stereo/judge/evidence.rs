@@ -432,7 +432,7 @@ fn reach(facts: &Facts) -> [Evidence; 2] {
             100.0 * left.min(right),
             "%",
             format!(
-                "corners reached {:.0} % of the left and {:.0} % of the right picture; in the rest the lens model is extrapolated and \
+                "of what both cameras see corners reached {:.0} % of the left and {:.0} % of the right picture; in the rest the lens model is extrapolated and \
                  was not checked",
                 100.0 * left,
                 100.0 * right

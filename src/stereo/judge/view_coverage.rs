@@ -3,9 +3,10 @@
 //! In: a calibration. Out: how the views are spread, and advice where something is missing. Tilt separates the focal length from the distance; corners near
 //! the borders determine the lens; different distances separate the lens from the focal length.
 
-use nalgebra::Vector3;
+use nalgebra::{Point2, Point3, Vector3};
 
 use crate::imaging::Side;
+use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::residual_correlation::{CELLS, Field, ResidualPattern};
 
@@ -33,7 +34,7 @@ pub struct Coverage {
     pub tilts_deg: [f64; 2],
     /// Nearest and farthest board, mm.
     pub depths_mm: [f64; 2],
-    /// Share of each picture that corners reached, left and right.
+    /// Share that corners reached of what each picture has in common with the other, left and right.
     pub field_shares: [f64; 2],
     /// Where most of each picture's empty cells lie.
     empty: [&'static str; 2],
@@ -52,17 +53,24 @@ impl Coverage {
             high - low
         });
         let fields = [&residual_pattern.fields[0], &residual_pattern.fields[1]];
-        let field_shares = fields.map(|field| {
-            let seen = field.cells.iter().filter(|c| c.corners >= SEEN).count();
-            seen as f64 / field.cells.len().max(1) as f64
+        let depths_mm = range(&mut poses.iter().map(|pose| pose.translation.vector.z));
+        let rig = calibration.rig();
+        let from_right =
+            range(&mut poses.iter().map(|pose| (rig.right_from_left * Point3::from(pose.translation.vector)).z));
+        // Where a board could have been seen by both cameras at the distances that were worked at.
+        let common = [(Side::Left, depths_mm), (Side::Right, from_right)].map(|(side, depths)| {
+            let cells = &fields[usize::from(side == Side::Right)].cells;
+            cells
+                .iter()
+                .map(|c| c.corners >= SEEN || is_common(rig, side, Point2::new(c.x_px, c.y_px), depths))
+                .collect::<Vec<bool>>()
         });
-        Coverage {
-            pairs: calibration.views.len(),
-            tilts_deg,
-            depths_mm: range(&mut poses.iter().map(|pose| pose.translation.vector.z)),
-            field_shares,
-            empty: fields.map(empty_region),
-        }
+        let field_shares = [0, 1].map(|side| {
+            let seen = fields[side].cells.iter().filter(|c| c.corners >= SEEN).count();
+            seen as f64 / common[side].iter().filter(|common| **common).count().max(1) as f64
+        });
+        let empty = [0, 1].map(|side| empty_region(fields[side], &common[side]));
+        Coverage { pairs: calibration.views.len(), tilts_deg, depths_mm, field_shares, empty }
     }
 
     /// What should be photographed next; empty where the views suffice.
@@ -91,7 +99,7 @@ impl Coverage {
         for (side, (share, empty)) in Side::BOTH.into_iter().zip(self.field_shares.into_iter().zip(self.empty)) {
             if share < LEAST_COVERAGE {
                 advice.push(format!(
-                    "corners reach {:.0} % of the {} picture: add pairs with the board {empty}",
+                    "corners reach {:.0} % of what the {} picture has in common with the other: add pairs with the board {empty}",
                     100.0 * share,
                     side.name(),
                 ));
@@ -101,10 +109,26 @@ impl Coverage {
     }
 }
 
-/// Where most of the empty cells lie.
-fn empty_region(field: &Field) -> &'static str {
+/// Whether the other camera sees what lies behind this pixel at one of these distances.
+fn is_common(rig: &Rig, side: Side, px: Point2<f64>, [near, far]: [f64; 2]) -> bool {
+    let Some(ray) = rig.camera(side).undistort(&px) else { return false };
+    let other = rig.camera(side.other());
+    [near, 0.5 * (near + far), far].into_iter().any(|depth| {
+        let point = Point3::new(ray.x * depth, ray.y * depth, depth);
+        let there = match side {
+            Side::Left => rig.right_from_left * point,
+            Side::Right => rig.right_from_left.inverse() * point,
+        };
+        let px = other.project(&there);
+        there.z > 0.0 && px.x > 0.0 && px.y > 0.0 && px.x < f64::from(other.width) && px.y < f64::from(other.height)
+    })
+}
+
+/// Where most of the empty cells lie among those that both cameras see.
+fn empty_region(field: &Field, common: &[bool]) -> &'static str {
     let empty = |inside: fn(usize, usize) -> bool| {
-        field.cells.iter().enumerate().filter(|(i, cell)| inside(i % CELLS, i / CELLS) && cell.corners < SEEN).count()
+        let cells = field.cells.iter().zip(common).enumerate();
+        cells.filter(|(i, (cell, common))| inside(i % CELLS, i / CELLS) && **common && cell.corners < SEEN).count()
     };
     let regions: [(&'static str, usize); 4] = [
         ("at the left border", empty(|x, _| 3 * x < CELLS)),
