@@ -19,8 +19,9 @@ const LARGEST_MM: f64 = 1e5;
 /// Factors of the stated covariances that are tried.
 const STATED: [f64; 10] = [1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3, 3.0, 10.0, 30.0, 100.0];
 
-/// Stated covariances count as too large where the residuals ask for less than this share of them.
-const OVERSTATED: f64 = 0.7;
+/// Stated covariances count as too large where the residuals ask for less than this share of them; a little less is what errors common to
+/// many rows look like, which scatter does not show.
+const OVERSTATED: f64 = 0.4;
 
 /// Halvings of the range of scatters, in its logarithm.
 const HALVINGS: usize = 40;

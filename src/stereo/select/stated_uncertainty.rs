@@ -3,13 +3,13 @@
 //! In: a problem at its minimum, the model, how the lenses that were tried predict held-out pairs. Out: the covariance, how the pairs scatter, and the
 //! richer models that are witnesses of another rig. A covariance assumes that its model is right. A richer model (a lens with more
 //! terms, a board that is not flat) that was not chosen, because it predicts no better, may yet be right: where its additional terms are more
-//! than chance at the level of an ordinary test, the step from the chosen model to it is taken as a bias that is known to its own size,
+//! than chance at the level of a strict test, the step from the chosen model to it is taken as a bias that is known to its own size,
 //! and the square of that step is added (GUM, F.2.4.5). Goes wrong: models that are not among those asked.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::Board;
-use crate::statistics::{NORMAL_95, chi_square_quantile};
+use crate::statistics::chi_square_quantile;
 use crate::stereo::Lens;
 use crate::stereo::Rig;
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
@@ -22,6 +22,10 @@ use crate::stereo::solve::normal_equations::Block;
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::Uncertainty;
+
+/// Quantile of the normal distribution at whose level of chi-squared additional terms are more than chance: one clean set of pairs in two hundred
+/// has such a witness.
+const MORE_THAN_CHANCE: f64 = 2.6;
 
 /// A richer model whose additional terms are more than chance.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,7 +115,7 @@ fn witnesses(problem: &Problem, layout: &Layout, scores: &[LensScore], factor: f
             let chi_square_fall = (chosen.chi_square() - trial.chi_square()) / factor;
             let step = step(layout, &chosen.values.shared, &trial.values.shared);
             let rig = trial.values.shared.rig;
-            (chi_square_fall > chi_square_quantile(added as f64, NORMAL_95)).then_some(Witness {
+            (chi_square_fall > chi_square_quantile(added as f64, MORE_THAN_CHANCE)).then_some(Witness {
                 layout: richer,
                 rig,
                 added,
