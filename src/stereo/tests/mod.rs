@@ -1,0 +1,36 @@
+//! The calibration as a whole against known truth: recovery, predicted scatter, symmetry, and what must be refused.
+
+mod models;
+mod recovery;
+mod refusals;
+mod scatter;
+mod target;
+
+use crate::imaging::Corners;
+use crate::stereo::Lens;
+use crate::stereo::calibrate::{Calibration, calibrate};
+use crate::stereo::judge::assessment::{Demand, Judged};
+use crate::stereo::judge::held_out;
+use crate::stereo::model::parameters::Shared;
+use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::synthetic::World;
+
+const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: Some(false) };
+
+fn judged(corners: &Corners, options: &Options, tolerance_mm: f64) -> Judged {
+    let found = calibrate(corners, options).unwrap();
+    let accuracy = held_out::hold_out(&found, None).unwrap();
+    Judged::new(&found, accuracy, None, &Demand { tolerance_mm, board_uncertainty_mm: None })
+}
+
+/// Deviations of the shared numbers from the truth, in the coordinates of the covariance.
+fn deviations(calibration: &Calibration, world: &World) -> Vec<f64> {
+    let layout = calibration.layout;
+    let truth = Shared { rig: world.rig.clone(), shape_mm: [world.bow_mm[0], world.bow_mm[1], world.twist_mm] };
+    let found = layout.numbers(&calibration.values.shared);
+    let mut off: Vec<f64> = found.iter().zip(layout.numbers(&truth)).map(|(a, b)| a - b).collect();
+    // A rotation's covariance is that of the small turn on its left.
+    let turn = calibration.rig().right_from_left.rotation * world.rig.right_from_left.rotation.inverse();
+    off[layout.transform_start()..][..3].copy_from_slice(turn.scaled_axis().as_slice());
+    off
+}

@@ -1,0 +1,72 @@
+//! What must be left out or refused, by name.
+
+use nalgebra::Vector3;
+
+use super::*;
+use crate::geometry::transform;
+use crate::stereo::Error;
+use crate::stereo::calibrate::Calibration;
+
+#[test]
+fn a_pair_that_was_not_taken_at_once_is_named_and_left_out() {
+    let world = World::new(9, 11);
+    let mut corners = world.corners(12);
+    let mut moved = world.clone();
+    moved.poses[4] = transform(Vector3::new(0.05, 0.1, 0.0), Vector3::new(4.0, -6.0, 10.0)) * moved.poses[4];
+    corners.pairs[4].right = moved.corners(12).pairs[4].right.clone();
+    let found = calibrate(&corners, &Options::default()).unwrap();
+    assert_eq!(found.skipped.len(), 1);
+    assert!(found.skipped[0].pair == "04" && found.skipped[0].reason.contains("same time"), "{:?}", found.skipped);
+    assert!((found.rig().baseline_mm() - world.rig.baseline_mm()).abs() < 0.1);
+}
+
+#[test]
+fn a_gross_corner_is_an_outlier_and_changes_nothing() {
+    let world = World::new(9, 11);
+    let mut corners = world.corners(12);
+    let clean = calibrate(&corners, &BROWN4).unwrap();
+    corners.pairs[2].left[17].px.x += 40.0;
+    let found = calibrate(&corners, &BROWN4).unwrap();
+    let view = found.views.iter().find(|view| view.pair == "02").unwrap();
+    let moved = view.observations.iter().find(|o| o.px == corners.pairs[2].left[17].px).unwrap();
+    assert!(!moved.active);
+    let outliers = found.views.iter().flat_map(|v| &v.observations).filter(|o| !o.active).count();
+    // One in a million Gaussian corners lies beyond the limit; there are 1584.
+    assert!(outliers <= 2, "{outliers}");
+    assert!((found.rig().baseline_mm() - clean.rig().baseline_mm()).abs() < 0.02);
+}
+
+#[test]
+fn pairs_of_nothing_in_common_are_refused_by_name() {
+    let world = World::new(8, 13);
+    let mut corners = world.corners(14);
+    // Every right picture belongs to another left one.
+    let mut rights: Vec<_> = corners.pairs.iter().map(|p| p.right.clone()).collect();
+    rights.rotate_left(3);
+    for (pair, right) in corners.pairs.iter_mut().zip(rights) {
+        pair.right = right;
+    }
+    match calibrate(&corners, &Options::default()) {
+        Err(Error::Contradiction { agreeing, total, bad }) => assert!(agreeing <= 4 && total == 8 && bad.len() >= 4),
+        other => panic!("{:?}", other.map(|c| c.rms_px)),
+    }
+}
+
+#[test]
+fn three_pairs_are_too_few() {
+    let corners = World::new(3, 1).corners(1);
+    assert!(matches!(calibrate(&corners, &Options::default()), Err(Error::TooFewPairs { found: 3, total: 3, .. })));
+}
+
+#[test]
+fn boards_that_are_never_tilted_do_not_tell_the_cameras() {
+    let mut world = World::new(8, 1);
+    // Side by side and square to the board, so that neither camera sees it from the side.
+    world.rig.right_from_left = transform(Vector3::zeros(), Vector3::new(-40.0, 0.0, 0.0));
+    for (i, pose) in world.poses.iter_mut().enumerate() {
+        *pose = transform(Vector3::new(0.0, 0.0, 0.1 * i as f64), Vector3::new(i as f64, -(i as f64), 550.0));
+    }
+    let refused = calibrate(&world.corners(1), &Options::default());
+    let told = |c: Calibration| (c.rig().left.fx, c.uncertainty.shared[(0, 0)].sqrt(), c.layout);
+    assert!(matches!(refused, Err(Error::Undetermined { .. })), "{:?}", refused.map(told));
+}

@@ -1,0 +1,263 @@
+//! Predicted scatter against the scatter there is.
+
+use nalgebra::{Matrix2, Matrix4, Point2, Vector2, Vector4};
+
+use super::*;
+use crate::simulate::draws::{Draws, Purpose};
+use crate::stereo::Lens;
+use crate::stereo::calibrate::Calibration;
+use crate::stereo::data::view::View;
+use crate::stereo::judge::verdict::{LengthError, Verdict};
+use crate::stereo::triangulate::{RigCovariance, common, triangulate};
+
+/// Noise as fits in windows of whole squares have it: across each edge, half of a corner's noise is that of the edge's other end.
+fn with_noise_of_shared_edges(exact: &Corners, sigma_px: f64, seed: u64) -> Corners {
+    let mut corners = exact.clone();
+    let mut draws = Draws::new(seed, Purpose::Points, 1);
+    let (columns, rows) = (corners.board.columns(), corners.board.rows());
+    for list in corners.pairs.iter_mut().flat_map(|p| [&mut p.left, &mut p.right]) {
+        let mut edges = |lines: usize, pieces: usize| -> Vec<Vec<f64>> {
+            (0..lines).map(|_| (0..=pieces).map(|_| draws.normal() * sigma_px / 2.0_f64.sqrt()).collect()).collect()
+        };
+        let (along_rows, along_columns) = (edges(rows, columns), edges(columns, rows));
+        let places: Vec<(usize, usize, Point2<f64>)> = list.iter().map(|c| (c.col, c.row, c.px)).collect();
+        let at = |col: usize, row: usize| places.iter().find(|p| (p.0, p.1) == (col, row)).map(|p| p.2);
+        for corner in list.iter_mut() {
+            let (col, row) = (corner.col, corner.row);
+            let next = |there: Option<Point2<f64>>, back: Option<Point2<f64>>| -> Vector2<f64> {
+                let t = there.or(back).map_or(Vector2::x(), |p| p - corner.px).normalize();
+                Vector2::new(-t.y, t.x)
+            };
+            let across_row = next(at(col + 1, row), col.checked_sub(1).and_then(|c| at(c, row)));
+            let across_column = next(at(col, row + 1), row.checked_sub(1).and_then(|r| at(col, r)));
+            let normals = Matrix2::from_rows(&[across_row.transpose(), across_column.transpose()]);
+            let inverse = normals.try_inverse().unwrap();
+            let piece = |line: &[f64], i: usize| line[i] + line[i + 1];
+            // A normal may point either way; that of an edge's both ends must agree in sign, so it is fixed here.
+            let sign = |n: &Vector2<f64>| if n.y.abs() > n.x.abs() { n.y.signum() } else { n.x.signum() };
+            let offsets = Vector2::new(
+                sign(&across_row) * piece(&along_rows[row], col),
+                sign(&across_column) * piece(&along_columns[col], row),
+            );
+            corner.px += inverse * offsets;
+            corner.covariance_px2 = Some(inverse * inverse.transpose() * sigma_px * sigma_px);
+        }
+    }
+    corners
+}
+
+#[test]
+fn corners_that_share_edges_are_worth_less_and_no_fault() {
+    let exact = World { sigma_px: 0.0, ..World::new(10, 5) };
+    let (mut squares, mut predicted, runs) = (0.0, 0.0, 30);
+    for run in 0..runs {
+        let corners = with_noise_of_shared_edges(&exact.corners(0), 0.05, run);
+        let found = calibrate(&corners, &BROWN4).unwrap();
+        let neighbours = found.neighbours;
+        // One half between the two ends of an edge, none along it; 11 x 8 corners have 1.78 neighbours each to the right or below.
+        assert!((neighbours.across - 0.5).abs() < 0.08 && neighbours.along.abs() < 0.08, "{neighbours:?}");
+        assert!((neighbours.inflation() - 1.9).abs() < 0.25, "{neighbours:?}");
+        assert!(crate::stereo::judge::residual_correlation::check(&found).white());
+        for (i, off) in deviations(&found, &exact).iter().enumerate() {
+            let variance = found.uncertainty.shared[(i, i)];
+            squares += off * off / variance;
+            predicted += 1.0;
+        }
+    }
+    // Without the allowance this ratio is near 0.7. 30 runs of correlated numbers know it to some 8 %.
+    let ratio = (predicted / squares).sqrt();
+    assert!((0.85..1.2).contains(&ratio), "predicted / true sigma {ratio:.3}");
+}
+
+#[test]
+fn independent_corners_share_nothing() {
+    let found = calibrate(&World::new(10, 5).corners(6), &BROWN4).unwrap();
+    assert_eq!(found.neighbours.inflation(), 1.0);
+}
+
+/// Spread over calibrations of fresh noise against the predicted standard deviations.
+struct Spread {
+    /// The shared numbers' names, and predicted over true standard deviation of each.
+    names: Vec<String>,
+    ratios: Vec<f64>,
+    /// Share of the 95 % intervals that hold the truth.
+    inside: f64,
+    /// The same ratio for lengths of 70 mm on boards that calibrated nothing: in all, and the calibration's share alone.
+    lengths: f64,
+    lengths_by_calibration: f64,
+}
+
+fn monte_carlo(runs: u64, options: &Options) -> Spread {
+    let world = World::new(10, 5);
+    let (mut squares, mut predicted, mut inside, mut names) = (Vec::new(), Vec::new(), 0usize, Vec::new());
+    let (mut lengths, mut by_calibration) = (Ratio::default(), Ratio::default());
+    for run in 0..runs {
+        let found = calibrate(&world.corners(1000 + run), options).unwrap();
+        let off = deviations(&found, &world);
+        squares.resize(off.len(), 0.0);
+        predicted.resize(off.len(), 0.0);
+        for (i, off) in off.iter().enumerate() {
+            let variance = found.uncertainty.shared[(i, i)];
+            squares[i] += off * off;
+            predicted[i] += variance;
+            inside += usize::from(off.abs() <= 1.96 * variance.sqrt());
+        }
+        names = found.layout.names();
+        lengths_of_70_mm(&found, &world, 5000 + run, &mut lengths);
+        lengths_of_70_mm(&found, &World { sigma_px: 1e-9, ..world.clone() }, 0, &mut by_calibration);
+    }
+    let ratios = squares.iter().zip(&predicted).map(|(s, p): (&f64, &f64)| (p / s).sqrt()).collect::<Vec<f64>>();
+    let total = ratios.len() as f64 * runs as f64;
+    let inside = inside as f64 / total;
+    Spread { names, ratios, inside, lengths: lengths.root(), lengths_by_calibration: by_calibration.root() }
+}
+
+#[derive(Default)]
+struct Ratio {
+    predicted: f64,
+    squares: f64,
+}
+
+impl Ratio {
+    fn root(&self) -> f64 {
+        (self.predicted / self.squares).sqrt()
+    }
+}
+
+/// The four sides of a square of 70 mm in six poses, measured by a calibrated rig in corners as noisy as the world's.
+fn lengths_of_70_mm(calibration: &Calibration, world: &World, seed: u64, ratio: &mut Ratio) {
+    let board = crate::imaging::Board { squares: "9x9".parse().unwrap(), square_mm: 10.0 };
+    let world = World { board, poses: World::new(6, 77).poses, ..world.clone() };
+    let covariance = RigCovariance::new(calibration.rig().covariance.as_ref().unwrap());
+    for pair in &world.corners(seed).pairs {
+        let mut view = View::new(&board, pair, 0);
+        // Each world's own noise: what the corners say of themselves.
+        for o in &mut view.observations {
+            o.whitener = nalgebra::Matrix2::identity() / world.sigma_px;
+        }
+        let seen = common(&view);
+        let point = |col: usize, row: usize| {
+            let (left, right) = seen.iter().find(|(l, _)| (l.col, l.row) == (col, row))?;
+            triangulate(calibration.rig(), left, right)
+        };
+        for (a, b) in [((0, 0), (7, 0)), ((0, 7), (7, 7)), ((0, 0), (0, 7)), ((7, 0), (7, 7))] {
+            let (Some(a), Some(b)) = (point(a.0, a.1), point(b.0, b.1)) else { continue };
+            let off = (b.point_mm - a.point_mm).norm() - 70.0;
+            ratio.squares += off * off;
+            ratio.predicted += a.corner_variance_mm2(&b) + covariance.length_variance_mm2(&a, &b);
+        }
+    }
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}
+
+/// Calibrations of a Monte Carlo; more where the environment says so, with the limits that so many allow.
+fn monte_carlo_runs() -> u64 {
+    std::env::var("STEREOCAL_MONTE_CARLO").ok().and_then(|n| n.parse().ok()).unwrap_or(40)
+}
+
+#[test]
+fn predicted_sigmas_are_the_true_ones() {
+    let runs = monte_carlo_runs();
+    for shape in [false, true] {
+        let spread = monte_carlo(runs, &Options { lens: Some(Lens::Brown4), shape: Some(shape) });
+        let Spread { names, ratios, inside, lengths, lengths_by_calibration } = &spread;
+        // So many runs know a standard deviation to 1 / sqrt(2 runs); the numbers are correlated, so their median is hardly better.
+        let known_to = 1.0 / (2.0 * runs as f64).sqrt();
+        let table: Vec<String> = names.iter().zip(ratios).map(|(name, ratio)| format!("{name} {ratio:.3}")).collect();
+        let said = format!(
+            "{runs} runs, shape free: {shape}; predicted / true sigma: median {:.3}, 95 % intervals hold {:.1} %, \
+             70 mm lengths {lengths:.3}, their calibration's share {lengths_by_calibration:.3}\n{}",
+            median(ratios),
+            100.0 * inside,
+            table.join("\n")
+        );
+        println!("{said}");
+        assert!((median(ratios) - 1.0).abs() < 2.2 * known_to, "{said}");
+        assert!(ratios.iter().all(|r| (r - 1.0).abs() < 4.5 * known_to), "{said}");
+        assert!((0.91..0.985).contains(inside), "{said}");
+        // 24 lengths a run with corners of their own: known better than any number of the rig.
+        assert!((lengths - 1.0).abs() < 0.1, "{said}");
+        assert!((lengths_by_calibration - 1.0).abs() < 4.0 * known_to, "{said}");
+    }
+}
+
+#[test]
+fn held_out_lengths_are_as_wrong_as_the_corners_make_them() {
+    let world = World::new(12, 17);
+    let found = calibrate(&world.corners(18), &BROWN4).unwrap();
+    let accuracy = held_out::hold_out(&found, None).unwrap();
+    assert_eq!(accuracy.pairs.len(), 12);
+    assert_eq!(accuracy.ranges.len(), 10 + 7);
+    // 0.05 px is 0.056 mm of depth at 550 mm; boards tilted by 35 degrees turn it into 0.045 mm of length; the worst of 30 000
+    // lies at four to six sigmas.
+    let extremes = accuracy.extremes;
+    assert!((0.1..0.4).contains(&extremes.max_abs_error_mm), "{}", extremes.max_abs_error_mm);
+    assert_eq!(accuracy.verdict(1.0), Verdict::Pass);
+    assert_eq!(accuracy.verdict(0.01), Verdict::Fail);
+    // The error itself as the tolerance leaves no room for any uncertainty.
+    assert_eq!(accuracy.verdict(extremes.max_abs_error_mm), Verdict::Undecided);
+    // Corners of 0.05 px leave what was said above; the calibration by twelve pairs a fraction of it.
+    let LengthError { corners_mm, calibration_mm, .. } = extremes.largest;
+    assert!((0.01..0.1).contains(&corners_mm) && (0.001..corners_mm).contains(&calibration_mm), "{extremes:?}");
+    // Each length has its own uncertainty: the one that may be most wrong need not be the one that came out most wrong.
+    assert!(extremes.largest.at_most_mm() >= extremes.max_abs_error_mm);
+    // Some hundreds of points with corners that scatter independently know the mean to a tenth.
+    assert!((accuracy.rays_chi_square - 1.0).abs() < 0.2, "{}", accuracy.rays_chi_square);
+    // A certificate of 30 mm uncertainty decides nothing.
+    let certified = held_out::hold_out(&found, Some(30.0)).unwrap();
+    assert!(certified.extremes.largest.expanded_uncertainty_mm() > 30.0);
+    assert_eq!(certified.verdict(1.0), Verdict::Undecided);
+}
+
+#[test]
+fn a_board_whose_print_scatters_is_told_from_corners_that_do() {
+    let mut world = World::new(12, 17);
+    world.sigma_px = 0.01;
+    world.print_mm = 0.03;
+    let found = calibrate(&world.corners(18), &BROWN4).unwrap();
+    let accuracy = held_out::hold_out(&found, None).unwrap();
+    // 0.02 mm (root mean square) is 0.07 px here, seven times the corners' own scatter.
+    assert!(accuracy.rays_chi_square < 0.1, "{}", accuracy.rays_chi_square);
+    let demand = Demand { tolerance_mm: 0.05, board_uncertainty_mm: None };
+    let judged = Judged::new(&found, accuracy, None, &demand);
+    assert!(judged.warnings.iter().any(|w| w.contains("places of the corners on the board")), "{:?}", judged.warnings);
+}
+
+#[test]
+fn the_rigs_covariance_holds_for_print_that_is_seen_through_windows() {
+    // Squared distance from the truth in units of the covariance, a number, the mean over rigs.
+    let chi_square = |windows_known: bool| {
+        let of = |seed: u64| {
+            let mut world = World::new(10, seed);
+            (world.sigma_px, world.print_mm, world.print_seed, world.reach) = (0.01, 0.02, seed, 0.8);
+            let mut corners = world.corners(100 + seed);
+            if !windows_known {
+                let pairs = corners.pairs.iter_mut();
+                pairs.flat_map(|p| p.left.iter_mut().chain(&mut p.right)).for_each(|corner| corner.reach = None);
+            }
+            let found = calibrate(&corners, &BROWN4).unwrap();
+            let off = Vector4::new(
+                found.rig().left.fx - world.rig.left.fx,
+                found.rig().left.cx - world.rig.left.cx,
+                found.rig().right.fx - world.rig.right.fx,
+                found.rig().right.cx - world.rig.right.cx,
+            );
+            let names = ["left.fx", "left.cx", "right.fx", "right.cx"];
+            let order = &found.rig().covariance.as_ref().unwrap().order;
+            let at = names.map(|name| order.iter().position(|n| n == name).unwrap());
+            let covariance = Matrix4::from_fn(|i, j| found.uncertainty.shared[(at[i], at[j])]);
+            off.dot(&(covariance.try_inverse().unwrap() * off)) / 4.0
+        };
+        (0..30).map(of).sum::<f64>() / 30.0
+    };
+    let known = chi_square(true);
+    assert!((0.6..1.4).contains(&known), "{known}");
+    // As if each corner were its crossing's own: what is smooth over the board is then taken for less than it is.
+    let unknown = chi_square(false);
+    assert!(unknown > 1.3 * known, "{known} {unknown}");
+}

@@ -1,0 +1,71 @@
+//! The target in a run of poses.
+
+use nalgebra::{Vector3, Vector6};
+
+use super::*;
+use crate::geometry::transform;
+use crate::stereo::target::series::{self, Knowledge, Seen};
+
+/// All poses of a world as a robot's run.
+fn run_of(corners: crate::imaging::Corners) -> Vec<Seen> {
+    let at = |pose: &str| crate::measurements::RobotPose {
+        pose: pose.to_owned(),
+        group: "1".to_owned(),
+        role: crate::measurements::Role::Sample,
+        joints_deg: vec![0.0],
+        slides: Vec::new(),
+    };
+    corners.pairs.into_iter().map(|pair| Seen { at: at(&pair.pair), corners: Ok(pair) }).collect()
+}
+
+#[test]
+fn the_targets_scatter_is_the_predicted_one() {
+    let mut world = World::new(60, 23);
+    world.board = crate::imaging::Board { squares: "7x6".parse().unwrap(), square_mm: 10.0 };
+    let known =
+        Knowledge { rig: world.rig.clone(), noise: None, board: world.board, crossing_mm: 0.01, tolerance_mm: 0.05 };
+    let mut sums = Vector6::<f64>::zeros();
+    let measured = series::measure(&known, run_of(world.corners(24)));
+    for (pose, truth) in measured.poses.iter().zip(&world.poses) {
+        let pose = pose.target.as_ref().unwrap();
+        let turn = (pose.cam_from_board.rotation * truth.rotation.inverse()).scaled_axis();
+        let shift = pose.cam_from_board.translation.vector - truth.translation.vector;
+        for i in 0..3 {
+            sums[i] += turn[i] * turn[i] / pose.covariance[(i, i)];
+            sums[3 + i] += shift[i] * shift[i] / pose.covariance[(3 + i, 3 + i)];
+        }
+    }
+    for sum in sums.iter() {
+        // 60 poses: chi-square over its freedom is 1 +- 0.18; the target's shape is found as well and shared by all.
+        assert!((0.5..1.7).contains(&(sum / 60.0)), "{sums}");
+    }
+    assert_eq!(measured.judgement, crate::stereo::target::judgement::Judgement::Agrees);
+}
+
+#[test]
+fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
+    let mut world = World::new(30, 29);
+    world.board = crate::imaging::Board { squares: "7x6".parse().unwrap(), square_mm: 10.0 };
+    let corners = world.corners(30);
+    let judged = |rig: &crate::stereo::Rig, square_mm: f64| {
+        let board = crate::imaging::Board { square_mm, ..world.board };
+        let known = Knowledge { rig: rig.clone(), noise: None, board, crossing_mm: 0.01, tolerance_mm: 0.05 };
+        let judgement = series::measure(&known, run_of(corners.clone())).judgement;
+        judgement.describe(rig, square_mm).unwrap_or_default()
+    };
+    assert_eq!(judged(&world.rig, 10.0), "");
+    let pitch = judged(&world.rig, 12.0);
+    assert!(pitch.contains("squares are 10.0") || pitch.contains("squares are 9.99"), "{pitch}");
+    let mut turned = world.rig.clone();
+    turned.right_from_left =
+        transform(Vector3::new(0.0, 0.1_f64.to_radians(), 0.0), Vector3::zeros()) * turned.right_from_left;
+    let yaw = judged(&turned, 10.0);
+    assert!((yaw.contains("-0.10") || yaw.contains("-0.09")) && yaw.contains("yaw"), "{yaw}");
+    let exchanged = crate::stereo::Rig {
+        left: turned.right,
+        right: turned.left,
+        right_from_left: world.rig.right_from_left.inverse(),
+        covariance: None,
+    };
+    assert!(judged(&exchanged, 10.0).contains("exchanged"));
+}
