@@ -134,7 +134,8 @@ fn range(board: &Board, measured: &[Measured], axis: Axis, squares: usize) -> Op
     let spread: f64 = errors.iter().map(|e| (e - mean) * (e - mean)).sum();
     Some(Range {
         axis,
-        nominal_mm: squares as f64 * board.square_mm,
+        // As a person writes it: 38.1 for three squares of 12.7.
+        nominal_mm: (squares as f64 * board.square_mm * 1e9).round() / 1e9,
         count: errors.len(),
         mean_error_mm: mean,
         std_mm: (spread / (errors.len() as f64 - 1.0).max(1.0)).sqrt(),
