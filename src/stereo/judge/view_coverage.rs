@@ -17,7 +17,7 @@ const LEAST_TILT_DEG: f64 = 15.0;
 const LEAST_DEPTH_SHARE: f64 = 0.05;
 
 /// Share of the cells of a picture that should have seen a corner.
-const LEAST_COVERAGE: f64 = 0.6;
+const LEAST_COVERAGE: f64 = 0.5;
 
 /// Corners in a cell that make it seen.
 const SEEN: usize = 3;
