@@ -117,7 +117,8 @@ impl Near<'_> {
     }
 
     fn grey(&self, p: Point2<f64>) -> f64 {
-        let inside = |v: f64, size: usize| (v.round().max(0.0) as usize).min(size - 1);
+        // Rounded to the nearest pixel; what is left of the first one is cut off to it.
+        let inside = |v: f64, size: usize| ((v + 0.5) as usize).min(size - 1);
         let (x, y) = (inside(p.x, self.picture.width), inside(p.y, self.picture.height));
         f64::from(self.picture.pixels[y * self.picture.width + x])
     }
