@@ -58,6 +58,9 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
         out.write("corners.csv", corners_csv::to_csv(&calibration.mark(&corners)).as_bytes())?;
     }
     let json = out.write_json("camera-check.json", &file)?;
+    let names = corners.pairs.iter().map(|pair| pair.pair.as_str());
+    let drawn = args.draw && args.images.is_some();
+    let page = if drawn { report::page::with_overlays(page, names) } else { page };
     let page = report::page::signed(page, out.provenance().as_ref());
     out.write("camera-check.html", page.as_bytes())?;
 

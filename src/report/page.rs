@@ -110,8 +110,27 @@ pub fn signed(page: String, provenance: Option<&Provenance>) -> String {
             }
         }
     };
+    before_the_end(page, &footer)
+}
+
+/// The page with links to the pictures that `--draw` wrote beside it, one a pair.
+pub fn with_overlays<'a>(page: String, pairs: impl Iterator<Item = &'a str>) -> String {
+    let links = html! {
+        h2 { "Every pair with its corners" }
+        p { @for pair in pairs { a href={ "overlays/" (in_a_link(pair)) ".png" } { (pair) } " " } }
+    };
+    before_the_end(page, &links)
+}
+
+/// A file's name as a part of an address.
+fn in_a_link(name: &str) -> String {
+    let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
+    name.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
+}
+
+fn before_the_end(page: String, more: &Markup) -> String {
     match page.rfind("</main>") {
-        Some(end) => format!("{}{}{}", &page[..end], footer.into_string(), &page[end..]),
+        Some(end) => format!("{}{}{}", &page[..end], more.0, &page[end..]),
         None => page,
     }
 }
@@ -154,6 +173,13 @@ pub fn text(sentence: &str) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn overlays_are_linked_by_names_that_a_browser_finds() {
+        let page = with_overlays("<main></main>".to_owned(), ["01", "a b#ü"].into_iter());
+        assert!(page.contains("<a href=\"overlays/01.png\">01</a>"), "{page}");
+        assert!(page.contains("href=\"overlays/a%20b%23%C3%BC.png\"") && page.ends_with("</main>"), "{page}");
+    }
 
     #[test]
     fn backticks_become_code_where_they_come_in_pairs() {

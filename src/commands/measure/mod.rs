@@ -55,6 +55,8 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     out.write("measurements.csv", measure::to_csv(&series.poses).as_bytes())?;
     let json = out.write_json("measure.json", &file)?;
     let page = report::measure::page(&series, &file, &known, &extras)?;
+    let names = corners.pairs.iter().map(|pair| pair.pair.as_str());
+    let page = if args.draw { report::page::with_overlays(page, names) } else { page };
     let page = report::page::signed(page, out.provenance().as_ref());
     out.write("measure.html", page.as_bytes())?;
     end(&series, &known)?;

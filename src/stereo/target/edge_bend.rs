@@ -22,14 +22,11 @@ const TELLING: f64 = 4.0;
 /// Steps from what windows see to the crossings; each leaves at most the windows' mean reach of what is missing.
 const STEPS: usize = 40;
 
-/// What a window with this reach along rows and columns sees of a coordinate (x, y) of a crossing: the crossings whose deviations count, with
-/// their shares. `None` stands for a crossing at the board's rim, which is never measured.
-pub(super) fn seen_shares(
-    board: &Board,
-    (col, row): (usize, usize),
-    axis: usize,
-    reach: [f64; 2],
-) -> [(Option<usize>, f64); 3] {
+/// Which crossings' deviations a window sees of a coordinate, with their shares; `None` stands for a crossing at the board's rim.
+pub(super) type SeenShares = [(Option<usize>, f64); 3];
+
+/// What a window with this reach along rows and columns sees of a coordinate (x, y) of a crossing.
+pub(super) fn seen_shares(board: &Board, (col, row): (usize, usize), axis: usize, reach: [f64; 2]) -> SeenShares {
     let at = |dc: isize, dr: isize| {
         let (col, row) = (col.checked_add_signed(dc), row.checked_add_signed(dr));
         let inside = col.zip(row).filter(|&(c, r)| c < board.columns() && r < board.rows());

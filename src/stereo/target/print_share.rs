@@ -16,7 +16,7 @@ use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::edge_bend::seen_shares;
+use crate::stereo::target::edge_bend::{SeenShares, seen_shares};
 use crate::stereo::target::pose_block::{PoseBlock, crossings};
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
@@ -101,7 +101,7 @@ struct Sums {
 /// What the windows see of the crossings' deviations: each coordinate of a crossing as shares of deviations.
 struct Seen {
     /// For each crossing, for x and y: see `seen_shares`.
-    shares: Vec<[[(Option<usize>, f64); 3]; 2]>,
+    shares: Vec<[SeenShares; 2]>,
 }
 
 impl Seen {

@@ -1,6 +1,6 @@
 //! The same question as `coverage`, from rendered pictures through the program: what windows, blur and bent edges do is in it.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{DMatrix, Isometry3, Vector3};
@@ -22,7 +22,7 @@ struct Found {
 }
 
 /// What the files of one run say of all of its poses, and the covariance of what they share.
-fn read_run(folder: &Path) -> (HashMap<String, Found>, DMatrix<f64>) {
+fn read_run(folder: &Path) -> (BTreeMap<String, Found>, DMatrix<f64>) {
     let text = std::fs::read_to_string(folder.join("out/measure.json")).expect("measure.json");
     let file: serde_json::Value = serde_json::from_str(&text).expect("JSON");
     let matrix = |value: &serde_json::Value| {
@@ -30,7 +30,7 @@ fn read_run(folder: &Path) -> (HashMap<String, Found>, DMatrix<f64>) {
         DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j])
     };
     let shared = matrix(&file["shared"]["covariance"]);
-    let by_shared: HashMap<String, DMatrix<f64>> = file["shared"]["poses"]
+    let by_shared: BTreeMap<String, DMatrix<f64>> = file["shared"]["poses"]
         .as_array()
         .expect("poses")
         .iter()
@@ -40,7 +40,7 @@ fn read_run(folder: &Path) -> (HashMap<String, Found>, DMatrix<f64>) {
     let table = std::fs::read_to_string(&path).expect("measurements.csv");
     let mut lines = table.lines();
     let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
-    let mut turns = HashMap::new();
+    let mut turns = BTreeMap::new();
     for line in lines {
         let cells: Vec<&str> = line.split(',').collect();
         let number = |name: &str| cells[header.iter().position(|h| *h == name)?].parse::<f64>().ok();
