@@ -131,8 +131,9 @@ impl Pool<'_> {
                 Kind::Fresh => FRESH,
                 Kind::Paper(total) | Kind::Pool(total) | Kind::Verify(total) => share(total, group),
             };
-            let postures = self.postures(placement)?;
-            let postures = if matches!(kind, Kind::Pool(_)) { postures.as_slice() } else { &postures[..1] };
+            let postures = self.postures(group)?;
+            let postures =
+                if matches!(kind, Kind::Pool(_) | Kind::Center) { postures.as_slice() } else { &postures[..1] };
             let most = DRAWS * wanted.max(LEAST_DRAWN);
             let tries: Vec<usize> = (0..most).collect();
             // In slices of the number wanted, so that no more is searched than needed; the order decides what is kept.
@@ -158,9 +159,21 @@ impl Pool<'_> {
         Ok(all)
     }
 
-    /// Postures at the placement's middle, the best first.
-    fn postures(&self, placement: &Placement) -> Result<Vec<Vec<f64>>> {
-        let wanted = scene::base_from_flange(self.robot, &placement.base_from_field);
+    /// Postures at the placement's middle, or as near to it as there is one, the best first.
+    fn postures(&self, group: usize) -> Result<Vec<Vec<f64>>> {
+        let placement = &self.placements[group];
+        for k in 0..=UPRIGHT_DRAWS as usize {
+            let found = self.postures_at(&(placement.base_from_field * self.drawn(Kind::Center, k, group)));
+            if !found.is_empty() {
+                return Ok(found);
+            }
+        }
+        Err(Error::TooFew { group: placement.name.clone(), found: 0, tried: STARTS, needed: 1 })
+    }
+
+    /// Postures with the target there, the best first.
+    fn postures_at(&self, base_from_target: &Transform) -> Vec<Vec<f64>> {
+        let wanted = scene::base_from_flange(self.robot, base_from_target);
         let mut found: Vec<(f64, Vec<f64>)> = Vec::new();
         for k in 0..STARTS {
             let start = inverse::spread_start(self.robot, k);
@@ -172,17 +185,13 @@ impl Pool<'_> {
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         found.truncate(MOST_POSTURES);
-        if found.is_empty() {
-            let group = placement.name.clone();
-            return Err(Error::TooFew { group, found: 0, tried: STARTS, needed: 1 });
-        }
-        Ok(found.into_iter().map(|(_, q)| q).collect())
+        found.into_iter().map(|(_, q)| q).collect()
     }
 
     fn candidate(&self, kind: Kind, group: usize, k: usize, postures: &[Vec<f64>]) -> Option<Candidate> {
         let placement = &self.placements[group];
         let field_from_target = self.drawn(kind, k, group);
-        if kind != Kind::Center && !self.scene.accepts(&field_from_target) {
+        if (kind != Kind::Center || k > 0) && !self.scene.accepts(&field_from_target) {
             return None;
         }
         let wanted = scene::base_from_flange(self.robot, &(placement.base_from_field * field_from_target));
@@ -209,7 +218,11 @@ impl Pool<'_> {
         let radius = self.settings.radius_mm;
         let at = |turn: UnitQuaternion<f64>, place: Vector3<f64>| transform(turn.scaled_axis(), place);
         match kind {
-            Kind::Center => Transform::identity(),
+            // Upright in the middle of the field, or as near to that as the arm can: cameras stand where they can, too.
+            Kind::Center => {
+                let share = (k as f64 / UPRIGHT_DRAWS).min(1.0);
+                at(draw.turn(share * FRESH_RAD, share * FRESH_RAD), draw.direction() * (share * CENTER_SHARE * radius))
+            }
             Kind::Paper(_) => at(UnitQuaternion::identity(), draw.direction() * radius),
             Kind::Verify(_) | Kind::Fresh => at(draw.turn(FRESH_RAD, FRESH_RAD), draw.direction() * radius),
             Kind::First(_) => {
@@ -229,6 +242,12 @@ impl Pool<'_> {
         }
     }
 }
+
+/// Draws over which a center is tilted and shifted more and more, where the arm cannot hold it upright in the middle.
+const UPRIGHT_DRAWS: f64 = 50.0;
+
+/// Farthest a center may be from the middle, as a share of the sphere's radius.
+const CENTER_SHARE: f64 = 0.8;
 
 /// Postures of the arm that candidates are taken from: all of a six-axis arm.
 const MOST_POSTURES: usize = 8;
