@@ -29,6 +29,9 @@ const LEAST_DAMPING: f64 = 1e-14;
 const LATELY: usize = 20;
 const NO_MATTER: f64 = 0.01;
 
+/// Share of the cost by which rounding may hide a gain.
+const ROUNDING: f64 = 1e-9;
+
 /// How far a search goes, and how carefully it begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Search {
@@ -61,6 +64,8 @@ pub enum Stop {
     Valley,
     /// After the largest number of steps.
     Steps,
+    /// Where not even a strongly damped step lowers the cost though the equations promise that one does: it jumps there.
+    Exhausted,
     /// A corner lies behind its camera at the start, or the views do not determine the poses.
     NoStart,
 }
@@ -115,7 +120,11 @@ pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss, search:
             damping *= rise;
             rise *= 10.0;
             if damping > MAX_DAMPING {
-                return Solution { values, cost, stop: Stop::Minimum, steps };
+                // No step lowers the cost, however short: a minimum but for rounding, unless the equations still promise something.
+                let promised = try_step(layout, &values, &blocks, search.first_damping).map_or(f64::INFINITY, |s| s.1);
+                let minimum = promised < NO_MATTER.max(ROUNDING * cost);
+                let stop = if minimum { Stop::Minimum } else { Stop::Exhausted };
+                return Solution { values, cost, stop, steps };
             }
         }
     }
