@@ -11,7 +11,7 @@ use crate::statistics::median;
 use crate::stereo::Rig;
 use crate::stereo::target::TargetPose;
 use crate::stereo::target::finish::{Shape, Shared};
-use crate::stereo::target::judgement::Judgement;
+use crate::stereo::target::rig_change::judgement::Judgement;
 use crate::stereo::target::series::{MeasuredPose, Series};
 
 /// Columns behind the joints.
@@ -223,7 +223,7 @@ impl RigRecord {
             Judgement::Moved { since, .. } => ("moved", &[][..], Some(since.clone())),
             Judgement::Unexplained { .. } => ("unexplained", &[][..], None),
         };
-        let change = |e: &crate::stereo::target::cause::Explanation| ChangeRecord {
+        let change = |e: &crate::stereo::target::rig_change::cause::Explanation| ChangeRecord {
             what: e.cause.describe(e.amount, rig, board.square_mm),
             amount: e.amount,
             unit: e.cause.unit(),

@@ -4,11 +4,11 @@ use maud::{Markup, html};
 
 use super::Result;
 use super::blur;
-use super::figure::Plot;
+use super::drawing::figure::Plot;
+use super::drawing::pair_picture::{self, PairPicture};
+use super::drawing::scene::{Ink, Scene};
 use super::page::{self, Tone};
-use super::pair_picture::{self, PairPicture};
 use super::rig;
-use super::scene::{Ink, Scene};
 use super::table::{Table, number, with_sigma};
 use crate::files::OutDir;
 use crate::imaging::Corners;

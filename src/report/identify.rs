@@ -4,9 +4,9 @@ use maud::{Markup, html};
 use nalgebra::Point3;
 
 use super::Result;
-use super::figure::Plot;
+use super::drawing::figure::Plot;
+use super::drawing::scene::{Ink, Scene};
 use super::page::{self, Tone};
-use super::scene::{Ink, Scene};
 use super::table::{Table, number};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::{RowError, Spread};

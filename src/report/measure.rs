@@ -5,17 +5,17 @@ use std::f64::consts::TAU;
 use maud::{Markup, PreEscaped, html};
 
 use super::Result;
-use super::figure::Plot;
+use super::drawing::figure::Plot;
+use super::drawing::scene::{Ink, Scene};
 use super::page::{self, Tone};
 use super::rig;
-use super::scene::{Ink, Scene};
 use super::table::number;
 use crate::files::OutDir;
 use crate::formats::measure::MeasureFile;
 use crate::measurements::Role;
 use crate::stereo::target::TargetPose;
 use crate::stereo::target::finish::Shape;
-use crate::stereo::target::judgement::Judgement;
+use crate::stereo::target::rig_change::judgement::Judgement;
 use crate::stereo::target::series::{Knowledge, MeasuredPose, Series};
 
 /// Poses in the table of the worst.

@@ -3,17 +3,14 @@
 pub mod blur;
 pub mod camera_check;
 pub mod day;
-pub mod figure;
+pub mod drawing;
 pub mod identify;
 pub mod measure;
 pub mod page;
-pub mod pair_picture;
-pub mod picture;
 pub mod plan;
 pub mod rectify;
 pub mod rig;
 pub mod robot;
-pub mod scene;
 pub mod table;
 
 use crate::diagnostic::Explain;

@@ -1,6 +1,6 @@
 //! The frame of every HTML report: one file, no network, readable on paper, on a phone and in the dark; a script only to turn a view in space.
 
-use super::scene;
+use super::drawing::scene;
 use crate::files::provenance::{Digested, Provenance};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -189,7 +189,7 @@ mod tests {
         );
         assert_eq!(text("a`b").into_string(), "a`b");
     }
-    use crate::report::scene::{Ink, Scene};
+    use crate::report::drawing::scene::{Ink, Scene};
     use nalgebra::Point3;
 
     #[test]

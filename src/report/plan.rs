@@ -4,7 +4,7 @@ use maud::html;
 use nalgebra::{Point3, Vector3};
 
 use super::Result;
-use super::figure::Plot;
+use super::drawing::figure::Plot;
 use super::page;
 use super::table::{Table, number};
 use crate::formats::plan::{Determined, PlanFile};

@@ -3,9 +3,9 @@
 use maud::{Markup, html};
 
 use super::Result;
-use super::figure::Plot;
+use super::drawing::figure::Plot;
+use super::drawing::picture::PairJpeg;
 use super::page::{self, Tone};
-use super::picture::PairJpeg;
 use super::table::number;
 use crate::files::OutDir;
 use crate::formats::rectified::{RectifiedFile, RectifiedPair};

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Point3};
 
-use super::scene::{Ink, Scene};
+use super::drawing::scene::{Ink, Scene};
 use crate::geometry::Transform;
 use crate::imaging::Board;
 use crate::stereo::{Camera, Rig};

@@ -8,8 +8,8 @@ use crate::imaging::image::Mosaic;
 use crate::imaging::input::pairs;
 use crate::imaging::{Corners, PairCorners, overlay};
 use crate::measurements::Role;
+use crate::report::drawing::picture::PairJpeg;
 use crate::report::measure::{Distance, Extras, Thumbnail};
-use crate::report::picture::PairJpeg;
 use crate::robot::{self, Robot};
 use crate::stereo::target::series::{MeasuredPose, Series};
 

@@ -8,15 +8,15 @@ use rayon::prelude::*;
 use crate::geometry::Transform;
 use crate::imaging::Side;
 use crate::stereo::data::view::View;
-use crate::stereo::target::alone::{Alone, Known};
-use crate::stereo::target::bundle::Bundle;
-use crate::stereo::target::cause::{named, stretch};
-use crate::stereo::target::consistency::{self, Change, usual_excess};
-use crate::stereo::target::estimate::Estimate;
-use crate::stereo::target::judgement::Judgement;
-use crate::stereo::target::pose_block::TRANSFORM;
-use crate::stereo::target::prior::frame_modes;
+use crate::stereo::target::rig_change::cause::{named, stretch};
+use crate::stereo::target::rig_change::consistency::{self, Change, usual_excess};
+use crate::stereo::target::rig_change::judgement::Judgement;
 use crate::stereo::target::series::{MeasuredPose, POSE_LIMIT, Refusal, Run, Series};
+use crate::stereo::target::solve::alone::{Alone, Known};
+use crate::stereo::target::solve::bundle::Bundle;
+use crate::stereo::target::solve::estimate::Estimate;
+use crate::stereo::target::solve::pose_block::TRANSFORM;
+use crate::stereo::target::solve::prior::frame_modes;
 use crate::stereo::target::start::{Start, enough};
 use crate::stereo::target::{FEWEST_CORNERS, TargetPose};
 
@@ -299,7 +299,7 @@ fn prior_chi_square(found: &Estimate<'_>) -> [f64; 2] {
         freedom += 1.0 - found.covariance[(i, i)] / variance;
     }
     let [amount, sigma] = stretch(found);
-    let before = found.bundle.shape.stretch_mm / super::prior::stretch_length_mm(found.bundle.board);
+    let before = found.bundle.shape.stretch_mm / super::solve::prior::stretch_length_mm(found.bundle.board);
     if before.is_finite() {
         chi += (amount / before).powi(2);
         freedom += 1.0 - (sigma / before).powi(2);

@@ -7,19 +7,11 @@
 //! `consistency` finds poses and moments at which the rig is another, `judge` fits every `cause` of a change of the whole run, and
 //! `finish` makes the answers; `series` is the list of these steps.
 
-mod alone;
-mod bundle;
-pub mod cause;
-mod consistency;
-mod edge_bend;
-mod estimate;
 pub mod finish;
-pub mod judge;
-pub mod judgement;
-mod pose_block;
 pub mod print_share;
-mod prior;
+pub mod rig_change;
 pub mod series;
+mod solve;
 mod start;
 mod turns;
 

@@ -16,8 +16,8 @@ use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::edge_bend::{SeenShares, seen_shares};
-use crate::stereo::target::pose_block::{PoseBlock, crossings};
+use crate::stereo::target::solve::edge_bend::{SeenShares, seen_shares};
+use crate::stereo::target::solve::pose_block::{PoseBlock, crossings};
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
 /// The print of a calibration board, and what it does.

@@ -10,16 +10,16 @@ use crate::stereo::Rig;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
 use crate::stereo::target::TargetPose;
-use crate::stereo::target::alone::Known;
-use crate::stereo::target::bundle::{Bundle, Values};
-use crate::stereo::target::cause::{Cause, Explanation, stretch};
-use crate::stereo::target::consistency::{self, Change, usual_excess};
-use crate::stereo::target::estimate::{Estimate, estimate};
-use crate::stereo::target::judge::{Changed, judge, scaled};
+use crate::stereo::target::rig_change::cause::{Cause, Explanation, stretch};
+use crate::stereo::target::rig_change::consistency::{self, Change, usual_excess};
+use crate::stereo::target::rig_change::judge::{Changed, judge, scaled};
+use crate::stereo::target::solve::alone::Known;
+use crate::stereo::target::solve::bundle::{Bundle, Values};
+use crate::stereo::target::solve::estimate::{Estimate, estimate};
 
 use crate::stereo::target::finish::{Shape, Shared};
-use crate::stereo::target::judgement::Judgement;
-use crate::stereo::target::prior::{RigPrior, ShapePrior};
+use crate::stereo::target::rig_change::judgement::Judgement;
+use crate::stereo::target::solve::prior::{RigPrior, ShapePrior};
 use crate::stereo::target::start::{Start, baseline_ratio, starts};
 use crate::stereo::target::turns;
 

@@ -39,7 +39,7 @@ fn the_targets_scatter_is_the_predicted_one() {
         // 60 poses: chi-square over its freedom is 1 +- 0.18; the target's shape is found as well and shared by all.
         assert!((0.5..1.7).contains(&(sum / 60.0)), "{sums}");
     }
-    assert_eq!(measured.judgement, crate::stereo::target::judgement::Judgement::Agrees);
+    assert_eq!(measured.judgement, crate::stereo::target::rig_change::judgement::Judgement::Agrees);
 }
 
 #[test]

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use maud::{Markup, html};
 use nalgebra::Vector2;
 
-use super::page;
 use super::picture::PairJpeg;
+use crate::report::page;
 use crate::stereo::data::observation::Observation;
 
 /// Length of the longest arrow as a share of the drawing's width.

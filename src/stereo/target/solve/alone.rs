@@ -9,8 +9,8 @@ use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::root_mean_square;
 use crate::stereo::data::view::View;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
-use crate::stereo::target::estimate::{Estimate, OUTLIER};
-use crate::stereo::target::pose_block::{Eliminated, PoseBlock, crossings, residual};
+use crate::stereo::target::solve::estimate::{Estimate, OUTLIER};
+use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, crossings, residual};
 use crate::stereo::target::start::enough;
 use crate::stereo::triangulate::{common, triangulate};
 
@@ -21,7 +21,7 @@ const STEPS: usize = 20;
 const ROUNDS: usize = 3;
 
 /// The shared values as a pose sees them.
-pub(super) struct Known<'a> {
+pub(in crate::stereo::target) struct Known<'a> {
     rig: Rig,
     crossings: Vec<Point3<f64>>,
     board: &'a Board,
@@ -30,7 +30,7 @@ pub(super) struct Known<'a> {
 }
 
 /// A pose on them.
-pub(super) struct Alone {
+pub(in crate::stereo::target) struct Alone {
     /// `left_from_board`.
     pub pose: Transform,
     /// Its corners; outliers are inactive.

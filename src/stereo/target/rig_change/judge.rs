@@ -6,11 +6,11 @@
 //! one ends the run.
 
 use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::target::bundle::{Bundle, Values};
-use crate::stereo::target::cause::{Cause, Explanation, explanations, moved_mm, stretch};
-use crate::stereo::target::estimate::{Estimate, estimate};
-use crate::stereo::target::pose_block::{crossings, residual};
-use crate::stereo::target::prior::stretch_length_mm;
+use crate::stereo::target::rig_change::cause::{Cause, Explanation, explanations, moved_mm, stretch};
+use crate::stereo::target::solve::bundle::{Bundle, Values};
+use crate::stereo::target::solve::estimate::{Estimate, estimate};
+use crate::stereo::target::solve::pose_block::{crossings, residual};
+use crate::stereo::target::solve::prior::stretch_length_mm;
 
 /// A cause that lowers chi-square by less than this is chance: four standard deviations.
 const CHANCE: f64 = 16.0;
@@ -39,7 +39,10 @@ pub struct Changed {
 }
 
 /// Names what changed, where more than chance did; and the estimate to go on with, in which the change is allowed for.
-pub(super) fn judge<'a>(found: Estimate<'a>, usual: Option<Noise>) -> (Estimate<'a>, Option<Changed>) {
+pub(in crate::stereo::target) fn judge<'a>(
+    found: Estimate<'a>,
+    usual: Option<Noise>,
+) -> (Estimate<'a>, Option<Changed>) {
     let scores = explanations(&found);
     let best = scores.iter().map(|e| e.fall).fold(0.0, f64::max);
     if best <= CHANCE {
@@ -144,7 +147,7 @@ fn shape_evidence(fit: &Estimate<'_>) -> f64 {
 }
 
 /// Values for a target whose size is off by a large factor: every pose scaled with it.
-pub(super) fn scaled(values: &Values, bundle: &Bundle<'_>, factor: f64) -> Values {
+pub(in crate::stereo::target) fn scaled(values: &Values, bundle: &Bundle<'_>, factor: f64) -> Values {
     let mut next = values.clone();
     let board = bundle.board;
     for (i, deviation) in next.deviations_mm.iter_mut().enumerate() {

@@ -15,14 +15,14 @@ use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::bundle::{Bundle, Normal, Values};
-use crate::stereo::target::edge_bend::edge_bends_mm;
-use crate::stereo::target::pose_block::{crossings, residual};
-use crate::stereo::target::prior::{stretch_mode, weights};
+use crate::stereo::target::solve::bundle::{Bundle, Normal, Values};
+use crate::stereo::target::solve::edge_bend::edge_bends_mm;
+use crate::stereo::target::solve::pose_block::{crossings, residual};
+use crate::stereo::target::solve::prior::{stretch_mode, weights};
 use crate::stereo::target::start::enough;
 
 /// Whitened residuals beyond this are outliers.
-pub(super) const OUTLIER: f64 = 5.3;
+pub(in crate::stereo::target) const OUTLIER: f64 = 5.3;
 
 /// Rounds of least squares with new weights.
 const ROUNDS: usize = 6;
@@ -44,7 +44,7 @@ const FIXED_POINT_STEPS: usize = 30;
 
 /// A minimum with its weights.
 #[derive(Debug, Clone)]
-pub(super) struct Estimate<'a> {
+pub(in crate::stereo::target) struct Estimate<'a> {
     /// The problem with the whiteners, the outliers and the shape's prior that were found.
     pub bundle: Bundle<'a>,
     /// The values.
@@ -60,7 +60,11 @@ pub(super) struct Estimate<'a> {
 }
 
 /// Finds the minimum. `usual` is the noise of the calibration's corners, where known. `None` where the corners do not determine the poses.
-pub(super) fn estimate<'a>(mut bundle: Bundle<'a>, start: Values, usual: Option<Noise>) -> Option<Estimate<'a>> {
+pub(in crate::stereo::target) fn estimate<'a>(
+    mut bundle: Bundle<'a>,
+    start: Values,
+    usual: Option<Noise>,
+) -> Option<Estimate<'a>> {
     let mut values = start;
     let certificate = bundle.shape;
     for _ in 0..2 {

@@ -5,8 +5,8 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::Error;
-use super::Result;
+use crate::report::Error;
+use crate::report::Result;
 
 /// Drawn at twice the size it is shown, because the backend rounds to whole units.
 const SCALE: u32 = 2;

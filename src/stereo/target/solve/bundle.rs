@@ -14,8 +14,8 @@ use crate::stereo::data::view::View;
 use crate::stereo::solve::normal_equations::solve_scaled;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::pose_block::{Eliminated, PoseBlock, TRANSFORM, crossings, residual};
-use crate::stereo::target::prior::{RigPrior, ShapePrior, weights};
+use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, TRANSFORM, crossings, residual};
+use crate::stereo::target::solve::prior::{RigPrior, ShapePrior, weights};
 use crate::stereo::triangulate::RIG_NUMBERS;
 
 /// Poses whose matrices are held at a time.
@@ -29,7 +29,7 @@ const PROMISE: f64 = 1e-6;
 
 /// Values of all unknowns.
 #[derive(Debug, Clone)]
-pub(super) struct Values {
+pub(in crate::stereo::target) struct Values {
     /// Of the rig's prior.
     pub rig: DVector<f64>,
     /// The crossings' deviations from the drawing, mm.
@@ -40,7 +40,7 @@ pub(super) struct Values {
 
 /// The problem: what was seen and what is known before.
 #[derive(Debug, Clone)]
-pub(super) struct Bundle<'a> {
+pub(in crate::stereo::target) struct Bundle<'a> {
     /// The target as drawn.
     pub board: &'a Board,
     /// Every pose's corners.
@@ -55,7 +55,7 @@ pub(super) struct Bundle<'a> {
 
 /// A pose's part of the normal equations at the minimum.
 #[derive(Debug, Clone)]
-pub(super) struct PosePart {
+pub(in crate::stereo::target) struct PosePart {
     /// Covariance from its own corners, everything shared held.
     pub own: Matrix6<f64>,
     /// Derivative of the pose by the shared unknowns.
@@ -71,7 +71,7 @@ pub(super) struct PosePart {
 
 /// The normal equations.
 #[derive(Debug, Clone)]
-pub(super) struct Normal {
+pub(in crate::stereo::target) struct Normal {
     /// What the corners say of the shared unknowns.
     pub data: DMatrix<f64>,
     /// What is known before.

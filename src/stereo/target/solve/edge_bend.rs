@@ -12,9 +12,9 @@ use crate::imaging::{Board, Side};
 use crate::stereo::Rig;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::observation::Observation;
-use crate::stereo::target::bundle::{Bundle, Values};
-use crate::stereo::target::estimate::OUTLIER;
-use crate::stereo::target::pose_block::{crossings, residual};
+use crate::stereo::target::solve::bundle::{Bundle, Values};
+use crate::stereo::target::solve::estimate::OUTLIER;
+use crate::stereo::target::solve::pose_block::{crossings, residual};
 
 /// Standard deviations by which the corners of a crossing must scatter beyond their noise.
 const TELLING: f64 = 4.0;
@@ -23,10 +23,15 @@ const TELLING: f64 = 4.0;
 const STEPS: usize = 40;
 
 /// Which crossings' deviations a window sees of a coordinate, with their shares; `None` stands for a crossing at the board's rim.
-pub(super) type SeenShares = [(Option<usize>, f64); 3];
+pub(in crate::stereo::target) type SeenShares = [(Option<usize>, f64); 3];
 
 /// What a window with this reach along rows and columns sees of a coordinate (x, y) of a crossing.
-pub(super) fn seen_shares(board: &Board, (col, row): (usize, usize), axis: usize, reach: [f64; 2]) -> SeenShares {
+pub(in crate::stereo::target) fn seen_shares(
+    board: &Board,
+    (col, row): (usize, usize),
+    axis: usize,
+    reach: [f64; 2],
+) -> SeenShares {
     let at = |dc: isize, dr: isize| {
         let (col, row) = (col.checked_add_signed(dc), row.checked_add_signed(dr));
         let inside = col.zip(row).filter(|&(c, r)| c < board.columns() && r < board.rows());
@@ -63,7 +68,7 @@ fn straight_part(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Vector3<f
 
 impl Bundle<'_> {
     /// Sets the crossings to what their corners, each through its own window, show on the whole; and with it what each corner sees.
-    pub(super) fn unbend(&mut self, values: &mut Values) {
+    pub(in crate::stereo::target) fn unbend(&mut self, values: &mut Values) {
         let board = self.board;
         let windows = self.mean_windows();
         let seen: Vec<Vector3<f64>> = values.deviations_mm.iter().zip(&windows).map(|(d, (_, off))| d + off).collect();
@@ -100,7 +105,7 @@ impl Bundle<'_> {
 
     /// Variances of the crossings' deviations along x, y and z that come from the crossings at the board's rim, mm^2: those bend edges as the
     /// others do and are never seen.
-    pub(super) fn rim_variances_mm2(&self) -> Vec<f64> {
+    pub(in crate::stereo::target) fn rim_variances_mm2(&self) -> Vec<f64> {
         let board = self.board;
         let of = |(k, ([along_rows, along_columns], _)): (usize, ([f64; 2], Vector3<f64>))| {
             let ends = |at: usize, count: usize| f64::from(u8::from(at == 0)) + f64::from(u8::from(at + 1 == count));
@@ -115,7 +120,7 @@ impl Bundle<'_> {
     }
 
     /// A corner with what its crossing's edges add to its covariance.
-    pub(super) fn with_edge_bend(&self, rig: &Rig, depth_mm: f64, o: &Observation) -> Observation {
+    pub(in crate::stereo::target) fn with_edge_bend(&self, rig: &Rig, depth_mm: f64, o: &Observation) -> Observation {
         let bend_px = self.edge_bends_mm[self.board.index(o.col, o.row)] * px_per_mm(rig, o.side, depth_mm);
         let mut o = *o;
         o.covariance_px2 += Matrix2::identity() * (bend_px * bend_px);
@@ -129,7 +134,7 @@ fn px_per_mm(rig: &Rig, side: Side, depth_mm: f64) -> f64 {
 }
 
 /// Standard deviation of what bent edges add to a corner along x and along y beyond its noise, mm, by crossing.
-pub(super) fn edge_bends_mm(bundle: &Bundle<'_>, values: &Values, noise: &Noise) -> Vec<f64> {
+pub(in crate::stereo::target) fn edge_bends_mm(bundle: &Bundle<'_>, values: &Values, noise: &Noise) -> Vec<f64> {
     let rig = bundle.rig_at(values);
     let places = crossings(bundle.board, &values.deviations_mm);
     let mut sums = vec![Sums::default(); places.len()];
@@ -177,7 +182,7 @@ mod tests {
     use crate::imaging::Squares;
     use crate::stereo::data::view::View;
     use crate::stereo::synthetic::World;
-    use crate::stereo::target::prior::{RigPrior, ShapePrior};
+    use crate::stereo::target::solve::prior::{RigPrior, ShapePrior};
 
     fn board() -> Board {
         Board { squares: Squares { columns: 7, rows: 6 }, square_mm: 10.0 }

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use nalgebra::{Point3, Vector3};
 
-use super::page;
+use crate::report::page;
 use maud::{Markup, html};
 
 /// Size of the drawing, px.

@@ -19,19 +19,19 @@ use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::triangulate::RIG_NUMBERS;
 
 /// Where the numbers of `right_from_left` begin among the rig's.
-pub(super) const TRANSFORM: usize = 2 * CAMERA_NUMBERS;
+pub(in crate::stereo::target) const TRANSFORM: usize = 2 * CAMERA_NUMBERS;
 
 /// A square matrix over the rig's numbers.
-pub(super) type RigMatrix = SMatrix<f64, RIG_NUMBERS, RIG_NUMBERS>;
+pub(in crate::stereo::target) type RigMatrix = SMatrix<f64, RIG_NUMBERS, RIG_NUMBERS>;
 
 /// Where each crossing is on the target, board's frame, mm, row by row.
-pub(super) fn crossings(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Point3<f64>> {
+pub(in crate::stereo::target) fn crossings(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Point3<f64>> {
     let at = |i: usize| board.corner_mm(i % board.columns(), i / board.columns());
     deviations_mm.iter().enumerate().map(|(i, deviation)| at(i) + deviation).collect()
 }
 
 /// Predicted minus seen, px; what is seen of a misprinted crossing is in [`Observation::seen_off_mm`]. `None` for a corner behind its camera.
-pub(super) fn residual(
+pub(in crate::stereo::target) fn residual(
     rig: &Rig,
     crossings: &[Point3<f64>],
     board: &Board,
@@ -48,7 +48,7 @@ pub(super) fn residual(
 }
 
 /// Sums over one pose's corners.
-pub(super) struct PoseBlock {
+pub(in crate::stereo::target) struct PoseBlock {
     rig: Box<RigMatrix>,
     rig_pose: SMatrix<f64, RIG_NUMBERS, 6>,
     rig_gradient: SVector<f64, RIG_NUMBERS>,
@@ -215,7 +215,7 @@ impl PoseBlock {
 }
 
 /// A pose's share with the pose eliminated.
-pub(super) struct Eliminated {
+pub(in crate::stereo::target) struct Eliminated {
     /// Shared by shared.
     pub matrix: DMatrix<f64>,
     /// Of the shared unknowns.

@@ -1,0 +1,6 @@
+//! What is drawn on pages: plots, views in space, and photographs with what was found in them.
+
+pub mod figure;
+pub mod pair_picture;
+pub mod picture;
+pub mod scene;
