@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """The peers of `cargo bench --bench identify` on the same data: pyswarms with a vectorised numpy objective, scipy's least_squares.
 
-    python3 -m venv /tmp/peers && /tmp/peers/bin/pip install numpy scipy pyswarms
-    stereocal simulate --points-only --preset paper --out /tmp/paper
-    cargo bench --bench identify -- /tmp/paper/measurements.csv /tmp/paper/robot.toml
-    /tmp/peers/bin/python scripts/bench_identify.py /tmp/paper/measurements.csv /tmp/paper/robot.toml
+    python3 -m venv target/peers/venv && target/peers/venv/bin/pip install numpy scipy pyswarms   # or scripts/peers
+    stereocal simulate --points-only --preset paper --out paper
+    cargo bench --bench identify -- paper/measurements.csv paper/robot.toml
+    target/peers/venv/bin/python scripts/bench_identify.py paper/measurements.csv paper/robot.toml
 
 All minimise eq. (12) over the distances to the groups' centres, in a box of 1 mm and 1 deg, all 27 parameters free but
 those that no distance sees.

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """What a plain OpenCV script costs for the pictures of `cargo bench --bench measure -- speed`.
 
-    python3 -m venv /tmp/peers && /tmp/peers/bin/pip install opencv-python-headless
-    /tmp/peers/bin/python scripts/bench_measure.py POSES CALIBRATION [sb|classic] [pairs]
+    python3 -m venv target/peers/venv && target/peers/venv/bin/pip install opencv-python-headless   # or scripts/peers
+    target/peers/venv/bin/python scripts/bench_measure.py POSES CALIBRATION [sb|classic] [pairs]
 
 Reads every pair, finds the target's 6x5 inner corners, undistorts, triangulates. Prints seconds a pair.
 """

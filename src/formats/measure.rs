@@ -255,8 +255,8 @@ fn row(m: &MeasuredPose) -> Row {
 
 fn shape_record(shape: &Shape, board: &Board) -> ShapeRecord {
     let crossing = |(k, (d, s)): (usize, (&nalgebra::Vector3<f64>, &nalgebra::Vector3<f64>))| CrossingRecord {
-        col: k % board.columns(),
-        row: k / board.columns(),
+        col: board.place(k).0,
+        row: board.place(k).1,
         dx_mm: d.x,
         dy_mm: d.y,
         dz_mm: d.z,

@@ -84,6 +84,16 @@ impl Board {
         row * self.columns() + col
     }
 
+    /// Column and row of the corner at this place in such a list.
+    pub fn place(&self, index: usize) -> (usize, usize) {
+        (index % self.columns(), index / self.columns())
+    }
+
+    /// Nominal places of all inner corners in the board's frame, mm, row by row.
+    pub fn corners_mm(&self) -> impl Iterator<Item = Point3<f64>> + '_ {
+        (0..self.corner_count()).map(|k| self.place(k)).map(|(col, row)| self.corner_mm(col, row))
+    }
+
     /// Nominal place of inner corner `(col, row)` in the board's frame (origin in the centre), mm.
     pub fn corner_mm(&self, col: usize, row: usize) -> Point3<f64> {
         Point3::new(

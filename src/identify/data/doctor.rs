@@ -149,6 +149,9 @@ fn far_from_nominal(found: &Identification) -> Option<String> {
 /// Scatter over stated standard deviation beyond which it is worth a sentence.
 const FAR_ABOVE: f64 = 5.0;
 
+/// Scatter over stated standard deviation below which the stated one is worth a sentence.
+const FAR_BELOW: f64 = 0.8;
+
 /// Whether the covariances of the file are far from what was seen.
 fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
     let stated: Vec<f64> = set
@@ -166,7 +169,7 @@ fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
     let stated_mm = (stated.iter().sum::<f64>() / stated.len() as f64).sqrt();
     let scatter = &found.scatter;
     let whole_mm = (stated_mm.powi(2) * scatter.stated + scatter.point_mm.powi(2)).sqrt();
-    if whole_mm < 0.8 * stated_mm {
+    if whole_mm < FAR_BELOW * stated_mm {
         return Some(format!(
             "the covariances are too large: the residuals are those of {:.1} times smaller standard deviations",
             stated_mm / whole_mm

@@ -17,6 +17,7 @@ use crate::stereo::target::solve::bundle::Bundle;
 use crate::stereo::target::solve::estimate::Estimate;
 use crate::stereo::target::solve::pose_block::TRANSFORM;
 use crate::stereo::target::solve::prior::frame_modes;
+use crate::stereo::target::solve::window::Window;
 use crate::stereo::target::start::{Start, enough};
 use crate::stereo::target::{FEWEST_CORNERS, TargetPose};
 
@@ -257,8 +258,12 @@ impl Finisher<'_> {
 /// Covariance of the shared unknowns, with what the target's rim, which no corner shows, leaves open: where corners are seen is known all the
 /// same, but not where the target's frame lies among them.
 fn with_rim(found: &Estimate<'_>) -> DMatrix<f64> {
-    let modes = DMatrix::from_columns(&frame_modes(found.bundle.board));
-    let variances = DMatrix::from_diagonal(&DVector::from_vec(found.bundle.rim_variances_mm2()));
+    let bundle = &found.bundle;
+    let modes = DMatrix::from_columns(&frame_modes(bundle.board));
+    let windows = Window::means(bundle.board, &bundle.views);
+    let variances = windows.iter().flat_map(|window| [window.rim_variance(0), window.rim_variance(1), 0.0]);
+    let variances = DMatrix::from_diagonal(&DVector::from_iterator(3 * windows.len(), variances))
+        * bundle.shape.in_plane_mm.powi(2);
     let through = &modes * (modes.transpose() * variances * &modes) * modes.transpose();
     let (n, m) = (found.values.rig.len(), modes.nrows());
     let mut covariance = found.covariance.clone();
@@ -283,7 +288,8 @@ fn shared(found: &Estimate<'_>, names: &DMatrix<f64>, covariance: DMatrix<f64>) 
     let board = found.bundle.board;
     let mut parameters = found.bundle.rig.names.clone();
     for i in 0..board.corner_count() {
-        let place = format!("target.{}.{}", i % board.columns(), i / board.columns());
+        let (col, row) = board.place(i);
+        let place = format!("target.{col}.{row}");
         parameters.extend(["x_mm", "y_mm", "z_mm"].map(|axis| format!("{place}.{axis}")));
     }
     let change: DVector<f64> = names * Bundle::shared(&found.values);

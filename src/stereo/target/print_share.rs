@@ -4,7 +4,7 @@
 //! for independent says a covariance that is too small. In: a calibration's views and values. Out: how far the board's crossings
 //! deviate, and the covariance of the shared numbers with that in it. Method: the score of each crossing's place at the minimum, in
 //! units of what the corners say of it, exceeds chance by the print (a variance component by moments); the print then goes
-//! through the normal equations to the shared numbers. Windows see a part of each crossing's deviation and of its neighbours' (`edge_bend`):
+//! through the normal equations to the shared numbers. Windows see a part of each crossing's deviation and of its neighbours' (`window`):
 //! what is smooth over the board reaches the lens and the rig whole, though crossings are seen to scatter less than they do.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
@@ -16,8 +16,8 @@ use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::solve::edge_bend::{SeenShares, seen_shares};
 use crate::stereo::target::solve::pose_block::{PoseBlock, crossings};
+use crate::stereo::target::solve::window::{SeenShares, Window};
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
 /// The print of a calibration board, and what it does.
@@ -43,8 +43,7 @@ impl PrintShare {
 
 fn print_share(views: &[View], board: &Board, layout: &Layout, values: &Values, inflation: f64) -> Option<PrintShare> {
     let m = board.corner_count();
-    let lifts: Vec<[f64; NUMBERS]> =
-        (0..m).map(|i| lift(board, &board.corner_mm(i % board.columns(), i / board.columns()))).collect();
+    let lifts: Vec<[f64; NUMBERS]> = board.corners_mm().map(|at| lift(board, &at)).collect();
     let shape = values.shared.shape_mm;
     let heights = lifts.iter().map(|l| Vector3::new(0.0, 0.0, l.iter().zip(&shape).map(|(l, s)| l * s).sum()));
     let places = crossings(board, &heights.collect::<Vec<_>>());
@@ -55,7 +54,7 @@ fn print_share(views: &[View], board: &Board, layout: &Layout, values: &Values, 
         basis[(number, column)] = 1.0;
     }
     let size = rig_count + 3 * m;
-    let seen = Seen::of(views, board);
+    let seen = Seen::of(board, views);
     let mut sums = Sums { matrix: DMatrix::zeros(size, size), gradient: DVector::zeros(size), told: 0.0, numbers: 0.0 };
     // One after the other: for a board of a thousand crossings each is large.
     for (view, pose) in views.iter().zip(&values.poses) {
@@ -100,24 +99,16 @@ struct Sums {
 
 /// What the windows see of the crossings' deviations: each coordinate of a crossing as shares of deviations.
 struct Seen {
-    /// For each crossing, for x and y: see `seen_shares`.
+    /// For each crossing, for x and y.
     shares: Vec<[SeenShares; 2]>,
 }
 
 impl Seen {
     /// On the average over the views.
-    fn of(views: &[View], board: &Board) -> Seen {
-        let mut sums = vec![(0.0, [0.0; 2]); board.corner_count()];
-        for o in views.iter().flat_map(|view| &view.observations).filter(|o| o.active) {
-            let (count, reach) = &mut sums[board.index(o.col, o.row)];
-            *count += 1.0;
-            (0..2).for_each(|i| reach[i] += o.reach[i]);
+    fn of(board: &Board, views: &[View]) -> Seen {
+        Seen {
+            shares: Window::means(board, views).iter().map(|window| [0, 1].map(|axis| window.shares(axis))).collect(),
         }
-        let shares = |(k, (count, reach)): (usize, (f64, [f64; 2]))| {
-            let (place, reach) = ((k % board.columns(), k / board.columns()), reach.map(|sum| sum / count.max(1.0)));
-            [0, 1].map(|axis| seen_shares(board, place, axis, reach))
-        };
-        Seen { shares: sums.into_iter().enumerate().map(shares).collect() }
     }
 
     /// Mean variance of what is seen of a crossing's coordinate, for a unit variance of the deviations.

@@ -118,7 +118,7 @@ fn lengths(found: &Calibration, seed: u64) -> Tally {
         let at = |side, col, row| views[0].active(side).find(|o| (o.col, o.row) == (col, row));
         let point = |col, row| triangulate(rig, at(Side::Left, col, row)?, at(Side::Right, col, row)?);
         for (from, to) in (0..board.corner_count()).flat_map(|k| {
-            let (col, row) = (k % board.columns(), k / board.columns());
+            let (col, row) = board.place(k);
             [((col, row), (col + SPAN, row)), ((col, row), (col, row + SPAN))]
         }) {
             let (Some(a), Some(b)) = (point(from.0, from.1), point(to.0, to.1)) else { continue };

@@ -101,7 +101,7 @@ fn run_speed() {
         decoding / pairs,
         wall / decoding
     );
-    for python in ["/tmp/peers/bin/python", "python3"] {
+    for python in [concat!(env!("CARGO_MANIFEST_DIR"), "/target/peers/venv/bin/python"), "python3"] {
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/bench_measure.py");
         let ran = ["sb", "classic"].map(|way| {
             Command::new(python).args([script, "poses", "rig/calibration.json", way, "6"]).current_dir(&folder).output()
@@ -113,7 +113,7 @@ fn run_speed() {
             return;
         }
     }
-    println!("no python with cv2: scripts/bench_measure.py says how to get one");
+    println!("no python with cv2: scripts/peers installs one");
 }
 
 /// What a pair costs beyond its pictures as the run grows: the solver alone, from corners.

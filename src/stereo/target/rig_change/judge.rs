@@ -149,9 +149,8 @@ fn shape_evidence(fit: &Estimate<'_>) -> f64 {
 /// Values for a target whose size is off by a large factor: every pose scaled with it.
 pub(in crate::stereo::target) fn scaled(values: &Values, bundle: &Bundle<'_>, factor: f64) -> Values {
     let mut next = values.clone();
-    let board = bundle.board;
-    for (i, deviation) in next.deviations_mm.iter_mut().enumerate() {
-        *deviation = board.corner_mm(i % board.columns(), i / board.columns()).coords * (factor - 1.0);
+    for (deviation, at) in next.deviations_mm.iter_mut().zip(bundle.board.corners_mm()) {
+        *deviation = at.coords * (factor - 1.0);
     }
     for pose in next.poses.iter_mut().flatten() {
         pose.translation.vector *= factor;

@@ -1,8 +1,9 @@
 //! One weighted least squares over all poses: the rig within its calibration, the target within its certificate, the corners through their
 //! windows.
 //!
-//! `pose_block` linearises a pose, `bundle` sums and steps, `prior` is what is known before, `edge_bend` what windows see of misprinted
-//! crossings; `estimate` finds the weights with the values, and `alone` fits a pose with everything shared held.
+//! `pose_block` linearises a pose, `bundle` sums and steps, `prior` is what is known before, `window` what a corner's window sees of
+//! misprinted crossings, `edge_bend` where those are; `estimate` finds the weights with the values, and `alone` fits a pose with everything
+//! shared held.
 
 pub(in crate::stereo::target) mod alone;
 pub(in crate::stereo::target) mod bundle;
@@ -10,3 +11,4 @@ pub(in crate::stereo::target) mod edge_bend;
 pub(in crate::stereo::target) mod estimate;
 pub(in crate::stereo::target) mod pose_block;
 pub(in crate::stereo::target) mod prior;
+pub(in crate::stereo::target) mod window;

@@ -26,8 +26,7 @@ pub(in crate::stereo::target) type RigMatrix = SMatrix<f64, RIG_NUMBERS, RIG_NUM
 
 /// Where each crossing is on the target, board's frame, mm, row by row.
 pub(in crate::stereo::target) fn crossings(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Point3<f64>> {
-    let at = |i: usize| board.corner_mm(i % board.columns(), i / board.columns());
-    deviations_mm.iter().enumerate().map(|(i, deviation)| at(i) + deviation).collect()
+    board.corners_mm().zip(deviations_mm).map(|(at, deviation)| at + deviation).collect()
 }
 
 /// Predicted minus seen, px; what is seen of a misprinted crossing is in [`Observation::seen_off_mm`]. `None` for a corner behind its camera.

@@ -144,14 +144,13 @@ pub(in crate::stereo::target) fn stretch_mode(board: &Board) -> DVector<f64> {
 
 /// Length of the vector of all deviations when the board is stretched by the whole of its size, mm.
 pub(in crate::stereo::target) fn stretch_length_mm(board: &Board) -> f64 {
-    let places = (0..board.corner_count()).map(|i| board.corner_mm(i % board.columns(), i / board.columns()));
-    places.map(|p| p.coords.norm_squared()).sum::<f64>().sqrt()
+    board.corners_mm().map(|p| p.coords.norm_squared()).sum::<f64>().sqrt()
 }
 
 fn mode(board: &Board, way: impl Fn(&Point3<f64>) -> Vector3<f64>) -> DVector<f64> {
     let mut all = DVector::zeros(3 * board.corner_count());
-    for i in 0..board.corner_count() {
-        all.rows_mut(3 * i, 3).copy_from(&way(&board.corner_mm(i % board.columns(), i / board.columns())));
+    for (i, at) in board.corners_mm().enumerate() {
+        all.rows_mut(3 * i, 3).copy_from(&way(&at));
     }
     all.normalize()
 }

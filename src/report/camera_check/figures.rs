@@ -1,0 +1,160 @@
+//! The plots: errors of lengths, what the model leaves of the corners, and how uncertain lengths are over the volume.
+
+use crate::report::Result;
+use crate::report::drawing::figure::Plot;
+use crate::report::page::{self};
+use crate::stereo::calibrate::Calibration;
+use crate::stereo::judge::assessment::Judged;
+use crate::stereo::judge::held_out::{Accuracy, HeldOutPair};
+use crate::stereo::judge::lengths::{Axis, Range};
+use crate::stereo::judge::residual_correlation::Field;
+use maud::{Markup, html};
+
+/// Fig. 6 of the paper, (a) to (d).
+pub(super) fn lengths(judged: &Judged) -> Result<Markup> {
+    let accuracy = &judged.accuracy;
+    let [long, _] = accuracy.long_mm;
+    let [short, _] = accuracy.short_mm;
+    let every = every_length(accuracy);
+    let guard = |plot: Plot| plot.hline(judged.tolerance_mm, "tolerance").hline(-judged.tolerance_mm, "");
+    let a =
+        guard(Plot::new(&format!("(a) Errors of all lengths of {long} mm"), "pair", "error, mm").points("", &every))
+            .svg()?;
+    let mean = |of: fn(&HeldOutPair) -> Option<f64>| -> Vec<(f64, f64)> {
+        accuracy.pairs.iter().enumerate().filter_map(|(i, p)| Some((i as f64 + 1.0, of(p)?))).collect()
+    };
+    let b = Plot::new("(b) Mean error of every pair", "pair", "mean error, mm")
+        .points(&format!("x {short} mm"), &mean(|p| p.mean_error_x_short_mm))
+        .points(&format!("y {short} mm"), &mean(|p| p.mean_error_y_short_mm))
+        .points(&format!("x {long} mm"), &mean(|p| p.mean_error_x_long_mm))
+        .points(&format!("y {long} mm"), &mean(|p| p.mean_error_y_long_mm))
+        .svg()?;
+    let range_plot = |title: &str, along: Axis| {
+        let of = |y: fn(&Range) -> f64| -> Vec<(f64, f64)> {
+            accuracy.ranges.iter().filter(|r| r.axis == along).map(|r| (r.nominal_mm, y(r))).collect()
+        };
+        let bars: Vec<(f64, f64, f64)> = accuracy
+            .ranges
+            .iter()
+            .filter(|r| r.axis == along)
+            .map(|r| (r.nominal_mm, r.mean_error_mm, r.std_mm))
+            .collect();
+        guard(
+            Plot::new(title, "range, mm", "error, mm")
+                .error_bars("mean and std", &bars)
+                .line("max |error|", &of(|r| r.max_abs_error_mm)),
+        )
+        .svg()
+    };
+    let c = range_plot("(c) Every range along x", Axis::X)?;
+    let d = range_plot("(d) Every range along y", Axis::Y)?;
+    Ok(html! {
+        div.side {
+            (page::figure(&a, "Pair after pair, x before y; of very many lengths the worst of each few are drawn. Steps between pairs are calibration, the width of the band is corner noise."))
+            (page::figure(&b, "A pair far from the others was moved, blurred or hit from the side by light; a mean that grows with the range is a scale."))
+        }
+        div.side {
+            (page::figure(&c, "A mean that bends with the range is a lens or a board's shape that the model lacks."))
+            (page::figure(&d, "Errors that do not grow with the range come from the corners, not from the rig."))
+        }
+    })
+}
+
+/// Fig. 6 (a): all long lengths, spread over their pair's number. Of more than can be told apart the worst of every few stay.
+pub(super) fn every_length(accuracy: &Accuracy) -> Vec<(f64, f64)> {
+    /// Points of a figure that still loads at once.
+    const MOST_POINTS: usize = 3000;
+    let total: usize = accuracy.pairs.iter().map(|pair| pair.long_errors_mm.len()).sum();
+    let few = total.div_ceil(MOST_POINTS).max(1);
+    let of_pair = |(i, pair): (usize, &HeldOutPair)| -> Vec<(f64, f64)> {
+        let count = pair.long_errors_mm.len().max(1) as f64;
+        let worst = |(k, errors): (usize, &[f64])| {
+            let error = errors.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+            Some((i as f64 + 0.6 + 0.8 * (k * few) as f64 / count, error))
+        };
+        pair.long_errors_mm.chunks(few).enumerate().filter_map(worst).collect()
+    };
+    accuracy.pairs.iter().enumerate().flat_map(of_pair).collect()
+}
+
+pub(super) fn residuals(calibration: &Calibration, judged: &Judged) -> Result<Markup> {
+    let rig = calibration.rig();
+    let mut figures = Vec::new();
+    for (field, camera) in judged.residual_pattern.fields.iter().zip([&rig.left, &rig.right]) {
+        figures.push(field_figure(field, camera.width, camera.height)?);
+    }
+    let noise = &calibration.noise;
+    let chi = match noise.reduced_chi_square {
+        Some(chi) => format!(
+            "The corners' own covariances explain the residuals with a reduced chi-square of {chi:.2}; {:.4} px were added to each \
+             coordinate.",
+            noise.added_px
+        ),
+        None => "The corners came without covariances; their scatter is that of the residuals.".to_owned(),
+    };
+    Ok(html! {
+        p {
+            (format!(
+                "Root mean square {:.4} px (length of the 2-D residual, both pictures), corner scatter {:.4} px a coordinate. {chi} \
+                 Neighbouring corners' residuals correlate by {:.3} (chance: {:.3}).",
+                calibration.rms_px,
+                noise.typical_px(&calibration.views),
+                judged.residual_pattern.neighbours.along,
+                judged.residual_pattern.neighbours.standard_error))
+        }
+        div.side { @for (svg, caption) in &figures { (page::figure(svg, caption)) } }
+    })
+}
+
+/// Mean residuals over one picture, magnified, and which cells have seen corners.
+fn field_figure(field: &Field, width: u32, height: u32) -> Result<(String, String)> {
+    let longest = field.cells.iter().map(|c| c.mean_px[0].hypot(c.mean_px[1])).fold(0.0, f64::max);
+    let cell = f64::from(width) / (field.cells.len() as f64).sqrt();
+    let magnify = if longest > 0.0 { 0.8 * cell / longest } else { 1.0 };
+    let arrows: Vec<[f64; 4]> = field
+        .cells
+        .iter()
+        .filter(|c| c.corners > 0)
+        .map(|c| [c.x_px, c.y_px, magnify * c.mean_px[0], magnify * c.mean_px[1]])
+        .collect();
+    let empty: Vec<(f64, f64)> = field.cells.iter().filter(|c| c.corners == 0).map(|c| (c.x_px, c.y_px)).collect();
+    let svg = Plot::new(&format!("Mean residuals, {} picture", field.side), "x, px", "y, px")
+        .vectors("", &arrows)
+        .points("no corner", &empty)
+        .x_range(-0.5, f64::from(width) - 0.5)
+        .y_range(-0.5, f64::from(height) - 0.5)
+        .y_down()
+        .equal_axes()
+        .svg()?;
+    let seen = field.cells.iter().filter(|c| c.corners > 0).count();
+    let caption = format!(
+        "Arrows are {magnify:.0} times too long; the longest is {longest:.4} px, the systematic part {:.4} px. Arrows that turn or point outward together \
+         are a lens that the model lacks. Corners reached {seen} of {} cells; what lies in the others is extrapolated.",
+        field.systematic_px,
+        field.cells.len()
+    );
+    Ok((svg, caption))
+}
+
+pub(super) fn volume(judged: &Judged) -> Result<Markup> {
+    let lying = |axis: usize| judged.volume.lengths.iter().filter(move |l| l.direction[axis] > 0.99);
+    let along = |axis: usize| -> Vec<(f64, f64)> { lying(axis).map(|l| (l.at_mm.z, l.sigma_mm())).collect() };
+    let svg = Plot::new(
+        &format!("Standard deviation of a length of {} mm", judged.volume.length_mm),
+        "distance from the left camera, mm",
+        "mm",
+    )
+    .points("along x", &along(0))
+    .points("along y", &along(1))
+    .points("along z", &along(2))
+    .svg()?;
+    let worst = |axis: usize| lying(axis).map(|l| l.sigma_mm()).fold(0.0, f64::max);
+    let caption = format!(
+        "{} lengths in the volume in which the boards stood, as far as both cameras see them; corner noise at both ends and the calibration together. The worst: \
+         {:.4} mm across, {:.4} mm along the line of sight.",
+        judged.volume.lengths.len(),
+        worst(0).max(worst(1)),
+        worst(2)
+    );
+    Ok(page::figure(&svg, &caption))
+}
