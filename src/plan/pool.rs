@@ -29,8 +29,9 @@ const STARTS: usize = 200;
 /// Tilt and turn of fresh poses, rad: as `simulate` varies them.
 const FRESH_RAD: f64 = 25.0 * std::f64::consts::PI / 180.0;
 
-/// Fresh poses a group, at which the accuracy is said.
+/// Fresh poses a group, at which the accuracy is said; and fewest of them, where the arm reaches a part of the sphere.
 const FRESH: usize = 50;
+const LEAST_FRESH: usize = 10;
 
 /// Turn about the flange's axis of candidates, rad.
 const SPIN_RAD: f64 = std::f64::consts::PI;
@@ -132,15 +133,16 @@ impl Pool<'_> {
                 Kind::Paper(total) | Kind::Pool(total) | Kind::Verify(total) => share(total, group),
             };
             let postures = self.postures(group)?;
-            let postures =
-                if matches!(kind, Kind::Pool(_) | Kind::Center) { postures.as_slice() } else { &postures[..1] };
-            let most = DRAWS * wanted.max(LEAST_DRAWN);
+            // The best posture, where it reaches enough of the field; after so many draws the others too.
+            let alone = if matches!(kind, Kind::Pool(_) | Kind::Center) { 0 } else { DRAWS * wanted.max(LEAST_DRAWN) };
+            let most = alone + DRAWS * wanted.max(LEAST_DRAWN);
             let tries: Vec<usize> = (0..most).collect();
             // In slices of the number wanted, so that no more is searched than needed; the order decides what is kept.
             let mut found: Vec<Candidate> = Vec::new();
             for slice in tries.chunks(wanted.max(LEAST_DRAWN)) {
+                let postures = |k: usize| if k < alone { &postures[..1] } else { &postures[..] };
                 let drawn: Vec<Candidate> =
-                    slice.par_iter().filter_map(|&k| self.candidate(kind, group, k, postures)).collect();
+                    slice.par_iter().filter_map(|&k| self.candidate(kind, group, k, postures(k))).collect();
                 found.extend(drawn.into_iter().take(wanted - found.len()));
                 if found.len() == wanted {
                     break;
@@ -148,6 +150,7 @@ impl Pool<'_> {
             }
             let needed = match kind {
                 Kind::Pool(_) => (2 * share(self.settings.samples, group)).min(wanted),
+                Kind::Fresh => LEAST_FRESH,
                 _ => wanted,
             };
             if found.len() < needed {
@@ -162,7 +165,7 @@ impl Pool<'_> {
     /// Postures at the placement's middle, or as near to it as there is one, the best first.
     fn postures(&self, group: usize) -> Result<Vec<Vec<f64>>> {
         let placement = &self.placements[group];
-        for k in 0..=UPRIGHT_DRAWS as usize {
+        for k in 0..=CENTER_DRAWS {
             let found = self.postures_at(&(placement.base_from_field * self.drawn(Kind::Center, k, group)));
             if !found.is_empty() {
                 return Ok(found);
@@ -221,7 +224,10 @@ impl Pool<'_> {
             // Upright in the middle of the field, or as near to that as the arm can: cameras stand where they can, too.
             Kind::Center => {
                 let share = (k as f64 / UPRIGHT_DRAWS).min(1.0);
-                at(draw.turn(share * FRESH_RAD, share * FRESH_RAD), draw.direction() * (share * CENTER_SHARE * radius))
+                let beyond = ((k as f64 - UPRIGHT_DRAWS) / (CENTER_DRAWS as f64 - UPRIGHT_DRAWS)).clamp(0.0, 1.0);
+                let wider = |most: f64| share * FRESH_RAD + beyond * (most - FRESH_RAD).max(0.0);
+                let turn = draw.turn(wider(self.scene.tilt_rad), wider(SPIN_RAD));
+                at(turn, draw.direction() * (share * CENTER_SHARE * radius))
             }
             Kind::Paper(_) => at(UnitQuaternion::identity(), draw.direction() * radius),
             Kind::Verify(_) | Kind::Fresh => at(draw.turn(FRESH_RAD, FRESH_RAD), draw.direction() * radius),
@@ -243,8 +249,10 @@ impl Pool<'_> {
     }
 }
 
-/// Draws over which a center is tilted and shifted more and more, where the arm cannot hold it upright in the middle.
+/// Draws over which a center is tilted and shifted more and more, where the arm cannot hold it upright in the middle: as far as fresh poses
+/// are. From there to the last draw it is tilted as far as the cameras see it and turned any way.
 const UPRIGHT_DRAWS: f64 = 50.0;
+const CENTER_DRAWS: usize = 250;
 
 /// Farthest a center may be from the middle, as a share of the sphere's radius.
 const CENTER_SHARE: f64 = 0.8;
