@@ -67,6 +67,32 @@ pub fn report(error: &impl Explain) -> String {
     text
 }
 
+/// Something a person should know although the command ends well.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Warning {
+    /// What, where and what to do, for the terminal.
+    pub text: String,
+    /// What it means and why, for the page and the results; empty where the text says all.
+    pub reason: String,
+}
+
+impl Warning {
+    /// Text and reason.
+    pub fn whole(&self) -> String {
+        let mut chars = self.reason.chars();
+        match chars.next() {
+            Some(first) => format!("{}. {}{}", self.text, first.to_uppercase(), chars.as_str()),
+            None => self.text.clone(),
+        }
+    }
+}
+
+impl From<String> for Warning {
+    fn from(text: String) -> Warning {
+        Warning { text, reason: String::new() }
+    }
+}
+
 /// A line of a text file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {

@@ -48,7 +48,7 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let accuracy = held_out::hold_out(&calibration, demand.board_uncertainty_mm)?;
     let second = second_board(args, board, &calibration, &out)?;
     let judged = Judged::new(&calibration, accuracy, second, &demand);
-    judged.advice.iter().chain(&judged.warnings).for_each(progress::warn);
+    judged.advice.iter().chain(judged.warnings.iter().map(|warning| &warning.text)).for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
     let pictures = pictures(args, &calibration, &judged);

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::diagnostic::Warning;
 use crate::imaging::Skipped;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
@@ -120,7 +121,7 @@ impl CameraCheckFile {
             disagreements: judged.disagreements.clone(),
             neighbour_correlation: judged.residual_pattern.neighbours,
             pair_scatter: calibration.pair_scatter.clone(),
-            warnings: judged.advice.iter().chain(&judged.warnings).cloned().collect(),
+            warnings: judged.advice.iter().cloned().chain(judged.warnings.iter().map(Warning::whole)).collect(),
         }
     }
 }

@@ -41,7 +41,14 @@ impl std::fmt::Display for Table {
 /// A number with so many decimals, or "n/a" where there is none or it is not finite.
 pub fn number(value: Option<f64>, decimals: usize) -> String {
     match value {
-        Some(v) if v.is_finite() => format!("{v:.decimals$}"),
+        Some(v) if v.is_finite() => {
+            let text = format!("{v:.decimals$}");
+            // What rounds to zero has no sign.
+            match text.strip_prefix('-') {
+                Some(zero) if zero.chars().all(|c| matches!(c, '0' | '.')) => zero.to_owned(),
+                _ => text,
+            }
+        }
         _ => "n/a".to_owned(),
     }
 }
@@ -72,6 +79,7 @@ mod tests {
         let mut table = Table::new(["axis", "mm"]);
         table.row(["x".to_owned(), number(Some(0.12345), 3)]);
         table.row(["µ-long", "n/a"]);
+        assert_eq!([number(Some(-0.00004), 4), number(Some(-0.00006), 4)], ["0.0000", "-0.0001"]);
         assert_eq!(table.to_string(), "axis       mm\nx       0.123\nµ-long    n/a\n");
     }
 }

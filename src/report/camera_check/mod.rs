@@ -3,6 +3,7 @@
 mod figures;
 mod summary;
 
+use crate::diagnostic::Warning;
 use crate::imaging::Corners;
 use crate::report::Result;
 use crate::report::blur;
@@ -30,6 +31,12 @@ pub fn worst_first(judged: &Judged) -> Vec<usize> {
     order
 }
 
+/// Warnings with their reasons, but for those whose reason stands in the table of evidence.
+fn warnings(judged: &Judged) -> Vec<String> {
+    let said = |warning: &Warning| judged.evidence.iter().any(|line| line.detail == warning.reason);
+    judged.warnings.iter().map(|warning| if said(warning) { warning.text.clone() } else { warning.whole() }).collect()
+}
+
 /// The report, with pictures of some pairs.
 pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictures: &[PairPicture]) -> Result<String> {
     let tone = match judged.verdict {
@@ -42,7 +49,7 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
         (ledger(judged))
         @if !judged.advice.is_empty() { p { "What to photograph next, before anything below is relied on:" } (page::warnings(&judged.advice)) }
         @if !judged.warnings.is_empty() { p { "What else to know:" } }
-        (page::warnings(&judged.warnings))
+        (page::warnings(&warnings(judged)))
         (scale(judged))
         h2 { "Lengths on pairs that the cameras had not seen" }
         (lengths(judged)?)

@@ -1,5 +1,6 @@
 //! All that was asked of a calibration: held-out lengths, a second board, residuals, models, coverage, and the verdict.
 
+use crate::diagnostic::Warning;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::evidence::{self, Evidence, Facts};
 use crate::stereo::judge::held_out::Accuracy;
@@ -32,7 +33,7 @@ pub struct Judged {
     /// What to photograph next, where the views are too few or too much alike.
     pub advice: Vec<String>,
     /// What else a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// What lengths are judged by.
@@ -63,10 +64,10 @@ impl Judged {
             tolerance_mm,
             expansion: Expansion::new(calibration.pair_scatter.groups, demand.board_uncertainty_mm),
         });
-        let mut warnings = Vec::from_iter(calibration.rig().unusual());
+        let mut warnings = Vec::from_iter(calibration.rig().unusual().map(Warning::from));
         // The held-out lengths are the result itself and stand in its first line.
         let doubts = evidence.iter().skip(1).filter(|line| line.allows != Verdict::Pass);
-        warnings.extend(doubts.map(|line| format!("{}: {}. {}", line.what, line.figure(), capital(&line.detail))));
+        warnings.extend(doubts.map(Evidence::warning));
         warnings.extend(print_scatter(calibration, &accuracy, tolerance_mm));
         Judged {
             tolerance_mm,
@@ -104,13 +105,8 @@ impl Judged {
     }
 }
 
-fn capital(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or_else(String::new, |first| first.to_uppercase().chain(chars).collect())
-}
-
 /// Says where it is the board that scatters and not the corners, by enough to matter: both pictures then see the same deviations.
-fn print_scatter(calibration: &Calibration, accuracy: &Accuracy, tolerance_mm: f64) -> Option<String> {
+fn print_scatter(calibration: &Calibration, accuracy: &Accuracy, tolerance_mm: f64) -> Option<Warning> {
     /// Of independent corners the mean of thousands of points lies within a tenth of one.
     const SHARED: f64 = 0.25;
     /// At both ends, at 95 %, a place that scatters by this share of the tolerance takes a twelfth of it.
@@ -122,10 +118,15 @@ fn print_scatter(calibration: &Calibration, accuracy: &Accuracy, tolerance_mm: f
     let depth_mm = depths.sum::<f64>() / calibration.values.poses.len().max(1) as f64;
     let sigma_px = calibration.noise.typical_px(&calibration.views);
     let place_mm = sigma_px * depth_mm / calibration.rig().left.fx;
-    (place_mm > MATTERS * tolerance_mm).then(|| format!(
-        "left and right picture agree on the corners {:.0} times better than the residuals let expect: what scatters is the places of the corners on the \
-         board, by about {:.4} mm each, not what the cameras see of them. A better board, not more pictures, would lower the errors",
-        1.0 / accuracy.rays_chi_square.sqrt(),
-        place_mm
-    ))
+    (place_mm > MATTERS * tolerance_mm).then(|| Warning {
+        text: format!(
+            "the corners' places on the board scatter by about {place_mm:.4} mm each: a better board, not more pictures, would lower the \
+             errors"
+        ),
+        reason: format!(
+            "left and right picture agree on the corners {:.0} times better than the residuals let expect, so that it is not what the \
+             cameras see of them",
+            1.0 / accuracy.rays_chi_square.sqrt()
+        ),
+    })
 }

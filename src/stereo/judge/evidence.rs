@@ -5,6 +5,7 @@
 
 use serde::Serialize;
 
+use crate::diagnostic::Warning;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::doubtful_corners::CONTRADICTED;
 use crate::stereo::judge::held_out::Accuracy;
@@ -31,6 +32,8 @@ pub struct Evidence {
     pub allows: Verdict,
     /// What it means, with the reason of the limit.
     pub detail: String,
+    /// What to do where it does not allow a pass; empty where it always does.
+    pub remedy: &'static str,
 }
 
 /// A figure with the digits that count: four decimals below one, none for whole numbers.
@@ -43,6 +46,11 @@ pub fn number(value: f64) -> String {
 }
 
 impl Evidence {
+    /// The warning of a line that does not allow a pass.
+    pub fn warning(&self) -> Warning {
+        Warning { text: format!("{}: {}; {}", self.what, self.figure(), self.remedy), reason: self.detail.clone() }
+    }
+
     /// What this line says, in one: the value against its limit.
     pub fn figure(&self) -> String {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
@@ -114,6 +122,7 @@ fn held_out_lengths(facts: &Facts) -> Evidence {
     };
     Evidence {
         what: "held-out lengths",
+        remedy: "look at the worst pair in camera-check.html, and at the lines below it",
         value: Some(worst.at_most_mm()),
         limit: Some(facts.tolerance_mm),
         unit: "mm",
@@ -150,6 +159,7 @@ fn any_length(facts: &Facts) -> Evidence {
     };
     Evidence {
         what: "any length in the working volume",
+        remedy: "add pairs with the board where it is least certain, and tilted",
         value,
         limit: Some(facts.tolerance_mm),
         unit: "mm",
@@ -165,6 +175,7 @@ fn models(facts: &Facts) -> Evidence {
     });
     Evidence {
         what: "spread of admissible models",
+        remedy: "add pairs with the board at the borders of both pictures",
         value: Some(value),
         limit: Some(facts.tolerance_mm),
         unit: "mm",
@@ -196,6 +207,7 @@ fn residuals(facts: &Facts) -> Evidence {
     };
     Evidence {
         what: "residual correlation",
+        remedy: "look at the map of residuals in camera-check.html; it takes another `--lens`, `--board-shape bowed` or a better board",
         value,
         limit: Some(facts.tolerance_mm),
         unit: "mm",
@@ -219,6 +231,7 @@ fn pair_scatter(facts: &Facts) -> Evidence {
     };
     Evidence {
         what: "scatter of pairs",
+        remedy: "add pairs with the board elsewhere and tilted otherwise",
         value: scatter.ratio,
         limit: None,
         unit: "",
@@ -233,6 +246,7 @@ fn folds(facts: &Facts) -> Evidence {
     let value = changes.fold(0.0_f64, |most, mm| most.max(mm.abs()));
     Evidence {
         what: "rigs without some pairs",
+        remedy: "add pairs with the board elsewhere and tilted otherwise",
         value: Some(value),
         limit: Some(facts.tolerance_mm),
         unit: "mm",
@@ -253,6 +267,7 @@ fn rays(facts: &Facts) -> Evidence {
     let named = if doubtful.pairs.is_empty() { String::new() } else { format!(", in {}", doubtful.named()) };
     Evidence {
         what: "rays that contradict each other",
+        remedy: "look at the corners of the named pairs for a hand, glare or shadow",
         value: Some(value),
         limit: Some(LIMIT_PERCENT),
         unit: "%",
@@ -273,6 +288,7 @@ fn epipolar(facts: &Facts) -> Evidence {
     let limit = px_per_mm.map(|px| px * facts.tolerance_mm);
     Evidence {
         what: "epipolar error",
+        remedy: "look at the worst pair in camera-check.html",
         value: Some(error.rms_px),
         limit,
         unit: "px",
@@ -302,6 +318,7 @@ fn corners_discarded(facts: &Facts) -> Evidence {
     let named = if named.is_empty() { String::new() } else { format!(", most in {}", named.join(", ")) };
     Evidence {
         what: "corners discarded",
+        remedy: "look at the pairs that lost most of them, and take those again",
         value: Some(value),
         limit: Some(LIMIT_PERCENT),
         unit: "%",
@@ -330,6 +347,7 @@ fn pairs_discarded(facts: &Facts) -> Evidence {
     let named = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
     Evidence {
         what: "pairs discarded",
+        remedy: "see why each is not used, and take those again",
         value: Some(value),
         limit: Some(LIMIT_PERCENT),
         unit: "%",
@@ -363,6 +381,7 @@ fn standing(facts: &Facts) -> Evidence {
     };
     Evidence {
         what: "last pairs that contradict the rig",
+        remedy: "add pairs of the rig as it stands",
         value: Some(after.len() as f64),
         limit: Some(0.0),
         unit: "",
@@ -377,6 +396,7 @@ fn poses(facts: &Facts) -> Evidence {
     let groups = facts.calibration.pair_scatter.groups as f64;
     Evidence {
         what: "pairs with poses of their own",
+        remedy: "add pairs with the board elsewhere and tilted otherwise",
         value: Some(groups),
         limit: Some(FEWEST),
         unit: "",
@@ -396,6 +416,7 @@ fn tilts(facts: &Facts) -> Evidence {
     let value = horizontal.max(vertical);
     Evidence {
         what: "tilts of the boards",
+        remedy: "add pairs tilted by 20 to 45 degrees",
         value: Some(value),
         limit: Some(LEAST_DEG),
         unit: "deg",
@@ -419,6 +440,7 @@ fn reach(facts: &Facts) -> [Evidence; 2] {
         unit,
         allows: Verdict::Pass,
         detail,
+        remedy: "",
     };
     [
         line(
@@ -444,6 +466,7 @@ fn reach(facts: &Facts) -> [Evidence; 2] {
 fn second_board(facts: &Facts) -> Evidence {
     let line = |value, allows, detail| Evidence {
         what: "second board",
+        remedy: "check `--check-squares` and `--check-square-mm`, and that the rig has not moved between the two boards",
         value,
         limit: Some(facts.tolerance_mm),
         unit: "mm",
