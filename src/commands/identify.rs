@@ -97,13 +97,13 @@ fn check_calibration(out: &OutDir, measurements: &Utf8Path) -> Option<Utf8PathBu
     let record = folder.join("measure.json");
     // Without provenance nothing says that they belong together but what they hold.
     let Some(measured_by) = Provenance::of_json(&record) else { return Some(record) };
-    let (csv, _) = Digested::read(measurements)?;
+    let csv = Digested::read(measurements)?;
     if !measured_by.outputs.iter().any(|output| output.sha256 == csv.sha256) {
         return None;
     }
     let calibration = folder.join("calibration.json");
     let used = measured_by.inputs.last();
-    if let (Some(used), Some((here, _))) = (used, Digested::read(&calibration))
+    if let (Some(used), Some(here)) = (used, Digested::read(&calibration))
         && !used.same_content(&here)
     {
         progress::warn(format!(

@@ -44,7 +44,7 @@ fn read(path: &Utf8Path) -> Result<Option<Value>> {
 /// Where a result was made of other files than those that stand in the folder now, as far as the results say what they were made of.
 fn breaks(folder: &Utf8Path) -> Vec<String> {
     let provenance = |name: &str| Provenance::of_json(&folder.join(name));
-    let now = |name: &str| Digested::read(&folder.join(name)).map(|(digested, _)| digested);
+    let now = |name: &str| Digested::read(&folder.join(name));
     let mut breaks = Vec::new();
     let mut compare = |then: Option<Digested>, name: &str, of: &str, command: &str| {
         if let (Some(then), Some(now)) = (then, now(name))

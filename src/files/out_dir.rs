@@ -13,7 +13,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use camino::{Utf8Path, Utf8PathBuf};
 use serde::Serialize;
 
-use super::provenance::{Digested, KEY, Provenance, Run, sha256};
+use super::provenance::{Digested, KEY, Provenance, Run, pictures, sha256};
 use super::{Durability, Error, Result, is_temporary, to_json, write_atomically};
 use crate::progress;
 
@@ -38,6 +38,10 @@ pub struct OutDir {
 #[derive(Debug, Default)]
 struct State {
     provenance: Option<Provenance>,
+    /// Folders of pictures that are not yet among the provenance's inputs, with their places there.
+    folders: Vec<(usize, Utf8PathBuf)>,
+    /// Hashes of the pictures that were read.
+    pictures: BTreeMap<Utf8PathBuf, String>,
     /// Hashes by name. More than one where a run was killed between writing here and renaming the file.
     written: BTreeMap<String, BTreeSet<String>>,
     log: Option<File>,
@@ -64,16 +68,30 @@ impl OutDir {
     pub fn for_run(mut self, run: &Run, inputs: &[&Utf8Path]) -> OutDir {
         self.force = run.force;
         let mut provenance = run.command.clone().map(Provenance::new);
+        let mut folders = Vec::new();
         for path in run.inputs.iter().map(Utf8PathBuf::as_path).chain(inputs.iter().copied()) {
-            if let Some((digested, files)) = Digested::read(path) {
-                self.inputs.extend(files.iter().filter_map(|file| file.as_std_path().canonicalize().ok()));
-                if let Some(provenance) = &mut provenance {
-                    provenance.inputs.push(digested);
-                }
+            let files = if path.is_dir() { pictures(path) } else { vec![path.to_owned()] };
+            self.inputs.extend(files.iter().filter_map(|file| file.as_std_path().canonicalize().ok()));
+            let Some(provenance) = &mut provenance else { continue };
+            match Digested::read(path) {
+                Some(digested) => provenance.inputs.push(digested),
+                // Pictures are hashed as they are read.
+                None if path.is_dir() => folders.push((provenance.inputs.len() + folders.len(), path.to_owned())),
+                None => (),
             }
         }
-        self.state().provenance = provenance;
+        let mut state = self.state();
+        (state.provenance, state.folders) = (provenance, folders);
+        drop(state);
         self
+    }
+
+    /// Remembers what was read from a picture, for the provenance.
+    pub fn picture_read(&self, path: &Utf8Path, bytes: &[u8]) {
+        if !self.state().folders.is_empty() {
+            let hash = sha256(bytes);
+            self.state().pictures.insert(path.to_owned(), hash);
+        }
     }
 
     /// The path of a file in the folder.
@@ -88,7 +106,23 @@ impl OutDir {
 
     /// What this run has read and written so far; `None` where no provenance is wanted.
     pub fn provenance(&self) -> Option<Provenance> {
-        self.state().provenance.clone()
+        let (folders, known) = {
+            let mut state = self.state();
+            (std::mem::take(&mut state.folders), std::mem::take(&mut state.pictures))
+        };
+        // Not under the lock: pictures that nobody has read are hashed by all threads.
+        let digested: Vec<_> = folders.iter().map(|(at, path)| (at, Digested::folder(path, &known))).collect();
+        let mut state = self.state();
+        let inputs = state.provenance.as_mut().map(|provenance| &mut provenance.inputs);
+        if let Some(inputs) = inputs {
+            for (at, folder) in digested {
+                // One that could not be read leaves those after it a place too far.
+                if let Some(folder) = folder {
+                    inputs.insert((*at).min(inputs.len()), folder);
+                }
+            }
+        }
+        state.provenance.clone()
     }
 
     /// Says how the measurements were made that this run reads.

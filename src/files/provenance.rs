@@ -3,9 +3,11 @@
 //! The hashes are SHA-256, so that `sha256sum` checks them. Everything but the date and the command line is the same for
 //! the same inputs; the date is that of `SOURCE_DATE_EPOCH` (reproducible-builds.org) where that is set.
 
+use std::collections::BTreeMap;
 use std::time::{Duration, SystemTime};
 
 use camino::{Utf8Path, Utf8PathBuf};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -106,25 +108,25 @@ impl Digested {
         }
     }
 
-    /// A file or folder that is read, with the files it stands for; `None` where it cannot be read: its reader will say why.
-    pub fn read(path: &Utf8Path) -> Option<(Digested, Vec<Utf8PathBuf>)> {
-        let kind = std::fs::metadata(path).ok()?;
-        if kind.is_dir() {
-            let files = pictures(path);
-            let mut lines = String::new();
-            for file in &files {
-                let name = file.strip_prefix(path).unwrap_or(file);
-                lines.push_str(&format!("{}  {name}\n", sha256_of_file(file)?));
-            }
-            let digested = Digested {
-                file: path.to_string(),
-                sha256: sha256(lines.as_bytes()),
-                pictures: Some(files.len()),
-                content_sha256: None,
-            };
-            return Some((digested, files));
-        }
-        if !kind.is_file() {
+    /// The pictures of a folder; `known` are the hashes of those that were read. `None` where one of the others cannot be read.
+    pub fn folder(path: &Utf8Path, known: &BTreeMap<Utf8PathBuf, String>) -> Option<Digested> {
+        let files = pictures(path);
+        let hash = |file: &Utf8PathBuf| known.get(file).cloned().or_else(|| sha256_of_file(file));
+        let hashes: Vec<String> = files.par_iter().map(hash).collect::<Option<_>>()?;
+        let line =
+            |(hash, file): (&String, &Utf8PathBuf)| format!("{hash}  {}\n", file.strip_prefix(path).unwrap_or(file));
+        let lines: String = hashes.iter().zip(&files).map(line).collect();
+        Some(Digested {
+            file: path.to_string(),
+            sha256: sha256(lines.as_bytes()),
+            pictures: Some(files.len()),
+            content_sha256: None,
+        })
+    }
+
+    /// A file that is read; `None` where it cannot be: its reader will say why.
+    pub fn read(path: &Utf8Path) -> Option<Digested> {
+        if !path.is_file() {
             return None;
         }
         let content_sha256 = match path.extension() {
@@ -132,7 +134,7 @@ impl Digested {
             _ => None,
         };
         let sha256 = sha256_of_file(path)?;
-        Some((Digested { file: path.to_string(), sha256, pictures: None, content_sha256 }, vec![path.to_owned()]))
+        Some(Digested { file: path.to_string(), sha256, pictures: None, content_sha256 })
     }
 
     /// Whether both were made of the same content, whatever their names and dates.
@@ -145,7 +147,7 @@ impl Digested {
 }
 
 /// The pictures of a folder and of its `left/` and `right/`, in the order of their names.
-fn pictures(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
+pub fn pictures(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
     let mut found = Vec::new();
     for folder in [folder.to_owned(), folder.join("left"), folder.join("right")] {
         for entry in folder.read_dir_utf8().into_iter().flatten().flatten() {
@@ -202,11 +204,16 @@ mod tests {
         std::fs::write(root.join("left/b.png"), "b").unwrap();
         std::fs::write(root.join("a.JPG"), "a").unwrap();
         std::fs::write(root.join("poses.csv"), "x").unwrap();
-        let (first, files) = Digested::read(root).unwrap();
-        assert_eq!((first.pictures, files.len()), (Some(2), 2));
+        let read = || Digested::folder(root, &BTreeMap::new()).unwrap();
+        let first = read();
+        assert_eq!(first.pictures, Some(2));
+        assert_eq!(first.sha256, sha256(format!("{}  a.JPG\n{}  left/b.png\n", sha256(b"a"), sha256(b"b")).as_bytes()));
         std::fs::write(root.join("poses.csv"), "y").unwrap();
-        assert_eq!(Digested::read(root).unwrap().0, first);
+        assert_eq!(read(), first);
         std::fs::write(root.join("left/b.png"), "c").unwrap();
-        assert_ne!(Digested::read(root).unwrap().0.sha256, first.sha256);
+        assert_ne!(read().sha256, first.sha256);
+        // What counts is what was read, whatever stands there since.
+        let known = BTreeMap::from([(root.join("left/b.png"), sha256(b"b"))]);
+        assert_eq!(Digested::folder(root, &known).unwrap(), first);
     }
 }

@@ -121,6 +121,7 @@ fn read_and_look(path: &Utf8Path, header: &Header, wanted: &Wanted<'_>) -> Look 
     let _claim = Claim::wait(header);
     let bytes = image::read(path, header)?;
     let Some(cache) = wanted.cache else { return look_at(bytes, path, wanted) };
+    cache.out.picture_read(path, &bytes);
     let entry = cache.entry(&bytes, wanted.board, wanted.mosaic);
     cache.read(&entry, wanted.board).unwrap_or_else(|| {
         let look = look_at(bytes, path, wanted);

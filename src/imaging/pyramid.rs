@@ -4,6 +4,8 @@
 //! place on a copy becomes one in the picture and back is said here and nowhere else. 16-bit values are stretched over the range that
 //! all but a few in a thousand use, so that a hot pixel or a lamp does not flatten the board.
 
+use std::ops::AddAssign;
+
 use nalgebra::Point2;
 
 use super::image::{Grey, Grey8, Image, Picture};
@@ -53,9 +55,9 @@ pub fn factor_for(picture: &Picture, pixels: usize) -> usize {
 
 /// A copy reduced by a whole factor; what is left over at the right and lower border is dropped.
 fn reduced(picture: &Picture, factor: usize) -> Grey8 {
-    let factor = factor.clamp(1, picture.width().min(picture.height()).max(1));
+    let factor = factor.clamp(1, picture.width().min(picture.height()).clamp(1, MOST_REDUCED));
     match &picture.grey {
-        Grey::Eight(image) => means(image, factor, u32::from, (0.0, 255.0)),
+        Grey::Eight(image) => means(image, factor, u16::from, (0.0, 255.0)),
         Grey::Sixteen(image) => {
             let (low, high) = range(image);
             // A hot pixel must not shine over its block.
@@ -64,23 +66,30 @@ fn reduced(picture: &Picture, factor: usize) -> Grey8 {
     }
 }
 
-/// Means of `factor` x `factor` pixels, `low..high` stretched to 0..255.
-fn means<T: Copy>(image: &Image<T>, factor: usize, value: impl Fn(T) -> u32, (low, high): (f64, f64)) -> Grey8 {
+/// Factor up to which 2^8 values of 8 bits fit into a sum of 16, and 2^16 of 16 into one of 32; no picture is so large.
+const MOST_REDUCED: usize = 256;
+
+/// Means of `factor` x `factor` pixels, `low..high` stretched to 0..255. `value` is a pixel as a type that holds the sum of a column.
+fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
+    image: &Image<T>,
+    factor: usize,
+    value: impl Fn(T) -> S,
+    (low, high): (f64, f64),
+) -> Grey8 {
     let (w, h) = (image.width / factor, image.height / factor);
     let mut pixels = Vec::with_capacity(w * h);
     // Whole lines first: adding them up is what a processor does sixteen at a time.
-    let mut sums = vec![0u32; w * factor];
+    let mut sums = vec![S::default(); w * factor];
     let scale = 255.0 / (high - low).max(1.0);
-    // 2^16 values of 16 bits just fit; no picture is reduced by more than 256.
     let unit = scale / (factor * factor) as f64;
     for y in 0..h {
-        sums.fill(0);
+        sums.fill(S::default());
         for line in image.pixels[y * factor * image.width..].chunks_exact(image.width).take(factor) {
             for (sum, &v) in sums.iter_mut().zip(line) {
                 *sum += value(v);
             }
         }
-        let groups = sums.chunks_exact(factor).map(|group| group.iter().sum::<u32>());
+        let groups = sums.chunks_exact(factor).map(|group| group.iter().map(|&sum| sum.into()).sum::<u32>());
         pixels.extend(groups.map(|sum| (f64::from(sum) * unit - low * scale + 0.5) as u8));
     }
     Grey8 { width: w, height: h, pixels }

@@ -71,14 +71,14 @@ impl<'a> Near<'a> {
         Near { picture, candidates, cells }
     }
 
-    /// Candidates within a distance, with it, the nearest first.
-    fn within(&self, at: &Point2<f64>, distance: f64) -> Vec<(f64, usize)> {
+    /// Candidates in question within a distance, with theirs, the nearest first.
+    fn within(&self, at: &Point2<f64>, distance: f64, asked: impl Fn(f64, usize) -> bool) -> Vec<(f64, usize)> {
         let (low, high) = (cell_of(&(at - Vector2::repeat(distance))), cell_of(&(at + Vector2::repeat(distance))));
         let mut found: Vec<(f64, usize)> = Vec::new();
         for x in low.0..=high.0 {
             for (_, members) in self.cells.range((x, low.1)..=(x, high.1)) {
                 let distances = members.iter().map(|&i| ((self.candidates[i].at - at).norm(), i));
-                found.extend(distances.filter(|(d, _)| *d <= distance));
+                found.extend(distances.filter(|&(d, k)| d <= distance && asked(d, k)));
             }
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -90,11 +90,18 @@ impl Near<'_> {
     /// True where two candidates are the ends of a square's edge: their colours are those of neighbours, and along both halves of the way
     /// from one to the other it is bright on the side on which it is bright at the ends.
     fn edge(&self, a: usize, b: usize) -> bool {
+        self.ends(a, b) && self.shows_edge(a, b)
+    }
+
+    /// True where two candidates by themselves could be neighbours: about as strong, and coloured as such.
+    fn ends(&self, a: usize, b: usize) -> bool {
         let (a, b) = (&self.candidates[a], &self.candidates[b]);
-        let alike = a.strength.max(b.strength) / WEAKER <= a.strength.min(b.strength);
-        if !alike || !opposite(a, b) {
-            return false;
-        }
+        a.strength.max(b.strength) / WEAKER <= a.strength.min(b.strength) && opposite(a, b)
+    }
+
+    /// True where the picture between two such candidates is that along an edge.
+    fn shows_edge(&self, a: usize, b: usize) -> bool {
+        let (a, b) = (&self.candidates[a], &self.candidates[b]);
         let step = b.at - a.at;
         let bright_left = (a.axis - step.y.atan2(step.x)).rem_euclid(PI) < FRAC_PI_2;
         let sign = if bright_left { 1.0 } else { -1.0 };
@@ -156,9 +163,9 @@ fn grow(candidates: &[Candidate], near: &Near, first: usize) -> Vec<(Place, usiz
             let stray = STRAY * step.norm();
             let around = [(1, 0), (0, 1), (-1, 0), (0, -1)].map(|(di, dj)| placed.get(&(next.0 + di, next.1 + dj)));
             let found = near
-                .within(&(here.at + step), stray)
+                .within(&(here.at + step), stray, |_, k| !used[k])
                 .into_iter()
-                .find(|&(_, k)| !used[k] && around.iter().flatten().all(|&&neighbour| near.edge(neighbour, k)));
+                .find(|&(_, k)| around.iter().flatten().all(|&&neighbour| near.edge(neighbour, k)));
             if let Some((_, k)) = found {
                 used[k] = true;
                 placed.insert(next, k);
@@ -187,20 +194,25 @@ fn seed_steps(candidates: &[Candidate], near: &Near, first: usize) -> Option<[Ve
     /// Edges nearer to each other than this are no board's, rad.
     const LEAST_ANGLE: f64 = 0.35;
     let here = &candidates[first];
-    let mut reach = 16.0;
+    let mut nearest: Option<Vector2<f64>> = None;
+    // In rings: most candidates have their neighbours near, and those that have none see much of the picture.
+    let (mut inner, mut reach) = (0.0, 16.0);
     while reach < 600.0 {
-        let steps: Vec<Vector2<f64>> = near
-            .within(&here.at, reach)
-            .into_iter()
-            .filter(|&(_, k)| k != first && near.edge(first, k))
-            .map(|(_, k)| candidates[k].at - here.at)
-            .collect();
-        if let Some(a) = steps.first()
-            && let Some(b) = steps.iter().find(|b| (a.perp(b).abs() / (a.norm() * b.norm())).asin() > LEAST_ANGLE)
-        {
-            return Some([*a, *b]);
+        let ring = |distance: f64, k: usize| (distance > inner || inner == 0.0) && k != first && near.ends(first, k);
+        for (_, k) in near.within(&here.at, reach, ring) {
+            if !near.shows_edge(first, k) {
+                continue;
+            }
+            let step = candidates[k].at - here.at;
+            match nearest {
+                None => nearest = Some(step),
+                Some(a) if (a.perp(&step).abs() / (a.norm() * step.norm())).asin() > LEAST_ANGLE => {
+                    return Some([a, step]);
+                }
+                Some(_) => (),
+            }
         }
-        reach *= 2.0;
+        (inner, reach) = (reach, 2.0 * reach);
     }
     None
 }
