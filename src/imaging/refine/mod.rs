@@ -16,7 +16,7 @@ mod outlying_pixels;
 pub mod saddle_fit;
 mod veil;
 
-use nalgebra::{Matrix2, Point2, Vector2};
+use nalgebra::{Matrix2, Point2, RowVector2, Vector2};
 
 use self::acceptance::{agrees, plausible};
 use self::cell::Cell;
@@ -36,9 +36,12 @@ const BAND_BLURS: f64 = 3.5;
 /// The next edge's blur reaches this many blurs into the square.
 const MARGIN_BLURS: f64 = 3.0;
 
-/// Half of the largest window, px. The gain goes with the root of the window, the time with the window; beyond this a
-/// board's own making (1 um is 0.02 px at 0.05 mm a px) hides all gain.
-const MOST_HALF_PX: f64 = 80.0;
+/// Half of the largest window, px. The gain goes with the root of the window, the time with the window; at this size the bend of the
+/// edges, known from the board's other corners, is still known well enough.
+const MOST_HALF_PX: f64 = 250.0;
+/// What a window leaves of each edge at least, as a share of it. Edges bend at crossings that are off their places; from windows that reach
+/// from crossing to crossing nobody could tell which crossing it is.
+const LEAST_MARGIN: f64 = 0.15;
 /// Half of the near window, px and in blurs: the least that holds an arm on each side of the crossing.
 const NEAR_HALF_PX: f64 = 10.0;
 const NEAR_HALF_BLURS: f64 = 7.0;
@@ -98,8 +101,39 @@ struct Full<'a, T> {
 struct Windows {
     cell: Cell,
     start: Model,
+    /// Whether the full window is hardly larger than the near one.
+    alone: bool,
     near: Option<Measured>,
     full: Option<Measured>,
+}
+
+impl Windows {
+    /// The same with other bends of the edges.
+    fn rebent(self, bend: [f64; 2]) -> Windows {
+        let start = Model { bend, ..self.start };
+        Windows { start, full: self.full.map(|full| full.rebent(bend, &self.cell)), ..self }
+    }
+}
+
+impl Measured {
+    /// What the fit would be with other bends: a straight edge through a window is off by a sixth of bend times half the window squared.
+    fn rebent(self, bend: [f64; 2], cell: &Cell) -> Measured {
+        let Measured { px, fit, reach } = self;
+        let off = |k: usize| (bend[k] - fit.model.bend[k]) * (reach[k] * cell.edges[k].norm()).powi(2) / 6.0;
+        let normals = fit.model.angles_rad.map(|angle| RowVector2::new(-angle.sin(), angle.cos()));
+        let step =
+            Matrix2::from_rows(&normals).try_inverse().map_or(Vector2::zeros(), |m| m * Vector2::new(off(0), off(1)));
+        let model = Model { corner: fit.model.corner + step, bend, ..fit.model };
+        Measured { px: px + step, fit: Fit { model, ..fit }, reach }
+    }
+}
+
+/// Bends as these windows show them, where there is one.
+fn bends_by(seen: &Lattice<Windows>, places: &Places, which: impl Fn(&Windows) -> Option<Measured>) -> Vec<[f64; 2]> {
+    bends(&Lattice::from_fn(seen.columns, seen.rows, |col, row| {
+        let measured = seen.get(col, row).and_then(&which).map(|m| m.px);
+        measured.or_else(|| places.get(col, row).copied())
+    }))
 }
 
 impl<T: Copy + Into<f64>> Full<'_, T> {
@@ -111,26 +145,36 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
     fn measure(&self, detected: &Detected) -> Lattice<Measured> {
         let mut window = Window::default();
         let coarse = coarse(detected, &mut window);
-        let bends = bends(&coarse.map(|m| detected.level.to_picture(&m.px)));
         let columns = coarse.columns;
+        let at = |bends: &[[f64; 2]], col: usize, row: usize| bends[row * columns + col];
+        let coarse_bends = bends(&coarse.map(|m| detected.level.to_picture(&m.px)));
         // A neighbour that could not be measured still says how far the squares reach.
         let places: Places = Lattice::from_fn(columns, coarse.rows, |col, row| {
             let px = coarse.get(col, row).map_or(detected.corners.get(col, row), |m| Some(&m.px))?;
             Some(detected.level.to_picture(px))
         });
         let scale = detected.level.scale();
-        let seen: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
+        let near: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
             let from = coarse.get(col, row)?;
             let cell = Cell::of(&places, col, row)?;
             let start = Model {
                 corner: Vector2::zeros(),
-                bend: bends[row * columns + col],
+                bend: at(&coarse_bends, col, row),
                 // The copy's grey values are not those above the veil: without contrast the fit finds levels of its own.
                 half_contrast: 0.0,
                 ..enlarged(&from.fit.model, scale)
             };
             // On a copy of full size the first fit is a measurement already.
-            Some(self.windows(cell, start, (scale == 1.0).then_some(*from), &mut window))
+            Some(self.near(cell, start, (scale == 1.0).then_some(*from), &mut window))
+        });
+        // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large ones from.
+        let near_bends = bends_by(&near, &places, |windows| windows.near);
+        let full: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            Some(self.full(near.get(col, row)?.clone(), at(&near_bends, col, row), &mut window))
+        });
+        let full_bends = bends_by(&full, &places, |windows| windows.full.or(windows.near));
+        let seen = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            Some(full.get(col, row)?.clone().rebent(at(&full_bends, col, row)))
         });
         let full: Vec<Measured> = seen.iter().filter_map(|(_, _, windows)| windows.full).collect();
         let board = acceptance::Board::of(&full);
@@ -141,18 +185,25 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
         measured
     }
 
-    /// Fits in the near window, then in the full one, each started where the one before it ended: most steps are taken where they are
-    /// cheap, and the blur is that of the picture, not of the copy, so fewer pixels count as near an edge.
-    fn windows(&self, cell: Cell, start: Model, coarse: Option<Measured>, window: &mut Window) -> Windows {
-        let full_px = (cell.side() - margin_px(&start, &cell)).max(0.5 * cell.side()).min(MOST_HALF_PX);
+    /// A fit in the near window, where the full one is enough larger to tell more; otherwise what the copy told, if that is of full size.
+    fn near(&self, cell: Cell, start: Model, coarse: Option<Measured>, window: &mut Window) -> Windows {
+        let full_px = half_px(cell.side(), margin_px(&start, &cell));
         let near_px = near_half_px(&start);
-        if near_px > NEAR_SHARE * full_px {
-            let full = self.fit_within(MOST_HALF_PX, &cell, &start, window);
-            return Windows { cell, start, near: coarse, full };
-        }
-        let near = self.fit_within(near_px, &cell, &start, window);
-        let full = near.as_ref().and_then(|near| self.fit_from(near, MOST_HALF_PX, &cell, window));
-        Windows { cell, start, near, full }
+        let alone = near_px > NEAR_SHARE * full_px;
+        let near = if alone { coarse } else { self.fit_within(near_px, &cell, &start, window) };
+        Windows { cell, start, alone, near, full: None }
+    }
+
+    /// A fit in the full window, started where the one in the near window ended: most steps are taken where they are cheap, and the blur is
+    /// that of the picture, not of the copy, so fewer pixels count as near an edge.
+    fn full(&self, seen: Windows, bend: [f64; 2], window: &mut Window) -> Windows {
+        let seen = Windows { start: Model { bend, ..seen.start }, ..seen };
+        let full = match &seen.near {
+            _ if seen.alone => self.fit_within(MOST_HALF_PX, &seen.cell, &seen.start, window),
+            None => None,
+            Some(near) => self.fit_from(near, MOST_HALF_PX, &seen, window),
+        };
+        Windows { full, ..seen }
     }
 
     /// A corner whose pixels lie farther from the model than is usual on the board, fitted again without those that it cannot explain, where
@@ -200,16 +251,16 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
             return seen.full;
         }
         let near = seen.near.as_ref()?;
-        let between = self.fit_from(near, BETWEEN * near_half_px(&seen.start), &seen.cell, window);
+        let between = self.fit_from(near, BETWEEN * near_half_px(&seen.start), &seen, window);
         let between = between.filter(|between| agrees(near, between) && board.holds_in_small_window(between));
         between.or_else(|| board.holds_in_small_window(near).then_some(*near))
     }
 
     /// A fit in a larger window, from what a smaller one told.
-    fn fit_from(&self, near: &Measured, most_half_px: f64, cell: &Cell, window: &mut Window) -> Option<Measured> {
+    fn fit_from(&self, near: &Measured, most_half_px: f64, seen: &Windows, window: &mut Window) -> Option<Measured> {
         // A window in the middle of which the corner is: what the light's gradient adds on one side it takes on the other.
-        let start = Model { corner: Vector2::zeros(), ..near.fit.model };
-        self.fit_within(most_half_px, &Cell { place: near.px, ..*cell }, &start, window)
+        let start = Model { corner: Vector2::zeros(), bend: seen.start.bend, ..near.fit.model };
+        self.fit_within(most_half_px, &Cell { place: near.px, ..seen.cell }, &start, window)
     }
 
     /// A fit in a window that reaches up to `most_half_px` along each edge.
@@ -230,7 +281,7 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
         loop {
             let blur = start.blur_px[0].max(start.blur_px[1]);
             let margin = margin_px(&start, cell);
-            let halves = cell.edges.map(|e| e.normalize() * (e.norm() - margin).max(0.5 * e.norm()).min(most_half_px));
+            let halves = cell.edges.map(|e| e.normalize() * half_px(e.norm(), margin).min(most_half_px));
             let band_px = BAND_BLURS * blur + 1.0;
             window.collect(self.image, self.veil, keep, &Frame { start: cell.place, halves, band_px });
             let found = fit(&start, window)?;
@@ -246,6 +297,11 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
             start = Model { blur_px: found.model.blur_px, ..start };
         }
     }
+}
+
+/// Half of the largest window along an edge of this length, px.
+fn half_px(edge_px: f64, margin_px: f64) -> f64 {
+    (edge_px - margin_px.max(LEAST_MARGIN * edge_px)).max(0.5 * edge_px).min(MOST_HALF_PX)
 }
 
 /// How far a window stays off the next edges, px. Oblique edges come nearer to each other.

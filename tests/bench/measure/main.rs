@@ -1,8 +1,8 @@
 //! Benchmark `measure`: is what `measure` says true, does it notice what is wrong, and what does it cost.
 //!
 //! `cargo bench --bench measure -- coverage|pictures|faults|speed`; without a word all of them. `coverage` and `faults` work on the
-//! simulator's true corners with Gaussian noise, so that hundreds of poses cost seconds; `pictures` and `speed` run the program on rendered
-//! pictures.
+//! simulator's true corners with Gaussian noise, so that hundreds of poses cost seconds; `pictures` (of one size in px, where a number follows) and
+//! `speed` run the program on rendered pictures.
 #![allow(
     clippy::print_stdout,
     clippy::unwrap_used,
@@ -25,7 +25,8 @@ fn main() {
         coverage::run();
     }
     if runs("pictures") {
-        pictures::run_all();
+        let size = wanted.iter().find_map(|word| word.parse().ok());
+        pictures::run_all(size);
     }
     if runs("faults") {
         faults::run();

@@ -106,7 +106,7 @@ fn one(size_px: u32, target_um: f64, samples: usize, seed: u64) -> ([Tally; 3], 
     (tallies, world.poses.len() - found.len())
 }
 
-pub fn run_all() {
+pub fn run_all(size: Option<u32>) {
     println!(
         "pictures: rendered, calibrated and measured by the program; columns as above, then poses without an answer"
     );
@@ -119,7 +119,7 @@ pub fn run_all() {
         (5120, 0.0, 8, 6),
         (5120, 10.0, 8, 6),
     ];
-    for (size_px, target_um, samples, rigs) in lines {
+    for (size_px, target_um, samples, rigs) in lines.into_iter().filter(|line| size.is_none_or(|px| px == line.0)) {
         let mut sum: [Tally; 3] = std::array::from_fn(|_| Tally::default());
         let mut missing = 0;
         for seed in 0..rigs {

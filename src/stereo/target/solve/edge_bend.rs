@@ -19,7 +19,7 @@ use crate::stereo::target::solve::window::{Window, crossing_means};
 const TELLING: f64 = 4.0;
 
 /// Steps from what windows see to the crossings; each leaves at most the windows' mean reach of what is missing.
-const STEPS: usize = 40;
+const STEPS: usize = 60;
 
 /// The part of the deviations that is a straight line in both places on the board.
 fn straight_part(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
