@@ -1,8 +1,8 @@
 //! Every gate that a corner passes before it counts, with its unit and its reason.
 //!
 //! A corner that is off by many of its sigmas is worse than a missing one. Three kinds of gates: what no corner does
-//! ([`plausible`]), what a larger window must tell as a smaller one does ([`agrees`]), and what the four arms of a corner must
-//! tell alike, measured by the board's other corners ([`Board`]).
+//! ([`plausible`]), what a larger window must tell as a smaller one does, and what the four arms of a corner must
+//! tell alike, both measured by the board's other corners ([`Board`]).
 
 use super::Measured;
 use super::cell::Cell;
@@ -52,12 +52,10 @@ pub(super) fn plausible(fit: &Fit, start: &Model, cell: &Cell) -> bool {
         && fit.covariance_px2.trace() < MOST_VARIANCE_PX2
 }
 
-/// True where a larger window tells the same as a smaller one: a hidden or unprinted neighbour square shows as a shift or as misfit.
-pub(super) fn agrees(small: &Measured, large: &Measured) -> bool {
-    // The larger window holds the smaller one's pixels, so the variance of the difference is that of the smaller less that of the larger.
-    let variance = (small.fit.covariance_px2 - large.fit.covariance_px2).trace().max(0.0);
-    (large.px - small.px).norm() < AGREE_SIGMAS * variance.sqrt() + AGREE_PX
-        && roughness(&large.fit) < AGREE_RESIDUAL * roughness(&small.fit) + AGREE_CONTRAST
+/// Variance (both axes together) of the difference between a corner's places in two windows, px^2. The larger window holds the smaller
+/// one's pixels, so it is the smaller one's variance less the larger one's.
+fn difference_px2(small: &Measured, large: &Measured) -> f64 {
+    (small.fit.covariance_px2 - large.fit.covariance_px2).trace().max(0.0)
 }
 
 /// Residual as a share of the contrast: the same number for copies of 8 bits and pictures of 16.
@@ -70,11 +68,18 @@ pub(super) struct Board {
     arm_misfit: f64,
     roughness: f64,
     variance_px2: f64,
+    /// Variance (both axes together) by which places in small and large windows differ beyond their noise, px^2: where crossings are off
+    /// their places edges bend, and a larger window sees less of it.
+    bent_px2: f64,
 }
 
 impl Board {
-    /// Of the corners measured in their full windows.
-    pub(super) fn of(corners: &[Measured]) -> Board {
+    /// Of the corners measured in their full windows, and of those that were measured in their near windows, too: the near one first.
+    pub(super) fn of(corners: &[Measured], both: &[(Measured, Measured)]) -> Board {
+        // Of two axes the square that half of the corners exceed is the variance times ln 2.
+        let beyond = both.iter().map(|(near, full)| {
+            (full.px - near.px).norm_squared() / std::f64::consts::LN_2 - difference_px2(near, full)
+        });
         Board {
             // An arm's two numbers have a chi-squared of two, of which the common model takes a half.
             arm_misfit: median(corners.iter().map(|m| m.fit.arm_misfit.iter().flatten().sum::<f64>() / 4.0))
@@ -82,12 +87,20 @@ impl Board {
                 .max(1.0),
             roughness: median(corners.iter().map(|m| roughness(&m.fit))).unwrap_or(f64::INFINITY),
             variance_px2: median(corners.iter().map(|m| m.fit.covariance_px2.trace())).unwrap_or(f64::INFINITY),
+            bent_px2: median(beyond).unwrap_or(0.0).max(0.0),
         }
     }
 
     /// The usual residual as a share of half the contrast.
     pub(super) fn roughness(&self) -> f64 {
         self.roughness
+    }
+
+    /// True where a larger window tells the same as a smaller one: a hidden or unprinted neighbour square shows as a shift or as misfit.
+    pub(super) fn agrees(&self, small: &Measured, large: &Measured) -> bool {
+        let variance = difference_px2(small, large) + self.bent_px2;
+        (large.px - small.px).norm() < AGREE_SIGMAS * variance.sqrt() + AGREE_PX
+            && roughness(&large.fit) < AGREE_RESIDUAL * roughness(&small.fit) + AGREE_CONTRAST
     }
 
     /// True for a corner whose pixels miss the model by more than is usual.

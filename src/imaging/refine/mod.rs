@@ -18,7 +18,7 @@ mod veil;
 
 use nalgebra::{Matrix2, Point2, RowVector2, Vector2};
 
-use self::acceptance::{agrees, plausible};
+use self::acceptance::plausible;
 use self::cell::Cell;
 use self::curvature::bends;
 use self::outlying_pixels::{Explained, few};
@@ -177,7 +177,8 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
             Some(full.get(col, row)?.clone().rebent(at(&full_bends, col, row)))
         });
         let full: Vec<Measured> = seen.iter().filter_map(|(_, _, windows)| windows.full).collect();
-        let board = acceptance::Board::of(&full);
+        let both: Vec<_> = seen.iter().filter_map(|(_, _, windows)| windows.near.zip(windows.full)).collect();
+        let board = acceptance::Board::of(&full, &both);
         let mut measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
             self.largest_free(seen.get(col, row)?, &board, &mut window)
         });
@@ -245,14 +246,14 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
             ..*seen
         };
         if let Some(full) = &seen.full
-            && seen.near.as_ref().is_none_or(|near| agrees(near, full))
+            && seen.near.as_ref().is_none_or(|near| board.agrees(near, full))
             && board.accepts(full)
         {
             return seen.full;
         }
         let near = seen.near.as_ref()?;
         let between = self.fit_from(near, BETWEEN * near_half_px(&seen.start), &seen, window);
-        let between = between.filter(|between| agrees(near, between) && board.holds_in_small_window(between));
+        let between = between.filter(|between| board.agrees(near, between) && board.holds_in_small_window(between));
         between.or_else(|| board.holds_in_small_window(near).then_some(*near))
     }
 
