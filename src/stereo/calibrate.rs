@@ -145,7 +145,7 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
     let mut own_noise = solved.noise;
     if let Some(print) = print {
         uncertainty.shared += print.covariance - without_scatter;
-        own_noise = own_noise.without_print(print.own_noise);
+        own_noise = print.own_noise;
     }
     values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: uncertainty.shared.clone() });
     Ok(Calibration {

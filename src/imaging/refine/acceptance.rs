@@ -29,6 +29,10 @@ const AGREE_PX: f64 = 0.02;
 const AGREE_RESIDUAL: f64 = 1.4;
 const AGREE_CONTRAST: f64 = 0.007;
 
+/// By how many of a corner's standard deviations bent edges may move it in a large window: how much of them a window sees is known to a few
+/// hundredths.
+const MOST_BENT: f64 = 10.0;
+
 /// Chi-squared (two degrees of freedom) of one arm against the common model, in units of what is usual on the board. Among the
 /// 4000 arms of the largest boards the largest by chance is 17; something that hides a tenth of an arm makes hundreds.
 const MOST_ARM_MISFIT: f64 = 30.0;
@@ -101,6 +105,14 @@ impl Board {
         let variance = difference_px2(small, large) + self.bent_px2;
         (large.px - small.px).norm() < AGREE_SIGMAS * variance.sqrt() + AGREE_PX
             && roughness(&large.fit) < AGREE_RESIDUAL * roughness(&small.fit) + AGREE_CONTRAST
+    }
+
+    /// How large windows may be, as a share of the full ones, so that what bent edges do stays in proportion to the noise: the one grows with
+    /// the window, the other falls with its root. A power of four, so that it is the same in nearly all pictures of a board.
+    pub(super) fn straight_share(&self) -> f64 {
+        let bent = (self.bent_px2 / self.variance_px2).sqrt();
+        let share = (MOST_BENT / bent.max(MOST_BENT)).powf(2.0 / 3.0);
+        (share.log2() / 2.0).round().exp2().powi(2)
     }
 
     /// True for a corner whose pixels miss the model by more than is usual.

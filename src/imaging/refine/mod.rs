@@ -103,6 +103,8 @@ struct Windows {
     start: Model,
     /// Whether the full window is hardly larger than the near one.
     alone: bool,
+    /// Half of the full window at the most, px.
+    most_half_px: f64,
     near: Option<Measured>,
     full: Option<Measured>,
 }
@@ -126,6 +128,13 @@ impl Measured {
         let model = Model { corner: fit.model.corner + step, bend, ..fit.model };
         Measured { px: px + step, fit: Fit { model, ..fit }, reach }
     }
+}
+
+/// What is usual on a board.
+fn usual(seen: &Lattice<Windows>) -> acceptance::Board {
+    let full: Vec<Measured> = seen.iter().filter_map(|(_, _, windows)| windows.full).collect();
+    let both: Vec<_> = seen.iter().filter_map(|(_, _, windows)| windows.near.zip(windows.full)).collect();
+    acceptance::Board::of(&full, &both)
 }
 
 /// Bends as these windows show them, where there is one.
@@ -176,9 +185,17 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
         let seen = Lattice::from_fn(columns, coarse.rows, |col, row| {
             Some(full.get(col, row)?.clone().rebent(at(&full_bends, col, row)))
         });
-        let full: Vec<Measured> = seen.iter().filter_map(|(_, _, windows)| windows.full).collect();
-        let both: Vec<_> = seen.iter().filter_map(|(_, _, windows)| windows.near.zip(windows.full)).collect();
-        let board = acceptance::Board::of(&full, &both);
+        let board = usual(&seen);
+        let share = board.straight_share();
+        let (seen, board) = if share < 1.0 {
+            let smaller = Lattice::from_fn(columns, coarse.rows, |col, row| {
+                Some(self.smaller(seen.get(col, row)?, share, &mut window))
+            });
+            let board = usual(&smaller);
+            (smaller, board)
+        } else {
+            (seen, board)
+        };
         let mut measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
             self.largest_free(seen.get(col, row)?, &board, &mut window)
         });
@@ -192,7 +209,7 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
         let near_px = near_half_px(&start);
         let alone = near_px > NEAR_SHARE * full_px;
         let near = if alone { coarse } else { self.fit_within(near_px, &cell, &start, window) };
-        Windows { cell, start, alone, near, full: None }
+        Windows { cell, start, alone, most_half_px: MOST_HALF_PX, near, full: None }
     }
 
     /// A fit in the full window, started where the one in the near window ended: most steps are taken where they are cheap, and the blur is
@@ -205,6 +222,14 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
             Some(near) => self.fit_from(near, MOST_HALF_PX, &seen, window),
         };
         Windows { full, ..seen }
+    }
+
+    /// With the full window cut down to a share of itself.
+    fn smaller(&self, seen: &Windows, share: f64, window: &mut Window) -> Windows {
+        let half_px = share * half_px(seen.cell.side(), margin_px(&seen.start, &seen.cell));
+        let again = seen.near.as_ref().filter(|_| !seen.alone);
+        let full = again.map_or(seen.full, |near| self.fit_from(near, half_px, seen, window));
+        Windows { full, most_half_px: half_px.min(seen.most_half_px), ..seen.clone() }
     }
 
     /// A corner whose pixels lie farther from the model than is usual on the board, fitted again without those that it cannot explain, where
@@ -242,7 +267,7 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
             near: seen
                 .near
                 .map(|near| self.without_outlying(&near, near_half_px(&seen.start), &seen.cell, board, window)),
-            full: seen.full.map(|full| self.without_outlying(&full, MOST_HALF_PX, &seen.cell, board, window)),
+            full: seen.full.map(|full| self.without_outlying(&full, seen.most_half_px, &seen.cell, board, window)),
             ..*seen
         };
         if let Some(full) = &seen.full
@@ -358,4 +383,70 @@ fn enlarged(model: &Model, k: f64) -> Model {
     // The copy's pixel adds the variance of its own box.
     let blur = |s: f64| if k > 1.0 { (k * k * (s * s - 1.0 / 12.0)).max(0.25).sqrt() } else { s };
     Model { blur_px: model.blur_px.map(blur), light_slope: model.light_slope / k, ..*model }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::{Board, detect};
+    use statrs::function::erf::erf;
+
+    const SIDE_PX: f64 = 60.0;
+
+    /// A board of 8x7 squares whose every other row of crossings is off by `zigzag_px` along the rows, with noise of 2 grey levels.
+    fn zigzag_board(zigzag_px: f64) -> Picture {
+        const BLUR_PX: f64 = 0.9;
+        let (width, height) = (600, 540);
+        // Light minus dark across the nearest of the lines that are a square apart, in the signs of the squares.
+        let across = |px: f64, lines: f64| {
+            let nearest = (px / SIDE_PX).round().clamp(0.0, lines);
+            let sign = if nearest.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
+            sign * erf((px - nearest * SIDE_PX) / (BLUR_PX * 2f64.sqrt()))
+        };
+        let grey = |x: f64, y: f64| {
+            let y = y - 60.3;
+            let x = x - 60.7 - zigzag_px * ((y / SIDE_PX).rem_euclid(2.0) - 1.0).abs();
+            let inside = (0.0..8.0 * SIDE_PX).contains(&x) && (0.0..7.0 * SIDE_PX).contains(&y);
+            if inside { 120.0 - 80.0 * across(x, 8.0) * across(y, 7.0) } else { 200.0 }
+        };
+        let mut state = 11u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f64 / f64::from(1u32 << 24) - 0.5
+        };
+        let pixels = (0..width * height).map(|k| {
+            let noise = 2.0 * 12f64.sqrt() * uniform();
+            (grey((k % width) as f64, (k / width) as f64) + noise).round().clamp(0.0, 255.0) as u8
+        });
+        Picture::from(Image { width, height, pixels: pixels.collect() })
+    }
+
+    #[test]
+    fn bent_edges_are_seen_in_windows_that_are_alike_and_small_where_they_bend_much() {
+        let board = Board { squares: "8x7".parse().unwrap(), square_mm: 10.0 };
+        let mean_reach = |zigzag_px: f64| {
+            let picture = zigzag_board(zigzag_px);
+            let measured = measure(&picture, &detect::detect(&picture, board).unwrap());
+            assert_eq!(measured.count(), 42);
+            let reach = measured.iter().map(|(_, _, m)| m.reach[1]).sum::<f64>() / 42.0;
+            for (_, _, m) in measured.iter() {
+                assert!((m.reach[1] - reach).abs() < 0.02, "{zigzag_px}: {:?}", m.reach);
+                // Crossings of even lines are off by the zigzag, those between are not.
+                let row = ((m.px.y - 60.3) / SIDE_PX).round();
+                let column = ((m.px.x - 60.7) / SIDE_PX).round();
+                let sign = if row.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
+                let seen = 60.7 + column * SIDE_PX + 0.5 * zigzag_px * (1.0 + sign * (1.0 - reach));
+                let sigma = m.fit.covariance_px2.m11.sqrt();
+                assert!(
+                    (m.px.x - seen).abs() < 5.0 * sigma + 0.03 * zigzag_px,
+                    "{zigzag_px}: {} {seen} {sigma}",
+                    m.px.x
+                );
+            }
+            reach
+        };
+        let (straight, bent, bent_much) = (mean_reach(0.0), mean_reach(0.1), mean_reach(0.8));
+        assert!((straight - 0.85).abs() < 0.02 && (bent - straight).abs() < 1e-3, "{straight} {bent}");
+        assert!(bent_much < 0.3, "{bent_much}");
+    }
 }

@@ -36,9 +36,21 @@ impl Noise {
         o.covariance_px2 * self.factor + Matrix2::identity() * (self.added_px * self.added_px)
     }
 
-    /// The noise of corners whose variance is only in this share their own.
-    pub fn without_print(&self, own_share: f64) -> Noise {
-        Noise { factor: self.factor * own_share, added_px: self.added_px * own_share.sqrt(), ..*self }
+    /// Share of the active corners' variance that the refinement's covariances are. The whiteners are this noise's.
+    pub fn stated_share(&self, views: &[View]) -> f64 {
+        let active = || views.iter().flat_map(|view| &view.observations).filter(|o| o.active);
+        let stated = |o: &Observation| (o.whitener * o.covariance_px2 * o.whitener.transpose()).trace() / 2.0;
+        self.factor * active().map(stated).sum::<f64>() / active().count().max(1) as f64
+    }
+
+    /// The noise of corners of whose variance only this share is their own: what was added gives way first. `stated` is the share of the
+    /// refinement's covariances.
+    pub fn of_share(&self, own: f64, stated: f64) -> Noise {
+        if own < stated {
+            return Noise { factor: self.factor * own / stated, added_px: 0.0, ..*self };
+        }
+        let added = if stated < 1.0 { (own - stated) / (1.0 - stated) } else { 0.0 };
+        Noise { added_px: self.added_px * added.max(0.0).sqrt(), ..*self }
     }
 
     /// Sets the whiteners of all corners.
@@ -143,4 +155,23 @@ pub fn whitener(covariance: &Matrix2<f64>) -> Matrix2<f64> {
     let l22 = (covariance.m22 - l21 * l21).max(0.0).sqrt();
     let w = Matrix2::new(1.0 / l11, 0.0, -l21 / (l11 * l22), 1.0 / l22);
     if w.iter().all(|v| v.is_finite()) { w } else { Matrix2::identity() / FLOOR_PX }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_added_gives_way_to_the_print_first() {
+        let noise = Noise { factor: 1.0, added_px: 0.03, reduced_chi_square: None };
+        // A tenth of the variance is the refinement's.
+        assert_eq!(noise.of_share(1.0, 0.1), noise);
+        assert_eq!(noise.of_share(0.1, 0.1), Noise { added_px: 0.0, ..noise });
+        let half = noise.of_share(0.55, 0.1);
+        assert!(half.factor == 1.0 && (half.added_px.powi(2) - 0.5 * 0.0009).abs() < 1e-12);
+        // Where nothing is known of the corners, all of it is shared out.
+        let unknown = noise.of_share(0.25, 0.0);
+        assert!((unknown.added_px - 0.015).abs() < 1e-12);
+        assert!((noise.of_share(0.05, 0.1).factor - 0.5).abs() < 1e-12);
+    }
 }

@@ -10,6 +10,7 @@
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
 
 use crate::imaging::Board;
+use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
 use crate::stereo::model::board_shape::{NUMBERS, lift};
 use crate::stereo::model::parameters::{Layout, Values};
@@ -25,8 +26,8 @@ use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 pub struct PrintShare {
     /// Standard deviation of a crossing along x and along y, mm.
     pub crossing_mm: f64,
-    /// Share of the corners' variance that is not the print's but their own.
-    pub own_noise: f64,
+    /// The corners' own noise, without the print.
+    pub own_noise: Noise,
     /// Covariance of the shared numbers, in the layout's order: the corners' own noise and the print.
     pub covariance: DMatrix<f64>,
     /// Variance of the shared numbers over what it were if all scatter were the corners' own, the mean over them; at least one.
@@ -37,11 +38,18 @@ impl PrintShare {
     /// Finds the print. `None` where the views do not determine the shared numbers.
     pub fn of(solved: &Solved, board: &Board, layout: &Layout) -> Option<PrintShare> {
         let Problem { views, values } = &solved.problem;
-        print_share(views, board, layout, values, solved.neighbours(board).inflation())
+        print_share(views, board, layout, values, &solved.noise, solved.neighbours(board).inflation())
     }
 }
 
-fn print_share(views: &[View], board: &Board, layout: &Layout, values: &Values, inflation: f64) -> Option<PrintShare> {
+fn print_share(
+    views: &[View],
+    board: &Board,
+    layout: &Layout,
+    values: &Values,
+    noise: &Noise,
+    inflation: f64,
+) -> Option<PrintShare> {
     let m = board.corner_count();
     let lifts: Vec<[f64; NUMBERS]> = board.corners_mm().map(|at| lift(board, &at)).collect();
     let shape = values.shared.shape_mm;
@@ -67,7 +75,9 @@ fn print_share(views: &[View], board: &Board, layout: &Layout, values: &Values, 
     }
     sums.told *= seen.usual_variance();
     let variance = sums.print_variance(rig_count, &seen);
-    let own_noise = 1.0 - variance * sums.told / sums.numbers;
+    // The difference of two large numbers where the print is most of it; but pixels scatter corners as much as the refinement says.
+    let stated = noise.stated_share(views);
+    let own_share = (1.0 - variance * sums.told / sums.numbers).max(stated);
     // The board's paraboloids are heights of its crossings.
     let mut to_shared = DMatrix::zeros(size, names.len());
     for i in 0..rig_count {
@@ -81,10 +91,11 @@ fn print_share(views: &[View], board: &Board, layout: &Layout, values: &Values, 
     let by_all = to_shared.tr_mul(&sums.matrix);
     let inverse = invert(&(&by_all * &to_shared))?;
     let by_print = &inverse * &by_all;
-    let mut covariance = &inverse * (own_noise * inflation);
+    let mut covariance = &inverse * (own_share * inflation);
     let add = |column: DVector<f64>| covariance.ger(variance, &column, &column, 1.0);
     seen.columns(&by_print, rig_count).into_iter().for_each(add);
     let excess = (&by_all * to_shared).component_mul(&covariance).sum() / (inflation * names.len() as f64);
+    let own_noise = noise.of_share(own_share, stated);
     Some(PrintShare { crossing_mm: variance.sqrt(), own_noise, covariance, excess: excess.max(1.0) })
 }
 

@@ -225,7 +225,7 @@ fn a_board_whose_print_scatters_is_told_from_corners_that_do() {
     assert!(accuracy.rays_chi_square < 0.1, "{}", accuracy.rays_chi_square);
     let demand = Demand { tolerance_mm: 0.05, board_uncertainty_mm: None };
     let judged = Judged::new(&found, accuracy, None, &demand);
-    assert!(judged.warnings.iter().any(|w| w.contains("places of the corners on the board")), "{:?}", judged.warnings);
+    assert!(judged.warnings.iter().any(|w| w.text.contains("corners' places on the board")), "{:?}", judged.warnings);
 }
 
 #[test]

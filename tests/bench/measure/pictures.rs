@@ -116,8 +116,8 @@ pub fn run_all(size: Option<u32>) {
         (1280, 10.0, 296, 1),
         (1280, 0.0, 8, 24),
         (1280, 10.0, 8, 24),
-        (5120, 0.0, 8, 6),
-        (5120, 10.0, 8, 6),
+        (5120, 0.0, 8, 12),
+        (5120, 10.0, 8, 12),
     ];
     for (size_px, target_um, samples, rigs) in lines.into_iter().filter(|line| size.is_none_or(|px| px == line.0)) {
         let mut sum: [Tally; 3] = std::array::from_fn(|_| Tally::default());
