@@ -29,6 +29,9 @@ const AGREE_PX: f64 = 0.02;
 const AGREE_RESIDUAL: f64 = 1.4;
 const AGREE_CONTRAST: f64 = 0.007;
 
+/// How many times the variance by noise places in two windows must differ by before it is the edges that bend: of thirty corners half exceed
+/// it by less, but for chance.
+const MORE_THAN_NOISE: f64 = 1.8;
 /// By how many of a corner's standard deviations bent edges may move it in a large window: how much of them a window sees is known to a few
 /// hundredths.
 const MOST_BENT: f64 = 10.0;
@@ -81,9 +84,10 @@ impl Board {
     /// Of the corners measured in their full windows, and of those that were measured in their near windows, too: the near one first.
     pub(super) fn of(corners: &[Measured], both: &[(Measured, Measured)]) -> Board {
         // Of two axes the square that half of the corners exceed is the variance times ln 2.
-        let beyond = both.iter().map(|(near, full)| {
-            (full.px - near.px).norm_squared() / std::f64::consts::LN_2 - difference_px2(near, full)
-        });
+        let apart = both.iter().map(|(near, full)| (full.px - near.px).norm_squared() / std::f64::consts::LN_2);
+        let apart_px2 = median(apart).unwrap_or(0.0);
+        let by_noise_px2 = median(both.iter().map(|(near, full)| difference_px2(near, full))).unwrap_or(0.0);
+        let bent = apart_px2 > MORE_THAN_NOISE * by_noise_px2;
         Board {
             // An arm's two numbers have a chi-squared of two, of which the common model takes a half.
             arm_misfit: median(corners.iter().map(|m| m.fit.arm_misfit.iter().flatten().sum::<f64>() / 4.0))
@@ -91,7 +95,7 @@ impl Board {
                 .max(1.0),
             roughness: median(corners.iter().map(|m| roughness(&m.fit))).unwrap_or(f64::INFINITY),
             variance_px2: median(corners.iter().map(|m| m.fit.covariance_px2.trace())).unwrap_or(f64::INFINITY),
-            bent_px2: median(beyond).unwrap_or(0.0).max(0.0),
+            bent_px2: if bent { apart_px2 - by_noise_px2 } else { 0.0 },
         }
     }
 

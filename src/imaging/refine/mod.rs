@@ -20,7 +20,7 @@ use nalgebra::{Matrix2, Point2, RowVector2, Vector2};
 
 use self::acceptance::plausible;
 use self::cell::Cell;
-use self::curvature::bends;
+use self::curvature::{Point, bends};
 use self::outlying_pixels::{Explained, few};
 use self::saddle_fit::window::{Below, Frame, Keep, Window};
 use self::saddle_fit::{Fit, Model, fit};
@@ -39,9 +39,14 @@ const MARGIN_BLURS: f64 = 3.0;
 /// Half of the largest window, px. The gain goes with the root of the window, the time with the window; at this size the bend of the
 /// edges, known from the board's other corners, is still known well enough.
 const MOST_HALF_PX: f64 = 250.0;
+/// The same where light is clipped: what the edges then miss of it does not fall with the window.
+const MOST_CLIPPED_HALF_PX: f64 = 80.0;
 /// What a window leaves of each edge at least, as a share of it. Edges bend at crossings that are off their places; from windows that reach
 /// from crossing to crossing nobody could tell which crossing it is.
 const LEAST_MARGIN: f64 = 0.15;
+/// How good places are on the copy and in the picture, px: what is farther from its line is hidden in part.
+const COARSE_PX: f64 = 0.1;
+const MEASURED_PX: f64 = 0.004;
 /// Half of the near window, px and in blurs: the least that holds an arm on each side of the crossing.
 const NEAR_HALF_PX: f64 = 10.0;
 const NEAR_HALF_BLURS: f64 = 7.0;
@@ -110,6 +115,12 @@ struct Windows {
 }
 
 impl Windows {
+    /// The full window, if nothing reaches into it.
+    fn free(&self, board: &acceptance::Board) -> Option<&Measured> {
+        let full = self.full.as_ref()?;
+        (self.near.as_ref().is_none_or(|near| board.agrees(near, full)) && board.accepts(full)).then_some(full)
+    }
+
     /// The same with other bends of the edges.
     fn rebent(self, bend: [f64; 2]) -> Windows {
         let start = Model { bend, ..self.start };
@@ -137,12 +148,13 @@ fn usual(seen: &Lattice<Windows>) -> acceptance::Board {
     acceptance::Board::of(&full, &both)
 }
 
-/// Bends as these windows show them, where there is one.
+/// Bends as these windows show them: corners without one, or with one that something reaches into, bend no line.
 fn bends_by(seen: &Lattice<Windows>, places: &Places, which: impl Fn(&Windows) -> Option<Measured>) -> Vec<[f64; 2]> {
-    bends(&Lattice::from_fn(seen.columns, seen.rows, |col, row| {
-        let measured = seen.get(col, row).and_then(&which).map(|m| m.px);
-        measured.or_else(|| places.get(col, row).copied())
-    }))
+    let grid = Lattice::from_fn(seen.columns, seen.rows, |col, row| {
+        let measured = seen.get(col, row).and_then(&which).map(|m| Point { px: m.px, counts: true });
+        measured.or_else(|| Some(Point { px: *places.get(col, row)?, counts: false }))
+    });
+    bends(&grid, MEASURED_PX)
 }
 
 impl<T: Copy + Into<f64>> Full<'_, T> {
@@ -156,7 +168,8 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
         let coarse = coarse(detected, &mut window);
         let columns = coarse.columns;
         let at = |bends: &[[f64; 2]], col: usize, row: usize| bends[row * columns + col];
-        let coarse_bends = bends(&coarse.map(|m| detected.level.to_picture(&m.px)));
+        let on_copy = |m: &Measured| Point { px: detected.level.to_picture(&m.px), counts: true };
+        let coarse_bends = bends(&coarse.map(on_copy), COARSE_PX);
         // A neighbour that could not be measured still says how far the squares reach.
         let places: Places = Lattice::from_fn(columns, coarse.rows, |col, row| {
             let px = coarse.get(col, row).map_or(detected.corners.get(col, row), |m| Some(&m.px))?;
@@ -177,11 +190,14 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
             Some(self.near(cell, start, (scale == 1.0).then_some(*from), &mut window))
         });
         // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large ones from.
-        let near_bends = bends_by(&near, &places, |windows| windows.near);
+        let near_only: Vec<Measured> = near.iter().filter_map(|(_, _, windows)| windows.near).collect();
+        let board = acceptance::Board::of(&near_only, &[]);
+        let near_bends = bends_by(&near, &places, |windows| windows.near.filter(|near| board.accepts(near)));
         let full: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
             Some(self.full(near.get(col, row)?.clone(), at(&near_bends, col, row), &mut window))
         });
-        let full_bends = bends_by(&full, &places, |windows| windows.full.or(windows.near));
+        let board = usual(&full);
+        let full_bends = bends_by(&full, &places, |windows| windows.free(&board).copied());
         let seen = Lattice::from_fn(columns, coarse.rows, |col, row| {
             Some(full.get(col, row)?.clone().rebent(at(&full_bends, col, row)))
         });
@@ -216,11 +232,17 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
     /// that of the picture, not of the copy, so fewer pixels count as near an edge.
     fn full(&self, seen: Windows, bend: [f64; 2], window: &mut Window) -> Windows {
         let seen = Windows { start: Model { bend, ..seen.start }, ..seen };
-        let full = match &seen.near {
-            _ if seen.alone => self.fit_within(MOST_HALF_PX, &seen.cell, &seen.start, window),
+        let mut within = |half_px: f64| match &seen.near {
+            _ if seen.alone => self.fit_within(half_px, &seen.cell, &seen.start, window),
             None => None,
-            Some(near) => self.fit_from(near, MOST_HALF_PX, &seen, window),
+            Some(near) => self.fit_from(near, half_px, &seen, window),
         };
+        let full = within(MOST_HALF_PX);
+        let reach_px = |full: &Measured| full.reach[0] * seen.cell.edges[0].norm();
+        let clips = full.is_some_and(|full| full.fit.left_out > 0 && reach_px(&full) > MOST_CLIPPED_HALF_PX);
+        if clips {
+            return Windows { full: within(MOST_CLIPPED_HALF_PX), most_half_px: MOST_CLIPPED_HALF_PX, ..seen };
+        }
         Windows { full, ..seen }
     }
 
@@ -270,11 +292,8 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
             full: seen.full.map(|full| self.without_outlying(&full, seen.most_half_px, &seen.cell, board, window)),
             ..*seen
         };
-        if let Some(full) = &seen.full
-            && seen.near.as_ref().is_none_or(|near| board.agrees(near, full))
-            && board.accepts(full)
-        {
-            return seen.full;
+        if let Some(full) = seen.free(board) {
+            return Some(*full);
         }
         let near = seen.near.as_ref()?;
         let between = self.fit_from(near, BETWEEN * near_half_px(&seen.start), &seen, window);
