@@ -1,36 +1,40 @@
 //! Coarse corners to measured ones: a fit of the blurred corner to the raw pixels at full size, for each corner.
 //!
-//! In: the picture and the board as detected. Out: corners with covariance. First each corner is fitted on the reduced copy
-//! in a small window that a coarse start can't lead astray (coarse); then at full size in a small window (near) and in the
-//! largest that stays inside the four squares round it (full). Where the larger window does not agree with the smaller one, or the four
-//! arms of a corner not with each other, something hides a part of it, and the largest window that is free of it is kept. Last,
-//! the board's corners share what they know of the light, which counts from the picture's veil (`veil`). Goes wrong: a corner without contrast, hidden, cut off by the border or
+//! In: the picture and the board as detected. Out: corners with covariance. First each corner is fitted on the reduced copy in a small
+//! window (`coarse`); then at full size in a small window (near), and in the largest that stays inside the four squares round
+//! it (full), along edges that bend as the lens bends the board's lines (`curvature`): as the near windows show them, and at last as the
+//! full ones do. On a board whose edges bend much from crossing to crossing the full windows are cut down. Where the larger
+//! window does not agree with the smaller one, or the four arms of a corner not with each other (`acceptance`), something hides a part of
+//! it, and the largest window that is free of it is kept. Last, the board's corners share what they know of the light
+//! (`illumination`), which counts from the picture's veil (`veil`). Goes wrong: a corner without contrast, hidden, cut off by the border or
 //! saturated; it is dropped, the others stay.
 
 mod acceptance;
 mod cell;
+mod coarse;
 mod curvature;
 pub mod fields;
 pub mod illumination;
 mod outlying_pixels;
 pub mod saddle_fit;
 mod veil;
+mod windows;
 
-use nalgebra::{Matrix2, Point2, RowVector2, Vector2};
+use nalgebra::{Matrix2, Point2, Vector2};
 
 use self::acceptance::plausible;
 use self::cell::Cell;
+use self::coarse::{coarse, enlarged};
 use self::curvature::{Point, bends};
 use self::outlying_pixels::{Explained, few};
 use self::saddle_fit::window::{Below, Frame, Keep, Window};
 use self::saddle_fit::{Fit, Model, fit};
+use self::windows::{Windows, bends_by, usual};
 use super::Corner;
 use super::detect::Detected;
 use super::image::{Grey, Image, Picture};
 use super::lattice::{Lattice, Places};
 
-/// Half of the first window on the copy, px.
-const FIRST_HALF_PX: f64 = 6.0;
 /// Pixels farther than this many blurs from both edges tell only the two grey levels.
 const BAND_BLURS: f64 = 3.5;
 /// The next edge's blur reaches this many blurs into the square.
@@ -44,9 +48,8 @@ const MOST_CLIPPED_HALF_PX: f64 = 80.0;
 /// What a window leaves of each edge at least, as a share of it. Edges bend at crossings that are off their places; from windows that reach
 /// from crossing to crossing nobody could tell which crossing it is.
 const LEAST_MARGIN: f64 = 0.15;
-/// How good places are on the copy and in the picture, px: what is farther from its line is hidden in part.
-const COARSE_PX: f64 = 0.1;
-const MEASURED_PX: f64 = 0.004;
+/// How good places on the copy are at least, px.
+const GOOD_PX: f64 = 0.1;
 /// Half of the near window, px and in blurs: the least that holds an arm on each side of the crossing.
 const NEAR_HALF_PX: f64 = 10.0;
 const NEAR_HALF_BLURS: f64 = 7.0;
@@ -101,62 +104,6 @@ struct Full<'a, T> {
     veil: f64,
 }
 
-/// What a corner's windows told.
-#[derive(Clone)]
-struct Windows {
-    cell: Cell,
-    start: Model,
-    /// Whether the full window is hardly larger than the near one.
-    alone: bool,
-    /// Half of the full window at the most, px.
-    most_half_px: f64,
-    near: Option<Measured>,
-    full: Option<Measured>,
-}
-
-impl Windows {
-    /// The full window, if nothing reaches into it.
-    fn free(&self, board: &acceptance::Board) -> Option<&Measured> {
-        let full = self.full.as_ref()?;
-        (self.near.as_ref().is_none_or(|near| board.agrees(near, full)) && board.accepts(full)).then_some(full)
-    }
-
-    /// The same with other bends of the edges.
-    fn rebent(self, bend: [f64; 2]) -> Windows {
-        let start = Model { bend, ..self.start };
-        Windows { start, full: self.full.map(|full| full.rebent(bend, &self.cell)), ..self }
-    }
-}
-
-impl Measured {
-    /// What the fit would be with other bends: a straight edge through a window is off by a sixth of bend times half the window squared.
-    fn rebent(self, bend: [f64; 2], cell: &Cell) -> Measured {
-        let Measured { px, fit, reach } = self;
-        let off = |k: usize| (bend[k] - fit.model.bend[k]) * (reach[k] * cell.edges[k].norm()).powi(2) / 6.0;
-        let normals = fit.model.angles_rad.map(|angle| RowVector2::new(-angle.sin(), angle.cos()));
-        let step =
-            Matrix2::from_rows(&normals).try_inverse().map_or(Vector2::zeros(), |m| m * Vector2::new(off(0), off(1)));
-        let model = Model { corner: fit.model.corner + step, bend, ..fit.model };
-        Measured { px: px + step, fit: Fit { model, ..fit }, reach }
-    }
-}
-
-/// What is usual on a board.
-fn usual(seen: &Lattice<Windows>) -> acceptance::Board {
-    let full: Vec<Measured> = seen.iter().filter_map(|(_, _, windows)| windows.full).collect();
-    let both: Vec<_> = seen.iter().filter_map(|(_, _, windows)| windows.near.zip(windows.full)).collect();
-    acceptance::Board::of(&full, &both)
-}
-
-/// Bends as these windows show them: corners without one, or with one that something reaches into, bend no line.
-fn bends_by(seen: &Lattice<Windows>, places: &Places, which: impl Fn(&Windows) -> Option<Measured>) -> Vec<[f64; 2]> {
-    let grid = Lattice::from_fn(seen.columns, seen.rows, |col, row| {
-        let measured = seen.get(col, row).and_then(&which).map(|m| Point { px: m.px, counts: true });
-        measured.or_else(|| Some(Point { px: *places.get(col, row)?, counts: false }))
-    });
-    bends(&grid, MEASURED_PX)
-}
-
 impl<T: Copy + Into<f64>> Full<'_, T> {
     fn of<'a>(image: &'a Image<T>, clip_level: f64, detected: &Detected) -> Full<'a, T> {
         let places = detected.corners.map(|px| detected.level.to_picture(px));
@@ -169,7 +116,7 @@ impl<T: Copy + Into<f64>> Full<'_, T> {
         let columns = coarse.columns;
         let at = |bends: &[[f64; 2]], col: usize, row: usize| bends[row * columns + col];
         let on_copy = |m: &Measured| Point { px: detected.level.to_picture(&m.px), counts: true };
-        let coarse_bends = bends(&coarse.map(on_copy), COARSE_PX);
+        let coarse_bends = bends(&coarse.map(on_copy), GOOD_PX);
         // A neighbour that could not be measured still says how far the squares reach.
         let places: Places = Lattice::from_fn(columns, coarse.rows, |col, row| {
             let px = coarse.get(col, row).map_or(detected.corners.get(col, row), |m| Some(&m.px))?;
@@ -356,52 +303,6 @@ fn margin_px(start: &Model, cell: &Cell) -> f64 {
 
 fn near_half_px(start: &Model) -> f64 {
     NEAR_HALF_PX.max(NEAR_HALF_BLURS * start.blur_px[0].max(start.blur_px[1]))
-}
-
-/// A first fit of each corner on the reduced copy.
-fn coarse(detected: &Detected, window: &mut Window) -> Lattice<Measured> {
-    Lattice::from_fn(detected.corners.columns, detected.corners.rows, |col, row| {
-        let cell = Cell::of(&detected.corners, col, row)?;
-        let (fit, reach) = coarse_fit(&detected.copy, &cell, window)?;
-        Some(Measured { px: fit.place(&cell.place), fit, reach })
-    })
-}
-
-/// A fit in a small window, or in larger ones where a wide blur fills it; and how far that reaches.
-fn coarse_fit(copy: &Image<u8>, cell: &Cell, window: &mut Window) -> Option<(Fit, [f64; 2])> {
-    let most = 0.6 * cell.side();
-    let mut half = FIRST_HALF_PX.min(most);
-    loop {
-        let start = Model {
-            corner: Vector2::zeros(),
-            angles_rad: cell.edges.map(|e| e.y.atan2(e.x)),
-            blur_px: [(0.15 * half).max(0.8); 2],
-            level: 0.0,
-            half_contrast: 0.0,
-            light_slope: Vector2::zeros(),
-            bend: [0.0; 2],
-        };
-        let halves = cell.edges.map(|e| e.normalize() * half);
-        // A stretched copy reaches 255 without being clipped.
-        window.collect(copy, 0.0, &Below(f64::MAX), &Frame { start: cell.place, halves, band_px: f64::MAX });
-        if let Some(first) = fit(&start, window)
-            && plausible(&first, &start, cell)
-            && (first.model.blur_px.iter().all(|&s| s < 0.4 * half) || half >= most)
-        {
-            return Some((first, cell.reach(&halves)));
-        }
-        if half >= most {
-            return None;
-        }
-        half = (2.0 * half).min(most);
-    }
-}
-
-/// A model of the copy as one of the picture it was reduced from by `k`.
-fn enlarged(model: &Model, k: f64) -> Model {
-    // The copy's pixel adds the variance of its own box.
-    let blur = |s: f64| if k > 1.0 { (k * k * (s * s - 1.0 / 12.0)).max(0.25).sqrt() } else { s };
-    Model { blur_px: model.blur_px.map(blur), light_slope: model.light_slope / k, ..*model }
 }
 
 #[cfg(test)]

@@ -1,0 +1,77 @@
+//! What the windows of a board's corners told: which of them nothing reaches into, and how the edges bend.
+
+use nalgebra::{Matrix2, RowVector2, Vector2};
+
+use super::Measured;
+use super::acceptance;
+use super::cell::Cell;
+use super::curvature::{Point, bends};
+use super::saddle_fit::{Fit, Model};
+use crate::imaging::lattice::{Lattice, Places};
+
+/// How good measured places are at least, px: what is farther from its line is hidden in part.
+const GOOD_PX: f64 = 0.004;
+
+/// What a corner's windows told.
+#[derive(Clone)]
+pub(super) struct Windows {
+    /// The squares round it.
+    pub(super) cell: Cell,
+    /// What the fits start from, with the edges' bends.
+    pub(super) start: Model,
+    /// Whether the full window is hardly larger than the near one.
+    pub(super) alone: bool,
+    /// Half of the full window at the most, px.
+    pub(super) most_half_px: f64,
+    /// The fit in the near window.
+    pub(super) near: Option<Measured>,
+    /// The fit in the full window.
+    pub(super) full: Option<Measured>,
+}
+
+impl Windows {
+    /// The full window, if nothing reaches into it.
+    pub(super) fn free(&self, board: &acceptance::Board) -> Option<&Measured> {
+        let full = self.full.as_ref()?;
+        (self.near.as_ref().is_none_or(|near| board.agrees(near, full)) && board.accepts(full)).then_some(full)
+    }
+
+    /// The same with other bends of the edges.
+    pub(super) fn rebent(self, bend: [f64; 2]) -> Windows {
+        let start = Model { bend, ..self.start };
+        Windows { start, full: self.full.map(|full| full.rebent(bend, &self.cell)), ..self }
+    }
+}
+
+impl Measured {
+    /// What the fit would be with other bends: a straight edge through a window is off by a sixth of bend times half the window squared.
+    fn rebent(self, bend: [f64; 2], cell: &Cell) -> Measured {
+        let Measured { px, fit, reach } = self;
+        let off = |k: usize| (bend[k] - fit.model.bend[k]) * (reach[k] * cell.edges[k].norm()).powi(2) / 6.0;
+        let normals = fit.model.angles_rad.map(|angle| RowVector2::new(-angle.sin(), angle.cos()));
+        let step =
+            Matrix2::from_rows(&normals).try_inverse().map_or(Vector2::zeros(), |m| m * Vector2::new(off(0), off(1)));
+        let model = Model { corner: fit.model.corner + step, bend, ..fit.model };
+        Measured { px: px + step, fit: Fit { model, ..fit }, reach }
+    }
+}
+
+/// What is usual on a board.
+pub(super) fn usual(seen: &Lattice<Windows>) -> acceptance::Board {
+    let full: Vec<Measured> = seen.iter().filter_map(|(_, _, windows)| windows.full).collect();
+    let both: Vec<_> = seen.iter().filter_map(|(_, _, windows)| windows.near.zip(windows.full)).collect();
+    acceptance::Board::of(&full, &both)
+}
+
+/// Bends as these windows show them: corners without one, or with one that something reaches into, bend no line.
+pub(super) fn bends_by(
+    seen: &Lattice<Windows>,
+    places: &Places,
+    which: impl Fn(&Windows) -> Option<Measured>,
+) -> Vec<[f64; 2]> {
+    let grid = Lattice::from_fn(seen.columns, seen.rows, |col, row| {
+        let measured = seen.get(col, row).and_then(&which).map(|m| Point { px: m.px, counts: true });
+        measured.or_else(|| Some(Point { px: *places.get(col, row)?, counts: false }))
+    });
+    bends(&grid, GOOD_PX)
+}
