@@ -2,8 +2,9 @@
 
 use crate::diagnostic::Warning;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::judge::evidence::{self, Evidence, Facts};
+use crate::stereo::judge::evidence::{self, Evidence};
 use crate::stereo::judge::held_out::Accuracy;
+use crate::stereo::judge::ledger::{Facts, ledger};
 use crate::stereo::judge::length_uncertainty::Volume;
 use crate::stereo::judge::model_disagreement::{self, Disagreement};
 use crate::stereo::judge::residual_correlation::{self, ResidualPattern};
@@ -53,7 +54,7 @@ impl Judged {
         let volume = Volume::new(calibration, accuracy.long_mm[0]);
         let disagreements = model_disagreement::find(calibration, &volume);
         let coverage = Coverage::of(calibration, &residual_pattern);
-        let evidence = evidence::ledger(&Facts {
+        let evidence = ledger(&Facts {
             calibration,
             accuracy: &accuracy,
             second: second.as_ref(),

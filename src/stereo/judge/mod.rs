@@ -5,6 +5,7 @@ pub mod doubtful_corners;
 pub mod evidence;
 pub mod field_of_corners;
 pub mod held_out;
+pub mod ledger;
 pub mod length_uncertainty;
 pub mod lengths;
 pub mod model_disagreement;
