@@ -2,10 +2,10 @@
 //!
 //! In: a rig with its covariance and noise, the target's certificate, the corners of every robot pose in the order of the run. Out:
 //! `cam_from_board` and its covariance, or why there is none; the target's own shape; what all poses share; a judgement of the rig.
-//! `start` finds each pose by itself, `estimate` solves one `bundle` over all of them within what is known before (`prior`) and through the
-//! windows that corners are measured in (`edge_bend`),
-//! `consistency` finds poses and moments at which the rig is another, `judge` fits every `cause` of a change of the whole run, and
-//! `finish` makes the answers; `series` is the list of these steps.
+//! `start` finds each pose by itself; `solve` is one least squares over all of them, within what is known before and through the windows
+//! that corners are measured in; `rig_change` finds poses and moments at which the rig is another, and what changed; `finish` makes the
+//! answers, and `series` is the list of these steps. `turns` numbers targets that look alike after a turn. `print_share` asks the same
+//! equations what a calibration board's own print does to a rig.
 
 pub mod finish;
 pub mod print_share;
