@@ -113,7 +113,9 @@ fn fidelity(robot: &Robot, carried: &Robot) -> String {
     }
     let terms = [
         ("gravity", !robot.corrections.gravity.is_empty() && carried.corrections.gravity.is_empty()),
+        ("bending", !robot.corrections.bending.is_empty() && carried.corrections.bending.is_empty()),
         ("harmonics", !robot.corrections.harmonics.is_empty() && carried.corrections.harmonics.is_empty()),
+        ("wobble", !robot.corrections.wobble.is_empty() && carried.corrections.wobble.is_empty()),
         ("couplings", !robot.corrections.couplings.is_empty() && carried.corrections.couplings.is_empty()),
     ];
     let lost: Vec<&str> = terms.iter().filter(|(_, lost)| *lost).map(|(name, _)| *name).collect();

@@ -73,7 +73,9 @@ impl Problem {
         let mut parameters = robot.mdh_parameters();
         parameters.extend(robot.beta_parameters());
         parameters.extend(robot.corrections.gravity.iter().map(|t| Parameter::Gravity(t.joint, t.point)));
+        parameters.extend(robot.corrections.bending.iter().map(|t| Parameter::Bending(t.joint, t.point)));
         parameters.extend(robot.corrections.harmonics.iter().map(|t| Parameter::Harmonic(t.joint, t.wave)));
+        parameters.extend(robot.corrections.wobble.iter().map(|t| Parameter::Wobble(t.joint, t.wave)));
         let first =
             |p: &Parameter| matches!(p, Parameter::Alpha(0) | Parameter::A(0) | Parameter::Theta(0) | Parameter::D(0));
         let moving = parameters.iter().take_while(|p| first(p)).count();
@@ -106,7 +108,7 @@ impl Problem {
     /// Place of the target, and its derivatives: a column a parameter, then six of a rigid motion about a point.
     fn columns(&self, joints_rad: &[f64], about_mm: &Vector3<f64>) -> (Vector3<f64>, DMatrix<f64>) {
         let torques = Torques::new(&self.robot, joints_rad);
-        let screws = Screws::new(&self.robot, &self.robot.corrected_with(joints_rad, &torques));
+        let screws = Screws::new(&self.robot.bent_with(joints_rad, &torques), &self.robot.tool_mm);
         let count = self.parameters.len();
         let mut columns = DMatrix::zeros(3, count + FRAME);
         for (k, &parameter) in self.parameters.iter().enumerate() {
@@ -158,7 +160,7 @@ impl Problem {
     pub fn prior(&self) -> Vec<f64> {
         let of = |p: &Parameter| match (p, p.unit()) {
             (Parameter::V(_), _) => TARGET_MM,
-            (Parameter::Gravity(..) | Parameter::Harmonic(..) | Parameter::Coupling(..), _) => TERM,
+            (p, _) if p.corrected_joint().is_some() || p.tilted_joint().is_some() => TERM,
             (_, Unit::Mm) => LENGTH_MM,
             (_, Unit::Mrad) => ANGLE_MRAD,
         };

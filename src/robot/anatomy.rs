@@ -116,6 +116,6 @@ mod tests {
         assert!(!anatomy.base_leans(&robot));
         robot.corrections.gravity_direction = Vector3::new(1.0, 0.0, 0.0);
         assert!(anatomy.base_leans(&robot));
-        assert_eq!(robot.gravity_parameters(true).len(), 3 + 2 + 4);
+        assert_eq!(robot.gravity_parameters(true).len(), 3 + 2 + 5);
     }
 }

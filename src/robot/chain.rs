@@ -91,19 +91,19 @@ impl Robot {
     /// The flange's frame (the last joint's) in the base frame. One commanded angle a joint, rad (mm where it slides); corrections are applied.
     pub fn base_from_flange(&self, joints_rad: &[f64]) -> Transform {
         debug_assert_eq!(joints_rad.len(), self.joints.len());
-        let corrected_rad = self.corrected_rad(joints_rad);
-        self.joints
+        let bent = self.bent(joints_rad);
+        bent.joints
             .iter()
-            .zip(&corrected_rad)
+            .zip(&bent.joints_rad)
             .fold(Transform::identity(), |base, (joint, &q)| base * joint.previous_from_this(q))
     }
 
     /// Origins of the base and of every joint's frame and the target, in the base frame, mm: the arm as a line.
     pub fn skeleton_mm(&self, joints_rad: &[f64]) -> Vec<Point3<f64>> {
-        let corrected_rad = self.corrected_rad(joints_rad);
+        let bent = self.bent(joints_rad);
         let mut base_from_this = Transform::identity();
         let mut places = vec![Point3::origin()];
-        for (joint, &q) in self.joints.iter().zip(&corrected_rad) {
+        for (joint, &q) in bent.joints.iter().zip(&bent.joints_rad) {
             base_from_this *= joint.previous_from_this(q);
             places.push(base_from_this * Point3::origin());
         }

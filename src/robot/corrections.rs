@@ -1,15 +1,20 @@
-//! What the joints do beyond the commanded angle: sag under gravity, and once- and twice-a-turn errors of the drives.
+//! What the joints do beyond the commanded angle: sag and bending under gravity, once- and twice-a-turn errors of the drives, and
+//! axes that wobble as they turn.
 //!
-//! In: the commanded angles. Out: the small angle that is added to each of them.
+//! In: the commanded angles. Out: the small angle that is added to each of them, and how far each joint's bearing tilts.
 //! Sag of joint j is its compliance times the torque of unit weights at origins of the chain and at the tool about its axis,
 //! on the robot's own chain without corrections; the periodic errors are `a sin q + b cos q + c sin 2q + d cos 2q`; a coupling
 //! is a ratio times the angle of another joint, or of the joint itself (an error of its scale).
+//! Bending is what a bearing and the link before it yield across the joint's axis: a tilt about x and y of the link (added to its alpha
+//! and beta) by the torque about these, with one compliance a joint.
+//! Wobble is the same tilt by the joint's own angle: `(cos q, -sin q)` and `(sin q, cos q)` about x and y, an oval bearing; the tilt
+//! that turns with the joint, `(cos q, sin q)`, is the twist of the next link.
 //! All are linear in their coefficients, so a pose contributes constants (the features) and the coefficients are parameters.
 //! The direction of gravity must be known: a robot on a wall needs its own.
 
 use nalgebra::{Point3, Vector3};
 
-use super::Robot;
+use super::{Joint, Robot};
 
 /// Where a unit weight hangs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -60,6 +65,17 @@ pub struct GravityTerm {
     pub k_rad_per_m: f64,
 }
 
+/// A joint's bearing and the link before it yield across the joint's axis to the torque of a unit weight.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BendingTerm {
+    /// The joint, from 0.
+    pub joint: usize,
+    /// Where the weight hangs.
+    pub point: LoadPoint,
+    /// Tilt a metre of lever, rad.
+    pub k_rad_per_m: f64,
+}
+
 /// A periodic error of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Wave {
@@ -87,6 +103,16 @@ impl Wave {
         }
     }
 
+    /// The tilt about x and y of a wobble at the commanded angle: this wave about x, with that which goes with it about y.
+    pub fn across(self, q_rad: f64) -> [f64; 2] {
+        let order = if matches!(self, Wave::Sin | Wave::Cos) { 1.0 } else { 2.0 };
+        let (sin, cos) = (order * q_rad).sin_cos();
+        match self {
+            Wave::Cos | Wave::Cos2 => [cos, -sin],
+            Wave::Sin | Wave::Sin2 => [sin, cos],
+        }
+    }
+
     /// Its value at the commanded angle.
     pub fn at(self, q_rad: f64) -> f64 {
         match self {
@@ -104,6 +130,17 @@ pub struct HarmonicTerm {
     /// The joint, from 0.
     pub joint: usize,
     /// Which wave.
+    pub wave: Wave,
+    /// Its amplitude, rad.
+    pub amplitude_rad: f64,
+}
+
+/// A joint whose axis tilts as it turns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WobbleTerm {
+    /// The joint, from 0.
+    pub joint: usize,
+    /// [`Wave::Cos`] or [`Wave::Sin`]: what the tilt about x of the link before follows.
     pub wave: Wave,
     /// Its amplitude, rad.
     pub amplitude_rad: f64,
@@ -127,8 +164,12 @@ pub struct Corrections {
     pub gravity_direction: Vector3<f64>,
     /// Sag.
     pub gravity: Vec<GravityTerm>,
+    /// Bending across the joints' axes.
+    pub bending: Vec<BendingTerm>,
     /// Periodic errors.
     pub harmonics: Vec<HarmonicTerm>,
+    /// Wobble.
+    pub wobble: Vec<WobbleTerm>,
     /// Scale and coupling.
     pub couplings: Vec<CouplingTerm>,
 }
@@ -138,7 +179,9 @@ impl Default for Corrections {
         Corrections {
             gravity_direction: Vector3::new(0.0, 0.0, -1.0),
             gravity: Vec::new(),
+            bending: Vec::new(),
             harmonics: Vec::new(),
+            wobble: Vec::new(),
             couplings: Vec::new(),
         }
     }
@@ -147,14 +190,50 @@ impl Default for Corrections {
 impl Corrections {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.gravity.is_empty() && self.harmonics.is_empty() && self.couplings.is_empty()
+        let weights = self.gravity.is_empty() && self.bending.is_empty();
+        weights && self.harmonics.is_empty() && self.wobble.is_empty() && self.couplings.is_empty()
     }
+
+    /// Whether a joint's link tilts.
+    pub fn tilts(&self, joint: usize) -> bool {
+        self.bending.iter().any(|t| t.joint == joint) || self.wobble.iter().any(|t| t.joint == joint)
+    }
+}
+
+/// The robot at one commanded pose with all of its corrections applied: a chain without any.
+#[derive(Debug, Clone)]
+pub struct Bent {
+    /// Its joints, tilted by their bending at this pose.
+    pub joints: Vec<Joint>,
+    /// The angles that they really take, rad (ways, mm, where they slide).
+    pub joints_rad: Vec<f64>,
+}
+
+impl Bent {
+    /// Tilts a joint about x and y of its link, rad. A joint that the robot lacks is left alone.
+    pub fn tilt(&mut self, joint: usize, [about_x, about_y]: [f64; 2]) {
+        if let Some(joint) = self.joints.get_mut(joint) {
+            joint.alpha_rad += about_x;
+            joint.beta_rad += about_y;
+        }
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Axes {
+    /// The joint's own.
+    z: Vector3<f64>,
+    origin: Point3<f64>,
+    /// Of alpha and of beta, and the foot of the joint's axis, which both pass through.
+    x: Vector3<f64>,
+    y: Vector3<f64>,
+    foot: Point3<f64>,
 }
 
 /// Torques of unit weights about the joints of the chain without corrections.
 #[derive(Debug, Clone)]
 pub struct Torques {
-    axes: Vec<(Vector3<f64>, Point3<f64>)>,
+    axes: Vec<Axes>,
     tool_mm: Point3<f64>,
     gravity_direction: Vector3<f64>,
 }
@@ -165,8 +244,17 @@ impl Torques {
         let mut axes = Vec::with_capacity(robot.joints.len());
         let mut base_from_joint = nalgebra::Isometry3::identity();
         for (joint, &q) in robot.joints.iter().zip(joints_rad) {
+            let before = base_from_joint;
             base_from_joint *= joint.previous_from_this(q);
-            axes.push((base_from_joint.rotation * Vector3::z(), Point3::from(base_from_joint.translation.vector)));
+            let (x, z) = (before.rotation * Vector3::x(), base_from_joint.rotation * Vector3::z());
+            let (sin, cos) = joint.alpha_rad.sin_cos();
+            axes.push(Axes {
+                z,
+                origin: Point3::from(base_from_joint.translation.vector),
+                x,
+                y: before.rotation * Vector3::new(0.0, cos, sin),
+                foot: before * Point3::new(joint.a_mm, 0.0, 0.0),
+            });
         }
         let tool_mm = base_from_joint * Point3::from(robot.tool_mm);
         Torques { axes, tool_mm, gravity_direction: robot.corrections.gravity_direction }
@@ -174,28 +262,59 @@ impl Torques {
 
     /// The lever of a unit weight at `point` about the axis of `joint` (from 0), m; zero where either does not exist.
     pub fn lever_m(&self, joint: usize, point: LoadPoint) -> f64 {
-        let place = match point.joint() {
-            Some(index) => self.axes.get(index).map(|(_, origin)| *origin),
-            None => Some(self.tool_mm),
-        };
-        match (self.axes.get(joint), place) {
-            (Some((axis, origin)), Some(place)) => axis.dot(&(place - origin).cross(&self.gravity_direction)) / 1000.0,
+        match (self.axes.get(joint), self.place(point)) {
+            (Some(axes), Some(place)) => self.torque(&axes.z, &axes.origin, &place),
             _ => 0.0,
         }
+    }
+
+    /// The levers of a unit weight at `point` about x and y of the link before `joint` (from 0), at the foot of its axis, m.
+    pub fn levers_across_m(&self, joint: usize, point: LoadPoint) -> [f64; 2] {
+        match (self.axes.get(joint), self.place(point)) {
+            (Some(axes), Some(place)) => [axes.x, axes.y].map(|axis| self.torque(&axis, &axes.foot, &place)),
+            _ => [0.0; 2],
+        }
+    }
+
+    fn place(&self, point: LoadPoint) -> Option<Point3<f64>> {
+        match point.joint() {
+            Some(index) => self.axes.get(index).map(|axes| axes.origin),
+            None => Some(self.tool_mm),
+        }
+    }
+
+    fn torque(&self, axis: &Vector3<f64>, through: &Point3<f64>, place: &Point3<f64>) -> f64 {
+        axis.dot(&(place - through).cross(&self.gravity_direction)) / 1000.0
     }
 }
 
 impl Robot {
-    /// The angles the joints really take when these are commanded, rad.
-    pub fn corrected_rad(&self, joints_rad: &[f64]) -> Vec<f64> {
+    /// What the joints really do when these angles are commanded, rad.
+    pub fn bent(&self, joints_rad: &[f64]) -> Bent {
         if self.corrections.is_empty() {
-            return joints_rad.to_vec();
+            return Bent { joints: self.joints.clone(), joints_rad: joints_rad.to_vec() };
         }
-        self.corrected_with(joints_rad, &Torques::new(self, joints_rad))
+        self.bent_with(joints_rad, &Torques::new(self, joints_rad))
     }
 
     /// The same with levers that are given.
-    pub fn corrected_with(&self, joints_rad: &[f64], torques: &Torques) -> Vec<f64> {
+    pub fn bent_with(&self, joints_rad: &[f64], torques: &Torques) -> Bent {
+        let mut bent = Bent { joints: self.joints.clone(), joints_rad: self.corrected_with(joints_rad, torques) };
+        for term in &self.corrections.bending {
+            bent.tilt(
+                term.joint,
+                torques.levers_across_m(term.joint, term.point).map(|lever| term.k_rad_per_m * lever),
+            );
+        }
+        for term in &self.corrections.wobble {
+            if let Some(&q) = joints_rad.get(term.joint) {
+                bent.tilt(term.joint, term.wave.across(q).map(|tilt| term.amplitude_rad * tilt));
+            }
+        }
+        bent
+    }
+
+    fn corrected_with(&self, joints_rad: &[f64], torques: &Torques) -> Vec<f64> {
         let mut corrected = joints_rad.to_vec();
         for term in &self.corrections.harmonics {
             if let (Some(angle), Some(&q)) = (corrected.get_mut(term.joint), joints_rad.get(term.joint)) {
@@ -224,11 +343,11 @@ mod tests {
     fn a_stretched_arm_sags_and_an_upright_one_does_not() {
         let mut robot = Robot::paper();
         robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Origin(2), k_rad_per_m: 1e-3 }];
-        let upright = robot.corrected_rad(&[0.0; 6]);
+        let upright = robot.bent(&[0.0; 6]).joints_rad;
         assert!(upright[1].abs() < 1e-15);
         // Lying flat, the elbow has a lever of 0.264 m; gravity lowers the target.
         let flat = [0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0, 0.0];
-        let sag = robot.corrected_rad(&flat)[1] - flat[1];
+        let sag = robot.bent(&flat).joints_rad[1] - flat[1];
         assert!((sag.abs() - 0.264e-3).abs() < 1e-12, "{sag}");
         let mut stiff = robot.clone();
         stiff.corrections = Corrections::default();
@@ -236,11 +355,43 @@ mod tests {
     }
 
     #[test]
+    fn a_bearing_yields_across_its_axis_and_not_about_it() {
+        // The arm lies flat along -x of the base; a soft bearing of the base's axis lets it down, and turns it nowhere else.
+        let mut robot = Robot::paper();
+        let flat = [0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0, 0.0];
+        let stiff = robot.target_mm(&flat);
+        robot.corrections.bending = vec![BendingTerm { joint: 0, point: LoadPoint::Tool, k_rad_per_m: 1e-3 }];
+        let (bent, reach_m) = (robot.target_mm(&flat), stiff.coords.xy().norm() / 1000.0);
+        // The tilt is the compliance times the reach, and lowers what reaches so far by that angle.
+        assert!((stiff.z - bent.z - 1e-3 * reach_m * reach_m * 1000.0).abs() < 1e-4, "{stiff} {bent}");
+        assert!((stiff.coords.xy().norm() - bent.coords.xy().norm()).abs() < 0.1, "{stiff} {bent}");
+        // Hanging from a ceiling it is let down the other way round in its own frame.
+        robot.corrections.gravity_direction = Vector3::new(0.0, 0.0, 1.0);
+        assert!(robot.target_mm(&flat).z > stiff.z);
+    }
+
+    #[test]
+    fn a_tilt_that_turns_with_the_joint_is_a_twist_and_a_wobble_is_not() {
+        let plain = Robot { tool_mm: Vector3::new(30.0, -20.0, 60.0), ..Robot::paper() };
+        let mut wobbling = plain.clone();
+        wobbling.corrections.wobble = vec![WobbleTerm { joint: 4, wave: Wave::Cos, amplitude_rad: 1e-3 }];
+        let q = |turn: f64| [0.1, 0.2, 0.3, 0.4, turn, 0.6];
+        let moved = |turn: f64| (wobbling.target_mm(&q(turn)) - plain.target_mm(&q(turn))).norm();
+        // At zero it tilts about x of the link alone, as its twist would; a quarter of a turn on about minus y.
+        let twisted = plain.shifted(&[crate::robot::Parameter::Alpha(4)], &[1.0]);
+        assert!((twisted.target_mm(&q(0.0)) - wobbling.target_mm(&q(0.0))).norm() < 1e-9);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let swung = plain.shifted(&[crate::robot::Parameter::Beta(4)], &[-1.0]);
+        assert!((swung.target_mm(&q(quarter)) - wobbling.target_mm(&q(quarter))).norm() < 1e-9);
+        assert!(moved(0.0) > 0.01 && moved(quarter) > 0.01);
+    }
+
+    #[test]
     fn waves_add_to_their_joint() {
         let mut robot = Robot::paper();
         robot.corrections.harmonics = vec![HarmonicTerm { joint: 3, wave: Wave::Cos2, amplitude_rad: 0.01 }];
         let q = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
-        let corrected = robot.corrected_rad(&q);
+        let corrected = robot.bent(&q).joints_rad;
         assert!((corrected[3] - 0.4 - 0.01 * 0.8f64.cos()).abs() < 1e-15);
         assert_eq!(corrected[..3], q[..3]);
     }

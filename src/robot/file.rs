@@ -4,7 +4,7 @@ use camino::Utf8Path;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
+use super::corrections::{BendingTerm, CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave, WobbleTerm};
 use super::ends::PoseRecord;
 use super::{Corrections, Ends, Error, Joint, Result, Robot};
 use crate::diagnostic::Place;
@@ -24,7 +24,11 @@ struct RobotRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     gravity: Option<GravityRecord>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    bending: Option<BendingRecord>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     harmonics: Option<HarmonicsRecord>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    wobble: Option<HarmonicsRecord>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     couplings: Option<CouplingsRecord>,
     /// `root_from_frame0`
@@ -83,7 +87,14 @@ struct GravityTermRecord {
     k_mrad_per_m: f64,
 }
 
-/// Periodic errors of the drives, in the commanded angle.
+/// What bearings and links yield across the joints' axes: `k_mrad_per_m` times the levers of a unit weight at `point`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BendingRecord {
+    terms: Vec<GravityTermRecord>,
+}
+
+/// Waves in the commanded angle: periodic errors of the drives, or the tilt of their axes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct HarmonicsRecord {
@@ -208,6 +219,10 @@ impl RobotRecord {
             1.. if joint <= joint_count => Ok(joint - 1),
             _ => Err(format!("[{table}]: joint {joint} of a robot with {joint_count}")),
         };
+        let point = |table: &str, name: &str| {
+            LoadPoint::from_name(name, joint_count)
+                .ok_or_else(|| format!("[{table}]: point \"{name}\"; it is joint_1 .. joint_{joint_count} or tool"))
+        };
         let direction = self.gravity_direction.or(self.gravity.as_ref().and_then(|g| g.direction));
         if let Some(direction) = direction.map(Vector3::from) {
             if !(direction.norm().is_finite() && direction.norm() > 0.0) {
@@ -217,29 +232,38 @@ impl RobotRecord {
         }
         if let Some(gravity) = &self.gravity {
             for term in &gravity.terms {
-                let point = LoadPoint::from_name(&term.point, joint_count).ok_or_else(|| {
-                    format!("[gravity]: point \"{}\"; it is joint_1 .. joint_{joint_count} or tool", term.point)
-                })?;
-                let joint = index("gravity", term.joint)?;
+                let (joint, point) = (index("gravity", term.joint)?, point("gravity", &term.point)?);
                 corrections.gravity.push(GravityTerm { joint, point, k_rad_per_m: term.k_mrad_per_m / 1000.0 });
             }
         }
+        for term in self.bending.iter().flat_map(|b| &b.terms) {
+            let (joint, point) = (index("bending", term.joint)?, point("bending", &term.point)?);
+            corrections.bending.push(BendingTerm { joint, point, k_rad_per_m: term.k_mrad_per_m / 1000.0 });
+        }
+        let wave = |table: &str, name: &str| {
+            let known = Wave::ALL.into_iter().find(|w| w.name() == name);
+            known.ok_or_else(|| format!("[{table}]: wave \"{name}\"; it is sin, cos, sin2 or cos2"))
+        };
         for term in self.harmonics.iter().flat_map(|h| &h.terms) {
-            let wave = Wave::ALL
-                .into_iter()
-                .find(|w| w.name() == term.wave)
-                .ok_or_else(|| format!("[harmonics]: wave \"{}\"; it is sin, cos, sin2 or cos2", term.wave))?;
-            let joint = index("harmonics", term.joint)?;
+            let (joint, wave) = (index("harmonics", term.joint)?, wave("harmonics", &term.wave)?);
             corrections.harmonics.push(HarmonicTerm { joint, wave, amplitude_rad: term.amplitude_mrad / 1000.0 });
+        }
+        for term in self.wobble.iter().flat_map(|w| &w.terms) {
+            let (joint, wave) = (index("wobble", term.joint)?, wave("wobble", &term.wave)?);
+            corrections.wobble.push(WobbleTerm { joint, wave, amplitude_rad: term.amplitude_mrad / 1000.0 });
         }
         for term in self.couplings.iter().flat_map(|c| &c.terms) {
             let (joint, of) = (index("couplings", term.joint)?, index("couplings", term.of)?);
             corrections.couplings.push(CouplingTerm { joint, of, ratio: term.per_mille / 1000.0 });
         }
         let coefficients = corrections.gravity.iter().map(|t| t.k_rad_per_m);
+        let coefficients = coefficients.chain(corrections.bending.iter().map(|t| t.k_rad_per_m));
         let coefficients = coefficients.chain(corrections.harmonics.iter().map(|t| t.amplitude_rad));
+        let coefficients = coefficients.chain(corrections.wobble.iter().map(|t| t.amplitude_rad));
         if coefficients.chain(corrections.couplings.iter().map(|t| t.ratio)).any(|v| !v.is_finite()) {
-            return Err("[gravity], [harmonics] and [couplings]: every number must be finite".to_owned());
+            return Err(
+                "[gravity], [bending], [harmonics], [wobble] and [couplings]: every number must be finite".to_owned()
+            );
         }
         Ok(corrections)
     }
@@ -257,6 +281,16 @@ fn gravity_record(corrections: &Corrections) -> Option<GravityRecord> {
     Some(GravityRecord { direction: None, terms: corrections.gravity.iter().map(term).collect() })
 }
 
+fn bending_record(corrections: &Corrections) -> Option<BendingRecord> {
+    let term = |t: &BendingTerm| GravityTermRecord {
+        joint: t.joint + 1,
+        point: t.point.name(),
+        k_mrad_per_m: 1000.0 * t.k_rad_per_m,
+    };
+    let terms: Vec<_> = corrections.bending.iter().map(term).collect();
+    if terms.is_empty() { None } else { Some(BendingRecord { terms }) }
+}
+
 fn harmonics_record(corrections: &Corrections) -> Option<HarmonicsRecord> {
     let term = |t: &HarmonicTerm| HarmonicTermRecord {
         joint: t.joint + 1,
@@ -264,6 +298,16 @@ fn harmonics_record(corrections: &Corrections) -> Option<HarmonicsRecord> {
         amplitude_mrad: 1000.0 * t.amplitude_rad,
     };
     let terms: Vec<_> = corrections.harmonics.iter().map(term).collect();
+    if terms.is_empty() { None } else { Some(HarmonicsRecord { terms }) }
+}
+
+fn wobble_record(corrections: &Corrections) -> Option<HarmonicsRecord> {
+    let term = |t: &WobbleTerm| HarmonicTermRecord {
+        joint: t.joint + 1,
+        wave: t.wave.name().to_owned(),
+        amplitude_mrad: 1000.0 * t.amplitude_rad,
+    };
+    let terms: Vec<_> = corrections.wobble.iter().map(term).collect();
     if terms.is_empty() { None } else { Some(HarmonicsRecord { terms }) }
 }
 
@@ -298,7 +342,9 @@ impl From<&Robot> for RobotRecord {
                 .collect(),
             tool: ToolRecord { x_mm: robot.tool_mm.x, y_mm: robot.tool_mm.y, z_mm: robot.tool_mm.z },
             gravity: gravity_record(&robot.corrections),
+            bending: bending_record(&robot.corrections),
             harmonics: harmonics_record(&robot.corrections),
+            wobble: wobble_record(&robot.corrections),
             couplings: couplings_record(&robot.corrections),
             base: PoseRecord::of(&robot.ends.root_from_frame0),
             flange: PoseRecord::of(&robot.ends.last_frame_from_flange),
@@ -317,7 +363,9 @@ mod tests {
         robot.joints[0].limits_rad = Some((-3.0, 3.0));
         robot.tool_mm = Vector3::new(1.5, -2.0, 30.0);
         robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Origin(4), k_rad_per_m: 0.25 }];
+        robot.corrections.bending = vec![BendingTerm { joint: 3, point: LoadPoint::Tool, k_rad_per_m: 0.125 }];
         robot.corrections.harmonics = vec![HarmonicTerm { joint: 5, wave: Wave::Sin2, amplitude_rad: 0.5 }];
+        robot.corrections.wobble = vec![WobbleTerm { joint: 4, wave: Wave::Cos, amplitude_rad: 0.25 }];
         robot.ends.last_frame_from_flange =
             crate::geometry::transform(Vector3::new(0.3, -3.0, 0.5), Vector3::new(1.0, 2.0, 3.0));
         let back = toml::from_str::<RobotRecord>(&to_toml(&robot)).unwrap().robot().unwrap();

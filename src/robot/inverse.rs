@@ -28,13 +28,13 @@ fn miss(robot: &Robot, wanted: &Transform, joints_rad: &[f64]) -> Vector6<f64> {
 }
 
 /// Change of the flange's pose with each joint, in the units of [`miss`]: columns `z_j x (p - o_j)` and `z_j` at the angles that the
-/// joints really take. A coupling moves a joint with another one's column; the slopes of sag and waves, thousandths, are left out: they
+/// joints really take. A coupling moves a joint with another one's column; the slopes of sag, bending and waves, thousandths, are left out: they
 /// cost a step, not the answer.
 fn jacobian(robot: &Robot, joints_rad: &[f64]) -> DMatrix<f64> {
-    let corrected_rad = robot.corrected_rad(joints_rad);
+    let bent = robot.bent(joints_rad);
     let mut screws = Vec::with_capacity(robot.joints.len());
     let mut base_from_joint = Transform::identity();
-    for (joint, &q) in robot.joints.iter().zip(&corrected_rad) {
+    for (joint, &q) in bent.joints.iter().zip(&bent.joints_rad) {
         base_from_joint *= joint.previous_from_this(q);
         screws
             .push((base_from_joint.rotation * nalgebra::Vector3::z() * joint.sign, base_from_joint.translation.vector));

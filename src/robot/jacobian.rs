@@ -5,11 +5,15 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use super::corrections::Torques;
-use super::{Parameter, Robot};
+use super::Parameter;
+use super::corrections::{Bent, Torques};
 
 /// Columns of angles are per mrad.
 const RAD_PER_MRAD: f64 = 1e-3;
+
+/// What a parameter's joint turns by at a pose per unit of the parameter: about its axis (first number), or, where its link tilts, about x
+/// and y of its link.
+pub type Feature = [f64; 2];
 
 /// The screws of a chain in one pose: what each of its parameters turns about or shifts along, base frame.
 #[derive(Debug, Clone)]
@@ -36,12 +40,12 @@ struct JointScrews {
 }
 
 impl Screws {
-    /// At the angles that the joints really take, rad (see [`Robot::corrected_rad`]).
-    pub fn new(robot: &Robot, corrected_rad: &[f64]) -> Screws {
+    /// Of the robot as it stands (see [`Robot::bent`]), with the target at `tool_mm` in the last joint's frame.
+    pub fn new(bent: &Bent, tool_mm: &Vector3<f64>) -> Screws {
         let mut rotation = Matrix3::identity();
         let mut origin = Point3::origin();
-        let mut joints = Vec::with_capacity(robot.joints.len());
-        for (joint, &q) in robot.joints.iter().zip(corrected_rad) {
+        let mut joints = Vec::with_capacity(bent.joints.len());
+        for (joint, &q) in bent.joints.iter().zip(&bent.joints_rad) {
             let (sa, ca) = joint.alpha_rad.sin_cos();
             let (sb, cb) = joint.beta_rad.sin_cos();
             let (st, ct) = joint.turn_rad(q).sin_cos();
@@ -57,7 +61,7 @@ impl Screws {
             origin += joint.shift_mm(q) * z;
             rotation = Matrix3::from_columns(&[ct * x1 + st * y, ct * y - st * x1, z]);
         }
-        let target_mm = origin + rotation * robot.tool_mm;
+        let target_mm = origin + rotation * tool_mm;
         Screws { joints, base_from_flange: rotation, target_mm }
     }
 
@@ -67,7 +71,7 @@ impl Screws {
     }
 
     /// Derivative of the target's point, mm per mm or mrad. `feature` is the parameter's factor at this pose (see [`feature`]).
-    pub fn point_column(&self, parameter: Parameter, feature: f64) -> Vector3<f64> {
+    pub fn point_column(&self, parameter: Parameter, feature: Feature) -> Vector3<f64> {
         let p = self.target_mm;
         let column =
             |i: usize, f: &dyn Fn(&JointScrews) -> Vector3<f64>| self.joints.get(i).map_or(Vector3::zeros(), f);
@@ -80,39 +84,49 @@ impl Screws {
             Parameter::V(axis) => self.base_from_flange.column(axis.min(2)).into(),
             Parameter::Gravity(i, _) | Parameter::Harmonic(i, _) | Parameter::Coupling(i, _) => column(i, &|s| {
                 let way = if s.slides { s.z } else { s.z.cross(&(p - s.origin)) };
-                way * (s.sign * feature * RAD_PER_MRAD)
+                way * (s.sign * feature[0] * RAD_PER_MRAD)
             }),
+            Parameter::Bending(i, _) | Parameter::Wobble(i, _) => {
+                column(i, &|s| (s.x * feature[0] + s.y * feature[1]).cross(&(p - s.origin)) * RAD_PER_MRAD)
+            }
         }
     }
 
     /// Derivative of the flange's orientation as a rotation vector in the base frame, rad per mm or mrad.
-    pub fn rotation_column(&self, parameter: Parameter, feature: f64) -> Vector3<f64> {
+    pub fn rotation_column(&self, parameter: Parameter, feature: Feature) -> Vector3<f64> {
         let column =
             |i: usize, f: &dyn Fn(&JointScrews) -> Vector3<f64>| self.joints.get(i).map_or(Vector3::zeros(), f);
         match parameter {
             Parameter::Alpha(i) => column(i, &|s| s.x * RAD_PER_MRAD),
             Parameter::Beta(i) => column(i, &|s| s.y * RAD_PER_MRAD),
             Parameter::Theta(i) => column(i, &|s| s.z * RAD_PER_MRAD),
+            Parameter::Bending(i, _) | Parameter::Wobble(i, _) => {
+                column(i, &|s| (s.x * feature[0] + s.y * feature[1]) * RAD_PER_MRAD)
+            }
             _ => parameter.corrected_joint().map_or(Vector3::zeros(), |i| {
-                column(i, &|s| if s.slides { Vector3::zeros() } else { s.z * (s.sign * feature * RAD_PER_MRAD) })
+                column(i, &|s| if s.slides { Vector3::zeros() } else { s.z * (s.sign * feature[0] * RAD_PER_MRAD) })
             }),
         }
     }
 }
 
-/// What a parameter's joint turns by at this pose per unit of the parameter: 1 but for corrections.
-pub fn feature(parameter: Parameter, torques: &Torques, joints_rad: &[f64]) -> f64 {
-    match parameter {
+/// The feature of a parameter: 1 but for corrections.
+pub fn feature(parameter: Parameter, torques: &Torques, joints_rad: &[f64]) -> Feature {
+    let about_axis = match parameter {
+        Parameter::Bending(joint, point) => return torques.levers_across_m(joint, point),
+        Parameter::Wobble(joint, wave) => return joints_rad.get(joint).map_or([0.0; 2], |&q| wave.across(q)),
         Parameter::Gravity(joint, point) => torques.lever_m(joint, point),
         Parameter::Harmonic(joint, wave) => joints_rad.get(joint).map_or(0.0, |&q| wave.at(q)),
         Parameter::Coupling(_, of) => joints_rad.get(of).copied().unwrap_or(0.0),
         _ => 1.0,
-    }
+    };
+    [about_axis, 0.0]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::Robot;
     use crate::robot::chain::Joint;
 
     /// Step of the central differences, mm or mrad; their error is its square times the third derivative (below 1e-3 mm).
@@ -149,7 +163,7 @@ mod tests {
     fn points_agree_with_the_chain() {
         for robot in robots() {
             let q: Vec<f64> = (0..robot.joints.len()).map(|i| 0.4 * i as f64 - 1.0).collect();
-            assert!((Screws::new(&robot, &q).target_mm - robot.target_mm(&q)).norm() < 1e-10);
+            assert!((Screws::new(&robot.bent(&q), &robot.tool_mm).target_mm - robot.target_mm(&q)).norm() < 1e-10);
         }
     }
 
@@ -161,7 +175,7 @@ mod tests {
             parameters.extend(robot.harmonic_parameters(2));
             parameters.extend(robot.coupling_parameters(true));
             let q: Vec<f64> = (0..robot.joints.len()).map(|i| 0.7 * i as f64 - 1.1).collect();
-            let screws = Screws::new(&robot, &q);
+            let screws = Screws::new(&robot.bent(&q), &robot.tool_mm);
             let torques = Torques::new(&robot, &q);
             for parameter in parameters {
                 let at = |delta: f64| robot.shifted(&[parameter], &[delta]);
@@ -182,11 +196,13 @@ mod tests {
     }
 
     #[test]
-    fn sag_turns_its_joint_by_its_lever() {
+    fn sag_and_bending_turn_by_their_levers() {
         let robot = &robots()[0];
         let q = [0.3, -0.4, 0.5, 0.6, -0.7, 0.8];
-        let (screws, torques) = (Screws::new(robot, &q), Torques::new(robot, &q));
-        for parameter in robot.gravity_parameters(true) {
+        let (screws, torques) = (Screws::new(&robot.bent(&q), &robot.tool_mm), Torques::new(robot, &q));
+        for parameter in
+            [robot.gravity_parameters(true), robot.bending_parameters(), robot.wobble_parameters()].concat()
+        {
             let at = |delta: f64| robot.shifted(&[parameter], &[delta]).target_mm(&q);
             let difference = (at(STEP) - at(-STEP)) / (2.0 * STEP);
             let column = screws.point_column(parameter, feature(parameter, &torques, &q));

@@ -2,7 +2,7 @@
 
 use super::Robot;
 use super::anatomy::Anatomy;
-use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
+use super::corrections::{BendingTerm, CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave, WobbleTerm};
 
 /// |sin alpha| below which two neighbouring axes count as parallel: 3 degrees, far above any tolerance of manufacture.
 pub(super) const PARALLEL_SIN: f64 = 0.05;
@@ -24,8 +24,12 @@ pub enum Parameter {
     V(usize),
     /// Compliance of a joint under a weight.
     Gravity(usize, LoadPoint),
+    /// Compliance of a joint's bearing, across its axis, under a weight.
+    Bending(usize, LoadPoint),
     /// Amplitude of a periodic error.
     Harmonic(usize, Wave),
+    /// Amplitude with which a joint's axis tilts as it turns.
+    Wobble(usize, Wave),
     /// What a joint does by itself as another joint moves (itself: an error of its scale).
     Coupling(usize, usize),
 }
@@ -62,16 +66,26 @@ impl Parameter {
             Parameter::V(1) => "v_y".to_owned(),
             Parameter::V(_) => "v_z".to_owned(),
             Parameter::Gravity(i, point) => format!("k_{}_{}", i + 1, point.name()),
+            Parameter::Bending(i, point) => format!("bend_{}_{}", i + 1, point.name()),
             Parameter::Harmonic(i, wave) => format!("{}_{}", wave.name(), i + 1),
+            Parameter::Wobble(i, wave) => format!("wobble_{}_{}", wave.name(), i + 1),
             Parameter::Coupling(i, of) if i == of => format!("scale_{}", i + 1),
             Parameter::Coupling(i, of) => format!("coupling_{}_{}", i + 1, of + 1),
         }
     }
 
-    /// The joint that a correction moves at a pose; `None` for the chain's own parameters and the target's.
+    /// The joint whose angle a correction changes at a pose; `None` for the chain's own parameters, the target's and those that tilt a link.
     pub fn corrected_joint(self) -> Option<usize> {
         match self {
             Parameter::Gravity(i, _) | Parameter::Harmonic(i, _) | Parameter::Coupling(i, _) => Some(i),
+            _ => None,
+        }
+    }
+
+    /// The joint whose link a correction tilts at a pose.
+    pub fn tilted_joint(self) -> Option<usize> {
+        match self {
+            Parameter::Bending(i, _) | Parameter::Wobble(i, _) => Some(i),
             _ => None,
         }
     }
@@ -99,7 +113,7 @@ impl Robot {
     }
 
     /// Compliances under the arm's own weight, of the shoulder and the elbow, and of the base where its axis does not stand along
-    /// gravity, then (`tool`) of these and the wrist under the load's. The joints come from the chain's geometry (see `super::anatomy`).
+    /// gravity, then (`tool`) under the load's of all joints from the shoulder to the wrist, those that turn a link about itself too. The joints come from the chain's geometry (see `super::anatomy`).
     pub fn gravity_parameters(&self, tool: bool) -> Vec<Parameter> {
         let Some(anatomy) = Anatomy::of(self) else { return Vec::new() };
         let (shoulder, elbow, wrist) = (anatomy.shoulder, anatomy.elbow, anatomy.wrist);
@@ -110,11 +124,17 @@ impl Robot {
             terms.extend([of_origin(0, elbow), of_origin(0, wrist)]);
         }
         if tool {
-            let joints = [shoulder, elbow, wrist].into_iter().chain(leaning.then_some(0));
+            let joints = (shoulder..=wrist).chain(leaning.then_some(0));
             terms.extend(joints.map(|joint| Parameter::Gravity(joint, LoadPoint::Tool)));
         }
         terms.retain(|t| t.corrected_joint().is_some_and(|j| !self.joints[j].slides));
         terms
+    }
+
+    /// Compliances across the axes of the joints from the base to the wrist under the load's weight: what bearings and links yield.
+    pub fn bending_parameters(&self) -> Vec<Parameter> {
+        let Some(anatomy) = Anatomy::of(self) else { return Vec::new() };
+        (0..=anatomy.wrist).map(|joint| Parameter::Bending(joint, LoadPoint::Tool)).collect()
     }
 
     /// An error of scale of every joint, and with `neighbours` what each does by itself as the joint before it moves
@@ -136,6 +156,12 @@ impl Robot {
         turning.flat_map(|i| waves.iter().map(move |&w| Parameter::Harmonic(i, w))).collect()
     }
 
+    /// Once-a-turn wobble of the axis of every joint that turns.
+    pub fn wobble_parameters(&self) -> Vec<Parameter> {
+        let turning = (0..self.joints.len()).filter(|&i| !self.joints[i].slides);
+        turning.flat_map(|i| [Wave::Sin, Wave::Cos].map(|wave| Parameter::Wobble(i, wave))).collect()
+    }
+
     /// The parameter's value, mm or mrad.
     pub fn value(&self, parameter: Parameter) -> f64 {
         let joint = |i: usize| self.joints.get(i);
@@ -150,8 +176,16 @@ impl Robot {
                 let terms = self.corrections.gravity.iter();
                 1000.0 * terms.filter(|t| t.joint == joint && t.point == point).map(|t| t.k_rad_per_m).sum::<f64>()
             }
+            Parameter::Bending(joint, point) => {
+                let terms = self.corrections.bending.iter();
+                1000.0 * terms.filter(|t| t.joint == joint && t.point == point).map(|t| t.k_rad_per_m).sum::<f64>()
+            }
             Parameter::Harmonic(joint, wave) => {
                 let terms = self.corrections.harmonics.iter();
+                1000.0 * terms.filter(|t| t.joint == joint && t.wave == wave).map(|t| t.amplitude_rad).sum::<f64>()
+            }
+            Parameter::Wobble(joint, wave) => {
+                let terms = self.corrections.wobble.iter();
                 1000.0 * terms.filter(|t| t.joint == joint && t.wave == wave).map(|t| t.amplitude_rad).sum::<f64>()
             }
             Parameter::Coupling(joint, of) => {
@@ -173,11 +207,25 @@ impl Robot {
                     None => terms.push(GravityTerm { joint, point, k_rad_per_m: angle }),
                 }
             }
+            Parameter::Bending(joint, point) => {
+                let terms = &mut self.corrections.bending;
+                match terms.iter_mut().find(|t| t.joint == joint && t.point == point) {
+                    Some(term) => term.k_rad_per_m += angle,
+                    None => terms.push(BendingTerm { joint, point, k_rad_per_m: angle }),
+                }
+            }
             Parameter::Harmonic(joint, wave) => {
                 let terms = &mut self.corrections.harmonics;
                 match terms.iter_mut().find(|t| t.joint == joint && t.wave == wave) {
                     Some(term) => term.amplitude_rad += angle,
                     None => terms.push(HarmonicTerm { joint, wave, amplitude_rad: angle }),
+                }
+            }
+            Parameter::Wobble(joint, wave) => {
+                let terms = &mut self.corrections.wobble;
+                match terms.iter_mut().find(|t| t.joint == joint && t.wave == wave) {
+                    Some(term) => term.amplitude_rad += angle,
+                    None => terms.push(WobbleTerm { joint, wave, amplitude_rad: angle }),
                 }
             }
             Parameter::Coupling(joint, of) => {
@@ -232,6 +280,8 @@ mod tests {
         let mut parameters = robot.mdh_parameters();
         parameters.extend(robot.beta_parameters());
         parameters.extend(robot.gravity_parameters(true));
+        parameters.extend(robot.bending_parameters());
+        parameters.extend(robot.wobble_parameters());
         parameters.extend(robot.harmonic_parameters(2));
         parameters.extend(robot.coupling_parameters(true));
         let delta: Vec<f64> = (0..parameters.len()).map(|i| 0.1 + i as f64).collect();

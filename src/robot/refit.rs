@@ -83,13 +83,11 @@ impl Robot {
     }
 
     fn equations(&self, plain: &Robot, parameters: &[Parameter], q: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
-        let mut at_flange = plain.clone();
-        at_flange.tool_mm = Vector3::zeros();
-        let screws = Screws::new(&at_flange, q);
+        let screws = Screws::new(&plain.bent(q), &Vector3::zeros());
         let mut columns = DMatrix::zeros(6, parameters.len());
         for (k, &parameter) in parameters.iter().enumerate() {
-            columns.fixed_view_mut::<3, 1>(0, k).copy_from(&screws.point_column(parameter, 1.0));
-            columns.fixed_view_mut::<3, 1>(3, k).copy_from(&(screws.rotation_column(parameter, 1.0) * ARM_MM));
+            columns.fixed_view_mut::<3, 1>(0, k).copy_from(&screws.point_column(parameter, [1.0, 0.0]));
+            columns.fixed_view_mut::<3, 1>(3, k).copy_from(&(screws.rotation_column(parameter, [1.0, 0.0]) * ARM_MM));
         }
         let (wanted, there) = (self.base_from_flange(q), plain.base_from_flange(q));
         let mut residual = DVector::zeros(6);

@@ -6,9 +6,9 @@
 
 use nalgebra::{Matrix3, Matrix3xX, Point3};
 
-use crate::robot::corrections::Torques;
-use crate::robot::jacobian::{Screws, feature};
-use crate::robot::{Parameter, Robot};
+use crate::robot::corrections::{Bent, Torques};
+use crate::robot::jacobian::{Feature, Screws, feature};
+use crate::robot::{Joint, Parameter, Robot};
 
 /// A robot at fixed commanded poses with chosen parameters free.
 #[derive(Debug, Clone)]
@@ -22,8 +22,10 @@ pub struct Kinematics {
 struct PoseConstants {
     /// Angles with the nominal robot's own corrections, rad.
     angles_rad: Vec<f64>,
+    /// What the nominal robot's own bending and wobble add to alpha and beta, one a joint, rad; empty without.
+    tilts_rad: Vec<[f64; 2]>,
     /// One a parameter.
-    features: Vec<f64>,
+    features: Vec<Feature>,
 }
 
 /// Where the target is at one pose, and how that changes.
@@ -45,8 +47,15 @@ impl Kinematics {
     pub fn new(nominal: &Robot, levers: &Robot, parameters: &[Parameter], joints_rad: &[&[f64]]) -> Kinematics {
         let constants = |q: &&[f64]| {
             let torques = Torques::new(levers, q);
+            let bent = nominal.bent_with(q, &torques);
+            let tilt = |(b, n): (&Joint, &Joint)| [b.alpha_rad - n.alpha_rad, b.beta_rad - n.beta_rad];
+            let tilts_rad = match (0..nominal.joints.len()).any(|joint| nominal.corrections.tilts(joint)) {
+                false => Vec::new(),
+                true => bent.joints.iter().zip(&nominal.joints).map(tilt).collect(),
+            };
             PoseConstants {
-                angles_rad: nominal.corrected_with(q, &torques),
+                angles_rad: bent.joints_rad,
+                tilts_rad,
                 features: parameters.iter().map(|&p| feature(p, &torques, q)).collect(),
             }
         };
@@ -73,8 +82,13 @@ impl Kinematics {
     }
 
     /// Of a pose: its angles with the nominal robot's own corrections, rad, and the features of the parameters.
-    pub fn constants(&self, pose: usize) -> (&[f64], &[f64]) {
+    pub fn constants(&self, pose: usize) -> (&[f64], &[Feature]) {
         (&self.poses[pose].angles_rad, &self.poses[pose].features)
+    }
+
+    /// Of a pose: what the nominal robot's own bending and wobble add to alpha and beta, one a joint, rad; empty without.
+    pub fn tilts_rad(&self, pose: usize) -> &[[f64; 2]] {
+        &self.poses[pose].tilts_rad
     }
 
     /// Every pose, with derivatives where asked.
@@ -84,15 +98,20 @@ impl Kinematics {
     }
 
     fn place(&self, robot: &Robot, pose: &PoseConstants, offsets: &[f64], derivatives: bool) -> Place {
-        let mut angles = pose.angles_rad.clone();
+        let mut bent = Bent { joints: robot.joints.clone(), joints_rad: pose.angles_rad.clone() };
+        for (joint, tilt) in pose.tilts_rad.iter().enumerate() {
+            bent.tilt(joint, *tilt);
+        }
         for ((&parameter, &offset), &feature) in self.parameters.iter().zip(offsets).zip(&pose.features) {
-            if let Some(joint) = parameter.corrected_joint()
-                && let Some(angle) = angles.get_mut(joint)
+            if let Some(joint) = parameter.tilted_joint() {
+                bent.tilt(joint, feature.map(|f| offset / 1000.0 * f));
+            } else if let Some(joint) = parameter.corrected_joint()
+                && let Some(angle) = bent.joints_rad.get_mut(joint)
             {
-                *angle += offset / 1000.0 * feature;
+                *angle += offset / 1000.0 * feature[0];
             }
         }
-        let screws = Screws::new(robot, &angles);
+        let screws = Screws::new(&bent, &robot.tool_mm);
         let (mut point_columns, mut rotation_columns) = (Matrix3xX::zeros(0), Matrix3xX::zeros(0));
         if derivatives {
             let columns = || self.parameters.iter().zip(&pose.features);

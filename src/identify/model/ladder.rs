@@ -24,23 +24,28 @@ pub struct Terms {
     pub chain: Chain,
     /// Hayati's rotation for parallel axes.
     pub beta: bool,
-    /// 0 none, 1 the arm's own weight, 2 the load's too.
+    /// 0 none, 1 the arm's own weight, 2 the load's too, 3 and what bearings and links yield across the axes.
     pub gravity: usize,
     /// 0 none, 1 scale of each joint, 2 coupling to the joint before it too.
     pub couplings: usize,
     /// 0 none, 1 once a turn, 2 twice a turn too.
     pub harmonics: usize,
+    /// Axes that tilt as they turn.
+    pub wobble: bool,
 }
 
 impl Terms {
     /// The nominal robot.
-    pub const NOMINAL: Terms = Terms { chain: Chain::Nominal, beta: false, gravity: 0, couplings: 0, harmonics: 0 };
+    pub const NOMINAL: Terms =
+        Terms { chain: Chain::Nominal, beta: false, gravity: 0, couplings: 0, harmonics: 0, wobble: false };
 
     /// All that there is.
-    pub const ALL: Terms = Terms { chain: Chain::Mdh, beta: true, gravity: 2, couplings: 2, harmonics: 2 };
+    pub const ALL: Terms =
+        Terms { chain: Chain::Mdh, beta: true, gravity: 3, couplings: 2, harmonics: 2, wobble: true };
 
     /// What gross errors and sessions are looked for with.
-    pub const REFERENCE: Terms = Terms { chain: Chain::Mdh, beta: true, gravity: 1, couplings: 0, harmonics: 0 };
+    pub const REFERENCE: Terms =
+        Terms { chain: Chain::Mdh, beta: true, gravity: 1, couplings: 0, harmonics: 0, wobble: false };
 
     /// The parameters of the robot with these terms.
     pub fn parameters(&self, robot: &Robot) -> Vec<Parameter> {
@@ -57,11 +62,17 @@ impl Terms {
         if self.gravity > 0 {
             parameters.extend(robot.gravity_parameters(self.gravity > 1));
         }
+        if self.gravity > 2 {
+            parameters.extend(robot.bending_parameters());
+        }
         if self.couplings > 0 {
             parameters.extend(robot.coupling_parameters(self.couplings > 1));
         }
         if self.harmonics > 0 {
             parameters.extend(robot.harmonic_parameters(self.harmonics));
+        }
+        if self.wobble {
+            parameters.extend(robot.wobble_parameters());
         }
         parameters
     }
@@ -81,7 +92,8 @@ impl Terms {
         match self.gravity {
             0 => {}
             1 => name.push_str(" + gravity (arm)"),
-            _ => name.push_str(" + gravity (arm, load)"),
+            2 => name.push_str(" + gravity (arm, load)"),
+            _ => name.push_str(" + gravity (arm, load) and bending"),
         }
         match self.couplings {
             0 => {}
@@ -90,6 +102,9 @@ impl Terms {
         }
         if self.harmonics > 0 {
             name.push_str(&format!(" + harmonics ({})", self.harmonics));
+        }
+        if self.wobble {
+            name.push_str(" + wobble");
         }
         name
     }
@@ -109,9 +124,10 @@ impl Terms {
         }
         if self.chain == Chain::Mdh && beyond {
             next.push(Terms { beta: true, ..*self });
-            next.extend((self.gravity + 1..=2).map(|gravity| Terms { gravity, ..*self }));
+            next.extend((self.gravity + 1..=3).map(|gravity| Terms { gravity, ..*self }));
             next.extend((self.couplings + 1..=2).map(|couplings| Terms { couplings, ..*self }));
             next.extend((self.harmonics + 1..=2).map(|harmonics| Terms { harmonics, ..*self }));
+            next.push(Terms { wobble: true, ..*self });
         }
         let count = self.parameters(robot).len();
         next.retain(|t| t.parameters(robot).len() > count);

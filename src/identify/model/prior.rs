@@ -15,7 +15,7 @@ use crate::robot::Parameter;
 /// Standard deviations that are tried for every kind, mm, mrad or thousandths.
 const GRID: [f64; 13] = [1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 
-/// Largest of them by kind (lengths, angles, target, gravity, harmonics, couplings, zero, scale): what no workshop gets wrong.
+/// Largest of them by kind (lengths, angles, target, gravity, harmonics, couplings, zero, warps): what no workshop gets wrong.
 const LARGEST: [f64; KINDS] = [30.0, 30.0, 1000.0, 30.0, 10.0, 30.0, 100.0, 30.0];
 
 /// Rounds over the kinds; the evidence is nearly separable.
@@ -44,8 +44,8 @@ pub struct Tolerance {
     pub couplings_per_mille: f64,
     /// Of the zero of distances, mm.
     pub zero_mm: f64,
-    /// Of the sensor's scale and warps, thousandths.
-    pub scale_per_mille: f64,
+    /// Of the sensor's warps, thousandths.
+    pub warps_per_mille: f64,
 }
 
 impl Default for Tolerance {
@@ -59,7 +59,7 @@ impl Default for Tolerance {
             harmonics_mrad: 1.0,
             couplings_per_mille: 1.0,
             zero_mm: 1.0,
-            scale_per_mille: 1.0,
+            warps_per_mille: 1.0,
         }
     }
 }
@@ -69,8 +69,8 @@ fn kind(parameter: Parameter) -> usize {
         Parameter::A(_) | Parameter::D(_) => 0,
         Parameter::Alpha(_) | Parameter::Theta(_) | Parameter::Beta(_) => 1,
         Parameter::V(_) => 2,
-        Parameter::Gravity(..) => 3,
-        Parameter::Harmonic(..) => 4,
+        Parameter::Gravity(..) | Parameter::Bending(..) => 3,
+        Parameter::Harmonic(..) | Parameter::Wobble(..) => 4,
         Parameter::Coupling(..) => 5,
     }
 }
@@ -78,7 +78,7 @@ fn kind(parameter: Parameter) -> usize {
 fn extra_kind(extra: Extra) -> Option<usize> {
     match extra {
         Extra::Zero => Some(6),
-        Extra::Scale | Extra::Warp(_) => Some(7),
+        Extra::Warp(_) => Some(7),
         Extra::Target(_) | Extra::Shared(_) => None,
     }
 }
@@ -93,7 +93,7 @@ impl Tolerance {
             self.harmonics_mrad,
             self.couplings_per_mille,
             self.zero_mm,
-            self.scale_per_mille,
+            self.warps_per_mille,
         ]
     }
 
@@ -120,7 +120,7 @@ impl Tolerance {
             &mut t.harmonics_mrad,
             &mut t.couplings_per_mille,
             &mut t.zero_mm,
-            &mut t.scale_per_mille,
+            &mut t.warps_per_mille,
         ];
         for (k, slot) in slots.into_iter().enumerate() {
             if k == kind {
@@ -218,7 +218,7 @@ fn best_of_grid(parameters: &[Parameter], extras: &[Extra], score: &dyn Fn(&Tole
         present[kind] = true;
     }
     let start = Tolerance { lengths_mm: 1.0, angles_mrad: 1.0, target_mm: 10.0, ..Tolerance::default() };
-    let mut best = (start, f64::NEG_INFINITY);
+    let mut best = (start, score(&start));
     for _ in 0..ROUNDS {
         for kind in (0..KINDS).filter(|&k| present[k]) {
             for &value in GRID.iter().filter(|v| **v <= LARGEST[kind]) {

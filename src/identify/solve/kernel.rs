@@ -5,7 +5,7 @@
 //! base, so that a joint costs three plane rotations and two shifts. Poses lie in lanes of eight (structure of arrays) for the
 //! compiler to vectorise; on x86 with AVX2 and FMA a copy compiled for them is taken at run time. A machine always takes the
 //! same copy, so the bytes do not depend on threads.
-//! Gravity and harmonics add a small angle that differs by pose; its sine and cosine are short series (error below 1e-13 up to
+//! Gravity and harmonics add a small angle that differs by pose, bending and wobble small tilts of the links; their sine and cosine are short series (error below 1e-13 up to
 //! a tenth of a radian, where the linear models of both have long ceased to hold).
 
 use nalgebra::{Matrix3, Vector3};
@@ -33,6 +33,18 @@ pub struct Kernel {
     shifts: Vec<Lane>,
     /// Corrections that are free: joint, index of the parameter, feature by block.
     corrections: Vec<(usize, usize, Vec<Lane>)>,
+    /// Joints whose links tilt.
+    tilts: Vec<Tilt>,
+}
+
+/// How a joint's link tilts about its x and y, by block.
+#[derive(Debug, Clone)]
+struct Tilt {
+    joint: usize,
+    /// By the nominal robot's own terms, rad.
+    own: Vec<[Lane; 2]>,
+    /// By free terms: index of the parameter, features.
+    free: Vec<(usize, Vec<[Lane; 2]>)>,
 }
 
 /// Points, coordinate by coordinate; padded to whole lanes.
@@ -76,6 +88,16 @@ impl Kernel {
         let mut angles = vec![([0.0; LANES], [1.0; LANES]); blocks * joints];
         let mut shifts = vec![[0.0; LANES]; blocks * joints];
         let mut corrections: Vec<(usize, usize, Vec<Lane>)> = Vec::new();
+        let none = vec![[[0.0; LANES]; 2]; blocks];
+        let tilts = |joint: &usize| {
+            robot.corrections.tilts(*joint) || parameters.iter().any(|p| p.tilted_joint() == Some(*joint))
+        };
+        let free = |joint: usize| {
+            let of_joint = |(_, p): &(usize, &Parameter)| p.tilted_joint() == Some(joint);
+            parameters.iter().enumerate().filter(of_joint).map(|(index, _)| (index, none.clone())).collect()
+        };
+        let mut tilts: Vec<Tilt> =
+            (0..joints).filter(tilts).map(|joint| Tilt { joint, own: none.clone(), free: free(joint) }).collect();
         for (index, &parameter) in parameters.iter().enumerate() {
             if let Some(joint) = parameter.corrected_joint()
                 && joint < joints
@@ -93,10 +115,18 @@ impl Kernel {
                 shifts[block * joints + joint][lane] = robot.joints[joint].shift_mm(*angle) - robot.joints[joint].d_mm;
             }
             for (joint, index, lanes) in &mut corrections {
-                lanes[block][lane] = robot.joints[*joint].sign * features[*index];
+                lanes[block][lane] = robot.joints[*joint].sign * features[*index][0];
+            }
+            for Tilt { joint, own, free } in &mut tilts {
+                for axis in 0..2 {
+                    own[block][axis][lane] = kinematics.tilts_rad(pose).get(*joint).map_or(0.0, |tilt| tilt[axis]);
+                    for (index, lanes) in free.iter_mut() {
+                        lanes[block][axis][lane] = features[*index][axis];
+                    }
+                }
             }
         }
-        Kernel { robot, parameters, pose_count, angles, shifts, corrections }
+        Kernel { robot, parameters, pose_count, angles, shifts, corrections, tilts }
     }
 
     /// Number of poses.
@@ -160,9 +190,12 @@ impl Kernel {
                 Parameter::Beta(i) => (i, 2, offset / 1000.0),
                 Parameter::Theta(i) => (i, 3, offset / 1000.0),
                 Parameter::D(i) => (i, 4, offset),
-                Parameter::V(_) | Parameter::Gravity(..) | Parameter::Harmonic(..) | Parameter::Coupling(..) => {
-                    continue;
-                }
+                Parameter::V(_)
+                | Parameter::Gravity(..)
+                | Parameter::Bending(..)
+                | Parameter::Harmonic(..)
+                | Parameter::Wobble(..)
+                | Parameter::Coupling(..) => continue,
             };
             if let Some(value) = values.get_mut(joint) {
                 value[field] += by;
@@ -203,12 +236,19 @@ impl Kernel {
                 if !self.corrections.is_empty() {
                     self.correct(block, joint, offsets, &mut s, &mut c, &mut shift);
                 }
+                let tilt = self.tilts.iter().find(|t| t.joint == joint).map(|t| t.at(block, offsets));
                 for l in 0..LANES {
-                    let turned_x = fma::<FMA>(c[l], x[l], -(s[l] * y[l]));
-                    let turned_y = fma::<FMA>(s[l], x[l], c[l] * y[l]);
-                    let risen = z[l] + link.d + shift[l];
+                    let mut turned_x = fma::<FMA>(c[l], x[l], -(s[l] * y[l]));
+                    let mut turned_y = fma::<FMA>(s[l], x[l], c[l] * y[l]);
+                    let mut risen = z[l] + link.d + shift[l];
+                    if let Some([_, about_y]) = &tilt {
+                        (risen, turned_x) = turned::<FMA>(&about_y[l], risen, turned_x);
+                    }
                     let swung_x = fma::<FMA>(link.cos_beta, turned_x, link.sin_beta * risen);
-                    let swung_z = fma::<FMA>(link.cos_beta, risen, -(link.sin_beta * turned_x));
+                    let mut swung_z = fma::<FMA>(link.cos_beta, risen, -(link.sin_beta * turned_x));
+                    if let Some([about_x, _]) = &tilt {
+                        (turned_y, swung_z) = turned::<FMA>(&about_x[l], turned_y, swung_z);
+                    }
                     x[l] = swung_x + link.a;
                     y[l] = fma::<FMA>(link.cos_alpha, turned_y, -(link.sin_alpha * swung_z));
                     z[l] = fma::<FMA>(link.sin_alpha, turned_y, link.cos_alpha * swung_z);
@@ -237,13 +277,42 @@ impl Kernel {
             return;
         }
         for l in 0..LANES {
-            let square = small[l] * small[l];
-            let sin =
-                small[l] * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0))));
-            let cos = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)));
+            let (sin, cos) = small_sin_cos(small[l]);
             (s[l], c[l]) = (s[l] * cos + c[l] * sin, c[l] * cos - s[l] * sin);
         }
     }
+}
+
+impl Tilt {
+    /// Sine and cosine of the tilt about x, then about y.
+    #[inline(always)]
+    fn at(&self, block: usize, offsets: &[f64]) -> [[(f64, f64); LANES]; 2] {
+        let mut small = self.own[block];
+        for (index, lanes) in &self.free {
+            let by = offsets[*index] / 1000.0;
+            for axis in 0..2 {
+                for l in 0..LANES {
+                    small[axis][l] += by * lanes[block][axis][l];
+                }
+            }
+        }
+        small.map(|lane| lane.map(small_sin_cos))
+    }
+}
+
+/// The plane vector (u, v) turned by an angle of this sine and cosine, from u towards v.
+#[inline(always)]
+fn turned<const FMA: bool>((sin, cos): &(f64, f64), u: f64, v: f64) -> (f64, f64) {
+    (fma::<FMA>(*cos, u, -(sin * v)), fma::<FMA>(*sin, u, cos * v))
+}
+
+/// Error below 1e-13 up to a tenth of a radian.
+#[inline(always)]
+fn small_sin_cos(angle: f64) -> (f64, f64) {
+    let square = angle * angle;
+    let sin = angle * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0))));
+    let cos = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)));
+    (sin, cos)
 }
 
 #[inline(always)]
@@ -255,6 +324,7 @@ fn fma<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::corrections::{BendingTerm, LoadPoint};
 
     /// Rounding of some dozen operations on coordinates of a metre.
     const TOLERANCE_MM: f64 = 1e-10;
@@ -268,6 +338,9 @@ mod tests {
         let mut parameters = robot.mdh_parameters();
         parameters.extend(robot.beta_parameters());
         parameters.extend(robot.gravity_parameters(true));
+        parameters.extend(robot.bending_parameters());
+        parameters.extend(robot.wobble_parameters());
+        robot.corrections.bending = vec![BendingTerm { joint: 2, point: LoadPoint::Tool, k_rad_per_m: 3e-3 }];
         parameters.extend(robot.harmonic_parameters(2));
         parameters.extend(robot.coupling_parameters(true));
         let joints: Vec<Vec<f64>> = (0..21).map(|i| (0..6).map(|j| ((7 * i + 3 * j) as f64).sin()).collect()).collect();

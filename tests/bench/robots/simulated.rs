@@ -27,6 +27,7 @@ pub fn table(runs: u64) {
         for (what, plan) in [
             ("60 poses", Plan::default()),
             ("60 poses, gravity", Plan { beyond: Beyond::Gravity, ..Plan::default() }),
+            ("60 poses, bending", Plan { beyond: Beyond::Bending, ..Plan::default() }),
             ("60 poses, harmonics", Plan { beyond: Beyond::Harmonics, ..Plan::default() }),
             ("60 poses, 4 placements off", Plan { groups: 4, beyond: Beyond::Common, ..Plan::default() }),
             ("20 poses, 0.1 mm", Plan { samples: 20, ..few }),
@@ -104,7 +105,8 @@ fn intervals(found: &Identification, nominal: &Robot, truth: &Robot) -> [usize; 
     let lacks = |p: &stereocal::robot::Parameter| {
         !parameters.contains(p) && (truth.value(*p) - nominal.value(*p)).abs() > 1e-12
     };
-    let beyond = [nominal.mdh_parameters(), nominal.gravity_parameters(true), nominal.harmonic_parameters(2)].concat();
+    let gravity = [nominal.gravity_parameters(true), nominal.bending_parameters()].concat();
+    let beyond = [nominal.mdh_parameters(), gravity, nominal.harmonic_parameters(2)].concat();
     if beyond.iter().any(lacks) {
         return [0, 0];
     }

@@ -14,6 +14,8 @@ pub enum Beyond {
     Nothing,
     /// Joints that give way under the arm's weight.
     Gravity,
+    /// Bearings that give way across their axes under the load, and joints that do under both weights.
+    Bending,
     /// Errors once and twice a turn.
     Harmonics,
     /// A smooth error of 0.03 mm common to a placement.
@@ -142,10 +144,11 @@ fn truth(nominal: &Robot, plan: Plan, random: &mut Pcg64Mcg) -> Robot {
     let mut errors: Vec<f64> = parameters.iter().map(|p| normal(random) * size(p)).collect();
     let more = match plan.beyond {
         Beyond::Gravity => nominal.gravity_parameters(false),
+        Beyond::Bending => [nominal.gravity_parameters(true), nominal.bending_parameters()].concat(),
         Beyond::Harmonics => nominal.harmonic_parameters(2),
         Beyond::Nothing | Beyond::Common => Vec::new(),
     };
-    let size = if plan.beyond == Beyond::Gravity { 1.0 } else { 0.3 };
+    let size = if matches!(plan.beyond, Beyond::Gravity | Beyond::Bending) { 1.0 } else { 0.3 };
     errors.extend(more.iter().map(|_| size * normal(random)));
     parameters.extend(more);
     nominal.shifted(&parameters, &errors)
