@@ -38,6 +38,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(record) = &measured {
         shared::take(record, &mut set);
     }
+    shared::suppose_scale(&mut set);
     let bar = progress::bar("identifying", 2 + step_count(&settings));
     bar.begin("units, signs and conventions");
     let (set, nominal, mut findings) = match settings.examine {

@@ -162,8 +162,8 @@ pub struct Identifiability {
 
 /// Errors of rows under a robot, as they go into tables and figures.
 pub fn quality(set: &Dataset, robot: &Robot, found: &Identification, settings: &Settings) -> (Quality, Vec<RowError>) {
-    // Shared errors are held against the points as they were read, as `verify` does, which knows nothing of them.
-    let of_sensor = found.extras.iter().copied().filter(|(e, _)| !matches!(e, Extra::Shared(_)));
+    // The sensor's errors are held against the points as they were read, as `verify` does, which knows nothing of them.
+    let of_sensor = found.extras.iter().copied().filter(|(e, _)| matches!(e, Extra::Zero | Extra::Target(_)));
     let (extras, values): (Vec<Extra>, Vec<f64>) = of_sensor.unzip();
     let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &found.fitted, settings.wire_offset) };
     let verify_rows = set.verify_rows();
@@ -193,6 +193,14 @@ pub fn spread(judge: &Judge, robot: &Robot, errors: &[RowError], rows: &[usize])
         point: some(if touches { Vec::new() } else { points.clone() }),
         consistency: some(if touches { points } else { Vec::new() }),
         distortion: some(judge.distortion_mm(robot, rows)),
+    }
+}
+
+/// Name and value of an unknown of the sensor; a supposed scale in thousandths.
+fn of_sensor(set: &Dataset, extra: Extra, value: f64) -> (String, f64) {
+    match set.supposed_scale {
+        Some(sd) if extra == Extra::Shared(0) => ("sensor_scale".to_owned(), 1000.0 * sd * value),
+        _ => (extra.name(), value),
     }
 }
 
@@ -232,9 +240,10 @@ impl Record {
             doctor,
             covariance: chosen.found.as_ref().map(|(f, _)| Covariance::new(f)),
             expected: chosen.found.as_ref().map(|(f, _)| Expected::new(f, set, &found.fitted)),
-            sensor: found.extras.iter().map(|(e, v)| (e.name(), *v)).collect(),
+            sensor: found.extras.iter().map(|(extra, value)| of_sensor(set, *extra, *value)).collect(),
         };
-        record.warnings = record.warnings(set, nominal, found);
+        let worse = found.worse_than_nominal(set, nominal, settings);
+        record.warnings = record.warnings(set, nominal, found, worse);
         record
     }
 
@@ -243,7 +252,7 @@ impl Record {
         self.methods.iter().find(|m| self.chosen == format!("{}/{}", m.name, m.model))
     }
 
-    fn warnings(&self, set: &Dataset, nominal: &Robot, found: &Identification) -> Vec<String> {
+    fn warnings(&self, set: &Dataset, nominal: &Robot, found: &Identification, is_worse: bool) -> Vec<String> {
         let mut list = Vec::new();
         if tilt_deg(set, nominal, &found.fitted) < ONE_ORIENTATION_DEG {
             list.push(
@@ -310,9 +319,15 @@ impl Record {
         if let Some(chosen) = self.chosen_method()
             && let Some((before, after)) = worse(&self.before.verify.distance, &chosen.verify.distance)
         {
-            list.push(format!(
-                "on the verify rows the identified robot is worse than the nominal one ({after:.3} against {before:.3} mm): don't use it"
-            ));
+            list.push(match is_worse {
+                true => format!(
+                    "on the verify rows the identified robot is worse than the nominal one ({after:.3} against {before:.3} mm): don't use it"
+                ),
+                false => format!(
+                    "on the verify rows distances to the centre are further off than the nominal robot's ({after:.3} against {before:.3} mm), \
+                     and points less so: all distances share the centre's own reading, and the points decide"
+                ),
+            });
         }
         if found.vetoed {
             list.push(
@@ -413,8 +428,8 @@ fn parameter_records(formulation: &Formulation, solution: &Solution) -> Vec<Para
 pub fn file_unit(parameter: Parameter) -> (&'static str, f64) {
     match (parameter, parameter.unit()) {
         (_, Unit::Mm) => ("mm", 1.0),
-        (Parameter::Gravity(..), _) => ("mrad/m", 1.0),
-        (Parameter::Harmonic(..), _) => ("mrad", 1.0),
+        (Parameter::Gravity(..) | Parameter::Bending(..), _) => ("mrad/m", 1.0),
+        (Parameter::Harmonic(..) | Parameter::Wobble(..), _) => ("mrad", 1.0),
         (Parameter::Coupling(..), _) => ("1e-3", 1.0),
         _ => ("deg", (1e-3f64).to_degrees()),
     }

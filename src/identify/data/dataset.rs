@@ -97,6 +97,8 @@ pub struct Dataset {
     pub split_here: bool,
     /// What each pose's point moves by with each shared error of the sensor, mm a standard deviation; empty without any.
     pub shared: Vec<Matrix3xX<f64>>,
+    /// Standard deviation of the scale of cameras about which nothing is stated, where `shared` is that scale and nothing else.
+    pub supposed_scale: Option<f64>,
     /// Which joints slide; empty where none does.
     pub slides: Vec<bool>,
     /// Rows whose covariance was singular and got a floor, by pose.
@@ -130,6 +132,7 @@ impl Dataset {
             skipped: Vec::new(),
             split_here: false,
             shared: Vec::new(),
+            supposed_scale: None,
             slides: Vec::new(),
             floored: Vec::new(),
             known: Vec::new(),

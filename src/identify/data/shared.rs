@@ -4,13 +4,14 @@
 //! the leading shared errors move its point by, a standard deviation of each, and the row's own covariance without them. The
 //! parameters are many and most act alike, so they are replaced by the principal directions of what they do to the points; what
 //! the others do stays in the rows' own covariance.
+//! Where nothing is stated, cameras are still known to have one error in common: their scale.
 //! What goes wrong: a `measure.json` of other measurements; its shared part does not fit into their covariances, and nothing is changed.
 
 use camino::Utf8Path;
-use nalgebra::{DMatrix, Matrix3, Matrix3xX, SymmetricEigen};
+use nalgebra::{DMatrix, Matrix3, Matrix3xX, SymmetricEigen, Vector3};
 use serde::Deserialize;
 
-use super::dataset::{Dataset, Reading};
+use super::dataset::{Dataset, Pose, Reading};
 
 /// Share of the whole shared variance below which a direction stays with the rows.
 const LEAST_SHARE: f64 = 1e-4;
@@ -23,6 +24,10 @@ const LEAST_OWN_MM2: f64 = 1e-8;
 
 /// Share of a row's variance by which the shared part may exceed it by rounding.
 const ROUNDING: f64 = 1e-3;
+
+/// How many times less certain a rig's scale is than its points, both relative to their distance: it comes from a board of known size
+/// that fills a tenth or so of that distance.
+const SCALE_OVER_POINT: f64 = 15.0;
 
 #[derive(Debug, Deserialize)]
 struct Measured {
@@ -62,6 +67,35 @@ pub fn take(path: &Utf8Path, set: &mut Dataset) {
         }
         set.shared = columns;
     }
+}
+
+/// Gives points of cameras (they have orientations and covariances) whose shared errors nobody stated the one that all rigs have: an
+/// unknown scale, as uncertain as the points' own noise lets expect. A robot that is fitted to points of a wrong scale has links of a wrong
+/// length, and nothing in the residuals tells; with the scale unknown, the links' tolerance has a say.
+pub fn suppose_scale(set: &mut Dataset) {
+    if !set.shared.is_empty() || !set.has_rotations() || !set.has_covariances() {
+        return;
+    }
+    let point = |pose: &Pose| match &pose.reading {
+        Reading::Position { point_mm, covariance_mm2: Some(covariance), .. } => Some((point_mm.coords, *covariance)),
+        _ => None,
+    };
+    let relative = |(point, covariance): (Vector3<f64>, Matrix3<f64>)| {
+        let distance = point.norm();
+        (distance > 0.0).then(|| covariance.symmetric_eigenvalues().max().max(0.0).sqrt() / distance)
+    };
+    let mut noise: Vec<f64> = set.poses.iter().filter_map(|p| relative(point(p)?)).collect();
+    if noise.is_empty() {
+        return;
+    }
+    noise.sort_by(f64::total_cmp);
+    let scale = SCALE_OVER_POINT * noise[noise.len() / 2];
+    set.shared = set
+        .poses
+        .iter()
+        .map(|p| Matrix3xX::from_columns(&[point(p).map_or(Vector3::zeros(), |(point, _)| -scale * point)]))
+        .collect();
+    set.supposed_scale = Some(scale);
 }
 
 /// Columns of the leading shared errors and own covariance, row by row.

@@ -9,7 +9,7 @@
 //! metre leave some hundredths.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use crate::identify::data::dataset::Dataset;
 use crate::identify::model::prior::Tolerance;
@@ -58,6 +58,7 @@ pub struct Cells {
     folds: Vec<Fold>,
     /// All cells fitted.
     whole: Fold,
+    whole_placements: bool,
     /// Root of the variance that stands for one, mm.
     unit_mm: f64,
 }
@@ -102,9 +103,15 @@ impl Cells {
             extras: rows.extras.clone(),
             folds: (0..folds).map(|f| make(Some(f))).collect(),
             whole: make(None),
+            whole_placements: whole,
             cells,
             unit_mm: rows.unit_variance_mm2().sqrt(),
         }
+    }
+
+    /// Whether whole placements are held out, not regions of them.
+    pub fn whole_placements(&self) -> bool {
+        self.whole_placements
     }
 
     fn columns(&self, parameters: &[Parameter]) -> Vec<usize> {
@@ -118,6 +125,52 @@ impl Cells {
         let normal = picked(&self.whole.normal, &columns);
         let gradient = DVector::from_iterator(columns.len(), columns.iter().map(|&c| self.whole.gradient[c]));
         Tolerance::from_evidence_of_all(parameters, &self.extras, &normal, &gradient)
+    }
+
+    /// How many times larger the variances of the model's parameters are than errors that are independent of each other would make them:
+    /// by how much the pulls of the folds (placements, or regions of joint space) on the parameters differ, against what their residuals'
+    /// sizes let expect. Errors that many rows share, a placement's or a model's that is not quite right, pull all one way. One where it
+    /// could be chance. Source: the cluster-robust covariance of Liang and Zeger (Biometrika 73, 1986), of which this is the mean factor.
+    pub fn common_factor(&self, parameters: &[Parameter]) -> f64 {
+        let columns = self.columns(parameters);
+        let sds = self.tolerance(parameters).0.standard_deviations(parameters, &self.extras);
+        let Some(x) = self.whole.solve(&columns, &sds) else { return 1.0 };
+        // In units of the tolerance, so that the prior is the identity.
+        let n = columns.len();
+        let data = DMatrix::from_fn(n, n, |r, c| sds[r] * sds[c] * self.whole.normal[(columns[r], columns[c])]);
+        let Some(inverse) = Cholesky::new(&data + DMatrix::<f64>::identity(n, n)).map(|c| c.inverse()) else {
+            return 1.0;
+        };
+        let mut pulls = vec![DVector::<f64>::zeros(n); self.folds.len()];
+        let mut informations = vec![DMatrix::<f64>::zeros(n, n); self.folds.len()];
+        for cell in &self.cells {
+            let Some(follow) = &self.whole.follows[cell.block] else { continue };
+            // The parameters' columns with the placement following them, and the residuals at the solution.
+            let (all, own) = (x.len(), follow.constant.len());
+            let mut moves = DMatrix::zeros(cell.normal.nrows(), n + 1);
+            for (k, &c) in columns.iter().enumerate() {
+                moves[(c, k)] = sds[k];
+                moves.view_mut((all, k), (own, 1)).copy_from(&(-sds[k] * follow.by.column(c)));
+            }
+            moves.view_mut((0, n), (all, 1)).copy_from(&x);
+            moves.view_mut((all, n), (own, 1)).copy_from(&-(&follow.by * &x + &follow.constant));
+            moves[(all + own, n)] = 1.0;
+            let products = moves.transpose() * &cell.normal * &moves;
+            pulls[cell.fold] += products.view((0, n), (n, 1)).column(0);
+            informations[cell.fold] += products.view((0, 0), (n, n));
+        }
+        let size: f64 = pulls.iter().map(|p| p.dot(&(&inverse * p))).sum();
+        // What independent errors let expect at the fit, which has followed every fold a part of the way.
+        let whole = &inverse * &data;
+        let expected = |information: &DMatrix<f64>| {
+            let part = &inverse * information;
+            let twice = &part * &part;
+            part.trace() - 2.0 * twice.trace() + (twice * &whole).trace()
+        };
+        let expected: f64 = informations.iter().map(expected).sum();
+        let Ok(chance) = ChiSquared::new(expected * self.folds.len() as f64) else { return 1.0 };
+        let certain = chance.inverse_cdf(1.0 - CHANCE) / self.folds.len() as f64;
+        if size > certain { size / expected } else { 1.0 }
     }
 
     /// Held-out errors of the model with these parameters; `None` where there is but one fold.

@@ -1,6 +1,7 @@
 //! The whole identification: gross errors named, models judged on samples that did not choose them, methods run and compared.
 //!
-//! 1. A robust fit names the rows that have no weight; they are left out. Verify rows are looked at too, named and kept.
+//! 1. A robust fit names the rows that have no weight; they are left out, until the model that is chosen says whether they are far off
+//!    from it too. Verify rows are looked at too, named and kept.
 //! 2. Cells (see [`super::cells`]) choose the rung of the ladder, from the nominal robot upwards: more only where the held-out errors
 //!    fall by more than twice their paired standard error. Unknowns of the sensor are taken where the evidence asks for them.
 //! 3. Every method solves the same problem, so the least cost is the best; the cheapest of equals is kept.
@@ -97,6 +98,9 @@ const COMPARED_POSES: usize = 4_000_000;
 /// Iterations of a swarm in a comparison at the least.
 const LEAST_ITERATIONS: usize = 10;
 
+/// Times that the ladder is climbed on, each time from where the model that was taken fits.
+const MOST_CLIMBS: usize = 4;
+
 /// Verify rows from which on their verdict counts.
 const VERDICT_ROWS: usize = 5;
 
@@ -123,7 +127,8 @@ pub fn identify(
     let mut session = Session { set, robot, settings, seed, rows: set.fit_rows(), extras, step };
     let by_points = if set.kind == Kind::Positions { Model::Position } else { model };
     step("gross errors");
-    let (outliers, verify_outliers) = session.drop_outliers(by_points)?;
+    let first = session.reference(ROWS_TELL);
+    let (mut outliers, mut verify_outliers) = session.drop_outliers(by_points, &first)?;
     if model == Model::Pose {
         session.extras.extend((0..3).map(Extra::Target));
     }
@@ -132,6 +137,11 @@ pub fn identify(
         Extensions::None => (Terms::default(), Vec::new()),
         Extensions::Auto => session.climb(by_points)?,
     };
+    if !outliers.is_empty() && terms.chain == Chain::Mdh && terms != first && session.tells(&terms, ROWS_TELL) {
+        // A row that a poorer model could not follow is no gross error.
+        session.rows = set.fit_rows();
+        (outliers, verify_outliers) = session.drop_outliers(by_points, &terms)?;
+    }
     let methods = settings.method.map_or(Method::ALL.to_vec(), |m| vec![m]);
     let fitted_terms = if terms == Terms::NOMINAL { Terms::default() } else { terms };
     let mut candidates = session.run_methods(model, fitted_terms, &methods)?;
@@ -205,18 +215,23 @@ impl Identification {
         judge.errors(robot, rows)
     }
 
-    /// Whether the verify rows find the chosen robot worse than the nominal one, by their points or by their distances.
+    /// Whether the verify rows find the chosen robot worse than the nominal one: points, in units of what they are known to, or distances
+    /// to a centre by more than the centre's own reading, which all of them share, may do.
     pub fn worse_than_nominal(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> bool {
         let rows: Vec<usize> = set.verify_rows().into_iter().filter(|r| !self.verify_outliers.contains(r)).collect();
         let [chosen, nominal] =
             [&self.candidates[self.chosen].robot, nominal].map(|robot| self.errors(set, settings, robot, &rows));
-        let mean = |errors: &[RowError], size: fn(&RowError) -> Option<f64>| {
+        let mean = |errors: &[RowError], size: &dyn Fn(&RowError) -> Option<f64>| {
             let sizes: Vec<f64> = errors.iter().filter_map(size).collect();
             sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
         };
-        let sizes: [fn(&RowError) -> Option<f64>; 2] =
-            [|e| e.point_mm.map(|p| p.norm()), |e| e.distance_mm.map(f64::abs)];
-        rows.len() >= VERDICT_ROWS && sizes.into_iter().any(|size| mean(&chosen, size) > mean(&nominal, size))
+        let more = |size: &dyn Fn(&RowError) -> Option<f64>| mean(&chosen, size) - mean(&nominal, size);
+        let point = |e: &RowError| e.point_mm.and_then(|_| e.score(&self.scatter));
+        let distance = |e: &RowError| e.distance_mm.map(f64::abs);
+        // Half of a distance's variance is the centre's; a wire's has no centre.
+        let of_center = |e: &RowError| e.point_mm.map(|_| self.scatter.stated * e.variance_mm2 / 2.0);
+        let shared = mean(&nominal, &of_center).sqrt();
+        rows.len() >= VERDICT_ROWS && (more(&point) > 0.0 || more(&distance) > shared)
     }
 }
 
@@ -238,21 +253,25 @@ impl Session<'_> {
         (a_row * self.rows.len()) as f64 - (a_group * groups.count()) as f64
     }
 
+    /// Whether there are so many times more numbers to tell by than parameters.
+    fn tells(&self, terms: &Terms, times: f64) -> bool {
+        terms.parameters(self.robot).len() as f64 * times <= self.numbers()
+    }
+
     /// The richest model that has so many times more numbers to tell by than parameters.
     fn reference(&self, times: f64) -> Terms {
         let poorer = |chain: Chain| Terms { chain, ..Terms::NOMINAL };
         let rich = [Terms::REFERENCE, Terms::default(), poorer(Chain::Offsets)];
-        let enough = |t: &Terms| t.parameters(self.robot).len() as f64 * times <= self.numbers();
-        rich.into_iter().find(enough).unwrap_or(poorer(Chain::Tool))
+        rich.into_iter().find(|t| self.tells(t, times)).unwrap_or(poorer(Chain::Tool))
     }
 
     /// Leaves out the rows that a robust fit gives no weight, and names them; and the verify rows that are as far off.
-    fn drop_outliers(&mut self, model: Model) -> Result<(Vec<usize>, Vec<usize>), Error> {
+    fn drop_outliers(&mut self, model: Model, terms: &Terms) -> Result<(Vec<usize>, Vec<usize>), Error> {
         let sigmas = self.settings.outlier_sigmas;
         if sigmas <= 0.0 {
             return Ok((Vec::new(), Vec::new()));
         }
-        let parameters = self.reference(ROWS_TELL).parameters(self.robot);
+        let parameters = terms.parameters(self.robot);
         let mut robust = self.task(&parameters, model).robust(Loss::Biweight)?;
         let outliers = robust.gross_errors(sigmas);
         let rows: Vec<usize> = self.rows.iter().copied().filter(|r| !outliers.contains(r)).collect();
@@ -276,39 +295,73 @@ impl Session<'_> {
     /// Up the ladder from the nominal robot: each time to the successor of least held-out error, as long as one is clearly better.
     fn climb(&mut self, model: Model) -> Result<(Terms, Vec<Judged>), Error> {
         let all = Terms::ALL.parameters(self.robot);
-        let numbers = self.numbers();
         let reference = self.reference(MOST_PARAMETERS);
-        let reference = Terms { chain: Chain::Mdh, ..reference }.parameters(self.robot);
-        let formulation = Formulation::new(&self.task(&reference, model))?;
+        let mut at = Terms { chain: Chain::Mdh, ..reference };
+        let parameters = at.parameters(self.robot);
+        let formulation = Formulation::new(&self.task(&parameters, model))?;
         let scatter = formulation.rows.scatter;
-        let cells = self.cells(&all, &reference, &formulation, scatter, model);
-        let cells = self.take_sensor_unknowns(cells, &all, &reference, scatter, model)?;
+        let cells = self.cells(&all, &parameters, &formulation, scatter, model);
+        let mut cells = self.take_sensor_unknowns(cells, &all, &parameters, scatter, model)?;
         let mut judged = Vec::new();
+        let mut best = Terms::NOMINAL;
+        for _ in 0..MOST_CLIMBS {
+            let Some(next) = self.climb_from(best, &cells, model, &mut judged) else {
+                return Ok((Terms::default(), judged));
+            };
+            if next == best {
+                break;
+            }
+            best = next;
+            // What a poor model leaves over hides what the next term would explain: on from where this one fits.
+            if best.chain < Chain::Mdh || best == at {
+                break;
+            }
+            at = best;
+            let parameters = at.parameters(self.robot);
+            let formulation = Formulation::new(&self.task(&parameters, model))?;
+            cells = self.cells(&all, &parameters, &formulation, formulation.rows.scatter, model);
+        }
+        Ok((best, judged))
+    }
+
+    /// Up the ladder from `best` by what these cells say; `None` where nothing can be held out.
+    fn climb_from(&self, mut best: Terms, cells: &Cells, model: Model, judged: &mut Vec<Judged>) -> Option<Terms> {
         let judge = |terms: Terms, judged: &mut Vec<Judged>| -> Option<HeldOut> {
             let held_out = cells.held_out(&terms.parameters(self.robot));
-            let held_out_mm = held_out.as_ref().and_then(root_mean);
-            judged.push(Judged { model: model.name(), terms: terms.name(), held_out_mm });
+            let (held_out_mm, terms) = (held_out.as_ref().and_then(root_mean), terms.name());
+            judged.retain(|j| j.terms != terms);
+            judged.push(Judged { model: model.name(), terms, held_out_mm });
             held_out
         };
-        let mut best = Terms::NOMINAL;
-        let Some(mut reference) = judge(best, &mut judged) else { return Ok((Terms::default(), judged)) };
+        let mut reference = judge(best, judged)?;
+        let evidence = |terms: &Terms| cells.tolerance(&terms.parameters(self.robot)).1;
         loop {
             let mut next: Option<(Terms, HeldOut)> = None;
             for terms in best.successors(self.robot, true) {
                 let beyond = terms.chain == Chain::Mdh && terms != Terms::default();
-                if beyond && terms.parameters(self.robot).len() as f64 * MOST_PARAMETERS > numbers {
+                if beyond && !self.tells(&terms, MOST_PARAMETERS) {
                     continue;
                 }
-                let Some(held_out) = judge(terms, &mut judged) else { continue };
+                let Some(held_out) = judge(terms, judged) else { continue };
                 let least = next.as_ref().is_none_or(|(_, h)| root_mean(&held_out) < root_mean(h));
-                if least && clearly_less(&held_out, &reference) {
+                if !least || root_mean(&held_out) >= root_mean(&reference) {
+                    continue;
+                }
+                let (clear, probable) =
+                    (clearly_less(&held_out, &reference), evidence(&terms) > evidence(&best) + EVIDENCE);
+                let taken = match best == Terms::NOMINAL {
+                    // A robot that nobody has found fault with needs no correction that could be chance.
+                    true => clear && probable,
+                    false => clear || probable && !cells.whole_placements(),
+                };
+                if taken {
                     next = Some((terms, held_out));
                 }
             }
             let Some((terms, held_out)) = next else { break };
             (best, reference) = (terms, held_out);
         }
-        Ok((best, judged))
+        Some(best)
     }
 
     /// Cells linearised where a formulation ended, at a scatter that need not be its own.
@@ -335,14 +388,12 @@ impl Session<'_> {
         match self.set.kind {
             Kind::Distances if self.set.groups.iter().any(|g| g.center.is_some()) => vec![vec![Extra::Zero]],
             // What `measure` says of its cameras' errors is better than what any cameras may have.
-            Kind::Positions if self.set.has_rotations() && self.set.has_covariances() && self.set.shared.is_empty() => {
-                vec![vec![Extra::Scale], (0..WARPS.len()).map(Extra::Warp).collect()]
-            }
+            Kind::Positions if self.set.supposed_scale.is_some() => vec![(0..WARPS.len()).map(Extra::Warp).collect()],
             _ => Vec::new(),
         }
     }
 
-    /// Takes the zero of distances, and scale and warps of a camera rig, where they make the data much more probable at one and the
+    /// Takes the zero of distances, and the warps of a camera rig, where they make the data much more probable at one and the
     /// same scatter.
     fn take_sensor_unknowns(
         &mut self,
@@ -401,7 +452,11 @@ impl Session<'_> {
     /// All methods on one problem.
     fn run_methods(&self, model: Model, terms: Terms, methods: &[Method]) -> Result<Vec<Candidate>, Error> {
         let parameters = terms.parameters(self.robot);
-        let formulation = Formulation::new(&self.task(&parameters, model))?;
+        let mut formulation = Formulation::new(&self.task(&parameters, model))?;
+        if model != Model::PairwiseDistance {
+            let cells = self.cells(&parameters, &parameters, &formulation, formulation.rows.scatter, model);
+            formulation.common = cells.common_factor(&parameters);
+        }
         let run = |method: &Method| {
             (self.step)(&format!("{} on {}", method.name(), model.name()));
             self.solved(&formulation, *method)

@@ -275,6 +275,9 @@ pub fn direction(v: &Vector3<f64>) -> (Vector3<f64>, f64) {
 
 /// Of a symmetric matrix that may lack rank. Rows and columns are brought to a common size first: radians and mm mix.
 pub fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    if matrix.is_empty() {
+        return matrix;
+    }
     let n = matrix.nrows();
     let scale = DVector::from_fn(n, |i, _| if matrix[(i, i)] > 0.0 { 1.0 / matrix[(i, i)].sqrt() } else { 0.0 });
     let scaled = DMatrix::from_fn(n, n, |r, c| matrix[(r, c)] * scale[r] * scale[c]);

@@ -10,8 +10,6 @@ use nalgebra::{Matrix3, Matrix3xX, Point3, RowDVector, Vector3};
 pub enum Extra {
     /// Reading of a distance when the target is at the centre, mm.
     Zero,
-    /// Scale of the sensor less one, thousandths.
-    Scale,
     /// What else wrongly calibrated cameras do to space, which they see through a projective map (Hartley and Zisserman, "Multiple view
     /// geometry", section 10.2): thousandths of stretch along z and y (0, 1), of shear in xy, xz, yz (2 to 4), and of scale a metre
     /// along x, y, z (5 to 7).
@@ -32,9 +30,8 @@ impl Extra {
     pub fn of_point(self, point_mm: &Point3<f64>, shared: Option<&Matrix3xX<f64>>) -> Vector3<f64> {
         let p = point_mm.coords;
         let moved = match self {
-            Extra::Zero | Extra::Target(_) => Vector3::zeros(),
+            Extra::Zero | Extra::Target(_) => return Vector3::zeros(),
             Extra::Shared(k) => return shared.map_or(Vector3::zeros(), |s| s.column(k).into()),
-            Extra::Scale => p,
             Extra::Warp(0) => Vector3::new(0.0, 0.0, p.z),
             Extra::Warp(1) => Vector3::new(0.0, p.y, 0.0),
             Extra::Warp(2) => Vector3::new(p.y, p.x, 0.0),
@@ -49,7 +46,6 @@ impl Extra {
     pub fn name(self) -> String {
         match self {
             Extra::Zero => "distance_zero".to_owned(),
-            Extra::Scale => "sensor_scale".to_owned(),
             Extra::Warp(k) => format!("sensor_{}", WARPS[k.min(WARPS.len() - 1)]),
             Extra::Target(axis) => format!("target_r{}", ["x", "y", "z"][axis.min(2)]),
             Extra::Shared(k) => format!("shared_{}", k + 1),

@@ -57,6 +57,8 @@ pub struct Formulation {
     pub effective: f64,
     /// Whether the data see the robot's size.
     pub scale_seen: bool,
+    /// How many times larger errors that rows share make the variances than independent ones would; one until it was looked for.
+    pub common: f64,
 }
 
 impl Formulation {
@@ -111,7 +113,8 @@ impl Formulation {
             let offsets = fit.offsets(&x);
             levers = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
             free_fit = Some(solved);
-            let settled = moved < SAME_CHAIN || !task.parameters.iter().any(|p| matches!(p, Parameter::Gravity(..)));
+            let settled = moved < SAME_CHAIN
+                || !task.parameters.iter().any(|p| matches!(p, Parameter::Gravity(..) | Parameter::Bending(..)));
             rows = Rows::new(&task.recipe(scatter, &[], &levers));
             if settled {
                 break;
@@ -130,6 +133,7 @@ impl Formulation {
             free_fit,
             effective,
             scale_seen: task.scale_is_seen(),
+            common: 1.0,
         })
     }
 
@@ -177,13 +181,17 @@ impl Formulation {
         Fit::new(rows, &self.base, self.spread(), &self.bounds, self.prior(&[]))
     }
 
-    /// Covariance of the unknowns (base parameters, extras), mm and mrad: data and prior together.
+    /// Covariance of the unknowns (base parameters, extras), mm and mrad: data and prior together, the data's part as much larger as
+    /// errors that rows share make it.
     pub fn covariance(&self) -> DMatrix<f64> {
         let free = vec![f64::INFINITY; self.free_fit.x.len()];
         let prior = self.prior(&self.rows.extras);
         let fit = Fit::new(Cow::Borrowed(&self.rows), &self.base, self.spread(), &free, prior.clone());
         let (_, jacobian) = fit.white(&self.free_fit.x);
-        pseudo_inverse(product(&jacobian, &jacobian) + prior.tr_mul(&prior))
+        let data = product(&jacobian, &jacobian);
+        let covariance = pseudo_inverse(&data + prior.tr_mul(&prior));
+        let more = &covariance * data * &covariance * (self.common - 1.0);
+        covariance + more
     }
 
     /// Covariance of all parameters of the robot: what is determined, and what the tolerance leaves open where it holds them.
