@@ -8,6 +8,7 @@ use super::table::Table;
 use crate::formats::urdf::roll_pitch_yaw;
 use crate::geometry::{Transform, rotation_vector};
 use crate::robot::catalogue::{ARMS, Arm, PAPER};
+use crate::robot::corrections::{LoadPoint, Wave};
 use crate::robot::{Joint, Robot};
 
 /// Angles that count as none, rad, and lengths, mm: a table's last digits.
@@ -52,10 +53,7 @@ pub fn chain(robot: &Robot) -> String {
     for (i, j) in robot.joints.iter().enumerate() {
         let _ = writeln!(text, "joint {}: {}", i + 1, sentence(i, j));
     }
-    for c in &robot.corrections.couplings {
-        let share = format!("{} times joint {}'s reading is added to joint {}'s", c.ratio, c.of + 1, c.joint + 1);
-        let _ = writeln!(text, "coupling: {share}");
-    }
+    corrections(robot).iter().for_each(|line| _ = writeln!(text, "{line}"));
     let constant = |what: &str, t: &Transform| {
         let place = t.translation.vector;
         let turn = rotation_vector(t) * 1.0f64.to_degrees();
@@ -68,6 +66,52 @@ pub fn chain(robot: &Robot) -> String {
         text += &constant("flange (in the last joint's frame)", &robot.ends.last_frame_from_flange);
     }
     text
+}
+
+/// What the joints do beyond the commanded angle, a line a term.
+fn corrections(robot: &Robot) -> Vec<String> {
+    let (terms, number) = (&robot.corrections, |v: f64| format!("{:.4}", 1000.0 * v + 0.0));
+    let at = |point: LoadPoint| match point {
+        LoadPoint::Origin(joint) => format!("joint {}", joint + 1),
+        LoadPoint::Tool => "the target".to_owned(),
+    };
+    let sag = terms.gravity.iter().map(|t| {
+        format!(
+            "sag: joint {} turns {} mrad a metre of lever of a weight at {}",
+            t.joint + 1,
+            number(t.k_rad_per_m),
+            at(t.point)
+        )
+    });
+    let bending = terms.bending.iter().map(|t| {
+        format!(
+            "bending: across its axis joint {} yields {} mrad a metre of lever of a weight at {}",
+            t.joint + 1,
+            number(t.k_rad_per_m),
+            at(t.point)
+        )
+    });
+    let wave = |wave: Wave| match wave {
+        Wave::Sin => "sin q",
+        Wave::Cos => "cos q",
+        Wave::Sin2 => "sin 2q",
+        Wave::Cos2 => "cos 2q",
+    };
+    let harmonics = terms.harmonics.iter().map(|t| {
+        format!(
+            "harmonic: {} mrad {} is added to joint {}'s reading",
+            number(t.amplitude_rad),
+            wave(t.wave),
+            t.joint + 1
+        )
+    });
+    let wobble = terms.wobble.iter().map(|t| {
+        format!("wobble: the axis of joint {} tilts by {} mrad {}", t.joint + 1, number(t.amplitude_rad), wave(t.wave))
+    });
+    let couplings = terms.couplings.iter().map(|c| {
+        format!("coupling: {} times joint {}'s reading is added to joint {}'s", c.ratio, c.of + 1, c.joint + 1)
+    });
+    sag.chain(bending).chain(harmonics).chain(wobble).chain(couplings).collect()
 }
 
 fn sentence(index: usize, joint: &Joint) -> String {

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::dataset::{Dataset, Reading};
-use super::sessions::Along;
+use super::sessions::{Along, Session};
 use crate::identify::judge::choose::Identification;
 use crate::identify::record::file_unit;
 use crate::robot::Parameter;
@@ -94,14 +94,18 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "the robot that was found is used; see whether the file is the right one",
         );
     }
-    if !along.sessions.is_empty() {
-        let ranges = along.sessions.iter().map(|s| format!("{}..{}", s.first, s.last)).collect();
+    let drifts = |s: &Session| along.drifting.contains(&s.group);
+    let ranges = |of: &dyn Fn(&&Session) -> bool| -> Vec<String> {
+        along.sessions.iter().filter(of).map(|s| format!("{}..{}", s.first, s.last)).collect()
+    };
+    let stepping = ranges(&|s| !drifts(s));
+    if !stepping.is_empty() {
         add(
             format!(
                 "the rows fall into {} sessions, between which the sensor, the wire's anchor or its zero, or the robot's base moved",
-                along.sessions.len()
+                stepping.len()
             ),
-            ranges,
+            stepping,
             "each session got a placement of its own",
         );
     }
@@ -109,7 +113,11 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
         add(
             "the sensor or the robot's base moves evenly along the rows of a group: a drift".to_owned(),
             along.drifting.clone(),
-            "nothing was done: the errors of these groups are in the result",
+            match ranges(&|s| drifts(s)).len() {
+                0 => "nothing was done: the errors of these groups are in the result".to_owned(),
+                parts => format!("the rows were cut into {parts} placements, within which little of it is left"),
+            }
+            .as_str(),
         );
     }
     list

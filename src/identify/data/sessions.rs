@@ -62,11 +62,12 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
         let task = Task { set: &cut, robot, parameters: &parameters, extras: &[], rows: &rows, model, settings };
         let Some(search) = Search::new(&task) else { break };
         let found = search.best_cut();
+        let drifting = search.drifting(found);
+        along.drifting.extend(drifting.into_iter().filter(|name| !along.drifting.contains(name)).collect::<Vec<_>>());
         if let Some(row) = found {
             split(&mut cut, row);
             continue;
         }
-        along.drifting = search.drifting();
         if cuts > 0 {
             along.sessions = list(&cut);
         }
@@ -175,11 +176,14 @@ impl<'a> Search<'a> {
         (0..joints).map(sorted).collect()
     }
 
-    /// Groups whose placement moves evenly along their rows.
-    fn drifting(&self) -> Vec<String> {
+    /// Groups whose placement moves evenly along their rows; where one of them is to be cut, only if that explains less.
+    fn drifting(&self, cut: Option<usize>) -> Vec<String> {
         let drifts = |placed: &&Placed| {
             let order: Vec<usize> = (0..placed.rows.len()).collect();
             let gain = placed.ramp(&order);
+            if cut.is_some_and(|cut| placed.rows.iter().any(|(row, _)| *row == cut)) {
+                return placed.best_step(&order).is_some_and(|(step, _)| gain > step);
+            }
             let rival = self.orders(placed).iter().map(|o| placed.ramp(o)).fold(0.0, f64::max);
             placed.rows.len() >= 2 * SHORTEST
                 && self.pays(gain, placed.linear.design.ncols())
