@@ -161,3 +161,81 @@ fn truth_is_recovered_within_the_predicted_sigmas() {
     // 95 % of normal deviations lie within two sigmas. The 19 of a seed are correlated; the 20 seeds are not.
     assert!(inside * 100 >= 90 * total, "{inside} of {total}");
 }
+
+/// The world's rows as cameras read them that state covariances of 0.2 mm at a metre, and see everything larger by this factor.
+fn seen_by_cameras(world: &World, scale: f64) -> Dataset {
+    use crate::measurements::Observed;
+    let mut rows = world.rows.clone();
+    let before_them = nalgebra::Vector3::new(0.0, 0.0, 1000.0);
+    for row in &mut rows {
+        if let Observed::Position { point_mm, covariance_mm2, rotation_rad } = &mut row.observed {
+            *point_mm = ((point_mm.coords + before_them) * scale).into();
+            *covariance_mm2 = Some(nalgebra::Matrix3::identity() * 0.04);
+            *rotation_rad = Some(nalgebra::Vector3::zeros());
+        }
+    }
+    let mut set = Dataset::new(&rows, 1).unwrap();
+    crate::identify::data::shared::suppose_scale(&mut set);
+    set
+}
+
+#[test]
+fn cameras_of_a_wrong_scale_do_not_stretch_the_robot() {
+    // A robot within its tolerance, seen 2 thousandths too large: of its 800 mm that would be 1.6.
+    let world = synthetic::planned(120, 30, 25.0, 0.2, 7, &|truth| {
+        let mut built = crate::robot::Robot::paper();
+        built.tool_mm = truth.tool_mm;
+        built.joints.iter_mut().enumerate().for_each(|(i, j)| j.a_mm += 0.3 * (i as f64).cos());
+        *truth = built;
+    });
+    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+    let length = |robot: &crate::robot::Robot| robot.joints[2].a_mm + robot.joints[3].a_mm;
+    let set = seen_by_cameras(&world, 1.002);
+    let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
+    let stretched = (length(&found.candidates[found.chosen].robot) - length(&world.truth)).abs();
+    let mut trusted = set.clone();
+    (trusted.shared, trusted.supposed_scale) = (Vec::new(), None);
+    let found = identify(&trusted, &world.nominal, &method, 1, &|_| {}).unwrap();
+    let fooled = (length(&found.candidates[found.chosen].robot) - length(&world.truth)).abs();
+    assert!(stretched < 0.5 * fooled, "{stretched} against {fooled}");
+}
+
+#[test]
+fn a_zero_that_is_off_costs_next_to_nothing_and_is_said() {
+    let world = synthetic::planned(200, 40, 25.0, NOISE_MM, 5, &|_| {});
+    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+    let error = |zero_mm: f64| {
+        use crate::measurements::{Observed, Role};
+        // Distances of all spheres' poses to the first sphere's centre: on one sphere a zero is a scale.
+        let place = |row: &crate::measurements::Measurement| world.truth.target_mm(&row.at.joints_rad());
+        let mut rows: Vec<_> = world.rows.iter().filter(|r| r.at.role != Role::Center).cloned().collect();
+        rows.insert(0, world.rows[0].clone());
+        let from = place(&rows[0]);
+        for (i, row) in rows.iter_mut().enumerate() {
+            let noise_mm = 1.4 * NOISE_MM * (2.7 * i as f64).sin();
+            let distance_mm = (place(row) - from).norm() + zero_mm + noise_mm;
+            row.at.group = "one".into();
+            row.observed = Observed::Distance { distance_mm, sigma_mm: None };
+        }
+        let set = Dataset::new(&rows, 1).unwrap();
+        let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
+        let said = crate::identify::data::doctor::findings(&set, &found, &Default::default());
+        let said = said.iter().any(|f| f.finding.contains("the zero of the readings is off"));
+        (
+            quality(&set, &found.candidates[found.chosen].robot, &found, &method)
+                .0
+                .verify
+                .distance
+                .mean_abs_mm
+                .unwrap(),
+            said,
+        )
+    };
+    let (right, alarm) = error(0.0);
+    assert!(!alarm);
+    for zero_mm in [0.05, 0.5, 5.0] {
+        let (off, said) = error(zero_mm);
+        // What is within its own uncertainty needs no word.
+        assert!(off < 1.2 * right && (said || zero_mm < 0.1), "{zero_mm}: {off} against {right}, said: {said}");
+    }
+}

@@ -6,6 +6,7 @@ use super::dataset::{Dataset, Reading};
 use super::sessions::{Along, Session};
 use crate::identify::judge::choose::Identification;
 use crate::identify::record::file_unit;
+use crate::identify::residuals::weights::Extra;
 use crate::robot::Parameter;
 
 /// One finding.
@@ -72,6 +73,16 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "the scale stays nominal; `--known-distances` gives it",
         );
     }
+    if let Some((zero_mm, sigma_mm)) = zero(found) {
+        let (size, way) = (zero_mm.abs(), if zero_mm > 0.0 { "long" } else { "short" });
+        add(
+            format!(
+                "the distances are {size:.3} mm too {way} (known to {sigma_mm:.3} mm): the zero of the readings is off"
+            ),
+            Vec::new(),
+            "it was found with the robot and taken off",
+        );
+    }
     if !found.outliers.is_empty() {
         let share = 100.0 * found.outliers.len() as f64 / (found.fitted.len() + found.outliers.len()) as f64;
         add(
@@ -121,6 +132,18 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
         );
     }
     list
+}
+
+/// Standard deviations from which on a zero that was found is said to be off.
+const ZERO_SIGMAS: f64 = 4.0;
+
+/// The zero of distances to a centre and its standard deviation, mm, where it is off.
+fn zero(found: &Identification) -> Option<(f64, f64)> {
+    let k = found.extras.iter().position(|(extra, _)| *extra == Extra::Zero)?;
+    let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
+    let at = formulation.base.rank() + k;
+    let (value, sigma) = (found.extras[k].1, formulation.covariance()[(at, at)].max(0.0).sqrt());
+    (value.abs() > ZERO_SIGMAS * sigma).then_some((value, sigma))
 }
 
 /// Corrections beyond which a link is not the one of the robot's file, mm and rad, and how many standard deviations they must have.

@@ -120,8 +120,11 @@ pub fn identify(
 ) -> Result<Identification, Error> {
     let models = models(set, settings)?;
     let model = models.first().copied().unwrap_or(Model::CenterDistance);
+    let to_centers = set.kind == Kind::Distances && set.groups.iter().any(|g| g.center.is_some());
     let extras: Vec<Extra> = match set.shared.first() {
         Some(shared) if model != Model::PairwiseDistance => (0..shared.ncols()).map(Extra::Shared).collect(),
+        // Its tolerance comes from the evidence, so that a zero that is right costs nothing.
+        _ if to_centers && settings.wire_offset => vec![Extra::Zero],
         _ => Vec::new(),
     };
     let mut session = Session { set, robot, settings, seed, rows: set.fit_rows(), extras, step };
@@ -386,15 +389,13 @@ impl Session<'_> {
     /// Unknowns of the sensor that the readings may have, each richer list after the poorer one.
     fn possible_unknowns(&self) -> Vec<Vec<Extra>> {
         match self.set.kind {
-            Kind::Distances if self.set.groups.iter().any(|g| g.center.is_some()) => vec![vec![Extra::Zero]],
             // What `measure` says of its cameras' errors is better than what any cameras may have.
             Kind::Positions if self.set.supposed_scale.is_some() => vec![(0..WARPS.len()).map(Extra::Warp).collect()],
             _ => Vec::new(),
         }
     }
 
-    /// Takes the zero of distances, and the warps of a camera rig, where they make the data much more probable at one and the
-    /// same scatter.
+    /// Takes the warps of a camera rig where they make the data much more probable at one and the same scatter.
     fn take_sensor_unknowns(
         &mut self,
         mut cells: Cells,

@@ -1,6 +1,6 @@
 //! Planted faults: is each named as what it is, and is nothing named on clean rows? Gross errors: what do they cost, and are they named?
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use stereocal::identify::Settings;
 use stereocal::identify::data::dataset::Dataset;
@@ -14,48 +14,77 @@ use stereocal::robot::Robot;
 use crate::simulated::against_truth;
 use crate::worlds::{Plan, arms, measured};
 
-/// Changes rows and the nominal robot.
-type Plant = fn(&mut Vec<Measurement>, &mut Robot);
+/// Changes rows and the nominal robot, by so much.
+type Plant = fn(&mut Vec<Measurement>, &mut Robot, f64);
 
-/// Faults and a word of the sentence that names each.
-const FAULTS: [(&str, Plant, &str); 18] = [
-    ("clean", |_, _| {}, ""),
-    ("radians", |rows, _| joints(rows, |_, j| j.iter_mut().for_each(|q| *q = q.to_radians())), "radians"),
-    ("metres", |rows, _| points(rows, |_, p| p.coords /= 1000.0), "are in m,"),
-    ("inches", |rows, _| points(rows, |_, p| p.coords /= 25.4), "inches"),
-    ("exchanged joints", |rows, _| joints(rows, |_, j| j.swap(1, 3)), "exchanged"),
-    ("negated joint", |rows, _| joints(rows, |_, j| j[2] = -j[2]), "sign is flipped"),
-    ("joint off by 90 deg", |rows, _| joints(rows, |_, j| j[1] += 90.0), "offset by"),
-    ("joint off by 180 deg", |rows, _| joints(rows, |_, j| j[3] += 180.0), "offset by"),
-    ("joints a row late", |rows, _| late(rows), "lag"),
-    ("standard DH", |_, robot| *robot = as_standard(robot), "standard DH"),
-    ("mirrored", |rows, _| points(rows, |_, p| p.y = -p.y), "mirrored"),
-    ("one point off by 5 mm", |rows, _| points(rows, |i, p| p.x += if i == 7 { 5.0 } else { 0.0 }), "far worse"),
+/// Faults, their sizes, and a word of the sentence that names each.
+const FAULTS: [(&str, &[f64], Plant, &str); 22] = [
+    ("clean", &[0.0], |_, _, _| {}, ""),
+    ("radians", &[0.0], |rows, _, _| joints(rows, |_, j| j.iter_mut().for_each(|q| *q = q.to_radians())), "radians"),
+    ("metres", &[0.0], |rows, _, _| points(rows, |_, p| p.coords /= 1000.0), "are in m,"),
+    ("inches", &[0.0], |rows, _, _| points(rows, |_, p| p.coords /= 25.4), "inches"),
+    ("exchanged joints", &[0.0], |rows, _, _| joints(rows, |_, j| j.swap(1, 3)), "exchanged"),
+    ("negated joint", &[0.0], |rows, _, _| joints(rows, |_, j| j[2] = -j[2]), "sign is flipped"),
+    ("joint off by, deg", &[90.0, 180.0, -90.0], |rows, _, by| joints(rows, |_, j| j[1] += by), "offset by"),
+    ("joints a row late", &[0.0], |rows, _, _| late(rows), "lag"),
+    ("standard DH", &[0.0], |_, robot, _| *robot = as_standard(robot), "standard DH"),
+    ("mirrored", &[0.0], |rows, _, _| points(rows, |_, p| p.y = -p.y), "mirrored"),
+    ("rows exchanged", &[2.0, 4.0, 12.0], |rows, _, by| exchanged(rows, by as usize), "far worse"),
     (
-        "verify point off by 5 mm",
-        |rows, _| points(rows, |i, p| p.x += if i == 90 { 5.0 } else { 0.0 }),
+        "one point off by, mm",
+        &[0.15, 0.5, 5.0],
+        |rows, _, by| points(rows, |i, p| p.x += if i == 7 { by } else { 0.0 }),
+        "far worse",
+    ),
+    ("centre off by, mm", &[0.15, 0.5, 5.0], |rows, _, by| centre(rows, by), "far worse"),
+    (
+        "verify point off by, mm",
+        &[0.3, 1.0, 5.0],
+        |rows, _, by| points(rows, |i, p| p.x += if i == 90 { by } else { 0.0 }),
         "verify rows fit",
     ),
-    ("base moved by 0.5 mm", |rows, _| points(rows, |i, p| p.x += if i >= 30 { 0.5 } else { 0.0 }), "sessions"),
-    ("drift of 0.5 mm", |rows, _| points(rows, |i, p| p.x += 0.5 * i.min(60) as f64 / 60.0), "drift"),
-    ("constant joint", |rows, _| joints(rows, |_, j| j[4] = 20.0), "same in all rows"),
-    ("repeated poses", |rows, _| repeated(rows), "repeated"),
-    ("another robot", |_, robot| robot.joints[2].a_mm += 60.0, "another robot"),
+    (
+        "base moved by, mm",
+        &[0.1, 0.5, 5.0],
+        |rows, _, by| points(rows, |i, p| p.x += if i >= 30 { by } else { 0.0 }),
+        "sessions",
+    ),
+    (
+        "drift of, mm",
+        &[0.15, 0.5, 3.0],
+        |rows, _, by| points(rows, |i, p| p.x += by * i.min(60) as f64 / 60.0),
+        "drift",
+    ),
+    ("sigmas too large by", &[3.0, 10.0, 30.0], |rows, _, by| stated(rows, by), "too large"),
+    ("sigmas too small by", &[3.0, 10.0, 30.0], |rows, _, by| stated(rows, 1.0 / by), "too small"),
+    ("covariance of nought", &[0.0], |rows, _, _| stated(rows, 0.0), "no variance"),
+    ("constant joint", &[0.0], |rows, _, _| joints(rows, |_, j| j[4] = 20.0), "same in all rows"),
+    ("repeated poses", &[0.0], |rows, _, _| repeated(rows), "repeated"),
+    ("a link longer by, mm", &[20.0, 60.0, 200.0], |_, robot, by| robot.joints[2].a_mm += by, "another robot"),
 ];
 
-/// One line a fault, then gross errors.
+/// A result so many times as far off as without the fault, and nothing said, is absorbed in silence.
+const SILENT: f64 = 1.5;
+
+/// One line a fault and size, then distances with a zero, then gross errors.
 pub fn table(runs: u64) {
-    println!(
-        "\nplanted faults, Table 1's robot, 60 poses, {runs} runs: named, findings in all, and what is said first where it is not named"
-    );
-    for (what, plant, word) in FAULTS {
-        let said: Vec<Vec<Finding>> = (1..=runs).into_par_iter().map(|seed| diagnosed(plant, seed)).collect();
-        let named = said.iter().filter(|list| list.iter().any(|f| f.finding.contains(word))).count();
-        let findings: usize = said.iter().map(Vec::len).sum();
-        let instead = said.iter().find(|list| !list.iter().any(|f| f.finding.contains(word)));
-        let instead = instead.map_or(String::new(), |l| l.first().map_or("nothing".to_owned(), Finding::sentence));
-        println!("{what:26} {named:4} of {runs:3} {findings:5}  {instead:.100}");
+    println!("\nplanted faults, Table 1's robot, 60 poses, {runs} runs");
+    println!("{:26} {:>7} {:>12} {:>9} {:>15}", "", "", "named of", "findings", "silently wrong");
+    let clean: Vec<f64> = (1..=runs).into_par_iter().map(|seed| diagnosed(|_, _, _| {}, 0.0, seed).1).collect();
+    for (what, sizes, plant, word) in FAULTS {
+        for &size in sizes {
+            let said: Vec<(Vec<Finding>, f64)> =
+                (1..=runs).into_par_iter().map(|seed| diagnosed(plant, size, seed)).collect();
+            let named = said.iter().filter(|(list, _)| list.iter().any(|f| f.finding.contains(word))).count();
+            let findings: usize = said.iter().map(|(list, _)| list.len()).sum();
+            let silent = said.iter().zip(&clean).filter(|((list, e), c)| list.is_empty() && *e > SILENT * **c).count();
+            let instead =
+                said.iter().find(|(list, _)| !word.is_empty() && !list.iter().any(|f| f.finding.contains(word)));
+            let instead = instead.map_or(String::new(), |(l, _)| l.first().map_or(String::new(), Finding::sentence));
+            println!("{what:26} {size:7} {named:5} of {runs:3} {findings:9} {silent:15}  {instead:.80}");
+        }
     }
+    zeros(runs);
     println!(
         "\ngross errors of 1 to 20 mm, {runs} runs: accuracy against that of the clean rows, share that is named, clean rows named"
     );
@@ -64,11 +93,81 @@ pub fn table(runs: u64) {
     }
 }
 
-fn joints(rows: &mut [Measurement], change: fn(usize, &mut [f64])) {
+/// Distances to a centre whose zero is off: what does it cost?
+fn zeros(runs: u64) {
+    println!("\ndistances to a centre with a zero that is off, {runs} runs: error against that without");
+    let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+    for by in [0.05, 0.5, 5.0] {
+        let ratio = |seed: u64| {
+            let (nominal, truth, rows) = measured(&arms()[0].1, Plan { samples: 120, ..Plan::default() }, seed);
+            let error = |by: f64| {
+                let set = Dataset::new(&distances(&rows, by), 1).expect("rows");
+                let found = identify(&set, &nominal, &settings, 1, &|_| {}).expect("it is enough");
+                against_truth(&Dataset::new(&rows, 1).expect("rows"), &truth, &found.candidates[found.chosen].robot)
+            };
+            (error(by), error(0.0))
+        };
+        let errors: Vec<(f64, f64)> = (1..=runs).into_par_iter().map(ratio).collect();
+        let mut all: Vec<f64> = errors.iter().map(|(with, without)| with / without).collect();
+        all.sort_by(f64::total_cmp);
+        let mean = |of: fn(&(f64, f64)) -> f64| errors.iter().map(of).sum::<f64>() / runs as f64;
+        println!(
+            "{by:5} mm: {:.3} in the median, {:.3} at worst; mean {:.4} and {:.4} mm",
+            all[all.len() / 2],
+            all[all.len() - 1],
+            mean(|e| e.0),
+            mean(|e| e.1)
+        );
+    }
+}
+
+/// The points as distances to the first one, their zero off by so much.
+fn distances(rows: &[Measurement], zero_mm: f64) -> Vec<Measurement> {
+    let mut list = rows.to_vec();
+    let at = |row: &Measurement| match &row.observed {
+        Observed::Position { point_mm, .. } => *point_mm,
+        _ => Point3::origin(),
+    };
+    let from = at(&rows[0]);
+    for row in &mut list {
+        let distance_mm = (at(row) - from).norm() + zero_mm;
+        row.observed = Observed::Distance { distance_mm, sigma_mm: None };
+    }
+    list[0].at.role = Role::Center;
+    list
+}
+
+/// States covariances that are off by this factor of a standard deviation.
+fn stated(rows: &mut [Measurement], factor: f64) {
+    let sigma = Plan::default().noise_mm * factor;
+    for row in rows {
+        if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
+            *covariance_mm2 = Some(Matrix3::identity() * sigma * sigma);
+        }
+    }
+}
+
+/// The first row becomes the centre, and its point is off.
+fn centre(rows: &mut [Measurement], by: f64) {
+    rows[0].at.role = Role::Center;
+    points(rows, |i, p| p.x += if i == 0 { by } else { 0.0 });
+}
+
+/// So many rows have each other's points.
+fn exchanged(rows: &mut [Measurement], count: usize) {
+    for k in 0..count / 2 {
+        let (a, b) = (3 + 4 * k, 5 + 4 * k);
+        let kept = rows[a].observed.clone();
+        rows[a].observed = rows[b].observed.clone();
+        rows[b].observed = kept;
+    }
+}
+
+fn joints(rows: &mut [Measurement], change: impl Fn(usize, &mut [f64])) {
     rows.iter_mut().enumerate().for_each(|(i, row)| change(i, &mut row.at.joints_deg));
 }
 
-fn points(rows: &mut [Measurement], change: fn(usize, &mut Point3<f64>)) {
+fn points(rows: &mut [Measurement], change: impl Fn(usize, &mut Point3<f64>)) {
     for (i, row) in rows.iter_mut().enumerate() {
         if let Observed::Position { point_mm, .. } = &mut row.observed {
             change(i, point_mm);
@@ -99,17 +198,18 @@ fn as_standard(robot: &Robot) -> Robot {
     typed
 }
 
-fn diagnosed(plant: Plant, seed: u64) -> Vec<Finding> {
-    let (mut nominal, _, mut rows) = measured(&arms()[0].1, Plan::default(), seed);
-    plant(&mut rows, &mut nominal);
+/// What is said, and how far off the result is, mm.
+fn diagnosed(plant: Plant, size: f64, seed: u64) -> (Vec<Finding>, f64) {
+    let (mut nominal, truth, mut rows) = measured(&arms()[0].1, Plan::default(), seed);
+    let unspoilt = Dataset::new(&rows, 1).expect("rows");
+    plant(&mut rows, &mut nominal, size);
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let set = Dataset::new(&rows, 1).expect("rows");
     let (set, nominal, mut list) = examine::examine(&set, &nominal, &settings);
     let (set, along) = sessions::find(&set, &nominal, &settings);
-    if let Ok(found) = identify(&set, &nominal, &settings, 1, &|_| {}) {
-        list.extend(doctor::findings(&set, &found, &along));
-    }
-    list
+    let Ok(found) = identify(&set, &nominal, &settings, 1, &|_| {}) else { return (list, f64::INFINITY) };
+    list.extend(doctor::findings(&set, &found, &along));
+    (list, against_truth(&unspoilt, &truth, &found.candidates[found.chosen].robot))
 }
 
 fn gross(percent: usize, runs: u64) {
