@@ -18,6 +18,9 @@ const GRID: [f64; 13] = [1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0,
 /// Largest of them by kind (lengths, angles, target, gravity, harmonics, couplings, zero, warps): what no workshop gets wrong.
 const LARGEST: [f64; KINDS] = [30.0, 30.0, 1000.0, 30.0, 10.0, 30.0, 100.0, 30.0];
 
+/// Logarithm of the evidence that a standard deviation may lack: one in three.
+const DOUBT: f64 = 1.0;
+
 /// Rounds over the kinds; the evidence is nearly separable.
 const ROUNDS: usize = 2;
 
@@ -192,6 +195,29 @@ impl Tolerance {
         best_of_grid(&free, extras, &score).0
     }
 
+    /// The largest standard deviations, kind by kind, that the data make next to as probable as these (see [`Tolerance::from_evidence`]):
+    /// few poses say little of how well a robot was made, and what they leave open is as uncertain as it may be.
+    pub fn at_most(
+        &self,
+        base: &Base,
+        parameters: &[Parameter],
+        extras: &[Extra],
+        normal: &DMatrix<f64>,
+        gradient: &DVector<f64>,
+    ) -> Tolerance {
+        let score = |t: &Tolerance| evidence(&t.covariance(base, parameters, extras), normal, gradient);
+        let least = score(self) - DOUBT;
+        let free: Vec<Parameter> = base.free.iter().map(|&i| parameters[i]).collect();
+        let mut most = *self;
+        for kind in (0..KINDS).filter(|&k| presence(&free, extras)[k]) {
+            let larger = GRID.iter().filter(|v| **v > self.values()[kind] && **v <= LARGEST[kind]);
+            for &value in larger.take_while(|v| score(&self.with(kind, **v)) > least) {
+                most = most.with(kind, value);
+            }
+        }
+        most
+    }
+
     /// The same for all parameters as they are, whether or not the data tell them apart; with the evidence.
     pub fn from_evidence_of_all(
         parameters: &[Parameter],
@@ -209,14 +235,17 @@ impl Tolerance {
     }
 }
 
-fn best_of_grid(parameters: &[Parameter], extras: &[Extra], score: &dyn Fn(&Tolerance) -> f64) -> (Tolerance, f64) {
+/// Which kinds there are.
+fn presence(parameters: &[Parameter], extras: &[Extra]) -> [bool; KINDS] {
     let mut present = [false; KINDS];
-    for &parameter in parameters {
-        present[kind(parameter)] = true;
-    }
-    for kind in extras.iter().filter_map(|&e| extra_kind(e)) {
+    for kind in parameters.iter().map(|&p| kind(p)).chain(extras.iter().filter_map(|&e| extra_kind(e))) {
         present[kind] = true;
     }
+    present
+}
+
+fn best_of_grid(parameters: &[Parameter], extras: &[Extra], score: &dyn Fn(&Tolerance) -> f64) -> (Tolerance, f64) {
+    let present = presence(parameters, extras);
     let start = Tolerance { lengths_mm: 1.0, angles_mrad: 1.0, target_mm: 10.0, ..Tolerance::default() };
     let mut best = (start, score(&start));
     for _ in 0..ROUNDS {

@@ -49,6 +49,8 @@ pub struct Formulation {
     pub widened: Vec<String>,
     /// The prior's standard deviations.
     pub tolerance: Tolerance,
+    /// The largest that the data allow: what the data leave open is as uncertain as these say.
+    pub most: Tolerance,
     /// Whether they hold the parameters, or only share out what is determined together.
     pub held: bool,
     /// The fit without a box, extras included.
@@ -121,6 +123,12 @@ impl Formulation {
             }
         }
         let free_fit = free_fit.ok_or(Error::NotFinite)?;
+        let (normal, gradient) =
+            Fit::new(Cow::Borrowed(&rows), &base, spread, &free, DMatrix::zeros(0, count)).normal(&x);
+        let most = match held {
+            true => tolerance.at_most(&base, task.parameters, task.extras, &normal, &gradient),
+            false => tolerance,
+        };
         let (bounds, widened) = bounds(&base, task.parameters, &free_fit.x, settings);
         Ok(Formulation {
             model: task.model,
@@ -129,6 +137,7 @@ impl Formulation {
             bounds,
             widened,
             tolerance,
+            most,
             held,
             free_fit,
             effective,
@@ -159,16 +168,16 @@ impl Formulation {
         &self.free_fit.x[self.base.rank()..]
     }
 
-    /// Rows of the prior; none without one.
-    fn prior(&self, extras: &[Extra]) -> DMatrix<f64> {
+    /// Rows of the prior of these standard deviations; none without one.
+    fn prior(&self, tolerance: &Tolerance, extras: &[Extra]) -> DMatrix<f64> {
         let rows = match self.held {
-            true => self.tolerance.rows(&self.base, self.parameters(), extras),
+            true => tolerance.rows(&self.base, self.parameters(), extras),
             false => DMatrix::zeros(0, self.base.rank() + extras.len()),
         };
         let nominal = self.rows.kinematics.nominal();
         match self.scale_seen {
             true => rows,
-            false => with_scale_held(rows, &self.tolerance, &self.base, self.parameters(), nominal),
+            false => with_scale_held(rows, tolerance, &self.base, self.parameters(), nominal),
         }
     }
 
@@ -178,14 +187,14 @@ impl Formulation {
             true => Cow::Borrowed(&self.rows),
             false => Cow::Owned(self.rows.with_extras_fixed(self.extras())),
         };
-        Fit::new(rows, &self.base, self.spread(), &self.bounds, self.prior(&[]))
+        Fit::new(rows, &self.base, self.spread(), &self.bounds, self.prior(&self.tolerance, &[]))
     }
 
     /// Covariance of the unknowns (base parameters, extras), mm and mrad: data and prior together, the data's part as much larger as
     /// errors that rows share make it.
     pub fn covariance(&self) -> DMatrix<f64> {
         let free = vec![f64::INFINITY; self.free_fit.x.len()];
-        let prior = self.prior(&self.rows.extras);
+        let prior = self.prior(&self.most, &self.rows.extras);
         let fit = Fit::new(Cow::Borrowed(&self.rows), &self.base, self.spread(), &free, prior.clone());
         let (_, jacobian) = fit.white(&self.free_fit.x);
         let data = product(&jacobian, &jacobian);
@@ -207,7 +216,7 @@ impl Formulation {
         if !self.held {
             return Vec::new();
         }
-        let before = self.tolerance.covariance(&self.base, self.parameters(), &[]);
+        let before = self.most.covariance(&self.base, self.parameters(), &[]);
         let after = self.covariance();
         let weak = |&k: &usize| after[(k, k)].sqrt() > 0.9 * before[(k, k)].sqrt();
         (0..self.base.rank()).filter(weak).map(|k| self.base.free[k]).collect()
