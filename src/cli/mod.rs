@@ -55,7 +55,7 @@ pub enum Command {
     Identify(Identify),
     /// Judge robots by the verify rows of measurements, without fitting any
     Verify(Verify),
-    /// Join camera check, measurements and robot into one page to sign
+    /// Join camera check, measurements and robot into one file to sign
     Report(Report),
     /// Undistort and rectify pairs of pictures, for eyes and for dense stereo
     Rectify(Rectify),

@@ -24,6 +24,9 @@ pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
     let inputs: Vec<&camino::Utf8Path> = inputs.into_iter().flatten().map(|path| path.as_path()).collect();
     let out = out.for_run(&Run { force: args.force, ..run }, &inputs);
     let exported = export(args, &robot)?;
+    if !args.force {
+        spare_other_robots(&out.join(exported.name), &exported)?;
+    }
     match args.format {
         RobotFormat::Toml => out.write_toml(exported.name, &exported.text)?,
         _ => out.write(exported.name, exported.text.as_bytes())?,
@@ -31,6 +34,18 @@ pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
     let mut stdout = format!("{}\n{}\n", out.join(exported.name), fidelity(&robot, &exported.carried));
     exported.notes.iter().for_each(|note| stdout.push_str(&format!("note: {note}\n")));
     Ok(Outcome { stdout, status: Status::Done })
+}
+
+/// A robot file that is no export, such as the nominal one that `simulate` and `robot new` write under the same name, is not replaced
+/// by a corrected one: the next identification would start from it.
+fn spare_other_robots(path: &camino::Utf8Path, exported: &ExportedRobot) -> Result<()> {
+    let Ok(standing) = std::fs::read_to_string(path) else { return Ok(()) };
+    let is_export = standing.lines().take_while(|line| line.starts_with('#')).any(|line| line.contains("export robot"));
+    if path.extension() != Some("toml") || standing == exported.text || is_export {
+        return Ok(());
+    }
+    let message = format!("{path} is there already and is no export: it may be the nominal robot");
+    Err(Error::NotExportable { message, hint: "another `--out`, or `--force`".to_owned() }.into())
 }
 
 fn export(args: &ExportRobot, robot: &Robot) -> Result<ExportedRobot> {

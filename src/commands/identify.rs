@@ -123,7 +123,9 @@ pub fn robot_file(path: Option<&Utf8Path>) -> Option<Utf8PathBuf> {
 
 fn nominal_robot(file: Option<&Utf8Path>, named: bool) -> Result<Robot> {
     let Some(file) = file else {
-        progress::note("nominal robot: Table 1 of the paper (no --robot, and no robot.toml here)");
+        progress::warn(
+            "the nominal robot is taken to be that of Table 1 of the paper: no --robot, and no robot.toml in this folder",
+        );
         return Ok(Robot::paper());
     };
     if !named {

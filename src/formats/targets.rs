@@ -31,7 +31,11 @@ pub struct Row {
 /// Reads targets for a robot.
 pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
     let table = Table::read(path, "the targets", HINT)?;
-    let name = table.require("name")?;
+    // `plan` and `measure` call it a pose.
+    let name = match table.column("pose") {
+        Some(pose) if table.column("name").is_none() => pose,
+        _ => table.require("name")?,
+    };
     let columns = ["x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad"];
     let poses: Vec<usize> = columns.iter().filter_map(|c| table.column(c)).collect();
     if !(poses.is_empty() || poses.len() == columns.len()) {

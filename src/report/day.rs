@@ -145,8 +145,8 @@ fn rig(check: &Value) -> Markup {
         (quantities(&rows))
         p { (format!(
             "E is the largest deviation of {lengths} lengths of {} to {} mm between corners of the board, on pairs that did not help to calibrate the cameras that \
-             measured them. The verdict keeps the uncertainty as a guard band, as ISO 14253-1 asks: a pass needs E and its uncertainty together within the limit.",
-            number(Some(least).filter(|v| v.is_finite()), 1), number(Some(most), 1))) }
+             measured them. The verdict keeps the uncertainty as a guard band, as ISO 14253-1 asks: a pass needs the length of greatest E and uncertainty together within the limit (here {}).",
+            number(Some(least).filter(|v| v.is_finite()), 1), number(Some(most), 1), mm(check, "/trusted_mm"))) }
         p {
             "A test by VDI/VDE 2634 part 1 takes lengths of an artefact calibrated by others, on at least seven lines through the measuring volume. "
             @if second { "Here a second board was measured that calibrated nothing; it stands in camera-check.html." }

@@ -27,7 +27,7 @@ pub fn summary(record: &Record) -> String {
     let i = &record.identifiability;
     let mut text = table.to_string();
     text.push_str(&format!(
-        "\n* kept, by its error on samples held out. {}: {} of {} parameters determined, condition {}\n",
+        "\n* kept: the terms by their error on samples held out, the method by its cost. {}: {} of {} parameters determined, condition {}\n",
         record.terms,
         i.rank,
         i.parameters,
@@ -80,9 +80,10 @@ pub fn page(
     after: &[RowError],
 ) -> Result<String> {
     let lead = format!(
-        "{} poses in {} groups, {} to verify; {} kept, seed {}",
+        "{} poses in {} {}, {} to verify; {} kept, seed {}",
         set.poses.len(),
         set.groups.len(),
+        if set.groups.len() == 1 { "group" } else { "groups" },
         set.verify_rows().len(),
         record.chosen,
         record.seed
@@ -204,11 +205,14 @@ fn verification_table(record: &Record) -> Markup {
 
 fn parameter_table(record: &Record) -> Markup {
     let Some(method) = record.chosen_method() else { return html! {} };
+    let seen = &record.identifiability;
+    let in_sum = |name: &str| seen.dependent.iter().any(|sum| sum.split_whitespace().any(|word| word == name));
     let row = |p: &crate::identify::record::ParameterRecord| {
         let state = match (p.identifiable, p.at_bound) {
-            (false, _) if p.delta != 0.0 => "its share of a sum",
-            (false, _) => "stays nominal",
             (true, true) => "at the wall",
+            (true, false) if seen.weak.contains(&p.name) => "from the tolerance alone",
+            _ if p.delta != 0.0 && in_sum(&p.name) => "its share of a sum",
+            (false, _) => "stays nominal",
             (true, false) => "",
         };
         vec![
@@ -284,22 +288,16 @@ fn joint_table(record: &Record) -> Markup {
 
 fn judged_table(record: &Record) -> Markup {
     let row = |j: &crate::identify::judge::choose::Judged| {
-        vec![j.model.to_owned(), j.terms.clone(), number(j.held_out_mm, 4)]
+        let mark = if j.terms == record.terms { " (kept)" } else { "" };
+        vec![j.model.to_owned(), format!("{}{mark}", j.terms), number(j.held_out_mm, 4)]
     };
-    let mut rows: Vec<Vec<String>> = record.judged.iter().map(row).collect();
-    rows.extend(
-        record
-            .methods
-            .iter()
-            .filter(|m| m.held_out_mm.is_some())
-            .map(|m| vec![m.model.to_owned(), format!("{} (one fold)", m.name), number(m.held_out_mm, 4)]),
-    );
+    let rows: Vec<Vec<String>> = record.judged.iter().map(row).collect();
     if rows.is_empty() {
         return html! { p { "Model, terms and method were given." } };
     }
     html! {
-        p { "Root mean square error on samples that were held out of the fit, mm. More terms, another model or a dearer method are taken only where this falls by more than two standard errors." }
-        (page::table(&["model", "terms or method", "held-out error, mm"], &rows))
+        p { "Root mean square error on samples that were held out of the fit, mm. More terms are taken only where this clearly falls. The methods all solve the same problem: the cheapest of those that end at the least cost is kept." }
+        (page::table(&["model", "terms", "held-out error, mm"], &rows))
     }
 }
 
@@ -337,7 +335,7 @@ fn layout_figures(places: &[(Role, Point3<f64>)]) -> Result<Markup> {
                    identified, and the corrections hold there only as far as the model is right.";
     Ok(html! { div.side {
         (page::figure(&view("Poses from above", "y, mm", (0, 1))?, caption))
-        (page::figure(&view("Poses from the side", "z, mm", (0, 2))?, "The same poses from the side."))
+        (page::figure(&view("Poses from the side", "z, mm", (0, 2))?, "The same poses from the side: spheres that all stand at one height leave what gravity does to the arm unseen."))
     } })
 }
 

