@@ -14,10 +14,10 @@ use serde::Deserialize;
 use super::dataset::{Dataset, Pose, Reading};
 
 /// Share of the whole shared variance below which a direction stays with the rows.
-const LEAST_SHARE: f64 = 1e-4;
+const LEAST_SHARE: f64 = 1e-8;
 
 /// Directions at the most.
-const MOST: usize = 16;
+const MOST: usize = 64;
 
 /// Variance that every row keeps, mm^2: a tenth of a micrometre.
 const LEAST_OWN_MM2: f64 = 1e-8;
