@@ -3,7 +3,7 @@
 //! 1. A robust fit names the rows that have no weight; they are left out, until the model that is chosen says whether they are far off
 //!    from it too. Verify rows are looked at too, named and kept.
 //! 2. Cells (see [`super::cells`]) choose the rung of the ladder, from the nominal robot upwards: more only where the held-out errors
-//!    fall by more than twice their paired standard error. Unknowns of the sensor are taken where the evidence asks for them.
+//!    fall and the evidence asks for it, and against a model that is contained only for what the further terms bring. Unknowns of the sensor are taken where the evidence asks for them.
 //! 3. Every method solves the same problem, so the least cost is the best; the cheapest of equals is kept.
 //! 4. Verify rows take no part in any choice but one: where the robot found is worse on them than the nominal one, nominal is kept.
 
@@ -348,8 +348,17 @@ impl Session<'_> {
             judged.push(Judged { model: model.name(), terms, held_out_mm });
             held_out
         };
-        let mut reference = judge(best, judged)?;
         let evidence = |terms: &Terms| cells.tolerance(&terms.parameters(self.robot)).1;
+        // Several are tried, so that what falls by chance must be probable, too; and of probable errors that whole placements share,
+        // or of a robot that nobody has found fault with, only what falls clearly counts.
+        let worth = |new: &(Terms, HeldOut), old: &(Terms, HeldOut)| {
+            evidence(&new.0) - evidence(&old.0) > EVIDENCE
+                && match cells.whole_placements() || old.0 == Terms::NOMINAL {
+                    true => clearly_less(&new.1, &old.1),
+                    false => root_mean(&new.1) < root_mean(&old.1),
+                }
+        };
+        let mut at = (best, judge(best, judged)?);
         loop {
             let mut next: Option<(Terms, HeldOut)> = None;
             for terms in best.successors(self.robot, true) {
@@ -358,23 +367,19 @@ impl Session<'_> {
                     continue;
                 }
                 let Some(held_out) = judge(terms, judged) else { continue };
-                let least = next.as_ref().is_none_or(|(_, h)| root_mean(&held_out) < root_mean(h));
-                if !least || root_mean(&held_out) >= root_mean(&reference) {
-                    continue;
-                }
-                let (clear, probable) =
-                    (clearly_less(&held_out, &reference), evidence(&terms) > evidence(&best) + EVIDENCE);
-                let taken = match best == Terms::NOMINAL {
-                    // A robot that nobody has found fault with needs no correction that could be chance.
-                    true => clear && probable,
-                    false => clear || probable && !cells.whole_placements(),
-                };
-                if taken {
-                    next = Some((terms, held_out));
+                let new = (terms, held_out);
+                // Against what it contains a richer model has to be worth its terms; among others the least error decides.
+                let better = next.as_ref().is_none_or(|pick| match terms.contains(&pick.0) {
+                    true => worth(&new, pick),
+                    false => root_mean(&new.1) < root_mean(&pick.1),
+                });
+                if better && worth(&new, &at) {
+                    next = Some(new);
                 }
             }
-            let Some((terms, held_out)) = next else { break };
-            (best, reference) = (terms, held_out);
+            let Some(next) = next else { break };
+            best = next.0;
+            at = next;
         }
         Some(best)
     }

@@ -77,6 +77,16 @@ impl Terms {
         parameters
     }
 
+    /// Whether it has all that another one has.
+    pub fn contains(&self, other: &Terms) -> bool {
+        self.chain >= other.chain
+            && self.beta >= other.beta
+            && self.gravity >= other.gravity
+            && self.couplings >= other.couplings
+            && self.harmonics >= other.harmonics
+            && self.wobble >= other.wobble
+    }
+
     /// In words.
     pub fn name(&self) -> String {
         let mut name = match self.chain {
