@@ -27,7 +27,7 @@ const ROUNDING: f64 = 1e-3;
 
 /// How many times less certain a rig's scale is than its points, both relative to their distance: it comes from a board of known size
 /// that fills a tenth or so of that distance.
-const SCALE_OVER_POINT: f64 = 15.0;
+const SCALE_OVER_POINT: f64 = 10.0;
 
 #[derive(Debug, Deserialize)]
 struct Measured {
