@@ -236,22 +236,10 @@ impl Kernel {
                 if !self.corrections.is_empty() {
                     self.correct(block, joint, offsets, &mut s, &mut c, &mut shift);
                 }
-                let tilt = self.tilts.iter().find(|t| t.joint == joint).map(|t| t.at(block, offsets));
-                for l in 0..LANES {
-                    let mut turned_x = fma::<FMA>(c[l], x[l], -(s[l] * y[l]));
-                    let mut turned_y = fma::<FMA>(s[l], x[l], c[l] * y[l]);
-                    let mut risen = z[l] + link.d + shift[l];
-                    if let Some([_, about_y]) = &tilt {
-                        (risen, turned_x) = turned::<FMA>(&about_y[l], risen, turned_x);
-                    }
-                    let swung_x = fma::<FMA>(link.cos_beta, turned_x, link.sin_beta * risen);
-                    let mut swung_z = fma::<FMA>(link.cos_beta, risen, -(link.sin_beta * turned_x));
-                    if let Some([about_x, _]) = &tilt {
-                        (turned_y, swung_z) = turned::<FMA>(&about_x[l], turned_y, swung_z);
-                    }
-                    x[l] = swung_x + link.a;
-                    y[l] = fma::<FMA>(link.cos_alpha, turned_y, -(link.sin_alpha * swung_z));
-                    z[l] = fma::<FMA>(link.sin_alpha, turned_y, link.cos_alpha * swung_z);
+                let (turn, at) = ((&s, &c), [&mut x, &mut y, &mut z]);
+                match self.tilts.iter().find(|t| t.joint == joint) {
+                    None => link.carry::<FMA, false>(turn, &shift, &STRAIGHT, at),
+                    Some(tilt) => link.carry::<FMA, true>(turn, &shift, &tilt.at(block, offsets), at),
                 }
             }
             xs.copy_from_slice(&x);
@@ -283,10 +271,45 @@ impl Kernel {
     }
 }
 
+/// Sine and cosine of the tilts of a link about its x and y.
+type TiltLanes = [[(f64, f64); LANES]; 2];
+
+/// No tilt.
+const STRAIGHT: TiltLanes = [[(0.0, 1.0); LANES]; 2];
+
+impl Link {
+    /// Carries points from the joint's frame to the frame before it. Two copies: what links do that do not tilt is the hot loop.
+    #[inline(always)]
+    fn carry<const FMA: bool, const TILTS: bool>(
+        &self,
+        (s, c): (&Lane, &Lane),
+        shift: &Lane,
+        [about_x, about_y]: &TiltLanes,
+        [x, y, z]: [&mut Lane; 3],
+    ) {
+        for l in 0..LANES {
+            let mut turned_x = fma::<FMA>(c[l], x[l], -(s[l] * y[l]));
+            let mut turned_y = fma::<FMA>(s[l], x[l], c[l] * y[l]);
+            let mut risen = z[l] + self.d + shift[l];
+            if TILTS {
+                (risen, turned_x) = turned::<FMA>(&about_y[l], risen, turned_x);
+            }
+            let swung_x = fma::<FMA>(self.cos_beta, turned_x, self.sin_beta * risen);
+            let mut swung_z = fma::<FMA>(self.cos_beta, risen, -(self.sin_beta * turned_x));
+            if TILTS {
+                (turned_y, swung_z) = turned::<FMA>(&about_x[l], turned_y, swung_z);
+            }
+            x[l] = swung_x + self.a;
+            y[l] = fma::<FMA>(self.cos_alpha, turned_y, -(self.sin_alpha * swung_z));
+            z[l] = fma::<FMA>(self.sin_alpha, turned_y, self.cos_alpha * swung_z);
+        }
+    }
+}
+
 impl Tilt {
     /// Sine and cosine of the tilt about x, then about y.
     #[inline(always)]
-    fn at(&self, block: usize, offsets: &[f64]) -> [[(f64, f64); LANES]; 2] {
+    fn at(&self, block: usize, offsets: &[f64]) -> TiltLanes {
         let mut small = self.own[block];
         for (index, lanes) in &self.free {
             let by = offsets[*index] / 1000.0;
