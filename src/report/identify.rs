@@ -287,7 +287,7 @@ fn joint_table(record: &Record) -> Markup {
 }
 
 fn judged_table(record: &Record) -> Markup {
-    let row = |j: &crate::identify::judge::choose::Judged| {
+    let row = |j: &crate::identify::judge::climb::Judged| {
         let mark = if j.terms == record.terms { " (kept)" } else { "" };
         vec![j.model.to_owned(), format!("{}{mark}", j.terms), number(j.held_out_mm, 4)]
     };

@@ -40,7 +40,7 @@ struct JointScrews {
 }
 
 impl Screws {
-    /// Of the robot as it stands (see [`Robot::bent`]), with the target at `tool_mm` in the last joint's frame.
+    /// Of the robot as it stands (see [`super::Robot::bent`]), with the target at `tool_mm` in the last joint's frame.
     pub fn new(bent: &Bent, tool_mm: &Vector3<f64>) -> Screws {
         let mut rotation = Matrix3::identity();
         let mut origin = Point3::origin();

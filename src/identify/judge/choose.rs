@@ -2,17 +2,17 @@
 //!
 //! 1. A robust fit names the rows that have no weight; they are left out, until the model that is chosen says whether they are far off
 //!    from it too. Verify rows are looked at too, named and kept.
-//! 2. Cells (see [`super::cells`]) choose the rung of the ladder, from the nominal robot upwards: more only where the held-out errors
-//!    fall and the evidence asks for it, and against a model that is contained only for what the further terms bring. Unknowns of the sensor are taken where the evidence asks for them.
+//! 2. The ladder of models is climbed (see [`super::climb`]): more terms only where the held-out errors fall and the evidence asks for
+//!    them, against a model that is contained only for what the further terms bring.
 //! 3. Every method solves the same problem, so the least cost is the best; the cheapest of equals is kept.
 //! 4. Verify rows take no part in any choice but one: where the robot found is worse on them than the nominal one, nominal is kept.
 
-use super::cells::{Cells, HeldOut, clearly_less, root_mean};
+use super::climb::Judged;
 use super::errors::{Judge, RowError};
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::model::ladder::{Chain, Terms};
-use crate::identify::residuals::weights::{EVIDENCE, Extra, Scatter, WARPS};
+use crate::identify::residuals::weights::{Extra, Scatter};
 use crate::identify::settings::{Extensions, Method, Model, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::problem::{Problem, Solution};
@@ -34,17 +34,6 @@ pub struct Candidate {
     pub robot: Robot,
     /// Root mean square held-out error of a number, mm, of the model where this ends at its least cost; `None` where it does not, or
     /// was not judged.
-    pub held_out_mm: Option<f64>,
-}
-
-/// A rung of the ladder, or a model, and how it did.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Judged {
-    /// The model's name.
-    pub model: &'static str,
-    /// The terms in words.
-    pub terms: String,
-    /// Root mean square held-out error of a number, mm; `None` where it could not be judged.
     pub held_out_mm: Option<f64>,
 }
 
@@ -74,21 +63,18 @@ pub struct Identification {
 }
 
 /// What all steps share.
-struct Session<'a> {
-    set: &'a Dataset,
-    robot: &'a Robot,
-    settings: &'a Settings,
+pub(super) struct Session<'a> {
+    pub(super) set: &'a Dataset,
+    pub(super) robot: &'a Robot,
+    pub(super) settings: &'a Settings,
     seed: u64,
-    rows: Vec<usize>,
-    extras: Vec<Extra>,
+    pub(super) rows: Vec<usize>,
+    pub(super) extras: Vec<Extra>,
     step: &'a (dyn Fn(&str) + Sync),
 }
 
 /// Numbers a parameter that a model needs to tell gross errors by: with fewer, a fit follows them.
 const ROWS_TELL: f64 = 2.0;
-
-/// Numbers a parameter that terms beyond MDH need at the least.
-const MOST_PARAMETERS: f64 = 1.5;
 
 /// Costs within this of each other are one: they come from different sums of the same squares.
 const SAME_COST: f64 = 1e-6;
@@ -98,9 +84,6 @@ const COMPARED_POSES: usize = 4_000_000;
 
 /// Iterations of a swarm in a comparison at the least.
 const LEAST_ITERATIONS: usize = 10;
-
-/// Times that the ladder is climbed on, each time from where the model that was taken fits.
-const MOST_CLIMBS: usize = 4;
 
 /// Verify rows from which on their verdict counts.
 const VERDICT_ROWS: usize = 5;
@@ -251,14 +234,14 @@ impl Identification {
 }
 
 impl Session<'_> {
-    fn task<'b>(&'b self, parameters: &'b [crate::robot::Parameter], model: Model) -> Task<'b> {
+    pub(super) fn task<'b>(&'b self, parameters: &'b [crate::robot::Parameter], model: Model) -> Task<'b> {
         let Session { set, robot, settings, .. } = *self;
         let extras = if model == Model::PairwiseDistance { &[] } else { self.extras.as_slice() };
         Task { set, robot, parameters, extras, rows: &self.rows, model, settings }
     }
 
     /// Numbers that were measured, less the unknowns of the placements.
-    fn numbers(&self) -> f64 {
+    pub(super) fn numbers(&self) -> f64 {
         let (a_row, a_group) = match self.set.kind {
             Kind::Positions => (3, 6),
             Kind::Distances if self.rows.iter().any(|&r| self.set.touches(r)) => (3, 3),
@@ -269,12 +252,12 @@ impl Session<'_> {
     }
 
     /// Whether there are so many times more numbers to tell by than parameters.
-    fn tells(&self, terms: &Terms, times: f64) -> bool {
+    pub(super) fn tells(&self, terms: &Terms, times: f64) -> bool {
         terms.parameters(self.robot).len() as f64 * times <= self.numbers()
     }
 
     /// The richest model that has so many times more numbers to tell by than parameters.
-    fn reference(&self, times: f64) -> Terms {
+    pub(super) fn reference(&self, times: f64) -> Terms {
         let poorer = |chain: Chain| Terms { chain, ..Terms::NOMINAL };
         let rich = [Terms::REFERENCE, Terms::default(), poorer(Chain::Offsets)];
         rich.into_iter().find(|t| self.tells(t, times)).unwrap_or(poorer(Chain::Tool))
@@ -305,134 +288,6 @@ impl Session<'_> {
         let verify_outliers = verify.iter().filter(|e| far(e)).map(|e| e.row).collect();
         self.rows = rows;
         Ok((outliers, verify_outliers))
-    }
-
-    /// Up the ladder from the nominal robot: each time to the successor of least held-out error, as long as one is clearly better.
-    fn climb(&mut self, model: Model) -> Result<(Terms, Vec<Judged>), Error> {
-        let all = Terms::ALL.parameters(self.robot);
-        let reference = self.reference(MOST_PARAMETERS);
-        let mut at = Terms { chain: Chain::Mdh, ..reference };
-        let parameters = at.parameters(self.robot);
-        let formulation = Formulation::new(&self.task(&parameters, model))?;
-        let scatter = formulation.rows.scatter;
-        let cells = self.cells(&all, &parameters, &formulation, scatter, model);
-        let mut cells = self.take_sensor_unknowns(cells, &all, &parameters, scatter, model)?;
-        let mut judged = Vec::new();
-        let mut best = Terms::NOMINAL;
-        for _ in 0..MOST_CLIMBS {
-            let Some(next) = self.climb_from(best, &cells, model, &mut judged) else {
-                return Ok((Terms::default(), judged));
-            };
-            if next == best {
-                break;
-            }
-            best = next;
-            // What a poor model leaves over hides what the next term would explain: on from where this one fits.
-            if best.chain < Chain::Mdh || best == at {
-                break;
-            }
-            at = best;
-            let parameters = at.parameters(self.robot);
-            let formulation = Formulation::new(&self.task(&parameters, model))?;
-            cells = self.cells(&all, &parameters, &formulation, formulation.rows.scatter, model);
-        }
-        Ok((best, judged))
-    }
-
-    /// Up the ladder from `best` by what these cells say; `None` where nothing can be held out.
-    fn climb_from(&self, mut best: Terms, cells: &Cells, model: Model, judged: &mut Vec<Judged>) -> Option<Terms> {
-        let judge = |terms: Terms, judged: &mut Vec<Judged>| -> Option<HeldOut> {
-            let held_out = cells.held_out(&terms.parameters(self.robot));
-            let (held_out_mm, terms) = (held_out.as_ref().and_then(root_mean), terms.name());
-            judged.retain(|j| j.terms != terms);
-            judged.push(Judged { model: model.name(), terms, held_out_mm });
-            held_out
-        };
-        let evidence = |terms: &Terms| cells.tolerance(&terms.parameters(self.robot)).1;
-        // Several are tried, so that what falls by chance must be probable, too; and of probable errors that whole placements share,
-        // or of a robot that nobody has found fault with, only what falls clearly counts.
-        let worth = |new: &(Terms, HeldOut), old: &(Terms, HeldOut)| {
-            evidence(&new.0) - evidence(&old.0) > EVIDENCE
-                && match cells.whole_placements() || old.0 == Terms::NOMINAL {
-                    true => clearly_less(&new.1, &old.1),
-                    false => root_mean(&new.1) < root_mean(&old.1),
-                }
-        };
-        let mut at = (best, judge(best, judged)?);
-        loop {
-            let mut next: Option<(Terms, HeldOut)> = None;
-            for terms in best.successors(self.robot, true) {
-                let beyond = terms.chain == Chain::Mdh && terms != Terms::default();
-                if beyond && !self.tells(&terms, MOST_PARAMETERS) {
-                    continue;
-                }
-                let Some(held_out) = judge(terms, judged) else { continue };
-                let new = (terms, held_out);
-                // Against what it contains a richer model has to be worth its terms; among others the least error decides.
-                let better = next.as_ref().is_none_or(|pick| match terms.contains(&pick.0) {
-                    true => worth(&new, pick),
-                    false => root_mean(&new.1) < root_mean(&pick.1),
-                });
-                if better && worth(&new, &at) {
-                    next = Some(new);
-                }
-            }
-            let Some(next) = next else { break };
-            best = next.0;
-            at = next;
-        }
-        Some(best)
-    }
-
-    /// Cells linearised where a formulation ended, at a scatter that need not be its own.
-    fn cells(
-        &self,
-        all: &[crate::robot::Parameter],
-        reference: &[crate::robot::Parameter],
-        at: &Formulation,
-        scatter: Scatter,
-        model: Model,
-    ) -> Cells {
-        let offsets = at.offsets_of();
-        let (of_robot, extras) = offsets.split_at(reference.len());
-        let mut wide: Vec<f64> =
-            all.iter().map(|p| reference.iter().position(|q| q == p).map_or(0.0, |i| of_robot[i])).collect();
-        wide.extend_from_slice(extras);
-        let levers = self.robot.shifted(reference, of_robot);
-        let rows = self.task(all, model).rows_at(scatter, &levers);
-        Cells::new(self.set, &rows, &wide, self.settings.folds)
-    }
-
-    /// Unknowns of the sensor that the readings may have, each richer list after the poorer one.
-    fn possible_unknowns(&self) -> Vec<Vec<Extra>> {
-        match self.set.kind {
-            // What `measure` says of its cameras' errors is better than what any cameras may have.
-            Kind::Positions if self.set.supposed_scale.is_some() => vec![(0..WARPS.len()).map(Extra::Warp).collect()],
-            _ => Vec::new(),
-        }
-    }
-
-    /// Takes the warps of a camera rig where they make the data much more probable at one and the same scatter.
-    fn take_sensor_unknowns(
-        &mut self,
-        mut cells: Cells,
-        all: &[crate::robot::Parameter],
-        reference: &[crate::robot::Parameter],
-        scatter: Scatter,
-        model: Model,
-    ) -> Result<Cells, Error> {
-        let mut kept = self.extras.len();
-        for list in self.possible_unknowns() {
-            let before = cells.tolerance(reference).1;
-            self.extras.extend(list);
-            let with = Formulation::new(&self.task(reference, model))?;
-            let richer = self.cells(all, reference, &with, scatter, model);
-            if richer.tolerance(reference).1 > before + EVIDENCE {
-                (cells, kept) = (richer, self.extras.len());
-            }
-        }
-        self.extras.truncate(kept);
-        Ok(cells)
     }
 
     fn run(&self, model: Model, terms: Terms, method: Method) -> Result<Candidate, Error> {

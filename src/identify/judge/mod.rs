@@ -2,4 +2,5 @@
 
 pub mod cells;
 pub mod choose;
+pub mod climb;
 pub mod errors;
