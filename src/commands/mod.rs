@@ -1,20 +1,17 @@
-//! One file a command; each reads as the list of its stages, and nothing else knows their order.
+//! One file or folder a command; each reads as the list of its stages, and nothing else knows their order.
 
 pub mod camera_check;
 pub mod compensate;
 pub mod error;
 pub mod export;
-pub mod export_robot;
-pub mod guide;
 pub mod identify;
-pub mod init;
 pub mod measure;
 pub mod plan;
 pub mod rectify;
 pub mod report;
 pub mod robot;
-pub mod shell;
 pub mod simulate;
+pub mod start;
 pub mod verify;
 
 use crate::cli::{Cli, Command};
@@ -59,10 +56,10 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Plan(args) => plan::run(&args, &config, run),
         Command::Compensate(args) => compensate::run(&args, &config, run),
         Command::Export(args) => export::run(&args, &config, run),
-        Command::Init(args) => init::run(&args, run),
-        Command::Guide(args) => guide::run(&args),
-        Command::Completions(args) => Ok(shell::completions(&args)),
-        Command::Man(args) => shell::man(&args, run),
+        Command::Init(args) => start::init::run(&args, run),
+        Command::Guide(args) => start::guide::run(&args),
+        Command::Completions(args) => Ok(start::shell::completions(&args)),
+        Command::Man(args) => start::shell::man(&args, run),
         Command::Robot(args) => robot::run(&args, &config, run),
     }
 }

@@ -5,7 +5,7 @@ use crate::report::drawing::figure::Plot;
 use crate::report::page::{self};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::assessment::Judged;
-use crate::stereo::judge::held_out::{Accuracy, HeldOutPair};
+use crate::stereo::judge::lengths::held_out::{Accuracy, HeldOutPair};
 use crate::stereo::judge::lengths::{Axis, Range};
 use crate::stereo::judge::residual_correlation::Field;
 use maud::{Markup, html};

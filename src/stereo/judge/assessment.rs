@@ -3,12 +3,12 @@
 use crate::diagnostic::Warning;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::evidence::{self, Evidence};
-use crate::stereo::judge::held_out::Accuracy;
 use crate::stereo::judge::ledger::{Facts, ledger};
-use crate::stereo::judge::length_uncertainty::Volume;
-use crate::stereo::judge::model_disagreement::{self, Disagreement};
+use crate::stereo::judge::lengths::held_out::Accuracy;
+use crate::stereo::judge::lengths::model_disagreement::{self, Disagreement};
+use crate::stereo::judge::lengths::second_board::SecondBoard;
+use crate::stereo::judge::lengths::uncertainty::Volume;
 use crate::stereo::judge::residual_correlation::{self, ResidualPattern};
-use crate::stereo::judge::second_board::SecondBoard;
 use crate::stereo::judge::verdict::{Expansion, Verdict};
 use crate::stereo::judge::view_coverage::Coverage;
 

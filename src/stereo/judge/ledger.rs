@@ -6,11 +6,11 @@
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::doubtful_corners::CONTRADICTED;
 use crate::stereo::judge::evidence::Evidence;
-use crate::stereo::judge::held_out::Accuracy;
-use crate::stereo::judge::length_uncertainty::Volume;
-use crate::stereo::judge::model_disagreement::{self, Disagreement};
+use crate::stereo::judge::lengths::held_out::Accuracy;
+use crate::stereo::judge::lengths::model_disagreement::{self, Disagreement};
+use crate::stereo::judge::lengths::second_board::SecondBoard;
+use crate::stereo::judge::lengths::uncertainty::Volume;
 use crate::stereo::judge::residual_correlation::ResidualPattern;
-use crate::stereo::judge::second_board::SecondBoard;
 use crate::stereo::judge::verdict::{Expansion, Verdict};
 use crate::stereo::judge::view_coverage::Coverage;
 use crate::stereo::pairs::Cause;

@@ -4,13 +4,9 @@ pub mod assessment;
 pub mod doubtful_corners;
 pub mod evidence;
 pub mod field_of_corners;
-pub mod held_out;
 pub mod ledger;
-pub mod length_uncertainty;
 pub mod lengths;
-pub mod model_disagreement;
 pub mod residual_correlation;
-pub mod second_board;
 #[cfg(test)]
 mod tests;
 pub mod verdict;

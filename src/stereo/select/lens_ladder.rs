@@ -6,7 +6,7 @@
 //! refute it: chi-squared falls by more than chance for a richer one that predicts no worse. What the board's print alone would let a term of no
 //! worth gain is allowed for in both.
 //! Goes wrong: pairs too few or too alike to tell models apart; then the simplest that fits wins, and
-//! [`crate::stereo::judge::model_disagreement`] says what is at stake.
+//! [`crate::stereo::judge::lengths::model_disagreement`] says what is at stake.
 
 use crate::imaging::Board;
 use crate::stereo::model::parameters::{Layout, Values};

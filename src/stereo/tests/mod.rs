@@ -10,7 +10,7 @@ use crate::imaging::Corners;
 use crate::stereo::Lens;
 use crate::stereo::calibrate::{Calibration, calibrate};
 use crate::stereo::judge::assessment::{Demand, Judged};
-use crate::stereo::judge::held_out;
+use crate::stereo::judge::lengths::held_out;
 use crate::stereo::model::parameters::Shared;
 use crate::stereo::select::lens_ladder::Options;
 use crate::stereo::synthetic::World;

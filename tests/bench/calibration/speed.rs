@@ -8,7 +8,7 @@ use stereocal::simulate::settings::Settings;
 use stereocal::simulate::world::World;
 use stereocal::stereo::Lens;
 use stereocal::stereo::calibrate::calibrate;
-use stereocal::stereo::judge::held_out;
+use stereocal::stereo::judge::lengths::held_out;
 use stereocal::stereo::select::lens_ladder::Options;
 
 const PAIRS: usize = 40;

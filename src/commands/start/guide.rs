@@ -1,6 +1,6 @@
 //! `stereocal guide`: the pages for the practitioner, without a network.
 
-use super::{Outcome, Result};
+use super::super::{Outcome, Result};
 use crate::cli::Guide;
 use crate::config;
 use crate::diagnostic::Status;

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::statistics::{NORMAL_999, chi_square_quantile};
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::judge::length_uncertainty::Volume;
+use crate::stereo::judge::lengths::uncertainty::Volume;
 use crate::stereo::select::stated_uncertainty::Witness;
 
 /// Another model, compared with the chosen one.

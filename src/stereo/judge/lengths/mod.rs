@@ -2,6 +2,11 @@
 //!
 //! In: a rig and the corners of a pair. Out: signed length errors (measured minus nominal) of every range along the board's rows and columns.
 
+pub mod held_out;
+pub mod model_disagreement;
+pub mod second_board;
+pub mod uncertainty;
+
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -2,7 +2,7 @@
 
 use clap::CommandFactory;
 
-use super::{Outcome, Result};
+use super::super::{Outcome, Result};
 use crate::cli::{Cli, Completions, Man};
 use crate::diagnostic::Status;
 use crate::files::provenance::Run;

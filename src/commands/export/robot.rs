@@ -1,6 +1,6 @@
 //! `stereocal export robot`: the identified robot for other programs, and what they cannot have of it.
 
-use super::{Outcome, Result};
+use super::super::{Outcome, Result};
 use crate::cli::{ExportRobot, RobotFormat};
 use crate::config::Config;
 use crate::diagnostic::Status;

@@ -1,6 +1,6 @@
 //! `stereocal init`: the files that a new cell starts from.
 
-use super::{Outcome, Result};
+use super::super::{Outcome, Result};
 use crate::cli::Init;
 use crate::diagnostic::Status;
 use crate::files::OutDir;

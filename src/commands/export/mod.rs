@@ -1,6 +1,8 @@
 //! `stereocal export`: a calibration or a robot in other programs' words.
 
-use super::{Outcome, Result, export_robot};
+mod robot;
+
+use super::{Outcome, Result};
 use crate::cli::{CalibrationFormat, Export, ExportCalibration, ExportWhat};
 use crate::config::Config;
 use crate::diagnostic::Status;
@@ -13,7 +15,7 @@ use crate::formats::export;
 pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
     match &args.what {
         ExportWhat::Calibration(args) => calibration(args, config, run),
-        ExportWhat::Robot(args) => export_robot::run(args, config, run),
+        ExportWhat::Robot(args) => robot::run(args, config, run),
     }
 }
 
