@@ -54,7 +54,7 @@ impl LoadPoint {
     }
 }
 
-/// A joint yields to the torque of a unit weight.
+/// A joint yields to the torque of a unit weight: about its axis where it sags, across it where its bearing and the link before bend.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GravityTerm {
     /// The joint, from 0.
@@ -65,18 +65,7 @@ pub struct GravityTerm {
     pub k_rad_per_m: f64,
 }
 
-/// A joint's bearing and the link before it yield across the joint's axis to the torque of a unit weight.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BendingTerm {
-    /// The joint, from 0.
-    pub joint: usize,
-    /// Where the weight hangs.
-    pub point: LoadPoint,
-    /// Tilt a metre of lever, rad.
-    pub k_rad_per_m: f64,
-}
-
-/// A periodic error of a drive.
+/// What repeats with a joint's angle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Wave {
     /// `sin q`
@@ -124,23 +113,12 @@ impl Wave {
     }
 }
 
-/// One wave of one joint.
+/// One wave of one joint: of its angle, or, where its axis wobbles, of the tilt about x of the link before (see [`Wave::across`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HarmonicTerm {
     /// The joint, from 0.
     pub joint: usize,
     /// Which wave.
-    pub wave: Wave,
-    /// Its amplitude, rad.
-    pub amplitude_rad: f64,
-}
-
-/// A joint whose axis tilts as it turns.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WobbleTerm {
-    /// The joint, from 0.
-    pub joint: usize,
-    /// [`Wave::Cos`] or [`Wave::Sin`]: what the tilt about x of the link before follows.
     pub wave: Wave,
     /// Its amplitude, rad.
     pub amplitude_rad: f64,
@@ -165,11 +143,11 @@ pub struct Corrections {
     /// Sag.
     pub gravity: Vec<GravityTerm>,
     /// Bending across the joints' axes.
-    pub bending: Vec<BendingTerm>,
+    pub bending: Vec<GravityTerm>,
     /// Periodic errors.
     pub harmonics: Vec<HarmonicTerm>,
     /// Wobble.
-    pub wobble: Vec<WobbleTerm>,
+    pub wobble: Vec<HarmonicTerm>,
     /// Scale and coupling.
     pub couplings: Vec<CouplingTerm>,
 }
@@ -360,7 +338,7 @@ mod tests {
         let mut robot = Robot::paper();
         let flat = [0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0, 0.0];
         let stiff = robot.target_mm(&flat);
-        robot.corrections.bending = vec![BendingTerm { joint: 0, point: LoadPoint::Tool, k_rad_per_m: 1e-3 }];
+        robot.corrections.bending = vec![GravityTerm { joint: 0, point: LoadPoint::Tool, k_rad_per_m: 1e-3 }];
         let (bent, reach_m) = (robot.target_mm(&flat), stiff.coords.xy().norm() / 1000.0);
         // The tilt is the compliance times the reach, and lowers what reaches so far by that angle.
         assert!((stiff.z - bent.z - 1e-3 * reach_m * reach_m * 1000.0).abs() < 1e-4, "{stiff} {bent}");
@@ -374,7 +352,7 @@ mod tests {
     fn a_tilt_that_turns_with_the_joint_is_a_twist_and_a_wobble_is_not() {
         let plain = Robot { tool_mm: Vector3::new(30.0, -20.0, 60.0), ..Robot::paper() };
         let mut wobbling = plain.clone();
-        wobbling.corrections.wobble = vec![WobbleTerm { joint: 4, wave: Wave::Cos, amplitude_rad: 1e-3 }];
+        wobbling.corrections.wobble = vec![HarmonicTerm { joint: 4, wave: Wave::Cos, amplitude_rad: 1e-3 }];
         let q = |turn: f64| [0.1, 0.2, 0.3, 0.4, turn, 0.6];
         let moved = |turn: f64| (wobbling.target_mm(&q(turn)) - plain.target_mm(&q(turn))).norm();
         // At zero it tilts about x of the link alone, as its twist would; a quarter of a turn on about minus y.

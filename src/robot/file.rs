@@ -4,7 +4,7 @@ use camino::Utf8Path;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::corrections::{BendingTerm, CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave, WobbleTerm};
+use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
 use super::ends::PoseRecord;
 use super::{Corrections, Ends, Error, Joint, Result, Robot};
 use crate::diagnostic::Place;
@@ -219,10 +219,6 @@ impl RobotRecord {
             1.. if joint <= joint_count => Ok(joint - 1),
             _ => Err(format!("[{table}]: joint {joint} of a robot with {joint_count}")),
         };
-        let point = |table: &str, name: &str| {
-            LoadPoint::from_name(name, joint_count)
-                .ok_or_else(|| format!("[{table}]: point \"{name}\"; it is joint_1 .. joint_{joint_count} or tool"))
-        };
         let direction = self.gravity_direction.or(self.gravity.as_ref().and_then(|g| g.direction));
         if let Some(direction) = direction.map(Vector3::from) {
             if !(direction.norm().is_finite() && direction.norm() > 0.0) {
@@ -230,36 +226,36 @@ impl RobotRecord {
             }
             corrections.gravity_direction = direction.normalize();
         }
-        if let Some(gravity) = &self.gravity {
-            for term in &gravity.terms {
-                let (joint, point) = (index("gravity", term.joint)?, point("gravity", &term.point)?);
-                corrections.gravity.push(GravityTerm { joint, point, k_rad_per_m: term.k_mrad_per_m / 1000.0 });
-            }
-        }
-        for term in self.bending.iter().flat_map(|b| &b.terms) {
-            let (joint, point) = (index("bending", term.joint)?, point("bending", &term.point)?);
-            corrections.bending.push(BendingTerm { joint, point, k_rad_per_m: term.k_mrad_per_m / 1000.0 });
-        }
-        let wave = |table: &str, name: &str| {
-            let known = Wave::ALL.into_iter().find(|w| w.name() == name);
-            known.ok_or_else(|| format!("[{table}]: wave \"{name}\"; it is sin, cos, sin2 or cos2"))
+        let weights = |table: &str, terms: &[GravityTermRecord]| -> Result<Vec<GravityTerm>, String> {
+            let term = |t: &GravityTermRecord| {
+                let point = LoadPoint::from_name(&t.point, joint_count).ok_or_else(|| {
+                    format!("[{table}]: point \"{}\"; it is joint_1 .. joint_{joint_count} or tool", t.point)
+                })?;
+                Ok(GravityTerm { joint: index(table, t.joint)?, point, k_rad_per_m: t.k_mrad_per_m / 1000.0 })
+            };
+            terms.iter().map(term).collect()
         };
-        for term in self.harmonics.iter().flat_map(|h| &h.terms) {
-            let (joint, wave) = (index("harmonics", term.joint)?, wave("harmonics", &term.wave)?);
-            corrections.harmonics.push(HarmonicTerm { joint, wave, amplitude_rad: term.amplitude_mrad / 1000.0 });
-        }
-        for term in self.wobble.iter().flat_map(|w| &w.terms) {
-            let (joint, wave) = (index("wobble", term.joint)?, wave("wobble", &term.wave)?);
-            corrections.wobble.push(WobbleTerm { joint, wave, amplitude_rad: term.amplitude_mrad / 1000.0 });
-        }
+        let waves = |table: &str, record: &Option<HarmonicsRecord>| -> Result<Vec<HarmonicTerm>, String> {
+            let term = |t: &HarmonicTermRecord| {
+                let known = Wave::ALL.into_iter().find(|w| w.name() == t.wave);
+                let wave =
+                    known.ok_or_else(|| format!("[{table}]: wave \"{}\"; it is sin, cos, sin2 or cos2", t.wave))?;
+                let (joint, amplitude_rad) = (index(table, t.joint)?, t.amplitude_mrad / 1000.0);
+                Ok(HarmonicTerm { joint, wave, amplitude_rad })
+            };
+            record.iter().flat_map(|r| &r.terms).map(term).collect()
+        };
+        corrections.gravity = weights("gravity", self.gravity.as_ref().map_or(&[], |g| &g.terms))?;
+        corrections.bending = weights("bending", self.bending.as_ref().map_or(&[], |b| &b.terms))?;
+        corrections.harmonics = waves("harmonics", &self.harmonics)?;
+        corrections.wobble = waves("wobble", &self.wobble)?;
         for term in self.couplings.iter().flat_map(|c| &c.terms) {
             let (joint, of) = (index("couplings", term.joint)?, index("couplings", term.of)?);
             corrections.couplings.push(CouplingTerm { joint, of, ratio: term.per_mille / 1000.0 });
         }
-        let coefficients = corrections.gravity.iter().map(|t| t.k_rad_per_m);
-        let coefficients = coefficients.chain(corrections.bending.iter().map(|t| t.k_rad_per_m));
-        let coefficients = coefficients.chain(corrections.harmonics.iter().map(|t| t.amplitude_rad));
-        let coefficients = coefficients.chain(corrections.wobble.iter().map(|t| t.amplitude_rad));
+        let coefficients = corrections.gravity.iter().chain(&corrections.bending).map(|t| t.k_rad_per_m);
+        let waves = corrections.harmonics.iter().chain(&corrections.wobble).map(|t| t.amplitude_rad);
+        let coefficients = coefficients.chain(waves);
         if coefficients.chain(corrections.couplings.iter().map(|t| t.ratio)).any(|v| !v.is_finite()) {
             return Err(
                 "[gravity], [bending], [harmonics], [wobble] and [couplings]: every number must be finite".to_owned()
@@ -269,45 +265,22 @@ impl RobotRecord {
     }
 }
 
-fn gravity_record(corrections: &Corrections) -> Option<GravityRecord> {
-    if corrections.gravity.is_empty() {
-        return None;
-    }
+fn weights_record(terms: &[GravityTerm]) -> Vec<GravityTermRecord> {
     let term = |t: &GravityTerm| GravityTermRecord {
         joint: t.joint + 1,
         point: t.point.name(),
         k_mrad_per_m: 1000.0 * t.k_rad_per_m,
     };
-    Some(GravityRecord { direction: None, terms: corrections.gravity.iter().map(term).collect() })
+    terms.iter().map(term).collect()
 }
 
-fn bending_record(corrections: &Corrections) -> Option<BendingRecord> {
-    let term = |t: &BendingTerm| GravityTermRecord {
-        joint: t.joint + 1,
-        point: t.point.name(),
-        k_mrad_per_m: 1000.0 * t.k_rad_per_m,
-    };
-    let terms: Vec<_> = corrections.bending.iter().map(term).collect();
-    if terms.is_empty() { None } else { Some(BendingRecord { terms }) }
-}
-
-fn harmonics_record(corrections: &Corrections) -> Option<HarmonicsRecord> {
+fn waves_record(terms: &[HarmonicTerm]) -> Option<HarmonicsRecord> {
     let term = |t: &HarmonicTerm| HarmonicTermRecord {
         joint: t.joint + 1,
         wave: t.wave.name().to_owned(),
         amplitude_mrad: 1000.0 * t.amplitude_rad,
     };
-    let terms: Vec<_> = corrections.harmonics.iter().map(term).collect();
-    if terms.is_empty() { None } else { Some(HarmonicsRecord { terms }) }
-}
-
-fn wobble_record(corrections: &Corrections) -> Option<HarmonicsRecord> {
-    let term = |t: &WobbleTerm| HarmonicTermRecord {
-        joint: t.joint + 1,
-        wave: t.wave.name().to_owned(),
-        amplitude_mrad: 1000.0 * t.amplitude_rad,
-    };
-    let terms: Vec<_> = corrections.wobble.iter().map(term).collect();
+    let terms: Vec<_> = terms.iter().map(term).collect();
     if terms.is_empty() { None } else { Some(HarmonicsRecord { terms }) }
 }
 
@@ -320,6 +293,7 @@ fn couplings_record(corrections: &Corrections) -> Option<CouplingsRecord> {
 impl From<&Robot> for RobotRecord {
     fn from(robot: &Robot) -> RobotRecord {
         let direction = robot.corrections.gravity_direction;
+        let some = |terms: Vec<GravityTermRecord>| (!terms.is_empty()).then_some(terms);
         let degrees = |limits: Option<(f64, f64)>| limits.map(|(low, high)| [low.to_degrees(), high.to_degrees()]);
         RobotRecord {
             name: robot.name.clone(),
@@ -341,10 +315,11 @@ impl From<&Robot> for RobotRecord {
                 })
                 .collect(),
             tool: ToolRecord { x_mm: robot.tool_mm.x, y_mm: robot.tool_mm.y, z_mm: robot.tool_mm.z },
-            gravity: gravity_record(&robot.corrections),
-            bending: bending_record(&robot.corrections),
-            harmonics: harmonics_record(&robot.corrections),
-            wobble: wobble_record(&robot.corrections),
+            gravity: some(weights_record(&robot.corrections.gravity))
+                .map(|terms| GravityRecord { direction: None, terms }),
+            bending: some(weights_record(&robot.corrections.bending)).map(|terms| BendingRecord { terms }),
+            harmonics: waves_record(&robot.corrections.harmonics),
+            wobble: waves_record(&robot.corrections.wobble),
             couplings: couplings_record(&robot.corrections),
             base: PoseRecord::of(&robot.ends.root_from_frame0),
             flange: PoseRecord::of(&robot.ends.last_frame_from_flange),
@@ -363,9 +338,9 @@ mod tests {
         robot.joints[0].limits_rad = Some((-3.0, 3.0));
         robot.tool_mm = Vector3::new(1.5, -2.0, 30.0);
         robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Origin(4), k_rad_per_m: 0.25 }];
-        robot.corrections.bending = vec![BendingTerm { joint: 3, point: LoadPoint::Tool, k_rad_per_m: 0.125 }];
+        robot.corrections.bending = vec![GravityTerm { joint: 3, point: LoadPoint::Tool, k_rad_per_m: 0.125 }];
         robot.corrections.harmonics = vec![HarmonicTerm { joint: 5, wave: Wave::Sin2, amplitude_rad: 0.5 }];
-        robot.corrections.wobble = vec![WobbleTerm { joint: 4, wave: Wave::Cos, amplitude_rad: 0.25 }];
+        robot.corrections.wobble = vec![HarmonicTerm { joint: 4, wave: Wave::Cos, amplitude_rad: 0.25 }];
         robot.ends.last_frame_from_flange =
             crate::geometry::transform(Vector3::new(0.3, -3.0, 0.5), Vector3::new(1.0, 2.0, 3.0));
         let back = toml::from_str::<RobotRecord>(&to_toml(&robot)).unwrap().robot().unwrap();

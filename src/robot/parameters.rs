@@ -2,7 +2,7 @@
 
 use super::Robot;
 use super::anatomy::Anatomy;
-use super::corrections::{BendingTerm, CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave, WobbleTerm};
+use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
 
 /// |sin alpha| below which two neighbouring axes count as parallel: 3 degrees, far above any tolerance of manufacture.
 pub(super) const PARALLEL_SIN: f64 = 0.05;
@@ -172,22 +172,10 @@ impl Robot {
             Parameter::Theta(i) => joint(i).map_or(0.0, |j| 1000.0 * j.theta_rad),
             Parameter::D(i) => joint(i).map_or(0.0, |j| j.d_mm),
             Parameter::V(axis) => self.tool_mm[axis.min(2)],
-            Parameter::Gravity(joint, point) => {
-                let terms = self.corrections.gravity.iter();
-                1000.0 * terms.filter(|t| t.joint == joint && t.point == point).map(|t| t.k_rad_per_m).sum::<f64>()
-            }
-            Parameter::Bending(joint, point) => {
-                let terms = self.corrections.bending.iter();
-                1000.0 * terms.filter(|t| t.joint == joint && t.point == point).map(|t| t.k_rad_per_m).sum::<f64>()
-            }
-            Parameter::Harmonic(joint, wave) => {
-                let terms = self.corrections.harmonics.iter();
-                1000.0 * terms.filter(|t| t.joint == joint && t.wave == wave).map(|t| t.amplitude_rad).sum::<f64>()
-            }
-            Parameter::Wobble(joint, wave) => {
-                let terms = self.corrections.wobble.iter();
-                1000.0 * terms.filter(|t| t.joint == joint && t.wave == wave).map(|t| t.amplitude_rad).sum::<f64>()
-            }
+            Parameter::Gravity(joint, point) => 1000.0 * compliance(&self.corrections.gravity, joint, point),
+            Parameter::Bending(joint, point) => 1000.0 * compliance(&self.corrections.bending, joint, point),
+            Parameter::Harmonic(joint, wave) => 1000.0 * amplitude(&self.corrections.harmonics, joint, wave),
+            Parameter::Wobble(joint, wave) => 1000.0 * amplitude(&self.corrections.wobble, joint, wave),
             Parameter::Coupling(joint, of) => {
                 let terms = self.corrections.couplings.iter();
                 1000.0 * terms.filter(|t| t.joint == joint && t.of == of).map(|t| t.ratio).sum::<f64>()
@@ -200,34 +188,10 @@ impl Robot {
         let angle = delta / 1000.0;
         match parameter {
             Parameter::V(axis) => self.tool_mm[axis.min(2)] += delta,
-            Parameter::Gravity(joint, point) => {
-                let terms = &mut self.corrections.gravity;
-                match terms.iter_mut().find(|t| t.joint == joint && t.point == point) {
-                    Some(term) => term.k_rad_per_m += angle,
-                    None => terms.push(GravityTerm { joint, point, k_rad_per_m: angle }),
-                }
-            }
-            Parameter::Bending(joint, point) => {
-                let terms = &mut self.corrections.bending;
-                match terms.iter_mut().find(|t| t.joint == joint && t.point == point) {
-                    Some(term) => term.k_rad_per_m += angle,
-                    None => terms.push(BendingTerm { joint, point, k_rad_per_m: angle }),
-                }
-            }
-            Parameter::Harmonic(joint, wave) => {
-                let terms = &mut self.corrections.harmonics;
-                match terms.iter_mut().find(|t| t.joint == joint && t.wave == wave) {
-                    Some(term) => term.amplitude_rad += angle,
-                    None => terms.push(HarmonicTerm { joint, wave, amplitude_rad: angle }),
-                }
-            }
-            Parameter::Wobble(joint, wave) => {
-                let terms = &mut self.corrections.wobble;
-                match terms.iter_mut().find(|t| t.joint == joint && t.wave == wave) {
-                    Some(term) => term.amplitude_rad += angle,
-                    None => terms.push(WobbleTerm { joint, wave, amplitude_rad: angle }),
-                }
-            }
+            Parameter::Gravity(joint, point) => add_compliance(&mut self.corrections.gravity, joint, point, angle),
+            Parameter::Bending(joint, point) => add_compliance(&mut self.corrections.bending, joint, point, angle),
+            Parameter::Harmonic(joint, wave) => add_amplitude(&mut self.corrections.harmonics, joint, wave, angle),
+            Parameter::Wobble(joint, wave) => add_amplitude(&mut self.corrections.wobble, joint, wave, angle),
             Parameter::Coupling(joint, of) => {
                 let terms = &mut self.corrections.couplings;
                 match terms.iter_mut().find(|t| t.joint == joint && t.of == of) {
@@ -257,6 +221,32 @@ impl Robot {
             }
         }
         robot
+    }
+}
+
+/// The compliance of a joint to a weight, rad a metre of lever.
+fn compliance(terms: &[GravityTerm], joint: usize, point: LoadPoint) -> f64 {
+    terms.iter().filter(|t| t.joint == joint && t.point == point).map(|t| t.k_rad_per_m).sum()
+}
+
+/// Adds to it.
+fn add_compliance(terms: &mut Vec<GravityTerm>, joint: usize, point: LoadPoint, k_rad_per_m: f64) {
+    match terms.iter_mut().find(|t| t.joint == joint && t.point == point) {
+        Some(term) => term.k_rad_per_m += k_rad_per_m,
+        None => terms.push(GravityTerm { joint, point, k_rad_per_m }),
+    }
+}
+
+/// The amplitude of a joint's wave, rad.
+fn amplitude(terms: &[HarmonicTerm], joint: usize, wave: Wave) -> f64 {
+    terms.iter().filter(|t| t.joint == joint && t.wave == wave).map(|t| t.amplitude_rad).sum()
+}
+
+/// Adds to it.
+fn add_amplitude(terms: &mut Vec<HarmonicTerm>, joint: usize, wave: Wave, amplitude_rad: f64) {
+    match terms.iter_mut().find(|t| t.joint == joint && t.wave == wave) {
+        Some(term) => term.amplitude_rad += amplitude_rad,
+        None => terms.push(HarmonicTerm { joint, wave, amplitude_rad }),
     }
 }
 

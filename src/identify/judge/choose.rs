@@ -241,7 +241,7 @@ impl Session<'_> {
     }
 
     /// Numbers that were measured, less the unknowns of the placements.
-    pub(super) fn numbers(&self) -> f64 {
+    fn numbers(&self) -> f64 {
         let (a_row, a_group) = match self.set.kind {
             Kind::Positions => (3, 6),
             Kind::Distances if self.rows.iter().any(|&r| self.set.touches(r)) => (3, 3),

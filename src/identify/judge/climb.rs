@@ -7,11 +7,11 @@
 use super::cells::{Cells, HeldOut, clearly_less, root_mean};
 use super::choose::Session;
 use crate::identify::Error;
-use crate::identify::data::dataset::Kind;
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::residuals::weights::{EVIDENCE, Extra, Scatter, WARPS};
 use crate::identify::settings::Model;
 use crate::identify::solve::formulation::Formulation;
+use crate::robot::Parameter;
 
 /// A rung of the ladder, or a model, and how it did.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -31,7 +31,7 @@ const MOST_PARAMETERS: f64 = 1.5;
 const MOST_CLIMBS: usize = 4;
 
 impl Session<'_> {
-    /// Up the ladder from the nominal robot: each time to the successor of least held-out error, as long as one is clearly better.
+    /// From the nominal robot up as far as it is worth it, with all that was judged.
     pub(super) fn climb(&mut self, model: Model) -> Result<(Terms, Vec<Judged>), Error> {
         let all = Terms::ALL.parameters(self.robot);
         let reference = self.reference(MOST_PARAMETERS);
@@ -40,7 +40,7 @@ impl Session<'_> {
         let formulation = Formulation::new(&self.task(&parameters, model))?;
         let scatter = formulation.rows.scatter;
         let cells = self.cells(&all, &parameters, &formulation, scatter, model);
-        let mut cells = self.take_sensor_unknowns(cells, &all, &parameters, scatter, model)?;
+        let mut cells = self.take_warps(cells, &all, &parameters, scatter, model)?;
         let mut judged = Vec::new();
         let mut best = Terms::NOMINAL;
         for _ in 0..MOST_CLIMBS {
@@ -85,7 +85,7 @@ impl Session<'_> {
         let mut at = (best, judge(best, judged)?);
         loop {
             let mut next: Option<(Terms, HeldOut)> = None;
-            for terms in best.successors(self.robot, true) {
+            for terms in best.successors(self.robot) {
                 let beyond = terms.chain == Chain::Mdh && terms != Terms::default();
                 if beyond && !self.tells(&terms, MOST_PARAMETERS) {
                     continue;
@@ -111,8 +111,8 @@ impl Session<'_> {
     /// Cells linearised where a formulation ended, at a scatter that need not be its own.
     pub(super) fn cells(
         &self,
-        all: &[crate::robot::Parameter],
-        reference: &[crate::robot::Parameter],
+        all: &[Parameter],
+        reference: &[Parameter],
         at: &Formulation,
         scatter: Scatter,
         model: Model,
@@ -127,33 +127,25 @@ impl Session<'_> {
         Cells::new(self.set, &rows, &wide, self.settings.folds)
     }
 
-    /// Unknowns of the sensor that the readings may have, each richer list after the poorer one.
-    fn possible_unknowns(&self) -> Vec<Vec<Extra>> {
-        match self.set.kind {
-            // What `measure` says of its cameras' errors is better than what any cameras may have.
-            Kind::Positions if self.set.supposed_scale.is_some() => vec![(0..WARPS.len()).map(Extra::Warp).collect()],
-            _ => Vec::new(),
-        }
-    }
-
-    /// Takes the warps of a camera rig where they make the data much more probable at one and the same scatter.
-    fn take_sensor_unknowns(
+    /// Takes the warps of cameras about whose errors nothing is stated where they make the data much more probable at one and the same
+    /// scatter.
+    fn take_warps(
         &mut self,
-        mut cells: Cells,
-        all: &[crate::robot::Parameter],
-        reference: &[crate::robot::Parameter],
+        cells: Cells,
+        all: &[Parameter],
+        reference: &[Parameter],
         scatter: Scatter,
         model: Model,
     ) -> Result<Cells, Error> {
-        let mut kept = self.extras.len();
-        for list in self.possible_unknowns() {
-            let before = cells.tolerance(reference).1;
-            self.extras.extend(list);
-            let with = Formulation::new(&self.task(reference, model))?;
-            let richer = self.cells(all, reference, &with, scatter, model);
-            if richer.tolerance(reference).1 > before + EVIDENCE {
-                (cells, kept) = (richer, self.extras.len());
-            }
+        if self.set.supposed_scale.is_none() {
+            return Ok(cells);
+        }
+        let kept = self.extras.len();
+        self.extras.extend((0..WARPS.len()).map(Extra::Warp));
+        let with = Formulation::new(&self.task(reference, model))?;
+        let richer = self.cells(all, reference, &with, scatter, model);
+        if richer.tolerance(reference).1 > cells.tolerance(reference).1 + EVIDENCE {
+            return Ok(richer);
         }
         self.extras.truncate(kept);
         Ok(cells)

@@ -181,44 +181,8 @@ impl Tolerance {
         spread
     }
 
-    /// The tolerance of greatest evidence for data that are linear in the base parameters and extras: `normal` is the product of
-    /// the white Jacobian with itself, `gradient` its product with the white residuals at offset zero.
-    pub fn from_evidence(
-        base: &Base,
-        parameters: &[Parameter],
-        extras: &[Extra],
-        normal: &DMatrix<f64>,
-        gradient: &DVector<f64>,
-    ) -> Tolerance {
-        let score = |t: &Tolerance| evidence(&t.covariance(base, parameters, extras), normal, gradient);
-        let free: Vec<Parameter> = base.free.iter().map(|&i| parameters[i]).collect();
-        best_of_grid(&free, extras, &score).0
-    }
-
-    /// The largest standard deviations, kind by kind, that the data make next to as probable as these (see [`Tolerance::from_evidence`]):
-    /// few poses say little of how well a robot was made, and what they leave open is as uncertain as it may be.
-    pub fn at_most(
-        &self,
-        base: &Base,
-        parameters: &[Parameter],
-        extras: &[Extra],
-        normal: &DMatrix<f64>,
-        gradient: &DVector<f64>,
-    ) -> Tolerance {
-        let score = |t: &Tolerance| evidence(&t.covariance(base, parameters, extras), normal, gradient);
-        let least = score(self) - DOUBT;
-        let free: Vec<Parameter> = base.free.iter().map(|&i| parameters[i]).collect();
-        let mut most = *self;
-        for kind in (0..KINDS).filter(|&k| presence(&free, extras)[k]) {
-            let larger = GRID.iter().filter(|v| **v > self.values()[kind] && **v <= LARGEST[kind]);
-            for &value in larger.take_while(|v| score(&self.with(kind, **v)) > least) {
-                most = most.with(kind, value);
-            }
-        }
-        most
-    }
-
-    /// The same for all parameters as they are, whether or not the data tell them apart; with the evidence.
+    /// The tolerance of greatest evidence for all parameters as they are, whether or not the data tell them apart; with the evidence.
+    /// `normal` and `gradient` as in [`Linearised`].
     pub fn from_evidence_of_all(
         parameters: &[Parameter],
         extras: &[Extra],
@@ -232,6 +196,51 @@ impl Tolerance {
     /// One a parameter, then one an extra.
     pub fn standard_deviations(&self, parameters: &[Parameter], extras: &[Extra]) -> Vec<f64> {
         parameters.iter().map(|&p| self.of(p)).chain(extras.iter().map(|&e| self.of_extra(e))).collect()
+    }
+}
+
+/// Data that are linear in the base parameters and extras.
+#[derive(Debug, Clone, Copy)]
+pub struct Linearised<'a> {
+    /// The base parameters.
+    pub base: &'a Base,
+    /// All parameters.
+    pub parameters: &'a [Parameter],
+    /// Unknowns of the sensor.
+    pub extras: &'a [Extra],
+    /// The product of the white Jacobian with itself.
+    pub normal: &'a DMatrix<f64>,
+    /// Its product with the white residuals at offset zero.
+    pub gradient: &'a DVector<f64>,
+}
+
+impl Linearised<'_> {
+    fn evidence(&self, tolerance: &Tolerance) -> f64 {
+        evidence(&tolerance.covariance(self.base, self.parameters, self.extras), self.normal, self.gradient)
+    }
+
+    fn free(&self) -> Vec<Parameter> {
+        self.base.free.iter().map(|&i| self.parameters[i]).collect()
+    }
+
+    /// The tolerance of greatest evidence.
+    pub fn most_probable(&self) -> Tolerance {
+        best_of_grid(&self.free(), self.extras, &|t| self.evidence(t)).0
+    }
+
+    /// The largest standard deviations, kind by kind, that the data make next to as probable as these: few poses say little of how well
+    /// a robot was made, and what they leave open is as uncertain as it may be.
+    pub fn at_most(&self, tolerance: &Tolerance) -> Tolerance {
+        let least = self.evidence(tolerance) - DOUBT;
+        let present = presence(&self.free(), self.extras);
+        let mut most = *tolerance;
+        for kind in (0..KINDS).filter(|&k| present[k]) {
+            let larger = GRID.iter().filter(|v| **v > tolerance.values()[kind] && **v <= LARGEST[kind]);
+            for &value in larger.take_while(|v| self.evidence(&tolerance.with(kind, **v)) > least) {
+                most = most.with(kind, value);
+            }
+        }
+        most
     }
 }
 
@@ -300,7 +309,9 @@ mod tests {
         let base = Base::new(&jacobian, 1e-9);
         let residuals = DVector::from_fn(n, |i, _| if i % 2 == 0 { 30.0 } else { -30.0 });
         let (normal, gradient) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&residuals));
-        assert_eq!(Tolerance::from_evidence(&base, &parameters, &[], &normal, &gradient).lengths_mm, 3.0);
+        let data =
+            Linearised { base: &base, parameters: &parameters, extras: &[], normal: &normal, gradient: &gradient };
+        assert_eq!(data.most_probable().lengths_mm, 3.0);
     }
 
     #[test]

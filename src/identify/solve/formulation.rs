@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::fit::Fit;
 use super::problem::Solution;
@@ -14,7 +14,7 @@ use super::task::{FIRST_SCATTER_MM, Task, prior_rows, with_scale_held};
 use super::trust_region;
 use crate::identify::Error;
 use crate::identify::model::base::Base;
-use crate::identify::model::prior::Tolerance;
+use crate::identify::model::prior::{Linearised, Tolerance};
 use crate::identify::residuals::eliminate::{product, pseudo_inverse};
 use crate::identify::residuals::rows::Rows;
 use crate::identify::residuals::weights::{Extra, Scatter};
@@ -88,7 +88,7 @@ impl Formulation {
             if held {
                 let (normal, gradient) =
                     Fit::new(Cow::Borrowed(&rows), &base, spread, &free, DMatrix::zeros(0, count)).normal(&x);
-                tolerance = Tolerance::from_evidence(&base, task.parameters, task.extras, &normal, &gradient);
+                tolerance = linearised(&base, task, &normal, &gradient).most_probable();
             }
             let prior = prior_rows(&tolerance, &base, task, held || round == 0);
             let spread = tolerance.spread(&base, task.parameters);
@@ -126,7 +126,7 @@ impl Formulation {
         let (normal, gradient) =
             Fit::new(Cow::Borrowed(&rows), &base, spread, &free, DMatrix::zeros(0, count)).normal(&x);
         let most = match held {
-            true => tolerance.at_most(&base, task.parameters, task.extras, &normal, &gradient),
+            true => linearised(&base, task, &normal, &gradient).at_most(&tolerance),
             false => tolerance,
         };
         let (bounds, widened) = bounds(&base, task.parameters, &free_fit.x, settings);
@@ -221,6 +221,15 @@ impl Formulation {
         let weak = |&k: &usize| after[(k, k)].sqrt() > 0.9 * before[(k, k)].sqrt();
         (0..self.base.rank()).filter(weak).map(|k| self.base.free[k]).collect()
     }
+}
+
+fn linearised<'a>(
+    base: &'a Base,
+    task: &Task<'a>,
+    normal: &'a DMatrix<f64>,
+    gradient: &'a DVector<f64>,
+) -> Linearised<'a> {
+    Linearised { base, parameters: task.parameters, extras: task.extras, normal, gradient }
 }
 
 /// Number of unknowns that the data, and not the prior, have determined.

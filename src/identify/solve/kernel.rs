@@ -5,8 +5,8 @@
 //! base, so that a joint costs three plane rotations and two shifts. Poses lie in lanes of eight (structure of arrays) for the
 //! compiler to vectorise; on x86 with AVX2 and FMA a copy compiled for them is taken at run time. A machine always takes the
 //! same copy, so the bytes do not depend on threads.
-//! Gravity and harmonics add a small angle that differs by pose, bending and wobble small tilts of the links; their sine and cosine are short series (error below 1e-13 up to
-//! a tenth of a radian, where the linear models of both have long ceased to hold).
+//! Gravity and harmonics add a small angle that differs by pose, bending and wobble small tilts of the links; their sine and cosine
+//! are short series (error below 1e-13 up to a tenth of a radian, where the linear models have long ceased to hold).
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -347,7 +347,7 @@ fn fma<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::corrections::{BendingTerm, LoadPoint};
+    use crate::robot::corrections::{GravityTerm, LoadPoint};
 
     /// Rounding of some dozen operations on coordinates of a metre.
     const TOLERANCE_MM: f64 = 1e-10;
@@ -363,7 +363,7 @@ mod tests {
         parameters.extend(robot.gravity_parameters(true));
         parameters.extend(robot.bending_parameters());
         parameters.extend(robot.wobble_parameters());
-        robot.corrections.bending = vec![BendingTerm { joint: 2, point: LoadPoint::Tool, k_rad_per_m: 3e-3 }];
+        robot.corrections.bending = vec![GravityTerm { joint: 2, point: LoadPoint::Tool, k_rad_per_m: 3e-3 }];
         parameters.extend(robot.harmonic_parameters(2));
         parameters.extend(robot.coupling_parameters(true));
         let joints: Vec<Vec<f64>> = (0..21).map(|i| (0..6).map(|j| ((7 * i + 3 * j) as f64).sin()).collect()).collect();
