@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::data::dataset::{Dataset, Skipped};
+use super::data::dataset::{Dataset, Kind, Skipped};
 use super::data::doctor::Finding;
 use super::data::sessions::{Along, Session};
 use super::judge::choose::{Candidate, Identification};
@@ -163,8 +163,8 @@ pub struct Identifiability {
 
 /// Errors of rows under a robot, as they go into tables and figures.
 pub fn quality(set: &Dataset, robot: &Robot, found: &Identification, settings: &Settings) -> (Quality, Vec<RowError>) {
-    // The sensor's errors are held against the points as they were read, as `verify` does, which knows nothing of them.
-    let of_sensor = found.extras.iter().copied().filter(|(e, _)| matches!(e, Extra::Zero | Extra::Target(_)));
+    // Points and distances as they were read, as `verify` takes them, which knows nothing of the sensor's errors.
+    let of_sensor = found.extras.iter().copied().filter(|(e, _)| matches!(e, Extra::Target(_)));
     let (extras, values): (Vec<Extra>, Vec<f64>) = of_sensor.unzip();
     let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &found.fitted, settings.wire_offset) };
     let verify_rows = set.verify_rows();
@@ -313,23 +313,7 @@ impl Record {
                  the angles deg, and whether this is the robot that was measured"
             ));
         }
-        let worse = |before: &Spread, after: &Spread| match (before.mean_abs_mm, after.mean_abs_mm) {
-            (Some(before), Some(after)) if after > before => Some((before, after)),
-            _ => None,
-        };
-        if let Some(chosen) = self.chosen_method()
-            && let Some((before, after)) = worse(&self.before.verify.distance, &chosen.verify.distance)
-        {
-            list.push(match is_worse {
-                true => format!(
-                    "on the verify rows the identified robot is worse than the nominal one ({after:.3} against {before:.3} mm): don't use it"
-                ),
-                false => format!(
-                    "on the verify rows distances to the centre are further off than the nominal robot's ({after:.3} against {before:.3} mm), \
-                     and points less so: all distances share the centre's own reading, and the points decide"
-                ),
-            });
-        }
+        list.extend(self.worse(set, is_worse));
         if found.vetoed {
             list.push(
                 "on the verify rows the robot that was found is worse than the nominal one: nominal is kept".to_owned(),
@@ -341,6 +325,32 @@ impl Record {
             );
         }
         list
+    }
+
+    /// Where the verify rows find the chosen robot worse than the nominal one, or seem to.
+    fn worse(&self, set: &Dataset, is_worse: bool) -> Option<String> {
+        let chosen = self.chosen_method()?;
+        let pair = |before: &Spread, after: &Spread| Some((before.mean_abs_mm?, after.mean_abs_mm?));
+        let distances =
+            pair(&self.before.verify.distance, &chosen.verify.distance).filter(|(before, after)| after > before);
+        let figures = distances.or_else(|| pair(self.before.verify.point.as_ref()?, chosen.verify.point.as_ref()?));
+        if is_worse {
+            let figures =
+                figures.map_or_else(String::new, |(before, after)| format!(" ({after:.3} against {before:.3} mm)"));
+            return Some(format!(
+                "on the verify rows the identified robot is worse than the nominal one{figures}: don't use it"
+            ));
+        }
+        let (before, after) = distances?;
+        let why = match set.kind {
+            Kind::Positions => {
+                "and points less so: all distances share the centre's own reading, and the points decide"
+            }
+            Kind::Distances => "but not beyond the sensor's own errors and the rows that are named as far off",
+        };
+        Some(format!(
+            "on the verify rows distances are further off than the nominal robot's as they were read ({after:.3} against {before:.3} mm), {why}"
+        ))
     }
 }
 

@@ -135,7 +135,7 @@ pub struct Settings {
     pub folds: usize,
     /// Whether units, signs, exchanged columns and the robot's convention are examined, and mended where the residuals prove a fault.
     pub examine: bool,
-    /// Whether a wire's zero is unknown as well as its anchor.
+    /// Whether the zero of measured distances is unknown: a wire's as well as its anchor, and that of distances to a centre.
     pub wire_offset: bool,
     /// Rows that fit worse than so many robust standard deviations are left out and named; 0 keeps all.
     pub outlier_sigmas: f64,

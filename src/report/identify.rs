@@ -296,7 +296,7 @@ fn judged_table(record: &Record) -> Markup {
         return html! { p { "Model, terms and method were given." } };
     }
     html! {
-        p { "Root mean square error on samples that were held out of the fit, mm. More terms are taken only where this clearly falls. The methods all solve the same problem: the cheapest of those that end at the least cost is kept." }
+        p { "Root mean square error on samples that were held out of the fit, mm. More terms are taken only where this falls and the data make them much more probable than what they are added to. The methods all solve the same problem: the cheapest of those that end at the least cost is kept." }
         (page::table(&["model", "terms", "held-out error, mm"], &rows))
     }
 }
@@ -335,7 +335,7 @@ fn layout_figures(places: &[(Role, Point3<f64>)]) -> Result<Markup> {
                    identified, and the corrections hold there only as far as the model is right.";
     Ok(html! { div.side {
         (page::figure(&view("Poses from above", "y, mm", (0, 1))?, caption))
-        (page::figure(&view("Poses from the side", "z, mm", (0, 2))?, "The same poses from the side: spheres that all stand at one height leave what gravity does to the arm unseen."))
+        (page::figure(&view("Poses from the side", "z, mm", (0, 2))?, "The same poses from the side: the heights and reaches over which the identification holds."))
     } })
 }
 

@@ -78,7 +78,7 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
         (curve(record)?)
         (map(plan)?)
         h2 { "Where the cameras stand" }
-        p { "One placement a group. Place the left camera so, base frame; a tenth of a metre and ten degrees off are taken up by `plan --after` a few first poses." }
+        p { "One placement a group. Place the left camera so, base frame; a tenth of a metre and ten degrees off are taken up by " code { "plan --after" } " a few first poses." }
         (page::table(
             &["group", "left camera x, mm", "y, mm", "z, mm", "looks along x", "y", "z", "middle of the sphere x, mm", "y, mm", "z, mm"],
             &plan.placements.iter().map(standing).collect::<Vec<_>>(),

@@ -109,6 +109,24 @@ fn what_a_format_cannot_carry_is_said_in_mm() {
 }
 
 #[test]
+fn an_export_spares_the_nominal_robot() {
+    let folder = workplace();
+    let at = folder.path();
+    run(at, &["robot", "new", "ur5e", "--out", "."], 0);
+    deviated(at, "robot.toml", "identified.toml", false);
+    let nominal = std::fs::read_to_string(at.join("robot.toml")).unwrap();
+    let export = ["export", "robot", "--robot", "identified.toml", "--format", "toml", "--out", "."];
+    let said = run(at, &export, 2);
+    assert!(said.contains("robot.toml is there already and is no export") && said.contains("--force"), "{said}");
+    assert_eq!(std::fs::read_to_string(at.join("robot.toml")).unwrap(), nominal);
+    run(at, &[&export[..], &["--force"]].concat(), 0);
+    // Its own export it replaces.
+    deviated(at, "robot.toml", "again.toml", false);
+    run(at, &["export", "robot", "--robot", "again.toml", "--format", "toml", "--out", "."], 0);
+    assert_ne!(std::fs::read_to_string(at.join("robot.toml")).unwrap(), nominal);
+}
+
+#[test]
 fn robots_that_a_format_is_not_for_are_refused() {
     let folder = workplace();
     let at = folder.path();

@@ -144,6 +144,19 @@ fn identified(folder: &Path, change: impl Fn(usize, Vec<String>) -> Vec<String>)
     serde_json::from_slice(&output.stdout).expect("stdout is JSON")
 }
 
+/// That `verify` says of the nominal and the written robot what `identify` said.
+fn assert_verified(folder: &Path, record: &serde_json::Value) {
+    let arguments =
+        ["verify", "--json", "--measurements", "m.csv", "--robot", "robot.toml", "--robot", "out/identified.toml"];
+    let output =
+        Command::cargo_bin("stereocal").expect("built").current_dir(folder).args(arguments).output().expect("it runs");
+    let verified: serde_json::Value = serde_json::from_slice(&output.stdout).expect("stdout is JSON");
+    for (k, said) in [(0, &record["before"]), (1, &record["methods"][0])] {
+        let again = verified["robots"][k]["verify"]["mean_abs_mm"].as_f64().expect("a mean");
+        assert!((again - mean(said)).abs() < 1e-9, "{again} {}", mean(said));
+    }
+}
+
 #[test]
 fn verify_says_of_the_written_robot_what_identify_said() {
     let folder = simulated();
@@ -154,18 +167,48 @@ fn verify_says_of_the_written_robot_what_identify_said() {
         record["outliers"],
         record["doctor"]
     );
-    let arguments =
-        ["verify", "--json", "--measurements", "m.csv", "--robot", "robot.toml", "--robot", "out/identified.toml"];
-    let output = Command::cargo_bin("stereocal")
-        .expect("built")
-        .current_dir(folder.path())
-        .args(arguments)
-        .output()
-        .expect("it runs");
-    let verified: serde_json::Value = serde_json::from_slice(&output.stdout).expect("stdout is JSON");
-    for (k, said) in [(0, &record["before"]), (1, &record["methods"][0])] {
-        let again = verified["robots"][k]["verify"]["mean_abs_mm"].as_f64().expect("a mean");
-        assert!((again - mean(said)).abs() < 1e-9, "{again} {}", mean(said));
+    assert_verified(folder.path(), &record);
+}
+
+/// The row with its distance to the group's centre in place of its point, too long by the zero.
+fn to_center(fields: &[String], center: &mut [f64; 3], zero_mm: f64) -> Vec<String> {
+    let role = fields.iter().position(|f| f == "center" || f == "sample" || f == "verify").expect("a role");
+    let mut row = fields[..=role + 6].to_vec();
+    let Ok(point) = fields[role + 7..role + 10].iter().map(|f| f.parse::<f64>()).collect::<Result<Vec<f64>, _>>()
+    else {
+        unreachable!("three coordinates")
+    };
+    if row[role] == "center" {
+        center.copy_from_slice(&point);
+        row.push(String::new());
+    } else {
+        let square: f64 = point.iter().zip(center.iter()).map(|(p, c)| (p - c).powi(2)).sum();
+        row.push((square.sqrt() + zero_mm).to_string());
+    }
+    row
+}
+
+#[test]
+fn distances_whose_zero_is_off_are_said_to_be_and_verified_as_they_were_read() {
+    let folder = simulated();
+    for zero_mm in [0.0, 0.5] {
+        let center = std::cell::Cell::new([0.0; 3]);
+        let distances = |i: usize, fields: Vec<String>| {
+            if i == 0 {
+                let role = fields.iter().position(|f| f == "role").expect("a role");
+                return [&fields[..=role + 6], &["distance_mm".to_owned()]].concat();
+            }
+            let mut at = center.get();
+            let row = to_center(&fields, &mut at, zero_mm);
+            center.set(at);
+            row
+        };
+        let record = identified(folder.path(), distances);
+        let said = record["doctor"].to_string();
+        assert_eq!(said.contains("the zero of the readings is off"), zero_mm > 0.0, "{said}");
+        let verify = mean(&record["methods"][0]);
+        assert!(if zero_mm > 0.0 { (verify - zero_mm).abs() < 0.1 } else { verify < 0.1 }, "{verify}");
+        assert_verified(folder.path(), &record);
     }
 }
 

@@ -80,7 +80,7 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
                 "the distances are {size:.3} mm too {way} (known to {sigma_mm:.3} mm): the zero of the readings is off"
             ),
             Vec::new(),
-            "it was found with the robot and taken off",
+            "it was found with the robot and taken off there; the figures below, as those of `verify`, hold the distances as they were read",
         );
     }
     if !found.outliers.is_empty() {

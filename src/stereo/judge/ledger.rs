@@ -59,6 +59,20 @@ pub fn ledger(facts: &Facts) -> Vec<Evidence> {
     lines
 }
 
+impl Evidence {
+    /// A length that is held against the tolerance, mm; without one nothing can be said.
+    fn of_length(
+        what: &'static str,
+        remedy: &'static str,
+        value_mm: Option<f64>,
+        facts: &Facts,
+        detail: String,
+    ) -> Evidence {
+        let allows = Verdict::within(value_mm.unwrap_or(f64::NAN), facts.tolerance_mm);
+        Evidence { what, remedy, value: value_mm, limit: Some(facts.tolerance_mm), unit: "mm", allows, detail }
+    }
+}
+
 fn held_out_lengths(facts: &Facts) -> Evidence {
     let extremes = &facts.accuracy.extremes;
     let worst = &extremes.largest;
@@ -105,15 +119,13 @@ fn any_length(facts: &Facts) -> Evidence {
             facts.expansion.calibration
         ),
     };
-    Evidence {
-        what: "any length in the working volume",
-        remedy: "add pairs with the board where it is least certain, and tilted",
+    Evidence::of_length(
+        "any length in the working volume",
+        "add pairs with the board where it is least certain, and tilted",
         value,
-        limit: Some(facts.tolerance_mm),
-        unit: "mm",
-        allows: Verdict::within(value.unwrap_or(f64::NAN), facts.tolerance_mm),
+        facts,
         detail,
-    }
+    )
 }
 
 fn models(facts: &Facts) -> Evidence {
@@ -121,15 +133,13 @@ fn models(facts: &Facts) -> Evidence {
     let detail = model_disagreement::describe(facts.disagreements).unwrap_or_else(|| {
         "no richer lens, and no board that is not flat, has additional terms that are more than chance: no admissible model measures other lengths".to_owned()
     });
-    Evidence {
-        what: "spread of admissible models",
-        remedy: "add pairs with the board at the borders of both pictures",
-        value: Some(value),
-        limit: Some(facts.tolerance_mm),
-        unit: "mm",
-        allows: Verdict::within(value, facts.tolerance_mm),
+    Evidence::of_length(
+        "spread of admissible models",
+        "add pairs with the board at the borders of both pictures",
+        Some(value),
+        facts,
         detail,
-    }
+    )
 }
 
 fn residuals(facts: &Facts) -> Evidence {
@@ -153,15 +163,13 @@ fn residuals(facts: &Facts) -> Evidence {
             neighbours.along, neighbours.standard_error
         )
     };
-    Evidence {
-        what: "residual correlation",
-        remedy: "look at the map of residuals in camera-check.html; it takes another `--lens`, `--board-shape bowed` or a better board",
+    Evidence::of_length(
+        "residual correlation",
+        "look at the map of residuals in camera-check.html; it takes another `--lens`, `--board-shape bowed` or a better board",
         value,
-        limit: Some(facts.tolerance_mm),
-        unit: "mm",
-        allows: Verdict::within(value.unwrap_or(f64::NAN), facts.tolerance_mm),
+        facts,
         detail,
-    }
+    )
 }
 
 fn pair_scatter(facts: &Facts) -> Evidence {
@@ -192,19 +200,18 @@ fn folds(facts: &Facts) -> Evidence {
     let layout = &facts.calibration.layout;
     let changes = facts.accuracy.fold_steps.iter().flat_map(|step| facts.volume.changes_by_step_mm(layout, step));
     let value = changes.fold(0.0_f64, |most, mm| most.max(mm.abs()));
-    Evidence {
-        what: "rigs without some pairs",
-        remedy: "add pairs with the board elsewhere and tilted otherwise",
-        value: Some(value),
-        limit: Some(facts.tolerance_mm),
-        unit: "mm",
-        allows: Verdict::within(value, facts.tolerance_mm),
-        detail: format!(
-            "largest change of a length of {:.0} mm anywhere in the working volume when a block of similar pairs is left out; a rig \
+    let detail = format!(
+        "largest change of a length of {:.0} mm anywhere in the working volume when a block of similar pairs is left out; a rig \
              that rests on one block is as wrong as that block may be",
-            facts.volume.length_mm
-        ),
-    }
+        facts.volume.length_mm
+    );
+    Evidence::of_length(
+        "rigs without some pairs",
+        "add pairs with the board elsewhere and tilted otherwise",
+        Some(value),
+        facts,
+        detail,
+    )
 }
 
 fn rays(facts: &Facts) -> Evidence {
