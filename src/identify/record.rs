@@ -12,6 +12,7 @@ use super::judge::errors::{Judge, RowError, Spread};
 use super::model::base::Observability;
 use super::model::prior::Tolerance;
 use super::model::uncertainty::{Covariance, Expected};
+use super::residuals::smooth::SmoothError;
 use super::residuals::weights::Extra;
 use super::settings::Settings;
 use super::solve::formulation::Formulation;
@@ -62,6 +63,9 @@ pub struct Record {
     pub expected: Option<Expected>,
     /// Unknowns of the sensor that were found beside the robot: name and value (mm, thousandths, mrad, standard deviations).
     pub sensor: Vec<(String, f64)>,
+    /// A smooth error that the points of each placement share.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smooth: Option<SmoothError>,
     /// Scatter of a point coordinate beyond the measurement's covariance, mm.
     pub scatter_mm: f64,
     /// The prior's standard deviations, where one was used.
@@ -236,6 +240,7 @@ impl Record {
             sessions: along.sessions.clone(),
             skipped: set.skipped.clone(),
             judged: found.judged.clone(),
+            smooth: found.smooth.map(|told| told.error),
             scatter_mm: found.scatter.point_mm,
             prior: fitted.filter(|(f, _)| f.held).map(|(f, _)| f.tolerance),
             doctor,

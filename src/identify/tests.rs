@@ -2,6 +2,7 @@
 
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::choose::identify;
+use crate::identify::judge::errors::Spread;
 use crate::identify::record::quality;
 use crate::identify::settings::{Extensions, Method, Model, Prior, Settings};
 use crate::identify::solve::formulation::Formulation;
@@ -19,7 +20,17 @@ fn formulated(
     model: Model,
     settings: &Settings,
 ) -> Formulation {
-    Formulation::new(&Task { set, robot, parameters, extras: &[], rows: &set.fit_rows(), model, settings }).unwrap()
+    Formulation::new(&Task {
+        set,
+        robot,
+        parameters,
+        extras: &[],
+        rows: &set.fit_rows(),
+        model,
+        smooth: None,
+        settings,
+    })
+    .unwrap()
 }
 
 fn settings(method: Method) -> Settings {
@@ -221,15 +232,8 @@ fn a_zero_that_is_off_costs_next_to_nothing_and_is_said() {
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
         let said = crate::identify::data::doctor::findings(&set, &found, &Default::default());
         let said = said.iter().any(|f| f.finding.contains("the zero of the readings is off"));
-        (
-            quality(&set, &found.candidates[found.chosen].robot, &found, &method)
-                .0
-                .verify
-                .distance
-                .mean_abs_mm
-                .unwrap(),
-            said,
-        )
+        let errors = found.errors(&set, &method, &found.candidates[found.chosen].robot, &set.verify_rows());
+        (Spread::new(errors.iter().filter_map(|e| e.distance_mm)).mean_abs_mm.unwrap(), said)
     };
     let (right, alarm) = error(0.0);
     assert!(!alarm);
@@ -237,5 +241,35 @@ fn a_zero_that_is_off_costs_next_to_nothing_and_is_said() {
         let (off, said) = error(zero_mm);
         // What is within its own uncertainty needs no word.
         assert!(off < 1.2 * right && (said || zero_mm < 0.1), "{zero_mm}: {off} against {right}, said: {said}");
+    }
+}
+
+#[test]
+fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain() {
+    use crate::identify::model::uncertainty::Expected;
+    use crate::measurements::Observed;
+    let world = synthetic::world(120, NOISE_MM, 3);
+    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+    let told = |size_mm: f64| {
+        let mut rows = world.rows.clone();
+        for row in &mut rows {
+            let group = row.at.group.bytes().last().map_or(0.0, f64::from);
+            if let Observed::Position { point_mm, .. } = &mut row.observed {
+                *point_mm += size_mm * point_mm.coords.map(|c| (c / 60.0 + 1.7 * group).sin());
+            }
+        }
+        let set = Dataset::new(&rows, 1).unwrap();
+        let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
+        let (formulation, _) = found.candidates[found.chosen].found.as_ref().unwrap();
+        let findings = crate::identify::data::doctor::findings(&set, &found, &Default::default());
+        let said = findings.iter().any(|f| f.finding.contains("smooth error"));
+        (said, found.smooth.map_or(0.0, |t| t.error.sd_mm), Expected::new(formulation, &set, &found.fitted).of_robot_mm)
+    };
+    let (alarm, _, clean_mm) = told(0.0);
+    assert!(!alarm);
+    for size_mm in [0.05, 0.2] {
+        let (said, sd_mm, of_robot_mm) = told(size_mm);
+        assert!(said && sd_mm > 0.4 * size_mm && sd_mm < 2.0 * size_mm, "{size_mm}: {sd_mm}");
+        assert!(of_robot_mm > 1.5 * clean_mm, "{size_mm}: {of_robot_mm} against {clean_mm}");
     }
 }

@@ -6,7 +6,7 @@ use super::dataset::{Dataset, Reading};
 use super::sessions::{Along, Session};
 use crate::identify::judge::choose::Identification;
 use crate::identify::record::file_unit;
-use crate::identify::residuals::weights::Extra;
+use crate::identify::residuals::weights::{EVIDENCE, Extra};
 use crate::robot::Parameter;
 
 /// One finding.
@@ -83,6 +83,18 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "it was found with the robot and taken off there; the figures below, as those of `verify`, hold the distances as they were read",
         );
     }
+    if let Some(told) = found.smooth.filter(|told| told.evidence > EVIDENCE) {
+        add(
+            format!(
+                "the points of each placement share a smooth error of about {:.3} mm a coordinate, which changes over some {} mm: what the \
+                 sensor does to space, or the robot beyond its model",
+                told.error.sd_mm,
+                rounded(told.error.length_mm)
+            ),
+            Vec::new(),
+            "it counts as one error of the placement, not as one of each point, and less is promised for it; more placements make it less",
+        );
+    }
     if !found.outliers.is_empty() {
         let share = 100.0 * found.outliers.len() as f64 / (found.fitted.len() + found.outliers.len()) as f64;
         add(
@@ -135,6 +147,12 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
         );
     }
     list
+}
+
+/// To one digit.
+fn rounded(length_mm: f64) -> f64 {
+    let unit = 10f64.powf(length_mm.log10().floor());
+    (length_mm / unit).round() * unit
 }
 
 /// Standard deviations from which on a zero that was found is said to be off.

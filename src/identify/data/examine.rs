@@ -84,7 +84,7 @@ fn scatter_mm(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<f64> 
     let rows: Vec<usize> = all.into_iter().step_by(step).collect();
     let parameters = robot.mdh_parameters();
     let model = if set.kind == Kind::Positions { Model::Position } else { Model::CenterDistance };
-    let task = Task { set, robot, parameters: &parameters, extras: &[], rows: &rows, model, settings };
+    let task = Task { set, robot, parameters: &parameters, extras: &[], rows: &rows, model, smooth: None, settings };
     let scatter = task.robust(Loss::Absolute).ok()?.scatter.point_mm;
     scatter.is_finite().then_some(scatter)
 }

@@ -59,7 +59,8 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     let model = if set.kind == Kind::Positions { Model::Position } else { Model::CenterDistance };
     for cuts in 0..MOST_CUTS {
         let rows = cut.fit_rows();
-        let task = Task { set: &cut, robot, parameters: &parameters, extras: &[], rows: &rows, model, settings };
+        let task =
+            Task { set: &cut, robot, parameters: &parameters, extras: &[], rows: &rows, model, smooth: None, settings };
         let Some(search) = Search::new(&task) else { break };
         let found = search.best_cut();
         let drifting = search.drifting(found);

@@ -4,11 +4,13 @@
 //!    from it too. Verify rows are looked at too, named and kept.
 //! 2. The ladder of models is climbed (see [`super::climb`]): more terms only where the held-out errors fall and the evidence asks for
 //!    them, against a model that is contained only for what the further terms bring.
-//! 3. Every method solves the same problem, so the least cost is the best; the cheapest of equals is kept.
-//! 4. Verify rows take no part in any choice but one: where the robot found is worse on them than the nominal one, nominal is kept.
+//! 3. What of the residuals is smooth over a placement of the sensor counts as one error, not as many.
+//! 4. Every method solves the same problem, so the least cost is the best; the cheapest of equals is kept.
+//! 5. Verify rows take no part in any choice but one: where the robot found is worse on them than the nominal one, nominal is kept.
 
 use super::climb::Judged;
 use super::errors::{Judge, RowError};
+use super::smooth;
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::model::ladder::{Chain, Terms};
@@ -56,6 +58,8 @@ pub struct Identification {
     pub fitted: Vec<usize>,
     /// The scatter that is left of the chosen fit.
     pub scatter: Scatter,
+    /// A smooth error that the points of each placement share.
+    pub smooth: Option<smooth::Told>,
     /// Unknowns of the sensor, and their values.
     pub extras: Vec<(Extra, f64)>,
     /// Whether the nominal robot was kept because the verify rows found the other one worse.
@@ -70,6 +74,7 @@ pub(super) struct Session<'a> {
     seed: u64,
     pub(super) rows: Vec<usize>,
     pub(super) extras: Vec<Extra>,
+    smooth: Option<smooth::Told>,
     step: &'a (dyn Fn(&str) + Sync),
 }
 
@@ -111,7 +116,7 @@ pub fn identify(
         _ if to_centers && settings.wire_offset => vec![Extra::Zero],
         _ => Vec::new(),
     };
-    let mut session = Session { set, robot, settings, seed, rows: set.fit_rows(), extras, step };
+    let mut session = Session { set, robot, settings, seed, rows: set.fit_rows(), extras, smooth: None, step };
     let by_points = if set.kind == Kind::Positions { Model::Position } else { model };
     step("gross errors");
     let first = session.reference(ROWS_TELL);
@@ -131,6 +136,7 @@ pub fn identify(
     }
     let methods = settings.method.map_or(Method::ALL.to_vec(), |m| vec![m]);
     let fitted_terms = if terms == Terms::NOMINAL { Terms::default() } else { terms };
+    session.take_smooth_error(by_points, &fitted_terms)?;
     let mut candidates = session.run_methods(model, fitted_terms, &methods)?;
     let held_out = |t: &Terms| judged.iter().find(|j| j.terms == t.name()).and_then(|j| j.held_out_mm);
     let nominal_held_out_mm = held_out(&Terms::NOMINAL);
@@ -161,6 +167,7 @@ pub fn identify(
         verify_outliers,
         fitted: session.rows.clone(),
         scatter,
+        smooth: session.smooth,
         extras,
         vetoed: false,
     };
@@ -237,7 +244,16 @@ impl Session<'_> {
     pub(super) fn task<'b>(&'b self, parameters: &'b [crate::robot::Parameter], model: Model) -> Task<'b> {
         let Session { set, robot, settings, .. } = *self;
         let extras = if model == Model::PairwiseDistance { &[] } else { self.extras.as_slice() };
-        Task { set, robot, parameters, extras, rows: &self.rows, model, settings }
+        Task {
+            set,
+            robot,
+            parameters,
+            extras,
+            rows: &self.rows,
+            model,
+            smooth: self.smooth.map(|told| told.error),
+            settings,
+        }
     }
 
     /// Numbers that were measured, less the unknowns of the placements.
@@ -261,6 +277,18 @@ impl Session<'_> {
         let poorer = |chain: Chain| Terms { chain, ..Terms::NOMINAL };
         let rich = [Terms::REFERENCE, Terms::default(), poorer(Chain::Offsets)];
         rich.into_iter().find(|t| self.tells(t, times)).unwrap_or(poorer(Chain::Tool))
+    }
+
+    /// Takes a smooth error that the points of each placement share, where they tell of one. It comes after the terms: what the robot
+    /// does wrong is as smooth, and a robot that is corrected is worth more than one about which less is certain.
+    fn take_smooth_error(&mut self, model: Model, terms: &Terms) -> Result<(), Error> {
+        if self.set.kind == Kind::Positions {
+            let parameters = terms.parameters(self.robot);
+            let at = Formulation::new(&self.task(&parameters, model))?;
+            let sds = at.tolerance.standard_deviations(&parameters, &self.extras);
+            self.smooth = smooth::most_probable(&at.rows, &at.offsets_of(), &sds);
+        }
+        Ok(())
     }
 
     /// Leaves out the rows that a robust fit gives no weight, and names them; and the verify rows that are as far off.

@@ -4,3 +4,4 @@ pub mod cells;
 pub mod choose;
 pub mod climb;
 pub mod errors;
+pub mod smooth;

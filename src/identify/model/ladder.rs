@@ -120,16 +120,15 @@ impl Terms {
     }
 
     /// What can be tried from here: every richer chain, and with the whole chain every term that is not taken yet. Rungs that failed
-    /// from a poorer model are tried again from a richer one; below the whole chain the first terms are also tried together with it.
+    /// from a poorer model are tried again from a richer one; below the whole chain every term is also tried together with it.
     pub fn successors(&self, robot: &Robot) -> Vec<Terms> {
         let chains = [Chain::Tool, Chain::Offsets, Chain::Mdh];
         let mut next: Vec<Terms> =
             chains.into_iter().filter(|c| *c > self.chain).map(|chain| Terms { chain, ..*self }).collect();
         if self.chain < Chain::Mdh {
-            // What a heavy or crooked arm needs before anything else pays.
+            // What a heavy, crooked or unround arm needs before anything else pays.
             let mdh = Terms { chain: Chain::Mdh, ..*self };
-            next.push(Terms { beta: true, ..mdh });
-            next.push(Terms { gravity: 1, ..mdh });
+            next.extend(mdh.successors(robot));
             next.push(Terms { beta: true, gravity: 1, ..mdh });
         }
         if self.chain == Chain::Mdh {

@@ -272,7 +272,7 @@ fn best_of_grid(parameters: &[Parameter], extras: &[Extra], score: &dyn Fn(&Tole
 }
 
 /// [`evidence`] for unknowns that are independent before the data: of these standard deviations.
-fn evidence_of_all(sds: &[f64], normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
+pub fn evidence_of_all(sds: &[f64], normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
     let n = sds.len();
     let inner = DMatrix::from_fn(n, n, |r, c| sds[r] * sds[c] * normal[(r, c)] + if r == c { 1.0 } else { 0.0 });
     let Some(inner) = Cholesky::new(inner) else { return f64::NEG_INFINITY };

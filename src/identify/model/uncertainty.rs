@@ -47,7 +47,8 @@ pub struct Expected {
     pub max_mm: f64,
     /// Mean of the expected length of the error that the parameters and the placement make, mm: against a truth without noise.
     pub of_robot_mm: f64,
-    /// The part of the mean that the robot's own scatter makes, mm: a model that is not quite right, and repeatability.
+    /// The part of the mean that the robot's own scatter makes, mm: a model that is not quite right, repeatability, and smooth errors that
+    /// the points of a placement share.
     pub scatter_mm: f64,
     /// For which poses it is said.
     pub poses: String,
@@ -73,6 +74,8 @@ impl Expected {
         let places = Kinematics::new(nominal, &robot, kinematics.parameters(), &joints).places(&offsets[..count], true);
         let covariance = formulation.robot_covariance();
         let scatter = formulation.rows.scatter.point_mm;
+        // Readings are off by what placements share, too.
+        let smooth_mm2 = formulation.rows.left_by_smooth_mm2();
         let (mut squares, mut of_robots) = (vec![0.0; places.len()], vec![0.0; places.len()]);
         for group in 0..set.groups.len() {
             let placing: Vec<usize> = fitted.iter().copied().filter(|&i| set.poses[i].group == group).collect();
@@ -91,7 +94,7 @@ impl Expected {
                 // The placement itself is found through the scatter of the rows it is fitted to.
                 let of_frame = (motion(i) * &inverse * motion(i).transpose()).trace() * scatter * scatter;
                 of_robots[i] = of_robot;
-                squares[i] = of_robot + of_frame + 3.0 * scatter * scatter;
+                squares[i] = of_robot + of_frame + 3.0 * (scatter * scatter + smooth_mm2);
             }
         }
         let lengths: Vec<f64> = squares.iter().map(|s| MEAN_OVER_RMS * s.sqrt()).collect();
@@ -102,7 +105,7 @@ impl Expected {
             max_mm: lengths.iter().copied().fold(0.0, f64::max),
             of_robot_mm: of_robots.iter().map(|s: &f64| MEAN_OVER_RMS * s.sqrt()).sum::<f64>()
                 / of_robots.len().max(1) as f64,
-            scatter_mm: MEAN_OVER_RMS * scatter * 3f64.sqrt(),
+            scatter_mm: MEAN_OVER_RMS * (3.0 * (scatter * scatter + smooth_mm2)).sqrt(),
             poses: region(set),
             map: set.poses.iter().map(|p| p.name.clone()).zip(lengths).collect(),
         }

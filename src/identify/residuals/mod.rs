@@ -5,5 +5,6 @@ pub mod eliminate;
 pub mod pairwise;
 pub mod points;
 pub mod rows;
+pub mod smooth;
 pub mod touch;
 pub mod weights;

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 
 use super::eliminate::Raw;
+use super::smooth::Field;
 use super::weights::{Extra, Scatter, Spot};
 use crate::geometry::{Transform, rotation_matrix, rotation_vector_of_matrix, skew};
 use crate::identify::model::kinematics::Place;
@@ -23,6 +24,8 @@ pub struct Points {
     pub oriented: bool,
     /// Which of the extra unknowns turn the target: index and axis.
     pub target: Vec<(usize, usize)>,
+    /// The smooth error that they share.
+    pub field: Option<Field>,
 }
 
 impl Points {
@@ -80,6 +83,14 @@ impl Points {
                 design.fixed_view_mut::<3, 3>(row + 3, 0).copy_from(&(weight * Matrix3::identity()));
             }
         }
+        if let Some(field) = &self.field {
+            let mut all = DMatrix::zeros(residuals.len(), 7);
+            all.columns_mut(0, 6).copy_from(&design);
+            all.set_column(6, &residuals);
+            field.whiten(&mut all);
+            residuals = all.column(6).into_owned();
+            design = all.remove_column(6);
+        }
         (residuals, design)
     }
 
@@ -105,15 +116,28 @@ impl Points {
                 }
             }
         }
+        if let Some(field) = &self.field {
+            field.whiten(&mut jacobian);
+        }
         jacobian
+    }
+
+    /// The smooth error at the spots, mm, as far as it is known.
+    pub(super) fn smooth_mm(&self, places: &[Place], extras: &[f64], frame: &Transform) -> Vec<Vector3<f64>> {
+        let residual = |spot: &Spot| self.point_residual(&places[spot.pose], extras, frame, spot);
+        match &self.field {
+            Some(field) => field.most_probable(&self.spots.iter().map(residual).collect::<Vec<_>>()),
+            None => vec![Vector3::zeros(); self.spots.len()],
+        }
     }
 
     pub(super) fn raw(&self, places: &[Place], extras: &[f64], frame: &Transform) -> Vec<(usize, f64, Raw)> {
         let flange_from_target = self.turned_target(extras);
         let mut list = Vec::new();
-        for spot in &self.spots {
+        let smooth = self.smooth_mm(places, extras, frame);
+        for (spot, smooth) in self.spots.iter().zip(smooth) {
             let place = &places[spot.pose];
-            let residual = self.point_residual(place, extras, frame, spot);
+            let residual = self.point_residual(place, extras, frame, spot) - smooth;
             list.push((spot.pose, spot.weight, Raw::Point(residual, spot.covariance_mm2)));
             if let (true, Some(measured)) = (self.oriented, &spot.rotation) {
                 let sensor_from_flange = rotation_matrix(frame) * place.rotation;

@@ -9,6 +9,7 @@ use super::distances::{Center, Wire};
 use super::eliminate::{Block, Evaluated, Raw, Unknowns, pseudo_inverse};
 use super::pairwise::{CHUNK, Pairs};
 use super::points::Points;
+use super::smooth::Field;
 use super::touch::{Contact, Known, Touch};
 use super::weights::{Extra, Length, Scatter, Spot};
 use crate::geometry::{Transform, transform_from_matrix};
@@ -141,18 +142,47 @@ impl Rows {
         precision.len().max(1) as f64 / precision.iter().sum::<f64>().max(f64::MIN_POSITIVE)
     }
 
-    /// The same rows with the extra unknowns fixed at these values and taken off the readings.
-    pub fn with_extras_fixed(&self, extras: &[f64]) -> Rows {
+    /// Degrees of freedom that residuals lose to smooth errors that placements share.
+    pub fn lost_to_smooth(&self) -> f64 {
+        let lost = |b: &Block| if let Block::Points(Points { field: Some(f), .. }) = b { f.lost() } else { 0.0 };
+        self.blocks.iter().map(lost).sum()
+    }
+
+    /// Mean square of a coordinate that smooth errors leave after a rigid fit to each placement, mm^2.
+    pub fn left_by_smooth_mm2(&self) -> f64 {
+        let (mut sum, mut count) = (0.0, 0);
+        for block in &self.blocks {
+            if let Block::Points(Points { field: Some(field), spots, .. }) = block {
+                sum += field.left_mm2() * spots.len() as f64;
+                count += spots.len();
+            }
+        }
+        sum / count.max(1) as f64
+    }
+
+    /// The same rows with the sensor's errors, the extra unknowns and what is smooth, fixed as they are at these offsets and taken off the
+    /// readings.
+    pub fn with_sensor_fixed(&self, offsets: &[f64]) -> Rows {
+        let (of_robot, extras) = self.split(offsets);
+        let places = self.kinematics.places(of_robot, false);
+        let unknowns = self.unknowns(offsets);
         let mut fixed = self.clone();
+        fixed.scatter.smooth = None;
         let off = |length: &mut Length| {
             length.length_mm -= length.extra.iter().zip(extras).map(|(x, e)| x * e).sum::<f64>();
             length.extra = RowDVector::zeros(0);
         };
-        for block in &mut fixed.blocks {
+        for (block, unknowns) in fixed.blocks.iter_mut().zip(&unknowns) {
             match block {
                 Block::Center(c) => c.lengths.iter_mut().for_each(off),
                 Block::Wire(w) => w.lengths.iter_mut().for_each(off),
                 Block::Points(p) => {
+                    if let Unknowns::Frame(frame) = unknowns {
+                        let smooth = p.smooth_mm(&places, extras, frame);
+                        // Residuals are predicted less measured.
+                        p.spots.iter_mut().zip(smooth).for_each(|(spot, error)| spot.point_mm += error);
+                    }
+                    p.field = None;
                     p.flange_from_target = p.turned_target(extras);
                     p.target.clear();
                     for spot in &mut p.spots {
@@ -342,8 +372,16 @@ impl Inputs<'_> {
         let frames: Vec<Transform> = lists.iter().map(|spots| robust_frame(spots, self.places)).collect();
         let flange_from_target = if oriented { mean_target(&lists, &frames, self.places) } else { Matrix3::identity() };
         let target = if oriented { Points::target_extras(self.recipe.extras) } else { Vec::new() };
+        let scatter = &self.recipe.scatter;
         let block = |(spots, sensor_from_base): (Vec<Spot>, Transform)| {
-            Block::Points(Points { spots, sensor_from_base, flange_from_target, oriented, target: target.clone() })
+            let target = target.clone();
+            let mut points = Points { spots, sensor_from_base, flange_from_target, oriented, target, field: None };
+            points.field = scatter.smooth.map(|error| {
+                let white = |s: &Spot| (s.point_mm, scatter.whitener(&s.covariance_mm2) * s.weight);
+                let spots: Vec<_> = points.spots.iter().map(white).collect();
+                Field::new(&spots, points.rows_a_spot(), error)
+            });
+            Block::Points(points)
         };
         lists.into_iter().zip(frames).map(block).collect()
     }

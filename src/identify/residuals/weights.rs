@@ -3,6 +3,7 @@
 //! A measured number is `value + own noise + extra' e`, where the extra unknowns `e` are common to many poses: the calibration of a
 //! rig, its scale, the zero of a wire. The fit finds them beside the robot.
 
+use super::smooth::SmoothError;
 use nalgebra::{Matrix3, Matrix3xX, Point3, RowDVector, Vector3};
 
 /// An unknown of the sensor that all placements share.
@@ -97,12 +98,14 @@ pub struct Scatter {
     pub rotation_rad: f64,
     /// What the stated covariances are multiplied by: one, where the residuals do not clearly say otherwise.
     pub stated: f64,
+    /// A smooth error that the points of a placement share, beside all these.
+    pub smooth: Option<SmoothError>,
 }
 
 impl Scatter {
     /// Of a point, its covariance taken at its word.
     pub fn of_point(point_mm: f64) -> Scatter {
-        Scatter { point_mm, rotation_rad: 1e-4, stated: 1.0 }
+        Scatter { point_mm, rotation_rad: 1e-4, stated: 1.0, smooth: None }
     }
 
     /// Whole covariance of a point, mm^2.

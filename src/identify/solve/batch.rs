@@ -56,6 +56,7 @@ impl BatchCost {
         let mut blocks = Vec::new();
         for block in &rows.blocks {
             blocks.push(match block {
+                Block::Points(Points { field: Some(_), .. }) => return None,
                 Block::Center(c) => BatchBlock::Center {
                     center: c.center,
                     pose: c.lengths.iter().map(|l| l.pose).collect(),
@@ -197,7 +198,7 @@ mod tests {
         let set = Dataset::new(rows, 1).unwrap();
         let parameters = world.nominal.mdh_parameters();
         let offsets: Vec<f64> = (0..parameters.len()).map(|i| (i as f64).sin()).collect();
-        let scatter = Scatter { point_mm: 0.1, rotation_rad: 1e-3, stated: 1.0 };
+        let scatter = Scatter { point_mm: 0.1, rotation_rad: 1e-3, stated: 1.0, smooth: None };
         let weights: Vec<f64> = (0..set.poses.len()).map(|i| 1.0 - 0.1 * (i % 4) as f64).collect();
         let rows = Rows::new(&Recipe {
             set: &set,

@@ -68,7 +68,7 @@ impl Formulation {
     pub fn new(task: &Task) -> Result<Formulation, Error> {
         let settings = task.settings;
         let mut levers = task.robot.clone();
-        let mut scatter = Scatter::of_point(FIRST_SCATTER_MM);
+        let mut scatter = Scatter { smooth: task.smooth, ..Scatter::of_point(FIRST_SCATTER_MM) };
         let mut rows = Rows::new(&task.recipe(scatter, &[], &levers));
         let base = task.base(&rows)?;
         task.check_count(&rows, &base)?;
@@ -181,11 +181,11 @@ impl Formulation {
         }
     }
 
-    /// The problem in its box, the sensor's extra unknowns fixed where the free fit found them.
+    /// The problem in its box, the sensor's errors fixed where the free fit found them.
     pub fn fit(&self) -> Fit<'_> {
-        let rows = match self.rows.extras.is_empty() {
+        let rows = match self.rows.extras.is_empty() && self.rows.scatter.smooth.is_none() {
             true => Cow::Borrowed(&self.rows),
-            false => Cow::Owned(self.rows.with_extras_fixed(self.extras())),
+            false => Cow::Owned(self.rows.with_sensor_fixed(&self.offsets_of())),
         };
         Fit::new(rows, &self.base, self.spread(), &self.bounds, self.prior(&self.tolerance, &[]))
     }

@@ -145,7 +145,7 @@ pub(super) fn estimate_scatter(rows: &Rows, offsets: &[f64], effective: f64, bef
     let of_points: f64 = residuals.iter().map(|r| r.count as f64).sum();
     let total = of_points + 3.0 * turns.len() as f64;
     // Each number loses the same share to parameters and placements.
-    let share = ((rows.count() as f64 - effective) / total.max(1.0)).max(1.0 / total.max(1.0));
+    let share = ((rows.count() as f64 - rows.lost_to_smooth() - effective) / total.max(1.0)).max(1.0 / total.max(1.0));
     let turn_square = turns.iter().sum::<f64>() / (3.0 * share * turns.len().max(1) as f64);
     let rotation_rad = if turns.is_empty() { before.rotation_rad } else { turn_square.sqrt().max(LEAST_RAD) };
     let wanted = share * of_points;

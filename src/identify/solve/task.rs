@@ -10,6 +10,7 @@ use crate::identify::data::dataset::Dataset;
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::Tolerance;
 use crate::identify::residuals::rows::{Recipe, Rows};
+use crate::identify::residuals::smooth::SmoothError;
 use crate::identify::residuals::weights::{Extra, Scatter};
 use crate::identify::settings::{Model, Prior, Redundancy, Settings};
 use crate::robot::{Parameter, Robot, Unit};
@@ -32,6 +33,8 @@ pub struct Task<'a> {
     pub rows: &'a [usize],
     /// What counts as a residual.
     pub model: Model,
+    /// A smooth error that the points of a placement share.
+    pub smooth: Option<SmoothError>,
     /// Settings.
     pub settings: &'a Settings,
 }

@@ -49,6 +49,7 @@ pub fn table(seeds: u64) {
             extras: &[],
             rows: &set.fit_rows(),
             model: Model::CenterDistance,
+            smooth: None,
             settings: &settings,
         })
         .expect("enough poses");

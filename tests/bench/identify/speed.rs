@@ -39,6 +39,7 @@ pub fn table(files: &[String]) {
         extras: &[],
         rows: &set.fit_rows(),
         model: Model::CenterDistance,
+        smooth: None,
         settings: &settings,
     })
     .expect("enough poses");

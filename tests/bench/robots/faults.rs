@@ -18,7 +18,7 @@ use crate::worlds::{Plan, arms, measured};
 type Plant = fn(&mut Vec<Measurement>, &mut Robot, f64);
 
 /// Faults, their sizes, and a word of the sentence that names each.
-const FAULTS: [(&str, &[f64], Plant, &str); 23] = [
+const FAULTS: [(&str, &[f64], Plant, &str); 24] = [
     ("clean", &[0.0], |_, _, _| {}, ""),
     ("radians", &[0.0], |rows, _, _| joints(rows, |_, j| j.iter_mut().for_each(|q| *q = q.to_radians())), "radians"),
     ("metres", &[0.0], |rows, _, _| points(rows, |_, p| p.coords /= 1000.0), "are in m,"),
@@ -57,6 +57,7 @@ const FAULTS: [(&str, &[f64], Plant, &str); 23] = [
         |rows, _, by| points(rows, |i, p| p.x += by * i.min(60) as f64 / 60.0),
         "drift",
     ),
+    ("placements off by, mm", &[0.0, 0.03, 0.1, 0.5], |rows, _, by| placements(rows, by), "smooth error"),
     ("sigmas too large by", &[3.0, 10.0, 30.0], |rows, _, by| stated(rows, by), "too large"),
     ("sigmas too small by", &[3.0, 10.0, 30.0], |rows, _, by| stated(rows, 1.0 / by), "too small"),
     ("covariance of nought", &[0.0], |rows, _, _| stated(rows, 0.0), "no variance"),
@@ -147,6 +148,18 @@ fn stated(rows: &mut [Measurement], factor: f64) {
             *covariance_mm2 = Some(Matrix3::identity() * sigma * sigma);
         }
     }
+}
+
+/// Four placements, in each of which space is bent by so much in a way of its own.
+fn placements(rows: &mut [Measurement], by: f64) {
+    for (i, row) in rows.iter_mut().enumerate() {
+        row.at.group = format!("g{}", i % 4);
+    }
+    let bent = |i: usize, p: Point3<f64>| {
+        let phase = |axis: usize| 1.7 * (i % 4) as f64 + 2.3 * axis as f64;
+        Vector3::from_fn(|axis, _| by * (p[(axis + 1) % 3] / 200.0 + phase(axis)).sin())
+    };
+    points(rows, |i, p| *p += bent(i, *p));
 }
 
 /// The first row becomes the centre, and its point is off.

@@ -29,6 +29,7 @@ pub fn table(runs: u64) {
             ("60 poses, gravity", Plan { beyond: Beyond::Gravity, ..Plan::default() }),
             ("60 poses, bending", Plan { beyond: Beyond::Bending, ..Plan::default() }),
             ("60 poses, harmonics", Plan { beyond: Beyond::Harmonics, ..Plan::default() }),
+            ("60 poses, harmonics, 4 pl.", Plan { groups: 4, beyond: Beyond::Harmonics, ..Plan::default() }),
             ("60 poses, 4 placements off", Plan { groups: 4, beyond: Beyond::Common, ..Plan::default() }),
             ("20 poses, 0.1 mm", Plan { samples: 20, ..few }),
             ("12 poses, 0.1 mm", Plan { samples: 12, ..few }),

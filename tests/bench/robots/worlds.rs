@@ -117,6 +117,8 @@ pub fn measured(nominal: &Robot, plan: Plan, seed: u64) -> (Robot, Robot, Vec<Me
     let mut nominal = nominal.clone();
     nominal.tool_mm = Vector3::new(30.0, -20.0, 60.0);
     let truth = truth(&nominal, plan, &mut random);
+    let mut of_sensors = Pcg64Mcg::seed_from_u64(seed ^ 0x5eed);
+    let phases: Vec<f64> = (0..3 * plan.groups).map(|_| std::f64::consts::TAU * of_sensors.random::<f64>()).collect();
     let rows = (0..plan.samples + plan.verify)
         .map(|i| {
             let joints: Vec<f64> = truth.joints.iter().map(|j| drawn(j, &mut random)).collect();
@@ -124,7 +126,9 @@ pub fn measured(nominal: &Robot, plan: Plan, seed: u64) -> (Robot, Robot, Vec<Me
             let group = i % plan.groups;
             let seen: Point3<f64> = sensor(group) * truth.target_mm(&joints);
             let common = match plan.beyond {
-                Beyond::Common => seen.coords.map(|c| 0.03 * (c / 300.0 + group as f64).sin()),
+                Beyond::Common => {
+                    Vector3::from_fn(|axis, _| 0.03 * (seen[axis] / 300.0 + phases[3 * group + axis]).sin())
+                }
                 _ => Vector3::zeros(),
             };
             let slides: Vec<bool> = truth.joints.iter().map(|j| j.slides).collect();

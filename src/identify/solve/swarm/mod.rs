@@ -248,6 +248,7 @@ mod tests {
             extras: &[],
             rows: &set.fit_rows(),
             model: Model::CenterDistance,
+            smooth: None,
             settings: &paper_settings(),
         })
         .unwrap()
