@@ -65,11 +65,30 @@ pub struct Record {
     pub sensor: Vec<(String, f64)>,
     /// A smooth error that the points of each placement share.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub smooth: Option<SmoothError>,
+    pub smooth: Option<Smooth>,
     /// Scatter of a point coordinate beyond the measurement's covariance, mm.
     pub scatter_mm: f64,
     /// The prior's standard deviations, where one was used.
     pub prior: Option<Tolerance>,
+}
+
+/// A smooth error that the points of each placement share.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Smooth {
+    /// How large and how smooth.
+    #[serde(flatten)]
+    pub error: SmoothError,
+    /// Root mean square of a coordinate that is left of it after a rigid fit to each placement, mm.
+    pub left_mm: f64,
+}
+
+impl Smooth {
+    /// Of the chosen fit.
+    pub fn new(found: &Identification) -> Option<Smooth> {
+        let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
+        let error = formulation.rows.scatter.smooth?;
+        Some(Smooth { error, left_mm: formulation.rows.left_by_smooth_mm2().sqrt() })
+    }
 }
 
 /// Errors of a robot.
@@ -240,7 +259,7 @@ impl Record {
             sessions: along.sessions.clone(),
             skipped: set.skipped.clone(),
             judged: found.judged.clone(),
-            smooth: found.smooth.map(|told| told.error),
+            smooth: Smooth::new(found),
             scatter_mm: found.scatter.point_mm,
             prior: fitted.filter(|(f, _)| f.held).map(|(f, _)| f.tolerance),
             doctor,

@@ -263,13 +263,18 @@ fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain()
         let (formulation, _) = found.candidates[found.chosen].found.as_ref().unwrap();
         let findings = crate::identify::data::doctor::findings(&set, &found, &Default::default());
         let said = findings.iter().any(|f| f.finding.contains("smooth error"));
-        (said, found.smooth.map_or(0.0, |t| t.error.sd_mm), Expected::new(formulation, &set, &found.fitted).of_robot_mm)
+        (
+            said,
+            formulation.rows.left_by_smooth_mm2().sqrt(),
+            Expected::new(formulation, &set, &found.fitted).of_robot_mm,
+        )
     };
     let (alarm, _, clean_mm) = told(0.0);
     assert!(!alarm);
     for size_mm in [0.05, 0.2] {
-        let (said, sd_mm, of_robot_mm) = told(size_mm);
-        assert!(said && sd_mm > 0.4 * size_mm && sd_mm < 2.0 * size_mm, "{size_mm}: {sd_mm}");
+        let (said, left_mm, of_robot_mm) = told(size_mm);
+        // A sine of the distances of a sphere loses some of its size to the rigid fit.
+        assert!(said && left_mm > 0.3 * size_mm && left_mm < size_mm, "{size_mm}: {left_mm}");
         assert!(of_robot_mm > 1.5 * clean_mm, "{size_mm}: {of_robot_mm} against {clean_mm}");
     }
 }

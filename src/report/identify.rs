@@ -120,7 +120,7 @@ const IMPLAUSIBLE_SCATTER_MM: f64 = 0.8;
 fn verdict(record: &Record) -> Markup {
     let before = record.before.verify.distance.mean_abs_mm;
     let after = record.chosen_method().and_then(|m| m.verify.distance.mean_abs_mm);
-    let left_mm = record.smooth.map_or(0.0, |s| s.sd_mm).hypot(record.scatter_mm);
+    let left_mm = record.smooth.map_or(0.0, |s| s.left_mm).hypot(record.scatter_mm);
     let tone = match (before, after) {
         // Not good as long as more is left than a built robot scatters by.
         (Some(before), Some(after)) if after < before && left_mm < IMPLAUSIBLE_SCATTER_MM => Tone::Good,

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::dataset::{Dataset, Reading};
 use super::sessions::{Along, Session};
 use crate::identify::judge::choose::Identification;
-use crate::identify::record::file_unit;
+use crate::identify::record::{Smooth, file_unit};
 use crate::identify::residuals::weights::{EVIDENCE, Extra};
 use crate::robot::Parameter;
 
@@ -83,13 +83,15 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "it was found with the robot and taken off there; the figures below, as those of `verify`, hold the distances as they were read",
         );
     }
-    if let Some(told) = found.smooth.filter(|told| told.evidence > EVIDENCE) {
+    if found.smooth.is_some_and(|told| told.evidence > EVIDENCE)
+        && let Some(smooth) = Smooth::new(found)
+    {
         add(
             format!(
                 "the points of each placement share a smooth error of about {:.3} mm a coordinate, which changes over some {} mm: what the \
                  sensor does to space, or the robot beyond its model",
-                told.error.sd_mm,
-                rounded(told.error.length_mm)
+                smooth.left_mm,
+                rounded(smooth.error.length_mm)
             ),
             Vec::new(),
             "it counts as one error of the placement, not as one of each point, and less is promised for it; more placements make it less",

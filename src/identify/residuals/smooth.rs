@@ -215,8 +215,9 @@ mod tests {
         }
         let rough: Vec<Vector3<f64>> =
             (0..20).map(|i| Vector3::repeat(if i % 2 == 0 { 0.02 } else { -0.02 })).collect();
+        let field = Field::new(&points, 3, SmoothError { sd_mm: 0.01, length_mm: 500.0 });
         let rest = field.most_probable(&rough);
         let (left, all) = (rest.iter().map(Vector3::norm).sum::<f64>(), rough.iter().map(Vector3::norm).sum::<f64>());
-        assert!(left < 0.9 * all && field.lost() > 10.0 && field.lost() < 54.0, "{left} {all} {}", field.lost());
+        assert!(left < 0.3 * all && field.lost() > 0.0 && field.lost() < 20.0, "{left} {all} {}", field.lost());
     }
 }

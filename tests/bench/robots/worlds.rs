@@ -142,7 +142,8 @@ pub fn measured(nominal: &Robot, plan: Plan, seed: u64) -> (Robot, Robot, Vec<Me
     (nominal, truth, rows)
 }
 
-fn truth(nominal: &Robot, plan: Plan, random: &mut Pcg64Mcg) -> Robot {
+/// A robot that is off as the plan says.
+pub fn truth(nominal: &Robot, plan: Plan, random: &mut Pcg64Mcg) -> Robot {
     let mut parameters = nominal.mdh_parameters();
     let size = |p: &Parameter| if p.unit() == Unit::Mm { plan.error_mm } else { plan.error_mrad };
     let mut errors: Vec<f64> = parameters.iter().map(|p| normal(random) * size(p)).collect();
