@@ -8,7 +8,7 @@ use stereocal::identify::data::{examine, sessions};
 use stereocal::identify::judge::choose::{Identification, identify};
 use stereocal::robot::Robot;
 
-use crate::worlds::{Plan, arms, measured};
+use crate::worlds::{Beyond, Plan, arms, measured};
 
 /// Seeds that must all choose the same.
 const SEEDS: u64 = 10;
@@ -16,15 +16,19 @@ const SEEDS: u64 = 10;
 /// One line a size, then seeds and threads.
 pub fn table() {
     println!("\nseconds from rows to robot with all methods, 2 threads");
-    for (what, samples, groups, wanted) in
-        [("300 rows", 300, 1, 1.5), ("4000 rows", 4000, 1, 10.0), ("100 groups of 12", 1200, 100, 10.0)]
-    {
-        let plan = Plan { samples, groups, verify: 50.max(groups), ..Plan::default() };
+    for (what, samples, groups, beyond, wanted) in [
+        ("300 rows", 300, 1, Beyond::Nothing, 1.5),
+        ("4000 rows", 4000, 1, Beyond::Nothing, 10.0),
+        ("4000 rows, 4 placements off", 4000, 4, Beyond::Common, 10.0),
+        ("100 groups of 12", 1200, 100, Beyond::Nothing, 10.0),
+        ("100 groups of 40, off", 4000, 100, Beyond::Common, 10.0),
+    ] {
+        let plan = Plan { samples, groups, beyond, verify: 50.max(groups), ..Plan::default() };
         let (nominal, _, rows) = measured(&arms()[0].1, plan, 1);
         let set = Dataset::new(&rows, 1).expect("rows");
         let start = Instant::now();
         threads(2, &|| whole(&set, &nominal, 1));
-        println!("{what:18} {:6.2} (wanted {wanted})", start.elapsed().as_secs_f64());
+        println!("{what:28} {:6.2} (wanted {wanted})", start.elapsed().as_secs_f64());
     }
     for (name, nominal) in arms() {
         let (nominal, _, rows) = measured(&nominal, Plan::default(), 1);
