@@ -11,6 +11,7 @@ pub mod order;
 pub mod overlay;
 pub mod pyramid;
 pub mod refine;
+mod wide;
 
 use camino::Utf8PathBuf;
 

@@ -19,6 +19,7 @@ use super::crossing::Crossing;
 use super::products::Products;
 use super::special::{erf_from, exp_negative};
 use super::window::{Group, Groups, LANES, Lanes, Window};
+use crate::imaging::wide::widest;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_SQRT_PI};
 
 /// Number of parameters: c (2), edge angles (2), blurs (2), m, A/2, g (2).
@@ -74,19 +75,10 @@ pub struct Across {
 impl Model {
     /// Sums of products over all pixels of the window.
     pub fn evaluate(&self, window: &Window) -> Evaluation {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has just said that it knows these instructions.
-            return unsafe { self.evaluate_avx2(window) };
-        }
-        self.evaluate_lanes(window)
-    }
-
-    /// The same arithmetic, hence the same bits, with wider registers.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn evaluate_avx2(&self, window: &Window) -> Evaluation {
-        self.evaluate_lanes(window)
+        widest(
+            #[inline(always)]
+            || self.evaluate_lanes(window),
+        )
     }
 
     #[inline(always)]
@@ -97,7 +89,10 @@ impl Model {
             let mut both = SMatrix::zeros();
             for ((groups, side), gain) in arms.iter().zip([-1.0, 1.0]).zip(&mut arm_gains[k]) {
                 let mut products = Products::<ARM>::new();
-                groups.groups.iter().for_each(|group| self.along(k, side, group, &mut products));
+                // No closure: one that is not inlined would be compiled for the narrowest registers.
+                for group in &groups.groups {
+                    self.along(k, side, group, &mut products);
+                }
                 let sums = products.sums();
                 *gain = arm_gain(&sums);
                 both += sums;
