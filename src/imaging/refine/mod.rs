@@ -27,7 +27,7 @@ use self::cell::Cell;
 use self::coarse::{coarse, enlarged};
 use self::curvature::{Point, bends};
 use self::outlying_pixels::{Explained, few};
-use self::saddle_fit::window::{Below, Frame, Keep, Window};
+use self::saddle_fit::window::{Below, Frame, Keep, Sample, Window};
 use self::saddle_fit::{Fit, Model, fit};
 use self::windows::{Windows, bends_by, usual};
 use super::Corner;
@@ -104,7 +104,7 @@ struct Full<'a, T> {
     veil: f64,
 }
 
-impl<T: Copy + Into<f64>> Full<'_, T> {
+impl<T: Sample> Full<'_, T> {
     fn of<'a>(image: &'a Image<T>, clip_level: f64, detected: &Detected) -> Full<'a, T> {
         let places = detected.corners.map(|px| detected.level.to_picture(px));
         Full { image, clip_level, veil: veil::level(image, clip_level, &places) }

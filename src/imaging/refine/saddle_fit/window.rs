@@ -9,6 +9,7 @@ use std::ops::Range;
 use nalgebra::{Matrix2, Matrix4, Point2, Vector2, Vector4};
 
 use crate::imaging::image::Image;
+use crate::imaging::wide::widest;
 
 /// Pixels that are worked on side by side: enough that the compiler makes vector loops of them.
 pub const LANES: usize = 32;
@@ -28,6 +29,12 @@ pub struct Group {
     /// One for a pixel, zero for none: the last group is filled up.
     pub weight: Lanes,
 }
+
+/// A grey value as the camera gave it.
+pub trait Sample: Copy + Into<f64> + Into<u32> {}
+
+impl Sample for u8 {}
+impl Sample for u16 {}
 
 /// Any number of pixels in groups.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -67,6 +74,11 @@ pub struct Frame {
 pub trait Keep {
     /// Whether it takes a pixel at a place relative to the window's start.
     fn keeps(&self, x: f64, y: f64, grey: f64) -> bool;
+
+    /// True where it takes every pixel up to this grey value, wherever it is: then nobody needs to ask for each.
+    fn keeps_up_to(&self, _highest: f64) -> bool {
+        false
+    }
 }
 
 /// Takes every pixel below a level.
@@ -76,6 +88,11 @@ impl Keep for Below {
     #[inline(always)]
     fn keeps(&self, _: f64, _: f64, grey: f64) -> bool {
         grey < self.0
+    }
+
+    #[inline(always)]
+    fn keeps_up_to(&self, highest: f64) -> bool {
+        highest < self.0
     }
 }
 
@@ -112,7 +129,15 @@ impl Window {
     }
 
     /// Fills the window anew with the pixels that are to be kept, as grey values above a whole number `veil`. Nothing is in a window without area.
-    pub fn collect<T: Copy + Into<f64>>(&mut self, image: &Image<T>, veil: f64, keep: &impl Keep, frame: &Frame) {
+    pub fn collect<T: Sample>(&mut self, image: &Image<T>, veil: f64, keep: &impl Keep, frame: &Frame) {
+        widest(
+            #[inline(always)]
+            || self.sort_in(image, veil, keep, frame),
+        );
+    }
+
+    #[inline(always)]
+    fn sort_in<T: Sample>(&mut self, image: &Image<T>, veil: f64, keep: &impl Keep, frame: &Frame) {
         self.crossing.clear();
         self.arms.iter_mut().flatten().for_each(Groups::clear);
         (self.flat, self.left_out) = ([Matrix4::zeros(); 2], 0);
@@ -151,7 +176,7 @@ impl Window {
 
 /// Adds a run of pixels one by one; `from` is the first one's place. Returns how many were not kept.
 #[inline(always)]
-fn push<T: Copy + Into<f64>>(
+fn push<T: Sample>(
     to: &mut Groups,
     row: &[T],
     run: Range<usize>,
@@ -160,7 +185,8 @@ fn push<T: Copy + Into<f64>>(
 ) -> usize {
     let mut left_out = 0;
     for (i, &value) in row[run].iter().enumerate() {
-        let (x, grey) = (from.0 + i as f64, value.into() - veil);
+        let value: f64 = value.into();
+        let (x, grey) = (from.0 + i as f64, value - veil);
         if keep.keeps(x, from.1, grey) {
             to.push(x, from.1, grey);
         } else {
@@ -170,13 +196,13 @@ fn push<T: Copy + Into<f64>>(
     left_out
 }
 
-/// Sums of a run that are kept side by side, so that one need not wait for the other.
-const SIDE_BY_SIDE: usize = 4;
+/// Sums of a run that are kept side by side, so that the compiler makes vector loops of them.
+const SIDE_BY_SIDE: usize = 16;
 
 /// Adds a run of pixels to the sums of products of `(1, x, y, grey)`; `from` is the first one's place. Returns how
 /// many were not kept.
 #[inline(always)]
-fn add<T: Copy + Into<f64>>(
+fn add<T: Sample>(
     to: &mut Matrix4<f64>,
     row: &[T],
     run: Range<usize>,
@@ -184,16 +210,20 @@ fn add<T: Copy + Into<f64>>(
     from: (f64, f64),
 ) -> usize {
     let values = &row[run];
-    let kept = |(i, grey): &(usize, f64)| keep.keeps(from.0 + *i as f64, from.1, *grey);
-    let [n, x, xx, g, xg, gg] = if values.iter().map(|&value| value.into() - veil).enumerate().all(|pixel| kept(&pixel))
-    {
+    let [n, x, xx, g, xg, gg] = if keep.keeps_up_to(highest(values) - veil) {
         run_sums(values, veil)
     } else {
-        let seen = values.iter().map(|&value| value.into() - veil).enumerate().filter(kept);
-        seen.fold([0.0; 6], |[n, x, xx, g, xg, gg], (i, grey)| {
-            let i = i as f64;
-            [n + 1.0, x + i, xx + i * i, g + grey, xg + i * grey, gg + grey * grey]
-        })
+        let mut sums = [0.0; 6];
+        for (i, &value) in values.iter().enumerate() {
+            let value: f64 = value.into();
+            let (i, grey) = (i as f64, value - veil);
+            if keep.keeps(from.0 + i, from.1, grey) {
+                for (sum, term) in sums.iter_mut().zip([1.0, i, i * i, grey, i * grey, grey * grey]) {
+                    *sum += term;
+                }
+            }
+        }
+        sums
     };
     let (x0, y) = from;
     let sum_x = x + n * x0;
@@ -208,30 +238,43 @@ fn add<T: Copy + Into<f64>>(
     values.len() - n as usize
 }
 
-/// Number, sums of x, x^2, grey, x grey and grey^2 of pixels side by side, the first at x = 0. Whole numbers, hence exact.
-fn run_sums<T: Copy + Into<f64>>(values: &[T], veil: f64) -> [f64; 6] {
-    let n = values.len() as f64;
-    let (mut g, mut xg, mut gg) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
-    let blocks = values.chunks_exact(SIDE_BY_SIDE);
-    let rest = blocks.remainder();
-    let mut at: [f64; SIDE_BY_SIDE] = std::array::from_fn(|l| l as f64);
-    for block in blocks {
+/// The highest grey value of a run.
+#[inline(always)]
+fn highest<T: Sample>(values: &[T]) -> f64 {
+    let mut highest = 0;
+    for &value in values {
+        let value: u32 = value.into();
+        highest = value.max(highest);
+    }
+    f64::from(highest)
+}
+
+/// Number, sums of x, x^2, grey, x grey and grey^2 of pixels side by side, the first at x = 0. Whole numbers, hence exact; the veil is taken
+/// off at the end.
+#[inline(always)]
+fn run_sums<T: Sample>(values: &[T], veil: f64) -> [f64; 6] {
+    let (mut g, mut xg, mut gg) = ([0u64; SIDE_BY_SIDE], [0u64; SIDE_BY_SIDE], [0u64; SIDE_BY_SIDE]);
+    let mut at: [u32; SIDE_BY_SIDE] = std::array::from_fn(|l| l as u32);
+    let mut blocks = values.chunks_exact(SIDE_BY_SIDE);
+    for block in &mut blocks {
         for l in 0..SIDE_BY_SIDE {
-            let grey = block[l].into() - veil;
-            g[l] += grey;
-            xg[l] += at[l] * grey;
-            gg[l] += grey * grey;
-            at[l] += SIDE_BY_SIDE as f64;
+            let value: u32 = block[l].into();
+            g[l] += u64::from(value);
+            xg[l] += u64::from(at[l]) * u64::from(value);
+            gg[l] += u64::from(value) * u64::from(value);
+            at[l] += SIDE_BY_SIDE as u32;
         }
     }
-    for ((value, at), ((g, xg), gg)) in rest.iter().zip(at).zip(g.iter_mut().zip(&mut xg).zip(&mut gg)) {
-        let grey = (*value).into() - veil;
-        *g += grey;
-        *xg += at * grey;
-        *gg += grey * grey;
+    for (l, &value) in blocks.remainder().iter().enumerate() {
+        let value: u32 = value.into();
+        g[l] += u64::from(value);
+        xg[l] += u64::from(at[l]) * u64::from(value);
+        gg[l] += u64::from(value) * u64::from(value);
     }
-    let total = |sums: [f64; SIDE_BY_SIDE]| sums.iter().sum();
-    [n, n * (n - 1.0) / 2.0, n * (n - 1.0) * (2.0 * n - 1.0) / 6.0, total(g), total(xg), total(gg)]
+    let total = |sums: [u64; SIDE_BY_SIDE]| sums.iter().sum::<u64>() as f64;
+    let (n, g, xg, gg) = (values.len() as f64, total(g), total(xg), total(gg));
+    let (x, xx) = (n * (n - 1.0) / 2.0, n * (n - 1.0) * (2.0 * n - 1.0) / 6.0);
+    [n, x, xx, g - n * veil, xg - x * veil, gg - (2.0 * g - n * veil) * veil]
 }
 
 /// The whole numbers from `low` to `high` that are at least zero and below `size`.
