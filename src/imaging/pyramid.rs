@@ -9,6 +9,7 @@ use std::ops::AddAssign;
 use nalgebra::Point2;
 
 use super::image::{Grey, Grey8, Image, Picture};
+use super::wide::widest;
 
 /// The size of a copy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,22 +78,62 @@ fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
     (low, high): (f64, f64),
 ) -> Grey8 {
     let (w, h) = (image.width / factor, image.height / factor);
-    let mut pixels = Vec::with_capacity(w * h);
-    // Whole lines first: adding them up is what a processor does sixteen at a time.
+    let mut pixels = vec![0; w * h];
     let mut sums = vec![S::default(); w * factor];
+    let mut totals = vec![0u32; w];
     let scale = 255.0 / (high - low).max(1.0);
     let unit = scale / (factor * factor) as f64;
-    for y in 0..h {
-        sums.fill(S::default());
-        for line in image.pixels[y * factor * image.width..].chunks_exact(image.width).take(factor) {
-            for (sum, &v) in sums.iter_mut().zip(line) {
-                *sum += value(v);
-            }
-        }
-        let groups = sums.chunks_exact(factor).map(|group| group.iter().map(|&sum| sum.into()).sum::<u32>());
-        pixels.extend(groups.map(|sum| (f64::from(sum) * unit - low * scale + 0.5) as u8));
+    let rows = image.pixels.chunks(factor * image.width.max(1));
+    for (out, rows) in pixels.chunks_exact_mut(w.max(1)).zip(rows) {
+        widest(
+            #[inline(always)]
+            || {
+                // Whole lines first: adding them up is what a processor does many at a time.
+                sums.fill(S::default());
+                for line in rows.chunks_exact(image.width) {
+                    for (sum, &v) in sums.iter_mut().zip(line) {
+                        *sum += value(v);
+                    }
+                }
+                add_groups(&sums, factor, &mut totals);
+                for (out, &total) in out.iter_mut().zip(&totals) {
+                    *out = (f64::from(total) * unit - low * scale + 0.5) as u8;
+                }
+            },
+        );
     }
     Grey8 { width: w, height: h, pixels }
+}
+
+/// The sums of groups of `factor` numbers.
+#[inline(always)]
+fn add_groups<S: Copy + Into<u32>>(sums: &[S], factor: usize, totals: &mut [u32]) {
+    // For the usual factors a length that the compiler knows.
+    match factor {
+        2 => add_each::<2, S>(sums, totals),
+        3 => add_each::<3, S>(sums, totals),
+        4 => add_each::<4, S>(sums, totals),
+        5 => add_each::<5, S>(sums, totals),
+        6 => add_each::<6, S>(sums, totals),
+        _ => {
+            for (total, group) in totals.iter_mut().zip(sums.chunks_exact(factor)) {
+                *total = 0;
+                for &sum in group {
+                    *total += sum.into();
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add_each<const FACTOR: usize, S: Copy + Into<u32>>(sums: &[S], totals: &mut [u32]) {
+    for (total, group) in totals.iter_mut().zip(sums.as_chunks::<FACTOR>().0) {
+        *total = 0;
+        for &sum in group {
+            *total += sum.into();
+        }
+    }
 }
 
 /// The values below and above which only a few pixels in a thousand lie.

@@ -8,6 +8,7 @@
 use nalgebra::{Point2, Vector2};
 
 use crate::imaging::image::Grey8;
+use crate::imaging::wide::widest;
 
 /// Offsets of the ring, px, in order round it: radius about 5.
 const RING: [(isize, isize); 16] = [
@@ -38,6 +39,8 @@ const LEAST_CONTRAST: f64 = 3.0;
 const LEAST_NOISE: f64 = 0.5;
 /// Tiles along the longer side of a picture. Each keeps as many candidates as it can hold corners of a board with the smallest squares.
 const TILES: usize = 16;
+/// Responses that are looked at together: most of a picture is far from any corner.
+const RUN: usize = 32;
 /// Least distance of two corners, px.
 const LEAST_DISTANCE_PX: usize = 8;
 
@@ -64,12 +67,19 @@ pub(super) fn candidates(picture: &Grey8) -> Vec<Candidate> {
     let side = w.max(h).div_ceil(TILES).max(8 * LEAST_DISTANCE_PX);
     let columns = w.div_ceil(side);
     let mut tiles: Vec<Vec<Candidate>> = vec![Vec::new(); columns * h.div_ceil(side)];
+    // As a whole number: of a response only the whole part is there.
+    let least = (LEAST_SHAPE * least_contrast).floor() as i16;
     for y in REACH..h - REACH {
-        for x in REACH..w - REACH {
-            let here = response[y * w + x];
-            if f64::from(here) > LEAST_SHAPE * least_contrast && is_peak(&response, w, x, y) {
+        for (run, here) in response[y * w..(y + 1) * w].chunks(RUN).enumerate().filter(|(_, run)| any_above(run, least))
+        {
+            for x in (run * RUN..).zip(here).filter(|(_, here)| **here > least).map(|(x, _)| x) {
+                if !is_peak(&response, w, x, y) {
+                    continue;
+                }
                 let candidate = candidate(picture, &response, x, y);
-                if candidate.contrast > least_contrast && f64::from(here) > LEAST_SHAPE * candidate.contrast {
+                if candidate.contrast > least_contrast
+                    && f64::from(candidate.strength) > LEAST_SHAPE * candidate.contrast
+                {
                     tiles[(y / side) * columns + x / side].push(candidate);
                 }
             }
@@ -105,6 +115,14 @@ fn noise(picture: &Grey8) -> f64 {
 /// Five times the ring response of every pixel, a whole number that fits: opposite pixels of the ring alike and a quarter turn on the
 /// other colour, less what a line or an edge shows, less what a spot shows. `REACH` px at the border have none.
 fn responses(picture: &Grey8) -> Vec<i16> {
+    widest(
+        #[inline(always)]
+        || row_by_row(picture),
+    )
+}
+
+#[inline(always)]
+fn row_by_row(picture: &Grey8) -> Vec<i16> {
     let (w, h) = (picture.width, picture.height);
     let mut response = vec![0i16; w * h];
     let wide = w - 2 * REACH;
@@ -126,17 +144,31 @@ fn responses(picture: &Grey8) -> Vec<i16> {
             }
         }
         for local in [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)].map(row) {
-            spot.iter_mut().zip(local).for_each(|(spot, grey)| *spot -= 16 * i16::from(*grey));
+            for (spot, grey) in spot.iter_mut().zip(local) {
+                *spot -= 16 * i16::from(*grey);
+            }
         }
-        here.iter_mut().zip(&spot).for_each(|(here, spot)| *here -= spot.abs());
+        for (here, spot) in here.iter_mut().zip(&spot) {
+            *here -= spot.abs();
+        }
     }
     response
+}
+
+#[inline]
+fn any_above(responses: &[i16], least: i16) -> bool {
+    let mut any = false;
+    for &response in responses {
+        any |= response > least;
+    }
+    any
 }
 
 fn is_peak(response: &[i16], w: usize, x: usize, y: usize) -> bool {
     const AROUND: usize = 3;
     let here = response[y * w + x];
-    (y - AROUND..=y + AROUND).all(|v| {
+    // The nearest rows first: they tell most places that are none.
+    [y, y - 1, y + 1, y - 2, y + 2, y - AROUND, y + AROUND].into_iter().all(|v| {
         (x - AROUND..=x + AROUND).all(|u| {
             let other = response[v * w + u];
             // Of equal neighbours the first is the peak.
