@@ -56,7 +56,10 @@ pub fn largest_grid(picture: &Grey8) -> Option<Places> {
 struct Near<'a> {
     picture: &'a Grey8,
     candidates: &'a [Candidate],
-    cells: BTreeMap<(i64, i64), Vec<usize>>,
+    /// Cells in a row.
+    columns: usize,
+    /// Row by row.
+    cells: Vec<Vec<usize>>,
 }
 
 /// Side of a cell, px.
@@ -64,24 +67,35 @@ const CELL: f64 = 32.0;
 
 impl<'a> Near<'a> {
     fn new(picture: &'a Grey8, candidates: &'a [Candidate]) -> Near<'a> {
-        let mut cells: BTreeMap<(i64, i64), Vec<usize>> = BTreeMap::new();
+        let cells_of = |size: usize| cell_of(size as f64, usize::MAX) + 1;
+        let (columns, rows) = (cells_of(picture.width), cells_of(picture.height));
+        let mut near = Near { picture, candidates, columns, cells: vec![Vec::new(); columns * rows] };
         for (i, c) in candidates.iter().enumerate() {
-            cells.entry(cell_of(&c.at)).or_default().push(i);
+            let [x, y] = near.cell(&c.at);
+            near.cells[y * columns + x].push(i);
         }
-        Near { picture, candidates, cells }
+        near
+    }
+
+    /// Column and row of a place's cell, of the nearest one for a place beyond the picture.
+    fn cell(&self, p: &Point2<f64>) -> [usize; 2] {
+        [cell_of(p.x, self.columns - 1), cell_of(p.y, self.cells.len() / self.columns - 1)]
     }
 
     /// Candidates in question within a distance, with theirs, the nearest first.
     fn within(&self, at: &Point2<f64>, distance: f64, asked: impl Fn(f64, usize) -> bool) -> Vec<(f64, usize)> {
-        let (low, high) = (cell_of(&(at - Vector2::repeat(distance))), cell_of(&(at + Vector2::repeat(distance))));
+        let ([left, top], [right, bottom]) =
+            (self.cell(&(at - Vector2::repeat(distance))), self.cell(&(at + Vector2::repeat(distance))));
         let mut found: Vec<(f64, usize)> = Vec::new();
-        for x in low.0..=high.0 {
-            for (_, members) in self.cells.range((x, low.1)..=(x, high.1)) {
-                let distances = members.iter().map(|&i| ((self.candidates[i].at - at).norm(), i));
-                found.extend(distances.filter(|&(d, k)| d <= distance && asked(d, k)));
+        for y in top..=bottom {
+            for &i in self.cells[y * self.columns + left..=y * self.columns + right].iter().flatten() {
+                let d = (self.candidates[i].at - at).norm();
+                if d <= distance && asked(d, i) {
+                    found.push((d, i));
+                }
             }
         }
-        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         found
     }
 }
@@ -125,19 +139,22 @@ impl Near<'_> {
 
     fn grey(&self, p: Point2<f64>) -> f64 {
         // Rounded to the nearest pixel; what is left of the first one is cut off to it.
-        let inside = |v: f64, size: usize| ((v + 0.5) as usize).min(size - 1);
+        let inside = |v: f64, size: usize| ((v + 0.5) as i32).clamp(0, size as i32 - 1) as usize;
         let (x, y) = (inside(p.x, self.picture.width), inside(p.y, self.picture.height));
         f64::from(self.picture.pixels[y * self.picture.width + x])
     }
 }
 
-fn cell_of(p: &Point2<f64>) -> (i64, i64) {
-    ((p.x / CELL).floor() as i64, (p.y / CELL).floor() as i64)
+/// The cell of a place along one side, the first or the last one where it lies beyond.
+fn cell_of(place: f64, last: usize) -> usize {
+    ((place / CELL) as usize).min(last)
 }
 
 /// True for corners whose colours are those of neighbours along an edge: the bright axes are perpendicular.
 fn opposite(a: &Candidate, b: &Candidate) -> bool {
-    let d = (a.axis - b.axis).rem_euclid(PI);
+    // Axes are at most half a turn apart: no division is needed.
+    let d = a.axis - b.axis;
+    let d = if d < 0.0 { d + PI } else { d };
     (d - FRAC_PI_2).abs() < SLANT
 }
 
@@ -200,16 +217,14 @@ fn seed_steps(candidates: &[Candidate], near: &Near, first: usize) -> Option<[Ve
     while reach < 600.0 {
         let ring = |distance: f64, k: usize| (distance > inner || inner == 0.0) && k != first && near.ends(first, k);
         for (_, k) in near.within(&here.at, reach, ring) {
-            if !near.shows_edge(first, k) {
+            let step = candidates[k].at - here.at;
+            let elsewhere = |a: &Vector2<f64>| (a.perp(&step).abs() / (a.norm() * step.norm())).asin() > LEAST_ANGLE;
+            if !nearest.as_ref().is_none_or(elsewhere) || !near.shows_edge(first, k) {
                 continue;
             }
-            let step = candidates[k].at - here.at;
             match nearest {
                 None => nearest = Some(step),
-                Some(a) if (a.perp(&step).abs() / (a.norm() * step.norm())).asin() > LEAST_ANGLE => {
-                    return Some([a, step]);
-                }
-                Some(_) => (),
+                Some(a) => return Some([a, step]),
             }
         }
         (inner, reach) = (reach, 2.0 * reach);
