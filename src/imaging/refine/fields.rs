@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 
 use crate::imaging::image::{Grey, Image, Picture};
 use crate::imaging::lattice::Places;
+use crate::imaging::wide::widest;
 
 /// Corners whose surroundings are looked at.
 const CORNERS: usize = 60;
@@ -35,7 +36,7 @@ pub fn shift_between_fields(picture: &Picture, places: &Places) -> Option<f64> {
     }
 }
 
-fn shift<T: Copy + Into<f64>>(image: &Image<T>, places: &Places) -> Option<f64> {
+fn shift<T: Copy + Into<i32>>(image: &Image<T>, places: &Places) -> Option<f64> {
     let half = (HALF_SQUARES * places.step_px()?).min(HALF_PX).ceil();
     let corners: Vec<Point2<f64>> = places.iter().map(|(_, _, p)| *p).collect();
     let every = corners.len().div_ceil(CORNERS).max(1);
@@ -66,25 +67,44 @@ fn common_square(seen: &[(Point2<f64>, [f64; 2])]) -> f64 {
 }
 
 /// The shift between fields round a corner, px, and the control's; `None` without an edge across the rows.
-fn around<T: Copy + Into<f64>>(image: &Image<T>, corner: &Point2<f64>, half: f64) -> Option<[f64; 2]> {
+fn around<T: Copy + Into<i32>>(image: &Image<T>, corner: &Point2<f64>, half: f64) -> Option<[f64; 2]> {
     let range = |at: f64, size: usize| {
         let low = (at - half).max(1.0) as usize;
         low..((at + half).max(0.0) as usize).min(size.saturating_sub(2)).max(low)
     };
-    let at = |x: usize, y: usize| -> f64 { image.pixels[y * image.width + x].into() };
-    let (mut sums, mut weight, mut most) = ([0.0; 2], 0.0, 0.0f64);
-    for y in range(corner.y, image.height) {
-        let (fields, control) = (if y % 2 == 0 { 1.0 } else { -1.0 }, if y % 4 < 2 { 1.0 } else { -1.0 });
-        for x in range(corner.x, image.width) {
-            let slope = (at(x + 1, y - 1) - at(x - 1, y - 1) + at(x + 1, y + 1) - at(x - 1, y + 1)) / 4.0;
-            let differs = slope * (at(x, y) - (at(x, y - 1) + at(x, y + 1)) / 2.0);
-            sums[0] += fields * differs;
-            sums[1] += control * differs;
-            weight += slope * slope;
-            most = most.max(slope.abs());
-        }
+    let (columns, rows) = (range(corner.x, image.width), range(corner.y, image.height));
+    if columns.is_empty() || rows.is_empty() {
+        return None;
     }
-    (most > 0.0 && weight > 0.0).then(|| sums.map(|sum| -sum / weight))
+    let (mut sums, mut weight) = ([0i64; 2], 0);
+    for y in rows {
+        let line = |y: usize| &image.pixels[y * image.width..][columns.start - 1..columns.end + 1];
+        let [along, square] = widest(
+            #[inline(always)]
+            || line_sums([line(y - 1), line(y), line(y + 1)]),
+        );
+        sums[0] += if y % 2 == 0 { along } else { -along };
+        sums[1] += if y % 4 < 2 { along } else { -along };
+        weight += square;
+    }
+    // Differences are twice, slopes four times what they are called.
+    (weight > 0).then(|| sums.map(|sum| -2.0 * sum as f64 / weight as f64))
+}
+
+/// Over a line's pixels: the sum of the slope along the rows times what the line differs by from those above and below, and that of the
+/// slope's square. Whole numbers: slopes times four, differences times two.
+#[inline(always)]
+fn line_sums<T: Copy + Into<i32>>([above, here, below]: [&[T]; 3]) -> [i64; 2] {
+    let (mut along, mut square) = (0, 0);
+    let at = |line: &'_ [T], i: usize| -> i32 { line[i].into() };
+    let length = here.len().min(above.len()).min(below.len());
+    for i in 1..length.saturating_sub(1) {
+        let slope = at(above, i + 1) - at(above, i - 1) + at(below, i + 1) - at(below, i - 1);
+        let differs = 2 * at(here, i) - at(above, i) - at(below, i);
+        along += i64::from(slope) * i64::from(differs);
+        square += i64::from(slope) * i64::from(slope);
+    }
+    [along, square]
 }
 
 #[cfg(test)]
