@@ -33,8 +33,8 @@ pub struct SideBySide {
 impl SideBySide {
     /// Reads both; `None` where a picture can't be read.
     pub fn read(files: &PairFiles, mosaic: Option<Mosaic>) -> Option<SideBySide> {
-        let (left, left_level) = small(&files.left, mosaic)?;
-        let (right, right_level) = small(&files.right, mosaic)?;
+        let both = rayon::join(|| small(&files.left, mosaic), || small(&files.right, mosaic));
+        let ((left, left_level), (right, right_level)) = (both.0?, both.1?);
         let mut image = RgbImage::new(left.width() + right.width(), left.height().max(right.height()));
         image::imageops::replace(&mut image, &left, 0, 0);
         image::imageops::replace(&mut image, &right, i64::from(left.width()), 0);
