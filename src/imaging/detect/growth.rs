@@ -58,8 +58,8 @@ struct Near<'a> {
     candidates: &'a [Candidate],
     /// Cells in a row.
     columns: usize,
-    /// Row by row.
-    cells: Vec<Vec<usize>>,
+    /// Row by row; each candidate with its place, which is all that most questions are about.
+    cells: Vec<Vec<(Point2<f64>, usize)>>,
 }
 
 /// Side of a cell, px.
@@ -72,7 +72,7 @@ impl<'a> Near<'a> {
         let mut near = Near { picture, candidates, columns, cells: vec![Vec::new(); columns * rows] };
         for (i, c) in candidates.iter().enumerate() {
             let [x, y] = near.cell(&c.at);
-            near.cells[y * columns + x].push(i);
+            near.cells[y * columns + x].push((c.at, i));
         }
         near
     }
@@ -88,8 +88,8 @@ impl<'a> Near<'a> {
             (self.cell(&(at - Vector2::repeat(distance))), self.cell(&(at + Vector2::repeat(distance))));
         let mut found: Vec<(f64, usize)> = Vec::new();
         for y in top..=bottom {
-            for &i in self.cells[y * self.columns + left..=y * self.columns + right].iter().flatten() {
-                let d = (self.candidates[i].at - at).norm();
+            for &(place, i) in self.cells[y * self.columns + left..=y * self.columns + right].iter().flatten() {
+                let d = (place - at).norm();
                 if d <= distance && asked(d, i) {
                     found.push((d, i));
                 }
@@ -128,20 +128,20 @@ impl Near<'_> {
         // To where the squares on both sides certainly are, even on an oblique board: the way is 0.4 of an edge.
         let aside = Vector2::new(-way.y, way.x) * 0.4;
         let samples = (way.norm().ceil() as usize).clamp(2, 32);
-        let sum: f64 = (0..samples)
+        let sum: i32 = (0..samples)
             .map(|k| {
                 let p = from + way * ((k as f64 + 0.5) / samples as f64);
                 self.grey(p + aside) - self.grey(p - aside)
             })
             .sum();
-        sum / samples as f64
+        f64::from(sum) / samples as f64
     }
 
-    fn grey(&self, p: Point2<f64>) -> f64 {
+    fn grey(&self, p: Point2<f64>) -> i32 {
         // Rounded to the nearest pixel; what is left of the first one is cut off to it.
         let inside = |v: f64, size: usize| ((v + 0.5) as i32).clamp(0, size as i32 - 1) as usize;
         let (x, y) = (inside(p.x, self.picture.width), inside(p.y, self.picture.height));
-        f64::from(self.picture.pixels[y * self.picture.width + x])
+        i32::from(self.picture.pixels[y * self.picture.width + x])
     }
 }
 
