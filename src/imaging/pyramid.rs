@@ -189,6 +189,24 @@ mod tests {
     }
 
     #[test]
+    fn every_factor_gives_means() {
+        let (width, height) = (97, 41);
+        let grey = |x: usize, y: usize| (x * x * 7 + y * 13 + x * y * 3) % 251;
+        let pixels = (0..width * height).map(|k| grey(k % width, k / width) as u8).collect();
+        let picture = Picture::from(Image { width, height, pixels });
+        for factor in 1..=9 {
+            let copy = Level::Reduced(factor).copy(&picture);
+            assert_eq!((copy.width, copy.height), (width / factor, height / factor));
+            for (k, &pixel) in copy.pixels.iter().enumerate() {
+                let (x, y) = (factor * (k % copy.width), factor * (k / copy.width));
+                let sum: usize = (0..factor * factor).map(|i| grey(x + i % factor, y + i / factor)).sum();
+                let mean = sum as f64 / (factor * factor) as f64;
+                assert!((f64::from(pixel) - mean).abs() <= 0.5 + 1e-9, "{factor}: {pixel} {mean}");
+            }
+        }
+    }
+
+    #[test]
     fn one_hot_pixel_does_not_flatten_a_picture() {
         let mut pixels: Vec<u16> = (0..10_000).map(|k| if k % 2 == 0 { 1000 } else { 3000 }).collect();
         pixels[5000] = 65_535;

@@ -67,7 +67,7 @@ pub(super) fn candidates(picture: &Grey8) -> Vec<Candidate> {
     let side = w.max(h).div_ceil(TILES).max(8 * LEAST_DISTANCE_PX);
     let columns = w.div_ceil(side);
     let mut tiles: Vec<Vec<Candidate>> = vec![Vec::new(); columns * h.div_ceil(side)];
-    // As a whole number: of a response only the whole part is there.
+    // A whole number, as responses are; those at the border, zero, are below it.
     let least = (LEAST_SHAPE * least_contrast).floor() as i16;
     for y in REACH..h - REACH {
         for (run, here) in response[y * w..(y + 1) * w].chunks(RUN).enumerate().filter(|(_, run)| any_above(run, least))
