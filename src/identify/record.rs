@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::data::dataset::{Dataset, Kind, Skipped};
-use super::data::doctor::Finding;
+use super::data::doctor::{self, Finding};
 use super::data::sessions::{Along, Session};
 use super::judge::choose::{Candidate, Identification};
 use super::judge::climb::Judged;
@@ -314,6 +314,14 @@ impl Record {
             .unwrap_or_default();
         if !at_bound.is_empty() {
             list.push(format!("{} ended at the wall of the box and would have gone on", at_bound.join(", ")));
+        }
+        let zero_mm = chosen.and_then(|(f, _)| f.zero_sigma_mm()).unwrap_or(0.0);
+        let promised_mm = self.expected.as_ref().map_or(f64::INFINITY, |e| e.of_robot_mm);
+        if zero_mm > promised_mm && doctor::zero(found).is_none() {
+            list.push(format!(
+                "the distances are too much alike to tell a zero of the readings that is off from a robot of another size: the data know \
+                 it to {zero_mm:.2} mm only; measure at distances that differ, or set `wire_offset = false` where the zero is right"
+            ));
         }
         for finding in &self.doctor {
             list.push(finding.sentence());

@@ -189,9 +189,9 @@ fn to_center(fields: &[String], center: &mut [f64; 3], zero_mm: f64) -> Vec<Stri
 }
 
 #[test]
-fn distances_whose_zero_is_off_are_said_to_be_and_verified_as_they_were_read() {
+fn distances_on_one_sphere_leave_their_zero_open_and_are_verified_as_they_were_read() {
     let folder = simulated();
-    for zero_mm in [0.0, 0.5] {
+    for zero_mm in [0.0, 0.5, 5.0] {
         let center = std::cell::Cell::new([0.0; 3]);
         let distances = |i: usize, fields: Vec<String>| {
             if i == 0 {
@@ -204,10 +204,10 @@ fn distances_whose_zero_is_off_are_said_to_be_and_verified_as_they_were_read() {
             row
         };
         let record = identified(folder.path(), distances);
-        let said = record["doctor"].to_string();
-        assert_eq!(said.contains("the zero of the readings is off"), zero_mm > 0.0, "{said}");
-        let verify = mean(&record["methods"][0]);
-        assert!(if zero_mm > 0.0 { (verify - zero_mm).abs() < 0.1 } else { verify < 0.1 }, "{verify}");
+        let said = record["doctor"].to_string() + &record["warnings"].to_string();
+        let (off, open) = ("the zero of the readings is off", "too much alike to tell a zero");
+        // On spheres of one radius a robot of another size has such a zero, as long as no workshop gets it so wrong.
+        assert!(said.contains(if zero_mm > 1.0 { off } else { open }), "{zero_mm}: {said}");
         assert_verified(folder.path(), &record);
     }
 }

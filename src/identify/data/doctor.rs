@@ -161,7 +161,7 @@ fn rounded(length_mm: f64) -> f64 {
 const ZERO_SIGMAS: f64 = 4.0;
 
 /// The zero of distances to a centre and its standard deviation, mm, where it is off.
-fn zero(found: &Identification) -> Option<(f64, f64)> {
+pub fn zero(found: &Identification) -> Option<(f64, f64)> {
     let k = found.extras.iter().position(|(extra, _)| *extra == Extra::Zero)?;
     let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
     let at = formulation.base.rank() + k;

@@ -136,7 +136,9 @@ pub fn identify(
     }
     let methods = settings.method.map_or(Method::ALL.to_vec(), |m| vec![m]);
     let fitted_terms = if terms == Terms::NOMINAL { Terms::default() } else { terms };
-    session.take_smooth_error(by_points, &fitted_terms)?;
+    if matches!(model, Model::Position | Model::Pose) {
+        session.smooth = session.smooth_error(by_points, &fitted_terms)?;
+    }
     let mut candidates = session.run_methods(model, fitted_terms, &methods)?;
     let held_out = |t: &Terms| judged.iter().find(|j| j.terms == t.name()).and_then(|j| j.held_out_mm);
     let nominal_held_out_mm = held_out(&Terms::NOMINAL);
@@ -279,16 +281,13 @@ impl Session<'_> {
         rich.into_iter().find(|t| self.tells(t, times)).unwrap_or(poorer(Chain::Tool))
     }
 
-    /// Takes a smooth error that the points of each placement share, where they tell of one. It comes after the terms: what the robot
+    /// A smooth error that the points of each placement share, where they tell of one. It comes after the terms: what the robot
     /// does wrong is as smooth, and a robot that is corrected is worth more than one about which less is certain.
-    fn take_smooth_error(&mut self, model: Model, terms: &Terms) -> Result<(), Error> {
-        if self.set.kind == Kind::Positions {
-            let parameters = terms.parameters(self.robot);
-            let at = Formulation::new(&self.task(&parameters, model))?;
-            let sds = at.tolerance.standard_deviations(&parameters, &self.extras);
-            self.smooth = smooth::most_probable(&at.rows, &at.offsets_of(), &sds);
-        }
-        Ok(())
+    fn smooth_error(&self, model: Model, terms: &Terms) -> Result<Option<smooth::Told>, Error> {
+        let parameters = terms.parameters(self.robot);
+        let at = Formulation::new(&self.task(&parameters, model))?;
+        let sds = at.tolerance.standard_deviations(&parameters, &self.extras);
+        Ok(smooth::most_probable(&at.rows, &at.offsets_of(), &sds))
     }
 
     /// Leaves out the rows that a robust fit gives no weight, and names them; and the verify rows that are as far off.

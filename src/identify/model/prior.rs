@@ -30,6 +30,10 @@ const TARGET_TURN_MRAD: f64 = 3000.0;
 /// Number of kinds.
 const KINDS: usize = 8;
 
+/// Index of the kind of zeros, and standard deviations that the search starts from, mm.
+const ZERO: usize = 6;
+const ZERO_STARTS: [f64; 4] = [0.03, 0.3, 1.0, 3.0];
+
 /// Standard deviations by kind.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Tolerance {
@@ -256,19 +260,28 @@ fn presence(parameters: &[Parameter], extras: &[Extra]) -> [bool; KINDS] {
 fn best_of_grid(parameters: &[Parameter], extras: &[Extra], score: &dyn Fn(&Tolerance) -> f64) -> (Tolerance, f64) {
     let present = presence(parameters, extras);
     let start = Tolerance { lengths_mm: 1.0, angles_mrad: 1.0, target_mm: 10.0, ..Tolerance::default() };
-    let mut best = (start, score(&start));
-    for _ in 0..ROUNDS {
-        for kind in (0..KINDS).filter(|&k| present[k]) {
-            for &value in GRID.iter().filter(|v| **v <= LARGEST[kind]) {
-                let trial = best.0.with(kind, value);
-                let score = score(&trial);
-                if score > best.1 {
-                    best = (trial, score);
+    let from = |start: Tolerance| {
+        let mut best = (start, score(&start));
+        for _ in 0..ROUNDS {
+            for kind in (0..KINDS).filter(|&k| present[k]) {
+                for &value in GRID.iter().filter(|v| **v <= LARGEST[kind]) {
+                    let trial = best.0.with(kind, value);
+                    let score = score(&trial);
+                    if score > best.1 {
+                        best = (trial, score);
+                    }
                 }
             }
         }
+        best
+    };
+    if !present[ZERO] {
+        return from(start);
     }
-    best
+    // A zero and the robot's size can look the same: what the one takes the other need not, and one kind after the other does not get from
+    // here to there.
+    let rest = |best: (Tolerance, f64), next: (Tolerance, f64)| if next.1 > best.1 { next } else { best };
+    ZERO_STARTS.iter().map(|&zero_mm| from(Tolerance { zero_mm, lengths_mm: 0.3, ..start })).fold(from(start), rest)
 }
 
 /// [`evidence`] for unknowns that are independent before the data: of these standard deviations.

@@ -34,6 +34,9 @@ const NEAR_WALL: f64 = 0.95;
 /// The written robot is the fitted one when moving the levers' chain moves no parameter by more, mm or mrad.
 const SAME_CHAIN: f64 = 1e-11;
 
+/// Standard deviation of a zero about which nothing is known, mm: far above any instrument's.
+const NO_ZERO_MM: f64 = 10.0;
+
 /// Everything the solvers share.
 #[derive(Debug, Clone)]
 pub struct Formulation {
@@ -193,8 +196,19 @@ impl Formulation {
     /// Covariance of the unknowns (base parameters, extras), mm and mrad: data and prior together, the data's part as much larger as
     /// errors that rows share make it.
     pub fn covariance(&self) -> DMatrix<f64> {
+        self.covariance_with(&self.most)
+    }
+
+    /// What the data alone know the zero of distances to a centre to, mm; `None` where it is no unknown.
+    pub fn zero_sigma_mm(&self) -> Option<f64> {
+        let k = self.base.rank() + self.rows.extras.iter().position(|e| *e == Extra::Zero)?;
+        let untold = Tolerance { zero_mm: NO_ZERO_MM, ..self.most };
+        Some(self.covariance_with(&untold)[(k, k)].max(0.0).sqrt())
+    }
+
+    fn covariance_with(&self, tolerance: &Tolerance) -> DMatrix<f64> {
         let free = vec![f64::INFINITY; self.free_fit.x.len()];
-        let prior = self.prior(&self.most, &self.rows.extras);
+        let prior = self.prior(tolerance, &self.rows.extras);
         let fit = Fit::new(Cow::Borrowed(&self.rows), &self.base, self.spread(), &free, prior.clone());
         let (_, jacobian) = fit.white(&self.free_fit.x);
         let data = product(&jacobian, &jacobian);

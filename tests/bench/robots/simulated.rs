@@ -82,7 +82,9 @@ fn outcome(nominal: &Robot, plan: Plan, seed: u64) -> Option<Outcome> {
     let set = Dataset::new(&rows, 1).expect("rows");
     let found = identify(&set, &nominal, &settings, 1, &|_| {}).ok()?;
     let robot = &found.candidates[found.chosen].robot;
-    let errors_mm = [&nominal, robot].map(|robot| against_truth(&set, &truth, robot));
+    // As with all methods, where the verify rows may keep the nominal robot.
+    let kept = if found.worse_than_nominal(&set, &nominal, &settings) { &nominal } else { robot };
+    let errors_mm = [&nominal, kept].map(|robot| against_truth(&set, &truth, robot));
     let mut outcome = Outcome { errors_mm, ..Outcome::default() };
     if let Some((formulation, _)) = &found.candidates[found.chosen].found {
         let expected = Expected::new(formulation, &set, &found.fitted);
