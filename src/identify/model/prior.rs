@@ -284,7 +284,8 @@ fn best_of_grid(parameters: &[Parameter], extras: &[Extra], score: &dyn Fn(&Tole
     ZERO_STARTS.iter().map(|&zero_mm| from(Tolerance { zero_mm, lengths_mm: 0.3, ..start })).fold(from(start), rest)
 }
 
-/// [`evidence`] for unknowns that are independent before the data: of these standard deviations.
+/// Logarithm of the data's probability up to what the prior does not touch, for unknowns that are independent before the data: of these
+/// standard deviations. `normal` and `gradient` as in [`Linearised`].
 pub fn evidence_of_all(sds: &[f64], normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
     let n = sds.len();
     let inner = DMatrix::from_fn(n, n, |r, c| sds[r] * sds[c] * normal[(r, c)] + if r == c { 1.0 } else { 0.0 });
