@@ -174,10 +174,7 @@ fn verify_says_of_the_written_robot_what_identify_said() {
 fn to_center(fields: &[String], center: &mut [f64; 3], zero_mm: f64) -> Vec<String> {
     let role = fields.iter().position(|f| f == "center" || f == "sample" || f == "verify").expect("a role");
     let mut row = fields[..=role + 6].to_vec();
-    let Ok(point) = fields[role + 7..role + 10].iter().map(|f| f.parse::<f64>()).collect::<Result<Vec<f64>, _>>()
-    else {
-        unreachable!("three coordinates")
-    };
+    let point: Vec<f64> = fields[role + 7..role + 10].iter().map(|f| f.parse().expect("a coordinate")).collect();
     if row[role] == "center" {
         center.copy_from_slice(&point);
         row.push(String::new());

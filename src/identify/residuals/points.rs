@@ -25,7 +25,7 @@ pub struct Points {
     /// Which of the extra unknowns turn the target: index and axis.
     pub target: Vec<(usize, usize)>,
     /// The smooth error that they share.
-    pub field: Option<Field>,
+    pub field: Option<Box<Field>>,
 }
 
 impl Points {

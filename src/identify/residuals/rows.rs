@@ -379,7 +379,7 @@ impl Inputs<'_> {
             points.field = scatter.smooth.map(|error| {
                 let white = |s: &Spot| (s.point_mm, scatter.whitener(&s.covariance_mm2) * s.weight);
                 let spots: Vec<_> = points.spots.iter().map(white).collect();
-                Field::new(&spots, points.rows_a_spot(), error)
+                Box::new(Field::new(&spots, points.rows_a_spot(), error))
             });
             Block::Points(points)
         };
