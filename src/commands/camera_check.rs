@@ -53,7 +53,10 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let file = CameraCheckFile::new(&calibration, &judged);
     let pictures = pictures(args, &calibration, &judged);
     let page = report::camera_check::page(&calibration, &judged, &corners, &pictures)?;
-    out.write_json("calibration.json", &CalibrationFile::from(calibration.rig()).with_noise(&calibration.own_noise))?;
+    out.write_json(
+        "calibration.json",
+        &CalibrationFile::from(calibration.rig()).with_check(&calibration.own_noise, judged.coverage.corner_depths_mm),
+    )?;
     if !out.is_input("corners.csv") {
         out.write("corners.csv", corners_csv::to_csv(&calibration.mark(&corners)).as_bytes())?;
     }

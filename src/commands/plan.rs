@@ -9,7 +9,7 @@ use crate::config::{self, Config};
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::calibration;
+use crate::formats::calibration::{self, Calibrated};
 use crate::formats::plan::{PlanFile, poses_csv};
 use crate::measurements::{self, Measurement};
 use crate::plan::scene::Scene;
@@ -36,7 +36,7 @@ const PROGRAM: &str = "stereocal_plan";
 pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let out = args.output.out.clone().unwrap_or_else(|| config.out.clone());
     let rig_file = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
-    let (rig, noise) = calibration::read_with_noise(&rig_file)?;
+    let Calibrated { rig, noise, .. } = calibration::read_with_check(&rig_file)?;
     let robot_file = robot_file(args.robot.as_deref());
     let robot = match &robot_file {
         Some(path) => robot::file::read(path)?,

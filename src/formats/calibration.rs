@@ -30,6 +30,27 @@ pub struct CalibrationFile {
     /// How corners scattered at the calibration: what pictures that the rig measures later are compared with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     corner_noise: Option<NoiseRecord>,
+    /// Where the boards stood: what the rig was checked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    boards: Option<BoardsRecord>,
+}
+
+/// Distances of the boards' corners from the left camera along its axis.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct BoardsRecord {
+    nearest_mm: f64,
+    farthest_mm: f64,
+}
+
+/// A rig and what its calibration says beside it; files made elsewhere do not say that.
+#[derive(Debug, Clone)]
+pub struct Calibrated {
+    /// The rig.
+    pub rig: Rig,
+    /// How corners scattered.
+    pub noise: Option<Noise>,
+    /// Nearest and farthest corner of a board, along the left camera's axis, mm.
+    pub depths_mm: Option<[f64; 2]>,
 }
 
 /// `factor` times the covariance that the refinement gives a corner, plus the square of `added_px` on both axes.
@@ -115,15 +136,22 @@ impl From<&Rig> for CalibrationFile {
                 matrix: c.matrix.row_iter().map(|row| row.iter().copied().collect()).collect(),
             }),
             corner_noise: None,
+            boards: None,
         }
     }
 }
 
 impl CalibrationFile {
-    /// The same with how corners scattered.
-    pub fn with_noise(mut self, noise: &Noise) -> CalibrationFile {
+    /// The same with how corners scattered, and between which depths the boards' corners were.
+    pub fn with_check(mut self, noise: &Noise, [nearest_mm, farthest_mm]: [f64; 2]) -> CalibrationFile {
         self.corner_noise = Some(NoiseRecord { factor: noise.factor, added_px: noise.added_px });
+        self.boards = Some(BoardsRecord { nearest_mm, farthest_mm });
         self
+    }
+
+    fn depths_mm(&self) -> Option<[f64; 2]> {
+        let depths = self.boards.map(|b| [b.nearest_mm, b.farthest_mm])?;
+        (depths[0] > 0.0 && depths[1] >= depths[0]).then_some(depths)
     }
 
     fn noise(&self) -> Option<Noise> {
@@ -186,19 +214,19 @@ pub fn file(named: Option<&Utf8Path>, out: &OutDir) -> Result<Utf8PathBuf> {
 
 /// Reads `calibration.json`, or one of the formats that [`crate::formats::export`] writes.
 pub fn read(path: &Utf8Path) -> Result<Rig> {
-    Ok(read_with_noise(path)?.0)
+    Ok(read_with_check(path)?.rig)
 }
 
-/// The same with how corners scattered at the calibration; files made elsewhere do not say that.
-pub fn read_with_noise(path: &Utf8Path) -> Result<(Rig, Option<Noise>)> {
+/// The same with what the calibration says beside the rig.
+pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
     const WHAT: &str = "the stereo calibration";
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
     let text = files::read_text(path, WHAT, Some(hint))?;
-    let (rig, noise) = match export::read(path, &text) {
-        Some(rig) => (rig, None),
+    let (rig, noise, depths_mm) = match export::read(path, &text) {
+        Some(rig) => (rig, None, None),
         None => {
             let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
-            (file.rig(), file.noise())
+            (file.rig(), file.noise(), file.depths_mm())
         }
     };
     let rig = rig.map_err(|message| files::Error::Format {
@@ -206,7 +234,7 @@ pub fn read_with_noise(path: &Utf8Path) -> Result<(Rig, Option<Noise>)> {
         place: Place { path: path.to_owned(), line: None },
         hint: None,
     })?;
-    Ok((rig, noise))
+    Ok(Calibrated { rig, noise, depths_mm })
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use crate::stereo::Rig;
 use crate::stereo::target::TargetPose;
 use crate::stereo::target::finish::{Shape, Shared};
 use crate::stereo::target::rig_change::judgement::Judgement;
-use crate::stereo::target::series::{MeasuredPose, Series};
+use crate::stereo::target::series::{Knowledge, MeasuredPose, Series};
 
 /// Columns behind the joints.
 const COLUMNS: &str = "x_mm,y_mm,z_mm,sxx_mm2,sxy_mm2,sxz_mm2,syy_mm2,syz_mm2,szz_mm2,rx_rad,ry_rad,rz_rad,fit_rms_mm,corners,status,\
@@ -141,7 +141,8 @@ struct SensitivityRecord {
 
 impl MeasureFile {
     /// Gathers the figures.
-    pub fn new(series: &Series, corners: &Corners, board: &Board, rig: &Rig) -> MeasureFile {
+    pub fn new(series: &Series, corners: &Corners, known: &Knowledge) -> MeasureFile {
+        let (board, rig) = (&known.board, &known.rig);
         let targets: Vec<&TargetPose> = series.poses.iter().filter_map(|m| m.target.as_ref().ok()).collect();
         let rms = |of: fn(&TargetPose) -> f64| {
             let squares: Vec<f64> = targets.iter().map(|t| of(t) * of(t)).collect();
@@ -154,6 +155,7 @@ impl MeasureFile {
         let mut warnings = corners.notes.clone();
         warnings.extend(series.notes.iter().cloned());
         warnings.extend(series.judgement.describe(rig, board.square_mm));
+        warnings.extend(unchecked_depths(series, known));
         warnings.extend(scatter(series));
         warnings.extend(grown(series));
         MeasureFile {
@@ -295,6 +297,29 @@ fn scatter(series: &Series) -> Option<String> {
     let (here, usual) = (series.noise_px?, series.usual_px?);
     (here > UNUSUAL_NOISE * usual).then(|| {
         format!("the corners scatter by {here:.4} px, {:.1} times as far as at the calibration ({usual:.4} px): out of focus, badly lit, or in motion", here / usual)
+    })
+}
+
+/// Poses much nearer or farther than the rig was checked for.
+fn unchecked_depths(series: &Series, known: &Knowledge) -> Option<String> {
+    /// Share of the depth by which a target may stand beyond the boards: what a lens does changes little over it.
+    const BEYOND: f64 = 0.25;
+    /// Poses that are named.
+    const NAMED: usize = 5;
+    let [near, far] = known.depths_mm?;
+    let unchecked = |m: &MeasuredPose| {
+        let depth = m.target.as_ref().ok()?.cam_from_board.translation.vector.z;
+        let beyond = depth < near * (1.0 - BEYOND) || depth > far * (1.0 + BEYOND);
+        beyond.then(|| format!("{} ({depth:.0} mm)", m.at.pose))
+    };
+    let poses: Vec<String> = series.poses.iter().filter_map(unchecked).collect();
+    let named = poses.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+    let more = if poses.len() > NAMED { format!(" and {} more", poses.len() - NAMED) } else { String::new() };
+    (!poses.is_empty()).then(|| {
+        format!(
+            "nearer or farther than the boards stood at the calibration ({near:.0} to {far:.0} mm), where the rig was not checked: \
+             {named}{more}; calibrate over the depth in which the target stands"
+        )
     })
 }
 

@@ -13,7 +13,7 @@ use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::calibration;
+use crate::formats::calibration::{self, Calibrated};
 use crate::formats::measure::{self, MeasureFile};
 use crate::imaging::input::cache::Cache;
 use crate::imaging::{Corners, PairCorners, Wanted, find_corners};
@@ -49,7 +49,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     corners.notes.iter().for_each(progress::note);
     known.rig.check_size(&corners)?;
     let series = series::measure(&known, seen(poses, &corners));
-    let file = MeasureFile::new(&series, &corners, &known.board, &known.rig);
+    let file = MeasureFile::new(&series, &corners, &known);
     say(&series, &file);
     let extras = extras::gather(&series, &corners, &args.poses, args.bayer)?;
     out.write("measurements.csv", measure::to_csv(&series.poses).as_bytes())?;
@@ -67,7 +67,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
 /// The rig, the target and what is known of both.
 fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Knowledge> {
     let board = config.target_board.board(args.squares, args.square_mm)?;
-    let (rig, noise) = calibration::read_with_noise(rig_file)?;
+    let Calibrated { rig, noise, depths_mm } = calibration::read_with_check(rig_file)?;
     if rig.covariance.is_none() {
         progress::warn(format!(
             "{rig_file} holds no covariance: the points' uncertainties leave out that of the calibration"
@@ -79,7 +79,7 @@ fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Kno
         ));
     }
     let (crossing_mm, tolerance_mm) = (config.measure.crossing_mm, config.tolerance_mm);
-    Ok(Knowledge { rig, noise, board, crossing_mm, tolerance_mm })
+    Ok(Knowledge { rig, noise, depths_mm, board, crossing_mm, tolerance_mm })
 }
 
 /// Every pose of the list with its corners, or why there are none.

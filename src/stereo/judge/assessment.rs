@@ -31,6 +31,8 @@ pub struct Judged {
     pub disagreements: Vec<Disagreement>,
     /// Lengths of the long range over the working volume.
     pub volume: Volume,
+    /// How the boards are spread.
+    pub coverage: Coverage,
     /// What to photograph next, where the views are too few or too much alike.
     pub advice: Vec<String>,
     /// What else a person should know.
@@ -80,6 +82,7 @@ impl Judged {
             disagreements,
             volume,
             advice: coverage.advice(),
+            coverage,
             warnings,
         }
     }

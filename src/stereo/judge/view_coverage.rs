@@ -34,6 +34,8 @@ pub struct Coverage {
     pub tilts_deg: [f64; 2],
     /// Nearest and farthest board, mm.
     pub depths_mm: [f64; 2],
+    /// Nearest and farthest corner of a board, mm.
+    pub corner_depths_mm: [f64; 2],
     /// Share that corners reached of what each picture has in common with the other, left and right.
     pub field_shares: [f64; 2],
     /// Where most of each picture's empty cells lie.
@@ -54,6 +56,11 @@ impl Coverage {
         });
         let fields = [&residual_pattern.fields[0], &residual_pattern.fields[1]];
         let depths_mm = range(&mut poses.iter().map(|pose| pose.translation.vector.z));
+        let corners =
+            calibration.views.iter().zip(poses).flat_map(|(view, pose)| {
+                view.observations.iter().filter(|o| o.active).map(move |o| (pose * o.board_mm).z)
+            });
+        let corner_depths_mm = range(&mut { corners });
         let rig = calibration.rig();
         let from_right =
             range(&mut poses.iter().map(|pose| (rig.right_from_left * Point3::from(pose.translation.vector)).z));
@@ -70,7 +77,7 @@ impl Coverage {
             seen as f64 / common[side].iter().filter(|common| **common).count().max(1) as f64
         });
         let empty = [0, 1].map(|side| empty_region(fields[side], &common[side]));
-        Coverage { pairs: calibration.views.len(), tilts_deg, depths_mm, field_shares, empty }
+        Coverage { pairs: calibration.views.len(), tilts_deg, depths_mm, corner_depths_mm, field_shares, empty }
     }
 
     /// What should be photographed next; empty where the views suffice.

@@ -75,6 +75,8 @@ pub struct Knowledge {
     pub rig: Rig,
     /// How its corners scattered, where that is known.
     pub noise: Option<Noise>,
+    /// Nearest and farthest corner of a board at the calibration, along the left camera's axis, mm, where that is known.
+    pub depths_mm: Option<[f64; 2]>,
     /// The target as drawn.
     pub board: Board,
     /// Standard deviation of a crossing against the drawing, by the certificate, mm.

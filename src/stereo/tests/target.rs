@@ -22,8 +22,14 @@ fn run_of(corners: crate::imaging::Corners) -> Vec<Seen> {
 fn the_targets_scatter_is_the_predicted_one() {
     let mut world = World::new(60, 23);
     world.board = crate::imaging::Board { squares: "7x6".parse().unwrap(), square_mm: 10.0 };
-    let known =
-        Knowledge { rig: world.rig.clone(), noise: None, board: world.board, crossing_mm: 0.01, tolerance_mm: 0.05 };
+    let known = Knowledge {
+        rig: world.rig.clone(),
+        noise: None,
+        depths_mm: None,
+        board: world.board,
+        crossing_mm: 0.01,
+        tolerance_mm: 0.05,
+    };
     let mut sums = Vector6::<f64>::zeros();
     let measured = series::measure(&known, run_of(world.corners(24)));
     for (pose, truth) in measured.poses.iter().zip(&world.poses) {
@@ -49,7 +55,8 @@ fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
     let corners = world.corners(30);
     let judged = |rig: &crate::stereo::Rig, square_mm: f64| {
         let board = crate::imaging::Board { square_mm, ..world.board };
-        let known = Knowledge { rig: rig.clone(), noise: None, board, crossing_mm: 0.01, tolerance_mm: 0.05 };
+        let known =
+            Knowledge { rig: rig.clone(), noise: None, depths_mm: None, board, crossing_mm: 0.01, tolerance_mm: 0.05 };
         let judgement = series::measure(&known, run_of(corners.clone())).judgement;
         judgement.describe(rig, square_mm).unwrap_or_default()
     };

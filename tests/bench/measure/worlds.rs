@@ -28,6 +28,7 @@ pub fn knowledge(world: &World) -> Knowledge {
     Knowledge {
         rig: found.rig().clone(),
         noise: Some(found.own_noise),
+        depths_mm: None,
         board: world.target.drawing,
         crossing_mm: 0.01,
         tolerance_mm: 0.05,
