@@ -164,7 +164,11 @@ fn write(
     let center = set.poses.iter().find(|p| p.role == Role::Center).or(set.poses.first());
     let arm = center.map_or_else(Vec::new, |p| nominal.skeleton_mm(&p.joints_rad));
     let page = report::identify::page(set, record, &places, &arm, &errors(nominal), &errors(identified))?;
-    out.write_toml("identified.toml", &robot::file::to_toml(identified))?;
+    let holds = record.expected.as_ref().map_or_else(
+        || "The nominal robot was kept.".to_owned(),
+        |expected| format!("Identified; {}; it holds within {}.", expected.sentence(), expected.poses),
+    );
+    out.write_toml("identified.toml", &format!("# {holds}\n{}", robot::file::to_toml(identified)))?;
     let json = out.write_json("identification.json", record)?;
     out.write("identify.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
     Ok(json)

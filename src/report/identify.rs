@@ -10,6 +10,7 @@ use super::page::{self, Tone};
 use super::table::{Table, number};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::{RowError, Spread};
+use crate::identify::model::uncertainty::Expected;
 use crate::identify::record::{MethodRecord, PointSpread, Record};
 use crate::identify::solve::swarm::halton;
 use crate::measurements::Role;
@@ -39,6 +40,9 @@ pub fn summary(record: &Record) -> String {
             number(before.mean_abs_mm, 4),
             number(after.mean_abs_mm, 4)
         ));
+    }
+    if let Some(expected) = &record.expected {
+        text.push_str(&format!("{}\n", expected.sentence()));
     }
     text
 }
@@ -95,6 +99,11 @@ pub fn page(
         (verification_figure(before, after)?)
         (verification_table(record))
         (worst_table(set, before, after))
+        @if let Some(expected) = &record.expected {
+            h2 { "How far to trust it" }
+            (expected_table(expected))
+            (expected_map(expected, places)?)
+        }
         h2 { "Parameters" }
         p { "Table 2 of the paper: the corrected parameters of each link and joint; alpha and a of link j - 1, theta and d of joint j." }
         (joint_table(record))
@@ -202,6 +211,46 @@ fn verification_table(record: &Record) -> Markup {
         p { "Table 3 of the paper, for every method and model. Methods that differ by less than their scatter have found the same robot." }
         (page::table(&["distances, mm", "mean", "std", "max", "min", "better by", "point mean", "point max"], &rows))
     }
+}
+
+fn expected_table(expected: &Expected) -> Markup {
+    let row = |what: &str, mm: f64| vec![what.to_owned(), number(Some(mm), 4)];
+    html! {
+        p { "The position error to expect of the identified robot at poses like these, after one rigid fit to each placement, from the \
+             covariance of the parameters and what is left of the residuals. It holds within " (expected.poses)
+            "; beyond, the corrections hold only as far as the model is right." }
+        (page::table(&["error to expect", "mm"], &[
+            row("mean", expected.mean_mm),
+            row("95 of 100 errors are below", expected.p95_mm),
+            row("mean at the worst pose", expected.max_mm),
+            row("of the mean: parameters and placement", expected.of_robot_mm),
+            row("of the mean: scatter of the rows", expected.scatter_mm),
+        ]))
+    }
+}
+
+/// The poses by thirds of the error to expect, from above and from the side.
+fn expected_map(expected: &Expected, places: &[(Role, Point3<f64>)]) -> Result<Markup> {
+    let mut errors: Vec<f64> = expected.map.iter().map(|(_, mm)| *mm).collect();
+    errors.sort_by(f64::total_cmp);
+    let third = |k: usize| errors.get(k * errors.len() / 3).copied().unwrap_or(0.0);
+    let limits = [(third(0), third(1)), (third(1), third(2)), (third(2), f64::INFINITY)];
+    let view = |title: &str, vertical: &str, axes: (usize, usize)| {
+        let mut plot = Plot::new(title, "x, mm", vertical).equal_axes();
+        for (low, high) in limits {
+            let within = expected.map.iter().zip(places).filter(|((_, mm), _)| *mm >= low && *mm < high);
+            let points: Vec<(f64, f64)> = within.map(|(_, (_, p))| (p[axes.0], p[axes.1])).collect();
+            let label =
+                if high.is_finite() { format!("{low:.4} to {high:.4} mm") } else { format!("{low:.4} mm and more") };
+            plot = plot.points(&label, &points);
+        }
+        plot.svg()
+    };
+    let caption = "The error to expect at the poses of the file, base frame, a third of them each. Where it is largest more poses tell most.";
+    Ok(html! { div.side {
+        (page::figure(&view("Error to expect, from above", "y, mm", (0, 1))?, caption))
+        (page::figure(&view("Error to expect, from the side", "z, mm", (0, 2))?, "The same from the side."))
+    } })
 }
 
 fn parameter_table(record: &Record) -> Markup {

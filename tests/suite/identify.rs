@@ -168,6 +168,13 @@ fn verify_says_of_the_written_robot_what_identify_said() {
         record["doctor"]
     );
     assert_verified(folder.path(), &record);
+    // The robot file, the page and the record say how far to trust it, and where.
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).expect("it was written");
+    let figure = |name: &str| format!("{:.4}", record["expected"][name].as_f64().expect("a number"));
+    for text in [read("identified.toml"), read("identify.html")] {
+        let all = ["mean_mm", "p95_mm", "max_mm"].iter().all(|name| text.contains(&figure(name)));
+        assert!(all && text.contains(record["expected"]["poses"].as_str().expect("a region")), "{text:.2000}");
+    }
 }
 
 /// The row with its distance to the group's centre in place of its point, too long by the zero.

@@ -112,6 +112,16 @@ impl Expected {
     }
 }
 
+impl Expected {
+    /// What it comes to.
+    pub fn sentence(&self) -> String {
+        format!(
+            "position error to expect after a rigid fit: {:.4} mm in the mean, {:.4} mm at the worst pose, 95 of 100 below {:.4} mm",
+            self.mean_mm, self.max_mm, self.p95_mm
+        )
+    }
+}
+
 /// How a small rigid motion (turn, shift) moves a point.
 fn rigid(point: &Vector3<f64>) -> DMatrix<f64> {
     let mut motion = DMatrix::zeros(3, 6);
