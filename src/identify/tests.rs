@@ -278,3 +278,28 @@ fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain()
         assert!(of_robot_mm > 1.5 * clean_mm, "{size_mm}: {of_robot_mm} against {clean_mm}");
     }
 }
+
+#[test]
+fn a_group_whose_covariances_are_off_is_named_and_others_are_not() {
+    use crate::measurements::Observed;
+    let world = synthetic::world(80, NOISE_MM, 4);
+    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+    for factor in [0.1, 1.0, 10.0] {
+        let mut rows = world.rows.clone();
+        for row in &mut rows {
+            let sd_mm = if row.at.group == "g1" { factor * NOISE_MM } else { NOISE_MM };
+            if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
+                *covariance_mm2 = Some(nalgebra::Matrix3::identity() * sd_mm * sd_mm);
+            }
+        }
+        let set = Dataset::new(&rows, 1).unwrap();
+        let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
+        let findings = crate::identify::data::doctor::findings(&set, &found, &Default::default());
+        let named: Vec<&str> =
+            findings.iter().map(|f| f.finding.as_str()).filter(|f| f.contains("covariances of group")).collect();
+        assert_eq!(named.len(), usize::from(factor != 1.0), "{factor}: {findings:?}");
+        assert!(
+            named.iter().all(|n| n.contains("group g1") && n.contains(if factor < 1.0 { "small" } else { "large" }))
+        );
+    }
+}

@@ -18,7 +18,7 @@ use crate::worlds::{Plan, arms, measured};
 type Plant = fn(&mut Vec<Measurement>, &mut Robot, f64);
 
 /// Faults, their sizes, and a word of the sentence that names each.
-const FAULTS: [(&str, &[f64], Plant, &str); 24] = [
+const FAULTS: [(&str, &[f64], Plant, &str); 26] = [
     ("clean", &[0.0], |_, _, _| {}, ""),
     ("radians", &[0.0], |rows, _, _| joints(rows, |_, j| j.iter_mut().for_each(|q| *q = q.to_radians())), "radians"),
     ("metres", &[0.0], |rows, _, _| points(rows, |_, p| p.coords /= 1000.0), "are in m,"),
@@ -60,6 +60,8 @@ const FAULTS: [(&str, &[f64], Plant, &str); 24] = [
     ("placements off by, mm", &[0.0, 0.03, 0.1, 0.5], |rows, _, by| placements(rows, by), "smooth error"),
     ("sigmas too large by", &[3.0, 10.0, 30.0], |rows, _, by| stated(rows, by), "too large"),
     ("sigmas too small by", &[3.0, 10.0, 30.0], |rows, _, by| stated(rows, 1.0 / by), "too small"),
+    ("a group's too small by", &[3.0, 10.0], |rows, _, by| of_group(rows, 1.0 / by), "of group"),
+    ("a group's too large by", &[3.0, 10.0], |rows, _, by| of_group(rows, by), "of group"),
     ("covariance of nought", &[0.0], |rows, _, _| stated(rows, 0.0), "no variance"),
     ("constant joint", &[0.0], |rows, _, _| joints(rows, |_, j| j[4] = 20.0), "same in all rows"),
     ("repeated poses", &[0.0], |rows, _, _| repeated(rows), "repeated"),
@@ -146,6 +148,17 @@ fn stated(rows: &mut [Measurement], factor: f64) {
     for row in rows {
         if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
             *covariance_mm2 = Some(Matrix3::identity() * sigma * sigma);
+        }
+    }
+}
+
+/// Four placements, of which one states covariances that are off by this factor of a standard deviation.
+fn of_group(rows: &mut [Measurement], factor: f64) {
+    placements(rows, 0.0);
+    stated(rows, 1.0);
+    for row in rows.iter_mut().filter(|row| row.at.group == "g2") {
+        if let Observed::Position { covariance_mm2: Some(covariance), .. } = &mut row.observed {
+            *covariance *= factor * factor;
         }
     }
 }
