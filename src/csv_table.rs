@@ -105,7 +105,8 @@ impl<'a> Table<'a> {
         self.header = header.iter().map(|name| unguarded(name).to_owned()).collect();
         for (i, name) in self.header.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
             if self.columns.insert(name.clone(), i).is_some() {
-                return Err(self.refuse(1, format!("two columns `{name}`")));
+                let hint = "a table begins with a line of column names, each of them once";
+                return Err(self.refuse_with(1, format!("two columns `{name}`"), Some(hint)));
             }
         }
         Ok(())

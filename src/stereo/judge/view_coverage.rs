@@ -56,11 +56,11 @@ impl Coverage {
         });
         let fields = [&residual_pattern.fields[0], &residual_pattern.fields[1]];
         let depths_mm = range(&mut poses.iter().map(|pose| pose.translation.vector.z));
-        let corners =
+        let mut corner_depths =
             calibration.views.iter().zip(poses).flat_map(|(view, pose)| {
                 view.observations.iter().filter(|o| o.active).map(move |o| (pose * o.board_mm).z)
             });
-        let corner_depths_mm = range(&mut { corners });
+        let corner_depths_mm = range(&mut corner_depths);
         let rig = calibration.rig();
         let from_right =
             range(&mut poses.iter().map(|pose| (rig.right_from_left * Point3::from(pose.translation.vector)).z));
