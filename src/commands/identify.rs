@@ -9,7 +9,7 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::{Digested, Provenance, Run};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::{doctor, examine, known, sessions, shared};
+use crate::identify::data::{covariances, doctor, examine, known, sessions, shared};
 use crate::identify::judge::choose::{Identification, identify, step_count};
 use crate::identify::record::{Record, quality};
 use crate::identify::{Error, Settings};
@@ -47,6 +47,11 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     };
     bar.begin("sessions along the rows");
     let (set, along) = sessions::find(&set, &nominal, &settings);
+    let (set, of_covariances) = match settings.examine {
+        true => covariances::examine(&set, &nominal, &settings),
+        false => (set, Vec::new()),
+    };
+    findings.extend(of_covariances);
     let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.begin(step))?;
     bar.finish_and_clear();
     findings.extend(doctor::findings(&set, &found, &along));

@@ -280,26 +280,25 @@ fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain()
 }
 
 #[test]
-fn a_group_whose_covariances_are_off_is_named_and_others_are_not() {
-    use crate::measurements::Observed;
-    let world = synthetic::world(80, NOISE_MM, 4);
+fn a_row_that_is_a_little_off_is_named_though_it_is_fitted_and_a_verify_row_too() {
+    use crate::measurements::{Observed, Role};
+    let world = synthetic::world(120, NOISE_MM, 6);
     let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
-    for factor in [0.1, 1.0, 10.0] {
+    let verify = world.rows.iter().position(|r| r.at.role == Role::Verify).unwrap();
+    for sigmas in [0.0, 6.5, 9.0, 100.0] {
         let mut rows = world.rows.clone();
-        for row in &mut rows {
-            let sd_mm = if row.at.group == "g1" { factor * NOISE_MM } else { NOISE_MM };
-            if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
-                *covariance_mm2 = Some(nalgebra::Matrix3::identity() * sd_mm * sd_mm);
+        for i in [40, verify] {
+            if let Observed::Position { point_mm, .. } = &mut rows[i].observed {
+                point_mm.x += sigmas * NOISE_MM;
             }
         }
         let set = Dataset::new(&rows, 1).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
-        let findings = crate::identify::data::doctor::findings(&set, &found, &Default::default());
-        let named: Vec<&str> =
-            findings.iter().map(|f| f.finding.as_str()).filter(|f| f.contains("covariances of group")).collect();
-        assert_eq!(named.len(), usize::from(factor != 1.0), "{factor}: {findings:?}");
-        assert!(
-            named.iter().all(|n| n.contains("group g1") && n.contains(if factor < 1.0 { "small" } else { "large" }))
-        );
+        let named = [&found.outliers, &found.doubtful].map(|list| list.as_slice()).concat();
+        assert_eq!(named, if sigmas > 0.0 { vec![40] } else { vec![] }, "{sigmas}");
+        assert!(sigmas < 8.0 || found.doubtful.is_empty(), "{sigmas}: fitted");
+        // What the others predict is uncertain too, so that near the limit of six either is right.
+        assert!(found.verify_outliers.iter().all(|r| *r == verify && sigmas > 6.0), "{sigmas}");
+        assert!(sigmas < 8.0 || found.verify_outliers == [verify], "{sigmas}");
     }
 }

@@ -6,10 +6,8 @@ use super::dataset::{Dataset, Reading};
 use super::sessions::{Along, Session};
 use crate::identify::judge::choose::Identification;
 use crate::identify::record::{Smooth, file_unit};
-use crate::identify::residuals::eliminate::Raw;
-use crate::identify::residuals::weights::{EVIDENCE, Extra};
+use crate::identify::residuals::weights::Extra;
 use crate::robot::Parameter;
-use crate::statistics::median;
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -62,11 +60,7 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "nothing was done; move it between poses",
         );
     }
-    let of_groups = covariances_of_groups(set, found);
-    for finding in &of_groups {
-        add(finding.clone(), Vec::new(), "nothing was done: its rows count for what the file says; mend the file");
-    }
-    if let Some(finding) = stated_covariances(set, found).filter(|_| of_groups.is_empty()) {
+    if let Some(finding) = stated_covariances(set, found) {
         add(finding, Vec::new(), "the fit weighs by what it found");
     }
     if set.groups.iter().any(|g| g.center.is_none())
@@ -89,7 +83,7 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "it was found with the robot and taken off there; the figures below, as those of `verify`, hold the distances as they were read",
         );
     }
-    if found.smooth.is_some_and(|told| told.evidence > EVIDENCE)
+    if found.smooth.is_some_and(|told| told.evidence > SMOOTH)
         && let Some(smooth) = Smooth::new(found)
     {
         add(
@@ -112,6 +106,16 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             },
             names(&found.outliers),
             "left out of the fit (`outlier_sigmas = 0` in [identify] keeps them)",
+        );
+    }
+    if !found.doubtful.is_empty() {
+        add(
+            match found.doubtful.len() {
+                1 => "1 row fits worse than the rest by more than chance allows".to_owned(),
+                count => format!("{count} rows fit worse than the rest by more than chance allows"),
+            },
+            names(&found.doubtful),
+            "fitted all the same; measure again",
         );
     }
     if !found.verify_outliers.is_empty() {
@@ -156,6 +160,9 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
     }
     list
 }
+
+/// Logarithm of the evidence from which on a smooth error is told of: of clean sets of four placements one in seventy has as much.
+const SMOOTH: f64 = 2.5;
 
 /// To one digit.
 fn rounded(length_mm: f64) -> f64 {
@@ -206,48 +213,8 @@ fn far_from_nominal(found: &Identification) -> Option<String> {
     (!list.is_empty()).then(|| format!("the links found are far from the nominal ones ({})", list.join(", ")))
 }
 
-/// Standard deviations of a group that are off by so many times are worth a sentence, and the numbers that it takes to see that.
-const GROUP_OFF: f64 = 2.0;
-const GROUP_NUMBERS: f64 = 15.0;
-
-/// Groups whose stated covariances do not go with their residuals as those of the other groups do. A group's residuals are as large as
-/// what it states and a scatter that all groups have; the scatter is the median of what the other groups leave over.
-fn covariances_of_groups(set: &Dataset, found: &Identification) -> Vec<String> {
-    let Some((formulation, _)) = found.candidates[found.chosen].found.as_ref() else { return Vec::new() };
-    // Of each group: numbers, the sum of their squares, the sum of their stated variances.
-    let mut sums = vec![[0.0; 3]; set.groups.len()];
-    for (row, _, raw) in formulation.rows.raw(&formulation.offsets_of()) {
-        let [numbers, squares, stated] = match raw {
-            Raw::Length(r, variance, _) => [1.0, r * r, variance],
-            Raw::Point(r, covariance) => [3.0, r.norm_squared(), covariance.trace()],
-            Raw::Turn(_) => continue,
-        };
-        let sum = &mut sums[set.poses[row].group];
-        *sum = [sum[0] + numbers, sum[1] + squares, sum[2] + stated];
-    }
-    let judged: Vec<(usize, f64, f64)> = (0..sums.len())
-        .filter(|&g| sums[g][0] >= GROUP_NUMBERS && sums[g][2] > 0.0)
-        .map(|g| (g, sums[g][1] / sums[g][0], sums[g][2] / sums[g][0]))
-        .collect();
-    let off = |&(group, seen, stated): &(usize, f64, f64)| {
-        let others = judged.iter().filter(|(g, ..)| *g != group).map(|(_, seen, stated)| seen - stated);
-        let scatter = median(others)?.max(0.0);
-        let ratio = (seen / (scatter + stated)).sqrt();
-        let (times, way) = if ratio > 1.0 { (ratio, "small") } else { (1.0 / ratio, "large") };
-        (times > GROUP_OFF).then(|| {
-            format!(
-                "the covariances of group {} are too {way} beside those of the other groups: its residuals are those of {times:.1} times {} \
-                 standard deviations",
-                set.groups[group].name,
-                if ratio > 1.0 { "larger" } else { "smaller" }
-            )
-        })
-    };
-    judged.iter().filter_map(off).collect()
-}
-
 /// Scatter over stated standard deviation beyond which it is worth a sentence.
-const FAR_ABOVE: f64 = 5.0;
+const FAR_ABOVE: f64 = 2.5;
 
 /// Scatter over stated standard deviation below which the stated one is worth a sentence.
 const FAR_BELOW: f64 = 0.8;
@@ -284,9 +251,10 @@ fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
     let ratio = scatter.point_mm / stated_mm.max(1e-9);
     (ratio > FAR_ABOVE).then(|| {
         format!(
-            "the rows scatter by {:.4} mm a coordinate, {ratio:.0} times what the rows' own covariances say ({stated_mm:.4} mm, without \
+            "the rows scatter by {0:.4} mm a coordinate, {ratio:.1$} times what the rows' own covariances say ({stated_mm:.4} mm, without \
              what all rows share): the robot's repeatability and what the model lacks, or covariances that are too small",
-            scatter.point_mm
+            scatter.point_mm,
+            if ratio < 10.0 { 1 } else { 0 },
         )
     })
 }

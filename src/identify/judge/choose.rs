@@ -52,7 +52,9 @@ pub struct Identification {
     pub judged: Vec<Judged>,
     /// Rows that were left out because they fit far worse than the rest.
     pub outliers: Vec<usize>,
-    /// Verify rows that are as far off; they are still counted.
+    /// Rows that were fitted and are further off than chance allows.
+    pub doubtful: Vec<usize>,
+    /// Verify rows that are as far off as those left out; they are still counted.
     pub verify_outliers: Vec<usize>,
     /// Rows that were fitted.
     pub fitted: Vec<usize>,
@@ -64,6 +66,17 @@ pub struct Identification {
     pub extras: Vec<(Extra, f64)>,
     /// Whether the nominal robot was kept because the verify rows found the other one worse.
     pub vetoed: bool,
+}
+
+/// Rows that are far from what the others predict.
+#[derive(Debug, Default, PartialEq)]
+struct Gross {
+    /// Left out of the fit.
+    outliers: Vec<usize>,
+    /// Fitted.
+    doubtful: Vec<usize>,
+    /// Verify rows.
+    of_verify: Vec<usize>,
 }
 
 /// What all steps share.
@@ -120,7 +133,7 @@ pub fn identify(
     let by_points = if set.kind == Kind::Positions { Model::Position } else { model };
     step("gross errors");
     let first = session.reference(ROWS_TELL);
-    let (mut outliers, mut verify_outliers) = session.drop_outliers(by_points, &first)?;
+    let mut gross = session.drop_outliers(by_points, &first)?;
     if model == Model::Pose {
         session.extras.extend((0..3).map(Extra::Target));
     }
@@ -129,10 +142,10 @@ pub fn identify(
         Extensions::None => (Terms::default(), Vec::new()),
         Extensions::Auto => session.climb(by_points)?,
     };
-    if !outliers.is_empty() && terms.chain == Chain::Mdh && terms != first && session.tells(&terms, ROWS_TELL) {
-        // A row that a poorer model could not follow is no gross error.
+    if terms.chain == Chain::Mdh && terms != first && session.tells(&terms, ROWS_TELL) {
+        // A row that a poorer model could not follow is no gross error, and a richer one follows too much.
         session.rows = set.fit_rows();
-        (outliers, verify_outliers) = session.drop_outliers(by_points, &terms)?;
+        gross = session.drop_outliers(by_points, &terms)?;
     }
     let methods = settings.method.map_or(Method::ALL.to_vec(), |m| vec![m]);
     let fitted_terms = if terms == Terms::NOMINAL { Terms::default() } else { terms };
@@ -165,8 +178,9 @@ pub fn identify(
         chosen,
         terms,
         judged,
-        outliers,
-        verify_outliers,
+        outliers: gross.outliers,
+        doubtful: gross.doubtful,
+        verify_outliers: gross.of_verify,
         fitted: session.rows.clone(),
         scatter,
         smooth: session.smooth,
@@ -290,31 +304,19 @@ impl Session<'_> {
         Ok(smooth::most_probable(&at.rows, &at.offsets_of(), &sds))
     }
 
-    /// Leaves out the rows that a robust fit gives no weight, and names them; and the verify rows that are as far off.
-    fn drop_outliers(&mut self, model: Model, terms: &Terms) -> Result<(Vec<usize>, Vec<usize>), Error> {
+    /// Leaves out the rows that a robust fit gives no weight, and names them; and others that are far off.
+    fn drop_outliers(&mut self, model: Model, terms: &Terms) -> Result<Gross, Error> {
         let sigmas = self.settings.outlier_sigmas;
         if sigmas <= 0.0 {
-            return Ok((Vec::new(), Vec::new()));
+            return Ok(Gross::default());
         }
         let parameters = terms.parameters(self.robot);
         let mut robust = self.task(&parameters, model).robust(Loss::Biweight)?;
         let outliers = robust.gross_errors(sigmas);
-        let rows: Vec<usize> = self.rows.iter().copied().filter(|r| !outliers.contains(r)).collect();
-        let values = robust.offsets[parameters.len()..].to_vec();
-        let judge = Judge {
-            set: self.set,
-            fitted: &rows,
-            scatter: robust.scatter,
-            wire_offset: self.settings.wire_offset,
-            extras: &self.extras,
-            values: &values,
-        };
-        // Fresh rows scatter more than fitted ones.
-        let far = |e: &RowError| e.score(&robust.scatter).is_some_and(|s| s > 1.5 * sigmas);
-        let verify = judge.errors(&robust.robot, &self.set.verify_rows());
-        let verify_outliers = verify.iter().filter(|e| far(e)).map(|e| e.row).collect();
-        self.rows = rows;
-        Ok((outliers, verify_outliers))
+        let doubtful = robust.doubtful(&outliers);
+        let of_verify = robust.far_off(&self.set.verify_rows(), sigmas);
+        self.rows.retain(|r| !outliers.contains(r));
+        Ok(Gross { outliers, doubtful, of_verify })
     }
 
     fn run(&self, model: Model, terms: Terms, method: Method) -> Result<Candidate, Error> {

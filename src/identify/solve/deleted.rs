@@ -1,14 +1,18 @@
-//! Rows that a robust fit gave no weight, held against what the other rows predict for them.
+//! Rows held against what the other rows predict for them.
 //!
-//! In: a robust fit. Out: the rows that are gross errors. A row far from all others pulls the fit towards itself, and a fit that lets it
-//! go may leave it by more than its own error: the variance of the prediction counts as well as the row's own ("deletion residuals":
-//! Cook and Weisberg, "Residuals and influence in regression", 1982). A row goes back
-//! where the others predict it: within two thirds of the standard deviations that it was left out for, their size that of the other rows' residuals.
+//! In: a robust fit. Out: the rows that are gross errors, those that are doubtful, and the verify rows that are as far off. A row far from
+//! all others pulls the fit towards itself, and a fit that lets it go may leave it by more than its own error: the variance of the
+//! prediction counts as well as the row's own ("deletion residuals": Cook and Weisberg, "Residuals and influence in regression", 1982).
+//! A row that was left out goes back where the others predict it: within two thirds of the standard deviations that it was left out for,
+//! their size that of the other rows' residuals. A row that was kept is doubtful where the others are so far from it as one set in a
+//! thousand would have such a row by chance.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::robust::{LEAST_FREEDOM, Robust};
 use super::scatter::as_one_number;
+use super::task::Task;
 use crate::identify::residuals::eliminate::{product, pseudo_inverse};
 
 /// Root of the weight of a row that must not count, but has to have residuals and derivatives.
@@ -23,6 +27,32 @@ const ROUNDS: usize = 4;
 /// Steps of the trust region after a change of the rows.
 const STEPS: usize = 6;
 
+/// Probability that a set without any gross error has a doubtful row.
+const DOUBT: f64 = 1e-3;
+
+/// A row against what the others predict.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Deleted {
+    /// Its white square, the variance of the prediction counted.
+    pub square: f64,
+    /// Numbers of which it is the sum.
+    pub numbers: usize,
+    /// Degrees of freedom of the other rows, and their white sum of squares over them.
+    freedom: f64,
+    variance: f64,
+}
+
+impl Deleted {
+    /// In standard deviations of the others, as of one normal number.
+    fn size(&self) -> f64 {
+        let square = self.square / self.variance.max(f64::MIN_POSITIVE);
+        match self.numbers {
+            0 | 1 => square.sqrt(),
+            n => as_one_number(square * 3.0 / n as f64).sqrt(),
+        }
+    }
+}
+
 impl Robust<'_> {
     /// The rows that are so many standard deviations of reading and prediction off; the fit is then one without them.
     pub fn gross_errors(&mut self, sigmas: f64) -> Vec<usize> {
@@ -31,13 +61,12 @@ impl Robust<'_> {
             for &row in self.task.rows {
                 self.weights[row] = if out.contains(&row) { UNHEARD } else { 1.0 };
             }
+            self.step(STEPS);
             if out.is_empty() {
                 break;
             }
-            self.step(STEPS);
-            let sizes = self.deleted(&out);
-            let still: Vec<usize> =
-                out.iter().zip(&sizes).filter(|(_, s)| **s > GOES_BACK * sigmas).map(|(r, _)| *r).collect();
+            let deleted = self.deleted();
+            let still: Vec<usize> = out.iter().copied().filter(|&r| deleted[r].size() > GOES_BACK * sigmas).collect();
             if still.len() == out.len() {
                 break;
             }
@@ -46,9 +75,32 @@ impl Robust<'_> {
         out
     }
 
-    /// Sizes of these rows' residuals, as of one normal number and in standard deviations of the others, with the variance of what the others
-    /// predict.
-    fn deleted(&self, out: &[usize]) -> Vec<f64> {
+    /// The rows of the fit that are further off than chance allows, without those that were left out.
+    pub fn doubtful(&self, out: &[usize]) -> Vec<usize> {
+        let deleted = self.deleted();
+        let rows: Vec<usize> = self.task.rows.iter().copied().filter(|r| !out.contains(r)).collect();
+        let share = DOUBT / (2 * rows.len().max(1)) as f64;
+        let far = |row: &usize| {
+            let d = &deleted[*row];
+            StudentsT::new(0.0, 1.0, d.freedom.max(1.0)).is_ok_and(|t| d.size() > t.inverse_cdf(1.0 - share))
+        };
+        rows.into_iter().filter(far).collect()
+    }
+
+    /// Of other rows those that are so many standard deviations of reading and prediction off.
+    pub fn far_off(&self, others: &[usize], sigmas: f64) -> Vec<usize> {
+        let mut rows = [self.task.rows, others].concat();
+        rows.sort_unstable();
+        rows.dedup();
+        let mut weights = self.weights.clone();
+        others.iter().for_each(|&row| weights[row] = UNHEARD);
+        let with = Robust { task: Task { rows: &rows, ..self.task }, weights, ..self.clone() };
+        let deleted = with.deleted();
+        others.iter().copied().filter(|&r| deleted[r].size() > sigmas).collect()
+    }
+
+    /// All rows of the data set against what the others predict for them; of those that are not in the fit nothing.
+    pub fn deleted(&self) -> Vec<Deleted> {
         let (rows, offsets, prior) = self.linearised();
         let mut normal = prior.clone();
         let (of_robot, extras) = rows.split(&offsets);
@@ -63,35 +115,56 @@ impl Robust<'_> {
             parts.push((block.row_poses(), linear, own, jacobian));
         }
         let covariance = pseudo_inverse(normal);
+        let weight = |row: usize| self.weights.get(row).copied().unwrap_or(1.0);
         let (mut squares, mut numbers, mut unknowns) = (0.0, 0usize, 0);
-        for (poses, linear, own, _) in &parts {
-            let kept = |i: &usize| poses[*i].is_some_and(|p| !out.contains(&rows.rows[p]));
-            squares += (0..poses.len()).filter(kept).map(|i| linear.residuals[i].powi(2)).sum::<f64>();
-            numbers += (0..poses.len()).filter(kept).count();
+        let mut deleted = vec![Deleted::default(); self.task.set.poses.len()];
+        for (poses, linear, own, jacobian) in &parts {
             unknowns += own.nrows();
+            for at in by_pose(poses) {
+                let Some(pose) = poses[at.start] else { continue };
+                let row = rows.rows[pose];
+                let residual = linear.residuals.rows(at.start, at.len()).into_owned();
+                if weight(row) > UNHEARD {
+                    squares += residual.norm_squared();
+                    numbers += at.len();
+                }
+                let (columns, design) = (jacobian.rows(at.start, at.len()), linear.design.rows(at.start, at.len()));
+                let leverage = columns * &covariance * columns.transpose() + design * own * design.transpose();
+                let square = square_of_deleted(&residual, leverage, weight(row)).unwrap_or(0.0);
+                if square > deleted[row].square {
+                    deleted[row] = Deleted { square, numbers: at.len(), ..deleted[row] };
+                }
+            }
         }
         // What the prior holds costs the data nothing.
         let determined = offsets.len() as f64 - (&covariance * prior).trace();
         let freedom =
             (numbers as f64 - unknowns as f64 - determined).max(numbers.div_ceil(LEAST_FREEDOM).max(1) as f64);
-        let scale = (squares / freedom).sqrt().max(f64::MIN_POSITIVE);
-        let mut sizes = vec![0.0; out.len()];
-        for (poses, linear, own, jacobian) in &parts {
-            for (size, &row) in sizes.iter_mut().zip(out) {
-                let at: Vec<usize> =
-                    (0..poses.len()).filter(|&i| poses[i].is_some_and(|p| rows.rows[p] == row)).collect();
-                let picked = |matrix: &DMatrix<f64>| matrix.select_rows(&at) / UNHEARD;
-                let (columns, design) = (picked(jacobian), picked(&linear.design));
-                let residual = DVector::from_iterator(at.len(), at.iter().map(|&i| linear.residuals[i] / UNHEARD));
-                let variance = &columns * &covariance * columns.transpose() + &design * own * design.transpose();
-                if let Some(total) = Cholesky::new(variance + DMatrix::identity(at.len(), at.len())) {
-                    let square = residual.dot(&total.solve(&residual));
-                    let square =
-                        if at.len() == 1 { square } else { as_one_number(square * 3.0 / at.len().max(1) as f64) };
-                    *size = f64::max(*size, square.sqrt() / scale);
-                }
-            }
+        for (row, d) in deleted.iter_mut().enumerate() {
+            // Where the row is in the fit its own share comes off.
+            let own = if weight(row) > UNHEARD { (d.square, d.numbers as f64) } else { (0.0, 0.0) };
+            d.freedom = (freedom - own.1).max(1.0);
+            d.variance = (squares - own.0).max(0.0) / d.freedom;
         }
-        sizes
+        deleted
     }
+}
+
+/// White square of a residual that was fitted with this leverage and root of a weight, held against the fit without it.
+fn square_of_deleted(fitted: &DVector<f64>, leverage: DMatrix<f64>, weight: f64) -> Option<f64> {
+    let identity = DMatrix::identity(fitted.len(), fitted.len());
+    // Deleted residuals are (I - H)^-1 e, and the others predict with a variance of H (I - H)^-1, both times the weight.
+    let grown = Cholesky::new(&identity - &leverage)?;
+    let residual = grown.solve(fitted);
+    let variance = grown.solve(&leverage) + identity * (weight * weight);
+    Some(residual.dot(&Cholesky::new((&variance + variance.transpose()) / 2.0)?.solve(&residual)))
+}
+
+/// Neighbouring residuals of one pose.
+fn by_pose(poses: &[Option<usize>]) -> impl Iterator<Item = std::ops::Range<usize>> {
+    let mut start = 0;
+    poses.chunk_by(|a, b| a == b).map(move |chunk| {
+        start += chunk.len();
+        start - chunk.len()..start
+    })
 }

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use nalgebra::DMatrix;
 
 use super::fit::Fit;
-use super::scatter::{Residual, median_size, robust_scatter, sizes};
+use super::scatter::{Residual, robust_scale, robust_scatter, sizes};
 use super::task::{FIRST_SCATTER_MM, Task, prior_rows};
 use super::trust_region;
 use crate::identify::Error;
@@ -64,11 +64,10 @@ impl<'a> Task<'a> {
                 let freedom = robust.freedom(&residuals, &rows);
                 let both = round > 0 && round % ROUNDS_A_FACTOR == 0;
                 scatter = robust_scatter(&residuals, self.rows, count, freedom, scatter, both);
-                scale = (median_size(&sizes(&residuals, &scatter, count), self.rows) * freedom).max(1e-12);
+                scale = robust_scale(&residuals, self.rows, count, freedom, &scatter);
             }
-            let mut scores = sizes(&residuals, &scatter, count);
+            let scores = sizes(&residuals, &scatter, scale, count);
             for &row in self.rows {
-                scores[row] /= scale;
                 let u = scores[row];
                 weights[row] = if round >= bounded { biweight(u) } else { (1.0 / u.max(1.0)).sqrt() };
             }
@@ -92,8 +91,8 @@ pub enum Loss {
 #[derive(Debug, Clone)]
 pub struct Robust<'a> {
     pub(super) task: Task<'a>,
-    base: Base,
-    x: Vec<f64>,
+    pub(super) base: Base,
+    pub(super) x: Vec<f64>,
     /// Roots of the rows' weights, one a row of the data set.
     pub weights: Vec<f64>,
     /// Sizes of the fitted rows' residuals in robust standard deviations, one a row of the data set.

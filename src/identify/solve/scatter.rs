@@ -90,11 +90,11 @@ impl Residual {
     }
 }
 
-/// White size of each row's residual, brought to the size of one normal number; zero for rows without one.
-pub(super) fn sizes(residuals: &[Residual], scatter: &Scatter, count: usize) -> Vec<f64> {
+/// White size of each row's residual in so many standard deviations, brought to the size of one normal number; zero for rows without one.
+pub(super) fn sizes(residuals: &[Residual], scatter: &Scatter, scale: f64, count: usize) -> Vec<f64> {
     let mut squares = vec![0.0; count];
     for residual in residuals {
-        let white = residual.white_square(scatter);
+        let white = residual.white_square(scatter) / (scale * scale);
         let square = if residual.count == 1 { white } else { as_one_number(white) };
         squares[residual.row] = f64::max(squares[residual.row], square);
     }
@@ -109,8 +109,25 @@ pub(super) fn as_one_number(square: f64) -> f64 {
     (1.0 - one + z * f64::sqrt(one)).max(1e-3).powi(3)
 }
 
+/// The standard deviation in which the median of these rows' sizes is what it should be, `freedom` times what the fit left.
+pub(super) fn robust_scale(
+    residuals: &[Residual],
+    rows: &[usize],
+    count: usize,
+    freedom: f64,
+    scatter: &Scatter,
+) -> f64 {
+    let (mut low, mut high) = (1e-12, 1e12);
+    for _ in 0..2 * HALVINGS {
+        let scale = f64::sqrt(low * high);
+        let above = freedom * median_size(&sizes(residuals, scatter, scale, count), rows) > 1.0;
+        if above { low = scale } else { high = scale }
+    }
+    f64::sqrt(low * high)
+}
+
 /// Robust standard deviation of the sizes of these rows: their median over that of a normal number's absolute value.
-pub(super) fn median_size(sizes: &[f64], rows: &[usize]) -> f64 {
+fn median_size(sizes: &[f64], rows: &[usize]) -> f64 {
     let mut list: Vec<f64> = rows.iter().map(|&r| sizes[r]).filter(|s| *s > 0.0).collect();
     if list.is_empty() {
         return 0.0;
@@ -129,7 +146,8 @@ pub(super) fn robust_scatter(
     before: Scatter,
     both: bool,
 ) -> Scatter {
-    let excess = |scatter: &Scatter| (freedom * median_size(&sizes(residuals, scatter, count), rows)).powi(2) - 1.0;
+    let excess =
+        |scatter: &Scatter| (freedom * median_size(&sizes(residuals, scatter, 1.0, count), rows)).powi(2) - 1.0;
     match both {
         true => most_probable(residuals, before, &excess),
         false => with_point(before, &excess),
@@ -231,5 +249,22 @@ mod tests {
     fn scatter_alike_in_all_directions_is_not_the_instruments() {
         let scatter = found(&points(Vector3::new(0.006, 0.004, 0.001), Vector3::repeat(0.006)));
         assert!(scatter.stated <= 0.1 && (scatter.point_mm - 0.006).abs() < 1e-3, "{scatter:?}");
+    }
+
+    #[test]
+    fn sizes_do_not_depend_on_the_unit_of_the_covariances() {
+        let sd = Vector3::new(0.05, 0.04, 0.3);
+        let rows: Vec<usize> = (0..200).collect();
+        let of = |times: f64| {
+            let mut residuals = points(times * sd, sd);
+            residuals.truncate(199);
+            residuals.extend(points(times * sd, 5.0 * sd).into_iter().skip(199));
+            let scatter = Scatter::of_point(1e-7);
+            let scale = robust_scale(&residuals, &rows, 200, 1.0, &scatter);
+            sizes(&residuals, &scatter, scale, 200)[199]
+        };
+        for times in [0.3, 1.5, 3.0, 30.0] {
+            assert!((of(times) / of(1.0) - 1.0).abs() < 1e-6, "{times}: {} against {}", of(times), of(1.0));
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Benchmark of the identification on robots: the real sets where they are, and simulated arms whose truth is known.
 //!
-//! `cargo bench --bench robots` prints all; `-- real`, `-- simulated [RUNS]`, `-- faults [RUNS]`, `-- touches [RUNS]` and `-- speed` one of them.
+//! `cargo bench --bench robots` prints all; `-- real`, `-- simulated [RUNS]`, `-- faults [RUNS [FAULT]]`, `-- touches [RUNS]` and `-- speed` one of them.
 #![allow(clippy::print_stdout, reason = "a benchmark says what it measured")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a benchmark that cannot run has nothing to say")]
 #![allow(clippy::disallowed_methods, reason = "a benchmark looks at the clock")]
@@ -27,7 +27,7 @@ fn main() {
         simulated::table(runs);
     }
     if asked("faults") {
-        faults::table(runs);
+        faults::table(runs, arguments.get(2).map_or("", String::as_str));
     }
     if asked("touches") {
         touches::table(runs);
