@@ -9,7 +9,8 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::{Digested, Provenance, Run};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::{covariances, doctor, examine, known, sessions, shared};
+use crate::identify::data::doctor::{self, Examined};
+use crate::identify::data::{known, shared};
 use crate::identify::judge::choose::{Identification, identify, step_count};
 use crate::identify::record::{Record, quality};
 use crate::identify::{Error, Settings};
@@ -40,18 +41,8 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     }
     shared::suppose_scale(&mut set);
     let bar = progress::bar("identifying", 2 + step_count(&settings));
-    bar.begin("units, signs and conventions");
-    let (set, nominal, mut findings) = match settings.examine {
-        true => examine::examine(&set, &given, &settings),
-        false => (set, given, Vec::new()),
-    };
-    bar.begin("sessions along the rows");
-    let (set, along) = sessions::find(&set, &nominal, &settings);
-    let (set, of_covariances) = match settings.examine {
-        true => covariances::examine(&set, &nominal, &settings),
-        false => (set, Vec::new()),
-    };
-    findings.extend(of_covariances);
+    let Examined { set, robot: nominal, along, mut findings } =
+        doctor::examine(&set, &given, &settings, &|step| bar.begin(step));
     let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.begin(step))?;
     bar.finish_and_clear();
     findings.extend(doctor::findings(&set, &found, &along));

@@ -302,3 +302,22 @@ fn a_row_that_is_a_little_off_is_named_though_it_is_fitted_and_a_verify_row_too(
         assert!(sigmas < 8.0 || found.verify_outliers == [verify], "{sigmas}");
     }
 }
+
+#[test]
+fn readings_of_another_scale_are_said_to_be_so() {
+    use crate::measurements::Observed;
+    let world = synthetic::world(120, NOISE_MM, 8);
+    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+    for (scale, said) in [(1.0, false), (0.95, true), (1.05, true)] {
+        let mut rows = world.rows.clone();
+        for row in &mut rows {
+            if let Observed::Position { point_mm, .. } = &mut row.observed {
+                *point_mm *= scale;
+            }
+        }
+        let set = Dataset::new(&rows, 1).unwrap();
+        let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
+        let findings = crate::identify::data::doctor::findings(&set, &found, &Default::default());
+        assert_eq!(findings.iter().any(|f| f.finding.contains("all links are found")), said, "{scale}: {findings:?}");
+    }
+}

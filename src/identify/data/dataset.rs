@@ -4,7 +4,7 @@
 //! A group without a centre row takes the used pose nearest to the centroid of its points as its reference; distances
 //! in such a group are distances to a fixed point that is unknown. Without verify rows a fifth of the samples is held out.
 
-use nalgebra::{Matrix3, Matrix3xX, Point3, UnitQuaternion};
+use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -35,8 +35,8 @@ pub enum Reading {
         point_mm: Point3<f64>,
         /// Its covariance, mm^2.
         covariance_mm2: Option<Matrix3<f64>>,
-        /// `sensor_from_target`.
-        rotation: Option<UnitQuaternion<f64>>,
+        /// `sensor_from_target` as a rotation vector.
+        rotation_rad: Option<Vector3<f64>>,
     },
     /// A distance.
     Distance {
@@ -221,7 +221,7 @@ impl Dataset {
             })
             .collect();
         let count = points.len().max(1) as f64;
-        let centroid = points.iter().fold(nalgebra::Vector3::zeros(), |sum, (_, p)| sum + p.coords) / count;
+        let centroid = points.iter().fold(Vector3::zeros(), |sum, (_, p)| sum + p.coords) / count;
         let nearest = points.iter().min_by(|(_, a), (_, b)| {
             (a.coords - centroid).norm_squared().total_cmp(&(b.coords - centroid).norm_squared())
         });
@@ -243,7 +243,7 @@ impl Dataset {
 
     /// Whether every pose that may be fitted has an orientation.
     pub fn has_rotations(&self) -> bool {
-        self.poses.iter().all(|p| matches!(p.reading, Reading::Position { rotation: Some(_), .. }))
+        self.poses.iter().all(|p| matches!(p.reading, Reading::Position { rotation_rad: Some(_), .. }))
     }
 }
 
@@ -259,7 +259,7 @@ fn reading(kind: Kind, row: &Measurement) -> Result<Reading, String> {
             point_mm: *point_mm,
             covariance_mm2: covariance_mm2
                 .map(|c| if is_singular(&c) { c + Matrix3::identity() * FLOOR_MM2 } else { c }),
-            rotation: rotation_rad.map(UnitQuaternion::from_scaled_axis),
+            rotation_rad: *rotation_rad,
         }),
         (_, Kind::Distances) if row.at.role == Role::Center => Ok(Reading::Reference),
         (Observed::Distance { distance_mm, sigma_mm }, Kind::Distances) => {

@@ -1,13 +1,16 @@
 //! What is wrong with the data: each finding in words, with the rows it is about and what was done.
 
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::dataset::{Dataset, Reading};
-use super::sessions::{Along, Session};
+use super::dataset::{Dataset, Kind, Reading};
+use super::sessions::{self, Along, Session};
+use super::{conventions, covariances, orientations};
 use crate::identify::judge::choose::Identification;
 use crate::identify::record::{Smooth, file_unit};
 use crate::identify::residuals::weights::Extra;
-use crate::robot::Parameter;
+use crate::identify::settings::Settings;
+use crate::robot::{Parameter, Robot};
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -34,6 +37,39 @@ impl Finding {
         }
         format!("{text}; {}", self.action)
     }
+}
+
+/// A data set and a nominal robot as they are to be used.
+#[derive(Debug, Clone)]
+pub struct Examined {
+    /// The measurements, mended, and cut into sessions.
+    pub set: Dataset,
+    /// The robot.
+    pub robot: Robot,
+    /// Sessions and drifts.
+    pub along: Along,
+    /// What was wrong, and what was done.
+    pub findings: Vec<Finding>,
+}
+
+/// Looks for what is wrong before anything is identified. `step` hears what is being done.
+pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(&str)) -> Examined {
+    step("units, signs and conventions");
+    let (mut set, mut robot, mut findings) = (set.clone(), robot.clone(), Vec::new());
+    if settings.examine {
+        (set, robot, findings) = conventions::examine(&set, &robot, settings);
+        let of_orientations = orientations::examine(&set, &robot);
+        set = of_orientations.0;
+        findings.extend(of_orientations.1);
+    }
+    step("sessions along the rows");
+    let (mut set, along) = sessions::find(&set, &robot, settings);
+    if settings.examine {
+        let of_covariances = covariances::examine(&set, &robot, settings);
+        set = of_covariances.0;
+        findings.extend(of_covariances.1);
+    }
+    Examined { set, robot, along, findings }
 }
 
 /// What was found along the way: gross errors, sessions, drifts, covariances that are off.
@@ -132,6 +168,18 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "the robot that was found is used; see whether the file is the right one",
         );
     }
+    if let Some((share, sigma)) = common_scale(found) {
+        let way = if share > 0.0 { "longer" } else { "shorter" };
+        add(
+            format!(
+                "all links are found {:.2} % (+- {:.2}) {way} than the nominal ones: the readings are scaled, or the lengths of the robot file",
+                100.0 * share.abs(),
+                100.0 * sigma
+            ),
+            Vec::new(),
+            "the robot that was found has the scale of the readings; check them on a known length",
+        );
+    }
     let drifts = |s: &Session| along.drifting.contains(&s.group);
     let ranges = |of: &dyn Fn(&&Session) -> bool| -> Vec<String> {
         along.sessions.iter().filter(of).map(|s| format!("{}..{}", s.first, s.last)).collect()
@@ -180,6 +228,44 @@ pub fn zero(found: &Identification) -> Option<(f64, f64)> {
     let at = formulation.base.rank() + k;
     let (value, sigma) = (found.extras[k].1, formulation.covariance()[(at, at)].max(0.0).sqrt());
     (value.abs() > ZERO_SIGMAS * sigma).then_some((value, sigma))
+}
+
+/// Fewest lengths that tell a common scale, and the probability of finding one where there is none.
+const LENGTHS: usize = 4;
+const BY_CHANCE: f64 = 1e-3;
+
+/// Share by which all determined lengths differ from nominal, and its standard deviation, where that is more than their own errors make
+/// by chance: a scale of the readings leaves no residual, but no workshop makes all links too long by the same share.
+fn common_scale(found: &Identification) -> Option<(f64, f64)> {
+    let candidate = &found.candidates[found.chosen];
+    let (formulation, _) = candidate.found.as_ref()?;
+    let (base, parameters) = (&formulation.base, formulation.parameters());
+    let nominal = formulation.rows.kinematics.nominal();
+    let is_link = |p: &Parameter| matches!(p, Parameter::A(_) | Parameter::D(_));
+    // The tool's nominal point is a guess more often than not.
+    let is_tool = |p: &Parameter| matches!(p, Parameter::V(_));
+    let combined = |k: usize| {
+        let with = (0..base.dependent.len()).map(|c| (base.coefficients[(k, c)], parameters[base.dependent[c]]));
+        let terms: Vec<(f64, Parameter)> =
+            std::iter::once((1.0, parameters[base.free[k]])).chain(with).filter(|(by, _)| by.abs() > 1e-6).collect();
+        if !is_link(&terms[0].1) || terms.iter().any(|(_, p)| is_tool(p)) {
+            return None;
+        }
+        let length: f64 = terms.iter().filter(|(_, p)| is_link(p)).map(|(by, p)| by * nominal.value(*p)).sum();
+        let moved: f64 = terms.iter().map(|(by, p)| by * (candidate.robot.value(*p) - nominal.value(*p))).sum();
+        Some((length, moved))
+    };
+    let lengths: Vec<(f64, f64)> = (0..base.rank()).filter_map(combined).collect();
+    if lengths.len() < LENGTHS {
+        return None;
+    }
+    let square: f64 = lengths.iter().map(|(l, _)| l * l).sum();
+    let share = lengths.iter().map(|(l, moved)| l * moved).sum::<f64>() / square;
+    let freedom = (lengths.len() - 1) as f64;
+    let left = lengths.iter().map(|(l, moved)| (moved - share * l).powi(2)).sum::<f64>() / freedom;
+    let sigma = (left / square).sqrt();
+    let limit = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(1.0 - BY_CHANCE / 2.0);
+    (share.abs() > limit * sigma).then_some((share, sigma))
 }
 
 /// Corrections beyond which a link is not the one of the robot's file, mm and rad, and how many standard deviations they must have.
@@ -248,7 +334,9 @@ fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
             scatter.stated.sqrt()
         ));
     }
-    let ratio = scatter.point_mm / stated_mm.max(1e-9);
+    // In a distance to a centre both ends scatter.
+    let ends = if set.kind == Kind::Distances && set.groups.iter().any(|g| g.center.is_some()) { 2.0 } else { 1.0 };
+    let ratio = f64::sqrt(ends) * scatter.point_mm / stated_mm.max(1e-9);
     (ratio > FAR_ABOVE).then(|| {
         format!(
             "the rows scatter by {0:.4} mm a coordinate, {ratio:.1$} times what the rows' own covariances say ({stated_mm:.4} mm, without \

@@ -1,10 +1,12 @@
 //! Sessions along the rows of a group: the sensor, the wire's anchor or the robot's base was moved, and nobody wrote it down.
 //!
-//! In: a set of points or of distances to unknown points, in the order of measurement. Out: the same set with each group cut where a
-//! new placement explains the rest of its rows better, and what drifts. Cuts are made one at a time at the row of greatest gain (binary
+//! In: a set of points or of distances, in the order of measurement. Out: the same set with each group cut where a
+//! new placement explains the rest of its rows better, and what drifts. Distances to a centre that was measured before everything moved
+//! are distances to a point that is unknown. Cuts are made one at a time at the row of greatest gain (binary
 //! segmentation: Vostrikova, 1981) as long as the Bayesian information criterion (Schwarz, 1978) pays for the cut's unknowns.
-//! Influence is bounded (weights of least absolute residuals), so that single gross errors make no session; for points, whose model
-//! errors are as smooth in the order of a grid as a drift is in time, the same rows sorted by each joint must not be cut as well.
+//! Influence is bounded (weights of least absolute residuals), so that single gross errors make no session; for points and distances to
+//! a centre, whose model errors are as smooth in the order of a grid as a drift is in time, the same rows sorted by each joint must not be
+//! cut as well.
 //! A verify row belongs to the session of the fitted row before it in the file; before all, to the first.
 //! What goes wrong: sessions shorter than [`SHORTEST`] rows are not seen.
 
@@ -13,8 +15,9 @@ use serde::Serialize;
 
 use crate::identify::data::dataset::{Dataset, Group, Kind};
 use crate::identify::residuals::eliminate::{Block, Linear, product, pseudo_inverse};
+use crate::identify::residuals::weights::Extra;
 use crate::identify::settings::{Model, Settings};
-use crate::identify::solve::robust::Loss;
+use crate::identify::solve::robust::{LEAST_FREEDOM, Loss};
 use crate::identify::solve::task::Task;
 use crate::measurements::Role;
 use crate::robot::Robot;
@@ -57,10 +60,13 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     let mut along = Along::default();
     let parameters = robot.mdh_parameters();
     let model = if set.kind == Kind::Positions { Model::Position } else { Model::CenterDistance };
+    // A zero that is off is no step.
+    let to_centers = set.kind == Kind::Distances && set.groups.iter().any(|g| g.center.is_some());
+    let extras: &[Extra] = if to_centers && settings.wire_offset { &[Extra::Zero] } else { &[] };
     for cuts in 0..MOST_CUTS {
         let rows = cut.fit_rows();
         let task =
-            Task { set: &cut, robot, parameters: &parameters, extras: &[], rows: &rows, model, smooth: None, settings };
+            Task { set: &cut, robot, parameters: &parameters, extras, rows: &rows, model, smooth: None, settings };
         let Some(search) = Search::new(&task) else { break };
         let found = search.best_cut();
         let drifting = search.drifting(found);
@@ -82,6 +88,10 @@ struct Placed {
     /// Rows of the data set in their order, each with where its residuals start and end.
     rows: Vec<(usize, std::ops::Range<usize>)>,
     linear: Linear,
+    /// A column an unknown of a new placement, where only some rows belong to it.
+    fresh: DMatrix<f64>,
+    /// Row of the centre that was measured, from which on things move.
+    center: Option<usize>,
     /// Inverse normal matrix of the robot's parameters and this placement's unknowns, the others' eliminated.
     inverse: DMatrix<f64>,
 }
@@ -89,19 +99,21 @@ struct Placed {
 struct Search<'a> {
     set: &'a Dataset,
     placed: Vec<Placed>,
-    /// Numbers measured, and the sum of their squares.
+    /// Numbers measured, how many of them the fit left, and the sum of their squares.
     numbers: f64,
+    freedom: f64,
     squares: f64,
 }
 
 impl<'a> Search<'a> {
     fn new(task: &Task<'a>) -> Option<Search<'a>> {
         let (rows, x, prior) = task.robust(Loss::Absolute).ok()?.linearised();
-        let places = rows.kinematics.places(rows.split(&x).0, true);
+        let (of_robot, extras) = rows.split(&x);
+        let places = rows.kinematics.places(of_robot, true);
         let count = x.len();
         let (mut normal, mut parts) = (prior, Vec::new());
         for block in &rows.blocks {
-            let linear = block.linear(&places, &[], &rows.scatter);
+            let linear = block.linear(&places, extras, &rows.scatter);
             let along = product(&linear.design, &linear.jacobian);
             let inverse = pseudo_inverse(product(&linear.design, &linear.design));
             let own = product(&linear.jacobian, &linear.jacobian) - along.transpose() * inverse * &along;
@@ -109,12 +121,17 @@ impl<'a> Search<'a> {
             parts.push((block, linear, own));
         }
         let numbers: usize = parts.iter().map(|(b, ..)| b.row_count()).sum();
+        // What is left of chance after the fit: the share that the unknowns took explains nothing any more.
+        let unknowns = count + parts.iter().map(|(_, l, _)| l.design.ncols()).sum::<usize>();
+        let freedom = numbers.saturating_sub(unknowns).max(numbers.div_ceil(LEAST_FREEDOM));
         let squares = parts.iter().map(|(_, l, _)| l.residuals.norm_squared()).sum();
         let mut placed = Vec::new();
         for (block, linear, own) in parts {
-            if !matches!(block, Block::Wire(_) | Block::Points(_)) {
-                continue;
-            }
+            let (fresh, center) = match block {
+                Block::Wire(_) | Block::Points(_) => (linear.design.clone(), None),
+                Block::Center(c) => (c.of_center(&places, &rows.scatter), Some(rows.rows[c.center])),
+                _ => continue,
+            };
             let unknowns = linear.design.ncols();
             let mut whole = DMatrix::zeros(count + unknowns, count + unknowns);
             let others = &normal - own + product(&linear.jacobian, &linear.jacobian);
@@ -131,14 +148,14 @@ impl<'a> Search<'a> {
                     _ => of_rows.push((row, i..i + 1)),
                 }
             }
-            placed.push(Placed { rows: of_rows, linear, inverse: pseudo_inverse(whole) });
+            placed.push(Placed { rows: of_rows, linear, fresh, center, inverse: pseudo_inverse(whole) });
         }
-        Some(Search { set: task.set, placed, numbers: numbers as f64, squares })
+        Some(Search { set: task.set, placed, numbers: numbers as f64, freedom: freedom as f64, squares })
     }
 
     fn pays(&self, gain: f64, unknowns: usize) -> bool {
         let left = (self.squares - gain).max(f64::MIN_POSITIVE);
-        self.numbers * (self.squares / left).ln() > (unknowns + 1) as f64 * self.numbers.ln()
+        self.freedom * (self.squares / left).ln() > (unknowns + 1) as f64 * self.numbers.ln()
     }
 
     /// The row of the set at which a new session pays most, if any does.
@@ -153,10 +170,10 @@ impl<'a> Search<'a> {
             }
         }
         let (gain, row, placed) = best?;
-        if !self.pays(gain, placed.linear.design.ncols()) {
+        if !self.pays(gain, placed.fresh.ncols()) {
             return None;
         }
-        if self.set.kind == Kind::Positions {
+        if self.set.kind == Kind::Positions || placed.center.is_some() {
             let rival = self.orders(placed).iter().filter_map(|o| Some(placed.best_step(o)?.0)).fold(0.0, f64::max);
             if gain < SHARE * self.squares || gain < BEATS * rival {
                 return None;
@@ -187,7 +204,7 @@ impl<'a> Search<'a> {
             }
             let rival = self.orders(placed).iter().map(|o| placed.ramp(o)).fold(0.0, f64::max);
             placed.rows.len() >= 2 * SHORTEST
-                && self.pays(gain, placed.linear.design.ncols())
+                && self.pays(gain, placed.fresh.ncols())
                 && gain > SHARE * self.squares
                 && gain > BEATS * rival
         };
@@ -197,28 +214,28 @@ impl<'a> Search<'a> {
 }
 
 impl Placed {
-    /// Of one row: design times residuals, design times design, design times all columns.
+    /// Of one row: the columns of a new placement times residuals, times themselves, times all columns there are.
     fn products(&self, k: usize) -> (DVector<f64>, DMatrix<f64>, DMatrix<f64>) {
         let range = self.rows[k].1.clone();
+        let fresh = self.fresh.rows(range.start, range.len());
         let design = self.linear.design.rows(range.start, range.len());
         let jacobian = self.linear.jacobian.rows(range.start, range.len());
         let residuals = self.linear.residuals.rows(range.start, range.len());
-        let own = design.tr_mul(&design);
-        let of_robot = design.tr_mul(&jacobian);
+        let of_robot = fresh.tr_mul(&jacobian);
         let count = of_robot.ncols();
-        let mut all = of_robot.resize_horizontally(count + own.ncols(), 0.0);
-        all.columns_mut(count, own.ncols()).copy_from(&own);
-        (design.tr_mul(&residuals), own, all)
+        let mut all = of_robot.resize_horizontally(count + design.ncols(), 0.0);
+        all.columns_mut(count, design.ncols()).copy_from(&fresh.tr_mul(&design));
+        (fresh.tr_mul(&residuals), fresh.tr_mul(&fresh), all)
     }
 
     fn gain(&self, pull: &DVector<f64>, own: &DMatrix<f64>, all: &DMatrix<f64>) -> f64 {
-        let fresh = own - all * &self.inverse * all.transpose();
-        pull.dot(&(pseudo_inverse(fresh) * pull))
+        let left = own - all * &self.inverse * all.transpose();
+        pull.dot(&(pseudo_inverse(left) * pull))
     }
 
     /// The place in `order` from which on a new placement gains most, with what it gains.
     fn best_step(&self, order: &[usize]) -> Option<(f64, usize)> {
-        let (unknowns, columns) = (self.linear.design.ncols(), self.inverse.nrows());
+        let (unknowns, columns) = (self.fresh.ncols(), self.inverse.nrows());
         let mut pull = DVector::zeros(unknowns);
         let (mut own, mut all) = (DMatrix::zeros(unknowns, unknowns), DMatrix::zeros(unknowns, columns));
         let mut best: Option<(f64, usize)> = None;
@@ -240,11 +257,15 @@ impl Placed {
 
     /// What a placement that moves evenly along `order` gains.
     fn ramp(&self, order: &[usize]) -> f64 {
-        let (unknowns, columns) = (self.linear.design.ncols(), self.inverse.nrows());
+        let (unknowns, columns) = (self.fresh.ncols(), self.inverse.nrows());
         let mut pull = DVector::zeros(unknowns);
         let (mut own, mut all) = (DMatrix::zeros(unknowns, unknowns), DMatrix::zeros(unknowns, columns));
+        // A placement that is unknown moves from its middle on, one whose centre was measured from there on.
+        let start = self.center.map_or(0.5 * order.len() as f64, |center| {
+            order.iter().filter(|&&k| self.rows[k].0 < center).count() as f64
+        });
         for (i, &k) in order.iter().enumerate() {
-            let t = i as f64 / order.len() as f64 - 0.5;
+            let t = (i as f64 - start) / order.len() as f64;
             let (p, o, a) = self.products(k);
             pull += t * p;
             own += t * t * o;
@@ -319,5 +340,43 @@ mod tests {
         let (world, rows) = wire(1000);
         let set = Dataset::new(&rows, 1).unwrap();
         assert!(find(&set, &world.nominal, &Settings::default()).1.sessions.is_empty());
+    }
+
+    /// Distances to the first pose, and everything but it moved by so much: evenly along the rows, or at once after 40 of them.
+    fn to_center(moved_mm: f64, evenly: bool) -> (synthetic::World, Dataset) {
+        let world = synthetic::planned(120, 20, 25.0, 0.0, 5, &|_| {});
+        let mut rows: Vec<Measurement> = world
+            .rows
+            .iter()
+            .enumerate()
+            .filter(|(i, r)| *i == 0 || r.at.role != Role::Center)
+            .map(|(_, r)| r.clone())
+            .collect();
+        let from = world.truth.target_mm(&rows[0].at.joints_rad());
+        let count = rows.len() as f64;
+        for (i, row) in rows.iter_mut().enumerate() {
+            let share = if evenly { i as f64 / count } else { f64::from(u8::from(i > 40)) };
+            let place = world.truth.target_mm(&row.at.joints_rad()) + moved_mm * share * nalgebra::Vector3::y();
+            // A ripple of 0.02 mm stands for noise, 0.3 mm for a zero that is off.
+            let distance_mm = if i == 0 { 0.0 } else { (place - from).norm() + 0.02 * (1.7 * i as f64).sin() + 0.3 };
+            row.at.group = "one".into();
+            row.observed = Observed::Distance { distance_mm, sigma_mm: None };
+        }
+        let set = Dataset::new(&rows, 1).unwrap();
+        (world, set)
+    }
+
+    #[test]
+    fn a_base_that_moved_is_found_in_distances_to_a_centre() {
+        for moved_mm in [0.2, 1.0, 5.0] {
+            let (world, set) = to_center(moved_mm, false);
+            let (_, along) = find(&set, &world.nominal, &Settings::default());
+            assert!(along.sessions.len() == 2 && along.sessions[0].count.abs_diff(40) <= 2, "{moved_mm}: {along:?}");
+            let (world, set) = to_center(moved_mm, true);
+            let (_, along) = find(&set, &world.nominal, &Settings::default());
+            assert!(!along.drifting.is_empty() || along.sessions.len() > 1, "{moved_mm}: {along:?}");
+        }
+        let (world, set) = to_center(0.0, false);
+        assert_eq!(find(&set, &world.nominal, &Settings::default()).1, Along::default());
     }
 }

@@ -66,6 +66,18 @@ impl Center {
         jacobian
     }
 
+    /// White derivatives of the residuals with respect to the centre, where it is another point than the one that was measured: three columns.
+    pub fn of_center(&self, places: &[Place], scatter: &Scatter) -> DMatrix<f64> {
+        let center = &places[self.center].point_mm;
+        let mut columns = DMatrix::zeros(self.lengths.len(), 3);
+        for (i, l) in self.lengths.iter().enumerate() {
+            let by = -l.weight / scatter.sd(l, 2.0);
+            let u = direction(&(places[l.pose].point_mm - center)).0 * by;
+            columns.fixed_view_mut::<1, 3>(i, 0).copy_from(&u.transpose());
+        }
+        columns
+    }
+
     pub(super) fn raw(&self, places: &[Place], extras: &[f64]) -> Vec<(usize, f64, Raw)> {
         let raw = |l: &Length| (l.pose, l.weight, Raw::Length(self.residual(places, extras, l), l.variance_mm2, 2.0));
         self.lengths.iter().map(raw).collect()

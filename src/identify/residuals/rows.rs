@@ -318,11 +318,11 @@ impl Inputs<'_> {
     fn spot(&self, row: usize) -> Option<Spot> {
         let pose = self.place_of(row)?;
         match &self.recipe.set.poses[row].reading {
-            Reading::Position { point_mm, covariance_mm2, rotation } => Some(Spot {
+            Reading::Position { point_mm, covariance_mm2, rotation_rad } => Some(Spot {
                 pose,
                 point_mm: *point_mm,
                 covariance_mm2: covariance_mm2.unwrap_or_else(Matrix3::zeros),
-                rotation: rotation.map(|r| r.to_rotation_matrix().into_inner()),
+                rotation: rotation_rad.map(|r| Rotation3::new(r).into_inner()),
                 weight: self.weight(row),
                 extra: point_extra(self.recipe.set, row, point_mm, self.recipe.extras),
             }),

@@ -32,7 +32,7 @@ const ROUNDS_A_FACTOR: usize = 4;
 const BIWEIGHT: f64 = 4.685;
 
 /// At least one number in so many counts as a degree of freedom, however many parameters there are: the prior holds them.
-pub(super) const LEAST_FREEDOM: usize = 4;
+pub const LEAST_FREEDOM: usize = 4;
 
 impl<'a> Task<'a> {
     /// A fit that gross errors cannot get past, from the nominal robot. The scale that a residual is held against follows the median

@@ -4,8 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use stereocal::identify::Settings;
 use stereocal::identify::data::dataset::Dataset;
-use stereocal::identify::data::doctor::{self, Finding};
-use stereocal::identify::data::{covariances, examine, sessions};
+use stereocal::identify::data::doctor::{self, Examined, Finding};
 use stereocal::identify::judge::choose::{Identification, identify};
 use stereocal::identify::settings::Method;
 use stereocal::measurements::{Measurement, Observed, Role};
@@ -18,7 +17,7 @@ use crate::worlds::{Plan, arms, measured};
 type Plant = fn(&mut Vec<Measurement>, &mut Robot, f64);
 
 /// Faults, their sizes, and a word of the sentence that names each.
-const FAULTS: [(&str, &[f64], Plant, &str); 26] = [
+const FAULTS: [(&str, &[f64], Plant, &str); 28] = [
     ("clean", &[0.0], |_, _, _| {}, ""),
     ("radians", &[0.0], |rows, _, _| joints(rows, |_, j| j.iter_mut().for_each(|q| *q = q.to_radians())), "radians"),
     ("metres", &[0.0], |rows, _, _| points(rows, |_, p| p.coords /= 1000.0), "are in m,"),
@@ -31,6 +30,8 @@ const FAULTS: [(&str, &[f64], Plant, &str); 26] = [
     ("joints a row late", &[0.0], |rows, _, _| late(rows), "lag"),
     ("standard DH", &[0.0], |_, robot, _| *robot = as_standard(robot), "standard DH"),
     ("mirrored", &[0.0], |rows, _, _| points(rows, |_, p| p.y = -p.y), "mirrored"),
+    ("scaled by", &[0.998, 1.01, 1.1], |rows, _, by| points(rows, |_, p| p.coords *= by), "all links"),
+    ("rotations in degrees", &[0.0], |rows, _, _| turned(rows), "in degrees"),
     ("rows exchanged", &[2.0, 4.0, 12.0], |rows, _, by| exchanged(rows, by as usize), "far worse"),
     (
         "one point off by, mm",
@@ -42,7 +43,7 @@ const FAULTS: [(&str, &[f64], Plant, &str); 26] = [
     (
         "verify point off by, mm",
         &[0.3, 1.0, 5.0],
-        |rows, _, by| points(rows, |i, p| p.x += if i == 90 { by } else { 0.0 }),
+        |rows, _, by| points(rows, |i, p| p.x += if i == 130 { by } else { 0.0 }),
         "verify rows fit",
     ),
     (
@@ -71,25 +72,32 @@ const FAULTS: [(&str, &[f64], Plant, &str); 26] = [
 /// A result so many times as far off as without the fault, and nothing said, is absorbed in silence.
 const SILENT: f64 = 1.5;
 
-/// One line a fault and size, then distances with a zero, then gross errors.
+/// How the target is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Sensor {
+    /// As points.
+    Points,
+    /// As distances to the first pose's point.
+    Center,
+    /// As distances to a fixed point that nobody knows.
+    Wire,
+}
+
+/// Faults that distances do not have, or do not see.
+const OF_POINTS: [&str; 5] = ["mirrored", "placements", "rotations", "nought", "centre"];
+
+/// One line a fault and size, for points and for distances, then distances with a zero, then gross errors.
 ///
 /// With `only` the faults whose name holds it.
 pub fn table(runs: u64, only: &str) {
-    println!("\nplanted faults, Table 1's robot, 60 poses, {runs} runs");
-    println!("{:26} {:>7} {:>12} {:>9} {:>15}", "", "", "named of", "findings", "silently wrong");
-    let clean: Vec<f64> = (1..=runs).into_par_iter().map(|seed| diagnosed(|_, _, _| {}, 0.0, seed).1).collect();
-    for (what, sizes, plant, word) in FAULTS.into_iter().filter(|(what, ..)| what.contains(only)) {
-        for &size in sizes {
-            let said: Vec<(Vec<Finding>, f64)> =
-                (1..=runs).into_par_iter().map(|seed| diagnosed(plant, size, seed)).collect();
-            let named = said.iter().filter(|(list, _)| list.iter().any(|f| f.finding.contains(word))).count();
-            let findings: usize = said.iter().map(|(list, _)| list.len()).sum();
-            let silent = said.iter().zip(&clean).filter(|((list, e), c)| list.is_empty() && *e > SILENT * **c).count();
-            let instead =
-                said.iter().find(|(list, _)| !word.is_empty() && !list.iter().any(|f| f.finding.contains(word)));
-            let instead = instead.map_or(String::new(), |(l, _)| l.first().map_or(String::new(), Finding::sentence));
-            println!("{what:26} {size:7} {named:5} of {runs:3} {findings:9} {silent:15}  {instead:.80}");
-        }
+    for (sensor, name) in [
+        (Sensor::Points, "60 points"),
+        (Sensor::Center, "120 distances to a centre"),
+        (Sensor::Wire, "120 lengths of a draw wire"),
+    ] {
+        println!("\nplanted faults, Table 1's robot, {name}, {runs} runs");
+        println!("{:26} {:>7} {:>12} {:>9} {:>15}", "", "", "named of", "findings", "silently wrong");
+        lines(sensor, runs, only);
     }
     if !only.is_empty() {
         return;
@@ -100,6 +108,24 @@ pub fn table(runs: u64, only: &str) {
     );
     for percent in [10, 15, 20, 25] {
         gross(percent, runs);
+    }
+}
+
+fn lines(sensor: Sensor, runs: u64, only: &str) {
+    let clean: Vec<f64> = (1..=runs).into_par_iter().map(|seed| diagnosed(sensor, |_, _, _| {}, 0.0, seed).1).collect();
+    let seen = |what: &str| sensor == Sensor::Points || !OF_POINTS.iter().any(|fault| what.contains(fault));
+    for (what, sizes, plant, word) in FAULTS.into_iter().filter(|(what, ..)| what.contains(only) && seen(what)) {
+        for &size in sizes {
+            let said: Vec<(Vec<Finding>, f64)> =
+                (1..=runs).into_par_iter().map(|seed| diagnosed(sensor, plant, size, seed)).collect();
+            let named = said.iter().filter(|(list, _)| list.iter().any(|f| f.finding.contains(word))).count();
+            let findings: usize = said.iter().map(|(list, _)| list.len()).sum();
+            let silent = said.iter().zip(&clean).filter(|((list, e), c)| list.is_empty() && *e > SILENT * **c).count();
+            let instead =
+                said.iter().find(|(list, _)| !word.is_empty() && !list.iter().any(|f| f.finding.contains(word)));
+            let instead = instead.map_or(String::new(), |(l, _)| l.first().map_or(String::new(), Finding::sentence));
+            println!("{what:26} {size:7} {named:5} of {runs:3} {findings:9} {silent:15}  {instead:.80}");
+        }
     }
 }
 
@@ -133,18 +159,27 @@ fn zeros(runs: u64) {
 
 /// The points as distances to the first one, their zero off by so much.
 fn distances(rows: &[Measurement], zero_mm: f64) -> Vec<Measurement> {
-    let mut list = rows.to_vec();
-    let at = |row: &Measurement| match &row.observed {
-        Observed::Position { point_mm, .. } => *point_mm,
-        _ => Point3::origin(),
-    };
-    let from = at(&rows[0]);
-    for row in &mut list {
-        let distance_mm = (at(row) - from).norm() + zero_mm;
-        row.observed = Observed::Distance { distance_mm, sigma_mm: None };
-    }
+    let mut list = lengths(rows, at(&rows[0]), zero_mm);
     list[0].at.role = Role::Center;
     list
+}
+
+/// The points as distances to another, their zero off by so much; as certain as the points along x.
+fn lengths(rows: &[Measurement], from: Point3<f64>, zero_mm: f64) -> Vec<Measurement> {
+    let mut list = rows.to_vec();
+    for row in &mut list {
+        let sigma_mm = match &row.observed {
+            Observed::Position { covariance_mm2: Some(covariance), .. } => Some(covariance[(0, 0)].sqrt()),
+            _ => None,
+        };
+        let distance_mm = (at(row) - from).norm() + zero_mm;
+        row.observed = Observed::Distance { distance_mm, sigma_mm };
+    }
+    list
+}
+
+fn at(row: &Measurement) -> Point3<f64> {
+    if let Observed::Position { point_mm, .. } = &row.observed { *point_mm } else { Point3::origin() }
 }
 
 /// States covariances that are off by this factor of a standard deviation.
@@ -208,6 +243,17 @@ fn points(rows: &mut [Measurement], change: impl Fn(usize, &mut Point3<f64>)) {
     }
 }
 
+/// Orientations as Table 1's robot has them, in degrees.
+fn turned(rows: &mut [Measurement]) {
+    let robot = &arms()[0].1;
+    for row in rows {
+        let turn = robot.base_from_flange(&row.at.joints_rad()).rotation.scaled_axis();
+        if let Observed::Position { rotation_rad, .. } = &mut row.observed {
+            *rotation_rad = Some(turn.map(f64::to_degrees));
+        }
+    }
+}
+
 fn late(rows: &mut [Measurement]) {
     let joints: Vec<Vec<f64>> = rows.iter().map(|r| r.at.joints_deg.clone()).collect();
     for (row, joints) in rows.iter_mut().skip(1).zip(joints) {
@@ -232,16 +278,31 @@ fn as_standard(robot: &Robot) -> Robot {
 }
 
 /// What is said, and how far off the result is, mm.
-fn diagnosed(plant: Plant, size: f64, seed: u64) -> (Vec<Finding>, f64) {
-    let (mut nominal, truth, mut rows) = measured(&arms()[0].1, Plan::default(), seed);
+fn diagnosed(sensor: Sensor, plant: Plant, size: f64, seed: u64) -> (Vec<Finding>, f64) {
+    let samples = if sensor == Sensor::Points { Plan::default().samples } else { 120 };
+    let (mut nominal, truth, mut rows) = measured(&arms()[0].1, Plan { samples, ..Plan::default() }, seed);
     let unspoilt = Dataset::new(&rows, 1).expect("rows");
+    if sensor == Sensor::Wire {
+        // The wire's end is a point like the others, so that what is done to space is done to it as well.
+        let mut end = rows[0].clone();
+        end.at.pose = "end".to_owned();
+        points(std::slice::from_mut(&mut end), |_, p| *p = Point3::new(600.0, 300.0, 0.0));
+        rows.push(end);
+    }
     plant(&mut rows, &mut nominal, size);
+    let rows = match sensor {
+        Sensor::Points => rows,
+        Sensor::Center => distances(&rows, 0.0),
+        Sensor::Wire => {
+            let end = rows.iter().position(|row| row.at.pose == "end").expect("the wire's end");
+            let from = at(&rows.remove(end));
+            lengths(&rows, from, 0.0)
+        }
+    };
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let set = Dataset::new(&rows, 1).expect("rows");
-    let (set, nominal, mut list) = examine::examine(&set, &nominal, &settings);
-    let (set, along) = sessions::find(&set, &nominal, &settings);
-    let (set, of_covariances) = covariances::examine(&set, &nominal, &settings);
-    list.extend(of_covariances);
+    let Examined { set, robot: nominal, along, findings: mut list } =
+        doctor::examine(&set, &nominal, &settings, &|_| {});
     let Ok(found) = identify(&set, &nominal, &settings, 1, &|_| {}) else { return (list, f64::INFINITY) };
     list.extend(doctor::findings(&set, &found, &along));
     (list, against_truth(&unspoilt, &truth, &found.candidates[found.chosen].robot))

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use stereocal::identify::Settings;
 use stereocal::identify::data::dataset::Dataset;
-use stereocal::identify::data::{examine, sessions};
+use stereocal::identify::data::doctor::{self, Examined};
 use stereocal::identify::judge::choose::{Identification, identify};
 use stereocal::robot::Robot;
 
@@ -50,8 +50,7 @@ pub fn table() {
 
 fn whole(set: &Dataset, nominal: &Robot, seed: u64) -> Identification {
     let settings = Settings::default();
-    let (set, nominal, _) = examine::examine(set, nominal, &settings);
-    let (set, _) = sessions::find(&set, &nominal, &settings);
+    let Examined { set, robot: nominal, .. } = doctor::examine(set, nominal, &settings, &|_| {});
     identify(&set, &nominal, &settings, seed, &|_| {}).expect("it is enough")
 }
 
