@@ -102,6 +102,45 @@ fn normal(random: &mut Pcg64Mcg) -> Vector3<f64> {
     Vector3::new(one(), one(), one())
 }
 
+/// Eight sockets touched twelve times each with 0.03 mm of play a coordinate; the third moves by so much after half of its touches.
+/// Where they are, mm, stands beside the world.
+pub fn touched(moved_mm: f64, seed: u64) -> (World, Vec<Vector3<f64>>) {
+    let mut world = planned(0, 0, 25.0, 0.0, seed, &|_| {});
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let mut sockets: Vec<Vector3<f64>> = Vec::new();
+    world.rows.clear();
+    while sockets.len() < 8 {
+        let mut unit = || 2.0 * random.random::<f64>() - 1.0;
+        let first: Vec<f64> = world.truth.joints.iter().map(|_| 1.2 * unit()).collect();
+        let (socket, flange) = (world.truth.target_mm(&first).coords, world.truth.base_from_flange(&first).rotation);
+        let mut postures = Vec::new();
+        for _ in 0..200 {
+            let turn = Vector3::from_fn(|_, _| 0.6 * (2.0 * random.random::<f64>() - 1.0));
+            let moves = sockets.len() == 2 && postures.len() >= 6;
+            let moved = Vector3::x() * if moves { moved_mm } else { 0.0 };
+            let rotation = UnitQuaternion::from_scaled_axis(turn) * flange;
+            let origin = socket + moved + 0.03 * normal(&mut random) - rotation * world.truth.tool_mm;
+            let flange = Transform::from_parts(origin.into(), rotation);
+            postures.extend(inverse::from_start(&world.truth, &flange, &first));
+            if postures.len() == 12 {
+                break;
+            }
+        }
+        if postures.len() < 12 {
+            continue;
+        }
+        for (i, joints) in postures.iter().enumerate() {
+            let group = format!("s{}", sockets.len());
+            let joints_deg = joints.iter().map(|q| q.to_degrees()).collect();
+            let pose = format!("{group}_{i}");
+            let at = RobotPose { pose, group, role: Role::Sample, joints_deg, slides: vec![] };
+            world.rows.push(Measurement { at, observed: Observed::Distance { distance_mm: 0.0, sigma_mm: None } });
+        }
+        sockets.push(socket);
+    }
+    (world, sockets)
+}
+
 /// Distances alone, to the group's centre.
 pub fn as_distances(rows: &[Measurement]) -> Vec<Measurement> {
     let center = |group: &str| {

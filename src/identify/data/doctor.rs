@@ -5,7 +5,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::dataset::{Dataset, Kind, Reading};
 use super::sessions::{self, Along, Session};
-use super::{conventions, covariances, orientations};
+use super::{conventions, covariances, known, orientations};
 use crate::identify::judge::choose::Identification;
 use crate::identify::record::{Smooth, file_unit};
 use crate::identify::residuals::weights::Extra;
@@ -61,6 +61,9 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
         let of_orientations = orientations::examine(&set, &robot);
         set = of_orientations.0;
         findings.extend(of_orientations.1);
+        let of_known = known::examine(&set, &robot, settings);
+        set = of_known.0;
+        findings.extend(of_known.1);
     }
     step("sessions along the rows");
     let (mut set, along) = sessions::find(&set, &robot, settings);
@@ -188,7 +191,7 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
     if !stepping.is_empty() {
         add(
             format!(
-                "the rows fall into {} sessions, between which the sensor, the wire's anchor or its zero, or the robot's base moved",
+                "the rows fall into {} sessions, between which the sensor, the socket, the wire's anchor or its zero, or the robot's base moved",
                 stepping.len()
             ),
             stepping,

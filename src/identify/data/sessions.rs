@@ -10,6 +10,8 @@
 //! A verify row belongs to the session of the fitted row before it in the file; before all, to the first.
 //! What goes wrong: sessions shorter than [`SHORTEST`] rows are not seen.
 
+use std::rc::Rc;
+
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
@@ -24,6 +26,9 @@ use crate::robot::Robot;
 
 /// Fewest fitted rows of a session: twice its own unknowns.
 pub const SHORTEST: usize = 8;
+
+/// Of touches of a socket.
+const SHORTEST_TOUCH: usize = 4;
 
 /// A cut of points must explain this share of what is left, and this many times what a cut along any joint explains.
 const SHARE: f64 = 0.1;
@@ -87,13 +92,19 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
 struct Placed {
     /// Rows of the data set in their order, each with where its residuals start and end.
     rows: Vec<(usize, std::ops::Range<usize>)>,
-    linear: Linear,
+    linear: Rc<Linear>,
     /// A column an unknown of a new placement, where only some rows belong to it.
     fresh: DMatrix<f64>,
     /// Row of the centre that was measured, from which on things move.
     center: Option<usize>,
     /// Inverse normal matrix of the robot's parameters and this placement's unknowns, the others' eliminated.
-    inverse: DMatrix<f64>,
+    inverse: Rc<DMatrix<f64>>,
+    /// Fewest rows of a session.
+    shortest: usize,
+    /// Whether a new placement must explain more than what is smooth along a joint.
+    rivalled: bool,
+    /// The sum of squares of which it must then explain a share.
+    squares: f64,
 }
 
 struct Search<'a> {
@@ -124,14 +135,12 @@ impl<'a> Search<'a> {
         // What is left of chance after the fit: the share that the unknowns took explains nothing any more.
         let unknowns = count + parts.iter().map(|(_, l, _)| l.design.ncols()).sum::<usize>();
         let freedom = numbers.saturating_sub(unknowns).max(numbers.div_ceil(LEAST_FREEDOM));
-        let squares = parts.iter().map(|(_, l, _)| l.residuals.norm_squared()).sum();
+        let squares: f64 = parts.iter().map(|(_, l, _)| l.residuals.norm_squared()).sum();
         let mut placed = Vec::new();
         for (block, linear, own) in parts {
-            let (fresh, center) = match block {
-                Block::Wire(_) | Block::Points(_) => (linear.design.clone(), None),
-                Block::Center(c) => (c.of_center(&places, &rows.scatter), Some(rows.rows[c.center])),
-                _ => continue,
-            };
+            if matches!(block, Block::Pairwise(_)) {
+                continue;
+            }
             let unknowns = linear.design.ncols();
             let mut whole = DMatrix::zeros(count + unknowns, count + unknowns);
             let others = &normal - own + product(&linear.jacobian, &linear.jacobian);
@@ -142,13 +151,40 @@ impl<'a> Search<'a> {
             whole.view_mut((count, count), (unknowns, unknowns)).copy_from(&product(&linear.design, &linear.design));
             let mut of_rows: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
             for (i, pose) in block.row_poses().into_iter().enumerate() {
-                let row = rows.rows[pose?];
+                let Some(pose) = pose else { continue };
+                let row = rows.rows[pose];
                 match of_rows.last_mut() {
                     Some((last, range)) if *last == row => range.end = i + 1,
                     _ => of_rows.push((row, i..i + 1)),
                 }
             }
-            placed.push(Placed { rows: of_rows, linear, fresh, center, inverse: pseudo_inverse(whole) });
+            let (linear, inverse) = (Rc::new(linear), Rc::new(pseudo_inverse(whole)));
+            let place = |rows, fresh, center, rivalled| {
+                let (linear, inverse) = (linear.clone(), inverse.clone());
+                Placed { rows, linear, fresh, center, inverse, shortest: SHORTEST, rivalled, squares }
+            };
+            match block {
+                Block::Wire(_) => placed.push(place(of_rows, linear.design.clone(), None, false)),
+                Block::Points(_) => placed.push(place(of_rows, linear.design.clone(), None, true)),
+                Block::Center(c) => {
+                    let center = Some(rows.rows[c.center]);
+                    placed.push(place(of_rows, c.of_center(&places, &rows.scatter), center, true));
+                }
+                // Each socket by itself: it touches few of the rows.
+                Block::Touch(touch) => {
+                    for socket in 0..touch.sockets.len() {
+                        let contacts = of_rows.iter().zip(&touch.contacts).filter(|(_, c)| c.socket == socket);
+                        let rows: Vec<_> = contacts.map(|(row, _)| row.clone()).collect();
+                        let of_row = |(_, at): &(usize, std::ops::Range<usize>)| {
+                            linear.residuals.rows(at.start, at.len()).norm_squared()
+                        };
+                        let squares = rows.iter().map(of_row).sum();
+                        let fresh = linear.design.columns(3 * socket, 3).into_owned();
+                        placed.push(Placed { shortest: SHORTEST_TOUCH, squares, ..place(rows, fresh, None, true) });
+                    }
+                }
+                Block::Pairwise(_) => {}
+            }
         }
         Some(Search { set: task.set, placed, numbers: numbers as f64, freedom: freedom as f64, squares })
     }
@@ -173,9 +209,9 @@ impl<'a> Search<'a> {
         if !self.pays(gain, placed.fresh.ncols()) {
             return None;
         }
-        if self.set.kind == Kind::Positions || placed.center.is_some() {
+        if placed.rivalled {
             let rival = self.orders(placed).iter().filter_map(|o| Some(placed.best_step(o)?.0)).fold(0.0, f64::max);
-            if gain < SHARE * self.squares || gain < BEATS * rival {
+            if gain < SHARE * placed.squares || gain < BEATS * rival {
                 return None;
             }
         }
@@ -203,9 +239,9 @@ impl<'a> Search<'a> {
                 return placed.best_step(&order).is_some_and(|(step, _)| gain > step);
             }
             let rival = self.orders(placed).iter().map(|o| placed.ramp(o)).fold(0.0, f64::max);
-            placed.rows.len() >= 2 * SHORTEST
+            placed.rows.len() >= 2 * placed.shortest
                 && self.pays(gain, placed.fresh.ncols())
-                && gain > SHARE * self.squares
+                && gain > SHARE * placed.squares
                 && gain > BEATS * rival
         };
         let name = |p: &Placed| self.set.groups[self.set.poses[p.rows[0].0].group].name.clone();
@@ -229,7 +265,7 @@ impl Placed {
     }
 
     fn gain(&self, pull: &DVector<f64>, own: &DMatrix<f64>, all: &DMatrix<f64>) -> f64 {
-        let left = own - all * &self.inverse * all.transpose();
+        let left = own - all * &*self.inverse * all.transpose();
         pull.dot(&(pseudo_inverse(left) * pull))
     }
 
@@ -245,7 +281,7 @@ impl Placed {
             own += o;
             all += a;
             let early = order.len() - late - 1;
-            if late + 1 >= SHORTEST && early >= SHORTEST {
+            if late + 1 >= self.shortest && early >= self.shortest {
                 let gain = self.gain(&pull, &own, &all);
                 if best.is_none_or(|(g, _)| gain > g) {
                     best = Some((gain, k));
@@ -286,6 +322,7 @@ fn split(set: &mut Dataset, row: usize) {
     }
 }
 
+/// The sessions of the groups that were cut.
 fn list(set: &Dataset) -> Vec<Session> {
     let session = |(g, group): (usize, &Group)| {
         let rows = set.rows(|p| p.group == g && p.role != Role::Verify);
@@ -293,7 +330,9 @@ fn list(set: &Dataset) -> Vec<Session> {
         let (first, last) = (name(rows.first())?, name(rows.last())?);
         Some((rows[0], Session { group: group.name.clone(), first, last, count: rows.len() }))
     };
-    let mut sessions: Vec<(usize, Session)> = set.groups.iter().enumerate().filter_map(session).collect();
+    let cut = |group: &Group| set.groups.iter().filter(|g| g.name == group.name).count() > 1;
+    let groups = set.groups.iter().enumerate().filter(|(_, group)| cut(group));
+    let mut sessions: Vec<(usize, Session)> = groups.filter_map(session).collect();
     sessions.sort_by_key(|(row, _)| *row);
     sessions.into_iter().map(|(_, s)| s).collect()
 }
@@ -377,6 +416,20 @@ mod tests {
             assert!(!along.drifting.is_empty() || along.sessions.len() > 1, "{moved_mm}: {along:?}");
         }
         let (world, set) = to_center(0.0, false);
+        assert_eq!(find(&set, &world.nominal, &Settings::default()).1, Along::default());
+    }
+
+    #[test]
+    fn a_socket_that_moved_is_found_where_it_moved() {
+        for moved_mm in [0.3, 1.0, 5.0] {
+            let (world, _) = synthetic::touched(moved_mm, 2);
+            let set = Dataset::new(&world.rows, 1).unwrap();
+            let (_, along) = find(&set, &world.nominal, &Settings::default());
+            let parts: Vec<&str> = along.sessions.iter().map(|s| s.first.as_str()).collect();
+            assert_eq!(parts, ["s2_0", "s2_6"], "{moved_mm}");
+        }
+        let (world, _) = synthetic::touched(0.0, 2);
+        let set = Dataset::new(&world.rows, 1).unwrap();
         assert_eq!(find(&set, &world.nominal, &Settings::default()).1, Along::default());
     }
 }

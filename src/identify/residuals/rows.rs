@@ -304,8 +304,8 @@ impl Inputs<'_> {
                 }));
             }
             let at = |group: usize| members.iter().position(|(g, _)| *g == group);
-            let known = set.known.iter().filter_map(|k| {
-                Some(Known { a: at(k.a)?, b: at(k.b)?, distance_mm: k.distance_mm, sigma_mm: k.sigma_mm })
+            let known = set.known.iter().enumerate().filter_map(|(index, k)| {
+                Some(Known { a: at(k.a)?, b: at(k.b)?, distance_mm: k.distance_mm, sigma_mm: k.sigma_mm, index })
             });
             Block::Touch(Touch { sockets, contacts, known: known.collect() })
         };

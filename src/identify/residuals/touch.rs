@@ -32,6 +32,8 @@ pub struct Known {
     pub distance_mm: f64,
     /// mm
     pub sigma_mm: f64,
+    /// Which of the data set's known distances it is.
+    pub index: usize,
 }
 
 /// Sockets that belong together, and when they were touched.

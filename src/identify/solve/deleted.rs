@@ -13,7 +13,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::robust::{LEAST_FREEDOM, Robust};
 use super::scatter::as_one_number;
 use super::task::Task;
-use crate::identify::residuals::eliminate::{product, pseudo_inverse};
+use crate::identify::residuals::eliminate::{Block, product, pseudo_inverse};
+use crate::identify::residuals::touch::Known;
 
 /// Root of the weight of a row that must not count, but has to have residuals and derivatives.
 const UNHEARD: f64 = 1e-5;
@@ -101,6 +102,15 @@ impl Robust<'_> {
 
     /// All rows of the data set against what the others predict for them; of those that are not in the fit nothing.
     pub fn deleted(&self) -> Vec<Deleted> {
+        self.all_deleted().0
+    }
+
+    /// The known distances of the data set against what everything else says of them, in their own standard deviations.
+    pub fn deleted_known(&self) -> Vec<f64> {
+        self.all_deleted().1
+    }
+
+    fn all_deleted(&self) -> (Vec<Deleted>, Vec<f64>) {
         let (rows, offsets, prior) = self.linearised();
         let mut normal = prior.clone();
         let (of_robot, extras) = rows.split(&offsets);
@@ -112,24 +122,35 @@ impl Robust<'_> {
             let follow = &own * product(&linear.design, &linear.jacobian);
             let jacobian = &linear.jacobian - &linear.design * follow;
             normal += product(&jacobian, &jacobian);
-            parts.push((block.row_poses(), linear, own, jacobian));
+            let known: &[Known] = if let Block::Touch(touch) = block { &touch.known } else { &[] };
+            parts.push((block.row_poses(), linear, own, jacobian, known));
         }
         let covariance = pseudo_inverse(normal);
         let weight = |row: usize| self.weights.get(row).copied().unwrap_or(1.0);
         let (mut squares, mut numbers, mut unknowns) = (0.0, 0usize, 0);
         let mut deleted = vec![Deleted::default(); self.task.set.poses.len()];
-        for (poses, linear, own, jacobian) in &parts {
+        let mut of_known = vec![0.0; self.task.set.known.len()];
+        for (poses, linear, own, jacobian, known) in &parts {
             unknowns += own.nrows();
+            let held = |at: &std::ops::Range<usize>| {
+                let residual = linear.residuals.rows(at.start, at.len()).into_owned();
+                let (columns, design) = (jacobian.rows(at.start, at.len()), linear.design.rows(at.start, at.len()));
+                let leverage = columns * &covariance * columns.transpose() + design * own * design.transpose();
+                (residual, leverage)
+            };
+            // The known distances stand behind the touches.
+            for (at, known) in (poses.len() - known.len()..poses.len()).zip(*known) {
+                let (residual, leverage) = held(&(at..at + 1));
+                of_known[known.index] = square_of_deleted(&residual, leverage, 1.0).unwrap_or(0.0).sqrt();
+            }
             for at in by_pose(poses) {
                 let Some(pose) = poses[at.start] else { continue };
                 let row = rows.rows[pose];
-                let residual = linear.residuals.rows(at.start, at.len()).into_owned();
+                let (residual, leverage) = held(&at);
                 if weight(row) > UNHEARD {
                     squares += residual.norm_squared();
                     numbers += at.len();
                 }
-                let (columns, design) = (jacobian.rows(at.start, at.len()), linear.design.rows(at.start, at.len()));
-                let leverage = columns * &covariance * columns.transpose() + design * own * design.transpose();
                 let square = square_of_deleted(&residual, leverage, weight(row)).unwrap_or(0.0);
                 if square > deleted[row].square {
                     deleted[row] = Deleted { square, numbers: at.len(), ..deleted[row] };
@@ -146,7 +167,7 @@ impl Robust<'_> {
             d.freedom = (freedom - own.1).max(1.0);
             d.variance = (squares - own.0).max(0.0) / d.freedom;
         }
-        deleted
+        (deleted, of_known)
     }
 }
 

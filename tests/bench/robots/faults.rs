@@ -231,7 +231,7 @@ fn exchanged(rows: &mut [Measurement], count: usize) {
     }
 }
 
-fn joints(rows: &mut [Measurement], change: impl Fn(usize, &mut [f64])) {
+pub fn joints(rows: &mut [Measurement], change: impl Fn(usize, &mut [f64])) {
     rows.iter_mut().enumerate().for_each(|(i, row)| change(i, &mut row.at.joints_deg));
 }
 
@@ -267,7 +267,7 @@ fn repeated(rows: &mut Vec<Measurement>) {
 }
 
 /// The rows of a standard DH table of the same arm, as somebody would type them who takes them for modified ones.
-fn as_standard(robot: &Robot) -> Robot {
+pub fn as_standard(robot: &Robot) -> Robot {
     let mut typed = robot.clone();
     let count = robot.joints.len();
     for i in 0..count {

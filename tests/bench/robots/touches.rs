@@ -16,6 +16,8 @@ use stereocal::identify::settings::Method;
 use stereocal::measurements::{Measurement, Observed, RobotPose, Role};
 use stereocal::robot::{Robot, inverse};
 
+use crate::faults::{as_standard, joints};
+use crate::simulated::against_truth;
 use crate::worlds::{Beyond, Plan, arms, normal, truth};
 
 /// Sockets, touches of each that are fitted, and that verify.
@@ -61,24 +63,102 @@ pub fn table(runs: u64) {
             );
         }
     }
+    faults(runs);
+}
+
+/// What touches are made of: the nominal robot, rows, known distances.
+struct World {
+    nominal: Robot,
+    truth: Robot,
+    rows: Vec<Measurement>,
+    known: Vec<KnownDistance>,
+}
+
+impl World {
+    /// With a socket that moves by so much after half of its touches.
+    fn new(nominal: &Robot, beyond: Beyond, moved_mm: f64, seed: u64) -> World {
+        let mut random = Pcg64Mcg::seed_from_u64(seed);
+        let plan = Plan { beyond, ..Plan::default() };
+        let mut nominal = nominal.clone();
+        nominal.tool_mm = Vector3::new(30.0, -20.0, 60.0);
+        let truth = truth(&nominal, plan, &mut random);
+        let (rows, sockets) = touched(&truth, moved_mm, &mut random);
+        let known = (0..3)
+            .map(|k| {
+                let (a, b) = (k, k + SOCKETS / 2);
+                let distance_mm = (sockets[a] - sockets[b]).norm() + KNOWN_MM * normal(&mut random);
+                KnownDistance { a, b, distance_mm, sigma_mm: KNOWN_MM }
+            })
+            .collect();
+        World { nominal, truth, rows, known }
+    }
+}
+
+/// Changes a world by so much.
+type Plant = fn(&mut World, f64);
+
+/// Faults, their sizes, and a word of the sentence that names each; what moves the socket is the world's own.
+const FAULTS: [(&str, &[f64], Plant, &str); 11] = [
+    ("clean", &[0.0], |_, _| {}, ""),
+    ("radians", &[0.0], |w, _| joints(&mut w.rows, |_, j| j.iter_mut().for_each(|q| *q = q.to_radians())), "radians"),
+    ("exchanged joints", &[0.0], |w, _| joints(&mut w.rows, |_, j| j.swap(1, 3)), "exchanged"),
+    ("negated joint", &[0.0], |w, _| joints(&mut w.rows, |_, j| j[2] = -j[2]), "sign is flipped"),
+    ("joint off by, deg", &[90.0, -90.0], |w, by| joints(&mut w.rows, |_, j| j[2] += by), "offset by"),
+    ("standard DH", &[0.0], |w, _| w.nominal = as_standard(&w.nominal), "standard DH"),
+    (
+        "a joint read wrong by, deg",
+        &[0.05, 0.2, 2.0],
+        |w, by| joints(&mut w.rows, |i, j| j[1] += if i == 7 { by } else { 0.0 }),
+        "worse than the rest",
+    ),
+    ("a socket moved by, mm", &[0.3, 1.0, 5.0], |_, _| {}, "sessions"),
+    ("a known length off by, mm", &[0.3, 1.0, 5.0], |w, by| w.known[1].distance_mm += by, "known distance"),
+    (
+        "all known lengths times",
+        &[1.01, 25.4, 1000.0],
+        |w, by| w.known.iter_mut().for_each(|k| k.distance_mm *= by),
+        "a",
+    ),
+    ("a link longer by, mm", &[20.0, 60.0], |w, by| w.nominal.joints[2].a_mm += by, "another robot"),
+];
+
+/// One line a fault and size: in how many runs it is named, and how many wrong results come without a word.
+fn faults(runs: u64) {
+    println!("\nplanted faults, Table 1's robot, {runs} runs: named of, findings, silently wrong");
+    let diagnosed = |plant: Plant, moved_mm: f64, size: f64, seed: u64| {
+        let mut world = World::new(&arms()[0].1, Beyond::Nothing, moved_mm, seed);
+        let exact = Dataset::new(&world.rows, 1).expect("rows");
+        plant(&mut world, size);
+        let mut set = Dataset::new(&world.rows, 1).expect("rows");
+        set.known = world.known;
+        let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+        let examined = doctor::examine(&set, &world.nominal, &settings, &|_| {});
+        let mut list = examined.findings;
+        let Ok(found) = identify(&examined.set, &examined.robot, &settings, 1, &|_| {}) else {
+            return (list, f64::INFINITY);
+        };
+        list.extend(doctor::findings(&examined.set, &found, &examined.along));
+        (list, against_truth(&exact, &world.truth, &found.candidates[found.chosen].robot))
+    };
+    let clean: Vec<f64> = (1..=runs).into_par_iter().map(|seed| diagnosed(|_, _| {}, 0.0, 0.0, seed).1).collect();
+    for (what, sizes, plant, word) in FAULTS {
+        for &size in sizes {
+            let moved_mm = if what.contains("socket") { size } else { 0.0 };
+            let said: Vec<_> = (1..=runs).into_par_iter().map(|seed| diagnosed(plant, moved_mm, size, seed)).collect();
+            let named = said.iter().filter(|(list, _)| list.iter().any(|f| f.finding.contains(word))).count();
+            let findings: usize = said.iter().map(|(list, _)| list.len()).sum();
+            let silent = said.iter().zip(&clean).filter(|((list, e), c)| list.is_empty() && *e > 1.5 * **c).count();
+            let first = said.iter().find_map(|(list, _)| list.first()).map_or(String::new(), |f| f.sentence());
+            println!("{what:26} {size:7} {named:5} of {runs:3} {findings:9} {silent:15}  {first:.100}");
+        }
+    }
 }
 
 /// Consistency and distortion of nominal robot, program and least squares; whether an unseen scale is said without known distances.
 fn outcome(nominal: &Robot, beyond: Beyond, seed: u64) -> [f64; 7] {
-    let mut random = Pcg64Mcg::seed_from_u64(seed);
-    let plan = Plan { beyond, ..Plan::default() };
-    let mut nominal = nominal.clone();
-    nominal.tool_mm = Vector3::new(30.0, -20.0, 60.0);
-    let truth = truth(&nominal, plan, &mut random);
-    let (rows, sockets) = touched(&truth, &mut random);
+    let World { nominal, rows, known, .. } = World::new(nominal, beyond, 0.0, seed);
     let mut set = Dataset::new(&rows, 1).expect("rows");
-    set.known = (0..3)
-        .map(|k| {
-            let (a, b) = (k, k + SOCKETS / 2);
-            let distance_mm = (sockets[a] - sockets[b]).norm() + KNOWN_MM * normal(&mut random);
-            KnownDistance { a, b, distance_mm, sigma_mm: KNOWN_MM }
-        })
-        .collect();
+    set.known = known;
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let found = identify(&set, &nominal, &settings, 1, &|_| {}).expect("it is enough");
     let judge = Judge::plain(&set, &found.fitted, true);
@@ -97,8 +177,8 @@ fn outcome(nominal: &Robot, beyond: Beyond, seed: u64) -> [f64; 7] {
     [before[0], before[1], after[0], after[1], plain[0], plain[1], f64::from(u8::from(said))]
 }
 
-/// Touches, and where the sockets are in the base frame, mm.
-fn touched(truth: &Robot, random: &mut Pcg64Mcg) -> (Vec<Measurement>, Vec<Vector3<f64>>) {
+/// Touches, and where the sockets are in the base frame, mm. The fourth moves by so much after half of its touches.
+fn touched(truth: &Robot, moved_mm: f64, random: &mut Pcg64Mcg) -> (Vec<Measurement>, Vec<Vector3<f64>>) {
     let (mut rows, mut sockets) = (Vec::new(), Vec::new());
     while sockets.len() < SOCKETS {
         let first: Vec<f64> = truth.joints.iter().map(|_| 1.2 * (2.0 * random.random::<f64>() - 1.0)).collect();
@@ -108,7 +188,9 @@ fn touched(truth: &Robot, random: &mut Pcg64Mcg) -> (Vec<Measurement>, Vec<Vecto
             let turn = Vector3::from_fn(|_, _| TURN_RAD * (2.0 * random.random::<f64>() - 1.0));
             let play = Vector3::from_fn(|_, _| PLAY_MM / 3f64.sqrt() * normal(random));
             let rotation = UnitQuaternion::from_scaled_axis(turn) * flange;
-            let origin = socket + play - rotation * truth.tool_mm;
+            let moves = sockets.len() == 3 && postures.len() >= FITTED / 2;
+            let moved = if moves { Vector3::x() * moved_mm } else { Vector3::zeros() };
+            let origin = socket + moved + play - rotation * truth.tool_mm;
             let wanted = Transform::from_parts(origin.into(), rotation);
             postures.extend(inverse::from_start(truth, &wanted, &first));
             if postures.len() == FITTED + VERIFY {
