@@ -31,6 +31,7 @@ const ROWS: usize = 120;
 enum Hypothesis {
     Radians,
     Lengths(f64, &'static str),
+    KnownLengths(f64, &'static str),
     Exchanged(usize, usize),
     Negated(usize),
     Offset(usize, f64),
@@ -92,8 +93,14 @@ fn scatter_mm(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<f64> 
 fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
     let joints = set.poses.first().map_or(0, |p| p.joints_rad.len());
     let mut list = vec![Hypothesis::Radians, Hypothesis::StandardDh];
+    // A touch reads no length.
+    let touches = (0..set.poses.len()).any(|row| set.touches(row));
     for (factor, unit) in [(1000.0, "m"), (25.4, "inches"), (10.0, "cm"), (0.001, "um")] {
-        list.push(Hypothesis::Lengths(factor, unit));
+        match touches {
+            false => list.push(Hypothesis::Lengths(factor, unit)),
+            true if set.known.is_empty() => {}
+            true => list.push(Hypothesis::KnownLengths(factor, unit)),
+        }
     }
     if set.kind == Kind::Positions {
         list.push(Hypothesis::Mirrored);
@@ -118,6 +125,7 @@ impl Hypothesis {
         match self {
             Hypothesis::Radians => "the joint angles are in radians, not in degrees".to_owned(),
             Hypothesis::Lengths(_, unit) => format!("the readings are in {unit}, not in mm"),
+            Hypothesis::KnownLengths(_, unit) => format!("the known distances are in {unit}, not in mm"),
             Hypothesis::Exchanged(i, j) => {
                 format!("the columns of joints {} and {} are exchanged (swapped)", i + 1, j + 1)
             }
@@ -158,6 +166,12 @@ impl Hypothesis {
                         }
                         Reading::Reference => {}
                     }
+                }
+            }
+            Hypothesis::KnownLengths(factor, _) => {
+                for known in &mut set.known {
+                    known.distance_mm *= factor;
+                    known.sigma_mm *= factor;
                 }
             }
             Hypothesis::Exchanged(i, j) => set.poses.iter_mut().for_each(|p| p.joints_rad.swap(i, j)),

@@ -29,6 +29,9 @@ const CLEAR: f64 = 4.0;
 /// Fewest groups among which one can be told from the others.
 const GROUPS: usize = 3;
 
+/// Fewest numbers that tell how large a group's residuals are.
+const FEWEST: usize = 15;
+
 /// A group that states too much is brought to this share of it at the least.
 const LEAST: f64 = 1e-4;
 
@@ -112,6 +115,9 @@ fn seen(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<Seen>, 
         let of_group = rows.iter().copied().filter(|&r| name(r) == *name_of).map(|r| deleted[r]);
         let rows: Vec<_> = of_group.filter(|d| d.numbers > 0).collect();
         let numbers = rows.first()?.numbers;
+        if numbers * rows.len() < FEWEST {
+            return None;
+        }
         let squares: Vec<f64> = rows.iter().map(|d| d.square).collect();
         Some(Seen {
             name: (**name_of).to_owned(),

@@ -28,6 +28,9 @@ const ROUNDS: usize = 4;
 /// Steps of the trust region after a change of the rows.
 const STEPS: usize = 6;
 
+/// Share of a row that the others must say for it to be held against them.
+const LEAST_OTHERS: f64 = 0.05;
+
 /// Probability that a set without any gross error has a doubtful row.
 const DOUBT: f64 = 1e-3;
 
@@ -150,6 +153,11 @@ impl Robust<'_> {
                 if weight(row) > UNHEARD {
                     squares += residual.norm_squared();
                     numbers += at.len();
+                }
+                // Where hardly anything but the row itself says what it should be, rounding decides what the others say.
+                let by_others = (DMatrix::identity(at.len(), at.len()) - &leverage).symmetric_eigenvalues().min();
+                if by_others < LEAST_OTHERS {
+                    continue;
                 }
                 let square = square_of_deleted(&residual, leverage, weight(row)).unwrap_or(0.0);
                 if square > deleted[row].square {

@@ -98,7 +98,7 @@ impl World {
 type Plant = fn(&mut World, f64);
 
 /// Faults, their sizes, and a word of the sentence that names each; what moves the socket is the world's own.
-const FAULTS: [(&str, &[f64], Plant, &str); 11] = [
+const FAULTS: [(&str, &[f64], Plant, &str); 13] = [
     ("clean", &[0.0], |_, _| {}, ""),
     ("radians", &[0.0], |w, _| joints(&mut w.rows, |_, j| j.iter_mut().for_each(|q| *q = q.to_radians())), "radians"),
     ("exchanged joints", &[0.0], |w, _| joints(&mut w.rows, |_, j| j.swap(1, 3)), "exchanged"),
@@ -113,14 +113,15 @@ const FAULTS: [(&str, &[f64], Plant, &str); 11] = [
     ),
     ("a socket moved by, mm", &[0.3, 1.0, 5.0], |_, _| {}, "sessions"),
     ("a known length off by, mm", &[0.3, 1.0, 5.0], |w, by| w.known[1].distance_mm += by, "known distance"),
-    (
-        "all known lengths times",
-        &[1.01, 25.4, 1000.0],
-        |w, by| w.known.iter_mut().for_each(|k| k.distance_mm *= by),
-        "a",
-    ),
+    ("known lengths times", &[1.01, 1.1], lengths, "all links"),
+    ("known lengths in inches", &[25.4], |w, by| lengths(w, 1.0 / by), "known distances are in inches"),
+    ("known lengths in m", &[1000.0], |w, by| lengths(w, 1.0 / by), "known distances are in m"),
     ("a link longer by, mm", &[20.0, 60.0], |w, by| w.nominal.joints[2].a_mm += by, "another robot"),
 ];
+
+fn lengths(world: &mut World, factor: f64) {
+    world.known.iter_mut().for_each(|k| k.distance_mm *= factor);
+}
 
 /// One line a fault and size: in how many runs it is named, and how many wrong results come without a word.
 fn faults(runs: u64) {
