@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::dataset::{Dataset, Kind, Reading};
 use super::doctor::Finding;
-use crate::identify::settings::{Model, Settings};
+use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;
 use crate::identify::solve::task::Task;
 use crate::robot::Robot;
@@ -84,8 +84,7 @@ fn scatter_mm(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<f64> 
     let step = all.len().div_ceil(ROWS).max(1);
     let rows: Vec<usize> = all.into_iter().step_by(step).collect();
     let parameters = robot.mdh_parameters();
-    let model = if set.kind == Kind::Positions { Model::Position } else { Model::CenterDistance };
-    let task = Task { set, robot, parameters: &parameters, extras: &[], rows: &rows, model, smooth: None, settings };
+    let task = Task::plain(set, robot, &parameters, &rows, settings);
     let scatter = task.robust(Loss::Absolute).ok()?.scatter.point_mm;
     scatter.is_finite().then_some(scatter)
 }

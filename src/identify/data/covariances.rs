@@ -11,10 +11,10 @@ use std::collections::BTreeMap;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::dataset::{Dataset, Kind, Reading};
+use super::dataset::{Dataset, Reading};
 use super::doctor::Finding;
 use crate::identify::Error;
-use crate::identify::settings::{Model, Settings};
+use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;
 use crate::identify::solve::task::Task;
 use crate::robot::Robot;
@@ -69,10 +69,10 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, V
         scale(&mut set, &off.name, off.factor);
         groups.retain(|g| g.name != off.name);
         let (times, sizes, way) =
-            if off.times > 1.0 { (off.times, "large", "small") } else { (1.0 / off.times, "small", "large") };
+            if off.times > 1.0 { (off.times, "larger", "small") } else { (1.0 / off.times, "smaller", "large") };
         findings.push(Finding {
             finding: format!(
-                "the covariances of group {} are too {way} beside those of the other groups: its residuals are {times:.1} times as {sizes}",
+                "the covariances of group {} are too {way} beside those of the other groups: its residuals are {times:.1} times {sizes}",
                 off.name
             ),
             rows: Vec::new(),
@@ -91,7 +91,7 @@ fn seen(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<Seen>, 
     for &row in &rows {
         let (count, sum) = of_groups.entry(name(row)).or_default();
         *count += 1;
-        *sum += variance_mm2(&set.poses[row].reading).unwrap_or(0.0);
+        *sum += set.poses[row].reading.variance_mm2().unwrap_or(0.0);
     }
     let stated: BTreeMap<&str, f64> =
         of_groups.iter().map(|(name, (count, sum))| (*name, sum / *count as f64)).collect();
@@ -105,10 +105,7 @@ fn seen(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<Seen>, 
         scale(&mut alike, name, middle_mm2 / stated_mm2);
     }
     let parameters = robot.mdh_parameters();
-    let model = if set.kind == Kind::Positions { Model::Position } else { Model::CenterDistance };
-    let task =
-        Task { set: &alike, robot, parameters: &parameters, extras: &[], rows: &rows, model, smooth: None, settings };
-    let robust = task.robust(Loss::Absolute)?;
+    let robust = Task::plain(&alike, robot, &parameters, &rows, settings).robust(Loss::Absolute)?;
     let deleted = robust.deleted();
     let unit_mm2 = robust.scatter.stated * middle_mm2 + robust.scatter.point_mm.powi(2);
     let of_group = |(name_of, stated_mm2): (&&str, &f64)| {
@@ -184,15 +181,6 @@ fn worst(groups: &[Seen]) -> Option<Off> {
     groups.iter().enumerate().filter_map(off).max_by(|a, b| a.evidence.total_cmp(&b.evidence))
 }
 
-/// Mean variance of a coordinate that a reading states, mm^2.
-fn variance_mm2(reading: &Reading) -> Option<f64> {
-    match reading {
-        Reading::Position { covariance_mm2: Some(c), .. } => Some(c.trace() / 3.0),
-        Reading::Distance { sigma_mm: Some(s), .. } => Some(s * s),
-        _ => None,
-    }
-}
-
 /// Multiplies the covariances of a group.
 fn scale(set: &mut Dataset, name: &str, factor: f64) {
     let of_group: Vec<bool> = set.groups.iter().map(|g| g.name == name).collect();
@@ -228,7 +216,7 @@ mod tests {
         let (set, findings) = examine(&set, &world.nominal, &Settings::default());
         let first = |name: &str| {
             let pose = set.poses.iter().find(|p| set.groups[p.group].name == name).unwrap();
-            variance_mm2(&pose.reading).unwrap()
+            pose.reading.variance_mm2().unwrap()
         };
         (findings.into_iter().map(|f| f.finding).collect(), first("g1") / first("g0"))
     }

@@ -49,6 +49,17 @@ pub enum Reading {
     Reference,
 }
 
+impl Reading {
+    /// Mean variance of a coordinate, or of the distance, that it states, mm^2.
+    pub fn variance_mm2(&self) -> Option<f64> {
+        match self {
+            Reading::Position { covariance_mm2: Some(c), .. } => Some(c.trace() / 3.0),
+            Reading::Distance { sigma_mm: Some(s), .. } => Some(s * s),
+            _ => None,
+        }
+    }
+}
+
 /// A pose that can be used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pose {
@@ -239,6 +250,11 @@ impl Dataset {
     /// Whether every pose has a covariance.
     pub fn has_covariances(&self) -> bool {
         self.poses.iter().all(|p| matches!(p.reading, Reading::Position { covariance_mm2: Some(_), .. }))
+    }
+
+    /// Whether distances are read to centres.
+    pub fn to_centers(&self) -> bool {
+        self.kind == Kind::Distances && self.groups.iter().any(|g| g.center.is_some())
     }
 
     /// Whether every pose that may be fitted has an orientation.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::dataset::{Dataset, Kind, Reading};
+use super::dataset::Dataset;
 use super::sessions::{self, Along, Session};
 use super::{conventions, covariances, known, orientations};
 use crate::identify::judge::choose::Identification;
@@ -310,15 +310,7 @@ const FAR_BELOW: f64 = 0.8;
 
 /// Whether the covariances of the file are far from what was seen.
 fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
-    let stated: Vec<f64> = set
-        .poses
-        .iter()
-        .filter_map(|p| match &p.reading {
-            Reading::Position { covariance_mm2: Some(c), .. } => Some(c.trace() / 3.0),
-            Reading::Distance { sigma_mm: Some(s), .. } => Some(s * s),
-            _ => None,
-        })
-        .collect();
+    let stated: Vec<f64> = set.poses.iter().filter_map(|p| p.reading.variance_mm2()).collect();
     if stated.is_empty() {
         return None;
     }
@@ -338,7 +330,7 @@ fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
         ));
     }
     // In a distance to a centre both ends scatter.
-    let ends = if set.kind == Kind::Distances && set.groups.iter().any(|g| g.center.is_some()) { 2.0 } else { 1.0 };
+    let ends = if set.to_centers() { 2.0 } else { 1.0 };
     let ratio = f64::sqrt(ends) * scatter.point_mm / stated_mm.max(1e-9);
     (ratio > FAR_ABOVE).then(|| {
         format!(

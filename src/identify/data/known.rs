@@ -10,10 +10,13 @@ use super::doctor::Finding;
 use crate::csv_table::Table;
 use crate::files;
 use crate::identify::Error;
-use crate::identify::settings::{Model, Settings};
+use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;
 use crate::identify::solve::task::Task;
 use crate::robot::Robot;
+
+/// Groups that a message names.
+const NAMED: usize = 8;
 
 /// Standard deviations, its own and the prediction's, from which on a known distance does not go with the rest.
 const OFF: f64 = 6.0;
@@ -28,11 +31,14 @@ pub fn read(path: &Utf8Path, set: &Dataset) -> files::Result<Vec<KnownDistance>>
     let (a, b) = (table.require("group_a")?, table.require("group_b")?);
     let distance = table.require("distance_mm")?;
     let sigma = table.column("sigma_mm");
+    let names: Vec<&str> = set.groups.iter().take(NAMED).map(|g| g.name.as_str()).collect();
+    let groups = format!("the groups are {}{}", names.join(", "), if set.groups.len() > NAMED { ", ..." } else { "" });
     let mut list = Vec::new();
     for (line, row) in &table.rows {
         let group = |column: usize| {
             let place = set.groups.iter().position(|g| g.name == row[column]);
-            place.ok_or_else(|| table.refuse(*line, format!("no group `{}` among the measurements", &row[column])))
+            let message = || format!("no group `{}` among the measurements", &row[column]);
+            place.ok_or_else(|| table.refuse_with(*line, message(), Some(&groups)))
         };
         let distance_mm = table.number(*line, row, distance)?;
         let sigma_mm = match sigma {
@@ -95,9 +101,7 @@ fn sizes(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<f64>, 
         return Ok(Vec::new());
     }
     let (rows, parameters) = (set.fit_rows(), robot.mdh_parameters());
-    let model = Model::CenterDistance;
-    let task = Task { set, robot, parameters: &parameters, extras: &[], rows: &rows, model, smooth: None, settings };
-    Ok(task.robust(Loss::Absolute)?.deleted_known())
+    Ok(Task::plain(set, robot, &parameters, &rows, settings).robust(Loss::Absolute)?.deleted_known())
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What was measured, sorted for identification: groups and roles, what is left out and why, sessions along the rows.
+//! What was measured, sorted for identification: groups and roles, what is left out and why, what is wrong with it, sessions along the rows.
 
 pub mod conventions;
 pub mod covariances;

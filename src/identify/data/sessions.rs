@@ -1,24 +1,24 @@
-//! Sessions along the rows of a group: the sensor, the wire's anchor or the robot's base was moved, and nobody wrote it down.
+//! Sessions along the rows of a group: the sensor, the socket, the wire's anchor or the robot's base was moved, and nobody wrote it down.
 //!
 //! In: a set of points or of distances, in the order of measurement. Out: the same set with each group cut where a
 //! new placement explains the rest of its rows better, and what drifts. Distances to a centre that was measured before everything moved
 //! are distances to a point that is unknown. Cuts are made one at a time at the row of greatest gain (binary
 //! segmentation: Vostrikova, 1981) as long as the Bayesian information criterion (Schwarz, 1978) pays for the cut's unknowns.
-//! Influence is bounded (weights of least absolute residuals), so that single gross errors make no session; for points and distances to
+//! Influence is bounded (weights of least absolute residuals), so that single gross errors make no session; for points, touches and distances to
 //! a centre, whose model errors are as smooth in the order of a grid as a drift is in time, the same rows sorted by each joint must not be
 //! cut as well.
 //! A verify row belongs to the session of the fitted row before it in the file; before all, to the first.
-//! What goes wrong: sessions shorter than [`SHORTEST`] rows are not seen.
+//! What goes wrong: sessions shorter than [`SHORTEST`] rows, of a socket [`SHORTEST_TOUCH`] touches, are not seen.
 
 use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use crate::identify::data::dataset::{Dataset, Group, Kind};
+use crate::identify::data::dataset::{Dataset, Group};
 use crate::identify::residuals::eliminate::{Block, Linear, product, pseudo_inverse};
 use crate::identify::residuals::weights::Extra;
-use crate::identify::settings::{Model, Settings};
+use crate::identify::settings::Settings;
 use crate::identify::solve::robust::{LEAST_FREEDOM, Loss};
 use crate::identify::solve::task::Task;
 use crate::measurements::Role;
@@ -64,14 +64,11 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     let mut cut = set.clone();
     let mut along = Along::default();
     let parameters = robot.mdh_parameters();
-    let model = if set.kind == Kind::Positions { Model::Position } else { Model::CenterDistance };
     // A zero that is off is no step.
-    let to_centers = set.kind == Kind::Distances && set.groups.iter().any(|g| g.center.is_some());
-    let extras: &[Extra] = if to_centers && settings.wire_offset { &[Extra::Zero] } else { &[] };
+    let extras: &[Extra] = if set.to_centers() && settings.wire_offset { &[Extra::Zero] } else { &[] };
     for cuts in 0..MOST_CUTS {
         let rows = cut.fit_rows();
-        let task =
-            Task { set: &cut, robot, parameters: &parameters, extras, rows: &rows, model, smooth: None, settings };
+        let task = Task { extras, ..Task::plain(&cut, robot, &parameters, &rows, settings) };
         let Some(search) = Search::new(&task) else { break };
         let found = search.best_cut();
         let drifting = search.drifting(found);

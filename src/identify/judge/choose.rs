@@ -122,11 +122,10 @@ pub fn identify(
 ) -> Result<Identification, Error> {
     let models = models(set, settings)?;
     let model = models.first().copied().unwrap_or(Model::CenterDistance);
-    let to_centers = set.kind == Kind::Distances && set.groups.iter().any(|g| g.center.is_some());
     let extras: Vec<Extra> = match set.shared.first() {
         Some(shared) if model != Model::PairwiseDistance => (0..shared.ncols()).map(Extra::Shared).collect(),
         // Its tolerance comes from the evidence, so that a zero that is right costs nothing.
-        _ if to_centers && settings.wire_offset => vec![Extra::Zero],
+        _ if set.to_centers() && settings.wire_offset => vec![Extra::Zero],
         _ => Vec::new(),
     };
     let mut session = Session { set, robot, settings, seed, rows: set.fit_rows(), extras, smooth: None, step };

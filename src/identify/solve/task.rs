@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 
 use crate::identify::Error;
-use crate::identify::data::dataset::Dataset;
+use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::Tolerance;
 use crate::identify::residuals::rows::{Recipe, Rows};
@@ -40,6 +40,18 @@ pub struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
+    /// These parameters on all fitted rows, as they are read: how measurements are looked at before it is known what is in them.
+    pub fn plain(
+        set: &'a Dataset,
+        robot: &'a Robot,
+        parameters: &'a [Parameter],
+        rows: &'a [usize],
+        settings: &'a Settings,
+    ) -> Task<'a> {
+        let model = if set.kind == Kind::Positions { Model::Position } else { Model::CenterDistance };
+        Task { set, robot, parameters, extras: &[], rows, model, smooth: None, settings }
+    }
+
     pub(super) fn recipe(&self, scatter: Scatter, weights: &'a [f64], levers: &'a Robot) -> Recipe<'a> {
         Recipe {
             set: self.set,
