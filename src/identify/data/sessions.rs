@@ -8,7 +8,7 @@
 //! a centre, whose model errors are as smooth in the order of a grid as a drift is in time, the same rows sorted by each joint must not be
 //! cut as well.
 //! A verify row belongs to the session of the fitted row before it in the file; before all, to the first.
-//! What goes wrong: sessions shorter than [`SHORTEST`] rows, of a socket [`SHORTEST_TOUCH`] touches, are not seen.
+//! What goes wrong: sessions shorter than [`SHORTEST`] rows, of a socket four touches, are not seen.
 
 use std::rc::Rc;
 
