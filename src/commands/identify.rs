@@ -164,7 +164,8 @@ fn write(
         || "The nominal robot was kept.".to_owned(),
         |expected| format!("Identified; {}; it holds within {}.", expected.sentence(), expected.poses),
     );
-    out.write_toml("identified.toml", &format!("# {holds}\n{}", robot::file::to_toml(identified)))?;
+    let scale = record.scale.map_or(String::new(), |scale| format!("# Not in this: {}.\n", scale.sentence()));
+    out.write_toml("identified.toml", &format!("# {holds}\n{scale}{}", robot::file::to_toml(identified)))?;
     let json = out.write_json("identification.json", record)?;
     out.write("identify.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
     Ok(json)

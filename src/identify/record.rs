@@ -9,6 +9,7 @@ use super::data::sessions::{Along, Session};
 use super::judge::choose::{Candidate, Identification};
 use super::judge::climb::Judged;
 use super::judge::errors::{Judge, RowError, Spread};
+use super::judge::scale::CommonScale;
 use super::model::base::Observability;
 use super::model::prior::Tolerance;
 use super::model::uncertainty::{Covariance, Expected};
@@ -61,6 +62,8 @@ pub struct Record {
     pub covariance: Option<Covariance>,
     /// The position error to expect of the chosen robot; `None` where nominal was kept.
     pub expected: Option<Expected>,
+    /// A scale of the readings, as far as the links' tolerance tells it from the robot's size; `None` where the links were not fitted.
+    pub scale: Option<CommonScale>,
     /// Unknowns of the sensor that were found beside the robot: name and value (mm, thousandths, mrad, standard deviations).
     pub sensor: Vec<(String, f64)>,
     /// A smooth error that the points of each placement share.
@@ -265,6 +268,7 @@ impl Record {
             doctor,
             covariance: chosen.found.as_ref().map(|(f, _)| Covariance::new(f)),
             expected: chosen.found.as_ref().map(|(f, _)| Expected::new(f, set, &found.fitted)),
+            scale: CommonScale::new(set, found),
             sensor: found.extras.iter().map(|(extra, value)| of_sensor(set, *extra, *value)).collect(),
         };
         let worse = found.worse_than_nominal(set, nominal, settings);

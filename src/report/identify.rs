@@ -44,6 +44,9 @@ pub fn summary(record: &Record) -> String {
     if let Some(expected) = &record.expected {
         text.push_str(&format!("{}\n", expected.sentence()));
     }
+    if let Some(scale) = record.scale.filter(|scale| !scale.is_told()) {
+        text.push_str(&format!("{}\n", scale.sentence()));
+    }
     text
 }
 
@@ -102,6 +105,9 @@ pub fn page(
         @if let Some(expected) = &record.expected {
             h2 { "How far to trust it" }
             (expected_table(expected))
+            @if let Some(scale) = record.scale.filter(|scale| !scale.is_told()) {
+                p { "Not in these figures: " (scale.sentence()) "." }
+            }
             (expected_map(expected, places)?)
         }
         h2 { "Parameters" }

@@ -1,12 +1,12 @@
 //! What is wrong with the data: each finding in words, with the rows it is about and what was done.
 
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::dataset::Dataset;
 use super::sessions::{self, Along, Session};
 use super::{conventions, covariances, known, orientations};
 use crate::identify::judge::choose::Identification;
+use crate::identify::judge::scale::CommonScale;
 use crate::identify::record::{Smooth, file_unit};
 use crate::identify::residuals::weights::Extra;
 use crate::identify::settings::Settings;
@@ -171,17 +171,8 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "the robot that was found is used; see whether the file is the right one",
         );
     }
-    if let Some((share, sigma)) = common_scale(found) {
-        let way = if share > 0.0 { "longer" } else { "shorter" };
-        add(
-            format!(
-                "all links are found {:.2} % (+- {:.2}) {way} than the nominal ones: the readings are scaled, or the lengths of the robot file",
-                100.0 * share.abs(),
-                100.0 * sigma
-            ),
-            Vec::new(),
-            "the robot that was found has the scale of the readings; check them on a known length",
-        );
+    if let Some(scale) = CommonScale::new(set, found).filter(CommonScale::is_told) {
+        add(scale.sentence(), Vec::new(), "the robot that was found has this scale; check it on a known length");
     }
     let drifts = |s: &Session| along.drifting.contains(&s.group);
     let ranges = |of: &dyn Fn(&&Session) -> bool| -> Vec<String> {
@@ -231,44 +222,6 @@ pub fn zero(found: &Identification) -> Option<(f64, f64)> {
     let at = formulation.base.rank() + k;
     let (value, sigma) = (found.extras[k].1, formulation.covariance()[(at, at)].max(0.0).sqrt());
     (value.abs() > ZERO_SIGMAS * sigma).then_some((value, sigma))
-}
-
-/// Fewest lengths that tell a common scale, and the probability of finding one where there is none.
-const LENGTHS: usize = 4;
-const BY_CHANCE: f64 = 1e-3;
-
-/// Share by which all determined lengths differ from nominal, and its standard deviation, where that is more than their own errors make
-/// by chance: a scale of the readings leaves no residual, but no workshop makes all links too long by the same share.
-fn common_scale(found: &Identification) -> Option<(f64, f64)> {
-    let candidate = &found.candidates[found.chosen];
-    let (formulation, _) = candidate.found.as_ref()?;
-    let (base, parameters) = (&formulation.base, formulation.parameters());
-    let nominal = formulation.rows.kinematics.nominal();
-    let is_link = |p: &Parameter| matches!(p, Parameter::A(_) | Parameter::D(_));
-    // The tool's nominal point is a guess more often than not.
-    let is_tool = |p: &Parameter| matches!(p, Parameter::V(_));
-    let combined = |k: usize| {
-        let with = (0..base.dependent.len()).map(|c| (base.coefficients[(k, c)], parameters[base.dependent[c]]));
-        let terms: Vec<(f64, Parameter)> =
-            std::iter::once((1.0, parameters[base.free[k]])).chain(with).filter(|(by, _)| by.abs() > 1e-6).collect();
-        if !is_link(&terms[0].1) || terms.iter().any(|(_, p)| is_tool(p)) {
-            return None;
-        }
-        let length: f64 = terms.iter().filter(|(_, p)| is_link(p)).map(|(by, p)| by * nominal.value(*p)).sum();
-        let moved: f64 = terms.iter().map(|(by, p)| by * (candidate.robot.value(*p) - nominal.value(*p))).sum();
-        Some((length, moved))
-    };
-    let lengths: Vec<(f64, f64)> = (0..base.rank()).filter_map(combined).collect();
-    if lengths.len() < LENGTHS {
-        return None;
-    }
-    let square: f64 = lengths.iter().map(|(l, _)| l * l).sum();
-    let share = lengths.iter().map(|(l, moved)| l * moved).sum::<f64>() / square;
-    let freedom = (lengths.len() - 1) as f64;
-    let left = lengths.iter().map(|(l, moved)| (moved - share * l).powi(2)).sum::<f64>() / freedom;
-    let sigma = (left / square).sqrt();
-    let limit = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(1.0 - BY_CHANCE / 2.0);
-    (share.abs() > limit * sigma).then_some((share, sigma))
 }
 
 /// Corrections beyond which a link is not the one of the robot's file, mm and rad, and how many standard deviations they must have.

@@ -4,4 +4,5 @@ pub mod cells;
 pub mod choose;
 pub mod climb;
 pub mod errors;
+pub mod scale;
 pub mod smooth;

@@ -217,6 +217,15 @@ impl Formulation {
         covariance + more
     }
 
+    /// The data, linear in the unknowns (base parameters, extras), without a prior: the product of the white Jacobian with itself, and with
+    /// the white residuals at offset zero.
+    pub fn normal(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let count = self.free_fit.x.len();
+        let free = vec![f64::INFINITY; count];
+        let fit = Fit::new(Cow::Borrowed(&self.rows), &self.base, self.spread(), &free, DMatrix::zeros(0, count));
+        fit.normal(&self.free_fit.x)
+    }
+
     /// Covariance of all parameters of the robot: what is determined, and what the tolerance leaves open where it holds them.
     pub fn robot_covariance(&self) -> DMatrix<f64> {
         let rank = self.base.rank();

@@ -1,0 +1,213 @@
+//! A scale of the readings: whether all links come out too long, or too short, by one share, and how large a share would not be seen.
+//!
+//! In: the fit of the chain. Out: the share, its standard deviation, and how much more probable the links are with it than without.
+//! Points and distances that are all too long by one share fit a robot that is too large by it, and leave no residual. What tells is the
+//! tolerance of the links alone: their errors have nothing to do with their lengths. How large that tolerance is, the links' errors say
+//! themselves, with what is known of workshops where they are few; the share is then a generalised least squares over what the poses
+//! determine, and the evidence (as for the tolerances: MacKay, "Bayesian interpolation", 1992) weighs it against no share.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::choose::Identification;
+use crate::identify::model::ladder::Chain;
+use crate::identify::model::prior::Tolerance;
+use crate::robot::Parameter;
+
+/// Tolerances of the links that are weighed, mm: from the smallest, so many, each so many times the one before.
+const SMALLEST_MM: f64 = 0.02;
+const TOLERANCES: usize = 36;
+const STEP: f64 = 1.25;
+
+/// What is known of them: robots are built to this, mm, give or take such a factor.
+const USUAL_MM: f64 = 0.4;
+const GIVE_OR_TAKE: f64 = 4.0;
+
+/// Standard deviations of a scale before the data: instruments, typing errors, units.
+const SCALES: [f64; 4] = [0.003, 0.01, 0.03, 0.1];
+
+/// Logarithm of the odds from which on a scale is told of, twelve to one: none of 600 clean simulated sets has as much.
+const TOLD: f64 = 2.5;
+
+/// Half width of a 95 % interval over the standard deviation.
+const P95: f64 = 1.96;
+
+/// Share by which all links differ from the nominal ones.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CommonScale {
+    /// The share, larger than nominal being positive.
+    pub share: f64,
+    /// What the links' tolerance lets it be known to: a standard deviation.
+    pub sigma: f64,
+    /// Logarithm of how many times more probable the links are with it.
+    pub log_odds: f64,
+    /// What gives the robot its scale.
+    pub of: &'static str,
+}
+
+impl CommonScale {
+    /// Of the chosen robot; `None` where its links were not fitted, or nothing that was measured has their scale.
+    pub fn new(set: &Dataset, found: &Identification) -> Option<CommonScale> {
+        let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
+        if found.terms.chain != Chain::Mdh || !formulation.scale_seen || !formulation.held {
+            return None;
+        }
+        let (base, parameters) = (&formulation.base, formulation.parameters());
+        let nominal = formulation.rows.kinematics.nominal();
+        let length = |i: usize| match parameters[i] {
+            p @ (Parameter::A(_) | Parameter::D(_) | Parameter::V(_)) => nominal.value(p),
+            _ => 0.0,
+        };
+        let extras = &formulation.rows.extras;
+        let mut longer = DVector::zeros(base.rank() + extras.len());
+        for k in 0..base.rank() {
+            let of_others = base.dependent.iter().enumerate().map(|(c, &i)| base.coefficients[(k, c)] * length(i));
+            longer[k] = length(base.free[k]) + of_others.sum::<f64>();
+        }
+        let (normal, gradient) = formulation.normal();
+        let weighed: Vec<Weighed> = (0..TOLERANCES)
+            .filter_map(|step| {
+                let lengths_mm = SMALLEST_MM * STEP.powi(step as i32);
+                let tolerance = Tolerance { lengths_mm, ..formulation.tolerance };
+                let covariance = tolerance.covariance(base, parameters, extras);
+                let before = -0.5 * ((lengths_mm / USUAL_MM).ln() / GIVE_OR_TAKE.ln()).powi(2);
+                Weighed::new(&covariance, &normal, &gradient, &longer, before)
+            })
+            .collect();
+        let (log_odds, share, sigma) = summed_up(&weighed);
+        let of = if set.known.is_empty() { "readings" } else { "known distances" };
+        (sigma.is_finite() && log_odds.is_finite()).then_some(CommonScale { share, sigma, log_odds, of })
+    }
+
+    /// Whether it is more than the links' own errors make by chance.
+    pub fn is_told(&self) -> bool {
+        self.log_odds > TOLD
+    }
+
+    /// Largest share that the links do not speak against (95 %).
+    pub fn unseen(&self) -> f64 {
+        self.share.abs() + P95 * self.sigma
+    }
+
+    /// The scale that was found, or how large a one would not be.
+    pub fn sentence(&self) -> String {
+        let CommonScale { share, sigma, of, .. } = *self;
+        let (percent, way) = (100.0 * share.abs(), if share > 0.0 { "longer" } else { "shorter" });
+        match self.is_told() {
+            true => format!(
+                "all links are found {percent:.2} % (+- {:.2}) {way} than the nominal ones: the {of} are scaled, or the lengths of the robot file",
+                100.0 * sigma
+            ),
+            false => format!(
+                "scale of the {of}: one that is off by up to {:.2} % looks like a robot that is as much larger, and would not be seen",
+                100.0 * self.unseen()
+            ),
+        }
+    }
+}
+
+/// The links' errors under one tolerance.
+struct Weighed {
+    log_evidence: f64,
+    precision: f64,
+    pull: f64,
+}
+
+impl Weighed {
+    fn new(
+        covariance: &DMatrix<f64>,
+        normal: &DMatrix<f64>,
+        gradient: &DVector<f64>,
+        longer: &DVector<f64>,
+        before: f64,
+    ) -> Option<Weighed> {
+        // What is measured of the links scatters by the tolerance and the noise: with N = J'J and C the tolerance, its weight is
+        // (C + N^-1)^-1 = (I + N C)^-1 N.
+        let mut inner = normal * covariance;
+        for i in 0..inner.nrows() {
+            inner[(i, i)] += 1.0;
+        }
+        let lu = inner.lu();
+        let log_determinant: f64 = lu.u().diagonal().iter().map(|d| d.abs().ln()).sum();
+        let seen = lu.solve(gradient)?;
+        let of_longer = lu.solve(&(normal * longer))?;
+        Some(Weighed {
+            log_evidence: before + 0.5 * (gradient.dot(&(covariance * &seen)) - log_determinant),
+            precision: longer.dot(&of_longer),
+            pull: -longer.dot(&seen),
+        })
+    }
+
+    fn share(&self) -> f64 {
+        self.pull / self.precision
+    }
+
+    /// Logarithm of the factor by which a scale of such a standard deviation makes the data more probable; with an infinite one up to a
+    /// factor that all tolerances share.
+    fn gain(&self, scale: f64) -> f64 {
+        match scale.is_finite() {
+            true => {
+                0.5 * (self.pull.powi(2) / (self.precision + scale.powi(-2))
+                    - (1.0 + scale * scale * self.precision).ln())
+            }
+            false => 0.5 * (self.pull.powi(2) / self.precision - self.precision.ln()),
+        }
+    }
+}
+
+/// Logarithm of the odds for a scale, the share and its standard deviation, over all tolerances.
+fn summed_up(weighed: &[Weighed]) -> (f64, f64, f64) {
+    let without = log_sum(weighed.iter().map(|w| w.log_evidence));
+    let with = |scale: f64| log_sum(weighed.iter().map(|w| w.log_evidence + w.gain(scale)));
+    let log_odds = SCALES.iter().map(|&s| with(s) - without).fold(f64::NEG_INFINITY, f64::max);
+    // With any scale as probable as any other.
+    let log_weight = |w: &Weighed| w.log_evidence + w.gain(f64::INFINITY);
+    let total = log_sum(weighed.iter().map(log_weight));
+    let mean =
+        |of: &dyn Fn(&Weighed) -> f64| weighed.iter().map(|w| (log_weight(w) - total).exp() * of(w)).sum::<f64>();
+    let share = mean(&|w| w.share());
+    let sigma = mean(&|w| 1.0 / w.precision + (w.share() - share).powi(2)).sqrt();
+    (log_odds, share, sigma)
+}
+
+/// Logarithm of the sum of exponentials.
+fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+    largest + logs.map(|l| (l - largest).exp()).sum::<f64>().ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Links of 50 to 400 mm, found exactly, off by errors of about `error_mm` and by a share.
+    fn weighed(error_mm: f64, share: f64) -> (f64, f64) {
+        let lengths = [400.0, -300.0, 250.0, 100.0, 50.0];
+        let errors = [0.9, 1.2, -0.7, -1.1, 0.8].map(|e| e * error_mm);
+        let longer = DVector::from_row_slice(&lengths);
+        let normal = DMatrix::<f64>::identity(5, 5) * 1e4;
+        let gradient = DVector::from_fn(5, |k, _| -1e4 * (errors[k] + share * lengths[k]));
+        let all: Vec<Weighed> = (0..TOLERANCES)
+            .map(|step| {
+                let mm = SMALLEST_MM * STEP.powi(step as i32);
+                let before = -0.5 * ((mm / USUAL_MM).ln() / GIVE_OR_TAKE.ln()).powi(2);
+                let covariance = DMatrix::<f64>::identity(5, 5) * mm * mm;
+                Weighed::new(&covariance, &normal, &gradient, &longer, before).unwrap()
+            })
+            .collect();
+        let (log_odds, share, _) = summed_up(&all);
+        (log_odds, share)
+    }
+
+    #[test]
+    fn a_scale_shows_where_it_is_larger_than_the_links_errors_make_it_by_chance() {
+        for (error_mm, share, told) in
+            [(0.5, 0.0, false), (0.5, 0.001, false), (0.5, 0.01, true), (5.0, 0.01, false), (0.02, -0.001, true)]
+        {
+            let (log_odds, found) = weighed(error_mm, share);
+            assert_eq!(log_odds > TOLD, told, "{error_mm} {share}: {log_odds} {found}");
+            assert!((found - share).abs() < 0.005 * error_mm.max(0.1), "{error_mm} {share}: {found}");
+        }
+    }
+}
