@@ -86,12 +86,14 @@ impl OutDir {
         self
     }
 
-    /// Remembers what was read from a picture, for the provenance.
-    pub fn picture_read(&self, path: &Utf8Path, bytes: &[u8]) {
-        if !self.state().folders.is_empty() {
-            let hash = sha256(bytes);
-            self.state().pictures.insert(path.to_owned(), hash);
-        }
+    /// Remembers the hash of what was read from a picture.
+    pub fn picture_read(&self, path: &Utf8Path, hash: &str) {
+        self.state().pictures.insert(path.to_owned(), hash.to_owned());
+    }
+
+    /// The hash of what this run has read from a picture.
+    pub fn hash_of_picture(&self, path: &Utf8Path) -> Option<String> {
+        self.state().pictures.get(path).cloned()
     }
 
     /// The path of a file in the folder.
@@ -108,7 +110,7 @@ impl OutDir {
     pub fn provenance(&self) -> Option<Provenance> {
         let (folders, known) = {
             let mut state = self.state();
-            (std::mem::take(&mut state.folders), std::mem::take(&mut state.pictures))
+            (std::mem::take(&mut state.folders), state.pictures.clone())
         };
         // Not under the lock: pictures that nobody has read are hashed by all threads.
         let digested: Vec<_> = folders.iter().map(|(at, path)| (at, Digested::folder(path, &known))).collect();

@@ -1,6 +1,7 @@
 //! Where a result came from: program, date, command line, and the files it was made of, with their hashes.
 //!
-//! The hashes are SHA-256, so that `sha256sum` checks them. Everything but the date and the command line is the same for
+//! The hashes are SHA-256, so that `sha256sum` checks them. Pictures, of which there may be gigabytes, are listed by their 128 bits of XXH3,
+//! as `xxh128sum` prints them, and the list is hashed: SHA-256 of every picture would take a third as long as decoding it. Everything but the date and the command line is the same for
 //! the same inputs; the date is that of `SOURCE_DATE_EPOCH` (reproducible-builds.org) where that is set.
 
 use std::collections::BTreeMap;
@@ -10,6 +11,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use xxhash_rust::xxh3::xxh3_128;
 
 /// The key of a JSON file that holds its provenance.
 pub const KEY: &str = "provenance";
@@ -87,7 +89,7 @@ fn date() -> String {
 pub struct Digested {
     /// Its name: as typed if read, below the results folder if written.
     pub file: String,
-    /// Of a file, of its bytes; of a folder, of what `sha256sum` prints for its pictures in the order of their names.
+    /// Of a file, of its bytes; of a folder, of what `xxh128sum` prints for its pictures in the order of their names.
     pub sha256: String,
     /// Pictures in the folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -111,7 +113,7 @@ impl Digested {
     /// The pictures of a folder; `known` are the hashes of those that were read. `None` where one of the others cannot be read.
     pub fn folder(path: &Utf8Path, known: &BTreeMap<Utf8PathBuf, String>) -> Option<Digested> {
         let files = pictures(path);
-        let hash = |file: &Utf8PathBuf| known.get(file).cloned().or_else(|| sha256_of_file(file));
+        let hash = |file: &Utf8PathBuf| known.get(file).cloned().or_else(|| hash_of_picture(file));
         let hashes: Vec<String> = files.par_iter().map(hash).collect::<Option<_>>()?;
         let line =
             |(hash, file): (&String, &Utf8PathBuf)| format!("{hash}  {}\n", file.strip_prefix(path).unwrap_or(file));
@@ -167,6 +169,15 @@ pub fn sha256(bytes: &[u8]) -> String {
     format!("{:x}", Sha256::digest(bytes))
 }
 
+/// XXH3 of a picture's bytes, 128 bits in hexadecimal digits: enough to tell any two pictures apart, no proof against forgery.
+pub fn picture_hash(bytes: &[u8]) -> String {
+    format!("{:032x}", xxh3_128(bytes))
+}
+
+fn hash_of_picture(path: &Utf8Path) -> Option<String> {
+    Some(picture_hash(&std::fs::read(path).ok()?))
+}
+
 fn sha256_of_file(path: &Utf8Path) -> Option<String> {
     let mut hash = Sha256::new();
     std::io::copy(&mut std::fs::File::open(path).ok()?, &mut hash).ok()?;
@@ -197,6 +208,11 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_has_the_hash_that_xxh128sum_prints() {
+        assert_eq!(picture_hash(b""), "99aa06d3014798d86001c324468d497f");
+    }
+
+    #[test]
     fn a_folder_is_its_pictures() {
         let folder = tempfile::tempdir().unwrap();
         let root = Utf8Path::from_path(folder.path()).unwrap();
@@ -207,13 +223,16 @@ mod tests {
         let read = || Digested::folder(root, &BTreeMap::new()).unwrap();
         let first = read();
         assert_eq!(first.pictures, Some(2));
-        assert_eq!(first.sha256, sha256(format!("{}  a.JPG\n{}  left/b.png\n", sha256(b"a"), sha256(b"b")).as_bytes()));
+        assert_eq!(
+            first.sha256,
+            sha256(format!("{}  a.JPG\n{}  left/b.png\n", picture_hash(b"a"), picture_hash(b"b")).as_bytes())
+        );
         std::fs::write(root.join("poses.csv"), "y").unwrap();
         assert_eq!(read(), first);
         std::fs::write(root.join("left/b.png"), "c").unwrap();
         assert_ne!(read().sha256, first.sha256);
         // What counts is what was read, whatever stands there since.
-        let known = BTreeMap::from([(root.join("left/b.png"), sha256(b"b"))]);
+        let known = BTreeMap::from([(root.join("left/b.png"), picture_hash(b"b"))]);
         assert_eq!(Digested::folder(root, &known).unwrap(), first);
     }
 }

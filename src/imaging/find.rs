@@ -8,14 +8,16 @@ use std::collections::BTreeMap;
 use camino::Utf8Path;
 use rayon::prelude::*;
 
-use super::detect::{self, Refusal, continuation};
+use super::detect::{self, Detected, Refusal, continuation};
 use super::image::{self, Claim, Header, Mosaic, Picture};
 use super::input::cache::{Cache, Look};
 use super::input::pairs::{self, PairFiles};
 use super::lattice::{Lattice, Places};
+use super::overlay::Small;
 use super::refine::fields;
 use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, Squares, order, overlay, refine};
 use crate::files::OutDir;
+use crate::files::provenance::picture_hash;
 use crate::progress;
 
 /// What is looked for.
@@ -120,14 +122,27 @@ pub fn find_pair(files: &PairFiles, wanted: &Wanted<'_>) -> Result<PairCorners, 
 fn read_and_look(path: &Utf8Path, header: &Header, wanted: &Wanted<'_>) -> Look {
     let _claim = Claim::wait(header);
     let bytes = image::read(path, header)?;
-    let Some(cache) = wanted.cache else { return look_at(bytes, path, wanted) };
-    cache.out.picture_read(path, &bytes);
-    let entry = cache.entry(&bytes, wanted.board, wanted.mosaic);
+    let Some(cache) = wanted.cache else { return look_at(bytes, path, wanted).0 };
+    let hash = picture_hash(&bytes);
+    cache.out.picture_read(path, &hash);
+    let entry = cache.entry(&hash, wanted.board, wanted.mosaic);
     cache.read(&entry, wanted.board).unwrap_or_else(|| {
-        let look = look_at(bytes, path, wanted);
+        let (look, thumbnail) = look_at(bytes, path, wanted);
+        if let Some(thumbnail) = thumbnail {
+            cache.write_thumbnail(&entry, &thumbnail);
+        }
         cache.write(&entry, &look);
         look
     })
+}
+
+/// The thumbnail of a picture that was looked at in this run: from the cache, or from the file where it is not there.
+pub fn thumbnail(path: &Utf8Path, wanted: &Wanted<'_>) -> Option<Small> {
+    let known = wanted.cache.and_then(|cache| {
+        let hash = cache.out.hash_of_picture(path)?;
+        cache.read_thumbnail(&cache.entry(&hash, wanted.board, wanted.mosaic))
+    });
+    known.or_else(|| overlay::thumbnail(path, wanted.mosaic))
 }
 
 /// A picture decoded, by itself.
@@ -137,19 +152,29 @@ pub(super) fn picture(path: &Utf8Path, mosaic: Option<Mosaic>) -> Result<Picture
     image::decode(&image::read(path, &header)?, path, mosaic)
 }
 
-fn look_at(bytes: Vec<u8>, path: &Utf8Path, wanted: &Wanted<'_>) -> Look {
-    let board = wanted.board;
-    let picture = image::decode(&bytes, path, wanted.mosaic)?;
+/// What is in a picture file, and its thumbnail where the search has made the copy that it takes.
+fn look_at(bytes: Vec<u8>, path: &Utf8Path, wanted: &Wanted<'_>) -> (Look, Option<Small>) {
+    let picture = match image::decode(&bytes, path, wanted.mosaic) {
+        Ok(picture) => picture,
+        Err(reason) => return (Err(reason.into()), None),
+    };
     drop(bytes);
-    let detected = detect::detect(&picture, board)?;
+    match detect::detect(&picture, wanted.board) {
+        Ok(detected) => (corners_of(&picture, &detected, wanted.board), Small::of_detected(&picture, &detected)),
+        Err(refusal) => (Err(refusal), None),
+    }
+}
+
+/// The corners of a board that was found.
+fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
     let places = detected.corners.map(|p| detected.level.to_picture(p));
-    if let Some(shift_px) = fields::shift_between_fields(&picture, &places) {
+    if let Some(shift_px) = fields::shift_between_fields(picture, &places) {
         return Err(format!(
             "is interlaced: its even and odd rows were taken at two moments, the board moved by {shift_px:.1} px or more between them"
         )
         .into());
     }
-    let (columns, rows) = continuation::lines_beyond(&detected);
+    let (columns, rows) = continuation::lines_beyond(detected);
     if columns + rows > 0 {
         let squares = board.squares;
         return Err(Refusal {
@@ -158,10 +183,10 @@ fn look_at(bytes: Vec<u8>, path: &Utf8Path, wanted: &Wanted<'_>) -> Look {
                 squares.columns + columns,
                 squares.rows + rows
             ),
-            seen: detect::size_seen(&detected).filter(|seen| *seen != squares),
+            seen: detect::size_seen(detected).filter(|seen| *seen != squares),
         });
     }
-    Ok(refine::refine(&picture, &detected))
+    Ok(refine::refine(picture, detected))
 }
 
 fn draw(pairs: &[PairCorners], files: &[PairFiles], mosaic: Option<Mosaic>, out: &OutDir) -> Result<()> {

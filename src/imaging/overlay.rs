@@ -1,4 +1,4 @@
-//! What was found, drawn over the pictures: left and right of a pair side by side, reduced to about a megapixel each.
+//! What was found, drawn over the pictures: left and right of a pair side by side, reduced to about a megapixel each, or to thumbnails.
 //!
 //! A ring at each corner, coloured by how well it is known; a line from corner (0, 0) along the columns and a shorter one
 //! along the rows shows the order both pictures were read in.
@@ -7,10 +7,10 @@ use camino::Utf8Path;
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
 
-use super::detect::COARSE_PX;
-use super::image::Mosaic;
+use super::detect::{COARSE_PX, Detected};
+use super::image::{Grey8, Mosaic, Picture};
 use super::input::pairs::PairFiles;
-use super::pyramid::{Level, factor_for};
+use super::pyramid::{Level, factor_for, reduced_again};
 use super::{Corner, PairCorners, Side};
 
 /// Standard deviations up to which a corner gets a colour, px, from the best.
@@ -21,6 +21,48 @@ const UNUSED: [u8; 3] = [60, 90, 255];
 /// The lines from corner (0, 0).
 const ORDER: [u8; 3] = [255, 0, 255];
 
+/// Columns of a thumbnail at the least, where the picture has as many.
+const THUMBNAIL_COLUMNS: usize = 360;
+
+/// Radius of a ring round a corner, px: on a megapixel, and on a thumbnail.
+const RING_PX: f64 = 4.0;
+const SMALL_RING_PX: f64 = 2.0;
+
+/// A picture reduced to grey, and how far.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Small {
+    /// The copy.
+    pub copy: Grey8,
+    /// Its size.
+    pub level: Level,
+}
+
+impl Small {
+    /// Of about a megapixel.
+    fn megapixel(picture: &Picture) -> Small {
+        let level = Level::Reduced(factor_for(picture, COARSE_PX));
+        Small { copy: level.copy(picture), level }
+    }
+
+    /// A thumbnail of a picture that was reduced before.
+    pub fn thumbnail(&self) -> Small {
+        let factor = (self.copy.width / THUMBNAIL_COLUMNS).max(1);
+        let copy = reduced_again(&self.copy, factor);
+        Small { copy, level: Level::Reduced(factor * self.level.scale() as usize) }
+    }
+
+    /// A thumbnail of a picture in which the board was found on the copy of about a megapixel.
+    pub fn of_detected(picture: &Picture, detected: &Detected) -> Option<Small> {
+        let same = detected.level == Level::Reduced(factor_for(picture, COARSE_PX));
+        same.then(|| Small { copy: detected.copy.clone(), level: detected.level }.thumbnail())
+    }
+
+    fn rgb(&self) -> RgbImage {
+        let Grey8 { width, height, pixels } = &self.copy;
+        RgbImage::from_fn(*width as u32, *height as u32, |x, y| Rgb([pixels[y as usize * width + x as usize]; 3]))
+    }
+}
+
 /// Both pictures of a pair, reduced, and where their pixels lie.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SideBySide {
@@ -28,17 +70,22 @@ pub struct SideBySide {
     pub image: RgbImage,
     levels: [Level; 2],
     left_width: u32,
+    ring_px: f64,
 }
 
 impl SideBySide {
     /// Reads both; `None` where a picture can't be read.
     pub fn read(files: &PairFiles, mosaic: Option<Mosaic>) -> Option<SideBySide> {
-        let both = rayon::join(|| small(&files.left, mosaic), || small(&files.right, mosaic));
-        let ((left, left_level), (right, right_level)) = (both.0?, both.1?);
-        let mut image = RgbImage::new(left.width() + right.width(), left.height().max(right.height()));
-        image::imageops::replace(&mut image, &left, 0, 0);
-        image::imageops::replace(&mut image, &right, i64::from(left.width()), 0);
-        Some(SideBySide { image, levels: [left_level, right_level], left_width: left.width() })
+        let (left, right) = rayon::join(|| small(&files.left, mosaic), || small(&files.right, mosaic));
+        Some(SideBySide::new([&left?, &right?], RING_PX))
+    }
+
+    fn new([left, right]: [&Small; 2], ring_px: f64) -> SideBySide {
+        let (width, height) = (left.copy.width + right.copy.width, left.copy.height.max(right.copy.height));
+        let mut image = RgbImage::new(width as u32, height as u32);
+        image::imageops::replace(&mut image, &left.rgb(), 0, 0);
+        image::imageops::replace(&mut image, &right.rgb(), left.copy.width as i64, 0);
+        SideBySide { image, levels: [left.level, right.level], left_width: left.copy.width as u32, ring_px }
     }
 
     /// Where a place in a raw picture lies, px.
@@ -57,17 +104,25 @@ impl SideBySide {
         }
         for corner in corners {
             let at = self.place(side, &corner.px);
-            ring(&mut self.image, at, colour(corner));
+            ring(&mut self.image, at, self.ring_px, colour(corner));
         }
     }
 }
 
 /// The pair with its corners; `None` where a picture can't be read any more.
 pub fn drawn(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> Option<SideBySide> {
-    let mut both = SideBySide::read(files, mosaic)?;
+    Some(with_corners(SideBySide::read(files, mosaic)?, corners))
+}
+
+/// Thumbnails of a pair with its corners.
+pub fn drawn_small(thumbnails: [&Small; 2], corners: &PairCorners) -> SideBySide {
+    with_corners(SideBySide::new(thumbnails, SMALL_RING_PX), corners)
+}
+
+fn with_corners(mut both: SideBySide, corners: &PairCorners) -> SideBySide {
     both.draw(Side::Left, &corners.left);
     both.draw(Side::Right, &corners.right);
-    Some(both)
+    both
 }
 
 /// The same as PNG.
@@ -77,14 +132,13 @@ pub fn png(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> 
     Some(bytes.into_inner())
 }
 
-fn small(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<(RgbImage, Level)> {
-    let picture = super::find::picture(path, mosaic).ok()?;
-    let level = Level::Reduced(factor_for(&picture, COARSE_PX));
-    let small = level.copy(&picture);
-    let image = RgbImage::from_fn(small.width as u32, small.height as u32, |x, y| {
-        Rgb([small.pixels[y as usize * small.width + x as usize]; 3])
-    });
-    Some((image, level))
+fn small(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<Small> {
+    Some(Small::megapixel(&super::find::picture(path, mosaic).ok()?))
+}
+
+/// The thumbnail of a picture file.
+pub fn thumbnail(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<Small> {
+    Some(small(path, mosaic)?.thumbnail())
 }
 
 fn colour(corner: &Corner) -> [u8; 3] {
@@ -100,10 +154,10 @@ fn set(image: &mut RgbImage, x: f64, y: f64, colour: [u8; 3]) {
     }
 }
 
-fn ring(image: &mut RgbImage, at: Point2<f64>, colour: [u8; 3]) {
+fn ring(image: &mut RgbImage, at: Point2<f64>, radius: f64, colour: [u8; 3]) {
     for step in 0..32 {
         let (sin, cos) = (f64::from(step) * std::f64::consts::TAU / 32.0).sin_cos();
-        set(image, at.x + 4.0 * cos, at.y + 4.0 * sin, colour);
+        set(image, at.x + radius * cos, at.y + radius * sin, colour);
     }
 }
 

@@ -67,6 +67,11 @@ fn reduced(picture: &Picture, factor: usize) -> Grey8 {
     }
 }
 
+/// A copy of a copy, reduced by a whole factor.
+pub fn reduced_again(copy: &Grey8, factor: usize) -> Grey8 {
+    means(copy, factor, u16::from, (0.0, 255.0))
+}
+
 /// Factor up to which 2^8 values of 8 bits fit into a sum of 16, and 2^16 of 16 into one of 32; no picture is so large.
 const MOST_REDUCED: usize = 256;
 

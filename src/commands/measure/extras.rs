@@ -4,9 +4,8 @@ use camino::Utf8Path;
 use rayon::prelude::*;
 
 use super::super::Result;
-use crate::imaging::image::Mosaic;
 use crate::imaging::input::pairs;
-use crate::imaging::{Corners, PairCorners, overlay};
+use crate::imaging::{Corners, PairCorners, Wanted, find, overlay};
 use crate::measurements::Role;
 use crate::report::drawing::picture::PairJpeg;
 use crate::report::measure::{Distance, Extras, Thumbnail};
@@ -23,12 +22,12 @@ const WIDTH: u32 = 720;
 /// The robot that was sent, where none is named.
 const ROBOT: &str = "robot.toml";
 
-/// Gathers them. `folder` holds the pictures.
-pub(super) fn gather(series: &Series, corners: &Corners, folder: &Utf8Path, mosaic: Option<Mosaic>) -> Result<Extras> {
-    Ok(Extras { thumbnails: thumbnails(series, corners, folder, mosaic)?, distances: distances(series)? })
+/// Gathers them. `folder` holds the pictures, `wanted` is what was looked for in them.
+pub(super) fn gather(series: &Series, corners: &Corners, folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Extras> {
+    Ok(Extras { thumbnails: thumbnails(series, corners, folder, wanted)?, distances: distances(series)? })
 }
 
-fn thumbnails(series: &Series, corners: &Corners, folder: &Utf8Path, mosaic: Option<Mosaic>) -> Result<Vec<Thumbnail>> {
+fn thumbnails(series: &Series, corners: &Corners, folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Vec<Thumbnail>> {
     let files = pairs::pair_files(folder)?.pairs;
     let failures = series.poses.iter().filter_map(|m| Some((m, m.target.as_ref().err()?.reason.clone())));
     let mut chosen: Vec<(&MeasuredPose, String)> = failures.take(FAILURES).collect();
@@ -43,9 +42,12 @@ fn thumbnails(series: &Series, corners: &Corners, folder: &Utf8Path, mosaic: Opt
         let found = files.iter().find(|f| f.pair == m.at.pose);
         let none = PairCorners { pair: m.at.pose.clone(), ..PairCorners::default() };
         let pair = corners.pairs.iter().find(|p| p.pair == m.at.pose).unwrap_or(&none);
-        let jpeg_base64 = found
-            .and_then(|files| PairJpeg::new(overlay::drawn(files, pair, mosaic)?, WIDTH))
-            .map_or_else(String::new, |jpeg| jpeg.base64);
+        let both = found.and_then(|files| {
+            let (left, right) =
+                rayon::join(|| find::thumbnail(&files.left, wanted), || find::thumbnail(&files.right, wanted));
+            Some(overlay::drawn_small([&left?, &right?], pair))
+        });
+        let jpeg_base64 = both.and_then(|both| PairJpeg::new(both, WIDTH)).map_or_else(String::new, |jpeg| jpeg.base64);
         Thumbnail { pose: m.at.pose.clone(), caption: caption.clone(), jpeg_base64 }
     };
     Ok(chosen.par_iter().map(draw).collect())

@@ -44,14 +44,14 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     out.check_free(&["measurements.csv", "measure.json", "measure.html"])?;
 
     let (cache, overlays) = (Some(Cache { out: &out }), args.draw.then_some(&out));
-    let corners =
-        find_corners(&args.poses, &Wanted { board: known.board, needed: 1, mosaic: args.bayer, cache, overlays })?;
+    let wanted = Wanted { board: known.board, needed: 1, mosaic: args.bayer, cache, overlays };
+    let corners = find_corners(&args.poses, &wanted)?;
     corners.notes.iter().for_each(progress::note);
     known.rig.check_size(&corners)?;
     let series = series::measure(&known, seen(poses, &corners));
     let file = MeasureFile::new(&series, &corners, &known);
     say(&series, &file);
-    let extras = extras::gather(&series, &corners, &args.poses, args.bayer)?;
+    let extras = extras::gather(&series, &corners, &args.poses, &wanted)?;
     out.write("measurements.csv", measure::to_csv(&series.poses).as_bytes())?;
     let json = out.write_json("measure.json", &file)?;
     let page = report::measure::page(&series, &file, &known, &extras)?;

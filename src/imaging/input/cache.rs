@@ -1,6 +1,6 @@
 //! Corners of pictures that were measured before, by what is in the picture.
 //!
-//! In: a picture file's bytes, the board, and how the file is read. Out: what a former run found, to the bit, if it is the same
+//! In: the hash of a picture file's bytes, the board, and how the file is read. Out: what a former run found, to the bit, if it is the same
 //! algorithm's. The name of an entry is a hash of all that the result depends on, so a changed picture, board or program makes a new
 //! entry; its first line is a hash of the rest, so a changed entry is none. An entry that can't be read is as good as none,
 //! and one that can't be written costs only time.
@@ -10,7 +10,10 @@ use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
 
 use crate::files::OutDir;
 use crate::imaging::detect::Refusal;
+use crate::imaging::image::Grey8;
 use crate::imaging::lattice::Lattice;
+use crate::imaging::overlay::Small;
+use crate::imaging::pyramid::Level;
 use crate::imaging::{Board, Corner, Mosaic};
 
 /// Names the algorithm by what it finds: a hash of the corners of the golden pictures below. A change that moves a corner fails the test
@@ -28,13 +31,13 @@ pub struct Cache<'a> {
 }
 
 impl Cache<'_> {
-    /// The entry of a picture file.
-    pub fn entry(&self, bytes: &[u8], board: Board, mosaic: Option<Mosaic>) -> String {
+    /// The entry of a picture file with this hash.
+    pub fn entry(&self, picture_hash: &str, board: Board, mosaic: Option<Mosaic>) -> String {
         let mut hash = Xxh3Default::new();
         hash.update(ALGORITHM.as_bytes());
         hash.update(board.squares.to_string().as_bytes());
         hash.update(mosaic.map_or("grey", Mosaic::name).as_bytes());
-        hash.update(bytes);
+        hash.update(picture_hash.as_bytes());
         format!("cache/{:032x}.txt", hash.digest128())
     }
 
@@ -48,6 +51,41 @@ impl Cache<'_> {
         // Without the entry the next run is slower, nothing else.
         let _ = self.out.write_scratch(entry, text(look).as_bytes());
     }
+}
+
+impl Cache<'_> {
+    /// The thumbnail of a picture that was looked at before.
+    pub fn read_thumbnail(&self, entry: &str) -> Option<Small> {
+        parse_thumbnail(&std::fs::read(self.out.join(&beside(entry))).ok()?)
+    }
+
+    /// Keeps a thumbnail.
+    pub fn write_thumbnail(&self, entry: &str, thumbnail: &Small) {
+        let Small { copy, level } = thumbnail;
+        let mut bytes =
+            format!("P5\n# reduced by {}\n{} {}\n255\n", level.scale(), copy.width, copy.height).into_bytes();
+        bytes.extend_from_slice(&copy.pixels);
+        let _ = self.out.write_scratch(&beside(entry), &bytes);
+    }
+}
+
+/// The name of the thumbnail that belongs to an entry.
+fn beside(entry: &str) -> String {
+    entry.replace(".txt", ".pgm")
+}
+
+/// A portable grey map whose comment says by how much it was reduced.
+fn parse_thumbnail(bytes: &[u8]) -> Option<Small> {
+    let mut lines = bytes.splitn(5, |b| *b == b'\n');
+    let mut line = || lines.next();
+    let text = |line: Option<&[u8]>| std::str::from_utf8(line?).ok().map(str::to_owned);
+    let (magic, factor, size, top) = (text(line())?, text(line())?, text(line())?, text(line())?);
+    let pixels = line()?.to_vec();
+    let factor: usize = factor.strip_prefix("# reduced by ")?.parse().ok()?;
+    let (width, height) = size.split_once(' ')?;
+    let (width, height): (usize, usize) = (width.parse().ok()?, height.parse().ok()?);
+    let whole = magic == "P5" && top == "255" && factor > 0 && width.checked_mul(height) == Some(pixels.len());
+    whole.then_some(Small { copy: Grey8 { width, height, pixels }, level: Level::Reduced(factor) })
 }
 
 /// The entry: a checksum of the rest, the algorithm, the corners.
@@ -132,15 +170,29 @@ mod tests {
     }
 
     #[test]
+    fn thumbnails_read_back_and_broken_ones_not_at_all() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = OutDir::open(camino::Utf8Path::from_path(dir.path()).unwrap()).unwrap();
+        let cache = Cache { out: &out };
+        let copy = Grey8 { width: 4, height: 3, pixels: b"\n\n12 4\nP5\xff\0\n".to_vec() };
+        let small = Small { copy, level: Level::Reduced(15) };
+        assert_eq!(cache.read_thumbnail("cache/a.txt"), None);
+        cache.write_thumbnail("cache/a.txt", &small);
+        assert_eq!(cache.read_thumbnail("cache/a.txt"), Some(small));
+        let bytes = std::fs::read(out.join("cache/a.pgm")).unwrap();
+        assert!((0..bytes.len()).all(|cut| parse_thumbnail(&bytes[..cut]).is_none()));
+    }
+
+    #[test]
     fn the_entry_follows_picture_and_board() {
         let dir = tempfile::tempdir().unwrap();
         let out = OutDir::open(camino::Utf8Path::from_path(dir.path()).unwrap()).unwrap();
         let cache = Cache { out: &out };
         let other = Board { squares: "5x3".parse().unwrap(), square_mm: 10.0 };
-        let entry = |bytes: &[u8], board, mosaic| cache.entry(bytes, board, mosaic);
-        let first = entry(b"a", board(), None);
-        assert_eq!(first, entry(b"a", board(), None));
-        for other in [entry(b"b", board(), None), entry(b"a", other, None), entry(b"a", board(), Some(Mosaic::Rggb))] {
+        let entry = |hash: &str, board, mosaic| cache.entry(hash, board, mosaic);
+        let first = entry("a", board(), None);
+        assert_eq!(first, entry("a", board(), None));
+        for other in [entry("b", board(), None), entry("a", other, None), entry("a", board(), Some(Mosaic::Rggb))] {
             assert_ne!(first, other);
         }
     }
