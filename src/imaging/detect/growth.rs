@@ -14,8 +14,10 @@ use super::saddles::{Candidate, candidates};
 use crate::imaging::image::Grey8;
 use crate::imaging::lattice::{Lattice, Places};
 
-/// Seeds from which a grid is tried.
+/// Seeds from which a grid is tried, and where one of enough corners is known: each part of the picture gives its strongest first, and a grid
+/// that is larger still has corners in several of them.
 const MOST_SEEDS: usize = 600;
+const SEEDS_BESIDE_ENOUGH: usize = 300;
 /// How far from its predicted place a corner may be, in steps of the grid.
 const STRAY: f64 = 0.3;
 /// How many times weaker than its neighbour a corner may respond; where squares end at the board's margin it is far more.
@@ -25,16 +27,20 @@ const EDGE_CONTRAST: f64 = 0.25;
 /// How far the bright axes of neighbours may be from perpendicular, rad.
 const SLANT: f64 = 0.6;
 
-/// The largest grid of corners in the picture; `None` where there is none of at least 3 x 3.
-pub fn largest_grid(picture: &Grey8) -> Option<Places> {
+/// The largest grid of corners in the picture; `None` where there is none of at least 3 x 3. Once one has `enough` corners, others are looked for
+/// less thoroughly.
+pub fn largest_grid(picture: &Grey8, enough: usize) -> Option<Places> {
     let candidates = candidates(picture);
     let near = Near::new(picture, &candidates);
     let mut taken = vec![false; candidates.len()];
     let mut best: Vec<((isize, isize), usize)> = Vec::new();
     let mut seeds = 0;
     for first in 0..candidates.len() {
-        if taken[first] || seeds == MOST_SEEDS {
+        if taken[first] {
             continue;
+        }
+        if seeds == if best.len() < enough { MOST_SEEDS } else { SEEDS_BESIDE_ENOUGH } {
+            break;
         }
         seeds += 1;
         let grown = grow(&candidates, &near, first);
@@ -89,9 +95,9 @@ impl<'a> Near<'a> {
         let mut found: Vec<(f64, usize)> = Vec::new();
         for y in top..=bottom {
             for &(place, i) in self.cells[y * self.columns + left..=y * self.columns + right].iter().flatten() {
-                let d = (place - at).norm();
-                if d <= distance && asked(d, i) {
-                    found.push((d, i));
+                let square = (place - at).norm_squared();
+                if square <= distance * distance && asked(square.sqrt(), i) {
+                    found.push((square.sqrt(), i));
                 }
             }
         }
@@ -128,20 +134,25 @@ impl Near<'_> {
         // To where the squares on both sides certainly are, even on an oblique board: the way is 0.4 of an edge.
         let aside = Vector2::new(-way.y, way.x) * 0.4;
         let samples = (way.norm().ceil() as usize).clamp(2, 32);
-        let sum: i32 = (0..samples)
-            .map(|k| {
-                let p = from + way * ((k as f64 + 0.5) / samples as f64);
-                self.grey(p + aside) - self.grey(p - aside)
-            })
-            .sum();
-        f64::from(sum) / samples as f64
+        let step = way / samples as f64;
+        let sums = [from + aside, from - aside].map(|from| self.sum(from + 0.5 * step, step, samples));
+        f64::from(sums[0] - sums[1]) / samples as f64
     }
 
-    fn grey(&self, p: Point2<f64>) -> i32 {
-        // Rounded to the nearest pixel; what is left of the first one is cut off to it.
-        let inside = |v: f64, size: usize| ((v + 0.5) as i32).clamp(0, size as i32 - 1) as usize;
-        let (x, y) = (inside(p.x, self.picture.width), inside(p.y, self.picture.height));
-        i32::from(self.picture.pixels[y * self.picture.width + x])
+    /// Sum of the grey values of pixels along a line, those of the border for places beyond it.
+    fn sum(&self, from: Point2<f64>, step: Vector2<f64>, samples: usize) -> i32 {
+        let Grey8 { width, height, pixels } = self.picture;
+        // In units of 2^-16 px, the nearest pixel being the whole part.
+        let fixed = |v: f64| ((v + 0.5) * 65_536.0) as i64;
+        let (mut x, mut y) = (fixed(from.x), fixed(from.y));
+        let (by_x, by_y) = ((step.x * 65_536.0) as i64, (step.y * 65_536.0) as i64);
+        let inside = |v: i64, size: usize| (v >> 16).clamp(0, size as i64 - 1) as usize;
+        let mut sum = 0;
+        for _ in 0..samples {
+            sum += i32::from(pixels[inside(y, *height) * width + inside(x, *width)]);
+            (x, y) = (x + by_x, y + by_y);
+        }
+        sum
     }
 }
 
@@ -282,22 +293,22 @@ mod tests {
 
     #[test]
     fn a_whole_board_is_found_whole() {
-        let grid = largest_grid(&picture(|_, _| false)).unwrap();
+        let grid = largest_grid(&picture(|_, _| false), 35).unwrap();
         assert_eq!((size(&grid), grid.count()), ((7, 5), 35));
     }
 
     #[test]
     fn a_hidden_part_is_a_hole() {
-        let grid = largest_grid(&picture(|u, v| (2.5..4.5).contains(&u) && (1.5..3.5).contains(&v))).unwrap();
+        let grid = largest_grid(&picture(|u, v| (2.5..4.5).contains(&u) && (1.5..3.5).contains(&v)), 35).unwrap();
         assert_eq!((size(&grid), grid.count()), ((7, 5), 31));
-        let cut = largest_grid(&picture(|u, _| u > 5.5)).unwrap();
+        let cut = largest_grid(&picture(|u, _| u > 5.5), 35).unwrap();
         assert_eq!((size(&cut), cut.count()), ((5, 5), 25));
     }
 
     #[test]
     fn nothing_in_nothing() {
-        assert_eq!(largest_grid(&picture(|_, _| true)), None);
-        assert_eq!(largest_grid(&Grey8 { width: 3, height: 3, pixels: vec![0; 9] }), None);
-        assert_eq!(largest_grid(&Grey8 { width: 0, height: 0, pixels: vec![] }), None);
+        assert_eq!(largest_grid(&picture(|_, _| true), 35), None);
+        assert_eq!(largest_grid(&Grey8 { width: 3, height: 3, pixels: vec![0; 9] }, 35), None);
+        assert_eq!(largest_grid(&Grey8 { width: 0, height: 0, pixels: vec![] }, 35), None);
     }
 }

@@ -154,7 +154,7 @@ fn found(small: &Grey8, attempt: Attempt, board: Board, search: &mut Search) -> 
         let corners = find_board(small, board.columns(), board.rows()).ok().flatten()?;
         return Some(whole(board, corners));
     }
-    let grid = grown(small)?;
+    let grid = grown(small, board.corner_count())?;
     let fitting = of_size(small, &grid, board);
     if fitting.is_none() && search.seen.as_ref().is_none_or(|(seen, _)| tells(&grid) > tells(seen)) {
         search.seen = Some((grid, attempt.level));
@@ -193,8 +193,8 @@ fn ladder(picture: &Picture) -> Vec<Attempt> {
     grown.chain(sectors.map(|level| Attempt { level, way: Way::Sectors })).collect()
 }
 
-fn grown(small: &Grey8) -> Option<Places> {
-    Some(extent::without_chance_lines(small, continuation::without_ends(small, largest_grid(small)?)))
+fn grown(small: &Grey8, enough: usize) -> Option<Places> {
+    Some(extent::without_chance_lines(small, continuation::without_ends(small, largest_grid(small, enough)?)))
 }
 
 fn whole(board: Board, corners: Vec<Point2<f64>>) -> Places {
@@ -246,7 +246,7 @@ fn refusal(seen: Option<Places>, board: Board) -> Refusal {
 
 /// The board that a picture shows, whatever was asked for, where all its corners are there.
 pub fn size_seen(detected: &Detected) -> Option<Squares> {
-    let grid = grown(&detected.copy)?;
+    let grid = grown(&detected.copy, usize::MAX)?;
     let (columns, rows) = (grid.columns.max(grid.rows) + 1, grid.columns.min(grid.rows) + 1);
     (grid.count() == grid.columns * grid.rows).then_some(Squares { columns, rows })
 }
