@@ -13,6 +13,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::dataset::{Dataset, Reading};
 use super::doctor::Finding;
+use super::shared;
 use crate::identify::Error;
 use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;
@@ -105,7 +106,9 @@ fn seen(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<Seen>, 
         scale(&mut alike, name, middle_mm2 / stated_mm2);
     }
     let parameters = robot.mdh_parameters();
-    let robust = Task::plain(&alike, robot, &parameters, &rows, settings).robust(Loss::Absolute)?;
+    let extras = shared::unknowns(set, settings);
+    let task = Task { extras: &extras, ..Task::plain(&alike, robot, &parameters, &rows, settings) };
+    let robust = task.robust(Loss::Absolute)?;
     let deleted = robust.deleted();
     let unit_mm2 = robust.scatter.stated * middle_mm2 + robust.scatter.point_mm.powi(2);
     let of_group = |(name_of, stated_mm2): (&&str, &f64)| {
@@ -236,6 +239,29 @@ mod tests {
         for of_all in [0.1, 1.0, 10.0] {
             assert_eq!(examined(1.0, of_all), (Vec::new(), 1.0), "{of_all}");
         }
+    }
+
+    #[test]
+    fn an_error_that_all_rows_share_is_not_a_groups_own() {
+        let world = synthetic::world(120, NOISE_MM, 4);
+        let mut rows = world.rows.clone();
+        // The first group stands where the calibration's error is large.
+        let column = |i: usize, row: &crate::measurements::Measurement| {
+            nalgebra::Vector3::z() * if row.at.group == "g1" { 0.2 * (1.7 * i as f64).sin() } else { 0.0 }
+        };
+        for (i, row) in rows.iter_mut().enumerate() {
+            let moved = column(i, row);
+            if let Observed::Position { point_mm, covariance_mm2, .. } = &mut row.observed {
+                *point_mm += moved;
+                *covariance_mm2 = Some(nalgebra::Matrix3::identity() * NOISE_MM * NOISE_MM);
+            }
+        }
+        let mut set = Dataset::new(&rows, 1).unwrap();
+        let said = |set: &Dataset| examine(set, &world.nominal, &Settings::default()).1.len();
+        assert_eq!(said(&set), 1);
+        set.shared =
+            rows.iter().enumerate().map(|(i, row)| nalgebra::Matrix3xX::from_columns(&[column(i, row)])).collect();
+        assert_eq!((set.shared.len(), said(&set)), (set.poses.len(), 0));
     }
 
     #[test]

@@ -16,8 +16,8 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use crate::identify::data::dataset::{Dataset, Group};
+use crate::identify::data::shared;
 use crate::identify::residuals::eliminate::{Block, Linear, product, pseudo_inverse};
-use crate::identify::residuals::weights::Extra;
 use crate::identify::settings::Settings;
 use crate::identify::solve::robust::{LEAST_FREEDOM, Loss};
 use crate::identify::solve::task::Task;
@@ -64,11 +64,11 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     let mut cut = set.clone();
     let mut along = Along::default();
     let parameters = robot.mdh_parameters();
-    // A zero that is off is no step.
-    let extras: &[Extra] = if set.to_centers() && settings.wire_offset { &[Extra::Zero] } else { &[] };
+    // A zero that is off is no step, and what the calibration leaves open no drift.
+    let extras = shared::unknowns(set, settings);
     for cuts in 0..MOST_CUTS {
         let rows = cut.fit_rows();
-        let task = Task { extras, ..Task::plain(&cut, robot, &parameters, &rows, settings) };
+        let task = Task { extras: &extras, ..Task::plain(&cut, robot, &parameters, &rows, settings) };
         let Some(search) = Search::new(&task) else { break };
         let found = search.best_cut();
         let drifting = search.drifting(found);

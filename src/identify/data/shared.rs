@@ -12,6 +12,8 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, SymmetricEigen, Vector3};
 use serde::Deserialize;
 
 use super::dataset::{Dataset, Pose, Reading};
+use crate::identify::residuals::weights::Extra;
+use crate::identify::settings::Settings;
 
 /// Share of the whole shared variance below which a direction stays with the rows.
 const LEAST_SHARE: f64 = 1e-8;
@@ -96,6 +98,16 @@ pub fn suppose_scale(set: &mut Dataset) {
         .map(|p| Matrix3xX::from_columns(&[point(p).map_or(Vector3::zeros(), |(point, _)| -scale * point)]))
         .collect();
     set.supposed_scale = Some(scale);
+}
+
+/// What the sensor leaves unknown: the errors that all rows share, or the zero of distances to a centre.
+pub fn unknowns(set: &Dataset, settings: &Settings) -> Vec<Extra> {
+    match set.shared.first() {
+        Some(shared) => (0..shared.ncols()).map(Extra::Shared).collect(),
+        // Its tolerance comes from the evidence, so that a zero that is right costs nothing.
+        _ if set.to_centers() && settings.wire_offset => vec![Extra::Zero],
+        _ => Vec::new(),
+    }
 }
 
 /// Columns of the leading shared errors and own covariance, row by row.

@@ -13,6 +13,7 @@ use super::errors::{Judge, RowError};
 use super::smooth;
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
+use crate::identify::data::shared;
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::residuals::weights::{Extra, Scatter};
 use crate::identify::settings::{Extensions, Method, Model, Settings};
@@ -122,12 +123,7 @@ pub fn identify(
 ) -> Result<Identification, Error> {
     let models = models(set, settings)?;
     let model = models.first().copied().unwrap_or(Model::CenterDistance);
-    let extras: Vec<Extra> = match set.shared.first() {
-        Some(shared) if model != Model::PairwiseDistance => (0..shared.ncols()).map(Extra::Shared).collect(),
-        // Its tolerance comes from the evidence, so that a zero that is right costs nothing.
-        _ if set.to_centers() && settings.wire_offset => vec![Extra::Zero],
-        _ => Vec::new(),
-    };
+    let extras = if model == Model::PairwiseDistance { Vec::new() } else { shared::unknowns(set, settings) };
     let mut session = Session { set, robot, settings, seed, rows: set.fit_rows(), extras, smooth: None, step };
     let by_points = if set.kind == Kind::Positions { Model::Position } else { model };
     step("gross errors");
