@@ -1,4 +1,7 @@
-//! `stereocal verify`: Table 3 of the paper for robots from anywhere; nothing is fitted but the sensor's placement.
+//! `stereocal verify`: Table 3 of the paper for robots from anywhere; nothing of them is fitted, only the sensor's placement.
+//!
+//! Measurements are examined as `identify` examines them, with the first robot, so that both judge by the same rows: units are mended and
+//! sessions get placements of their own. The robots are those of their files.
 
 use serde::Serialize;
 
@@ -9,10 +12,12 @@ use crate::diagnostic::Status;
 use crate::files;
 use crate::identify::Settings;
 use crate::identify::data::dataset::Dataset;
+use crate::identify::data::doctor::{self, Examined};
 use crate::identify::data::known;
 use crate::identify::judge::errors::Judge;
 use crate::identify::record::{PointSpread, spread};
 use crate::measurements;
+use crate::progress;
 use crate::report;
 use crate::robot;
 
@@ -38,15 +43,32 @@ pub fn run(args: &Verify, settings: &Settings) -> Result<Outcome> {
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
-    let (fitted, judged) = (set.fit_rows(), set.verify_rows());
-    let judge = Judge::plain(&set, &fitted, settings.wire_offset);
     let mut robots = Vec::new();
     for file in &args.robot {
         let robot = robot::file::read(file)?;
         super::identify::check_joints(&robot, &rows, &args.measurements)?;
-        let errors = judge.errors(&robot, &judged);
-        robots.push(RobotVerified { file: file.to_string(), verify: spread(&judge, &robot, &errors, &judged) });
+        robots.push((file, robot));
     }
+    if let Some((file, robot)) = robots.first() {
+        let Examined { set: examined, robot: mended, along, findings } =
+            doctor::examine(&set, robot, settings, &|_| {});
+        for finding in findings.into_iter().chain(doctor::along_the_rows(&along)) {
+            progress::warn(finding.sentence());
+        }
+        if mended != *robot {
+            progress::warn(format!("the robot of {file} is judged as its file has it"));
+        }
+        set = examined;
+    }
+    let (fitted, judged) = (set.fit_rows(), set.verify_rows());
+    let judge = Judge::plain(&set, &fitted, settings.wire_offset);
+    let robots: Vec<RobotVerified> = robots
+        .iter()
+        .map(|(file, robot)| {
+            let errors = judge.errors(robot, &judged);
+            RobotVerified { file: file.to_string(), verify: spread(&judge, robot, &errors, &judged) }
+        })
+        .collect();
     let stdout = match args.json {
         true => files::to_json(&Verified { robots }),
         false => {

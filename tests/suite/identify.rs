@@ -119,8 +119,13 @@ fn robotcali_is_seen_to_be_several_sessions() {
 
 /// A small world without pictures: `measurements.csv` and `robot.toml` in a folder.
 fn simulated() -> tempfile::TempDir {
+    simulated_with(&[])
+}
+
+/// The same with more flags.
+fn simulated_with(flags: &[&str]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    let arguments = ["simulate", "--points-only", "--preset", "small", "--seed", "3", "--out", "."];
+    let arguments = [&["simulate", "--points-only", "--preset", "small", "--seed", "3", "--out", "."], flags].concat();
     Command::cargo_bin("stereocal")
         .expect("the program is built")
         .current_dir(folder.path())
@@ -175,6 +180,34 @@ fn verify_says_of_the_written_robot_what_identify_said() {
         let all = ["mean_mm", "p95_mm", "max_mm"].iter().all(|name| text.contains(&figure(name)));
         assert!(all && text.contains(record["expected"]["poses"].as_str().expect("a region")), "{text:.2000}");
     }
+}
+
+#[test]
+fn verify_reads_measurements_as_identify_does() {
+    let folder = simulated_with(&["--samples", "96"]);
+    let joints = |fields: &[String]| fields.iter().position(|f| f == "center" || f == "sample" || f == "verify");
+    let radians = |_: usize, mut fields: Vec<String>| {
+        if let Some(role) = joints(&fields) {
+            for angle in &mut fields[role + 1..=role + 6] {
+                *angle = angle.parse::<f64>().expect("an angle").to_radians().to_string();
+            }
+        }
+        fields
+    };
+    let record = identified(folder.path(), radians);
+    assert!(record["doctor"].to_string().contains("radians"), "{}", record["doctor"]);
+    assert_verified(folder.path(), &record);
+    // Everything was moved in the middle of a group.
+    let moved = |i: usize, mut fields: Vec<String>| {
+        if let Some(role) = joints(&fields).filter(|_| i > 12) {
+            let x: f64 = fields[role + 7].parse().expect("a coordinate");
+            fields[role + 7] = (x + 3.0).to_string();
+        }
+        fields
+    };
+    let record = identified(folder.path(), moved);
+    assert!(record["sessions"].is_array(), "{}", record["doctor"]);
+    assert_verified(folder.path(), &record);
 }
 
 /// The row with its distance to the group's centre in place of its point, too long by the zero.

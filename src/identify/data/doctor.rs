@@ -174,6 +174,16 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
     if let Some(scale) = CommonScale::new(set, found).filter(CommonScale::is_told) {
         add(scale.sentence(), Vec::new(), "the robot that was found has this scale; check it on a known length");
     }
+    list.extend(along_the_rows(along));
+    list
+}
+
+/// Sessions and drifts.
+pub fn along_the_rows(along: &Along) -> Vec<Finding> {
+    let mut list = Vec::new();
+    let mut add = |finding: String, rows: Vec<String>, action: &str| {
+        list.push(Finding { finding, rows, action: action.to_owned() });
+    };
     let drifts = |s: &Session| along.drifting.contains(&s.group);
     let ranges = |of: &dyn Fn(&&Session) -> bool| -> Vec<String> {
         along.sessions.iter().filter(of).map(|s| format!("{}..{}", s.first, s.last)).collect()
