@@ -128,7 +128,7 @@ fn corners(args: &CameraCheck, board: Board, out: &OutDir) -> Result<Corners> {
     match (&args.corners, &args.images) {
         (Some(file), _) => Ok(corners_csv::read(file, board, args.picture_size)?),
         (None, Some(images)) => {
-            let (cache, overlays) = (Some(Cache { out }), args.draw.then_some(out));
+            let (cache, overlays) = (Some(Cache { out, thumbnails: false }), args.draw.then_some(out));
             Ok(find_corners(images, &Wanted { board, needed: FEWEST_PAIRS, mosaic: args.bayer, cache, overlays })?)
         }
         // The command line asks for one of the two.
@@ -153,7 +153,7 @@ fn second_board(
     let mut problems = Vec::new();
     config::within(&mut problems, "check_square_mm", board.square_mm, config::SQUARES_MM);
     config::reject(problems)?;
-    let (mosaic, cache) = (args.bayer, Some(Cache { out }));
+    let (mosaic, cache) = (args.bayer, Some(Cache { out, thumbnails: false }));
     let corners = find_corners(images, &Wanted { board, needed: 1, mosaic, cache, overlays: None })?;
     calibration.rig().check_size(&corners)?;
     Ok(Some(second_board::second_board(calibration, &corners, args.board_uncertainty_mm)))

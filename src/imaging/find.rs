@@ -128,7 +128,7 @@ fn read_and_look(path: &Utf8Path, header: &Header, wanted: &Wanted<'_>) -> Look 
     let entry = cache.entry(&hash, wanted.board, wanted.mosaic);
     cache.read(&entry, wanted.board).unwrap_or_else(|| {
         let (look, thumbnail) = look_at(bytes, path, wanted);
-        if let Some(thumbnail) = thumbnail {
+        if let Some(thumbnail) = thumbnail.filter(|_| cache.thumbnails) {
             cache.write_thumbnail(&entry, &thumbnail);
         }
         cache.write(&entry, &look);

@@ -44,17 +44,16 @@ impl Small {
         Small { copy: level.copy(picture), level }
     }
 
-    /// A thumbnail of a picture that was reduced before.
-    pub fn thumbnail(&self) -> Small {
-        let factor = (self.copy.width / THUMBNAIL_COLUMNS).max(1);
-        let copy = reduced_again(&self.copy, factor);
-        Small { copy, level: Level::Reduced(factor * self.level.scale() as usize) }
+    /// A thumbnail, from a copy that was made before.
+    fn thumbnail(copy: &Grey8, level: Level) -> Small {
+        let factor = (copy.width / THUMBNAIL_COLUMNS).max(1);
+        Small { copy: reduced_again(copy, factor), level: Level::Reduced(factor * level.scale() as usize) }
     }
 
     /// A thumbnail of a picture in which the board was found on the copy of about a megapixel.
     pub fn of_detected(picture: &Picture, detected: &Detected) -> Option<Small> {
         let same = detected.level == Level::Reduced(factor_for(picture, COARSE_PX));
-        same.then(|| Small { copy: detected.copy.clone(), level: detected.level }.thumbnail())
+        same.then(|| Small::thumbnail(&detected.copy, detected.level))
     }
 
     fn rgb(&self) -> RgbImage {
@@ -138,7 +137,8 @@ fn small(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<Small> {
 
 /// The thumbnail of a picture file.
 pub fn thumbnail(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<Small> {
-    Some(small(path, mosaic)?.thumbnail())
+    let Small { copy, level } = small(path, mosaic)?;
+    Some(Small::thumbnail(&copy, level))
 }
 
 fn colour(corner: &Corner) -> [u8; 3] {

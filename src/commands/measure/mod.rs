@@ -34,7 +34,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
             board: known.board,
             needed: 1,
             mosaic: args.bayer,
-            cache: Some(Cache { out: &out }),
+            cache: Some(Cache { out: &out, thumbnails: true }),
             overlays: None,
         };
         watch::wait(&args.poses, &poses, &known, &wanted)?;
@@ -43,7 +43,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let out = out.for_run(&run, &[&args.poses, &list, &rig_file]);
     out.check_free(&["measurements.csv", "measure.json", "measure.html"])?;
 
-    let (cache, overlays) = (Some(Cache { out: &out }), args.draw.then_some(&out));
+    let (cache, overlays) = (Some(Cache { out: &out, thumbnails: true }), args.draw.then_some(&out));
     let wanted = Wanted { board: known.board, needed: 1, mosaic: args.bayer, cache, overlays };
     let corners = find_corners(&args.poses, &wanted)?;
     corners.notes.iter().for_each(progress::note);

@@ -28,6 +28,8 @@ pub type Look = Result<Lattice<Corner>, Refusal>;
 pub struct Cache<'a> {
     /// The results folder.
     pub out: &'a OutDir,
+    /// Whether small copies of the pictures are kept as well, for a page.
+    pub thumbnails: bool,
 }
 
 impl Cache<'_> {
@@ -56,7 +58,7 @@ impl Cache<'_> {
 impl Cache<'_> {
     /// The thumbnail of a picture that was looked at before.
     pub fn read_thumbnail(&self, entry: &str) -> Option<Small> {
-        parse_thumbnail(&std::fs::read(self.out.join(&beside(entry))).ok()?)
+        parse_thumbnail(&std::fs::read(self.out.join(&thumbnail_of(entry))).ok()?)
     }
 
     /// Keeps a thumbnail.
@@ -65,13 +67,13 @@ impl Cache<'_> {
         let mut bytes =
             format!("P5\n# reduced by {}\n{} {}\n255\n", level.scale(), copy.width, copy.height).into_bytes();
         bytes.extend_from_slice(&copy.pixels);
-        let _ = self.out.write_scratch(&beside(entry), &bytes);
+        let _ = self.out.write_scratch(&thumbnail_of(entry), &bytes);
     }
 }
 
-/// The name of the thumbnail that belongs to an entry.
-fn beside(entry: &str) -> String {
-    entry.replace(".txt", ".pgm")
+/// The name of the thumbnail that belongs to an entry; among the program's own files, for it is no result.
+fn thumbnail_of(entry: &str) -> String {
+    entry.replace("cache/", ".stereocal/thumbnails/").replace(".txt", ".pgm")
 }
 
 /// A portable grey map whose comment says by how much it was reduced.
@@ -173,13 +175,13 @@ mod tests {
     fn thumbnails_read_back_and_broken_ones_not_at_all() {
         let dir = tempfile::tempdir().unwrap();
         let out = OutDir::open(camino::Utf8Path::from_path(dir.path()).unwrap()).unwrap();
-        let cache = Cache { out: &out };
+        let cache = Cache { out: &out, thumbnails: true };
         let copy = Grey8 { width: 4, height: 3, pixels: b"\n\n12 4\nP5\xff\0\n".to_vec() };
         let small = Small { copy, level: Level::Reduced(15) };
         assert_eq!(cache.read_thumbnail("cache/a.txt"), None);
         cache.write_thumbnail("cache/a.txt", &small);
         assert_eq!(cache.read_thumbnail("cache/a.txt"), Some(small));
-        let bytes = std::fs::read(out.join("cache/a.pgm")).unwrap();
+        let bytes = std::fs::read(out.join(".stereocal/thumbnails/a.pgm")).unwrap();
         assert!((0..bytes.len()).all(|cut| parse_thumbnail(&bytes[..cut]).is_none()));
     }
 
@@ -187,7 +189,7 @@ mod tests {
     fn the_entry_follows_picture_and_board() {
         let dir = tempfile::tempdir().unwrap();
         let out = OutDir::open(camino::Utf8Path::from_path(dir.path()).unwrap()).unwrap();
-        let cache = Cache { out: &out };
+        let cache = Cache { out: &out, thumbnails: true };
         let other = Board { squares: "5x3".parse().unwrap(), square_mm: 10.0 };
         let entry = |hash: &str, board, mosaic| cache.entry(hash, board, mosaic);
         let first = entry("a", board(), None);
