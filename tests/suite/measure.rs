@@ -127,4 +127,13 @@ fn pictures_that_arrive_late_give_the_same_bytes() {
     let bytes = |out: &str| std::fs::read(world.join(out).join("measurements.csv")).unwrap();
     assert!(bytes("watched") == bytes("after"));
     assert_eq!(json(&world.join("watched/measure.json")), json(&world.join("after/measure.json")));
+    // The page's pictures are the same from the copies that were kept and from the files.
+    let again = || {
+        let run = stereocal(&world, &[&["measure", "late", "--no-provenance"], &rig[..], &["after"]].concat());
+        assert_eq!(run.status.code(), Some(0), "{}", stderr(&run));
+        std::fs::read(world.join("after/measure.html")).unwrap()
+    };
+    let kept = again();
+    std::fs::remove_dir_all(world.join("after/.stereocal/thumbnails")).unwrap();
+    assert!(again() == kept);
 }
