@@ -13,7 +13,7 @@ use super::image::{self, Claim, Header, Mosaic, Picture};
 use super::input::cache::{Cache, Look};
 use super::input::pairs::{self, PairFiles};
 use super::lattice::{Lattice, Places};
-use super::overlay::Small;
+use super::pyramid::{Level, Small, factor_for};
 use super::refine::fields;
 use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, Squares, order, overlay, refine};
 use crate::files::OutDir;
@@ -160,9 +160,15 @@ fn look_at(bytes: Vec<u8>, path: &Utf8Path, wanted: &Wanted<'_>) -> (Look, Optio
     };
     drop(bytes);
     match detect::detect(&picture, wanted.board) {
-        Ok(detected) => (corners_of(&picture, &detected, wanted.board), Small::of_detected(&picture, &detected)),
+        Ok(detected) => (corners_of(&picture, &detected, wanted.board), thumbnail_of(&picture, &detected)),
         Err(refusal) => (Err(refusal), None),
     }
+}
+
+/// A thumbnail of a picture in which the board was found on the copy of about a megapixel: the same as from the file.
+fn thumbnail_of(picture: &Picture, detected: &Detected) -> Option<Small> {
+    let same = detected.level == Level::Reduced(factor_for(picture, detect::COARSE_PX));
+    same.then(|| Small::thumbnail(&detected.copy, detected.level))
 }
 
 /// The corners of a board that was found.

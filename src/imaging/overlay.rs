@@ -7,10 +7,10 @@ use camino::Utf8Path;
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
 
-use super::detect::{COARSE_PX, Detected};
-use super::image::{Grey8, Mosaic, Picture};
+use super::detect::COARSE_PX;
+use super::image::{Grey8, Mosaic};
 use super::input::pairs::PairFiles;
-use super::pyramid::{Level, factor_for, reduced_again};
+use super::pyramid::{Level, Small};
 use super::{Corner, PairCorners, Side};
 
 /// Standard deviations up to which a corner gets a colour, px, from the best.
@@ -21,46 +21,9 @@ const UNUSED: [u8; 3] = [60, 90, 255];
 /// The lines from corner (0, 0).
 const ORDER: [u8; 3] = [255, 0, 255];
 
-/// Columns of a thumbnail at the least, where the picture has as many.
-const THUMBNAIL_COLUMNS: usize = 360;
-
 /// Radius of a ring round a corner, px: on a megapixel, and on a thumbnail.
 const RING_PX: f64 = 4.0;
 const SMALL_RING_PX: f64 = 2.0;
-
-/// A picture reduced to grey, and how far.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Small {
-    /// The copy.
-    pub copy: Grey8,
-    /// Its size.
-    pub level: Level,
-}
-
-impl Small {
-    /// Of about a megapixel.
-    fn megapixel(picture: &Picture) -> Small {
-        let level = Level::Reduced(factor_for(picture, COARSE_PX));
-        Small { copy: level.copy(picture), level }
-    }
-
-    /// A thumbnail, from a copy that was made before.
-    fn thumbnail(copy: &Grey8, level: Level) -> Small {
-        let factor = (copy.width / THUMBNAIL_COLUMNS).max(1);
-        Small { copy: reduced_again(copy, factor), level: Level::Reduced(factor * level.scale() as usize) }
-    }
-
-    /// A thumbnail of a picture in which the board was found on the copy of about a megapixel.
-    pub fn of_detected(picture: &Picture, detected: &Detected) -> Option<Small> {
-        let same = detected.level == Level::Reduced(factor_for(picture, COARSE_PX));
-        same.then(|| Small::thumbnail(&detected.copy, detected.level))
-    }
-
-    fn rgb(&self) -> RgbImage {
-        let Grey8 { width, height, pixels } = &self.copy;
-        RgbImage::from_fn(*width as u32, *height as u32, |x, y| Rgb([pixels[y as usize * width + x as usize]; 3]))
-    }
-}
 
 /// Both pictures of a pair, reduced, and where their pixels lie.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,8 +45,8 @@ impl SideBySide {
     fn new([left, right]: [&Small; 2], ring_px: f64) -> SideBySide {
         let (width, height) = (left.copy.width + right.copy.width, left.copy.height.max(right.copy.height));
         let mut image = RgbImage::new(width as u32, height as u32);
-        image::imageops::replace(&mut image, &left.rgb(), 0, 0);
-        image::imageops::replace(&mut image, &right.rgb(), left.copy.width as i64, 0);
+        image::imageops::replace(&mut image, &rgb(&left.copy), 0, 0);
+        image::imageops::replace(&mut image, &rgb(&right.copy), left.copy.width as i64, 0);
         SideBySide { image, levels: [left.level, right.level], left_width: left.copy.width as u32, ring_px }
     }
 
@@ -132,7 +95,13 @@ pub fn png(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> 
 }
 
 fn small(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<Small> {
-    Some(Small::megapixel(&super::find::picture(path, mosaic).ok()?))
+    Some(Small::of(&super::find::picture(path, mosaic).ok()?, COARSE_PX))
+}
+
+fn rgb(copy: &Grey8) -> RgbImage {
+    RgbImage::from_fn(copy.width as u32, copy.height as u32, |x, y| {
+        Rgb([copy.pixels[y as usize * copy.width + x as usize]; 3])
+    })
 }
 
 /// The thumbnail of a picture file.

@@ -48,6 +48,33 @@ impl Level {
     }
 }
 
+/// Columns of a thumbnail at the least, where the picture has as many.
+const THUMBNAIL_COLUMNS: usize = 360;
+
+/// A reduced copy, and how far it is reduced.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Small {
+    /// The copy.
+    pub copy: Grey8,
+    /// Its size; never doubled.
+    pub level: Level,
+}
+
+impl Small {
+    /// Of about so many pixels.
+    pub fn of(picture: &Picture, pixels: usize) -> Small {
+        let level = Level::Reduced(factor_for(picture, pixels));
+        Small { copy: level.copy(picture), level }
+    }
+
+    /// A thumbnail from a reduced copy.
+    pub fn thumbnail(copy: &Grey8, level: Level) -> Small {
+        let factor = (copy.width / THUMBNAIL_COLUMNS).max(1);
+        let smaller = means(copy, factor, u16::from, (0.0, 255.0));
+        Small { copy: smaller, level: Level::Reduced(factor * level.scale() as usize) }
+    }
+}
+
 /// The whole factor that brings a picture closest to `pixels` from above.
 pub fn factor_for(picture: &Picture, pixels: usize) -> usize {
     let ratio = (picture.width() * picture.height()) as f64 / pixels as f64;
@@ -65,11 +92,6 @@ fn reduced(picture: &Picture, factor: usize) -> Grey8 {
             means(image, factor, |v| u32::from(v.min(high)), (f64::from(low), f64::from(high)))
         }
     }
-}
-
-/// A copy of a copy, reduced by a whole factor.
-pub fn reduced_again(copy: &Grey8, factor: usize) -> Grey8 {
-    means(copy, factor, u16::from, (0.0, 255.0))
 }
 
 /// Factor up to which 2^8 values of 8 bits fit into a sum of 16, and 2^16 of 16 into one of 32; no picture is so large.

@@ -1,4 +1,4 @@
-//! Corners of pictures that were measured before, by what is in the picture.
+//! Corners of pictures that were measured before, by what is in the picture, and thumbnails of them.
 //!
 //! In: the hash of a picture file's bytes, the board, and how the file is read. Out: what a former run found, to the bit, if it is the same
 //! algorithm's. The name of an entry is a hash of all that the result depends on, so a changed picture, board or program makes a new
@@ -12,8 +12,7 @@ use crate::files::OutDir;
 use crate::imaging::detect::Refusal;
 use crate::imaging::image::Grey8;
 use crate::imaging::lattice::Lattice;
-use crate::imaging::overlay::Small;
-use crate::imaging::pyramid::Level;
+use crate::imaging::pyramid::{Level, Small};
 use crate::imaging::{Board, Corner, Mosaic};
 
 /// Names the algorithm by what it finds: a hash of the corners of the golden pictures below. A change that moves a corner fails the test
@@ -40,25 +39,23 @@ impl Cache<'_> {
         hash.update(board.squares.to_string().as_bytes());
         hash.update(mosaic.map_or("grey", Mosaic::name).as_bytes());
         hash.update(picture_hash.as_bytes());
-        format!("cache/{:032x}.txt", hash.digest128())
+        format!("{:032x}", hash.digest128())
     }
 
     /// What a former run found.
     pub fn read(&self, entry: &str, board: Board) -> Option<Look> {
-        parse(&std::fs::read_to_string(self.out.join(entry)).ok()?, board)
+        parse(&std::fs::read_to_string(self.out.join(&corners_file(entry))).ok()?, board)
     }
 
     /// Keeps what was found.
     pub fn write(&self, entry: &str, look: &Look) {
         // Without the entry the next run is slower, nothing else.
-        let _ = self.out.write_scratch(entry, text(look).as_bytes());
+        let _ = self.out.write_scratch(&corners_file(entry), text(look).as_bytes());
     }
-}
 
-impl Cache<'_> {
     /// The thumbnail of a picture that was looked at before.
     pub fn read_thumbnail(&self, entry: &str) -> Option<Small> {
-        parse_thumbnail(&std::fs::read(self.out.join(&thumbnail_of(entry))).ok()?)
+        parse_thumbnail(&std::fs::read(self.out.join(&thumbnail_file(entry))).ok()?)
     }
 
     /// Keeps a thumbnail.
@@ -67,16 +64,20 @@ impl Cache<'_> {
         let mut bytes =
             format!("P5\n# reduced by {}\n{} {}\n255\n", level.scale(), copy.width, copy.height).into_bytes();
         bytes.extend_from_slice(&copy.pixels);
-        let _ = self.out.write_scratch(&thumbnail_of(entry), &bytes);
+        let _ = self.out.write_scratch(&thumbnail_file(entry), &bytes);
     }
 }
 
-/// The name of the thumbnail that belongs to an entry; among the program's own files, for it is no result.
-fn thumbnail_of(entry: &str) -> String {
-    entry.replace("cache/", ".stereocal/thumbnails/").replace(".txt", ".pgm")
+fn corners_file(entry: &str) -> String {
+    format!("cache/{entry}.txt")
 }
 
-/// A portable grey map whose comment says by how much it was reduced.
+/// Among the program's own files, for it is no result.
+fn thumbnail_file(entry: &str) -> String {
+    format!(".stereocal/thumbnails/{entry}.pgm")
+}
+
+/// From a portable grey map whose comment says by how much it was reduced.
 fn parse_thumbnail(bytes: &[u8]) -> Option<Small> {
     let mut lines = bytes.splitn(5, |b| *b == b'\n');
     let mut line = || lines.next();
@@ -178,9 +179,9 @@ mod tests {
         let cache = Cache { out: &out, thumbnails: true };
         let copy = Grey8 { width: 4, height: 3, pixels: b"\n\n12 4\nP5\xff\0\n".to_vec() };
         let small = Small { copy, level: Level::Reduced(15) };
-        assert_eq!(cache.read_thumbnail("cache/a.txt"), None);
-        cache.write_thumbnail("cache/a.txt", &small);
-        assert_eq!(cache.read_thumbnail("cache/a.txt"), Some(small));
+        assert_eq!(cache.read_thumbnail("a"), None);
+        cache.write_thumbnail("a", &small);
+        assert_eq!(cache.read_thumbnail("a"), Some(small));
         let bytes = std::fs::read(out.join(".stereocal/thumbnails/a.pgm")).unwrap();
         assert!((0..bytes.len()).all(|cut| parse_thumbnail(&bytes[..cut]).is_none()));
     }
