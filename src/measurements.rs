@@ -85,6 +85,8 @@ pub enum Observed {
 pub struct Measurement {
     /// Where the robot was.
     pub at: RobotPose,
+    /// Which of several targets was measured; empty where the file names none.
+    pub target: String,
     /// What was seen.
     pub observed: Observed,
 }
@@ -109,12 +111,14 @@ impl Table<'_> {
         Ok((columns, if slides.contains(&true) { slides } else { Vec::new() }))
     }
 
-    fn poses(&self) -> Result<Vec<RobotPose>> {
+    /// The robot's poses, one a row. With a column `target`, rows of several targets may be of one pose.
+    fn poses(&self, target: Option<usize>) -> Result<Vec<RobotPose>> {
         let (pose, group, role) = (self.require("pose")?, self.require("group")?, self.require("role")?);
         let (joints, slides) = self.joint_columns()?;
         let mut seen = std::collections::BTreeMap::new();
         let mut centers = std::collections::BTreeMap::new();
-        let mut poses = Vec::with_capacity(self.rows.len());
+        let mut first_rows = std::collections::BTreeMap::new();
+        let mut poses: Vec<RobotPose> = Vec::with_capacity(self.rows.len());
         for (line, row) in &self.rows {
             let line = *line;
             let role = match &row[role] {
@@ -128,23 +132,38 @@ impl Table<'_> {
             if row[pose].is_empty() {
                 return Err(self.refuse(line, "the pose has no name".to_owned()));
             }
-            if let Some(first) = seen.insert(&row[pose], line) {
-                return Err(self.refuse(line, format!("pose `{}` stands in line {first} already", &row[pose])));
+            let of_target = target.map_or("", |c| &row[c]);
+            if target.is_some() && of_target.is_empty() {
+                return Err(self.refuse(line, format!("the target of pose `{}` has no name", &row[pose])));
+            }
+            if let Some(first) = seen.insert((&row[pose], of_target), line) {
+                let what = if target.is_some() { format!(" with target `{of_target}`") } else { String::new() };
+                return Err(self.refuse(line, format!("pose `{}`{what} stands in line {first} already", &row[pose])));
             }
             if role == Role::Center
-                && let Some(first) = centers.insert(&row[group], line)
+                && let Some((first, center)) = centers.insert(&row[group], (line, &row[pose]))
+                && center != &row[pose]
             {
                 let message = format!("group `{}` has a center in line {first} already; a group has one", &row[group]);
                 return Err(self.refuse(line, message));
             }
             let joints_deg = joints.iter().map(|&c| self.number(line, row, c)).collect::<Result<Vec<f64>>>()?;
-            poses.push(RobotPose {
+            let read = RobotPose {
                 pose: row[pose].to_owned(),
                 group: row[group].to_owned(),
                 role,
                 joints_deg,
                 slides: slides.clone(),
-            });
+            };
+            let first: usize = *first_rows.entry(&row[pose]).or_insert(poses.len());
+            if let Some(before) = poses.get(first).filter(|before| **before != read) {
+                let message = format!(
+                    "pose `{}` stands in line {} with another group, role or joints; its targets are measured at one pose",
+                    before.pose, self.rows[first].0
+                );
+                return Err(self.refuse(line, message));
+            }
+            poses.push(read);
         }
         Ok(poses)
     }
@@ -153,15 +172,18 @@ impl Table<'_> {
 /// Reads `poses.csv`.
 pub fn read_poses(path: &Utf8Path) -> Result<Vec<RobotPose>> {
     let hint = "a poses folder holds left/, right/ and poses.csv with the columns pose,group,role,j1_deg,...";
-    Table::read(path, "the list of poses", hint)?.poses()
+    Table::read(path, "the list of poses", hint)?.poses(None)
 }
 
 /// Reads `measurements.csv`, or any CSV with `pose,group,role,j1_deg..` and either `x_mm,y_mm,z_mm` or `distance_mm`.
-/// A row whose `status` is not `ok`, or whose numbers are all empty, is [`Observed::Missing`].
+/// A row whose `status` is not `ok`, or whose numbers are all empty, is [`Observed::Missing`]. With a column `target` a pose has a row for each of
+/// its targets.
 pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
     let hint = "`stereocal measure POSES` writes out/measurements.csv; `--measurements FILE` names another";
     let table = Table::read(path, "the measurements", hint)?;
-    let poses = table.poses()?;
+    let named = |c: &usize| table.rows.iter().any(|(_, row)| !row[*c].is_empty());
+    let target = table.column("target").filter(named);
+    let poses = table.poses(target)?;
     let status = table.column("status");
     let all = |names: &[&str]| names.iter().map(|n| table.column(n)).collect::<Option<Vec<usize>>>();
     let position = all(&["x_mm", "y_mm", "z_mm"]);
@@ -207,7 +229,7 @@ pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
         } else {
             Observed::Missing { reason: "no numbers".to_owned() }
         };
-        rows.push(Measurement { at, observed });
+        rows.push(Measurement { at, target: target.map_or_else(String::new, |c| row[c].to_owned()), observed });
     }
     Ok(rows)
 }
@@ -258,6 +280,24 @@ mod tests {
         assert_eq!(rows[1].observed, Observed::Missing { reason: "no board".into() });
         let rows = read_str("pose;group;role;j1_deg;distance_mm;sigma_mm\na;1;sample;0;12.5;0.1\n").unwrap();
         assert_eq!(rows[0].observed, Observed::Distance { distance_mm: 12.5, sigma_mm: Some(0.1) });
+    }
+
+    #[test]
+    fn a_pose_has_a_row_for_each_of_its_targets() {
+        let header = "pose,group,role,target,j1_deg,x_mm,y_mm,z_mm\n";
+        let rows =
+            read_str(&format!("{header}a,1,center,l,0,1,2,3\na,1,center,r,0,4,5,6\nb,1,sample,l,1,1,2,3\n")).unwrap();
+        assert_eq!(rows.iter().map(|r| r.target.as_str()).collect::<Vec<_>>(), ["l", "r", "l"]);
+        for (second, part) in [
+            ("a,1,center,l,0,4,5,6", "with target `l` stands in line 2 already"),
+            ("a,1,center,r,5,4,5,6", "another group, role or joints"),
+            ("b,1,center,r,0,4,5,6", "has a center in line 2 already"),
+            ("a,1,center,,0,4,5,6", "has no name"),
+        ] {
+            let message =
+                crate::diagnostic::report(&read_str(&format!("{header}a,1,center,l,0,1,2,3\n{second}\n")).unwrap_err());
+            assert!(message.contains(part) && message.contains("m.csv:3"), "{message}");
+        }
     }
 
     #[test]

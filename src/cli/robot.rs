@@ -9,7 +9,7 @@ use crate::imaging::Squares;
 /// `stereocal identify`
 #[derive(Debug, Args)]
 pub struct Identify {
-    /// Measurements [default: measurements.csv in the results folder]
+    /// Measurements [default: measurements.csv in the results folder]; with a column `target`, a row for each target of a pose
     #[arg(long, value_name = "FILE")]
     pub measurements: Option<Utf8PathBuf>,
     /// The nominal robot [default: robot.toml in the working directory if there, else Table 1 of the paper]

@@ -1,5 +1,6 @@
 //! `stereocal plan`: robot, rig and spheres to poses, and robot programs that visit them.
 
+use camino::Utf8Path;
 use nalgebra::Vector3;
 
 use super::identify::robot_file;
@@ -47,6 +48,9 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     };
     check(args, &robot)?;
     let earlier = args.after.as_deref().map(measurements::read).transpose()?;
+    if let (Some(rows), Some(path)) = (&earlier, &args.after) {
+        check_one_target(rows, path)?;
+    }
     let out = OutDir::open(&out)?;
     let inputs = [Some(&rig_file), robot_file.as_ref(), args.after.as_ref()];
     let inputs: Vec<&camino::Utf8Path> = inputs.into_iter().flatten().map(|path| path.as_path()).collect();
@@ -68,6 +72,21 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     out.write("plan.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
     let stdout = if args.output.json { json } else { said(args, &found, &record, &out, earlier.as_deref()) };
     Ok(Outcome { stdout, status: Status::Done })
+}
+
+/// A plan is for the board whose centre is the mark point.
+fn check_one_target(rows: &[Measurement], path: &Utf8Path) -> Result<()> {
+    match rows.iter().find(|row| row.target != rows[0].target) {
+        None => Ok(()),
+        Some(other) => Err(crate::plan::Error::Measured {
+            message: format!(
+                "rows of several targets (`{}` and `{}`); a plan is for one",
+                rows[0].target, other.target
+            ),
+            place: path.to_string(),
+        }
+        .into()),
+    }
 }
 
 fn check(args: &Arguments, robot: &Robot) -> Result<()> {

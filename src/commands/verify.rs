@@ -60,6 +60,9 @@ pub fn run(args: &Verify, settings: &Settings) -> Result<Outcome> {
         }
         set = examined;
     }
+    if let Some(targets) = &set.targets {
+        progress::note(targets.sentence());
+    }
     let (fitted, judged) = (set.fit_rows(), set.verify_rows());
     let judge = Judge::plain(&set, &fitted, settings.wire_offset);
     let robots: Vec<RobotVerified> = robots

@@ -80,6 +80,14 @@ pub enum Error {
         /// Poses to fit.
         poses: usize,
     },
+    /// Several targets a pose that cannot be made one.
+    #[error("{message}")]
+    Targets {
+        /// What was found.
+        message: String,
+        /// What to look at.
+        hint: &'static str,
+    },
     /// The chosen model needs what the data lack.
     #[error("model `{model}` needs {needed}, which the measurements don't have")]
     ModelNeeds {
@@ -114,6 +122,7 @@ impl Explain for Error {
             Error::NothingDetermined { .. } | Error::TooFew { .. } => {
                 Some("measure more poses, spread over the workspace and with varied orientation".to_owned())
             }
+            Error::Targets { hint, .. } => Some((*hint).to_owned()),
             Error::ModelNeeds { .. } => Some("leave `--model` out and the model is chosen by the data".to_owned()),
             _ => None,
         }

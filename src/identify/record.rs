@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::data::dataset::{Dataset, Kind, Skipped};
 use super::data::doctor::{self, Finding};
 use super::data::sessions::{Along, Session};
+use super::data::targets::Targets;
 use super::judge::choose::{Candidate, Identification};
 use super::judge::climb::Judged;
 use super::judge::errors::{Judge, RowError, Spread};
@@ -64,6 +65,9 @@ pub struct Record {
     pub expected: Option<Expected>,
     /// A scale of the readings, as far as the links' tolerance tells it from the robot's size; `None` where the links were not fitted.
     pub scale: Option<CommonScale>,
+    /// The targets of each pose, where there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub targets: Option<Targets>,
     /// Unknowns of the sensor that were found beside the robot: name and value (mm, thousandths, mrad, standard deviations).
     pub sensor: Vec<(String, f64)>,
     /// A smooth error that the points of each placement share.
@@ -269,6 +273,7 @@ impl Record {
             covariance: chosen.found.as_ref().map(|(f, _)| Covariance::new(f)),
             expected: chosen.found.as_ref().map(|(f, _)| Expected::new(f, set, &found.fitted)),
             scale: CommonScale::new(set, found),
+            targets: set.targets.clone(),
             sensor: found.extras.iter().map(|(extra, value)| of_sensor(set, *extra, *value)).collect(),
         };
         let worse = found.worse_than_nominal(set, nominal, settings);

@@ -75,7 +75,7 @@ pub fn planned(
                 slides: vec![],
             };
             let observed = Observed::Position { point_mm: point, covariance_mm2: None, rotation_rad: None };
-            rows.push(Measurement { at, observed });
+            rows.push(Measurement { at, target: String::new(), observed });
             break;
         }
     }
@@ -85,6 +85,22 @@ pub fn planned(
 /// Elbow up, all round the base.
 fn starts() -> Vec<Vec<f64>> {
     (0..8).map(|k| vec![0.785 * k as f64 - 3.0, 0.6, -1.2, 0.5, 1.3, 0.2]).collect()
+}
+
+/// What a tracker reads of several targets on the flange, by their places in the last joint's frame, mm, and the noise of a coordinate.
+pub fn of_targets(world: &World, targets: &[(&str, Vector3<f64>)], noise_mm: f64, seed: u64) -> Vec<Measurement> {
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let mut rows = Vec::new();
+    for row in &world.rows {
+        let group = row.at.group[1..].parse().unwrap_or(0);
+        let sensor_from_flange = sensor(group) * world.truth.base_from_flange(&row.at.joints_rad());
+        for (name, place) in targets {
+            let point_mm = sensor_from_flange * Point3::from(*place) + noise_mm * normal(&mut random);
+            let observed = Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None };
+            rows.push(Measurement { at: row.at.clone(), target: (*name).to_owned(), observed });
+        }
+    }
+    rows
 }
 
 /// A camera frame somewhere.
@@ -134,7 +150,11 @@ pub fn touched(moved_mm: f64, seed: u64) -> (World, Vec<Vector3<f64>>) {
             let joints_deg = joints.iter().map(|q| q.to_degrees()).collect();
             let pose = format!("{group}_{i}");
             let at = RobotPose { pose, group, role: Role::Sample, joints_deg, slides: vec![] };
-            world.rows.push(Measurement { at, observed: Observed::Distance { distance_mm: 0.0, sigma_mm: None } });
+            world.rows.push(Measurement {
+                at,
+                target: String::new(),
+                observed: Observed::Distance { distance_mm: 0.0, sigma_mm: None },
+            });
         }
         sockets.push(socket);
     }
@@ -152,7 +172,11 @@ pub fn as_distances(rows: &[Measurement]) -> Vec<Measurement> {
                 (Some(c), Some(p)) => (p - c).norm(),
                 _ => 0.0,
             };
-            Measurement { at: row.at.clone(), observed: Observed::Distance { distance_mm, sigma_mm: None } }
+            Measurement {
+                at: row.at.clone(),
+                target: String::new(),
+                observed: Observed::Distance { distance_mm, sigma_mm: None },
+            }
         })
         .collect()
 }

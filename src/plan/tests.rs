@@ -173,7 +173,7 @@ fn first_poses_find_cameras_that_stand_elsewhere() {
             covariance_mm2: None,
             rotation_rad: Some(there.rotation.scaled_axis()),
         };
-        Measurement { at: p.at.clone(), observed }
+        Measurement { at: p.at.clone(), target: String::new(), observed }
     };
     let rows: Vec<Measurement> = first.poses.iter().map(row).collect();
     let rest = plan(&robot, &scene, &settings(), Some((&rows, "m.csv"))).unwrap();

@@ -41,6 +41,9 @@ pub fn summary(record: &Record) -> String {
             number(after.mean_abs_mm, 4)
         ));
     }
+    if let Some(targets) = &record.targets {
+        text.push_str(&format!("{}\n", targets.sentence()));
+    }
     if let Some(expected) = &record.expected {
         text.push_str(&format!("{}\n", expected.sentence()));
     }
@@ -101,6 +104,9 @@ pub fn page(
         h2 { "Verification" }
         (verification_figure(before, after)?)
         (verification_table(record))
+        @if let Some(targets) = &record.targets {
+            p { (targets.sentence()) "." }
+        }
         (worst_table(set, before, after))
         @if let Some(expected) = &record.expected {
             h2 { "How far to trust it" }

@@ -281,3 +281,85 @@ fn exchanged_columns_are_named_as_that() {
     assert!(said.contains("joints 2 and 3 are exchanged"), "{said}");
     assert!(record["scatter_mm"].as_f64().is_some_and(|s| s < 0.1), "{}", record["scatter_mm"]);
 }
+
+/// `cam_from_board` by pose.
+type Turns = std::collections::BTreeMap<String, nalgebra::Rotation3<f64>>;
+
+fn true_turns(folder: &Path) -> Turns {
+    let text = std::fs::read_to_string(folder.join("truth/measurements.csv")).expect("the truth");
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().expect("a header");
+    let at = header.iter().position(|name| *name == "rx_rad").expect("orientations");
+    let turn = |fields: &[&str]| nalgebra::Vector3::from_fn(|k, _| fields[at + k].parse().expect("a number"));
+    lines.map(|fields| (fields[0].to_owned(), nalgebra::Rotation3::new(turn(&fields)))).collect()
+}
+
+/// Three targets round the mark point, mm, and what a reading of each is off by at a pose.
+const TARGETS_MM: [[f64; 3]; 3] = [[50.0, 0.0, 0.0], [-20.0, 40.0, 10.0], [-30.0, -40.0, -10.0]];
+
+/// A row for each of the targets instead of one for their mean, with neither covariances nor orientations; `turns` are the target's by pose.
+fn of_targets(fields: &[String], names: [&str; 3], line: usize, turns: &Turns) -> Vec<String> {
+    let role = fields.iter().position(|f| f == "center" || f == "sample" || f == "verify").expect("a role");
+    let number = |k: usize| fields[role + 7 + k].parse::<f64>().expect("a number");
+    let mark = nalgebra::Vector3::new(number(0), number(1), number(2));
+    let turn = turns[&fields[0]];
+    let row = |k: usize| {
+        let off = nalgebra::Vector3::from_fn(|axis, _| 0.01 * ((7 * line + 3 * k + axis) as f64 * 2.1).sin());
+        let at = mark + turn * nalgebra::Vector3::from(TARGETS_MM[k]) + off;
+        format!("{},{},{},{},{}", fields[..=role + 6].join(","), names[k], at.x, at.y, at.z)
+    };
+    vec![(0..3).map(row).collect::<Vec<_>>().join("\n")]
+}
+
+#[test]
+fn several_targets_a_pose_count_as_one_that_turns() {
+    let folder = simulated_with(&["--samples", "60"]);
+    let turns = true_turns(folder.path());
+    let turns = &turns;
+    let rows = |spoil: usize| {
+        move |i: usize, fields: Vec<String>| match i {
+            0 => vec!["pose,group,role,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,target,x_mm,y_mm,z_mm".to_owned()],
+            _ if i == spoil => of_targets(&fields, ["left", "low", "right"], i, turns),
+            _ => of_targets(&fields, ["left", "right", "low"], i, turns),
+        }
+    };
+    let one = identified(folder.path(), |_, fields| fields);
+    let clean = identified(folder.path(), rows(usize::MAX));
+    assert_eq!(clean["targets"]["names"], serde_json::json!(["left", "right", "low"]));
+    assert_eq!((&clean["targets"]["oriented"], &clean["doctor"]), (&serde_json::json!(true), &serde_json::json!([])));
+    assert_eq!(clean["methods"][0]["model"], "pose");
+    // Their mark point is the one whose rows they replace.
+    assert!(
+        mean(&clean["methods"][0]) < 1.5 * mean(&one["methods"][0]),
+        "{} {}",
+        clean["methods"][0],
+        one["methods"][0]
+    );
+    assert_verified(folder.path(), &clean);
+    let page = std::fs::read_to_string(folder.path().join("out/identify.html")).expect("a page");
+    assert!(page.contains("3 targets a pose (left, right, low)"));
+    let spoiled = identified(folder.path(), rows(20));
+    let doctor = spoiled["doctor"].to_string();
+    assert!(doctor.contains("the names of targets right and low are exchanged"), "{doctor}");
+    assert!((mean(&spoiled["methods"][0]) - mean(&clean["methods"][0])).abs() < 1e-3);
+}
+
+#[test]
+fn targets_that_cannot_be_made_one_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let header = "pose,group,role,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,target,";
+    for (columns, second, said) in [
+        ("x_mm,y_mm,z_mm", "p1,g,sample,1,2,3,4,5,6,b,1,2,3", "no pose shows two of them"),
+        ("distance_mm", "p0,g,sample,0,0,0,0,0,0,b,5", "distances of 2 targets (a, b)"),
+        ("x_mm,y_mm,z_mm", "p0,g,sample,0,0,0,0,9,0,b,1,2,3", "another group, role or joints"),
+    ] {
+        let first = if columns == "distance_mm" { "5" } else { "1,2,3" };
+        let text = format!("{header}{columns}\np0,g,sample,0,0,0,0,0,0,a,{first}\n{second}\n");
+        std::fs::write(folder.path().join("m.csv"), text).expect("written");
+        identify(folder.path())
+            .assert()
+            .code(2)
+            .stdout("")
+            .stderr(contains(said).and(contains("hint:").or(contains("m.csv:3"))));
+    }
+}

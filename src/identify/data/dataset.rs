@@ -8,6 +8,7 @@ use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use super::targets::{self, Targets};
 use crate::identify::Error;
 use crate::measurements::{Measurement, Observed, Role};
 
@@ -15,7 +16,7 @@ use crate::measurements::{Measurement, Observed, Role};
 const HELD_OUT: usize = 5;
 
 /// Variance that singular covariances get on top, mm^2: a micrometre, the resolution of a good instrument.
-const FLOOR_MM2: f64 = 1e-6;
+pub(super) const FLOOR_MM2: f64 = 1e-6;
 
 /// What all readings of a set are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,6 +117,8 @@ pub struct Dataset {
     pub floored: Vec<String>,
     /// Known distances between touched points.
     pub known: Vec<KnownDistance>,
+    /// The targets whose rows were made one a pose, where there were several.
+    pub targets: Option<Targets>,
 }
 
 /// A known distance between the points that two groups touched.
@@ -132,8 +135,10 @@ pub struct KnownDistance {
 }
 
 impl Dataset {
-    /// Sorts the rows; `seed` draws the held-out fifth where the file names no verify rows.
+    /// Sorts the rows, several targets of a pose made one; `seed` draws the held-out fifth where the file names no verify rows.
     pub fn new(rows: &[Measurement], seed: u64) -> Result<Dataset, Error> {
+        let (of_targets, targets) = targets::as_one(rows)?.unzip();
+        let rows = of_targets.as_deref().unwrap_or(rows);
         let positions = rows.iter().any(|r| matches!(r.observed, Observed::Position { .. }));
         let kind = if positions { Kind::Positions } else { Kind::Distances };
         let mut set = Dataset {
@@ -147,6 +152,7 @@ impl Dataset {
             slides: Vec::new(),
             floored: Vec::new(),
             known: Vec::new(),
+            targets,
         };
         set.slides = rows.first().map_or_else(Vec::new, |r| r.at.slides.clone());
         for row in rows {
@@ -308,7 +314,7 @@ mod tests {
             joints_deg: vec![name as f64],
             slides: vec![],
         };
-        Measurement { at, observed }
+        Measurement { at, target: String::new(), observed }
     }
 
     fn point(x: f64) -> Observed {

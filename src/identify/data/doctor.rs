@@ -56,6 +56,7 @@ pub struct Examined {
 pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(&str)) -> Examined {
     step("units, signs and conventions");
     let (mut set, mut robot, mut findings) = (set.clone(), robot.clone(), Vec::new());
+    let of_targets = set.targets.as_ref().map_or_else(Vec::new, |targets| targets.findings.clone());
     if settings.examine {
         (set, robot, findings) = conventions::examine(&set, &robot, settings);
         let of_orientations = orientations::examine(&set, &robot);
@@ -72,6 +73,7 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
         set = of_covariances.0;
         findings.extend(of_covariances.1);
     }
+    findings.splice(0..0, of_targets);
     Examined { set, robot, along, findings }
 }
 

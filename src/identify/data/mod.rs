@@ -8,3 +8,4 @@ pub mod known;
 pub mod orientations;
 pub mod sessions;
 pub mod shared;
+pub mod targets;

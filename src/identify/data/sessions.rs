@@ -355,7 +355,7 @@ mod tests {
                     (world.truth.target_mm(&row.at.joints_rad()) - anchor).norm() + 0.05 * (1.7 * i as f64).sin();
                 let mut at = row.at.clone();
                 at.group = "wire".into();
-                Measurement { at, observed: Observed::Distance { distance_mm, sigma_mm: None } }
+                Measurement { at, target: String::new(), observed: Observed::Distance { distance_mm, sigma_mm: None } }
             })
             .collect();
         (world, rows)

@@ -93,6 +93,7 @@ fn made_up() -> (Robot, Vec<Measurement>) {
         let point_mm = truth.target_mm(&at.joints_rad());
         rows.push(Measurement {
             at,
+            target: String::new(),
             observed: Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None },
         });
     }

@@ -134,6 +134,7 @@ fn identified(
                 joints_deg: q.iter().map(|v| v.to_degrees()).collect(),
                 slides: Vec::new(),
             },
+            target: String::new(),
             observed: Observed::Position { point_mm, covariance_mm2: Some(variance), rotation_rad: None },
         });
     }

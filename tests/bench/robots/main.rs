@@ -1,6 +1,6 @@
 //! Benchmark of the identification on robots: the real sets where they are, and simulated arms whose truth is known.
 //!
-//! `cargo bench --bench robots` prints all; `-- real`, `-- simulated [RUNS]`, `-- faults [RUNS [FAULT]]`, `-- touches [RUNS]` and `-- speed` one of them.
+//! `cargo bench --bench robots` prints all; `-- real`, `-- simulated [RUNS]`, `-- faults [RUNS [FAULT]]`, `-- touches [RUNS]`, `-- targets [RUNS]` and `-- speed` one of them.
 #![allow(clippy::print_stdout, reason = "a benchmark says what it measured")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a benchmark that cannot run has nothing to say")]
 #![allow(clippy::disallowed_methods, reason = "a benchmark looks at the clock")]
@@ -9,6 +9,7 @@ mod faults;
 mod real;
 mod simulated;
 mod speed;
+mod targets;
 mod touches;
 mod worlds;
 
@@ -31,6 +32,9 @@ fn main() {
     }
     if asked("touches") {
         touches::table(runs);
+    }
+    if asked("targets") {
+        targets::table(runs);
     }
     if asked("speed") {
         speed::table();

@@ -45,12 +45,15 @@ pub fn table(runs: u64) {
 
 /// What one run says.
 #[derive(Debug, Default, Clone, Copy)]
-struct Outcome {
-    errors_mm: [f64; 2],
+pub struct Outcome {
+    /// Of the nominal robot and of the one that is kept.
+    pub errors_mm: [f64; 2],
     /// Promised and realised, each placement fitted by itself.
-    promise_mm: Option<[f64; 2]>,
-    parameters: [usize; 2],
-    points: [usize; 2],
+    pub promise_mm: Option<[f64; 2]>,
+    /// Base parameters whose interval holds the truth, and all of them.
+    pub parameters: [usize; 2],
+    /// Verify points within what is promised for 95 of 100, and all of them.
+    pub points: [usize; 2],
 }
 
 fn line(name: &str, what: &str, nominal: &Robot, plan: Plan, runs: u64) {
@@ -77,25 +80,29 @@ fn line(name: &str, what: &str, nominal: &Robot, plan: Plan, runs: u64) {
 }
 
 fn outcome(nominal: &Robot, plan: Plan, seed: u64) -> Option<Outcome> {
-    let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let (nominal, truth, rows) = measured(nominal, plan, seed);
-    let set = Dataset::new(&rows, 1).expect("rows");
-    let found = identify(&set, &nominal, &settings, 1, &|_| {}).ok()?;
+    let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+    judged(&nominal, &truth, &Dataset::new(&rows, 1).expect("rows"), &settings).map(|(outcome, _)| outcome)
+}
+
+/// What becomes of a robot, and the one that is kept.
+pub fn judged(nominal: &Robot, truth: &Robot, set: &Dataset, settings: &Settings) -> Option<(Outcome, Robot)> {
+    let found = identify(set, nominal, settings, 1, &|_| {}).ok()?;
     let robot = &found.candidates[found.chosen].robot;
     // As with all methods, where the verify rows may keep the nominal robot.
-    let kept = if found.worse_than_nominal(&set, &nominal, &settings) { &nominal } else { robot };
-    let errors_mm = [&nominal, kept].map(|robot| against_truth(&set, &truth, robot));
+    let kept = if found.worse_than_nominal(set, nominal, settings) { nominal } else { robot };
+    let errors_mm = [nominal, kept].map(|robot| against_truth(set, truth, robot));
     let mut outcome = Outcome { errors_mm, ..Outcome::default() };
     if let Some((formulation, _)) = &found.candidates[found.chosen].found {
-        let expected = Expected::new(formulation, &set, &found.fitted);
-        outcome.promise_mm = Some([expected.of_robot_mm, off(&set, &truth, robot, true)]);
+        let expected = Expected::new(formulation, set, &found.fitted);
+        outcome.promise_mm = Some([expected.of_robot_mm, off(set, truth, robot, true)]);
         let verify = set.verify_rows();
-        let errors = Judge::plain(&set, &found.fitted, true).errors(robot, &verify);
+        let errors = Judge::plain(set, &found.fitted, true).errors(robot, &verify);
         let sizes: Vec<f64> = errors.iter().filter_map(|e| e.point_mm).map(|p| p.norm()).collect();
         outcome.points = [sizes.iter().filter(|s| **s <= expected.p95_mm).count(), sizes.len()];
-        outcome.parameters = intervals(&found, &nominal, &truth);
+        outcome.parameters = intervals(&found, nominal, truth);
     }
-    Some(outcome)
+    Some((outcome, kept.clone()))
 }
 
 /// How many base parameters of the chosen fit have the truth in their interval, and how many there are; none where the truth has

@@ -209,7 +209,11 @@ fn touched(truth: &Robot, moved_mm: f64, random: &mut Pcg64Mcg) -> (Vec<Measurem
                 joints_deg: joints.iter().map(|q| q.to_degrees()).collect(),
                 slides: vec![],
             };
-            rows.push(Measurement { at, observed: Observed::Distance { distance_mm: 0.0, sigma_mm: None } });
+            rows.push(Measurement {
+                at,
+                target: String::new(),
+                observed: Observed::Distance { distance_mm: 0.0, sigma_mm: None },
+            });
         }
         sockets.push(socket);
     }

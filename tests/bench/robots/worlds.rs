@@ -136,7 +136,11 @@ pub fn measured(nominal: &Robot, plan: Plan, seed: u64) -> (Robot, Robot, Vec<Me
             let role = if i < plan.samples { Role::Sample } else { Role::Verify };
             let at = RobotPose { pose: format!("p{i}"), group: format!("g{group}"), role, joints_deg, slides };
             let point_mm = seen + common + noise;
-            Measurement { at, observed: Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None } }
+            Measurement {
+                at,
+                target: String::new(),
+                observed: Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None },
+            }
         })
         .collect();
     (nominal, truth, rows)
@@ -159,7 +163,8 @@ pub fn truth(nominal: &Robot, plan: Plan, random: &mut Pcg64Mcg) -> Robot {
     nominal.shifted(&parameters, &errors)
 }
 
-fn sensor(group: usize) -> Transform {
+/// Where a placement's sensor sees the base.
+pub fn sensor(group: usize) -> Transform {
     let turn = 0.7 * group as f64;
     Transform::from_parts(
         Vector3::new(1200.0 * turn.cos(), -700.0 + 300.0 * turn.sin(), 400.0).into(),

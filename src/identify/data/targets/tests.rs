@@ -1,0 +1,219 @@
+use super::*;
+use crate::geometry::transform;
+use crate::identify::data::dataset::Dataset;
+use crate::identify::synthetic;
+use crate::measurements::Role;
+use crate::robot::Robot;
+
+const NOISE_MM: f64 = 0.02;
+
+/// Three targets off a line, and a fourth.
+const TARGETS: [(&str, Vector3<f64>); 4] = [
+    ("a", Vector3::new(60.0, 0.0, 20.0)),
+    ("b", Vector3::new(-30.0, 45.0, 25.0)),
+    ("c", Vector3::new(-20.0, -55.0, 40.0)),
+    ("d", Vector3::new(15.0, 20.0, 70.0)),
+];
+
+fn rows(count: usize, seed: u64) -> Vec<Measurement> {
+    synthetic::of_targets(&synthetic::world(40, 0.0, seed), &TARGETS[..count], NOISE_MM, seed)
+}
+
+fn point(row: &mut Measurement) -> &mut Point3<f64> {
+    match &mut row.observed {
+        Observed::Position { point_mm, .. } => point_mm,
+        _ => panic!("a point"),
+    }
+}
+
+fn one(rows: &[Measurement]) -> (Vec<Measurement>, Targets) {
+    as_one(rows).unwrap().unwrap()
+}
+
+fn refusal(rows: &[Measurement]) -> String {
+    as_one(rows).err().unwrap().to_string()
+}
+
+#[test]
+fn the_mark_point_is_the_mean_and_turns_with_the_flange() {
+    for count in [3, 4] {
+        let world = synthetic::world(40, 0.0, 3);
+        let (poses, targets) = one(&rows(count, 3));
+        assert_eq!((poses.len(), targets.names.len(), targets.oriented), (world.rows.len(), count, true));
+        assert!((targets.scatter_mm / NOISE_MM - 1.0).abs() < 0.15, "{}", targets.scatter_mm);
+        let mean = TARGETS[..count].iter().map(|(_, p)| p).sum::<Vector3<f64>>() / count as f64;
+        let truth = Robot { tool_mm: mean, ..world.truth.clone() };
+        let mut turns = Vec::new();
+        let mut distances = Vec::new();
+        for pair in poses.iter().filter(|p| p.at.group == "g0").collect::<Vec<_>>().windows(2) {
+            let of = |m: &Measurement| match &m.observed {
+                Observed::Position { point_mm, rotation_rad: Some(r), .. } => transform(*r, point_mm.coords),
+                _ => panic!("a point with an orientation"),
+            };
+            let flange = |m: &Measurement| truth.base_from_flange(&m.at.joints_rad()).rotation;
+            let (a, b) = (of(pair[0]), of(pair[1]));
+            turns.push(a.rotation.angle_to(&b.rotation) - flange(pair[0]).angle_to(&flange(pair[1])));
+            let apart = truth.target_mm(&pair[0].at.joints_rad()) - truth.target_mm(&pair[1].at.joints_rad());
+            distances.push((a.translation.vector - b.translation.vector).norm() - apart.norm());
+        }
+        let rms = |v: &[f64]| (v.iter().map(|v| v * v).sum::<f64>() / v.len() as f64).sqrt();
+        // Of two means of so many readings; turns of so large a body.
+        assert!(rms(&distances) < 1.5 * NOISE_MM * (2.0 / count as f64).sqrt(), "{}", rms(&distances));
+        assert!(rms(&turns) < 2.0 * NOISE_MM / 50.0, "{}", rms(&turns));
+        assert_eq!(targets.findings, []);
+    }
+}
+
+#[test]
+fn the_covariance_is_that_of_the_mean() {
+    let mut list = rows(3, 5);
+    let stated = Matrix3::from_diagonal(&Vector3::new(1e-4, 4e-4, 9e-4));
+    for row in &mut list {
+        if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
+            *covariance_mm2 = Some(stated);
+        }
+    }
+    let (poses, _) = one(&list);
+    for pose in &poses {
+        let Observed::Position { covariance_mm2: Some(c), .. } = &pose.observed else { panic!() };
+        // The body's origin is the mean, and its turn takes nothing from it where the noise is alike at all targets.
+        assert!((c - stated / 3.0).norm() < 0.02 * stated.norm(), "{c}");
+    }
+}
+
+#[test]
+fn clean_targets_raise_no_alarm() {
+    for seed in 0..20 {
+        for count in [2, 3, 4] {
+            let (_, targets) = one(&rows(count, seed));
+            assert_eq!(targets.findings, [], "{seed} {count}");
+        }
+    }
+}
+
+#[test]
+fn a_gross_error_of_one_target_is_named() {
+    for (size_mm, seed) in [(0.5, 1), (2.0, 2), (50.0, 3)] {
+        let mut list = rows(4, seed);
+        point(&mut list[4 * 7 + 1]).x += size_mm;
+        let name = list[4 * 7 + 1].at.pose.clone();
+        let (poses, targets) = one(&list);
+        assert_eq!(targets.findings.len(), 1, "{size_mm}");
+        assert!(targets.findings[0].sentence().contains("target b does not stand"), "{:?}", targets.findings);
+        assert_eq!(targets.findings[0].rows, vec![name.clone()]);
+        assert!(matches!(poses[7].observed, Observed::Position { .. }));
+
+        // Of three nobody knows which is off.
+        let mut list = rows(3, seed);
+        point(&mut list[3 * 7 + 1]).x += size_mm;
+        let (poses, targets) = one(&list);
+        assert!(targets.findings[0].sentence().contains("a fourth target"), "{:?}", targets.findings);
+        assert_eq!((targets.findings.len(), &targets.findings[0].rows), (1, &vec![name]));
+        assert!(matches!(poses[7].observed, Observed::Missing { .. }));
+    }
+}
+
+#[test]
+fn exchanged_names_are_mended() {
+    for count in [3, 4] {
+        let mut list = rows(count, 4);
+        let (clean, _) = one(&list);
+        for pose in [3, 11] {
+            let (a, b) = (count * pose, count * pose + 2);
+            (list[a].target, list[b].target) = (list[b].target.clone(), list[a].target.clone());
+        }
+        let (poses, targets) = one(&list);
+        assert_eq!(targets.findings.len(), 1);
+        assert!(targets.findings[0].sentence().contains("targets a and c are exchanged"));
+        assert_eq!(targets.findings[0].rows, [list[count * 3].at.pose.clone(), list[count * 11].at.pose.clone()]);
+        for (mended, clean) in poses.iter().zip(&clean) {
+            let (Observed::Position { point_mm: a, .. }, Observed::Position { point_mm: b, .. }) =
+                (&mended.observed, &clean.observed)
+            else {
+                panic!()
+            };
+            assert!((a - b).norm() < NOISE_MM, "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn a_target_that_moved_is_named_from_there_on() {
+    let mut list = rows(4, 6);
+    let from = 4 * 30;
+    for row in list[from..].iter_mut().filter(|row| row.target == "d") {
+        // In the sensor's frame it moves with the flange's turn; that it no longer fits is all that is asked.
+        point(row).z += 1.0;
+    }
+    let (_, targets) = one(&list);
+    let sentence = targets.findings[0].sentence();
+    assert!(
+        sentence.contains("target d") && sentence.contains(&format!("before {}", list[from].at.pose)),
+        "{sentence}"
+    );
+}
+
+#[test]
+fn two_targets_and_targets_on_a_line_give_their_mean() {
+    let world = synthetic::world(20, 0.0, 2);
+    let line: Vec<(&str, Vector3<f64>)> =
+        [("a", 0.0), ("b", 30.0), ("c", 70.0)].map(|(n, x)| (n, Vector3::new(x, 2.0 * x, 10.0))).into();
+    for targets in [&line[..], &line[..2]] {
+        let mut list = synthetic::of_targets(&world, targets, NOISE_MM, 1);
+        list[1].observed = Observed::Missing { reason: "hidden".to_owned() };
+        // Along the line: across it nothing would be seen.
+        let at = 5 * targets.len();
+        let away = *point(&mut list[at]) - *point(&mut list[at + 1]);
+        *point(&mut list[at]) += away.normalize();
+        let (poses, found) = one(&list);
+        assert!(!found.oriented);
+        assert!(matches!(&poses[0].observed, Observed::Missing { reason } if reason.contains("all of them")));
+        let Observed::Position { rotation_rad: None, .. } = poses[1].observed else { panic!("{:?}", poses[1]) };
+        assert!(matches!(&poses[5].observed, Observed::Missing { reason } if reason.contains("do not stand")));
+        assert_eq!(found.findings.len(), 1);
+    }
+}
+
+#[test]
+fn a_pose_that_shows_too_few_is_left_out_with_the_reason() {
+    let mut list = rows(3, 7);
+    list.remove(3 * 5);
+    for row in &mut list[3 * 8 - 1..3 * 9 - 1] {
+        row.observed = Observed::Missing { reason: "beam broken".to_owned() };
+    }
+    let (poses, targets) = one(&list);
+    assert!(
+        matches!(&poses[5].observed, Observed::Missing { reason } if reason == "2 of 3 targets; three off a line are needed")
+    );
+    assert!(matches!(&poses[8].observed, Observed::Missing { reason } if reason == "beam broken"));
+    assert_eq!(targets.findings, []);
+}
+
+#[test]
+fn what_is_no_body_is_refused() {
+    let mut list = rows(3, 1);
+    for (i, row) in list.iter_mut().enumerate() {
+        let size = 30.0 * (7.3 * i as f64).sin();
+        *point(row) += Vector3::new(size, -size, 0.5 * size);
+    }
+    assert!(refusal(&list).contains("no rigid body"));
+    let mut list = rows(3, 1);
+    let keep: Vec<bool> = (0..list.len()).map(|i| i % 3 == (i / 3) % 3).collect();
+    let mut kept = keep.iter();
+    list.retain(|_| *kept.next().unwrap());
+    assert!(refusal(&list).contains("no pose shows two"));
+    let mut list = rows(3, 1);
+    for row in &mut list {
+        row.observed = Observed::Distance { distance_mm: 5.0, sigma_mm: None };
+    }
+    assert!(refusal(&list).contains("distances of 3 targets"));
+}
+
+#[test]
+fn one_target_by_name_is_one_target() {
+    let list: Vec<Measurement> = rows(3, 1).into_iter().filter(|row| row.target == "b").collect();
+    assert!(as_one(&list).unwrap().is_none());
+    let set = Dataset::new(&list, 1).unwrap();
+    assert_eq!((set.poses.len(), set.targets.is_none()), (list.len(), true));
+    assert_eq!(list.iter().filter(|r| r.at.role == Role::Center).count(), 4);
+}
