@@ -8,6 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::choose::Identification;
@@ -20,6 +21,10 @@ const SMALLEST_MM: f64 = 0.02;
 const TOLERANCES: usize = 36;
 const STEP: f64 = 1.25;
 
+/// Standard deviation of the target's place for this, mm: it is mounted by hand, and a place that is right by chance is no proof of the
+/// scale.
+const MOUNTED_MM: f64 = 100.0;
+
 /// What is known of them: robots are built to this, mm, give or take such a factor.
 const USUAL_MM: f64 = 0.4;
 const GIVE_OR_TAKE: f64 = 4.0;
@@ -30,8 +35,8 @@ const SCALES: [f64; 4] = [0.003, 0.01, 0.03, 0.1];
 /// Logarithm of the odds from which on a scale is told of, twelve to one: none of 600 clean simulated sets has as much.
 const TOLD: f64 = 2.5;
 
-/// Half width of a 95 % interval over the standard deviation.
-const P95: f64 = 1.96;
+/// Chance that the scale is larger than is said of one that would not be seen.
+const LARGER: f64 = 0.01;
 
 /// Share by which all links differ from the nominal ones.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -42,6 +47,8 @@ pub struct CommonScale {
     pub sigma: f64,
     /// Logarithm of how many times more probable the links are with it.
     pub log_odds: f64,
+    /// The share that the readings may be off by and nothing would show it: in 1 of 100 cases it is larger.
+    pub unseen: f64,
     /// What gives the robot its scale.
     pub of: &'static str,
 }
@@ -69,15 +76,15 @@ impl CommonScale {
         let weighed: Vec<Weighed> = (0..TOLERANCES)
             .filter_map(|step| {
                 let lengths_mm = SMALLEST_MM * STEP.powi(step as i32);
-                let tolerance = Tolerance { lengths_mm, ..formulation.tolerance };
+                let tolerance = Tolerance { lengths_mm, target_mm: MOUNTED_MM, ..formulation.tolerance };
                 let covariance = tolerance.covariance(base, parameters, extras);
                 let before = -0.5 * ((lengths_mm / USUAL_MM).ln() / GIVE_OR_TAKE.ln()).powi(2);
                 Weighed::new(&covariance, &normal, &gradient, &longer, before)
             })
             .collect();
-        let (log_odds, share, sigma) = summed_up(&weighed);
+        let Summary { log_odds, share, sigma, unseen } = summed_up(&weighed);
         let of = if set.known.is_empty() { "readings" } else { "known distances" };
-        (sigma.is_finite() && log_odds.is_finite()).then_some(CommonScale { share, sigma, log_odds, of })
+        (sigma.is_finite() && log_odds.is_finite()).then_some(CommonScale { share, sigma, log_odds, unseen, of })
     }
 
     /// Whether it is more than the links' own errors make by chance.
@@ -85,14 +92,9 @@ impl CommonScale {
         self.log_odds > TOLD
     }
 
-    /// Largest share that the links do not speak against (95 %).
-    pub fn unseen(&self) -> f64 {
-        self.share.abs() + P95 * self.sigma
-    }
-
     /// The scale that was found, or how large a one would not be.
     pub fn sentence(&self) -> String {
-        let CommonScale { share, sigma, of, .. } = *self;
+        let CommonScale { share, sigma, unseen, of, .. } = *self;
         let (percent, way) = (100.0 * share.abs(), if share > 0.0 { "longer" } else { "shorter" });
         match self.is_told() {
             true => format!(
@@ -101,7 +103,7 @@ impl CommonScale {
             ),
             false => format!(
                 "scale of the {of}: one that is off by up to {:.2} % looks like a robot that is as much larger, and would not be seen",
-                100.0 * self.unseen()
+                100.0 * unseen
             ),
         }
     }
@@ -156,8 +158,16 @@ impl Weighed {
     }
 }
 
-/// Logarithm of the odds for a scale, the share and its standard deviation, over all tolerances.
-fn summed_up(weighed: &[Weighed]) -> (f64, f64, f64) {
+/// What all tolerances together say of a scale.
+struct Summary {
+    log_odds: f64,
+    share: f64,
+    sigma: f64,
+    unseen: f64,
+}
+
+/// Over all tolerances, each with its weight.
+fn summed_up(weighed: &[Weighed]) -> Summary {
     let without = log_sum(weighed.iter().map(|w| w.log_evidence));
     let with = |scale: f64| log_sum(weighed.iter().map(|w| w.log_evidence + w.gain(scale)));
     let log_odds = SCALES.iter().map(|&s| with(s) - without).fold(f64::NEG_INFINITY, f64::max);
@@ -168,7 +178,20 @@ fn summed_up(weighed: &[Weighed]) -> (f64, f64, f64) {
         |of: &dyn Fn(&Weighed) -> f64| weighed.iter().map(|w| (log_weight(w) - total).exp() * of(w)).sum::<f64>();
     let share = mean(&|w| w.share());
     let sigma = mean(&|w| 1.0 / w.precision + (w.share() - share).powi(2)).sqrt();
-    (log_odds, share, sigma)
+    // Few links leave their tolerance open, and with it the tails: a normal distribution of this sigma has shorter ones.
+    let normal = Normal::standard();
+    let larger = |limit: f64| {
+        mean(&|w| {
+            let sds = |value: f64| value * w.precision.sqrt();
+            normal.cdf(sds(-limit - w.share())) + normal.sf(sds(limit - w.share()))
+        })
+    };
+    let (mut low, mut high) = (0.0, share.abs() + 100.0 * sigma);
+    while high - low > 1e-6 * high {
+        let middle = 0.5 * (low + high);
+        if larger(middle) > LARGER { low = middle } else { high = middle }
+    }
+    Summary { log_odds, share, sigma, unseen: high }
 }
 
 /// Logarithm of the sum of exponentials.
@@ -182,7 +205,7 @@ mod tests {
     use super::*;
 
     /// Links of 50 to 400 mm, found exactly, off by errors of about `error_mm` and by a share.
-    fn weighed(error_mm: f64, share: f64) -> (f64, f64) {
+    fn weighed(error_mm: f64, share: f64) -> Summary {
         let lengths = [400.0, -300.0, 250.0, 100.0, 50.0];
         let errors = [0.9, 1.2, -0.7, -1.1, 0.8].map(|e| e * error_mm);
         let longer = DVector::from_row_slice(&lengths);
@@ -196,8 +219,7 @@ mod tests {
                 Weighed::new(&covariance, &normal, &gradient, &longer, before).unwrap()
             })
             .collect();
-        let (log_odds, share, _) = summed_up(&all);
-        (log_odds, share)
+        summed_up(&all)
     }
 
     #[test]
@@ -205,7 +227,11 @@ mod tests {
         for (error_mm, share, told) in
             [(0.5, 0.0, false), (0.5, 0.001, false), (0.5, 0.01, true), (5.0, 0.01, false), (0.02, -0.001, true)]
         {
-            let (log_odds, found) = weighed(error_mm, share);
+            let Summary { log_odds, share: found, sigma, unseen } = weighed(error_mm, share);
+            assert!(
+                unseen > found.abs() + 2.0 * sigma && unseen < found.abs() + 5.0 * sigma,
+                "{found} {sigma} {unseen}"
+            );
             assert_eq!(log_odds > TOLD, told, "{error_mm} {share}: {log_odds} {found}");
             assert!((found - share).abs() < 0.005 * error_mm.max(0.1), "{error_mm} {share}: {found}");
         }

@@ -129,7 +129,7 @@ fn lines(sensor: Sensor, runs: u64, only: &str) {
                 instead.map_or(String::new(), |(l, ..)| l.first().map_or(String::new(), Finding::sentence));
             if what == "scaled by" {
                 // What the links' tolerance cannot tell is said with every result.
-                let unseen = |scale: &Option<CommonScale>| scale.is_some_and(|s| (size - 1.0).abs() < s.unseen());
+                let unseen = |scale: &Option<CommonScale>| scale.is_some_and(|s| (size - 1.0).abs() < s.unseen);
                 let warned = said.iter().filter(|(list, _, scale)| list.is_empty() && unseen(scale)).count();
                 instead = format!("{warned} more within the scale that is said not to be seen");
             }
