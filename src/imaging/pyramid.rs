@@ -97,6 +97,12 @@ fn reduced(picture: &Picture, factor: usize) -> Grey8 {
 /// Factor up to which 2^8 values of 8 bits fit into a sum of 16, and 2^16 of 16 into one of 32; no picture is so large.
 const MOST_REDUCED: usize = 256;
 
+/// Bits of a reciprocal in whole numbers: 255 n / n times 2^23 fits into 31 bits.
+const SHIFT: u32 = 23;
+
+/// Factor up to which a mean by a reciprocal in whole numbers is rounded as the mean itself: 255 n / 2^23 is less than 1 / n up to n of 181.
+const MOST_BY_WHOLE: usize = 13;
+
 /// Means of `factor` x `factor` pixels, `low..high` stretched to 0..255. `value` is a pixel as a type that holds the sum of a column.
 fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
     image: &Image<T>,
@@ -110,6 +116,9 @@ fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
     let mut totals = vec![0u32; w];
     let scale = 255.0 / (high - low).max(1.0);
     let unit = scale / (factor * factor) as f64;
+    // The same numbers in whole ones where nothing is stretched: the rounding upwards of the reciprocal is too little to reach the next half.
+    let by_whole = (low == 0.0 && high == 255.0 && factor <= MOST_BY_WHOLE)
+        .then(|| (1u32 << SHIFT).div_ceil((factor * factor) as u32));
     let rows = image.pixels.chunks(factor * image.width.max(1));
     for (out, rows) in pixels.chunks_exact_mut(w.max(1)).zip(rows) {
         widest(
@@ -123,8 +132,17 @@ fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
                     }
                 }
                 add_groups(&sums, factor, &mut totals);
-                for (out, &total) in out.iter_mut().zip(&totals) {
-                    *out = (f64::from(total) * unit - low * scale + 0.5) as u8;
+                match by_whole {
+                    Some(per_total) => {
+                        for (out, &total) in out.iter_mut().zip(&totals) {
+                            *out = ((total * per_total + (1 << (SHIFT - 1))) >> SHIFT) as u8;
+                        }
+                    }
+                    None => {
+                        for (out, &total) in out.iter_mut().zip(&totals) {
+                            *out = (f64::from(total) * unit - low * scale + 0.5) as u8;
+                        }
+                    }
                 }
             },
         );
