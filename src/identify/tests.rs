@@ -68,6 +68,24 @@ fn the_papers_experiment_ends_at_the_noise() {
 }
 
 #[test]
+fn a_target_that_the_file_puts_on_the_last_axis_is_found_where_it_is() {
+    let mut world = synthetic::planned(60, 30, 25.0, 0.01, 5, &|_| {});
+    let found = |world: &World| {
+        let set = Dataset::new(&world.rows, 1).unwrap();
+        let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+        let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
+        let robot = &found.candidates[found.chosen].robot;
+        let point = quality(&set, robot, &found, &settings).0.verify.point.unwrap().mean_abs_mm.unwrap();
+        (point, found.outliers.len() + found.doubtful.len() + found.verify_outliers.len())
+    };
+    let (where_it_is, _) = found(&world);
+    // From there, what turns about the target moves nothing; where it is, the poses see it.
+    world.nominal.tool_mm = nalgebra::Vector3::zeros();
+    let (on_the_axis, far) = found(&world);
+    assert!(on_the_axis < 1.05 * where_it_is && far == 0, "{on_the_axis} {where_it_is} {far}");
+}
+
+#[test]
 fn equation_13_and_what_it_misses() {
     let (varied, names) = base_names(&synthetic::planned(262, 0, 25.0, 0.0, 3, &|_| {}));
     let zero: Vec<&str> = varied.base.zero.iter().map(|&i| names[i].as_str()).collect();

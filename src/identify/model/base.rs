@@ -99,6 +99,14 @@ impl Base {
         Base { free: kept, zero: reference.zero, dependent, coefficients, singular_values }
     }
 
+    /// The base parameters of a robot whose parameters are off by these.
+    pub fn coordinates(&self, offsets: &[f64]) -> Vec<f64> {
+        let of_others = |row: usize| -> f64 {
+            self.dependent.iter().enumerate().map(|(c, &i)| self.coefficients[(row, c)] * offsets[i]).sum()
+        };
+        self.free.iter().enumerate().map(|(row, &i)| offsets[i] + of_others(row)).collect()
+    }
+
     /// Number of base parameters.
     pub fn rank(&self) -> usize {
         self.free.len()

@@ -24,6 +24,9 @@ use crate::robot::{Parameter, Unit};
 /// Rounds of fitting and of estimating scatter and prior from the residuals.
 const ROUNDS: usize = 4;
 
+/// Rounds in which the fit may have come to where the poses determine more.
+const BASES: usize = 2;
+
 /// Rounds of estimating scatter and prior from the residuals at the most, and the change of the scatter's logarithm that ends them.
 const ESTIMATES: usize = 10;
 const SAME_SCATTER: f64 = 0.01;
@@ -73,10 +76,10 @@ impl Formulation {
         let mut levers = task.robot.clone();
         let mut scatter = Scatter { smooth: task.smooth, ..Scatter::of_point(FIRST_SCATTER_MM) };
         let mut rows = Rows::new(&task.recipe(scatter, &[], &levers));
-        let base = task.base(&rows)?;
+        let mut base = task.base(&rows)?;
         task.check_count(&rows, &base)?;
-        let count = base.rank() + task.extras.len();
-        let free = vec![f64::INFINITY; count];
+        let mut count = base.rank() + task.extras.len();
+        let mut free = vec![f64::INFINITY; count];
         let held = settings.prior == Prior::Evidence;
         let mut tolerance = Tolerance::default();
         let mut x = vec![0.0; count];
@@ -101,6 +104,13 @@ impl Formulation {
             effective = determined(&fit, &x, &prior);
             scatter = estimate_scatter(&rows, &offsets, effective, scatter);
             levers = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
+            if round < BASES
+                && let Some(richer) = task.richer(&rows, &offsets, &base)
+            {
+                x = [richer.coordinates(&offsets), x.split_off(base.rank())].concat();
+                (base, count) = (richer, x.len());
+                free = vec![f64::INFINITY; count];
+            }
             let change = (scatter.point_mm / before.point_mm).ln().abs() + (scatter.stated / before.stated).ln().abs();
             if round + 1 >= ROUNDS && change < SAME_SCATTER {
                 break;

@@ -73,6 +73,9 @@ impl<'a> Task<'a> {
             }
             robust = Robust { scores, scatter, weights: weights.clone(), ..robust };
             robust.step(STEPS_A_ROUND);
+            if round == 0 {
+                robust.look_again(&rows);
+            }
         }
         Ok(robust)
     }
@@ -130,6 +133,14 @@ impl Robust<'_> {
         self.x = trust_region::solve(&fit, &self.x, &settings).x;
         self.offsets = fit.offsets(&self.x);
         self.robot = task.robot.shifted(task.parameters, &self.offsets[..task.parameters.len()]);
+    }
+
+    /// Takes in what the poses determine where the fit has come to.
+    fn look_again(&mut self, rows: &Rows) {
+        if let Some(richer) = self.task.richer(rows, &self.offsets, &self.base) {
+            self.x = [richer.coordinates(&self.offsets), self.x.split_off(self.base.rank())].concat();
+            self.base = richer;
+        }
     }
 
     /// What residuals that were fitted have lost: root of numbers over degrees of freedom.

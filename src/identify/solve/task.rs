@@ -39,6 +39,9 @@ pub struct Task<'a> {
     pub settings: &'a Settings,
 }
 
+/// How far the target must lie from where the file has it that what turns about it is worth a look: a mrad at such a lever is a micrometre.
+const FAR_MM: f64 = 1.0;
+
 impl<'a> Task<'a> {
     /// These parameters on all fitted rows, as they are read: how measurements are looked at before it is known what is in them.
     pub fn plain(
@@ -79,11 +82,33 @@ impl<'a> Task<'a> {
         Rows::new(&self.recipe(scatter, &[], levers))
     }
 
+    /// What the poses determine, seen from the nominal robot.
     pub(super) fn base(&self, rows: &Rows) -> Result<Base, Error> {
+        self.base_at(rows, &vec![0.0; rows.offset_count()])
+    }
+
+    /// What they determine where the target really is, if that is more than where the file has it: a target on the last axes hides what turns
+    /// about it. `None` where these offsets do not move it far enough to matter.
+    pub(super) fn richer(&self, rows: &Rows, offsets: &[f64], base: &Base) -> Option<Base> {
+        // The rest of the robot stays nominal: what one orientation of the flange hides is not seen because the links are a little off.
+        let mut of_target = vec![0.0; rows.offset_count()];
+        for ((at, &offset), parameter) in of_target.iter_mut().zip(offsets).zip(self.parameters) {
+            if matches!(parameter, Parameter::V(_)) {
+                *at = offset;
+            }
+        }
+        if !of_target.iter().any(|offset| offset.abs() > FAR_MM) {
+            return None;
+        }
+        let there = self.base_at(rows, &of_target).ok()?;
+        (there.rank() > base.rank() && self.check_count(rows, &there).is_ok()).then_some(there)
+    }
+
+    fn base_at(&self, rows: &Rows, offsets: &[f64]) -> Result<Base, Error> {
         if self.parameters.is_empty() {
             return Ok(Base::new(&DMatrix::zeros(1, 0), self.settings.rank_tolerance));
         }
-        let (_, jacobian) = rows.evaluate(&vec![0.0; rows.offset_count()], true);
+        let (_, jacobian) = rows.evaluate(offsets, true);
         let jacobian = jacobian.columns(0, self.parameters.len()).into_owned();
         let base = match self.settings.redundancy {
             Redundancy::Qr => Base::new(&jacobian, self.settings.rank_tolerance),

@@ -18,7 +18,7 @@ use crate::worlds::{Plan, arms, measured};
 type Plant = fn(&mut Vec<Measurement>, &mut Robot, f64);
 
 /// Faults, their sizes, and a word of the sentence that names each.
-const FAULTS: [(&str, &[f64], Plant, &str); 28] = [
+const FAULTS: [(&str, &[f64], Plant, &str); 30] = [
     ("clean", &[0.0], |_, _, _| {}, ""),
     ("radians", &[0.0], |rows, _, _| joints(rows, |_, j| j.iter_mut().for_each(|q| *q = q.to_radians())), "radians"),
     ("metres", &[0.0], |rows, _, _| points(rows, |_, p| p.coords /= 1000.0), "are in m,"),
@@ -67,6 +67,14 @@ const FAULTS: [(&str, &[f64], Plant, &str); 28] = [
     ("covariance of nought", &[0.0], |rows, _, _| stated(rows, 0.0), "no variance"),
     ("constant joint", &[0.0], |rows, _, _| joints(rows, |_, j| j[4] = 20.0), "same in all rows"),
     ("repeated poses", &[0.0], |rows, _, _| repeated(rows), "repeated"),
+    // The target's place is free: wherever the file has it, on the last axis too, it costs nothing and is no fault.
+    ("target on the last axis", &[0.0], |_, robot, _| robot.tool_mm = Vector3::zeros(), ""),
+    (
+        "target elsewhere by, mm",
+        &[5.0, 50.0, 150.0],
+        |_, robot, by| robot.tool_mm += Vector3::new(by, -by, 0.5 * by),
+        "",
+    ),
     ("a link longer by, mm", &[20.0, 60.0, 200.0], |_, robot, by| robot.joints[2].a_mm += by, "another robot"),
 ];
 
