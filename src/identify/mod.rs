@@ -38,6 +38,8 @@ pub enum Error {
         rows: usize,
         /// Rows without a reading.
         skipped: usize,
+        /// Why the first of them has none.
+        reason: Option<String>,
     },
     /// Robot and measurements are not about the same machine.
     #[error("the robot has {robot} joints, the measurements have {measurements}")]
@@ -122,6 +124,7 @@ impl Explain for Error {
             Error::NothingDetermined { .. } | Error::TooFew { .. } => {
                 Some("measure more poses, spread over the workspace and with varied orientation".to_owned())
             }
+            Error::NoSamples { reason: Some(reason), .. } => Some(format!("the first of those without: {reason}")),
             Error::Targets { hint, .. } => Some((*hint).to_owned()),
             Error::ModelNeeds { .. } => Some("leave `--model` out and the model is chosen by the data".to_owned()),
             _ => None,

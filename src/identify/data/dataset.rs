@@ -183,7 +183,8 @@ impl Dataset {
         }
         let samples = set.poses.iter().filter(|p| p.role == Role::Sample).count();
         if samples == 0 {
-            return Err(Error::NoSamples { rows: rows.len(), skipped: set.skipped.len() });
+            let reason = set.skipped.first().map(|skipped| format!("{}, {}", skipped.pose, skipped.reason));
+            return Err(Error::NoSamples { rows: rows.len(), skipped: set.skipped.len(), reason });
         }
         Ok(set)
     }

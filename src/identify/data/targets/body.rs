@@ -58,7 +58,8 @@ impl Body {
             median(poses.iter().filter_map(|pose| Some((seen(&pose, a)? - seen(&pose, b)?).norm())))
         };
         let distances = DMatrix::from_fn(targets, targets, |a, b| if a == b { Some(0.0) } else { apart(a, b) });
-        let joined = largest_joined(&distances);
+        let shown = |t: usize| poses.iter().flatten().filter(|s| s.target == t).count();
+        let joined = largest_joined(&distances, &(0..targets).map(shown).collect::<Vec<_>>());
         if joined.len() < 2 {
             return None;
         }
@@ -208,8 +209,9 @@ fn are_on_a_line<'a>(places: impl Iterator<Item = &'a Vector3<f64>> + Clone) -> 
     sizes[1] <= LINE * sizes[2]
 }
 
-/// The targets, from each as a start one after the other, whose distances to all taken before are known; of all starts the most.
-fn largest_joined(distances: &DMatrix<Option<f64>>) -> Vec<usize> {
+/// The targets, from each as a start one after the other, whose distances to all taken before are known; of all starts the most, and of as many
+/// those that were seen most often.
+fn largest_joined(distances: &DMatrix<Option<f64>>, seen: &[usize]) -> Vec<usize> {
     let count = distances.nrows();
     let from = |start: usize| {
         let mut joined = vec![start];
@@ -220,8 +222,9 @@ fn largest_joined(distances: &DMatrix<Option<f64>>) -> Vec<usize> {
         }
         joined
     };
-    let mut best: Vec<usize> =
-        (0..count).map(from).fold(Vec::new(), |best, list| if list.len() > best.len() { list } else { best });
+    let size = |list: &[usize]| (list.len(), list.iter().map(|&t| seen[t]).sum::<usize>());
+    let better = |best: Vec<usize>, list: Vec<usize>| if size(&list) > size(&best) { list } else { best };
+    let mut best = (0..count).map(from).fold(Vec::new(), better);
     best.sort_unstable();
     best
 }

@@ -7,6 +7,7 @@
 //! What goes wrong: targets that are no rigid body, or that no pose shows together; both are errors.
 
 mod body;
+mod moved;
 
 use std::collections::BTreeMap;
 
@@ -20,6 +21,7 @@ use crate::identify::Error;
 use crate::measurements::{Measurement, Observed};
 use crate::statistics::{chi_square_quantile, median};
 use body::{Body, Sighting};
+use moved::Moved;
 
 /// Of clean sets, the share in which a pose is taken for one with a gross error.
 const FALSE_ALARMS: f64 = 1e-3;
@@ -96,7 +98,8 @@ pub fn as_one(rows: &[Measurement]) -> Result<Option<(Vec<Measurement>, Targets)
         });
     }
     let stated = rows.iter().all(|r| !matches!(r.observed, Observed::Position { covariance_mm2: None, .. }));
-    let poses = shown(rows, &names, stated);
+    let mut poses = shown(rows, &names, stated);
+    let moved = told_apart(&mut poses, &mut names);
     let seen: Vec<Vec<Sighting>> = poses.iter().map(|p| p.sightings.clone()).collect();
     let body = Body::new(&seen, names.len()).ok_or_else(|| Error::Targets {
         message: format!("the rows are of {} targets ({}), but no pose shows two of them", names.len(), names.join(", ")),
@@ -106,7 +109,7 @@ pub fn as_one(rows: &[Measurement]) -> Result<Option<(Vec<Measurement>, Targets)
     let scatter_mm = sorter.scatter_mm(&seen);
     sorter.check_rigid(scatter_mm, &names)?;
     let judged: Vec<Judged> = poses.iter().map(|pose| sorter.judge(pose)).collect();
-    let findings = findings(&poses, &judged, &names, &sorter);
+    let findings = findings(&poses, &judged, &moved, &names, &sorter);
     let targets = Targets {
         scatter_mm,
         places_mm: sorter.body.places_mm.iter().map(|p| p.map(Into::into)).collect(),
@@ -144,6 +147,22 @@ fn shown<'a>(rows: &'a [Measurement], names: &[String], stated: bool) -> Vec<Sho
         }
     }
     poses
+}
+
+/// Makes targets that moved others from there on; each with the index that it has from there on.
+fn told_apart(poses: &mut [Shown], names: &mut Vec<String>) -> Vec<(Moved, usize)> {
+    let mut list = Vec::new();
+    let most = names.len();
+    while list.len() < most {
+        let seen: Vec<Vec<Sighting>> = poses.iter().map(|p| p.sightings.clone()).collect();
+        let Some(moved) = moved::next(&seen, names.len()) else { break };
+        let new = names.len();
+        names.push(format!("{} from {} on", names[moved.target], poses[moved.from].first.at.pose));
+        let later = poses[moved.from..].iter_mut().flat_map(|pose| &mut pose.sightings);
+        later.filter(|s| s.target == moved.target).for_each(|s| s.target = new);
+        list.push((moved, new));
+    }
+    list
 }
 
 /// Of a covariance that may be singular.
@@ -345,8 +364,31 @@ impl Sorter {
 }
 
 /// What was wrong at which poses.
-fn findings(poses: &[Shown], judged: &[Judged], names: &[String], sorter: &Sorter) -> Vec<Finding> {
+fn findings(
+    poses: &[Shown],
+    judged: &[Judged],
+    moved: &[(Moved, usize)],
+    names: &[String],
+    sorter: &Sorter,
+) -> Vec<Finding> {
     let mut list = Vec::new();
+    for (Moved { target, from }, new) in moved {
+        let joined = [target, new].iter().all(|&&t| sorter.body.places_mm[t].is_some());
+        list.push(Finding {
+            finding: format!(
+                "target {} was moved before {}: its distances to the others are other ones from there on",
+                names[*target], poses[*from].first.at.pose
+            ),
+            rows: Vec::new(),
+            action: match joined {
+                true => "it counts as another target from there on".to_owned(),
+                false => {
+                    "the poses on the shorter side show too few other targets and are left out; measure them again"
+                        .to_owned()
+                }
+            },
+        });
+    }
     let mut add = |finding: String, rows: Vec<String>, action: &str| {
         if !rows.is_empty() {
             list.push(Finding { finding, rows, action: action.to_owned() });
@@ -357,16 +399,14 @@ fn findings(poses: &[Shown], judged: &[Judged], names: &[String], sorter: &Sorte
         held.map(|(pose, _)| pose.first.at.pose.clone()).collect()
     };
     for (target, name) in names.iter().enumerate() {
-        if sorter.body.places_mm[target].is_none() {
+        if sorter.body.places_mm[target].is_none() && !moved.iter().any(|(m, new)| [m.target, *new].contains(&target)) {
             let shows = |pose: &&Shown| pose.sightings.iter().any(|s| s.target == target);
             let shown = poses.iter().filter(shows).map(|pose| pose.first.at.pose.clone()).collect();
-            add(format!("no pose shows target {name} beside three others"), shown, "its readings are left out");
+            add(format!("no pose joins target {name} to the others"), shown, "its readings are left out");
         }
-        let left_out = rows(&|j| matches!(j, Judged::Taken { left_out: Some(out), .. } if *out == target));
-        let last = poses.last().is_some_and(|pose| left_out.last() == Some(&pose.first.at.pose));
         add(
-            format!("target {name} does not stand to the others as at the other poses{}", moved(&left_out, last)),
-            left_out,
+            format!("target {name} does not stand to the others as at the other poses"),
+            rows(&|j| matches!(j, Judged::Taken { left_out: Some(out), .. } if *out == target)),
             "its readings there are left out, the other targets are used",
         );
         for (other, other_name) in names.iter().enumerate().skip(target + 1) {
@@ -379,24 +419,12 @@ fn findings(poses: &[Shown], judged: &[Judged], names: &[String], sorter: &Sorte
             );
         }
     }
-    let misfit = rows(&|j| matches!(j, Judged::Refused { misfit: true, .. }));
-    let last = poses.last().is_some_and(|pose| misfit.last() == Some(&pose.first.at.pose));
     add(
-        format!("the targets do not stand to each other as at the other poses{}", moved(&misfit, last)),
-        misfit,
+        "the targets do not stand to each other as at the other poses".to_owned(),
+        rows(&|j| matches!(j, Judged::Refused { misfit: true, .. })),
         if sorter.body.count() > 3 { "left out" } else { "left out; a fourth target would tell which of them is off" },
     );
     list
-}
-
-/// Poses in a row to the end from which a target has moved rather than been read wrongly.
-const MOVED: usize = 5;
-
-fn moved(rows: &[String], to_the_end: bool) -> String {
-    match rows.first() {
-        Some(first) if to_the_end && rows.len() >= MOVED => format!("; it may have moved before {first}"),
-        _ => String::new(),
-    }
 }
 
 #[cfg(test)]

@@ -137,20 +137,33 @@ fn exchanged_names_are_mended() {
     }
 }
 
+/// Rows of so many targets, one of which stands elsewhere by so much from a pose on.
+fn rows_with_moved(count: usize, seed: u64, from: usize, by_mm: f64) -> Vec<Measurement> {
+    let mut later = TARGETS;
+    later[2].1 += by_mm * Vector3::new(0.6, -0.7, 0.4);
+    let world = synthetic::world(40, 0.0, seed);
+    let [before, after] = [TARGETS, later].map(|t| synthetic::of_targets(&world, &t[..count], NOISE_MM, seed));
+    before[..count * from].iter().chain(&after[count * from..]).cloned().collect()
+}
+
 #[test]
-fn a_target_that_moved_is_named_from_there_on() {
-    let mut list = rows(4, 6);
-    let from = 4 * 30;
-    for row in list[from..].iter_mut().filter(|row| row.target == "d") {
-        // In the sensor's frame it moves with the flange's turn; that it no longer fits is all that is asked.
-        point(row).z += 1.0;
+fn a_target_that_moved_is_named_and_counts_as_another() {
+    for (by_mm, from) in [(0.2, 25), (2.0, 10), (2.0, 25), (30.0, 40)] {
+        let list = rows_with_moved(4, 6, from, by_mm);
+        let (poses, targets) = one(&list);
+        let sentence = targets.findings[0].sentence();
+        let named = format!("target c was moved before {}", list[4 * from].at.pose);
+        assert!(sentence.contains(&named) && sentence.contains("another target"), "{by_mm} {from}: {sentence}");
+        assert_eq!(targets.findings.len(), 1, "{by_mm} {from}: {:?}", targets.findings);
+        assert!(poses.iter().all(|p| matches!(p.observed, Observed::Position { .. })));
+        // Of three the others don't tell the turn.
+        let list = rows_with_moved(3, 6, from, by_mm);
+        let (poses, targets) = one(&list);
+        let sentence = targets.findings[0].sentence();
+        assert!(sentence.contains("target c was moved") && sentence.contains("left out"), "{by_mm} {from}: {sentence}");
+        let kept = poses.iter().filter(|p| matches!(p.observed, Observed::Position { .. })).count();
+        assert_eq!(kept, from.max(poses.len() - from), "{by_mm} {from}");
     }
-    let (_, targets) = one(&list);
-    let sentence = targets.findings[0].sentence();
-    assert!(
-        sentence.contains("target d") && sentence.contains(&format!("before {}", list[from].at.pose)),
-        "{sentence}"
-    );
 }
 
 #[test]

@@ -1,0 +1,80 @@
+//! Targets that were moved between two poses: from there on their distances to the others are other ones.
+//!
+//! In: what the poses showed, in their order. Out: the same with a target that moved as another one from there on. Each distance between two
+//! targets is looked through for a step, held against what it changes from one pose to the next; large deviations are bounded, so that gross
+//! errors make none. The target in most of the distances that step is the one that moved. Steps of less than about three times the
+//! scatter, and within the first or last few poses, are not seen.
+
+use super::body::Sighting;
+use crate::statistics::median;
+
+/// Fewest poses before and after.
+const FEWEST: usize = 5;
+
+/// Deviations beyond so many times the scatter count as that.
+const BOUNDED: f64 = 4.0;
+
+/// Standard deviations that a difference of two means must have.
+const CLEAR: f64 = 8.0;
+
+/// Median change from one normal number to the next, in standard deviations of one.
+const MEDIAN_CHANGE: f64 = 0.954;
+
+/// A target and the pose from which on it stands elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Moved {
+    /// Which target.
+    pub target: usize,
+    /// Index of the pose.
+    pub from: usize,
+}
+
+/// The step that is looked at next, if there is any.
+pub fn next(poses: &[Vec<Sighting>], targets: usize) -> Option<Moved> {
+    let mut of_target = vec![(0, 0.0, 0); targets];
+    for a in 0..targets {
+        for b in 0..a {
+            let Some((clear, from)) = step(&distances(poses, a, b)) else { continue };
+            for target in [a, b] {
+                let (steps, clearest, at) = of_target[target];
+                of_target[target] = (steps + 1, f64::max(clearest, clear), if clear > clearest { from } else { at });
+            }
+        }
+    }
+    let most = |(_, a): &(usize, (i32, f64, usize)), (_, b): &(usize, (i32, f64, usize))| {
+        (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
+    };
+    let (target, (steps, _, from)) = of_target.into_iter().enumerate().max_by(most)?;
+    (steps > 0).then_some(Moved { target, from })
+}
+
+/// The distance of two targets at the poses that show both, mm.
+fn distances(poses: &[Vec<Sighting>], a: usize, b: usize) -> Vec<(usize, f64)> {
+    let point = |pose: &[Sighting], target: usize| pose.iter().find(|s| s.target == target).map(|s| s.point_mm);
+    let apart = |(index, pose): (usize, &Vec<Sighting>)| Some((index, (point(pose, a)? - point(pose, b)?).norm()));
+    poses.iter().enumerate().filter_map(apart).collect()
+}
+
+/// How clear the clearest step is, and the pose after it.
+fn step(distances: &[(usize, f64)]) -> Option<(f64, usize)> {
+    let count = distances.len();
+    let middle = median(distances.iter().map(|d| d.1))?;
+    let change = median(distances.windows(2).map(|two| (two[1].1 - two[0].1).abs()))?;
+    let scatter = (change / MEDIAN_CHANGE).max(super::LEAST_SCATTER * middle);
+    let bounded = |d: f64| ((d - middle) / scatter).clamp(-BOUNDED, BOUNDED);
+    let total: f64 = distances.iter().map(|d| bounded(d.1)).sum();
+    let mut before = 0.0;
+    let mut best = (CLEAR, None);
+    for k in 1..count {
+        before += bounded(distances[k - 1].1);
+        if k < FEWEST || count - k < FEWEST {
+            continue;
+        }
+        let (first, second) = (before / k as f64, (total - before) / (count - k) as f64);
+        let clear = (first - second).abs() * (k as f64 * (count - k) as f64 / count as f64).sqrt();
+        if clear > best.0 {
+            best = (clear, Some(distances[k].0));
+        }
+    }
+    best.1.map(|from| (best.0, from))
+}
