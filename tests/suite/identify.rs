@@ -337,7 +337,7 @@ fn several_targets_a_pose_count_as_one_that_turns() {
     );
     assert_verified(folder.path(), &clean);
     let page = std::fs::read_to_string(folder.path().join("out/identify.html")).expect("a page");
-    assert!(page.contains("3 targets a pose (left, right, low)"));
+    assert!(page.contains("the targets of a pose (left, right, low)"));
     let spoiled = identified(folder.path(), rows(20));
     let doctor = spoiled["doctor"].to_string();
     assert!(doctor.contains("the names of targets right and low are exchanged"), "{doctor}");

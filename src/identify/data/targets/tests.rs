@@ -1,3 +1,5 @@
+use nalgebra::{Point3, Vector3};
+
 use super::*;
 use crate::geometry::transform;
 use crate::identify::data::dataset::Dataset;
@@ -209,6 +211,8 @@ fn what_is_no_body_is_refused() {
         let size = 30.0 * (7.3 * i as f64).sin();
         *point(row) += Vector3::new(size, -size, 0.5 * size);
     }
+    assert!(refusal(&list).contains("no rigid body"));
+    list.iter_mut().for_each(|row| *point(row) = Point3::new(1.0, 2.0, 3.0));
     assert!(refusal(&list).contains("no rigid body"));
     let mut list = rows(3, 1);
     let keep: Vec<bool> = (0..list.len()).map(|i| i % 3 == (i / 3) % 3).collect();
