@@ -206,6 +206,22 @@ impl Dataset {
         self.split_here = true;
     }
 
+    /// Without these rows, for this reason.
+    pub fn without(mut self, rows: &[usize], reason: &str) -> Dataset {
+        let left_out: Vec<bool> = (0..self.poses.len()).map(|row| rows.contains(&row)).collect();
+        let before = |row: usize| left_out[..row].iter().filter(|out| **out).count();
+        for group in &mut self.groups {
+            group.center = group.center.filter(|&c| !left_out[c]).map(|c| c - before(c));
+        }
+        let skipped = |row: &usize| Skipped { pose: self.poses[*row].name.clone(), reason: reason.to_owned() };
+        self.skipped.extend(rows.iter().map(skipped));
+        let mut kept = left_out.iter().map(|out| !out);
+        self.poses.retain(|_| kept.next().unwrap_or(true));
+        let mut kept = left_out.iter().map(|out| !out);
+        self.shared.retain(|_| kept.next().unwrap_or(true));
+        self
+    }
+
     /// Indices of the poses that `keep` likes.
     pub fn rows(&self, keep: impl Fn(&Pose) -> bool) -> Vec<usize> {
         (0..self.poses.len()).filter(|&i| keep(&self.poses[i])).collect()

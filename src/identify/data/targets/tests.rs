@@ -3,6 +3,7 @@ use nalgebra::{Point3, Vector3};
 use super::*;
 use crate::geometry::transform;
 use crate::identify::data::dataset::Dataset;
+use crate::identify::data::orientations;
 use crate::identify::synthetic;
 use crate::measurements::Role;
 use crate::robot::Robot;
@@ -233,4 +234,29 @@ fn one_target_by_name_is_one_target() {
     let set = Dataset::new(&list, 1).unwrap();
     assert_eq!((set.poses.len(), set.targets.is_none()), (list.len(), true));
     assert_eq!(list.iter().filter(|r| r.at.role == Role::Center).count(), 4);
+}
+
+#[test]
+fn exchanged_names_of_an_even_triangle_show_by_their_turn() {
+    let triangle: Vec<(&str, Vector3<f64>)> = [("a", 90.0f64), ("b", 210.0), ("c", 330.0)]
+        .map(|(name, deg)| (name, Vector3::new(60.0 * deg.to_radians().cos(), 60.0 * deg.to_radians().sin(), 20.0)))
+        .into();
+    let world = synthetic::world(40, 0.0, 8);
+    let mut list = synthetic::of_targets(&world, &triangle, NOISE_MM, 8);
+    let said = |list: &[Measurement]| orientations::examine(&Dataset::new(list, 1).unwrap(), &world.nominal);
+    let (clean, finding) = said(&list);
+    assert_eq!((clean.poses.len(), finding), (world.rows.len(), None));
+    for pose in [0, 17] {
+        let (a, b) = (3 * pose, 3 * pose + 2);
+        (list[a].target, list[b].target) = (list[b].target.clone(), list[a].target.clone());
+    }
+    let (kept, finding) = said(&list);
+    let names = [0, 17].map(|pose: usize| list[3 * pose].at.pose.clone());
+    assert_eq!(finding.unwrap().rows, names);
+    assert_eq!(kept.skipped.iter().map(|s| &s.pose).collect::<Vec<_>>(), names.iter().collect::<Vec<_>>());
+    // The first pose is its group's centre; the others' centres are where they were.
+    assert_eq!(kept.groups[0].center, None);
+    for group in &kept.groups[1..] {
+        assert_eq!(kept.poses[group.center.unwrap()].role, Role::Center);
+    }
 }
