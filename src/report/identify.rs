@@ -105,7 +105,7 @@ pub fn page(
         (verification_figure(before, after)?)
         (verification_table(record))
         @if let Some(targets) = &record.targets {
-            p { (targets.sentence()) "." }
+            p { "Several targets: " (targets.sentence()) "." }
         }
         (worst_table(set, before, after))
         @if let Some(expected) = &record.expected {
