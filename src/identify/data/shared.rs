@@ -73,7 +73,8 @@ pub fn take(path: &Utf8Path, set: &mut Dataset) {
 
 /// Gives points of cameras (they have orientations and covariances) whose shared errors nobody stated the one that all rigs have: an
 /// unknown scale, as uncertain as the points' own noise lets expect. A robot that is fitted to points of a wrong scale has links of a wrong
-/// length, and nothing in the residuals tells (several targets are a tracker's, whose scale is its laser's); with the scale unknown, the links' tolerance has a say.
+/// length, and nothing in the residuals tells; with the scale unknown, the links' tolerance has a say. Several targets are a tracker's, whose
+/// scale is its laser's.
 pub fn suppose_scale(set: &mut Dataset) {
     if !set.shared.is_empty() || set.targets.is_some() || !set.has_rotations() || !set.has_covariances() {
         return;

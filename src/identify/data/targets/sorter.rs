@@ -96,12 +96,10 @@ impl Sorter {
     /// Chi-squared that one clean pose in very many exceeds. Where nothing says how the noise is spread over the directions, it may all lie in
     /// one.
     fn limit(&self, freedom: usize) -> f64 {
-        let quantile = |freedom: f64, normal: f64| chi_square_quantile(freedom, normal);
+        let at = |freedom: f64| chi_square_quantile(freedom, self.normal);
+        let middle = |freedom: f64| chi_square_quantile(freedom, 0.0);
         let freedom = freedom as f64;
-        match self.stated {
-            true => self.variance * quantile(freedom, self.normal),
-            false => self.variance * quantile(freedom, 0.0) * quantile(1.0, self.normal) / quantile(1.0, 0.0),
-        }
+        self.variance * if self.stated { at(freedom) } else { middle(freedom) * at(1.0) / middle(1.0) }
     }
 
     /// Root mean square of a coordinate's residual over the poses that fit, mm, the freedom that the poses' fits used taken into account.
