@@ -125,12 +125,7 @@ fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
             #[inline(always)]
             || {
                 // Whole lines first: adding them up is what a processor does many at a time.
-                sums.fill(S::default());
-                for line in rows.chunks_exact(image.width) {
-                    for (sum, &v) in sums.iter_mut().zip(line) {
-                        *sum += value(v);
-                    }
-                }
+                add_lines(rows, image.width, factor, &value, &mut sums);
                 add_groups(&sums, factor, &mut totals);
                 match by_whole {
                     Some(per_total) => {
@@ -148,6 +143,50 @@ fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
         );
     }
     Grey8 { width: w, height: h, pixels }
+}
+
+/// The sums of `factor` lines, place by place.
+#[inline(always)]
+fn add_lines<T: Copy, S: Copy + Default + AddAssign>(
+    rows: &[T],
+    width: usize,
+    factor: usize,
+    value: &impl Fn(T) -> S,
+    sums: &mut [S],
+) {
+    // For the usual factors a number of lines that the compiler knows: it keeps the sums in registers.
+    match factor {
+        2 => add_known_lines::<2, T, S>(rows, width, value, sums),
+        3 => add_known_lines::<3, T, S>(rows, width, value, sums),
+        4 => add_known_lines::<4, T, S>(rows, width, value, sums),
+        5 => add_known_lines::<5, T, S>(rows, width, value, sums),
+        6 => add_known_lines::<6, T, S>(rows, width, value, sums),
+        _ => {
+            sums.fill(S::default());
+            for line in rows.chunks_exact(width) {
+                for (sum, &v) in sums.iter_mut().zip(line) {
+                    *sum += value(v);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add_known_lines<const FACTOR: usize, T: Copy, S: Copy + Default + AddAssign>(
+    rows: &[T],
+    width: usize,
+    value: &impl Fn(T) -> S,
+    sums: &mut [S],
+) {
+    let lines: [&[T]; FACTOR] = std::array::from_fn(|line| &rows[line * width..][..sums.len()]);
+    for (at, sum) in sums.iter_mut().enumerate() {
+        let mut here = S::default();
+        for line in lines {
+            here += value(line[at]);
+        }
+        *sum = here;
+    }
 }
 
 /// The sums of groups of `factor` numbers.

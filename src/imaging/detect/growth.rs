@@ -33,7 +33,7 @@ pub fn largest_grid(picture: &Grey8, enough: usize) -> Option<Places> {
     let candidates = candidates(picture);
     let near = Near::new(picture, &candidates);
     let mut taken = vec![false; candidates.len()];
-    let mut best: Vec<((isize, isize), usize)> = Vec::new();
+    let mut best: Vec<(Place, usize)> = Vec::new();
     let mut seeds = 0;
     for first in 0..candidates.len() {
         if taken[first] {
@@ -43,7 +43,7 @@ pub fn largest_grid(picture: &Grey8, enough: usize) -> Option<Places> {
             break;
         }
         seeds += 1;
-        let grown = grow(&candidates, &near, first);
+        let grown = grow(&candidates, &near, first, longest_step(picture, best.len()));
         if grown.len() >= 9 {
             grown.iter().for_each(|&(_, i)| taken[i] = true);
         }
@@ -171,9 +171,20 @@ fn opposite(a: &Candidate, b: &Candidate) -> bool {
 
 type Place = (isize, isize);
 
-/// A grid from one candidate on: places with the candidate there.
-fn grow(candidates: &[Candidate], near: &Near, first: usize) -> Vec<(Place, usize)> {
-    let Some(seed_steps) = seed_steps(candidates, near, first) else { return Vec::new() };
+/// How long the steps of a grid of at least so many corners are at its start, px. Its squares share the picture, and where some are
+/// larger than their share others are smaller: the grid is found from those.
+fn longest_step(picture: &Grey8, corners: usize) -> f64 {
+    /// The longest step that is looked for, px.
+    const LONGEST: f64 = 512.0;
+    /// How much longer than the side of a square of that share: seen obliquely, one side is longer than the other.
+    const LONGER: f64 = 2.0;
+    let share = (picture.width * picture.height) as f64 / corners.max(1) as f64;
+    (LONGER * share.sqrt()).min(LONGEST)
+}
+
+/// A grid from one candidate on: places with the candidate there. No neighbour of the first one is farther than `longest`, px.
+fn grow(candidates: &[Candidate], near: &Near, first: usize, longest: f64) -> Vec<(Place, usize)> {
+    let Some(seed_steps) = seed_steps(candidates, near, first, longest) else { return Vec::new() };
     let mut placed: BTreeMap<Place, usize> = BTreeMap::from([((0, 0), first)]);
     let mut used = vec![false; candidates.len()];
     used[first] = true;
@@ -217,15 +228,16 @@ fn step_at(at: &dyn Fn(Place) -> Option<Point2<f64>>, (i, j): Place, (di, dj): P
 }
 
 /// Steps to the neighbours of a corner along its two edges: the nearest of opposite colouring, and the nearest of those in
-/// another direction.
-fn seed_steps(candidates: &[Candidate], near: &Near, first: usize) -> Option<[Vector2<f64>; 2]> {
+/// another direction, no farther than `longest`, px.
+fn seed_steps(candidates: &[Candidate], near: &Near, first: usize, longest: f64) -> Option<[Vector2<f64>; 2]> {
     /// Edges nearer to each other than this are no board's, rad.
     const LEAST_ANGLE: f64 = 0.35;
     let here = &candidates[first];
     let mut nearest: Option<Vector2<f64>> = None;
     // In rings: most candidates have their neighbours near, and those that have none see much of the picture.
-    let (mut inner, mut reach) = (0.0, 16.0);
-    while reach < 600.0 {
+    let (mut inner, mut reach) = (0.0, 8.0_f64);
+    while inner < longest {
+        reach = (2.0 * reach).min(longest);
         let ring = |distance: f64, k: usize| (distance > inner || inner == 0.0) && k != first && near.ends(first, k);
         for (_, k) in near.within(&here.at, reach, ring) {
             let step = candidates[k].at - here.at;
@@ -238,7 +250,7 @@ fn seed_steps(candidates: &[Candidate], near: &Near, first: usize) -> Option<[Ve
                 Some(a) => return Some([a, step]),
             }
         }
-        (inner, reach) = (reach, 2.0 * reach);
+        inner = reach;
     }
     None
 }

@@ -76,11 +76,9 @@ pub(super) fn candidates(picture: &Grey8) -> Vec<Candidate> {
                 if !is_peak(&response, w, x, y) {
                     continue;
                 }
-                let candidate = candidate(picture, &response, x, y);
-                if candidate.contrast > least_contrast
-                    && f64::from(candidate.strength) > LEAST_SHAPE * candidate.contrast
-                {
-                    tiles[(y / side) * columns + x / side].push(candidate);
+                let contrast = contrast(picture, x, y);
+                if contrast > least_contrast && f64::from(response[y * w + x]) > LEAST_SHAPE * contrast {
+                    tiles[(y / side) * columns + x / side].push(candidate(picture, &response, contrast, (x, y)));
                 }
             }
         }
@@ -104,12 +102,18 @@ fn noise(picture: &Grey8) -> f64 {
     /// The third quartile of the difference of two normal deviates, in standard deviations of one.
     const THIRD_QUARTILE: f64 = 1.627;
     let step = (picture.pixels.len() / LOOKED_AT).max(1) | 1;
-    let mut differences: Vec<u8> = picture.pixels.windows(2).step_by(step).map(|two| two[0].abs_diff(two[1])).collect();
-    let rank = 3 * differences.len() / 4;
-    if rank >= differences.len() {
-        return LEAST_NOISE;
+    // How often each difference occurs, to find the one of that rank.
+    let mut counts = [0_usize; 256];
+    for two in picture.pixels.windows(2).step_by(step) {
+        counts[usize::from(two[0].abs_diff(two[1]))] += 1;
     }
-    (f64::from(*differences.select_nth_unstable(rank).1) / THIRD_QUARTILE).max(LEAST_NOISE)
+    let rank = 3 * counts.iter().sum::<usize>() / 4;
+    let mut below = 0;
+    let third_quartile = counts.iter().position(|count| {
+        below += count;
+        below > rank
+    });
+    third_quartile.map_or(LEAST_NOISE, |difference| (difference as f64 / THIRD_QUARTILE).max(LEAST_NOISE))
 }
 
 /// Five times the ring response of every pixel, a whole number that fits: opposite pixels of the ring alike and a quarter turn on the
@@ -167,17 +171,33 @@ fn any_above(responses: &[i16], least: i16) -> bool {
 fn is_peak(response: &[i16], w: usize, x: usize, y: usize) -> bool {
     const AROUND: usize = 3;
     let here = response[y * w + x];
-    // The nearest rows first: they tell most places that are none.
-    [y, y - 1, y + 1, y - 2, y + 2, y - AROUND, y + AROUND].into_iter().all(|v| {
-        (x - AROUND..=x + AROUND).all(|u| {
-            let other = response[v * w + u];
-            // Of equal neighbours the first is the peak.
-            other < here || (other == here && (v, u) >= (y, x))
-        })
-    })
+    let highest = |v: usize, from: usize, to: usize| response[v * w + from..v * w + to].iter().copied().max();
+    let (left, right) = (x - AROUND, x + AROUND + 1);
+    // Of equal neighbours the first is the peak. The nearest first: they tell most places that are none.
+    let next = |v: usize, u: usize| response[v * w + u];
+    next(y, x - 1) < here
+        && next(y, x + 1) <= here
+        && next(y - 1, x) < here
+        && next(y + 1, x) <= here
+        && highest(y, left, x) < Some(here)
+        && highest(y, x + 1, right) <= Some(here)
+        && (1..=AROUND).all(|d| highest(y - d, left, right) < Some(here) && highest(y + d, left, right) <= Some(here))
 }
 
-fn candidate(picture: &Grey8, response: &[i16], x: usize, y: usize) -> Candidate {
+/// Grey value of a pixel of the ring round a place.
+fn on_ring(picture: &Grey8, (x, y): (usize, usize), (dx, dy): (isize, isize)) -> u8 {
+    picture.pixels[((y as isize + dy) as usize) * picture.width + (x as isize + dx) as usize]
+}
+
+/// Mean of the brighter half of the ring round a place less that of the darker half.
+fn contrast(picture: &Grey8, x: usize, y: usize) -> f64 {
+    let ring = RING.map(|offset| on_ring(picture, (x, y), offset));
+    // Where half of the values lie on either side of a level, their distances from it add up to the one less the other, and to more elsewhere.
+    let distances = |level: u8| ring.iter().map(|grey| u16::from(grey.abs_diff(level))).sum::<u16>();
+    f64::from(ring.map(distances).into_iter().fold(u16::MAX, u16::min)) / (ring.len() / 2) as f64
+}
+
+fn candidate(picture: &Grey8, response: &[i16], contrast: f64, (x, y): (usize, usize)) -> Candidate {
     let w = picture.width;
     let (mut sum, mut weight) = (Vector2::zeros(), 0.0);
     for v in y - 2..=y + 2 {
@@ -189,16 +209,12 @@ fn candidate(picture: &Grey8, response: &[i16], x: usize, y: usize) -> Candidate
     }
     let (mut cos, mut sin) = (0.0, 0.0);
     for (dx, dy) in RING {
-        let grey = f64::from(picture.pixels[((y as isize + dy) as usize) * w + (x as isize + dx) as usize]);
+        let grey = f64::from(on_ring(picture, (x, y), (dx, dy)));
         // Cosine and sine of twice the direction.
         let (dx, dy) = (dx as f64, dy as f64);
         let square = dx * dx + dy * dy;
         cos += grey * (dx * dx - dy * dy) / square;
         sin += grey * 2.0 * dx * dy / square;
     }
-    let mut ring = RING.map(|(dx, dy)| picture.pixels[((y as isize + dy) as usize) * w + (x as isize + dx) as usize]);
-    ring.sort_unstable();
-    let mean = |half: &[u8]| half.iter().map(|&v| f64::from(v)).sum::<f64>() / half.len() as f64;
-    let contrast = mean(&ring[8..]) - mean(&ring[..8]);
     Candidate { at: Point2::from(sum / weight), strength: response[y * w + x], axis: 0.5 * sin.atan2(cos), contrast }
 }
