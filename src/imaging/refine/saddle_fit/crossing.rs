@@ -1,25 +1,28 @@
 //! Where both edges are near: their blurs overlap.
 
-use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+use std::f32::consts::FRAC_1_SQRT_2;
+use std::f64::consts::TAU;
 
-use super::model::{COLUMNS, Model, N};
+use super::model::{COLUMNS, Edge, Light, Model, N};
 use super::special::{erf_from, exp_negative};
 use super::window::{Group, LANES, Lanes};
 
 /// Beyond this many blurs from the crossing the two edges know nothing of each other: exp(-4.5^2/2) is 4e-5.
-const CROSSING_BLURS: f64 = 4.5;
+const CROSSING_BLURS: f32 = 4.5;
 
 /// What all pixels share in one evaluation.
 pub struct Crossing {
+    edges: [Edge; 2],
+    light: Light,
     /// n_1.n_2 and its change by the first angle (the second's is the opposite).
-    correlation: f64,
-    correlation_slope: f64,
+    correlation: f32,
+    correlation_slope: f32,
     /// 1 / sqrt(1 - correlation^2).
-    stretch: f64,
+    stretch: f32,
     /// sin of each node of the integral over the correlation, -1 / (2 cos^2) of it, and the node's weight times 4 arcsin(correlation) / tau.
-    nodes: [(f64, f64, f64); 6],
+    nodes: [(f32, f32, f32); 6],
     /// The same for the correlation itself, with 4 / (tau cos).
-    top: (f64, f64, f64),
+    top: (f32, f32, f32),
 }
 
 impl Crossing {
@@ -38,11 +41,13 @@ impl Crossing {
         // Edges that nearly coincide are no corner; the bound only keeps the numbers finite until that is noticed.
         let correlation = turn.cos().clamp(-0.99, 0.99);
         let angle = correlation.asin();
-        let at = |sin: f64, weight: f64| (sin, -0.5 / (1.0 - sin * sin), weight);
+        let at = |sin: f64, weight: f64| (sin as f32, (-0.5 / (1.0 - sin * sin)) as f32, weight as f32);
         Crossing {
-            correlation,
-            correlation_slope: -turn.sin(),
-            stretch: 1.0 / (1.0 - correlation * correlation).sqrt(),
+            edges: [0, 1].map(|k| Edge::of(model, k)),
+            light: Light::of(model),
+            correlation: correlation as f32,
+            correlation_slope: -turn.sin() as f32,
+            stretch: (1.0 / (1.0 - correlation * correlation).sqrt()) as f32,
             nodes: NODES.map(|(node, weight)| at((node * angle).sin(), weight * angle * 4.0 / TAU)),
             top: at(correlation, 4.0 / (TAU * angle.cos())),
         }
@@ -50,8 +55,9 @@ impl Crossing {
 
     /// The parameters' derivatives and the residual for a group of pixels.
     #[inline(always)]
-    pub fn columns(&self, model: &Model, group: &Group, columns: &mut [Lanes; COLUMNS]) {
-        let edges = [model.across(0, group), model.across(1, group)];
+    pub fn columns(&self, group: &Group, columns: &mut [Lanes; COLUMNS]) {
+        let edges = [self.edges[0].across(group), self.edges[1].across(group)];
+        let Light { level, half_contrast, slope } = self.light;
         let mut other = [edges[1].value, edges[0].value];
         let (mut pattern, mut by_correlation) = ([0.0; LANES], [0.0; LANES]);
         for ((pattern, a), b) in pattern.iter_mut().zip(&edges[0].value).zip(&edges[1].value) {
@@ -61,9 +67,9 @@ impl Crossing {
         let mut half = [0.0; LANES];
         for l in 0..LANES {
             let (x, y, weight) = (group.x[l], group.y[l], group.weight[l]);
-            let light = weight * (1.0 + model.light_slope.x * x + model.light_slope.y * y);
-            let reflected = model.level + model.half_contrast * pattern[l];
-            half[l] = light * model.half_contrast;
+            let light = weight * (1.0 + slope[0] * x + slope[1] * y);
+            let reflected = level + half_contrast * pattern[l];
+            half[l] = light * half_contrast;
             columns[6][l] = light;
             columns[7][l] = light * pattern[l];
             columns[8][l] = weight * x * reflected;
@@ -73,10 +79,10 @@ impl Crossing {
         (columns[0], columns[1]) = ([0.0; LANES], [0.0; LANES]);
         for (k, edge) in edges.iter().enumerate() {
             let turn = if k == 0 { self.correlation_slope } else { -self.correlation_slope };
-            let (sin, cos) = model.angles_rad[k].sin_cos();
+            let Edge { sin, cos, bend, .. } = self.edges[k];
             for l in 0..LANES {
                 let by_u = half[l] * edge.slope[l] * other[k][l];
-                let bent = model.bend[k] * edge.along[l];
+                let bent = bend * edge.along[l];
                 columns[0][l] += by_u * (sin - bent * cos);
                 columns[1][l] += by_u * (-cos - bent * sin);
                 columns[2 + k][l] = half[l] * by_correlation[l] * turn - by_u * edge.along[l];

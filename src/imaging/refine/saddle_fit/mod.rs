@@ -136,6 +136,10 @@ fn settled(start: Model, window: &Window, freedom: f64) -> Option<(Model, Equati
     /// Where the undamped step would gain less than this share of one pixel's variance, nothing moves by more than a tenth of its sigma;
     /// that step is still taken, and steps shrink at least tenfold by then, so less than a hundredth is left.
     const SETTLED: f64 = 1e-2;
+    /// What the seven digits of a pixel's numbers do to its residual at the most, as a share of its grey value.
+    const ROUNDING: f64 = 5e-7;
+    /// Residuals of less than this share of the grey value, which no camera has, are mostly such rounding.
+    const LEAST_RESIDUAL: f64 = 1e-4;
     let mut model = start;
     let mut at = model.equations(window);
     let mut damping = 1e-3;
@@ -146,7 +150,8 @@ fn settled(start: Model, window: &Window, freedom: f64) -> Option<(Model, Equati
         if !whole.iter().all(|v| v.is_finite()) {
             return None;
         }
-        if at.gradient.dot(&whole) < SETTLED * (at.cost / freedom).max(1e-6) {
+        let grey = model.level.abs() + model.half_contrast.abs();
+        if at.gradient.dot(&whole) < SETTLED * (at.cost / freedom).max((LEAST_RESIDUAL * grey).powi(2)) {
             return Some((model.add(&whole), at, steps));
         }
         let mut damped = at.matrix;
@@ -155,8 +160,9 @@ fn settled(start: Model, window: &Window, freedom: f64) -> Option<(Model, Equati
         }
         let next = model.add(&damped.cholesky()?.solve(&at.gradient));
         let there = next.equations(window);
-        // The gain that counts is the one that came out.
-        if there.cost <= at.cost {
+        // The gain that counts is the one that came out, as far as rounding lets it be seen.
+        let rounding = 2.0 * ROUNDING * grey * (at.cost * freedom).sqrt();
+        if there.cost <= at.cost + rounding {
             (model, at) = (next, there);
             damping = (damping * 0.1).max(1e-9);
         } else {
