@@ -34,7 +34,7 @@ pub struct Group {
 /// Rows of a window from which pixels away from both edges are taken, about: in a large window they are so many that what they tell,
 /// two levels and the light's slope, is known far better than the corner. An odd step from one to the next, so that both fields of an
 /// interlaced picture are seen.
-const FLAT_ROWS: usize = 40;
+const FLAT_ROWS: usize = 100;
 
 /// A grey value as the camera gave it.
 pub trait Sample: Copy + Into<f64> + Into<u32> {}
