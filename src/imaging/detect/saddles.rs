@@ -173,13 +173,8 @@ fn is_peak(response: &[i16], w: usize, x: usize, y: usize) -> bool {
     let here = response[y * w + x];
     let highest = |v: usize, from: usize, to: usize| response[v * w + from..v * w + to].iter().copied().max();
     let (left, right) = (x - AROUND, x + AROUND + 1);
-    // Of equal neighbours the first is the peak. The nearest first: they tell most places that are none.
-    let next = |v: usize, u: usize| response[v * w + u];
-    next(y, x - 1) < here
-        && next(y, x + 1) <= here
-        && next(y - 1, x) < here
-        && next(y + 1, x) <= here
-        && highest(y, left, x) < Some(here)
+    // Of equal neighbours the first is the peak. The nearest rows first: they tell most places that are none.
+    highest(y, left, x) < Some(here)
         && highest(y, x + 1, right) <= Some(here)
         && (1..=AROUND).all(|d| highest(y - d, left, right) < Some(here) && highest(y + d, left, right) <= Some(here))
 }

@@ -189,23 +189,42 @@ impl Model {
     }
 
     /// The parameters' derivatives from the columns of [`along`].
-    fn arm_to_parameters(&self, k: usize) -> [Share; ARM + 3] {
+    fn arm_to_parameters(&self, k: usize) -> [Share; 11] {
         let (sin, cos) = self.angles_rad[k].sin_cos();
-        let edge = [(0, 0, sin), (0, 1, -self.bend[k] * cos), (1, 0, -cos), (1, 1, -self.bend[k] * sin)];
-        let [a, b, c, d] = edge;
-        let levels = |column: usize| (column + 3, column, 1.0);
-        [a, b, c, d, (2 + k, 1, -1.0), (4 + k, 2, -1.0), levels(3), levels(4), levels(5), levels(6), levels(7)]
+        let bend = self.bend[k];
+        [
+            (0, 0, sin),
+            (0, 1, -bend * cos),
+            (1, 0, -cos),
+            (1, 1, -bend * sin),
+            (2 + k, 1, -1.0),
+            (4 + k, 2, -1.0),
+            (6, 3, 1.0),
+            (7, 4, 1.0),
+            (8, 5, 1.0),
+            (9, 6, 1.0),
+            (N, 7, 1.0),
+        ]
     }
 
     /// The parameters' derivatives where E is `alike`, from `(1, x, y, grey)`.
     fn flat_to_parameters(&self, alike: f64) -> [Share; 12] {
         let reflected = self.level + self.half_contrast * alike;
         let (x, y) = (self.light_slope.x, self.light_slope.y);
-        let level = [(6, 0, 1.0), (6, 1, x), (6, 2, y)];
-        let contrast = [(7, 0, alike), (7, 1, alike * x), (7, 2, alike * y)];
-        let residual = [(N, 0, -reflected), (N, 1, -reflected * x), (N, 2, -reflected * y)];
-        let [[a, b, c], [d, e, f], [g, h, i]] = [level, contrast, residual];
-        [a, b, c, d, e, f, (8, 1, reflected), (9, 2, reflected), g, h, i, (N, 3, 1.0)]
+        [
+            (6, 0, 1.0),
+            (6, 1, x),
+            (6, 2, y),
+            (7, 0, alike),
+            (7, 1, alike * x),
+            (7, 2, alike * y),
+            (8, 1, reflected),
+            (9, 2, reflected),
+            (N, 0, -reflected),
+            (N, 1, -reflected * x),
+            (N, 2, -reflected * y),
+            (N, 3, 1.0),
+        ]
     }
 }
 

@@ -6,7 +6,7 @@ use super::window::Lanes;
 
 /// Sums that are kept side by side, so that the compiler makes vector loops of them.
 const WIDTH: usize = 8;
-/// Groups of pixels that are added up with seven digits: a total of so few is rounded no more than its terms are.
+/// Groups of pixels that are added up with seven digits: a total of so few is rounded hardly more than its terms are.
 const GROUPS: usize = 8;
 
 /// The sums of products of `C` columns so far.

@@ -14,6 +14,11 @@ use crate::imaging::wide::widest;
 /// Pixels that are worked on side by side: enough that the compiler makes vector loops of them.
 pub const LANES: usize = 32;
 
+/// About so many rows of a window give pixels away from both edges, all where it has less than twice as many: in a large window they are
+/// so many that what they tell, two levels and the light's slope, is known far better than the corner. The step from one to the next is odd,
+/// so that both fields of an interlaced picture are seen.
+const FLAT_ROWS: usize = 100;
+
 /// A number for each pixel of a group. Of seven digits, so that twice as many fit side by side: what rounding adds to a residual is a
 /// hundred-thousandth of the contrast, far less than any camera's noise; sums are of sixteen.
 pub type Lanes = [f32; LANES];
@@ -30,11 +35,6 @@ pub struct Group {
     /// One for a pixel, zero for none: the last group is filled up.
     pub weight: Lanes,
 }
-
-/// Rows of a window from which pixels away from both edges are taken, about: in a large window they are so many that what they tell,
-/// two levels and the light's slope, is known far better than the corner. An odd step from one to the next, so that both fields of an
-/// interlaced picture are seen.
-const FLAT_ROWS: usize = 100;
 
 /// A grey value as the camera gave it.
 pub trait Sample: Copy + Into<f64> + Into<u32> {}
@@ -412,6 +412,19 @@ mod tests {
         }
         let middle = |sums: &Matrix4<f64>| Vector2::new(sums[(0, 1)], sums[(0, 2)]) / sums[(0, 0)];
         assert!(window.flat.iter().all(|sums| middle(sums).norm() < 1.0 && sums[(0, 0)] > 100.0));
+    }
+
+    #[test]
+    fn a_large_window_takes_all_of_its_edges_and_a_third_of_its_rows_elsewhere() {
+        let (side, half) = (401, 180.0);
+        let picture = Image { width: side, height: side, pixels: vec![100u8; side * side] };
+        let halves = [Vector2::new(half, 0.0), Vector2::new(0.0, half)];
+        let mut window = Window::default();
+        window.collect(&picture, 0.0, &Below(256.0), &Frame { start: Point2::new(200.0, 200.0), halves, band_px: 5.0 });
+        // Bands of 11 px along 361; of the 350 rows outside the band across, those that 3 divides.
+        assert_eq!(window.near(), 2 * 11 * 361 - 11 * 11);
+        let rows = (20..=380).filter(|y: &usize| y.abs_diff(200) > 5 && y.is_multiple_of(3)).count();
+        assert_eq!(window.count() - window.near(), rows * 350);
     }
 
     #[test]
