@@ -13,6 +13,7 @@ mod acceptance;
 mod cell;
 mod coarse;
 mod curvature;
+mod distortion;
 pub mod fields;
 pub mod illumination;
 mod outlying_pixels;
@@ -115,8 +116,9 @@ impl<T: Sample> Full<'_, T> {
         let coarse = coarse(detected, &mut window);
         let columns = coarse.columns;
         let at = |bends: &[[f64; 2]], col: usize, row: usize| bends[row * columns + col];
+        let middle = Point2::new(0.5 * (self.image.width as f64 - 1.0), 0.5 * (self.image.height as f64 - 1.0));
         let on_copy = |m: &Measured| Point { px: detected.level.to_picture(&m.px), counts: true };
-        let coarse_bends = bends(&coarse.map(on_copy), GOOD_PX);
+        let coarse_bends = bends(&coarse.map(on_copy), &middle, GOOD_PX);
         // A neighbour that could not be measured still says how far the squares reach.
         let places: Places = Lattice::from_fn(columns, coarse.rows, |col, row| {
             let px = coarse.get(col, row).map_or(detected.corners.get(col, row), |m| Some(&m.px))?;
@@ -139,12 +141,12 @@ impl<T: Sample> Full<'_, T> {
         // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large ones from.
         let near_only: Vec<Measured> = near.iter().filter_map(|(_, _, windows)| windows.near).collect();
         let board = acceptance::Board::of(&near_only, &[]);
-        let near_bends = bends_by(&near, &places, |windows| windows.near.filter(|near| board.accepts(near)));
+        let near_bends = bends_by(&near, &places, &middle, |windows| windows.near.filter(|near| board.accepts(near)));
         let full: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
             Some(self.full(near.get(col, row)?.clone(), at(&near_bends, col, row), &mut window))
         });
         let board = usual(&full);
-        let full_bends = bends_by(&full, &places, |windows| windows.free(&board).copied());
+        let full_bends = bends_by(&full, &places, &middle, |windows| windows.free(&board).copied());
         let seen = Lattice::from_fn(columns, coarse.rows, |col, row| {
             Some(full.get(col, row)?.clone().rebent(at(&full_bends, col, row)))
         });
