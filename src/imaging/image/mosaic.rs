@@ -67,7 +67,9 @@ impl FromStr for Mosaic {
 }
 
 /// Cells that are looked at.
-const CELLS: usize = 60_000;
+const CELLS: usize = 30_000;
+/// So many of them side by side: memory comes in pieces, and waiting for them is what looking at a large picture costs.
+const RUN: usize = 64;
 /// Cells that differ from the next one by less than this share are flat.
 const FLAT: f64 = 0.06;
 /// Share by which pixels of a cell differ from their mean in a mosaic, at the least. Unequal rows of a sensor with several amplifiers
@@ -129,15 +131,18 @@ fn flat_cells<T: Value>(image: &Image<T>) -> Vec<[f64; 4]> {
         return Vec::new();
     }
     let (columns, rows) = (w / 2 - 1, h / 2);
+    let run = columns.min(RUN);
+    let (runs, a_row) = (columns / run * rows, columns / run);
     // A step with no common divisor walks over all of the picture.
-    let step = (columns * rows).div_ceil(CELLS) | 1;
+    let step = (runs * run).div_ceil(CELLS) | 1;
     let cell = |x: usize, y: usize| -> [f64; 4] {
         let at = 2 * y * w + 2 * x;
         [at, at + 1, at + w, at + w + 1].map(|k| image.pixels[k].into())
     };
-    (0..columns * rows)
+    (0..runs)
         .step_by(step)
-        .map(|k| (cell(k % columns, k / columns), cell(k % columns + 1, k / columns)))
+        .flat_map(|k| (0..run).map(move |i| (k % a_row * run + i, k / a_row)))
+        .map(|(x, y)| (cell(x, y), cell(x + 1, y)))
         .filter(|(here, next)| {
             let scale = here.iter().sum::<f64>() / 4.0;
             let alike = |(a, b): (&f64, &f64)| (a - b).abs() <= FLAT * scale + 1.0;
