@@ -25,7 +25,7 @@ const AT_ONCE: usize = 16;
 const STEPS: usize = 12;
 
 /// The search is done when a step promises to lower the cost by less than this share of a squared residual.
-const PROMISE: f64 = 1e-6;
+const PROMISE: f64 = 1e-8;
 
 /// Values of all unknowns.
 #[derive(Debug, Clone)]
@@ -151,10 +151,13 @@ impl Bundle<'_> {
     /// Minimises from these values. `None` where the corners do not determine the poses.
     pub fn solve(&self, start: Values, loss: Loss) -> Option<(Values, Normal)> {
         let mut values = start;
+        let mut normal = self.normal(&values, loss)?;
         for _ in 0..STEPS {
-            let normal = self.normal(&values, loss)?;
-            let before = self.cost(&values, &normal.weights, loss);
             let (step, promise) = normal.step(&Self::shared(&values))?;
+            if promise < PROMISE {
+                break;
+            }
+            let before = self.cost(&values, &normal.weights, loss);
             let mut share = 1.0;
             let better = loop {
                 let trial = values.moved(&step, &normal, share);
@@ -168,11 +171,8 @@ impl Bundle<'_> {
             };
             let Some(trial) = better else { break };
             values = trial;
-            if promise < PROMISE {
-                break;
-            }
+            normal = self.normal(&values, loss)?;
         }
-        let normal = self.normal(&values, loss)?;
         Some((values, normal))
     }
 }
