@@ -25,7 +25,6 @@ pub mod csv_table;
 pub mod diagnostic;
 pub mod files;
 pub mod geometry;
-pub mod homography;
 pub mod progress;
 pub mod statistics;
 

@@ -3,7 +3,7 @@
 //! In: the picture and the board as detected. Out: corners with covariance. First each corner is fitted on the reduced copy in a small
 //! window (`coarse`); then at full size in a small window (near), and in the largest that stays inside the four squares round
 //! it (full), along edges that bend as the lens bends the board's lines (`curvature`): as the near windows show them, and at last as the
-//! full ones do. Where some of the full windows tell that edges bend much from crossing to crossing, all are cut down. Where the larger
+//! full ones do. On a board whose edges bend much from crossing to crossing the full windows are cut down. Where the larger
 //! window does not agree with the smaller one, or the four arms of a corner not with each other (`acceptance`), something hides a part of
 //! it, and the largest window that is free of it is kept. Last, the board's corners share what they know of the light
 //! (`illumination`), which counts from the picture's veil (`veil`). Goes wrong: a corner without contrast, hidden, cut off by the border or
@@ -13,7 +13,6 @@ mod acceptance;
 mod cell;
 mod coarse;
 mod curvature;
-mod distortion;
 pub mod fields;
 pub mod illumination;
 mod outlying_pixels;
@@ -56,9 +55,6 @@ const NEAR_HALF_PX: f64 = 10.0;
 const NEAR_HALF_BLURS: f64 = 7.0;
 /// Half of the window that is tried where the full one is not free, as a multiple of the near one's.
 const BETWEEN: f64 = 2.8;
-/// One corner of so many is tried in its full window to see how much edges bend, and so many at the least.
-const TRIED: usize = 3;
-const LEAST_TRIED: usize = 9;
 /// A near window that is not smaller than this share of the full one would tell nothing of its own.
 const NEAR_SHARE: f64 = 0.7;
 
@@ -114,18 +110,13 @@ impl<T: Sample> Full<'_, T> {
         Full { image, clip_level, veil: veil::level(image, clip_level, &places) }
     }
 
-    /// The picture's middle, px.
-    fn middle(&self) -> Point2<f64> {
-        Point2::new(0.5 * (self.image.width as f64 - 1.0), 0.5 * (self.image.height as f64 - 1.0))
-    }
-
     fn measure(&self, detected: &Detected) -> Lattice<Measured> {
         let mut window = Window::default();
         let coarse = coarse(detected, &mut window);
         let columns = coarse.columns;
         let at = |bends: &[[f64; 2]], col: usize, row: usize| bends[row * columns + col];
         let on_copy = |m: &Measured| Point { px: detected.level.to_picture(&m.px), counts: true };
-        let coarse_bends = bends(&coarse.map(on_copy), &self.middle(), GOOD_PX);
+        let coarse_bends = bends(&coarse.map(on_copy), GOOD_PX);
         // A neighbour that could not be measured still says how far the squares reach.
         let places: Places = Lattice::from_fn(columns, coarse.rows, |col, row| {
             let px = coarse.get(col, row).map_or(detected.corners.get(col, row), |m| Some(&m.px))?;
@@ -148,12 +139,26 @@ impl<T: Sample> Full<'_, T> {
         // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large ones from.
         let near_only: Vec<Measured> = near.iter().filter_map(|(_, _, windows)| windows.near).collect();
         let board = acceptance::Board::of(&near_only, &[]);
-        let near_bends =
-            bends_by(&near, &places, &self.middle(), |windows| windows.near.filter(|near| board.accepts(near)));
-        let near = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            Some(near.get(col, row)?.clone().rebent(at(&near_bends, col, row)))
+        let near_bends = bends_by(&near, &places, |windows| windows.near.filter(|near| board.accepts(near)));
+        let full: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            Some(self.full(near.get(col, row)?.clone(), at(&near_bends, col, row), &mut window))
         });
-        let (seen, board) = self.large(&near, &places, &mut window);
+        let board = usual(&full);
+        let full_bends = bends_by(&full, &places, |windows| windows.free(&board).copied());
+        let seen = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            Some(full.get(col, row)?.clone().rebent(at(&full_bends, col, row)))
+        });
+        let board = usual(&seen);
+        let share = board.straight_share();
+        let (seen, board) = if share < 1.0 {
+            let smaller = Lattice::from_fn(columns, coarse.rows, |col, row| {
+                Some(self.smaller(seen.get(col, row)?, share, &mut window))
+            });
+            let board = usual(&smaller);
+            (smaller, board)
+        } else {
+            (seen, board)
+        };
         let mut measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
             self.largest_free(seen.get(col, row)?, &board, &mut window)
         });
@@ -170,57 +175,30 @@ impl<T: Sample> Full<'_, T> {
         Windows { cell, start, alone, most_half_px: MOST_HALF_PX, near, full: None }
     }
 
-    /// The fits in full windows, or where edges bend too much for these in smaller ones, along edges that bend as these windows show it;
-    /// with what is usual in them.
-    fn large(
-        &self,
-        near: &Lattice<Windows>,
-        places: &Places,
-        window: &mut Window,
-    ) -> (Lattice<Windows>, acceptance::Board) {
-        // How much edges bend is seen on some of the corners as well: where full windows are of no use, most need not be looked at.
-        let few = near.count() < LEAST_TRIED * TRIED;
-        let tried = Lattice::from_fn(near.columns, near.rows, |col, row| {
-            let seen = near.get(col, row).filter(|_| few || (col + row).is_multiple_of(TRIED))?;
-            Some(self.full(seen.clone(), 1.0, window))
-        });
-        let mut within = |share: f64| {
-            let seen = Lattice::from_fn(near.columns, near.rows, |col, row| {
-                let known = tried.get(col, row).filter(|_| share == 1.0).cloned();
-                known.or_else(|| Some(self.full(near.get(col, row)?.clone(), share, window)))
-            });
-            let board = usual(&seen);
-            let bends = bends_by(&seen, places, &self.middle(), |windows| windows.free(&board).copied());
-            let seen = Lattice::from_fn(near.columns, near.rows, |col, row| {
-                Some(seen.get(col, row)?.clone().rebent(bends[row * near.columns + col]))
-            });
-            let board = usual(&seen);
-            (seen, board)
-        };
-        let share = usual(&tried).straight_share();
-        let (seen, board) = within(share);
-        let smaller = board.straight_share();
-        if share == 1.0 && smaller < 1.0 { within(smaller) } else { (seen, board) }
-    }
-
-    /// A fit in the full window or in a share of it, started where the one in the near window ended: most steps are taken where they are
-    /// cheap, and the blur is that of the picture, not of the copy, so fewer pixels count as near an edge.
-    fn full(&self, seen: Windows, share: f64, window: &mut Window) -> Windows {
+    /// A fit in the full window, started where the one in the near window ended: most steps are taken where they are cheap, and the blur is
+    /// that of the picture, not of the copy, so fewer pixels count as near an edge.
+    fn full(&self, seen: Windows, bend: [f64; 2], window: &mut Window) -> Windows {
+        let seen = Windows { start: Model { bend, ..seen.start }, ..seen };
         let mut within = |half_px: f64| match &seen.near {
             _ if seen.alone => self.fit_within(half_px, &seen.cell, &seen.start, window),
             None => None,
             Some(near) => self.fit_from(near, half_px, &seen, window),
         };
-        // What is hardly larger than the near window is not made smaller.
-        let share_px = share * half_px(seen.cell.side(), margin_px(&seen.start, &seen.cell));
-        let most_half_px = if seen.alone || share == 1.0 { MOST_HALF_PX } else { share_px };
-        let full = within(most_half_px);
+        let full = within(MOST_HALF_PX);
         let reach_px = |full: &Measured| full.reach[0] * seen.cell.edges[0].norm();
         let clips = full.is_some_and(|full| full.fit.left_out > 0 && reach_px(&full) > MOST_CLIPPED_HALF_PX);
         if clips {
             return Windows { full: within(MOST_CLIPPED_HALF_PX), most_half_px: MOST_CLIPPED_HALF_PX, ..seen };
         }
-        Windows { full, most_half_px, ..seen }
+        Windows { full, ..seen }
+    }
+
+    /// With the full window cut down to a share of itself.
+    fn smaller(&self, seen: &Windows, share: f64, window: &mut Window) -> Windows {
+        let half_px = share * half_px(seen.cell.side(), margin_px(&seen.start, &seen.cell));
+        let again = seen.near.as_ref().filter(|_| !seen.alone);
+        let full = again.map_or(seen.full, |near| self.fit_from(near, half_px, seen, window));
+        Windows { full, most_half_px: half_px.min(seen.most_half_px), ..seen.clone() }
     }
 
     /// A corner whose pixels lie farther from the model than is usual on the board, fitted again without those that it cannot explain, where

@@ -1,6 +1,6 @@
 //! What the windows of a board's corners told: which of them nothing reaches into, and how the edges bend.
 
-use nalgebra::{Matrix2, Point2, RowVector2, Vector2};
+use nalgebra::{Matrix2, RowVector2, Vector2};
 
 use super::Measured;
 use super::acceptance;
@@ -67,12 +67,11 @@ pub(super) fn usual(seen: &Lattice<Windows>) -> acceptance::Board {
 pub(super) fn bends_by(
     seen: &Lattice<Windows>,
     places: &Places,
-    middle: &Point2<f64>,
     which: impl Fn(&Windows) -> Option<Measured>,
 ) -> Vec<[f64; 2]> {
     let grid = Lattice::from_fn(seen.columns, seen.rows, |col, row| {
         let measured = seen.get(col, row).and_then(&which).map(|m| Point { px: m.px, counts: true });
         measured.or_else(|| Some(Point { px: *places.get(col, row)?, counts: false }))
     });
-    bends(&grid, middle, GOOD_PX)
+    bends(&grid, GOOD_PX)
 }

@@ -6,12 +6,11 @@
 use nalgebra::{Matrix6, Point2};
 
 use crate::geometry::Transform;
-use crate::homography::homography;
 use crate::imaging::Side;
 use crate::stereo::Camera;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
-use crate::stereo::init::zhang::pose;
+use crate::stereo::init::homography::{homography, pose};
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
 use crate::stereo::solve::robust_loss::Loss;
@@ -64,7 +63,7 @@ pub fn of_picture(shared: &Shared, view: &View, side: Side) -> Option<Transform>
         Side::Left => &shared.rig.left,
         Side::Right => &shared.rig.right,
     };
-    let points: Vec<_> = view.active(side).filter_map(|o| Some((o.board_mm.xy(), ray(camera, o)?))).collect();
+    let points: Vec<_> = view.active(side).filter_map(|o| Some((o.board_mm, ray(camera, o)?))).collect();
     let camera_from_board = pose(&homography(&points)?.0)?;
     Some(match side {
         Side::Left => camera_from_board,

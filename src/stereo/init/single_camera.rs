@@ -8,14 +8,13 @@
 use nalgebra::{Matrix3, Point2};
 
 use crate::geometry::Transform;
-use crate::homography::homography;
 use crate::imaging::Side;
 use crate::statistics::median;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::residuals::{self, median_px};
 use crate::stereo::data::view::View;
 use crate::stereo::init::board_pose;
-use crate::stereo::init::zhang::{focal_lengths, pixel_pairs, pose};
+use crate::stereo::init::homography::{focal_lengths, homography, pixel_pairs, pose};
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search};

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use crate::homography::FEWEST_POINTS;
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
 use crate::stereo::Error;
 use crate::stereo::data::view::View;
+use crate::stereo::init::homography::FEWEST_CORNERS;
 use crate::stereo::init::single_camera::{self, OneCamera};
 use crate::stereo::pairs::discarded::too_few_pairs;
 use crate::stereo::pairs::{Cause, DiscardedPair, FEWEST_PAIRS};
@@ -31,7 +31,7 @@ impl Candidates {
         let not_found = |s: &crate::imaging::Skipped| DiscardedPair::new(&s.pair, Cause::NoBoard, s.reason.clone());
         let mut discarded: Vec<DiscardedPair> = corners.skipped.iter().map(not_found).collect();
         let mut views = Vec::new();
-        let fewest = FEWEST_POINTS.max(fewest_corners(&corners.board));
+        let fewest = FEWEST_CORNERS.max(fewest_corners(&corners.board));
         for (i, pair) in corners.pairs.iter().enumerate() {
             if let Some(first) = corners.pairs[..i].iter().find(|first| same_corners(first, pair)) {
                 let reason = format!("the same pictures as pair {}", first.pair);

@@ -5,10 +5,10 @@
 
 use serde::Serialize;
 
-use crate::homography::FEWEST_POINTS;
 use crate::imaging::{Corners, Skipped};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::view::View;
+use crate::stereo::init::homography::FEWEST_CORNERS;
 use crate::stereo::judge::doubtful_corners::{self, DoubtfulCorners};
 use crate::stereo::judge::lengths::{self, Range, all_ranges, mean, measure};
 use crate::stereo::judge::verdict::{Expansion, Extremes};
@@ -48,7 +48,7 @@ pub fn second_board(calibration: &Calibration, corners: &Corners, board_mm: Opti
     let mut skipped = corners.skipped.clone();
     let (mut measured, mut names) = (Vec::new(), Vec::new());
     for pair in &corners.pairs {
-        let mut views = [View::new(board, pair, FEWEST_POINTS)];
+        let mut views = [View::new(board, pair, FEWEST_CORNERS)];
         calibration.noise.apply(&mut views);
         let [mut view] = views;
         // How the cameras stand decides between numberings that the pictures leave open; lengths have no part in it.
