@@ -85,8 +85,8 @@ pub fn invert(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     }
     let n = matrix.nrows();
     let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
-    let eigen = scaled.clone().symmetric_eigen();
-    if eigen.eigenvalues.min() <= SMALLEST * eigen.eigenvalues.max() {
+    let eigenvalues = scaled.symmetric_eigenvalues();
+    if eigenvalues.min() <= SMALLEST * eigenvalues.max() {
         return None;
     }
     let inverse = scaled.cholesky()?.inverse();

@@ -15,7 +15,6 @@ use crate::stereo::target::series::{MeasuredPose, POSE_LIMIT, Refusal, Run, Seri
 use crate::stereo::target::solve::alone::{Alone, Known};
 use crate::stereo::target::solve::bundle::Bundle;
 use crate::stereo::target::solve::estimate::Estimate;
-use crate::stereo::target::solve::pose_block::TRANSFORM;
 use crate::stereo::target::solve::prior::frame_modes;
 use crate::stereo::target::solve::window::Window;
 use crate::stereo::target::start::{Start, enough};
@@ -155,14 +154,13 @@ impl Finisher<'_> {
         let grown = if alone.chi_square > chance { alone.chi_square } else { 1.0 };
         let own_covariance = alone.part.pose_inverse * grown * self.excess;
         let sensitivity = self.sensitivity(alone);
-        let change = Matrix6::from_fn(|i, j| alone.part.rig[(TRANSFORM + i, TRANSFORM + j)]);
-        let gradient = Vector6::from_fn(|i, _| alone.part.rig_gradient[TRANSFORM + i]);
+        let (change, gradient) = (&alone.part.change, &alone.part.change_gradient);
         let t = self.run.known.rig.right_from_left.translation.vector;
         let turn = |axis: Vector3<f64>| {
             let moved = axis.cross(&t);
             let d = Vector6::new(axis.x, axis.y, axis.z, moved.x, moved.y, moved.z);
             let curvature = d.dot(&(change * d));
-            [-d.dot(&gradient) / curvature, 1.0 / curvature.sqrt()]
+            [-d.dot(gradient) / curvature, 1.0 / curvature.sqrt()]
         };
         TargetPose {
             cam_from_board: alone.pose,

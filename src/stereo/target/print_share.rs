@@ -17,7 +17,7 @@ use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::solve::pose_block::{PoseBlock, crossings};
+use crate::stereo::target::solve::pose_block::{PoseBlock, Totals, crossings};
 use crate::stereo::target::solve::window::{SeenShares, Window};
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
@@ -63,17 +63,16 @@ fn print_share(
     }
     let size = rig_count + 3 * m;
     let seen = Seen::of(board, views);
-    let mut sums = Sums { matrix: DMatrix::zeros(size, size), gradient: DVector::zeros(size), told: 0.0, numbers: 0.0 };
-    // One after the other: for a board of a thousand crossings each is large.
-    for (view, pose) in views.iter().zip(&values.poses) {
-        let block = PoseBlock::new(&values.shared.rig, &places, board, pose, view, Loss::Squared)?;
-        sums.told += block.told_in_plane();
-        sums.numbers += 2.0 * view.observations.iter().filter(|o| o.active).count() as f64;
-        let part = block.eliminate(&basis)?;
-        sums.matrix += part.matrix;
-        sums.gradient += part.gradient;
-    }
-    sums.told *= seen.usual_variance();
+    let pairs: Vec<_> = views.iter().zip(&values.poses).collect();
+    let mut told = 0.0;
+    let Totals { matrix, gradient, .. } = Totals::of(
+        &pairs,
+        (&basis, m),
+        |(view, pose)| PoseBlock::new(&values.shared.rig, &places, board, pose, view, Loss::Squared),
+        |_, block, _| told += block.told_in_plane(),
+    )?;
+    let numbers = 2.0 * views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count() as f64;
+    let sums = Sums { matrix, gradient, told: told * seen.usual_variance(), numbers };
     let variance = sums.print_variance(rig_count, &seen);
     // The difference of two large numbers where the print is most of it; but pixels scatter corners as much as the refinement says.
     let stated = noise.stated_share(views);

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, Matrix6, Vector6};
 use crate::statistics::median;
 use crate::stereo::solve::normal_equations::inverse6;
 use crate::stereo::target::solve::bundle::{Normal, PosePart};
-use crate::stereo::target::solve::pose_block::{Eliminated, TRANSFORM};
+use crate::stereo::target::solve::pose_block::Eliminated;
 
 /// Median of chi-square with six degrees of freedom.
 const MEDIAN_CHI_SQUARE_6: f64 = 5.348;
@@ -32,11 +32,8 @@ pub(in crate::stereo::target) fn at_each(normal: &Normal, covariance: &DMatrix<f
 
 /// What a change would gain at a pose that had no part in the minimum.
 pub(in crate::stereo::target) fn of_outsider(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change> {
-    let own = Matrix6::from_fn(|i, j| part.rig[(TRANSFORM + i, TRANSFORM + j)]);
-    let gradient = Vector6::from_fn(|i, _| part.rig_gradient[TRANSFORM + i]);
     // The gradient scatters with the pose's own corners and with the shared values, which its corners did not help to find.
-    let shared = part.rig_shared.rows(TRANSFORM, 6).into_owned();
-    score(&own, &shared, &gradient, &-covariance)
+    score(&part.change, &part.change_shared, &part.change_gradient, &-covariance)
 }
 
 /// Where a change from one pose on gains most, and what: the index of its first pose, and how much of the gain a change before the

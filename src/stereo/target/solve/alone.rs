@@ -10,7 +10,7 @@ use crate::stereo::data::residuals::root_mean_square;
 use crate::stereo::data::view::View;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::target::solve::estimate::{Estimate, OUTLIER};
-use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, crossings, residual};
+use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, PoseSums, crossings, residual};
 use crate::stereo::target::start::enough;
 use crate::stereo::triangulate::{common, triangulate};
 
@@ -74,7 +74,8 @@ impl<'a> Known<'a> {
             }
             pose = self.search(&view, pose, Loss::Squared)?;
         }
-        let part = self.block(&view, &pose, Loss::Squared)?.eliminate(self.basis)?;
+        let block = PoseBlock::new(&self.rig, &self.crossings, self.board, &pose, &view, Loss::Squared)?;
+        let part = block.eliminate(self.basis)?;
         let active: Vec<(&Observation, Vector2<f64>)> =
             view.observations.iter().filter(|o| o.active).filter_map(|o| Some((o, self.residual(&pose, o)?))).collect();
         let freedom = 2.0 * active.len() as f64 - 6.0;
@@ -95,28 +96,28 @@ impl<'a> Known<'a> {
         residual(&self.rig, &self.crossings, self.board, pose, o)
     }
 
-    fn block(&self, view: &View, pose: &Transform, loss: Loss) -> Option<PoseBlock> {
-        PoseBlock::new(&self.rig, &self.crossings, self.board, pose, view, loss)
+    fn sums(&self, view: &View, pose: &Transform, loss: Loss) -> Option<PoseSums> {
+        PoseSums::new(&self.rig, &self.crossings, self.board, pose, view, loss)
     }
 
     /// Gauss-Newton with halved steps.
     fn search(&self, view: &View, start: Transform, loss: Loss) -> Option<Transform> {
         let mut pose = start;
-        let mut block = self.block(view, &pose, loss)?;
+        let mut at = self.sums(view, &pose, loss)?;
         for _ in 0..STEPS {
-            let (step, promise) = block.pose_step()?;
+            let (step, promise) = at.step()?;
             let mut share = 1.0;
             let better = loop {
                 let s: Vector6<f64> = step * share;
                 let trial = perturb(&pose, Vector3::new(s[0], s[1], s[2]), Vector3::new(s[3], s[4], s[5]));
-                match self.block(view, &trial, loss) {
-                    Some(next) if next.cost <= block.cost => break Some((trial, next)),
+                match self.sums(view, &trial, loss) {
+                    Some(next) if next.cost <= at.cost => break Some((trial, next)),
                     _ if share < 1e-3 => break None,
                     _ => share *= 0.5,
                 }
             };
             let Some((trial, next)) = better else { break };
-            (pose, block) = (trial, next);
+            (pose, at) = (trial, next);
             if promise < 1e-9 {
                 break;
             }

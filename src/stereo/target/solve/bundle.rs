@@ -14,12 +14,8 @@ use crate::stereo::data::view::View;
 use crate::stereo::solve::normal_equations::solve_scaled;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, TRANSFORM, crossings, residual};
+use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, Totals, crossings, residual};
 use crate::stereo::target::solve::prior::{RigPrior, ShapePrior, weights};
-use crate::stereo::triangulate::RIG_NUMBERS;
-
-/// Poses whose matrices are held at a time.
-const AT_ONCE: usize = 16;
 
 /// Steps of one search at most; each squares what is left.
 const STEPS: usize = 12;
@@ -104,31 +100,20 @@ impl Bundle<'_> {
     pub fn normal(&self, values: &Values, loss: Loss) -> Option<Normal> {
         let rig = self.rig_at(values);
         let crossings = crossings(self.board, &values.deviations_mm);
-        let count = values.rig.len() + 3 * crossings.len();
-        let mut normal = Normal {
-            data: DMatrix::zeros(count, count),
-            weights: DMatrix::zeros(0, 0),
-            gradient: DVector::zeros(count),
-            rig: DMatrix::zeros(RIG_NUMBERS, RIG_NUMBERS),
-            rig_shared: DMatrix::zeros(RIG_NUMBERS, count),
-            rig_gradient: DVector::zeros(RIG_NUMBERS),
-            poses: vec![None; values.poses.len()],
-        };
         let present: Vec<(usize, &Transform)> =
             values.poses.iter().enumerate().filter_map(|(i, pose)| Some((i, pose.as_ref()?))).collect();
-        for some in present.chunks(AT_ONCE) {
-            let blocks: Vec<Option<Eliminated>> = some
-                .par_iter()
-                .map(|&(i, pose)| {
-                    PoseBlock::new(&rig, &crossings, self.board, pose, &self.views[i], loss)?.eliminate(&self.rig.basis)
-                })
-                .collect();
-            for (&(i, _), block) in some.iter().zip(blocks) {
-                normal.add(i, block?);
-            }
+        if present.is_empty() {
+            return None;
         }
-        normal.weights = weights(&self.rig, &self.shape, self.board, &normal.data);
-        (!present.is_empty()).then_some(normal)
+        let mut poses = vec![None; values.poses.len()];
+        let Totals { matrix: data, gradient, rig, rig_shared, rig_gradient } = Totals::of(
+            &present,
+            (&self.rig.basis, crossings.len()),
+            |&(i, pose)| PoseBlock::new(&rig, &crossings, self.board, pose, &self.views[i], loss),
+            |k, _, part| poses[present[k].0] = Some(PosePart::of(part)),
+        )?;
+        let weights = weights(&self.rig, &self.shape, self.board, &data);
+        Some(Normal { data, weights, gradient, rig, rig_shared, rig_gradient, poses })
     }
 
     /// Cost of the corners at these values; infinite where a corner would lie behind its camera.
@@ -202,23 +187,21 @@ impl Values {
     }
 }
 
-impl Normal {
-    fn add(&mut self, i: usize, block: Eliminated) {
-        self.data += &block.matrix;
-        self.gradient += &block.gradient;
-        self.rig += &block.rig;
-        self.rig_shared += &block.rig_shared;
-        self.rig_gradient += &block.rig_gradient;
-        self.poses[i] = Some(PosePart {
-            own: block.pose_inverse,
-            by_shared: -(block.pose_inverse * block.mixed.transpose()),
-            change: Matrix6::from_fn(|i, j| block.rig[(TRANSFORM + i, TRANSFORM + j)]),
-            change_shared: block.rig_shared.rows(TRANSFORM, 6).into_owned(),
-            change_gradient: Vector6::from_fn(|i, _| block.rig_gradient[TRANSFORM + i]),
-            step_to: -(block.pose_inverse * block.pose_gradient),
-        });
+impl PosePart {
+    fn of(part: Eliminated) -> PosePart {
+        let Eliminated { mixed, pose_inverse, pose_gradient, change, change_shared, change_gradient, .. } = part;
+        PosePart {
+            own: pose_inverse,
+            by_shared: -(pose_inverse * mixed.transpose()),
+            change,
+            change_shared,
+            change_gradient,
+            step_to: -(pose_inverse * pose_gradient),
+        }
     }
+}
 
+impl Normal {
     /// The step of the shared unknowns from these values, and by how much the cost would fall if the equations were straight.
     fn step(&self, shared: &DVector<f64>) -> Option<(DVector<f64>, f64)> {
         let gradient = &self.gradient + &self.weights * shared;

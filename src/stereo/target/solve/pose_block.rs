@@ -2,11 +2,13 @@
 //!
 //! In: a rig, the target's crossings, a pose and its corners. Out: the sums of products of derivatives by the rig's raw numbers, by the
 //! crossings' deviations and by the pose, then the same with the pose eliminated. A corner touches the rig, its own crossing and its own
-//! pose only, so that the crossings' part of a single pose is block diagonal.
+//! pose only, so that the crossings' part of a single pose is block diagonal; only what the poses' freedom takes off is dense.
 
 use nalgebra::{
-    DMatrix, DVector, Matrix2x3, Matrix3, Matrix3x6, Matrix6, Point3, SMatrix, SVector, Vector2, Vector3, Vector6,
+    DMatrix, DMatrixViewMut, DVector, Matrix2x3, Matrix3, Matrix3x6, Matrix6, Point3, SMatrix, SVector, Vector2,
+    Vector3, Vector6,
 };
+use rayon::prelude::*;
 
 use crate::geometry::{Transform, rotation_matrix};
 use crate::imaging::Board;
@@ -20,6 +22,9 @@ use crate::stereo::triangulate::RIG_NUMBERS;
 
 /// Where the numbers of `right_from_left` begin among the rig's.
 pub(in crate::stereo::target) const TRANSFORM: usize = 2 * CAMERA_NUMBERS;
+
+/// Poses whose sums are held at a time.
+const AT_ONCE: usize = 16;
 
 /// A square matrix over the rig's numbers.
 pub(in crate::stereo::target) type RigMatrix = SMatrix<f64, RIG_NUMBERS, RIG_NUMBERS>;
@@ -48,32 +53,60 @@ pub(in crate::stereo::target) fn residual(
 
 /// Sums over one pose's corners.
 pub(in crate::stereo::target) struct PoseBlock {
-    rig: Box<RigMatrix>,
+    shared: CornerSums,
     rig_pose: SMatrix<f64, RIG_NUMBERS, 6>,
-    rig_gradient: SVector<f64, RIG_NUMBERS>,
-    pose: Matrix6<f64>,
-    pose_gradient: Vector6<f64>,
-    crossings: Vec<CrossingBlock>,
+    crossings_pose: Vec<Matrix3x6<f64>>,
+    pose: PoseSums,
+}
+
+/// The part of the pose alone.
+pub(in crate::stereo::target) struct PoseSums {
+    matrix: Matrix6<f64>,
+    gradient: Vector6<f64>,
     /// Half the robust sum of squares.
     pub cost: f64,
 }
 
+/// The part of what all poses share: it is added up over the poses before anything is made of it.
+struct CornerSums {
+    /// Its upper triangle.
+    rig: Box<RigMatrix>,
+    rig_gradient: SVector<f64, RIG_NUMBERS>,
+    crossings: Vec<CrossingSums>,
+}
+
 /// The part of one crossing.
 #[derive(Clone)]
-struct CrossingBlock {
+struct CrossingSums {
     own: Matrix3<f64>,
     rig: SMatrix<f64, RIG_NUMBERS, 3>,
-    pose: Matrix3x6<f64>,
     gradient: Vector3<f64>,
 }
 
-impl CrossingBlock {
-    const ZERO: CrossingBlock = CrossingBlock {
-        own: SMatrix::from_array_storage(nalgebra::ArrayStorage([[0.0; 3]; 3])),
-        rig: SMatrix::from_array_storage(nalgebra::ArrayStorage([[0.0; RIG_NUMBERS]; 3])),
-        pose: SMatrix::from_array_storage(nalgebra::ArrayStorage([[0.0; 3]; 6])),
-        gradient: SMatrix::from_array_storage(nalgebra::ArrayStorage([[0.0; 3]; 1])),
-    };
+impl CornerSums {
+    fn zeros(crossings: usize) -> CornerSums {
+        let none = CrossingSums { own: Matrix3::zeros(), rig: SMatrix::zeros(), gradient: Vector3::zeros() };
+        CornerSums {
+            rig: Box::new(RigMatrix::zeros()),
+            rig_gradient: SVector::zeros(),
+            crossings: vec![none; crossings],
+        }
+    }
+
+    fn add(&mut self, other: &CornerSums) {
+        *self.rig += &*other.rig;
+        self.rig_gradient += other.rig_gradient;
+        for (all, one) in self.crossings.iter_mut().zip(&other.crossings) {
+            all.own += one.own;
+            all.rig += one.rig;
+            all.gradient += one.gradient;
+        }
+    }
+
+    /// The rig's numbers by themselves, whole.
+    fn rig(&self) -> RigMatrix {
+        RigMatrix::from_fn(|i, j| self.rig[(i.min(j), i.max(j))])
+    }
 }
 
 /// A row of the whitened Jacobian. `rig` is filled in `from..to` only.
@@ -82,6 +115,72 @@ struct Row {
     pose: [f64; 6],
     crossing: [f64; 3],
     residual: f64,
+}
+
+impl PoseSums {
+    const ZERO: PoseSums = PoseSums {
+        matrix: SMatrix::from_array_storage(nalgebra::ArrayStorage([[0.0; 6]; 6])),
+        gradient: SMatrix::from_array_storage(nalgebra::ArrayStorage([[0.0; 6]; 1])),
+        cost: 0.0,
+    };
+
+    /// The sums at these values, without those of a [`PoseBlock`]. `None` where a corner would lie behind its camera.
+    pub fn new(
+        rig: &Rig,
+        crossings: &[Point3<f64>],
+        board: &Board,
+        pose: &Transform,
+        view: &View,
+        loss: Loss,
+    ) -> Option<PoseSums> {
+        let mut sums = PoseSums::ZERO;
+        each_corner(rig, crossings, board, pose, view, |_, _, rows| {
+            let weight = sums.weigh(rows, loss);
+            rows.iter().for_each(|row| sums.add(row, weight));
+        })?;
+        Some(sums)
+    }
+
+    /// Adds a corner's cost and gives its weight.
+    fn weigh(&mut self, rows: &[Row; 2], loss: Loss) -> f64 {
+        let squared: f64 = rows.iter().map(|row| row.residual * row.residual).sum();
+        let (cost, weight) = loss.cost_and_weight(squared);
+        self.cost += cost;
+        weight
+    }
+
+    fn add(&mut self, row: &Row, weight: f64) {
+        for j in 0..6 {
+            let by = weight * row.pose[j];
+            self.gradient[j] += by * row.residual;
+            (0..6).for_each(|i| self.matrix[(i, j)] += by * row.pose[i]);
+        }
+    }
+
+    /// The step of the pose with everything else held, and by how much the cost would fall if the equations were straight.
+    pub fn step(&self) -> Option<(Vector6<f64>, f64)> {
+        let step = -(inverse6(&self.matrix)? * self.gradient);
+        Some((step, -0.5 * step.dot(&self.gradient)))
+    }
+}
+
+/// Hands over the rows of every active corner, with its side and its crossing's number. `None` where one would lie behind its camera.
+fn each_corner(
+    rig: &Rig,
+    crossings: &[Point3<f64>],
+    board: &Board,
+    pose: &Transform,
+    view: &View,
+    mut take: impl FnMut(Side, usize, &[Row; 2]),
+) -> Option<()> {
+    let turns = [rotation_matrix(pose), rotation_matrix(&rig.right_from_left)];
+    for side in Side::BOTH {
+        for o in view.active(side) {
+            let at = board.index(o.col, o.row);
+            take(side, at, &rows(rig, &turns, pose, &(crossings[at] + o.seen_off_mm), o)?);
+        }
+    }
+    Some(())
 }
 
 impl PoseBlock {
@@ -95,44 +194,33 @@ impl PoseBlock {
         loss: Loss,
     ) -> Option<PoseBlock> {
         let mut block = PoseBlock {
-            rig: Box::new(RigMatrix::zeros()),
+            shared: CornerSums::zeros(crossings.len()),
             rig_pose: SMatrix::zeros(),
-            rig_gradient: SVector::zeros(),
-            pose: Matrix6::zeros(),
-            pose_gradient: Vector6::zeros(),
-            crossings: vec![CrossingBlock::ZERO; crossings.len()],
-            cost: 0.0,
+            crossings_pose: vec![Matrix3x6::zeros(); crossings.len()],
+            pose: PoseSums::ZERO,
         };
-        let turns = [rotation_matrix(pose), rotation_matrix(&rig.right_from_left)];
-        for side in Side::BOTH {
-            for o in view.active(side) {
-                let at = board.index(o.col, o.row);
-                let mut rows = rows(rig, &turns, pose, &(crossings[at] + o.seen_off_mm), o)?;
-                let squared: f64 = rows.iter().map(|row| row.residual * row.residual).sum();
-                let (cost, weight) = loss.cost_and_weight(squared);
-                block.cost += cost;
-                for row in &mut rows {
-                    block.add(row, side, at, weight);
-                }
-            }
-        }
+        each_corner(rig, crossings, board, pose, view, |side, at, rows| {
+            let weight = block.pose.weigh(rows, loss);
+            rows.iter().for_each(|row| block.add(row, side, at, weight));
+        })?;
         Some(block)
     }
 
     fn add(&mut self, row: &Row, side: Side, at: usize, weight: f64) {
+        self.pose.add(row, weight);
         let columns = match side {
             Side::Left => 0..CAMERA_NUMBERS,
             Side::Right => CAMERA_NUMBERS..RIG_NUMBERS,
         };
-        let crossing = &mut self.crossings[at];
+        let crossing = &mut self.shared.crossings[at];
         for j in columns.clone() {
             let by = weight * row.rig[j];
             if by == 0.0 {
                 continue;
             }
-            self.rig_gradient[j] += by * row.residual;
+            self.shared.rig_gradient[j] += by * row.residual;
             for i in columns.start..=j {
-                self.rig[(i, j)] += by * row.rig[i];
+                self.shared.rig[(i, j)] += by * row.rig[i];
             }
             for k in 0..6 {
                 self.rig_pose[(j, k)] += by * row.pose[k];
@@ -143,9 +231,7 @@ impl PoseBlock {
         }
         for j in 0..6 {
             let by = weight * row.pose[j];
-            self.pose_gradient[j] += by * row.residual;
-            (0..6).for_each(|i| self.pose[(i, j)] += by * row.pose[i]);
-            (0..3).for_each(|i| crossing.pose[(i, j)] += by * row.crossing[i]);
+            (0..3).for_each(|i| self.crossings_pose[at][(i, j)] += by * row.crossing[i]);
         }
         for j in 0..3 {
             let by = weight * row.crossing[j];
@@ -156,83 +242,174 @@ impl PoseBlock {
 
     /// What the corners say of their crossings' places in the plane: the trace of the normal matrix there.
     pub fn told_in_plane(&self) -> f64 {
-        self.crossings.iter().map(|c| c.own[(0, 0)] + c.own[(1, 1)]).sum()
-    }
-
-    /// The step of the pose with everything else held, and by how much the cost would fall if the equations were straight.
-    pub fn pose_step(&self) -> Option<(Vector6<f64>, f64)> {
-        let step = -(inverse6(&self.pose)? * self.pose_gradient);
-        Some((step, -0.5 * step.dot(&self.pose_gradient)))
+        self.shared.crossings.iter().map(|c| c.own[(0, 0)] + c.own[(1, 1)]).sum()
     }
 
     /// With the pose eliminated, in the coordinates of the shared unknowns: `basis` maps the first of them to the rig's numbers, the
     /// crossings' deviations follow. `None` where the corners do not determine the pose.
     pub fn eliminate(&self, basis: &DMatrix<f64>) -> Option<Eliminated> {
-        let (n, m) = (basis.ncols(), 3 * self.crossings.len());
-        let pose_inverse = inverse6(&self.pose)?;
-        let mut rig = DMatrix::from_fn(RIG_NUMBERS, RIG_NUMBERS, |i, j| self.rig[(i.min(j), i.max(j))]);
-        let mut rig_shared = DMatrix::zeros(RIG_NUMBERS, n + m);
-        rig_shared.columns_mut(0, n).gemm(1.0, &rig, basis, 0.0);
-        let mut matrix = DMatrix::zeros(n + m, n + m);
+        let (n, m) = (basis.ncols(), 3 * self.crossings_pose.len());
+        let pose_inverse = inverse6(&self.pose.matrix)?;
         let mut mixed = DMatrix::zeros(n + m, 6);
-        let mut gradient = DVector::zeros(n + m);
-        let rig_pose = DMatrix::from_fn(RIG_NUMBERS, 6, |i, j| self.rig_pose[(i, j)]);
-        let rig_gradient = DVector::from_column_slice(self.rig_gradient.as_slice());
-        matrix.view_mut((0, 0), (n, n)).copy_from(&basis.tr_mul(&rig_shared.columns(0, n)));
-        mixed.rows_mut(0, n).copy_from(&basis.tr_mul(&rig_pose));
-        gradient.rows_mut(0, n).copy_from(&basis.tr_mul(&rig_gradient));
-        for (k, crossing) in self.crossings.iter().enumerate() {
+        mixed.rows_mut(0, n).copy_from(&basis.tr_mul(&self.rig_pose));
+        // A change of `right_from_left` at this pose alone.
+        let by_rig = self.shared.rig().fixed_rows::<6>(TRANSFORM).into_owned();
+        let mut change_shared = DMatrix::zeros(6, n + m);
+        change_shared.columns_mut(0, n).copy_from(&(by_rig * basis));
+        for (k, (crossing, pose)) in self.shared.crossings.iter().zip(&self.crossings_pose).enumerate() {
             let at = n + 3 * k;
-            rig_shared.view_mut((0, at), (RIG_NUMBERS, 3)).copy_from(&crossing.rig);
-            let by_basis = basis.tr_mul(&rig_shared.columns(at, 3));
-            matrix.view_mut((0, at), (n, 3)).copy_from(&by_basis);
-            matrix.view_mut((at, 0), (3, n)).copy_from(&by_basis.transpose());
-            matrix.view_mut((at, at), (3, 3)).copy_from(&crossing.own);
-            mixed.view_mut((at, 0), (3, 6)).copy_from(&crossing.pose);
-            gradient.rows_mut(at, 3).copy_from(&crossing.gradient);
+            change_shared.columns_mut(at, 3).copy_from(&crossing.rig.fixed_rows::<6>(TRANSFORM));
+            mixed.rows_mut(at, 3).copy_from(pose);
         }
-        let through = &mixed * pose_inverse;
-        matrix.gemm(-1.0, &through, &mixed.transpose(), 1.0);
-        gradient -= &through * self.pose_gradient;
-        let rig_through = &rig_pose * pose_inverse;
-        rig_shared.gemm(-1.0, &rig_through, &mixed.transpose(), 1.0);
-        rig.gemm(-1.0, &rig_through, &rig_pose.transpose(), 1.0);
-        let rig_gradient = rig_gradient - &rig_through * self.pose_gradient;
-        let pose_gradient = self.pose_gradient;
+        let change_pose = self.rig_pose.fixed_rows::<6>(TRANSFORM).into_owned();
+        let through = change_pose * pose_inverse;
+        change_shared -= through * mixed.transpose();
         Some(Eliminated {
-            matrix,
-            gradient,
             mixed,
-            rig_mixed: rig_pose,
+            rig_mixed: self.rig_pose,
             pose_inverse,
-            pose_gradient,
-            rig,
-            rig_shared,
-            rig_gradient,
+            pose_gradient: self.pose.gradient,
+            change: by_rig.fixed_columns::<6>(TRANSFORM) - through * change_pose.transpose(),
+            change_shared,
+            change_gradient: self.shared.rig_gradient.fixed_rows::<6>(TRANSFORM) - through * self.pose.gradient,
         })
     }
 }
 
 /// A pose's share with the pose eliminated.
 pub(in crate::stereo::target) struct Eliminated {
-    /// Shared by shared.
-    pub matrix: DMatrix<f64>,
-    /// Of the shared unknowns.
-    pub gradient: DVector<f64>,
     /// Shared by pose, before the elimination.
     pub mixed: DMatrix<f64>,
     /// The rig's raw numbers by pose, before the elimination.
-    pub rig_mixed: DMatrix<f64>,
+    pub rig_mixed: SMatrix<f64, RIG_NUMBERS, 6>,
     /// Covariance of the pose from its own corners.
     pub pose_inverse: Matrix6<f64>,
     /// Gradient of the pose.
     pub pose_gradient: Vector6<f64>,
+    /// A change of `right_from_left` at this pose alone, by itself.
+    pub change: Matrix6<f64>,
+    /// The same by the shared unknowns.
+    pub change_shared: DMatrix<f64>,
+    /// Its gradient.
+    pub change_gradient: Vector6<f64>,
+}
+
+/// Sums over poses for what they share, with every pose eliminated.
+struct SharedSums<'a> {
+    basis: &'a DMatrix<f64>,
+    corners: CornerSums,
+    /// What the poses' freedom takes off, by the rig's raw numbers and by the shared unknowns together; below the diagonal and on it.
+    taken: DMatrix<f64>,
+    taken_gradient: DVector<f64>,
+}
+
+/// Sums over all poses for what they share, with every pose eliminated.
+pub(in crate::stereo::target) struct Totals {
+    /// Shared by shared.
+    pub matrix: DMatrix<f64>,
+    /// Of the shared unknowns.
+    pub gradient: DVector<f64>,
     /// The rig's raw numbers, whether or not anything of them is an unknown.
     pub rig: DMatrix<f64>,
     /// The rig's raw numbers by the shared unknowns.
     pub rig_shared: DMatrix<f64>,
     /// Gradient of the rig's raw numbers.
     pub rig_gradient: DVector<f64>,
+}
+
+/// Columns that a thread works on at a time.
+const COLUMNS: usize = 48;
+
+impl Totals {
+    /// Adds up the blocks of `poses`, worked on in parallel and summed in their order; `each` gets every pose's parts, with its number. `basis` is
+    /// that of [`PoseBlock::eliminate`]. `None` where one has no block or its corners do not determine it.
+    pub fn of<P: Sync>(
+        poses: &[P],
+        (basis, crossings): (&DMatrix<f64>, usize),
+        block: impl Fn(&P) -> Option<PoseBlock> + Sync,
+        mut each: impl FnMut(usize, PoseBlock, Eliminated),
+    ) -> Option<Totals> {
+        let parts = |pose: &P| {
+            let block = block(pose)?;
+            let part = block.eliminate(basis)?;
+            Some((block, part))
+        };
+        let mut sums = SharedSums::new(basis, crossings);
+        let mut number = 0;
+        for some in poses.chunks(AT_ONCE) {
+            let blocks: Vec<Option<(PoseBlock, Eliminated)>> = some.par_iter().map(parts).collect();
+            let blocks = blocks.into_iter().collect::<Option<Vec<_>>>()?;
+            sums.add(&blocks);
+            for (block, part) in blocks {
+                each(number, block, part);
+                number += 1;
+            }
+        }
+        Some(sums.totals())
+    }
+}
+
+impl<'a> SharedSums<'a> {
+    /// No pose yet.
+    fn new(basis: &'a DMatrix<f64>, crossings: usize) -> SharedSums<'a> {
+        let size = RIG_NUMBERS + basis.ncols() + 3 * crossings;
+        SharedSums {
+            basis,
+            corners: CornerSums::zeros(crossings),
+            taken: DMatrix::zeros(size, size),
+            taken_gradient: DVector::zeros(size),
+        }
+    }
+
+    /// Adds poses, in their order. All at once, since one product of large matrices costs less than many of small ones.
+    fn add(&mut self, blocks: &[(PoseBlock, Eliminated)]) {
+        let size = self.taken.nrows();
+        let mut mixed = DMatrix::zeros(size, 6 * blocks.len());
+        let mut through = mixed.clone();
+        for (i, (block, part)) in blocks.iter().enumerate() {
+            self.corners.add(&block.shared);
+            mixed.view_mut((0, 6 * i), (RIG_NUMBERS, 6)).copy_from(&part.rig_mixed);
+            mixed.view_mut((RIG_NUMBERS, 6 * i), part.mixed.shape()).copy_from(&part.mixed);
+            let mut through = through.columns_mut(6 * i, 6);
+            mixed.columns(6 * i, 6).mul_to(&part.pose_inverse, &mut through);
+            self.taken_gradient.gemv(1.0, &through, &part.pose_gradient, 1.0);
+        }
+        let mixed = mixed.transpose();
+        self.taken.as_mut_slice().par_chunks_mut(COLUMNS * size).enumerate().for_each(|(k, columns)| {
+            let (from, count) = (k * COLUMNS, columns.len() / size);
+            let mut columns = DMatrixViewMut::from_slice(columns, size, count);
+            let rows = size - from;
+            columns.rows_mut(from, rows).gemm(1.0, &through.rows(from, rows), &mixed.columns(from, count), 1.0);
+        });
+    }
+
+    fn totals(mut self) -> Totals {
+        let (n, m) = (self.basis.ncols(), 3 * self.corners.crossings.len());
+        self.taken.fill_upper_triangle_with_lower_triangle();
+        let own = self.corners.rig();
+        let mut rig_shared = DMatrix::zeros(RIG_NUMBERS, n + m);
+        let mut gradient = DVector::zeros(n + m);
+        rig_shared.columns_mut(0, n).copy_from(&(own * self.basis));
+        gradient.rows_mut(0, n).copy_from(&self.basis.tr_mul(&self.corners.rig_gradient));
+        for (k, crossing) in self.corners.crossings.iter().enumerate() {
+            rig_shared.columns_mut(n + 3 * k, 3).copy_from(&crossing.rig);
+            gradient.rows_mut(n + 3 * k, 3).copy_from(&crossing.gradient);
+        }
+        let mut matrix = DMatrix::zeros(n + m, n + m);
+        let by_basis = self.basis.tr_mul(&rig_shared);
+        matrix.rows_mut(0, n).copy_from(&by_basis);
+        matrix.columns_mut(0, n).copy_from(&by_basis.transpose());
+        matrix.view_mut((0, 0), (n, n)).copy_from(&by_basis.columns(0, n));
+        for (k, crossing) in self.corners.crossings.iter().enumerate() {
+            matrix.view_mut((n + 3 * k, n + 3 * k), (3, 3)).copy_from(&crossing.own);
+        }
+        matrix -= self.taken.view((RIG_NUMBERS, RIG_NUMBERS), (n + m, n + m));
+        rig_shared -= self.taken.view((0, RIG_NUMBERS), (RIG_NUMBERS, n + m));
+        gradient -= self.taken_gradient.rows(RIG_NUMBERS, n + m);
+        let rig = DMatrix::from_fn(RIG_NUMBERS, RIG_NUMBERS, |i, j| own[(i, j)] - self.taken[(i, j)]);
+        let rig_gradient = DVector::from_fn(RIG_NUMBERS, |i, _| self.corners.rig_gradient[i] - self.taken_gradient[i]);
+        Totals { matrix, gradient, rig, rig_shared, rig_gradient }
+    }
 }
 
 /// The two rows of a corner. `None` where it would lie behind its camera.
