@@ -13,7 +13,7 @@ use super::image::{self, Claim, Header, Mosaic, Picture};
 use super::input::cache::{Cache, Look};
 use super::input::pairs::{self, PairFiles};
 use super::lattice::{Lattice, Places};
-use super::pyramid::{Level, Small, factor_for};
+use super::pyramid::Small;
 use super::refine::fields;
 use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, Squares, order, overlay, refine};
 use crate::files::OutDir;
@@ -128,7 +128,7 @@ fn read_and_look(path: &Utf8Path, header: &Header, wanted: &Wanted<'_>) -> Look 
     let entry = cache.entry(&hash, wanted.board, wanted.mosaic);
     cache.read(&entry, wanted.board).unwrap_or_else(|| {
         let (look, thumbnail) = look_at(bytes, path, wanted);
-        if let Some(thumbnail) = thumbnail.filter(|_| cache.thumbnails) {
+        if let Some(thumbnail) = thumbnail {
             cache.write_thumbnail(&entry, &thumbnail);
         }
         cache.write(&entry, &look);
@@ -142,7 +142,7 @@ pub fn thumbnail(path: &Utf8Path, wanted: &Wanted<'_>) -> Option<Small> {
         let hash = cache.out.hash_of_picture(path)?;
         cache.read_thumbnail(&cache.entry(&hash, wanted.board, wanted.mosaic))
     });
-    known.or_else(|| overlay::thumbnail(path, wanted.mosaic))
+    known.or_else(|| Some(thumbnail_of(&picture(path, wanted.mosaic).ok()?, None)))
 }
 
 /// A picture decoded, by itself.
@@ -152,7 +152,7 @@ pub(super) fn picture(path: &Utf8Path, mosaic: Option<Mosaic>) -> Result<Picture
     image::decode(&image::read(path, &header)?, path, mosaic)
 }
 
-/// What is in a picture file, and its thumbnail where the search has made the copy that it takes.
+/// What is in a picture file, and its thumbnail where the cache keeps it and the board was found.
 fn look_at(bytes: Vec<u8>, path: &Utf8Path, wanted: &Wanted<'_>) -> (Look, Option<Small>) {
     let picture = match image::decode(&bytes, path, wanted.mosaic) {
         Ok(picture) => picture,
@@ -160,15 +160,22 @@ fn look_at(bytes: Vec<u8>, path: &Utf8Path, wanted: &Wanted<'_>) -> (Look, Optio
     };
     drop(bytes);
     match detect::detect(&picture, wanted.board) {
-        Ok(detected) => (corners_of(&picture, &detected, wanted.board), thumbnail_of(&picture, &detected)),
+        Ok(detected) => {
+            let is_kept = wanted.cache.is_some_and(|cache| cache.thumbnails);
+            let thumbnail = is_kept.then(|| thumbnail_of(&picture, Some(&detected)));
+            (corners_of(&picture, &detected, wanted.board), thumbnail)
+        }
         Err(refusal) => (Err(refusal), None),
     }
 }
 
-/// A thumbnail of a picture in which the board was found on the copy of about a megapixel: the same as from the file.
-fn thumbnail_of(picture: &Picture, detected: &Detected) -> Option<Small> {
-    let same = detected.level == Level::Reduced(factor_for(picture, detect::COARSE_PX));
-    same.then(|| Small::thumbnail(&detected.copy, detected.level))
+/// The thumbnail of a picture, whether or not the board was found on the copy that it is made of.
+fn thumbnail_of(picture: &Picture, detected: Option<&Detected>) -> Small {
+    let level = detect::glance_level(picture);
+    match detected.filter(|detected| detected.level == level) {
+        Some(detected) => Small::thumbnail(&detected.copy, level),
+        None => Small::thumbnail(&level.copy(picture), level),
+    }
 }
 
 /// The corners of a board that was found.

@@ -21,8 +21,17 @@ pub type Places = Lattice<Point2<f64>>;
 impl Places {
     /// The median distance of neighbours along the rows and the columns, px; `None` without neighbours.
     pub fn step_px(&self) -> Option<f64> {
+        median(self.steps_px())
+    }
+
+    /// The least distance of neighbours, px; `None` without neighbours.
+    pub fn least_step_px(&self) -> Option<f64> {
+        self.steps_px().min_by(f64::total_cmp)
+    }
+
+    fn steps_px(&self) -> impl Iterator<Item = f64> + '_ {
         let to = |col: usize, row: usize, p: &Point2<f64>| self.get(col, row).map(|next| (next - p).norm());
-        median(self.iter().flat_map(|(col, row, p)| [to(col + 1, row, p), to(col, row + 1, p)]).flatten())
+        self.iter().flat_map(move |(col, row, p)| [to(col + 1, row, p), to(col, row + 1, p)]).flatten()
     }
 
     /// Where a line of corners goes on beyond `(col, row)` in a direction, and the step that leads there: from the two or three corners

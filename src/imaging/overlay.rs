@@ -104,12 +104,6 @@ fn rgb(copy: &Grey8) -> RgbImage {
     })
 }
 
-/// The thumbnail of a picture file.
-pub fn thumbnail(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<Small> {
-    let Small { copy, level } = small(path, mosaic)?;
-    Some(Small::thumbnail(&copy, level))
-}
-
 fn colour(corner: &Corner) -> [u8; 3] {
     let Some(s) = corner.covariance_px2.filter(|_| corner.used) else { return UNUSED };
     let sigma = (s.trace() / 2.0).sqrt();

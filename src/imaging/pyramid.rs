@@ -48,7 +48,7 @@ impl Level {
     }
 }
 
-/// Columns of a thumbnail at the least, where the picture has as many.
+/// Columns of a thumbnail at the least, where its copy has as many.
 const THUMBNAIL_COLUMNS: usize = 360;
 
 /// A reduced copy, and how far it is reduced.

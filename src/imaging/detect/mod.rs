@@ -2,8 +2,8 @@
 //!
 //! In: a picture and the board's size. Out: a reduced copy and a grid of coarse corners on it, right-handed, columns along
 //! the longer side, turned as far as the colours tell. The copy is an area average of about [`COARSE_PX`] pixels: the board is seen there
-//! as well as on 26 Mpx, in a twentieth of the time; a ladder of attempts on finer and coarser copies follows where the
-//! first fails. Its work is bounded by the pixels of the copies, whatever they show: no clock decides what is found, and OpenCV's
+//! as well as on 26 Mpx, in a twentieth of the time; where a copy of a quarter of that shows all of a board with large squares, that will do. A
+//! ladder of attempts on finer and coarser copies follows where the first fails. Its work is bounded by the pixels of the copies, whatever they show: no clock decides what is found, and OpenCV's
 //! classic detector is not among the attempts, because fine texture keeps it busy for minutes (and what it finds is found without
 //! it). Goes wrong: no board, another board, or a board of which too little is in view; each is a reason in words.
 
@@ -23,7 +23,7 @@ use super::pyramid::{Level, factor_for};
 use super::{Board, Squares};
 use crate::opencv::find_board;
 
-/// Pixels of the copy on which the board is looked for first.
+/// Pixels of the copy on which boards of any kind are looked for first.
 pub const COARSE_PX: usize = 1_000_000;
 
 /// Grids of fewer corners than this are chance.
@@ -104,6 +104,9 @@ impl Search {
 
 /// Looks for the board; the reason where it was not found.
 pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
+    if let Some(detected) = at_a_glance(picture, board) {
+        return Ok(detected);
+    }
     let mut search = Search::default();
     let mut last: Option<(Level, Grey8)> = None;
     for attempt in ladder(picture) {
@@ -145,6 +148,29 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     let seen = search.seen.map(|(grid, _)| grid);
     let larger = seen.as_ref().map_or(0, Lattice::count);
     search.partial.filter(|p| p.corners.count() > larger).ok_or_else(|| refusal(seen, board))
+}
+
+/// The copy on which whole boards with large squares are seen: half as long and wide as that of about [`COARSE_PX`], of a small picture the same.
+pub fn glance_level(picture: &Picture) -> Level {
+    let first = factor_for(picture, COARSE_PX);
+    Level::Reduced(if first == 1 { 1 } else { 2 * first })
+}
+
+/// The whole board, where its squares are large enough on a smaller copy than that of the first attempt.
+fn at_a_glance(picture: &Picture, board: Board) -> Option<Detected> {
+    /// Squares whose sides have at least as many pixels of a copy are seen there as well as on a finer one.
+    const LARGE_PX: f64 = 11.0;
+    let level = glance_level(picture);
+    if level == Level::Reduced(1) {
+        return None;
+    }
+    let copy = level.copy(picture);
+    let grid = of_size(&copy, &grown(&copy, board.corner_count())?, board)?;
+    if grid.count() < board.corner_count() || grid.least_step_px()? < LARGE_PX {
+        return None;
+    }
+    let corners = turn_by_colours(&copy, right_handed(grid), board);
+    Some(Detected { corners, copy, level })
 }
 
 /// The board, or a part of it, by one attempt; another grid is kept as seen.
