@@ -3,7 +3,7 @@
 //! In: the picture and the board as detected. Out: corners with covariance. First each corner is fitted on the reduced copy in a small
 //! window (`coarse`); then at full size in a small window (near), and in the largest that stays inside the four squares round
 //! it (full), along edges that bend as the lens bends the board's lines (`curvature`): as the near windows show them, and at last as the
-//! full ones do. On a board whose edges bend much from crossing to crossing the full windows are cut down. Where the larger
+//! full ones do. Where some of the full windows tell that edges bend much from crossing to crossing, all are cut down. Where the larger
 //! window does not agree with the smaller one, or the four arms of a corner not with each other (`acceptance`), something hides a part of
 //! it, and the largest window that is free of it is kept. Last, the board's corners share what they know of the light
 //! (`illumination`), which counts from the picture's veil (`veil`). Goes wrong: a corner without contrast, hidden, cut off by the border or
@@ -55,6 +55,9 @@ const NEAR_HALF_PX: f64 = 10.0;
 const NEAR_HALF_BLURS: f64 = 7.0;
 /// Half of the window that is tried where the full one is not free, as a multiple of the near one's.
 const BETWEEN: f64 = 2.8;
+/// One corner of so many is tried in its full window to see how much edges bend, and so many at the least.
+const TRIED: usize = 3;
+const LEAST_TRIED: usize = 9;
 /// A near window that is not smaller than this share of the full one would tell nothing of its own.
 const NEAR_SHARE: f64 = 0.7;
 
@@ -140,25 +143,10 @@ impl<T: Sample> Full<'_, T> {
         let near_only: Vec<Measured> = near.iter().filter_map(|(_, _, windows)| windows.near).collect();
         let board = acceptance::Board::of(&near_only, &[]);
         let near_bends = bends_by(&near, &places, |windows| windows.near.filter(|near| board.accepts(near)));
-        let full: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            Some(self.full(near.get(col, row)?.clone(), at(&near_bends, col, row), &mut window))
+        let near = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            Some(near.get(col, row)?.clone().rebent(at(&near_bends, col, row)))
         });
-        let board = usual(&full);
-        let full_bends = bends_by(&full, &places, |windows| windows.free(&board).copied());
-        let seen = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            Some(full.get(col, row)?.clone().rebent(at(&full_bends, col, row)))
-        });
-        let board = usual(&seen);
-        let share = board.straight_share();
-        let (seen, board) = if share < 1.0 {
-            let smaller = Lattice::from_fn(columns, coarse.rows, |col, row| {
-                Some(self.smaller(seen.get(col, row)?, share, &mut window))
-            });
-            let board = usual(&smaller);
-            (smaller, board)
-        } else {
-            (seen, board)
-        };
+        let (seen, board) = self.large(&near, &places, &mut window);
         let mut measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
             self.largest_free(seen.get(col, row)?, &board, &mut window)
         });
@@ -175,30 +163,57 @@ impl<T: Sample> Full<'_, T> {
         Windows { cell, start, alone, most_half_px: MOST_HALF_PX, near, full: None }
     }
 
-    /// A fit in the full window, started where the one in the near window ended: most steps are taken where they are cheap, and the blur is
-    /// that of the picture, not of the copy, so fewer pixels count as near an edge.
-    fn full(&self, seen: Windows, bend: [f64; 2], window: &mut Window) -> Windows {
-        let seen = Windows { start: Model { bend, ..seen.start }, ..seen };
+    /// The fits in full windows, or where edges bend too much for these in smaller ones, along edges that bend as these windows show it;
+    /// with what is usual in them.
+    fn large(
+        &self,
+        near: &Lattice<Windows>,
+        places: &Places,
+        window: &mut Window,
+    ) -> (Lattice<Windows>, acceptance::Board) {
+        // How much edges bend is seen on some of the corners as well: where full windows are of no use, most need not be looked at.
+        let few = near.count() < LEAST_TRIED * TRIED;
+        let tried = Lattice::from_fn(near.columns, near.rows, |col, row| {
+            let seen = near.get(col, row).filter(|_| few || (col + row).is_multiple_of(TRIED))?;
+            Some(self.full(seen.clone(), 1.0, window))
+        });
+        let mut within = |share: f64| {
+            let seen = Lattice::from_fn(near.columns, near.rows, |col, row| {
+                let known = tried.get(col, row).filter(|_| share == 1.0).cloned();
+                known.or_else(|| Some(self.full(near.get(col, row)?.clone(), share, window)))
+            });
+            let board = usual(&seen);
+            let bends = bends_by(&seen, places, |windows| windows.free(&board).copied());
+            let seen = Lattice::from_fn(near.columns, near.rows, |col, row| {
+                Some(seen.get(col, row)?.clone().rebent(bends[row * near.columns + col]))
+            });
+            let board = usual(&seen);
+            (seen, board)
+        };
+        let share = usual(&tried).straight_share();
+        let (seen, board) = within(share);
+        let smaller = board.straight_share();
+        if share == 1.0 && smaller < 1.0 { within(smaller) } else { (seen, board) }
+    }
+
+    /// A fit in the full window or in a share of it, started where the one in the near window ended: most steps are taken where they are
+    /// cheap, and the blur is that of the picture, not of the copy, so fewer pixels count as near an edge.
+    fn full(&self, seen: Windows, share: f64, window: &mut Window) -> Windows {
         let mut within = |half_px: f64| match &seen.near {
             _ if seen.alone => self.fit_within(half_px, &seen.cell, &seen.start, window),
             None => None,
             Some(near) => self.fit_from(near, half_px, &seen, window),
         };
-        let full = within(MOST_HALF_PX);
+        // What is hardly larger than the near window is not made smaller.
+        let share_px = share * half_px(seen.cell.side(), margin_px(&seen.start, &seen.cell));
+        let most_half_px = if seen.alone || share == 1.0 { MOST_HALF_PX } else { share_px };
+        let full = within(most_half_px);
         let reach_px = |full: &Measured| full.reach[0] * seen.cell.edges[0].norm();
         let clips = full.is_some_and(|full| full.fit.left_out > 0 && reach_px(&full) > MOST_CLIPPED_HALF_PX);
         if clips {
             return Windows { full: within(MOST_CLIPPED_HALF_PX), most_half_px: MOST_CLIPPED_HALF_PX, ..seen };
         }
-        Windows { full, ..seen }
-    }
-
-    /// With the full window cut down to a share of itself.
-    fn smaller(&self, seen: &Windows, share: f64, window: &mut Window) -> Windows {
-        let half_px = share * half_px(seen.cell.side(), margin_px(&seen.start, &seen.cell));
-        let again = seen.near.as_ref().filter(|_| !seen.alone);
-        let full = again.map_or(seen.full, |near| self.fit_from(near, half_px, seen, window));
-        Windows { full, most_half_px: half_px.min(seen.most_half_px), ..seen.clone() }
+        Windows { full, most_half_px, ..seen }
     }
 
     /// A corner whose pixels lie farther from the model than is usual on the board, fitted again without those that it cannot explain, where
