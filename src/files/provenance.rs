@@ -102,12 +102,8 @@ pub struct Digested {
 impl Digested {
     /// A file that was written.
     pub fn written(name: &str, bytes: &[u8]) -> Digested {
-        Digested {
-            file: name.to_owned(),
-            sha256: sha256(bytes),
-            pictures: None,
-            content_sha256: content_sha256(name, bytes),
-        }
+        let (sha256, content_sha256) = rayon::join(|| sha256(bytes), || content_sha256(name, bytes));
+        Digested { file: name.to_owned(), sha256, pictures: None, content_sha256 }
     }
 
     /// The pictures of a folder; `known` are the hashes of those that were read. `None` where one of the others cannot be read.

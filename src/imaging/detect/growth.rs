@@ -10,14 +10,15 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Point2, Vector2};
 
-use super::saddles::{Candidate, candidates};
+use super::saddles::{Candidate, candidates, tiles};
 use crate::imaging::image::Grey8;
 use crate::imaging::lattice::{Lattice, Places};
 
-/// Seeds from which a grid is tried, and where one of enough corners is known: each part of the picture gives its strongest first, and a grid
-/// that is larger still has corners in several of them.
+/// Seeds from which a grid is tried, and where one of enough corners is known, altogether and for two tiles: each tile gives its strongest
+/// first, and a grid that is larger still has corners in several of them.
 const MOST_SEEDS: usize = 600;
 const SEEDS_BESIDE_ENOUGH: usize = 300;
+const SEEDS_FOR_TWO_TILES: usize = 3;
 /// How far from its predicted place a corner may be, in steps of the grid.
 const STRAY: f64 = 0.3;
 /// How many times weaker than its neighbour a corner may respond; where squares end at the board's margin it is far more.
@@ -34,12 +35,13 @@ pub fn largest_grid(picture: &Grey8, enough: usize) -> Option<Places> {
     let near = Near::new(picture, &candidates);
     let mut taken = vec![false; candidates.len()];
     let mut best: Vec<(Place, usize)> = Vec::new();
+    let beside_enough = SEEDS_BESIDE_ENOUGH.min(SEEDS_FOR_TWO_TILES * tiles(picture) / 2);
     let mut seeds = 0;
     for first in 0..candidates.len() {
         if taken[first] {
             continue;
         }
-        if seeds == if best.len() < enough { MOST_SEEDS } else { SEEDS_BESIDE_ENOUGH } {
+        if seeds == if best.len() < enough { MOST_SEEDS } else { beside_enough } {
             break;
         }
         seeds += 1;

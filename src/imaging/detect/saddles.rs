@@ -56,6 +56,18 @@ pub(super) struct Candidate {
     pub(super) contrast: f64,
 }
 
+/// Side of a picture's tiles, px, and how many there are in a row and in a column.
+fn tiling(picture: &Grey8) -> (usize, usize, usize) {
+    let side = picture.width.max(picture.height).div_ceil(TILES).max(8 * LEAST_DISTANCE_PX);
+    (side, picture.width.div_ceil(side), picture.height.div_ceil(side))
+}
+
+/// How many tiles a picture has.
+pub(super) fn tiles(picture: &Grey8) -> usize {
+    let (_, columns, rows) = tiling(picture);
+    columns * rows
+}
+
 /// All candidates: first the strongest of each tile, then each tile's second, and so on, so that every part of the picture is soon looked at.
 pub(super) fn candidates(picture: &Grey8) -> Vec<Candidate> {
     let (w, h) = (picture.width, picture.height);
@@ -64,9 +76,8 @@ pub(super) fn candidates(picture: &Grey8) -> Vec<Candidate> {
     }
     let response = responses(picture);
     let least_contrast = LEAST_CONTRAST * noise(picture);
-    let side = w.max(h).div_ceil(TILES).max(8 * LEAST_DISTANCE_PX);
-    let columns = w.div_ceil(side);
-    let mut tiles: Vec<Vec<Candidate>> = vec![Vec::new(); columns * h.div_ceil(side)];
+    let (side, columns, rows) = tiling(picture);
+    let mut tiles: Vec<Vec<Candidate>> = vec![Vec::new(); columns * rows];
     // A whole number, as responses are; those at the border, zero, are below it.
     let least = (LEAST_SHAPE * least_contrast).floor() as i16;
     for y in REACH..h - REACH {
