@@ -276,3 +276,43 @@ pub fn size_seen(detected: &Detected) -> Option<Squares> {
     let (columns, rows) = (grid.columns.max(grid.rows) + 1, grid.columns.min(grid.rows) + 1);
     (grid.count() == grid.columns * grid.rows).then_some(Squares { columns, rows })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::image::Image;
+
+    /// A board of 8x6 squares of `side` px in a light margin, its crossings at whole multiples of `side`.
+    fn picture(size: usize, side: usize) -> Picture {
+        let grey = |x: usize, y: usize| {
+            let (i, j) = (x / side, y / side);
+            let dark = (1..=8).contains(&i) && (1..=6).contains(&j) && (i + j) % 2 == 0;
+            if dark { 40 } else { 200u8 }
+        };
+        let pixels = (0..size * size).map(|k| grey(k % size, k / size)).collect();
+        Picture::from(Image { width: size, height: size, pixels })
+    }
+
+    #[test]
+    fn large_squares_are_found_on_a_smaller_copy_than_small_ones() {
+        let board = Board { squares: "8x6".parse().unwrap(), square_mm: 10.0 };
+        for (side, level) in [(170, 4), (48, 4), (40, 2), (20, 2)] {
+            let detected = detect(&picture(2048, side), board).unwrap();
+            assert_eq!((detected.level, detected.corners.count()), (Level::Reduced(level), 35), "{side}");
+            for (col, row, place) in detected.corners.iter() {
+                let place = (detected.level.to_picture(place).coords.add_scalar(0.5)) / side as f64;
+                let off = place.map(|v| (v - v.round()).abs() * side as f64);
+                assert!(off.max() <= level as f64, "{side}: {col} {row} {place}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_part_of_a_board_is_not_what_is_seen_at_a_glance() {
+        let board = Board { squares: "9x6".parse().unwrap(), square_mm: 10.0 };
+        assert!(at_a_glance(&picture(2048, 170), board).is_none());
+        let smaller = Board { squares: "7x6".parse().unwrap(), square_mm: 10.0 };
+        assert!(at_a_glance(&picture(2048, 170), smaller).is_none());
+        assert!(detect(&picture(2048, 170), smaller).is_err());
+    }
+}
