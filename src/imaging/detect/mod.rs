@@ -2,8 +2,9 @@
 //!
 //! In: a picture and the board's size. Out: a reduced copy and a grid of coarse corners on it, right-handed, columns along
 //! the longer side, turned as far as the colours tell. The copy is an area average of about [`COARSE_PX`] pixels: the board is seen there
-//! as well as on 26 Mpx, in a twentieth of the time; where a copy of a quarter of that shows all of a board with large squares, that will do. A
-//! ladder of attempts on finer and coarser copies follows where the first fails. Its work is bounded by the pixels of the copies, whatever they show: no clock decides what is found, and OpenCV's
+//! as well as on 26 Mpx, in a twentieth of the time. Of large pictures a copy of a quarter of that is tried before, and will do where it
+//! shows all of a board with large squares; a ladder of attempts on finer and coarser copies follows where the first fails. Its work is
+//! bounded by the pixels of the copies, whatever they show: no clock decides what is found, and OpenCV's
 //! classic detector is not among the attempts, because fine texture keeps it busy for minutes (and what it finds is found without
 //! it). Goes wrong: no board, another board, or a board of which too little is in view; each is a reason in words.
 

@@ -17,7 +17,7 @@ use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::solve::pose_block::{PoseBlock, Totals, crossings};
+use crate::stereo::target::solve::pose_block::{PoseBlock, SeenFrom, Totals, crossings};
 use crate::stereo::target::solve::window::{SeenShares, Window};
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
@@ -68,7 +68,9 @@ fn print_share(
     let Totals { matrix, gradient, .. } = Totals::of(
         &pairs,
         (&basis, m),
-        |(view, pose)| PoseBlock::new(&values.shared.rig, &places, board, pose, view, Loss::Squared),
+        |&(view, pose)| {
+            PoseBlock::of(&SeenFrom { rig: &values.shared.rig, crossings: &places, board, pose, view }, Loss::Squared)
+        },
         |_, block, _| told += block.told_in_plane(),
     )?;
     let numbers = 2.0 * views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count() as f64;

@@ -10,7 +10,7 @@ use crate::stereo::data::residuals::root_mean_square;
 use crate::stereo::data::view::View;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::target::solve::estimate::{Estimate, OUTLIER};
-use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, PoseSums, crossings, residual};
+use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, PoseSums, SeenFrom, crossings, residual};
 use crate::stereo::target::start::enough;
 use crate::stereo::triangulate::{common, triangulate};
 
@@ -74,8 +74,7 @@ impl<'a> Known<'a> {
             }
             pose = self.search(&view, pose, Loss::Squared)?;
         }
-        let block = PoseBlock::new(&self.rig, &self.crossings, self.board, &pose, &view, Loss::Squared)?;
-        let part = block.eliminate(self.basis)?;
+        let part = PoseBlock::of(&self.seen(&view, &pose), Loss::Squared)?.eliminate(self.basis)?;
         let active: Vec<(&Observation, Vector2<f64>)> =
             view.observations.iter().filter(|o| o.active).filter_map(|o| Some((o, self.residual(&pose, o)?))).collect();
         let freedom = 2.0 * active.len() as f64 - 6.0;
@@ -96,21 +95,21 @@ impl<'a> Known<'a> {
         residual(&self.rig, &self.crossings, self.board, pose, o)
     }
 
-    fn sums(&self, view: &View, pose: &Transform, loss: Loss) -> Option<PoseSums> {
-        PoseSums::new(&self.rig, &self.crossings, self.board, pose, view, loss)
+    fn seen<'b>(&'b self, view: &'b View, pose: &'b Transform) -> SeenFrom<'b> {
+        SeenFrom { rig: &self.rig, crossings: &self.crossings, board: self.board, pose, view }
     }
 
     /// Gauss-Newton with halved steps.
     fn search(&self, view: &View, start: Transform, loss: Loss) -> Option<Transform> {
         let mut pose = start;
-        let mut at = self.sums(view, &pose, loss)?;
+        let mut at = PoseSums::of(&self.seen(view, &pose), loss)?;
         for _ in 0..STEPS {
             let (step, promise) = at.step()?;
             let mut share = 1.0;
             let better = loop {
                 let s: Vector6<f64> = step * share;
                 let trial = perturb(&pose, Vector3::new(s[0], s[1], s[2]), Vector3::new(s[3], s[4], s[5]));
-                match self.sums(view, &trial, loss) {
+                match PoseSums::of(&self.seen(view, &trial), loss) {
                     Some(next) if next.cost <= at.cost => break Some((trial, next)),
                     _ if share < 1e-3 => break None,
                     _ => share *= 0.5,

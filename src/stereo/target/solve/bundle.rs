@@ -14,7 +14,7 @@ use crate::stereo::data::view::View;
 use crate::stereo::solve::normal_equations::solve_scaled;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, Totals, crossings, residual};
+use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, SeenFrom, Totals, crossings, residual};
 use crate::stereo::target::solve::prior::{RigPrior, ShapePrior, weights};
 
 /// Steps of one search at most; each squares what is left.
@@ -109,7 +109,10 @@ impl Bundle<'_> {
         let Totals { matrix: data, gradient, rig, rig_shared, rig_gradient } = Totals::of(
             &present,
             (&self.rig.basis, crossings.len()),
-            |&(i, pose)| PoseBlock::new(&rig, &crossings, self.board, pose, &self.views[i], loss),
+            |&(i, pose)| {
+                let view = &self.views[i];
+                PoseBlock::of(&SeenFrom { rig: &rig, crossings: &crossings, board: self.board, pose, view }, loss)
+            },
             |k, _, part| poses[present[k].0] = Some(PosePart::of(part)),
         )?;
         let weights = weights(&self.rig, &self.shape, self.board, &data);

@@ -51,6 +51,34 @@ pub(in crate::stereo::target) fn residual(
     in_front.then(|| camera.project(&point) - o.px).filter(|r| r.x.is_finite() && r.y.is_finite())
 }
 
+/// A target in front of the rig, and what was seen of it there.
+pub(in crate::stereo::target) struct SeenFrom<'a> {
+    /// The rig.
+    pub rig: &'a Rig,
+    /// Where each crossing is on the target, as [`crossings`] has them.
+    pub crossings: &'a [Point3<f64>],
+    /// The target as drawn.
+    pub board: &'a Board,
+    /// `left_from_board`.
+    pub pose: &'a Transform,
+    /// The corners.
+    pub view: &'a View,
+}
+
+impl SeenFrom<'_> {
+    /// Hands over the rows of every active corner, with its side and its crossing's number. `None` where one would lie behind its camera.
+    fn each_corner(&self, mut take: impl FnMut(Side, usize, &[Row; 2])) -> Option<()> {
+        let turns = [rotation_matrix(self.pose), rotation_matrix(&self.rig.right_from_left)];
+        for side in Side::BOTH {
+            for o in self.view.active(side) {
+                let at = self.board.index(o.col, o.row);
+                take(side, at, &rows(self.rig, &turns, self.pose, &(self.crossings[at] + o.seen_off_mm), o)?);
+            }
+        }
+        Some(())
+    }
+}
+
 /// Sums over one pose's corners.
 pub(in crate::stereo::target) struct PoseBlock {
     shared: CornerSums,
@@ -118,23 +146,14 @@ struct Row {
 }
 
 impl PoseSums {
-    const ZERO: PoseSums = PoseSums {
-        matrix: SMatrix::from_array_storage(nalgebra::ArrayStorage([[0.0; 6]; 6])),
-        gradient: SMatrix::from_array_storage(nalgebra::ArrayStorage([[0.0; 6]; 1])),
-        cost: 0.0,
-    };
+    fn zeros() -> PoseSums {
+        PoseSums { matrix: Matrix6::zeros(), gradient: Vector6::zeros(), cost: 0.0 }
+    }
 
     /// The sums at these values, without those of a [`PoseBlock`]. `None` where a corner would lie behind its camera.
-    pub fn new(
-        rig: &Rig,
-        crossings: &[Point3<f64>],
-        board: &Board,
-        pose: &Transform,
-        view: &View,
-        loss: Loss,
-    ) -> Option<PoseSums> {
-        let mut sums = PoseSums::ZERO;
-        each_corner(rig, crossings, board, pose, view, |_, _, rows| {
+    pub fn of(seen: &SeenFrom<'_>, loss: Loss) -> Option<PoseSums> {
+        let mut sums = PoseSums::zeros();
+        seen.each_corner(|_, _, rows| {
             let weight = sums.weigh(rows, loss);
             rows.iter().for_each(|row| sums.add(row, weight));
         })?;
@@ -164,42 +183,16 @@ impl PoseSums {
     }
 }
 
-/// Hands over the rows of every active corner, with its side and its crossing's number. `None` where one would lie behind its camera.
-fn each_corner(
-    rig: &Rig,
-    crossings: &[Point3<f64>],
-    board: &Board,
-    pose: &Transform,
-    view: &View,
-    mut take: impl FnMut(Side, usize, &[Row; 2]),
-) -> Option<()> {
-    let turns = [rotation_matrix(pose), rotation_matrix(&rig.right_from_left)];
-    for side in Side::BOTH {
-        for o in view.active(side) {
-            let at = board.index(o.col, o.row);
-            take(side, at, &rows(rig, &turns, pose, &(crossings[at] + o.seen_off_mm), o)?);
-        }
-    }
-    Some(())
-}
-
 impl PoseBlock {
     /// The sums at these values. `None` where a corner would lie behind its camera.
-    pub fn new(
-        rig: &Rig,
-        crossings: &[Point3<f64>],
-        board: &Board,
-        pose: &Transform,
-        view: &View,
-        loss: Loss,
-    ) -> Option<PoseBlock> {
+    pub fn of(seen: &SeenFrom<'_>, loss: Loss) -> Option<PoseBlock> {
         let mut block = PoseBlock {
-            shared: CornerSums::zeros(crossings.len()),
+            shared: CornerSums::zeros(seen.crossings.len()),
             rig_pose: SMatrix::zeros(),
-            crossings_pose: vec![Matrix3x6::zeros(); crossings.len()],
-            pose: PoseSums::ZERO,
+            crossings_pose: vec![Matrix3x6::zeros(); seen.crossings.len()],
+            pose: PoseSums::zeros(),
         };
-        each_corner(rig, crossings, board, pose, view, |side, at, rows| {
+        seen.each_corner(|side, at, rows| {
             let weight = block.pose.weigh(rows, loss);
             rows.iter().for_each(|row| block.add(row, side, at, weight));
         })?;
