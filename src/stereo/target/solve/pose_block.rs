@@ -137,7 +137,7 @@ impl CornerSums {
     }
 }
 
-/// A row of the whitened Jacobian. `rig` is filled in `from..to` only.
+/// A row of the whitened Jacobian. `rig` is zero but for the numbers of the camera that saw the corner.
 struct Row {
     rig: [f64; RIG_NUMBERS],
     pose: [f64; 6],
