@@ -16,6 +16,8 @@ use super::wide::widest;
 pub enum Level {
     /// Reduced by a whole factor.
     Reduced(usize),
+    /// The same of a few lines of each block only, which costs half: most of the time goes into reading the picture.
+    Skimmed(usize),
     /// Enlarged to twice the size, for squares of a few pixels.
     Doubled,
 }
@@ -24,7 +26,7 @@ impl Level {
     /// Pixels of the picture along one pixel of the copy.
     pub fn scale(self) -> f64 {
         match self {
-            Level::Reduced(factor) => factor as f64,
+            Level::Reduced(factor) | Level::Skimmed(factor) => factor as f64,
             Level::Doubled => 0.5,
         }
     }
@@ -42,8 +44,9 @@ impl Level {
     /// The copy of a picture at this level.
     pub fn copy(self, picture: &Picture) -> Grey8 {
         match self {
-            Level::Reduced(factor) => reduced(picture, factor),
-            Level::Doubled => doubled(&reduced(picture, 1)),
+            Level::Reduced(factor) => reduced(picture, factor, &|factor| (0..factor).collect()),
+            Level::Skimmed(factor) => reduced(picture, factor, &skimmed_lines),
+            Level::Doubled => doubled(&Level::Reduced(1).copy(picture)),
         }
     }
 }
@@ -70,7 +73,8 @@ impl Small {
     /// A thumbnail from a reduced copy.
     pub fn thumbnail(copy: &Grey8, level: Level) -> Small {
         let factor = (copy.width / THUMBNAIL_COLUMNS).max(1);
-        let smaller = means(copy, factor, u16::from, (0.0, 255.0));
+        let lines: Vec<usize> = (0..factor).collect();
+        let smaller = means(copy, factor, &lines, u16::from, (0.0, 255.0));
         Small { copy: smaller, level: Level::Reduced(factor * level.scale() as usize) }
     }
 }
@@ -81,17 +85,30 @@ pub fn factor_for(picture: &Picture, pixels: usize) -> usize {
     ratio.sqrt().floor().max(1.0) as usize
 }
 
-/// A copy reduced by a whole factor; what is left over at the right and lower border is dropped.
-fn reduced(picture: &Picture, factor: usize) -> Grey8 {
+/// A copy reduced by a whole factor; what is left over at the right and lower border is dropped. `lines` are those of a block that count.
+fn reduced(picture: &Picture, factor: usize, lines: &dyn Fn(usize) -> Vec<usize>) -> Grey8 {
     let factor = factor.clamp(1, picture.width().min(picture.height()).clamp(1, MOST_REDUCED));
+    let lines = lines(factor);
     match &picture.grey {
-        Grey::Eight(image) => means(image, factor, u16::from, (0.0, 255.0)),
+        Grey::Eight(image) => means(image, factor, &lines, u16::from, (0.0, 255.0)),
         Grey::Sixteen(image) => {
             let (low, high) = range(image);
             // A hot pixel must not shine over its block.
-            means(image, factor, |v| u32::from(v.min(high)), (f64::from(low), f64::from(high)))
+            means(image, factor, &lines, |v| u32::from(v.min(high)), (f64::from(low), f64::from(high)))
         }
     }
+}
+
+/// The lines of a block of `factor` that are read where it is skimmed: spread evenly, their mean the block's centre.
+fn skimmed_lines(factor: usize) -> Vec<usize> {
+    /// Half as many as are read.
+    const HALF: usize = 2;
+    if factor <= 2 * HALF {
+        return (0..factor).collect();
+    }
+    let upper = (0..HALF).map(|i| (2 * i + 1) * factor / (4 * HALF));
+    let lower = upper.clone().rev().map(|line| factor - 1 - line);
+    upper.chain(lower).collect()
 }
 
 /// Factor up to which 2^8 values of 8 bits fit into a sum of 16, and 2^16 of 16 into one of 32; no picture is so large.
@@ -100,13 +117,15 @@ const MOST_REDUCED: usize = 256;
 /// Bits of a reciprocal in whole numbers: 255 n / n times 2^23 fits into 31 bits.
 const SHIFT: u32 = 23;
 
-/// Factor up to which a mean by a reciprocal in whole numbers is rounded as the mean itself: 255 n / 2^23 is less than 1 / n up to n of 181.
-const MOST_BY_WHOLE: usize = 13;
+/// Pixels up to which a mean by a reciprocal in whole numbers is rounded as the mean itself: 255 n / 2^23 is less than 1 / n up to here.
+const MOST_BY_WHOLE: usize = 181;
 
-/// Means of `factor` x `factor` pixels, `low..high` stretched to 0..255. `value` is a pixel as a type that holds the sum of a column.
+/// Means of the `lines` of blocks of `factor` x `factor` pixels, `low..high` stretched to 0..255. `value` is a pixel as a type that holds
+/// the sum of a column.
 fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
     image: &Image<T>,
     factor: usize,
+    lines: &[usize],
     value: impl Fn(T) -> S,
     (low, high): (f64, f64),
 ) -> Grey8 {
@@ -115,17 +134,18 @@ fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
     let mut sums = vec![S::default(); w * factor];
     let mut totals = vec![0u32; w];
     let scale = 255.0 / (high - low).max(1.0);
-    let unit = scale / (factor * factor) as f64;
+    let count = lines.len() * factor;
+    let unit = scale / count as f64;
     // The same numbers in whole ones where nothing is stretched: the rounding upwards of the reciprocal is too little to reach the next half.
-    let by_whole = (low == 0.0 && high == 255.0 && factor <= MOST_BY_WHOLE)
-        .then(|| (1u32 << SHIFT).div_ceil((factor * factor) as u32));
+    let by_whole = (low == 0.0 && high == 255.0 && count <= MOST_BY_WHOLE)
+        .then(|| (1u32 << SHIFT).div_ceil(count as u32));
     let rows = image.pixels.chunks(factor * image.width.max(1));
     for (out, rows) in pixels.chunks_exact_mut(w.max(1)).zip(rows) {
         widest(
             #[inline(always)]
             || {
                 // Whole lines first: adding them up is what a processor does many at a time.
-                add_lines(rows, image.width, factor, &value, &mut sums);
+                add_lines(rows, image.width, lines, &value, &mut sums);
                 add_groups(&sums, factor, &mut totals);
                 match by_whole {
                     Some(per_total) => {
@@ -145,26 +165,26 @@ fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
     Grey8 { width: w, height: h, pixels }
 }
 
-/// The sums of `factor` lines, place by place.
+/// The sums of these lines, place by place.
 #[inline(always)]
 fn add_lines<T: Copy, S: Copy + Default + AddAssign>(
     rows: &[T],
     width: usize,
-    factor: usize,
+    lines: &[usize],
     value: &impl Fn(T) -> S,
     sums: &mut [S],
 ) {
-    // For the usual factors a number of lines that the compiler knows: it keeps the sums in registers.
-    match factor {
-        2 => add_known_lines::<2, T, S>(rows, width, value, sums),
-        3 => add_known_lines::<3, T, S>(rows, width, value, sums),
-        4 => add_known_lines::<4, T, S>(rows, width, value, sums),
-        5 => add_known_lines::<5, T, S>(rows, width, value, sums),
-        6 => add_known_lines::<6, T, S>(rows, width, value, sums),
+    // For the usual ones a number of lines that the compiler knows: it keeps the sums in registers.
+    match *lines {
+        [a, b] => add_known_lines(rows, width, [a, b], value, sums),
+        [a, b, c] => add_known_lines(rows, width, [a, b, c], value, sums),
+        [a, b, c, d] => add_known_lines(rows, width, [a, b, c, d], value, sums),
+        [a, b, c, d, e] => add_known_lines(rows, width, [a, b, c, d, e], value, sums),
+        [a, b, c, d, e, f] => add_known_lines(rows, width, [a, b, c, d, e, f], value, sums),
         _ => {
             sums.fill(S::default());
-            for line in rows.chunks_exact(width) {
-                for (sum, &v) in sums.iter_mut().zip(line) {
+            for line in lines {
+                for (sum, &v) in sums.iter_mut().zip(&rows[line * width..][..width]) {
                     *sum += value(v);
                 }
             }
@@ -173,13 +193,14 @@ fn add_lines<T: Copy, S: Copy + Default + AddAssign>(
 }
 
 #[inline(always)]
-fn add_known_lines<const FACTOR: usize, T: Copy, S: Copy + Default + AddAssign>(
+fn add_known_lines<const COUNT: usize, T: Copy, S: Copy + Default + AddAssign>(
     rows: &[T],
     width: usize,
+    lines: [usize; COUNT],
     value: &impl Fn(T) -> S,
     sums: &mut [S],
 ) {
-    let lines: [&[T]; FACTOR] = std::array::from_fn(|line| &rows[line * width..][..sums.len()]);
+    let lines = lines.map(|line| &rows[line * width..][..sums.len()]);
     for (at, sum) in sums.iter_mut().enumerate() {
         let mut here = S::default();
         for line in lines {
@@ -199,6 +220,8 @@ fn add_groups<S: Copy + Into<u32>>(sums: &[S], factor: usize, totals: &mut [u32]
         4 => add_each::<4, S>(sums, totals),
         5 => add_each::<5, S>(sums, totals),
         6 => add_each::<6, S>(sums, totals),
+        8 => add_each::<8, S>(sums, totals),
+        10 => add_each::<10, S>(sums, totals),
         _ => {
             for (total, group) in totals.iter_mut().zip(sums.chunks_exact(factor)) {
                 *total = 0;
@@ -287,6 +310,20 @@ mod tests {
                 let mean = sum as f64 / (factor * factor) as f64;
                 assert!((f64::from(pixel) - mean).abs() <= 0.5 + 1e-9, "{factor}: {pixel} {mean}");
             }
+        }
+    }
+
+    #[test]
+    fn skimmed_pixels_are_means_of_lines_round_the_centre() {
+        for factor in 1..=40 {
+            let lines = skimmed_lines(factor);
+            assert!(lines.is_sorted_by(|a, b| a < b) && lines.iter().all(|&line| line < factor), "{factor}: {lines:?}");
+            // A ramp shows whether the copy is shifted.
+            let ramp = |k: usize| (k % (3 * factor) + 2 * (k / (3 * factor))) as u8;
+            let pixels = (0..6 * factor * factor).map(ramp).collect();
+            let picture = Picture::from(Image { width: 3 * factor, height: 2 * factor, pixels });
+            let (skimmed, all) = (Level::Skimmed(factor).copy(&picture), Level::Reduced(factor).copy(&picture));
+            assert_eq!(skimmed, all, "{factor}: {lines:?}");
         }
     }
 

@@ -4,11 +4,11 @@ use camino::Utf8Path;
 use rayon::prelude::*;
 
 use super::super::Result;
-use crate::imaging::input::pairs;
+use crate::imaging::input::pairs::PairFiles;
 use crate::imaging::{Corners, PairCorners, Wanted, find, overlay};
 use crate::measurements::Role;
 use crate::report::drawing::picture::PairJpeg;
-use crate::report::measure::{Distance, Extras, Thumbnail};
+use crate::report::measure::{Distance, Thumbnail};
 use crate::robot::{self, Robot};
 use crate::stereo::target::series::{MeasuredPose, Series};
 
@@ -22,13 +22,14 @@ const WIDTH: u32 = 720;
 /// The robot that was sent, where none is named.
 const ROBOT: &str = "robot.toml";
 
-/// Gathers them. `folder` holds the pictures, `wanted` is what was looked for in them.
-pub(super) fn gather(series: &Series, corners: &Corners, folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Extras> {
-    Ok(Extras { thumbnails: thumbnails(series, corners, folder, wanted)?, distances: distances(series)? })
-}
-
-fn thumbnails(series: &Series, corners: &Corners, folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Vec<Thumbnail>> {
-    let files = pairs::pair_files(folder)?.pairs;
+/// Small pictures of the poses without a measurement and of those that fit worst. `files` are the pictures, `wanted` is what was looked
+/// for in them.
+pub(super) fn thumbnails(
+    series: &Series,
+    corners: &Corners,
+    files: &[PairFiles],
+    wanted: &Wanted<'_>,
+) -> Vec<Thumbnail> {
     let failures = series.poses.iter().filter_map(|m| Some((m, m.target.as_ref().err()?.reason.clone())));
     let mut chosen: Vec<(&MeasuredPose, String)> = failures.take(FAILURES).collect();
     let mut measured: Vec<(f64, &MeasuredPose)> =
@@ -50,11 +51,11 @@ fn thumbnails(series: &Series, corners: &Corners, folder: &Utf8Path, wanted: &Wa
         let jpeg_base64 = both.and_then(|both| PairJpeg::new(both, WIDTH)).map_or_else(String::new, |jpeg| jpeg.base64);
         Thumbnail { pose: m.at.pose.clone(), caption: caption.clone(), jpeg_base64 }
     };
-    Ok(chosen.par_iter().map(draw).collect())
+    chosen.par_iter().map(draw).collect()
 }
 
 /// Distances to each group's centre, where a robot of so many joints is known.
-fn distances(series: &Series) -> Result<Vec<Distance>> {
+pub(super) fn distances(series: &Series) -> Result<Vec<Distance>> {
     let file = Utf8Path::new(ROBOT);
     let robot = if file.is_file() { robot::file::read(file)? } else { Robot::paper() };
     if series.poses.iter().any(|m| m.at.joints_deg.len() != robot.joints.len()) {

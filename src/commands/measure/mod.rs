@@ -16,8 +16,10 @@ use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
 use crate::formats::measure::{self, MeasureFile};
 use crate::imaging::input::cache::Cache;
+use crate::imaging::input::pairs;
 use crate::imaging::{Corners, PairCorners, Wanted, find_corners};
 use crate::measurements::{self, RobotPose};
+use crate::report::measure::Extras;
 use crate::stereo;
 use crate::stereo::target::series::{self, Knowledge, Refusal, Seen, Series};
 use crate::{progress, report};
@@ -51,10 +53,16 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let series = series::measure(&known, seen(poses, &corners));
     let file = MeasureFile::new(&series, &corners, &known);
     say(&series, &file);
-    let extras = extras::gather(&series, &corners, &args.poses, &wanted)?;
-    out.write("measurements.csv", measure::to_csv(&series.poses).as_bytes())?;
-    let json = out.write_json("measure.json", &file)?;
-    let page = report::measure::page(&series, &file, &known, &extras)?;
+    let (distances, files) = (extras::distances(&series)?, pairs::pair_files(&args.poses)?.pairs);
+    let (thumbnails, json) = rayon::join(
+        || extras::thumbnails(&series, &corners, &files, &wanted),
+        || {
+            out.write("measurements.csv", measure::to_csv(&series.poses).as_bytes())?;
+            out.write_json("measure.json", &file)
+        },
+    );
+    let json = json?;
+    let page = report::measure::page(&series, &file, &known, &Extras { thumbnails, distances })?;
     let names = corners.pairs.iter().map(|pair| pair.pair.as_str());
     let page = if args.draw { report::page::with_overlays(page, names) } else { page };
     let page = report::page::signed(page, out.provenance().as_ref());

@@ -154,7 +154,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
 /// The copy on which whole boards with large squares are seen: half as long and wide as that of about [`COARSE_PX`], of a small picture the same.
 pub fn glance_level(picture: &Picture) -> Level {
     let first = factor_for(picture, COARSE_PX);
-    Level::Reduced(if first == 1 { 1 } else { 2 * first })
+    if first == 1 { Level::Reduced(1) } else { Level::Skimmed(2 * first) }
 }
 
 /// The whole board, where its squares are large enough on a smaller copy than that of the first attempt.
@@ -246,7 +246,7 @@ fn of_size(small: &Grey8, grid: &Places, board: Board) -> Option<Places> {
 /// What was found on a copy, on one that is no finer than the picture.
 fn on_a_copy(picture: &Picture, level: Level, small: &Grey8, corners: Places) -> Detected {
     match level {
-        Level::Reduced(_) => Detected { corners, copy: small.clone(), level },
+        Level::Reduced(_) | Level::Skimmed(_) => Detected { corners, copy: small.clone(), level },
         Level::Doubled => {
             let level = Level::Reduced(1);
             let corners = corners.map(|p| level.to_copy(&Level::Doubled.to_picture(p)));

@@ -80,6 +80,7 @@ impl Run<'_> {
         let finisher =
             Finisher { run: &self, found, shared_covariance: &shared_covariance, known: &known, alone: &alone, excess };
         let targets: Vec<Result<TargetPose, Refusal>> = (0..self.at.len())
+            .into_par_iter()
             .map(|i| match (&self.refusals[i], &ended) {
                 (Some(refusal), _) => Err(refusal.clone()),
                 (None, Some(reason)) => Err(Refusal { status: "rig changed", reason: reason.clone() }),

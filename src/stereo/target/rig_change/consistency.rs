@@ -6,6 +6,7 @@
 //! six degrees of freedom where nothing is wrong.
 
 use nalgebra::{DMatrix, Matrix6, Vector6};
+use rayon::prelude::*;
 
 use crate::statistics::median;
 use crate::stereo::solve::normal_equations::inverse6;
@@ -27,7 +28,7 @@ pub(in crate::stereo::target) struct Change {
 /// What a change at each pose alone would gain.
 pub(in crate::stereo::target) fn at_each(normal: &Normal, covariance: &DMatrix<f64>) -> Vec<Option<Change>> {
     let of = |part: &PosePart| score(&part.change, &part.change_shared, &part.change_gradient, covariance);
-    normal.poses.iter().map(|part| of(part.as_ref()?)).collect()
+    normal.poses.par_iter().map(|part| of(part.as_ref()?)).collect()
 }
 
 /// What a change would gain at a pose that had no part in the minimum.
@@ -42,20 +43,26 @@ pub(in crate::stereo::target) fn from_one_on(
     normal: &Normal,
     covariance: &DMatrix<f64>,
 ) -> Option<(usize, Change, f64)> {
-    let mut best: Option<(usize, Change)> = None;
     let mut own = Matrix6::zeros();
     let mut shared = DMatrix::zeros(6, covariance.nrows());
     let mut gradient = Vector6::zeros();
+    let mut through = DMatrix::zeros(6, covariance.nrows());
+    let mut best: Option<(usize, Change)> = None;
     let first = normal.poses.iter().position(Option::is_some)?;
     let mut whole = 0.0;
-    for (i, part) in normal.poses.iter().enumerate().skip(first).rev() {
-        let Some(part) = part else { continue };
+    // From the last pose on, so that each adds only its own part.
+    let with_covariance: Vec<_> =
+        normal.poses.par_iter().map(|part| Some(&part.as_ref()?.change_shared * covariance)).collect();
+    for (i, (part, part_through)) in normal.poses.iter().zip(with_covariance).enumerate().skip(first).rev() {
+        let (Some(part), Some(part_through)) = (part, part_through) else { continue };
         own += part.change;
         shared += &part.change_shared;
+        through += part_through;
         gradient += part.change_gradient;
+        let change = score_through(&own, &(&through * shared.transpose()), &gradient);
         if i == first {
-            whole = score(&own, &shared, &gradient, covariance).map_or(0.0, |change| change.fall);
-        } else if let Some(change) = score(&own, &shared, &gradient, covariance)
+            whole = change.map_or(0.0, |change| change.fall);
+        } else if let Some(change) = change
             && best.is_none_or(|(_, b)| change.fall > b.fall)
         {
             best = Some((i, change));
@@ -75,7 +82,11 @@ fn score(
     gradient: &Vector6<f64>,
     covariance: &DMatrix<f64>,
 ) -> Option<Change> {
-    let through = shared * covariance * shared.transpose();
+    score_through(own, &(shared * covariance * shared.transpose()), gradient)
+}
+
+/// The same where it is known how the shared values' covariance comes through to the change.
+fn score_through(own: &Matrix6<f64>, through: &DMatrix<f64>, gradient: &Vector6<f64>) -> Option<Change> {
     let curvature = own - Matrix6::from_fn(|i, j| 0.5 * (through[(i, j)] + through[(j, i)]));
     let change = -(inverse6(&curvature)? * gradient);
     Some(Change { change, fall: -gradient.dot(&change) })

@@ -20,8 +20,17 @@ use crate::stereo::target::solve::prior::{RigPrior, ShapePrior, weights};
 /// Steps of one search at most; each squares what is left.
 const STEPS: usize = 12;
 
-/// The search is done when a step promises to lower the cost by less than this share of a squared residual.
-const PROMISE: f64 = 1e-8;
+/// How close to the minimum a search goes: it is done when a step promises to lower the cost by less than this, in squared residuals of
+/// unit variance. A thousandth of a standard deviation lowers it by a millionth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::stereo::target) struct Promise(f64);
+
+impl Promise {
+    /// For values that are a result.
+    pub const RESULT: Promise = Promise(1e-7);
+    /// For values that only tell which corners are outliers.
+    pub const ROUGH: Promise = Promise(1e-3);
+}
 
 /// Values of all unknowns.
 #[derive(Debug, Clone)]
@@ -137,12 +146,12 @@ impl Bundle<'_> {
     }
 
     /// Minimises from these values. `None` where the corners do not determine the poses.
-    pub fn solve(&self, start: Values, loss: Loss) -> Option<(Values, Normal)> {
+    pub fn solve(&self, start: Values, loss: Loss, least: Promise) -> Option<(Values, Normal)> {
         let mut values = start;
         let mut normal = self.normal(&values, loss)?;
         for _ in 0..STEPS {
             let (step, promise) = normal.step(&Self::shared(&values))?;
-            if promise < PROMISE {
+            if promise < least.0 {
                 break;
             }
             let before = self.cost(&values, &normal.weights, loss);

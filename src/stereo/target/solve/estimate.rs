@@ -6,6 +6,7 @@
 //! noise; then the calibration's noise is taken.
 
 use nalgebra::{DMatrix, DVector, Vector2};
+use rayon::prelude::*;
 
 use crate::geometry::Transform;
 use crate::statistics::median;
@@ -15,7 +16,7 @@ use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::solve::bundle::{Bundle, Normal, Values};
+use crate::stereo::target::solve::bundle::{Bundle, Normal, Promise, Values};
 use crate::stereo::target::solve::edge_bend::edge_bends_mm;
 use crate::stereo::target::solve::pose_block::{crossings, residual};
 use crate::stereo::target::solve::prior::{stretch_mode, weights};
@@ -70,7 +71,7 @@ pub(in crate::stereo::target) fn estimate<'a>(
     for _ in 0..2 {
         let noise = Noise::from_median(&residuals(&bundle, &values, |_| true));
         bundle.weigh(&values, &noise);
-        values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH))?.0;
+        values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?.0;
     }
     let poses = values.poses.iter().flatten().count();
     let mut noise = Noise::from_median(&residuals(&bundle, &values, |_| true));
@@ -83,7 +84,7 @@ pub(in crate::stereo::target) fn estimate<'a>(
         bundle.weigh(&values, &noise);
         bundle.mark_outliers(&mut values);
         inflate(&mut bundle.views, inflation);
-        (values, normal) = bundle.solve(values, Loss::Squared)?;
+        (values, normal) = bundle.solve(values, Loss::Squared, Promise::RESULT)?;
         let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm);
         if poses >= TELLING_POSES {
             settle_shape(&mut bundle, &values, &normal, certificate.in_plane_mm)?;
@@ -113,7 +114,7 @@ pub(in crate::stereo::target) fn estimate<'a>(
 fn residuals(
     bundle: &Bundle<'_>,
     values: &Values,
-    wanted: impl Fn(&Observation) -> bool,
+    wanted: impl Fn(&Observation) -> bool + Sync,
 ) -> Vec<(Observation, Vector2<f64>)> {
     by_pose(bundle, values, wanted).into_iter().flatten().collect()
 }
@@ -121,11 +122,11 @@ fn residuals(
 fn by_pose(
     bundle: &Bundle<'_>,
     values: &Values,
-    wanted: impl Fn(&Observation) -> bool,
+    wanted: impl Fn(&Observation) -> bool + Sync,
 ) -> Vec<Vec<(Observation, Vector2<f64>)>> {
     let rig = bundle.rig_at(values);
     let crossings = crossings(bundle.board, &values.deviations_mm);
-    let of = |(view, pose): (&View, &Option<Transform>)| {
+    let of = |(view, pose): (&View, &Option<Transform>)| -> Vec<_> {
         let Some(pose) = pose else { return Vec::new() };
         let wanted = view.observations.iter().filter(|o| wanted(o));
         let with_residual = |o: &Observation| {
@@ -134,7 +135,7 @@ fn by_pose(
         };
         wanted.filter_map(with_residual).collect()
     };
-    bundle.views.iter().zip(&values.poses).map(of).collect()
+    bundle.views.par_iter().zip(&values.poses).map(of).collect()
 }
 
 fn inflate(views: &mut [View], inflation: f64) {
@@ -161,12 +162,12 @@ impl Bundle<'_> {
         let usual_mm =
             median(values.poses.iter().flatten().map(|pose| pose.translation.vector.z)).unwrap_or(f64::INFINITY);
         let mut views = std::mem::take(&mut self.views);
-        for (view, pose) in views.iter_mut().zip(&values.poses) {
+        views.par_iter_mut().zip(&values.poses).for_each(|(view, pose)| {
             for o in &mut view.observations {
                 let depth_mm = pose.map_or(usual_mm, |pose| (pose * crossings[self.board.index(o.col, o.row)]).z);
                 o.whitener = whitener(&noise.covariance(&self.with_edge_bend(&rig, depth_mm, o)));
             }
-        }
+        });
         self.views = views;
     }
 
@@ -175,16 +176,17 @@ impl Bundle<'_> {
     fn mark_outliers(&mut self, values: &mut Values) {
         let rig = self.rig_at(values);
         let crossings = crossings(self.board, &values.deviations_mm);
-        for (view, place) in self.views.iter_mut().zip(&mut values.poses) {
-            let Some(pose) = place else { continue };
+        let board = self.board;
+        self.views.par_iter_mut().zip(&mut values.poses).for_each(|(view, place)| {
+            let Some(pose) = place else { return };
             for o in &mut view.observations {
                 o.active =
-                    residual(&rig, &crossings, self.board, pose, o).is_some_and(|r| o.whiten(r).norm() <= OUTLIER);
+                    residual(&rig, &crossings, board, pose, o).is_some_and(|r| o.whiten(r).norm() <= OUTLIER);
             }
             if !enough(view) {
                 *place = None;
             }
-        }
+        });
     }
 }
 
