@@ -4,13 +4,13 @@
 //! along the rows shows the order both pictures were read in.
 
 use camino::Utf8Path;
-use image::{Rgb, RgbImage};
+use image::{GrayImage, Luma, Rgb, RgbImage, imageops};
 use nalgebra::Point2;
 
 use super::detect::COARSE_PX;
 use super::image::{Grey8, Mosaic};
 use super::input::pairs::PairFiles;
-use super::pyramid::{Level, Small};
+use super::pyramid::Small;
 use super::{Corner, PairCorners, Side};
 
 /// Standard deviations up to which a corner gets a colour, px, from the best.
@@ -30,7 +30,8 @@ const SMALL_RING_PX: f64 = 2.0;
 pub struct SideBySide {
     /// Left, then right.
     pub image: RgbImage,
-    levels: [Level; 2],
+    /// Pixels of each picture along one pixel here.
+    scales: [f64; 2],
     left_width: u32,
     ring_px: f64,
 }
@@ -39,20 +40,27 @@ impl SideBySide {
     /// Reads both; `None` where a picture can't be read.
     pub fn read(files: &PairFiles, mosaic: Option<Mosaic>) -> Option<SideBySide> {
         let (left, right) = rayon::join(|| small(&files.left, mosaic), || small(&files.right, mosaic));
-        Some(SideBySide::new([&left?, &right?], RING_PX))
+        let (left, right) = (left?, right?);
+        Some(SideBySide::new([&left, &right].map(|s| (grey(&s.copy), s.level.scale())), RING_PX))
     }
 
-    fn new([left, right]: [&Small; 2], ring_px: f64) -> SideBySide {
-        let (width, height) = (left.copy.width + right.copy.width, left.copy.height.max(right.copy.height));
-        let mut image = RgbImage::new(width as u32, height as u32);
-        image::imageops::replace(&mut image, &rgb(&left.copy), 0, 0);
-        image::imageops::replace(&mut image, &rgb(&right.copy), left.copy.width as i64, 0);
-        SideBySide { image, levels: [left.level, right.level], left_width: left.copy.width as u32, ring_px }
+    fn new([(left, left_scale), (right, right_scale)]: [(GrayImage, f64); 2], ring_px: f64) -> SideBySide {
+        let (width, height) = (left.width() + right.width(), left.height().max(right.height()));
+        let image = RgbImage::from_fn(width, height, |x, y| {
+            let of = if x < left.width() {
+                left.get_pixel_checked(x, y)
+            } else {
+                right.get_pixel_checked(x - left.width(), y)
+            };
+            let Luma([grey]) = of.copied().unwrap_or(Luma([0]));
+            Rgb([grey; 3])
+        });
+        SideBySide { image, scales: [left_scale, right_scale], left_width: left.width(), ring_px }
     }
 
     /// Where a place in a raw picture lies, px.
     pub fn place(&self, side: Side, px: &Point2<f64>) -> Point2<f64> {
-        let at = self.levels[side as usize].to_copy(px);
+        let at = px.map(|v| (v + 0.5) / self.scales[side as usize] - 0.5);
         if side == Side::Right { Point2::new(at.x + f64::from(self.left_width), at.y) } else { at }
     }
 
@@ -76,9 +84,20 @@ pub fn drawn(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -
     Some(with_corners(SideBySide::read(files, mosaic)?, corners))
 }
 
-/// Thumbnails of a pair with its corners.
-pub fn drawn_small(thumbnails: [&Small; 2], corners: &PairCorners) -> SideBySide {
-    with_corners(SideBySide::new(thumbnails, SMALL_RING_PX), corners)
+/// Thumbnails of a pair with its corners, together not wider than this, px.
+pub fn drawn_small(thumbnails: [&Small; 2], corners: &PairCorners, width: u32) -> SideBySide {
+    with_corners(SideBySide::new(thumbnails.map(|small| narrowed(small, width / 2)), SMALL_RING_PX), corners)
+}
+
+/// A thumbnail not wider than this, px, and how many pixels of the picture one of it is.
+fn narrowed(small: &Small, width: u32) -> (GrayImage, f64) {
+    let (all, scale) = (grey(&small.copy), small.level.scale());
+    if all.width() <= width {
+        return (all, scale);
+    }
+    let by = f64::from(all.width()) / f64::from(width.max(1));
+    let height = (f64::from(all.height()) / by).round().max(1.0) as u32;
+    (imageops::thumbnail(&all, width.max(1), height), scale * by)
 }
 
 fn with_corners(mut both: SideBySide, corners: &PairCorners) -> SideBySide {
@@ -98,9 +117,9 @@ fn small(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<Small> {
     Some(Small::of(&super::find::picture(path, mosaic).ok()?, COARSE_PX))
 }
 
-fn rgb(copy: &Grey8) -> RgbImage {
-    RgbImage::from_fn(copy.width as u32, copy.height as u32, |x, y| {
-        Rgb([copy.pixels[y as usize * copy.width + x as usize]; 3])
+fn grey(copy: &Grey8) -> GrayImage {
+    GrayImage::from_fn(copy.width as u32, copy.height as u32, |x, y| {
+        Luma([copy.pixels[y as usize * copy.width + x as usize]])
     })
 }
 

@@ -137,8 +137,8 @@ fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
     let count = lines.len() * factor;
     let unit = scale / count as f64;
     // The same numbers in whole ones where nothing is stretched: the rounding upwards of the reciprocal is too little to reach the next half.
-    let by_whole = (low == 0.0 && high == 255.0 && count <= MOST_BY_WHOLE)
-        .then(|| (1u32 << SHIFT).div_ceil(count as u32));
+    let by_whole =
+        (low == 0.0 && high == 255.0 && count <= MOST_BY_WHOLE).then(|| (1u32 << SHIFT).div_ceil(count as u32));
     let rows = image.pixels.chunks(factor * image.width.max(1));
     for (out, rows) in pixels.chunks_exact_mut(w.max(1)).zip(rows) {
         widest(

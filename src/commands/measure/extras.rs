@@ -46,7 +46,7 @@ pub(super) fn thumbnails(
         let both = found.and_then(|files| {
             let (left, right) =
                 rayon::join(|| find::thumbnail(&files.left, wanted), || find::thumbnail(&files.right, wanted));
-            Some(overlay::drawn_small([&left?, &right?], pair))
+            Some(overlay::drawn_small([&left?, &right?], pair, WIDTH))
         });
         let jpeg_base64 = both.and_then(|both| PairJpeg::new(both, WIDTH)).map_or_else(String::new, |jpeg| jpeg.base64);
         Thumbnail { pose: m.at.pose.clone(), caption: caption.clone(), jpeg_base64 }

@@ -27,7 +27,8 @@ impl PairJpeg {
         let image = std::mem::take(&mut both.image);
         let scale = f64::from(width) / f64::from(image.width().max(1));
         let height = ((f64::from(image.height()) * scale) as u32).max(1);
-        let reduced = image::imageops::thumbnail(&image, width, height);
+        let drawn_so = image.dimensions() == (width, height);
+        let reduced = if drawn_so { image } else { image::imageops::thumbnail(&image, width, height) };
         let mut bytes = std::io::Cursor::new(Vec::new());
         reduced.write_to(&mut bytes, image::ImageFormat::Jpeg).ok()?;
         Some(PairJpeg { base64: BASE64_STANDARD.encode(bytes.into_inner()), width, height, scale, places: both })

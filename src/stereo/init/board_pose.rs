@@ -34,6 +34,11 @@ pub fn fit(shared: &Shared, view: &View, loss: Loss) -> Option<PoseFit> {
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
+/// Fits a pose that is known with other weights, to about a tenth of a standard deviation.
+pub fn refit(shared: &Shared, view: &View, known: Transform, loss: Loss) -> Option<PoseFit> {
+    search(shared, view, known, loss, Search::ROUGH)
+}
+
 /// Fits the pose from a start that is known, to the limit of rounding.
 pub fn refine(shared: &Shared, view: &View, start: Transform, loss: Loss) -> Option<PoseFit> {
     search(shared, view, start, loss, Search::EXACT)

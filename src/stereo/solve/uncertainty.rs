@@ -3,7 +3,8 @@
 //! In: the blocks of all pairs at a minimum. Out: the covariance of the shared numbers and of each pose, with unit variance of the
 //! whitened residuals. Goes wrong: numbers that the views do not determine; then there is no covariance.
 
-use nalgebra::{DMatrix, Matrix6};
+use nalgebra::{DMatrix, DMatrixViewMut, Matrix6};
+use rayon::prelude::*;
 
 use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::{Layout, Values};
@@ -77,6 +78,8 @@ pub fn of_blocks(blocks: &[Block], layout: &Layout) -> Option<Uncertainty> {
 
 /// Inverse of a symmetric positive definite matrix with rows of different units; `None` where it is singular to rounding.
 pub fn invert(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    /// Columns of the inverse that are worked on at a time.
+    const COLUMNS: usize = 16;
     /// Smallest share of its scaled eigenvalues that double precision still tells from a dependence.
     const SMALLEST: f64 = 1e-13;
     let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());
@@ -85,7 +88,11 @@ pub fn invert(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     }
     let n = matrix.nrows();
     let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
-    let inverse = scaled.clone().cholesky()?.inverse();
+    let cholesky = scaled.clone().cholesky()?;
+    let mut inverse = DMatrix::identity(n, n);
+    inverse.as_mut_slice().par_chunks_mut(COLUMNS * n).for_each(|columns| {
+        cholesky.solve_mut(&mut DMatrixViewMut::from_slice(columns, n, columns.len() / n));
+    });
     // The norms bound the ratio of the eigenvalues from below, and cost next to nothing beside them.
     let bound = 1.0 / (scaled.norm() * inverse.norm());
     if bound.is_nan() || bound <= SMALLEST {

@@ -68,7 +68,10 @@ impl Run<'_> {
             self.starts
                 .par_iter()
                 .enumerate()
-                .map(|(i, start)| known.fit(&found.bundle.views[i], start.pose.as_ref()?))
+                .map(|(i, start)| {
+                    let begin = found.values.poses[i].as_ref().or(start.pose.as_ref())?;
+                    known.fit(&found.bundle.views[i], begin)
+                })
                 .collect()
         };
         let ended = match &judgement {

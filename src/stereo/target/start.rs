@@ -37,17 +37,16 @@ pub(super) struct Start {
 pub(super) fn starts(rig: &Rig, board: &Board, pairs: &[PairCorners]) -> Vec<Start> {
     let shared = Shared { rig: rig.clone(), shape_mm: FLAT };
     let mut views: Vec<View> = pairs.par_iter().map(|pair| View::new(board, pair, FEWEST_CORNERS)).collect();
-    let mut poses: Vec<Option<Transform>> = Vec::new();
-    // Twice: the scatter is known only after the first fit.
-    for round in 0..2 {
-        if round == 0 {
-            views.par_iter_mut().for_each(|view| {
-                if let Some(quarters) = numbering::on_rig(&shared, board, view) {
-                    view.turn_right(board, quarters);
-                }
-            });
+    views.par_iter_mut().for_each(|view| {
+        if let Some(quarters) = numbering::on_rig(&shared, board, view) {
+            view.turn_right(board, quarters);
         }
-        poses = views.par_iter().map(|view| Some(robust(&shared, view)?.left_from_board)).collect();
+    });
+    let mut poses: Vec<Option<Transform>> = vec![None; views.len()];
+    // Twice: the scatter is known only after the first fit.
+    for _ in 0..2 {
+        let robust = |(view, known): (&View, &Option<Transform>)| Some(robust(&shared, view, *known)?.left_from_board);
+        poses = views.par_iter().zip(&poses).map(robust).collect();
         let left: Vec<(Observation, Vector2<f64>)> = views
             .iter()
             .zip(&poses)
@@ -70,8 +69,13 @@ pub(super) fn enough(view: &View) -> bool {
     Side::BOTH.iter().all(|side| view.active(*side).count() >= FEWEST_CORNERS)
 }
 
-fn robust(shared: &Shared, view: &View) -> Option<PoseFit> {
-    if enough(view) { board_pose::fit(shared, view, Loss::Cauchy(CAUCHY_WIDTH)) } else { None }
+fn robust(shared: &Shared, view: &View, known: Option<Transform>) -> Option<PoseFit> {
+    let loss = Loss::Cauchy(CAUCHY_WIDTH);
+    match known {
+        _ if !enough(view) => None,
+        Some(known) => board_pose::refit(shared, view, known, loss),
+        None => board_pose::fit(shared, view, loss),
+    }
 }
 
 /// Median over the poses of the length of `right_from_left` as each camera alone sees the target, over the calibrated one: what the

@@ -41,6 +41,7 @@ fn pictures() -> PathBuf {
 /// Runs the program; wall time in seconds and the largest memory in MB.
 pub fn run(folder: &Path, args: &[&str]) -> (f64, f64) {
     let start = Instant::now();
+    let wall_s = std::sync::OnceLock::new();
     let mut child = Command::new(env!("CARGO_BIN_EXE_stereocal"))
         .args(args)
         .current_dir(folder)
@@ -50,15 +51,22 @@ pub fn run(folder: &Path, args: &[&str]) -> (f64, f64) {
         .expect("the program");
     let status = PathBuf::from(format!("/proc/{}/status", child.id()));
     let mut peak_kb: f64 = 0.0;
-    while child.try_wait().expect("a child").is_none() {
-        if let Ok(text) = std::fs::read_to_string(&status) {
-            let line = text.lines().find(|line| line.starts_with("VmHWM"));
-            let kb = line.and_then(|line| line.split_whitespace().nth(1)).and_then(|kb| kb.parse().ok());
-            peak_kb = peak_kb.max(kb.unwrap_or(0.0));
+    std::thread::scope(|scope| {
+        // Its end is waited for, not looked for from time to time.
+        scope.spawn(|| {
+            child.wait().expect("a child");
+            wall_s.set(start.elapsed().as_secs_f64()).expect("one end");
+        });
+        while wall_s.get().is_none() {
+            if let Ok(text) = std::fs::read_to_string(&status) {
+                let line = text.lines().find(|line| line.starts_with("VmHWM"));
+                let kb = line.and_then(|line| line.split_whitespace().nth(1)).and_then(|kb| kb.parse().ok());
+                peak_kb = peak_kb.max(kb.unwrap_or(0.0));
+            }
+            std::thread::sleep(std::time::Duration::from_millis(20));
         }
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
-    (start.elapsed().as_secs_f64(), peak_kb / 1024.0)
+    });
+    (*wall_s.get().expect("an end"), peak_kb / 1024.0)
 }
 
 /// Reads every picture and hands its bytes to a decoder, with the program's threads, and does nothing with what it gives.
@@ -80,6 +88,8 @@ fn run_speed() {
     let bare = |bytes: &[u8], _: &camino::Utf8Path| drop(::image::load_from_memory(bytes).expect("a picture"));
     let (mut decoding, mut without_checks, mut wall) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
     let mut memory: f64 = 0.0;
+    // Kept to the end: a file system is slow to make files where many were deleted just before.
+    let mut results = Vec::new();
     // In turn, so that what else the machine does meets all of them.
     for _ in 0..RUNS {
         decoding = decoding.min(decode_s(&folder, program));
@@ -89,6 +99,7 @@ fn run_speed() {
         let (s, mb) = self::run(&folder, &["measure", "poses", "--calibration", "rig/calibration.json", "--out", out]);
         wall = wall.min(s);
         memory = memory.max(mb);
+        results.push(fresh);
     }
     println!(
         "\n{pairs} pairs of 26 Mpx: measure {:.3} s a pair, decoding alone {:.3}, ratio {:.2} (without the checks of the file {:.3}, ratio {:.2}); memory {memory:.0} MB",

@@ -9,6 +9,7 @@ use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::root_mean_square;
 use crate::stereo::data::view::View;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::target::solve::bundle::Promise;
 use crate::stereo::target::solve::estimate::{Estimate, OUTLIER};
 use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, PoseSums, SeenFrom, crossings, residual};
 use crate::stereo::target::start::enough;
@@ -63,7 +64,7 @@ impl<'a> Known<'a> {
     pub fn fit(&self, view: &View, start: &Transform) -> Option<Alone> {
         let mut view = view.clone();
         view.observations.iter_mut().for_each(|o| o.active = true);
-        let mut pose = self.search(&view, *start, Loss::Cauchy(CAUCHY_WIDTH))?;
+        let mut pose = self.search(&view, *start, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?;
         for _ in 0..ROUNDS {
             for o in &mut view.observations {
                 o.active =
@@ -72,7 +73,7 @@ impl<'a> Known<'a> {
             if !enough(&view) {
                 return None;
             }
-            pose = self.search(&view, pose, Loss::Squared)?;
+            pose = self.search(&view, pose, Loss::Squared, Promise::RESULT)?;
         }
         let part = PoseBlock::of(&self.seen(&view, &pose), Loss::Squared)?.eliminate(self.basis)?;
         let active: Vec<(&Observation, Vector2<f64>)> =
@@ -100,7 +101,7 @@ impl<'a> Known<'a> {
     }
 
     /// Gauss-Newton with halved steps.
-    fn search(&self, view: &View, start: Transform, loss: Loss) -> Option<Transform> {
+    fn search(&self, view: &View, start: Transform, loss: Loss, least: Promise) -> Option<Transform> {
         let mut pose = start;
         let mut at = PoseSums::of(&self.seen(view, &pose), loss)?;
         for _ in 0..STEPS {
@@ -117,7 +118,7 @@ impl<'a> Known<'a> {
             };
             let Some((trial, next)) = better else { break };
             (pose, at) = (trial, next);
-            if promise < 1e-9 {
+            if promise < least.0 {
                 break;
             }
         }

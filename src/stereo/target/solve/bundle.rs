@@ -23,13 +23,13 @@ const STEPS: usize = 12;
 /// How close to the minimum a search goes: it is done when a step promises to lower the cost by less than this, in squared residuals of
 /// unit variance. A thousandth of a standard deviation lowers it by a millionth.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stereo::target) struct Promise(f64);
+pub(in crate::stereo::target) struct Promise(pub f64);
 
 impl Promise {
     /// For values that are a result.
     pub const RESULT: Promise = Promise(1e-7);
     /// For values that only tell which corners are outliers.
-    pub const ROUGH: Promise = Promise(1e-3);
+    pub const ROUGH: Promise = Promise(1e-2);
 }
 
 /// Values of all unknowns.

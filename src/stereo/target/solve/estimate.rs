@@ -5,6 +5,8 @@
 //! (MacKay's fixed point, the same as restricted maximum likelihood at its end). Goes wrong: one or two poses cannot tell print from
 //! noise; then the calibration's noise is taken.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector, Vector2};
 use rayon::prelude::*;
 
@@ -77,6 +79,7 @@ pub(in crate::stereo::target) fn estimate<'a>(
     let mut noise = Noise::from_median(&residuals(&bundle, &values, |_| true));
     let mut inflation: f64 = 1.0;
     let mut normal = bundle.normal(&values, Loss::Squared)?;
+    let mut covariance = DMatrix::zeros(0, 0);
     for round in 0..ROUNDS {
         if round > 0 && poses >= TELLING_POSES {
             bundle.unbend(&mut values);
@@ -85,12 +88,14 @@ pub(in crate::stereo::target) fn estimate<'a>(
         bundle.mark_outliers(&mut values);
         inflate(&mut bundle.views, inflation);
         (values, normal) = bundle.solve(values, Loss::Squared, Promise::RESULT)?;
+        covariance = normal.covariance()?;
         let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm);
         if poses >= TELLING_POSES {
-            settle_shape(&mut bundle, &values, &normal, certificate.in_plane_mm)?;
+            settle_shape(&mut bundle, &values, (&normal, &covariance), certificate.in_plane_mm)?;
             bundle.edge_bends_mm = edge_bends_mm(&bundle, &values, &noise);
         }
-        let told = told_by_data(&normal)?;
+        // How many of the shared unknowns the corners determine rather than what was known before.
+        let told = covariance.component_mul(&normal.data).sum();
         let active = residuals(&bundle, &values, |o| o.active);
         noise = match usual {
             Some(usual) if poses < TELLING_POSES => usual,
@@ -106,7 +111,6 @@ pub(in crate::stereo::target) fn estimate<'a>(
             break;
         }
     }
-    let covariance = normal.covariance()?;
     Some(Estimate { bundle, values, normal, covariance, noise, inflation })
 }
 
@@ -147,12 +151,6 @@ fn neighbours(bundle: &Bundle<'_>, values: &Values) -> NeighbourCorrelation {
     NeighbourCorrelation::of(bundle.board, by_pose(bundle, values, |o| o.active).into_iter())
 }
 
-/// How many of the shared unknowns the corners determine rather than what was known before.
-fn told_by_data(normal: &Normal) -> Option<f64> {
-    let covariance = normal.covariance()?;
-    Some(covariance.component_mul(&normal.data).sum())
-}
-
 impl Bundle<'_> {
     /// Sets the whiteners of all corners: their noise and what bent edges add.
     fn weigh(&mut self, values: &Values, noise: &Noise) {
@@ -180,8 +178,7 @@ impl Bundle<'_> {
         self.views.par_iter_mut().zip(&mut values.poses).for_each(|(view, place)| {
             let Some(pose) = place else { return };
             for o in &mut view.observations {
-                o.active =
-                    residual(&rig, &crossings, board, pose, o).is_some_and(|r| o.whiten(r).norm() <= OUTLIER);
+                o.active = residual(&rig, &crossings, board, pose, o).is_some_and(|r| o.whiten(r).norm() <= OUTLIER);
             }
             if !enough(view) {
                 *place = None;
@@ -190,8 +187,14 @@ impl Bundle<'_> {
     }
 }
 
-/// Finds how far the crossings deviate in the plane and out of it, everything else as linearised.
-fn settle_shape(bundle: &mut Bundle<'_>, values: &Values, normal: &Normal, certificate_mm: f64) -> Option<()> {
+/// Finds how far the crossings deviate in the plane and out of it, everything else as linearised; with the covariance of the shared
+/// unknowns as the deviations were thought to be before.
+fn settle_shape(
+    bundle: &mut Bundle<'_>,
+    values: &Values,
+    (normal, covariance): (&Normal, &DMatrix<f64>),
+    certificate_mm: f64,
+) -> Option<()> {
     let n = values.rig.len();
     let m = 3 * values.deviations_mm.len();
     let stretch = stretch_mode(bundle.board);
@@ -199,11 +202,10 @@ fn settle_shape(bundle: &mut Bundle<'_>, values: &Values, normal: &Normal, certi
     // Shifts, turns, tilts and the stretch are not the print's.
     let free = [2.0 * crossings - 4.0, crossings - 3.0];
     let right = &normal.data * Bundle::shared(values) - &normal.gradient;
+    let mut covariance = Cow::Borrowed(covariance);
     for _ in 0..FIXED_POINT_STEPS {
         let before = [bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm];
-        let weights = weights(&bundle.rig, &bundle.shape, bundle.board, &normal.data);
-        let covariance = invert(&(&normal.data + weights))?;
-        let shape: DVector<f64> = (&covariance * &right).rows(n, m).into_owned();
+        let shape: DVector<f64> = (covariance.as_ref() * &right).rows(n, m).into_owned();
         let block = covariance.view((n, n), (m, m));
         let along = stretch.dot(&shape);
         let mut squares = [-along * along, 0.0];
@@ -222,6 +224,8 @@ fn settle_shape(bundle: &mut Bundle<'_>, values: &Values, normal: &Normal, certi
         if next.iter().zip(before).all(|(next, before)| (next / before - 1.0).abs() < SETTLED) {
             break;
         }
+        let weights = weights(&bundle.rig, &bundle.shape, bundle.board, &normal.data);
+        covariance = Cow::Owned(invert(&(&normal.data + weights))?);
     }
     Some(())
 }
