@@ -297,13 +297,14 @@ mod tests {
     #[test]
     fn large_squares_are_found_on_a_smaller_copy_than_small_ones() {
         let board = Board { squares: "8x6".parse().unwrap(), square_mm: 10.0 };
-        for (side, level) in [(170, 4), (48, 4), (40, 2), (20, 2)] {
+        let (glance, first) = (Level::Skimmed(4), Level::Reduced(2));
+        for (side, level) in [(170, glance), (48, glance), (40, first), (20, first)] {
             let detected = detect(&picture(2048, side), board).unwrap();
-            assert_eq!((detected.level, detected.corners.count()), (Level::Reduced(level), 35), "{side}");
+            assert_eq!((detected.level, detected.corners.count()), (level, 35), "{side}");
             for (col, row, place) in detected.corners.iter() {
                 let place = (detected.level.to_picture(place).coords.add_scalar(0.5)) / side as f64;
                 let off = place.map(|v| (v - v.round()).abs() * side as f64);
-                assert!(off.max() <= level as f64, "{side}: {col} {row} {place}");
+                assert!(off.max() <= level.scale(), "{side}: {col} {row} {place}");
             }
         }
     }
