@@ -26,6 +26,9 @@ pub struct Told {
 /// changes what is said of the robot.
 const ENOUGH: f64 = 2.0;
 
+/// A smooth error of less than this is rounding, mm: data without noise have one.
+const SMALLEST_MM: f64 = 1e-5;
+
 /// Lengths that are tried, in root mean square distances of a placement's points from their middle.
 const LENGTHS: [f64; 4] = [0.4, 0.7, 1.2, 2.5];
 
@@ -70,7 +73,9 @@ pub fn most_probable(rows: &Rows, offsets: &[f64], sds: &[f64]) -> Option<Told> 
             }
         }
     }
-    found.map(|(evidence, error)| Told { error, evidence: evidence - without }).filter(|told| told.evidence > ENOUGH)
+    found
+        .map(|(evidence, error)| Told { error, evidence: evidence - without })
+        .filter(|told| told.evidence > ENOUGH && told.error.sd_mm > SMALLEST_MM)
 }
 
 /// Root mean square distance of points from the middle of their placement, mm; `None` where there are too few points or placements.

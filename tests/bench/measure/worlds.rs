@@ -20,6 +20,14 @@ pub fn world(size_px: u32, target_um: f64, samples: usize, seed: u64) -> World {
     World::new(settings, None).expect("the preset is possible")
 }
 
+/// The same with a robot that repeats exactly.
+pub fn still_world(size_px: u32, target_um: f64, samples: usize, seed: u64) -> World {
+    let mut settings = Settings { size_px, samples, verify: 0, seed, ..Settings::small() };
+    settings.target_workmanship.pitch_um = target_um;
+    settings.robot.repeatability_mm = 0.0;
+    World::new(settings, None).expect("the preset is possible")
+}
+
 /// What the calibration of a world's check pairs leaves `measure` with.
 pub fn knowledge(world: &World) -> Knowledge {
     let corners = noisy(world.check_corners(), 2 * world.settings.seed);
