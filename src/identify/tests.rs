@@ -1,8 +1,8 @@
 //! The paper's experiment rebuilt: four spheres, 262 poses and 50 to verify, Table 2's values as truth.
 
-use crate::identify::data::dataset::Dataset;
+use crate::identify::data::dataset::{Dataset, Reading};
 use crate::identify::judge::choose::identify;
-use crate::identify::judge::errors::Spread;
+use crate::identify::judge::errors::{Judge, Spread};
 use crate::identify::record::quality;
 use crate::identify::settings::{Extensions, Method, Model, Prior, Settings};
 use crate::identify::solve::formulation::Formulation;
@@ -337,5 +337,42 @@ fn readings_of_another_scale_are_said_to_be_so() {
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
         let findings = crate::identify::data::doctor::findings(&set, &found, &Default::default());
         assert_eq!(findings.iter().any(|f| f.finding.contains("all links are found")), said, "{scale}: {findings:?}");
+    }
+}
+
+#[test]
+fn points_without_noise_give_the_true_robot_whatever_covariances_they_state() {
+    use crate::measurements::Observed;
+    let world = synthetic::world(60, 0.0, 8);
+    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+    // None; and such that the data outweigh the tolerances by more than double precision holds.
+    for stated_mm in [0.0, 1e-4, 0.002, 0.1] {
+        let mut rows = world.rows.clone();
+        for row in &mut rows {
+            if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
+                let covariance = nalgebra::Matrix3::from_diagonal_element(stated_mm * stated_mm);
+                *covariance_mm2 = (stated_mm > 0.0).then_some(covariance);
+            }
+        }
+        let mut set = Dataset::new(&rows, 1).unwrap();
+        if stated_mm > 0.0 {
+            // A scale, and bends of space, that all rows share.
+            let columns = |p: &nalgebra::Vector3<f64>| {
+                let c = p.map(|v| v / 500.0);
+                [c, c.map(|v| v * v), nalgebra::Vector3::new(c.y * c.z, c.x * c.z, c.x * c.y), c * c.z]
+            };
+            let shared = |pose: &crate::identify::data::dataset::Pose| match &pose.reading {
+                Reading::Position { point_mm, .. } => {
+                    nalgebra::Matrix3xX::from_columns(&columns(&point_mm.coords).map(|c| c * 0.003))
+                }
+                _ => nalgebra::Matrix3xX::zeros(4),
+            };
+            set.shared = set.poses.iter().map(shared).collect();
+        }
+        let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
+        let robot = &found.candidates[found.chosen].robot;
+        let errors = Judge::plain(&set, &found.fitted, true).errors(robot, &set.verify_rows());
+        let worst = errors.iter().filter_map(|e| e.point_mm).map(|p| p.norm()).fold(0.0, f64::max);
+        assert!(worst < 1e-4, "{stated_mm}: {} leaves {worst} mm", found.terms.name());
     }
 }
