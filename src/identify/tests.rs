@@ -373,6 +373,6 @@ fn points_without_noise_give_the_true_robot_whatever_covariances_they_state() {
         let robot = &found.candidates[found.chosen].robot;
         let errors = Judge::plain(&set, &found.fitted, true).errors(robot, &set.verify_rows());
         let worst = errors.iter().filter_map(|e| e.point_mm).map(|p| p.norm()).fold(0.0, f64::max);
-        assert!(worst < 1e-4, "{stated_mm}: {} leaves {worst} mm", found.terms.name());
+        assert!(worst < 1e-3, "{stated_mm}: {} leaves {worst} mm", found.terms.name());
     }
 }
