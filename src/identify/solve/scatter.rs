@@ -8,6 +8,7 @@
 use crate::identify::residuals::eliminate::Raw;
 use crate::identify::residuals::rows::Rows;
 use crate::identify::residuals::weights::{EVIDENCE, Scatter};
+use crate::statistics::median;
 
 /// Least scatter, mm and rad: far below any instrument; keeps weights finite for exact data.
 pub(super) const LEAST_MM: f64 = 1e-7;
@@ -117,7 +118,9 @@ pub(super) fn robust_scale(
     freedom: f64,
     scatter: &Scatter,
 ) -> f64 {
-    let (mut low, mut high) = (1e-12, 1e12);
+    // Of data without noise rounding is left, which is no scale for what is left after the next step.
+    let sds = residuals.iter().flat_map(Residual::numbers).map(|n| n.variance(scatter).sqrt());
+    let (mut low, mut high) = (LEAST_MM / median(sds).unwrap_or(1.0).max(LEAST_MM), 1e12);
     for _ in 0..2 * HALVINGS {
         let scale = f64::sqrt(low * high);
         let above = freedom * median_size(&sizes(residuals, scatter, scale, count), rows) > 1.0;
