@@ -16,7 +16,7 @@ use super::wide::widest;
 pub enum Level {
     /// Reduced by a whole factor.
     Reduced(usize),
-    /// The same of a few lines of each block only, which costs half: most of the time goes into reading the picture.
+    /// The same of four lines of each block only, which costs half: most of the time goes into reading the picture.
     Skimmed(usize),
     /// Enlarged to twice the size, for squares of a few pixels.
     Doubled,

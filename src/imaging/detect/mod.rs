@@ -151,7 +151,8 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     search.partial.filter(|p| p.corners.count() > larger).ok_or_else(|| refusal(seen, board))
 }
 
-/// The copy on which whole boards with large squares are seen: half as long and wide as that of about [`COARSE_PX`], of a small picture the same.
+/// The copy on which whole boards with large squares are seen: half as long and wide as that of about [`COARSE_PX`] and made of a few of the
+/// picture's lines, of a small picture the same.
 pub fn glance_level(picture: &Picture) -> Level {
     let first = factor_for(picture, COARSE_PX);
     if first == 1 { Level::Reduced(1) } else { Level::Skimmed(2 * first) }

@@ -90,7 +90,7 @@ pub fn invert(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
     let cholesky = scaled.clone().cholesky()?;
     let mut inverse = DMatrix::identity(n, n);
-    inverse.as_mut_slice().par_chunks_mut(COLUMNS * n).for_each(|columns| {
+    inverse.as_mut_slice().par_chunks_mut((COLUMNS * n).max(1)).for_each(|columns| {
         cholesky.solve_mut(&mut DMatrixViewMut::from_slice(columns, n, columns.len() / n));
     });
     // The norms bound the ratio of the eigenvalues from below, and cost next to nothing beside them.
