@@ -3,8 +3,8 @@
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-use clap::Parser;
-use stereocal::cli::Cli;
+use clap::{CommandFactory, Parser};
+use stereocal::cli::{Cli, unexpected};
 use stereocal::commands::{self, Outcome};
 use stereocal::diagnostic::{Explain, report};
 
@@ -15,8 +15,12 @@ fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(message) if message.use_stderr() => {
+            let words: Vec<String> = std::env::args_os().skip(1).map(|w| w.to_string_lossy().into_owned()).collect();
             // A stderr that cannot be written leaves nowhere to complain to.
             let _ = message.print();
+            if let Some(hint) = unexpected::hint(&Cli::command(), &words, &message) {
+                let _ = writeln!(std::io::stderr().lock(), "  hint: {hint}");
+            }
             return ExitCode::from(BAD_USAGE);
         }
         Err(help) => return printed(help.print(), 0),

@@ -3,6 +3,7 @@
 mod cameras;
 mod robot;
 mod simulate;
+pub mod unexpected;
 
 use camino::Utf8PathBuf;
 use clap::{Args, Parser, Subcommand};

@@ -24,6 +24,7 @@ fn no_command_is_bad_usage() {
     refused(&[], &[], 2, &["Usage"]);
     refused(&["camera-check"], &[], 2, &["required"]);
     refused(&["calibrate"], &[], 2, &["unrecognized subcommand"]);
+    refused(&["identify", "points.csv"], &[], 2, &["unexpected argument", "hint: ", "`--measurements points.csv`"]);
 }
 
 #[test]
