@@ -112,8 +112,8 @@ pub fn run_all(size: Option<u32>) {
     );
     println!("  px  target poses rigs | point um            | orientation urad    | distance um         | missing");
     let lines = [
-        (1280, 0.0, 296, 1),
-        (1280, 10.0, 296, 1),
+        (1280, 0.0, 296, 6),
+        (1280, 10.0, 296, 6),
         (1280, 0.0, 8, 24),
         (1280, 10.0, 8, 24),
         (5120, 0.0, 8, 12),
