@@ -166,11 +166,24 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "they are counted in the figures; measure them again",
         );
     }
-    if let Some(far) = far_from_nominal(found) {
+    if let Some(far) = far(found, &link_limit) {
         add(
-            format!("{far}: more than any workshop gets wrong, so the robot file may be of another robot"),
+            format!(
+                "the links found are far from the nominal ones ({far}): more than any workshop gets wrong, so the robot file may be of another \
+                 robot"
+            ),
             Vec::new(),
             "the robot that was found is used; see whether the file is the right one",
+        );
+    }
+    if let Some(far) = far(found, &term_limit) {
+        add(
+            format!(
+                "terms found are larger than gears, bearings and encoders have them ({far}): they may stand in for something else that is \
+                 wrong, such as joints or conventions"
+            ),
+            Vec::new(),
+            "the robot that was found is used where it was measured; don't trust it elsewhere before the reason is known",
         );
     }
     if let Some(scale) = CommonScale::new(set, found).filter(CommonScale::is_told) {
@@ -207,7 +220,7 @@ pub fn along_the_rows(along: &Along) -> Vec<Finding> {
             along.drifting.clone(),
             match ranges(&|s| drifts(s)).len() {
                 0 => "nothing was done: the errors of these groups are in the result".to_owned(),
-                parts => format!("the rows were cut into {parts} placements, within which little of it is left"),
+                parts => format!("the rows were cut into {parts} placements; what moves within each is in the result"),
             }
             .as_str(),
         );
@@ -236,35 +249,48 @@ pub fn zero(found: &Identification) -> Option<(f64, f64)> {
     (value.abs() > ZERO_SIGMAS * sigma).then_some((value, sigma))
 }
 
-/// Corrections beyond which a link is not the one of the robot's file, mm and rad, and how many standard deviations they must have.
-const FAR_MM: f64 = 10.0;
-const FAR_RAD: f64 = 0.06;
+/// How many standard deviations a correction must have to be far from nominal.
 const FAR_SIGMAS: f64 = 5.0;
 
-/// The determined links whose correction is too large for a robot that was built after its file.
-fn far_from_nominal(found: &Identification) -> Option<String> {
+/// The correction, mm or mrad, beyond which a link is not the one of the robot's file.
+fn link_limit(parameter: Parameter) -> Option<f64> {
+    match parameter {
+        Parameter::A(_) | Parameter::D(_) => Some(10.0),
+        Parameter::Alpha(_) | Parameter::Theta(_) => Some(60.0),
+        _ => None,
+    }
+}
+
+/// The size beyond which a term is no gear's, bearing's or encoder's any more: mrad, mrad a metre of lever, or thousandths. Those of the
+/// real robots of the README's table are less than a third of this.
+fn term_limit(parameter: Parameter) -> Option<f64> {
+    match parameter {
+        Parameter::Harmonic(..) | Parameter::Wobble(..) | Parameter::Coupling(..) => Some(10.0),
+        Parameter::Gravity(..) | Parameter::Bending(..) => Some(50.0),
+        _ => None,
+    }
+}
+
+/// The determined parameters whose correction is beyond its limit, for a sentence.
+fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>) -> Option<String> {
     let candidate = &found.candidates[found.chosen];
     let (formulation, _) = candidate.found.as_ref()?;
     let (covariance, nominal) = (formulation.robot_covariance(), formulation.rows.kinematics.nominal());
     let parameters = formulation.parameters();
-    let far = |i: &usize| {
-        let p = parameters[*i];
-        let limit = match p {
-            Parameter::A(_) | Parameter::D(_) => FAR_MM,
-            Parameter::Alpha(_) | Parameter::Theta(_) => 1000.0 * FAR_RAD,
-            _ => return false,
-        };
-        let moved = (candidate.robot.value(p) - nominal.value(p)).abs();
-        moved > limit && moved > FAR_SIGMAS * covariance[(*i, *i)].max(0.0).sqrt()
+    let moved = |p: Parameter| candidate.robot.value(p) - nominal.value(p);
+    let is_far = |i: &usize| {
+        let size = moved(parameters[*i]).abs();
+        let sigma = covariance[(*i, *i)].max(0.0).sqrt();
+        limit(parameters[*i]).is_some_and(|limit| size > limit) && size > FAR_SIGMAS * sigma
     };
-    let alone = formulation.base.free.iter().filter(|i| !formulation.base.in_group(**i));
     let name = |i: &usize| {
         let (unit, factor) = file_unit(parameters[*i]);
-        let delta = factor * (candidate.robot.value(parameters[*i]) - nominal.value(parameters[*i]));
-        format!("{} {delta:+.1} {unit}", parameters[*i].name())
+        format!("{} {:+.1} {unit}", parameters[*i].name(), factor * moved(parameters[*i]))
     };
-    let list: Vec<String> = alone.filter(|i| far(i)).map(name).collect();
-    (!list.is_empty()).then(|| format!("the links found are far from the nominal ones ({})", list.join(", ")))
+    // What a link shares with others may be theirs; terms are nothing else's.
+    let shared = |i: &usize| link_limit(parameters[*i]).is_some() && formulation.base.in_group(*i);
+    let list: Vec<String> = formulation.base.free.iter().filter(|i| is_far(i) && !shared(i)).map(name).collect();
+    (!list.is_empty()).then(|| list.join(", "))
 }
 
 /// Scatter over stated standard deviation beyond which it is worth a sentence.

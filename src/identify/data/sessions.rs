@@ -70,7 +70,7 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
         let rows = cut.fit_rows();
         let task = Task { extras: &extras, ..Task::plain(&cut, robot, &parameters, &rows, settings) };
         let Some(search) = Search::new(&task) else { break };
-        let found = search.best_cut();
+        let found = search.best_cut(&along.drifting);
         let drifting = search.drifting(found);
         along.drifting.extend(drifting.into_iter().filter(|name| !along.drifting.contains(name)).collect::<Vec<_>>());
         if let Some(row) = found {
@@ -191,8 +191,8 @@ impl<'a> Search<'a> {
         self.freedom * (self.squares / left).ln() > (unknowns + 1) as f64 * self.numbers.ln()
     }
 
-    /// The row of the set at which a new session pays most, if any does.
-    fn best_cut(&self) -> Option<usize> {
+    /// The row of the set at which a new session pays most, if any does. In groups that are known to drift it need not beat cuts along joints.
+    fn best_cut(&self, drifting: &[String]) -> Option<usize> {
         let mut best: Option<(f64, usize, &Placed)> = None;
         for placed in &self.placed {
             let order: Vec<usize> = (0..placed.rows.len()).collect();
@@ -208,7 +208,8 @@ impl<'a> Search<'a> {
         }
         if placed.rivalled {
             let rival = self.orders(placed).iter().filter_map(|o| Some(placed.best_step(o)?.0)).fold(0.0, f64::max);
-            if gain < SHARE * placed.squares || gain < BEATS * rival {
+            let drifts = drifting.contains(self.name(placed));
+            if gain < SHARE * placed.squares || (gain < BEATS * rival && !drifts) {
                 return None;
             }
         }
@@ -241,8 +242,12 @@ impl<'a> Search<'a> {
                 && gain > SHARE * placed.squares
                 && gain > BEATS * rival
         };
-        let name = |p: &Placed| self.set.groups[self.set.poses[p.rows[0].0].group].name.clone();
-        self.placed.iter().filter(drifts).map(name).collect()
+        self.placed.iter().filter(drifts).map(|placed| self.name(placed).clone()).collect()
+    }
+
+    /// The group of a placement.
+    fn name(&self, placed: &Placed) -> &String {
+        &self.set.groups[self.set.poses[placed.rows[0].0].group].name
     }
 }
 

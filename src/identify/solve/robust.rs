@@ -81,6 +81,38 @@ impl<'a> Task<'a> {
     }
 }
 
+/// Rounds in which the placement of a robot that is not fitted settles.
+const PLACING_ROUNDS: usize = 4;
+
+impl Task<'_> {
+    /// The same of the robot as it is, with nothing but the sensor placed: what a few rounds of bounded influence leave, or the first figure
+    /// that is beyond `hopeless_mm`.
+    pub fn unfitted_mm(&self, hopeless_mm: f64) -> f64 {
+        let mut weights = vec![1.0; self.set.poses.len()];
+        let mut typical = f64::INFINITY;
+        for _ in 0..PLACING_ROUNDS {
+            let rows = Rows::new(&self.recipe(Scatter::of_point(FIRST_SCATTER_MM), &weights, self.robot));
+            let residuals = Residual::all(&rows.raw(&vec![0.0; rows.offset_count()]));
+            typical = typical_mm(&residuals);
+            if typical > hopeless_mm {
+                break;
+            }
+            for residual in &residuals {
+                weights[residual.row()] = (typical / residual.size_mm().max(typical).max(f64::MIN_POSITIVE)).sqrt();
+            }
+        }
+        typical
+    }
+}
+
+/// Mean size of residuals a coordinate, mm, without the largest tenth.
+fn typical_mm(residuals: &[Residual]) -> f64 {
+    let mut sizes: Vec<f64> = residuals.iter().map(Residual::size_mm).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.truncate(sizes.len() - sizes.len() / 10);
+    sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
+}
+
 /// How large residuals are held down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Loss {
@@ -133,6 +165,12 @@ impl Robust<'_> {
         self.x = trust_region::solve(&fit, &self.x, &settings).x;
         self.offsets = fit.offsets(&self.x);
         self.robot = task.robot.shifted(task.parameters, &self.offsets[..task.parameters.len()]);
+    }
+
+    /// Mean size of the fitted rows' residuals a coordinate, mm, without the largest tenth of them.
+    pub fn typical_mm(&self) -> f64 {
+        let probe = self.task.recipe(self.scatter, &self.weights, &self.robot);
+        typical_mm(&Residual::all(&Rows::new(&probe).raw(&self.offsets)))
     }
 
     /// Takes in what the poses determine where the fit has come to.

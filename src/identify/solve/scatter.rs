@@ -77,6 +77,16 @@ impl Residual {
         Some(Residual { row, weight, numbers, count })
     }
 
+    /// Its row of the data set.
+    pub(super) fn row(&self) -> usize {
+        self.row
+    }
+
+    /// Root mean square of its numbers, mm.
+    pub(super) fn size_mm(&self) -> f64 {
+        (self.numbers().iter().map(|n| n.square).sum::<f64>() / self.count as f64).sqrt()
+    }
+
     /// Numbers that it has.
     pub(super) fn count(&self) -> usize {
         self.count
