@@ -271,7 +271,7 @@ fn turned(rows: &mut [Measurement]) {
     }
 }
 
-fn late(rows: &mut [Measurement]) {
+pub fn late(rows: &mut [Measurement]) {
     let joints: Vec<Vec<f64>> = rows.iter().map(|r| r.at.joints_deg.clone()).collect();
     for (row, joints) in rows.iter_mut().skip(1).zip(joints) {
         row.at.joints_deg = joints;

@@ -1,10 +1,11 @@
 //! Benchmark of the identification on robots: the real sets where they are, and simulated arms whose truth is known.
 //!
-//! `cargo bench --bench robots` prints all; `-- real`, `-- simulated [RUNS]`, `-- faults [RUNS [FAULT]]`, `-- touches [RUNS]`, `-- targets [RUNS]` and `-- speed` one of them.
+//! `cargo bench --bench robots` prints all; `-- real` (with wrong conventions planted in the real tables), `-- simulated [RUNS]`, `-- faults [RUNS [FAULT]]`, `-- touches [RUNS]`, `-- targets [RUNS]` and `-- speed` one of them.
 #![allow(clippy::print_stdout, reason = "a benchmark says what it measured")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a benchmark that cannot run has nothing to say")]
 #![allow(clippy::disallowed_methods, reason = "a benchmark looks at the clock")]
 
+mod conventions;
 mod faults;
 mod real;
 mod simulated;
@@ -23,6 +24,7 @@ fn main() {
     let asked = |name: &str| wanted.is_none_or(|w| w == name);
     if asked("real") {
         real::table();
+        conventions::table();
     }
     if asked("simulated") {
         simulated::table(runs);
