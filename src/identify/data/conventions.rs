@@ -216,6 +216,10 @@ fn in_sessions(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<f64>
     let others: Vec<usize> = set.rows(|_| true).into_iter().filter(|row| !kept.contains(row)).collect();
     let thinned = set.clone().without(&others, "");
     let (cut, _) = sessions::find(&thinned, robot, settings);
+    // Placements of a few rows each, such as of a socket, take up what is wrong instead of explaining it.
+    if kept.len() < sessions::SHORTEST * cut.groups.len() {
+        return None;
+    }
     let parameters = robot.mdh_parameters();
     let scatter = |set: &Dataset| {
         let rows = set.fit_rows();
