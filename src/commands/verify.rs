@@ -10,13 +10,13 @@ use super::error::Result;
 use crate::cli::Verify;
 use crate::diagnostic::Status;
 use crate::files;
-use crate::identify::Settings;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::doctor::{self, Examined};
 use crate::identify::data::known;
-use crate::identify::judge::errors::Judge;
+use crate::identify::judge::errors::{Judge, PLACED_BY_ITSELF};
 use crate::identify::record::{PointSpread, spread};
-use crate::measurements;
+use crate::identify::{self, Settings};
+use crate::measurements::{self, Measurement, Observed, Role};
 use crate::progress;
 use crate::report;
 use crate::robot;
@@ -36,9 +36,23 @@ struct RobotVerified {
     verify: PointSpread,
 }
 
+/// Makes verify rows samples where the file has none to place the sensor by, as a file of nothing but fresh poses; says whether it did.
+fn place_by_verify_rows(rows: &mut [Measurement]) -> bool {
+    let usable =
+        |role: Role| move |row: &Measurement| row.at.role == role && !matches!(row.observed, Observed::Missing { .. });
+    if rows.iter().any(usable(Role::Sample)) || !rows.iter().any(usable(Role::Verify)) {
+        return false;
+    }
+    for row in rows.iter_mut().filter(|row| row.at.role == Role::Verify) {
+        row.at.role = Role::Sample;
+    }
+    true
+}
+
 /// Runs the command.
 pub fn run(args: &Verify, settings: &Settings) -> Result<Outcome> {
-    let rows = measurements::read(&args.measurements)?;
+    let mut rows = measurements::read(&args.measurements)?;
+    let only_verify = place_by_verify_rows(&mut rows);
     let mut set = Dataset::new(&rows, SEED)?;
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
@@ -63,7 +77,16 @@ pub fn run(args: &Verify, settings: &Settings) -> Result<Outcome> {
     if let Some(targets) = &set.targets {
         progress::note(targets.sentence());
     }
-    let (fitted, judged) = (set.fit_rows(), set.verify_rows());
+    let (fitted, judged) = match only_verify {
+        true => (set.rows(|_| true), set.rows(|pose| pose.role != Role::Center)),
+        false => (set.fit_rows(), set.verify_rows()),
+    };
+    if only_verify {
+        progress::warn(
+            "no row of role `sample` can be used: the verify rows place the sensor as well as judging the robot, which flatters points and wire lengths where they are few"
+                .to_owned(),
+        );
+    }
     let judge = Judge::plain(&set, &fitted, settings.wire_offset);
     let robots: Vec<RobotVerified> = robots
         .iter()
@@ -72,6 +95,9 @@ pub fn run(args: &Verify, settings: &Settings) -> Result<Outcome> {
             RobotVerified { file: file.to_string(), verify: spread(&judge, robot, &errors, &judged) }
         })
         .collect();
+    if robots.iter().all(|robot| robot.verify.is_empty()) {
+        return Err(identify::Error::NothingJudged { rows: judged.len(), needed: PLACED_BY_ITSELF }.into());
+    }
     let stdout = match args.json {
         true => files::to_json(&Verified { robots }),
         false => {

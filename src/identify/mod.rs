@@ -90,6 +90,16 @@ pub enum Error {
         /// What to look at.
         hint: &'static str,
     },
+    /// No verify row has anything to be measured from.
+    #[error(
+        "none of the {rows} rows can be judged: a row is judged by its distance to another of its group, or by a placement that takes {needed}"
+    )]
+    NothingJudged {
+        /// Rows to judge.
+        rows: usize,
+        /// Rows that a group is placed by.
+        needed: usize,
+    },
     /// The chosen model needs what the data lack.
     #[error("model `{model}` needs {needed}, which the measurements don't have")]
     ModelNeeds {
@@ -106,7 +116,9 @@ pub enum Error {
 impl Explain for Error {
     fn status(&self) -> Status {
         match self {
-            Error::NothingDetermined { .. } | Error::TooFew { .. } | Error::NotFinite => Status::Undetermined,
+            Error::NothingDetermined { .. } | Error::TooFew { .. } | Error::NothingJudged { .. } | Error::NotFinite => {
+                Status::Undetermined
+            }
             _ => Status::BadInput,
         }
     }
@@ -121,7 +133,7 @@ impl Explain for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Error::JointCount { .. } => Some("`--robot FILE` names the robot that was measured".to_owned()),
-            Error::NothingDetermined { .. } | Error::TooFew { .. } => {
+            Error::NothingDetermined { .. } | Error::TooFew { .. } | Error::NothingJudged { .. } => {
                 Some("measure more poses, spread over the workspace and with varied orientation".to_owned())
             }
             Error::NoSamples { reason: Some(reason), .. } => Some(format!("the first of those without: {reason}")),

@@ -124,6 +124,14 @@ pub struct PointSpread {
     pub distortion: Option<Spread>,
 }
 
+impl PointSpread {
+    /// Whether there is no figure at all.
+    pub fn is_empty(&self) -> bool {
+        let others = [&self.point, &self.consistency, &self.distortion];
+        self.distance.count == 0 && others.into_iter().flatten().all(|spread| spread.count == 0)
+    }
+}
+
 /// One method on one model.
 #[derive(Debug, Clone, Serialize)]
 pub struct MethodRecord {

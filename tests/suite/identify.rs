@@ -210,6 +210,39 @@ fn verify_reads_measurements_as_identify_does() {
     assert_verified(folder.path(), &record);
 }
 
+/// `verify` on a file of these rows of the simulated measurements.
+fn verify_only(folder: &Path, robots: &[&str], keep: impl Fn(&str) -> bool) -> std::process::Output {
+    let table = std::fs::read_to_string(folder.join("measurements.csv")).expect("it was simulated");
+    let kept: Vec<&str> = table.lines().enumerate().filter(|(i, line)| *i == 0 || keep(line)).map(|(_, l)| l).collect();
+    std::fs::write(folder.join("fresh.csv"), kept.join("\n")).expect("it is written");
+    let robots = robots.iter().flat_map(|robot| ["--robot", robot]);
+    let arguments = ["verify", "--json", "--measurements", "fresh.csv"].into_iter().chain(robots);
+    Command::cargo_bin("stereocal").expect("built").current_dir(folder).args(arguments).output().expect("it runs")
+}
+
+#[test]
+fn verify_takes_a_file_of_fresh_poses_alone() {
+    let folder = simulated();
+    let record = identified(folder.path(), |_, fields| fields);
+    let robots = ["robot.toml", "out/identified.toml"];
+    let output = verify_only(folder.path(), &robots, |line| !line.contains(",sample,"));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.contains("no row of role `sample`"), "{said}");
+    let verified: serde_json::Value = serde_json::from_slice(&output.stdout).expect("stdout is JSON");
+    for (k, said) in [(0, &record["before"]), (1, &record["methods"][0])] {
+        // With the centres in the file the distances are those that `identify` judged by.
+        let again = &verified["robots"][k]["verify"];
+        assert!((again["mean_abs_mm"].as_f64().expect("a mean") - mean(said)).abs() < 1e-9, "{again} {said}");
+        let point = again["point"]["mean_abs_mm"].as_f64().expect("a mean");
+        assert!(point > 0.3 * said["verify"]["point"]["mean_abs_mm"].as_f64().expect("a mean"), "{again} {said}");
+    }
+    // One row has nothing to be measured from.
+    let first = std::cell::Cell::new(true);
+    let output = verify_only(folder.path(), &robots, |line| line.contains(",verify,") && first.replace(false));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(3) && said.contains("can be judged"), "{said}");
+}
+
 /// The row with its distance to the group's centre in place of its point, too long by the zero.
 fn to_center(fields: &[String], center: &mut [f64; 3], zero_mm: f64) -> Vec<String> {
     let role = fields.iter().position(|f| f == "center" || f == "sample" || f == "verify").expect("a role");

@@ -82,8 +82,9 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, R
         }
         // Most faults bring the file's robot nearer to the readings; the others cost a fit each.
         let mut tried = explaining(&set, &robot, settings, &now, true);
-        if tried.is_empty() && now.fitted >= IMPLAUSIBLE_MM {
-            cut = in_sessions(&set, &robot, settings);
+        let unexplained = tried.is_empty() && now.fitted >= IMPLAUSIBLE_MM;
+        cut = if unexplained { in_sessions(&set, &robot, settings) } else { None };
+        if unexplained {
             tried = explaining(&set, &robot, settings, &now, false);
         }
         let least = tried.iter().map(|(there, _)| there.fitted).fold(f64::INFINITY, f64::min);

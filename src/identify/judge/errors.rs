@@ -16,7 +16,7 @@ use crate::identify::settings::Model;
 use crate::robot::Robot;
 
 /// Fewest rows that a group without fitted rows is placed by.
-const PLACED_BY_ITSELF: usize = 4;
+pub const PLACED_BY_ITSELF: usize = 4;
 
 /// Figures of absolute errors, as in Table 3 of the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
