@@ -60,6 +60,29 @@ impl std::ops::Index<usize> for Fields {
     }
 }
 
+/// Counts lines as an editor does. The reader's own count is one short in files whose lines end in `\r\n`: it takes a record to begin
+/// between the two.
+struct Lines<'a> {
+    text: &'a [u8],
+    at: usize,
+    line: u64,
+}
+
+impl Lines<'_> {
+    /// The line of the first byte at or after `byte` that ends no line; `byte` never falls from call to call.
+    fn of(&mut self, byte: u64) -> u64 {
+        let byte = usize::try_from(byte).unwrap_or(usize::MAX);
+        while let Some(&here) = self.text.get(self.at)
+            && (self.at < byte || here == b'\n' || here == b'\r')
+        {
+            self.at += 1;
+            let ends = here == b'\n' || here == b'\r' && self.text.get(self.at) != Some(&b'\n');
+            self.line += u64::from(ends);
+        }
+        self.line
+    }
+}
+
 impl<'a> Table<'a> {
     /// Reads a whole file; `what` names it in the message when it is not there, `hint` says what makes it. A file without rows is refused.
     pub fn read(path: &'a Utf8Path, what: &'static str, hint: &str) -> Result<Table<'a>> {
@@ -76,8 +99,9 @@ impl<'a> Table<'a> {
         let mut table = Table { path, header: Vec::new(), rows: Vec::new(), columns: BTreeMap::new() };
         table.read_header(&mut reader)?;
         let mut record = csv::StringRecord::new();
+        let mut lines = Lines { text: text.as_bytes(), at: 0, line: 1 };
         while reader.read_record(&mut record).map_err(|e| table.unreadable(&e))? {
-            let line = record.position().map_or(0, csv::Position::line);
+            let line = lines.of(record.position().map_or(0, csv::Position::byte));
             if record.iter().all(str::is_empty) {
                 continue;
             }
@@ -211,6 +235,21 @@ mod tests {
         fn names_read_back(names in prop::collection::vec("[-=+@',;\"\t\r\n a-c0\\\\é]{0,8}", 1..6)) {
             let trimmed: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();
             prop_assert_eq!(read_back(&trimmed), trimmed);
+        }
+    }
+
+    #[test]
+    fn lines_are_counted_as_editors_count_them() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = Utf8Path::from_path(dir.path()).unwrap().join("t.csv");
+        for end in ["\n", "\r\n", "\r"] {
+            let text = ["a,b", "1,\"two", "lines\"", "", "2,x", "3,y", ""].join(end);
+            for mark in ["", "\u{feff}"] {
+                std::fs::write(&path, format!("{mark}{text}")).unwrap();
+                let table = Table::read(&path, "the table", "").unwrap();
+                let lines: Vec<u64> = table.rows.iter().map(|(line, _)| *line).collect();
+                assert_eq!(lines, [2, 5, 6], "{end:?}");
+            }
         }
     }
 
