@@ -41,10 +41,11 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     }
     shared::suppose_scale(&mut set);
     let bar = progress::bar("identifying", 2 + step_count(&settings));
-    let Examined { set, robot: nominal, along, mut findings } =
+    let Examined { set, robot: nominal, along, mut findings, unexplained } =
         doctor::examine(&set, &given, &settings, &|step| bar.begin(step));
     let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.begin(step))?;
     bar.finish_and_clear();
+    findings.extend(unexplained.filter(|_| !doctor::is_explained(&found)));
     findings.extend(doctor::findings(&set, &found, &along));
     let record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     for warning in &record.warnings {

@@ -64,9 +64,9 @@ pub fn run(args: &Verify, settings: &Settings) -> Result<Outcome> {
         robots.push((file, robot));
     }
     if let Some((file, robot)) = robots.first() {
-        let Examined { set: examined, robot: mended, along, findings } =
+        let Examined { set: examined, robot: mended, along, findings, unexplained } =
             doctor::examine(&set, robot, settings, &|_| {});
-        for finding in findings.into_iter().chain(doctor::along_the_rows(&along)) {
+        for finding in findings.into_iter().chain(unexplained).chain(doctor::along_the_rows(&along)) {
             progress::warn(finding.sentence());
         }
         if mended != *robot {

@@ -19,13 +19,17 @@ use crate::identify::solve::task::Task;
 use crate::robot::{Parameter, Robot};
 
 /// Robust scatter of a coordinate, mm, that no built robot has after a fit.
-const IMPLAUSIBLE_MM: f64 = 0.8;
+pub const IMPLAUSIBLE_MM: f64 = 0.8;
 
 /// A hypothesis explains what is wrong when it brings errors down by this factor.
 const EXPLAINS: f64 = 4.0;
 
 /// Where errors do not vanish, the factors by which nominal robot and fit come nearer to the readings must be this together.
 const NEARER: f64 = 6.0;
+
+/// By what factor the nominal robot comes nearer where the fit may get worse; each time that it gets worse by some factor asks for the
+/// fourth power of that.
+const STRIKING: f64 = 50.0;
 
 /// Errors of the nominal robot, mm, below which its file is not doubted.
 const DOUBTED_MM: f64 = 0.5;
@@ -35,6 +39,9 @@ const AS_GOOD: f64 = 1.2;
 
 /// Of hypotheses whose fits are within this factor of the best, that with the nominal robot nearest to the readings is the likelier.
 const ALIKE: f64 = 2.0;
+
+/// Hypotheses whose errors differ by less than this share, which is what fits end within, are one robot in other words.
+const SAME: f64 = 1e-3;
 
 /// Faults that are looked for one after the other.
 const FAULTS: usize = 3;
@@ -70,10 +77,25 @@ struct Misfit {
     fitted: f64,
 }
 
-/// The set and the robot as they are to be used, with what was mended or could not be explained.
-pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Robot, Vec<Finding>) {
+/// What the hypotheses left of a data set and a robot.
+#[derive(Debug, Clone)]
+pub struct Mended {
+    /// The measurements as they are to be used.
+    pub set: Dataset,
+    /// The robot as it is to be used.
+    pub robot: Robot,
+    /// What was mended.
+    pub findings: Vec<Finding>,
+    /// Errors that no hypothesis explains, mm a coordinate, where they are more than a built robot's.
+    pub unexplained_mm: Option<f64>,
+}
+
+/// Looks for what is wrong with the conventions of a set and of a robot's file, and mends it.
+pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
     let (mut set, mut robot, mut findings) = (set.clone(), robot.clone(), Vec::new());
-    let Some(mut left) = Misfit::of(&set, &robot, settings, None) else { return (set, robot, findings) };
+    let Some(mut left) = Misfit::of(&set, &robot, settings, None) else {
+        return Mended { set, robot, findings, unexplained_mm: None };
+    };
     let mut cut = None;
     for _ in 0..FAULTS {
         let now = left;
@@ -89,12 +111,17 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, R
         }
         let least = tried.iter().map(|(there, _)| there.fitted).fold(f64::INFINITY, f64::min);
         let best = tried
-            .into_iter()
+            .iter()
             .filter(|(there, _)| there.fitted <= ALIKE * least)
             .min_by(|(a, _), (b, _)| a.product().total_cmp(&b.product()));
-        let Some((there, hypothesis)) = best.filter(|(there, _)| cut.is_none_or(|cut| there.fitted < cut)) else {
+        let Some(&(there, hypothesis)) = best.filter(|(there, _)| cut.is_none_or(|cut| there.fitted < cut)) else {
             break;
         };
+        let same: Vec<String> = tried
+            .iter()
+            .filter(|(other, h)| *h != hypothesis && other.is_the_same(&there))
+            .map(|(_, h)| format!(", or, which these readings do not tell apart, {}", h.name()))
+            .collect();
         (set, robot) = hypothesis.applied(&set, &robot);
         let (whose, from, to) = match there.fitted * EXPLAINS < now.fitted {
             true => ("the errors", now.fitted, there.fitted),
@@ -104,24 +131,26 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, R
             false => ("the nominal links' errors", now.target, there.target),
         };
         findings.push(Finding {
-            finding: format!("{} ({whose} fall from {from:.2} to {to:.3} mm)", hypothesis.name()),
+            finding: format!("{}{} ({whose} fall from {from:.2} to {to:.3} mm)", hypothesis.name(), same.concat()),
             rows: Vec::new(),
             action: "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)".to_owned(),
         });
         left = there.scaled(1.0 / hypothesis.factor());
     }
-    if left.fitted >= IMPLAUSIBLE_MM && cut.is_none() {
-        findings.push(Finding {
-            finding: format!(
-                "{:.2} mm a coordinate are left at best, more than any built robot's: the robot file is not of the robot that was \
-                 measured, or joints and readings do not belong together",
-                left.fitted
-            ),
-            rows: Vec::new(),
-            action: "nothing explains it; don't use the result".to_owned(),
-        });
+    let unexplained_mm = (left.fitted >= IMPLAUSIBLE_MM && cut.is_none()).then_some(left.fitted);
+    Mended { set, robot, findings, unexplained_mm }
+}
+
+/// What is said of errors that no hypothesis explains.
+pub fn unexplained(left_mm: f64) -> Finding {
+    Finding {
+        finding: format!(
+            "{left_mm:.2} mm a coordinate are left at best, more than any built robot's: the robot file is not of the robot that was \
+             measured, or joints and readings do not belong together"
+        ),
+        rows: Vec::new(),
+        action: "nothing explains it; don't use the result".to_owned(),
     }
-    (set, robot, findings)
 }
 
 /// The hypotheses that explain what is left, of those that bring the file's robot `nearer` or of all.
@@ -172,6 +201,12 @@ impl Misfit {
         self.nominal * self.target * self.fitted
     }
 
+    /// Whether two hypotheses are one and the same robot in other words, as a shoulder turned over and a base that turns the other way.
+    fn is_the_same(&self, other: &Misfit) -> bool {
+        let pairs = [(self.nominal, other.nominal), (self.target, other.target), (self.fitted, other.fitted)];
+        pairs.iter().all(|(a, b)| (a - b).abs() <= SAME * b)
+    }
+
     /// Whether the robot of the file is much nearer to the readings, by its target as well or by its links alone.
     fn is_nearer(&self, now: &Misfit) -> bool {
         self.nearer(now) > EXPLAINS
@@ -188,8 +223,11 @@ impl Misfit {
         if now.fitted >= IMPLAUSIBLE_MM {
             return better > EXPLAINS;
         }
-        // Of some sixty hypotheses one that is wrong brings distances with few poses nearer by four or five times.
-        better * AS_GOOD >= 1.0 && self.is_nearer(now) && self.nearer(now) * better > NEARER
+        // Of some sixty hypotheses one that is wrong brings distances with few poses nearer by four or five times. None that is wrong
+        // brings the file's robot nearer by a hundred, and where joints move little what is wrong may even fit a little better.
+        let nearer = self.nearer(now);
+        let striking = better * ALIKE >= 1.0 && nearer * better.powi(4) > STRIKING;
+        striking || better * AS_GOOD >= 1.0 && nearer > EXPLAINS && nearer * better > NEARER
     }
 }
 
@@ -386,7 +424,8 @@ mod tests {
 
     fn said(rows: &[Measurement], robot: &Robot) -> Vec<String> {
         let set = Dataset::new(rows, 1).unwrap();
-        examine(&set, robot, &Settings::default()).2.into_iter().map(|f| f.finding).collect()
+        let Mended { findings, unexplained_mm, .. } = examine(&set, robot, &Settings::default());
+        findings.into_iter().chain(unexplained_mm.map(unexplained)).map(|f| f.finding).collect()
     }
 
     fn joints(rows: &[Measurement], change: impl Fn(&mut Vec<f64>)) -> Vec<Measurement> {
@@ -459,7 +498,7 @@ mod tests {
             late[i].at.joints_deg.clone_from(&rows[i - 1].at.joints_deg);
         }
         let set = Dataset::new(&late, 1).unwrap();
-        let (mended, ..) = examine(&set, &world.nominal, &Settings::default());
+        let Mended { set: mended, .. } = examine(&set, &world.nominal, &Settings::default());
         assert_eq!(mended.poses.len(), set.poses.len() - 1);
         assert_eq!(mended.skipped.len(), 1);
         for (pose, row) in mended.poses.iter().zip(&rows) {

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::conventions::Mended;
 use super::dataset::Dataset;
 use super::sessions::{self, Along, Session};
 use super::{conventions, covariances, known, orientations};
@@ -50,15 +51,17 @@ pub struct Examined {
     pub along: Along,
     /// What was wrong, and what was done.
     pub findings: Vec<Finding>,
+    /// Errors that nothing explained so far.
+    pub unexplained: Option<Finding>,
 }
 
 /// Looks for what is wrong before anything is identified. `step` hears what is being done.
 pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(&str)) -> Examined {
     step("units, signs and conventions");
-    let (mut set, mut robot, mut findings) = (set.clone(), robot.clone(), Vec::new());
+    let (mut set, mut robot, mut findings, mut unexplained_mm) = (set.clone(), robot.clone(), Vec::new(), None);
     let of_targets = set.targets.as_ref().map_or_else(Vec::new, |targets| targets.findings.clone());
     if settings.examine {
-        (set, robot, findings) = conventions::examine(&set, &robot, settings);
+        Mended { set, robot, findings, unexplained_mm } = conventions::examine(&set, &robot, settings);
         let of_orientations = orientations::examine(&set, &robot);
         set = of_orientations.0;
         findings.extend(of_orientations.1);
@@ -74,7 +77,15 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
         findings.extend(of_covariances.1);
     }
     findings.splice(0..0, of_targets);
-    Examined { set, robot, along, findings }
+    Examined { set, robot, along, findings, unexplained: unexplained_mm.map(conventions::unexplained) }
+}
+
+/// Whether the robot that was found explains what no convention did, as where a link is so far off that only the whole search reaches it.
+pub fn is_explained(found: &Identification) -> bool {
+    let few_left_out = found.outliers.len() * 10 <= found.fitted.len();
+    found.candidates[found.chosen].found.is_some()
+        && few_left_out
+        && found.scatter.point_mm < conventions::IMPLAUSIBLE_MM
 }
 
 /// What was found along the way: gross errors, sessions, drifts, covariances that are off.
@@ -161,7 +172,10 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
     }
     if !found.verify_outliers.is_empty() {
         add(
-            format!("{} verify rows fit far worse than the rest", found.verify_outliers.len()),
+            match found.verify_outliers.len() {
+                1 => "1 verify row fits far worse than the rest".to_owned(),
+                count => format!("{count} verify rows fit far worse than the rest"),
+            },
             names(&found.verify_outliers),
             "they are counted in the figures; measure them again",
         );

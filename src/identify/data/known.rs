@@ -59,15 +59,19 @@ pub fn read(path: &Utf8Path, set: &Dataset) -> files::Result<Vec<KnownDistance>>
 pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Vec<Finding>) {
     let (mut set, mut findings) = (set.clone(), Vec::new());
     let all = set.known.len();
+    let rows = match all {
+        0 | 1 => return (set, findings),
+        _ => trusted(&set, robot, settings).unwrap_or_else(|_| set.fit_rows()),
+    };
     let name = |set: &Dataset, k: &KnownDistance| format!("{} to {}", set.groups[k.a].name, set.groups[k.b].name);
-    while let Ok(sizes) = sizes(&set, robot, settings) {
+    while let Ok(sizes) = sizes(&set, robot, &rows, settings) {
         let off: Vec<usize> = (0..sizes.len()).filter(|&k| sizes[k] > OFF).collect();
         // What a wrong distance leaves behind spreads over the others: the one without which they agree best is wrong.
         let without = |k: usize| {
             let mut others = set.clone();
             others.known.remove(k);
-            let left =
-                self::sizes(&others, robot, settings).map_or(f64::INFINITY, |s| s.into_iter().fold(0.0, f64::max));
+            let left = self::sizes(&others, robot, &rows, settings)
+                .map_or(f64::INFINITY, |s| s.into_iter().fold(0.0, f64::max));
             (left, k, others)
         };
         let best = off.iter().map(|&k| without(k)).min_by(|a, b| a.0.total_cmp(&b.0));
@@ -95,23 +99,43 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, V
     (set, findings)
 }
 
+/// The fitted touches without those that are gross errors among the touches themselves, which would speak against the known distances of
+/// their sockets.
+fn trusted(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<usize>, Error> {
+    let alone = Dataset { known: Vec::new(), ..set.clone() };
+    let (mut rows, parameters) = (set.fit_rows(), robot.mdh_parameters());
+    if settings.outlier_sigmas > 0.0 {
+        let mut robust = Task::plain(&alone, robot, &parameters, &rows, settings).robust(Loss::Biweight)?;
+        let gross = robust.gross_errors(settings.outlier_sigmas);
+        rows.retain(|row| !gross.contains(row));
+    }
+    Ok(rows)
+}
+
 /// How far each known distance is from what the rest says, in standard deviations.
-fn sizes(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<f64>, Error> {
+fn sizes(set: &Dataset, robot: &Robot, rows: &[usize], settings: &Settings) -> Result<Vec<f64>, Error> {
     if set.known.len() < 2 {
         return Ok(Vec::new());
     }
-    let (rows, parameters) = (set.fit_rows(), robot.mdh_parameters());
-    Ok(Task::plain(set, robot, &parameters, &rows, settings).robust(Loss::Absolute)?.deleted_known())
+    let parameters = robot.mdh_parameters();
+    Ok(Task::plain(set, robot, &parameters, rows, settings).robust(Loss::Absolute)?.deleted_known())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::identify::synthetic;
+    use crate::measurements::Measurement;
 
     /// What is left of so many known distances, of which the second is off, and what is said.
     fn examined(count: usize, off_mm: f64) -> (usize, Vec<Finding>) {
-        let (world, sockets) = synthetic::touched(0.0, 3);
+        examined_with(count, off_mm, |_| {})
+    }
+
+    /// The same with something wrong in the touches.
+    fn examined_with(count: usize, off_mm: f64, plant: impl Fn(&mut [Measurement])) -> (usize, Vec<Finding>) {
+        let (mut world, sockets) = synthetic::touched(0.0, 3);
+        plant(&mut world.rows);
         let mut set = Dataset::new(&world.rows, 1).unwrap();
         set.known = (0..count)
             .map(|k| KnownDistance {
@@ -142,6 +166,16 @@ mod tests {
     fn of_two_that_disagree_neither_is_left_out() {
         let (left, findings) = examined(2, 5.0);
         assert!(left == 2 && findings[0].finding.contains("do not go together"), "{findings:?}");
+    }
+
+    #[test]
+    fn a_touch_of_the_wrong_socket_does_not_speak_against_known_distances() {
+        for by_deg in [1.0, 10.0, 60.0] {
+            let wrong = |rows: &mut [Measurement]| rows[3].at.joints_deg[1] += by_deg;
+            assert_eq!(examined_with(4, 0.0, wrong), (4, Vec::new()), "{by_deg}");
+            let (left, findings) = examined_with(4, 2.0, wrong);
+            assert!(left == 3 && findings[0].rows == ["s1 to s5"], "{by_deg}: {findings:?}");
+        }
     }
 
     #[test]

@@ -34,6 +34,9 @@ const LEAST_OTHERS: f64 = 0.05;
 /// Probability that a set without any gross error has a doubtful row.
 const DOUBT: f64 = 1e-3;
 
+/// Rows of a placement that tell which of them is off with none of them fitted: twice its own unknowns.
+const LEAST_ALONE: usize = 12;
+
 /// A row against what the others predict.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Deleted {
@@ -100,7 +103,28 @@ impl Robust<'_> {
         others.iter().for_each(|&row| weights[row] = UNHEARD);
         let with = Robust { task: Task { rows: &rows, ..self.task }, weights, ..self.clone() };
         let deleted = with.deleted();
-        others.iter().copied().filter(|&r| deleted[r].size() > sigmas).collect()
+        let mut far: Vec<usize> = others.iter().copied().filter(|&r| deleted[r].size() > sigmas).collect();
+        far.extend(self.far_off_alone(others, sigmas));
+        far.sort_unstable();
+        far.dedup();
+        far
+    }
+
+    /// The same of placements of which no row is fitted: nothing says where they are but their own rows, of which most are right.
+    fn far_off_alone(&self, others: &[usize], sigmas: f64) -> Vec<usize> {
+        let set = self.task.set;
+        let mut far = Vec::new();
+        for group in 0..set.groups.len() {
+            let of = |row: &&usize| set.poses[**row].group == group;
+            let rows: Vec<usize> = others.iter().filter(of).copied().collect();
+            if rows.len() < LEAST_ALONE || self.task.rows.iter().any(|row| of(&row)) {
+                continue;
+            }
+            let alone = Task { rows: &rows, robot: &self.robot, parameters: &[], extras: &[], ..self.task };
+            let sizes = alone.unfitted_sizes(self.scatter);
+            far.extend(rows.iter().copied().filter(|&row| sizes[row] > sigmas));
+        }
+        far
     }
 
     /// All rows of the data set against what the others predict for them; of those that are not in the fit nothing.

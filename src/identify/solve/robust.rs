@@ -85,15 +85,19 @@ impl<'a> Task<'a> {
 const PLACING_ROUNDS: usize = 4;
 
 impl Task<'_> {
-    /// The same of the robot as it is, with nothing but the sensor placed: what a few rounds of bounded influence leave, or the first figure
-    /// that is beyond `hopeless_mm`.
+    /// What is left of the robot as it is, with nothing but the sensor placed: mean size a coordinate, mm, after a few rounds of bounded
+    /// influence, or the first figure that is beyond `hopeless_mm`.
     pub fn unfitted_mm(&self, hopeless_mm: f64) -> f64 {
+        typical_mm(&self.unfitted(hopeless_mm))
+    }
+
+    fn unfitted(&self, hopeless_mm: f64) -> Vec<Residual> {
         let mut weights = vec![1.0; self.set.poses.len()];
-        let mut typical = f64::INFINITY;
+        let mut residuals = Vec::new();
         for _ in 0..PLACING_ROUNDS {
             let rows = Rows::new(&self.recipe(Scatter::of_point(FIRST_SCATTER_MM), &weights, self.robot));
-            let residuals = Residual::all(&rows.raw(&vec![0.0; rows.offset_count()]));
-            typical = typical_mm(&residuals);
+            residuals = Residual::all(&rows.raw(&vec![0.0; rows.offset_count()]));
+            let typical = typical_mm(&residuals);
             if typical > hopeless_mm {
                 break;
             }
@@ -101,7 +105,15 @@ impl Task<'_> {
                 weights[residual.row()] = (typical / residual.size_mm().max(typical).max(f64::MIN_POSITIVE)).sqrt();
             }
         }
-        typical
+        residuals
+    }
+
+    /// Sizes of what is left of the robot as it is, in standard deviations of `least` or, where these rows scatter by more, of theirs; one
+    /// a row of the data set.
+    pub fn unfitted_sizes(&self, least: Scatter) -> Vec<f64> {
+        let (residuals, count) = (self.unfitted(f64::INFINITY), self.set.poses.len());
+        let own = robust_scatter(&residuals, self.rows, count, 1.0, least, false);
+        sizes(&residuals, &Scatter { point_mm: own.point_mm.max(least.point_mm), ..least }, 1.0, count)
     }
 }
 

@@ -45,7 +45,7 @@ const FAULTS: [(&str, &[f64], Plant, &str); 30] = [
         "verify point off by, mm",
         &[0.3, 1.0, 5.0],
         |rows, _, by| points(rows, |i, p| p.x += if i == 130 { by } else { 0.0 }),
-        "verify rows fit",
+        "verify row",
     ),
     (
         "base moved by, mm",
@@ -318,11 +318,13 @@ fn diagnosed(sensor: Sensor, plant: Plant, size: f64, seed: u64) -> (Vec<Finding
     };
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let set = Dataset::new(&rows, 1).expect("rows");
-    let Examined { set, robot: nominal, along, findings: mut list } =
+    let Examined { set, robot: nominal, along, findings: mut list, unexplained } =
         doctor::examine(&set, &nominal, &settings, &|_| {});
     let Ok(found) = identify(&set, &nominal, &settings, 1, &|_| {}) else {
+        list.extend(unexplained);
         return (list, f64::INFINITY, None);
     };
+    list.extend(unexplained.filter(|_| !doctor::is_explained(&found)));
     list.extend(doctor::findings(&set, &found, &along));
     let error = against_truth(&unspoilt, &truth, &found.candidates[found.chosen].robot);
     (list, error, CommonScale::new(&set, &found))

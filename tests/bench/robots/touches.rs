@@ -98,7 +98,7 @@ impl World {
 type Plant = fn(&mut World, f64);
 
 /// Faults, their sizes, and a word of the sentence that names each; what moves the socket is the world's own.
-const FAULTS: [(&str, &[f64], Plant, &str); 13] = [
+const FAULTS: [(&str, &[f64], Plant, &str); 15] = [
     ("clean", &[0.0], |_, _| {}, ""),
     ("radians", &[0.0], |w, _| joints(&mut w.rows, |_, j| j.iter_mut().for_each(|q| *q = q.to_radians())), "radians"),
     ("exchanged joints", &[0.0], |w, _| joints(&mut w.rows, |_, j| j.swap(1, 3)), "exchanged"),
@@ -107,10 +107,12 @@ const FAULTS: [(&str, &[f64], Plant, &str); 13] = [
     ("standard DH", &[0.0], |w, _| w.nominal = as_standard(&w.nominal), "standard DH"),
     (
         "a joint read wrong by, deg",
-        &[0.05, 0.2, 2.0],
+        &[0.05, 0.2, 2.0, 60.0],
         |w, by| joints(&mut w.rows, |i, j| j[1] += if i == 7 { by } else { 0.0 }),
         "worse than the rest",
     ),
+    ("touches exchanged", &[1.0, 3.0], |w, by| exchanged(w, by as usize), "worse than the rest"),
+    ("verify joint wrong by, deg", &[0.05, 0.2, 2.0, 60.0], verify_socket, "verify row"),
     ("a socket moved by, mm", &[0.3, 1.0, 5.0], |_, _| {}, "sessions"),
     ("a known length off by, mm", &[0.3, 1.0, 5.0], |w, by| w.known[1].distance_mm += by, "known distance"),
     ("known lengths times", &[1.01, 1.1], lengths, "all links"),
@@ -118,6 +120,22 @@ const FAULTS: [(&str, &[f64], Plant, &str); 13] = [
     ("known lengths in m", &[1000.0], |w, by| lengths(w, 1.0 / by), "known distances are in m"),
     ("a link longer by, mm", &[20.0, 60.0], |w, by| w.nominal.joints[2].a_mm += by, "another robot"),
 ];
+
+/// So many touches of the first socket and of the third carry each other's joints.
+fn exchanged(world: &mut World, count: usize) {
+    for k in 0..count {
+        let (a, b) = (5 + k, 2 * (FITTED + VERIFY) + 3 + k);
+        let kept = std::mem::take(&mut world.rows[a].at.joints_deg);
+        world.rows[a].at.joints_deg = std::mem::replace(&mut world.rows[b].at.joints_deg, kept);
+    }
+}
+
+/// The last socket only verifies, and one of its touches has a joint that was read wrong.
+fn verify_socket(world: &mut World, by_deg: f64) {
+    let last = world.rows.len() - FITTED - VERIFY;
+    world.rows[last..].iter_mut().for_each(|row| row.at.role = Role::Verify);
+    world.rows[last + 4].at.joints_deg[1] += by_deg;
+}
 
 fn lengths(world: &mut World, factor: f64) {
     world.known.iter_mut().for_each(|k| k.distance_mm *= factor);
@@ -136,15 +154,17 @@ fn faults(runs: u64) {
         let examined = doctor::examine(&set, &world.nominal, &settings, &|_| {});
         let mut list = examined.findings;
         let Ok(found) = identify(&examined.set, &examined.robot, &settings, 1, &|_| {}) else {
+            list.extend(examined.unexplained);
             return (list, f64::INFINITY);
         };
+        list.extend(examined.unexplained.filter(|_| !doctor::is_explained(&found)));
         list.extend(doctor::findings(&examined.set, &found, &examined.along));
         (list, against_truth(&exact, &world.truth, &found.candidates[found.chosen].robot))
     };
     let clean: Vec<f64> = (1..=runs).into_par_iter().map(|seed| diagnosed(|_, _| {}, 0.0, 0.0, seed).1).collect();
     for (what, sizes, plant, word) in FAULTS {
         for &size in sizes {
-            let moved_mm = if what.contains("socket") { size } else { 0.0 };
+            let moved_mm = if what.contains("moved") { size } else { 0.0 };
             let said: Vec<_> = (1..=runs).into_par_iter().map(|seed| diagnosed(plant, moved_mm, size, seed)).collect();
             let named = said.iter().filter(|(list, _)| list.iter().any(|f| f.finding.contains(word))).count();
             let findings: usize = said.iter().map(|(list, _)| list.len()).sum();
