@@ -34,6 +34,9 @@ const SHORTEST_TOUCH: usize = 4;
 const SHARE: f64 = 0.1;
 const BEATS: f64 = 1.3;
 
+/// Robust standard deviations from which on a row counts no more the farther it is off: a few that are off by metres would hide a step.
+const GROSS: f64 = 8.0;
+
 /// Most cuts; data that want more are no sessions.
 const MOST_CUTS: usize = 30;
 
@@ -66,23 +69,39 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     let parameters = robot.mdh_parameters();
     // A zero that is off is no step, and what the calibration leaves open no drift.
     let extras = shared::unknowns(set, settings);
-    for cuts in 0..MOST_CUTS {
-        let rows = cut.fit_rows();
+    // Small steps show only once the rows that are gross errors of the sessions found so far are out of the way.
+    let (mut gross, mut is_second) = (Vec::new(), false);
+    for _ in 0..MOST_CUTS {
+        let rows: Vec<usize> = cut.fit_rows().into_iter().filter(|row| !gross.contains(row)).collect();
         let task = Task { extras: &extras, ..Task::plain(&cut, robot, &parameters, &rows, settings) };
         let Some(search) = Search::new(&task) else { break };
         let found = search.best_cut(&along.drifting);
         let drifting = search.drifting(found);
         along.drifting.extend(drifting.into_iter().filter(|name| !along.drifting.contains(name)).collect::<Vec<_>>());
-        if let Some(row) = found {
-            split(&mut cut, row);
-            continue;
+        match found {
+            Some(row) => split(&mut cut, row),
+            None if is_second => break,
+            None => {
+                (gross, is_second) = (gross_errors(&task), true);
+                if gross.is_empty() {
+                    break;
+                }
+            }
         }
-        if cuts > 0 {
-            along.sessions = list(&cut);
-        }
-        break;
+    }
+    if cut.groups.len() > set.groups.len() {
+        along.sessions = list(&cut);
     }
     (cut, along)
+}
+
+/// Rows that are gross errors with the sessions as they are.
+fn gross_errors(task: &Task) -> Vec<usize> {
+    let sigmas = task.settings.outlier_sigmas;
+    match task.robust(Loss::Biweight) {
+        Ok(mut robust) if sigmas > 0.0 => robust.gross_errors(sigmas),
+        _ => Vec::new(),
+    }
 }
 
 /// One placement as the search sees it.
@@ -115,7 +134,7 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(task: &Task<'a>) -> Option<Search<'a>> {
-        let (rows, x, prior) = task.robust(Loss::Absolute).ok()?.linearised();
+        let (rows, x, prior) = task.robust(Loss::Absolute).ok()?.capped(GROSS).linearised();
         let (of_robot, extras) = rows.split(&x);
         let places = rows.kinematics.places(of_robot, true);
         let count = x.len();

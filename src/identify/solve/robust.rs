@@ -25,6 +25,9 @@ const BOUNDED_ROUNDS: usize = 8;
 /// Steps of the trust region between two estimates of weights.
 const STEPS_A_ROUND: usize = 2;
 
+/// Steps after residuals were capped.
+const STEPS_A_CAP: usize = 4;
+
 /// The factor of the stated covariances is looked for every so many rounds.
 const ROUNDS_A_FACTOR: usize = 4;
 
@@ -177,6 +180,19 @@ impl Robust<'_> {
         self.x = trust_region::solve(&fit, &self.x, &settings).x;
         self.offsets = fit.offsets(&self.x);
         self.robot = task.robot.shifted(task.parameters, &self.offsets[..task.parameters.len()]);
+    }
+
+    /// The same fit with no residual counting for more than one of `cap` robust standard deviations: with bounded influence alone a row that
+    /// is off by a thousand still holds more of the sum of squares than all the others.
+    pub fn capped(mut self, cap: f64) -> Self {
+        let beyond: Vec<usize> = self.task.rows.iter().copied().filter(|&row| self.scores[row] > cap).collect();
+        for &row in &beyond {
+            self.weights[row] = cap.sqrt() / self.scores[row];
+        }
+        if !beyond.is_empty() {
+            self.step(STEPS_A_CAP);
+        }
+        self
     }
 
     /// Mean size of the fitted rows' residuals a coordinate, mm, without the largest tenth of them.
