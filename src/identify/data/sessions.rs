@@ -80,7 +80,7 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
         along.drifting.extend(drifting.into_iter().filter(|name| !along.drifting.contains(name)).collect::<Vec<_>>());
         match found {
             Some(row) => split(&mut cut, row),
-            None if is_second => break,
+            None if is_second || !search.is_doubtful => break,
             None => {
                 (gross, is_second) = (gross_errors(&task), true);
                 if gross.is_empty() {
@@ -126,6 +126,8 @@ struct Placed {
 struct Search<'a> {
     set: &'a Dataset,
     placed: Vec<Placed>,
+    /// Whether a row is so far off that it may be a gross error.
+    is_doubtful: bool,
     /// Numbers measured, how many of them the fit left, and the sum of their squares.
     numbers: f64,
     freedom: f64,
@@ -134,7 +136,9 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(task: &Task<'a>) -> Option<Search<'a>> {
-        let (rows, x, prior) = task.robust(Loss::Absolute).ok()?.capped(GROSS).linearised();
+        let robust = task.robust(Loss::Absolute).ok()?.capped(GROSS);
+        let is_doubtful = task.rows.iter().any(|&row| robust.scores[row] > task.settings.outlier_sigmas);
+        let (rows, x, prior) = robust.linearised();
         let (of_robot, extras) = rows.split(&x);
         let places = rows.kinematics.places(of_robot, true);
         let count = x.len();
@@ -202,7 +206,7 @@ impl<'a> Search<'a> {
                 Block::Pairwise(_) => {}
             }
         }
-        Some(Search { set: task.set, placed, numbers: numbers as f64, freedom: freedom as f64, squares })
+        Some(Search { set: task.set, placed, is_doubtful, numbers: numbers as f64, freedom: freedom as f64, squares })
     }
 
     fn pays(&self, gain: f64, unknowns: usize) -> bool {
