@@ -69,30 +69,43 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     let parameters = robot.mdh_parameters();
     // A zero that is off is no step, and what the calibration leaves open no drift.
     let extras = shared::unknowns(set, settings);
-    // Small steps show only once the rows that are gross errors of the sessions found so far are out of the way.
-    let (mut gross, mut is_second) = (Vec::new(), false);
+    let (mut look, mut gross) = (Look::AsTheyAre, Vec::new());
     for _ in 0..MOST_CUTS {
         let rows: Vec<usize> = cut.fit_rows().into_iter().filter(|row| !gross.contains(row)).collect();
         let task = Task { extras: &extras, ..Task::plain(&cut, robot, &parameters, &rows, settings) };
-        let Some(search) = Search::new(&task) else { break };
+        let Some(search) = Search::new(&task, look) else { break };
         let found = search.best_cut(&along.drifting);
         let drifting = search.drifting(found);
         along.drifting.extend(drifting.into_iter().filter(|name| !along.drifting.contains(name)).collect::<Vec<_>>());
-        match found {
-            Some(row) => split(&mut cut, row),
-            None if is_second || !search.is_doubtful => break,
-            None => {
-                (gross, is_second) = (gross_errors(&task), true);
+        look = match (found, look) {
+            (Some(row), _) => {
+                split(&mut cut, row);
+                look
+            }
+            (None, Look::AsTheyAre) if search.is_doubtful => Look::Capped,
+            (None, Look::Capped) => {
+                gross = gross_errors(&task);
                 if gross.is_empty() {
                     break;
                 }
+                Look::WithoutGross
             }
-        }
+            _ => break,
+        };
     }
     if cut.groups.len() > set.groups.len() {
         along.sessions = list(&cut);
     }
     (cut, along)
+}
+
+/// How a search looks at rows that are far off. Gross errors hide small steps, but rows are far off beside a large step as well: only where
+/// nothing is found any more are they held down, and at last left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Look {
+    AsTheyAre,
+    Capped,
+    WithoutGross,
 }
 
 /// Rows that are gross errors with the sessions as they are.
@@ -135,8 +148,8 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(task: &Task<'a>) -> Option<Search<'a>> {
-        let robust = task.robust(Loss::Absolute).ok()?.capped(GROSS);
+    fn new(task: &Task<'a>, look: Look) -> Option<Search<'a>> {
+        let robust = task.robust(Loss::Absolute).ok()?.capped(if look == Look::Capped { GROSS } else { f64::INFINITY });
         let is_doubtful = task.rows.iter().any(|&row| robust.scores[row] > task.settings.outlier_sigmas);
         let (rows, x, prior) = robust.linearised();
         let (of_robot, extras) = rows.split(&x);
@@ -397,6 +410,24 @@ mod tests {
         assert_eq!(sessions.len(), 2, "{sessions:?}");
         assert!(sessions[0].count.abs_diff(70) <= 1, "{sessions:?}");
         assert_eq!(cut.groups.len(), 2);
+    }
+
+    #[test]
+    fn gross_errors_hide_no_session_and_make_none() {
+        for off_mm in [10.0, 100.0, 2000.0] {
+            for (moved, sessions) in [(70, 2), (1000, 0)] {
+                let (world, mut rows) = wire(moved);
+                for i in [7, 31, 32, 55, 76, 90, 108] {
+                    let Observed::Distance { distance_mm, .. } = &mut rows[i].observed else { unreachable!() };
+                    *distance_mm += off_mm;
+                }
+                let set = Dataset::new(&rows, 1).unwrap();
+                let (_, along) = find(&set, &world.nominal, &Settings::default());
+                assert_eq!(along.sessions.len(), sessions, "{off_mm} mm, {moved}: {:?}", along.sessions);
+                let first = along.sessions.first().map_or(70, |session| session.count);
+                assert!(first.abs_diff(70) <= 2, "{off_mm} mm: {:?}", along.sessions);
+            }
+        }
     }
 
     #[test]
