@@ -83,8 +83,7 @@ pub fn run(args: &Verify, settings: &Settings) -> Result<Outcome> {
     };
     if only_verify {
         progress::warn(
-            "no row of role `sample` can be used: the verify rows place the sensor as well as judging the robot, which flatters points and wire lengths where they are few"
-                .to_owned(),
+            "no row of role `sample` can be used: the verify rows place the sensor as well as judging the robot, which flatters points and wire lengths where they are few",
         );
     }
     let judge = Judge::plain(&set, &fitted, settings.wire_offset);
