@@ -74,6 +74,12 @@ impl Board {
         self.squares.rows - 1
     }
 
+    /// Distance between two opposite outermost inner corners, mm.
+    pub fn diagonal_mm(&self) -> f64 {
+        let sides = [self.columns() - 1, self.rows() - 1].map(|squares| squares as f64 * self.square_mm);
+        sides[0].hypot(sides[1])
+    }
+
     /// Number of inner corners.
     pub fn corner_count(&self) -> usize {
         self.columns() * self.rows()

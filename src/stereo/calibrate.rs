@@ -4,25 +4,24 @@
 //! not and why. Goes wrong: too few pairs, pairs that contradict each other, views too similar to tell the cameras.
 
 use crate::imaging::{Board, Corners, Side, Skipped};
-use crate::statistics::median;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
 use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::pairs::candidates::Candidates;
-use crate::stereo::pairs::consensus::{self, Consensus};
-use crate::stereo::pairs::discarded::too_few_pairs;
-use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, FEWEST_PAIRS, Standing};
+use crate::stereo::pairs::series::{self, Series};
+use crate::stereo::pairs::{Discarded, DiscardedPair, Standing};
 use crate::stereo::select::lens_ladder;
 use crate::stereo::select::lens_ladder::Options;
 use crate::stereo::select::model_comparison::LensScore;
 use crate::stereo::select::pair_scatter::PairScatter;
 use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
+use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::uncertainty::Uncertainty;
 use crate::stereo::target::print_share::PrintShare;
-use crate::stereo::{Error, Lens, Rig};
+use crate::stereo::{Error, Rig};
 
 /// A calibrated rig with all that it was made from.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +42,10 @@ pub struct Calibration {
     pub own_noise: Noise,
     /// How neighbouring corners' residuals hang together; the covariance allows for the information that they share.
     pub neighbours: NeighbourCorrelation,
+    /// Factor on the covariance that follows from the weighted normal equations: what neighbours share, and the loss.
+    pub inflation: f64,
+    /// What is expected of cameras and board before any picture.
+    pub priors: Priors,
     /// How the pairs scatter about the common rig; the covariance allows for more than the corners' noise lets expect.
     pub pair_scatter: PairScatter,
     /// Richer models whose additional terms are more than chance.
@@ -67,7 +70,7 @@ impl Calibration {
 
     /// The pairs with the values reached, to solve again in part or with another model.
     pub fn problem(&self) -> Problem {
-        Problem { views: self.views.clone(), values: self.values.clone() }
+        Problem { views: self.views.clone(), values: self.values.clone(), priors: self.priors.clone() }
     }
 
     /// The corners as they were used: outliers and the corners of pairs that are out are marked, turned boards turned.
@@ -90,58 +93,25 @@ impl Calibration {
     }
 }
 
-/// The lens with which pairs are judged before there is another: what nearly all cameras need.
-const JUDGING_LENS: Lens = Lens::Brown5;
-
-/// A picture that loses more than this share of its corners, and this many times the share that pictures usually lose, is not what it
-/// seems: of Gaussian corners one in a million is lost.
-const LOST_SHARE: f64 = 0.1;
-const LOST_TIMES_USUAL: f64 = 3.0;
-
 /// Calibrates both cameras and the rig.
 pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Error> {
     let candidates = Candidates::new(corners)?;
-    let mut consensus = consensus::find(&candidates, JUDGING_LENS.max(options.lens.unwrap_or(JUDGING_LENS)))?;
-    let choose = |consensus: &Consensus| {
-        lens_ladder::choose(&consensus.problem(), &corners.board, options).map_err(|e| e.without(&consensus.skipped()))
-    };
-    let mut choice = choose(&consensus)?;
-    if let Some(richer) = choice.layout.left.filter(|lens| options.lens.is_none() && *lens > JUDGING_LENS) {
-        let again = consensus::find(&candidates, richer)?;
-        if again.names() != consensus.names() {
-            choice = choose(&again)?;
-        }
-        consensus = again;
-    }
-    let lens_ladder::Choice { layout, near, scores: lens_scores } = choice;
-    let start = consensus.problem();
-    let near = near.filter(|near| near.poses.len() == start.views.len());
-    let mut solved = Problem { values: near.unwrap_or(start.values), ..start }
+    let Series { problem: start, discarded } = series::find(&candidates)?;
+    let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
+    let lens_ladder::Choice { layout, near, scores: lens_scores } =
+        lens_ladder::choose(&start, &corners.board, options).map_err(|e| e.without(&skipped))?;
+    let solved = Problem { values: near.unwrap_or_else(|| start.values.clone()), ..start }
         .solve(&layout)
-        .map_err(|e| e.without(&consensus.skipped()).of_lens(options.lens))?;
-    let Consensus { mut discarded, standing, .. } = consensus;
-    loop {
-        let lost = emptied(&solved.problem.views);
-        if lost.is_empty() {
-            break;
-        }
-        let kept = solved.problem.subset(|i| lost.iter().all(|(at, _)| *at != i));
-        discarded.extend(lost.into_iter().map(|(_, pair)| pair));
-        discarded.sort_by(|a, b| a.pair.cmp(&b.pair));
-        if kept.views.len() < FEWEST_PAIRS {
-            return Err(too_few_pairs(kept.views.len(), &discarded));
-        }
-        let skipped = || discarded.iter().map(DiscardedPair::skipped).collect::<Vec<Skipped>>();
-        solved = kept.solve(&layout).map_err(|e| e.without(&skipped()))?;
-    }
+        .map_err(|e| e.without(&skipped).of_lens(options.lens))?;
     let neighbours = solved.neighbours(&corners.board);
-    let by_noise = solved.uncertainty(&layout).map_err(|e| e.of_lens(options.lens))?.scaled(neighbours.inflation());
+    let inflation = neighbours.inflation() * solved.loss_factor;
+    let by_noise = solved.uncertainty(&layout).map_err(|e| e.of_lens(options.lens))?.scaled(inflation);
     let without_scatter = by_noise.shared.clone();
     let print = PrintShare::of(&solved, &corners.board, &layout);
     let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
     let Stated { mut uncertainty, pair_scatter, witnesses } =
-        stated_uncertainty::state(&solved, &layout, by_noise, &neighbours, &lens_scores, print_excess);
-    let Problem { views, mut values } = solved.problem;
+        stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, print_excess);
+    let Problem { views, mut values, priors } = solved.problem;
     let mut own_noise = solved.noise;
     if let Some(print) = print {
         uncertainty.shared += print.covariance - without_scatter;
@@ -157,34 +127,14 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
         neighbours,
         pair_scatter,
         witnesses,
-        skipped: discarded.iter().map(DiscardedPair::skipped).collect(),
+        inflation,
+        priors,
+        skipped,
         discarded: Discarded::new(&views, discarded),
-        standing,
+        standing: Standing::default(),
         lens_scores,
         views,
         values,
         uncertainty,
     })
-}
-
-/// Pairs that lost a good part of the corners in one of their pictures, and their places.
-fn emptied(views: &[View]) -> Vec<(usize, DiscardedPair)> {
-    let lost = |view: &View, side: Side| {
-        let seen = view.observations.iter().filter(|o| o.side == side).count();
-        (seen - view.active(side).count(), seen)
-    };
-    let share = |view: &View, side: Side| lost(view, side).0 as f64 / lost(view, side).1.max(1) as f64;
-    let usual = median(views.iter().flat_map(|view| Side::BOTH.map(|side| share(view, side)))).unwrap_or(0.0);
-    let limit = LOST_SHARE.max(LOST_TIMES_USUAL * usual);
-    let of = |(i, view): (usize, &View)| {
-        let side = Side::BOTH.into_iter().find(|side| share(view, *side) > limit)?;
-        let (lost, seen) = lost(view, side);
-        let reason = format!(
-            "{lost} of {seen} corners in the {} picture lie farther from the rig's prediction than their scatter allows: \
-             partly covered, in motion, taken line by line (interlaced), or a light that moves edges",
-            side.name()
-        );
-        Some((i, DiscardedPair::new(&view.pair, Cause::CornersLost, reason)))
-    };
-    views.iter().enumerate().filter_map(of).collect()
 }

@@ -35,12 +35,20 @@ pub enum Error {
         side: Side,
     },
     /// Most pairs do not belong to one rig.
-    #[error("the pairs contradict each other: only {agreeing} of {total} fit one rig{}", list(.bad))]
+    #[error(
+        "the pairs contradict each other: only {agreeing} of {total} fit one rig; half of them miss it by {usual_px:.1} px and more, \
+         each camera alone by {alone_px:.2} px{}",
+        list(.bad)
+    )]
     Contradiction {
         /// Pairs that fit one rig.
         agreeing: usize,
         /// Pairs that were compared.
         total: usize,
+        /// Median over the pairs of what they miss the rig by, px.
+        usual_px: f64,
+        /// Median over the pictures of what each camera alone leaves, px.
+        alone_px: f64,
         /// The others.
         bad: Vec<Skipped>,
     },

@@ -9,6 +9,7 @@ use nalgebra::{Matrix2, Vector2};
 use crate::statistics::median;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
+use crate::stereo::solve::robust_loss::Loss;
 
 /// The noise model of all corners.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,11 +75,55 @@ impl Noise {
         fit(residuals, |chi| chi.iter().sum::<f64>() / freedom)
     }
 
+    /// The likeliest noise with the loss that belongs to it, `unknowns` numbers being fitted to the same residuals: Gaussian, or Student's
+    /// distribution where its tails are more than chance (Bayes' criterion for one number more). Pictures that nobody triggered have
+    /// heavy tails, and some of their corners are simply wrong.
+    pub fn likeliest(residuals: &[(Observation, Vector2<f64>)], unknowns: usize) -> (Noise, Loss) {
+        /// Degrees of freedom that are tried; with fewer the tails of a pair that moved would be taken for the corners'.
+        const FREEDOMS: [f64; 9] = [4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 24.0, 36.0, 64.0];
+        let freedom = (2 * residuals.len()).saturating_sub(unknowns).max(1) as f64;
+        let with = |loss: Loss| {
+            let noise = fit(residuals, |chi| chi.iter().map(|c| loss.cost_and_weight(*c).1 * c).sum::<f64>() / freedom);
+            (noise, loss, noise.log_likelihood(residuals, loss))
+        };
+        let gaussian = with(Loss::Squared);
+        let least = gaussian.2 + 0.5 * (residuals.len().max(1) as f64).ln();
+        let likeliest = FREEDOMS.map(|freedom| with(Loss::Student(freedom))).into_iter();
+        let likeliest = likeliest.filter(|student| student.2 > least).max_by(|a, b| a.2.total_cmp(&b.2));
+        let (noise, loss, _) = likeliest.unwrap_or(gaussian);
+        (noise, loss)
+    }
+
+    /// Logarithm of the likelihood of residuals, but for a constant.
+    fn log_likelihood(&self, residuals: &[(Observation, Vector2<f64>)], loss: Loss) -> f64 {
+        let of = |(o, r): &(Observation, Vector2<f64>)| {
+            let covariance = self.covariance(o);
+            let whitened = whitener(&covariance) * r;
+            -0.5 * covariance.determinant().max(f64::MIN_POSITIVE).ln()
+                - loss.cost_and_weight(whitened.norm_squared()).0
+        };
+        residuals.iter().map(of).sum()
+    }
+
     /// Median over the corners of the standard deviation of a coordinate, px.
     pub fn typical_px(&self, views: &[View]) -> f64 {
         let active = views.iter().flat_map(|view| view.observations.iter().filter(|o| o.active));
         median(active.map(|o| (self.covariance(o).trace() / 2.0).sqrt())).unwrap_or(self.added_px)
     }
+}
+
+/// The factor on the covariances after which the `reduced` chi-square of the corners is one; `first` is that with a factor of one.
+fn shrunk(chi: &[f64], first: f64, reduced: &impl Fn(&mut [f64]) -> f64) -> f64 {
+    let mut factor = first.max(f64::MIN_POSITIVE.sqrt());
+    // Where the reduced chi-square is a mean or a median, the first is right; weights that fall with chi-square need some rounds.
+    for _ in 0..100 {
+        let ratio = reduced(&mut chi.iter().map(|c| c / factor).collect::<Vec<f64>>());
+        if (ratio - 1.0).abs() < 1e-9 || !ratio.is_finite() || ratio <= 0.0 {
+            break;
+        }
+        factor *= ratio;
+    }
+    factor
 }
 
 /// A residual along the axes of its corner's own covariance: squares, px^2, and the variances they come with.
@@ -120,7 +165,7 @@ fn fit(residuals: &[(Observation, Vector2<f64>)], reduced: impl Fn(&mut [f64]) -
     let known = residuals.iter().all(|(o, _)| o.covariance_px2.m11 > 0.0);
     let own = known.then(|| with(0.0));
     if let Some(own) = own.filter(|own| *own <= 1.0) {
-        let factor = own.max(f64::MIN_POSITIVE.sqrt());
+        let factor = shrunk(&aligned.iter().map(|a| a.chi(0.0)).collect::<Vec<f64>>(), own, &reduced);
         return Noise { factor, added_px: 0.0, reduced_chi_square: Some(own) };
     }
     // With the covariances in, less than the plain scatter is missing: the root lies between zero and it. The inverse of the

@@ -13,6 +13,7 @@ use crate::stereo::data::view::View;
 use crate::stereo::init::homography::{homography, pose};
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
+use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty;
 
@@ -59,7 +60,7 @@ fn search(shared: &Shared, view: &View, start: Transform, loss: Loss, search: Se
 /// Covariance of a fitted pose from the corners alone, with unit variance of the whitened residuals.
 pub fn covariance(shared: &Shared, view: &View, left_from_board: &Transform) -> Option<Matrix6<f64>> {
     let values = Values { shared: shared.clone(), poses: vec![*left_from_board] };
-    uncertainty::of_solution(std::slice::from_ref(view), &Layout::POSES_ONLY, &values)?.poses.pop()
+    uncertainty::of_solution(std::slice::from_ref(view), &Layout::POSES_ONLY, &Priors::NONE, &values)?.poses.pop()
 }
 
 /// `left_from_board` as one picture alone shows it, from the homography of its undistorted rays. `None` where its corners give none.

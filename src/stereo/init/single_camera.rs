@@ -18,6 +18,7 @@ use crate::stereo::init::homography::{focal_lengths, homography, pixel_pairs, po
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
+use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::CAUCHY_WIDTH;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::{Camera, Lens, Rig};
@@ -40,7 +41,7 @@ pub struct OneCamera {
 }
 
 /// Calibrates one camera from its pictures alone. `None` where no start leads anywhere.
-pub fn one_camera(views: &[View], side: Side, size: (u32, u32)) -> Option<OneCamera> {
+pub fn one_camera(views: &[View], side: Side, size: (u32, u32), diagonal_mm: f64) -> Option<OneCamera> {
     // Seen by itself, either camera is the left one of a rig without a right one.
     let pictures: Vec<View> = views.iter().map(|view| as_left(view, side)).collect();
     let center = Point2::new((f64::from(size.0) - 1.0) / 2.0, (f64::from(size.1) - 1.0) / 2.0);
@@ -59,7 +60,7 @@ pub fn one_camera(views: &[View], side: Side, size: (u32, u32)) -> Option<OneCam
             let mut camera = Camera::pinhole(size.0, size.1, fx);
             camera.fy = fy;
             camera.lens = FIRST_LENS;
-            from_focal_length(&pictures, &homographies, &good, camera)
+            from_focal_length(&pictures, &homographies, &good, camera, diagonal_mm)
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, one)| one)
@@ -87,6 +88,7 @@ fn from_focal_length(
     homographies: &[Option<(Matrix3<f64>, f64)>],
     good: &[usize],
     camera: Camera,
+    diagonal_mm: f64,
 ) -> Option<(f64, OneCamera)> {
     let inverse = camera.matrix().try_inverse()?;
     let start_of = |i: usize| homographies[i].and_then(|(h, _)| pose(&(inverse * h)));
@@ -95,16 +97,18 @@ fn from_focal_length(
     let rig = Rig { left: camera, right: camera, right_from_left: Transform::identity(), covariance: None };
     let poses = chosen.iter().map(|(_, pose)| *pose).collect();
     let mut values = Values { shared: Shared { rig, shape_mm: FLAT }, poses };
+    let priors = Priors::of_one_camera(&camera, diagonal_mm);
     let mut cost = f64::INFINITY;
-    for lens in [FIRST_LENS, FIRST_LENS, Lens::Brown4] {
+    for lens in [FIRST_LENS, FIRST_LENS, Lens::Brown5] {
         values.shared.rig.left.lens = lens;
         let noise = Noise::from_median(&residuals::active(&views, &values)?);
         noise.apply(&mut views);
         let loss = Loss::Cauchy(CAUCHY_WIDTH);
-        values = levenberg_marquardt::solve(&views, &Layout::one_camera(lens), values, loss, Search::ROUGH).values;
+        let layout = Layout::one_camera(lens);
+        values = levenberg_marquardt::solve_with(&views, &layout, &priors, values, loss, Search::ROUGH).values;
         cost = residuals::active(&views, &values).map(|r| Noise::from_median(&r).added_px)?;
     }
-    (views, values) = with_the_others(pictures, &mut chosen, views, values);
+    (views, values) = with_the_others(pictures, &mut chosen, views, values, &priors);
     cost = residuals::active(&views, &values).map(|r| Noise::from_median(&r).added_px).unwrap_or(cost);
     let camera = values.shared.rig.left;
     let mut poses = vec![None; pictures.len()];
@@ -124,6 +128,7 @@ fn with_the_others(
     chosen: &mut Vec<(usize, Transform)>,
     mut views: Vec<View>,
     mut values: Values,
+    priors: &Priors,
 ) -> (Vec<View>, Values) {
     let others: Vec<usize> = (0..pictures.len()).filter(|i| chosen.iter().all(|(known, _)| known != i)).collect();
     if others.is_empty() {
@@ -141,7 +146,7 @@ fn with_the_others(
         Noise::from_median(&left).apply(&mut views);
         let layout = Layout::one_camera(values.shared.rig.left.lens);
         let loss = Loss::Cauchy(CAUCHY_WIDTH);
-        values = levenberg_marquardt::solve(&views, &layout, values, loss, Search::ROUGH).values;
+        values = levenberg_marquardt::solve_with(&views, &layout, priors, values, loss, Search::ROUGH).values;
     }
     (views, values)
 }

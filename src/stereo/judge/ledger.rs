@@ -48,7 +48,6 @@ pub fn ledger(facts: &Facts) -> Vec<Evidence> {
         folds(facts),
         rays(facts),
         epipolar(facts),
-        corners_discarded(facts),
         pairs_discarded(facts),
         standing(facts),
         poses(facts),
@@ -252,35 +251,6 @@ fn epipolar(facts: &Facts) -> Evidence {
             "root mean square distance of held-out corners from the epipolar lines of their partners (largest {:.3} px); as much along \
              the line is depth and moves a length by the tolerance at the limit",
             error.max_px
-        ),
-    }
-}
-
-fn corners_discarded(facts: &Facts) -> Evidence {
-    /// Beyond a twentieth it is no longer single corners that are wrong, and which ones were kept shapes the result.
-    const LIMIT_PERCENT: f64 = 5.0;
-    let views = &facts.calibration.views;
-    let all: usize = views.iter().map(|view| view.observations.len()).sum();
-    let mut worst: Vec<(usize, &str)> = views
-        .iter()
-        .map(|view| (view.observations.iter().filter(|o| !o.active).count(), view.pair.as_str()))
-        .filter(|(count, _)| *count > 0)
-        .collect();
-    worst.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
-    let discarded: usize = worst.iter().map(|(count, _)| count).sum();
-    let value = 100.0 * discarded as f64 / all.max(1) as f64;
-    let named: Vec<String> = worst.iter().take(5).map(|(count, pair)| format!("{pair} ({count})")).collect();
-    let named = if named.is_empty() { String::new() } else { format!(", most in {}", named.join(", ")) };
-    Evidence {
-        what: "corners discarded",
-        remedy: "look at the pairs that lost most of them, and take those again",
-        value: Some(value),
-        limit: Some(LIMIT_PERCENT),
-        unit: "%",
-        allows: Verdict::within(value, LIMIT_PERCENT),
-        detail: format!(
-            "{discarded} of {all} corners lie farther from the common rig than their own covariance lets expect (one in a million \
-             does){named}; beyond the limit the verdict rests on which ones were kept"
         ),
     }
 }

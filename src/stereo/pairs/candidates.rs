@@ -53,7 +53,7 @@ impl Candidates {
         let sizes = [corners.left_size, corners.right_size];
         let cameras: Vec<Option<OneCamera>> = Side::BOTH
             .into_par_iter()
-            .map(|side| single_camera::one_camera(&views, side, sizes[side as usize]))
+            .map(|side| single_camera::one_camera(&views, side, sizes[side as usize], corners.board.diagonal_mm()))
             .collect();
         let of = |side: Side| cameras[side as usize].clone().ok_or(Error::NoCamera { side });
         let cameras = [of(Side::Left)?, of(Side::Right)?];

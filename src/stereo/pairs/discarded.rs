@@ -18,14 +18,14 @@ pub enum Cause {
     Duplicate,
     /// A picture's corners form no board: misread, blurred, or taken in motion or line by line.
     Misshapen,
-    /// Many of its corners contradict the rig although the others fit.
-    CornersLost,
     /// Its corners are numbered from another end of the board in one picture than in the other.
     Numbering,
     /// Left and right are exchanged, or a picture is turned or mirrored.
     Altered,
     /// Its pictures belong to different pairs.
     Mismatched,
+    /// It contradicts the others, and nothing that is known here explains it.
+    Unknown,
     /// The board or a camera moved between its two pictures.
     NotSimultaneous,
     /// The board is another one, of another pitch.

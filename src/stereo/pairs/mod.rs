@@ -1,16 +1,11 @@
 //! Which pairs belong to one rig, how their corners are numbered, and what happened to the others.
 
 pub mod candidates;
-mod changes;
-pub mod consensus;
-mod consistency;
-mod diagnosis;
 pub mod discarded;
+mod misfit;
+mod mixups;
 pub mod numbering;
-mod screening;
-mod single_pictures;
-#[cfg(test)]
-mod tests;
+pub mod series;
 
 pub use discarded::{Cause, Discarded, DiscardedPair, PictureCorners, Standing};
 

@@ -11,7 +11,8 @@ use nalgebra::{DMatrix, DVector, Point3};
 use crate::geometry::Transform;
 use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::{Layout, Shared};
-use crate::stereo::solve::normal_equations::{self, Block};
+use crate::stereo::solve::normal_equations::{self, Equations};
+use crate::stereo::solve::priors::Information;
 use crate::stereo::solve::uncertainty::{self, determines_cameras};
 
 /// Folds over the pairs; with fewer pairs each is a fold of its own.
@@ -100,20 +101,23 @@ pub struct Without {
 }
 
 /// The calibration without each fold. `None` for a fold without which the others do not determine the cameras.
-pub fn leave_out(blocks: &[Block], layout: &Layout, shared: &Shared, fold_of: &[usize]) -> Vec<Option<Without>> {
+pub fn leave_out(equations: &Equations, layout: &Layout, shared: &Shared, fold_of: &[usize]) -> Vec<Option<Without>> {
+    let blocks = &equations.blocks;
     let reduced: Option<Vec<(DMatrix<f64>, DVector<f64>)>> = blocks.iter().map(|block| block.reduced(0.0)).collect();
     let Some(reduced) = reduced else { return vec![None; count(fold_of)] };
-    (0..count(fold_of)).map(|fold| without(&reduced, layout, shared, |i| fold_of[i] != fold)).collect()
+    (0..count(fold_of))
+        .map(|fold| without(&equations.prior, &reduced, layout, shared, |i| fold_of[i] != fold))
+        .collect()
 }
 
 fn without(
+    prior: &Information,
     reduced: &[(DMatrix<f64>, DVector<f64>)],
     layout: &Layout,
     shared: &Shared,
     keep: impl Fn(usize) -> bool,
 ) -> Option<Without> {
-    let count = layout.count();
-    let (mut matrix, mut gradient) = (DMatrix::zeros(count, count), DVector::zeros(count));
+    let (mut matrix, mut gradient) = (prior.matrix.clone(), prior.gradient.clone());
     for (_, (own, own_gradient)) in reduced.iter().enumerate().filter(|(i, _)| keep(*i)) {
         matrix += own;
         gradient += own_gradient;
@@ -136,8 +140,6 @@ mod tests {
     use crate::stereo::Lens;
     use crate::stereo::calibrate::calibrate;
     use crate::stereo::select::lens_ladder::Options;
-    use crate::stereo::solve::levenberg_marquardt;
-    use crate::stereo::solve::robust_loss::Loss;
     use crate::stereo::synthetic::World;
 
     #[test]
@@ -148,8 +150,9 @@ mod tests {
             let found = calibrate(&World::new(pairs, 2).corners(3), &options).unwrap();
             let layout = found.layout;
             let fold_of: Vec<usize> = (0..pairs).collect();
-            let blocks = levenberg_marquardt::blocks(&found.views, &layout, &found.values, Loss::Squared).unwrap();
-            let all = leave_out(&blocks, &layout, &found.values.shared, &fold_of);
+            let problem = found.problem();
+            let equations = problem.equations(&layout).unwrap();
+            let all = leave_out(&equations, &layout, &found.values.shared, &fold_of);
             for (fold, without) in all.iter().enumerate() {
                 let without = without.as_ref().unwrap();
                 let searched = found.problem().subset(|i| fold_of[i] != fold).refit(&layout).unwrap();

@@ -12,9 +12,7 @@ use crate::imaging::Board;
 use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::select::model_comparison::{Chance, LensScore, score, simplest};
 use crate::stereo::select::stated_uncertainty;
-use crate::stereo::solve::levenberg_marquardt;
 use crate::stereo::solve::problem::Problem;
-use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty;
 use crate::stereo::target::print_share::PrintShare;
 use crate::stereo::{Error, Lens};
@@ -104,8 +102,7 @@ fn ladder(problem: &Problem, shape: bool) -> Vec<LensScore> {
 /// a chi-square with as many degrees of freedom as it adds. Of a lens that cannot be determined nothing is expected.
 fn expects_gain(problem: &Problem, layout: &Layout, simpler: &Layout) -> bool {
     let start = problem.with_layout(layout);
-    let expected = levenberg_marquardt::blocks(&start.views, layout, &start.values, Loss::Squared)
-        .and_then(|blocks| uncertainty::expected_decrease(&blocks, layout));
+    let expected = start.equations(layout).and_then(|equations| uncertainty::expected_decrease(&equations));
     let added = (layout.count() - simpler.count()) as f64;
     expected.is_some_and(|expected| expected > added + 2.0 * (2.0 * added).sqrt())
 }

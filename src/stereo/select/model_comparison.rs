@@ -12,7 +12,7 @@ use crate::stereo::init::board_pose;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::select::cross_validation::{self, FOLDS};
 use crate::stereo::solve::levenberg_marquardt;
-use crate::stereo::solve::normal_equations::Block;
+use crate::stereo::solve::normal_equations::Equations;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::{self, determines_cameras};
@@ -70,7 +70,7 @@ pub struct Trial {
     pub values: Values,
     /// Covariance of rig and shape.
     pub covariance: DMatrix<f64>,
-    /// Sum of the squared whitened residuals of the pairs it was fitted to.
+    /// Sum of the squared whitened residuals of the pairs it was fitted to, and of what the lens misses of what is expected of lenses.
     chi_square: f64,
     /// How many corners they are.
     corners: usize,
@@ -96,21 +96,21 @@ pub fn simplest<'a>(scores: &'a [LensScore], chance: &Chance) -> Option<&'a Tria
 impl Trial {
     /// A model calibrated with all pairs and held against none. `None` where the pairs do not determine it.
     pub fn new(problem: &Problem, layout: Layout) -> Option<Trial> {
-        Some(Trial::with_blocks(problem, layout)?.0)
+        Some(Trial::with_equations(problem, layout)?.0)
     }
 
     /// The model at its minimum, with the normal equations there.
-    fn with_blocks(problem: &Problem, layout: Layout) -> Option<(Trial, Vec<Block>)> {
+    fn with_equations(problem: &Problem, layout: Layout) -> Option<(Trial, Equations)> {
         let values = problem.refit(&layout)?;
         let views = &problem.views;
-        let blocks = levenberg_marquardt::blocks(views, &layout, &values, Loss::Squared)?;
-        let covariance = uncertainty::of_blocks(&blocks, &layout)?.shared;
+        let equations = levenberg_marquardt::equations(views, &layout, &problem.priors, &values, Loss::Squared)?;
+        let covariance = uncertainty::of_equations(&equations)?.shared;
         if !determines_cameras(&covariance, &layout, &values.shared.rig) {
             return None;
         }
-        let chi_square = 2.0 * blocks.iter().map(|block| block.cost).sum::<f64>();
+        let chi_square = 2.0 * equations.cost();
         let corners = views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count();
-        Some((Trial { layout, values, covariance, chi_square, corners, by_pair: Vec::new() }, blocks))
+        Some((Trial { layout, values, covariance, chi_square, corners, by_pair: Vec::new() }, equations))
     }
 
     /// Sum of the squared whitened residuals of the pairs it was fitted to.
@@ -161,10 +161,10 @@ pub fn score(problem: &Problem, lens: Lens, shape: bool) -> LensScore {
 /// The model with all pairs and, fold by fold, on those it has not seen. `None` where the pairs do not determine it.
 fn hold_out(problem: &Problem, layout: Layout) -> Option<(Trial, f64)> {
     // A lens that all pairs together do not determine is none.
-    let (trial, blocks) = Trial::with_blocks(problem, layout)?;
+    let (trial, equations) = Trial::with_equations(problem, layout)?;
     let views = &problem.views;
     let fold_of = cross_validation::folds(views, &trial.values.poses, FOLDS);
-    let rigs = cross_validation::leave_out(&blocks, &layout, &trial.values.shared, &fold_of);
+    let rigs = cross_validation::leave_out(&equations, &layout, &trial.values.shared, &fold_of);
     let rigs = rigs.into_iter().map(|without| Some(without?.shared)).collect::<Option<Vec<Shared>>>()?;
     let misses: Vec<Option<Miss>> =
         views.par_iter().enumerate().map(|(i, view)| miss(&rigs[fold_of[i]], view, trial.values.poses[i])).collect();

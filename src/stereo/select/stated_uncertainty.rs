@@ -12,15 +12,12 @@ use crate::imaging::Board;
 use crate::statistics::chi_square_quantile;
 use crate::stereo::Lens;
 use crate::stereo::Rig;
-use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::select::cross_validation;
 use crate::stereo::select::model_comparison::{LensScore, Trial};
 use crate::stereo::select::pair_scatter::{self, PairScatter};
-use crate::stereo::solve::levenberg_marquardt;
-use crate::stereo::solve::normal_equations::Block;
+use crate::stereo::solve::normal_equations::Equations;
 use crate::stereo::solve::problem::{Problem, Solved};
-use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::Uncertainty;
 
 /// Quantile of the normal distribution at whose level of chi-squared additional terms are more than chance: one clean set of pairs in two hundred
@@ -52,18 +49,17 @@ pub struct Stated {
     pub witnesses: Vec<Witness>,
 }
 
-/// Enlarges the covariance `by_noise`, which allows for what neighbours share. `print_excess`: see
+/// Enlarges the covariance `by_noise`, which is `inflation` times that of the normal equations. `print_excess`: see
 /// [`Chance::print`](crate::stereo::select::model_comparison::Chance).
 pub fn state(
     solved: &Solved,
     layout: &Layout,
     by_noise: Uncertainty,
-    neighbours: &NeighbourCorrelation,
+    inflation: f64,
     scores: &[LensScore],
     print_excess: f64,
 ) -> Stated {
-    let inflation = neighbours.inflation();
-    let Some((blocks, mut shared, pair_scatter)) = scattered(&solved.problem, layout, &by_noise.shared, inflation)
+    let Some((equations, mut shared, pair_scatter)) = scattered(&solved.problem, layout, &by_noise.shared, inflation)
     else {
         let pair_scatter = PairScatter { groups: solved.problem.views.len(), ratio: None };
         return Stated { uncertainty: by_noise, pair_scatter, witnesses: Vec::new() };
@@ -77,12 +73,12 @@ pub fn state(
     for witness in likeliest.into_iter().chain(witnesses.iter().filter(|w| w.layout.left == layout.left)) {
         shared += &witness.step * witness.step.transpose();
     }
-    Stated { uncertainty: by_noise.with_shared(shared, &blocks), pair_scatter, witnesses }
+    Stated { uncertainty: by_noise.with_shared(shared, &equations.blocks), pair_scatter, witnesses }
 }
 
 /// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs tell; at least one.
 pub fn excess_scatter(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
-    let inflation = solved.neighbours(board).inflation();
+    let inflation = solved.neighbours(board).inflation() * solved.loss_factor;
     let ratio = || {
         let by_noise = solved.uncertainty(layout).ok()?.scaled(inflation);
         scattered(&solved.problem, layout, &by_noise.shared, inflation)?.2.ratio
@@ -96,13 +92,13 @@ fn scattered(
     layout: &Layout,
     by_noise: &DMatrix<f64>,
     inflation: f64,
-) -> Option<(Vec<Block>, DMatrix<f64>, PairScatter)> {
-    let Problem { views, values } = problem;
+) -> Option<(Equations, DMatrix<f64>, PairScatter)> {
+    let Problem { views, values, .. } = problem;
     let groups = cross_validation::groups(views, &values.poses);
-    let blocks = levenberg_marquardt::blocks(views, layout, values, Loss::Squared)?;
-    let without = cross_validation::leave_out(&blocks, layout, &values.shared, &groups);
-    let (shared, pair_scatter) = pair_scatter::covariance(by_noise, inflation, &blocks, &groups, &without);
-    Some((blocks, shared, pair_scatter))
+    let equations = problem.equations(layout)?;
+    let without = cross_validation::leave_out(&equations, layout, &values.shared, &groups);
+    let (shared, pair_scatter) = pair_scatter::covariance(by_noise, inflation, &equations.blocks, &groups, &without);
+    Some((equations, shared, pair_scatter))
 }
 
 fn witnesses(problem: &Problem, layout: &Layout, scores: &[LensScore], factor: f64) -> Vec<Witness> {

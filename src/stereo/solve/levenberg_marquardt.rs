@@ -15,7 +15,8 @@ use crate::geometry::perturb;
 use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::Layout;
 use crate::stereo::model::parameters::Values;
-use crate::stereo::solve::normal_equations::{self, Block};
+use crate::stereo::solve::normal_equations::{self, Block, Equations};
+use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::Loss;
 
 /// The search is done when even a strongly damped step does not lower the cost.
@@ -83,25 +84,37 @@ pub struct Solution {
     pub steps: usize,
 }
 
-/// Minimises. Views and `start.poses` correspond by place.
+/// Minimises with nothing expected of the shared numbers. Views and `start.poses` correspond by place.
 pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss, search: Search) -> Solution {
-    let Some(mut blocks) = blocks(views, layout, &start, loss) else {
+    solve_with(views, layout, &Priors::NONE, start, loss, search)
+}
+
+/// Minimises with what is expected of the shared numbers.
+pub fn solve_with(
+    views: &[View],
+    layout: &Layout,
+    priors: &Priors,
+    start: Values,
+    loss: Loss,
+    search: Search,
+) -> Solution {
+    let Some(mut equations) = equations(views, layout, priors, &start, loss) else {
         return Solution { values: start, cost: f64::INFINITY, stop: Stop::NoStart, steps: 0 };
     };
     let mut values = start;
-    let mut cost = total_cost(&blocks);
+    let mut cost = equations.cost();
     let mut damping = search.first_damping;
     // Grows while steps fail: the way up from hardly any damping would be long otherwise.
     let mut rise = 10.0;
     let mut lately = VecDeque::from([cost]);
     for steps in 1..=search.most_steps {
         let mut accepted = false;
-        if let Some((trial, predicted_gain)) = try_step(layout, &values, &blocks, damping) {
-            let next = self::blocks(views, layout, &trial, loss);
-            let gain = next.as_ref().map_or(f64::NEG_INFINITY, |b| cost - total_cost(b));
+        if let Some((trial, predicted_gain)) = try_step(layout, &values, &equations, damping) {
+            let next = self::equations(views, layout, priors, &trial, loss);
+            let gain = next.as_ref().map_or(f64::NEG_INFINITY, |next| cost - next.cost());
             if let Some(next) = next.filter(|_| gain >= 0.0) {
                 values = trial;
-                blocks = next;
+                equations = next;
                 cost -= gain;
                 damping = (damping * damping_change(gain / predicted_gain)).max(LEAST_DAMPING);
                 rise = 10.0;
@@ -121,7 +134,8 @@ pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss, search:
             rise *= 10.0;
             if damping > MAX_DAMPING {
                 // No step lowers the cost, however short: a minimum but for rounding, unless the equations still promise something.
-                let promised = try_step(layout, &values, &blocks, search.first_damping).map_or(f64::INFINITY, |s| s.1);
+                let promised =
+                    try_step(layout, &values, &equations, search.first_damping).map_or(f64::INFINITY, |s| s.1);
                 let minimum = promised < NO_MATTER.max(ROUNDING * cost);
                 let stop = if minimum { Stop::Minimum } else { Stop::Exhausted };
                 return Solution { values, cost, stop, steps };
@@ -144,33 +158,30 @@ fn damping_change(share: f64) -> f64 {
     }
 }
 
-/// The blocks of all pairs, in their order. `None` where a corner would lie behind its camera.
-pub fn blocks(views: &[View], layout: &Layout, values: &Values, loss: Loss) -> Option<Vec<Block>> {
-    views
+/// The normal equations; the pairs' shares in their order. `None` where a corner would lie behind its camera.
+pub fn equations(views: &[View], layout: &Layout, priors: &Priors, values: &Values, loss: Loss) -> Option<Equations> {
+    let blocks: Option<Vec<Block>> = views
         .par_iter()
         .zip(&values.poses)
         .map(|(view, pose)| normal_equations::block(&values.shared, layout, pose, view, loss))
         .collect::<Vec<_>>()
         .into_iter()
-        .collect()
-}
-
-fn total_cost(blocks: &[Block]) -> f64 {
-    blocks.iter().map(|b| b.cost).sum()
+        .collect();
+    Some(Equations { blocks: blocks?, prior: priors.information(layout, &values.shared) })
 }
 
 /// The damped step and the gain that the linear equations predict. `None` where the damped system is still singular.
-fn try_step(layout: &Layout, values: &Values, blocks: &[Block], damping: f64) -> Option<(Values, f64)> {
+fn try_step(layout: &Layout, values: &Values, equations: &Equations, damping: f64) -> Option<(Values, f64)> {
     let count = layout.count();
     let step = if count == 0 {
         DVector::zeros(0)
     } else {
-        let (matrix, gradient) = normal_equations::eliminate(blocks, damping, count)?;
+        let (matrix, gradient) = normal_equations::eliminate(equations, damping)?;
         -normal_equations::solve_scaled(&matrix, &gradient)?
     };
-    let mut predicted_gain = 0.0;
-    let mut poses = Vec::with_capacity(blocks.len());
-    for (block, pose) in blocks.iter().zip(&values.poses) {
+    let mut predicted_gain = -0.5 * equations.prior.gradient.dot(&step);
+    let mut poses = Vec::with_capacity(equations.blocks.len());
+    for (block, pose) in equations.blocks.iter().zip(&values.poses) {
         let right = block.pose_gradient + block.mixed.tr_mul(&step);
         let pose_step: Vector6<f64> = -(block.pose_inverse(damping)? * right);
         predicted_gain -= 0.5 * block.pose_gradient.dot(&pose_step);

@@ -3,6 +3,7 @@
 mod gram_matrix;
 pub mod levenberg_marquardt;
 pub mod normal_equations;
+pub mod priors;
 pub mod problem;
 pub mod robust_loss;
 pub mod uncertainty;

@@ -14,6 +14,7 @@ use crate::stereo::data::view::View;
 use crate::stereo::model::board_shape;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::solve::gram_matrix::{Products, WIDEST};
+use crate::stereo::solve::priors::Information;
 use crate::stereo::solve::robust_loss::Loss;
 
 /// One pair's share of the normal equations.
@@ -229,12 +230,34 @@ pub fn inverse6(matrix: &Matrix6<f64>) -> Option<Matrix6<f64>> {
     Some(Matrix6::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
+/// The normal equations of all pairs, with what is expected of the shared numbers before any picture.
+#[derive(Debug, Clone)]
+pub struct Equations {
+    /// Each pair's share, in their order.
+    pub blocks: Vec<Block>,
+    /// What is expected.
+    pub prior: Information,
+}
+
+impl Equations {
+    /// Half the robust sum of squares, expectations included.
+    pub fn cost(&self) -> f64 {
+        self.blocks.iter().map(|block| block.cost).sum::<f64>() + self.prior.cost
+    }
+
+    /// Number of shared unknowns.
+    pub fn count(&self) -> usize {
+        self.prior.gradient.len()
+    }
+}
+
 /// The shared system with all poses eliminated: matrix and right-hand side. Summed in the order of the pairs.
-pub fn eliminate(blocks: &[Block], damping: f64, count: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
-    let mut matrix = DMatrix::zeros(count, count);
-    let mut gradient = DVector::zeros(count);
-    let mut diagonal = DVector::zeros(count);
-    for block in blocks {
+pub fn eliminate(equations: &Equations, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    let count = equations.count();
+    let mut matrix = equations.prior.matrix.clone();
+    let mut gradient = equations.prior.gradient.clone();
+    let mut diagonal = matrix.diagonal();
+    for block in &equations.blocks {
         let (own, own_gradient) = block.reduced(damping)?;
         matrix += own;
         gradient += own_gradient;
@@ -262,6 +285,7 @@ mod tests {
     use super::*;
     use crate::geometry::perturb;
     use crate::stereo::Lens;
+    use crate::stereo::solve::priors::Priors;
     use crate::stereo::synthetic::World;
     use nalgebra::Vector3;
 
@@ -339,7 +363,9 @@ mod tests {
                 right[at + r] += b.pose_gradient[r];
             }
         }
-        let (matrix, gradient) = eliminate(&blocks, 0.0, n).unwrap();
+        let shared = Shared { rig: world.rig.clone(), shape_mm: [0.0; 3] };
+        let prior = Priors::NONE.information(&layout, &shared);
+        let (matrix, gradient) = eliminate(&Equations { blocks, prior }, 0.0).unwrap();
         let eliminated = solve_scaled(&matrix, &gradient).unwrap();
         let direct = solve_scaled(&whole, &right).unwrap();
         for i in 0..n {

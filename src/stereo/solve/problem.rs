@@ -1,24 +1,26 @@
 //! A calibration as a least-squares problem: views, values to start from, and which numbers are free.
 //!
-//! In: views that agree and values near their minimum. Out: the values at the minimum, the corners that are outliers, and how the others
-//! scatter. Method: a robust search, then least squares over the corners that are no outliers, with the scatter fitted to what is left.
+//! In: views that agree and values near their minimum. Out: the values at the minimum, how corners scatter, and what each weighs. Method: a robust search, then the likeliest scatter of the corners, whose tails follow from the data, together with weak
+//! expectations of what lenses and boards are like ([`crate::stereo::solve::priors`]).
+
+use nalgebra::Vector2;
 
 use crate::imaging::Board;
 use crate::stereo::Error;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
+use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals;
 use crate::stereo::data::view::View;
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search, Stop};
+use crate::stereo::solve::normal_equations::Equations;
+use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::solve::uncertainty::{self, Uncertainty, WORST_FOCAL_SIGMA, worst_focal_sigma};
 
-/// Whitened residuals beyond this are outliers: of Gaussian corners one in a million lies there.
-const OUTLIER: f64 = 5.3;
-
-/// Rounds of marking corners and solving again: corners at the border of a wide lens come back a few in each.
+/// Rounds of fitting the scatter and solving again.
 const MOST_ROUNDS: usize = 12;
 
 /// Views that agree, with values to start from.
@@ -28,6 +30,8 @@ pub struct Problem {
     pub views: Vec<View>,
     /// Values of all unknowns.
     pub values: Values,
+    /// What is expected of cameras and board before any picture.
+    pub priors: Priors,
 }
 
 /// A problem at its minimum.
@@ -37,6 +41,10 @@ pub struct Solved {
     pub problem: Problem,
     /// How corners scatter.
     pub noise: Noise,
+    /// Gaussian, or with heavy tails; the whiteners hold the weights that it gives.
+    pub loss: Loss,
+    /// Variance of the unknowns over what the weighted normal equations say, as the loss makes it.
+    pub loss_factor: f64,
     /// Root mean square of the length of the 2-D residuals, px.
     pub rms_px: f64,
 }
@@ -58,45 +66,46 @@ impl Problem {
         problem
     }
 
-    /// Solves robustly, then by least squares over the corners that are no outliers, with the scatter fitted to what is left.
+    /// Solves robustly, then with the likeliest scatter of the corners, Gaussian or with heavy tails. No corner is thrown away: what lies far
+    /// off counts little, and its whitener says so afterwards.
     pub fn solve(&self, layout: &Layout) -> Result<Solved, Error> {
-        let Problem { mut views, mut values } = self.with_layout(layout);
+        let Problem { mut views, mut values, priors } = self.with_layout(layout);
         let unknowns = layout.count() + 6 * views.len();
-        for o in views.iter_mut().flat_map(|v| &mut v.observations) {
-            o.active = true;
+        let unseen = || Error::NotConverged { steps: 0 };
+        let corners = views.iter().map(|view| view.observations.len()).sum::<usize>();
+        if 2 * corners <= unknowns {
+            return Err(Error::TooFewCorners { corners, unknowns });
         }
-        let mut noise = Noise::UNIT;
         // Twice: the scatter is known only after the first solution.
         for _ in 0..2 {
-            noise = Noise::from_median(&residuals::active(&views, &values).ok_or(Error::NotConverged { steps: 0 })?);
-            noise.apply(&mut views);
-            let loss = Loss::Cauchy(CAUCHY_WIDTH);
-            values = levenberg_marquardt::solve(&views, layout, values, loss, Search::ROUGH).values;
+            Noise::from_median(&residuals::active(&views, &values).ok_or_else(unseen)?).apply(&mut views);
+            let (loss, search) = (Loss::Cauchy(CAUCHY_WIDTH), Search::ROUGH);
+            values = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search).values;
         }
+        let (mut noise, mut loss) = Noise::likeliest(&residuals::active(&views, &values).ok_or_else(unseen)?, unknowns);
         for _ in 0..MOST_ROUNDS {
-            let marked = mark_outliers(&mut views, &values);
-            let left = residuals::active(&views, &values).ok_or(Error::NotConverged { steps: 0 })?;
-            if 2 * left.len() <= unknowns {
-                return Err(Error::TooFewCorners { corners: left.len(), unknowns });
-            }
-            let before = noise;
-            noise = Noise::from_mean(&left, unknowns);
             noise.apply(&mut views);
-            let solution = levenberg_marquardt::solve(&views, layout, values, Loss::Squared, Search::NEAR);
+            let solution = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, Search::NEAR);
             // A lens that was asked for may have numbers that these views do not tell apart; the covariance says which.
             if !matches!(solution.stop, Stop::Minimum | Stop::Valley) {
                 return Err(Error::NotConverged { steps: solution.steps });
             }
             values = solution.values;
-            if !marked && (noise.added_px - before.added_px).abs() <= 1e-3 * noise.added_px {
+            let before = (noise, loss);
+            (noise, loss) = Noise::likeliest(&residuals::active(&views, &values).ok_or_else(unseen)?, unknowns);
+            let moved = |a: f64, b: f64| (a - b).abs() > 1e-3 * b;
+            if loss == before.1 && !moved(before.0.added_px, noise.added_px) && !moved(before.0.factor, noise.factor) {
                 break;
             }
         }
-        let left = residuals::active(&views, &values).ok_or(Error::NotConverged { steps: 0 })?;
-        noise = Noise::from_mean(&left, unknowns);
+        noise.apply(&mut views);
+        let left = residuals::active(&views, &values).ok_or_else(unseen)?;
+        let whitened = |o: &Observation, r: &Vector2<f64>| o.whiten(*r).norm_squared();
+        let loss_factor = loss.variance_factor(left.iter().map(|(o, r)| whitened(o, r)));
+        weigh(&mut views, &values, loss);
         let squares: Vec<f64> = left.iter().map(|(_, r)| r.norm_squared()).collect();
         let rms_px = residuals::root_mean_square(&squares).unwrap_or(0.0);
-        Ok(Solved { problem: Problem { views, values }, noise, rms_px })
+        Ok(Solved { problem: Problem { views, values, priors }, noise, loss, loss_factor, rms_px })
     }
 
     /// The same without some pairs: `keep` says which stay.
@@ -109,6 +118,7 @@ impl Problem {
                 shared: self.values.shared.clone(),
                 poses: all.filter(kept).map(|i| self.values.poses[i]).collect(),
             },
+            priors: self.priors.clone(),
         }
     }
 
@@ -116,24 +126,31 @@ impl Problem {
     /// end at a minimum: these pairs do not determine this lens.
     pub fn refit(&self, layout: &Layout) -> Option<Values> {
         let start = self.with_layout(layout);
-        let solution = levenberg_marquardt::solve(&start.views, layout, start.values, Loss::Squared, Search::TRIAL);
+        let (views, priors) = (&start.views, &start.priors);
+        let solution =
+            levenberg_marquardt::solve_with(views, layout, priors, start.values, Loss::Squared, Search::TRIAL);
         (solution.stop == Stop::Minimum).then_some(solution.values)
+    }
+
+    /// The normal equations with the weights as they are. `None` where a corner would lie behind its camera.
+    pub fn equations(&self, layout: &Layout) -> Option<Equations> {
+        levenberg_marquardt::equations(&self.views, layout, &self.priors, &self.values, Loss::Squared)
     }
 }
 
 impl Solved {
     /// How the residuals of neighbouring corners hang together.
     pub fn neighbours(&self, board: &Board) -> NeighbourCorrelation {
-        let Problem { views, values } = &self.problem;
+        let Problem { views, values, .. } = &self.problem;
         let of_view = |(view, pose)| residuals::of_view(&values.shared, view, pose);
         NeighbourCorrelation::of(board, views.iter().zip(&values.poses).map(of_view))
     }
 
     /// Covariance of everything; an error where the views do not tell.
     pub fn uncertainty(&self, layout: &Layout) -> Result<Uncertainty, Error> {
-        let Problem { views, values } = &self.problem;
-        let uncertainty = uncertainty::of_solution(views, layout, values).ok_or_else(Error::undetermined)?;
-        let worst = worst_focal_sigma(&uncertainty.shared, layout, &values.shared.rig);
+        let equations = self.problem.equations(layout).ok_or_else(Error::undetermined)?;
+        let uncertainty = uncertainty::of_equations(&equations).ok_or_else(Error::undetermined)?;
+        let worst = worst_focal_sigma(&uncertainty.shared, layout, &self.shared().rig);
         let known = worst <= WORST_FOCAL_SIGMA;
         if known { Ok(uncertainty) } else { Err(Error::Undetermined { focal_sigma: Some(worst), skipped: Vec::new() }) }
     }
@@ -144,15 +161,12 @@ impl Solved {
     }
 }
 
-/// Marks corners beyond the limit. True where a mark changed.
-fn mark_outliers(views: &mut [View], values: &Values) -> bool {
-    let mut changed = false;
+/// Puts the weights of a loss into the whiteners, so that the minimum is that of the weighted squares.
+fn weigh(views: &mut [View], values: &Values, loss: Loss) {
     for (view, pose) in views.iter_mut().zip(&values.poses) {
         for o in &mut view.observations {
-            let far = residuals::residual_px(&values.shared, pose, o).is_none_or(|r| o.whiten(r).norm() > OUTLIER);
-            changed |= far == o.active;
-            o.active = !far;
+            let squared = residuals::residual_px(&values.shared, pose, o).map_or(0.0, |r| o.whiten(r).norm_squared());
+            o.whitener *= loss.cost_and_weight(squared).1.sqrt();
         }
     }
-    changed
 }

@@ -10,6 +10,8 @@ pub enum Loss {
     Squared,
     /// Cauchy's, with its width in standard deviations: corners far beyond it hardly count.
     Cauchy(f64),
+    /// The likelihood of Student's distribution in two dimensions with so many degrees of freedom.
+    Student(f64),
 }
 
 impl Loss {
@@ -21,22 +23,70 @@ impl Loss {
                 let c2 = width * width;
                 (0.5 * c2 * (squared / c2).ln_1p(), 1.0 / (1.0 + squared / c2))
             }
+            Loss::Student(freedom) => {
+                (0.5 * (freedom + 2.0) * (squared / freedom).ln_1p(), (freedom + 2.0) / (freedom + squared))
+            }
         }
+    }
+
+    /// Variance of an estimate over the inverse of the weighted normal equations, `J' W J` with the weights that these squared residuals
+    /// have: the sandwich of an M-estimator with two-dimensional residuals (Huber 1981, section 7.6). One for least squares.
+    pub fn variance_factor(self, squares: impl Iterator<Item = f64>) -> f64 {
+        let Loss::Student(freedom) = self else { return 1.0 };
+        let (mut count, mut weights, mut bread, mut meat) = (0.0, 0.0, 0.0, 0.0);
+        for squared in squares {
+            let weight = self.cost_and_weight(squared).1;
+            count += 1.0;
+            weights += weight;
+            bread += weight * freedom / (freedom + squared);
+            meat += 0.5 * weight * weight * squared;
+        }
+        if count > 0.0 { weights * meat / (bread * bread) } else { 1.0 }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simulate::draws::{Draws, Purpose};
 
     #[test]
     fn weight_is_twice_the_slope_of_the_cost() {
-        for loss in [Loss::Squared, Loss::Cauchy(2.5)] {
+        for loss in [Loss::Squared, Loss::Cauchy(2.5), Loss::Student(8.0)] {
             for s in [0.1, 1.0, 30.0] {
                 let h = 1e-5 * s;
                 let slope = (loss.cost_and_weight(s + h).0 - loss.cost_and_weight(s - h).0) / (2.0 * h);
                 assert!((2.0 * slope - loss.cost_and_weight(s).1).abs() < 1e-7, "{loss:?} at {s}");
             }
         }
+    }
+
+    #[test]
+    fn the_variance_factor_is_that_of_an_estimated_mean() {
+        // The mean of points in a plane with Student's distribution: its variance over many draws against the stated one.
+        let (freedom, points, runs) = (5.0, 60, 3000);
+        let loss = Loss::Student(freedom);
+        let mut draws = Draws::new(3, Purpose::Points, 0);
+        let (mut found, mut stated) = (0.0, 0.0);
+        for _ in 0..runs {
+            let all: Vec<[f64; 2]> = (0..points)
+                .map(|_| {
+                    let chi: f64 = (0..5).map(|_| draws.normal().powi(2)).sum();
+                    [draws.normal(), draws.normal()].map(|z| z * (freedom / chi).sqrt())
+                })
+                .collect();
+            let mut mean = [0.0; 2];
+            let squared = |p: &[f64; 2], m: &[f64; 2]| (p[0] - m[0]).powi(2) + (p[1] - m[1]).powi(2);
+            let mut information = 0.0;
+            for _ in 0..40 {
+                let weights: Vec<f64> = all.iter().map(|p| loss.cost_and_weight(squared(p, &mean)).1).collect();
+                information = weights.iter().sum();
+                mean = [0, 1].map(|k| all.iter().zip(&weights).map(|(p, w)| p[k] * w).sum::<f64>() / information);
+            }
+            found += 0.5 * (mean[0].powi(2) + mean[1].powi(2));
+            stated += loss.variance_factor(all.iter().map(|p| squared(p, &mean))) / information;
+        }
+        // 3000 runs of two coordinates know a variance to 1.8 %.
+        assert!((found / stated - 1.0).abs() < 0.06, "{}", found / stated);
     }
 }

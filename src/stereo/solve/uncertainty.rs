@@ -8,8 +8,9 @@ use rayon::prelude::*;
 
 use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::{Layout, Values};
-use crate::stereo::solve::levenberg_marquardt::blocks;
-use crate::stereo::solve::normal_equations::{self, Block};
+use crate::stereo::solve::levenberg_marquardt::equations;
+use crate::stereo::solve::normal_equations::{self, Block, Equations};
+use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::{Rig, Side};
 
@@ -18,8 +19,8 @@ pub const WORST_FOCAL_SIGMA: f64 = 0.02;
 
 /// By how much chi-square (twice the cost) would fall if the equations were straight from here to the minimum: what a richer
 /// model is expected to gain at a simpler one's minimum (Rao's score). `None` where the views do not determine the unknowns.
-pub fn expected_decrease(blocks: &[Block], layout: &Layout) -> Option<f64> {
-    let (matrix, gradient) = normal_equations::eliminate(blocks, 0.0, layout.count())?;
+pub fn expected_decrease(equations: &Equations) -> Option<f64> {
+    let (matrix, gradient) = normal_equations::eliminate(equations, 0.0)?;
     Some(gradient.dot(&(invert(&matrix)? * &gradient)))
 }
 
@@ -55,16 +56,17 @@ impl Uncertainty {
 }
 
 /// Covariance at a minimum. `None` where the views do not determine the unknowns.
-pub fn of_solution(views: &[View], layout: &Layout, values: &Values) -> Option<Uncertainty> {
-    of_blocks(&blocks(views, layout, values, Loss::Squared)?, layout)
+pub fn of_solution(views: &[View], layout: &Layout, priors: &Priors, values: &Values) -> Option<Uncertainty> {
+    of_equations(&equations(views, layout, priors, values, Loss::Squared)?)
 }
 
-/// The same from the blocks at the minimum.
-pub fn of_blocks(blocks: &[Block], layout: &Layout) -> Option<Uncertainty> {
-    let count = layout.count();
+/// The same from the equations at the minimum.
+pub fn of_equations(equations: &Equations) -> Option<Uncertainty> {
+    let count = equations.count();
     let shared =
-        if count == 0 { DMatrix::zeros(0, 0) } else { invert(&normal_equations::eliminate(blocks, 0.0, count)?.0)? };
-    let poses = blocks
+        if count == 0 { DMatrix::zeros(0, 0) } else { invert(&normal_equations::eliminate(equations, 0.0)?.0)? };
+    let poses = equations
+        .blocks
         .iter()
         .map(|block| {
             let inverse = block.pose_inverse(0.0)?;

@@ -13,7 +13,7 @@ use crate::imaging::Board;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
 use crate::stereo::model::board_shape::{NUMBERS, lift};
-use crate::stereo::model::parameters::{Layout, Values};
+use crate::stereo::model::parameters::Layout;
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
@@ -37,19 +37,13 @@ pub struct PrintShare {
 impl PrintShare {
     /// Finds the print. `None` where the views do not determine the shared numbers.
     pub fn of(solved: &Solved, board: &Board, layout: &Layout) -> Option<PrintShare> {
-        let Problem { views, values } = &solved.problem;
-        print_share(views, board, layout, values, &solved.noise, solved.neighbours(board).inflation())
+        print_share(solved, board, layout, solved.neighbours(board).inflation() * solved.loss_factor)
     }
 }
 
-fn print_share(
-    views: &[View],
-    board: &Board,
-    layout: &Layout,
-    values: &Values,
-    noise: &Noise,
-    inflation: f64,
-) -> Option<PrintShare> {
+fn print_share(solved: &Solved, board: &Board, layout: &Layout, inflation: f64) -> Option<PrintShare> {
+    let Problem { views, values, priors } = &solved.problem;
+    let noise = &solved.noise;
     let m = board.corner_count();
     let lifts: Vec<[f64; NUMBERS]> = board.corners_mm().map(|at| lift(board, &at)).collect();
     let shape = values.shared.shape_mm;
@@ -90,7 +84,7 @@ fn print_share(
         }
     }
     let by_all = to_shared.tr_mul(&sums.matrix);
-    let inverse = invert(&(&by_all * &to_shared))?;
+    let inverse = invert(&(&by_all * &to_shared + priors.information(layout, &values.shared).matrix))?;
     let by_print = &inverse * &by_all;
     let mut covariance = &inverse * (own_share * inflation);
     let add = |column: DVector<f64>| covariance.ger(variance, &column, &column, 1.0);

@@ -15,8 +15,7 @@ use crate::stereo::judge::lengths::{self, Axis, Measured, Range, all_ranges, mea
 use crate::stereo::judge::verdict::{Expansion, Extremes, Verdict};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::select::cross_validation::{self, FOLDS, Without};
-use crate::stereo::solve::robust_loss::Loss;
-use crate::stereo::solve::{levenberg_marquardt, uncertainty};
+use crate::stereo::solve::uncertainty;
 use crate::stereo::triangulate::RigCovariance;
 use crate::stereo::{Error, Rig};
 
@@ -116,12 +115,12 @@ pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accu
 /// The rigs without each fold, with covariances that allow for the same as the final one's.
 fn folds(calibration: &Calibration) -> Option<Folds> {
     let Calibration { views, values, layout, .. } = calibration;
-    let blocks = levenberg_marquardt::blocks(views, layout, values, Loss::Squared)?;
+    let equations = calibration.problem().equations(layout)?;
     let of_pair = cross_validation::folds(views, &values.poses, FOLDS);
-    let without = cross_validation::leave_out(&blocks, layout, &values.shared, &of_pair);
+    let without = cross_validation::leave_out(&equations, layout, &values.shared, &of_pair);
     let without = without.into_iter().collect::<Option<Vec<Without>>>()?;
-    let inflation = calibration.neighbours.inflation();
-    let by_noise = uncertainty::of_blocks(&blocks, layout)?.shared * inflation;
+    let inflation = calibration.inflation;
+    let by_noise = uncertainty::of_equations(&equations)?.shared * inflation;
     let more = &calibration.uncertainty.shared - by_noise;
     let covariance = |w: &Without| {
         let matrix = &w.covariance * inflation + &more;

@@ -1,88 +1,55 @@
-//! What happened to the pairs that do not fit the common rig.
+//! Pictures that do not belong together, or are not as the camera wrote them.
 //!
-//! In: all pairs of a series, the rig that most of them agree on, and which do. Out: a reason for each of the others, with what to do.
+//! In: all pairs of a series, the rig that most of them agree on, and which do not fit it. Out: what was mixed up in these, with what to do.
 //! Method: every idea of what happened is a change of the corners (sides exchanged, a picture turned or mirrored, another pair's
-//! picture, another place of the right camera) under which the pair must fit as well as the others do; the first that does is the
-//! reason. What is left was not taken at one moment. Goes wrong: two things that happened to one pair.
+//! picture) under which the pair must fit as well as the others do; the first that does is the reason. Goes wrong: two things that
+//! happened to one pair.
 
-use nalgebra::{Point2, Vector3};
+use nalgebra::Point2;
 use rayon::prelude::*;
 
-use crate::geometry::{Transform, rotation_vector};
+use crate::geometry::Transform;
 use crate::imaging::{Board, Side};
-use crate::stereo::Rig;
 use crate::stereo::data::view::View;
 use crate::stereo::init::board_pose;
-use crate::stereo::init::relative_pose::{agreed_transform, deviation};
-use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::model::parameters::Shared;
 use crate::stereo::pairs::Cause;
-use crate::stereo::pairs::numbering::{renumbered, turns_of_outline};
-use crate::stereo::pairs::screening::{Usual, misfit_px};
-use crate::stereo::solve::levenberg_marquardt::{self, Search};
+use crate::stereo::pairs::misfit::misfit_px;
+use crate::stereo::pairs::numbering::turns_of_outline;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 
 /// Corners of a picture that are enough to try an idea on.
 const ENOUGH_CORNERS: usize = 40;
 /// Pairs that are tried as the home of a picture, those with the board nearest to where it shows it.
 const NEAREST: usize = 3;
-/// How far relative poses from single pictures may be apart for one rig: radians, and shares of the boards' distance.
-const ONE_RIG: f64 = 0.1;
-/// Pairs that make another rig; two that agree in six numbers to a fraction of a pixel do not by chance.
-const FEWEST_MOVED: usize = 2;
 
-/// A pair of the series.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Member<'a> {
-    /// Its corners.
-    pub view: &'a View,
-    /// What each of its pictures leaves alone, px.
-    pub alone_px: [Option<f64>; 2],
-    /// Whether it fits the common rig.
-    pub belongs: bool,
-}
-
-/// The pairs in their order, with what most of them agree on.
+/// A series of pairs, the rig that most of them agree on, and which of them do not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series<'a> {
     /// The common rig.
     pub shared: &'a Shared,
     /// The board.
     pub board: &'a Board,
-    /// What pictures of this rig usually leave.
-    pub usual: Usual,
-    /// All pairs.
-    pub members: Vec<Member<'a>>,
+    /// All pairs in their order.
+    pub views: &'a [View],
+    /// What each picture leaves on its own camera, px; left, then right.
+    pub alone_px: [&'a [Option<f64>]; 2],
+    /// What a pair leaves on the common rig at most, px, where it belongs to it.
+    pub limit_px: f64,
 }
 
 /// The poses that each of a pair's pictures gives the board alone, as `left_from_board` on the common rig.
 type Alone = [Option<Transform>; 2];
 
-/// A reason for each pair that does not belong, in the order of the members; `None` for the others.
-pub fn explain(series: &Series) -> Vec<Option<(Cause, String)>> {
-    let strays: Vec<usize> = (0..series.members.len()).filter(|&i| !series.members[i].belongs).collect();
-    let mut reasons = vec![None; series.members.len()];
+/// What was mixed up in each of these pairs, where something was: with it undone the pair fits the rig of the others.
+pub fn explain(series: &Series, strays: &[usize]) -> Vec<Option<(Cause, String)>> {
     if strays.is_empty() {
-        return reasons;
+        return Vec::new();
     }
-    let views: Vec<View> = series.members.iter().map(|m| m.view.thinned(ENOUGH_CORNERS)).collect();
+    let views: Vec<View> = series.views.iter().map(|view| view.thinned(ENOUGH_CORNERS)).collect();
     let scene = Scene { series, views };
     let alone: Vec<Alone> = scene.views.par_iter().map(|view| scene.alone(view)).collect();
-    let of_pictures: Vec<_> = strays.par_iter().map(|&i| scene.files(i).or_else(|| scene.partner(i, &alone))).collect();
-    strays.iter().zip(of_pictures).for_each(|(&i, reason)| reasons[i] = reason);
-    loop {
-        let open: Vec<usize> = strays.iter().copied().filter(|&i| reasons[i].is_none()).collect();
-        let Some((group, right_from_left)) = scene.other_rig(&open, &alone) else { break };
-        let as_first = |&i: &usize| format!("a camera moved, as for pair {}", series.members[i].view.pair);
-        let as_first = group.first().map(|i| (Cause::CameraMoved, as_first(i)));
-        group.iter().for_each(|&i| reasons[i] = as_first.clone());
-        if let Some(&first) = group.first() {
-            reasons[first] = Some((Cause::CameraMoved, scene.camera_moved(&group, &right_from_left)));
-        }
-    }
-    for i in strays {
-        reasons[i].get_or_insert_with(|| (Cause::NotSimultaneous, scene.board_moved(&alone[i])));
-    }
-    reasons
+    strays.par_iter().map(|&i| scene.files(i).or_else(|| scene.partner(i, &alone))).collect()
 }
 
 /// Something that may be done to a picture on its way from the camera.
@@ -126,7 +93,7 @@ struct Scene<'a> {
 impl Scene<'_> {
     /// True where the view fits on a rig in one of the numberings that the board's outline allows.
     fn fits(&self, shared: &Shared, view: &View) -> bool {
-        let limit = self.series.usual.limit_px(0.0);
+        let limit = self.series.limit_px;
         turns_of_outline(self.series.board).into_iter().any(|quarters| {
             let mut turned = view.clone();
             turned.turn_right(self.series.board, quarters);
@@ -145,7 +112,7 @@ impl Scene<'_> {
         let turned = |&quarters: &usize| {
             let mut turned = view.clone();
             turned.turn_right(self.series.board, quarters);
-            misfit_px(shared, &turned).is_some_and(|(px, _)| px <= self.series.usual.limit_px(0.0))
+            misfit_px(shared, &turned).is_some_and(|(px, _)| px <= self.series.limit_px)
         };
         if turns_of_outline(self.series.board).iter().filter(|&&quarters| quarters != 0).any(turned) {
             let reason = "the corners are numbered from another end of the board in the right picture than in the left";
@@ -173,9 +140,7 @@ impl Scene<'_> {
                 }
             }
         }
-        let misread = |side: &Side| {
-            self.series.members[i].alone_px[*side as usize].is_none_or(|px| px > self.series.usual.limit_px(0.0))
-        };
+        let misread = |side: &Side| self.series.alone_px[*side as usize][i].is_none_or(|px| px > self.series.limit_px);
         Side::BOTH.into_iter().find(misread).map(|side| {
             let side = side.name();
             let reason = format!(
@@ -209,86 +174,6 @@ impl Scene<'_> {
             Some((Cause::Mismatched, reason))
         })
     }
-
-    /// Pairs that fit together on a rig with another place of the right camera, and that place.
-    fn other_rig(&self, open: &[usize], alone: &[Alone]) -> Option<(Vec<usize>, Transform)> {
-        let rig = &self.series.shared.rig;
-        let both: Vec<(usize, Transform, Transform)> =
-            open.iter().filter_map(|&i| Some((i, alone[i][0]?, rig.right_from_left * alone[i][1]?))).collect();
-        let choices: Vec<Vec<Transform>> = both
-            .iter()
-            .map(|(_, l, r)| {
-                turns_of_outline(self.series.board)
-                    .into_iter()
-                    .map(|quarters| r * renumbered(quarters) * l.inverse())
-                    .collect()
-            })
-            .collect();
-        let distance_mm = both.first()?.1.translation.vector.norm();
-        let agreed = agreed_transform(&choices, distance_mm)?;
-        let (mut views, mut poses) = (Vec::new(), Vec::new());
-        for ((i, left_from_board, _), choices) in both.iter().zip(&choices) {
-            let off = |choice: &Transform| deviation(choice, &agreed, distance_mm);
-            let nearest = turns_of_outline(self.series.board)
-                .into_iter()
-                .zip(choices)
-                .min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
-            if let Some((quarters, choice)) = nearest
-                && off(choice) < ONE_RIG
-            {
-                let mut view = self.views[*i].clone();
-                view.turn_right(self.series.board, quarters);
-                views.push(view);
-                poses.push(*left_from_board);
-            }
-        }
-        let moved =
-            |right_from_left| Shared { rig: Rig { right_from_left, ..rig.clone() }, ..self.series.shared.clone() };
-        let layout = Layout { transform: true, ..Layout::POSES_ONLY };
-        let start = Values { shared: moved(agreed), poses };
-        let shared =
-            levenberg_marquardt::solve(&views, &layout, start, Loss::Cauchy(CAUCHY_WIDTH), Search::ROUGH).values.shared;
-        let group: Vec<usize> = open.iter().copied().filter(|&i| self.fits(&shared, &self.views[i])).collect();
-        (group.len() >= FEWEST_MOVED).then_some((group, shared.rig.right_from_left))
-    }
-
-    fn camera_moved(&self, group: &[usize], right_from_left: &Transform) -> String {
-        let members = &self.series.members;
-        let name = |i: Option<&usize>| i.map_or("", |&i| members[i].view.pair.as_str());
-        let belongs = |range: &[Member]| range.iter().any(|m| m.belongs);
-        let (first, last) = (group.first().copied().unwrap_or(0), group.last().copied().unwrap_or(0));
-        let which = match (belongs(&members[..first]), belongs(&members[last..])) {
-            (true, false) => format!("from pair {} on", name(group.first())),
-            (false, true) => format!("up to pair {}", name(group.last())),
-            _ => format!("in {} pairs", group.len()),
-        };
-        let change = right_from_left * self.series.shared.rig.right_from_left.inverse();
-        let shift = camera_place(right_from_left) - camera_place(&self.series.shared.rig.right_from_left);
-        format!(
-            "a camera moved: {which} the right one is turned by {:.2} deg and shifted by {:.1} mm against the left, compared with the \
-             other pairs. Clamp both; pictures from before and from after make two calibrations",
-            rotation_vector(&change).norm().to_degrees(),
-            shift.norm()
-        )
-    }
-
-    fn board_moved(&self, alone: &Alone) -> String {
-        let amount = alone[0].zip(alone[1]).map_or(String::new(), |(left, right)| {
-            let turn = |quarters| rotation_vector(&(right * renumbered(quarters) * left.inverse())).norm();
-            let least = turns_of_outline(self.series.board).into_iter().map(turn).fold(f64::INFINITY, f64::min);
-            let shift = (right.translation.vector - left.translation.vector).norm();
-            format!(" by about {shift:.1} mm and {:.1} deg", least.to_degrees())
-        });
-        format!(
-            "the pictures were not taken at the same time: each shows a board, but between them it moved{amount} (or a camera did). \
-             Clamp the board and trigger both cameras at once"
-        )
-    }
-}
-
-/// Where the right camera stands in the left one's frame, mm.
-fn camera_place(right_from_left: &Transform) -> Vector3<f64> {
-    right_from_left.inverse().translation.vector
 }
 
 #[cfg(test)]

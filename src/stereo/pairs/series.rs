@@ -1,0 +1,176 @@
+//! The pairs that one rig is calibrated from, and what happened to the others.
+//!
+//! In: candidates. Out: the views with values to start from, and the pairs that are left out with their causes. Method: the numbering
+//! that most pairs agree on, the relative pose that lies in their middle, one robust bundle over all of them. A pair is left out only
+//! where it misses the rig of all by several times what pairs usually do: then its pictures do not belong together, or something else
+//! happened to it. How much pairs usually miss their rig is estimated from the pairs at hand; hand-held boards before
+//! cameras that nobody triggered miss it by much more than their corners scatter, and belong to it all the same.
+//! Goes wrong: half of the pairs or more contradict the others.
+
+use rayon::prelude::*;
+
+use crate::geometry::Transform;
+use crate::imaging::{Side, Skipped};
+use crate::statistics::median;
+use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::data::residuals;
+use crate::stereo::data::view::View;
+use crate::stereo::model::board_shape::FLAT;
+use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::pairs::candidates::Candidates;
+use crate::stereo::pairs::discarded::too_few_pairs;
+use crate::stereo::pairs::misfit::misfit_px;
+use crate::stereo::pairs::{Cause, DiscardedPair, FEWEST_PAIRS, mixups, numbering};
+use crate::stereo::solve::levenberg_marquardt::{self, Search};
+use crate::stereo::solve::priors::Priors;
+use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::{Error, Lens, Rig};
+
+/// A pair that misses the rig by so many times what pairs usually do is not one of them.
+const SEVERAL: f64 = 6.0;
+
+/// Rounds of calibrating and of looking which pairs belong.
+const MOST_ROUNDS: usize = 5;
+
+/// The lens with which pairs are looked at before there is another: what nearly all cameras need.
+const FIRST_LENS: Lens = Lens::Brown5;
+
+/// A rig that misses half of its pairs by more than this share of the picture's width, and by several times what each camera leaves of its
+/// own pictures, is the rig of none of them.
+const LARGEST_SHARE: f64 = 2e-3;
+
+/// The pairs of a rig, near their common minimum.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Its pairs, with right corners turned where that was needed, and a first rig with each pair's pose on it.
+    pub problem: Problem,
+    /// The other pairs.
+    pub discarded: Vec<DiscardedPair>,
+}
+
+impl Series {
+    /// The other pairs with what happened to them.
+    pub fn skipped(&self) -> Vec<Skipped> {
+        self.discarded.iter().map(DiscardedPair::skipped).collect()
+    }
+}
+
+/// What a pair leaves on a rig: px, and its pose. `None` where it has none.
+type Misfit = Option<(f64, Transform)>;
+
+/// Finds the pairs of the rig.
+pub fn find(candidates: &Candidates) -> Result<Series, Error> {
+    let (views, first) = numbered(candidates)?;
+    let mut shared = first;
+    let diagonal_mm = candidates.board.diagonal_mm();
+    let priors = Priors::of_rig(&shared.rig, diagonal_mm);
+    let mut misfits = misfits(&shared, &views);
+    let mut members = belonging(&misfits);
+    for _ in 0..MOST_ROUNDS {
+        shared = bundle(&views, &misfits, &members, &shared, &priors)?;
+        misfits = self::misfits(&shared, &views);
+        let now = belonging(&misfits);
+        if now == members {
+            break;
+        }
+        members = now;
+    }
+    let usual_px = median(misfits.iter().flatten().map(|(px, _)| *px)).unwrap_or(f64::INFINITY);
+    let strays: Vec<usize> = (0..views.len()).filter(|i| !members.contains(i)).collect();
+    let alone_px = candidates.cameras.each_ref().map(|camera| camera.median_px.as_slice());
+    let limit_px = SEVERAL * usual_px;
+    let series = mixups::Series { shared: &shared, board: &candidates.board, views: &views, alone_px, limit_px };
+    let mixed_up = mixups::explain(&series, &strays);
+    let unexplained = |i: usize| (Cause::Unknown, contradicts(misfits[i].map(|(px, _)| px), usual_px));
+    let discarded: Vec<DiscardedPair> = strays
+        .iter()
+        .zip(mixed_up)
+        .map(|(&i, reason)| (i, reason.unwrap_or_else(|| unexplained(i))))
+        .map(|(i, (cause, reason))| DiscardedPair::new(&views[i].pair, cause, reason))
+        .collect();
+    check(candidates, usual_px, &members, &discarded)?;
+    let values = Values { shared, poses: members.iter().filter_map(|&i| Some(misfits[i]?.1)).collect() };
+    let views = members.iter().map(|&i| views[i].clone()).collect();
+    let mut discarded: Vec<DiscardedPair> = discarded.into_iter().chain(candidates.discarded.iter().cloned()).collect();
+    discarded.sort_by(|a, b| a.pair.cmp(&b.pair));
+    Ok(Series { problem: Problem { views, values, priors }, discarded })
+}
+
+/// The pairs with the numbering that they agree on, and the rig in the middle of their own.
+fn numbered(candidates: &Candidates) -> Result<(Vec<View>, Shared), Error> {
+    let [left, right] = &candidates.cameras;
+    let both: Vec<Option<(Transform, Transform)>> =
+        left.poses.iter().zip(&right.poses).map(|(l, r)| l.zip(*r)).collect();
+    let distances = both.iter().flatten().map(|(l, _)| l.translation.vector.norm());
+    let distance_mm = median(distances).ok_or(Error::NoCamera { side: Side::Left })?;
+    let open = numbering::turns_left_open(&candidates.board);
+    let (right_from_left, turns) =
+        numbering::agreed(&open, &both, distance_mm).ok_or(Error::NoCamera { side: Side::Right })?;
+    let mut views = candidates.views.clone();
+    for (view, turn) in views.iter_mut().zip(turns) {
+        view.turn_right(&candidates.board, turn);
+    }
+    let rig = Rig { left: left.camera, right: right.camera, right_from_left, covariance: None };
+    Ok((views, Shared { rig, shape_mm: FLAT }))
+}
+
+fn misfits(shared: &Shared, views: &[View]) -> Vec<Misfit> {
+    views.par_iter().map(|view| misfit_px(shared, view)).collect()
+}
+
+/// The pairs that miss the rig by no more than several times what pairs usually do.
+fn belonging(misfits: &[Misfit]) -> Vec<usize> {
+    let usual = median(misfits.iter().map(|misfit| misfit.map_or(f64::INFINITY, |(px, _)| px))).unwrap_or(0.0);
+    (0..misfits.len()).filter(|&i| misfits[i].is_some_and(|(px, _)| px <= SEVERAL * usual)).collect()
+}
+
+/// The rig of these pairs by a robust bundle.
+fn bundle(
+    views: &[View],
+    misfits: &[Misfit],
+    members: &[usize],
+    start: &Shared,
+    priors: &Priors,
+) -> Result<Shared, Error> {
+    let mut seen: Vec<View> = members.iter().map(|&i| views[i].clone()).collect();
+    let poses = members.iter().filter_map(|&i| Some(misfits[i]?.1)).collect();
+    let mut values = Values { shared: start.clone(), poses };
+    let layout = Layout::rig(FIRST_LENS, false);
+    values.shared.rig.left.lens = FIRST_LENS;
+    values.shared.rig.right.lens = FIRST_LENS;
+    // Twice: the scatter is known only after the first solution.
+    for _ in 0..2 {
+        let left = residuals::active(&seen, &values).ok_or_else(Error::undetermined)?;
+        Noise::from_median(&left).apply(&mut seen);
+        let loss = Loss::Cauchy(CAUCHY_WIDTH);
+        values = levenberg_marquardt::solve_with(&seen, &layout, priors, values, loss, Search::ROUGH).values;
+    }
+    Ok(values.shared)
+}
+
+fn contradicts(misfit_px: Option<f64>, usual_px: f64) -> String {
+    let by = misfit_px.map_or("it has no pose on their rig".to_owned(), |px| {
+        format!("its corners miss their rig by {px:.2} px, those of the others by {usual_px:.2} px")
+    });
+    format!("it contradicts the other pairs: {by}. Clamp the board and the cameras, and trigger both at once")
+}
+
+/// Refuses where there is no telling which pairs are right, or too few are left.
+fn check(candidates: &Candidates, usual_px: f64, members: &[usize], discarded: &[DiscardedPair]) -> Result<(), Error> {
+    let total = candidates.views.len();
+    let alone = candidates.cameras.iter().flat_map(|camera| camera.median_px.iter().flatten().copied());
+    let alone_px = median(alone).unwrap_or(0.0);
+    let width_px = f64::from(candidates.width_px);
+    let none = usual_px > SEVERAL * alone_px && usual_px > LARGEST_SHARE * width_px;
+    if none || 2 * members.len() <= total {
+        let bad = discarded.iter().map(DiscardedPair::skipped).collect();
+        let agreeing = if none { 0 } else { members.len() };
+        return Err(Error::Contradiction { agreeing, total, usual_px, alone_px, bad });
+    }
+    if members.len() < FEWEST_PAIRS {
+        let all: Vec<DiscardedPair> = discarded.iter().chain(&candidates.discarded).cloned().collect();
+        return Err(too_few_pairs(members.len(), &all));
+    }
+    Ok(())
+}

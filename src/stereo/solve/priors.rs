@@ -1,0 +1,198 @@
+//! What is known of lenses, picture centres and boards before any picture: weak, so that it decides only where pictures do not.
+//!
+//! In: a rig to start from, and the size of the board. Out: expectations, each a sum of the shared numbers with a value and a standard
+//! deviation, and their share of the normal equations. Hand-held pictures often leave two or three terms of a lens open; without an
+//! expectation these run off and spoil what lies beside the boards. The widths are generous for built cameras (27 public
+//! sets of webcams and phones keep within them), and next to nothing beside corners that are measured well.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::imaging::Side;
+use crate::stereo::model::board_shape;
+use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::{Camera, Lens, Rig};
+
+/// What distortion does at the corner of the picture, as shares of the corner's distance from the middle: k1, k2, k3.
+const RADIAL_AT_CORNER: [f64; 3] = [0.2, 0.1, 0.05];
+/// Tangential distortion, p1 and p2.
+const TANGENTIAL: f64 = 1e-3;
+/// How far the picture's centre lies from its middle, as a share of the width.
+const CENTRE_SHARE: f64 = 0.015;
+/// By how much fx and fy differ; pixels whose sides differ by more than the second number are not meant to be square.
+const ASPECT: f64 = 0.005;
+const NOT_SQUARE: f64 = 0.03;
+/// By how much two cameras of one make differ in focal length; cameras that differ by more than the second number are of two makes.
+const ALIKE: f64 = 0.01;
+const TWO_MAKES: f64 = 0.05;
+/// By how much a board bends, as a share of its diagonal.
+const BOW_SHARE: f64 = 0.003;
+
+/// A sum of shared numbers that is expected to have some value.
+#[derive(Debug, Clone, PartialEq)]
+struct Expectation {
+    terms: Vec<(Number, f64)>,
+    value: f64,
+    sigma: f64,
+}
+
+/// One of the shared numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Number {
+    Camera(Side, usize),
+    Shape(usize),
+}
+
+/// All expectations.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Priors {
+    all: Vec<Expectation>,
+}
+
+/// Their share of the normal equations, as that of a pair.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Information {
+    /// Shared by shared.
+    pub matrix: DMatrix<f64>,
+    /// Gradient of half the sum of squares.
+    pub gradient: DVector<f64>,
+    /// Half the sum of squares.
+    pub cost: f64,
+}
+
+impl Priors {
+    /// Nothing is expected.
+    pub const NONE: Priors = Priors { all: Vec::new() };
+
+    /// What is expected of both cameras and a board with this diagonal.
+    pub fn of_rig(start: &Rig, diagonal_mm: f64) -> Priors {
+        let mut priors = Priors::NONE;
+        priors.of_camera(Side::Left, &start.left);
+        priors.of_camera(Side::Right, &start.right);
+        let [left, right] = [&start.left, &start.right].map(|camera| (camera.fx * camera.fy).sqrt());
+        if (left / right).ln().abs() < TWO_MAKES {
+            let terms = vec![(Number::Camera(Side::Left, 0), 1.0), (Number::Camera(Side::Right, 0), -1.0)];
+            priors.all.push(Expectation { terms, value: 0.0, sigma: ALIKE * left });
+        }
+        priors.of_board(diagonal_mm);
+        priors
+    }
+
+    /// What is expected of one camera alone, as the left one, and a board with this diagonal.
+    pub fn of_one_camera(start: &Camera, diagonal_mm: f64) -> Priors {
+        let mut priors = Priors::NONE;
+        priors.of_camera(Side::Left, start);
+        priors.of_board(diagonal_mm);
+        priors
+    }
+
+    fn of_camera(&mut self, side: Side, camera: &Camera) {
+        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+        let focal = (camera.fx * camera.fy).sqrt();
+        let corner = (0.5 * width / camera.fx).hypot(0.5 * height / camera.fy);
+        let mut one = |at: usize, value: f64, sigma: f64| {
+            self.all.push(Expectation { terms: vec![(Number::Camera(side, at), 1.0)], value, sigma });
+        };
+        one(2, 0.5 * (width - 1.0), CENTRE_SHARE * width);
+        one(3, 0.5 * (height - 1.0), CENTRE_SHARE * width);
+        for (at, power, share) in
+            [(4, 2, RADIAL_AT_CORNER[0]), (5, 4, RADIAL_AT_CORNER[1]), (8, 6, RADIAL_AT_CORNER[2])]
+        {
+            one(at, 0.0, share / corner.powi(power));
+        }
+        one(6, 0.0, TANGENTIAL);
+        one(7, 0.0, TANGENTIAL);
+        if (camera.fx / camera.fy).ln().abs() < NOT_SQUARE {
+            let terms = vec![(Number::Camera(side, 0), 1.0), (Number::Camera(side, 1), -1.0)];
+            self.all.push(Expectation { terms, value: 0.0, sigma: ASPECT * focal });
+        }
+    }
+
+    fn of_board(&mut self, diagonal_mm: f64) {
+        self.all.extend((0..board_shape::NUMBERS).map(|k| Expectation {
+            terms: vec![(Number::Shape(k), 1.0)],
+            value: 0.0,
+            sigma: BOW_SHARE * diagonal_mm,
+        }));
+    }
+
+    /// Their share of the normal equations. Expectations of numbers that are not free say nothing; nor do those of single distortion
+    /// terms where the lens has the rational terms that these are exchanged for.
+    pub fn information(&self, layout: &Layout, shared: &Shared) -> Information {
+        let count = layout.count();
+        let mut sum = Information { matrix: DMatrix::zeros(count, count), gradient: DVector::zeros(count), cost: 0.0 };
+        if self.all.is_empty() {
+            return sum;
+        }
+        let numbers = layout.numbers(shared);
+        for expectation in &self.all {
+            let Some(terms) =
+                expectation.terms.iter().map(|(n, by)| Some((place(layout, *n)?, *by))).collect::<Option<Vec<_>>>()
+            else {
+                continue;
+            };
+            let off = terms.iter().map(|(at, by)| by * numbers[*at]).sum::<f64>() - expectation.value;
+            let weight = 1.0 / (expectation.sigma * expectation.sigma);
+            sum.cost += 0.5 * weight * off * off;
+            for (i, a) in &terms {
+                sum.gradient[*i] += weight * a * off;
+                for (j, b) in &terms {
+                    sum.matrix[(*i, *j)] += weight * a * b;
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// Where a number stands among those that are free and of which something is expected.
+fn place(layout: &Layout, number: Number) -> Option<usize> {
+    match number {
+        Number::Camera(side, at) => {
+            let lens = if side == Side::Left { layout.left } else { layout.right }?;
+            let told = at < 4 || lens <= Lens::Brown5;
+            (told && at < layout.camera_count(side)).then(|| layout.camera_start(side) + at)
+        }
+        Number::Shape(k) => layout.shape.then(|| layout.shape_start() + k),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stereo::synthetic::World;
+
+    #[test]
+    fn the_gradient_is_the_slope_of_the_cost() {
+        let rig = World::new(1, 1).rig;
+        let priors = Priors::of_rig(&rig, 200.0);
+        let layout = Layout::rig(Lens::Brown5, true);
+        let shared = Shared { rig, shape_mm: [0.1, -0.2, 0.3] };
+        let at = priors.information(&layout, &shared);
+        for (i, name) in layout.names().iter().enumerate() {
+            let cost = |h: f64| {
+                let mut step = vec![0.0; layout.count()];
+                step[i] = h;
+                priors.information(&layout, &layout.step(&shared, &step)).cost
+            };
+            // Quadratic: central differences are exact but for rounding.
+            let slope = (cost(1e-3) - cost(-1e-3)) / 2e-3;
+            assert!((slope - at.gradient[i]).abs() < 1e-6 * (1.0 + slope.abs()), "{name}: {slope} {}", at.gradient[i]);
+        }
+    }
+
+    #[test]
+    fn pixels_that_are_not_square_and_cameras_of_two_makes_are_left_alone() {
+        let mut rig = World::new(1, 1).rig;
+        let layout = Layout::rig(Lens::Radial2, false);
+        let told = |rig: &Rig| {
+            let shared = Shared { rig: rig.clone(), shape_mm: [0.0; 3] };
+            let matrix = Priors::of_rig(rig, 200.0).information(&layout, &shared).matrix;
+            (matrix[(0, 1)] != 0.0, matrix[(0, layout.camera_start(Side::Right))] != 0.0)
+        };
+        assert_eq!(told(&rig), (true, true));
+        rig.left.fy = 1.34 * rig.left.fx;
+        rig.right.fx *= 1.4;
+        rig.right.fy *= 1.4;
+        assert_eq!(told(&rig), (false, false));
+    }
+}
