@@ -17,6 +17,10 @@ use crate::stereo::solve::uncertainty;
 use crate::stereo::target::print_share::PrintShare;
 use crate::stereo::{Error, Lens};
 
+/// The lens of all cameras whose pictures do not ask for more. What hand-held pictures leave open of its terms is held by what is expected of
+/// lenses, so that nothing simpler is needed.
+const SIMPLEST: Lens = Lens::Brown5;
+
 /// What may be forced.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Options {
@@ -43,15 +47,13 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     if let (Some(lens), Some(shape)) = (options.lens, forced_shape) {
         return Ok(Choice { layout: Layout::rig(lens, shape), near: None, scores: Vec::new() });
     }
-    // Weights and outliers from a model that is at least as rich as most need; the comparison uses the same for all.
-    let fit = |lens, shape| {
-        let layout = Layout::rig(lens, shape);
+    // Weights from a model that is at least as rich as most need; the comparison uses the same for all.
+    let fit = |shape| {
+        let layout = Layout::rig(SIMPLEST, shape);
         start.solve(&layout).map(|solved| (solved, layout))
     };
-    let (solved, layout) = fit(Lens::Brown5, forced_shape.unwrap_or(true))
-        .or_else(|_| fit(Lens::Brown5, forced_shape.unwrap_or(false)))
-        .or_else(|_| fit(Lens::Brown4, false))
-        .map_err(|e| match e {
+    let (solved, layout) =
+        fit(forced_shape.unwrap_or(true)).or_else(|_| fit(forced_shape.unwrap_or(false))).map_err(|e| match e {
             // Not even the simplest search ends: the pairs leave a valley, not a minimum.
             Error::NotConverged { .. } => Error::undetermined(),
             other => other,
@@ -61,33 +63,29 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
         print: PrintShare::of(&solved, board, &layout).map_or(1.0, |print| print.excess),
     };
     // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
-    let bent = forced_shape.unwrap_or(true);
-    let mut scores = ladder(&solved.problem, bent);
-    if forced_shape.is_none() && scores.iter().all(|s| s.trial.is_none()) {
+    let mut scores = ladder(&solved.problem, layout.shape);
+    let bent = simplest(&scores, &chance).filter(|_| forced_shape.is_none() && layout.shape);
+    let flat = bent.and_then(|bent| score(&solved.problem, bent.layout.left?, false).trial);
+    let bends = bent.zip(flat).is_none_or(|(bent, flat)| flat.is_worse_than(bent, &chance) || flat.is_refuted_by(bent, &chance));
+    if !bends {
         scores = ladder(&solved.problem, false);
     }
-    let chosen = simplest(&scores, &chance).ok_or_else(Error::undetermined)?;
-    if forced_shape.is_none() && chosen.layout.shape {
-        let flat = chosen.layout.left.and_then(|lens| score(&solved.problem, lens, false).trial);
-        let bends = flat.is_none_or(|flat| flat.is_worse_than(chosen, &chance) || flat.is_refuted_by(chosen, &chance));
-        if !bends {
-            scores = ladder(&solved.problem, false);
-        }
-    }
-    let chosen = simplest(&scores, &chance).ok_or_else(Error::undetermined)?;
-    Ok(Choice { layout: chosen.layout, near: Some(chosen.values.clone()), scores })
+    Ok(match simplest(&scores, &chance) {
+        Some(chosen) => Choice { layout: chosen.layout, near: Some(chosen.values.clone()), scores },
+        // Some pairs cannot be left out without losing the cameras: nothing can be compared.
+        None => Choice { layout, near: Some(solved.problem.values), scores: Vec::new() },
+    })
 }
 
-/// Every lens from the simplest, each from where the one before it that has a minimum ended: a richer lens begins as a simpler one. One that is
-/// expected to gain no more than chance cannot predict better, and is not tried.
+/// The simplest lens and those that are richer, each from where the one before it that has a minimum ended: a richer lens begins as a
+/// simpler one. One that is expected to gain no more than chance cannot predict better, and is not tried.
 fn ladder(problem: &Problem, shape: bool) -> Vec<LensScore> {
     let mut problem = problem.clone();
     let mut simpler = None;
     let mut scores = Vec::new();
-    for lens in Lens::LADDER {
+    for lens in Lens::LADDER.into_iter().filter(|lens| *lens >= SIMPLEST) {
         let layout = Layout::rig(lens, shape);
-        let rich = lens > Lens::Brown5;
-        let tried = !rich || simpler.is_some_and(|simpler| expects_gain(&problem, &layout, &simpler));
+        let tried = simpler.is_none_or(|simpler| expects_gain(&problem, &layout, &simpler));
         let score = if tried { score(&problem, lens, shape) } else { LensScore::untried(lens) };
         if let Some(trial) = &score.trial {
             problem.values = trial.values.clone();

@@ -15,7 +15,7 @@ use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::{Rig, Side};
 
 /// A focal length that is known no better than this share is not known.
-pub const WORST_FOCAL_SIGMA: f64 = 0.02;
+pub const WORST_FOCAL_SIGMA: f64 = 0.1;
 
 /// By how much chi-square (twice the cost) would fall if the equations were straight from here to the minimum: what a richer
 /// model is expected to gain at a simpler one's minimum (Rao's score). `None` where the views do not determine the unknowns.
