@@ -98,9 +98,9 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
     let candidates = Candidates::new(corners)?;
     let Series { problem: start, discarded } = series::find(&candidates)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
-    let lens_ladder::Choice { layout, near, scores: lens_scores } =
+    let lens_ladder::Choice { layout, near, priors, scores: lens_scores } =
         lens_ladder::choose(&start, &corners.board, options).map_err(|e| e.without(&skipped))?;
-    let solved = Problem { values: near.unwrap_or_else(|| start.values.clone()), ..start }
+    let solved = Problem { values: near.unwrap_or(start.values), priors, views: start.views }
         .solve(&layout)
         .map_err(|e| e.without(&skipped).of_lens(options.lens))?;
     let neighbours = solved.neighbours(&corners.board);

@@ -10,8 +10,9 @@
 
 use crate::imaging::Board;
 use crate::stereo::model::parameters::{Layout, Values};
-use crate::stereo::select::model_comparison::{Chance, LensScore, score, simplest};
+use crate::stereo::select::model_comparison::{Chance, LensScore, Trial, score, simplest};
 use crate::stereo::select::stated_uncertainty;
+use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::uncertainty;
 use crate::stereo::target::print_share::PrintShare;
@@ -37,6 +38,8 @@ pub struct Choice {
     pub layout: Layout,
     /// Values near the minimum of that model, where it was tried.
     pub near: Option<Values>,
+    /// What is expected of that model.
+    pub priors: Priors,
     /// Every lens of the ladder; empty where the lens was forced.
     pub scores: Vec<LensScore>,
 }
@@ -45,7 +48,8 @@ pub struct Choice {
 pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choice, Error> {
     let forced_shape = options.shape.or(options.lens.map(|_| false));
     if let (Some(lens), Some(shape)) = (options.lens, forced_shape) {
-        return Ok(Choice { layout: Layout::rig(lens, shape), near: None, scores: Vec::new() });
+        let priors = start.priors.clone();
+        return Ok(Choice { layout: Layout::rig(lens, shape), near: None, priors, scores: Vec::new() });
     }
     // Weights from a model that is at least as rich as most need; the comparison uses the same for all.
     let fit = |shape| {
@@ -70,11 +74,35 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     if !bends {
         scores = ladder(&solved.problem, false);
     }
-    Ok(match simplest(&scores, &chance) {
-        Some(chosen) => Choice { layout: chosen.layout, near: Some(chosen.values.clone()), scores },
+    let Some(chosen) = simplest(&scores, &chance) else {
         // Some pairs cannot be left out without losing the cameras: nothing can be compared.
-        None => Choice { layout, near: Some(solved.problem.values), scores: Vec::new() },
-    })
+        let priors = solved.problem.priors.clone();
+        return Ok(Choice { layout, near: Some(solved.problem.values), priors, scores: Vec::new() });
+    };
+    let fewer = fewer_terms(&solved.problem, chosen, &chance);
+    let Trial { layout, values, priors, .. } = fewer.as_ref().unwrap_or(chosen).clone();
+    Ok(Choice { layout, near: Some(values), priors, scores })
+}
+
+/// A lens of fewer terms than the simplest of the ladder, where the pairs say so: the logarithm of its evidence (Laplace's approximation; what is
+/// expected of the terms that it lacks is part of it) is larger by a margin. Corners that are measured well tell a term that is not there
+/// from one that is; hand-held pictures do not, and keep all of them.
+fn fewer_terms(problem: &Problem, five: &Trial, chance: &Chance) -> Option<Trial> {
+    /// Twenty to one.
+    const MARGIN: f64 = 3.0;
+    if five.layout.left != Some(SIMPLEST) {
+        return None;
+    }
+    let evidence = |trial: &Trial| {
+        let added = (five.layout.count() - trial.layout.count()) as f64;
+        let wider = 0.5 * (five.log_volume()? - trial.log_volume()? + added * chance.scatter.ln());
+        let fall = 0.5 * (trial.chi_square() - five.chi_square()) / chance.scatter;
+        Some(problem.priors.log_width(&five.layout, &trial.layout) - wider - fall)
+    };
+    let fewer = Lens::LADDER.into_iter().filter(|lens| *lens < SIMPLEST);
+    let trials = fewer.filter_map(|lens| Trial::new(problem, Layout::rig(lens, five.layout.shape)));
+    let best = trials.filter_map(|trial| Some((evidence(&trial)?, trial))).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (best.0 > MARGIN).then_some(best.1)
 }
 
 /// The simplest lens and those that are richer, each from where the one before it that has a minimum ended: a richer lens begins as a
@@ -90,6 +118,8 @@ fn ladder(problem: &Problem, shape: bool) -> Vec<LensScore> {
         if let Some(trial) = &score.trial {
             problem.values = trial.values.clone();
             simpler = Some(layout);
+        } else if lens == Lens::Rational8 {
+            problem.priors = problem.priors.holding_rational();
         }
         scores.push(score);
     }

@@ -13,6 +13,7 @@ use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::select::cross_validation::{self, FOLDS};
 use crate::stereo::solve::levenberg_marquardt;
 use crate::stereo::solve::normal_equations::Equations;
+use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::{self, determines_cameras};
@@ -68,6 +69,8 @@ pub struct Trial {
     pub layout: Layout,
     /// Rig, shape and poses.
     pub values: Values,
+    /// What was expected of them.
+    pub priors: Priors,
     /// Covariance of rig and shape.
     pub covariance: DMatrix<f64>,
     /// Sum of the squared whitened residuals of the pairs it was fitted to, and of what the lens misses of what is expected of lenses.
@@ -110,12 +113,21 @@ impl Trial {
         }
         let chi_square = 2.0 * equations.cost();
         let corners = views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count();
-        Some((Trial { layout, values, covariance, chi_square, corners, by_pair: Vec::new() }, equations))
+        Some((Trial { layout, values, priors: problem.priors.clone(), covariance, chi_square, corners, by_pair: Vec::new() }, equations))
     }
 
     /// Sum of the squared whitened residuals of the pairs it was fitted to.
     pub fn chi_square(&self) -> f64 {
         self.chi_square
+    }
+
+    /// Logarithm of the determinant of the covariance. `None` where it has none.
+    pub fn log_volume(&self) -> Option<f64> {
+        let scale = self.covariance.diagonal().map(f64::sqrt);
+        let unit = DMatrix::from_fn(scale.len(), scale.len(), |i, j| self.covariance[(i, j)] / (scale[i] * scale[j]));
+        let root = unit.cholesky()?;
+        let logs = root.l_dirty().diagonal().map(f64::ln) + scale.map(f64::ln);
+        Some(2.0 * logs.sum())
     }
 
     fn loss(&self) -> f64 {

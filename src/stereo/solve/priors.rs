@@ -14,6 +14,8 @@ use crate::stereo::{Camera, Lens, Rig};
 
 /// What distortion does at the corner of the picture, as shares of the corner's distance from the middle: k1, k2, k3.
 const RADIAL_AT_CORNER: [f64; 3] = [0.2, 0.1, 0.05];
+/// What the rational terms do there, k4, k5, k6: these and the radial ones are exchanged for each other, so that one of the two is held.
+const RATIONAL_AT_CORNER: [f64; 3] = [1.0, 1.0, 1.0];
 /// Tangential distortion, p1 and p2.
 const TANGENTIAL: f64 = 1e-3;
 /// How far the picture's centre lies from its middle, as a share of the width.
@@ -46,6 +48,8 @@ enum Number {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Priors {
     all: Vec<Expectation>,
+    /// Whether the rational terms are held at zero, so that a lens has those after them only.
+    rational_held: bool,
 }
 
 /// Their share of the normal equations, as that of a pair.
@@ -61,7 +65,7 @@ pub struct Information {
 
 impl Priors {
     /// Nothing is expected.
-    pub const NONE: Priors = Priors { all: Vec::new() };
+    pub const NONE: Priors = Priors { all: Vec::new(), rational_held: false };
 
     /// What is expected of both cameras and a board with this diagonal.
     pub fn of_rig(start: &Rig, diagonal_mm: f64) -> Priors {
@@ -85,6 +89,21 @@ impl Priors {
         priors
     }
 
+    /// The same with the rational terms held at zero: what a lens needs of the terms after these shows without them, where all together
+    /// are not told apart.
+    pub fn holding_rational(&self) -> Priors {
+        Priors { rational_held: true, ..self.clone() }
+    }
+
+    /// Sum of the logarithms of the standard deviations of those numbers that a richer layout has and a simpler one has not.
+    pub fn log_width(&self, richer: &Layout, simpler: &Layout) -> f64 {
+        let free = |layout: &Layout, expectation: &&Expectation| {
+            expectation.terms.iter().all(|(number, _)| self.place(layout, *number).is_some())
+        };
+        let added = self.all.iter().filter(|e| free(richer, e) && !free(simpler, e));
+        added.map(|expectation| expectation.sigma.ln()).sum()
+    }
+
     fn of_camera(&mut self, side: Side, camera: &Camera) {
         let (width, height) = (f64::from(camera.width), f64::from(camera.height));
         let focal = (camera.fx * camera.fy).sqrt();
@@ -97,6 +116,9 @@ impl Priors {
         for (at, power, share) in
             [(4, 2, RADIAL_AT_CORNER[0]), (5, 4, RADIAL_AT_CORNER[1]), (8, 6, RADIAL_AT_CORNER[2])]
         {
+            one(at, 0.0, share / corner.powi(power));
+        }
+        for (at, power, share) in [(9, 2, RATIONAL_AT_CORNER[0]), (10, 4, RATIONAL_AT_CORNER[1]), (11, 6, RATIONAL_AT_CORNER[2])] {
             one(at, 0.0, share / corner.powi(power));
         }
         one(6, 0.0, TANGENTIAL);
@@ -118,6 +140,8 @@ impl Priors {
     /// Their share of the normal equations. Expectations of numbers that are not free say nothing; nor do those of single distortion
     /// terms where the lens has the rational terms that these are exchanged for.
     pub fn information(&self, layout: &Layout, shared: &Shared) -> Information {
+        /// Small enough to hold a number, and large enough for the equations.
+        const HELD: f64 = 1e-6;
         let count = layout.count();
         let mut sum = Information { matrix: DMatrix::zeros(count, count), gradient: DVector::zeros(count), cost: 0.0 };
         if self.all.is_empty() {
@@ -126,12 +150,14 @@ impl Priors {
         let numbers = layout.numbers(shared);
         for expectation in &self.all {
             let Some(terms) =
-                expectation.terms.iter().map(|(n, by)| Some((place(layout, *n)?, *by))).collect::<Option<Vec<_>>>()
+                expectation.terms.iter().map(|(n, by)| Some((self.place(layout, *n)?, *by))).collect::<Option<Vec<_>>>()
             else {
                 continue;
             };
             let off = terms.iter().map(|(at, by)| by * numbers[*at]).sum::<f64>() - expectation.value;
-            let weight = 1.0 / (expectation.sigma * expectation.sigma);
+            let held = self.rational_held && expectation.terms.iter().any(|(number, _)| number.is_rational());
+            let sigma = if held { HELD * expectation.sigma } else { expectation.sigma };
+            let weight = 1.0 / (sigma * sigma);
             sum.cost += 0.5 * weight * off * off;
             for (i, a) in &terms {
                 sum.gradient[*i] += weight * a * off;
@@ -142,17 +168,24 @@ impl Priors {
         }
         sum
     }
+
+    /// Where a number stands among those that are free and of which something is expected.
+    fn place(&self, layout: &Layout, number: Number) -> Option<usize> {
+        match number {
+            Number::Camera(side, at) => {
+                let lens = if side == Side::Left { layout.left } else { layout.right }?;
+                let told = !(4..9).contains(&at) || lens <= Lens::Brown5 || self.rational_held;
+                (told && at < layout.camera_count(side)).then(|| layout.camera_start(side) + at)
+            }
+            Number::Shape(k) => layout.shape.then(|| layout.shape_start() + k),
+        }
+    }
 }
 
-/// Where a number stands among those that are free and of which something is expected.
-fn place(layout: &Layout, number: Number) -> Option<usize> {
-    match number {
-        Number::Camera(side, at) => {
-            let lens = if side == Side::Left { layout.left } else { layout.right }?;
-            let told = at < 4 || lens <= Lens::Brown5;
-            (told && at < layout.camera_count(side)).then(|| layout.camera_start(side) + at)
-        }
-        Number::Shape(k) => layout.shape.then(|| layout.shape_start() + k),
+impl Number {
+    /// True for k4, k5 and k6.
+    fn is_rational(self) -> bool {
+        matches!(self, Number::Camera(_, 9..=11))
     }
 }
 
