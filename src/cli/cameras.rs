@@ -6,6 +6,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use super::{ExportRobot, Output, between};
 use crate::imaging::{Mosaic, Squares};
 use crate::stereo::Lens;
+use crate::stereo::volume::Extent;
 
 /// `stereocal camera-check`
 #[derive(Debug, Args)]
@@ -31,6 +32,13 @@ pub struct CameraCheck {
     /// Lens model: radial2, brown4, brown5, rational8, thin-prism12 or tilted14 [default: chosen by held-out pairs]
     #[arg(long, value_name = "NAME", value_parser = lens)]
     pub lens: Option<Lens>,
+    /// Only the pairs from this one on, by name: the rig as it is since then
+    #[arg(long, value_name = "PAIR")]
+    pub since: Option<String>,
+    /// The volume that the verdict is for: `all` of what both cameras see, or a box X0,Y0,Z0,X1,Y1,Z1 in mm in the left camera's frame
+    /// [default: where the boards were]
+    #[arg(long, value_name = "VOLUME", allow_hyphen_values = true)]
+    pub volume: Option<Extent>,
     /// Whether the board may be bowed [default: as held-out pairs say; flat where --lens is given]
     #[arg(long, value_name = "SHAPE")]
     pub board_shape: Option<BoardShape>,

@@ -16,8 +16,9 @@ use crate::imaging::overlay::SideBySide;
 use crate::imaging::{Board, Corners, Wanted, find_corners};
 use crate::report::drawing::pair_picture::PairPicture;
 use crate::report::drawing::picture::PairJpeg;
-use crate::stereo::calibrate::{Calibration, calibrate};
+use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::residuals;
+use crate::stereo::findings::standing::{self, Asked};
 use crate::stereo::judge::assessment::{Demand, Judged};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::lengths::second_board::{self, SecondBoard};
@@ -35,27 +36,34 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(mm) = args.board_uncertainty_mm {
         config::within(&mut problems, "board_uncertainty_mm", mm, config::TOLERANCES_MM);
     }
-    let demand = Demand { tolerance_mm, board_uncertainty_mm: args.board_uncertainty_mm };
+    let extent = args.volume.unwrap_or_default();
+    let demand = Demand { tolerance_mm, board_uncertainty_mm: args.board_uncertainty_mm, extent };
     config::reject(problems)?;
     let out = open(args, config, run)?;
 
     let corners = corners(args, board, &out)?;
     corners.notes.iter().for_each(progress::note);
-    let calibration = calibrate(&corners, &options(args))?;
-    for skipped in &calibration.skipped {
-        progress::warn(format!("pair {} is not used: {}", skipped.pair, skipped.reason));
-    }
+    let asked = Asked { options: options(args), tolerance_mm, extent };
+    let (calibration, findings) = match &args.since {
+        Some(pair) => standing::calibrate_since(&corners, pair, &asked)?,
+        None => standing::calibrate_standing(&corners, &asked)?,
+    };
     let accuracy = held_out::hold_out(&calibration, demand.board_uncertainty_mm)?;
     let second = second_board(args, board, &calibration, &out)?;
-    let judged = Judged::new(&calibration, accuracy, second, &demand);
-    judged.advice.iter().chain(judged.warnings.iter().map(|warning| &warning.text)).for_each(progress::warn);
+    let judged = Judged::new(&calibration, findings, accuracy, second, &demand);
+    calibration.rig().unusual().into_iter().for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
     let pictures = pictures(args, &calibration, &judged);
     let page = report::camera_check::page(&calibration, &judged, &corners, &pictures)?;
     out.write_json(
         "calibration.json",
-        &CalibrationFile::from(calibration.rig()).with_check(&calibration.own_noise, judged.coverage.corner_depths_mm),
+        &CalibrationFile::from(calibration.rig()).with_check(
+            &calibration.own_noise,
+            judged.coverage.corner_depths_mm,
+            &judged.volume.volume,
+            &calibration.standing.unconfirmed,
+        ),
     )?;
     if !out.is_input("corners.csv") {
         out.write("corners.csv", corners_csv::to_csv(&calibration.mark(&corners)).as_bytes())?;

@@ -10,6 +10,7 @@ use crate::files::{self, OutDir, Result};
 use crate::geometry::rotation_matrix;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::model::rig::{Covariance, Rig};
+use crate::stereo::volume::Volume;
 use crate::stereo::{Camera, Lens};
 
 /// Version of the format that this program writes.
@@ -33,6 +34,12 @@ pub struct CalibrationFile {
     /// Where the boards stood: what the rig was checked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     boards: Option<BoardsRecord>,
+    /// The volume that the verdict was for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    volume: Option<Volume>,
+    /// Whether the last pairs confirmed the rig; empty where they did.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    unconfirmed: Vec<String>,
 }
 
 /// Distances of the boards' corners from the left camera along its axis.
@@ -51,6 +58,10 @@ pub struct Calibrated {
     pub noise: Option<Noise>,
     /// Nearest and farthest corner of a board, along the left camera's axis, mm.
     pub depths_mm: Option<[f64; 2]>,
+    /// The volume that the verdict was for.
+    pub volume: Option<Volume>,
+    /// The calibration's last pairs, where they contradict the rig.
+    pub unconfirmed: Vec<String>,
 }
 
 /// `factor` times the covariance that the refinement gives a corner, plus the square of `added_px` on both axes.
@@ -137,13 +148,24 @@ impl From<&Rig> for CalibrationFile {
             }),
             corner_noise: None,
             boards: None,
+            volume: None,
+            unconfirmed: Vec::new(),
         }
     }
 }
 
 impl CalibrationFile {
-    /// The same with how corners scattered, and between which depths the boards' corners were.
-    pub fn with_check(mut self, noise: &Noise, [nearest_mm, farthest_mm]: [f64; 2]) -> CalibrationFile {
+    /// The same with how corners scattered, between which depths the boards' corners were, the volume that the verdict was for, and the last
+    /// pairs where they contradict the rig.
+    pub fn with_check(
+        mut self,
+        noise: &Noise,
+        [nearest_mm, farthest_mm]: [f64; 2],
+        volume: &Volume,
+        unconfirmed: &[String],
+    ) -> CalibrationFile {
+        self.volume = Some(volume.clone());
+        self.unconfirmed = unconfirmed.to_vec();
         self.corner_noise = Some(NoiseRecord { factor: noise.factor, added_px: noise.added_px });
         self.boards = Some(BoardsRecord { nearest_mm, farthest_mm });
         self
@@ -222,11 +244,11 @@ pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
     const WHAT: &str = "the stereo calibration";
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
     let text = files::read_text(path, WHAT, Some(hint))?;
-    let (rig, noise, depths_mm) = match export::read(path, &text) {
-        Some(rig) => (rig, None, None),
+    let (rig, noise, depths_mm, volume, unconfirmed) = match export::read(path, &text) {
+        Some(rig) => (rig, None, None, None, Vec::new()),
         None => {
             let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
-            (file.rig(), file.noise(), file.depths_mm())
+            (file.rig(), file.noise(), file.depths_mm(), file.volume, file.unconfirmed)
         }
     };
     let rig = rig.map_err(|message| files::Error::Format {
@@ -234,7 +256,7 @@ pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
         place: Place { path: path.to_owned(), line: None },
         hint: None,
     })?;
-    Ok(Calibrated { rig, noise, depths_mm })
+    Ok(Calibrated { rig, noise, depths_mm, volume, unconfirmed })
 }
 
 #[cfg(test)]

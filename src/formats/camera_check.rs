@@ -6,6 +6,7 @@ use crate::diagnostic::Warning;
 use crate::imaging::Skipped;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
+use crate::stereo::findings::{self, Finding};
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::Range;
@@ -15,6 +16,7 @@ use crate::stereo::judge::lengths::second_board::SecondBoard;
 use crate::stereo::judge::verdict::{COVERAGE, Verdict};
 use crate::stereo::select::model_comparison::LensScore;
 use crate::stereo::select::pair_scatter::PairScatter;
+use crate::stereo::volume::Volume;
 
 /// The content of `camera-check.json`. Lengths held out: no pair helped to calibrate the cameras that measured it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,6 +28,12 @@ pub struct CameraCheckFile {
     /// The tolerance that the rig would meet, mm; null where something else than a length stands against it.
     trusted_mm: Option<f64>,
     max_abs_error_mm: f64,
+    /// Nineteen of twenty held-out lengths are off by no more, mm.
+    within_95_mm: f64,
+    /// What the verdict is for.
+    volume: Volume,
+    /// What happened over the pairs, and to pairs that are not used.
+    findings: Vec<Finding>,
     /// Of the length whose error may be largest: its own.
     expanded_uncertainty_mm: f64,
     /// Its standard deviations through the corners, the calibration, and the board's certificate, mm; null without a certificate.
@@ -94,6 +102,9 @@ impl CameraCheckFile {
             evidence: judged.evidence.clone(),
             trusted_mm: judged.trusted_mm(),
             max_abs_error_mm: accuracy.extremes.max_abs_error_mm,
+            within_95_mm: accuracy.extremes.one_in_twenty_mm,
+            volume: judged.volume.volume.clone(),
+            findings: judged.findings.iter().cloned().chain(findings::of_pairs(&calibration.discarded.pairs)).collect(),
             expanded_uncertainty_mm: worst.expanded_uncertainty_mm(),
             uncertainty_shares_mm: [
                 Some(worst.corners_mm),

@@ -52,17 +52,13 @@ pub enum Error {
         /// The others.
         bad: Vec<Skipped>,
     },
-    /// The rig changed, and too few pairs show the one that stands.
-    #[error("the rig changed: from pair {since} on it is another one, which {after} pairs show; calibration needs {needed}{}", list(.bad))]
-    SeriesChanged {
-        /// First pair of the rig that stands.
-        since: String,
-        /// Its pairs.
-        after: usize,
-        /// Fewest pairs for a calibration.
-        needed: usize,
-        /// The others.
-        bad: Vec<Skipped>,
+    /// A pair that was asked for and is not there.
+    #[error("there is no pair {pair} with a board in both pictures; there are {}", named(.pairs))]
+    NoSuchPair {
+        /// Its name.
+        pair: String,
+        /// Names of those that there are.
+        pairs: Vec<String>,
     },
     /// The views do not tell the cameras.
     #[error("the views are too similar to tell the cameras{}{}", focal(.focal_sigma), list(.skipped))]
@@ -135,6 +131,14 @@ pub enum Error {
     },
 }
 
+/// The first names, and how many more there are.
+fn named(pairs: &[String]) -> String {
+    const MOST: usize = 8;
+    let more = pairs.len().saturating_sub(MOST);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{}{more}", pairs.iter().take(MOST).cloned().collect::<Vec<_>>().join(", "))
+}
+
 fn list(pairs: &[Skipped]) -> String {
     pairs.iter().map(|s| format!("\n  {}: {}", s.pair, s.reason)).collect()
 }
@@ -173,7 +177,10 @@ impl Error {
 impl Explain for Error {
     fn status(&self) -> Status {
         match self {
-            Error::TooFewPairs { .. } | Error::PictureSize { .. } | Error::LensNotExportable { .. } => Status::BadInput,
+            Error::TooFewPairs { .. }
+            | Error::NoSuchPair { .. }
+            | Error::PictureSize { .. }
+            | Error::LensNotExportable { .. } => Status::BadInput,
             _ => Status::Undetermined,
         }
     }
@@ -189,9 +196,7 @@ impl Explain for Error {
                 Error::Contradiction { .. } => {
                     "trigger both cameras at once, clamp them and the board, and check that equal names belong together"
                 }
-                Error::SeriesChanged { .. } => {
-                    "photograph more pairs with the rig as it stands; pairs from before are another rig's and need a folder of their own"
-                }
+                Error::NoSuchPair { .. } => "`--since` takes the name of a pair as the report lists it",
                 Error::Undetermined { .. } => {
                     "photograph the board tilted by 20 to 45 degrees about both of its axes, at several distances"
                 }

@@ -2,7 +2,7 @@
 //!
 //! Rooms in the order of the data; imports point up this list only: `model` and `data` say what is looked for and what was seen,
 //! `solve` finds the most likely rig, `init` where to start, `pairs` which pairs belong to it, `select` which lens;
-//! `calibrate()` is all of that in turn. `judge` measures boards with the rig and says what it is worth, `triangulate` and
+//! `calibrate()` is all of that in turn. `volume` is where the boards were, `judge` measures boards with the rig and says what it is worth, `triangulate` and
 //! `target` measure points and a board's pose with it.
 
 mod error;
@@ -22,6 +22,10 @@ pub mod select;
 pub mod calibrate;
 
 pub mod triangulate;
+
+pub mod volume;
+
+pub mod findings;
 
 pub mod judge;
 

@@ -139,7 +139,7 @@ fn field_figure(field: &Field, width: u32, height: u32) -> Result<(String, Strin
 }
 
 pub(super) fn volume(judged: &Judged) -> Result<Markup> {
-    let lying = |axis: usize| judged.volume.lengths.iter().filter(move |l| l.direction[axis] > 0.99);
+    let lying = |axis: usize| judged.volume.lengths.iter().filter(move |l| l.direction[axis].abs() > 0.7);
     let along = |axis: usize| -> Vec<(f64, f64)> { lying(axis).map(|l| (l.at_mm.z, l.sigma_mm())).collect() };
     let svg = Plot::new(
         &format!("Standard deviation of a length of {} mm", judged.volume.length_mm),

@@ -5,10 +5,11 @@ use crate::report::table::{Table, number};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::lengths::{Axis, Range};
-use crate::stereo::judge::verdict::{COVERAGE, Verdict};
+use crate::stereo::judge::verdict::Verdict;
+use crate::stereo::pairs::Cause;
 
-/// Rows of the table on stdout: more ranges are thinned out.
-const TABLE_ROWS: usize = 7;
+/// Rows of the table on stdout along each axis.
+const TABLE_ROWS: usize = 3;
 
 pub(super) fn word(verdict: Verdict) -> &'static str {
     match verdict {
@@ -22,15 +23,32 @@ pub(super) fn axis(range: &Range) -> &'static str {
     if range.axis == Axis::X { "x" } else { "y" }
 }
 
-/// The short table on stdout.
+/// The first screen: the verdict and what it is for, the pairs, the rig, what to do next.
 pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> String {
-    let accuracy = &judged.accuracy;
-    let rig = calibration.rig();
+    let mut lines = vec![
+        format!("{}: {}", word(judged.verdict), explanation(judged)),
+        volume(judged),
+        deciding(judged),
+        trusted(judged),
+    ];
+    lines.extend(standing(calibration));
+    lines.extend(judged.findings.iter().map(|finding| format!("over the pairs: {}", finding.action)));
+    lines.extend(pairs(calibration));
+    lines.push(rig(calibration, judged));
+    lines.push(board(calibration));
+    lines.extend(next(judged).map(|what| format!("next: {what}")));
+    format!("{}\n\n{}\nreport: {}\n", lines.join("\n"), ranges(judged), out.join("camera-check.html"))
+}
+
+/// The shortest, a middle and the longest range along each axis.
+fn ranges(judged: &Judged) -> Table {
     let mut table = Table::new(["range mm", "lengths", "mean mm", "std mm", "max |error| mm"]);
     for along in [Axis::X, Axis::Y] {
-        let ranges: Vec<&Range> = accuracy.ranges.iter().filter(|r| r.axis == along).collect();
-        let step = ranges.len().div_ceil(TABLE_ROWS).max(1);
-        for range in ranges.iter().step_by(step) {
+        let ranges: Vec<&Range> = judged.accuracy.ranges.iter().filter(|r| r.axis == along).collect();
+        let mut shown: Vec<usize> =
+            (0..TABLE_ROWS).map(|k| k * ranges.len().saturating_sub(1) / (TABLE_ROWS - 1)).collect();
+        shown.dedup();
+        for range in shown.into_iter().filter_map(|i| ranges.get(i)) {
             table.row([
                 format!("{} {}", axis(range), range.nominal_mm),
                 range.count.to_string(),
@@ -40,42 +58,100 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
             ]);
         }
     }
+    table
+}
+
+/// Where the verdict holds.
+pub(super) fn volume(judged: &Judged) -> String {
+    let volume = &judged.volume.volume;
+    let [near, far] = volume.depth_mm;
+    let [x0, x1, y0, y1] = volume.tilt_deg;
+    format!(
+        "for where the boards were: {near:.0} to {far:.0} mm away, tilted by {x0:.0} to {x1:.0} deg about x and {y0:.0} to {y1:.0} deg about y"
+    )
+}
+
+/// Which rig of several it is, where the rig changed.
+fn standing(calibration: &Calibration) -> Option<String> {
+    let standing = &calibration.standing;
+    if let Some(last) = standing.unconfirmed.first() {
+        return Some(format!(
+            "the last pairs ({}) contradict this rig: it may no longer stand; `--since {last}` calibrates from them alone, once there are enough",
+            named(&standing.unconfirmed)
+        ));
+    }
+    let since = standing.since.as_ref()?;
+    Some(format!("the rig as it is since pair {since}: {} earlier pairs are of the one before", standing.pairs_before))
+}
+
+/// How many pairs were used, and in a line a cause which were not.
+fn pairs(calibration: &Calibration) -> Vec<String> {
+    /// Causes with a line of their own; the page has all.
+    const MOST: usize = 4;
     let total = calibration.views.len() + calibration.skipped.len();
+    let mut lines = vec![format!("{} of {total} pairs used", calibration.views.len())];
+    let mut causes: Vec<(Cause, &str, Vec<String>)> = Vec::new();
+    for pair in &calibration.discarded.pairs {
+        match causes.iter_mut().find(|(cause, ..)| *cause == pair.cause) {
+            Some((.., names)) => names.push(pair.pair.clone()),
+            None => causes.push((pair.cause, &pair.reason, vec![pair.pair.clone()])),
+        }
+    }
+    causes.sort_by_key(|(.., names)| std::cmp::Reverse(names.len()));
+    let others: usize = causes.iter().skip(MOST).map(|(.., names)| names.len()).sum();
+    lines.extend(causes.iter().take(MOST).map(|(_, reason, names)| {
+        let of = if names.len() > 1 { "first: " } else { "" };
+        format!("  without {}: {of}{reason}", self::named(names))
+    }));
+    if others > 0 {
+        lines.push(format!("  without {others} more, see the report"));
+    }
+    lines
+}
+
+/// At most eight names.
+fn named(names: &[String]) -> String {
+    const MOST: usize = 8;
+    let more = names.len().saturating_sub(MOST);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{}{more}", names.iter().take(MOST).cloned().collect::<Vec<_>>().join(", "))
+}
+
+fn rig(calibration: &Calibration, judged: &Judged) -> String {
+    let (rig, epipolar) = (calibration.rig(), &judged.accuracy.epipolar);
+    format!(
+        "{} lens, baseline {} mm, reprojection RMS {} px, epipolar error RMS {} px",
+        rig.left.lens.name(),
+        number(Some(rig.baseline_mm()), 3),
+        number(Some(calibration.rms_px), 3),
+        number(Some(epipolar.rms_px), 3),
+    )
+}
+
+fn board(calibration: &Calibration) -> String {
     let [along_x, along_y, twist] = calibration.values.shared.shape_mm;
     let bow = if calibration.layout.shape {
-        format!(", board bowed by {along_x:.4} mm along x and {along_y:.4} mm along y, twisted by {twist:.4} mm")
+        format!(", bowed by {along_x:.4} mm along x and {along_y:.4} mm along y, twisted by {twist:.4} mm")
     } else {
-        String::new()
+        ", taken as flat".to_owned()
     };
-    let epipolar = &accuracy.epipolar;
-    format!(
-        "{}: {}\n{}\n{}\n{} of {total} pairs, {} lens, reprojection RMS {} px, baseline {} mm{bow}\nepipolar error RMS {} px, largest \
-         {} px\n\n{table}\nreport: {}\n",
-        word(judged.verdict),
-        explanation(judged),
-        deciding(judged),
-        trusted(judged),
-        calibration.views.len(),
-        rig.left.lens.name(),
-        number(Some(calibration.rms_px), 3),
-        number(Some(rig.baseline_mm()), 3),
-        number(Some(epipolar.rms_px), 3),
-        number(Some(epipolar.max_px), 3),
-        out.join("camera-check.html"),
-    )
+    format!("board of {} squares of {} mm{bow}", calibration.board.squares, calibration.board.square_mm)
+}
+
+/// What to do next: what the deciding line asks for, then what the views lack.
+fn next(judged: &Judged) -> impl Iterator<Item = &str> {
+    const MOST: usize = 2;
+    let remedy = judged.deciding().filter(|line| line.allows != Verdict::Pass).map(|line| line.remedy);
+    remedy.into_iter().filter(|remedy| !remedy.is_empty()).chain(judged.advice.iter().map(String::as_str)).take(MOST)
 }
 
 pub(super) fn explanation(judged: &Judged) -> String {
     let extremes = &judged.accuracy.extremes;
-    let worst = &extremes.largest;
-    let board = worst.expansion.board_mm.map_or_else(String::new, |mm| format!(", board {:.4}", mm / COVERAGE));
     format!(
-        "largest held-out length error {:.4} mm, expanded uncertainty {:.4} mm (95 %; standard deviations: corners {:.4}, calibration \
-         {:.4}{board}), tolerance {} mm",
+        "nineteen of twenty held-out lengths within {:.4} mm, largest error {:.4} mm (may be {:.4}), tolerance {} mm",
+        extremes.one_in_twenty_mm,
         extremes.max_abs_error_mm,
-        worst.expanded_uncertainty_mm(),
-        worst.corners_mm,
-        worst.calibration_mm,
+        extremes.largest.at_most_mm(),
         judged.tolerance_mm
     )
 }
@@ -84,10 +160,10 @@ pub(super) fn explanation(judged: &Judged) -> String {
 pub(super) fn deciding(judged: &Judged) -> String {
     let below = judged.evidence.iter().filter(|line| line.allows != Verdict::Pass).count();
     let others = match below.saturating_sub(1) {
-        0 if below == 0 => format!("all {} lines of evidence allow a pass", judged.evidence.len()),
-        0 => "nothing else stands against a pass".to_owned(),
-        1 => "1 other line of evidence is below a pass".to_owned(),
-        others => format!("{others} other lines of evidence are below a pass"),
+        0 if below == 0 => format!("all {} checks passed", judged.evidence.len()),
+        0 => "all other checks passed".to_owned(),
+        1 => "1 other check is not passed".to_owned(),
+        others => format!("{others} other checks are not passed"),
     };
     judged.deciding().map_or(others.clone(), |line| format!("decided by {}: {}; {others}", line.what, line.figure()))
 }

@@ -2,15 +2,17 @@
 
 use crate::diagnostic::Warning;
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::findings::Finding;
 use crate::stereo::judge::evidence::{self, Evidence};
 use crate::stereo::judge::ledger::{Facts, ledger};
 use crate::stereo::judge::lengths::held_out::Accuracy;
 use crate::stereo::judge::lengths::model_disagreement::{self, Disagreement};
 use crate::stereo::judge::lengths::second_board::SecondBoard;
-use crate::stereo::judge::lengths::uncertainty::Volume;
 use crate::stereo::judge::residual_correlation::{self, ResidualPattern};
 use crate::stereo::judge::verdict::{Expansion, Verdict};
 use crate::stereo::judge::view_coverage::Coverage;
+use crate::stereo::volume::Extent;
+use crate::stereo::volume::lengths::VolumeLengths;
 
 /// A calibration with everything that was asked of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,8 +31,10 @@ pub struct Judged {
     pub residual_pattern: ResidualPattern,
     /// Lens models that disagree.
     pub disagreements: Vec<Disagreement>,
-    /// Lengths of the long range over the working volume.
-    pub volume: Volume,
+    /// Lengths of the long range over the volume that the verdict is for.
+    pub volume: VolumeLengths,
+    /// What happened to the rig while it was photographed.
+    pub findings: Vec<Finding>,
     /// How the boards are spread.
     pub coverage: Coverage,
     /// What to photograph next, where the views are too few or too much alike.
@@ -46,14 +50,23 @@ pub struct Demand {
     pub tolerance_mm: f64,
     /// Expanded uncertainty (k = 2) of the boards' own lengths, as certified, mm.
     pub board_uncertainty_mm: Option<f64>,
+    /// The volume that the verdict is for.
+    pub extent: Extent,
 }
 
 impl Judged {
     /// Judges.
-    pub fn new(calibration: &Calibration, accuracy: Accuracy, second: Option<SecondBoard>, demand: &Demand) -> Judged {
+    pub fn new(
+        calibration: &Calibration,
+        findings: Vec<Finding>,
+        accuracy: Accuracy,
+        second: Option<SecondBoard>,
+        demand: &Demand,
+    ) -> Judged {
         let tolerance_mm = demand.tolerance_mm;
         let residual_pattern = residual_correlation::check(calibration);
-        let volume = Volume::new(calibration, accuracy.long_mm[0]);
+        let share = accuracy.disagreement_share();
+        let volume = VolumeLengths::new(calibration, demand.extent, accuracy.long_mm[0], share);
         let disagreements = model_disagreement::find(calibration, &volume);
         let coverage = Coverage::of(calibration, &residual_pattern);
         let evidence = ledger(&Facts {
@@ -61,6 +74,7 @@ impl Judged {
             accuracy: &accuracy,
             second: second.as_ref(),
             volume: &volume,
+            findings: &findings,
             residual_pattern: &residual_pattern,
             disagreements: &disagreements,
             coverage: &coverage,
@@ -80,6 +94,7 @@ impl Judged {
             second,
             residual_pattern,
             disagreements,
+            findings,
             volume,
             advice: coverage.advice(),
             coverage,

@@ -3,17 +3,19 @@
 //! In: what was asked of a calibration. Out: one line a fact. Wherever it can be computed a fact is what it could do to a length, in mm,
 //! and its limit is the tolerance. No verdict is better than its worst line.
 
+use crate::statistics::median;
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::findings::Finding;
+use crate::stereo::findings::standing::MATERIAL_SHARE;
 use crate::stereo::judge::doubtful_corners::CONTRADICTED;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::held_out::Accuracy;
 use crate::stereo::judge::lengths::model_disagreement::{self, Disagreement};
 use crate::stereo::judge::lengths::second_board::SecondBoard;
-use crate::stereo::judge::lengths::uncertainty::Volume;
 use crate::stereo::judge::residual_correlation::ResidualPattern;
-use crate::stereo::judge::verdict::{Expansion, Verdict};
+use crate::stereo::judge::verdict::{COVERAGE, Expansion, Verdict};
 use crate::stereo::judge::view_coverage::Coverage;
-use crate::stereo::pairs::Cause;
+use crate::stereo::volume::lengths::{VolumeLength, VolumeLengths};
 
 /// All that was asked of a calibration.
 pub struct Facts<'a> {
@@ -23,8 +25,10 @@ pub struct Facts<'a> {
     pub accuracy: &'a Accuracy,
     /// A second board, where one was asked for.
     pub second: Option<&'a SecondBoard>,
-    /// Lengths over the working volume.
-    pub volume: &'a Volume,
+    /// Lengths through the volume that the verdict is for.
+    pub volume: &'a VolumeLengths,
+    /// What happened to the rig while it was photographed.
+    pub findings: &'a [Finding],
     /// Whether the residuals are noise.
     pub residual_pattern: &'a ResidualPattern,
     /// Models that measure other lengths.
@@ -49,6 +53,7 @@ pub fn ledger(facts: &Facts) -> Vec<Evidence> {
         rays(facts),
         epipolar(facts),
         pairs_discarded(facts),
+        findings(facts),
         standing(facts),
         poses(facts),
         tilts(facts),
@@ -101,30 +106,69 @@ fn held_out_lengths(facts: &Facts) -> Evidence {
     }
 }
 
+impl Facts<'_> {
+    /// Expanded uncertainty of a length, the board's certificate left out, mm.
+    fn expanded_mm(&self, length: &VolumeLength) -> f64 {
+        (COVERAGE * length.corners_mm).hypot(self.expansion.calibration * length.calibration_mm)
+    }
+}
+
+/// Steps and drifts that are in the rig.
+fn findings(facts: &Facts) -> Evidence {
+    let since = facts.calibration.standing.since.as_deref();
+    let within = |finding: &&Finding| finding.pairs.first().map(String::as_str) != since || since.is_none();
+    let left: Vec<&Finding> = facts.findings.iter().filter(within).collect();
+    let value = left.iter().filter_map(|finding| finding.effect_mm).fold(0.0, f64::max);
+    let detail = if left.is_empty() {
+        "nothing happened over the pairs that were used: no step, no drift, no change of focus beyond the pairs' own scatter".to_owned()
+    } else {
+        let told: Vec<&str> = left.iter().map(|finding| finding.action.as_str()).collect();
+        format!(
+            "{}. It is in the uncertainty of the rig; what moves a length by less than {:.0} % of the tolerance costs nothing",
+            told.join("; "),
+            100.0 * MATERIAL_SHARE
+        )
+    };
+    Evidence::of_length(
+        "changes over the pairs",
+        "clamp the cameras, switch autofocus off, and photograph again",
+        Some(value),
+        facts,
+        detail,
+    )
+}
+
 fn any_length(facts: &Facts) -> Evidence {
-    let worst = facts.volume.worst(|length| length.expanded_mm(&facts.expansion));
+    let worst = facts.volume.worst(|length| facts.expanded_mm(length));
     let value = worst.map(|(mm, _)| mm);
     let detail = match worst {
         None => "the rig has no covariance over the volume in which the boards stood".to_owned(),
         Some((_, length)) => format!(
             "expanded uncertainty of a length of {:.0} mm where it is largest, {} {:.0} mm away (standard deviations: corners {:.4}, \
-             calibration {:.4}, the latter times {:.2} for so few pairs; what the models leave open is in it): lengths that no board \
-             showed will be measured, too",
+             calibration {:.4}, the latter times {:.2} for so few pairs; what the models leave open is in it), over the volume where the \
+             boards were and in the directions that they took there{}",
             facts.volume.length_mm,
             length.lies(),
             length.at_mm.z,
             length.corners_mm,
             length.calibration_mm,
-            facts.expansion.calibration
+            facts.expansion.calibration,
+            along_sight(facts)
         ),
     };
     Evidence::of_length(
-        "any length in the working volume",
+        "any length in the volume",
         "add pairs with the board where it is least certain, and tilted",
         value,
         facts,
         detail,
     )
+}
+
+/// What lengths that no board showed would be known to.
+fn along_sight(facts: &Facts) -> String {
+    let worst = facts.volume.along_sight.iter().map(|length| facts.expanded_mm(length)).reduce(f64::max);
+    worst.map_or(String::new(), |mm| format!(". Along the line of sight, where no board lay, it would be {mm:.4} mm"))
 }
 
 fn models(facts: &Facts) -> Evidence {
@@ -144,7 +188,7 @@ fn models(facts: &Facts) -> Evidence {
 fn residuals(facts: &Facts) -> Evidence {
     let sigma_px = facts.calibration.noise.typical_px(&facts.calibration.views);
     let systematic_px = facts.residual_pattern.systematic_px(sigma_px);
-    let corners_mm = facts.volume.worst(|length| length.corners_mm).map(|(mm, _)| mm);
+    let corners_mm = median(facts.volume.lengths.iter().map(|length| length.corners_mm));
     let value = corners_mm.map(|mm| mm * systematic_px / sigma_px);
     let neighbours = &facts.residual_pattern.neighbours;
     let detail = if systematic_px > 0.0 {
@@ -237,8 +281,9 @@ fn rays(facts: &Facts) -> Evidence {
 fn epipolar(facts: &Facts) -> Evidence {
     let error = &facts.accuracy.epipolar;
     let sigma_px = facts.calibration.noise.typical_px(&facts.calibration.views);
+    let sigma_px = sigma_px * facts.accuracy.disagreement_share().sqrt();
     // A miss as large along the epipolar line is depth, and moves lengths as corners do.
-    let px_per_mm = facts.volume.worst(|length| length.corners_mm).map(|(mm, _)| sigma_px / mm);
+    let px_per_mm = median(facts.volume.lengths.iter().map(|length| sigma_px / length.corners_mm));
     let limit = px_per_mm.map(|px| px * facts.tolerance_mm);
     Evidence {
         what: "epipolar error",
@@ -257,9 +302,8 @@ fn epipolar(facts: &Facts) -> Evidence {
 
 /// Pairs with a board that do not fit the rig now standing: not those without a board, shown twice, or of a rig that stood before.
 fn contradicting<'a>(facts: &'a Facts) -> Vec<&'a str> {
-    let explained = |cause| matches!(cause, Cause::NoBoard | Cause::Duplicate | Cause::CameraMoved | Cause::Zoomed);
     let all = facts.calibration.discarded.pairs.iter();
-    all.filter(|p| !explained(p.cause)).map(|p| p.pair.as_str()).collect()
+    all.filter(|p| p.cause.contradicts()).map(|p| p.pair.as_str()).collect()
 }
 
 fn pairs_discarded(facts: &Facts) -> Evidence {

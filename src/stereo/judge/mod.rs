@@ -3,7 +3,6 @@
 pub mod assessment;
 pub mod doubtful_corners;
 pub mod evidence;
-pub mod field_of_corners;
 pub mod ledger;
 pub mod lengths;
 pub mod residual_correlation;

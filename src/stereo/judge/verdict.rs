@@ -93,9 +93,9 @@ impl LengthError {
         (self.expansion.calibration * self.calibration_mm).hypot(self.expansion.board_mm.unwrap_or(0.0))
     }
 
-    /// The error may be as large as this, mm.
+    /// The error may be as large as this, mm. What the corners at its ends scatter by is in the error already.
     pub fn at_most_mm(&self) -> f64 {
-        self.error_mm + self.expanded_uncertainty_mm()
+        self.error_mm + self.expanded_without_corners_mm()
     }
 
     /// The error that is not the corners' scatter is at least as large as this, mm, for whichever of very many lengths is looked at.

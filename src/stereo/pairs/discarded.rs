@@ -7,7 +7,7 @@ use crate::stereo::Error;
 use crate::stereo::data::view::View;
 use crate::stereo::pairs::FEWEST_PAIRS;
 
-/// What happened to a pair that is not used.
+/// What happened to a pair, or to the rig over the pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -17,23 +17,69 @@ pub enum Cause {
     /// It is another pair once more.
     Duplicate,
     /// A picture's corners form no board: misread, blurred, or taken in motion or line by line.
-    Misshapen,
+    Misread,
     /// Its corners are numbered from another end of the board in one picture than in the other.
     Numbering,
-    /// Left and right are exchanged, or a picture is turned or mirrored.
-    Altered,
+    /// Left and right picture are exchanged.
+    Exchanged,
+    /// A picture is mirrored.
+    Mirrored,
+    /// A picture is turned.
+    Turned,
     /// Its pictures belong to different pairs.
-    Mismatched,
-    /// It contradicts the others, and nothing that is known here explains it.
-    Unknown,
+    OtherPair,
     /// The board or a camera moved between its two pictures.
     NotSimultaneous,
     /// The board is another one, of another pitch.
     OtherBoard,
-    /// Before or after this pair a camera was moved.
+    /// The right camera turned about the vertical axis of its picture.
+    Yaw,
+    /// About the horizontal axis.
+    Pitch,
+    /// About its line of sight.
+    Roll,
+    /// The distance of the cameras changed.
+    Baseline,
+    /// A focal length changed.
+    Focus,
+    /// The right camera stands and looks otherwise, in more than one way.
     CameraMoved,
-    /// Before or after this pair the focal length of a camera changed.
-    Zoomed,
+    /// It belongs to what was photographed before the pair that was asked for.
+    Before,
+    /// It contradicts the others, and nothing that is known here explains it better than the rest.
+    Unknown,
+}
+
+impl Cause {
+    /// The word that files have for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Cause::NoBoard => "no-board",
+            Cause::Duplicate => "duplicate",
+            Cause::Misread => "misread",
+            Cause::Numbering => "numbering",
+            Cause::Exchanged => "exchanged",
+            Cause::Mirrored => "mirrored",
+            Cause::Turned => "turned",
+            Cause::OtherPair => "other-pair",
+            Cause::NotSimultaneous => "not-simultaneous",
+            Cause::OtherBoard => "other-board",
+            Cause::Yaw => "yaw",
+            Cause::Pitch => "pitch",
+            Cause::Roll => "roll",
+            Cause::Baseline => "baseline",
+            Cause::Focus => "focus",
+            Cause::CameraMoved => "camera-moved",
+            Cause::Before => "before",
+            Cause::Unknown => "unknown",
+        }
+    }
+
+    /// True where the pair is one of the series and contradicts the others: not one without a board, shown twice, or of a rig that stood before.
+    pub fn contradicts(self) -> bool {
+        use Cause::{Before, CameraMoved, Duplicate, Focus, NoBoard};
+        !matches!(self, NoBoard | Duplicate | Before | CameraMoved | Focus)
+    }
 }
 
 /// A pair that is not used.
@@ -110,9 +156,7 @@ impl Discarded {
 
     /// Share of the pairs that were seen, with a board in both pictures, and contradict the others.
     pub fn contradicting_share(&self) -> f64 {
-        let contradicts = |p: &&DiscardedPair| {
-            !matches!(p.cause, Cause::NoBoard | Cause::Duplicate | Cause::CameraMoved | Cause::Zoomed)
-        };
+        let contradicts = |p: &&DiscardedPair| p.cause.contradicts();
         self.pairs.iter().filter(contradicts).count() as f64 / self.pairs_in_all.max(1) as f64
     }
 }

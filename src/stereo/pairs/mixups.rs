@@ -55,6 +55,7 @@ pub fn explain(series: &Series, strays: &[usize]) -> Vec<Option<(Cause, String)>
 /// Something that may be done to a picture on its way from the camera.
 struct Change {
     words: &'static str,
+    cause: Cause,
     /// Whether the board then shows its back, as it were: corners are numbered so that it faces the viewer.
     mirrors: bool,
     /// A place in the picture as it was, from one in a picture that is so many px wide and high.
@@ -62,10 +63,10 @@ struct Change {
 }
 
 const CHANGES: [Change; 4] = [
-    Change { words: "turned by 180 degrees", mirrors: false, undo: half },
-    Change { words: "turned by 90 degrees", mirrors: false, undo: quarter },
-    Change { words: "turned by 90 degrees", mirrors: false, undo: back },
-    Change { words: "mirrored", mirrors: true, undo: mirror },
+    Change { cause: Cause::Turned, words: "turned by 180 degrees", mirrors: false, undo: half },
+    Change { cause: Cause::Turned, words: "turned by 90 degrees", mirrors: false, undo: quarter },
+    Change { cause: Cause::Turned, words: "turned by 90 degrees", mirrors: false, undo: back },
+    Change { cause: Cause::Mirrored, words: "mirrored", mirrors: true, undo: mirror },
 ];
 
 fn half(p: Point2<f64>, width: f64, height: f64) -> Point2<f64> {
@@ -120,7 +121,7 @@ impl Scene<'_> {
         }
         if self.fits(shared, &view.exchanged()) {
             let reason = "left and right picture are exchanged: give each the other's name";
-            return Some((Cause::Altered, reason.to_owned()));
+            return Some((Cause::Exchanged, reason.to_owned()));
         }
         for side in Side::BOTH {
             let camera = shared.rig.camera(side);
@@ -136,7 +137,7 @@ impl Scene<'_> {
                 if self.fits(shared, &undone) {
                     let (side, words) = (side.name(), change.words);
                     let reason = format!("the {side} picture is {words}: use the file as the camera wrote it");
-                    return Some((Cause::Altered, reason));
+                    return Some((change.cause, reason));
                 }
             }
         }
@@ -146,7 +147,7 @@ impl Scene<'_> {
             let reason = format!(
                 "the {side} corners do not form a board: misread, in a wrong order, blurred, moving, or taken line by line (interlaced)"
             );
-            (Cause::Misshapen, reason)
+            (Cause::Misread, reason)
         })
     }
 
@@ -171,7 +172,7 @@ impl Scene<'_> {
                 other.name(),
                 self.views[home].pair
             );
-            Some((Cause::Mismatched, reason))
+            Some((Cause::OtherPair, reason))
         })
     }
 }

@@ -70,7 +70,9 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     let mut scores = ladder(&solved.problem, layout.shape);
     let bent = simplest(&scores, &chance).filter(|_| forced_shape.is_none() && layout.shape);
     let flat = bent.and_then(|bent| score(&solved.problem, bent.layout.left?, false).trial);
-    let bends = bent.zip(flat).is_none_or(|(bent, flat)| flat.is_worse_than(bent, &chance) || flat.is_refuted_by(bent, &chance));
+    let bends = bent
+        .zip(flat)
+        .is_none_or(|(bent, flat)| flat.is_worse_than(bent, &chance) || flat.is_refuted_by(bent, &chance));
     if !bends {
         scores = ladder(&solved.problem, false);
     }

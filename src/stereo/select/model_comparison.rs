@@ -113,7 +113,18 @@ impl Trial {
         }
         let chi_square = 2.0 * equations.cost();
         let corners = views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count();
-        Some((Trial { layout, values, priors: problem.priors.clone(), covariance, chi_square, corners, by_pair: Vec::new() }, equations))
+        Some((
+            Trial {
+                layout,
+                values,
+                priors: problem.priors.clone(),
+                covariance,
+                chi_square,
+                corners,
+                by_pair: Vec::new(),
+            },
+            equations,
+        ))
     }
 
     /// Sum of the squared whitened residuals of the pairs it was fitted to.

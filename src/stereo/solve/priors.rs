@@ -118,7 +118,9 @@ impl Priors {
         {
             one(at, 0.0, share / corner.powi(power));
         }
-        for (at, power, share) in [(9, 2, RATIONAL_AT_CORNER[0]), (10, 4, RATIONAL_AT_CORNER[1]), (11, 6, RATIONAL_AT_CORNER[2])] {
+        for (at, power, share) in
+            [(9, 2, RATIONAL_AT_CORNER[0]), (10, 4, RATIONAL_AT_CORNER[1]), (11, 6, RATIONAL_AT_CORNER[2])]
+        {
             one(at, 0.0, share / corner.powi(power));
         }
         one(6, 0.0, TANGENTIAL);
@@ -149,8 +151,11 @@ impl Priors {
         }
         let numbers = layout.numbers(shared);
         for expectation in &self.all {
-            let Some(terms) =
-                expectation.terms.iter().map(|(n, by)| Some((self.place(layout, *n)?, *by))).collect::<Option<Vec<_>>>()
+            let Some(terms) = expectation
+                .terms
+                .iter()
+                .map(|(n, by)| Some((self.place(layout, *n)?, *by)))
+                .collect::<Option<Vec<_>>>()
             else {
                 continue;
             };

@@ -71,6 +71,12 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
+    /// Share of the corners' variance by which both pictures disagree. The rest is the board's (its print, its bends, what of it moved with both
+    /// pictures), which both see alike: it moves no point.
+    pub fn disagreement_share(&self) -> f64 {
+        self.rays_chi_square.clamp(f64::MIN_POSITIVE, 1.0)
+    }
+
     /// What the held-out pairs say.
     pub fn verdict(&self, tolerance_mm: f64) -> Verdict {
         self.extremes.verdict(tolerance_mm)
@@ -147,9 +153,11 @@ fn summarise(
     let long = [largest(LONG_SQUARES, board.columns()), largest(LONG_SQUARES, board.rows())];
     let pairs = calibration.views.iter().zip(measured).map(|(view, m)| pair(view, m, short, long)).collect();
     let expansion = Expansion::new(calibration.pair_scatter.groups, board_mm);
+    let rays_chi_square = mean(&measured.iter().flat_map(|m| &m.points).map(|p| p.chi_square).collect::<Vec<_>>())?;
+    let share = rays_chi_square.clamp(f64::MIN_POSITIVE, 1.0);
     Some(Accuracy {
-        extremes: lengths::extremes(measured, |i| folds.covariances.get(folds.of_pair[i]), expansion)?,
-        rays_chi_square: mean(&measured.iter().flat_map(|m| &m.points).map(|p| p.chi_square).collect::<Vec<_>>())?,
+        extremes: lengths::extremes(measured, |i| folds.covariances.get(folds.of_pair[i]), expansion, share)?,
+        rays_chi_square,
         epipolar: epipolar(calibration.rig(), measured)?,
         doubtful,
         folds: folds.rigs.len(),

@@ -5,7 +5,6 @@
 pub mod held_out;
 pub mod model_disagreement;
 pub mod second_board;
-pub mod uncertainty;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -97,11 +96,13 @@ pub(super) fn measure(rig: &Rig, board: &Board, view: &View) -> Measured {
     Measured { doubtful: vec![false; points.len()], points, sigmas_px, lengths }
 }
 
-/// The length errors that decide, each with its own uncertainty; `covariance_of` is that of the rig that measured a pair.
+/// The length errors that decide, each with its own uncertainty; `covariance_of` is that of the rig that measured a pair, `share` that of the
+/// corners' variance by which both pictures disagree.
 pub(super) fn extremes<'a>(
     measured: &[Measured],
     covariance_of: impl Fn(usize) -> Option<&'a RigCovariance> + Sync,
     expansion: Expansion,
+    share: f64,
 ) -> Option<Extremes> {
     let of_pair = |(i, measured): (usize, &Measured)| -> Option<Extremes> {
         let of_length = |length: &Length| -> Extremes {
@@ -109,7 +110,7 @@ pub(super) fn extremes<'a>(
             let calibration = covariance_of(i).map_or(0.0, |c| c.length_variance_mm2(a, b));
             let error = LengthError {
                 error_mm: length.error_mm.abs(),
-                corners_mm: a.corner_variance_mm2(b).max(0.0).sqrt(),
+                corners_mm: (share * a.corner_variance_mm2(b)).max(0.0).sqrt(),
                 calibration_mm: calibration.max(0.0).sqrt(),
                 expansion,
             };

@@ -10,8 +10,8 @@ use serde::Serialize;
 
 use crate::statistics::{NORMAL_999, chi_square_quantile};
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::judge::lengths::uncertainty::Volume;
 use crate::stereo::select::stated_uncertainty::Witness;
+use crate::stereo::volume::lengths::VolumeLengths;
 
 /// Another model, compared with the chosen one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -33,11 +33,11 @@ pub struct Disagreement {
 }
 
 /// All richer models that measure other lengths.
-pub fn find(calibration: &Calibration, volume: &Volume) -> Vec<Disagreement> {
+pub fn find(calibration: &Calibration, volume: &VolumeLengths) -> Vec<Disagreement> {
     calibration.witnesses.iter().filter_map(|witness| compare(calibration, volume, witness)).collect()
 }
 
-fn compare(calibration: &Calibration, volume: &Volume, witness: &Witness) -> Option<Disagreement> {
+fn compare(calibration: &Calibration, volume: &VolumeLengths, witness: &Witness) -> Option<Disagreement> {
     let (own, theirs) = (calibration.layout.left?, witness.layout.left?);
     let chance = chi_square_quantile(witness.added as f64, NORMAL_999);
     if witness.chi_square_fall <= chance {

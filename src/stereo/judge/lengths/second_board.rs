@@ -68,7 +68,7 @@ pub fn second_board(calibration: &Calibration, corners: &Corners, board_mm: Opti
     let both_boards = board_mm.map(|mm| mm * std::f64::consts::SQRT_2);
     let expansion = Expansion::new(calibration.pair_scatter.groups, both_boards);
     let covariance = rig.covariance.as_ref().map(RigCovariance::new);
-    let extremes = lengths::extremes(&measured, |_| covariance.as_ref(), expansion);
+    let extremes = lengths::extremes(&measured, |_| covariance.as_ref(), expansion, 1.0);
     let scales: Vec<f64> = measured.iter().map(|m| m.scale_error(board)).collect();
     let scale_error = mean(&scales);
     let scale_error_sigma = scale_error.map(|mean| {

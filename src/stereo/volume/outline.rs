@@ -1,11 +1,25 @@
 //! The part of a picture that corners reached: the convex hull of all of them. Beyond it the lens model is extrapolated.
 
 use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
 
 /// A convex polygon, its points in order; empty for fewer than three points.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(from = "Vec<[f64; 2]>", into = "Vec<[f64; 2]>")]
 pub struct Hull {
     points: Vec<Point2<f64>>,
+}
+
+impl From<Vec<[f64; 2]>> for Hull {
+    fn from(points: Vec<[f64; 2]>) -> Hull {
+        Hull::of(points.into_iter().map(|[x, y]| Point2::new(x, y)))
+    }
+}
+
+impl From<Hull> for Vec<[f64; 2]> {
+    fn from(hull: Hull) -> Vec<[f64; 2]> {
+        hull.points.iter().map(|p| [p.x, p.y]).collect()
+    }
 }
 
 impl Hull {

@@ -1,8 +1,9 @@
-//! How uncertain a length is wherever and however it lies in the working volume, seen there or not.
+//! How uncertain a length is wherever it lies in the volume, and in the directions that boards took there.
 //!
-//! In: a calibrated rig with its covariance. Out: lengths in nine directions on a lattice through the volume that the boards filled, with
-//! their standard deviations from the corners' scatter at both ends and from the calibration they share, and by how much another rig
-//! would measure them otherwise. Boards that were never tilted say nothing of lengths along the line of sight: here they count as well.
+//! In: a calibrated rig with its covariance, and the volume that is asked for. Out: lengths through a lattice of places, with their standard
+//! deviations from the corners' scatter at both ends and from the calibration they share, and by how much another rig would measure
+//! them otherwise. Boards that were all parallel say nothing of lengths along the line of sight; these stand beside the others and decide
+//! only where they are asked for.
 
 use nalgebra::{DVector, Point3, Vector3};
 use rayon::prelude::*;
@@ -11,15 +12,17 @@ use crate::imaging::Side;
 use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::observation::Observation;
-use crate::stereo::judge::field_of_corners::Hull;
-use crate::stereo::judge::verdict::{COVERAGE, Expansion};
 use crate::stereo::model::parameters::Layout;
 use crate::stereo::triangulate::{RigCovariance, SpacePoint, rig_number, triangulate};
+use crate::stereo::volume::{Extent, Volume};
 
 /// Places along x and y, and along z.
 const PLACES: [usize; 3] = [7, 7, 5];
 
-/// Directions: the axes of the left camera and halfway between each two of them.
+/// Boards whose directions are taken, those that differ most; the others lie nearly as one of them.
+const BOARDS: usize = 8;
+
+/// Directions of a box that is asked for: the axes of the left camera and halfway between each two of them.
 const DIRECTIONS: [[f64; 3]; 9] = [
     [1.0, 0.0, 0.0],
     [0.0, 1.0, 0.0],
@@ -60,11 +63,6 @@ impl VolumeLength {
         self.corners_mm.hypot(self.calibration_mm)
     }
 
-    /// Expanded uncertainty of the length, the board's certificate left out, mm.
-    pub fn expanded_mm(&self, expansion: &Expansion) -> f64 {
-        (COVERAGE * self.corners_mm).hypot(expansion.calibration * self.calibration_mm)
-    }
-
     /// Derivative of the length by a number of the rig.
     fn slope(&self, number: usize) -> f64 {
         self.direction.dot(&(self.ends[1].point.by_rig[number] - self.ends[0].point.by_rig[number]))
@@ -87,31 +85,44 @@ impl VolumeLength {
     }
 }
 
-/// Lengths over the working volume.
+/// Lengths through the volume.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Volume {
+pub struct VolumeLengths {
+    /// The volume.
+    pub volume: Volume,
     /// How long they are, mm.
     pub length_mm: f64,
-    /// Those whose ends both cameras see within the field that corners reached.
+    /// Those whose ends lie in the volume, as the boards lay in it.
     pub lengths: Vec<VolumeLength>,
+    /// The same along the line of sight, where no board lay.
+    pub along_sight: Vec<VolumeLength>,
 }
 
-impl Volume {
-    /// Lengths of `length_mm` over the volume in which the boards stood, as far as corners reached. Empty where the rig has no covariance.
-    pub fn new(calibration: &Calibration, length_mm: f64) -> Volume {
+impl VolumeLengths {
+    /// Lengths of `length_mm` through the volume. `share` of the corners' variance is what the pictures disagree by; the rest both
+    /// see alike, and it moves no point. Empty where the rig has no covariance.
+    pub fn new(calibration: &Calibration, extent: Extent, length_mm: f64, share: f64) -> VolumeLengths {
+        let volume = Volume::of(calibration, extent);
         let rig = calibration.rig();
-        let Some(covariance) = rig.covariance.as_ref().map(RigCovariance::new) else { return Volume::default() };
-        let sigma_px = calibration.noise.typical_px(&calibration.views);
-        let places = places(calibration);
-        let reached =
-            Side::BOTH.map(|side| Hull::of(calibration.views.iter().flat_map(|view| view.active(side).map(|o| o.px))));
-        let of_place = |at: &Point3<f64>| -> Vec<VolumeLength> {
-            let lengths = DIRECTIONS.iter().map(|d| Vector3::from(*d).normalize());
-            lengths
-                .filter_map(|direction| length(rig, &covariance, at, direction * length_mm, sigma_px, &reached))
-                .collect()
+        let Some(covariance) = rig.covariance.as_ref().map(RigCovariance::new) else {
+            return VolumeLengths { volume, length_mm, ..VolumeLengths::default() };
         };
-        Volume { length_mm, lengths: places.par_iter().flat_map_iter(of_place).collect() }
+        let sigma_px = calibration.noise.typical_px(&calibration.views) * share.sqrt();
+        let directions = match extent {
+            Extent::Boards => directions_of_boards(calibration),
+            _ => DIRECTIONS.iter().map(|d| Vector3::from(*d).normalize()).collect(),
+        };
+        let places = places(calibration, extent);
+        let of_place = |at: &Point3<f64>, directions: &[Vector3<f64>]| -> Vec<VolumeLength> {
+            let length =
+                |direction: &Vector3<f64>| length(rig, &covariance, at, direction * length_mm, sigma_px, &volume);
+            directions.iter().filter_map(length).collect()
+        };
+        let through = |directions: &[Vector3<f64>]| -> Vec<VolumeLength> {
+            places.par_iter().flat_map_iter(|at| of_place(at, directions)).collect()
+        };
+        let (lengths, along_sight) = (through(&directions), through(&[Vector3::z()]));
+        VolumeLengths { length_mm, lengths, along_sight, volume }
     }
 
     /// The length for which this is largest, with its value.
@@ -133,17 +144,33 @@ impl Volume {
     }
 }
 
-/// A lattice through the box in the left camera's frame that the boards' corners filled.
-fn places(calibration: &Calibration) -> Vec<Point3<f64>> {
+/// The rows' and the columns' directions of the boards that differ most: from the first on, always the one that lies least as those that
+/// are taken.
+fn directions_of_boards(calibration: &Calibration) -> Vec<Vector3<f64>> {
+    let poses = &calibration.values.poses;
+    let apart = |a: usize, b: usize| poses[a].rotation.angle_to(&poses[b].rotation);
+    let mut taken: Vec<usize> = (0..poses.len().min(1)).collect();
+    while taken.len() < BOARDS.min(poses.len()) {
+        let least = |i: usize| taken.iter().map(|&j| apart(i, j)).fold(f64::INFINITY, f64::min);
+        let Some(next) = (0..poses.len()).max_by(|&a, &b| least(a).total_cmp(&least(b)).then(b.cmp(&a))) else { break };
+        taken.push(next);
+    }
+    taken.iter().flat_map(|&i| [Vector3::x(), Vector3::y()].map(|axis| poses[i].rotation * axis)).collect()
+}
+
+/// A lattice through the box in the left camera's frame that the boards' corners filled, or that is asked for.
+fn places(calibration: &Calibration, extent: Extent) -> Vec<Point3<f64>> {
     let points = calibration
         .views
         .iter()
         .zip(&calibration.values.poses)
         .flat_map(|(view, pose)| view.active(Side::Left).map(move |o| pose * o.board_mm));
-    let (low, high) = points
-        .fold((Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)), |(low, high), p| {
+    let (low, high) = match extent {
+        Extent::Box([x0, y0, z0, x1, y1, z1]) => (Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)),
+        _ => points.fold((Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)), |(low, high), p| {
             (low.inf(&p.coords), high.sup(&p.coords))
-        });
+        }),
+    };
     let share = |i: usize, of: usize| i as f64 / (of - 1) as f64;
     let mut places = Vec::new();
     for iz in 0..PLACES[2] {
@@ -163,9 +190,9 @@ fn length(
     at: &Point3<f64>,
     along: Vector3<f64>,
     sigma_px: f64,
-    reached: &[Hull; 2],
+    volume: &Volume,
 ) -> Option<VolumeLength> {
-    let ends = [end(rig, &(at - along / 2.0), sigma_px, reached)?, end(rig, &(at + along / 2.0), sigma_px, reached)?];
+    let ends = [end(rig, &(at - along / 2.0), sigma_px, volume)?, end(rig, &(at + along / 2.0), sigma_px, volume)?];
     let [a, b] = [&ends[0].point, &ends[1].point];
     Some(VolumeLength {
         at_mm: *at,
@@ -176,16 +203,12 @@ fn length(
     })
 }
 
-/// A point as both cameras would see it; `None` where that is not within the field that corners reached.
-fn end(rig: &Rig, at: &Point3<f64>, sigma_px: f64, reached: &[Hull; 2]) -> Option<End> {
-    let in_front = at.z > 0.0 && (rig.right_from_left * at).z > 0.0;
-    if !in_front {
+/// A point as both cameras would see it; `None` where it is not in the volume.
+fn end(rig: &Rig, at: &Point3<f64>, sigma_px: f64, volume: &Volume) -> Option<End> {
+    if !volume.holds(rig, at) {
         return None;
     }
     let (left, right) = rig.project(at);
-    if !reached[0].contains(&left) || !reached[1].contains(&right) {
-        return None;
-    }
     let left = Observation::of_point(Side::Left, left, sigma_px);
     let right = Observation::of_point(Side::Right, right, sigma_px);
     let point = triangulate(rig, &left, &right)?;

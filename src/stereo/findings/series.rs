@@ -1,0 +1,119 @@
+//! The pairs of a calibration as a linear problem: what a change of the rig along the series would gain.
+//!
+//! In: a problem at its minimum. Out: for any change of the shared numbers that grows along the series by a pattern, how large it is and what it
+//! gains, all shared numbers and poses solved again. Method: each pair's share of the normal equations at the minimum; a change is a few columns
+//! more, solved in one elimination. What a pair's residual depends on where its board stood (a lens that lacks something) would look
+//! like a change wherever the board was moved in one direction, so that the same change as a function of the board's place
+//! is a nuisance in each. Its scatter is that of the pairs after the change was taken out: what all pairs do, triggered or not.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::stereo::model::parameters::Layout;
+use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::uncertainty::invert;
+
+/// Fewest pairs for which the board's place is a nuisance: three numbers more must leave some for the scatter.
+const PLACES_FROM: usize = 12;
+
+/// A change and what it explains.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// In each of its directions, in units of them.
+    pub amounts: DVector<f64>,
+    /// By how much chi-squared falls.
+    pub gain: f64,
+    /// Variance of the pairs' residuals about the rig, with the change, over what their corners let expect.
+    pub scatter: f64,
+    /// Degrees of freedom that this scatter is known with.
+    pub freedom: f64,
+}
+
+/// The pairs of a calibration at its minimum.
+pub struct Linear {
+    matrices: Vec<DMatrix<f64>>,
+    gradients: Vec<DVector<f64>>,
+    inverse: DMatrix<f64>,
+    /// Where each board stood, in units of the boards' spread; a column each.
+    places: Vec<[f64; 3]>,
+}
+
+impl Linear {
+    /// The pairs of a problem at its minimum. `None` where they do not determine the shared numbers.
+    pub fn new(problem: &Problem, layout: &Layout) -> Option<Linear> {
+        let equations = problem.equations(layout)?;
+        let reduced = equations.blocks.iter().map(|block| block.reduced(0.0)).collect::<Option<Vec<_>>>()?;
+        let (matrices, gradients): (Vec<_>, Vec<_>) = reduced.into_iter().unzip();
+        let sum = matrices.iter().fold(equations.prior.matrix.clone(), |sum, m| sum + m);
+        let inverse = invert(&sum)?;
+        let centres: Vec<[f64; 3]> = problem.values.poses.iter().map(|pose| pose.translation.vector.into()).collect();
+        let count = centres.len() as f64;
+        let mean = |k: usize| centres.iter().map(|c| c[k]).sum::<f64>() / count;
+        let spread = |k: usize| (centres.iter().map(|c| (c[k] - mean(k)).powi(2)).sum::<f64>() / count).sqrt();
+        let [means, spreads] = [[0, 1, 2].map(mean), [0, 1, 2].map(spread)];
+        let unit = |c: &[f64; 3]| [0, 1, 2].map(|k| (c[k] - means[k]) / spreads[k].max(f64::MIN_POSITIVE));
+        let places = centres.iter().map(unit).collect();
+        Some(Linear { matrices, gradients, inverse, places })
+    }
+
+    /// How many pairs there are.
+    pub fn len(&self) -> usize {
+        self.matrices.len()
+    }
+
+    /// A change along these directions that each pair has by so much as the pattern says. `None` where the pairs do not determine it.
+    pub fn change(&self, directions: &[DVector<f64>], pattern: &[f64]) -> Option<Change> {
+        let n = self.len();
+        let mut columns: Vec<(&DVector<f64>, Vec<f64>)> = directions.iter().map(|d| (d, pattern.to_vec())).collect();
+        if n >= PLACES_FROM {
+            let of_place = |d, k: usize| (d, self.places.iter().map(|place| place[k]).collect());
+            columns.extend(directions.iter().flat_map(|d| (0..3).map(move |k| of_place(d, k))));
+        }
+        let (wanted, all) = (directions.len(), columns.len());
+        // Each column's slope of the gradient, summed over the pairs, and what the shared numbers do about it.
+        let products: Vec<Vec<DVector<f64>>> =
+            directions.iter().map(|d| self.matrices.iter().map(|m| m * d).collect()).collect();
+        let product = |c: usize, i: usize| &products[if c < wanted { c } else { (c - wanted) / 3 }][i];
+        let sums: Vec<DVector<f64>> = (0..all)
+            .map(|c| (0..n).fold(DVector::zeros(self.inverse.nrows()), |sum, i| sum + product(c, i) * columns[c].1[i]))
+            .collect();
+        let moved: Vec<DVector<f64>> = sums.iter().map(|sum| &self.inverse * sum).collect();
+        let matrix = DMatrix::from_fn(all, all, |a, b| {
+            let own: f64 = (0..n).map(|i| columns[a].1[i] * columns[b].1[i] * columns[a].0.dot(product(b, i))).sum();
+            own - sums[a].dot(&moved[b])
+        });
+        let right = DVector::from_fn(all, |a, _| {
+            -(0..n).map(|i| columns[a].1[i] * columns[a].0.dot(&self.gradients[i])).sum::<f64>()
+        });
+        let inverse = invert(&matrix)?;
+        let solution = &inverse * &right;
+        let amounts = solution.rows(0, wanted).into_owned();
+        let own = inverse.view((0, 0), (wanted, wanted)).into_owned();
+        let gain = amounts.dot(&(invert(&own)? * &amounts));
+        let (scatter, freedom) = self.scatter(&columns, &moved, &solution, wanted);
+        (gain.is_finite() && scatter.is_finite()).then_some(Change { amounts, gain, scatter, freedom })
+    }
+
+    /// The pairs' scatter along these columns with the change taken out, at least what their corners let expect.
+    fn scatter(
+        &self,
+        columns: &[(&DVector<f64>, Vec<f64>)],
+        moved: &[DVector<f64>],
+        solution: &DVector<f64>,
+        wanted: usize,
+    ) -> (f64, f64) {
+        let common =
+            moved.iter().zip(solution.iter()).fold(DVector::zeros(self.inverse.nrows()), |sum, (m, a)| sum + m * *a);
+        let mut squares = 0.0;
+        for i in 0..self.len() {
+            let mut step = -&common;
+            columns.iter().zip(solution.iter()).for_each(|((d, x), a)| step.axpy(x[i] * a, *d, 1.0));
+            let left = &self.gradients[i] + &self.matrices[i] * step;
+            for (direction, _) in &columns[..wanted] {
+                let information = direction.dot(&(&self.matrices[i] * *direction));
+                squares += direction.dot(&left).powi(2) / information.max(f64::MIN_POSITIVE) / wanted as f64;
+            }
+        }
+        let freedom = (self.len() as f64 - 1.0 - (columns.len() / wanted.max(1)) as f64).max(1.0);
+        ((squares / freedom).max(1.0), freedom)
+    }
+}

@@ -1,0 +1,1 @@
+//! Tests of findings: planted changes, and series in which nothing happened.
