@@ -76,6 +76,7 @@ fn pattern(names: &[&str]) -> String {
     let reversed: Vec<String> = names.iter().map(|name| backward(name)).collect();
     let end = reversed.iter().filter_map(|name| common(&reversed[0], name)).min().unwrap_or(0);
     let end: String = reversed[0][..end].trim_end_matches(digit).chars().rev().collect();
+    let end = if end.contains('.') { end.as_str() } else { "" };
     format!("{start}*{end}")
 }
 

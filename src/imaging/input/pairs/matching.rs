@@ -105,6 +105,7 @@ pub fn pair(left: &[Utf8PathBuf], right: &[Utf8PathBuf], by: Option<PairBy>) -> 
                     break;
                 }
             }
+            Err(_) if way == Way::LastNumber => (),
             Err(e) => refused = refused.or(Some(e)),
         }
     }

@@ -91,13 +91,15 @@ fn tell(first: &Folder, second: &Folder, alone: bool) -> Option<(Told, Side)> {
             return Some((told, side));
         }
     }
-    let by_path = [first, second].map(|folder| Open::new(&folder.below, Reach::Words).side());
+    let apart = apart(&first.below, &second.below);
+    let by_path = apart.map(|path| Open::new(path, Reach::Words).side());
     let inside = [first, second].map(common_side);
     match (by_path, inside) {
-        ([a, b], [Some(side), Some(other)]) if side != other && a == b => return Some((Told::Words, side)),
+        ([a, b], [Some(side), Some(other)]) if side != other && a.is_none() && b.is_none() => {
+            return Some((Told::Words, side));
+        }
         // A left one without its right one, or two left ones: nothing to guess at.
-        ([a, b], _) if a != b => return None,
-        (_, [Some(_), _] | [_, Some(_)]) => return None,
+        ([Some(_), _] | [_, Some(_)], _) | (_, [Some(_), _] | [_, Some(_)]) => return None,
         _ => (),
     }
     let (a, b) = (tokens(&first.below), tokens(&second.below));
@@ -115,6 +117,12 @@ fn tell(first: &Folder, second: &Folder, alone: bool) -> Option<(Told, Side)> {
         (false, true) => Some((Told::Two, Side::Left)),
         (false, false) => None,
     }
+}
+
+/// Two paths from the first folder on in which they differ.
+fn apart<'a>(a: &'a str, b: &'a str) -> [&'a str; 2] {
+    let same = a.split('/').zip(b.split('/')).take_while(|(a, b)| a == b).map(|(a, _)| a.len() + 1).sum::<usize>();
+    [a, b].map(|path| path.get(same..).unwrap_or_default())
 }
 
 /// The side that all names of a folder tell.
@@ -210,7 +218,9 @@ pub fn choose(mut readings: Vec<Reading>) -> Vec<Reading> {
     readings.retain(|reading| reading.count() > 0);
     let Some(best) = readings.iter().min_by_key(|r| (r.told, r.depth)).cloned() else { return Vec::new() };
     readings.retain(|r| {
-        let equal = r.told == best.told && (r.depth == best.depth || r.count() > best.count());
+        // Names in the folder itself were always read, whatever lay below.
+        let itself = best.depth == 0 && r.depth > 0;
+        let equal = r.told == best.told && (!itself || r.count() > best.count());
         let nearer = r.told > best.told && r.depth < best.depth && r.count() >= best.count();
         equal || nearer
     });
