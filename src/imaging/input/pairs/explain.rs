@@ -69,15 +69,20 @@ fn below<'a>(path: &'a Utf8Path, top: &Utf8Path) -> &'a str {
 fn pattern(names: &[&str]) -> String {
     let (Some(first), true) = (names.first(), names.len() > 1) else { return names.concat() };
     let digit = |c: char| c.is_ascii_digit();
-    let common = |a: &str, b: &str| a.char_indices().zip(b.chars()).find(|((_, x), y)| x != y).map(|((at, _), _)| at);
-    let start = names.iter().filter_map(|name| common(first, name)).min().unwrap_or(first.len());
-    let start = first[..start].trim_end_matches(digit);
-    let backward = |name: &str| name[start.len().min(name.len())..].chars().rev().collect::<String>();
-    let reversed: Vec<String> = names.iter().map(|name| backward(name)).collect();
-    let end = reversed.iter().filter_map(|name| common(&reversed[0], name)).min().unwrap_or(0);
-    let end: String = reversed[0][..end].trim_end_matches(digit).chars().rev().collect();
+    let start = &first[..names.iter().map(|name| common(first, name)).min().unwrap_or(0)];
+    let start = start.trim_end_matches(digit);
+    let backward = |name: &&str| name[start.len()..].chars().rev().collect::<String>();
+    let reversed: Vec<String> = names.iter().map(backward).collect();
+    let end = &reversed[0][..reversed.iter().map(|name| common(&reversed[0], name)).min().unwrap_or(0)];
+    let end: String = end.trim_end_matches(digit).chars().rev().collect();
     let end = if end.contains('.') { end.as_str() } else { "" };
     format!("{start}*{end}")
+}
+
+/// How many bytes two names have in common at their start.
+fn common(a: &str, b: &str) -> usize {
+    let differing = a.char_indices().zip(b.chars()).find(|((_, x), y)| x != y);
+    differing.map_or(a.len().min(b.len()), |((at, _), _)| at)
 }
 
 /// Folders with pictures that were not taken.

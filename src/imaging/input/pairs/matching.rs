@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::PairFiles;
-use super::names::{Open, Reach, natural_order, numbers};
+use super::names::{Open, Reach, SEPARATORS, natural_order, numbers};
 use crate::imaging::{Error, Result, Side};
 
 /// How pictures were paired, or are to be.
@@ -121,19 +121,19 @@ fn stem(path: &Utf8Path) -> &str {
 
 /// Pairs by a key that each name has; `None` is a name without one.
 pub fn by_key(sides: [&[Utf8PathBuf]; 2], by: PairBy, key: &dyn Fn(&[&str]) -> Vec<Option<String>>) -> Result<Matched> {
-    let mut keyed: BTreeMap<String, [Vec<&Utf8PathBuf>; 2]> = BTreeMap::new();
+    let mut keyed: BTreeMap<(String, String), [Vec<&Utf8PathBuf>; 2]> = BTreeMap::new();
     let mut matched = Matched { by, pairs: Vec::new(), single: Vec::new() };
     for side in Side::BOTH {
         let paths = sides[side as usize];
         let stems: Vec<&str> = paths.iter().map(|p| stem(p)).collect();
         for (path, key) in paths.iter().zip(key(&stems)) {
             match key {
-                Some(key) => keyed.entry(key).or_default()[side as usize].push(path),
+                Some(key) => keyed.entry((shown(&key), key)).or_default()[side as usize].push(path),
                 None => matched.single.push(path.clone()),
             }
         }
     }
-    for (key, [left, right]) in keyed {
+    for ((shown, key), [left, right]) in keyed {
         match (left.as_slice(), right.as_slice()) {
             ([left], [right]) => {
                 let pair = name(by, &key, left, right);
@@ -141,12 +141,16 @@ pub fn by_key(sides: [&[Utf8PathBuf]; 2], by: PairBy, key: &dyn Fn(&[&str]) -> V
             }
             ([], single) | (single, []) => matched.single.extend(single.iter().map(|path| (*path).clone())),
             ([first, second, ..], _) | (_, [first, second, ..]) => {
-                let pair = key.replace('\0', "*");
-                return Err(Error::SameName { pair, first: (*first).clone(), second: (*second).clone() });
+                return Err(Error::SameName { pair: shown, first: (*first).clone(), second: (*second).clone() });
             }
         }
     }
     Ok(finished(matched))
+}
+
+/// A key without the marks of words that were left open, for an order that a person expects.
+fn shown(key: &str) -> String {
+    key.replace('\0', "").trim_matches(SEPARATORS).to_owned()
 }
 
 /// What a pair is called: what a person recognises in both names.

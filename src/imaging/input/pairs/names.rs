@@ -46,20 +46,35 @@ pub struct Open {
     /// What the words tell, in their order.
     pub sides: Vec<Side>,
     words: Vec<Range<usize>>,
-    /// Whether each word stands alone.
-    alone: Vec<bool>,
+    weights: Vec<Weight>,
 }
+
+/// How much a word says by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Weight {
+    /// A long word that stands alone.
+    Word,
+    /// A short one.
+    Short,
+    /// Part of another word, which says something only against another name.
+    Part,
+}
+
+/// Where a word is, what it tells, and how much by itself.
+type Found = (Range<usize>, Side, Weight);
 
 impl Open {
     /// Looks for words in a name.
     pub fn new(name: &str, reach: Reach) -> Open {
-        let mut found: Vec<(Range<usize>, Side, bool)> = Vec::new();
+        let mut found: Vec<Found> = Vec::new();
         for run in runs(name, char::is_alphabetic) {
             let before = found.len();
             let pieces = pieces(name, run.clone());
             long_words(name, run.clone(), &pieces, &mut found);
             if found.len() == before {
-                found.extend(pieces.iter().filter_map(|p| Some((p.clone(), side_of(&name[p.clone()], &SHORT)?, true))));
+                found.extend(
+                    pieces.iter().filter_map(|p| Some((p.clone(), side_of(&name[p.clone()], &SHORT)?, Weight::Short))),
+                );
             }
             if found.len() == before && reach == Reach::Letters {
                 found.extend(letters_at_ends(name, run));
@@ -73,16 +88,25 @@ impl Open {
             end = word.end;
         }
         key.push_str(&name[end..]);
-        let alone = found.iter().map(|(_, _, alone)| *alone).collect();
+        let weights = found.iter().map(|(_, _, weight)| *weight).collect();
         let sides = found.iter().map(|(_, side, _)| *side).collect();
-        Open { key, sides, words: found.into_iter().map(|(word, _, _)| word).collect(), alone }
+        Open { key, sides, words: found.into_iter().map(|(word, _, _)| word).collect(), weights }
     }
 
-    /// The side that all words tell, where they stand alone and agree.
+    /// The side that the name tells by itself: that of its long words, else that of its short ones.
     pub fn side(&self) -> Option<Side> {
-        let first = *self.sides.first()?;
-        let agree = self.sides.iter().all(|side| *side == first) && self.alone.iter().all(|alone| *alone);
-        agree.then_some(first)
+        let of = |weight: Weight| {
+            let words = self.sides.iter().zip(&self.weights).filter(move |(_, w)| **w == weight);
+            words.map(|(side, _)| *side).collect::<Vec<Side>>()
+        };
+        let told = Some(of(Weight::Word)).filter(|sides| !sides.is_empty()).unwrap_or_else(|| of(Weight::Short));
+        let (first, last) = (*told.first()?, *told.last()?);
+        match told.iter().all(|side| *side == first) {
+            true => Some(first),
+            // Of words that disagree the one at the start of the name counts, else the one at its end.
+            false if self.key.starts_with('\0') => self.sides.first().copied(),
+            false => self.key.ends_with('\0').then_some(last),
+        }
     }
 
     /// The side of this name beside another of the same key: they differ in words for a side only, each time the same way round.
@@ -108,7 +132,7 @@ impl Open {
 }
 
 /// Signs that hold words apart and mean nothing by themselves.
-const SEPARATORS: [char; 3] = ['_', '-', ' '];
+pub const SEPARATORS: [char; 3] = ['_', '-', ' '];
 
 /// Appends what follows a word that was taken out, with one sign between in place of two.
 fn push_apart(kept: &mut String, next: &str) {
@@ -146,7 +170,7 @@ fn pieces(name: &str, run: Range<usize>) -> Vec<Range<usize>> {
 }
 
 /// The first long word of a run. It stands alone where it is a piece of the run, or where the run has no case that could cut it.
-fn long_words(name: &str, run: Range<usize>, pieces: &[Range<usize>], found: &mut Vec<(Range<usize>, Side, bool)>) {
+fn long_words(name: &str, run: Range<usize>, pieces: &[Range<usize>], found: &mut Vec<Found>) {
     let lower = name[run.clone()].to_lowercase();
     // Where small letters are longer than the capitals, places in one are not places in the other.
     if lower.len() != run.len() {
@@ -158,7 +182,7 @@ fn long_words(name: &str, run: Range<usize>, pieces: &[Range<usize>], found: &mu
         let word = run.start + at..run.start + at + length;
         let ideogram = !name[word.clone()].is_ascii();
         let alone = pieces.contains(&word) || word == run || ideogram;
-        found.push((word, side, alone));
+        found.push((word, side, if alone { Weight::Word } else { Weight::Part }));
     }
 }
 
@@ -170,10 +194,10 @@ fn side_of(word: &str, words: &[(&str, &str)]) -> Option<Side> {
     })
 }
 
-fn letters_at_ends(name: &str, run: Range<usize>) -> Vec<(Range<usize>, Side, bool)> {
+fn letters_at_ends(name: &str, run: Range<usize>) -> Vec<Found> {
     let one = |at: Range<usize>| {
         let side = side_of(name.get(at.clone())?, &SHORT[..1])?;
-        Some((at, side, false))
+        Some((at, side, Weight::Part))
     };
     [run.start..run.start + 1, run.end - 1..run.end].into_iter().filter_map(one).collect()
 }
@@ -283,7 +307,7 @@ mod tests {
         ] {
             assert_eq!(against(a, b, Reach::Letters), None, "{a} {b}");
         }
-        for name in ["leftover_1", "bright", "upright3", "colour", "label", "rl_1", "left_r1"] {
+        for name in ["leftover_1", "bright", "upright3", "colour", "label", "rl_1", "a_left_right_1", "a_l_r1"] {
             assert_eq!(Open::new(name, Reach::Words).side(), None, "{name}");
         }
     }

@@ -10,7 +10,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 
 use super::listing::Folder;
 use super::matching::{self, Matched, PairBy, by_key};
-use super::names::{Open, Reach, tokens};
+use super::names::{Open, Reach, SEPARATORS, tokens};
 use crate::imaging::{Result, Side};
 
 /// What tells left from right, the strongest first.
@@ -208,9 +208,8 @@ fn by_two_values(folder: &Folder, by: Option<PairBy>) -> Vec<Result<Reading>> {
 /// A name without the token at a place, and with one sign where two then meet.
 fn without(tokens: &[&str], place: usize) -> String {
     let (before, after) = (tokens[..place].concat(), tokens[place + 1..].concat());
-    let signs = ['_', '-', ' '];
-    let met = before.is_empty() || before.ends_with(signs);
-    before + if met { after.trim_start_matches(signs) } else { &after }
+    let met = before.is_empty() || before.ends_with(SEPARATORS);
+    before + if met { after.trim_start_matches(SEPARATORS) } else { &after }
 }
 
 /// The best reading, or all that are as good: none of them is to be preferred without being told.
