@@ -6,9 +6,10 @@ use camino::{Utf8Path, Utf8PathBuf};
 
 use super::listing::Folder;
 use super::matching::PairBy;
+use super::names::{Open, Reach};
 use super::readings::{Reading, Told};
 use super::{Pairing, Source};
-use crate::imaging::{Error, image};
+use crate::imaging::{Error, Side, image};
 
 /// Folders, and readings, that a message shows at most.
 const MOST_SHOWN: usize = 8;
@@ -148,7 +149,7 @@ pub fn none(source: &Source<'_>, folders: &[Folder], readings: &[Reading]) -> Er
         None => match one_side(folders) {
             Some((have, lacks)) => (
                 format!("there is {have}/ but no {lacks}/"),
-                match holding.iter().filter(|folder| folder.depth > 0).collect::<Vec<_>>().as_slice() {
+                match left_first(&holding).as_slice() {
                     [a, b] => Call::new(source, vec![&a.path, &b.path], "").to_string(),
                     _ => by_hand(source),
                 },
@@ -196,6 +197,26 @@ fn one_side(folders: &[Folder]) -> Option<(&'static str, &'static str)> {
     }
 }
 
+/// The folders below the one that was named, those with a word for left first and for right last.
+fn left_first<'a>(holding: &[&'a Folder]) -> Vec<&'a Folder> {
+    let mut below: Vec<&Folder> = holding.iter().copied().filter(|folder| folder.depth > 0).collect();
+    below.sort_by_key(|folder| match Open::new(&folder.below, Reach::Words).side() {
+        Some(Side::Left) => 0,
+        None => 1,
+        Some(Side::Right) => 2,
+    });
+    below
+}
+
+/// One folder was named twice.
+pub fn same(source: &Source<'_>) -> Error {
+    Error::Unpaired {
+        path: source.images.to_owned(),
+        statement: "both sides are the same folder".to_owned(),
+        hint: format!("{} takes a folder of each camera's pictures", by_hand(source)),
+    }
+}
+
 /// Nothing tells left from right.
 fn untold(source: &Source<'_>, holding: &[&Folder], pictures: usize) -> (String, String) {
     let wide = holding.iter().find(|folder| folder.pictures.first().is_some_and(|path| is_wide(path)));
@@ -203,7 +224,7 @@ fn untold(source: &Source<'_>, holding: &[&Folder], pictures: usize) -> (String,
         let call = Call::new(source, vec![&folder.path], "--side-by-side");
         format!("if each picture holds both halves: {call}")
     });
-    let below: Vec<&&Folder> = holding.iter().filter(|folder| folder.depth > 0).collect();
+    let below = left_first(holding);
     let (statement, hint) = match below.as_slice() {
         [first, second, ..] => (
             format!("which of these {} are left and right is not told", count(below.len(), "folder")),

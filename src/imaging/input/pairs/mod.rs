@@ -92,6 +92,9 @@ impl<'a> Source<'a> {
         if let Some(right) = self.right {
             let (left, right) =
                 (the_pictures(self, top)?, the_pictures(self, list(right).map_err(|e| self.beside(e))?)?);
+            if left.path.canonicalize().is_ok_and(|path| right.path.canonicalize().is_ok_and(|other| path == other)) {
+                return Err(explain::same(self));
+            }
             let reading = readings::two_folders(&left, &right, Told::Given, self.by)?;
             return self.one(reading, &[left, right]);
         }

@@ -10,8 +10,11 @@ use camino::{Utf8Path, Utf8PathBuf};
 
 use super::listing::Folder;
 use super::matching::{self, Matched, PairBy, by_key};
-use super::names::{Open, Reach, SEPARATORS, tokens};
+use super::names::{Open, Reach, SEPARATORS, natural_order, tokens};
 use crate::imaging::{Result, Side};
+
+/// Folders that are compared with each other: among more, no two are the cameras' without being named.
+const MOST_COMPARED: usize = 32;
 
 /// What tells left from right, the strongest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -71,6 +74,9 @@ pub fn two_folders(left: &Folder, right: &Folder, told: Told, by: Option<PairBy>
 pub fn all(folders: &[Folder], by: Option<PairBy>) -> Vec<Result<Reading>> {
     let mut readings: Vec<Result<Reading>> = folders.iter().flat_map(|folder| by_names(folder, by)).collect();
     let below: Vec<&Folder> = folders.iter().filter(|folder| folder.depth > 0).collect();
+    if below.len() > MOST_COMPARED {
+        return readings;
+    }
     for (k, first) in below.iter().enumerate() {
         for second in below[k + 1..].iter().filter(|second| second.depth == first.depth) {
             let alone = below.iter().filter(|folder| folder.depth == first.depth).count() == 2;
@@ -193,7 +199,10 @@ fn by_two_values(folder: &Folder, by: Option<PairBy>) -> Vec<Result<Reading>> {
         for (tokens, path) in &named {
             values.entry(tokens[place]).or_default().push((*path).clone());
         }
-        let sides: [Vec<Utf8PathBuf>; 2] = values.into_values().collect::<Vec<_>>().try_into().ok()?;
+        let mut values: Vec<(&str, Vec<Utf8PathBuf>)> = values.into_iter().collect();
+        values.sort_by(|(a, _), (b, _)| natural_order(a, b));
+        let sides: [Vec<Utf8PathBuf>; 2] =
+            values.into_iter().map(|(_, side)| side).collect::<Vec<_>>().try_into().ok()?;
         let rest = |stems: &[&str]| stems.iter().map(|stem| Some(without(&tokens(stem), place))).collect();
         let matched = match by {
             None | Some(PairBy::Name) => by_key([&sides[0], &sides[1]], PairBy::Name, &rest),

@@ -178,6 +178,8 @@ fn folders_without_pairs_say_what_they_hold() {
     assert!(complaint(&[] as &[&str], None).contains("there are no pictures here"));
     let said = complaint(&["left/a.png", "rigth/a.png"], None);
     assert!(said.contains("left/ but no right/") && said.contains("camera-check IMAGES/left IMAGES/rigth`"), "{said}");
+    let said = complaint(&["left/a.png", "cam2/a.png"], None);
+    assert!(said.contains("camera-check IMAGES/left IMAGES/cam2`"), "{said}");
     // Without numbers or equal names nothing says what belongs together.
     assert!(complaint(&["left/a.png", "right/b.png"], None).contains("2 pictures have no partner"));
     let said = complaint(&["board.png", "scene.png"], None);
@@ -217,6 +219,14 @@ fn more_than_one_reading_is_refused_with_each() {
 }
 
 #[test]
+fn many_folders_are_not_compared_with_each_other() {
+    let files: Vec<String> = (0..200).flat_map(|k| (0..3).map(move |n| format!("set{k}/{n}.png"))).collect();
+    let (_keep, path) = folder(&files);
+    let said = crate::diagnostic::report(&read(&path, None).unwrap_err());
+    assert!(said.contains("which of these 200 folders") && said.contains("and 192 more folders"), "{said}");
+}
+
+#[test]
 fn pictures_of_one_camera_are_no_pairs() {
     for files in [
         ["left/1.png", "left_corners/1.png", "left/2.png", "left_corners/2.png"],
@@ -244,6 +254,7 @@ fn two_folders_are_given_in_their_order() {
     let said = |right| crate::diagnostic::report(&of(&z, right).unwrap_err());
     assert!(said(&out).contains("there are no pictures here"), "{}", said(&out));
     assert!(said(&file).contains("this is a file") && said(&file).contains("--out"), "{}", said(&file));
+    assert!(crate::diagnostic::report(&of(&z, &z).unwrap_err()).contains("the same folder"));
     let nowhere = path.join("nowhere");
     assert!(said(&nowhere).contains("folder not found") && said(&nowhere).contains("`--out"), "{}", said(&nowhere));
 }
