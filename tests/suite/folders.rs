@@ -47,6 +47,10 @@ fn the_same_pictures_give_the_same_rig_whatever_their_names() {
     let (cams, said) = check(&["cams"], "cams_out");
     assert!(said.contains("10 pairs by number: left cam1/b*.png, right cam2/a*.png; no word tells"), "{said}");
     assert!(cams == plain);
+    // What was read is named as the input, wherever it lies below the folder.
+    done(root, &["camera-check", "cams", "--out", "cams_out"]);
+    let written = std::fs::read_to_string(root.join("cams_out/camera-check.json")).unwrap();
+    assert!(written.contains("\"pictures\": 20"), "{written}");
     let (given, _) = check(&["cams/cam1", "cams/cam2"], "given");
     assert!(given == plain);
     let (ordered, said) = check(&["cams", "--pair-by", "order"], "ordered");
