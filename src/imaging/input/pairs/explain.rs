@@ -50,6 +50,9 @@ pub fn taken(reading: &Reading, top: &Utf8Path) -> String {
         pattern(&paired.map(|path| below(path, top)).collect::<Vec<_>>())
     };
     let unsaid = match reading.told {
+        Told::Given | Told::Words | Told::Letters if names_disagree(reading) => {
+            "; the names of the pictures say it the other way round"
+        }
         Told::Given | Told::Words | Told::Letters => "",
         Told::Alike | Told::Two => "; no word tells left from right: the first by name is left",
     };
@@ -60,6 +63,15 @@ pub fn taken(reading: &Reading, top: &Utf8Path) -> String {
         files(0),
         files(1)
     )
+}
+
+/// Whether the left pictures are all called right ones, and the right pictures left ones.
+fn names_disagree(reading: &Reading) -> bool {
+    let all = |side: Side, paths: &[Utf8PathBuf]| {
+        let told = |path: &Utf8PathBuf| Open::new(path.file_stem().unwrap_or_default(), Reach::Words).side();
+        paths.iter().all(|path| told(path) == Some(side.other()))
+    };
+    Side::BOTH.into_iter().all(|side| all(side, &reading.sides[side as usize]))
 }
 
 fn below<'a>(path: &'a Utf8Path, top: &Utf8Path) -> &'a str {

@@ -90,6 +90,14 @@ fn what_was_taken_is_said() {
 }
 
 #[test]
+fn names_that_contradict_their_folders_are_said() {
+    let exchanged = pairing(&["left/right1.png", "left/right2.png", "right/left1.png", "right/left2.png"]);
+    assert!(exchanged.pairs[0].left.as_str().ends_with("left/right1.png"));
+    assert!(exchanged.taken.ends_with("; the names of the pictures say it the other way round"), "{}", exchanged.taken);
+    assert!(!pairing(&["left/left1.png", "right/right1.png"]).taken.contains("other way"));
+}
+
+#[test]
 fn what_lies_beside_pictures_does_not_mislead() {
     let files = [
         "left/2.png",
