@@ -45,6 +45,8 @@ impl fmt::Display for Call<'_> {
 
 /// What was taken: `31 pairs by number: left stereoLeft/imageL*.png, right stereoRight/imageR*.png`.
 pub fn taken(reading: &Reading, top: &Utf8Path) -> String {
+    // Two folders that were named are said as they were named.
+    let top = if reading.told == Told::Given { Utf8Path::new("") } else { top };
     let files = |side: usize| {
         let paired = reading.matched.pairs.iter().map(|pair| if side == 0 { &pair.left } else { &pair.right });
         pattern(&paired.map(|path| below(path, top)).collect::<Vec<_>>())

@@ -258,7 +258,8 @@ fn two_folders_are_given_in_their_order() {
     let found = of(&z, &a).unwrap();
     assert_eq!(found.pairs[0].left, z.join("b1.png"));
     assert_eq!(found.pairs[0].right, a.join("raw/1.png"));
-    assert!(!found.taken.contains("no word"), "{}", found.taken);
+    let said = format!("2 pairs by number: left {z}/b*.png, right {a}/raw/*.png");
+    assert_eq!(found.taken, said);
     let said = |right| crate::diagnostic::report(&of(&z, right).unwrap_err());
     assert!(said(&out).contains("there are no pictures here"), "{}", said(&out));
     assert!(said(&file).contains("this is a file") && said(&file).contains("--out"), "{}", said(&file));
