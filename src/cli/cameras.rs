@@ -1,19 +1,45 @@
 //! Commands from pictures to points: `camera-check`, `measure`, `rectify`, `export`.
 
-use camino::Utf8PathBuf;
+use camino::{Utf8Path, Utf8PathBuf};
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::{ExportRobot, Output, between};
+use crate::imaging::input::pairs::{PairBy, Source};
 use crate::imaging::{Mosaic, Squares};
 use crate::stereo::Lens;
 use crate::stereo::volume::Extent;
 
+/// How a folder of pictures is read, and the second one where each camera has its own.
+#[derive(Debug, Args)]
+pub struct Pairs {
+    /// Folder of the right camera's pictures, where the first one holds the left camera's alone
+    #[arg(value_name = "RIGHT")]
+    pub right: Option<Utf8PathBuf>,
+    /// What tells which pictures belong together [default: names, else the numbers in them]
+    #[arg(long, value_name = "HOW", conflicts_with = "side_by_side")]
+    pub pair_by: Option<PairBy>,
+    /// Each picture holds both views: its left half is the left camera's
+    #[arg(long, conflicts_with_all = ["right", "bayer"])]
+    pub side_by_side: bool,
+}
+
+impl Pairs {
+    /// Where the pictures are.
+    pub fn source<'a>(&'a self, command: &'a str, images: &'a Utf8Path) -> Source<'a> {
+        let Pairs { right, pair_by, side_by_side } = self;
+        Source { command, images, right: right.as_deref(), by: *pair_by, side_by_side: *side_by_side }
+    }
+}
+
 /// `stereocal camera-check`
 #[derive(Debug, Args)]
 pub struct CameraCheck {
-    /// Folder with left/ and right/ pictures, or with left*/right* names
+    /// Folder with a folder of pictures for each camera, or with names that say left or right; or the left camera's, before RIGHT
     #[arg(required_unless_present = "corners", conflicts_with = "corners")]
     pub images: Option<Utf8PathBuf>,
+    /// How it is read.
+    #[command(flatten)]
+    pub pairs: Pairs,
     /// Corners from a CSV file instead of pictures
     #[arg(long, value_name = "FILE")]
     pub corners: Option<Utf8PathBuf>,
@@ -83,8 +109,12 @@ pub enum BoardShape {
 /// `stereocal measure`
 #[derive(Debug, Args)]
 pub struct Measure {
-    /// Folder with left/ and right/ pictures and poses.csv
+    /// Folder with the pictures, as for camera-check, and poses.csv; or the left camera's, before RIGHT: poses.csv is then beside the
+    /// two folders, or in one of them
     pub poses: Utf8PathBuf,
+    /// How it is read.
+    #[command(flatten)]
+    pub pairs: Pairs,
     /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
@@ -98,7 +128,7 @@ pub struct Measure {
     #[arg(long, value_name = "PATTERN")]
     pub bayer: Option<Mosaic>,
     /// Measure pictures as they arrive; ends when all of poses.csv are there, or on Ctrl-C
-    #[arg(long)]
+    #[arg(long, conflicts_with = "side_by_side")]
     pub watch: bool,
     /// Draw the corners found over each pair, into overlays/ in the results folder
     #[arg(long)]
@@ -111,8 +141,11 @@ pub struct Measure {
 /// `stereocal rectify`
 #[derive(Debug, Args)]
 pub struct Rectify {
-    /// Folder with left/ and right/ pictures, or with left*/right* names
+    /// Folder with a folder of pictures for each camera, or with names that say left or right; or the left camera's, before RIGHT
     pub images: Utf8PathBuf,
+    /// How it is read.
+    #[command(flatten)]
+    pub pairs: Pairs,
     /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,

@@ -43,7 +43,7 @@ mod tests {
     fn a_file_without_its_flag_is_answered_with_the_flags_that_take_one() {
         let said = of(&["identify", "points.csv"]).unwrap();
         assert!(said.contains("`--measurements points.csv`") && said.contains("or `--out points.csv`"), "{said}");
-        assert!(of(&["--quiet", "camera-check", "images", "more"]).unwrap().contains("--out"));
+        assert!(of(&["--quiet", "camera-check", "left", "right", "more"]).unwrap().contains("--out"));
     }
 
     #[test]

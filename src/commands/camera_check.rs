@@ -11,7 +11,8 @@ use crate::files::provenance::Run;
 use crate::formats::calibration::CalibrationFile;
 use crate::formats::camera_check::CameraCheckFile;
 use crate::imaging::input::cache::Cache;
-use crate::imaging::input::{corners_csv, pairs};
+use crate::imaging::input::corners_csv;
+use crate::imaging::input::pairs::{Pairing, Source};
 use crate::imaging::overlay::SideBySide;
 use crate::imaging::{Board, Corners, Wanted, find_corners};
 use crate::report::drawing::pair_picture::PairPicture;
@@ -41,7 +42,8 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     config::reject(problems)?;
     let out = open(args, config, run)?;
 
-    let corners = corners(args, board, &out)?;
+    let pairing = pairing(args, &out)?;
+    let corners = corners(args, board, pairing.as_ref(), &out)?;
     corners.notes.iter().for_each(progress::note);
     let asked = Asked { options: options(args), tolerance_mm, extent };
     let (calibration, findings) = match &args.since {
@@ -54,7 +56,7 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     calibration.rig().unusual().into_iter().for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
-    let pictures = pictures(args, &calibration, &judged);
+    let pictures = pictures(args, pairing.as_ref(), &calibration, &judged);
     let page = report::camera_check::page(&calibration, &judged, &corners, &pictures)?;
     out.write_json(
         "calibration.json",
@@ -81,12 +83,15 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
 }
 
 /// The worst and the best pair for the page; none where corners came without pictures.
-fn pictures(args: &CameraCheck, calibration: &Calibration, judged: &Judged) -> Vec<PairPicture> {
+fn pictures(
+    args: &CameraCheck,
+    pairing: Option<&Pairing>,
+    calibration: &Calibration,
+    judged: &Judged,
+) -> Vec<PairPicture> {
     /// Width of a pair on the page, both pictures together, px.
     const WIDTH: u32 = 960;
-    let Some(files) = args.images.as_deref().and_then(|images| pairs::pair_files(images).ok()) else {
-        return Vec::new();
-    };
+    let Some(files) = pairing else { return Vec::new() };
     let order = report::camera_check::worst_first(judged);
     let chosen = [("worst by its largest length error", order.first()), ("best", order.last())];
     let picture = |(role, index): (&'static str, Option<&usize>)| {
@@ -103,8 +108,11 @@ fn pictures(args: &CameraCheck, calibration: &Calibration, judged: &Judged) -> V
 /// The results folder, once nothing is in the way of what will be written.
 fn open(args: &CameraCheck, config: &Config, run: Run) -> Result<OutDir> {
     let run = Run { force: args.output.force, ..run };
-    let inputs: Vec<&Utf8Path> =
-        [&args.images, &args.corners, &args.check_images].into_iter().flatten().map(|p| p.as_path()).collect();
+    let inputs: Vec<&Utf8Path> = [&args.images, &args.pairs.right, &args.corners, &args.check_images]
+        .into_iter()
+        .flatten()
+        .map(|p| p.as_path())
+        .collect();
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &inputs);
     out.check_free(&["calibration.json", "camera-check.json", "camera-check.html"])?;
     if out.is_input("corners.csv") {
@@ -132,12 +140,20 @@ fn options(args: &CameraCheck) -> Options {
     Options { lens: args.lens, shape: args.board_shape.map(|shape| shape == BoardShape::Bowed) }
 }
 
-fn corners(args: &CameraCheck, board: Board, out: &OutDir) -> Result<Corners> {
-    match (&args.corners, &args.images) {
+/// The pairs of pictures, where there are pictures.
+fn pairing(args: &CameraCheck, out: &OutDir) -> Result<Option<Pairing>> {
+    let Some(images) = &args.images else { return Ok(None) };
+    let pairing = args.pairs.source("camera-check", images).pairs(out)?;
+    progress::note(&pairing.taken);
+    Ok(Some(pairing))
+}
+
+fn corners(args: &CameraCheck, board: Board, pairing: Option<&Pairing>, out: &OutDir) -> Result<Corners> {
+    match (&args.corners, pairing) {
         (Some(file), _) => Ok(corners_csv::read(file, board, args.picture_size)?),
-        (None, Some(images)) => {
+        (None, Some(pairing)) => {
             let (cache, overlays) = (Some(Cache { out, thumbnails: false }), args.draw.then_some(out));
-            Ok(find_corners(images, &Wanted { board, needed: FEWEST_PAIRS, mosaic: args.bayer, cache, overlays })?)
+            Ok(find_corners(pairing, &Wanted { board, needed: FEWEST_PAIRS, mosaic: args.bayer, cache, overlays })?)
         }
         // The command line asks for one of the two.
         (None, None) => {
@@ -162,7 +178,8 @@ fn second_board(
     config::within(&mut problems, "check_square_mm", board.square_mm, config::SQUARES_MM);
     config::reject(problems)?;
     let (mosaic, cache) = (args.bayer, Some(Cache { out, thumbnails: false }));
-    let corners = find_corners(images, &Wanted { board, needed: 1, mosaic, cache, overlays: None })?;
+    let pairing = Source::folder("camera-check", images).pairs(out)?;
+    let corners = find_corners(&pairing, &Wanted { board, needed: 1, mosaic, cache, overlays: None })?;
     calibration.rig().check_size(&corners)?;
     Ok(Some(second_board::second_board(calibration, &corners, args.board_uncertainty_mm)))
 }

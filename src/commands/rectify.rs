@@ -15,7 +15,7 @@ use crate::formats::rectified::{Coverage, RectifiedFile, RectifiedPair};
 use crate::imaging::find::find_pair;
 use crate::imaging::image::raster::Raster;
 use crate::imaging::image::{self, Claim, Header};
-use crate::imaging::input::pairs::{self, PairFiles};
+use crate::imaging::input::pairs::PairFiles;
 use crate::imaging::{self, Board, PairCorners, Skipped, Wanted};
 use crate::opencv::{Map, remap, undistort_rectify_map};
 use crate::stereo::model::rectification::{Matrices, Scaling, row_differences, row_residual};
@@ -34,8 +34,10 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
     let rig = calibration::read(&rig_file)?;
     let run = Run { force: args.output.force, ..run };
-    let out = out.for_run(&run, &[&args.images, &rig_file]);
-    let pairing = pairs::pair_files(&args.images)?;
+    let source = args.pairs.source("rectify", &args.images);
+    let out = out.for_run(&run, &[source.places().as_slice(), &[&rig_file]].concat());
+    let pairing = source.pairs(&out)?;
+    progress::note(&pairing.taken);
     pairing.left_out().iter().for_each(progress::note);
     let headers = headers(&pairing.pairs, &rig)?;
     let names: Vec<[String; 2]> = pairing.pairs.iter().map(names).collect();
@@ -68,7 +70,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
         }
     }
     if kept.is_empty() {
-        return Err(imaging::Error::NoneReadable { path: args.images.clone(), skipped: file.pairs_skipped }.into());
+        return Err(imaging::Error::NoneReadable { path: pairing.place, skipped: file.pairs_skipped }.into());
     }
     let rectified: Vec<PairFiles> = kept
         .iter()

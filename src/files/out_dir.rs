@@ -63,6 +63,11 @@ impl OutDir {
         Ok(OutDir { path: path.to_owned(), force: false, inputs: Vec::new(), state: Mutex::new(state), lock })
     }
 
+    /// Whether a run has written its results here.
+    pub fn is_at(path: &Utf8Path) -> bool {
+        path.join(OWN).is_dir()
+    }
+
     /// Remembers what the run was asked for and what it reads: those files will not be overwritten, and every JSON file says
     /// what it was made of. An input that is not there is left to its reader to complain of.
     pub fn for_run(mut self, run: &Run, inputs: &[&Utf8Path]) -> OutDir {

@@ -108,7 +108,12 @@ impl Digested {
 
     /// The pictures of a folder; `known` are the hashes of those that were read. `None` where one of the others cannot be read.
     pub fn folder(path: &Utf8Path, known: &BTreeMap<Utf8PathBuf, String>) -> Option<Digested> {
-        let files = pictures(path);
+        let mut files = pictures(path);
+        // Pictures that lie elsewhere below it.
+        if !files.iter().any(|file| known.contains_key(file)) {
+            files.extend(known.keys().filter(|file| file.starts_with(path)).cloned());
+            files.sort();
+        }
         let hash = |file: &Utf8PathBuf| known.get(file).cloned().or_else(|| hash_of_picture(file));
         let hashes: Vec<String> = files.par_iter().map(hash).collect::<Option<_>>()?;
         let line =

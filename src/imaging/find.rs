@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::detect::{self, Detected, Refusal, continuation};
 use super::image::{self, Claim, Header, Mosaic, Picture};
 use super::input::cache::{Cache, Look};
-use super::input::pairs::{self, PairFiles};
+use super::input::pairs::{PairFiles, Pairing};
 use super::lattice::{Lattice, Places};
 use super::pyramid::Small;
 use super::refine::fields;
@@ -35,11 +35,10 @@ pub struct Wanted<'a> {
     pub overlays: Option<&'a OutDir>,
 }
 
-/// Finds the board's corners in all pairs of a folder, numbered alike in left and right.
+/// Finds the board's corners in all pairs, numbered alike in left and right.
 ///
-/// An error where the folder holds no pairs, or fewer than needed show the board.
-pub fn find_corners(folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Corners> {
-    let pairing = pairs::pair_files(folder)?;
+/// An error where fewer than needed show the board.
+pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     let mut notes: Vec<String> = pairing.left_out().into_iter().collect();
     let headers: Vec<[Announced; 2]> =
         pairing.pairs.par_iter().map(|files| [&files.left, &files.right].map(|path| image::header(path))).collect();
@@ -67,7 +66,7 @@ pub fn find_corners(folder: &Utf8Path, wanted: &Wanted<'_>) -> Result<Corners> {
             total,
             needed: wanted.needed,
             board: wanted.board,
-            path: folder.to_owned(),
+            path: pairing.place.clone(),
             skipped,
             other,
         });

@@ -50,27 +50,31 @@ pub enum Error {
         /// The file.
         path: Utf8PathBuf,
     },
-    /// `left/` without `right/`, or the other way round.
-    #[error("there is {found}/ but no {missing}/")]
-    OneSide {
-        /// The folder.
+    /// A second place that is no folder of the right camera's pictures.
+    #[error("{}", if *.found { "a folder of the right camera's pictures is needed, this is a file" } else { "folder not found" })]
+    NotRight {
+        /// What was named.
         path: Utf8PathBuf,
-        /// The side that is there.
-        found: &'static str,
-        /// The side that is not.
-        missing: &'static str,
+        /// Whether there is something of that name.
+        found: bool,
     },
-    /// Pictures, perhaps, but no left one with a right one.
-    #[error("{}", no_pairs(*.single, *.sideless))]
-    NoPairs {
+    /// Pictures, perhaps, but not which left one belongs to which right one.
+    #[error("{statement}")]
+    Unpaired {
         /// The folder.
         path: Utf8PathBuf,
-        /// Pictures of one side whose partner is missing.
-        single: usize,
-        /// Pictures whose names tell no side.
-        sideless: usize,
-        /// A folder below that holds left/ and right/.
-        deeper: Option<Utf8PathBuf>,
+        /// What was found.
+        statement: String,
+        /// The call that would do.
+        hint: String,
+    },
+    /// A picture that cannot be cut into two equal halves.
+    #[error("the picture is {width} px wide, which are no two equal halves")]
+    OddWidth {
+        /// The picture.
+        path: Utf8PathBuf,
+        /// Its width, px.
+        width: usize,
     },
     /// Two files that would be the same picture of the same pair.
     #[error("two pictures claim the same side of pair `{pair}`: {first} and {second}")]
@@ -114,14 +118,6 @@ pub enum Error {
 const SAVED_AS: &str = "save the pictures as the camera gives them: PNG, TIFF, BMP, JPEG or PGM of 8 or 16 bits a pixel, up to 300 million \
                         px and 1 GiB when decoded";
 
-fn no_pairs(single: usize, sideless: usize) -> String {
-    match (single, sideless) {
-        (0, 0) => "there are no pictures here (PNG, TIFF, BMP, JPEG, PGM)".to_owned(),
-        (0, n) => format!("no pair found: the names of {n} pictures tell neither left nor right"),
-        (n, _) => format!("no pair found: {n} pictures have no partner of the same name on the other side"),
-    }
-}
-
 /// The first few pairs that were skipped, a line each.
 fn reasons(skipped: &[Skipped]) -> String {
     /// More would push the message itself off the screen.
@@ -140,8 +136,9 @@ impl Explain for Error {
             Error::BoardSize { .. } | Error::SameName { .. } => None,
             Error::NoFolder { path }
             | Error::NotAFolder { path }
-            | Error::OneSide { path, .. }
-            | Error::NoPairs { path, .. }
+            | Error::NotRight { path, .. }
+            | Error::Unpaired { path, .. }
+            | Error::OddWidth { path, .. }
             | Error::NoneReadable { path, .. }
             | Error::TooFewPairs { path, .. } => Some(path.to_string()),
         }
@@ -151,11 +148,15 @@ impl Explain for Error {
         match self {
             Error::Files(e) => e.hint(),
             Error::BoardSize { .. } => Some("`--squares 20x20` is a board with 19x19 inner corners".to_owned()),
-            Error::NoPairs { deeper: Some(folder), .. } => Some(format!("name `{folder}`, which holds left/ and right/")),
-            Error::NoFolder { .. } | Error::NotAFolder { .. } | Error::OneSide { .. } | Error::NoPairs { .. } => Some(
+            Error::NoFolder { .. } | Error::NotAFolder { .. } => Some(
                 "a folder of pairs holds left/ and right/ with equal names, or left*/right*, *_left/*_right, *_L/*_R names"
                     .to_owned(),
             ),
+            Error::NotRight { path, .. } => Some(format!(
+                "a second folder is that of the right camera's pictures; other places are named by their flags, results by `--out {path}`"
+            )),
+            Error::Unpaired { hint, .. } => Some(hint.clone()),
+            Error::OddWidth { .. } => Some("`--side-by-side` is for pictures that hold both views, each as wide as the other".to_owned()),
             Error::SameName { .. } => Some("remove or rename one of them".to_owned()),
             Error::NoneReadable { .. } => Some(SAVED_AS.to_owned()),
             Error::TooFewPairs { skipped, .. }

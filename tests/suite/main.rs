@@ -18,6 +18,7 @@ mod worlds;
 mod compensate;
 mod export_robot;
 mod faults;
+mod folders;
 mod fuzz;
 mod guide;
 mod house;

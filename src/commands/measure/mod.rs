@@ -5,7 +5,7 @@ mod watch;
 
 use std::collections::BTreeMap;
 
-use camino::Utf8Path;
+use camino::{Utf8Path, Utf8PathBuf};
 
 use super::{Outcome, Result};
 use crate::cli::Measure;
@@ -16,7 +16,7 @@ use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
 use crate::formats::measure::{self, MeasureFile};
 use crate::imaging::input::cache::Cache;
-use crate::imaging::input::pairs;
+use crate::imaging::input::pairs::Source;
 use crate::imaging::{Corners, PairCorners, Wanted, find_corners};
 use crate::measurements::{self, RobotPose};
 use crate::report::measure::Extras;
@@ -28,7 +28,8 @@ use crate::{progress, report};
 pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
-    let list = args.poses.join("poses.csv");
+    let source = args.pairs.source("measure", &args.poses);
+    let list = list_of_poses(&source);
     let known = knowledge(args, config, &rig_file)?;
     let poses = measurements::read_poses(&list)?;
     if args.watch {
@@ -39,23 +40,25 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
             cache: Some(Cache { out: &out, thumbnails: true }),
             overlays: None,
         };
-        watch::wait(&args.poses, &poses, &known, &wanted)?;
+        watch::wait(&source, &out, &poses, &known, &wanted)?;
     }
     let run = Run { force: args.output.force, ..run };
-    let out = out.for_run(&run, &[&args.poses, &list, &rig_file]);
+    let out = out.for_run(&run, &[source.places().as_slice(), &[&list, &rig_file]].concat());
     out.check_free(&["measurements.csv", "measure.json", "measure.html"])?;
 
     let (cache, overlays) = (Some(Cache { out: &out, thumbnails: true }), args.draw.then_some(&out));
     let wanted = Wanted { board: known.board, needed: 1, mosaic: args.bayer, cache, overlays };
-    let corners = find_corners(&args.poses, &wanted)?;
+    let pairing = source.pairs(&out)?;
+    progress::note(&pairing.taken);
+    let corners = find_corners(&pairing, &wanted)?;
     corners.notes.iter().for_each(progress::note);
     known.rig.check_size(&corners)?;
     let series = series::measure(&known, seen(poses, &corners));
     let file = MeasureFile::new(&series, &corners, &known);
     say(&series, &file);
-    let (distances, files) = (extras::distances(&series)?, pairs::pair_files(&args.poses)?.pairs);
+    let distances = extras::distances(&series)?;
     let (thumbnails, json) = rayon::join(
-        || extras::thumbnails(&series, &corners, &files, &wanted),
+        || extras::thumbnails(&series, &corners, &pairing.pairs, &wanted),
         || {
             out.write("measurements.csv", measure::to_csv(&series.poses).as_bytes())?;
             out.write_json("measure.json", &file)
@@ -70,6 +73,15 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     end(&series, &known)?;
     let stdout = if args.output.json { json } else { report::measure::summary(&file, &out) };
     Ok(Outcome { stdout, status: Status::Done })
+}
+
+/// Where the poses are: in the folder of the pictures; of two folders in the one that holds both, else in one of them.
+fn list_of_poses(source: &Source<'_>) -> Utf8PathBuf {
+    let both = source.right.and_then(|right| source.images.ancestors().find(|above| right.starts_with(above)));
+    let places = both.into_iter().chain(source.places());
+    let mut lists = places.map(|place| place.join("poses.csv"));
+    let first = both.unwrap_or(source.images).join("poses.csv");
+    lists.find(|list| list.is_file()).unwrap_or(first)
 }
 
 /// The rig, the target and what is known of both.

@@ -13,7 +13,8 @@ use camino::Utf8Path;
 use rayon::prelude::*;
 
 use super::super::Result;
-use crate::imaging::input::pairs::{self, PairFiles};
+use crate::files::OutDir;
+use crate::imaging::input::pairs::{PairFiles, Source};
 use crate::imaging::{PairCorners, Wanted, find};
 use crate::measurements::RobotPose;
 use crate::progress;
@@ -43,17 +44,23 @@ struct Arrival {
 }
 
 /// Waits for the pictures of all poses, or for Ctrl-C.
-pub(super) fn wait(folder: &Utf8Path, poses: &[RobotPose], known: &Knowledge, wanted: &Wanted<'_>) -> Result<()> {
+pub(super) fn wait(
+    source: &Source<'_>,
+    out: &OutDir,
+    poses: &[RobotPose],
+    known: &Knowledge,
+    wanted: &Wanted<'_>,
+) -> Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     if signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&stop)).is_err() {
         progress::warn("Ctrl-C ends the program without results here: it could not be caught");
     }
-    progress::note(format!("waiting for the pictures of {} poses in {folder}; Ctrl-C ends", poses.len()));
+    progress::note(format!("waiting for the pictures of {} poses in {}; Ctrl-C ends", poses.len(), source.images));
     let mut arrivals: BTreeMap<&str, Arrival> =
         poses.iter().map(|pose| (pose.pose.as_str(), Arrival::default())).collect();
     let mut refused = BTreeSet::new();
     while !stop.load(Ordering::SeqCst) {
-        if look(folder, &mut arrivals, wanted) > 0 {
+        if look(source, out, &mut arrivals, wanted) > 0 {
             judge(poses, &arrivals, known, &mut refused);
         }
         if arrivals.values().all(|a| a.found.is_some()) {
@@ -68,9 +75,9 @@ pub(super) fn wait(folder: &Utf8Path, poses: &[RobotPose], known: &Knowledge, wa
 }
 
 /// Looks at all pairs that have arrived since the last time; how many were found anew.
-fn look(folder: &Utf8Path, arrivals: &mut BTreeMap<&str, Arrival>, wanted: &Wanted<'_>) -> usize {
+fn look(source: &Source<'_>, out: &OutDir, arrivals: &mut BTreeMap<&str, Arrival>, wanted: &Wanted<'_>) -> usize {
     // A folder that is still empty, or in which only one side has arrived, is no fault here.
-    let Ok(pairing) = pairs::pair_files(folder) else { return 0 };
+    let Ok(pairing) = source.pairs(out) else { return 0 };
     let mut ready: Vec<(PairFiles, &mut Arrival)> = Vec::new();
     let mut files: BTreeMap<String, PairFiles> = pairing.pairs.into_iter().map(|f| (f.pair.clone(), f)).collect();
     for (pose, arrival) in arrivals.iter_mut() {

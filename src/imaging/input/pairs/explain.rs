@@ -1,0 +1,278 @@
+//! What is said of a folder that was read, or could not be: what was found, and the call that would do.
+
+use std::fmt;
+
+use camino::{Utf8Path, Utf8PathBuf};
+
+use super::listing::Folder;
+use super::matching::PairBy;
+use super::names::{Open, Reach};
+use super::readings::{Reading, Told};
+use super::{Pairing, Source};
+use crate::imaging::{Error, Side, image};
+
+/// Folders, and readings, that a message shows at most.
+const MOST_SHOWN: usize = 8;
+
+/// `1 picture`, `2 pictures`.
+pub fn count(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
+/// A command to type.
+pub struct Call<'a> {
+    command: &'a str,
+    places: Vec<&'a Utf8Path>,
+    flag: &'a str,
+}
+
+impl<'a> Call<'a> {
+    fn new(source: &Source<'a>, places: Vec<&'a Utf8Path>, flag: &'a str) -> Call<'a> {
+        Call { command: source.command, places, flag }
+    }
+}
+
+impl fmt::Display for Call<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "`stereocal {}", self.command)?;
+        for place in &self.places {
+            let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
+            if place.as_str().chars().all(plain) { write!(f, " {place}")? } else { write!(f, " '{place}'")? }
+        }
+        if self.flag.is_empty() { write!(f, "`") } else { write!(f, " {}`", self.flag) }
+    }
+}
+
+/// What was taken: `31 pairs by number: left stereoLeft/imageL*.png, right stereoRight/imageR*.png`.
+pub fn taken(reading: &Reading, top: &Utf8Path) -> String {
+    // Two folders that were named are said as they were named.
+    let top = if reading.told == Told::Given { Utf8Path::new("") } else { top };
+    let files = |side: usize| {
+        let paired = reading.matched.pairs.iter().map(|pair| if side == 0 { &pair.left } else { &pair.right });
+        pattern(&paired.map(|path| below(path, top)).collect::<Vec<_>>())
+    };
+    let unsaid = match reading.told {
+        Told::Given | Told::Words | Told::Letters if names_disagree(reading) => {
+            "; the names of the pictures say it the other way round"
+        }
+        Told::Given | Told::Words | Told::Letters => "",
+        Told::Alike | Told::Two => "; no word tells left from right: the first by name is left",
+    };
+    format!(
+        "{} by {}: left {}, right {}{unsaid}",
+        count(reading.count(), "pair"),
+        reading.matched.by.word(),
+        files(0),
+        files(1)
+    )
+}
+
+/// Whether the left pictures are all called right ones, and the right pictures left ones.
+fn names_disagree(reading: &Reading) -> bool {
+    let all = |side: Side, paths: &[Utf8PathBuf]| {
+        let told = |path: &Utf8PathBuf| Open::new(path.file_stem().unwrap_or_default(), Reach::Words).side();
+        paths.iter().all(|path| told(path) == Some(side.other()))
+    };
+    Side::BOTH.into_iter().all(|side| all(side, &reading.sides[side as usize]))
+}
+
+fn below<'a>(path: &'a Utf8Path, top: &Utf8Path) -> &'a str {
+    path.strip_prefix(top).unwrap_or(path).as_str()
+}
+
+/// What names have in common, with a star in place of the rest; numbers are not cut.
+fn pattern(names: &[&str]) -> String {
+    let (Some(first), true) = (names.first(), names.len() > 1) else { return names.concat() };
+    let digit = |c: char| c.is_ascii_digit();
+    let start = &first[..names.iter().map(|name| common(first, name)).min().unwrap_or(0)];
+    let start = start.trim_end_matches(digit);
+    let backward = |name: &&str| name[start.len()..].chars().rev().collect::<String>();
+    let reversed: Vec<String> = names.iter().map(backward).collect();
+    let end = &reversed[0][..reversed.iter().map(|name| common(&reversed[0], name)).min().unwrap_or(0)];
+    let end: String = end.trim_end_matches(digit).chars().rev().collect();
+    let end = if end.contains('.') { end.as_str() } else { "" };
+    format!("{start}*{end}")
+}
+
+/// How many bytes two names have in common at their start.
+fn common(a: &str, b: &str) -> usize {
+    let differing = a.char_indices().zip(b.chars()).find(|((_, x), y)| x != y);
+    differing.map_or(a.len().min(b.len()), |((at, _), _)| at)
+}
+
+/// Folders with pictures that were not taken.
+pub fn not_taken(reading: &Reading, folders: &[Folder]) -> Option<String> {
+    let others = folders.iter().filter(|folder| !folder.pictures.is_empty() && !reading.places.contains(&folder.path));
+    let shown: Vec<String> = others.map(|f| format!("{} ({})", name(f), count(f.pictures.len(), "picture"))).collect();
+    let more = if shown.len() > MOST_SHOWN { ", ..." } else { "" };
+    (!shown.is_empty()).then(|| format!("not taken: {}{more}", shown[..shown.len().min(MOST_SHOWN)].join(", ")))
+}
+
+fn name(folder: &Folder) -> String {
+    if folder.below.is_empty() { "./".to_owned() } else { format!("{}/", folder.below) }
+}
+
+/// The folders, how many pictures each holds, and two of their names.
+fn found(folders: &[Folder]) -> String {
+    let holding: Vec<&Folder> = folders.iter().filter(|folder| !folder.pictures.is_empty()).collect();
+    let mut text = String::new();
+    for folder in holding.iter().take(MOST_SHOWN) {
+        let names: Vec<&str> = folder.pictures.iter().take(2).filter_map(|p| p.file_name()).collect();
+        let more = if folder.pictures.len() > names.len() { ", ..." } else { "" };
+        let pictures = count(folder.pictures.len(), "picture");
+        text.push_str(&format!("\n  {}: {pictures} ({}{more})", name(folder), names.join(", ")));
+    }
+    if holding.len() > MOST_SHOWN {
+        text.push_str(&format!("\n  and {} more folders with pictures", holding.len() - MOST_SHOWN));
+    }
+    text
+}
+
+/// Several readings are as good.
+pub fn several(source: &Source<'_>, readings: &[Reading]) -> Error {
+    let mut statement = format!("these pictures can be read in {} ways", readings.len());
+    let mut calls = Vec::new();
+    for reading in readings.iter().take(MOST_SHOWN) {
+        statement.push_str(&format!("\n  {}", taken(reading, source.images)));
+        let places: Vec<&Utf8Path> = reading.places.iter().map(Utf8PathBuf::as_path).collect();
+        if places != [source.images] {
+            calls.push(Call::new(source, places, "").to_string());
+        }
+    }
+    if readings.len() > MOST_SHOWN {
+        statement.push_str(&format!("\n  and {} more", readings.len() - MOST_SHOWN));
+    }
+    if calls.len() < readings.len().min(MOST_SHOWN) {
+        calls.push(format!("move each camera's pictures into a folder of its own: {}", by_hand(source)));
+    }
+    Error::Unpaired { path: source.images.to_owned(), statement, hint: calls.join(", or ") }
+}
+
+fn by_hand(source: &Source<'_>) -> String {
+    format!("`stereocal {} LEFT RIGHT`", source.command)
+}
+
+/// No reading finds a pair. `readings` are those that were tried.
+pub fn none(source: &Source<'_>, folders: &[Folder], readings: &[Reading]) -> Error {
+    let holding: Vec<&Folder> = folders.iter().filter(|folder| !folder.pictures.is_empty()).collect();
+    let pictures: usize = holding.iter().map(|folder| folder.pictures.len()).sum();
+    let best = readings.iter().min_by_key(|r| (r.told, r.depth));
+    let (statement, hint) = match best {
+        _ if pictures == 0 => ("there are no pictures here (PNG, TIFF, BMP, JPEG, PGM)".to_owned(), by_hand(source)),
+        Some(reading) => unmatched(source, reading),
+        None => match one_side(folders) {
+            Some((have, lacks)) => (
+                format!("there is {have}/ but no {lacks}/"),
+                match left_first(&holding).as_slice() {
+                    [a, b] => Call::new(source, vec![&a.path, &b.path], "").to_string(),
+                    _ => by_hand(source),
+                },
+            ),
+            None => untold(source, &holding, pictures),
+        },
+    };
+    let statement = statement + &found(folders);
+    Error::Unpaired { path: source.images.to_owned(), statement, hint }
+}
+
+/// The sides are told, but nothing says which pictures belong together.
+fn unmatched(source: &Source<'_>, reading: &Reading) -> (String, String) {
+    let [left, right] = [&reading.sides[0], &reading.sides[1]].map(Vec::len);
+    if source.by == Some(PairBy::Order) {
+        let statement =
+            format!("{} and {right} right ones cannot be paired in their order", count(left, "left picture"));
+        return (statement, "`--pair-by order` needs as many left pictures as right ones".to_owned());
+    }
+    let statement = format!(
+        "no pair found: {} have no partner of the same name or number on the other side",
+        count(left + right, "picture")
+    );
+    let hint = if left == right {
+        let places = std::iter::once(source.images).chain(source.right).collect();
+        format!("{} pairs them in the order of their names", Call::new(source, places, "--pair-by order"))
+    } else {
+        format!(
+            "name partners alike; {left} left pictures and {right} right ones cannot be paired in their order either"
+        )
+    };
+    (statement, hint)
+}
+
+/// A folder called left without one called right, or the other way round.
+fn one_side(folders: &[Folder]) -> Option<(&'static str, &'static str)> {
+    let top = folders.first()?;
+    let is = |word: &str| {
+        top.folders.iter().any(|folder| folder.file_name().is_some_and(|name| name.eq_ignore_ascii_case(word)))
+    };
+    match (is("left"), is("right")) {
+        (true, false) => Some(("left", "right")),
+        (false, true) => Some(("right", "left")),
+        _ => None,
+    }
+}
+
+/// The folders below the one that was named, those with a word for left first and for right last.
+fn left_first<'a>(holding: &[&'a Folder]) -> Vec<&'a Folder> {
+    let mut below: Vec<&Folder> = holding.iter().copied().filter(|folder| folder.depth > 0).collect();
+    below.sort_by_key(|folder| match Open::new(&folder.below, Reach::Words).side() {
+        Some(Side::Left) => 0,
+        None => 1,
+        Some(Side::Right) => 2,
+    });
+    below
+}
+
+/// One folder was named twice.
+pub fn same(source: &Source<'_>) -> Error {
+    Error::Unpaired {
+        path: source.images.to_owned(),
+        statement: "both sides are the same folder".to_owned(),
+        hint: format!("{} takes a folder of each camera's pictures", by_hand(source)),
+    }
+}
+
+/// Nothing tells left from right.
+fn untold(source: &Source<'_>, holding: &[&Folder], pictures: usize) -> (String, String) {
+    let wide = holding.iter().find(|folder| folder.pictures.first().is_some_and(|path| is_wide(path)));
+    let halves = wide.map(|folder| {
+        let call = Call::new(source, vec![&folder.path], "--side-by-side");
+        format!("if each picture holds both halves: {call}")
+    });
+    let below = left_first(holding);
+    let (statement, hint) = match below.as_slice() {
+        [first, second, ..] => (
+            format!("which of these {} are left and right is not told", count(below.len(), "folder")),
+            format!("name two: {}", Call::new(source, vec![&first.path, &second.path], "")),
+        ),
+        _ => (
+            format!("no pair found: the names of {} tell neither left nor right", count(pictures, "picture")),
+            format!("{} takes a folder of each camera's pictures", by_hand(source)),
+        ),
+    };
+    (statement, halves.map_or(hint.clone(), |halves| format!("{halves}; else {hint}")))
+}
+
+/// Whether a picture is as wide as two beside each other, none of which is taller than wide.
+fn is_wide(path: &Utf8Path) -> bool {
+    image::header(path).is_ok_and(|header| header.width >= 2 * header.height)
+}
+
+impl Pairing {
+    /// What was left out, in a line; `None` where nothing was.
+    pub fn left_out(&self) -> Option<String> {
+        let mut parts = Vec::new();
+        if !self.single.is_empty() {
+            let names: Vec<&str> = self.single.iter().take(3).filter_map(|p| p.file_name()).collect();
+            let more = if self.single.len() > names.len() { ", ..." } else { "" };
+            let pictures = count(self.single.len(), "picture");
+            parts.push(format!("{pictures} without a partner ({}{more})", names.join(", ")));
+        }
+        if self.sideless > 0 {
+            parts.push(format!("{} whose names tell neither left nor right", count(self.sideless, "picture")));
+        }
+        if self.other > 0 {
+            parts.push(count(self.other, "other file"));
+        }
+        (!parts.is_empty()).then(|| format!("left out: {}", parts.join("; ")))
+    }
+}

@@ -1,0 +1,389 @@
+//! Folders of stereo pictures as people publish them: the form of each, that is the names alone, with empty files.
+//!
+//! `{1,2}` stands for each of a list, `{1..9}` for each number of a range. Cut short where a form goes on in the same way.
+
+use camino::Utf8Path;
+
+use super::tests::{folder, read};
+use super::{PairBy, Pairing};
+
+/// What comes of a folder.
+enum Outcome {
+    /// So many pairs, the name of the first and of the last, and what is said of the left pictures.
+    Pairs(usize, [&'static str; 2], &'static str),
+    /// So many pairs with `--pair-by order`, after a refusal that names it.
+    InOrder(usize),
+    /// A refusal that says this.
+    Refused(&'static [&'static str]),
+}
+
+use Outcome::{InOrder, Pairs, Refused};
+
+/// Repository and folder, the files, and what comes of it.
+type Layout = (&'static str, &'static [&'static str], Outcome);
+
+const LAYOUTS: [Layout; 47] = [
+    // Two folders called left and right.
+    (
+        "thiyagu1/Handy_Calib_Images: .",
+        &["{Left,Right}/{1..36}.jpg", "README.md"],
+        Pairs(36, ["1", "36"], "Left/*.jpg"),
+    ),
+    (
+        "Roshnee/StereoCalibration: .",
+        &["left/left0{1..9}.jpg", "right/right0{1..9}.jpg", "disparity.jpg"],
+        Pairs(9, ["01", "09"], "left/left*.jpg"),
+    ),
+    (
+        "WaitingQin/My-Binocular-Stereo-Vision: .",
+        &["left/left_{0..15}.jpg", "right/right_{0..15}.jpg"],
+        Pairs(16, ["0", "15"], "left/left_*.jpg"),
+    ),
+    (
+        "shubhamwagh/stereo-calib: dataset",
+        &[
+            "left/left_p{0_0,0_1,0_2,1_3,10_30,10_31}.png",
+            "right/right_p{0_0,0_1,0_2,1_3,10_30,10_31}.png",
+            "board.pdf",
+            "target_info.txt",
+        ],
+        Pairs(6, ["p0_0", "p10_31"], "left/left_p*.png"),
+    ),
+    (
+        "SharkPeppero/stereo_calibration: data",
+        &[
+            "{left,right}/{0..23}.png",
+            "20250510_180342/left/left_{0..23}.png",
+            "20250510_180342/right/right_{0..23}.png",
+        ],
+        Pairs(24, ["0", "23"], "left/*.png"),
+    ),
+    (
+        "SharkPeppero/stereo_calibration: data/20250510_180342",
+        &["left/left_{0..23}.png", "right/right_{0..23}.png"],
+        Pairs(24, ["0", "23"], "left/left_*.png"),
+    ),
+    (
+        "mengxz0203/RCS_3D: images",
+        &[
+            "left/left{01,05,06,08,09,12,15}.jpg",
+            "right/right{02,07,09,11,12,15}.jpg",
+            "test/left/left{1..15}.jpg",
+            "test/right/right{1..15}.jpg",
+        ],
+        Pairs(3, ["09", "15"], "left/left*.jpg"),
+    ),
+    (
+        "janicema0702/polyu-research: calib",
+        &["left/{1..8}.jpg", "right/{1,2,4,5,6,7,8}.jpg"],
+        Pairs(7, ["1", "8"], "left/*.jpg"),
+    ),
+    (
+        "yangpan011/Stereo_Calibration: StereoVision/SourceImage",
+        &["{left,right}/{2,3,4,6,7,8,9,10,11}.bmp"],
+        Pairs(9, ["2", "11"], "left/*.bmp"),
+    ),
+    (
+        "HONGZHANG-WANG/Stereo_Calibration_and_estimated_distance: input/calib",
+        &["{left,right}/{1..19}.jpg"],
+        Pairs(19, ["1", "19"], "left/*.jpg"),
+    ),
+    // The same one level deeper.
+    ("janicema0702/polyu-research: .", &["calib/{left,right}/{1..8}.jpg"], Pairs(8, ["1", "8"], "calib/left/*.jpg")),
+    ("qdm8t2/capstone-autonomous-car: .", &["data/{left,right}/{1..8}.png"], Pairs(8, ["1", "8"], "data/left/*.png")),
+    // Other names with a word or letter for the side.
+    (
+        "minhDuc107886/stereo_Calibration: stereo*",
+        &["stereoLeft/imageL{0..6}.png", "stereoRight/imageR{0..6}.png"],
+        Pairs(7, ["image0", "image6"], "stereoLeft/imageL*.png"),
+    ),
+    (
+        "andrea-abascal/stereo_vision_AIX: images",
+        &[
+            "original/image{0..30}.png",
+            "stereoLeft/imageL{0,2,3,9,12,14,18}.png",
+            "stereoRight/imageR{0,1,2,3,7,12,14,18}.png",
+        ],
+        Pairs(6, ["image0", "image18"], "stereoLeft/imageL*.png"),
+    ),
+    (
+        "Spenc3rB/Stereo2Depth: .",
+        &["images/stereoLeft/imageL{0..9}.png", "images/stereoRight/imageR{0..9}.png"],
+        Pairs(10, ["image0", "image9"], "images/stereoLeft/imageL*.png"),
+    ),
+    (
+        "gxanesh/stereo_camera_calibration_v1: data/images",
+        &["stereoL/img{1..30}.png", "stereoR/img{1..30}.png", "delete_stereo_images.py"],
+        Pairs(30, ["img1", "img30"], "stereoL/img*.png"),
+    ),
+    (
+        "Carzuiliam/calibrated-stereo-vision-system: calibration",
+        &["{l,r}Data/{1..30}.jpg"],
+        Pairs(30, ["1", "30"], "lData/*.jpg"),
+    ),
+    (
+        "vccheng2001/Stereo-Camera-Calib-OpenCV: .",
+        &["capture_{left,right}/{0,10,20,90,100,110}.jpg"],
+        Pairs(6, ["0", "110"], "capture_left/*.jpg"),
+    ),
+    (
+        "KehanBack/StereoCalibDemo: data/test_data",
+        &["20190903_01/{L,R}/{1..26}.png", "20190903_01/{L,R}/imagePath.txt"],
+        Pairs(26, ["1", "26"], "20190903_01/L/*.png"),
+    ),
+    (
+        "KehanBack/StereoCalibDemo: data/undistortImg",
+        &["{L,R}/balance_zero{1..26}.png"],
+        Pairs(26, ["balance_zero1", "balance_zero26"], "L/balance_zero*.png"),
+    ),
+    (
+        "HONGZHANG-WANG/Stereo_Calibration_and_estimated_distance: input/underwear_trepang",
+        &["trepang_left/trepang left_{1..8}.jpg", "trepang_right/trepang right_{1..8}.jpg"],
+        Pairs(8, ["trepang 1", "trepang 8"], "trepang_left/trepang left_*.jpg"),
+    ),
+    // No word for the side.
+    (
+        "vic-w/stereo_calibration_and_triangulation: .",
+        &["cam1/b{00,01,02,09,10,14}.jpg", "cam2/a{00,01,02,09,10,14}.jpg", "matlab/calib.m"],
+        Pairs(6, ["00", "14"], "cam1/b*.jpg"),
+    ),
+    (
+        "Xaizzz/StereoCalibration: calibr",
+        &[
+            "{cam1,cam2}/0204_1a/{0..13}.png",
+            "m{1..10}.png",
+            "loading.png",
+            "images (2).jpg",
+            "calibration_result.json",
+        ],
+        Pairs(14, ["0", "13"], "cam1/0204_1a/*.png"),
+    ),
+    // One folder, names that say the side.
+    (
+        "sourishg/stereo-calibration: calib_imgs/1",
+        &["left{1..20}.jpg", "right{1..19}.jpg"],
+        Pairs(19, ["1", "19"], "left*.jpg"),
+    ),
+    ("QLHua001/StereoCalib: example/calib_imgs", &["{left,right}{0..6}.jpg"], Pairs(7, ["0", "6"], "left*.jpg")),
+    ("realizator/stereopi-fisheye-robot: pairs", &["{left,right}_{01..30}.png"], Pairs(30, ["01", "30"], "left_*.png")),
+    (
+        "aryanvij02/StereoVision: .",
+        &["images/image_{01..32}.png", "pairs/{left,right}_{01..11}.png", "pairs/{left,right}_{13,15}.png"],
+        Pairs(13, ["01", "15"], "pairs/left_*.png"),
+    ),
+    ("rubenmeester/stereobm320: .", &["{0..54}_{left,right}.png"], Pairs(55, ["0", "54"], "*_left.png")),
+    (
+        "shanheshejitu/Object-pose-estimation-based-on-two-cameras: .",
+        &["{1,2}{L,R}.jpg"],
+        Pairs(2, ["1", "2"], "*L.jpg"),
+    ),
+    ("ybaik/stereo_calibration: bin", &["{l,r}1.jpg", "{l,r}1.txt"], Pairs(1, ["1", "1"], "l1.jpg")),
+    ("minhDuc107886/stereo_Calibration: img_detect", &["img{L,R}{0,1}.png"], Pairs(2, ["img0", "img1"], "imgL*.png")),
+    (
+        "BakaAayush/Stereo-calibration: Depth sensing/calibration_images",
+        &["{left,right}_{001772455357526,001772456606777,001772457243382}.png", "left_001772846839725 - Copy.png"],
+        Pairs(3, ["001772455357526", "001772457243382"], "left_*.png"),
+    ),
+    (
+        "jerry8137/stereo_calibration_check: data/images",
+        &[
+            "chess_{left,right}_{distorted,rect}.png",
+            "{rect,sync}_{left,right}.png",
+            "thermal_{left,right}_{recalibrated,rectified}.png",
+        ],
+        Pairs(6, ["chess_distorted", "thermal_rectified"], "*.png"),
+    ),
+    (
+        "omoterikuto/stereo-vision-calibration: input",
+        &["FAST_{left,right}.jpg", "left1_gray.png", "right1_gray.png"],
+        Pairs(2, ["1_gray", "FAST"], "*"),
+    ),
+    (
+        "omoterikuto/stereo-vision-calibration: calibration-result",
+        &[
+            "{000000_10_gray,GPU_corrected_image,calibrated_image,corrected_image}_{L,R}.png",
+            "d{y,z}_corrected.png",
+            "r{x,y,z}_corrected.png",
+        ],
+        Pairs(4, ["000000_10_gray", "corrected_image"], "*_L.png"),
+    ),
+    (
+        "xmba15/stereo_calibration: data",
+        &["sample_{left,right}.png", "stereo_param_config.json"],
+        Pairs(1, ["sample", "sample"], "sample_left.png"),
+    ),
+    (
+        "yangpan011/Stereo_Calibration: StereoVision/SaveImage",
+        &["{left,right}{2,3,4,6,7,8,9,10,11}.bmp"],
+        Pairs(9, ["2", "11"], "left*.bmp"),
+    ),
+    // One folder, two cameras by number.
+    (
+        "TemugeB/python_stereo_camera_calibrate: frames_pair",
+        &["camera{0,1}_{0..3}.png"],
+        Pairs(4, ["camera_0", "camera_3"], "camera0_*.png"),
+    ),
+    (
+        "sebastiengilbert73/tutorial_calibrate_stereo_vision: calibration_images",
+        &["camera_{1,2}_{60,70,80,90,100,110,120}cm.png", "calibration_pattern_xy.csv"],
+        Pairs(7, ["camera_60cm", "camera_120cm"], "camera_1_*cm.png"),
+    ),
+    // More than one reading.
+    (
+        "minhDuc107886/stereo_Calibration: .",
+        &["stereoLeft/imageL{0..6}.png", "stereoRight/imageR{0..6}.png", "img_detect/img{L,R}{0,1}.png"],
+        Refused(&["2 ways", "camera-check IMAGES/img_detect`", "camera-check IMAGES/stereoLeft IMAGES/stereoRight`"]),
+    ),
+    (
+        "sourishg/stereo-calibration: calib_imgs",
+        &["{1,2}/left{1..20}.jpg", "{1,2}/right{1..19}.jpg"],
+        Refused(&["2 ways", "camera-check IMAGES/1`", "camera-check IMAGES/2`"]),
+    ),
+    (
+        "QLHua001/StereoCalib: example",
+        &["calib_imgs/{left,right}{0..6}.jpg", "calib_imgs_{2,3}/{left,right}{0..26}.jpg"],
+        Refused(&["3 ways", "camera-check IMAGES/calib_imgs_3`"]),
+    ),
+    (
+        "TemugeB/python_stereo_camera_calibrate: .",
+        &["frames/camera{0,1}_{0..3}.png", "frames_pair/camera{0,1}_{0..3}.png"],
+        Refused(&["2 ways", "camera-check IMAGES/frames_pair`"]),
+    ),
+    (
+        "HONGZHANG-WANG/Stereo_Calibration_and_estimated_distance: input",
+        &[
+            "calib/{left,right}/{1..19}.jpg",
+            "underwear_trepang/trepang_left/trepang left_{1..8}.jpg",
+            "underwear_trepang/trepang_right/trepang right_{1..8}.jpg",
+        ],
+        Refused(&["2 ways", "camera-check IMAGES/calib/left IMAGES/calib/right`"]),
+    ),
+    // Nothing that says which pictures belong together.
+    (
+        "SIDDHARTH-S-001/Stereo_Vision_Tutorial: .",
+        &[
+            "images_left/image_{83342982396100,83343911497400,83350469575000}.png",
+            "images_right/image_{83218230747000,83224084311800}.png",
+        ],
+        Refused(&["5 pictures have no partner", "images_left/: 3 pictures", "3 left pictures and 2 right ones"]),
+    ),
+    (
+        "tjresearch/research-aneesh_sai: calib_images",
+        &["left_{0,5,8,9,10,16}.png", "right_{2,3,7,20,27}.png"],
+        Refused(&["11 pictures have no partner", "./: 11 pictures"]),
+    ),
+    (
+        "sebastiengilbert73/tutorial_calibrate_stereo_vision: red_square_images, one folder a camera",
+        &[
+            "camera_1/2023-01-02_{165050.931152,165050.993401,165051.063160}.png",
+            "camera_2/2023-01-02_{165050.940113,165051.001270,165051.070007}.png",
+        ],
+        InOrder(3),
+    ),
+];
+
+/// All names that a pattern stands for.
+fn expanded(pattern: &str) -> Vec<String> {
+    let Some((before, rest)) = pattern.split_once('{') else { return vec![pattern.to_owned()] };
+    let (inside, after) = rest.split_once('}').unwrap();
+    let choices: Vec<String> = match inside.split_once("..") {
+        Some((first, last)) => {
+            let (from, to): (usize, usize) = (first.parse().unwrap(), last.parse().unwrap());
+            let width = if first.starts_with('0') && first.len() > 1 { first.len() } else { 1 };
+            (from..=to).map(|n| format!("{n:0width$}")).collect()
+        }
+        None => inside.split(',').map(str::to_owned).collect(),
+    };
+    let rest = expanded(after);
+    choices.iter().flat_map(|choice| rest.iter().map(move |rest| format!("{before}{choice}{rest}"))).collect()
+}
+
+/// The folder read, or the refusal with the folder's own path taken out.
+fn outcome(path: &Utf8Path, by: Option<PairBy>) -> Result<Pairing, String> {
+    read(path, by).map_err(|e| crate::diagnostic::report(&e).replace(path.as_str(), "IMAGES"))
+}
+
+#[test]
+fn folders_as_people_have_them() {
+    for (owner, files, expected) in LAYOUTS {
+        let names: Vec<String> = files.iter().flat_map(|pattern| expanded(pattern)).collect();
+        let (_keep, path) = folder(&names);
+        match (expected, outcome(&path, None)) {
+            (Pairs(count, ends, left), Ok(found)) => {
+                let (first, last) = (&found.pairs[0].pair, &found.pairs[found.pairs.len() - 1].pair);
+                assert_eq!((found.pairs.len(), [first.as_str(), last.as_str()]), (count, ends), "{owner}");
+                assert!(found.taken.contains(&format!(": left {left}, right ")), "{owner}: {}", found.taken);
+            }
+            (InOrder(count), Err(said)) => {
+                assert!(said.contains("--pair-by order`"), "{owner}: {said}");
+                assert_eq!(outcome(&path, Some(PairBy::Order)).unwrap().pairs.len(), count, "{owner}");
+            }
+            (Refused(words), Err(said)) => {
+                assert!(words.iter().all(|word| said.contains(word)), "{owner}: {said}");
+            }
+            (_, Ok(found)) => panic!("{owner} was read: {}", found.taken),
+            (_, Err(said)) => panic!("{owner} was refused: {said}"),
+        }
+    }
+}
+
+/// Other forms whose names tell the sides, and how many pairs each holds.
+const TOLD: [(&str, usize); 24] = [
+    ("left_images/left_{0..3}.jpg right_images/right_{0..3}.jpg", 4),
+    ("videoLeft_000{0..3}.jpg videoRight_000{0..3}.jpg", 4),
+    ("DJI_STE_{left,right}_{1073..1076}.jpg", 4),
+    ("left/l{1..4}.jpg right/r{1..4}.jpg", 4),
+    ("left/Im_L_{1..4}.png right/Im_R_{1..4}.png", 4),
+    ("LEFT/opencv_Left_frame_{0..3}.png RIGHT/opencv_Right_frame_{0..3}.png", 4),
+    ("calib_left/left{1..4}.tif calib_right/right{1..4}.tif", 4),
+    ("{left,right}_cam/{1..4}.png", 4),
+    ("{left,right}camera/{1..4}.png", 4),
+    ("cam{left,right}/{1..4}.png", 4),
+    ("{左,右}/{1..4}.png", 4),
+    ("{1..4}_{左,右}.png", 4),
+    ("左相机/图{1..4}.png 右相机/图{1..4}.png", 4),
+    ("{links,rechts}/{1..4}.png", 4),
+    ("{gauche,droite}{1..4}.png", 4),
+    ("img{l,r}{01..04}.png", 4),
+    ("left/{1..4}.png right/{1..4}.jpg", 4),
+    ("left/0{1..4}.png right/{1..4}.png", 4),
+    ("left/calib/{1..4}.png right/calib/{1..4}.png", 4),
+    ("cam1/left_{1..4}.png cam2/right_{1..4}.png", 4),
+    ("right_angle_{left,right}_{1..4}.png", 4),
+    ("stereo_{L,R}_2021-03-04_10{10,11,12}.png", 3),
+    ("left/WIN_20210304_11_22_{10,11}_Pro.jpg right/WIN_20210304_11_22_{10,11}_Pro.jpg", 2),
+    ("rgb/{1..4}_left.png rgb/{1..4}_right.png", 4),
+];
+
+/// Forms in which no word does: the first by name is left.
+const UNTOLD: [(&str, usize); 11] = [
+    ("image{0,1}/{0..3}.png", 4),
+    ("image_{0,1}/00000{0..3}.png", 4),
+    ("cam{0,1}/data/{1403715273262142976,1403715273312143104}.png", 2),
+    ("{0,1}/{1..4}.png", 4),
+    ("{A,B}/{1..4}.png", 4),
+    ("{A,B}0{1..4}.png", 4),
+    ("cam_{a,b}_{1..4}.png", 4),
+    ("{master,slave}_{1..4}.png", 4),
+    ("a/{1..4}.png b/{1..4}.png", 4),
+    ("front_camera/{1..4}.png rear_camera/{1..4}.png", 4),
+    ("right_bench/cam1/{1..4}.png right_bench/cam2/{1..4}.png", 4),
+];
+
+#[test]
+fn other_forms() {
+    for (k, (files, count)) in TOLD.into_iter().chain(UNTOLD).enumerate() {
+        let names: Vec<String> = files.split(' ').flat_map(expanded).collect();
+        let (_keep, path) = folder(&names);
+        let found = outcome(&path, None).unwrap_or_else(|e| panic!("{files}: {e}"));
+        assert_eq!(found.pairs.len(), count, "{files}");
+        let untold = "; no word tells left from right: the first by name is left";
+        assert_eq!(found.taken.ends_with(untold), k >= TOLD.len(), "{files}: {}", found.taken);
+        let first = &found.pairs[0];
+        let [left, right] = [&first.left, &first.right].map(|p| p.strip_prefix(&path).unwrap().as_str().to_lowercase());
+        let says = |name: &str, words: [&str; 5]| words.iter().any(|word| name.contains(word));
+        let told = says(&left, ["left", "左", "links", "gauche", "l"])
+            && says(&right, ["right", "右", "rechts", "droite", "r"]);
+        assert!(if k < TOLD.len() { told } else { left < right }, "{files}: {}", found.taken);
+    }
+}

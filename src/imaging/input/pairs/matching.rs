@@ -1,0 +1,231 @@
+//! From the pictures of two sides to pairs: by equal names, by what is left without the word for the side, by number, or in their order.
+//!
+//! Out: pairs in natural order of their names, each with a name of its own, and the pictures without a partner. The first way that pairs
+//! most of the smaller side is taken, else the one that pairs most. Goes wrong: two pictures of a side that would be the same one of a pair.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use camino::{Utf8Path, Utf8PathBuf};
+
+use super::PairFiles;
+use super::names::{Open, Reach, SEPARATORS, natural_order, numbers};
+use crate::imaging::{Error, Result, Side};
+
+/// How pictures were paired, or are to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum PairBy {
+    /// By their names, a word for the side left away
+    Name,
+    /// By the number in their names
+    Number,
+    /// In the order of their names; as many left pictures as right ones
+    Order,
+}
+
+impl PairBy {
+    /// The word in messages.
+    pub fn word(self) -> &'static str {
+        match self {
+            PairBy::Name => "name",
+            PairBy::Number => "number",
+            PairBy::Order => "order",
+        }
+    }
+}
+
+/// Two sides paired.
+#[derive(Debug, Clone)]
+pub struct Matched {
+    /// How.
+    pub by: PairBy,
+    /// In natural order of their names.
+    pub pairs: Vec<PairFiles>,
+    /// Pictures without a partner.
+    pub single: Vec<Utf8PathBuf>,
+}
+
+/// Name of a pair whose files are called by nothing but their side.
+const NAMELESS: &str = "left-right";
+
+/// The ways of telling which pictures belong together, in the order they are tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    EqualNames,
+    OpenNames(Reach),
+    /// The numbers that are not the same throughout a side.
+    VaryingNumbers,
+    /// The last number of each name: taken only where it pairs most of a side, for the seconds of a time agree by chance.
+    LastNumber,
+}
+
+const WAYS: [Way; 5] = [
+    Way::EqualNames,
+    Way::OpenNames(Reach::Words),
+    Way::OpenNames(Reach::Letters),
+    Way::VaryingNumbers,
+    Way::LastNumber,
+];
+
+impl Way {
+    fn by(self) -> PairBy {
+        match self {
+            Way::EqualNames | Way::OpenNames(_) => PairBy::Name,
+            Way::VaryingNumbers | Way::LastNumber => PairBy::Number,
+        }
+    }
+
+    fn keys(self, stems: &[&str]) -> Vec<Option<String>> {
+        match self {
+            Way::EqualNames => stems.iter().map(|stem| Some((*stem).to_owned())).collect(),
+            Way::OpenNames(reach) => stems.iter().map(|stem| Some(Open::new(stem, reach).key)).collect(),
+            Way::VaryingNumbers => varying_numbers(stems),
+            Way::LastNumber => {
+                stems.iter().map(|stem| plain_numbers(stem).last().map(|number| (*number).to_owned())).collect()
+            }
+        }
+    }
+}
+
+/// Pairs left pictures with right ones. No pair at all is no error here, two pictures for one place are, where nothing else pairs them.
+pub fn pair(left: &[Utf8PathBuf], right: &[Utf8PathBuf], by: Option<PairBy>) -> Result<Matched> {
+    if by == Some(PairBy::Order) {
+        return Ok(in_order([left, right]));
+    }
+    let smaller = left.len().min(right.len());
+    let mut best = Matched { by: PairBy::Name, pairs: Vec::new(), single: Vec::new() };
+    let mut refused = None;
+    for way in WAYS.into_iter().filter(|way| by.is_none_or(|by| way.by() == by)) {
+        match by_key([left, right], way.by(), &|stems| way.keys(stems)) {
+            Ok(matched) => {
+                let most = 2 * matched.pairs.len() > smaller;
+                if matched.pairs.len() > best.pairs.len() && (most || way != Way::LastNumber) {
+                    best = matched;
+                }
+                if most {
+                    break;
+                }
+            }
+            Err(_) if way == Way::LastNumber => (),
+            Err(e) => refused = refused.or(Some(e)),
+        }
+    }
+    match refused {
+        Some(e) if best.pairs.is_empty() => Err(e),
+        _ => Ok(best),
+    }
+}
+
+fn stem(path: &Utf8Path) -> &str {
+    path.file_stem().unwrap_or_default()
+}
+
+/// Pairs by a key that each name has; `None` is a name without one.
+pub fn by_key(sides: [&[Utf8PathBuf]; 2], by: PairBy, key: &dyn Fn(&[&str]) -> Vec<Option<String>>) -> Result<Matched> {
+    let mut keyed: BTreeMap<(String, String), [Vec<&Utf8PathBuf>; 2]> = BTreeMap::new();
+    let mut matched = Matched { by, pairs: Vec::new(), single: Vec::new() };
+    for side in Side::BOTH {
+        let paths = sides[side as usize];
+        let stems: Vec<&str> = paths.iter().map(|p| stem(p)).collect();
+        for (path, key) in paths.iter().zip(key(&stems)) {
+            match key {
+                Some(key) => keyed.entry((shown(&key), key)).or_default()[side as usize].push(path),
+                None => matched.single.push(path.clone()),
+            }
+        }
+    }
+    for ((shown, key), [left, right]) in keyed {
+        match (left.as_slice(), right.as_slice()) {
+            ([left], [right]) => {
+                let pair = name(by, &key, left, right);
+                matched.pairs.push(PairFiles { pair, left: (*left).clone(), right: (*right).clone() });
+            }
+            ([], single) | (single, []) => matched.single.extend(single.iter().map(|path| (*path).clone())),
+            ([first, second, ..], _) | (_, [first, second, ..]) => {
+                return Err(Error::SameName { pair: shown, first: (*first).clone(), second: (*second).clone() });
+            }
+        }
+    }
+    Ok(finished(matched))
+}
+
+/// A key without the marks of words that were left open, for an order that a person expects.
+fn shown(key: &str) -> String {
+    key.replace('\0', "").trim_matches(SEPARATORS).to_owned()
+}
+
+/// What a pair is called: what a person recognises in both names.
+fn name(by: PairBy, key: &str, left: &Utf8Path, right: &Utf8Path) -> String {
+    let (left, right) = (stem(left), stem(right));
+    match by {
+        PairBy::Number => {
+            let written = [left, right].map(|stem| numbers(stem).into_iter().rfind(|number| plain(number) == key));
+            match written {
+                [Some(left), Some(right)] if left == right => left.to_owned(),
+                _ => key.to_owned(),
+            }
+        }
+        _ if left == right => left.to_owned(),
+        _ => {
+            let opened = Reach::ALL.map(|reach| [Open::new(left, reach), Open::new(right, reach)]);
+            let alike = opened.iter().find(|[a, b]| a.key == b.key);
+            alike.map_or_else(|| key.to_owned(), |[a, b]| a.without_side(left, b))
+        }
+    }
+}
+
+/// The numbers that are not the same in all names of a side, where all have as many.
+fn varying_numbers(stems: &[&str]) -> Vec<Option<String>> {
+    let all: Vec<Vec<&str>> = stems.iter().map(|stem| plain_numbers(stem)).collect();
+    let width = all.first().map_or(0, Vec::len);
+    if width == 0 || all.iter().any(|numbers| numbers.len() != width) {
+        return vec![None; stems.len()];
+    }
+    let varies = |column: &usize| all.iter().any(|numbers| numbers[*column] != all[0][*column]);
+    let mut columns: Vec<usize> = (0..width).filter(varies).collect();
+    if columns.is_empty() {
+        columns.push(width - 1);
+    }
+    all.iter().map(|numbers| Some(columns.iter().map(|c| numbers[*c]).collect::<Vec<_>>().join("_"))).collect()
+}
+
+fn plain_numbers(stem: &str) -> Vec<&str> {
+    numbers(stem).into_iter().map(plain).collect()
+}
+
+/// A number without zeros in front.
+fn plain(number: &str) -> &str {
+    let plain = number.trim_start_matches('0');
+    if plain.is_empty() { number.get(number.len().saturating_sub(1)..).unwrap_or_default() } else { plain }
+}
+
+fn in_order(sides: [&[Utf8PathBuf]; 2]) -> Matched {
+    let [left, right] = sides.map(|paths| {
+        let mut sorted = paths.to_vec();
+        sorted.sort_by(|a, b| natural_order(stem(a), stem(b)));
+        sorted
+    });
+    let pairs = if left.len() == right.len() {
+        let both = left.into_iter().zip(right);
+        both.map(|(left, right)| PairFiles { pair: stem(&left).to_owned(), left, right }).collect()
+    } else {
+        Vec::new()
+    };
+    Matched { by: PairBy::Order, pairs, single: Vec::new() }
+}
+
+/// Names that are their own, and the order of them.
+fn finished(mut matched: Matched) -> Matched {
+    for pair in &mut matched.pairs {
+        if pair.pair.is_empty() {
+            pair.pair = NAMELESS.to_owned();
+        }
+    }
+    let names: BTreeSet<&str> = matched.pairs.iter().map(|p| p.pair.as_str()).collect();
+    if names.len() < matched.pairs.len() {
+        for pair in &mut matched.pairs {
+            pair.pair = stem(&pair.left).to_owned();
+        }
+    }
+    matched.pairs.sort_by(|a, b| natural_order(&a.pair, &b.pair));
+    matched
+}
