@@ -46,6 +46,8 @@ pub struct Calibration {
     pub inflation: f64,
     /// What is expected of cameras and board before any picture.
     pub priors: Priors,
+    /// How many of the first or last pairs are in it although they contradict the others.
+    pub runs: usize,
     /// How the pairs scatter about the common rig; the covariance allows for more than the corners' noise lets expect.
     pub pair_scatter: PairScatter,
     /// Richer models whose additional terms are more than chance.
@@ -93,10 +95,16 @@ impl Calibration {
     }
 }
 
-/// Calibrates both cameras and the rig.
+/// Calibrates both cameras and the rig from the pairs that belong together.
 pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Error> {
+    calibrate_with(corners, options, false)
+}
+
+/// The same; with `runs`, the first or the last pairs of the series stay in where they contradict the others, so that a change of the rig
+/// can be found over the series.
+pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Result<Calibration, Error> {
     let candidates = Candidates::new(corners)?;
-    let Series { problem: start, discarded } = series::find(&candidates)?;
+    let Series { problem: start, discarded, runs } = series::find(&candidates, runs)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
     let lens_ladder::Choice { layout, near, priors, scores: lens_scores } =
         lens_ladder::choose(&start, &corners.board, options).map_err(|e| e.without(&skipped))?;
@@ -129,6 +137,7 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
         witnesses,
         inflation,
         priors,
+        runs,
         skipped,
         discarded: Discarded::new(&views, discarded),
         standing: Standing::default(),

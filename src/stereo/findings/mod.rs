@@ -13,12 +13,15 @@ pub mod standing;
 mod tests;
 
 use nalgebra::DVector;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::hypothesis::{Hypothesis, any_place};
-use crate::stereo::findings::series::{Change, Linear};
+use crate::stereo::findings::series::{Change, Line, Linear};
 use crate::stereo::pairs::{Cause, DiscardedPair};
 use crate::stereo::volume::lengths::VolumeLengths;
 
@@ -28,11 +31,15 @@ const FALSE_ALARM: f64 = 1e-3;
 /// Causes are told apart where the logarithm of one's likelihood is larger by this: 150 to 1.
 const TOLD_APART: f64 = 5.0;
 
-/// Fewest pairs on either side of a step: one pair or two that differ are no change of the rig.
-const FEWEST_EACH: usize = 3;
+/// Fewest pairs on either side of a step: one pair that differs is no change of the rig.
+const FEWEST_EACH: usize = 2;
+
+/// Fewest pairs whose order can be exchanged often enough, how often it is, and in how many of a hundred orders so large a change may be found.
+const PERMUTED_FROM: usize = 12;
+const PERMUTATIONS: usize = 400;
 
 /// Fewest pairs in which a change is looked for.
-const FEWEST: usize = 2 * FEWEST_EACH;
+const FEWEST: usize = 6;
 
 /// Over which pairs something happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -93,59 +100,92 @@ pub fn of_pairs(discarded: &[DiscardedPair]) -> Vec<Finding> {
     found
 }
 
-/// A hypothesis with a pattern, and what it explains.
-struct Candidate<'a> {
+/// A pattern over the series.
+struct Pattern {
     kind: Kind,
     first: usize,
-    pattern: Vec<f64>,
+    by_pair: DVector<f64>,
+}
+
+/// A cause with the pattern that is looked at, and what it explains.
+struct Candidate<'a> {
     hypothesis: Option<&'a Hypothesis>,
     change: Change,
-    chance: f64,
 }
 
 /// The change of the rig over the series that explains most, where there is one.
-pub fn look(calibration: &Calibration, lengths: &VolumeLengths) -> Vec<Finding> {
+pub fn look(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Finding> {
     let problem = calibration.problem();
     let count = problem.views.len();
-    let Some(linear) = Linear::new(&problem, &calibration.layout).filter(|_| count >= FEWEST) else {
-        return Vec::new();
-    };
+    if count < FEWEST {
+        return None;
+    }
+    let linear = Linear::new(&problem, &calibration.layout)?;
     let hypotheses = hypothesis::all(&calibration.layout, calibration.rig());
+    let pattern = significant(&linear, &hypotheses)?;
     let any = any_place(&calibration.layout);
-    let candidates = candidates(&linear, &hypotheses, &any);
-    let Some(best) = likeliest(&candidates) else { return Vec::new() };
-    vec![finding(calibration, lengths, &candidates, best, &any)]
+    let by_pair = pattern.by_pair.as_slice();
+    let one = |h| {
+        Some(Candidate { hypothesis: Some(h), change: linear.change(std::slice::from_ref(&h.direction), by_pair)? })
+    };
+    let mut candidates: Vec<Candidate> = hypotheses.iter().filter_map(one).collect();
+    // Six numbers of a step need more pairs than they are; six that drift at once are no cause.
+    if pattern.kind == Kind::Step && count > 2 * any.len() {
+        let change = linear.change(&any, by_pair);
+        candidates.extend(change.map(|change| Candidate { hypothesis: None, change }));
+    }
+    finding(calibration, lengths, &candidates, &pattern, &any)
 }
 
-/// Every cause as a step at every pair and as a drift, and any other place of the right camera.
-fn candidates<'a>(linear: &Linear, hypotheses: &'a [Hypothesis], any: &[DVector<f64>]) -> Vec<Candidate<'a>> {
+/// The pattern of one cause that is least a matter of chance, where one is not: every step and the drift of every cause by the F test, and, where
+/// there are pairs enough, against the same pairs in another order.
+fn significant(linear: &Linear, hypotheses: &[Hypothesis]) -> Option<Pattern> {
     let count = linear.len();
-    let step = |first: usize| (Kind::Step, first, (0..count).map(|i| f64::from(i >= first)).collect::<Vec<f64>>());
-    let drift = (Kind::Drift, 0, (0..count).map(|i| i as f64 / (count - 1) as f64).collect());
-    let patterns: Vec<_> = (FEWEST_EACH..=count - FEWEST_EACH).map(step).chain([drift]).collect();
-    let looks = (patterns.len() * (hypotheses.len() + 1)) as f64;
-    let mut all = Vec::new();
-    for (kind, first, pattern) in patterns {
-        let mut add = |hypothesis: Option<&'a Hypothesis>, directions: &[DVector<f64>]| {
-            let Some(change) = linear.change(directions, &pattern) else { return };
-            let numbers = directions.len() as f64;
-            let f = change.gain / numbers / change.scatter;
-            let chance = looks * FisherSnedecor::new(numbers, change.freedom).map_or(1.0, |d| d.sf(f.max(0.0)));
-            all.push(Candidate { kind, first, pattern: pattern.clone(), hypothesis, change, chance });
-        };
-        hypotheses.iter().for_each(|h| add(Some(h), std::slice::from_ref(&h.direction)));
-        // Six numbers need more pairs than they are.
-        if count > 2 * any.len() {
-            add(None, any);
+    let step = |first: usize| Pattern {
+        kind: Kind::Step,
+        first,
+        by_pair: DVector::from_fn(count, |i, _| f64::from(i >= first)),
+    };
+    let by_pair = DVector::from_fn(count, |i, _| i as f64 / (count - 1) as f64);
+    let drift = Pattern { kind: Kind::Drift, first: 0, by_pair };
+    let patterns: Vec<Pattern> = (FEWEST_EACH..=count - FEWEST_EACH).map(step).chain([drift]).collect();
+    let lines: Vec<Line> = hypotheses.iter().map(|h| linear.line(&h.direction)).collect();
+    let largest = |order: &[usize]| -> (f64, f64, usize) {
+        let mut most = (0.0, 1.0, 0);
+        for (p, pattern) in patterns.iter().enumerate() {
+            let ordered = DVector::from_fn(count, |i, _| pattern.by_pair[order[i]]);
+            for line in &lines {
+                let (f, freedom) = line.f(&ordered);
+                if f > most.0 {
+                    most = (f, freedom, p);
+                }
+            }
+        }
+        most
+    };
+    let (f, freedom, at) = largest(&(0..count).collect::<Vec<usize>>());
+    let looks = (patterns.len() * lines.len()) as f64;
+    if looks * FisherSnedecor::new(1.0, freedom).map_or(1.0, |d| d.sf(f)) >= FALSE_ALARM {
+        return None;
+    }
+    if count >= PERMUTED_FROM {
+        let larger =
+            (0..PERMUTATIONS).into_par_iter().filter(|k| largest(&shuffled(count, *k)).0 > 1.000_001 * f).count();
+        if larger * 100 > PERMUTATIONS {
+            return None;
         }
     }
-    all
+    patterns.into_iter().nth(at)
 }
 
-/// The candidate that is least a matter of chance, where one is not.
-fn likeliest<'a, 'b>(candidates: &'b [Candidate<'a>]) -> Option<&'b Candidate<'a>> {
-    let significant = candidates.iter().filter(|c| c.chance < FALSE_ALARM);
-    significant.min_by(|a, b| a.chance.total_cmp(&b.chance).then(b.change.gain.total_cmp(&a.change.gain)))
+/// The pairs in an order that has nothing to do with when they were taken.
+fn shuffled(count: usize, seed: usize) -> Vec<usize> {
+    let mut random = Pcg64::seed_from_u64(seed as u64);
+    let mut order: Vec<usize> = (0..count).collect();
+    for i in (1..count).rev() {
+        order.swap(i, random.random_range(0..=i));
+    }
+    order
 }
 
 impl Candidate<'_> {
@@ -159,19 +199,17 @@ fn finding(
     calibration: &Calibration,
     lengths: &VolumeLengths,
     candidates: &[Candidate],
-    best: &Candidate,
+    best: &Pattern,
     any: &[DVector<f64>],
-) -> Finding {
+) -> Option<Finding> {
     let count = calibration.views.len();
     // Of all, the one that explains most; its scatter is what the others are judged by.
     let scatter = candidates.iter().map(|c| c.change.scatter).fold(f64::INFINITY, f64::min).max(1.0);
     let evidence = |c: &Candidate| c.evidence(scatter, count);
-    let same = |c: &&Candidate| c.kind == best.kind && c.first == best.first;
-    let top = candidates.iter().filter(same).map(&evidence).fold(f64::NEG_INFINITY, f64::max);
-    let mut equals: Vec<&Candidate> =
-        candidates.iter().filter(same).filter(|c| top - evidence(c) < TOLD_APART).collect();
+    let top = candidates.iter().map(&evidence).fold(f64::NEG_INFINITY, f64::max);
+    let mut equals: Vec<&Candidate> = candidates.iter().filter(|c| top - evidence(c) < TOLD_APART).collect();
     equals.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
-    let shown = equals.first().copied().unwrap_or(best);
+    let shown = *equals.first()?;
     let mut causes: Vec<Cause> = Vec::new();
     for candidate in &equals {
         let cause = candidate.hypothesis.map_or(Cause::CameraMoved, |h| h.cause);
@@ -189,7 +227,7 @@ fn finding(
             any.iter().zip(shown.change.amounts.iter()).fold(DVector::zeros(any[0].len()), |sum, (d, a)| sum + d * *a)
         }
     };
-    let mean = shown.pattern.iter().sum::<f64>() / count as f64;
+    let mean = best.by_pair.mean();
     let changes = lengths.changes_by_step_mm(&calibration.layout, &whole);
     let effect_mm = changes.into_iter().fold(0.0, |most: f64, mm| most.max(mm.abs()));
     let at = calibration.layout.transform_start();
@@ -209,7 +247,7 @@ fn finding(
         Some((first, others)) => format!("{first} (or {})", others.join(", or ")),
     };
     let action = format!("{what} by {size:.3} {unit} {which}, which moves a length by up to {effect_mm:.4} mm");
-    Finding {
+    Some(Finding {
         cause: causes.iter().map(|cause| cause.word()).collect::<Vec<_>>().join("|"),
         kind: best.kind,
         pairs: (best.first..count).map(name).collect(),
@@ -219,5 +257,5 @@ fn finding(
         action,
         step: Some(whole * (1.0 - mean)),
         first: best.first,
-    }
+    })
 }

@@ -28,6 +28,37 @@ pub struct Change {
     pub freedom: f64,
 }
 
+/// One direction over the series: what any pattern of it gains is a quadratic form over the pairs.
+pub struct Line {
+    /// Slope of the gradient by the amounts of two pairs, all shared numbers and poses solved again.
+    form: DMatrix<f64>,
+    /// Each pair's gradient along the direction.
+    gradient: DVector<f64>,
+    /// Each pair's own information on the amount.
+    own: Vec<f64>,
+    /// Patterns that are a nuisance: the board's place.
+    places: Vec<DVector<f64>>,
+}
+
+impl Line {
+    /// F of a pattern: what it gains over the pairs' scatter with it taken out, and the degrees of freedom of that scatter. Zero where the
+    /// pairs do not determine it.
+    pub fn f(&self, pattern: &DVector<f64>) -> (f64, f64) {
+        let n = pattern.len();
+        let columns: Vec<&DVector<f64>> = std::iter::once(pattern).chain(&self.places).collect();
+        let freedom = (n as f64 - 1.0 - columns.len() as f64).max(1.0);
+        let turned: Vec<DVector<f64>> = columns.iter().map(|c| &self.form * *c).collect();
+        let matrix = DMatrix::from_fn(columns.len(), columns.len(), |a, b| columns[a].dot(&turned[b]));
+        let right = DVector::from_fn(columns.len(), |a, _| -columns[a].dot(&self.gradient));
+        let Some(inverse) = invert(&matrix) else { return (0.0, freedom) };
+        let amounts = &inverse * right;
+        let left = turned.iter().zip(amounts.iter()).fold(self.gradient.clone(), |left, (t, a)| left + t * *a);
+        let squares: f64 = left.iter().zip(&self.own).map(|(l, own)| l * l / own.max(f64::MIN_POSITIVE)).sum();
+        let f = amounts[0].powi(2) / inverse[(0, 0)] / (squares / freedom).max(1.0);
+        (if f.is_finite() { f } else { 0.0 }, freedom)
+    }
+}
+
 /// The pairs of a calibration at its minimum.
 pub struct Linear {
     matrices: Vec<DMatrix<f64>>,
@@ -58,6 +89,22 @@ impl Linear {
     /// How many pairs there are.
     pub fn len(&self) -> usize {
         self.matrices.len()
+    }
+
+    /// One direction over the series.
+    pub fn line(&self, direction: &DVector<f64>) -> Line {
+        let n = self.len();
+        let products: Vec<DVector<f64>> = self.matrices.iter().map(|m| m * direction).collect();
+        let moved: Vec<DVector<f64>> = products.iter().map(|p| &self.inverse * p).collect();
+        let own: Vec<f64> = products.iter().map(|p| direction.dot(p)).collect();
+        let form = DMatrix::from_fn(n, n, |i, j| if i == j { own[i] } else { 0.0 } - products[i].dot(&moved[j]));
+        let gradient = DVector::from_fn(n, |i, _| direction.dot(&self.gradients[i]));
+        let places = if n >= PLACES_FROM {
+            (0..3).map(|k| DVector::from_fn(n, |i, _| self.places[i][k])).collect()
+        } else {
+            Vec::new()
+        };
+        Line { form, gradient, own, places }
     }
 
     /// A change along these directions that each pair has by so much as the pattern says. `None` where the pairs do not determine it.

@@ -7,7 +7,7 @@
 
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
-use crate::stereo::calibrate::{Calibration, calibrate};
+use crate::stereo::calibrate::{Calibration, calibrate, calibrate_with};
 use crate::stereo::findings::{self, Finding, Kind};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, FEWEST_PAIRS, Standing};
@@ -20,9 +20,6 @@ pub const MATERIAL_SHARE: f64 = 0.1;
 
 /// Squares of the lengths that a change is judged by: 70 mm on the paper's board.
 const LONG_SQUARES: usize = 7;
-
-/// Changes of a series that are looked for one after the other.
-const MOST_CHANGES: usize = 4;
 
 /// What is asked of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,29 +34,33 @@ pub struct Asked {
 
 /// Calibrates the rig that stands now, and says what happened to it before.
 pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
-    let mut told: Vec<Finding> = Vec::new();
-    let mut corners = corners.clone();
-    let mut before: Vec<DiscardedPair> = Vec::new();
-    let mut found = calibrate(&corners, &asked.options)?;
-    for _ in 0..MOST_CHANGES {
-        let Some(change) = change(&found, asked) else { break };
-        let since = change.pairs.first().cloned().unwrap_or_default();
-        let later = (change.kind == Kind::Step && change.material(asked))
-            .then(|| later(&corners, &since, asked, &found, &change))
-            .flatten();
-        let Some((kept, calibration)) = later else {
-            stays(&mut found, &change, asked);
-            told.push(change);
-            break;
-        };
-        before.extend(dropped(&corners, &kept, &change));
-        (corners, found) = (kept, calibration);
-        found.standing.since = Some(since);
-        told.push(change);
+    let mut found = calibrate_with(corners, &asked.options, true)?;
+    let mut told = Vec::from_iter(change(&found, asked));
+    let mut standing = told.first_mut().and_then(|change| later(corners, asked, &found, change));
+    if standing.is_none() && found.runs > 0 {
+        // What contradicts the others is no rig of its own, or too few pairs of one: it is left out.
+        found = calibrate(corners, &asked.options)?;
+        told = Vec::from_iter(change(&found, asked));
+        standing = told.first_mut().and_then(|change| later(corners, asked, &found, change));
     }
-    trailing(&mut found, &corners);
-    found.standing.pairs_before = before.len();
-    leave_out(&mut found, before);
+    match (standing, told.first()) {
+        (Some(standing), Some(change)) => {
+            let since = change.pairs.first().cloned();
+            let before = dropped(corners, &standing.corners, change);
+            found = standing.calibration;
+            found.standing = Standing { since, pairs_before: before.len(), ..Standing::default() };
+            trailing(&mut found, corners);
+            leave_out(&mut found, before);
+            if let Some(change) = standing.change {
+                stays(&mut found, &change, asked);
+                told.push(change);
+            }
+        }
+        (_, change) => {
+            trailing(&mut found, corners);
+            change.into_iter().for_each(|change| stays(&mut found, change, asked));
+        }
+    }
     Ok((found, told))
 }
 
@@ -98,7 +99,7 @@ fn lengths(calibration: &Calibration, extent: Extent) -> VolumeLengths {
 }
 
 fn change(calibration: &Calibration, asked: &Asked) -> Option<Finding> {
-    findings::look(calibration, &lengths(calibration, asked.extent)).into_iter().next()
+    findings::look(calibration, &lengths(calibration, asked.extent))
 }
 
 impl Finding {
@@ -108,25 +109,36 @@ impl Finding {
     }
 }
 
-/// The rig of the pairs since a step, where these are enough and it is surer than the one of all.
-fn later(
-    corners: &Corners,
-    first: &str,
-    asked: &Asked,
-    all: &Calibration,
-    change: &Finding,
-) -> Option<(Corners, Calibration)> {
-    let kept = since(corners, first)?;
-    if change.pairs.len() < FEWEST_PAIRS {
+/// The rig of the pairs since a step.
+struct Later {
+    corners: Corners,
+    calibration: Calibration,
+    /// What goes on in these pairs.
+    change: Option<Finding>,
+}
+
+/// The rig of the pairs since a step, where these are enough, it is surer than the one of all, and it stands: of a rig that goes on changing (a
+/// focus that hunts) no part is the one that stands, and all pairs together say best what it does.
+fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Finding) -> Option<Later> {
+    if change.kind != Kind::Step || !change.material(asked) || change.pairs.len() < FEWEST_PAIRS {
         return None;
     }
-    let calibration = calibrate(&kept, &asked.options).ok()?;
+    let corners = since(corners, change.pairs.first()?)?;
+    let calibration = calibrate(&corners, &asked.options).ok()?;
     let worst = |calibration: &Calibration| {
         let lengths = lengths(calibration, asked.extent);
         lengths.worst(|length| length.calibration_mm).map_or(f64::INFINITY, |(mm, _)| mm)
     };
     let with_step = worst(all).hypot(change.effect_mm?);
-    (worst(&calibration) < with_step).then_some((kept, calibration))
+    let further = self::change(&calibration, asked);
+    if let Some(again) = further.as_ref().filter(|again| again.kind == Kind::Step && again.material(asked)) {
+        let from = again.pairs.first().map_or("", String::as_str);
+        change.cause = Cause::Unknown.word().to_owned();
+        change.action =
+            format!("the rig goes on changing: {}, and again from pair {from} on ({})", change.action, again.action);
+        return None;
+    }
+    (worst(&calibration) < with_step).then_some(Later { corners, calibration, change: further })
 }
 
 /// A change that stays in the rig is part of its uncertainty; where its last pairs are those of another rig, that is said.

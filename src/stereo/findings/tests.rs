@@ -1,1 +1,165 @@
-//! Tests of findings: planted changes, and series in which nothing happened.
+//! Faults planted in the corners of a series: each must be named, and a clean series of any noise must lose nothing.
+
+use nalgebra::Vector3;
+
+use crate::geometry::transform;
+use crate::imaging::{Corners, PairCorners};
+use crate::stereo::Lens;
+use crate::stereo::calibrate::Calibration;
+use crate::stereo::findings::Finding;
+use crate::stereo::findings::standing::{Asked, calibrate_standing};
+use crate::stereo::pairs::Cause;
+use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::synthetic::World;
+use crate::stereo::volume::Extent;
+
+const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: Some(false) };
+
+/// The paper's rig, and the same at a fifth of its pixels.
+fn worlds(pairs: usize, seed: u64) -> [World; 2] {
+    let small = World { sigma_px: 0.01, ..World::new(pairs, seed) };
+    [World::paper(pairs, seed), small]
+}
+
+/// The pairs of `range` as another world shows them.
+fn planted(world: &World, seed: u64, range: impl Iterator<Item = usize>, change: impl Fn(&mut World)) -> Corners {
+    let mut other = world.clone();
+    change(&mut other);
+    let (mut corners, others) = (world.corners(seed), other.corners(seed));
+    for i in range {
+        corners.pairs[i] = others.pairs[i].clone();
+    }
+    corners
+}
+
+fn causes(found: &Calibration) -> Vec<(&str, Cause)> {
+    found.discarded.pairs.iter().map(|d| (d.pair.as_str(), d.cause)).collect()
+}
+
+fn asked(options: Options) -> Asked {
+    Asked { options, tolerance_mm: 0.05, extent: Extent::Boards }
+}
+
+fn standing(corners: &Corners) -> (Calibration, Vec<Finding>) {
+    calibrate_standing(corners, &asked(BROWN4)).unwrap()
+}
+
+#[test]
+fn a_clean_series_of_any_noise_loses_nothing() {
+    for sigma_px in [0.002, 0.02, 0.3, 1.0] {
+        for seed in [1, 2] {
+            for world in worlds(8 + 4 * seed as usize, seed) {
+                let world = World { sigma_px, ..world };
+                let (found, told) = calibrate_standing(&world.corners(seed), &asked(Options::default())).unwrap();
+                assert!(found.skipped.is_empty() && told.is_empty(), "{sigma_px} px: {:?} {told:?}", found.skipped);
+                assert_eq!((found.standing.since, found.standing.unconfirmed), (None, Vec::new()));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_camera_that_moved_leaves_the_last_rig() {
+    let shifts = [
+        ("1 mm", Vector3::zeros(), Vector3::new(0.0, 0.0, 1.0)),
+        ("0.2 mm", Vector3::zeros(), Vector3::new(0.2, 0.0, 0.0)),
+        ("0.2 mm along z", Vector3::zeros(), Vector3::new(0.0, 0.0, 0.2)),
+        ("0.05 deg", Vector3::new(0.0, 0.05_f64.to_radians(), 0.0), Vector3::zeros()),
+    ];
+    for (what, turn, shift) in shifts {
+        for (w, world) in worlds(12, 3).into_iter().enumerate() {
+            for first in [6, 8] {
+                let corners = planted(&world, 4, first..12, |after| {
+                    after.rig.right_from_left = transform(turn, shift) * world.rig.right_from_left;
+                });
+                let (found, told) = standing(&corners);
+                let before: Vec<&str> = found.discarded.pairs.iter().map(|d| d.pair.as_str()).collect();
+                let expected: Vec<String> = (0..first).map(|i| format!("{i:02}")).collect();
+                assert_eq!(before, expected, "{what} before pair {first} in world {w}: {:?} {told:?}", found.skipped);
+                let named = ["yaw", "baseline", "camera-moved"].iter().any(|cause| told[0].cause.contains(cause));
+                assert!(named && told.len() == 1, "{what}: {told:?}");
+                assert_eq!(found.standing.since, Some(format!("{first:02}")));
+                let off = found.rig().right_from_left.translation.vector
+                    - (transform(turn, shift) * world.rig.right_from_left).translation.vector;
+                assert!(off.norm() < 0.15, "{what}: {off}");
+            }
+            // Too few pairs of the rig that stands: said, and the rig of the others is no longer confirmed.
+            let corners = planted(&world, 4, 10..12, |after| {
+                after.rig.right_from_left = transform(turn, shift) * world.rig.right_from_left;
+            });
+            let (found, told) = standing(&corners);
+            assert_eq!(found.standing.unconfirmed, ["10", "11"], "{what} in world {w}: {:?} {told:?}", found.skipped);
+        }
+    }
+}
+
+#[test]
+fn a_camera_that_zoomed() {
+    for world in worlds(12, 5) {
+        let corners = planted(&world, 6, 7..12, |after| {
+            after.rig.right.fx *= 1.001;
+            after.rig.right.fy *= 1.001;
+        });
+        let (found, told) = standing(&corners);
+        assert_eq!(found.standing.since.as_deref(), Some("07"), "{told:?}");
+        assert!(told[0].cause.contains("focus"), "{told:?}");
+    }
+}
+
+#[test]
+fn two_pairs_out_of_step() {
+    for shift_mm in [2.0, 5.0] {
+        for world in worlds(12, 9) {
+            let mut corners = world.corners(10);
+            for i in [3, 7] {
+                let mut late = world.clone();
+                let turn = Vector3::new(0.0, 2e-4 * shift_mm, 1e-4 * shift_mm);
+                late.poses[i] =
+                    transform(turn, Vector3::new(shift_mm, -0.3 * shift_mm, 0.2 * shift_mm)) * late.poses[i];
+                corners.pairs[i].right = late.corners(10).pairs[i].right.clone();
+            }
+            let (found, told) = standing(&corners);
+            assert_eq!(
+                causes(&found),
+                [("03", Cause::Unknown), ("07", Cause::Unknown)],
+                "{shift_mm} mm: {:?}",
+                found.skipped
+            );
+            assert!(told.is_empty(), "{told:?}");
+        }
+    }
+}
+
+#[test]
+fn interlaced_pictures() {
+    for world in worlds(12, 11) {
+        for shift_px in [0.2, 1.0] {
+            let mut corners = world.corners(12);
+            for i in [1, 8] {
+                let PairCorners { left, .. } = &mut corners.pairs[i];
+                // Every other line was taken later: corners move by what their lines show.
+                for corner in left.iter_mut() {
+                    corner.px.x += shift_px * if (corner.px.y as i64) % 2 == 0 { 0.5 } else { -0.5 };
+                }
+            }
+            let (found, _) = standing(&corners);
+            let pairs: Vec<&str> = causes(&found).into_iter().map(|(pair, _)| pair).collect();
+            assert_eq!(pairs, ["01", "08"], "{shift_px} px: {:?}", found.skipped);
+        }
+    }
+}
+
+#[test]
+fn small_noisy_pictures_fit_one_rig() {
+    let mut world = World::new(16, 15);
+    for camera in [&mut world.rig.left, &mut world.rig.right] {
+        (camera.width, camera.height) = (320, 240);
+        for number in [&mut camera.fx, &mut camera.fy, &mut camera.cx, &mut camera.cy] {
+            *number /= 4.0;
+        }
+    }
+    world.sigma_px = 0.3;
+    let (found, told) = standing(&world.corners(16));
+    assert!(told.is_empty(), "{told:?}");
+    assert!(found.skipped.is_empty(), "{:?}", found.skipped);
+}

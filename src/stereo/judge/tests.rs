@@ -11,6 +11,7 @@ use crate::stereo::judge::lengths::second_board::second_board;
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::select::lens_ladder::Options;
 use crate::stereo::synthetic::World;
+use crate::stereo::volume::Extent;
 
 /// Corners of 0.004 px on this rig: lengths to some 0.03 mm.
 const SIGMA_PX: f64 = 0.004;
@@ -24,8 +25,8 @@ fn judge_with(corners: &Corners, second: Option<&Corners>) -> Judged {
     let found = calibrate(corners, &Options::default()).unwrap();
     let accuracy = held_out::hold_out(&found, None).unwrap();
     let second = second.map(|corners| second_board(&found, corners, None));
-    let demand = Demand { tolerance_mm: TOLERANCE_MM, board_uncertainty_mm: None };
-    Judged::new(&found, accuracy, second, &demand)
+    let demand = Demand { tolerance_mm: TOLERANCE_MM, board_uncertainty_mm: None, extent: Extent::Boards };
+    Judged::new(&found, Vec::new(), accuracy, second, &demand)
 }
 
 fn judge(corners: &Corners) -> Judged {

@@ -47,6 +47,8 @@ pub struct Series {
     pub problem: Problem,
     /// The other pairs.
     pub discarded: Vec<DiscardedPair>,
+    /// How many pairs of runs that contradict the others stayed.
+    pub runs: usize,
 }
 
 impl Series {
@@ -59,8 +61,9 @@ impl Series {
 /// What a pair leaves on a rig: px, and its pose. `None` where it has none.
 type Misfit = Option<(f64, Transform)>;
 
-/// Finds the pairs of the rig.
-pub fn find(candidates: &Candidates) -> Result<Series, Error> {
+/// Finds the pairs of the rig. With `runs`, the first or the last pairs of the series stay where they contradict the others and nothing was
+/// mixed up in them: a rig that changed is a step to be found over the series, and not a few bad pairs.
+pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
     let (views, first) = numbered(candidates)?;
     let mut shared = first;
     let diagonal_mm = candidates.board.diagonal_mm();
@@ -82,10 +85,18 @@ pub fn find(candidates: &Candidates) -> Result<Series, Error> {
     let limit_px = SEVERAL * usual_px;
     let series = mixups::Series { shared: &shared, board: &candidates.board, views: &views, alone_px, limit_px };
     let mixed_up = mixups::explain(&series, &strays);
+    let mut runs_kept = Vec::new();
+    if runs {
+        let open: Vec<usize> = strays.iter().zip(&mixed_up).filter(|(_, why)| why.is_none()).map(|(i, _)| *i).collect();
+        runs_kept = ends(&open, views.len(), &misfits);
+        members.extend(&runs_kept);
+        members.sort_unstable();
+    }
     let unexplained = |i: usize| (Cause::Unknown, contradicts(misfits[i].map(|(px, _)| px), usual_px));
     let discarded: Vec<DiscardedPair> = strays
         .iter()
         .zip(mixed_up)
+        .filter(|(i, _)| !runs_kept.contains(i))
         .map(|(&i, reason)| (i, reason.unwrap_or_else(|| unexplained(i))))
         .map(|(i, (cause, reason))| DiscardedPair::new(&views[i].pair, cause, reason))
         .collect();
@@ -94,7 +105,8 @@ pub fn find(candidates: &Candidates) -> Result<Series, Error> {
     let views = members.iter().map(|&i| views[i].clone()).collect();
     let mut discarded: Vec<DiscardedPair> = discarded.into_iter().chain(candidates.discarded.iter().cloned()).collect();
     discarded.sort_by(|a, b| a.pair.cmp(&b.pair));
-    Ok(Series { problem: Problem { views, values, priors }, discarded })
+    let runs = runs_kept.len();
+    Ok(Series { problem: Problem { views, values, priors }, discarded, runs })
 }
 
 /// The pairs with the numbering that they agree on, and the rig in the middle of their own.
@@ -147,6 +159,14 @@ fn bundle(
         values = levenberg_marquardt::solve_with(&seen, &layout, priors, values, loss, Search::ROUGH).values;
     }
     Ok(values.shared)
+}
+
+/// Which of these pairs are a run of two or more at the beginning or at the end of the series, with poses on the rig.
+fn ends(open: &[usize], count: usize, misfits: &[Misfit]) -> Vec<usize> {
+    let is_open = |i: &usize| open.contains(i) && misfits[*i].is_some();
+    let first: Vec<usize> = (0..count).take_while(is_open).collect();
+    let last: Vec<usize> = (0..count).rev().take_while(is_open).collect();
+    [first, last].into_iter().filter(|run| run.len() >= 2).flatten().collect()
 }
 
 fn contradicts(misfit_px: Option<f64>, usual_px: f64) -> String {

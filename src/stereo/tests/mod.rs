@@ -14,13 +14,20 @@ use crate::stereo::judge::lengths::held_out;
 use crate::stereo::model::parameters::Shared;
 use crate::stereo::select::lens_ladder::Options;
 use crate::stereo::synthetic::World;
+use crate::stereo::volume::Extent;
 
 const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: Some(false) };
 
 fn judged(corners: &Corners, options: &Options, tolerance_mm: f64) -> Judged {
     let found = calibrate(corners, options).unwrap();
     let accuracy = held_out::hold_out(&found, None).unwrap();
-    Judged::new(&found, accuracy, None, &Demand { tolerance_mm, board_uncertainty_mm: None })
+    Judged::new(
+        &found,
+        Vec::new(),
+        accuracy,
+        None,
+        &Demand { tolerance_mm, board_uncertainty_mm: None, extent: Extent::Boards },
+    )
 }
 
 /// Deviations of the shared numbers from the truth, in the coordinates of the covariance.

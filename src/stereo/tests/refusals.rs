@@ -47,7 +47,9 @@ fn pairs_of_nothing_in_common_are_refused_by_name() {
         pair.right = right;
     }
     match calibrate(&corners, &Options::default()) {
-        Err(Error::Contradiction { agreeing, total, bad }) => assert!(agreeing <= 4 && total == 8 && bad.len() >= 4),
+        Err(Error::Contradiction { agreeing, total, bad, .. }) => {
+            assert!(agreeing <= 4 && total == 8 && bad.len() >= 4)
+        }
         other => panic!("{:?}", other.map(|c| c.rms_px)),
     }
 }
