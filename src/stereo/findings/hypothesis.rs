@@ -49,12 +49,15 @@ pub fn all(layout: &Layout, rig: &Rig) -> Vec<Hypothesis> {
     let longer = vector(&|d| d.rows_mut(at + 3, 3).copy_from(&along));
     // Larger squares make everything seem nearer, the baseline too; one unit is a per cent.
     let larger = vector(&|d| d.rows_mut(at + 3, 3).copy_from(&(-0.01 * translation)));
+    let shifted = |axis: usize| vector(&|d| d[at + 3 + axis] = 1.0);
     let of = |cause, words: &str, direction, unit| Hypothesis { cause, words: words.to_owned(), direction, unit };
     vec![
         of(Cause::Yaw, "the right camera turned about its vertical axis", turn(Vector3::y()), "deg"),
         of(Cause::Pitch, "the right camera turned about its horizontal axis", turn(Vector3::x()), "deg"),
         of(Cause::Roll, "the right camera turned about its line of sight", turn(Vector3::z()), "deg"),
         of(Cause::Baseline, "the baseline changed", longer, "mm"),
+        of(Cause::CameraMoved, "the right camera moved along its line of sight", shifted(2), "mm"),
+        of(Cause::CameraMoved, "the right camera moved up or down", shifted(1), "mm"),
         of(Cause::Focus, "the left camera's focal length changed", focal(&[Side::Left]), "%"),
         of(Cause::Focus, "the right camera's focal length changed", focal(&[Side::Right]), "%"),
         of(Cause::Focus, "both focal lengths changed", focal(&Side::BOTH), "%"),

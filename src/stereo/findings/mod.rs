@@ -130,7 +130,7 @@ pub fn look(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Findin
     };
     let mut candidates: Vec<Candidate> = hypotheses.iter().filter_map(one).collect();
     // Six numbers of a step need more pairs than they are; six that drift at once are no cause.
-    if pattern.kind == Kind::Step && count > 2 * any.len() {
+    if pattern.kind == Kind::Step && count > any.len() + 2 {
         let change = linear.change(&any, by_pair);
         candidates.extend(change.map(|change| Candidate { hypothesis: None, change }));
     }
@@ -209,6 +209,10 @@ fn finding(
     let top = candidates.iter().map(&evidence).fold(f64::NEG_INFINITY, f64::max);
     let mut equals: Vec<&Candidate> = candidates.iter().filter(|c| top - evidence(c) < TOLD_APART).collect();
     equals.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
+    // A single number that does as well as all six of another place is what happened.
+    if equals.iter().any(|c| c.hypothesis.is_some()) {
+        equals.retain(|c| c.hypothesis.is_some());
+    }
     let shown = *equals.first()?;
     let mut causes: Vec<Cause> = Vec::new();
     for candidate in &equals {
@@ -216,10 +220,6 @@ fn finding(
         if !causes.contains(&cause) {
             causes.push(cause);
         }
-    }
-    // A single number that does as well as all six of another place is what happened.
-    if causes.len() > 1 {
-        causes.retain(|cause| *cause != Cause::CameraMoved);
     }
     let whole = match shown.hypothesis {
         Some(h) => &h.direction * shown.change.amounts[0],

@@ -158,8 +158,13 @@ fn stays(found: &mut Calibration, change: &Finding, asked: &Asked) {
 fn trailing(found: &mut Calibration, corners: &Corners) {
     let used = |pair: &PairCorners| found.views.iter().any(|view| view.pair == pair.pair);
     let Some(last) = corners.pairs.iter().rposition(used) else { return };
-    let contradicts =
-        |pair: &&PairCorners| found.discarded.pairs.iter().any(|d| d.pair == pair.pair && d.cause == Cause::Unknown);
+    let contradicts = |pair: &&PairCorners| {
+        found
+            .discarded
+            .pairs
+            .iter()
+            .any(|d| d.pair == pair.pair && matches!(d.cause, Cause::Unknown | Cause::NotSimultaneous))
+    };
     let after: Vec<String> =
         corners.pairs[last + 1..].iter().filter(contradicts).map(|pair| pair.pair.clone()).collect();
     found.standing =

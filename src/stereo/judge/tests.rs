@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use crate::geometry::transform;
 use crate::imaging::{Corner, Corners};
-use crate::stereo::calibrate::calibrate;
+use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::judge::assessment::{Demand, Judged};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::lengths::second_board::second_board;
@@ -22,11 +22,12 @@ fn world(pairs: usize, seed: u64) -> World {
 }
 
 fn judge_with(corners: &Corners, second: Option<&Corners>) -> Judged {
-    let found = calibrate(corners, &Options::default()).unwrap();
+    let asked = Asked { options: Options::default(), tolerance_mm: TOLERANCE_MM, extent: Extent::Boards };
+    let (found, findings) = calibrate_standing(corners, &asked).unwrap();
     let accuracy = held_out::hold_out(&found, None).unwrap();
     let second = second.map(|corners| second_board(&found, corners, None));
     let demand = Demand { tolerance_mm: TOLERANCE_MM, board_uncertainty_mm: None, extent: Extent::Boards };
-    Judged::new(&found, Vec::new(), accuracy, second, &demand)
+    Judged::new(&found, findings, accuracy, second, &demand)
 }
 
 fn judge(corners: &Corners) -> Judged {

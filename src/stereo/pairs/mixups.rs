@@ -8,14 +8,14 @@
 use nalgebra::Point2;
 use rayon::prelude::*;
 
-use crate::geometry::Transform;
+use crate::geometry::{Transform, rotation_vector};
 use crate::imaging::{Board, Side};
 use crate::stereo::data::view::View;
 use crate::stereo::init::board_pose;
 use crate::stereo::model::parameters::Shared;
 use crate::stereo::pairs::Cause;
 use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::pairs::numbering::turns_of_outline;
+use crate::stereo::pairs::numbering::{renumbered, turns_of_outline};
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 
 /// Corners of a picture that are enough to try an idea on.
@@ -50,6 +50,44 @@ pub fn explain(series: &Series, strays: &[usize]) -> Vec<Option<(Cause, String)>
     let scene = Scene { series, views };
     let alone: Vec<Alone> = scene.views.par_iter().map(|view| scene.alone(view)).collect();
     strays.par_iter().map(|&i| scene.files(i).or_else(|| scene.partner(i, &alone))).collect()
+}
+
+/// What happened to a pair in which nothing was mixed up: another board, where one number explains it, or something that moved between its two
+/// pictures. `misfit_px` is by how much it misses the rig, `usual_px` what pairs usually do.
+pub fn moved_between(series: &Series, i: usize, misfit_px: Option<f64>, usual_px: f64) -> (Cause, String) {
+    let view = &series.views[i];
+    let scene = Scene { series, views: Vec::new() };
+    let [left, right] = scene.alone(view);
+    let Some((left, right)) = left.zip(right) else {
+        return (Cause::Unknown, "its corners form no board on one of the cameras".to_owned());
+    };
+    let missed = misfit_px.map_or(String::new(), |px| {
+        format!(" (its corners miss the rig by {px:.2} px, those of others by {usual_px:.2} px)")
+    });
+    let apart = right.translation.vector - left.translation.vector;
+    // A board whose squares are larger by a share is taken for nearer by each camera along its own rays: the two places are apart along the
+    // baseline, by that share of it.
+    let centre = series.shared.rig.right_from_left.inverse().translation.vector;
+    let share = -apart.dot(&centre) / centre.norm_squared();
+    let mut larger = view.clone();
+    larger.observations.iter_mut().for_each(|o| o.board_mm *= 1.0 + share);
+    if misfit_px.is_some() && scene.fits(series.shared, &larger) {
+        let percent = 100.0 * share.abs();
+        let which = if share > 0.0 { "larger" } else { "smaller" };
+        let reason = format!(
+            "it shows another board: its squares are {percent:.2} % {which} than those in the other pairs{missed}"
+        );
+        return (Cause::OtherBoard, reason);
+    }
+    let turn = |quarters| rotation_vector(&(right * renumbered(quarters) * left.inverse())).norm();
+    let turned = turns_of_outline(series.board).into_iter().map(turn).fold(f64::INFINITY, f64::min);
+    let reason = format!(
+        "its pictures were not taken at one moment: between them the board (or a camera) moved by about {:.1} mm and {:.1} deg{missed}. Clamp \
+         the board and trigger both cameras at once",
+        apart.norm(),
+        turned.to_degrees()
+    );
+    (Cause::NotSimultaneous, reason)
 }
 
 /// Something that may be done to a picture on its way from the camera.

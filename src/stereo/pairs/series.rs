@@ -20,7 +20,7 @@ use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::discarded::too_few_pairs;
 use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::pairs::{Cause, DiscardedPair, FEWEST_PAIRS, mixups, numbering};
+use crate::stereo::pairs::{DiscardedPair, FEWEST_PAIRS, mixups, numbering};
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
@@ -92,7 +92,7 @@ pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
         members.extend(&runs_kept);
         members.sort_unstable();
     }
-    let unexplained = |i: usize| (Cause::Unknown, contradicts(misfits[i].map(|(px, _)| px), usual_px));
+    let unexplained = |i: usize| mixups::moved_between(&series, i, misfits[i].map(|(px, _)| px), usual_px);
     let discarded: Vec<DiscardedPair> = strays
         .iter()
         .zip(mixed_up)
@@ -100,7 +100,7 @@ pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
         .map(|(&i, reason)| (i, reason.unwrap_or_else(|| unexplained(i))))
         .map(|(i, (cause, reason))| DiscardedPair::new(&views[i].pair, cause, reason))
         .collect();
-    check(candidates, usual_px, &members, &discarded)?;
+    check(candidates, &misfits, usual_px, &members, &discarded)?;
     let values = Values { shared, poses: members.iter().filter_map(|&i| Some(misfits[i]?.1)).collect() };
     let views = members.iter().map(|&i| views[i].clone()).collect();
     let mut discarded: Vec<DiscardedPair> = discarded.into_iter().chain(candidates.discarded.iter().cloned()).collect();
@@ -169,23 +169,30 @@ fn ends(open: &[usize], count: usize, misfits: &[Misfit]) -> Vec<usize> {
     [first, last].into_iter().filter(|run| run.len() >= 2).flatten().collect()
 }
 
-fn contradicts(misfit_px: Option<f64>, usual_px: f64) -> String {
-    let by = misfit_px.map_or("it has no pose on their rig".to_owned(), |px| {
-        format!("its corners miss their rig by {px:.2} px, those of the others by {usual_px:.2} px")
-    });
-    format!("it contradicts the other pairs: {by}. Clamp the board and the cameras, and trigger both at once")
-}
-
 /// Refuses where there is no telling which pairs are right, or too few are left.
-fn check(candidates: &Candidates, usual_px: f64, members: &[usize], discarded: &[DiscardedPair]) -> Result<(), Error> {
+fn check(
+    candidates: &Candidates,
+    misfits: &[Misfit],
+    usual_px: f64,
+    members: &[usize],
+    discarded: &[DiscardedPair],
+) -> Result<(), Error> {
     let total = candidates.views.len();
     let alone = candidates.cameras.iter().flat_map(|camera| camera.median_px.iter().flatten().copied());
     let alone_px = median(alone).unwrap_or(0.0);
     let width_px = f64::from(candidates.width_px);
     let none = usual_px > SEVERAL * alone_px && usual_px > LARGEST_SHARE * width_px;
     if none || 2 * members.len() <= total {
-        let bad = discarded.iter().map(DiscardedPair::skipped).collect();
+        let mut bad: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
         let agreeing = if none { 0 } else { members.len() };
+        if none {
+            let missed = |&i: &usize| {
+                let reason = format!("misses the rig of all by {:.1} px", misfits[i].map_or(f64::NAN, |(px, _)| px));
+                Skipped { pair: candidates.views[i].pair.clone(), reason }
+            };
+            bad.extend(members.iter().map(missed));
+            bad.sort_by(|a, b| a.pair.cmp(&b.pair));
+        }
         return Err(Error::Contradiction { agreeing, total, usual_px, alone_px, bad });
     }
     if members.len() < FEWEST_PAIRS {

@@ -93,7 +93,7 @@ impl Problem {
             values = solution.values;
             let before = (noise, loss);
             (noise, loss) = Noise::likeliest(&residuals::active(&views, &values).ok_or_else(unseen)?, unknowns);
-            let moved = |a: f64, b: f64| (a - b).abs() > 1e-3 * b;
+            let moved = |a: f64, b: f64| (a - b).abs() > 1e-6 * b;
             if loss == before.1 && !moved(before.0.added_px, noise.added_px) && !moved(before.0.factor, noise.factor) {
                 break;
             }

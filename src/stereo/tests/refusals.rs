@@ -16,7 +16,11 @@ fn a_pair_that_was_not_taken_at_once_is_named_and_left_out() {
     corners.pairs[4].right = moved.corners(12).pairs[4].right.clone();
     let found = calibrate(&corners, &Options::default()).unwrap();
     assert_eq!(found.skipped.len(), 1);
-    assert!(found.skipped[0].pair == "04" && found.skipped[0].reason.contains("same time"), "{:?}", found.skipped);
+    assert!(
+        found.skipped[0].pair == "04" && found.skipped[0].reason.contains("not taken at one moment"),
+        "{:?}",
+        found.skipped
+    );
     assert!((found.rig().baseline_mm() - world.rig.baseline_mm()).abs() < 0.1);
 }
 
@@ -29,10 +33,10 @@ fn a_gross_corner_is_an_outlier_and_changes_nothing() {
     let found = calibrate(&corners, &BROWN4).unwrap();
     let view = found.views.iter().find(|view| view.pair == "02").unwrap();
     let moved = view.observations.iter().find(|o| o.px == corners.pairs[2].left[17].px).unwrap();
-    assert!(!moved.active);
-    let outliers = found.views.iter().flat_map(|v| &v.observations).filter(|o| !o.active).count();
-    // One in a million Gaussian corners lies beyond the limit; there are 1584.
-    assert!(outliers <= 2, "{outliers}");
+    // It stays, and weighs a thousandth of what the others do.
+    let sigmas: Vec<f64> = view.observations.iter().map(|o| o.sigma_px()).collect();
+    let usual = crate::statistics::median(sigmas).unwrap();
+    assert!(moved.active && moved.sigma_px() > 30.0 * usual, "{} {usual}", moved.sigma_px());
     assert!((found.rig().baseline_mm() - clean.rig().baseline_mm()).abs() < 0.02);
 }
 
@@ -48,7 +52,7 @@ fn pairs_of_nothing_in_common_are_refused_by_name() {
     }
     match calibrate(&corners, &Options::default()) {
         Err(Error::Contradiction { agreeing, total, bad, .. }) => {
-            assert!(agreeing <= 4 && total == 8 && bad.len() >= 4)
+            assert!(agreeing <= 4 && total == 8 && bad.len() >= 4, "{agreeing} {bad:?}")
         }
         other => panic!("{:?}", other.map(|c| c.rms_px)),
     }
