@@ -2,9 +2,9 @@
 //!
 //! In: a problem at its minimum. Out: for any change of the shared numbers that grows along the series by a pattern, how large it is and what it
 //! gains, all shared numbers and poses solved again. Method: each pair's share of the normal equations at the minimum; a change is a few columns
-//! more, solved in one elimination. What a pair's residual depends on where its board stood (a lens that lacks something) would look
-//! like a change wherever the board was moved in one direction, so that the same change as a function of the board's place
-//! is a nuisance in each. Its scatter is that of the pairs after the change was taken out: what all pairs do, triggered or not.
+//! more, solved in one elimination. Where a pair's residual depends on where its board stood (a lens that lacks something), that would look
+//! like a change wherever the board was moved in one direction: whether a change is there at all is asked with the same change as a
+//! function of the board's place as a nuisance. Its scatter is that of the pairs after the change was taken out: what all pairs do.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -24,8 +24,6 @@ pub struct Change {
     pub gain: f64,
     /// Variance of the pairs' residuals about the rig, with the change, over what their corners let expect.
     pub scatter: f64,
-    /// Degrees of freedom that this scatter is known with.
-    pub freedom: f64,
 }
 
 /// One direction over the series: what any pattern of it gains is a quadratic form over the pairs.
@@ -109,58 +107,47 @@ impl Linear {
 
     /// A change along these directions that each pair has by so much as the pattern says. `None` where the pairs do not determine it.
     pub fn change(&self, directions: &[DVector<f64>], pattern: &[f64]) -> Option<Change> {
-        let n = self.len();
-        let mut columns: Vec<(&DVector<f64>, Vec<f64>)> = directions.iter().map(|d| (d, pattern.to_vec())).collect();
-        if n >= PLACES_FROM {
-            let of_place = |d, k: usize| (d, self.places.iter().map(|place| place[k]).collect());
-            columns.extend(directions.iter().flat_map(|d| (0..3).map(move |k| of_place(d, k))));
-        }
-        let (wanted, all) = (directions.len(), columns.len());
-        // Each column's slope of the gradient, summed over the pairs, and what the shared numbers do about it.
+        let (n, all) = (self.len(), directions.len());
+        // Each direction's slope of the gradient, summed over the pairs, and what the shared numbers do about it.
         let products: Vec<Vec<DVector<f64>>> =
             directions.iter().map(|d| self.matrices.iter().map(|m| m * d).collect()).collect();
-        let product = |c: usize, i: usize| &products[if c < wanted { c } else { (c - wanted) / 3 }][i];
-        let sums: Vec<DVector<f64>> = (0..all)
-            .map(|c| (0..n).fold(DVector::zeros(self.inverse.nrows()), |sum, i| sum + product(c, i) * columns[c].1[i]))
-            .collect();
+        let zero = || DVector::zeros(self.inverse.nrows());
+        let sum = |of: &Vec<DVector<f64>>| of.iter().zip(pattern).fold(zero(), |sum, (p, x)| sum + p * *x);
+        let sums: Vec<DVector<f64>> = products.iter().map(sum).collect();
         let moved: Vec<DVector<f64>> = sums.iter().map(|sum| &self.inverse * sum).collect();
         let matrix = DMatrix::from_fn(all, all, |a, b| {
-            let own: f64 = (0..n).map(|i| columns[a].1[i] * columns[b].1[i] * columns[a].0.dot(product(b, i))).sum();
+            let own: f64 = (0..n).map(|i| pattern[i].powi(2) * directions[a].dot(&products[b][i])).sum();
             own - sums[a].dot(&moved[b])
         });
         let right = DVector::from_fn(all, |a, _| {
-            -(0..n).map(|i| columns[a].1[i] * columns[a].0.dot(&self.gradients[i])).sum::<f64>()
+            -(0..n).map(|i| pattern[i] * directions[a].dot(&self.gradients[i])).sum::<f64>()
         });
-        let inverse = invert(&matrix)?;
-        let solution = &inverse * &right;
-        let amounts = solution.rows(0, wanted).into_owned();
-        let own = inverse.view((0, 0), (wanted, wanted)).into_owned();
-        let gain = amounts.dot(&(invert(&own)? * &amounts));
-        let (scatter, freedom) = self.scatter(&columns, &moved, &solution, wanted);
-        (gain.is_finite() && scatter.is_finite()).then_some(Change { amounts, gain, scatter, freedom })
+        let amounts = invert(&matrix)? * &right;
+        let gain = amounts.dot(&right);
+        let scatter = self.scatter(directions, pattern, &moved, &amounts);
+        (gain.is_finite() && scatter.is_finite()).then_some(Change { amounts, gain, scatter })
     }
 
-    /// The pairs' scatter along these columns with the change taken out, at least what their corners let expect.
+    /// The pairs' scatter along these directions with the change taken out, at least what their corners let expect.
     fn scatter(
         &self,
-        columns: &[(&DVector<f64>, Vec<f64>)],
+        directions: &[DVector<f64>],
+        pattern: &[f64],
         moved: &[DVector<f64>],
-        solution: &DVector<f64>,
-        wanted: usize,
-    ) -> (f64, f64) {
-        let common =
-            moved.iter().zip(solution.iter()).fold(DVector::zeros(self.inverse.nrows()), |sum, (m, a)| sum + m * *a);
+        amounts: &DVector<f64>,
+    ) -> f64 {
+        let zero = || DVector::zeros(self.inverse.nrows());
+        let common = moved.iter().zip(amounts.iter()).fold(zero(), |sum, (m, a)| sum + m * *a);
+        let own = directions.iter().zip(amounts.iter()).fold(zero(), |sum, (d, a)| sum + d * *a);
         let mut squares = 0.0;
-        for i in 0..self.len() {
-            let mut step = -&common;
-            columns.iter().zip(solution.iter()).for_each(|((d, x), a)| step.axpy(x[i] * a, *d, 1.0));
-            let left = &self.gradients[i] + &self.matrices[i] * step;
-            for (direction, _) in &columns[..wanted] {
-                let information = direction.dot(&(&self.matrices[i] * *direction));
-                squares += direction.dot(&left).powi(2) / information.max(f64::MIN_POSITIVE) / wanted as f64;
+        for (i, x) in pattern.iter().enumerate() {
+            let left = &self.gradients[i] + &self.matrices[i] * (&own * *x - &common);
+            for direction in directions {
+                let information = direction.dot(&(&self.matrices[i] * direction));
+                squares += direction.dot(&left).powi(2) / information.max(f64::MIN_POSITIVE);
             }
         }
-        let freedom = (self.len() as f64 - 1.0 - (columns.len() / wanted.max(1)) as f64).max(1.0);
-        ((squares / freedom).max(1.0), freedom)
+        let freedom = (directions.len() * self.len().saturating_sub(2)).max(1) as f64;
+        (squares / freedom).max(1.0)
     }
 }

@@ -190,7 +190,7 @@ fn residuals(facts: &Facts) -> Evidence {
     let systematic_px = facts.residual_pattern.systematic_px(sigma_px);
     // What both pictures see alike moves no point, but the rig that is fitted to it: the corners' whole scatter counts here.
     let share = facts.accuracy.disagreement_share().sqrt();
-    let corners_mm = median(facts.volume.lengths.iter().map(|length| length.corners_mm / share));
+    let corners_mm = facts.volume.worst(|length| length.corners_mm / share).map(|(mm, _)| mm);
     let value = corners_mm.map(|mm| mm * systematic_px / sigma_px);
     let neighbours = &facts.residual_pattern.neighbours;
     let detail = if systematic_px > 0.0 {

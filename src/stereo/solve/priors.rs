@@ -75,7 +75,7 @@ impl Priors {
         let [left, right] = [&start.left, &start.right].map(|camera| (camera.fx * camera.fy).sqrt());
         if (left / right).ln().abs() < TWO_MAKES {
             let terms = vec![(Number::Camera(Side::Left, 0), 1.0), (Number::Camera(Side::Right, 0), -1.0)];
-            priors.all.push(Expectation { terms, value: 0.0, sigma: ALIKE * left });
+            priors.all.push(Expectation { terms, value: 0.0, sigma: ALIKE * (left * right).sqrt() });
         }
         priors.of_board(diagonal_mm);
         priors
