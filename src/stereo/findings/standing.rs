@@ -34,34 +34,97 @@ pub struct Asked {
 
 /// Calibrates the rig that stands now, and says what happened to it before.
 pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
-    let mut found = calibrate_with(corners, &asked.options, true)?;
-    let mut told = Vec::from_iter(change(&found, asked));
-    let mut standing = told.first_mut().and_then(|change| later(corners, asked, &found, change));
-    if standing.is_none() && found.runs > 0 {
+    let with_runs = calibrate_with(corners, &asked.options, true);
+    let mut told = with_runs.as_ref().ok().and_then(|found| change(found, asked));
+    if let (Ok(all), Some(change)) = (&with_runs, &mut told)
+        && let Some(later) = later(corners, asked, all, change)
+    {
+        return Ok(stands_since(corners, asked, later, change.clone()));
+    }
+    match with_runs {
+        Ok(mut found) if found.runs == 0 => {
+            trailing(&mut found, corners);
+            told.iter().for_each(|change| stays(&mut found, change, asked));
+            Ok((found, Vec::from_iter(told)))
+        }
         // What contradicts the others is no rig of its own, or too few pairs of one: it is left out.
-        found = calibrate(corners, &asked.options)?;
-        told = Vec::from_iter(change(&found, asked));
-        standing = told.first_mut().and_then(|change| later(corners, asked, &found, change));
+        _ => without_runs(corners, asked, told),
     }
-    match (standing, told.first()) {
-        (Some(standing), Some(change)) => {
-            let since = change.pairs.first().cloned();
-            let before = dropped(corners, &standing.corners, change);
-            found = standing.calibration;
-            found.standing = Standing { since, pairs_before: before.len(), ..Standing::default() };
-            trailing(&mut found, corners);
-            leave_out(&mut found, before);
-            if let Some(change) = standing.change {
-                stays(&mut found, &change, asked);
-                told.push(change);
-            }
-        }
-        (_, change) => {
-            trailing(&mut found, corners);
-            change.into_iter().for_each(|change| stays(&mut found, change, asked));
-        }
+}
+
+/// The rig that stands since a step.
+fn stands_since(corners: &Corners, asked: &Asked, later: Later, change: Finding) -> (Calibration, Vec<Finding>) {
+    let mut found = later.calibration;
+    let before = dropped(corners, &later.corners, &change);
+    let since = change.pairs.first().cloned();
+    found.standing = Standing { since, pairs_before: before.len(), ..Standing::default() };
+    trailing(&mut found, corners);
+    leave_out(&mut found, before);
+    let mut told = vec![change];
+    if let Some(further) = later.change {
+        stays(&mut found, &further, asked);
+        told.push(further);
     }
-    Ok((found, told))
+    (found, told)
+}
+
+/// The rig without the first or the last pairs that contradict the others; `told` is the step that these are, where it was found.
+fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Result<(Calibration, Vec<Finding>), Error> {
+    let mut found = calibrate(corners, &asked.options)?;
+    let contradicts = |pair: &PairCorners| {
+        let of_pair = found.discarded.pairs.iter().find(|d| d.pair == pair.pair);
+        of_pair.is_some_and(|d| matches!(d.cause, Cause::Unknown | Cause::NotSimultaneous | Cause::OtherBoard))
+    };
+    let names = |pairs: &mut dyn Iterator<Item = &PairCorners>| -> Vec<String> {
+        pairs.take_while(|pair| contradicts(pair)).map(|pair| pair.pair.clone()).collect()
+    };
+    let first = names(&mut corners.pairs.iter());
+    let mut last = names(&mut corners.pairs.iter().rev());
+    last.reverse();
+    if last.len() >= FEWEST_PAIRS
+        && let Some(kept) = since(corners, &last[0])
+        && let Ok(calibration) = calibrate(&kept, &asked.options)
+    {
+        let change = another_rig(told, last);
+        return Ok(stands_since(corners, asked, Later { corners: kept, calibration, change: None }, change));
+    }
+    let run = if last.len() >= 2 { last } else { first };
+    let mut findings = Vec::new();
+    if run.len() >= 2 {
+        let at_end = corners.pairs.last().is_some_and(|pair| run.contains(&pair.pair));
+        let pairs = if at_end { run.clone() } else { found.views.iter().map(|view| view.pair.clone()).collect() };
+        let change = another_rig(told, pairs);
+        for discarded in found.discarded.pairs.iter_mut().filter(|d| run.contains(&d.pair)) {
+            *discarded = DiscardedPair::new(&discarded.pair, of_rig(&change), change.action.clone());
+        }
+        found.skipped = found.discarded.pairs.iter().map(DiscardedPair::skipped).collect();
+        if at_end {
+            found.standing.unconfirmed = run;
+        } else {
+            found.standing.since = change.pairs.first().cloned();
+            found.standing.pairs_before = run.len();
+        }
+        findings.push(change);
+    }
+    trailing(&mut found, corners);
+    Ok((found, findings))
+}
+
+/// The step to these pairs, as it was found, or as far as it is known: a rig that fits so badly to the other that none fits both.
+fn another_rig(told: Option<Finding>, pairs: Vec<String>) -> Finding {
+    told.filter(|told| told.kind == Kind::Step && told.pairs == pairs).unwrap_or_else(|| {
+        let first = pairs.first().map_or("", String::as_str);
+        let action = format!(
+            "a camera moved or was focused: from pair {first} on the pairs are of another rig than those before. Clamp both cameras"
+        );
+        let cause = format!("{}|{}", Cause::CameraMoved.word(), Cause::Focus.word());
+        Finding { cause, kind: Kind::Step, pairs, size: None, unit: "", effect_mm: None, action, step: None, first: 0 }
+    })
+}
+
+/// The cause of pairs that a step left behind.
+fn of_rig(change: &Finding) -> Cause {
+    if change.cause == Cause::Focus.word() { Cause::Focus } else { Cause::CameraMoved }
 }
 
 /// Calibrates from the pairs since one of them, as asked for.
@@ -174,7 +237,7 @@ fn trailing(found: &mut Calibration, corners: &Corners) {
 /// The pairs of the rig that stood before a step.
 fn dropped(corners: &Corners, kept: &Corners, change: &Finding) -> Vec<DiscardedPair> {
     let is_kept = |pair: &str| kept.pairs.iter().any(|p| p.pair == pair);
-    let cause = if change.cause == "focus" { Cause::Focus } else { Cause::CameraMoved };
+    let cause = of_rig(change);
     let reason = format!("the rig changed after it: {}", change.action);
     let before = corners.pairs.iter().filter(|p| !is_kept(&p.pair));
     before.map(|p| DiscardedPair::new(&p.pair, cause, reason.clone())).collect()

@@ -10,12 +10,17 @@ use rayon::prelude::*;
 
 use crate::geometry::{Transform, rotation_vector};
 use crate::imaging::{Board, Side};
+use crate::stereo::Rig;
+use crate::stereo::data::residuals::median_px;
 use crate::stereo::data::view::View;
 use crate::stereo::init::board_pose;
-use crate::stereo::model::parameters::Shared;
+use crate::stereo::init::single_camera::as_left;
+use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::pairs::Cause;
 use crate::stereo::pairs::misfit::misfit_px;
 use crate::stereo::pairs::numbering::{renumbered, turns_of_outline};
+use crate::stereo::solve::levenberg_marquardt::{self, Search};
+use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 
 /// Corners of a picture that are enough to try an idea on.
@@ -69,8 +74,7 @@ pub fn moved_between(series: &Series, i: usize, misfit_px: Option<f64>, usual_px
     // baseline, by that share of it.
     let centre = series.shared.rig.right_from_left.inverse().translation.vector;
     let share = -apart.dot(&centre) / centre.norm_squared();
-    let mut larger = view.clone();
-    larger.observations.iter_mut().for_each(|o| o.board_mm *= 1.0 + share);
+    let (larger, share) = of_best_size(series.shared, view, share);
     if misfit_px.is_some() && scene.fits(series.shared, &larger) {
         let percent = 100.0 * share.abs();
         let which = if share > 0.0 { "larger" } else { "smaller" };
@@ -88,6 +92,29 @@ pub fn moved_between(series: &Series, i: usize, misfit_px: Option<f64>, usual_px
         turned.to_degrees()
     );
     (Cause::NotSimultaneous, reason)
+}
+
+/// The pair as one of a board that is larger by the share that fits best, and that share; the start is some parts of it off.
+fn of_best_size(shared: &Shared, view: &View, start: f64) -> (View, f64) {
+    let sized = |share: f64| {
+        let mut sized = view.clone();
+        sized.observations.iter_mut().for_each(|o| o.board_mm *= 1.0 + share);
+        sized
+    };
+    let cost = |share: f64| board_pose::fit(shared, &sized(share), Loss::Squared).map_or(f64::INFINITY, |fit| fit.cost);
+    let (mut share, mut width) = (start, 0.5 * start.abs());
+    // Near its minimum the cost is a parabola in the share.
+    for _ in 0..5 {
+        let [below, here, above] = [cost(share - width), cost(share), cost(share + width)];
+        let bend = below - 2.0 * here + above;
+        let step = 0.5 * width * (below - above) / bend;
+        if !(bend > 0.0 && step.is_finite()) {
+            break;
+        }
+        share += step.clamp(-2.0 * width, 2.0 * width);
+        width *= 0.2;
+    }
+    (sized(share), share)
 }
 
 /// Something that may be done to a picture on its way from the camera.
@@ -179,7 +206,10 @@ impl Scene<'_> {
                 }
             }
         }
-        let misread = |side: &Side| self.series.alone_px[*side as usize][i].is_none_or(|px| px > self.series.limit_px);
+        let misread = |side: &Side| {
+            let known = self.series.alone_px[*side as usize][i].is_some_and(|px| px <= self.series.limit_px);
+            !known && !self.is_board(i, *side)
+        };
         Side::BOTH.into_iter().find(misread).map(|side| {
             let side = side.name();
             let reason = format!(
@@ -187,6 +217,23 @@ impl Scene<'_> {
             );
             (Cause::Misread, reason)
         })
+    }
+
+    /// Whether a picture's corners are those of a board through a camera of any focal length: one that was zoomed or focused shows a board.
+    fn is_board(&self, i: usize, side: Side) -> bool {
+        let camera = *self.series.shared.rig.camera(side);
+        let view = as_left(&self.series.views[i], side);
+        let rig = Rig { left: camera, right: camera, right_from_left: Transform::identity(), covariance: None };
+        let shared = Shared { rig, ..self.series.shared.clone() };
+        let Some(pose) = board_pose::of_picture(&shared, &view, Side::Left) else { return false };
+        let layout = Layout::one_camera(camera.lens);
+        let priors = Priors::of_one_camera(&camera, self.series.board.diagonal_mm());
+        let (loss, search) = (Loss::Cauchy(CAUCHY_WIDTH), Search::ROUGH);
+        let start = Values { shared, poses: vec![pose] };
+        let views = std::slice::from_ref(&view);
+        let found = levenberg_marquardt::solve_with(views, &layout, &priors, start, loss, search).values;
+        let left_px = found.poses.first().and_then(|pose| median_px(&found.shared, pose, &view, Side::Left));
+        left_px.is_some_and(|px| px <= self.series.limit_px)
     }
 
     /// The pair that one of the pictures belongs to.
