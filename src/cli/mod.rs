@@ -13,7 +13,7 @@ pub use self::cameras::{
 };
 pub use self::robot::{
     Compensate, DhConvention, ExportRobot, Identify, Plan, PlanKind, RobotCommand, RobotFormat, RobotImport, RobotNew,
-    RobotPlace, RobotShow, RobotWhat, Verify,
+    RobotPlace, RobotShow, RobotWhat, TableFlags, Verify,
 };
 pub use self::simulate::{LensBlur, Preset, Simulate};
 

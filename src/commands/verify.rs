@@ -8,15 +8,16 @@ use serde::Serialize;
 use super::Outcome;
 use super::error::Result;
 use crate::cli::Verify;
+use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files;
+use crate::identify;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::doctor::{self, Examined};
 use crate::identify::data::known;
 use crate::identify::judge::errors::{Judge, PLACED_BY_ITSELF};
 use crate::identify::record::{PointSpread, spread};
-use crate::identify::{self, Settings};
-use crate::measurements::{self, Measurement, Observed, Role};
+use crate::measurements::{Measurement, Observed, Role};
 use crate::progress;
 use crate::report;
 use crate::robot;
@@ -50,18 +51,24 @@ fn place_by_verify_rows(rows: &mut [Measurement]) -> bool {
 }
 
 /// Runs the command.
-pub fn run(args: &Verify, settings: &Settings) -> Result<Outcome> {
-    let mut rows = measurements::read(&args.measurements)?;
+pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
+    let settings = &config.identify;
+    let mut robots = Vec::new();
+    for file in &args.robot {
+        robots.push((file, robot::file::read(file)?));
+    }
+    let source = super::identify::source(args.measurements.clone(), &args.table, config);
+    let mut rows = match robots.first() {
+        Some((_, robot)) => super::identify::read(&source, robot)?,
+        None => Vec::new(),
+    };
+    for (_, robot) in &robots {
+        super::identify::check_joints(robot, &rows, &args.measurements[0])?;
+    }
     let only_verify = place_by_verify_rows(&mut rows);
     let mut set = Dataset::new(&rows, SEED)?;
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
-    }
-    let mut robots = Vec::new();
-    for file in &args.robot {
-        let robot = robot::file::read(file)?;
-        super::identify::check_joints(&robot, &rows, &args.measurements)?;
-        robots.push((file, robot));
     }
     if let Some((file, robot)) = robots.first() {
         let Examined { set: examined, robot: mended, along, findings, unexplained } =

@@ -11,6 +11,7 @@ pub mod inverse;
 pub mod jacobian;
 pub mod parameters;
 pub mod refit;
+pub mod tool_fit;
 
 use crate::diagnostic::{Explain, Place};
 
