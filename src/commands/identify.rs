@@ -11,7 +11,7 @@ use crate::files::provenance::{Digested, Provenance, Run};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::doctor::{self, Examined};
 use crate::identify::data::{known, shared};
-use crate::identify::judge::choose::{Identification, identify, step_count};
+use crate::identify::judge::choose::{Against, Identification, identify, step_count};
 use crate::identify::record::{Record, quality};
 use crate::identify::{Error, Settings};
 use crate::measurements::{Measurement, Role, Source};
@@ -32,7 +32,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let file = robot_file(args.robot.as_deref());
     let given = nominal_robot(file.as_deref(), args.robot.is_some())?;
     let rows = read(&source, &given)?;
-    let mut set = Dataset::new(&rows, args.seed)?;
+    let mut set = Dataset::new(&rows)?;
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
@@ -55,7 +55,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let json = write(&out, &set, &nominal, &found, &record, &settings)?;
     let stdout = if args.output.json { json } else { report::identify::summary(&record) };
     // A method or model that was asked for is kept whatever it is worth; that it is worth less than nothing is no success.
-    let worse = found.worse_than_nominal(&set, &nominal, &settings);
+    let worse = found.against_nominal(&set, &nominal, &settings) != Against::NotWorse;
     Ok(Outcome { stdout, status: if worse { Status::OutOfTolerance } else { Status::Done } })
 }
 
@@ -180,11 +180,13 @@ fn write(
     settings: &Settings,
 ) -> Result<String> {
     let identified = &found.candidates[found.chosen].robot;
-    let errors = |robot: &Robot| quality(set, robot, found, settings).1;
+    let errors = |robot: &Robot, fitted: bool| quality(set, robot, fitted, found, settings).1;
+    let is_fitted = found.candidates[found.chosen].found.is_some();
     let places: Vec<_> = set.poses.iter().map(|p| (p.role, nominal.target_mm(&p.joints_rad))).collect();
     let center = set.poses.iter().find(|p| p.role == Role::Center).or(set.poses.first());
     let arm = center.map_or_else(Vec::new, |p| nominal.skeleton_mm(&p.joints_rad));
-    let page = report::identify::page(set, record, &places, &arm, &errors(nominal), &errors(identified))?;
+    let page =
+        report::identify::page(set, record, &places, &arm, &errors(nominal, false), &errors(identified, is_fitted))?;
     let holds = record.expected.as_ref().map_or_else(
         || "The nominal robot was kept.".to_owned(),
         |expected| format!("Identified; {}; it holds within {}.", expected.sentence(), expected.poses),

@@ -16,14 +16,12 @@ use crate::identify::data::dataset::Dataset;
 use crate::identify::data::doctor::{self, Examined};
 use crate::identify::data::known;
 use crate::identify::judge::errors::{Judge, PLACED_BY_ITSELF};
+use crate::identify::judge::folds;
 use crate::identify::record::{PointSpread, spread};
 use crate::measurements::{Measurement, Observed, Role};
 use crate::progress;
 use crate::report;
 use crate::robot;
-
-/// The seed that holds out a fifth where no row verifies: `identify`'s default.
-const SEED: u64 = 1;
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
@@ -66,7 +64,7 @@ pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
         super::identify::check_joints(robot, &rows, &args.measurements[0])?;
     }
     let only_verify = place_by_verify_rows(&mut rows);
-    let mut set = Dataset::new(&rows, SEED)?;
+    let mut set = Dataset::new(&rows)?;
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
@@ -84,10 +82,17 @@ pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
     if let Some(targets) = &set.targets {
         progress::note(targets.sentence());
     }
-    let (fitted, judged) = match only_verify {
+    if let Some(repeats) = &set.repeats {
+        progress::note(repeats.sentence());
+    }
+    let folded = !only_verify && set.verify_rows().is_empty();
+    let (fitted, judged) = match only_verify || folded {
         true => (set.rows(|_| true), set.rows(|pose| pose.role != Role::Center)),
         false => (set.fit_rows(), set.verify_rows()),
     };
+    if folded {
+        progress::note("no row is to verify: each is judged by a placement of the sensor that it takes no part in");
+    }
     if only_verify {
         progress::warn(
             "no row of role `sample` can be used: the verify rows place the sensor as well as judging the robot, which flatters points and wire lengths where they are few",
@@ -97,7 +102,7 @@ pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
     let robots: Vec<RobotVerified> = robots
         .iter()
         .map(|(file, robot)| {
-            let errors = judge.errors(robot, &judged);
+            let errors = if folded { folds::judged(&judge, robot, &judged) } else { judge.errors(robot, &judged) };
             RobotVerified { file: file.to_string(), verify: spread(&judge, robot, &errors, &judged) }
         })
         .collect();

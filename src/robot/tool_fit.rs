@@ -29,6 +29,14 @@ pub struct ToolFit {
 }
 
 impl Robot {
+    /// Middle distance of the points that this robot predicts from the measured ones, mm, once the sensor is placed.
+    pub fn left_mm(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>]) -> Option<f64> {
+        let predicted: Vec<Vector3<f64>> = joints_rad.iter().map(|q| self.target_mm(q).coords).collect();
+        let measured: Vec<Vector3<f64>> = points_mm.iter().map(|p| p.coords).collect();
+        let frame = placed(&predicted, &measured);
+        median(predicted.iter().zip(&measured).map(|(p, m)| (frame * Point3::from(*p) - m).coords.norm()))
+    }
+
     /// The tool with which this chain comes nearest to the points; `None` for fewer than four poses.
     pub fn fit_tool(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>]) -> Option<ToolFit> {
         let count = joints_rad.len().min(points_mm.len());

@@ -364,7 +364,10 @@ fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
     rows.dedup();
     let names: Vec<String> = rows.iter().map(|&r| set.poses[r].name.clone()).collect();
     (!names.is_empty()).then(|| {
-        (names, "poses that are repeated: they say how well the robot repeats, and nothing about its links".to_owned())
+        (
+            names,
+            "poses that the robot came back to: they say how well it repeats, and nothing about its links".to_owned(),
+        )
     })
 }
 

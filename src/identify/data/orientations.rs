@@ -147,7 +147,7 @@ mod tests {
                     *rotation_rad = Some(written(turn));
                 }
             }
-            Dataset::new(&rows, 1).unwrap()
+            Dataset::new(&rows).unwrap()
         };
         let (right, read) = (rows(&|r| r.scaled_axis()), rows(written));
         let (mended, finding) = examine(&read, &world.nominal);

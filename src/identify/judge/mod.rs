@@ -4,5 +4,6 @@ pub mod cells;
 pub mod choose;
 pub mod climb;
 pub mod errors;
+pub mod folds;
 pub mod scale;
 pub mod smooth;
