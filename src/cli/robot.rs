@@ -199,14 +199,20 @@ pub enum RobotWhat {
 /// `stereocal robot import`
 #[derive(Debug, Args)]
 pub struct RobotImport {
-    /// A URDF (.urdf, .xml) or a table (.csv)
+    /// A URDF (.urdf, .xml) or a table of any form: columns alpha, a, theta, d in any order
     pub file: Utf8PathBuf,
     /// Link of a URDF that carries the target [default: the end of the chain]
     #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
-    /// Where alpha and a of a table's row stand: behind the joint (classic) or before it
-    #[arg(long, value_enum, default_value = "modified")]
-    pub dh: DhConvention,
+    /// Where alpha and a of a table's row stand: behind the joint (classic) or before it [default: what fits --measurements, else modified]
+    #[arg(long, value_enum)]
+    pub dh: Option<DhConvention>,
+    /// Measurements of the robot, which tell what a table leaves open; repeat as for `identify`
+    #[arg(long, value_name = "FILE")]
+    pub measurements: Vec<Utf8PathBuf>,
+    /// What a table's columns are, in their order: alpha,a,d,theta
+    #[arg(long, value_name = "NAME,NAME,...")]
+    pub columns: Option<String>,
     /// Where it goes.
     #[command(flatten)]
     pub place: RobotPlace,

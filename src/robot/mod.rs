@@ -38,6 +38,16 @@ pub enum Error {
         /// Where.
         place: Place,
     },
+    /// A table that could be read in several ways, or in none.
+    #[error("{message}")]
+    Table {
+        /// What was found.
+        message: String,
+        /// The file.
+        place: String,
+        /// What settles it.
+        hint: String,
+    },
     /// No arm of this name is known.
     #[error("no arm `{name}` is known")]
     Unknown {
@@ -83,6 +93,7 @@ impl Explain for Error {
         match self {
             Error::Files(e) => e.place(),
             Error::File { place, .. } => Some(place.to_string()),
+            Error::Table { place, .. } => Some(place.clone()),
             Error::Occupied { path } => Some(path.clone()),
             _ => None,
         }
@@ -99,6 +110,7 @@ impl Explain for Error {
                 Some("both files are of one robot, before and after `stereocal identify`".to_owned())
             }
             Error::NotExportable { hint, .. } => Some(hint.clone()),
+            Error::Table { hint, .. } => Some(hint.clone()),
             Error::File { .. } => None,
             Error::Files(e) => e.hint(),
         }

@@ -300,7 +300,7 @@ pub fn is_index(word: &str) -> bool {
 }
 
 /// The words of a name, small, letters and digits apart, and the unit in brackets.
-fn words(name: &str) -> (Vec<String>, Option<Unit>) {
+pub fn words(name: &str) -> (Vec<String>, Option<Unit>) {
     let mut unit = None;
     let mut plain = String::new();
     let mut rest = name;

@@ -242,8 +242,8 @@ fn models(set: &Dataset, settings: &Settings) -> Result<Vec<Model>, Error> {
             Err(Error::ModelNeeds { model: model.name(), needed: "positions (x_mm, y_mm, z_mm)" })
         }
         Some(model) => Ok(vec![model]),
-        // Several targets of one instrument know the turn as well as the point.
-        None if set.targets.is_some() && set.has_rotations() => Ok([vec![Model::Pose], all].concat()),
+        // An orientation is worth what its own residuals say.
+        None if set.has_rotations() => Ok([vec![Model::Pose], all].concat()),
         None => Ok(all),
     }
 }

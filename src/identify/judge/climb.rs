@@ -23,6 +23,9 @@ pub struct Judged {
     pub model: &'static str,
     /// The terms in words.
     pub terms: String,
+    /// The terms.
+    #[serde(skip)]
+    pub of: Terms,
     /// Root mean square held-out error of a number, mm; `None` where it could not be judged.
     pub held_out_mm: Option<f64>,
     /// The same of each way in which rows were held out: regions or placements first, then here and there, several times.
@@ -40,20 +43,21 @@ pub struct Certainty {
     pub of: usize,
 }
 
-/// How sure the choice of `terms` is: against the nominal robot, and against the model that comes nearest.
+/// How sure the choice of `terms` is: against the nominal robot, and against the model that comes nearest of those that do not contain it. Richer
+/// ones may have a little less error by chance: they must make the data more probable, too.
 pub fn certainty(judged: &[Judged], terms: &Terms) -> Vec<Certainty> {
-    let Some(chosen) = judged.iter().find(|j| j.terms == terms.name()) else { return Vec::new() };
+    let Some(chosen) = judged.iter().find(|j| j.of == *terms) else { return Vec::new() };
     let against = |other: &Judged| Certainty {
         than: other.terms.clone(),
         better: chosen.by_way_mm.iter().zip(&other.by_way_mm).filter(|(a, b)| a < b).count(),
         of: chosen.by_way_mm.len().min(other.by_way_mm.len()),
     };
-    let nominal = judged.iter().find(|j| j.terms == Terms::NOMINAL.name());
-    let others = judged.iter().filter(|j| j.terms != chosen.terms && Some(&j.terms) != nominal.map(|n| &n.terms));
+    let nominal = judged.iter().find(|j| j.of == Terms::NOMINAL);
+    let others = judged.iter().filter(|j| j.of != Terms::NOMINAL && !j.of.contains(terms));
     let next = others
         .filter(|j| j.held_out_mm.is_some())
         .min_by(|a, b| a.held_out_mm.unwrap_or(f64::INFINITY).total_cmp(&b.held_out_mm.unwrap_or(f64::INFINITY)));
-    nominal.filter(|n| n.terms != chosen.terms).into_iter().chain(next).map(against).collect()
+    nominal.filter(|n| n.of != *terms).into_iter().chain(next).map(against).collect()
 }
 
 /// Held-out errors of a model, of each way to hold rows out.
@@ -112,9 +116,8 @@ impl Session<'_> {
             let ways: Option<Ways> = cells.par_iter().map(|c| c.held_out(&parameters, &tolerance)).collect();
             let held_out_mm = ways.as_ref().and_then(root_mean_of);
             let by_way_mm = ways.iter().flatten().filter_map(root_mean).collect();
-            let terms = terms.name();
-            judged.retain(|j| j.terms != terms);
-            judged.push(Judged { model: model.name(), terms, held_out_mm, by_way_mm });
+            judged.retain(|j| j.of != terms);
+            judged.push(Judged { model: model.name(), terms: terms.name(), of: terms, held_out_mm, by_way_mm });
             ways
         };
         let evidence = |terms: &Terms| regions.tolerance(&terms.parameters(self.robot)).1;

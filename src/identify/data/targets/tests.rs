@@ -243,7 +243,7 @@ fn exchanged_names_of_an_even_triangle_show_by_their_turn() {
         .into();
     let world = synthetic::world(40, 0.0, 8);
     let mut list = synthetic::of_targets(&world, &triangle, NOISE_MM, 8);
-    let said = |list: &[Measurement]| orientations::examine(&Dataset::new(list).unwrap(), &world.nominal);
+    let said = |list: &[Measurement]| orientations::examine(&Dataset::new(list).unwrap(), &world.nominal, false);
     let (clean, finding) = said(&list);
     assert_eq!((clean.poses.len(), finding), (world.rows.len(), None));
     for pose in [0, 17] {
