@@ -1,7 +1,7 @@
 //! Columns and units held against the nominal robot: the right ones leave what a built robot is off by, wrong ones what the points are apart.
 //!
 //! In: ways to read a table. Out: the one that is taken, and how sure it is. The tool and the sensor's place are solved for each (see
-//! [`Robot::fit_tool`]); what is left is judged as a share of the predicted points' spread. A way is taken where it is near and every other
+//! [`Robot::fit_tool`]); what is left is judged as a share of the spread of the predicted or the measured points, whichever is less. A way is taken where it is near and every other
 //! one leaves several times as much.
 //! What goes wrong: poses that hardly vary, and a robot file with other conventions, decide nothing; the sizes of the numbers do then, where
 //! they can.
@@ -127,13 +127,27 @@ pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, force
             }
         }
         if let Some(other) = others.iter().find(|way| way.picked != best.picked && near(way)) {
-            return Verdict::Open(best, (*other).clone());
+            let (first, second) = apart(&best, &others).unwrap_or((best.clone(), (*other).clone()));
+            return Verdict::Open(first, second);
         }
     }
     if !only {
         return Verdict::None;
     }
     by_sizes(parts, &candidates[0], forced)
+}
+
+/// Two of the ways that have no column in common, the first ones: y and z of one point with x of the next are a point as well, turned.
+fn apart(best: &Way, others: &[&Way]) -> Option<(Way, Way)> {
+    let start = |way: &Way| way.picked.points.first().map(|(_, at)| at[0]);
+    let mut alike: Vec<&Way> = others.iter().copied().filter(|w| w.picked.joints == best.picked.joints).collect();
+    alike.push(best);
+    alike.sort_by_key(|way| start(way));
+    let first = *alike.first()?;
+    let taken = first.picked.points.first()?.1;
+    let second =
+        alike.iter().find(|w| w.picked.points.first().is_some_and(|(_, at)| at.iter().all(|a| !taken.contains(a))))?;
+    Some((first.clone(), (*second).clone()))
 }
 
 /// Units by the sizes of the numbers, where they leave no choice.
@@ -162,7 +176,7 @@ fn by_sizes(parts: &[Part], picked: &Picked, forced: Forced) -> Verdict {
     }
 }
 
-/// What the nominal robot leaves of these columns in these units, as a share of the spread of the points that it predicts.
+/// What the nominal robot leaves of these columns in these units, as a share of the spread of the points.
 fn left(parts: &[Part], picked: &Picked, robot: &Robot, joints: Unit, lengths: Unit) -> Option<f64> {
     let (_, at) = picked.points.first()?;
     let rows = parts[picked.joints[0].part].rows.len();
@@ -186,5 +200,7 @@ fn left(parts: &[Part], picked: &Picked, robot: &Robot, joints: Unit, lengths: U
     let predicted: Vec<Point3<f64>> = readings.iter().map(|q| robot.target_mm(q)).collect();
     let mean = predicted.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / predicted.len() as f64;
     let spread = predicted.iter().map(|p| (p.coords - mean).norm_squared()).sum::<f64>() / predicted.len() as f64;
-    (spread > 0.0).then(|| fit.left_mm / spread.sqrt())
+    // Tiny motions under a tool that all but cancels them would come near to points that are small by a wrong unit.
+    let least = spread.sqrt().min(fit.spread_mm);
+    (least > 0.0).then(|| fit.left_mm / least)
 }

@@ -26,6 +26,8 @@ pub struct ToolFit {
     pub tool_mm: Vector3<f64>,
     /// Middle distance of a predicted point from the measured one, mm.
     pub left_mm: f64,
+    /// Root mean square distance of the measured points from their centre, mm.
+    pub spread_mm: f64,
 }
 
 impl Robot {
@@ -90,7 +92,9 @@ impl Robot {
             }
         }
         let left_mm = median(now.iter().map(Vector3::norm))?;
-        left_mm.is_finite().then_some(ToolFit { tool_mm: tool, left_mm })
+        let centre = measured.iter().sum::<Vector3<f64>>() / measured.len() as f64;
+        let spread_mm = (cost(&measured.iter().map(|m| m - centre).collect::<Vec<_>>()) / measured.len() as f64).sqrt();
+        left_mm.is_finite().then_some(ToolFit { tool_mm: tool, left_mm, spread_mm })
     }
 }
 
