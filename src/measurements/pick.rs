@@ -89,6 +89,12 @@ pub(super) fn by_names(parts: &[Part], count: usize) -> Result<Picked> {
     }
 }
 
+/// Whether a file names as many joints as the robot has; a quaternion `Q0..Q3` is none.
+pub(super) fn names_joints(part: &Part, count: usize) -> bool {
+    let number = |n: &Name| if let What::Joint(i) = n.what { Some(i) } else { None };
+    groups(std::slice::from_ref(part), number).iter().any(|group| group.columns.len() == count)
+}
+
 fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
     let mut complete: Vec<(Vec<At>, Option<bool>)> = Vec::new();
     let mut largest: Option<(usize, usize)> = None;

@@ -176,7 +176,7 @@ fn name_columns(parts: &mut [Part], columns: &str, count: usize) -> Result<bool>
 
 /// Files that make one table each: those with joints and points, and those that complete each other.
 fn sets(parts: Vec<Part>, count: usize) -> Vec<Vec<Part>> {
-    let joints = |p: &Part| p.is_program() || p.names_any(|w| matches!(w, What::Joint(_)));
+    let joints = |p: &Part| p.is_program() || pick::names_joints(p, count);
     let measured = |p: &Part| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance | What::Matrix(..)));
     let lone = |p: &Part| joints(p) != measured(p);
     // A file without names may be either; beside one that lacks the other half it is what that one lacks.

@@ -105,156 +105,22 @@ const OWN: [&str; 15] = [
     "szz_mm2", "rx_rad", "ry_rad", "rz_rad",
 ];
 
-const JOINT: [&str; 16] = [
-    "j",
-    "q",
-    "joint",
-    "joints",
-    "theta",
-    "θ",
-    "th",
-    "axis",
-    "ax",
-    "a",
-    "jnt",
-    "jt",
-    "jointangle",
-    "jointpos",
-    "jointposition",
-    "angle",
-];
+const JOINT: &str = "j q joint joints theta θ th axis ax a jnt jt jointangle jointpos jointposition angle";
 
 /// Words beside a joint's name or a coordinate's that say nothing new.
-const PLAIN: [&str; 16] = [
-    "angle",
-    "angles",
-    "pos",
-    "position",
-    "positions",
-    "value",
-    "values",
-    "coord",
-    "coordinate",
-    "coordinates",
-    "p",
-    "point",
-    "state",
-    "reading",
-    "xyz",
-    "in",
-];
+const PLAIN: &str = "angle angles pos position positions value values coord coordinate coordinates p point state reading \
+    xyz in";
 
 /// Words that say that a number is something else.
-const ELSE: [&str; 49] = [
-    "tau",
-    "torque",
-    "torques",
-    "force",
-    "f",
-    "current",
-    "i",
-    "vel",
-    "velocity",
-    "speed",
-    "v",
-    "qd",
-    "dq",
-    "acc",
-    "temp",
-    "temperature",
-    "dif",
-    "diff",
-    "delta",
-    "err",
-    "error",
-    "errors",
-    "e",
-    "res",
-    "residual",
-    "residuals",
-    "dev",
-    "deviation",
-    "std",
-    "sd",
-    "sigma",
-    "unc",
-    "uncertainty",
-    "u",
-    "rms",
-    "var",
-    "cov",
-    "rot",
-    "rotation",
-    "roll",
-    "pitch",
-    "yaw",
-    "euler",
-    "quat",
-    "quaternion",
-    "orientation",
-    "offset",
-    "normal",
-    "min",
-];
+const ELSE: &str = "tau torque torques force f current i vel velocity speed v qd dq acc temp temperature dif diff delta \
+    err error errors e res residual residuals dev deviation std sd sigma unc uncertainty u rms var cov \
+    rot rotation roll pitch yaw euler quat quaternion orientation offset normal min";
 
-const COMMANDED: [&str; 30] = [
-    "cmd",
-    "command",
-    "commanded",
-    "nominal",
-    "nom",
-    "n",
-    "t",
-    "target",
-    "goal",
-    "desired",
-    "des",
-    "d",
-    "ref",
-    "reference",
-    "set",
-    "setpoint",
-    "plan",
-    "planned",
-    "theo",
-    "theoretical",
-    "ideal",
-    "taught",
-    "programmed",
-    "fk",
-    "calc",
-    "calculated",
-    "computed",
-    "c",
-    "model",
-    "robot",
-];
+const COMMANDED: &str = "cmd command commanded nominal nom n t target goal desired des d ref reference set setpoint plan \
+    planned theo theoretical ideal taught programmed fk calc calculated computed c model robot";
 
-const MEASURED: [&str; 23] = [
-    "m",
-    "meas",
-    "measure",
-    "measured",
-    "measurement",
-    "act",
-    "actual",
-    "laser",
-    "tracker",
-    "lt",
-    "leica",
-    "faro",
-    "smr",
-    "camera",
-    "vicon",
-    "ndi",
-    "mocap",
-    "observed",
-    "obs",
-    "real",
-    "cmm",
-    "marker",
-    "reflector",
-];
+const MEASURED: &str = "m meas measure measured measurement act actual laser tracker lt leica faro smr camera vicon ndi \
+    mocap observed obs real cmm marker reflector";
 
 impl Name {
     /// Reads a name.
@@ -273,7 +139,7 @@ impl Name {
             words.pop();
         }
         let other = Name { what: What::Other, unit, key: Vec::new(), measured: None };
-        if words.iter().any(|word| ELSE.contains(&word.as_str())) {
+        if words.iter().any(|word| is_in(ELSE, word)) {
             return other;
         }
         let Some((what, mut rest)) =
@@ -281,17 +147,22 @@ impl Name {
         else {
             return other;
         };
-        let says = |list: &[&str], rest: &[String]| rest.iter().any(|word| list.contains(&word.as_str()));
+        let says = |list: &str, rest: &[String]| rest.iter().any(|word| is_in(list, word));
         // `target 2` is a reflector, `target` alone where the robot was sent.
         let counted = rest.windows(2).any(|two| two[0] == "target" && is_index(&two[1]));
-        rest.retain(|word| !(counted && word == "target" || PLAIN.contains(&word.as_str())));
-        let measured = match (says(&COMMANDED, &rest), says(&MEASURED, &rest)) {
+        rest.retain(|word| !(counted && word == "target" || is_in(PLAIN, word)));
+        let measured = match (says(COMMANDED, &rest), says(MEASURED, &rest)) {
             (true, _) => Some(false),
             (false, true) => Some(true),
             _ => None,
         };
         Name { what, unit, key: rest, measured }
     }
+}
+
+/// Whether a list of words has this one.
+fn is_in(list: &str, word: &str) -> bool {
+    list.split_whitespace().any(|listed| listed == word)
 }
 
 /// Whether a word counts things: a number or a single letter.
@@ -341,7 +212,7 @@ fn without(words: &[String], out: &[usize]) -> Vec<String> {
 
 /// `joint 3`, `q3`, `theta_3_actual`: a word for joints and the only number. The word stays in the key: `q` and `theta` are two sets.
 fn joint(words: &[String]) -> Option<(What, Vec<String>)> {
-    let at = words.iter().position(|word| JOINT.contains(&word.as_str()))?;
+    let at = words.iter().position(|word| is_in(JOINT, word))?;
     let numbers: Vec<usize> = (0..words.len()).filter(|&i| words[i].parse::<usize>().is_ok()).collect();
     let [number] = numbers[..] else { return None };
     if number < at {

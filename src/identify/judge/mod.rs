@@ -5,5 +5,6 @@ pub mod choose;
 pub mod climb;
 pub mod errors;
 pub mod folds;
+pub mod held_out;
 pub mod scale;
 pub mod smooth;
