@@ -61,7 +61,7 @@ pub struct Config {
     /// Measuring the target on the robot.
     pub measure: MeasureSettings,
     /// Columns and units of tables of measurements.
-    pub measurements: crate::measurements::Source,
+    pub measurements: crate::measurements::source::Known,
     /// Identification: method, model, box, solvers.
     pub identify: crate::identify::Settings,
 }
@@ -110,7 +110,7 @@ impl Default for Config {
             target_board: BoardSettings { squares: Squares { columns: 7, rows: 6 }, square_mm: 10.0 },
             tolerance_mm: 0.05,
             measure: MeasureSettings::default(),
-            measurements: crate::measurements::Source::default(),
+            measurements: crate::measurements::source::Known::default(),
             identify: crate::identify::Settings::default(),
         }
     }

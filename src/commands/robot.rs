@@ -34,7 +34,7 @@ fn import(args: &RobotImport, config: &Config, run: Run) -> Result<String> {
         let description = urdf::Urdf::read(&args.file)?;
         description.chain(args.tip.as_deref())?.robot(&description.name)
     } else {
-        table(args, name, config)?
+        table(args, name)?
     };
     write(&robot, &args.place, config, run, &[&args.file])
 }
@@ -43,7 +43,7 @@ fn import(args: &RobotImport, config: &Config, run: Run) -> Result<String> {
 const CLEAR: f64 = 4.0;
 
 /// The robot of a table: of several ways to read it the one that fits the measurements.
-fn table(args: &RobotImport, name: &str, config: &Config) -> Result<Robot> {
+fn table(args: &RobotImport, name: &str) -> Result<Robot> {
     let readings = dh_csv::readings(&args.file, args.columns.as_deref())?;
     let conventions = match (args.dh, args.measurements.is_empty()) {
         (Some(typed), _) => vec![typed.into()],
@@ -81,7 +81,7 @@ fn table(args: &RobotImport, name: &str, config: &Config) -> Result<Robot> {
         }
         _ => {}
     }
-    let source = Source { files: args.measurements.clone(), ..config.measurements.clone() };
+    let source = Source { files: args.measurements.clone(), ..Source::default() };
     let mut left: Vec<(f64, &dh_csv::Reading, Convention)> = ways
         .iter()
         .filter_map(|(reading, convention)| {

@@ -18,12 +18,31 @@ use crate::files::Result;
 use crate::robot::Robot;
 use crate::tables::names::{Name, Unit, What};
 
-/// Where measurements come from, and what is known of their columns.
+/// Section `[measurements]`: what is known of tables beside what they say.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+pub struct Known {
+    /// As in [`Source`].
+    pub columns: Option<String>,
+    /// As in [`Source`].
+    pub units: Option<String>,
+}
+
+impl Known {
+    /// Notes what is no unit.
+    pub fn validate(&self, problems: &mut Vec<String>) {
+        if let Some(units) = &self.units
+            && units.split(',').any(|word| Unit::of(word).is_none())
+        {
+            problems.push(format!("measurements.units is `{units}`; it is one of deg and rad, one of mm, m and um, or both with a comma between"));
+        }
+    }
+}
+
+/// Where measurements come from, and what is known of their columns.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Source {
     /// Files, each perhaps with `#SHEET` behind it.
-    #[serde(skip)]
     pub files: Vec<Utf8PathBuf>,
     /// Names of the columns in their order, those of all files side by side; `-` skips one.
     pub columns: Option<String>,
@@ -40,15 +59,6 @@ impl Source {
     /// The files without the names of sheets.
     pub fn paths(&self) -> Vec<Utf8PathBuf> {
         self.files.iter().map(|file| crate::tables::Grid::file(file)).collect()
-    }
-
-    /// Notes what is no unit.
-    pub fn validate(&self, problems: &mut Vec<String>) {
-        if let Some(units) = &self.units
-            && units.split(',').any(|word| Unit::of(word).is_none())
-        {
-            problems.push(format!("measurements.units is `{units}`; it is one of deg and rad, one of mm, m and um, or both with a comma between"));
-        }
     }
 
     fn forced(&self) -> Forced {

@@ -31,6 +31,10 @@ const ROUNDS: usize = 4;
 /// Steps of the trust region after a change of the rows.
 const STEPS: usize = 6;
 
+/// Variance of a prediction over a reading's, beyond which the prior says how far off a prediction may be, and not what the model lacks: a built
+/// robot's links are off by tens of what its readings scatter by.
+const MOST_EXTRAPOLATED: f64 = 30.0;
+
 /// Share of a row that the others must say for it to be held against them.
 const LEAST_OTHERS: f64 = 0.05;
 
@@ -191,7 +195,7 @@ impl Robust<'_> {
                     continue;
                 }
                 let (square, odds) = square_of_deleted(&residual, leverage, weight(row)).unwrap_or((0.0, 1.0));
-                let square = square / odds.max(1.0).powi(2);
+                let square = square / odds.clamp(1.0, MOST_EXTRAPOLATED);
                 if square > deleted[row].square {
                     deleted[row] = Deleted { square, numbers: at.len(), ..deleted[row] };
                 }
