@@ -60,6 +60,8 @@ pub struct Config {
     pub tolerance_mm: f64,
     /// Measuring the target on the robot.
     pub measure: MeasureSettings,
+    /// Columns and units of tables of measurements.
+    pub measurements: crate::measurements::source::Known,
     /// Identification: method, model, box, solvers.
     pub identify: crate::identify::Settings,
 }
@@ -108,6 +110,7 @@ impl Default for Config {
             target_board: BoardSettings { squares: Squares { columns: 7, rows: 6 }, square_mm: 10.0 },
             tolerance_mm: 0.05,
             measure: MeasureSettings::default(),
+            measurements: crate::measurements::source::Known::default(),
             identify: crate::identify::Settings::default(),
         }
     }
@@ -135,6 +138,7 @@ impl Config {
         within(&mut problems, "check_board.square_mm", self.check_board.square_mm, SQUARES_MM);
         within(&mut problems, "target_board.square_mm", self.target_board.square_mm, SQUARES_MM);
         positive(&mut problems, "measure.crossing_mm", self.measure.crossing_mm);
+        self.measurements.validate(&mut problems);
         self.identify.validate(&mut problems);
         reject(problems)
     }

@@ -1,8 +1,8 @@
-//! A CSV file with a header: columns by name, every row as long as the header, complaints with the line.
+//! A table with a header: columns by name, every row as long as the header, complaints with the line.
 //!
-//! Time and memory grow with the file's length alone, and there is an end to it: [`MOST_COLUMNS`], [`MOST_ROWS`].
-//!
-//! Text cells that a spreadsheet would run as a formula are written with an apostrophe before them and read without.
+//! The file may have any form that [`crate::tables`] reads. Time and memory grow with the file's length alone, and there is an end to it:
+//! [`MOST_COLUMNS`], [`MOST_ROWS`]. Text cells that a spreadsheet would run as a formula are written with an apostrophe before them and read
+//! without.
 
 use std::collections::BTreeMap;
 
@@ -10,17 +10,11 @@ use camino::Utf8Path;
 
 use crate::diagnostic::Place;
 use crate::files::{self, Result};
+use crate::tables::Grid;
+use crate::tables::grid::is_formula;
+pub use crate::tables::grid::{Fields, MOST_COLUMNS, MOST_ROWS};
 
-/// Columns of the widest table that is read.
-pub const MOST_COLUMNS: usize = 100_000;
-
-/// Rows of the longest table that is read.
-pub const MOST_ROWS: usize = 3_000_000;
-
-/// The longest table that is read, bytes.
-const MOST_BYTES: u64 = 2 << 30;
-
-/// A CSV file with its header understood: fields by name, complaints with the line.
+/// A table with its header understood: fields by name, complaints with the line.
 pub struct Table<'a> {
     /// Where it was read.
     pub path: &'a Utf8Path,
@@ -31,115 +25,43 @@ pub struct Table<'a> {
     columns: BTreeMap<String, usize>,
 }
 
-/// The fields of a row, in one piece.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Fields {
-    text: Box<str>,
-    ends: Box<[u32]>,
-}
-
-impl Fields {
-    fn new(record: &csv::StringRecord) -> Fields {
-        let mut text = String::with_capacity(record.as_slice().len());
-        let mut ends = Vec::with_capacity(record.len());
-        for field in record {
-            text.push_str(unguarded(field));
-            // A file has less than 2^32 bytes.
-            ends.push(text.len() as u32);
-        }
-        Fields { text: text.into(), ends: ends.into() }
-    }
-}
-
-impl std::ops::Index<usize> for Fields {
-    type Output = str;
-
-    fn index(&self, column: usize) -> &str {
-        let start = if column == 0 { 0 } else { self.ends[column - 1] };
-        &self.text[start as usize..self.ends[column] as usize]
-    }
-}
-
-/// Counts lines as an editor does. The reader's own count is one short in files whose lines end in `\r\n`: it takes a record to begin
-/// between the two.
-struct Lines<'a> {
-    text: &'a [u8],
-    at: usize,
-    line: u64,
-}
-
-impl Lines<'_> {
-    /// The line of the first byte at or after `byte` that ends no line; `byte` never falls from call to call.
-    fn of(&mut self, byte: u64) -> u64 {
-        let byte = usize::try_from(byte).unwrap_or(usize::MAX);
-        while let Some(&here) = self.text.get(self.at)
-            && (self.at < byte || here == b'\n' || here == b'\r')
-        {
-            self.at += 1;
-            let ends = here == b'\n' || here == b'\r' && self.text.get(self.at) != Some(&b'\n');
-            self.line += u64::from(ends);
-        }
-        self.line
-    }
-}
-
 impl<'a> Table<'a> {
     /// Reads a whole file; `what` names it in the message when it is not there, `hint` says what makes it. A file without rows is refused.
     pub fn read(path: &'a Utf8Path, what: &'static str, hint: &str) -> Result<Table<'a>> {
-        let text = files::read_text_up_to(path, what, Some(hint), MOST_BYTES)?;
-        // Spreadsheets put a byte order mark first and, in half of Europe, semicolons between; instruments put tabs.
-        let text = text.trim_start_matches('\u{feff}');
-        let first = text.lines().next().unwrap_or_default();
-        let delimiter = [b',', b';', b'\t'].into_iter().find(|&d| first.contains(char::from(d))).unwrap_or(b',');
-        let mut reader = csv::ReaderBuilder::new()
-            .delimiter(delimiter)
-            .trim(csv::Trim::All)
-            .flexible(true)
-            .from_reader(text.as_bytes());
-        let mut table = Table { path, header: Vec::new(), rows: Vec::new(), columns: BTreeMap::new() };
-        table.read_header(&mut reader)?;
-        let mut record = csv::StringRecord::new();
-        let mut lines = Lines { text: text.as_bytes(), at: 0, line: 1 };
-        while reader.read_record(&mut record).map_err(|e| table.unreadable(&e))? {
-            let line = lines.of(record.position().map_or(0, csv::Position::byte));
-            if record.iter().all(str::is_empty) {
-                continue;
-            }
-            if record.len() != table.header.len() {
-                let message = format!("{} fields, but the header has {}", record.len(), table.header.len());
-                return Err(table.refuse(line, message));
-            }
-            if table.rows.len() == MOST_ROWS {
-                return Err(table.refuse(line, format!("more than {MOST_ROWS} rows; that many are read at the most")));
-            }
-            table.rows.push((line, Fields::new(&record)));
+        let grid = Grid::read(path, what, hint)?;
+        let mut rows = grid.rows.into_iter();
+        let header = rows.next().map_or_else(Vec::new, |(_, row)| row.iter().map(str::to_owned).collect());
+        Table::new(path, header, rows.collect())
+    }
+
+    /// A table of these rows under this header.
+    pub fn new(path: &'a Utf8Path, mut header: Vec<String>, mut rows: Vec<(u64, Fields)>) -> Result<Table<'a>> {
+        // A delimiter at the end of each line makes a column that is none.
+        let longest = rows.iter().map(|(_, row)| row.len()).max().unwrap_or(0);
+        while header.len() > longest && longest > 0 && header.last().is_some_and(String::is_empty) {
+            header.pop();
         }
-        if table.rows.is_empty() {
+        let mut table = Table { path, header, rows: Vec::new(), columns: BTreeMap::new() };
+        for (i, name) in table.header.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
+            if table.columns.insert(name.clone(), i).is_some() {
+                let hint = "a table begins with a line of column names, each of them once";
+                return Err(table.refuse_with(1, format!("two columns `{name}`"), Some(hint)));
+            }
+        }
+        for (line, row) in &mut rows {
+            let wanted = table.header.len();
+            if row.len() > wanted && row.iter().skip(wanted).all(str::is_empty) {
+                *row = Fields::new(row.iter().take(wanted));
+            }
+            if row.len() != wanted {
+                return Err(table.refuse(*line, format!("{} fields, but the header has {wanted}", row.len())));
+            }
+        }
+        if rows.is_empty() {
             return Err(table.refuse(1, "the file has no rows below its header".to_owned()));
         }
+        table.rows = rows;
         Ok(table)
-    }
-
-    fn read_header(&mut self, reader: &mut csv::Reader<&[u8]>) -> Result<()> {
-        let header = reader.headers().map_err(|e| self.unreadable(&e))?;
-        if header.len() > MOST_COLUMNS {
-            let message = format!("{} columns; {MOST_COLUMNS} are read at the most", header.len());
-            return Err(self.refuse(1, message));
-        }
-        self.header = header.iter().map(|name| unguarded(name).to_owned()).collect();
-        for (i, name) in self.header.iter().enumerate().filter(|(_, name)| !name.is_empty()) {
-            if self.columns.insert(name.clone(), i).is_some() {
-                let hint = "a table begins with a line of column names, each of them once";
-                return Err(self.refuse_with(1, format!("two columns `{name}`"), Some(hint)));
-            }
-        }
-        Ok(())
-    }
-
-    fn unreadable(&self, e: &csv::Error) -> files::Error {
-        let line = e.position().map(csv::Position::line);
-        let place = Place { path: self.path.to_owned(), line };
-        files::Error::Format { message: format!("not readable as CSV: {e}"), place, hint: None }
     }
 
     /// The header as a message shows it: not all of a hundred thousand names.
@@ -199,19 +121,6 @@ pub fn quoted(field: &str) -> String {
     let bytes = writer.write_record([guarded.as_str(), ""]).ok().and_then(|()| writer.into_inner().ok());
     let line = bytes.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
     line.strip_suffix(",\n").unwrap_or_default().to_owned()
-}
-
-/// Whether a spreadsheet would compute this cell (OWASP, "CSV Injection"). A number, of either sign, is no formula.
-fn is_formula(text: &str) -> bool {
-    text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err()
-}
-
-/// A field without the apostrophe that [`quoted`] put before a formula.
-fn unguarded(field: &str) -> &str {
-    match field.strip_prefix('\'') {
-        Some(rest) if is_formula(rest.trim_start_matches('\'')) => rest,
-        _ => field,
-    }
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@ pub mod files;
 pub mod geometry;
 pub mod progress;
 pub mod statistics;
+pub mod tables;
 
 pub mod imaging;
 pub mod opencv;

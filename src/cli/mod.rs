@@ -13,7 +13,7 @@ pub use self::cameras::{
 };
 pub use self::robot::{
     Compensate, DhConvention, ExportRobot, Identify, Plan, PlanKind, RobotCommand, RobotFormat, RobotImport, RobotNew,
-    RobotPlace, RobotShow, RobotWhat, Verify,
+    RobotPlace, RobotShow, RobotWhat, TableFlags, Verify,
 };
 pub use self::simulate::{LensBlur, Preset, Simulate};
 
@@ -72,7 +72,7 @@ pub enum Command {
     Robot(RobotCommand),
     /// Write a commented stereocal.toml, a robot.toml and a poses.csv to start from
     Init(Init),
-    /// Print a page of the guide: boards, cameras, pictures, poses, a day in the cell, a robot's way, warnings
+    /// Print a page of the guide: boards, cameras, pictures, poses, a day in the cell, a robot's way, tables, warnings
     Guide(Guide),
     /// Print a shell's completions
     Completions(Completions),

@@ -9,9 +9,12 @@ use crate::imaging::Squares;
 /// `stereocal identify`
 #[derive(Debug, Args)]
 pub struct Identify {
-    /// Measurements [default: measurements.csv in the results folder]; with a column `target`, a row for each target of a pose
+    /// Measurements: CSV with any delimiter, xlsx, xls, ods (FILE#SHEET), program lines; repeat for files that complete each other or are stacked [default: measurements.csv in the results folder]
     #[arg(long, value_name = "FILE")]
-    pub measurements: Option<Utf8PathBuf>,
+    pub measurements: Vec<Utf8PathBuf>,
+    /// How to read them.
+    #[command(flatten)]
+    pub table: TableFlags,
     /// The nominal robot [default: robot.toml in the working directory if there, else Table 1 of the paper]
     #[arg(long, value_name = "FILE")]
     pub robot: Option<Utf8PathBuf>,
@@ -38,12 +41,26 @@ pub struct Identify {
     pub output: Output,
 }
 
+/// What is known of a table that people have.
+#[derive(Debug, Clone, Args)]
+pub struct TableFlags {
+    /// What the columns are, in their order, those of all files side by side: j1,j2,...,-,x,y,z; `-` skips one; key `measurements.columns`
+    #[arg(long, value_name = "NAME,NAME,...", allow_hyphen_values = true)]
+    pub columns: Option<String>,
+    /// Units of joints and lengths: deg or rad, mm, m or um; key `measurements.units` [default: what the names say, else what fits the nominal robot]
+    #[arg(long, value_name = "UNIT,UNIT", value_parser = units)]
+    pub units: Option<String>,
+}
+
 /// `stereocal verify`
 #[derive(Debug, Args)]
 pub struct Verify {
-    /// Measurements with verify rows (without any, a fifth of the samples is judged)
-    #[arg(long, value_name = "FILE")]
-    pub measurements: Utf8PathBuf,
+    /// Measurements, in any form that `identify` reads; without verify rows all of them are judged
+    #[arg(long, value_name = "FILE", required = true)]
+    pub measurements: Vec<Utf8PathBuf>,
+    /// How to read them.
+    #[command(flatten)]
+    pub table: TableFlags,
     /// A robot to judge; repeat for more
     #[arg(long, value_name = "FILE", required = true)]
     pub robot: Vec<Utf8PathBuf>,
@@ -182,14 +199,20 @@ pub enum RobotWhat {
 /// `stereocal robot import`
 #[derive(Debug, Args)]
 pub struct RobotImport {
-    /// A URDF (.urdf, .xml) or a table (.csv)
+    /// A URDF (.urdf, .xml) or a table of any form: columns alpha, a, theta, d in any order
     pub file: Utf8PathBuf,
     /// Link of a URDF that carries the target [default: the end of the chain]
     #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
-    /// Where alpha and a of a table's row stand: behind the joint (classic) or before it
-    #[arg(long, value_enum, default_value = "modified")]
-    pub dh: DhConvention,
+    /// Where alpha and a of a table's row stand: behind the joint (classic) or before it [default: what fits --measurements, else modified]
+    #[arg(long, value_enum)]
+    pub dh: Option<DhConvention>,
+    /// Measurements of the robot, which tell what a table leaves open; repeat as for `identify`
+    #[arg(long, value_name = "FILE")]
+    pub measurements: Vec<Utf8PathBuf>,
+    /// What a table's columns are, in their order: alpha,a,d,theta
+    #[arg(long, value_name = "NAME,NAME,...")]
+    pub columns: Option<String>,
     /// Where it goes.
     #[command(flatten)]
     pub place: RobotPlace,
@@ -222,7 +245,7 @@ pub struct RobotShow {
     /// The robot file
     pub file: Utf8PathBuf,
     /// Joint angles, deg, with commas [default: all zero]
-    #[arg(long, value_name = "DEG,DEG,...", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG,DEG,...", value_delimiter = ',', allow_hyphen_values = true)]
     pub joints: Vec<f64>,
 }
 
@@ -281,4 +304,12 @@ fn point(text: &str) -> Result<[f64; 3], String> {
     let numbers: Vec<f64> =
         text.split(',').filter_map(|v| v.trim().parse().ok()).filter(|v: &f64| v.is_finite()).collect();
     <[f64; 3]>::try_from(numbers).map_err(|_| "three numbers X,Y,Z in mm are needed".to_owned())
+}
+
+/// Reads units.
+fn units(text: &str) -> Result<String, String> {
+    match text.split(',').all(|word| crate::tables::names::Unit::of(word).is_some()) {
+        true => Ok(text.to_owned()),
+        false => Err("deg or rad, mm, m or um, or one of each with a comma between are needed".to_owned()),
+    }
 }

@@ -3,7 +3,7 @@
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::{Outcome, Result};
-use crate::cli::Identify;
+use crate::cli::{Identify, TableFlags};
 use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files::OutDir;
@@ -12,9 +12,10 @@ use crate::identify::data::dataset::Dataset;
 use crate::identify::data::doctor::{self, Examined};
 use crate::identify::data::{known, shared};
 use crate::identify::judge::choose::{Identification, identify, step_count};
+use crate::identify::judge::held_out::Against;
 use crate::identify::record::{Record, quality};
 use crate::identify::{Error, Settings};
-use crate::measurements::{self, Measurement, Role};
+use crate::measurements::{Measurement, Role, Source};
 use crate::progress;
 use crate::report;
 use crate::robot::{self, Robot};
@@ -26,16 +27,17 @@ const DEFAULT_ROBOT: &str = "robot.toml";
 pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let settings = settings(args, config);
     let out = args.output.out.clone().unwrap_or_else(|| config.out.clone());
-    let path = args.measurements.clone().unwrap_or_else(|| out.join("measurements.csv"));
-    let rows = measurements::read(&path)?;
+    let default =
+        if args.measurements.is_empty() { vec![out.join("measurements.csv")] } else { args.measurements.clone() };
+    let source = source(default, &args.table, config);
     let file = robot_file(args.robot.as_deref());
     let given = nominal_robot(file.as_deref(), args.robot.is_some())?;
-    check_joints(&given, &rows, &path)?;
-    let mut set = Dataset::new(&rows, args.seed)?;
+    let rows = read(&source, &given)?;
+    let mut set = Dataset::new(&rows)?;
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
-    let (out, measured) = open(args, &out, run, &path, file.as_deref())?;
+    let (out, measured) = open(args, &out, run, &source.paths(), file.as_deref())?;
     if let Some(record) = &measured {
         shared::take(record, &mut set);
     }
@@ -54,7 +56,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let json = write(&out, &set, &nominal, &found, &record, &settings)?;
     let stdout = if args.output.json { json } else { report::identify::summary(&record) };
     // A method or model that was asked for is kept whatever it is worth; that it is worth less than nothing is no success.
-    let worse = found.worse_than_nominal(&set, &nominal, &settings);
+    let worse = found.against_nominal(&set, &nominal, &settings) != Against::NotWorse;
     Ok(Outcome { stdout, status: if worse { Status::OutOfTolerance } else { Status::Done } })
 }
 
@@ -72,19 +74,42 @@ fn settings(args: &Identify, config: &Config) -> Settings {
     settings
 }
 
+/// The files with what is known of their columns: what was typed beats the settings.
+pub fn source(files: Vec<Utf8PathBuf>, typed: &TableFlags, config: &Config) -> Source {
+    let known = &config.measurements;
+    Source {
+        files,
+        columns: typed.columns.clone().or_else(|| known.columns.clone()),
+        units: typed.units.clone().or_else(|| known.units.clone()),
+    }
+}
+
+/// Measurements of a robot; says what was taken of tables that are not in the contract's own columns.
+pub fn read(source: &Source, robot: &Robot) -> Result<Vec<Measurement>> {
+    let (rows, said) = source.read(robot)?;
+    said.into_iter().for_each(progress::note);
+    if let Some(path) = source.files.first() {
+        check_joints(robot, &rows, path)?;
+    }
+    Ok(rows)
+}
+
 /// The results folder, once nothing is in the way of what will be written, and the `measure.json` that is about the measurements.
 fn open(
     args: &Identify,
     out: &Utf8Path,
     run: Run,
-    measurements: &Utf8Path,
+    measurements: &[Utf8PathBuf],
     robot: Option<&Utf8Path>,
 ) -> Result<(OutDir, Option<Utf8PathBuf>)> {
     let run = Run { force: args.output.force, ..run };
-    let inputs: Vec<&Utf8Path> = [measurements].into_iter().chain(robot).collect();
+    let inputs: Vec<&Utf8Path> = measurements.iter().map(Utf8PathBuf::as_path).chain(robot).collect();
     let out = OutDir::open(out)?.for_run(&run, &inputs);
     out.check_free(&["identification.json", "identified.toml", "identify.html"])?;
-    let measured = check_calibration(&out, measurements);
+    let measured = match measurements {
+        [only] => check_calibration(&out, only),
+        _ => None,
+    };
     Ok((out, measured))
 }
 
@@ -156,11 +181,13 @@ fn write(
     settings: &Settings,
 ) -> Result<String> {
     let identified = &found.candidates[found.chosen].robot;
-    let errors = |robot: &Robot| quality(set, robot, found, settings).1;
+    let errors = |robot: &Robot, fitted: bool| quality(set, robot, fitted, found, settings).1;
+    let is_fitted = found.candidates[found.chosen].found.is_some();
     let places: Vec<_> = set.poses.iter().map(|p| (p.role, nominal.target_mm(&p.joints_rad))).collect();
     let center = set.poses.iter().find(|p| p.role == Role::Center).or(set.poses.first());
     let arm = center.map_or_else(Vec::new, |p| nominal.skeleton_mm(&p.joints_rad));
-    let page = report::identify::page(set, record, &places, &arm, &errors(nominal), &errors(identified))?;
+    let page =
+        report::identify::page(set, record, &places, &arm, &errors(nominal, false), &errors(identified, is_fitted))?;
     let holds = record.expected.as_ref().map_or_else(
         || "The nominal robot was kept.".to_owned(),
         |expected| format!("Identified; {}; it holds within {}.", expected.sentence(), expected.poses),

@@ -49,7 +49,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::CameraCheck(args) => camera_check::run(&args, &config, run),
         Command::Measure(args) => measure::run(&args, &config, run),
         Command::Identify(args) => identify::run(&args, &config, run),
-        Command::Verify(args) => verify::run(&args, &config.identify),
+        Command::Verify(args) => verify::run(&args, &config),
         Command::Rectify(args) => rectify::run(&args, &config, run),
         Command::Report(args) => report::run(&args, &config, run),
         Command::Simulate(args) => simulate::run(&args, &config, run),

@@ -12,7 +12,7 @@ use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
 use crate::formats::plan::{PlanFile, poses_csv};
-use crate::measurements::{self, Measurement};
+use crate::measurements::{Measurement, Source};
 use crate::plan::scene::Scene;
 use crate::plan::{PAPER_SAMPLES, Plan, Planned, Settings, plan};
 use crate::programs::{Joints, Language, Motion, Stop, program};
@@ -47,7 +47,10 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
         }
     };
     check(args, &robot)?;
-    let earlier = args.after.as_deref().map(measurements::read).transpose()?;
+    let earlier = match &args.after {
+        Some(path) => Some(super::identify::read(&Source::of(path.clone()), &robot)?),
+        None => None,
+    };
     if let (Some(rows), Some(path)) = (&earlier, &args.after) {
         check_one_target(rows, path)?;
     }

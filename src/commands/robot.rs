@@ -1,6 +1,7 @@
 //! `stereocal robot`: nominal robot files, and what they say in words.
 
 use camino::Utf8Path;
+use nalgebra::Point3;
 
 use super::{Outcome, Result};
 use crate::cli::{DhConvention, RobotCommand, RobotImport, RobotNew, RobotPlace, RobotShow, RobotWhat};
@@ -9,6 +10,8 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::{dh_csv, urdf};
+use crate::measurements::{Observed, Source};
+use crate::progress;
 use crate::report::robot as report;
 use crate::robot::catalogue::{self, Convention};
 use crate::robot::{Error, Robot, file};
@@ -26,14 +29,100 @@ pub fn run(args: &RobotCommand, config: &Config, run: Run) -> Result<Outcome> {
 
 fn import(args: &RobotImport, config: &Config, run: Run) -> Result<String> {
     let name = args.file.file_stem().unwrap_or("robot");
-    let table = args.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"));
-    let robot = if table {
-        dh_csv::read(&args.file, name, args.dh.into())?
-    } else {
+    let description = args.file.extension().is_some_and(|e| ["urdf", "xml"].iter().any(|u| e.eq_ignore_ascii_case(u)));
+    let robot = if description {
         let description = urdf::Urdf::read(&args.file)?;
         description.chain(args.tip.as_deref())?.robot(&description.name)
+    } else {
+        table(args, name)?
     };
     write(&robot, &args.place, config, run, &[&args.file])
+}
+
+/// How many times nearer to the measurements one way to read a table must come than the others.
+const CLEAR: f64 = 4.0;
+
+/// The robot of a table: of several ways to read it the one that fits the measurements.
+fn table(args: &RobotImport, name: &str) -> Result<Robot> {
+    let readings = dh_csv::readings(&args.file, args.columns.as_deref())?;
+    let conventions = match (args.dh, args.measurements.is_empty()) {
+        (Some(typed), _) => vec![typed.into()],
+        (None, true) => vec![Convention::Modified],
+        (None, false) => vec![Convention::Modified, Convention::Classic],
+    };
+    let refuse =
+        |message: String, hint: &str| Error::Table { message, place: args.file.to_string(), hint: hint.to_owned() };
+    let of = |convention: Convention| if convention == Convention::Classic { "classic" } else { "modified" };
+    let ways: Vec<(&dh_csv::Reading, Convention)> = readings
+        .iter()
+        .flat_map(|r| conventions.iter().map(move |&c| (r, c)))
+        .filter(|(r, c)| !(r.is_modified() && *c == Convention::Classic))
+        .collect();
+    let said = |reading: &dh_csv::Reading, convention: Convention| {
+        progress::note(format!("{}: {}, {} convention", args.file, reading.said, of(convention)));
+    };
+    match &ways[..] {
+        [] => {
+            return Err(refuse(
+                "beta_deg stands beside alpha and a of a modified table".to_owned(),
+                "`--dh modified` reads it",
+            )
+            .into());
+        }
+        [(reading, convention)] => {
+            said(reading, *convention);
+            return Ok(reading.robot(name, *convention));
+        }
+        _ if args.measurements.is_empty() => {
+            let orders: Vec<String> = ways.iter().map(|(r, _)| format!("`--columns {}`", r.columns)).collect();
+            let message = "the columns have no names, and more than one order could be".to_owned();
+            let hint = format!("{} says which; `--measurements FILE` lets the readings decide", orders.join(" or "));
+            return Err(refuse(message, &hint).into());
+        }
+        _ => {}
+    }
+    let source = Source { files: args.measurements.clone(), ..Source::default() };
+    let mut left: Vec<(f64, &dh_csv::Reading, Convention)> = ways
+        .iter()
+        .filter_map(|(reading, convention)| {
+            Some((left_mm(&reading.robot(name, *convention), &source)?, *reading, *convention))
+        })
+        .collect();
+    left.sort_by(|a, b| a.0.total_cmp(&b.0));
+    match &left[..] {
+        [] => Err(refuse(
+            "no way to read the table comes near to the measurements".to_owned(),
+            "see whether they are of one robot; `--dh` and `--columns` read the table without them",
+        )
+        .into()),
+        [best, next, ..] if next.0 < CLEAR * best.0 => {
+            let way = |(left, r, c): &(f64, &dh_csv::Reading, Convention)| {
+                format!("`--dh {} --columns {}` ({left:.2} mm)", of(*c), r.columns)
+            };
+            let message = "more than one way to read the table fits the measurements".to_owned();
+            Err(refuse(message, &format!("{} or {} says which", way(best), way(next))).into())
+        }
+        [best, ..] => {
+            said(best.1, best.2);
+            Ok(best.1.robot(name, best.2))
+        }
+    }
+}
+
+/// What a robot leaves of the measured points of the placement that has most of them, its tool and the sensor solved for, mm.
+fn left_mm(robot: &Robot, source: &Source) -> Option<f64> {
+    let (rows, _) = source.read(robot).ok()?;
+    let mut groups: std::collections::BTreeMap<&str, (Vec<Vec<f64>>, Vec<Point3<f64>>)> =
+        std::collections::BTreeMap::new();
+    for row in rows.iter().filter(|row| row.target == rows[0].target) {
+        if let Observed::Position { point_mm, .. } = row.observed {
+            let group = groups.entry(&row.at.group).or_default();
+            group.0.push(row.at.joints_rad());
+            group.1.push(point_mm);
+        }
+    }
+    let (joints, points) = groups.into_values().max_by_key(|(joints, _)| joints.len())?;
+    (joints.first()?.len() == robot.joints.len()).then(|| robot.fit_tool(&joints, &points))?.map(|fit| fit.left_mm)
 }
 
 fn new(args: &RobotNew, config: &Config, run: Run) -> Result<String> {

@@ -8,21 +8,20 @@ use serde::Serialize;
 use super::Outcome;
 use super::error::Result;
 use crate::cli::Verify;
+use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files;
+use crate::identify;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::doctor::{self, Examined};
 use crate::identify::data::known;
 use crate::identify::judge::errors::{Judge, PLACED_BY_ITSELF};
+use crate::identify::judge::folds;
 use crate::identify::record::{PointSpread, spread};
-use crate::identify::{self, Settings};
-use crate::measurements::{self, Measurement, Observed, Role};
+use crate::measurements::{Measurement, Observed, Role};
 use crate::progress;
 use crate::report;
 use crate::robot;
-
-/// The seed that holds out a fifth where no row verifies: `identify`'s default.
-const SEED: u64 = 1;
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
@@ -50,18 +49,24 @@ fn place_by_verify_rows(rows: &mut [Measurement]) -> bool {
 }
 
 /// Runs the command.
-pub fn run(args: &Verify, settings: &Settings) -> Result<Outcome> {
-    let mut rows = measurements::read(&args.measurements)?;
-    let only_verify = place_by_verify_rows(&mut rows);
-    let mut set = Dataset::new(&rows, SEED)?;
-    if let Some(path) = &args.known_distances {
-        set.known = known::read(path, &set)?;
-    }
+pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
+    let settings = &config.identify;
     let mut robots = Vec::new();
     for file in &args.robot {
-        let robot = robot::file::read(file)?;
-        super::identify::check_joints(&robot, &rows, &args.measurements)?;
-        robots.push((file, robot));
+        robots.push((file, robot::file::read(file)?));
+    }
+    let source = super::identify::source(args.measurements.clone(), &args.table, config);
+    let mut rows = match robots.first() {
+        Some((_, robot)) => super::identify::read(&source, robot)?,
+        None => Vec::new(),
+    };
+    for (_, robot) in &robots {
+        super::identify::check_joints(robot, &rows, &args.measurements[0])?;
+    }
+    let only_verify = place_by_verify_rows(&mut rows);
+    let mut set = Dataset::new(&rows)?;
+    if let Some(path) = &args.known_distances {
+        set.known = known::read(path, &set)?;
     }
     if let Some((file, robot)) = robots.first() {
         let Examined { set: examined, robot: mended, along, findings, unexplained } =
@@ -77,10 +82,17 @@ pub fn run(args: &Verify, settings: &Settings) -> Result<Outcome> {
     if let Some(targets) = &set.targets {
         progress::note(targets.sentence());
     }
-    let (fitted, judged) = match only_verify {
+    if let Some(repeats) = &set.repeats {
+        progress::note(repeats.sentence());
+    }
+    let folded = !only_verify && set.verify_rows().is_empty();
+    let (fitted, judged) = match only_verify || folded {
         true => (set.rows(|_| true), set.rows(|pose| pose.role != Role::Center)),
         false => (set.fit_rows(), set.verify_rows()),
     };
+    if folded {
+        progress::note("no row is to verify: each is judged by a placement of the sensor that it takes no part in");
+    }
     if only_verify {
         progress::warn(
             "no row of role `sample` can be used: the verify rows place the sensor as well as judging the robot, which flatters points and wire lengths where they are few",
@@ -90,7 +102,7 @@ pub fn run(args: &Verify, settings: &Settings) -> Result<Outcome> {
     let robots: Vec<RobotVerified> = robots
         .iter()
         .map(|(file, robot)| {
-            let errors = judge.errors(robot, &judged);
+            let errors = if folded { folds::judged(&judge, robot, &judged) } else { judge.errors(robot, &judged) };
             RobotVerified { file: file.to_string(), verify: spread(&judge, robot, &errors, &judged) }
         })
         .collect();

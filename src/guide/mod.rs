@@ -15,6 +15,8 @@ pub mod poses {}
 pub mod day {}
 #[doc = include_str!("robot.md")]
 pub mod robot {}
+#[doc = include_str!("tables.md")]
+pub mod tables {}
 #[doc = include_str!("warnings.md")]
 pub mod warnings {}
 
@@ -28,13 +30,14 @@ pub struct Page {
 }
 
 /// All pages, in the order in which they are needed.
-pub const PAGES: [Page; 8] = [
+pub const PAGES: [Page; 9] = [
     Page { topic: "day", text: include_str!("day.md") },
     Page { topic: "boards", text: include_str!("boards.md") },
     Page { topic: "cameras", text: include_str!("cameras.md") },
     Page { topic: "pictures", text: include_str!("pictures.md") },
     Page { topic: "poses", text: include_str!("poses.md") },
     Page { topic: "robot", text: include_str!("robot.md") },
+    Page { topic: "tables", text: include_str!("tables.md") },
     Page { topic: "warnings", text: include_str!("warnings.md") },
     Page { topic: "conventions", text: include_str!("../CONVENTIONS.md") },
 ];

@@ -3,13 +3,15 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::data::dataset::{Dataset, Kind, Skipped};
+use super::data::dataset::{Dataset, Reading, Skipped};
 use super::data::doctor::{self, Finding};
+use super::data::repeats::Repeats;
 use super::data::sessions::{Along, Session};
 use super::data::targets::Targets;
 use super::judge::choose::{Candidate, Identification};
-use super::judge::climb::Judged;
+use super::judge::climb::{self, Certainty, Judged};
 use super::judge::errors::{Judge, RowError, Spread};
+use super::judge::held_out::Against;
 use super::judge::scale::CommonScale;
 use super::model::base::Observability;
 use super::model::prior::Tolerance;
@@ -68,6 +70,16 @@ pub struct Record {
     /// The targets of each pose, where there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub targets: Option<Targets>,
+    /// Readings that were repeated at one pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeats: Option<Repeats>,
+    /// How sure the choice of terms is.
+    pub certainty: Vec<Certainty>,
+    /// Whether `verify` has all rows, each in fits that it was left out of, because the file has none to verify.
+    pub folded: bool,
+    /// The tool that the nominal chain asks for and the middle error that is left with it, mm, where that is far less than with the tool of the file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tool_mm: Option<([f64; 3], f64)>,
     /// Unknowns of the sensor that were found beside the robot: name and value (mm, thousandths, mrad, standard deviations).
     pub sensor: Vec<(String, f64)>,
     /// A smooth error that the points of each placement share.
@@ -200,16 +212,22 @@ pub struct Identifiability {
 }
 
 /// Errors of rows under a robot, as they go into tables and figures.
-pub fn quality(set: &Dataset, robot: &Robot, found: &Identification, settings: &Settings) -> (Quality, Vec<RowError>) {
+/// A robot that was `fitted` is judged on rows that its fit was without.
+pub fn quality(
+    set: &Dataset,
+    robot: &Robot,
+    fitted: bool,
+    found: &Identification,
+    settings: &Settings,
+) -> (Quality, Vec<RowError>) {
     // Points and distances as they were read, as `verify` takes them, which knows nothing of the sensor's errors.
     let of_sensor = found.extras.iter().copied().filter(|(e, _)| matches!(e, Extra::Target(_)));
     let (extras, values): (Vec<Extra>, Vec<f64>) = of_sensor.unzip();
     let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &found.fitted, settings.wire_offset) };
-    let verify_rows = set.verify_rows();
-    let (fit, verify) = (judge.errors(robot, &found.fitted), judge.errors(robot, &verify_rows));
+    let (fit, verify) = (judge.errors(robot, &found.fitted), found.held_out_errors(&judge, robot, fitted));
     let quality = Quality {
         fit: spread(&judge, robot, &fit, &found.fitted),
-        verify: spread(&judge, robot, &verify, &verify_rows),
+        verify: spread(&judge, robot, &verify, &found.judged_rows(set)),
     };
     (quality, verify)
 }
@@ -259,9 +277,12 @@ impl Record {
         let fitted = chosen.found.as_ref().or(found.candidates.first().and_then(|c| c.found.as_ref()));
         let identifiability = fitted.map_or_else(Identifiability::nothing, |(f, _)| identifiability(f));
         let names = |rows: &[usize]| rows.iter().map(|&i| set.poses[i].name.clone()).collect::<Vec<_>>();
-        let methods: Vec<MethodRecord> =
-            found.candidates.iter().map(|c| method_record(c, quality(set, &c.robot, found, settings).0)).collect();
-        let before = quality(set, nominal, found, settings).0;
+        let methods: Vec<MethodRecord> = found
+            .candidates
+            .iter()
+            .map(|c| method_record(c, quality(set, &c.robot, c.found.is_some(), found, settings).0))
+            .collect();
+        let before = quality(set, nominal, false, found, settings).0;
         let mut record = Record {
             seed,
             chosen: format!("{}/{}", chosen.name, chosen.model.name()),
@@ -282,10 +303,14 @@ impl Record {
             expected: chosen.found.as_ref().map(|(f, _)| Expected::new(f, set, &found.fitted)),
             scale: CommonScale::new(set, found),
             targets: set.targets.clone(),
+            repeats: set.repeats,
+            certainty: climb::certainty(&found.judged, &found.terms),
+            folded: !found.deletions.is_empty(),
+            tool_mm: tool(set, nominal),
             sensor: found.extras.iter().map(|(extra, value)| of_sensor(set, *extra, *value)).collect(),
         };
-        let worse = found.worse_than_nominal(set, nominal, settings);
-        record.warnings = record.warnings(set, nominal, found, worse);
+        let against = found.against_nominal(set, nominal, settings);
+        record.warnings = record.warnings(set, nominal, found, against);
         record
     }
 
@@ -294,7 +319,7 @@ impl Record {
         self.methods.iter().find(|m| self.chosen == format!("{}/{}", m.name, m.model))
     }
 
-    fn warnings(&self, set: &Dataset, nominal: &Robot, found: &Identification, is_worse: bool) -> Vec<String> {
+    fn warnings(&self, set: &Dataset, nominal: &Robot, found: &Identification, against: Against) -> Vec<String> {
         let mut list = Vec::new();
         if tilt_deg(set, nominal, &found.fitted) < ONE_ORIENTATION_DEG {
             list.push(
@@ -351,56 +376,80 @@ impl Record {
                 self.skipped[0].reason
             ));
         }
-        if set.split_here {
-            list.push(
-                "the file has no verify rows: a fifth of the samples, drawn from the seed, was held out".to_owned(),
-            );
-        }
-        if let Some(before) = self.before.verify.distance.mean_abs_mm.filter(|&mean| mean > IMPLAUSIBLE_MM) {
+        // The tool is a free number, and usually unknown: what is left once it is solved says whether the chain is implausible.
+        let before = match self.tool_mm {
+            Some((_, left)) => Some(left),
+            None => self.before.verify.distance.mean_abs_mm,
+        };
+        if let Some(before) = before.filter(|&mean| mean > IMPLAUSIBLE_MM) {
             list.push(format!(
                 "the nominal robot is off by {before:.0} mm on the mean, which no built robot is: see whether the lengths are mm and \
                  the angles deg, and whether this is the robot that was measured"
             ));
         }
-        list.extend(self.worse(set, is_worse));
+        list.extend(self.worse(against));
         if found.vetoed {
             list.push(
-                "on the verify rows the robot that was found is worse than the nominal one: nominal is kept".to_owned(),
-            );
-        } else if chosen.is_none() {
-            list.push(
-                "no model predicts samples that were held out better than the nominal robot does: nominal is kept"
+                "on the verify rows the robot that was found is worse than the nominal one, by more than another draw of rows would let \
+                 expect: nominal is kept"
                     .to_owned(),
             );
+        } else if chosen.is_none() {
+            list.push(self.not_proved());
         }
         list
     }
 
-    /// Where the verify rows find the chosen robot worse than the nominal one, or seem to.
-    fn worse(&self, set: &Dataset, is_worse: bool) -> Option<String> {
+    /// Where rows that took no part in the fit find the chosen robot worse than the nominal one.
+    fn worse(&self, against: Against) -> Option<String> {
         let chosen = self.chosen_method()?;
         let pair = |before: &Spread, after: &Spread| Some((before.mean_abs_mm?, after.mean_abs_mm?));
-        let distances =
-            pair(&self.before.verify.distance, &chosen.verify.distance).filter(|(before, after)| after > before);
-        let figures = distances.or_else(|| pair(self.before.verify.point.as_ref()?, chosen.verify.point.as_ref()?));
-        if is_worse {
-            let figures =
-                figures.map_or_else(String::new, |(before, after)| format!(" ({after:.3} against {before:.3} mm)"));
-            return Some(format!(
-                "on the verify rows the identified robot is worse than the nominal one{figures}: don't use it"
-            ));
-        }
-        let (before, after) = distances?;
-        let why = match set.kind {
-            Kind::Positions => {
-                "and points less so: all distances share the centre's own reading, and the points decide"
+        let of_points = || pair(self.before.verify.point.as_ref()?, chosen.verify.point.as_ref()?);
+        let figures = of_points().or_else(|| pair(&self.before.verify.distance, &chosen.verify.distance));
+        let figures =
+            figures.map_or_else(String::new, |(before, after)| format!(" ({after:.3} against {before:.3} mm)"));
+        let rows = if self.folded { "rows that were left out of the fit" } else { "the verify rows" };
+        match against {
+            Against::NotWorse => None,
+            Against::Perhaps => Some(format!(
+                "on {rows} the identified robot is no better than the nominal one{figures}; another draw of rows may find it better, \
+                 these don't: measure more of them before you use it"
+            )),
+            Against::Worse => {
+                Some(format!("on {rows} the identified robot is worse than the nominal one{figures}: don't use it"))
             }
-            Kind::Distances => "but not beyond the sensor's own errors and the rows that are named as far off",
-        };
-        Some(format!(
-            "on the verify rows distances are further off than the nominal robot's as they were read ({after:.3} against {before:.3} mm), {why}"
-        ))
+        }
     }
+
+    /// Why the nominal robot was kept, with what the best of the others has on the same rows.
+    fn not_proved(&self) -> String {
+        let nominal = self.judged.iter().find(|j| j.terms == self.terms).and_then(|j| j.held_out_mm);
+        let others = self.judged.iter().filter(|j| j.terms != self.terms);
+        let best = others.filter_map(|j| Some((j.held_out_mm?, &j.terms))).min_by(|a, b| a.0.total_cmp(&b.0));
+        match (nominal, best) {
+            (Some(nominal), Some((best, terms))) if best < nominal => format!(
+                "nominal is kept: the best other model, {terms}, has {best:.4} mm on samples held out against {nominal:.4} mm, which is not \
+                 more than chance; the lines of the table are for comparison"
+            ),
+            _ => "no model predicts samples that were held out better than the nominal robot does: nominal is kept"
+                .to_owned(),
+        }
+    }
+}
+
+/// The tool that the nominal chain asks for, where it makes it far nearer to the points; of the placement with most rows.
+fn tool(set: &Dataset, nominal: &Robot) -> Option<([f64; 3], f64)> {
+    /// Times that the chain must come nearer by a tool of its own.
+    const FAR_NEARER: f64 = 3.0;
+    let of_group = |g: usize| set.rows(|p| p.group == g);
+    let rows = (0..set.groups.len()).map(of_group).max_by_key(Vec::len)?;
+    let point = |&r: &usize| match set.poses[r].reading {
+        Reading::Position { point_mm, .. } => Some((set.poses[r].joints_rad.clone(), point_mm)),
+        _ => None,
+    };
+    let (joints, points): (Vec<_>, Vec<_>) = rows.iter().filter_map(point).unzip();
+    let (before, after) = (nominal.left_mm(&joints, &points)?, nominal.fit_tool(&joints, &points)?);
+    (after.left_mm * FAR_NEARER < before).then(|| (after.tool_mm.into(), after.left_mm))
 }
 
 /// A list of which the first are said.

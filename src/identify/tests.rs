@@ -43,15 +43,15 @@ fn settings(method: Method) -> Settings {
 }
 
 fn mean_errors(world: &World, method: Method, seed: u64) -> (f64, f64) {
-    let set = Dataset::new(&world.rows, 1).unwrap();
+    let set = Dataset::new(&world.rows).unwrap();
     let settings = settings(method);
     let found = identify(&set, &world.nominal, &settings, seed, &|_| {}).unwrap();
-    let mean = |robot| quality(&set, robot, &found, &settings).0.verify.distance.mean_abs_mm.unwrap();
+    let mean = |robot| quality(&set, robot, true, &found, &settings).0.verify.distance.mean_abs_mm.unwrap();
     (mean(&world.nominal), mean(&found.candidates[found.chosen].robot))
 }
 
 fn base_names(world: &World) -> (Formulation, Vec<String>) {
-    let set = Dataset::new(&world.rows, 1).unwrap();
+    let set = Dataset::new(&world.rows).unwrap();
     let parameters = world.nominal.mdh_parameters();
     let off = Settings { prior: Prior::Off, ..Settings::default() };
     let prepared = formulated(&set, &world.nominal, &parameters, Model::CenterDistance, &off);
@@ -71,11 +71,11 @@ fn the_papers_experiment_ends_at_the_noise() {
 fn a_target_that_the_file_puts_on_the_last_axis_is_found_where_it_is() {
     let mut world = synthetic::planned(60, 30, 25.0, 0.01, 5, &|_| {});
     let found = |world: &World| {
-        let set = Dataset::new(&world.rows, 1).unwrap();
+        let set = Dataset::new(&world.rows).unwrap();
         let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
         let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
         let robot = &found.candidates[found.chosen].robot;
-        let point = quality(&set, robot, &found, &settings).0.verify.point.unwrap().mean_abs_mm.unwrap();
+        let point = quality(&set, robot, true, &found, &settings).0.verify.point.unwrap().mean_abs_mm.unwrap();
         (point, found.outliers.len() + found.doubtful.len() + found.verify_outliers.len())
     };
     let (where_it_is, _) = found(&world);
@@ -112,7 +112,7 @@ fn one_orientation_hides_the_tool_and_more() {
 #[test]
 fn the_nineteen_of_the_paper_are_more_than_its_plan_determines() {
     let world = synthetic::planned(262, 0, 0.0, 0.0, 3, &|_| {});
-    let set = Dataset::new(&world.rows, 1).unwrap();
+    let set = Dataset::new(&world.rows).unwrap();
     let parameters = world.nominal.mdh_parameters();
     let settings = Settings {
         redundancy: crate::identify::settings::Redundancy::Correlation,
@@ -149,7 +149,7 @@ fn unmodelled_effects_treat_all_methods_alike() {
 #[test]
 fn any_number_of_threads_gives_the_same_bytes() {
     let world = synthetic::world(40, NOISE_MM, 2);
-    let set = Dataset::new(&world.rows, 1).unwrap();
+    let set = Dataset::new(&world.rows).unwrap();
     let mut settings = settings(Method::Stapso);
     settings.swarm.iterations = 40;
     let found = |threads| {
@@ -175,7 +175,7 @@ fn truth_is_recovered_within_the_predicted_sigmas() {
                 joint.a_mm += 0.5 * (i as f64).cos();
             }
         });
-        let set = Dataset::new(&world.rows, 1).unwrap();
+        let set = Dataset::new(&world.rows).unwrap();
         let parameters = world.nominal.mdh_parameters();
         let off = Settings { prior: Prior::Off, ..Settings::default() };
         let prepared = formulated(&set, &world.nominal, &parameters, Model::Position, &off);
@@ -203,7 +203,7 @@ fn seen_by_cameras(world: &World, scale: f64) -> Dataset {
             *rotation_rad = Some(nalgebra::Vector3::zeros());
         }
     }
-    let mut set = Dataset::new(&rows, 1).unwrap();
+    let mut set = Dataset::new(&rows).unwrap();
     crate::identify::data::shared::suppose_scale(&mut set);
     set
 }
@@ -217,7 +217,9 @@ fn cameras_of_a_wrong_scale_do_not_stretch_the_robot() {
         built.joints.iter_mut().enumerate().for_each(|(i, j)| j.a_mm += 0.3 * (i as f64).cos());
         *truth = built;
     });
-    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
+    // Its orientations are there to say that it was cameras, and none of them is right.
+    let model = Some(Model::Position);
+    let method = Settings { method: Some(Method::TrustRegion), model, ..Settings::default() };
     let length = |robot: &crate::robot::Robot| robot.joints[2].a_mm + robot.joints[3].a_mm;
     let set = seen_by_cameras(&world, 1.002);
     let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
@@ -246,11 +248,14 @@ fn a_zero_that_is_off_costs_next_to_nothing_and_is_said() {
             row.at.group = "one".into();
             row.observed = Observed::Distance { distance_mm, sigma_mm: None };
         }
-        let set = Dataset::new(&rows, 1).unwrap();
+        let set = Dataset::new(&rows).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
         let said = crate::identify::data::doctor::findings(&set, &found, &Default::default());
         let said = said.iter().any(|f| f.finding.contains("the zero of the readings is off"));
-        let errors = found.errors(&set, &method, &found.candidates[found.chosen].robot, &set.verify_rows());
+        let (extras, values): (Vec<_>, Vec<f64>) = found.extras.iter().copied().unzip();
+        let plain = Judge::plain(&set, &found.fitted, method.wire_offset);
+        let errors = Judge { extras: &extras, values: &values, ..plain }
+            .errors(&found.candidates[found.chosen].robot, &set.verify_rows());
         (Spread::new(errors.iter().filter_map(|e| e.distance_mm)).mean_abs_mm.unwrap(), said)
     };
     let (right, alarm) = error(0.0);
@@ -276,7 +281,7 @@ fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain()
                 *point_mm += size_mm * point_mm.coords.map(|c| (c / 60.0 + 1.7 * group).sin());
             }
         }
-        let set = Dataset::new(&rows, 1).unwrap();
+        let set = Dataset::new(&rows).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
         let (formulation, _) = found.candidates[found.chosen].found.as_ref().unwrap();
         let findings = crate::identify::data::doctor::findings(&set, &found, &Default::default());
@@ -310,7 +315,7 @@ fn a_row_that_is_a_little_off_is_named_though_it_is_fitted_and_a_verify_row_too(
                 point_mm.x += sigmas * NOISE_MM;
             }
         }
-        let set = Dataset::new(&rows, 1).unwrap();
+        let set = Dataset::new(&rows).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
         let named = [&found.outliers, &found.doubtful].map(|list| list.as_slice()).concat();
         assert_eq!(named, if sigmas > 0.0 { vec![40] } else { vec![] }, "{sigmas}");
@@ -333,7 +338,7 @@ fn readings_of_another_scale_are_said_to_be_so() {
                 *point_mm *= scale;
             }
         }
-        let set = Dataset::new(&rows, 1).unwrap();
+        let set = Dataset::new(&rows).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
         let findings = crate::identify::data::doctor::findings(&set, &found, &Default::default());
         assert_eq!(findings.iter().any(|f| f.finding.contains("all links are found")), said, "{scale}: {findings:?}");
@@ -354,7 +359,7 @@ fn points_without_noise_give_the_true_robot_whatever_covariances_they_state() {
                 *covariance_mm2 = (stated_mm > 0.0).then_some(covariance);
             }
         }
-        let mut set = Dataset::new(&rows, 1).unwrap();
+        let mut set = Dataset::new(&rows).unwrap();
         if stated_mm > 0.0 {
             // A scale, and bends of space, that all rows share.
             let columns = |p: &nalgebra::Vector3<f64>| {

@@ -41,6 +41,22 @@ pub fn summary(record: &Record) -> String {
             number(after.mean_abs_mm, 4)
         ));
     }
+    if record.folded {
+        text.push_str(
+            "no row is to verify: the robot is from all rows, and each row is judged by fits that it was left out of\n",
+        );
+    }
+    if let Some(sure) = sure(record) {
+        text.push_str(&format!("{sure}\n"));
+    }
+    if let Some(([x, y, z], left)) = record.tool_mm {
+        text.push_str(&format!(
+            "the nominal chain asks for a tool of {x:.1}, {y:.1}, {z:.1} mm and is off by {left:.3} mm with it; `before` has the tool of the file\n"
+        ));
+    }
+    if let Some(repeats) = &record.repeats {
+        text.push_str(&format!("{}\n", repeats.sentence()));
+    }
     if let Some(targets) = &record.targets {
         text.push_str(&format!("{}\n", targets.sentence()));
     }
@@ -51,6 +67,15 @@ pub fn summary(record: &Record) -> String {
         text.push_str(&format!("{}\n", scale.sentence()));
     }
     text
+}
+
+/// How sure the choice of terms is.
+fn sure(record: &Record) -> Option<String> {
+    let against = |c: &crate::identify::judge::climb::Certainty| {
+        format!("less error than {} in {} of {} ways to hold samples out", c.than, c.better, c.of)
+    };
+    let all: Vec<String> = record.certainty.iter().map(against).collect();
+    (!all.is_empty()).then(|| format!("{}: {}", record.terms, all.join(", ")))
 }
 
 /// Table 3 for robots from anywhere.
@@ -90,11 +115,14 @@ pub fn page(
     after: &[RowError],
 ) -> Result<String> {
     let lead = format!(
-        "{} poses in {} {}, {} to verify; {} kept, seed {}",
+        "{} poses in {} {}, {}; {} kept, seed {}",
         set.poses.len(),
         set.groups.len(),
         if set.groups.len() == 1 { "group" } else { "groups" },
-        set.verify_rows().len(),
+        match record.folded {
+            true => "all fitted, each judged by fits that it was left out of".to_owned(),
+            false => format!("{} to verify", set.verify_rows().len()),
+        },
         record.chosen,
         record.seed
     );

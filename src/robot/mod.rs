@@ -11,6 +11,7 @@ pub mod inverse;
 pub mod jacobian;
 pub mod parameters;
 pub mod refit;
+pub mod tool_fit;
 
 use crate::diagnostic::{Explain, Place};
 
@@ -36,6 +37,16 @@ pub enum Error {
         message: String,
         /// Where.
         place: Place,
+    },
+    /// A table that could be read in several ways, or in none.
+    #[error("{message}")]
+    Table {
+        /// What was found.
+        message: String,
+        /// The file.
+        place: String,
+        /// What settles it.
+        hint: String,
     },
     /// No arm of this name is known.
     #[error("no arm `{name}` is known")]
@@ -82,6 +93,7 @@ impl Explain for Error {
         match self {
             Error::Files(e) => e.place(),
             Error::File { place, .. } => Some(place.to_string()),
+            Error::Table { place, .. } => Some(place.clone()),
             Error::Occupied { path } => Some(path.clone()),
             _ => None,
         }
@@ -98,6 +110,7 @@ impl Explain for Error {
                 Some("both files are of one robot, before and after `stereocal identify`".to_owned())
             }
             Error::NotExportable { hint, .. } => Some(hint.clone()),
+            Error::Table { hint, .. } => Some(hint.clone()),
             Error::File { .. } => None,
             Error::Files(e) => e.hint(),
         }

@@ -13,6 +13,8 @@ mod corner_floors;
 mod pictures;
 mod planted_faults;
 mod run;
+mod spreadsheet;
+mod tables;
 mod worlds;
 
 mod compensate;

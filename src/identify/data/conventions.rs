@@ -423,7 +423,7 @@ mod tests {
     }
 
     fn said(rows: &[Measurement], robot: &Robot) -> Vec<String> {
-        let set = Dataset::new(rows, 1).unwrap();
+        let set = Dataset::new(rows).unwrap();
         let Mended { findings, unexplained_mm, .. } = examine(&set, robot, &Settings::default());
         findings.into_iter().chain(unexplained_mm.map(unexplained)).map(|f| f.finding).collect()
     }
@@ -497,7 +497,7 @@ mod tests {
         for i in 1..rows.len() {
             late[i].at.joints_deg.clone_from(&rows[i - 1].at.joints_deg);
         }
-        let set = Dataset::new(&late, 1).unwrap();
+        let set = Dataset::new(&late).unwrap();
         let Mended { set: mended, .. } = examine(&set, &world.nominal, &Settings::default());
         assert_eq!(mended.poses.len(), set.poses.len() - 1);
         assert_eq!(mended.skipped.len(), 1);

@@ -215,7 +215,7 @@ mod tests {
                 *covariance_mm2 = Some(nalgebra::Matrix3::identity() * sd_mm * sd_mm);
             }
         }
-        let set = Dataset::new(&rows, 1).unwrap();
+        let set = Dataset::new(&rows).unwrap();
         let (set, findings) = examine(&set, &world.nominal, &Settings::default());
         let first = |name: &str| {
             let pose = set.poses.iter().find(|p| set.groups[p.group].name == name).unwrap();
@@ -256,7 +256,7 @@ mod tests {
                 *covariance_mm2 = Some(nalgebra::Matrix3::identity() * NOISE_MM * NOISE_MM);
             }
         }
-        let mut set = Dataset::new(&rows, 1).unwrap();
+        let mut set = Dataset::new(&rows).unwrap();
         let said = |set: &Dataset| examine(set, &world.nominal, &Settings::default()).1.len();
         assert_eq!(said(&set), 1);
         set.shared =

@@ -2,18 +2,14 @@
 //!
 //! In: rows of `measurements.csv`. Out: poses with joint angles in rad and one kind of reading for all of them.
 //! A group without a centre row takes the used pose nearest to the centroid of its points as its reference; distances
-//! in such a group are distances to a fixed point that is unknown. Without verify rows a fifth of the samples is held out.
+//! in such a group are distances to a fixed point that is unknown. Readings that follow each other at one pose are one (see [`super::repeats`]).
 
 use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64Mcg;
 
+use super::repeats::{self, Repeats};
 use super::targets::{self, Targets};
 use crate::identify::Error;
 use crate::measurements::{Measurement, Observed, Role};
-
-/// One row in `HELD_OUT` is held out when the file names none.
-const HELD_OUT: usize = 5;
 
 /// Variance that singular covariances get on top, mm^2: a micrometre, the resolution of a good instrument.
 pub(super) const FLOOR_MM2: f64 = 1e-6;
@@ -105,8 +101,8 @@ pub struct Dataset {
     pub poses: Vec<Pose>,
     /// Rows without a usable reading.
     pub skipped: Vec<Skipped>,
-    /// Whether the verify rows were chosen here, the file having none.
-    pub split_here: bool,
+    /// Readings that were repeated at one pose, where there were any.
+    pub repeats: Option<Repeats>,
     /// What each pose's point moves by with each shared error of the sensor, mm a standard deviation; empty without any.
     pub shared: Vec<Matrix3xX<f64>>,
     /// Standard deviation of the scale of cameras about which nothing is stated, where `shared` is that scale and nothing else.
@@ -135,10 +131,11 @@ pub struct KnownDistance {
 }
 
 impl Dataset {
-    /// Sorts the rows, several targets of a pose made one; `seed` draws the held-out fifth where the file names no verify rows.
-    pub fn new(rows: &[Measurement], seed: u64) -> Result<Dataset, Error> {
+    /// Sorts the rows, several targets of a pose and repeated readings made one.
+    pub fn new(rows: &[Measurement]) -> Result<Dataset, Error> {
         let (of_targets, targets) = targets::as_one(rows)?.unzip();
-        let rows = of_targets.as_deref().unwrap_or(rows);
+        let (merged, repeats) = repeats::as_one(of_targets.as_deref().unwrap_or(rows));
+        let rows = merged.as_slice();
         let positions = rows.iter().any(|r| matches!(r.observed, Observed::Position { .. }));
         let kind = if positions { Kind::Positions } else { Kind::Distances };
         let mut set = Dataset {
@@ -146,7 +143,7 @@ impl Dataset {
             groups: Vec::new(),
             poses: Vec::new(),
             skipped: Vec::new(),
-            split_here: false,
+            repeats,
             shared: Vec::new(),
             supposed_scale: None,
             slides: Vec::new(),
@@ -178,9 +175,6 @@ impl Dataset {
                 Err(reason) => set.skipped.push(Skipped { pose: row.at.pose.clone(), reason }),
             }
         }
-        if !set.poses.iter().any(|p| p.role == Role::Verify) {
-            set.hold_out(seed);
-        }
         let samples = set.poses.iter().filter(|p| p.role == Role::Sample).count();
         if samples == 0 {
             let reason = set.skipped.first().map(|skipped| format!("{}, {}", skipped.pose, skipped.reason));
@@ -194,16 +188,6 @@ impl Dataset {
             self.groups.push(Group { name: name.to_owned(), center: None });
             self.groups.len() - 1
         })
-    }
-
-    fn hold_out(&mut self, seed: u64) {
-        let mut samples: Vec<usize> = self.rows(|p| p.role == Role::Sample);
-        let count = samples.len() / HELD_OUT;
-        shuffle(&mut samples, seed);
-        for &i in samples.iter().take(count) {
-            self.poses[i].role = Role::Verify;
-        }
-        self.split_here = true;
     }
 
     /// Without these rows, for this reason.
@@ -310,14 +294,6 @@ fn reading(kind: Kind, row: &Measurement) -> Result<Reading, String> {
     }
 }
 
-/// Fisher and Yates' shuffle, from the seed.
-pub fn shuffle(items: &mut [usize], seed: u64) {
-    let mut random = Pcg64Mcg::seed_from_u64(seed);
-    for i in (1..items.len()).rev() {
-        items.swap(i, random.random_range(0..=i));
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -339,12 +315,10 @@ mod tests {
     }
 
     #[test]
-    fn a_fifth_is_held_out_where_no_row_verifies() {
+    fn the_reference_is_the_row_in_the_middle() {
         let rows: Vec<_> = (0..25).map(|i| row(i, Role::Sample, point(i as f64))).collect();
-        let set = Dataset::new(&rows, 1).unwrap();
-        assert!(set.split_here);
-        assert_eq!((set.verify_rows().len(), set.fit_rows().len()), (5, 20));
-        assert_ne!(set.verify_rows(), Dataset::new(&rows, 2).unwrap().verify_rows());
+        let set = Dataset::new(&rows).unwrap();
+        assert_eq!((set.verify_rows().len(), set.fit_rows().len()), (0, 25));
         assert_eq!(set.reference(0, &(0..25).collect::<Vec<_>>()), Some(12));
     }
 
@@ -358,13 +332,13 @@ mod tests {
             row(2, Role::Sample, missing),
             row(3, Role::Verify, distance),
         ];
-        let set = Dataset::new(&rows, 1).unwrap();
+        let set = Dataset::new(&rows).unwrap();
         assert_eq!(set.groups[0].center, Some(0));
         assert_eq!(set.skipped, [Skipped { pose: "p2".into(), reason: "no board".into() }]);
     }
 
     #[test]
     fn nothing_to_fit_is_said() {
-        assert!(Dataset::new(&[row(0, Role::Center, point(0.0)), row(1, Role::Verify, point(1.0))], 1).is_err());
+        assert!(Dataset::new(&[row(0, Role::Center, point(0.0)), row(1, Role::Verify, point(1.0))]).is_err());
     }
 }

@@ -3,14 +3,14 @@
 use serde::Serialize;
 
 use super::conventions::Mended;
-use super::dataset::Dataset;
+use super::dataset::{Dataset, Reading};
 use super::sessions::{self, Along, Session};
 use super::{conventions, covariances, known, orientations};
 use crate::identify::judge::choose::Identification;
 use crate::identify::judge::scale::CommonScale;
 use crate::identify::record::{Smooth, file_unit};
 use crate::identify::residuals::weights::Extra;
-use crate::identify::settings::Settings;
+use crate::identify::settings::{Model, Settings};
 use crate::robot::{Parameter, Robot};
 
 /// One finding.
@@ -62,7 +62,7 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     let of_targets = set.targets.as_ref().map_or_else(Vec::new, |targets| targets.findings.clone());
     if settings.examine {
         Mended { set, robot, findings, unexplained_mm } = conventions::examine(&set, &robot, settings);
-        let of_orientations = orientations::examine(&set, &robot);
+        let of_orientations = orientations::examine(&set, &robot, settings.model == Some(Model::Pose));
         set = of_orientations.0;
         findings.extend(of_orientations.1);
         let of_known = known::examine(&set, &robot, settings);
@@ -100,6 +100,16 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "covariances with a direction of no variance".to_owned(),
             set.floored.clone(),
             "a micrometre was added to each coordinate",
+        );
+    }
+    let oriented =
+        set.poses.iter().filter(|p| matches!(p.reading, Reading::Position { rotation_rad: Some(_), .. })).count();
+    if oriented > 0 && !set.has_rotations() {
+        let count = set.poses.len();
+        add(
+            format!("{oriented} of {count} poses have an orientation: it counts where all of them do"),
+            Vec::new(),
+            "the points alone are used; measure the orientation of all poses, or of none",
         );
     }
     if let Some((names, finding)) = repeated(set) {
@@ -364,7 +374,10 @@ fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
     rows.dedup();
     let names: Vec<String> = rows.iter().map(|&r| set.poses[r].name.clone()).collect();
     (!names.is_empty()).then(|| {
-        (names, "poses that are repeated: they say how well the robot repeats, and nothing about its links".to_owned())
+        (
+            names,
+            "poses that the robot came back to: they say how well it repeats, and nothing about its links".to_owned(),
+        )
     })
 }
 

@@ -129,7 +129,7 @@ mod tests {
     /// What is left of so many known distances, of which the second is off, and what is said.
     fn examined(count: usize, off_mm: f64) -> (usize, Vec<Finding>) {
         let (world, sockets) = synthetic::touched(0.0, 3);
-        let mut set = Dataset::new(&world.rows, 1).unwrap();
+        let mut set = Dataset::new(&world.rows).unwrap();
         set.known = (0..count)
             .map(|k| KnownDistance {
                 a: k,
@@ -168,7 +168,7 @@ mod tests {
             let (mut world, sockets) = synthetic::touched(0.0, 3);
             world.rows.retain(|row| ["s0", "s1", "s4", "s5"].contains(&row.at.group.as_str()));
             world.rows[3].at.joints_deg[1] += by_deg;
-            let mut set = Dataset::new(&world.rows, 1).unwrap();
+            let mut set = Dataset::new(&world.rows).unwrap();
             let length = |a: usize, b: usize| (sockets[a] - sockets[b]).norm();
             set.known = [(0, 2, length(0, 4)), (1, 3, length(1, 5))]
                 .map(|(a, b, distance_mm)| KnownDistance { a, b, distance_mm, sigma_mm: 0.01 })

@@ -37,8 +37,8 @@ fn of_fixed_axes(v: Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_euler_angles(v.x, v.y, v.z)
 }
 
-/// The set with orientations that go with the joints, and what was wrong with them.
-pub fn examine(set: &Dataset, robot: &Robot) -> (Dataset, Option<Finding>) {
+/// The set with orientations that go with the joints, and what was wrong with them. Those that don't are left out unless they are `asked` for.
+pub fn examine(set: &Dataset, robot: &Robot, asked: bool) -> (Dataset, Option<Finding>) {
     let mut set = set.clone();
     let Some(as_read) = difference_rad(&set, robot, UnitQuaternion::from_scaled_axis) else { return (set, None) };
     if as_read < IMPLAUSIBLE_RAD {
@@ -55,7 +55,17 @@ pub fn examine(set: &Dataset, robot: &Robot) -> (Dataset, Option<Finding>) {
             "the orientations do not go with the joints: between poses the target turns by {:.1} deg more or less than the flange",
             degrees(as_read)
         );
-        return (set, finding(said, "they count with `--model pose` alone; look at rx_rad, ry_rad, rz_rad"));
+        if !asked {
+            for pose in &mut set.poses {
+                if let Reading::Position { rotation_rad, .. } = &mut pose.reading {
+                    *rotation_rad = None;
+                }
+            }
+        }
+        return (
+            set,
+            finding(said, "they are left out unless `--model pose` asks for them; look at rx_rad, ry_rad, rz_rad"),
+        );
     };
     for pose in &mut set.poses {
         if let Reading::Position { rotation_rad: Some(rotation), .. } = &mut pose.reading {
@@ -147,10 +157,10 @@ mod tests {
                     *rotation_rad = Some(written(turn));
                 }
             }
-            Dataset::new(&rows, 1).unwrap()
+            Dataset::new(&rows).unwrap()
         };
         let (right, read) = (rows(&|r| r.scaled_axis()), rows(written));
-        let (mended, finding) = examine(&read, &world.nominal);
+        let (mended, finding) = examine(&read, &world.nominal, false);
         (right, mended, finding.map(|f| f.finding))
     }
 

@@ -405,7 +405,7 @@ mod tests {
     #[test]
     fn an_anchor_that_moved_is_found_where_it_moved() {
         let (world, rows) = wire(70);
-        let set = Dataset::new(&rows, 1).unwrap();
+        let set = Dataset::new(&rows).unwrap();
         let (cut, Along { sessions, .. }) = find(&set, &world.nominal, &Settings::default());
         assert_eq!(sessions.len(), 2, "{sessions:?}");
         assert!(sessions[0].count.abs_diff(70) <= 1, "{sessions:?}");
@@ -422,7 +422,7 @@ mod tests {
                         *distance_mm += off_mm;
                     }
                 }
-                let set = Dataset::new(&rows, 1).unwrap();
+                let set = Dataset::new(&rows).unwrap();
                 let (_, along) = find(&set, &world.nominal, &Settings::default());
                 assert_eq!(along.sessions.len(), sessions, "{off_mm} mm, {moved}: {:?}", along.sessions);
                 let first = along.sessions.first().map_or(70, |session| session.count);
@@ -434,7 +434,7 @@ mod tests {
     #[test]
     fn an_anchor_that_stayed_is_one_session() {
         let (world, rows) = wire(1000);
-        let set = Dataset::new(&rows, 1).unwrap();
+        let set = Dataset::new(&rows).unwrap();
         assert!(find(&set, &world.nominal, &Settings::default()).1.sessions.is_empty());
     }
 
@@ -458,7 +458,7 @@ mod tests {
             row.at.group = "one".into();
             row.observed = Observed::Distance { distance_mm, sigma_mm: None };
         }
-        let set = Dataset::new(&rows, 1).unwrap();
+        let set = Dataset::new(&rows).unwrap();
         (world, set)
     }
 
@@ -480,13 +480,13 @@ mod tests {
     fn a_socket_that_moved_is_found_where_it_moved() {
         for moved_mm in [0.3, 1.0, 5.0] {
             let (world, _) = synthetic::touched(moved_mm, 2);
-            let set = Dataset::new(&world.rows, 1).unwrap();
+            let set = Dataset::new(&world.rows).unwrap();
             let (_, along) = find(&set, &world.nominal, &Settings::default());
             let parts: Vec<&str> = along.sessions.iter().map(|s| s.first.as_str()).collect();
             assert_eq!(parts, ["s2_0", "s2_6"], "{moved_mm}");
         }
         let (world, _) = synthetic::touched(0.0, 2);
-        let set = Dataset::new(&world.rows, 1).unwrap();
+        let set = Dataset::new(&world.rows).unwrap();
         assert_eq!(find(&set, &world.nominal, &Settings::default()).1, Along::default());
     }
 }

@@ -184,7 +184,7 @@ mod tests {
             poses.push(PoseSensitivity { pose: row.at.pose.clone(), sensitivity: s });
         }
         let covariance = vec![vec![0.01, 0.0], vec![0.0, 0.04]];
-        (Dataset::new(&world.rows, 1).unwrap(), Shared { covariance, poses })
+        (Dataset::new(&world.rows).unwrap(), Shared { covariance, poses })
     }
 
     #[test]

@@ -2,7 +2,8 @@
 //!
 //! In: rows linearised where a rich model fits them, for all parameters that any model has. The rows of each placement are cut into
 //! regions of joint space; a cell is a region of a placement. Whole placements are held out where there are three or more, else regions:
-//! a model is judged where it was not fitted, not between its own rows. Each cell keeps the product of its white columns (parameters,
+//! a model is judged where it was not fitted, not between its own rows. Poses that turn one axis after the other leave a region that is held
+//! out to pure extrapolation; so rows are also held out here and there (see [`super::folds`]), and what is worth it by either counts. Each cell keeps the product of its white columns (parameters,
 //! placement, residual) with themselves; every model on every fold is then algebra on small matrices, so that the ladder costs next to
 //! nothing and is linear in rows and placements. No draw is made: the choice depends on no seed.
 //! What goes wrong: a model whose parameters move the target by so much that a linear model does not hold; nominal errors of 5 mm on a
@@ -11,15 +12,19 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
+use super::folds::FOLDS;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::model::prior::Tolerance;
-use crate::identify::residuals::eliminate::{Linear, product, pseudo_inverse};
+use crate::identify::residuals::eliminate::{Block, Linear, product, pseudo_inverse};
 use crate::identify::residuals::rows::Rows;
 use crate::identify::residuals::weights::Extra;
 use crate::robot::Parameter;
 
 /// Cells in all, about.
 const CELLS: usize = 12;
+
+/// The fold of rows that are always fitted.
+const SKIPPED: usize = usize::MAX / 2;
 
 /// Placements from which on whole placements are held out.
 const WHOLE: usize = 3;
@@ -66,47 +71,101 @@ pub struct Cells {
 /// Held-out errors of one model: of each cell the mean square of its numbers, mm^2, and how many there are.
 pub type HeldOut = Vec<(f64, f64)>;
 
-impl Cells {
-    /// `offsets` are where `rows` are linearised; `most` is the largest number of folds.
-    pub fn new(set: &Dataset, rows: &Rows, offsets: &[f64], most: usize) -> Cells {
+/// Rows linearised once, to be cut into cells in several ways.
+pub struct Linearised<'a> {
+    rows: &'a Rows,
+    /// Of each placement its derivatives, its residuals at offset zero, and the place of each of them.
+    blocks: Vec<(Linear, DVector<f64>, Vec<Option<usize>>)>,
+    columns: usize,
+}
+
+impl<'a> Linearised<'a> {
+    /// Where the rows are at these offsets.
+    pub fn new(rows: &'a Rows, offsets: &[f64]) -> Linearised<'a> {
         let (of_robot, extras) = rows.split(offsets);
         let places = rows.kinematics.places(of_robot, true);
-        let count = rows.blocks.len();
-        let (regions, whole) =
-            (if count >= WHOLE { CELLS.div_ceil(count).min(3) } else { most / count.max(1) }, count >= WHOLE);
-        let mut cells = Vec::new();
-        let mut folds = 0;
-        for (b, block) in rows.blocks.iter().enumerate() {
+        let of_block = |block: &Block| {
             let linear = block.linear(&places, extras, &rows.scatter);
             let at_zero = &linear.residuals - &linear.jacobian * DVector::from_column_slice(offsets);
-            let poses = block.row_poses();
-            let labels = labels(set, rows, &poses, regions);
+            (linear, at_zero, block.row_poses())
+        };
+        Linearised { rows, blocks: rows.blocks.iter().map(of_block).collect(), columns: offsets.len() }
+    }
+
+    /// Cells of these labels, one a residual of each placement; `fold` is that of a placement's label.
+    fn cells(
+        &self,
+        labels: &dyn Fn(&[Option<usize>]) -> Vec<Option<usize>>,
+        fold: &dyn Fn(usize, usize) -> usize,
+        whole_placements: bool,
+    ) -> Cells {
+        let mut cells = Vec::new();
+        for (b, (linear, at_zero, poses)) in self.blocks.iter().enumerate() {
+            let labels = labels(poses);
             let used = labels.iter().flatten().max().map_or(0, |m| m + 1);
             for region in 0..used {
                 let of_region: Vec<usize> =
                     (0..poses.len()).filter(|&i| labels[i].map_or(region == 0, |l| l == region)).collect();
-                let fold = if whole { b % most } else { folds + region };
-                let normal = normal(&linear, &at_zero, &of_region);
-                cells.push(Cell { block: b, fold, numbers: of_region.len() as f64, normal });
-            }
-            if !whole {
-                folds += used;
+                let normal = normal(linear, at_zero, &of_region);
+                cells.push(Cell { block: b, fold: fold(b, region), numbers: of_region.len() as f64, normal });
             }
         }
-        if whole {
-            folds = count.min(most);
+        if !whole_placements {
+            // A placement of few rows has fewer regions than there are numbers for.
+            let mut used: Vec<usize> = cells.iter().map(|c: &Cell| c.fold).filter(|f| *f < SKIPPED).collect();
+            used.sort_unstable();
+            used.dedup();
+            for cell in cells.iter_mut().filter(|c| c.fold < SKIPPED) {
+                cell.fold = used.binary_search(&cell.fold).unwrap_or(0);
+            }
         }
-        let columns = offsets.len();
-        let make = |f: Option<usize>| Fold::new(&cells, count, columns, f);
+        let folds = cells.iter().map(|c| c.fold + 1).filter(|f| *f < SKIPPED).max().unwrap_or(0);
+        let make = |f: Option<usize>| Fold::new(&cells, self.blocks.len(), self.columns, f);
         Cells {
-            parameters: rows.kinematics.parameters().to_vec(),
-            extras: rows.extras.clone(),
+            parameters: self.rows.kinematics.parameters().to_vec(),
+            extras: self.rows.extras.clone(),
             folds: (0..folds).map(|f| make(Some(f))).collect(),
             whole: make(None),
-            whole_placements: whole,
+            whole_placements,
             cells,
-            unit_mm: rows.unit_variance_mm2().sqrt(),
+            unit_mm: self.rows.unit_variance_mm2().sqrt(),
         }
+    }
+
+    /// Regions of joint space, or whole placements where there are three; `most` is the largest number of folds.
+    pub fn by_regions(&self, set: &Dataset, most: usize) -> Cells {
+        let count = self.blocks.len();
+        let (regions, whole) =
+            (if count >= WHOLE { CELLS.div_ceil(count).min(3) } else { most / count.max(1) }, count >= WHOLE);
+        let labels = |poses: &[Option<usize>]| labels(set, self.rows, poses, regions);
+        match whole {
+            true => self.cells(&labels, &|block, _| block % most, true),
+            false => self.cells(&labels, &|block, region| block * regions + region, false),
+        }
+    }
+
+    /// Rows here and there: `of_row` is the fold of each row of the data set.
+    pub fn by_folds(&self, of_row: &[Option<usize>]) -> Cells {
+        let label = |poses: &[Option<usize>]| {
+            // What is in no fold is always fitted: its label is one more than the last fold.
+            poses.iter().map(|p| p.map(|p| of_row[self.rows.rows[p]].unwrap_or(FOLDS))).collect()
+        };
+        self.cells(&label, &|_, region| if region < FOLDS { region } else { SKIPPED }, false)
+    }
+}
+
+impl Cells {
+    /// What the most probable values of these parameters change by where each fold is left out, beside those of all; mm and mrad, one a
+    /// parameter.
+    pub fn deletions(&self, parameters: &[Parameter], tolerance: &Tolerance) -> Vec<Option<Vec<f64>>> {
+        let columns = self.columns(parameters);
+        let sds = tolerance.standard_deviations(parameters, &self.extras);
+        let whole = self.whole.solve(&columns, &sds);
+        let change = |fold: &Fold| {
+            let change = fold.solve(&columns, &sds)? - whole.as_ref()?;
+            Some(columns.iter().take(parameters.len()).map(|&c| change[c]).collect())
+        };
+        self.folds.iter().map(change).collect()
     }
 
     /// Whether whole placements are held out, not regions of them.
@@ -156,6 +215,9 @@ impl Cells {
             moves.view_mut((all, n), (own, 1)).copy_from(&-(&follow.by * &x + &follow.constant));
             moves[(all + own, n)] = 1.0;
             let products = moves.transpose() * &cell.normal * &moves;
+            if cell.fold >= SKIPPED {
+                continue;
+            }
             pulls[cell.fold] += products.view((0, n), (n, 1)).column(0);
             informations[cell.fold] += products.view((0, 0), (n, n));
         }
@@ -175,12 +237,11 @@ impl Cells {
         if factor > chance.inverse_cdf(1.0 - CHANCE) / freedom { factor } else { 1.0 }
     }
 
-    /// Held-out errors of the model with these parameters; `None` where there is but one fold.
-    pub fn held_out(&self, parameters: &[Parameter]) -> Option<HeldOut> {
+    /// Held-out errors of the model with these parameters, whose tolerance all rows tell; `None` where there is but one fold.
+    pub fn held_out(&self, parameters: &[Parameter], tolerance: &Tolerance) -> Option<HeldOut> {
         if self.folds.len() < 2 {
             return None;
         }
-        let tolerance = self.tolerance(parameters).0;
         let columns = self.columns(parameters);
         let sds = tolerance.standard_deviations(parameters, &self.extras);
         let mut list = vec![(0.0, 0.0); self.cells.len()];

@@ -6,11 +6,13 @@
 //!    them, against a model that is contained only for what the further terms bring.
 //! 3. What of the residuals is smooth over a placement of the sensor counts as one error, not as many.
 //! 4. Every method solves the same problem, so the least cost is the best; the cheapest of equals is kept.
-//! 5. Verify rows take no part in any choice but one: where the robot found is worse on them than the nominal one, nominal is kept.
+//! 5. Verify rows take no part in any choice but one: where the robot found is worse on them than the nominal one by more than another draw
+//!    of rows would let expect, nominal is kept. Without verify rows every row is fitted, and judged by fits that it was left out of.
 
+use super::cells::Linearised;
 use super::climb::Judged;
-use super::errors::{Judge, RowError};
-use super::smooth;
+use super::held_out::{Against, Deletion};
+use super::{folds, smooth};
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::shared;
@@ -22,7 +24,7 @@ use crate::identify::solve::problem::{Problem, Solution};
 use crate::identify::solve::robust::Loss;
 use crate::identify::solve::task::Task;
 use crate::identify::solve::{swarm, trust_region};
-use crate::robot::Robot;
+use crate::robot::{Parameter, Robot};
 
 /// One method on one model, fitted to all rows that may be fitted.
 #[derive(Debug, Clone)]
@@ -67,6 +69,10 @@ pub struct Identification {
     pub extras: Vec<(Extra, f64)>,
     /// Whether the nominal robot was kept because the verify rows found the other one worse.
     pub vetoed: bool,
+    /// The fits that rows were left out of, where no row is there to verify.
+    pub deletions: Vec<Deletion>,
+    /// The parameters that they change.
+    pub(super) deleted_parameters: Vec<Parameter>,
 }
 
 /// Rows that are far from what the others predict.
@@ -103,9 +109,6 @@ const COMPARED_POSES: usize = 4_000_000;
 
 /// Iterations of a swarm in a comparison at the least.
 const LEAST_ITERATIONS: usize = 10;
-
-/// Verify rows from which on their verdict counts.
-const VERDICT_ROWS: usize = 5;
 
 /// How many steps [`identify`] tells of.
 pub fn step_count(settings: &Settings) -> u64 {
@@ -147,7 +150,7 @@ pub fn identify(
     if matches!(model, Model::Position | Model::Pose) {
         session.smooth = session.smooth_error(by_points, &fitted_terms)?;
     }
-    let mut candidates = session.run_methods(model, fitted_terms, &methods)?;
+    let (mut candidates, deletions) = session.run_methods(model, fitted_terms, &methods)?;
     let held_out = |t: &Terms| judged.iter().find(|j| j.terms == t.name()).and_then(|j| j.held_out_mm);
     let nominal_held_out_mm = held_out(&Terms::NOMINAL);
     let mut chosen = best(&candidates);
@@ -181,11 +184,13 @@ pub fn identify(
         smooth: session.smooth,
         extras,
         vetoed: false,
+        deletions,
+        deleted_parameters: fitted_terms.parameters(robot),
     };
     found.vetoed = terms != Terms::NOMINAL
         && settings.extensions == Extensions::Auto
         && settings.method.is_none()
-        && found.worse_than_nominal(set, robot, settings);
+        && found.against_nominal(set, robot, settings) == Against::Worse;
     if terms == Terms::NOMINAL || found.vetoed {
         let held_out_mm = nominal_held_out_mm;
         let robot = robot.clone();
@@ -212,8 +217,8 @@ fn models(set: &Dataset, settings: &Settings) -> Result<Vec<Model>, Error> {
             Err(Error::ModelNeeds { model: model.name(), needed: "positions (x_mm, y_mm, z_mm)" })
         }
         Some(model) => Ok(vec![model]),
-        // Several targets of one instrument know the turn as well as the point.
-        None if set.targets.is_some() && set.has_rotations() => Ok([vec![Model::Pose], all].concat()),
+        // An orientation is worth what its own residuals say.
+        None if set.has_rotations() => Ok([vec![Model::Pose], all].concat()),
         None => Ok(all),
     }
 }
@@ -222,34 +227,6 @@ impl Candidate {
     /// What its method minimised; infinite of the nominal robot.
     fn cost(&self) -> f64 {
         self.found.as_ref().map_or(f64::INFINITY, |(_, solution)| solution.cost)
-    }
-}
-
-impl Identification {
-    /// How robots are judged.
-    pub fn errors(&self, set: &Dataset, settings: &Settings, robot: &Robot, rows: &[usize]) -> Vec<RowError> {
-        let (extras, values): (Vec<Extra>, Vec<f64>) = self.extras.iter().copied().unzip();
-        let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &self.fitted, settings.wire_offset) };
-        judge.errors(robot, rows)
-    }
-
-    /// Whether the verify rows find the chosen robot worse than the nominal one: points, in units of what they are known to, or distances
-    /// to a centre by more than the centre's own reading, which all of them share, may do.
-    pub fn worse_than_nominal(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> bool {
-        let rows: Vec<usize> = set.verify_rows().into_iter().filter(|r| !self.verify_outliers.contains(r)).collect();
-        let [chosen, nominal] =
-            [&self.candidates[self.chosen].robot, nominal].map(|robot| self.errors(set, settings, robot, &rows));
-        let mean = |errors: &[RowError], size: &dyn Fn(&RowError) -> Option<f64>| {
-            let sizes: Vec<f64> = errors.iter().filter_map(size).collect();
-            sizes.iter().sum::<f64>() / sizes.len().max(1) as f64
-        };
-        let more = |size: &dyn Fn(&RowError) -> Option<f64>| mean(&chosen, size) - mean(&nominal, size);
-        let point = |e: &RowError| e.point_mm.and_then(|_| e.score(&self.scatter));
-        let distance = |e: &RowError| e.distance_mm.map(f64::abs);
-        // Half of a distance's variance is the centre's; a wire's has no centre.
-        let of_center = |e: &RowError| e.point_mm.map(|_| self.scatter.stated * e.variance_mm2 / 2.0);
-        let shared = mean(&nominal, &of_center).sqrt();
-        rows.len() >= VERDICT_ROWS && (more(&point) > 0.0 || more(&distance) > shared)
     }
 }
 
@@ -348,19 +325,50 @@ impl Session<'_> {
         Ok(Candidate { name: method.name(), model, found, robot, held_out_mm: None })
     }
 
-    /// All methods on one problem.
-    fn run_methods(&self, model: Model, terms: Terms, methods: &[Method]) -> Result<Vec<Candidate>, Error> {
+    /// All methods on one problem, and the fits without some of the rows where no row is there to verify.
+    fn run_methods(
+        &self,
+        model: Model,
+        terms: Terms,
+        methods: &[Method],
+    ) -> Result<(Vec<Candidate>, Vec<Deletion>), Error> {
         let parameters = terms.parameters(self.robot);
         let mut formulation = Formulation::new(&self.task(&parameters, model))?;
         if model != Model::PairwiseDistance {
             let cells = self.cells(&parameters, &parameters, &formulation, formulation.rows.scatter, model);
-            formulation.common = cells.common_factor(&parameters);
+            formulation.common = cells[0].common_factor(&parameters);
         }
+        let deletions = if self.set.verify_rows().is_empty() {
+            self.deletions(model, &parameters, &formulation)
+        } else {
+            Vec::new()
+        };
         let run = |method: &Method| {
             (self.step)(&format!("{} on {}", method.name(), model.name()));
             self.solved(&formulation, *method)
         };
-        methods.iter().map(run).collect()
+        let candidates = methods.iter().map(run).collect::<Result<Vec<Candidate>, Error>>()?;
+        Ok((candidates, deletions))
+    }
+
+    /// What the fit becomes without each fold of the rows, each time that they are cut into folds.
+    fn deletions(&self, model: Model, parameters: &[Parameter], at: &Formulation) -> Vec<Deletion> {
+        let offsets = at.offsets_of();
+        let levers = self.robot.shifted(parameters, &offsets[..parameters.len()]);
+        // What is smooth over a placement makes one of all its rows; without it rows can be left out.
+        let scatter = Scatter { smooth: None, ..at.rows.scatter };
+        let task = Task { smooth: None, ..self.task(parameters, model) };
+        let rows = task.rows_at(scatter, &levers);
+        let linearised = Linearised::new(&rows, &offsets);
+        let of_repeat = |of_row: &Vec<Option<usize>>| -> Vec<Deletion> {
+            let changes = linearised.by_folds(of_row).deletions(parameters, &at.tolerance);
+            let of_fold = |(fold, change): (usize, Option<Vec<f64>>)| {
+                let rows: Vec<usize> = (0..of_row.len()).filter(|&r| of_row[r] == Some(fold)).collect();
+                Some(Deletion { rows, change: change? }).filter(|d| !d.rows.is_empty())
+            };
+            changes.into_iter().enumerate().filter_map(of_fold).collect()
+        };
+        folds::folds(self.set, &self.rows).iter().flat_map(of_repeat).collect()
     }
 }
 

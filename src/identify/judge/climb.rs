@@ -4,8 +4,11 @@
 //! nominal robot on the successor of least held-out error is taken that is worth its terms; the cells that say so are linearised anew
 //! where the model that was taken fits, and the climb goes on from there.
 
-use super::cells::{Cells, HeldOut, clearly_less, root_mean};
+use rayon::prelude::*;
+
+use super::cells::{Cells, HeldOut, Linearised, clearly_less, root_mean};
 use super::choose::Session;
+use super::folds;
 use crate::identify::Error;
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::residuals::weights::{EVIDENCE, Extra, Scatter, WARPS};
@@ -20,8 +23,49 @@ pub struct Judged {
     pub model: &'static str,
     /// The terms in words.
     pub terms: String,
+    /// The terms.
+    #[serde(skip)]
+    pub of: Terms,
     /// Root mean square held-out error of a number, mm; `None` where it could not be judged.
     pub held_out_mm: Option<f64>,
+    /// The same of each way in which rows were held out: regions or placements first, then here and there, several times.
+    pub by_way_mm: Vec<f64>,
+}
+
+/// In how many ways to hold rows out a model has less error than another.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Certainty {
+    /// The other model.
+    pub than: String,
+    /// Ways in which it has less error.
+    pub better: usize,
+    /// Ways in all.
+    pub of: usize,
+}
+
+/// How sure the choice of `terms` is: against the nominal robot, and against the model that comes nearest of those that do not contain it. Richer
+/// ones may have a little less error by chance: they must make the data more probable, too.
+pub fn certainty(judged: &[Judged], terms: &Terms) -> Vec<Certainty> {
+    let Some(chosen) = judged.iter().find(|j| j.of == *terms) else { return Vec::new() };
+    let against = |other: &Judged| Certainty {
+        than: other.terms.clone(),
+        better: chosen.by_way_mm.iter().zip(&other.by_way_mm).filter(|(a, b)| a < b).count(),
+        of: chosen.by_way_mm.len().min(other.by_way_mm.len()),
+    };
+    let nominal = judged.iter().find(|j| j.of == Terms::NOMINAL);
+    let others = judged.iter().filter(|j| j.of != Terms::NOMINAL && !j.of.contains(terms));
+    let next = others
+        .filter(|j| j.held_out_mm.is_some())
+        .min_by(|a, b| a.held_out_mm.unwrap_or(f64::INFINITY).total_cmp(&b.held_out_mm.unwrap_or(f64::INFINITY)));
+    nominal.filter(|n| n.of != *terms).into_iter().chain(next).map(against).collect()
+}
+
+/// Held-out errors of a model, of each way to hold rows out.
+type Ways = Vec<HeldOut>;
+
+/// Root mean square over all ways.
+fn root_mean_of(ways: &Ways) -> Option<f64> {
+    root_mean(&ways.concat())
 }
 
 /// Numbers a parameter that terms beyond MDH need at the least.
@@ -64,27 +108,36 @@ impl Session<'_> {
     }
 
     /// Up the ladder from `best` by what these cells say; `None` where nothing can be held out.
-    fn climb_from(&self, mut best: Terms, cells: &Cells, model: Model, judged: &mut Vec<Judged>) -> Option<Terms> {
-        let judge = |terms: Terms, judged: &mut Vec<Judged>| -> Option<HeldOut> {
-            let held_out = cells.held_out(&terms.parameters(self.robot));
-            let (held_out_mm, terms) = (held_out.as_ref().and_then(root_mean), terms.name());
-            judged.retain(|j| j.terms != terms);
-            judged.push(Judged { model: model.name(), terms, held_out_mm });
-            held_out
+    fn climb_from(&self, mut best: Terms, cells: &[Cells], model: Model, judged: &mut Vec<Judged>) -> Option<Terms> {
+        let regions = cells.first()?;
+        let judge = |terms: Terms, judged: &mut Vec<Judged>| -> Option<Ways> {
+            let parameters = terms.parameters(self.robot);
+            let tolerance = regions.tolerance(&parameters).0;
+            let ways: Option<Ways> = cells.par_iter().map(|c| c.held_out(&parameters, &tolerance)).collect();
+            let held_out_mm = ways.as_ref().and_then(root_mean_of);
+            let by_way_mm = ways.iter().flatten().filter_map(root_mean).collect();
+            judged.retain(|j| j.of != terms);
+            judged.push(Judged { model: model.name(), terms: terms.name(), of: terms, held_out_mm, by_way_mm });
+            ways
         };
-        let evidence = |terms: &Terms| cells.tolerance(&terms.parameters(self.robot)).1;
+        let evidence = |terms: &Terms| regions.tolerance(&terms.parameters(self.robot)).1;
         // Several are tried, so that what falls by chance must be probable, too; and of probable errors that whole placements share,
-        // or of a robot that nobody has found fault with, only what falls clearly counts.
-        let worth = |new: &(Terms, HeldOut), old: &(Terms, HeldOut)| {
+        // or of a robot that nobody has found fault with, only what falls clearly counts: where regions or placements are held out, or
+        // every time that rows are held out here and there.
+        let clearly = |new: &Ways, old: &Ways| {
+            let falls: Vec<bool> = new.iter().zip(old).map(|(n, o)| clearly_less(n, o)).collect();
+            falls.split_first().is_some_and(|(first, rest)| *first || !rest.is_empty() && rest.iter().all(|f| *f))
+        };
+        let worth = |new: &(Terms, Ways), old: &(Terms, Ways)| {
             evidence(&new.0) - evidence(&old.0) > EVIDENCE
-                && match cells.whole_placements() || old.0 == Terms::NOMINAL {
-                    true => clearly_less(&new.1, &old.1),
-                    false => root_mean(&new.1) < root_mean(&old.1),
+                && match regions.whole_placements() || old.0 == Terms::NOMINAL {
+                    true => clearly(&new.1, &old.1),
+                    false => root_mean_of(&new.1) < root_mean_of(&old.1),
                 }
         };
         let mut at = (best, judge(best, judged)?);
         loop {
-            let mut next: Option<(Terms, HeldOut)> = None;
+            let mut next: Option<(Terms, Ways)> = None;
             for terms in best.successors(self.robot) {
                 let beyond = terms.chain == Chain::Mdh && terms != Terms::default();
                 if beyond && !self.tells(&terms, MOST_PARAMETERS) {
@@ -95,7 +148,7 @@ impl Session<'_> {
                 // Against what it contains a richer model has to be worth its terms; among others the least error decides.
                 let better = next.as_ref().is_none_or(|pick| match terms.contains(&pick.0) {
                     true => worth(&new, pick),
-                    false => root_mean(&new.1) < root_mean(&pick.1),
+                    false => root_mean_of(&new.1) < root_mean_of(&pick.1),
                 });
                 if better && worth(&new, &at) {
                     next = Some(new);
@@ -108,7 +161,8 @@ impl Session<'_> {
         Some(best)
     }
 
-    /// Cells linearised where a formulation ended, at a scatter that need not be its own.
+    /// Cells linearised where a formulation ended, at a scatter that need not be its own: regions or whole placements, and where it is regions
+    /// rows here and there as often as they are cut anew.
     pub(super) fn cells(
         &self,
         all: &[Parameter],
@@ -116,7 +170,7 @@ impl Session<'_> {
         at: &Formulation,
         scatter: Scatter,
         model: Model,
-    ) -> Cells {
+    ) -> Vec<Cells> {
         let offsets = at.offsets_of();
         let (of_robot, extras) = offsets.split_at(reference.len());
         let mut wide: Vec<f64> =
@@ -124,19 +178,26 @@ impl Session<'_> {
         wide.extend_from_slice(extras);
         let levers = self.robot.shifted(reference, of_robot);
         let rows = self.task(all, model).rows_at(scatter, &levers);
-        Cells::new(self.set, &rows, &wide, self.settings.folds)
+        let linearised = Linearised::new(&rows, &wide);
+        let regions = linearised.by_regions(self.set, self.settings.folds);
+        if regions.whole_placements() {
+            return vec![regions];
+        }
+        let scattered = folds::folds(self.set, &self.rows);
+        let others: Vec<Cells> = scattered.iter().map(|of_row| linearised.by_folds(of_row)).collect();
+        std::iter::once(regions).chain(others).collect()
     }
 
     /// Takes the warps of cameras about whose errors nothing is stated where they make the data much more probable at one and the same
     /// scatter.
     fn take_warps(
         &mut self,
-        cells: Cells,
+        cells: Vec<Cells>,
         all: &[Parameter],
         reference: &[Parameter],
         scatter: Scatter,
         model: Model,
-    ) -> Result<Cells, Error> {
+    ) -> Result<Vec<Cells>, Error> {
         if self.set.supposed_scale.is_none() {
             return Ok(cells);
         }
@@ -144,7 +205,7 @@ impl Session<'_> {
         self.extras.extend((0..WARPS.len()).map(Extra::Warp));
         let with = Formulation::new(&self.task(reference, model))?;
         let richer = self.cells(all, reference, &with, scatter, model);
-        if richer.tolerance(reference).1 > cells.tolerance(reference).1 + EVIDENCE {
+        if richer[0].tolerance(reference).1 > cells[0].tolerance(reference).1 + EVIDENCE {
             return Ok(richer);
         }
         self.extras.truncate(kept);

@@ -4,5 +4,7 @@ pub mod cells;
 pub mod choose;
 pub mod climb;
 pub mod errors;
+pub mod folds;
+pub mod held_out;
 pub mod scale;
 pub mod smooth;

@@ -195,7 +195,7 @@ mod tests {
     /// Costs of a robot that is up to a millimetre and a milliradian off everywhere, both ways.
     fn agree(rows: &[Measurement], model: Model) {
         let world = synthetic::world(40, 0.05, 3);
-        let set = Dataset::new(rows, 1).unwrap();
+        let set = Dataset::new(rows).unwrap();
         let parameters = world.nominal.mdh_parameters();
         let offsets: Vec<f64> = (0..parameters.len()).map(|i| (i as f64).sin()).collect();
         let scatter = Scatter { point_mm: 0.1, rotation_rad: 1e-3, stated: 1.0, smooth: None };

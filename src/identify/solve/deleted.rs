@@ -3,6 +3,9 @@
 //! In: a robust fit. Out: the rows that are gross errors, those that are doubtful, and the verify rows that are as far off. A row far from
 //! all others pulls the fit towards itself, and a fit that lets it go may leave it by more than its own error: the variance of the
 //! prediction counts as well as the row's own ("deletion residuals": Cook and Weisberg, "Residuals and influence in regression", 1982).
+//! What the others say of a row far from them is extrapolated, and what the model lacks grows with it as noise does: where the prediction is
+//! less certain than the reading, a row must be as many times further off. A row is named against most of the others: where more than half of
+//! all would be left out, none is.
 //! A row that was left out goes back where the others predict it: within two thirds of the standard deviations that it was left out for,
 //! their size that of the other rows' residuals. A row that was kept is doubtful where the others are so far from it as one set in a
 //! thousand would have such a row by chance.
@@ -27,6 +30,10 @@ const ROUNDS: usize = 4;
 
 /// Steps of the trust region after a change of the rows.
 const STEPS: usize = 6;
+
+/// Variance of a prediction over a reading's, beyond which the prior says how far off a prediction may be, and not what the model lacks: a built
+/// robot's links are off by tens of what its readings scatter by.
+const MOST_EXTRAPOLATED: f64 = 30.0;
 
 /// Share of a row that the others must say for it to be held against them.
 const LEAST_OTHERS: f64 = 0.05;
@@ -64,6 +71,9 @@ impl Robust<'_> {
     /// The rows that are so many standard deviations of reading and prediction off; the fit is then one without them.
     pub fn gross_errors(&mut self, sigmas: f64) -> Vec<usize> {
         let mut out: Vec<usize> = self.task.rows.iter().copied().filter(|&r| self.scores[r] > sigmas).collect();
+        if 2 * out.len() > self.task.rows.len() {
+            out.clear();
+        }
         for _ in 0..ROUNDS {
             for &row in self.task.rows {
                 self.weights[row] = if out.contains(&row) { UNHEARD } else { 1.0 };
@@ -168,7 +178,8 @@ impl Robust<'_> {
             // The known distances stand behind the touches.
             for (at, known) in (poses.len() - known.len()..poses.len()).zip(*known) {
                 let (residual, leverage) = held(&(at..at + 1));
-                of_known[known.index] = square_of_deleted(&residual, leverage, 1.0).unwrap_or(0.0).sqrt();
+                of_known[known.index] =
+                    square_of_deleted(&residual, leverage, 1.0).map_or(0.0, |(square, _)| square.sqrt());
             }
             for at in by_pose(poses) {
                 let Some(pose) = poses[at.start] else { continue };
@@ -183,7 +194,8 @@ impl Robust<'_> {
                 if by_others < LEAST_OTHERS {
                     continue;
                 }
-                let square = square_of_deleted(&residual, leverage, weight(row)).unwrap_or(0.0);
+                let (square, odds) = square_of_deleted(&residual, leverage, weight(row)).unwrap_or((0.0, 1.0));
+                let square = square / odds.clamp(1.0, MOST_EXTRAPOLATED);
                 if square > deleted[row].square {
                     deleted[row] = Deleted { square, numbers: at.len(), ..deleted[row] };
                 }
@@ -203,14 +215,17 @@ impl Robust<'_> {
     }
 }
 
-/// White square of a residual that was fitted with this leverage and root of a weight, held against the fit without it.
-fn square_of_deleted(fitted: &DVector<f64>, leverage: DMatrix<f64>, weight: f64) -> Option<f64> {
+/// White square of a residual that was fitted with this leverage and root of a weight, held against the fit without it, and the largest variance
+/// of the prediction over that of the reading.
+fn square_of_deleted(fitted: &DVector<f64>, leverage: DMatrix<f64>, weight: f64) -> Option<(f64, f64)> {
     let identity = DMatrix::identity(fitted.len(), fitted.len());
     // Deleted residuals are (I - H)^-1 e, and the others predict with a variance of H (I - H)^-1, both times the weight.
     let grown = Cholesky::new(&identity - &leverage)?;
     let residual = grown.solve(fitted);
-    let variance = grown.solve(&leverage) + identity * (weight * weight);
-    Some(residual.dot(&Cholesky::new((&variance + variance.transpose()) / 2.0)?.solve(&residual)))
+    let predicted = grown.solve(&leverage);
+    let odds = ((&predicted + predicted.transpose()) / 2.0).symmetric_eigenvalues().max() / (weight * weight);
+    let variance = predicted + identity * (weight * weight);
+    Some((residual.dot(&Cholesky::new((&variance + variance.transpose()) / 2.0)?.solve(&residual)), odds))
 }
 
 /// Neighbouring residuals of one pose.

@@ -39,7 +39,7 @@ pub fn table(seeds: u64) {
         let root = Utf8Path::from_path(folder.path()).expect("a path of letters");
         let rows = measurements::read(&root.join("measurements.csv")).expect("the measurements");
         let nominal = robot::file::read(&root.join("robot.toml")).expect("the robot");
-        let set = Dataset::new(&rows, 1).expect("rows to fit");
+        let set = Dataset::new(&rows).expect("rows to fit");
         let settings = Settings { prior: Prior::Off, widen_bounds, ..Settings::default() };
         let parameters = nominal.mdh_parameters();
         let prepared = Formulation::new(&Task {

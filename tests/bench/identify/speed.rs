@@ -29,7 +29,7 @@ pub fn table(files: &[String]) {
         ),
         _ => made_up(),
     };
-    let set = Dataset::new(&rows, SEED).expect("rows to fit");
+    let set = Dataset::new(&rows).expect("rows to fit");
     let mut settings = Settings { prior: Prior::Off, ..Settings::default() };
     settings.swarm.patience = 0;
     let prepared = Formulation::new(&Task {

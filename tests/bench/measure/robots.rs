@@ -101,7 +101,7 @@ fn measured(world: &World, folder: &Utf8Path) -> Vec<Measurement> {
 }
 
 fn dataset(rows: &[Measurement], folder: &Utf8Path) -> Dataset {
-    let mut set = Dataset::new(rows, 1).expect("rows");
+    let mut set = Dataset::new(rows).expect("rows");
     shared::take(&folder.join("measure.json"), &mut set);
     assert!(!set.shared.is_empty(), "the shared part belongs to the rows");
     set

@@ -138,7 +138,7 @@ fn identified(
             observed: Observed::Position { point_mm, covariance_mm2: Some(variance), rotation_rad: None },
         });
     }
-    let set = Dataset::new(&rows, 1).unwrap();
+    let set = Dataset::new(&rows).unwrap();
     let settings = Identify { method: Some(Method::TrustRegion), model: Some(Model::Position), ..Identify::default() };
     let found = identify(&set, nominal, &settings, 1, &|_| {}).unwrap();
     found.candidates[found.chosen].robot.clone()

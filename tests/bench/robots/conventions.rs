@@ -84,7 +84,7 @@ fn planted(folder: &Path, plant: Plant, words: &[&str]) -> (String, f64) {
     let mut nominal = file::read(&path("robot.toml")).expect("a robot");
     plant(&mut rows, &mut nominal);
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
-    let given = Dataset::new(&rows, 1).expect("rows");
+    let given = Dataset::new(&rows).expect("rows");
     let Examined { set, robot, findings, .. } = doctor::examine(&given, &nominal, &settings, &|_| {});
     let found = identify(&set, &robot, &settings, 1, &|_| {}).expect("it is enough");
     let judge = Judge::plain(&set, &found.fitted, settings.wire_offset);

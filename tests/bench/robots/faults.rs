@@ -154,9 +154,9 @@ fn zeros(runs: u64) {
         let ratio = |seed: u64| {
             let (nominal, truth, rows) = measured(&arms()[0].1, Plan { samples: 120, ..Plan::default() }, seed);
             let error = |by: f64| {
-                let set = Dataset::new(&distances(&rows, by), 1).expect("rows");
+                let set = Dataset::new(&distances(&rows, by)).expect("rows");
                 let found = identify(&set, &nominal, &settings, 1, &|_| {}).expect("it is enough");
-                against_truth(&Dataset::new(&rows, 1).expect("rows"), &truth, &found.candidates[found.chosen].robot)
+                against_truth(&Dataset::new(&rows).expect("rows"), &truth, &found.candidates[found.chosen].robot)
             };
             (error(by), error(0.0))
         };
@@ -298,7 +298,7 @@ pub fn as_standard(robot: &Robot) -> Robot {
 fn diagnosed(sensor: Sensor, plant: Plant, size: f64, seed: u64) -> (Vec<Finding>, f64, Option<CommonScale>) {
     let samples = if sensor == Sensor::Points { Plan::default().samples } else { 120 };
     let (mut nominal, truth, mut rows) = measured(&arms()[0].1, Plan { samples, ..Plan::default() }, seed);
-    let unspoilt = Dataset::new(&rows, 1).expect("rows");
+    let unspoilt = Dataset::new(&rows).expect("rows");
     if sensor == Sensor::Wire {
         // The wire's end is a point like the others, so that what is done to space is done to it as well.
         let mut end = rows[0].clone();
@@ -317,7 +317,7 @@ fn diagnosed(sensor: Sensor, plant: Plant, size: f64, seed: u64) -> (Vec<Finding
         }
     };
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
-    let set = Dataset::new(&rows, 1).expect("rows");
+    let set = Dataset::new(&rows).expect("rows");
     let Examined { set, robot: nominal, along, findings: mut list, unexplained } =
         doctor::examine(&set, &nominal, &settings, &|_| {});
     let Ok(found) = identify(&set, &nominal, &settings, 1, &|_| {}) else {
@@ -333,7 +333,7 @@ fn diagnosed(sensor: Sensor, plant: Plant, size: f64, seed: u64) -> (Vec<Finding
 fn gross(percent: usize, runs: u64) {
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let run = |rows: &[Measurement], nominal: &Robot, truth: &Robot| -> (f64, Identification) {
-        let set = Dataset::new(rows, 1).expect("rows");
+        let set = Dataset::new(rows).expect("rows");
         let found = identify(&set, nominal, &settings, 1, &|_| {}).expect("it is enough");
         (against_truth(&set, truth, &found.candidates[found.chosen].robot), found)
     };

@@ -5,6 +5,7 @@ use stereocal::identify::Settings;
 use stereocal::identify::data::dataset::{Dataset, Reading};
 use stereocal::identify::judge::choose::{Identification, identify};
 use stereocal::identify::judge::errors::Judge;
+use stereocal::identify::judge::held_out::Against;
 use stereocal::identify::model::uncertainty::Expected;
 use stereocal::identify::settings::Method;
 use stereocal::robot::Robot;
@@ -82,7 +83,7 @@ fn line(name: &str, what: &str, nominal: &Robot, plan: Plan, runs: u64) {
 fn outcome(nominal: &Robot, plan: Plan, seed: u64) -> Option<Outcome> {
     let (nominal, truth, rows) = measured(nominal, plan, seed);
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
-    judged(&nominal, &truth, &Dataset::new(&rows, 1).expect("rows"), &settings).map(|(outcome, _)| outcome)
+    judged(&nominal, &truth, &Dataset::new(&rows).expect("rows"), &settings).map(|(outcome, _)| outcome)
 }
 
 /// What becomes of a robot, and the one that is kept.
@@ -90,7 +91,7 @@ pub fn judged(nominal: &Robot, truth: &Robot, set: &Dataset, settings: &Settings
     let found = identify(set, nominal, settings, 1, &|_| {}).ok()?;
     let robot = &found.candidates[found.chosen].robot;
     // As with all methods, where the verify rows may keep the nominal robot.
-    let kept = if found.worse_than_nominal(set, nominal, settings) { nominal } else { robot };
+    let kept = if found.against_nominal(set, nominal, settings) == Against::Worse { nominal } else { robot };
     let errors_mm = [nominal, kept].map(|robot| against_truth(set, truth, robot));
     let mut outcome = Outcome { errors_mm, ..Outcome::default() };
     if let Some((formulation, _)) = &found.candidates[found.chosen].found {

@@ -25,14 +25,14 @@ pub fn table() {
     ] {
         let plan = Plan { samples, groups, beyond, verify: 50.max(groups), ..Plan::default() };
         let (nominal, _, rows) = measured(&arms()[0].1, plan, 1);
-        let set = Dataset::new(&rows, 1).expect("rows");
+        let set = Dataset::new(&rows).expect("rows");
         let start = Instant::now();
         threads(2, &|| whole(&set, &nominal, 1));
         println!("{what:28} {:6.2} (wanted {wanted})", start.elapsed().as_secs_f64());
     }
     for (name, nominal) in arms() {
         let (nominal, _, rows) = measured(&nominal, Plan::default(), 1);
-        let set = Dataset::new(&rows, 1).expect("rows");
+        let set = Dataset::new(&rows).expect("rows");
         let choice = |found: &Identification| {
             let chosen = &found.candidates[found.chosen];
             format!("{}/{} {}", chosen.name, chosen.model.name(), found.terms.name())

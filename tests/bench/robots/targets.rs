@@ -51,7 +51,7 @@ fn line(name: &str, what: &str, nominal: &Robot, plan: Plan, (count, model): (us
         .filter_map(|seed| {
             let (nominal, truth, rows) = measured(nominal, plan, seed);
             let rows = if count == 1 { rows } else { of_targets(&truth, &rows, count, plan.noise_mm, seed) };
-            let set = Dataset::new(&rows, 1).expect("rows");
+            let set = Dataset::new(&rows).expect("rows");
             let (outcome, kept) = judged(&nominal, &truth, &set, &settings)?;
             let further = |robot: &Robot| Robot { tool_mm: robot.tool_mm + Vector3::from(FURTHER_MM), ..robot.clone() };
             Some((outcome, against_truth(&set, &further(&truth), &further(&kept))))

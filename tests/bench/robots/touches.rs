@@ -146,9 +146,9 @@ fn faults(runs: u64) {
     println!("\nplanted faults, Table 1's robot, {runs} runs: named of, findings, silently wrong");
     let diagnosed = |plant: Plant, moved_mm: f64, size: f64, seed: u64| {
         let mut world = World::new(&arms()[0].1, Beyond::Nothing, moved_mm, seed);
-        let exact = Dataset::new(&world.rows, 1).expect("rows");
+        let exact = Dataset::new(&world.rows).expect("rows");
         plant(&mut world, size);
-        let mut set = Dataset::new(&world.rows, 1).expect("rows");
+        let mut set = Dataset::new(&world.rows).expect("rows");
         set.known = world.known;
         let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
         let examined = doctor::examine(&set, &world.nominal, &settings, &|_| {});
@@ -178,7 +178,7 @@ fn faults(runs: u64) {
 /// Consistency and distortion of nominal robot, program and least squares; whether an unseen scale is said without known distances.
 fn outcome(nominal: &Robot, beyond: Beyond, seed: u64) -> [f64; 7] {
     let World { nominal, rows, known, .. } = World::new(nominal, beyond, 0.0, seed);
-    let mut set = Dataset::new(&rows, 1).expect("rows");
+    let mut set = Dataset::new(&rows).expect("rows");
     set.known = known;
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let found = identify(&set, &nominal, &settings, 1, &|_| {}).expect("it is enough");

@@ -39,6 +39,12 @@ pub struct Plan {
     pub error_mm: f64,
     /// Standard deviation of the truth's angles, mrad.
     pub error_mrad: f64,
+    /// Whether the poses to fit turn one axis after the other, all others where they were.
+    pub one_axis: bool,
+    /// Readings of each pose to fit.
+    pub readings: usize,
+    /// Whether the file of the nominal robot knows nothing of the tool.
+    pub no_tool: bool,
 }
 
 impl Default for Plan {
@@ -52,6 +58,9 @@ impl Default for Plan {
             noise_mm: 0.02,
             error_mm: 0.5,
             error_mrad: 1.0,
+            one_axis: false,
+            readings: 1,
+            no_tool: false,
         }
     }
 }
@@ -116,12 +125,35 @@ pub fn measured(nominal: &Robot, plan: Plan, seed: u64) -> (Robot, Robot, Vec<Me
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut nominal = nominal.clone();
     nominal.tool_mm = Vector3::new(30.0, -20.0, 60.0);
-    let truth = truth(&nominal, plan, &mut random);
+    let mut truth = truth(&nominal, plan, &mut random);
+    if plan.no_tool {
+        truth.tool_mm += Vector3::new(110.0, -80.0, 145.0);
+        nominal.tool_mm = Vector3::zeros();
+    }
     let mut of_sensors = Pcg64Mcg::seed_from_u64(seed ^ 0x5eed);
     let phases: Vec<f64> = (0..3 * plan.groups).map(|_| std::f64::consts::TAU * of_sensors.random::<f64>()).collect();
+    let home: Vec<f64> = truth.joints.iter().map(|j| 0.4 * drawn(j, &mut random)).collect();
+    let each = plan.samples.div_ceil(home.len());
+    let pose = |i: usize, random: &mut Pcg64Mcg| -> Vec<f64> {
+        let joints: Vec<f64> = truth.joints.iter().map(|j| drawn(j, random)).collect();
+        if !plan.one_axis || i >= plan.samples {
+            return joints;
+        }
+        let (axis, step) = (i / each, (i % each) as f64 / (each - 1).max(1) as f64);
+        let mut joints = home.clone();
+        joints[axis] = if truth.joints[axis].slides { 20.0 + 160.0 * step } else { 1.2 * (2.0 * step - 1.0) };
+        joints
+    };
+    let readings = |i: usize| if i < plan.samples { plan.readings } else { 1 };
     let rows = (0..plan.samples + plan.verify)
-        .map(|i| {
-            let joints: Vec<f64> = truth.joints.iter().map(|j| drawn(j, &mut random)).collect();
+        .flat_map(|i| {
+            let joints = pose(i, &mut random);
+            (0..readings(i)).map(|k| (i, k, joints.clone())).collect::<Vec<_>>()
+        })
+        .collect::<Vec<_>>();
+    let rows = rows
+        .into_iter()
+        .map(|(i, k, joints)| {
             let noise = Vector3::from_fn(|_, _| plan.noise_mm * normal(&mut random));
             let group = i % plan.groups;
             let seen: Point3<f64> = sensor(group) * truth.target_mm(&joints);
@@ -134,7 +166,8 @@ pub fn measured(nominal: &Robot, plan: Plan, seed: u64) -> (Robot, Robot, Vec<Me
             let slides: Vec<bool> = truth.joints.iter().map(|j| j.slides).collect();
             let joints_deg = joints.iter().zip(&slides).map(|(q, s)| if *s { *q } else { q.to_degrees() }).collect();
             let role = if i < plan.samples { Role::Sample } else { Role::Verify };
-            let at = RobotPose { pose: format!("p{i}"), group: format!("g{group}"), role, joints_deg, slides };
+            let pose = if plan.readings > 1 { format!("p{i}.{k}") } else { format!("p{i}") };
+            let at = RobotPose { pose, group: format!("g{group}"), role, joints_deg, slides };
             let point_mm = seen + common + noise;
             Measurement {
                 at,

@@ -231,7 +231,7 @@ fn what_is_no_body_is_refused() {
 fn one_target_by_name_is_one_target() {
     let list: Vec<Measurement> = rows(3, 1).into_iter().filter(|row| row.target == "b").collect();
     assert!(as_one(&list).unwrap().is_none());
-    let set = Dataset::new(&list, 1).unwrap();
+    let set = Dataset::new(&list).unwrap();
     assert_eq!((set.poses.len(), set.targets.is_none()), (list.len(), true));
     assert_eq!(list.iter().filter(|r| r.at.role == Role::Center).count(), 4);
 }
@@ -243,7 +243,7 @@ fn exchanged_names_of_an_even_triangle_show_by_their_turn() {
         .into();
     let world = synthetic::world(40, 0.0, 8);
     let mut list = synthetic::of_targets(&world, &triangle, NOISE_MM, 8);
-    let said = |list: &[Measurement]| orientations::examine(&Dataset::new(list, 1).unwrap(), &world.nominal);
+    let said = |list: &[Measurement]| orientations::examine(&Dataset::new(list).unwrap(), &world.nominal, false);
     let (clean, finding) = said(&list);
     assert_eq!((clean.poses.len(), finding), (world.rows.len(), None));
     for pose in [0, 17] {

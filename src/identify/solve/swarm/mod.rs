@@ -239,7 +239,7 @@ mod tests {
 
     fn prepared(noise_mm: f64) -> Formulation {
         let world = synthetic::world(SAMPLES, noise_mm, 7);
-        let set = Dataset::new(&world.rows, 1).unwrap();
+        let set = Dataset::new(&world.rows).unwrap();
         let parameters = world.nominal.mdh_parameters();
         Formulation::new(&Task {
             set: &set,

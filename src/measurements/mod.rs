@@ -1,5 +1,12 @@
 //! `poses.csv` and `measurements.csv`: where the robot was sent, and what was measured there.
 
+mod assemble;
+mod judge;
+mod layout;
+mod part;
+mod pick;
+pub mod source;
+
 use std::fmt::Write as _;
 
 use camino::Utf8Path;
@@ -8,6 +15,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use crate::csv_table::Table;
 pub use crate::csv_table::quoted;
 use crate::files::Result;
+pub use source::Source;
 
 /// What a pose is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,15 +121,19 @@ impl Table<'_> {
 
     /// The robot's poses, one a row. With a column `target`, rows of several targets may be of one pose.
     fn poses(&self, target: Option<usize>) -> Result<Vec<RobotPose>> {
-        let (pose, group, role) = (self.require("pose")?, self.require("group")?, self.require("role")?);
+        let (pose, group, role) = (self.column("pose"), self.column("group"), self.column("role"));
+        let numbers: Vec<String> =
+            (1..=if pose.is_none() { self.rows.len() } else { 0 }).map(|n| n.to_string()).collect();
         let (joints, slides) = self.joint_columns()?;
         let mut seen = std::collections::BTreeMap::new();
         let mut centers = std::collections::BTreeMap::new();
         let mut first_rows = std::collections::BTreeMap::new();
         let mut poses: Vec<RobotPose> = Vec::with_capacity(self.rows.len());
-        for (line, row) in &self.rows {
+        for (i, (line, row)) in self.rows.iter().enumerate() {
             let line = *line;
-            let role = match &row[role] {
+            let pose = pose.map_or_else(|| numbers[i].as_str(), |c| &row[c]);
+            let group = group.map_or("1", |c| &row[c]);
+            let role = match role.map_or("sample", |c| &row[c]).to_lowercase().as_str() {
                 "center" | "centre" => Role::Center,
                 "sample" => Role::Sample,
                 "verify" => Role::Verify,
@@ -129,33 +141,28 @@ impl Table<'_> {
                     return Err(self.refuse(line, format!("role is `{other}`; it is one of center, sample, verify")));
                 }
             };
-            if row[pose].is_empty() {
+            if pose.is_empty() {
                 return Err(self.refuse(line, "the pose has no name".to_owned()));
             }
             let of_target = target.map_or("", |c| &row[c]);
             if target.is_some() && of_target.is_empty() {
-                return Err(self.refuse(line, format!("the target of pose `{}` has no name", &row[pose])));
+                return Err(self.refuse(line, format!("the target of pose `{pose}` has no name")));
             }
-            if let Some(first) = seen.insert((&row[pose], of_target), line) {
+            if let Some(first) = seen.insert((pose, of_target), line) {
                 let what = if target.is_some() { format!(" with target `{of_target}`") } else { String::new() };
-                return Err(self.refuse(line, format!("pose `{}`{what} stands in line {first} already", &row[pose])));
+                return Err(self.refuse(line, format!("pose `{pose}`{what} stands in line {first} already")));
             }
             if role == Role::Center
-                && let Some((first, center)) = centers.insert(&row[group], (line, &row[pose]))
-                && center != &row[pose]
+                && let Some((first, center)) = centers.insert(group, (line, pose))
+                && center != pose
             {
-                let message = format!("group `{}` has a center in line {first} already; a group has one", &row[group]);
+                let message = format!("group `{group}` has a center in line {first} already; a group has one");
                 return Err(self.refuse(line, message));
             }
             let joints_deg = joints.iter().map(|&c| self.number(line, row, c)).collect::<Result<Vec<f64>>>()?;
-            let read = RobotPose {
-                pose: row[pose].to_owned(),
-                group: row[group].to_owned(),
-                role,
-                joints_deg,
-                slides: slides.clone(),
-            };
-            let first: usize = *first_rows.entry(&row[pose]).or_insert(poses.len());
+            let read =
+                RobotPose { pose: pose.to_owned(), group: group.to_owned(), role, joints_deg, slides: slides.clone() };
+            let first: usize = *first_rows.entry(pose).or_insert(poses.len());
             if let Some(before) = poses.get(first).filter(|before| **before != read) {
                 let message = format!(
                     "pose `{}` stands in line {} with another group, role or joints; its targets are measured at one pose",
@@ -172,15 +179,23 @@ impl Table<'_> {
 /// Reads `poses.csv`.
 pub fn read_poses(path: &Utf8Path) -> Result<Vec<RobotPose>> {
     let hint = "a poses folder holds left/, right/ and poses.csv with the columns pose,group,role,j1_deg,...";
-    Table::read(path, "the list of poses", hint)?.poses(None)
+    let table = Table::read(path, "the list of poses", hint)?;
+    // A pose of `measure` is the stem of its pictures; its number would not do.
+    table.require("pose")?;
+    table.poses(None)
 }
 
-/// Reads `measurements.csv`, or any CSV with `pose,group,role,j1_deg..` and either `x_mm,y_mm,z_mm` or `distance_mm`.
+/// Reads `measurements.csv`, or any table with `j1_deg..` and either `x_mm,y_mm,z_mm` or `distance_mm`; `pose` is the row's number, `group` one and
+/// `role` sample where they are absent.
 /// A row whose `status` is not `ok`, or whose numbers are all empty, is [`Observed::Missing`]. With a column `target` a pose has a row for each of
 /// its targets.
 pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
     let hint = "`stereocal measure POSES` writes out/measurements.csv; `--measurements FILE` names another";
-    let table = Table::read(path, "the measurements", hint)?;
+    from_table(&Table::read(path, "the measurements", hint)?)
+}
+
+/// Measurements from a table.
+fn from_table(table: &Table) -> Result<Vec<Measurement>> {
     let named = |c: &usize| table.rows.iter().any(|(_, row)| !row[*c].is_empty());
     let target = table.column("target").filter(named);
     let poses = table.poses(target)?;

@@ -1,0 +1,125 @@
+//! Readings that were repeated at one pose, as trackers measure: their mean, and their scatter.
+//!
+//! In: rows of measurements. Out: one row for rows of one group and role that follow each other with the same joints, and the standard deviation
+//! of a coordinate within them: what the instrument repeats. It says nothing about the robot, which stood still, so that as rows of their own
+//! they would count one error of the robot several times. A pose that the robot came back to is another row.
+
+use nalgebra::{Matrix3, Vector3};
+use serde::Serialize;
+
+use crate::measurements::{Measurement, Observed, Role};
+
+/// Readings repeated at one pose.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Repeats {
+    /// Readings in all, of the poses that have several.
+    pub readings: usize,
+    /// Poses that have several.
+    pub poses: usize,
+    /// Standard deviation of a coordinate, or of a distance, within a pose, mm.
+    pub scatter_mm: f64,
+}
+
+impl Repeats {
+    /// For the terminal and the page.
+    pub fn sentence(&self) -> String {
+        format!(
+            "{} readings were repeated at {} poses: each pose counts once, with their mean; the instrument repeats to {:.4} mm",
+            self.readings, self.poses, self.scatter_mm
+        )
+    }
+}
+
+/// One row a pose.
+pub fn as_one(rows: &[Measurement]) -> (Vec<Measurement>, Option<Repeats>) {
+    let same = |a: &Measurement, b: &Measurement| {
+        a.at.role != Role::Center
+            && (a.at.role, &a.at.group, &a.at.joints_deg, &a.target)
+                == (b.at.role, &b.at.group, &b.at.joints_deg, &b.target)
+            && numbers(a).is_some_and(|n| numbers(b).is_some_and(|m| m.len() == n.len()))
+    };
+    let mut merged = Vec::with_capacity(rows.len());
+    let (mut readings, mut poses, mut squares, mut freedom) = (0, 0, 0.0, 0usize);
+    for pose in rows.chunk_by(same) {
+        merged.push(mean(pose));
+        if pose.len() > 1 {
+            readings += pose.len();
+            poses += 1;
+            let all: Vec<Vec<f64>> = pose.iter().filter_map(numbers).collect();
+            for k in 0..all[0].len() {
+                let middle = all.iter().map(|n| n[k]).sum::<f64>() / all.len() as f64;
+                squares += all.iter().map(|n| (n[k] - middle).powi(2)).sum::<f64>();
+                freedom += all.len() - 1;
+            }
+        }
+    }
+    let repeats =
+        (poses > 0).then(|| Repeats { readings, poses, scatter_mm: (squares / freedom.max(1) as f64).sqrt() });
+    (merged, repeats)
+}
+
+/// What was read, where it can be averaged; a touch says that the target was there, and has nothing to average.
+fn numbers(row: &Measurement) -> Option<Vec<f64>> {
+    match &row.observed {
+        Observed::Position { point_mm, .. } => Some(point_mm.coords.iter().copied().collect()),
+        Observed::Distance { distance_mm, .. } if *distance_mm > 0.0 => Some(vec![*distance_mm]),
+        _ => None,
+    }
+}
+
+/// The mean of what was read at one pose. Its covariance is that of one reading: what is stated may be shared by all of them.
+fn mean(rows: &[Measurement]) -> Measurement {
+    let mut one = rows[0].clone();
+    let count = rows.len() as f64;
+    match &mut one.observed {
+        Observed::Position { point_mm, covariance_mm2, .. } => {
+            let points = rows.iter().filter_map(|r| match &r.observed {
+                Observed::Position { point_mm, .. } => Some(point_mm.coords),
+                _ => None,
+            });
+            point_mm.coords = points.sum::<Vector3<f64>>() / count;
+            let stated: Option<Vec<Matrix3<f64>>> =
+                rows.iter()
+                    .map(|r| {
+                        if let Observed::Position { covariance_mm2, .. } = &r.observed { *covariance_mm2 } else { None }
+                    })
+                    .collect();
+            *covariance_mm2 = stated.map(|all| all.iter().sum::<Matrix3<f64>>() / count);
+        }
+        Observed::Distance { distance_mm, .. } => {
+            *distance_mm = rows.iter().filter_map(numbers).map(|n| n[0]).sum::<f64>() / count;
+        }
+        Observed::Missing { .. } => {}
+    }
+    one
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurements::RobotPose;
+    use nalgebra::Point3;
+
+    fn row(joint: f64, x: f64) -> Measurement {
+        let at = RobotPose {
+            pose: format!("{joint} {x}"),
+            group: "g".into(),
+            role: Role::Sample,
+            joints_deg: vec![joint],
+            slides: vec![],
+        };
+        let observed =
+            Observed::Position { point_mm: Point3::new(x, 0.0, 0.0), covariance_mm2: None, rotation_rad: None };
+        Measurement { at, target: String::new(), observed }
+    }
+
+    #[test]
+    fn readings_at_one_pose_are_one_with_their_scatter() {
+        let (rows, repeats) = as_one(&[row(1.0, 0.1), row(1.0, 0.3), row(2.0, 5.0), row(1.0, 7.0)]);
+        assert_eq!(rows.iter().map(|r| numbers(r).unwrap()[0]).collect::<Vec<_>>(), [0.2, 5.0, 7.0]);
+        let repeats = repeats.unwrap();
+        assert_eq!((repeats.readings, repeats.poses), (2, 1));
+        assert!((repeats.scatter_mm - (0.02f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert_eq!(as_one(&[row(1.0, 0.1), row(2.0, 0.3)]).1, None);
+    }
+}

@@ -1,0 +1,98 @@
+//! The chosen robot on rows that took no part in its fit, beside the nominal one.
+//!
+//! In: what was identified. Out: errors of the rows to verify, or without any of every row in the fits that it was left out of, and whether they
+//! find the robot worse than the nominal one by more than another draw of rows would let expect (Student's test of the rows' differences).
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::choose::Identification;
+use super::errors::{Judge, RowError};
+use super::folds;
+use crate::identify::data::dataset::Dataset;
+use crate::identify::residuals::weights::Extra;
+use crate::identify::settings::Settings;
+use crate::robot::Robot;
+
+/// Chance with which rows find a robot worse that is not.
+const CHANCE: f64 = 0.05;
+
+/// A fit without some of the rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deletion {
+    /// The rows that were left out.
+    pub rows: Vec<usize>,
+    /// What the parameters change by, mm and mrad.
+    pub change: Vec<f64>,
+}
+
+/// How the verify rows, or rows left out of a fit, find the chosen robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Against {
+    /// Not worse than the nominal one.
+    NotWorse,
+    /// Worse, by no more than another draw of rows might.
+    Perhaps,
+    /// Worse.
+    Worse,
+}
+
+impl Identification {
+    /// Rows by which robots are judged: those to verify, without any all that were fitted.
+    pub fn judged_rows(&self, set: &Dataset) -> Vec<usize> {
+        match self.deletions.is_empty() {
+            true => set.verify_rows(),
+            false => {
+                let mut rows: Vec<usize> = self.deletions.iter().flat_map(|d| d.rows.iter().copied()).collect();
+                rows.sort_unstable();
+                rows.dedup();
+                rows
+            }
+        }
+    }
+
+    /// Errors of a robot on rows that took no part in its fit: the rows to verify, or every row in the fits that it was left out of. A robot
+    /// that was `fitted` changes as the chosen one does where rows are left out; the nominal one does not. `judge` is for all fitted rows.
+    pub fn held_out_errors(&self, judge: &Judge, robot: &Robot, fitted: bool) -> Vec<RowError> {
+        if self.deletions.is_empty() {
+            return judge.errors(robot, &judge.set.verify_rows());
+        }
+        let part = |Deletion { rows, change }: &Deletion| {
+            let changed = if fitted { robot.shifted(&self.deleted_parameters, change) } else { robot.clone() };
+            folds::without(judge, &changed, rows)
+        };
+        folds::one_a_row(judge.set, self.deletions.iter().flat_map(part))
+    }
+
+    /// How rows that took no part in the fit find the chosen robot against the nominal one: by points where there are any, in units of what
+    /// they are known to; by distances otherwise. Distances of points share the point that they start at, which is one draw.
+    pub fn against_nominal(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> Against {
+        let candidate = &self.candidates[self.chosen];
+        if candidate.found.is_none() {
+            return Against::NotWorse;
+        }
+        let (extras, values): (Vec<Extra>, Vec<f64>) = self.extras.iter().copied().unzip();
+        let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &self.fitted, settings.wire_offset) };
+        let [chosen, before] = [(&candidate.robot, true), (nominal, false)].map(|(robot, fitted)| {
+            let mut errors = self.held_out_errors(&judge, robot, fitted);
+            errors.retain(|e| !self.verify_outliers.contains(&e.row));
+            errors
+        });
+        let points = chosen.iter().any(|e| e.point_mm.is_some());
+        let size = |e: &RowError| match points {
+            true => e.point_mm.and_then(|_| e.score(&self.scatter)),
+            false => e.distance_mm.map(f64::abs),
+        };
+        let more: Vec<f64> = chosen.iter().zip(&before).filter_map(|(c, b)| Some(size(c)? - size(b)?)).collect();
+        let count = more.len() as f64;
+        let mean = more.iter().sum::<f64>() / count;
+        if more.is_empty() || mean <= 0.0 {
+            return Against::NotWorse;
+        }
+        let spread = (more.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0) / count).sqrt();
+        let limit = match StudentsT::new(0.0, 1.0, count - 1.0) {
+            Ok(student) if more.len() > 1 => student.inverse_cdf(1.0 - CHANCE) * spread,
+            _ => f64::INFINITY,
+        };
+        if mean > limit { Against::Worse } else { Against::Perhaps }
+    }
+}

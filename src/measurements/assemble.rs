@@ -1,0 +1,291 @@
+//! Rows of measurements from the columns that were taken, and the sentence that says which.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use super::judge::{Basis, Way};
+use super::layout::is_kept;
+use super::part::{At, Kind, Part};
+use super::pick::listed;
+use super::{Measurement, from_table};
+use crate::csv_table::Table;
+use crate::files::Result;
+use crate::tables::Fields;
+use crate::tables::grid::Form;
+use crate::tables::names::{Name, What};
+
+/// Readings within this share of what the rows are apart are of one point.
+const ONE_POINT: f64 = 1e-3;
+
+/// Makes files with a multiple of the others' rows, so many readings a pose, as long as these: one row a pose, the readings side by side.
+pub(super) fn widen(parts: &mut [Part]) -> Result<()> {
+    let Some(least) = parts.iter().map(|p| p.rows.len()).min() else { return Ok(()) };
+    let counts: Vec<String> = parts.iter().map(|p| format!("{} has {} rows", p.file_name(), p.rows.len())).collect();
+    for part in parts.iter_mut().filter(|part| part.rows.len() != least) {
+        let times = part.rows.len() / least;
+        let order = if times * least == part.rows.len() { order(part, least, times) } else { None };
+        let Some(order) = order else {
+            let hint = "files are joined row by row: the same rows in each, or for each pose so many readings one after the other, whose distances are kept";
+            return Err(part.refuse(counts.join(", "), Some(hint)));
+        };
+        let together = |row: usize| {
+            let all: Vec<&(u64, Fields)> = (0..times).map(|k| &part.rows[order(row, k)]).collect();
+            (all[0].0, Fields::new(all.iter().flat_map(|(_, fields)| fields.iter())))
+        };
+        let rows = (0..least).map(together).collect();
+        let repeated = |k: usize| {
+            move |name: &Name| match name.what {
+                What::Coordinate(_) | What::Matrix(..) => {
+                    Name { key: [name.key.clone(), vec![k.to_string()]].concat(), ..name.clone() }
+                }
+                _ if k == 1 => name.clone(),
+                _ => Name { what: What::Other, ..name.clone() },
+            }
+        };
+        part.meanings = part.meanings.as_ref().map(|m| (1..=times).flat_map(|k| m.iter().map(repeated(k))).collect());
+        part.names = part.names.as_ref().map(|n| n.iter().cycle().take(times * n.len()).cloned().collect());
+        part.kinds = part.kinds.iter().cycle().take(times * part.kinds.len()).cloned().collect();
+        part.rows = rows;
+    }
+    Ok(())
+}
+
+/// Where the k-th reading of a pose stands: one after the other, or first all of the first target.
+fn order(part: &Part, poses: usize, times: usize) -> Option<Box<dyn Fn(usize, usize) -> usize>> {
+    let columns = coordinates(part)?;
+    let point = |row: usize| -> Option<nalgebra::Point3<f64>> {
+        let number = |c: usize| part.optional(row, c).ok().flatten();
+        Some(nalgebra::Point3::new(number(columns[0])?, number(columns[1])?, number(columns[2])?))
+    };
+    let apart = |a: usize, b: usize| Some((point(a)? - point(b)?).norm());
+    let next: Vec<f64> = (0..poses).filter_map(|row| apart(row * times, row * times + 1)).collect();
+    let between: Vec<f64> = (1..poses).filter_map(|row| apart((row - 1) * times, row * times)).collect();
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
+    if is_kept(next.clone()) || mean(&next) < ONE_POINT * mean(&between) {
+        return Some(Box::new(move |row, k| row * times + k));
+    }
+    let later: Vec<f64> = (0..poses).filter_map(|row| apart(row, poses + row)).collect();
+    (is_kept(later.clone()) || mean(&later) < ONE_POINT * mean(&between))
+        .then(|| -> Box<dyn Fn(usize, usize) -> usize> { Box::new(move |row, k| k * poses + row) })
+}
+
+/// The first three columns that are a point.
+fn coordinates(part: &Part) -> Option<[usize; 3]> {
+    let named = |axis: usize| {
+        part.meanings.as_ref()?.iter().position(|n| n.what == What::Coordinate(axis) && n.measured != Some(false))
+    };
+    match (named(0), named(1), named(2)) {
+        (Some(x), Some(y), Some(z)) => Some([x, y, z]),
+        _ => part.free().first_chunk::<3>().copied(),
+    }
+}
+
+/// What was taken of a set of files.
+pub(super) struct Taken<'a> {
+    /// The files.
+    pub parts: &'a [Part],
+    /// Columns and units.
+    pub way: &'a Way,
+    /// Who says so.
+    pub basis: Basis,
+    /// Which joints slide.
+    pub slides: &'a [bool],
+    /// Which of several tables it is.
+    pub number: Option<usize>,
+}
+
+impl Taken<'_> {
+    /// The rows.
+    pub fn rows(&self) -> Result<Vec<Measurement>> {
+        let picked = &self.way.picked;
+        let joints_in = &self.parts[picked.joints[0].part];
+        let places = self.targets_as_readings();
+        let own = self.own();
+        let mut header: Vec<String> = ["pose", "group", "role"].map(str::to_owned).into();
+        let several = picked.points.len() > 1 && !places;
+        header.extend((several && !own.contains_key("target")).then(|| "target".to_owned()));
+        header.extend(
+            self.slides.iter().enumerate().map(|(j, s)| format!("j{}_{}", j + 1, if *s { "mm" } else { "deg" })),
+        );
+        header.extend(match picked.distance {
+            Some(_) => vec!["distance_mm".to_owned()],
+            None => ["x_mm", "y_mm", "z_mm"].map(str::to_owned).to_vec(),
+        });
+        let more: Vec<(&str, At)> =
+            own.iter().filter(|(n, _)| !["pose", "group", "role"].contains(n)).map(|(n, at)| (*n, *at)).collect();
+        header.extend(more.iter().map(|(name, _)| (*name).to_owned()));
+        let measured: Vec<(&str, Vec<At>)> = match picked.distance {
+            Some(at) => vec![("", vec![at])],
+            None => picked.points.iter().map(|(name, at)| (name.as_str(), at.to_vec())).collect(),
+        };
+        let mut rows = Vec::new();
+        for row in 0..joints_in.rows.len() {
+            for (k, (target, columns)) in measured.iter().enumerate() {
+                let repeated = (places && measured.len() > 1).then_some(k + 1);
+                let mut cells = self.named(row, repeated, &own);
+                cells.extend((several && !own.contains_key("target")).then(|| (*target).to_owned()));
+                for (at, slides) in picked.joints.iter().zip(self.slides) {
+                    let value = self.parts[at.part].number(row, at.column)?;
+                    let unit = if *slides { self.way.lengths } else { self.way.joints };
+                    cells.push(unit.converted(value).to_string());
+                }
+                let mut numbers = Vec::new();
+                for at in columns {
+                    numbers.push(self.parts[at.part].optional(row, at.column)?.map(|v| self.way.lengths.converted(v)));
+                }
+                // A point without one of its coordinates is none.
+                let whole = numbers.iter().all(Option::is_some);
+                cells.extend(numbers.iter().map(|v| v.filter(|_| whole).map_or_else(String::new, |v| v.to_string())));
+                cells.extend(more.iter().map(|(_, at)| self.cell(row, *at).to_owned()));
+                let line = columns.first().map_or(0, |at| self.parts[at.part].rows[row].0);
+                rows.push((line, Fields::new(cells.iter().map(String::as_str))));
+            }
+        }
+        let path = &self.parts[picked.points.first().map_or(picked.joints[0].part, |(_, at)| at[0].part)].grid.path;
+        from_table(&Table::new(path, header, rows)?)
+    }
+
+    fn cell(&self, row: usize, at: At) -> &str {
+        &self.parts[at.part].rows[row].1[at.column]
+    }
+
+    /// Columns of the contract's own names.
+    fn own(&self) -> BTreeMap<&'static str, At> {
+        let mut list = BTreeMap::new();
+        for (part, meanings) in self.parts.iter().enumerate().filter_map(|(i, p)| Some((i, p.meanings.as_ref()?))) {
+            for (column, name) in meanings.iter().enumerate() {
+                if let What::Own(own) = name.what {
+                    list.entry(own).or_insert(At { part, column });
+                }
+            }
+        }
+        list
+    }
+
+    /// Pose, group and role of a row.
+    fn named(&self, row: usize, repeated: Option<usize>, own: &BTreeMap<&'static str, At>) -> Vec<String> {
+        let given = |name: &str| own.get(name).map(|at| self.cell(row, *at).to_owned()).filter(|cell| !cell.is_empty());
+        let mut pose = given("pose").unwrap_or_else(|| (row + 1).to_string());
+        if let Some(k) = repeated {
+            let _ = write!(pose, ".{k}");
+        }
+        let mut group = given("group").unwrap_or_else(|| "1".to_owned());
+        if let Some(number) = self.number {
+            pose = format!("{number}:{pose}");
+            group = match given("group") {
+                Some(group) => format!("{number}:{group}"),
+                None => number.to_string(),
+            };
+        }
+        vec![pose, group, given("role").unwrap_or_else(|| "sample".to_owned())]
+    }
+
+    /// Whether what looks like several targets is one that was read several times.
+    fn targets_as_readings(&self) -> bool {
+        let points = &self.way.picked.points;
+        let rows = self.parts[self.way.picked.joints[0].part].rows.len();
+        let point = |row: usize, k: usize| super::layout::point(self.parts, row, &points[k].1);
+        let apart = |a: Option<nalgebra::Point3<f64>>, b: Option<nalgebra::Point3<f64>>| Some((a? - b?).norm());
+        let mean = |v: Vec<f64>| v.iter().sum::<f64>() / v.len().max(1) as f64;
+        points.len() > 1 && {
+            let within = mean((0..rows).filter_map(|row| apart(point(row, 0), point(row, 1))).collect());
+            within < ONE_POINT * mean((1..rows).filter_map(|row| apart(point(row - 1, 0), point(row, 0))).collect())
+        }
+    }
+
+    /// What was taken, in one line.
+    pub fn sentence(&self) -> String {
+        let picked = &self.way.picked;
+        let files: Vec<String> = self.parts.iter().map(Part::file_name).collect();
+        let count = self.parts[picked.joints[0].part].rows.len();
+        let from = |columns: &[At]| {
+            let of = if self.parts.len() > 1 {
+                format!(" of {}", self.parts[columns[0].part].file_name())
+            } else {
+                String::new()
+            };
+            match self.parts[columns[0].part].is_program() {
+                true => format!("targets{of}"),
+                false => format!("{}{of}", listed(self.parts, columns)),
+            }
+        };
+        let measured = match (&picked.distance, &picked.points[..]) {
+            (Some(at), _) => format!("distances from {}", from(&[*at])),
+            (None, [(_, at)]) => format!("points from {}", from(at)),
+            (None, all) => {
+                let each: Vec<String> = all.iter().map(|(_, at)| listed(self.parts, at)).collect();
+                let what = if self.targets_as_readings() { "readings" } else { "targets" };
+                format!("{} {what} a pose from {} and {}", all.len(), from(&all[0].1), each[1..].join(" and "))
+            }
+        };
+        let basis = match self.basis {
+            Basis::Stated => "",
+            Basis::Robot => " (which the nominal robot confirms)",
+            Basis::Sizes => " (by their size; the nominal robot does not tell)",
+        };
+        let mut text = format!(
+            "{}: {count} rows; joints from {} in {}, {measured} in {}{basis}",
+            files.join(" + "),
+            from(&picked.joints),
+            self.way.joints.word(),
+            self.way.lengths.word()
+        );
+        text.push_str(&self.form());
+        let own = self.own();
+        let absent = |name: &str, says: &str| if own.contains_key(name) { String::new() } else { says.to_owned() };
+        text.push_str(&absent("pose", "; pose = row"));
+        text.push_str(&match self.number {
+            Some(number) if !own.contains_key("group") => format!("; group = {number}"),
+            _ => String::new(),
+        });
+        text.push_str(&self.unused());
+        text
+    }
+
+    fn form(&self) -> String {
+        let mut words: Vec<String> = Vec::new();
+        for part in self.parts {
+            let form = match &part.grid.form {
+                Form::Delimited(';') => Some("semicolons".to_owned()),
+                Form::Delimited('\t') => Some("tabs".to_owned()),
+                Form::Delimited(' ') => Some("blanks".to_owned()),
+                Form::Delimited(_) => None,
+                Form::Sheet(name, others) if *others > 0 => Some(format!("sheet {name} ({others} more not read)")),
+                Form::Sheet(name, _) => Some(format!("sheet {name}")),
+                Form::Program { others: 0, .. } => Some("a program's lines".to_owned()),
+                Form::Program { others, .. } => Some(format!("a program's lines ({others} lines hold no target)")),
+            };
+            let header = (part.names.is_none() && !part.is_program()).then(|| "no header".to_owned());
+            words.extend(form.into_iter().chain(part.grid.encoding.map(str::to_owned)).chain(header));
+        }
+        words.dedup();
+        words.iter().map(|word| format!(", {word}")).collect()
+    }
+
+    /// Columns of numbers that were left alone.
+    fn unused(&self) -> String {
+        const NAMED: usize = 12;
+        let picked = &self.way.picked;
+        let taken: Vec<At> = picked
+            .joints
+            .iter()
+            .copied()
+            .chain(picked.points.iter().flat_map(|(_, at)| *at))
+            .chain(picked.distance)
+            .collect();
+        let own: Vec<At> = self.own().into_values().collect();
+        let mut left = Vec::new();
+        for (part, file) in self.parts.iter().enumerate().filter(|(_, p)| !p.is_program()) {
+            let is_left = |column: &usize| {
+                let at = At { part, column: *column };
+                file.kinds[*column] == Kind::Numbers && !taken.contains(&at) && !own.contains(&at)
+            };
+            left.extend((0..file.width()).filter(is_left).map(|column| file.column_name(column)));
+        }
+        match left.len() {
+            0 => String::new(),
+            n if n > NAMED => format!("; not used: {} and {} more columns", left[..NAMED].join(", "), n - NAMED),
+            _ => format!("; not used: {}", left.join(", ")),
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! Columns and units held against the nominal robot: the right ones leave what a built robot is off by, wrong ones what the points are apart.
+//!
+//! In: ways to read a table. Out: the one that is taken, and how sure it is. The tool and the sensor's place are solved for each (see
+//! [`Robot::fit_tool`]); what is left is judged as a share of the spread of the predicted or the measured points, whichever is less. A way is taken where it is near and every other
+//! one leaves several times as much.
+//! What goes wrong: poses that hardly vary, and a robot file with other conventions, decide nothing; the sizes of the numbers do then, where
+//! they can.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Point3;
+
+use super::layout::point;
+use super::part::Part;
+use super::pick::Picked;
+use crate::robot::Robot;
+use crate::tables::names::Unit;
+
+/// What is left as a share of the points' spread at the most where columns and units are right and the robot's file is of this robot.
+const NEAR: f64 = 0.05;
+
+/// How many times more another way must leave.
+const CLEAR: f64 = 4.0;
+
+/// How many times more a unit that a name states must leave than another for the name to be wrong: an order of magnitude.
+const WRONG: f64 = 10.0;
+
+/// Points beyond this are in no metres.
+const METRES: f64 = 10.0;
+
+/// Rows that are looked at.
+const ROWS: usize = 60;
+
+/// A way to read a table.
+#[derive(Debug, Clone)]
+pub(super) struct Way {
+    /// The columns.
+    pub picked: Picked,
+    /// Unit of the joints.
+    pub joints: Unit,
+    /// Unit of points or distances.
+    pub lengths: Unit,
+    /// Share of the points' spread that is left; `None` where nothing can be said.
+    pub left: Option<f64>,
+}
+
+/// How a way was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Basis {
+    /// Names or flags say it.
+    Stated,
+    /// The nominal robot does.
+    Robot,
+    /// The sizes of the numbers do.
+    Sizes,
+}
+
+/// What came out.
+pub(super) enum Verdict {
+    /// This way.
+    Taken(Way, Basis),
+    /// A name states a unit that another one is much nearer than.
+    WrongUnit { stated: Way, better: Way },
+    /// Two ways that would do.
+    Open(Way, Way),
+    /// Nothing says which unit it is.
+    NoUnit { joints: bool },
+    /// No way is near.
+    None,
+}
+
+/// Units that flags state, which nothing doubts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Forced {
+    pub joints: Option<Unit>,
+    pub lengths: Option<Unit>,
+}
+
+/// Judges all ways.
+pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Forced) -> Verdict {
+    let mut ways: Vec<Way> = Vec::new();
+    for picked in candidates {
+        for joints in [Unit::Deg, Unit::Rad].into_iter().filter(|u| forced.joints.is_none_or(|f| f == *u)) {
+            for lengths in [Unit::Mm, Unit::M, Unit::Um] {
+                let stated = forced.lengths.or(picked.length_unit);
+                // Nobody writes micrometres without saying so.
+                let wanted = stated
+                    .map_or(lengths != Unit::Um, |s| s == lengths || forced.lengths.is_none() && lengths != Unit::Um);
+                if wanted {
+                    let left = left(parts, picked, robot, joints, lengths);
+                    ways.push(Way { picked: picked.clone(), joints, lengths, left });
+                }
+            }
+        }
+    }
+    ways.sort_by(|a, b| a.left.unwrap_or(f64::INFINITY).total_cmp(&b.left.unwrap_or(f64::INFINITY)));
+    let Some(best) = ways.first().cloned() else { return Verdict::None };
+    let near = |way: &Way| way.left.is_some_and(|left| left < NEAR);
+    let rival = |way: &&Way, times: f64| {
+        let differs = way.picked != best.picked || way.joints != best.joints || way.lengths != best.lengths;
+        differs && way.left.is_some_and(|left| left < times * best.left.unwrap_or(f64::INFINITY))
+    };
+    let is_stated = |way: &Way| {
+        way.picked.joint_unit.or(forced.joints).is_none_or(|u| u == way.joints)
+            && way.picked.length_unit.or(forced.lengths).is_none_or(|u| u == way.lengths)
+    };
+    let only = candidates.len() == 1;
+    let says_all = |p: &Picked| p.joint_unit.or(forced.joints).is_some() && p.length_unit.or(forced.lengths).is_some();
+    if only && says_all(&candidates[0]) {
+        let stated = ways.iter().find(|way| is_stated(way)).cloned();
+        let Some(stated) = stated else { return Verdict::None };
+        let wrong =
+            near(&best) && !is_stated(&best) && stated.left.is_some_and(|s| best.left.is_some_and(|b| s > WRONG * b));
+        return match wrong {
+            true => Verdict::WrongUnit { stated, better: best },
+            false => Verdict::Taken(stated, Basis::Stated),
+        };
+    }
+    if near(&best) {
+        let others: Vec<&Way> = ways.iter().filter(|way| rival(way, CLEAR)).collect();
+        if others.is_empty() {
+            if is_stated(&best) {
+                return Verdict::Taken(best, Basis::Robot);
+            }
+            if let Some(stated) = ways.iter().find(|way| is_stated(way) && way.picked == best.picked) {
+                return Verdict::WrongUnit { stated: stated.clone(), better: best };
+            }
+        }
+        if let Some(other) = others.iter().find(|way| way.picked != best.picked && near(way)) {
+            let (first, second) = apart(&best, &others).unwrap_or((best.clone(), (*other).clone()));
+            return Verdict::Open(first, second);
+        }
+    }
+    if !only {
+        return Verdict::None;
+    }
+    by_sizes(parts, &candidates[0], forced)
+}
+
+/// Two of the ways that have no column in common, the first ones: y and z of one point with x of the next are a point as well, turned.
+fn apart(best: &Way, others: &[&Way]) -> Option<(Way, Way)> {
+    let start = |way: &Way| way.picked.points.first().map(|(_, at)| at[0]);
+    let mut alike: Vec<&Way> = others.iter().copied().filter(|w| w.picked.joints == best.picked.joints).collect();
+    alike.push(best);
+    alike.sort_by_key(|way| start(way));
+    let first = *alike.first()?;
+    let taken = first.picked.points.first()?.1;
+    let second =
+        alike.iter().find(|w| w.picked.points.first().is_some_and(|(_, at)| at.iter().all(|a| !taken.contains(a))))?;
+    Some((first.clone(), (*second).clone()))
+}
+
+/// Units by the sizes of the numbers, where they leave no choice.
+fn by_sizes(parts: &[Part], picked: &Picked, forced: Forced) -> Verdict {
+    let largest = |columns: &mut dyn Iterator<Item = super::part::At>| {
+        let mut most = 0.0f64;
+        for at in columns {
+            for row in 0..parts[at.part].rows.len() {
+                most = most.max(parts[at.part].optional(row, at.column).ok().flatten().unwrap_or(0.0).abs());
+            }
+        }
+        most
+    };
+    let joints = forced
+        .joints
+        .or(picked.joint_unit)
+        .or_else(|| (largest(&mut picked.joints.iter().copied()) > TAU).then_some(Unit::Deg));
+    let mut measured = picked.points.iter().flat_map(|(_, at)| *at).chain(picked.distance);
+    let lengths =
+        forced.lengths.or(picked.length_unit).or_else(|| (largest(&mut measured) > METRES).then_some(Unit::Mm));
+    match (joints, lengths) {
+        (Some(joints), Some(lengths)) => {
+            Verdict::Taken(Way { picked: picked.clone(), joints, lengths, left: None }, Basis::Sizes)
+        }
+        (joints, _) => Verdict::NoUnit { joints: joints.is_none() },
+    }
+}
+
+/// What the nominal robot leaves of these columns in these units, as a share of the spread of the points.
+fn left(parts: &[Part], picked: &Picked, robot: &Robot, joints: Unit, lengths: Unit) -> Option<f64> {
+    let (_, at) = picked.points.first()?;
+    let rows = parts[picked.joints[0].part].rows.len();
+    let (mut readings, mut points) = (Vec::new(), Vec::<Point3<f64>>::new());
+    for row in (0..rows).step_by(rows.div_ceil(ROWS).max(1)) {
+        let angles: Option<Vec<f64>> = picked
+            .joints
+            .iter()
+            .zip(&robot.joints)
+            .map(|(at, joint)| {
+                let value = parts[at.part].optional(row, at.column).ok().flatten()?;
+                Some(if joint.slides { lengths.converted(value) } else { joints.converted(value).to_radians() })
+            })
+            .collect();
+        if let (Some(angles), Some(point)) = (angles, point(parts, row, at)) {
+            readings.push(angles);
+            points.push(point.map(|v| lengths.converted(v)));
+        }
+    }
+    let fit = robot.fit_tool(&readings, &points)?;
+    let predicted: Vec<Point3<f64>> = readings.iter().map(|q| robot.target_mm(q)).collect();
+    let mean = predicted.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / predicted.len() as f64;
+    let spread = predicted.iter().map(|p| (p.coords - mean).norm_squared()).sum::<f64>() / predicted.len() as f64;
+    // Tiny motions under a tool that all but cancels them would come near to points that are small by a wrong unit.
+    let least = spread.sqrt().min(fit.spread_mm);
+    (least > 0.0).then(|| fit.left_mm / least)
+}

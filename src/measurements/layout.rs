@@ -1,0 +1,90 @@
+//! Which columns are the joints and which the points where no name says it: every way that the counts allow, for the nominal robot to decide.
+//!
+//! Columns of zeros, of words and of the row's number are none of them. Joints stand side by side, as many as the robot has; so do the three
+//! numbers of a point. Where columns remain that are as many points side by side, and these keep their distances from row to row, they are
+//! several targets.
+
+use nalgebra::Point3;
+
+use super::part::{At, Part};
+use super::pick::Picked;
+
+/// Columns of a file without names in which joints and points are looked for.
+const MOST_FREE: usize = 60;
+
+/// Two points that a body carries keep their distance within this share of it.
+const RIGID: f64 = 0.02;
+
+/// Rows that tell whether a distance is kept.
+const ROWS: usize = 200;
+
+/// All ways to complete what the names say.
+pub(super) fn candidates(parts: &[Part], picked: &Picked, count: usize) -> Vec<Picked> {
+    let free: Vec<Vec<At>> = parts
+        .iter()
+        .enumerate()
+        .map(|(part, file)| file.free().into_iter().take(MOST_FREE).map(|column| At { part, column }).collect())
+        .collect();
+    let mut list = Vec::new();
+    for joints in blocks(&free, count, !picked.joints.is_empty()) {
+        let joints = if picked.joints.is_empty() { joints } else { picked.joints.clone() };
+        if joints.is_empty() {
+            continue;
+        }
+        if picked.is_measured() {
+            list.push(Picked { joints, ..picked.clone() });
+            continue;
+        }
+        let rest: Vec<Vec<At>> =
+            free.iter().map(|of| of.iter().copied().filter(|at| !joints.contains(at)).collect()).collect();
+        let total: usize = rest.iter().map(Vec::len).sum();
+        let of_points = |points: Vec<(String, [At; 3])>| Picked { joints: joints.clone(), points, ..picked.clone() };
+        if total > 3 && total.is_multiple_of(3) {
+            let all: Vec<[At; 3]> = rest.iter().flat_map(|of| of.chunks_exact(3)).map(|c| [c[0], c[1], c[2]]).collect();
+            if 3 * all.len() == total && all.windows(2).all(|two| keeps_distance(parts, &two[0], &two[1])) {
+                list.push(of_points(all.into_iter().enumerate().map(|(i, at)| ((i + 1).to_string(), at)).collect()));
+                continue;
+            }
+        }
+        for of in &rest {
+            // Three columns side by side: what stands between two of them is no part of a point.
+            list.extend(
+                of.windows(3).filter(|w| beside(w)).map(|w| of_points(vec![(String::new(), [w[0], w[1], w[2]])])),
+            );
+        }
+    }
+    list
+}
+
+fn beside(columns: &[At]) -> bool {
+    columns.windows(2).all(|two| two[0].part == two[1].part && two[0].column + 1 == two[1].column)
+}
+
+/// Columns side by side that may be the joints; an empty one where they are known.
+fn blocks(free: &[Vec<At>], count: usize, known: bool) -> Vec<Vec<At>> {
+    if known {
+        return vec![Vec::new()];
+    }
+    free.iter().flat_map(|of| of.windows(count).map(<[At]>::to_vec)).collect()
+}
+
+/// Whether two points keep their distance from row to row, and are not one.
+fn keeps_distance(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> bool {
+    let rows = parts[a[0].part].rows.len().min(parts[b[0].part].rows.len());
+    let apart = |row: usize| Some((point(parts, row, a)? - point(parts, row, b)?).norm());
+    is_kept((0..rows).take(ROWS).filter_map(apart).collect())
+}
+
+/// Whether these distances are one.
+pub(super) fn is_kept(apart: Vec<f64>) -> bool {
+    let count = apart.len() as f64;
+    let mean = apart.iter().sum::<f64>() / count.max(1.0);
+    let variance = apart.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / count.max(1.0);
+    apart.len() > 1 && mean > 0.0 && variance.sqrt() < RIGID * mean
+}
+
+/// A point as the file has it.
+pub(super) fn point(parts: &[Part], row: usize, at: &[At; 3]) -> Option<Point3<f64>> {
+    let number = |at: &At| parts[at.part].optional(row, at.column).ok().flatten();
+    Some(Point3::new(number(&at[0])?, number(&at[1])?, number(&at[2])?))
+}

@@ -1,0 +1,182 @@
+//! One file of a table: its columns, with names understood where there are any.
+
+use camino::Utf8Path;
+
+use crate::files::{Error, Result};
+use crate::tables::grid::Form;
+use crate::tables::header;
+use crate::tables::names::{Name, Unit, What};
+use crate::tables::{Fields, Grid};
+
+/// A column of one of several files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct At {
+    /// The file.
+    pub part: usize,
+    /// Its column, from 0.
+    pub column: usize,
+}
+
+/// What a column has in its cells.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Numbers, some of them other than zero; empty cells allowed.
+    Numbers,
+    /// The row's number.
+    Counts,
+    /// Nothing but zeros.
+    Zeros,
+    /// No number at all.
+    Words,
+    /// Numbers and, in this row, a word.
+    Mixed(usize),
+}
+
+/// A file.
+#[derive(Debug, Clone)]
+pub(super) struct Part {
+    /// Where it was read, and how.
+    pub grid: Grid,
+    /// Names as they stand.
+    pub names: Option<Vec<String>>,
+    /// Names as they are understood; of a program its joints.
+    pub meanings: Option<Vec<Name>>,
+    /// Line and cells, all of one length.
+    pub rows: Vec<(u64, Fields)>,
+    /// What is in each column.
+    pub kinds: Vec<Kind>,
+}
+
+/// Cells that say that there is no number.
+const NOTHING: [&str; 8] = ["", "nan", "na", "n/a", "-", "null", "none", "inf"];
+
+impl Part {
+    /// Reads a file; a program's targets have the robot's joints, so many.
+    pub fn read(path: &Utf8Path, joints: usize) -> Result<Part> {
+        let hint = "`stereocal measure POSES` writes out/measurements.csv; `--measurements FILE` names another";
+        let grid = Grid::read_with_programs(path, "the measurements", hint, joints)?;
+        if grid.rows.is_empty() {
+            return Err(grid.refuse(1, "the file is empty".to_owned(), None));
+        }
+        let headed = match grid.form {
+            Form::Program { .. } => header::Headed { names: None, rows: grid.rows.clone() },
+            _ => header::split(&grid)?,
+        };
+        let width = headed.rows.first().map_or(0, |(_, row)| row.len());
+        let kinds = (0..width).map(|column| kind(&headed.rows, column)).collect();
+        let mut meanings: Option<Vec<Name>> =
+            headed.names.as_ref().map(|names| names.iter().map(|name| Name::of(name)).collect());
+        if let Form::Program { degrees, .. } = grid.form {
+            meanings = Some((0..width).map(|column| of_program(column, joints, degrees)).collect());
+        }
+        Ok(Part { grid, names: headed.names, meanings, rows: headed.rows, kinds })
+    }
+
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.kinds.len()
+    }
+
+    /// Whether it is a program's.
+    pub fn is_program(&self) -> bool {
+        matches!(self.grid.form, Form::Program { .. })
+    }
+
+    /// Whether names say what it has.
+    pub fn is_named(&self) -> bool {
+        self.meanings.as_ref().is_some_and(|m| m.iter().any(|name| name.what != What::Other))
+    }
+
+    /// Whether a named column is one of these.
+    pub fn names_any(&self, wanted: impl Fn(&What) -> bool) -> bool {
+        self.meanings.as_ref().is_some_and(|m| m.iter().any(|name| wanted(&name.what)))
+    }
+
+    /// Columns of numbers without a name that says anything.
+    pub fn free(&self) -> Vec<usize> {
+        if self.is_named() {
+            return Vec::new();
+        }
+        (0..self.width()).filter(|&c| self.kinds[c] == Kind::Numbers).collect()
+    }
+
+    /// A column as a message calls it.
+    pub fn column_name(&self, column: usize) -> String {
+        match self.names.as_ref().and_then(|names| names.get(column)).filter(|name| !name.is_empty()) {
+            Some(name) => name.clone(),
+            None => format!("column {}", column + 1),
+        }
+    }
+
+    /// The number of a cell, or none where the cell says so.
+    pub fn optional(&self, row: usize, column: usize) -> Result<Option<f64>> {
+        let (line, fields) = &self.rows[row];
+        let cell = fields[column].trim();
+        match cell.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(Some(value)),
+            _ if NOTHING.contains(&cell.to_lowercase().as_str()) => Ok(None),
+            _ => {
+                let numbers = self.rows.iter().filter(|(_, r)| r[column].parse::<f64>().is_ok()).count();
+                let message = format!(
+                    "`{}` is not a number: `{cell}` ({numbers} of {} rows have one)",
+                    self.column_name(column),
+                    self.rows.len()
+                );
+                Err(self.grid.refuse(
+                    *line,
+                    message,
+                    Some("mend or remove the row, or leave the cell empty where nothing was measured"),
+                ))
+            }
+        }
+    }
+
+    /// The number of a cell that must have one.
+    pub fn number(&self, row: usize, column: usize) -> Result<f64> {
+        let value = self.optional(row, column)?;
+        value.ok_or_else(|| {
+            let message = format!("`{}` has no number", self.column_name(column));
+            self.grid.refuse(self.rows[row].0, message, Some("a row without all joints says nothing; remove it"))
+        })
+    }
+
+    /// The name of the file for a sentence.
+    pub fn file_name(&self) -> String {
+        self.grid.path.file_name().unwrap_or(self.grid.path.as_str()).to_owned()
+    }
+
+    /// A complaint about the file as a whole.
+    pub fn refuse(&self, message: String, hint: Option<&str>) -> Error {
+        self.grid.refuse(self.rows.first().map_or(1, |(line, _)| *line), message, hint)
+    }
+}
+
+/// Numbers of a program's line beyond the robot's joints are those of axes that it does not have.
+fn of_program(column: usize, joints: usize, degrees: bool) -> Name {
+    let what = if column < joints { What::Joint(column + 1) } else { What::Other };
+    Name { what, unit: degrees.then_some(Unit::Deg), key: Vec::new(), measured: None }
+}
+
+fn kind(rows: &[(u64, Fields)], column: usize) -> Kind {
+    let (mut numbers, mut words, mut zeros, mut counts) = (0, None, true, true);
+    let first = rows[0].1[column].parse::<f64>().unwrap_or(f64::NAN);
+    for (i, (_, row)) in rows.iter().enumerate() {
+        match row[column].parse::<f64>() {
+            Ok(value) => {
+                numbers += 1;
+                zeros &= value == 0.0;
+                counts &= value == first + i as f64;
+            }
+            Err(_) if NOTHING.contains(&row[column].to_lowercase().as_str()) => {}
+            Err(_) => words = words.or(Some(i)),
+        }
+    }
+    match (numbers, words) {
+        (0, _) => Kind::Words,
+        (_, Some(row)) => Kind::Mixed(row),
+        _ if zeros => Kind::Zeros,
+        // Readings do not count rows.
+        _ if counts && (first == 0.0 || first == 1.0) && rows.len() > 3 => Kind::Counts,
+        _ => Kind::Numbers,
+    }
+}

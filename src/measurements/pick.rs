@@ -1,0 +1,278 @@
+//! Which columns are the joints and which the measured points, by their names.
+//!
+//! Joints are a set of as many columns as the robot has joints, numbered from 1 or 0 without a gap and of one word; a set that is not complete (a
+//! quaternion `Q0..Q3`) is none. Points are three columns whose names differ in x, y, z alone, or the last column of a 4x4 matrix. Points that
+//! are commanded, nominal or computed by their names are never taken. What goes wrong: two sets that would do are asked about.
+
+use super::part::{At, Part};
+use crate::files::{Error, Result};
+use crate::tables::names::{Name, Unit, What, is_index};
+
+/// Columns, taken so far.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Picked {
+    /// One a joint.
+    pub joints: Vec<At>,
+    /// x, y and z of each target, with its name.
+    pub points: Vec<(String, [At; 3])>,
+    /// A distance.
+    pub distance: Option<At>,
+    /// The unit of the joints that names state.
+    pub joint_unit: Option<Unit>,
+    /// The unit of points or distances.
+    pub length_unit: Option<Unit>,
+}
+
+impl Picked {
+    /// Whether there is something measured.
+    pub fn is_measured(&self) -> bool {
+        !self.points.is_empty() || self.distance.is_some()
+    }
+}
+
+/// A set of columns that belong together.
+struct Group {
+    key: Vec<String>,
+    measured: Option<bool>,
+    columns: Vec<(usize, At)>,
+}
+
+fn groups(parts: &[Part], number: impl Fn(&Name) -> Option<usize>) -> Vec<Group> {
+    let mut list: Vec<Group> = Vec::new();
+    for (part, meanings) in parts.iter().enumerate().filter_map(|(i, p)| Some((i, p.meanings.as_ref()?))) {
+        for (column, name) in meanings.iter().enumerate() {
+            let Some(number) = number(name) else { continue };
+            let at = (number, At { part, column });
+            let same = |g: &&mut Group| g.key == name.key && g.columns[0].1.part == part;
+            match list.iter_mut().find(same) {
+                Some(group) => group.columns.push(at),
+                None => list.push(Group { key: name.key.clone(), measured: name.measured, columns: vec![at] }),
+            }
+        }
+    }
+    list
+}
+
+/// Takes what the names say; `count` is the robot's number of joints.
+pub(super) fn by_names(parts: &[Part], count: usize) -> Result<Picked> {
+    let mut picked = Picked { joints: joints(parts, count)?, ..Picked::default() };
+    let distance = groups(parts, |n| (n.what == What::Distance && n.measured != Some(false)).then_some(0));
+    let points = points(parts)?;
+    // `x y z` beside a length is where the robot was sent; a point that calls itself measured, or has the contract's own name, is not.
+    let own = |at: &At| parts[at.part].names.as_ref().is_some_and(|n| n[at.column].eq_ignore_ascii_case("x_mm"));
+    let bare = points.iter().all(|(_, at, measured)| *measured != Some(true) && !own(&at[0]));
+    match distance.first() {
+        Some(group) if bare => {
+            if group.columns.len() > 1 || distance.len() > 1 {
+                let columns: Vec<At> = distance.iter().flat_map(|g| g.columns.iter().map(|(_, at)| *at)).collect();
+                return Err(twice(parts, "a distance", &columns));
+            }
+            picked.distance = Some(group.columns[0].1);
+        }
+        _ => picked.points = points.into_iter().map(|(name, at, _)| (name, at)).collect(),
+    }
+    let unit = |at: &At| parts[at.part].meanings.as_ref().and_then(|m| m[at.column].unit);
+    picked.joint_unit = picked.joints.iter().find_map(unit).filter(|u| u.is_angle());
+    let measured = picked.points.iter().flat_map(|(_, at)| at).chain(picked.distance.iter());
+    picked.length_unit = measured.clone().find_map(unit).filter(|u| !u.is_angle());
+    let mixed = |columns: Vec<At>| {
+        let units: Vec<Unit> = columns.iter().filter_map(unit).collect();
+        units.windows(2).any(|two| two[0] != two[1]).then_some(columns)
+    };
+    match mixed(picked.joints.clone()).or_else(|| mixed(measured.copied().collect())) {
+        Some(columns) => {
+            let message = format!("{} have different units", listed(parts, &columns));
+            Err(parts[columns[0].part]
+                .refuse(message, Some("convert the table to one unit each for joints and lengths")))
+        }
+        None => Ok(picked),
+    }
+}
+
+/// Whether a file names as many joints as the robot has; a quaternion `Q0..Q3` is none.
+pub(super) fn names_joints(part: &Part, count: usize) -> bool {
+    let number = |n: &Name| if let What::Joint(i) = n.what { Some(i) } else { None };
+    groups(std::slice::from_ref(part), number).iter().any(|group| group.columns.len() == count)
+}
+
+fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
+    let mut complete: Vec<(Vec<At>, Option<bool>)> = Vec::new();
+    let mut largest: Option<(usize, usize)> = None;
+    for mut group in groups(parts, |n| if let What::Joint(i) = n.what { Some(i) } else { None }) {
+        group.columns.sort_unstable();
+        if let Some(two) = group.columns.windows(2).find(|two| two[0].0 == two[1].0) {
+            return Err(twice(parts, &format!("joint {}", two[0].0), &[two[0].1, two[1].1]));
+        }
+        let first = group.columns[0].0;
+        let without_gap = group.columns.iter().zip(first..).all(|((n, _), i)| *n == i);
+        if group.columns.len() == count && without_gap && first < 2 {
+            complete.push((group.columns.iter().map(|(_, at)| *at).collect(), group.measured));
+        } else if largest.is_none_or(|(most, _)| group.columns.len() > most) {
+            largest = Some((group.columns.len(), group.columns[0].1.part));
+        }
+    }
+    if complete.len() > 1 {
+        // Where the robot was sent and where it says that it is: the identified robot corrects commands.
+        let (first, second) = (&complete[0].0, &complete[1].0);
+        let message = format!("two sets of joints would do: {} and {}", listed(parts, first), listed(parts, second));
+        let hint = format!("`--columns {}` takes the first", columns_flag(parts, first, &[], None));
+        return Err(parts[first[0].part].refuse(message, Some(&hint)));
+    }
+    match (complete.pop(), largest) {
+        (Some((columns, _)), _) => Ok(columns),
+        (None, Some((found, part))) if found >= 3 && !parts.iter().any(|p| !p.free().is_empty()) => {
+            let message = format!(
+                "{found} columns of joints, but the robot has {count} joints, counted from 1 or 0 without a gap"
+            );
+            Err(parts[part].refuse(
+                message,
+                Some("`--robot FILE` names the robot that was measured; `--columns` names the columns"),
+            ))
+        }
+        _ => Ok(Vec::new()),
+    }
+}
+
+/// The measured points: the name of each target, its columns, and whether they call themselves measured.
+#[allow(clippy::type_complexity, reason = "one use")]
+fn points(parts: &[Part]) -> Result<Vec<(String, [At; 3], Option<bool>)>> {
+    let mut sets: Vec<(Vec<String>, [At; 3], Option<bool>)> = Vec::new();
+    let mut commanded: Option<[At; 3]> = None;
+    for group in groups(parts, |n| if let What::Coordinate(axis) = n.what { Some(axis) } else { None }) {
+        let of_axis = |axis: usize| group.columns.iter().filter(move |(a, _)| *a == axis).map(|(_, at)| *at);
+        for axis in 0..3 {
+            let found: Vec<At> = of_axis(axis).collect();
+            if found.len() > 1 && group.measured != Some(false) {
+                return Err(twice(parts, "a coordinate", &found));
+            }
+        }
+        let [Some(x), Some(y), Some(z)] = [0, 1, 2].map(|axis| of_axis(axis).next()) else { continue };
+        match group.measured {
+            Some(false) => commanded = Some([x, y, z]),
+            measured => sets.push((group.key, [x, y, z], measured)),
+        }
+    }
+    sets.extend(translations(parts));
+    if sets.len() > 1 {
+        let marked: Vec<usize> = (0..sets.len()).filter(|&i| sets[i].2 == Some(true)).collect();
+        if let Some(names) = as_targets(&sets.iter().map(|s| s.0.clone()).collect::<Vec<_>>()) {
+            return Ok(names.into_iter().zip(sets).map(|(name, set)| (name, set.1, set.2)).collect());
+        }
+        let of_marked: Vec<Vec<String>> = marked.iter().map(|&i| sets[i].0.clone()).collect();
+        match (&marked[..], as_targets(&of_marked)) {
+            ([one], _) => sets = vec![sets.swap_remove(*one)],
+            (_, Some(names)) if marked.len() > 1 => {
+                let taken = names.into_iter().zip(&marked);
+                return Ok(taken.map(|(name, &i)| (name, sets[i].1, sets[i].2)).collect());
+            }
+            _ => return Err(asked(parts, &sets[0].1, &sets[1].1)),
+        }
+    }
+    if sets.is_empty()
+        && let Some(columns) = commanded
+        && !parts.iter().any(|p| !p.free().is_empty() || p.names_any(|w| *w == What::Distance))
+    {
+        let message = format!(
+            "{} are where the robot was sent, or computed, by their names; no column has what was measured",
+            listed(parts, &columns)
+        );
+        let hint = "join the file of the measured points with another `--measurements FILE`, or name the columns with `--columns`";
+        return Err(parts[columns[0].part].refuse(message, Some(hint)));
+    }
+    Ok(sets.into_iter().map(|(_, at, measured)| (String::new(), at, measured)).collect())
+}
+
+/// Names of targets, where the sets' names differ in one number or letter alone; one may be without.
+fn as_targets(keys: &[Vec<String>]) -> Option<Vec<String>> {
+    if keys.len() < 2 {
+        return None;
+    }
+    let split = |key: &Vec<String>| -> (Vec<String>, String) {
+        match key.iter().position(|word| is_index(word) && word != "m") {
+            Some(at) => {
+                (key.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, w)| w.clone()).collect(), key[at].clone())
+            }
+            None => (key.clone(), String::new()),
+        }
+    };
+    let parts: Vec<(Vec<String>, String)> = keys.iter().map(split).collect();
+    let alike = parts.iter().all(|(stem, _)| *stem == parts[0].0);
+    let without = parts.iter().filter(|(_, name)| name.is_empty()).count();
+    (alike && without < 2)
+        .then(|| parts.into_iter().map(|(_, n)| if n.is_empty() { "0".to_owned() } else { n }).collect())
+}
+
+/// The last columns of 4x4 matrices, counted from 0 or from 1.
+fn translations(parts: &[Part]) -> Vec<(Vec<String>, [At; 3], Option<bool>)> {
+    let number = |n: &Name| if let What::Matrix(row, column) = n.what { Some(10 * row + column) } else { None };
+    let translation = |group: Group| {
+        let at = |entry: usize| group.columns.iter().find(|(n, _)| *n == entry).map(|(_, at)| *at);
+        let entries = if at(0).is_some() || at(3).is_some() { [3, 13, 23] } else { [14, 24, 34] };
+        let [x, y, z] = entries.map(at);
+        Some((group.key, [x?, y?, z?], group.measured))
+    };
+    groups(parts, number).into_iter().filter_map(translation).collect()
+}
+
+/// Columns as a sentence names them.
+pub(super) fn listed(parts: &[Part], columns: &[At]) -> String {
+    let name = |at: &At| parts[at.part].column_name(at.column);
+    let run = columns.windows(2).all(|two| two[0].part == two[1].part && two[0].column + 1 == two[1].column);
+    match columns {
+        [] => "none".to_owned(),
+        [first, .., last] if run => match (name(first).strip_prefix("column "), name(last).strip_prefix("column ")) {
+            (Some(a), Some(b)) => format!("columns {a} to {b}"),
+            _ => format!("{} to {}", name(first), name(last)),
+        },
+        _ => columns.iter().map(name).collect::<Vec<_>>().join(", "),
+    }
+}
+
+fn twice(parts: &[Part], what: &str, columns: &[At]) -> Error {
+    let numbers: Vec<String> =
+        columns.iter().map(|at| format!("{} (`{}`)", at.column + 1, parts[at.part].column_name(at.column))).collect();
+    let message = format!("{what} is named twice: columns {}", numbers.join(" and "));
+    parts[columns[0].part]
+        .refuse(message, Some("`--columns NAME,NAME,...` names the columns in their order; `-` skips one"))
+}
+
+/// That two sets of points would do, with the flags that take either.
+pub(super) fn asked(parts: &[Part], first: &[At; 3], second: &[At; 3]) -> Error {
+    let message = format!(
+        "two points would do, {} and {}: which was measured, and which was commanded or computed, only you know",
+        listed(parts, first),
+        listed(parts, second)
+    );
+    let flag = |points: &[At; 3]| columns_flag(parts, &[], points, None);
+    let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(first), flag(second));
+    parts[first[0].part].refuse(message, Some(&hint))
+}
+
+/// What `--columns` must say to take these columns; joints or points that names say are added.
+pub(super) fn columns_flag(parts: &[Part], joints: &[At], points: &[At], known: Option<&[At]>) -> String {
+    let named_joints: Vec<At> = match (joints, known) {
+        ([], Some(known)) => known.to_vec(),
+        ([], None) => {
+            let number = |n: &Name| if let What::Joint(i) = n.what { Some(i) } else { None };
+            let mut best: Vec<(usize, At)> =
+                groups(parts, number).into_iter().map(|g| g.columns).max_by_key(Vec::len).unwrap_or_default();
+            best.sort_unstable();
+            best.into_iter().map(|(_, at)| at).collect()
+        }
+        (joints, _) => joints.to_vec(),
+    };
+    let mut words = Vec::new();
+    for (part, file) in parts.iter().enumerate() {
+        let width = if file.is_program() { named_joints.len().max(1).min(file.width()) } else { file.width() };
+        for column in 0..width {
+            let at = At { part, column };
+            let joint = named_joints.iter().position(|j| *j == at).map(|i| format!("j{}", i + 1));
+            let point = points.iter().position(|p| *p == at).map(|i| ["x", "y", "z"][i % 3].to_owned());
+            words.push(joint.or(point).unwrap_or_else(|| "-".to_owned()));
+        }
+    }
+    while words.last().is_some_and(|word| word == "-") {
+        words.pop();
+    }
+    words.join(",")
+}

@@ -1,0 +1,304 @@
+//! Measurements from files as people have them.
+//!
+//! In: one or several files, perhaps names of their columns and units, and the nominal robot. Out: rows of measurements, and a line for each table
+//! that says what was taken. A table in the contract's own columns is read as it stands. Of others the names say which columns are which, where
+//! there are names, and the nominal robot decides what they leave open; what stays open is refused with the flags that settle it.
+//! Files that lack joints or points are joined row by row, complete ones are stacked.
+
+use camino::Utf8PathBuf;
+use serde::Deserialize;
+
+use super::assemble::{self, Taken};
+use super::judge::{self, Basis, Forced, Verdict, Way};
+use super::layout;
+use super::part::Part;
+use super::pick::{self, Picked, columns_flag, listed};
+use super::{Measurement, read};
+use crate::files::Result;
+use crate::robot::Robot;
+use crate::tables::names::{Name, Unit, What};
+
+/// Section `[measurements]`: what is known of tables beside what they say.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Known {
+    /// As in [`Source`].
+    pub columns: Option<String>,
+    /// As in [`Source`].
+    pub units: Option<String>,
+}
+
+impl Known {
+    /// Notes what is no unit.
+    pub fn validate(&self, problems: &mut Vec<String>) {
+        if let Some(units) = &self.units
+            && units.split(',').any(|word| Unit::of(word).is_none())
+        {
+            problems.push(format!("measurements.units is `{units}`; it is one of deg and rad, one of mm, m and um, or both with a comma between"));
+        }
+    }
+}
+
+/// Where measurements come from, and what is known of their columns.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Source {
+    /// Files, each perhaps with `#SHEET` behind it.
+    pub files: Vec<Utf8PathBuf>,
+    /// Names of the columns in their order, those of all files side by side; `-` skips one.
+    pub columns: Option<String>,
+    /// Units of joints and lengths, `rad,mm`.
+    pub units: Option<String>,
+}
+
+impl Source {
+    /// A single file, nothing known.
+    pub fn of(file: Utf8PathBuf) -> Source {
+        Source { files: vec![file], ..Source::default() }
+    }
+
+    /// The files without the names of sheets.
+    pub fn paths(&self) -> Vec<Utf8PathBuf> {
+        self.files.iter().map(|file| crate::tables::Grid::file(file)).collect()
+    }
+
+    fn forced(&self) -> Forced {
+        let units: Vec<Unit> = self.units.iter().flat_map(|u| u.split(',')).filter_map(Unit::of).collect();
+        Forced {
+            joints: units.iter().copied().find(|u| u.is_angle()),
+            lengths: units.iter().copied().find(|u| !u.is_angle()),
+        }
+    }
+
+    /// Reads everything; the sentences say what was taken.
+    pub fn read(&self, robot: &Robot) -> Result<(Vec<Measurement>, Vec<String>)> {
+        let count = robot.joints.len();
+        let mut parts = Vec::with_capacity(self.files.len());
+        for file in &self.files {
+            if let [only] = &self.files[..]
+                && self.columns.is_none()
+                && self.units.is_none()
+                && is_own(&Part::read(only, count)?)
+            {
+                return Ok((read(only)?, Vec::new()));
+            }
+            parts.push(Part::read(file, count)?);
+        }
+        let joined_by_columns = match &self.columns {
+            Some(columns) => name_columns(&mut parts, columns, count)?,
+            None => false,
+        };
+        let sets = if joined_by_columns { vec![parts] } else { sets(parts, count) };
+        let several = sets.len() > 1;
+        let (mut rows, mut said) = (Vec::new(), Vec::new());
+        for (number, mut set) in sets.into_iter().enumerate() {
+            assemble::widen(&mut set)?;
+            let (way, basis) = self.way(&set, robot)?;
+            let (way, slides) = (way, robot.joints.iter().map(|j| j.slides).collect::<Vec<_>>());
+            let taken = Taken { parts: &set, way: &way, basis, slides: &slides, number: several.then_some(number + 1) };
+            rows.extend(taken.rows()?);
+            said.push(taken.sentence());
+        }
+        Ok((rows, said))
+    }
+
+    /// The columns and units of a set of files.
+    fn way(&self, parts: &[Part], robot: &Robot) -> Result<(Way, Basis)> {
+        let count = robot.joints.len();
+        let picked = pick::by_names(parts, count)?;
+        let complete = picked.joints.len() == count && picked.is_measured();
+        let candidates = if complete { vec![picked.clone()] } else { layout::candidates(parts, &picked, count) };
+        if candidates.is_empty() {
+            return Err(lacking(parts, &picked, count));
+        }
+        match judge::decide(parts, &candidates, robot, self.forced()) {
+            Verdict::Taken(way, basis) => Ok((way, basis)),
+            Verdict::WrongUnit { stated, better } => Err(wrong_unit(parts, &stated, &better)),
+            Verdict::Open(a, b) => Err(open(parts, &a, &b)),
+            Verdict::NoUnit { joints } => {
+                let (what, hint) = match joints {
+                    true => ("joints are degrees or radians", "`--units deg` or `--units rad` says it"),
+                    false => ("points are mm or m", "`--units mm` or `--units m` says it (`--units rad,m` both)"),
+                };
+                let message = format!(
+                    "whether the {what} is said by no name, the numbers could be either, and the nominal robot does not tell"
+                );
+                Err(parts[0].refuse(message, Some(hint)))
+            }
+            Verdict::None => Err(unplaced(parts, &candidates[0])),
+        }
+    }
+}
+
+/// Whether a file has the contract's own columns, poses with names, groups and roles.
+fn is_own(part: &Part) -> bool {
+    let has = |name: &str| part.names.as_ref().is_some_and(|names| names.iter().any(|n| n == name));
+    ["pose", "group", "role"].into_iter().all(has)
+        && (has("j1_deg") || has("j1_mm"))
+        && (has("x_mm") || has("distance_mm"))
+}
+
+/// Names the columns of all files in their order; says whether the files are one table side by side.
+fn name_columns(parts: &mut [Part], columns: &str, count: usize) -> Result<bool> {
+    let words: Vec<&str> = columns.split(',').map(str::trim).collect();
+    let width =
+        |part: &Part, whole: bool| if part.is_program() && !whole { count.min(part.width()) } else { part.width() };
+    let whole = words.len() == parts.iter().map(|p| width(p, true)).sum::<usize>();
+    let total: usize = parts.iter().map(|p| width(p, whole)).sum();
+    let name = |word: &&str| if *word == "-" { Name::of("") } else { Name::of(word) };
+    let names: Vec<Name> = words.iter().map(name).collect();
+    let says = |of: &dyn Fn(&What) -> bool| names.iter().any(|n| of(&n.what));
+    let complete =
+        says(&|w| matches!(w, What::Joint(_))) && says(&|w| matches!(w, What::Coordinate(_) | What::Distance));
+    let each = parts.len() > 1 && complete && parts.iter().all(|p| words.len() <= p.width() && !p.is_program());
+    if !each && words.len() > total {
+        let message = format!("`--columns` names {} columns, but there are {total}", words.len());
+        return Err(parts[0].refuse(
+            message,
+            Some("one name a column in their order, those of all files side by side; `-` skips one"),
+        ));
+    }
+    if let Some(word) = words.iter().zip(&names).find(|(word, name)| **word != "-" && name.what == What::Other) {
+        let message = format!("`--columns` has `{}`, which is no name of a column", word.0);
+        return Err(parts[0].refuse(message, Some("j1, j2, ... for joints, x, y, z (x1, y1, z1, x2, ... of several targets) or L, pose, group, role; `-` skips one")));
+    }
+    let mut given = names.into_iter();
+    for part in parts.iter_mut() {
+        let own = match each {
+            true => words.iter().map(name).collect(),
+            false => given.by_ref().take(width(part, whole)).collect::<Vec<_>>(),
+        };
+        let before = part.meanings.take();
+        // A unit that the file states stays true of a column that gets another name.
+        let with_unit = |(column, name): (usize, Name)| {
+            let unit = before.as_ref().and_then(|m| m.get(column)).and_then(|n| n.unit);
+            Name { unit: name.unit.or(unit), ..name }
+        };
+        let mut meanings: Vec<Name> = own.into_iter().enumerate().map(with_unit).collect();
+        meanings.resize(part.width(), Name::of(""));
+        // What is not named is not looked at.
+        part.kinds.iter_mut().zip(&meanings).filter(|(_, n)| n.what == What::Other).for_each(|(kind, _)| {
+            *kind = super::part::Kind::Words;
+        });
+        part.meanings = Some(meanings);
+    }
+    Ok(!each)
+}
+
+/// Files that make one table each: those with joints and points, and those that complete each other.
+fn sets(parts: Vec<Part>, count: usize) -> Vec<Vec<Part>> {
+    let joints = |p: &Part| p.is_program() || pick::names_joints(p, count);
+    let measured = |p: &Part| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance | What::Matrix(..)));
+    let lone = |p: &Part| joints(p) != measured(p);
+    // A file without names may be either; beside one that lacks the other half it is what that one lacks.
+    let lacking = parts.iter().any(|p| p.is_named() && lone(p));
+    let whole = |p: &Part| match p.is_named() {
+        true => joints(p) && measured(p),
+        false => !lacking && p.free().len() >= count + 3,
+    };
+    let mut list: Vec<Vec<Part>> = Vec::new();
+    let mut open: Vec<Part> = Vec::new();
+    for part in parts {
+        if whole(&part) {
+            list.push(vec![part]);
+            continue;
+        }
+        let begins = joints(&part)
+            || !part.is_named()
+                && part.free().len() == count
+                && !open.is_empty()
+                && open.iter().any(|p| p.free().len() == count);
+        if begins && open.iter().any(|p| joints(p) || !p.is_named() && p.free().len() == count) && open.len() > 1 {
+            list.push(std::mem::take(&mut open));
+        }
+        open.push(part);
+    }
+    if !open.is_empty() {
+        list.push(open);
+    }
+    list
+}
+
+fn lacking(parts: &[Part], picked: &Picked, count: usize) -> crate::files::Error {
+    let names = |p: &Part| {
+        let shown = p.names.as_ref().map(|n| n.iter().take(40).cloned().collect::<Vec<_>>().join(", "));
+        match shown {
+            Some(names) => format!("{} has {names}", p.file_name()),
+            None => {
+                format!("{} has {} columns without names, {} of them numbers", p.file_name(), p.width(), p.free().len())
+            }
+        }
+    };
+    let found: Vec<String> = parts.iter().map(names).collect();
+    let what = match (picked.joints.is_empty(), picked.is_measured()) {
+        (true, true) => format!("no columns of {count} joints"),
+        (false, false) => "no columns of a measured point or a distance".to_owned(),
+        _ => format!("no columns of {count} joints and of a measured point or a distance"),
+    };
+    let hint = "another `--measurements FILE` joins the file that has them row by row; \
+                `--columns j1,j2,...,-,x,y,z` names the columns in their order, `-` skips one";
+    parts[0].refuse(format!("{what}: {}", found.join("; ")), Some(hint))
+}
+
+fn unplaced(parts: &[Part], first: &Picked) -> crate::files::Error {
+    let hint = format!(
+        "`--columns {}` if these are the columns; look at `--robot`, too: its file must be of this robot",
+        columns_flag(parts, &first.joints, &first.points.first().map_or(Vec::new(), |(_, at)| at.to_vec()), None)
+    );
+    let message = "no name says which columns are the joints and which the point, and no choice of them comes near to the nominal robot".to_owned();
+    parts[0].refuse(message, Some(&hint))
+}
+
+fn open(parts: &[Part], a: &Way, b: &Way) -> crate::files::Error {
+    let point = |way: &Way| way.picked.points.first().map(|(_, at)| *at);
+    match (point(a), point(b)) {
+        (Some(first), Some(second)) if first != second && a.picked.joints == b.picked.joints => {
+            let (first, second) = if first <= second { (first, second) } else { (second, first) };
+            let flag =
+                |points: &[super::part::At; 3]| columns_flag(parts, &a.picked.joints, points, Some(&a.picked.joints));
+            let message = format!(
+                "two points would do, {} and {}: which was measured, and which was commanded or computed, only you know",
+                listed(parts, &first),
+                listed(parts, &second)
+            );
+            let hint =
+                format!("`--columns {}` takes the first, `--columns {}` the second", flag(&first), flag(&second));
+            parts[first[0].part].refuse(message, Some(&hint))
+        }
+        _ => {
+            let message = format!(
+                "two sets of joints would do, {} and {}",
+                listed(parts, &a.picked.joints),
+                listed(parts, &b.picked.joints)
+            );
+            let flag = |way: &Way| {
+                columns_flag(parts, &way.picked.joints, &point(way).map_or(Vec::new(), |p| p.to_vec()), None)
+            };
+            let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(a), flag(b));
+            parts[0].refuse(message, Some(&hint))
+        }
+    }
+}
+
+fn wrong_unit(parts: &[Part], stated: &Way, better: &Way) -> crate::files::Error {
+    let (what, columns, said, found) = match stated.joints == better.joints {
+        false => ("joints", better.picked.joints.clone(), stated.joints, better.joints),
+        true => {
+            let points = better.picked.points.first().map_or(Vec::new(), |(_, at)| at.to_vec());
+            ("points", points, stated.lengths, better.lengths)
+        }
+    };
+    let factor = stated.left.unwrap_or(f64::NAN) / better.left.unwrap_or(f64::NAN).max(f64::MIN_POSITIVE);
+    let message = format!(
+        "the names call the {what} ({}) {}, but the nominal robot is {factor:.0} times nearer to the points with {}",
+        listed(parts, &columns),
+        said.word(),
+        found.word()
+    );
+    let hint = format!(
+        "`--units {}` if they are {}; `--units {}` keeps what the names say",
+        found.flag(),
+        found.word(),
+        said.flag()
+    );
+    parts[columns[0].part].refuse(message, Some(&hint))
+}

@@ -1,0 +1,305 @@
+//! A file as rows of cells: which delimiter it has, and whether its numbers have a decimal comma.
+//!
+//! The delimiter is the one with which most of the first rows have equally many cells, and of those that do equally well the one that makes
+//! most cells numbers; comma, semicolon, tab and blanks in this order. Where it is no comma, numbers may have a decimal comma.
+//! Time and memory grow with the file's length alone.
+
+use camino::{Utf8Path, Utf8PathBuf};
+
+use super::program_lines;
+use super::source::{self, Source};
+use crate::diagnostic::Place;
+use crate::files::{Error, Result};
+
+/// Columns of the widest table that is read.
+pub const MOST_COLUMNS: usize = 100_000;
+
+/// Rows of the longest table that is read.
+pub const MOST_ROWS: usize = 3_000_000;
+
+/// Rows that tell the delimiter.
+const SEEN_ROWS: usize = 60;
+
+/// The fields of a row, in one piece.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fields {
+    text: Box<str>,
+    ends: Box<[u32]>,
+}
+
+impl Fields {
+    /// From cells in their order.
+    pub fn new<'a>(cells: impl Iterator<Item = &'a str>) -> Fields {
+        let (mut text, mut ends) = (String::new(), Vec::new());
+        for cell in cells {
+            text.push_str(cell);
+            // A row has less than 2^32 bytes.
+            ends.push(text.len() as u32);
+        }
+        Fields { text: text.into(), ends: ends.into() }
+    }
+
+    /// Number of fields.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// One after the other.
+    pub fn iter(&self) -> impl Iterator<Item = &str> {
+        (0..self.len()).map(|column| &self[column])
+    }
+}
+
+impl std::ops::Index<usize> for Fields {
+    type Output = str;
+
+    fn index(&self, column: usize) -> &str {
+        let start = if column == 0 { 0 } else { self.ends[column - 1] };
+        &self.text[start as usize..self.ends[column] as usize]
+    }
+}
+
+/// How the cells of a file were told apart.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Form {
+    /// Text with this between the cells; a blank stands for any number of them.
+    Delimited(char),
+    /// A sheet of a spreadsheet, and how many others there are.
+    Sheet(String, usize),
+    /// Lines of a program, each with one joint target.
+    Program {
+        /// Lines without a target.
+        others: usize,
+        /// Whether the language says that the numbers are degrees.
+        degrees: bool,
+    },
+}
+
+/// A file as rows of cells; rows without anything in them are left out.
+#[derive(Debug, Clone)]
+pub struct Grid {
+    /// Where it was read.
+    pub path: Utf8PathBuf,
+    /// How.
+    pub form: Form,
+    /// The encoding, where it is not UTF-8.
+    pub encoding: Option<&'static str>,
+    /// Line in the file (from 1) and cells.
+    pub rows: Vec<(u64, Fields)>,
+}
+
+impl Grid {
+    /// Reads a file; `what` names it in the message when it is not there, `hint` says what makes it.
+    pub fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<Grid> {
+        Grid::of(path, source::read(path, what, hint)?, None)
+    }
+
+    /// Reads a file that may be a program's: lines that hold a joint target of at least so many numbers are rows of those.
+    pub fn read_with_programs(path: &Utf8Path, what: &'static str, hint: &str, joints: usize) -> Result<Grid> {
+        Grid::of(path, source::read(path, what, hint)?, Some(joints))
+    }
+
+    fn of(path: &Utf8Path, source: Source, joints: Option<usize>) -> Result<Grid> {
+        let empty = |form, encoding| Grid { path: path.to_owned(), form, encoding, rows: Vec::new() };
+        match source {
+            Source::Sheet { rows, name, others } => {
+                let mut grid = empty(Form::Sheet(name, others), None);
+                rows.iter().try_for_each(|(line, cells)| grid.push(*line, cells.iter().map(String::as_str)))?;
+                Ok(grid)
+            }
+            Source::Text(text, encoding) => {
+                if let Some((rows, form)) = joints.and_then(|joints| program_lines::read(path, &text, joints)) {
+                    return Ok(Grid { rows, ..empty(form, encoding) });
+                }
+                let delimiter = delimiter(&text);
+                let mut grid = empty(Form::Delimited(delimiter), encoding);
+                grid.fill(&text, delimiter, usize::MAX)?;
+                Ok(grid)
+            }
+        }
+    }
+
+    /// The file without the name of a sheet.
+    pub fn file(path: &Utf8Path) -> Utf8PathBuf {
+        source::split(path).0
+    }
+
+    fn fill(&mut self, text: &str, delimiter: char, most: usize) -> Result<()> {
+        if delimiter == ' ' {
+            let mut lines = Lines { text: text.as_bytes(), at: 0, line: 1 };
+            let start = text.as_ptr() as usize;
+            for row in text.split(['\n', '\r']).filter(|row| !row.trim().is_empty()).take(most) {
+                let line = lines.of((row.as_ptr() as usize - start) as u64);
+                let cells: Vec<String> = row.split_whitespace().map(|cell| tidy(cell, true)).collect();
+                self.push(line, cells.iter().map(String::as_str))?;
+            }
+            return Ok(());
+        }
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(delimiter as u8)
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .has_headers(false)
+            .from_reader(text.as_bytes());
+        let mut record = csv::StringRecord::new();
+        let mut lines = Lines { text: text.as_bytes(), at: 0, line: 1 };
+        while self.rows.len() < most && reader.read_record(&mut record).map_err(|e| self.unreadable(&e))? {
+            let line = lines.of(record.position().map_or(0, csv::Position::byte));
+            let cells: Vec<String> = record.iter().map(|cell| tidy(cell, delimiter != ',')).collect();
+            self.push(line, cells.iter().map(String::as_str))?;
+        }
+        Ok(())
+    }
+
+    fn push<'a>(&mut self, line: u64, cells: impl Iterator<Item = &'a str> + Clone) -> Result<()> {
+        if cells.clone().all(|cell| cell.trim().is_empty()) {
+            return Ok(());
+        }
+        if self.rows.len() > MOST_ROWS {
+            return Err(self.refuse(line, format!("more than {MOST_ROWS} rows; that many are read at the most"), None));
+        }
+        let fields = Fields::new(cells);
+        if fields.len() > MOST_COLUMNS {
+            let message = format!("{} columns; {MOST_COLUMNS} are read at the most", fields.len());
+            return Err(self.refuse(line, message, None));
+        }
+        self.rows.push((line, fields));
+        Ok(())
+    }
+
+    fn unreadable(&self, e: &csv::Error) -> Error {
+        let line = e.position().map(csv::Position::line);
+        let place = Place { path: self.path.clone(), line };
+        Error::Format { message: format!("not readable as CSV: {e}"), place, hint: None }
+    }
+
+    /// A complaint about a line.
+    pub fn refuse(&self, line: u64, message: String, hint: Option<&str>) -> Error {
+        let place = Place { path: self.path.clone(), line: Some(line) };
+        Error::Format { message, place, hint: hint.map(str::to_owned) }
+    }
+}
+
+/// A cell without the apostrophe before a formula, a number with a decimal point.
+fn tidy(cell: &str, comma_is_decimal: bool) -> String {
+    let cell = unguarded(cell);
+    // A minus sign as typesetters have it.
+    let number = cell.replace('\u{2212}', "-");
+    if number.parse::<f64>().is_ok() {
+        return number;
+    }
+    if comma_is_decimal && number.matches(',').count() == 1 && !number.contains('.') {
+        let pointed = number.replace(',', ".");
+        if pointed.parse::<f64>().is_ok() {
+            return pointed;
+        }
+    }
+    cell.to_owned()
+}
+
+/// Whether a spreadsheet would compute this cell (OWASP, "CSV Injection"). A number, of either sign, is no formula.
+pub fn is_formula(text: &str) -> bool {
+    text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err()
+}
+
+/// A field without the apostrophe that is put before a formula.
+fn unguarded(field: &str) -> &str {
+    match field.strip_prefix('\'') {
+        Some(rest) if is_formula(rest.trim_start_matches('\'')) => rest,
+        _ => field,
+    }
+}
+
+/// What stands between the cells of a text.
+fn delimiter(text: &str) -> char {
+    // (rows of equally many cells, numbers among their cells)
+    let score = |delimiter: char| {
+        let mut grid =
+            Grid { path: Utf8PathBuf::new(), form: Form::Delimited(delimiter), encoding: None, rows: Vec::new() };
+        if grid.fill(text, delimiter, SEEN_ROWS).is_err() {
+            return (0, 0);
+        }
+        let mut counts: Vec<usize> = grid.rows.iter().map(|(_, row)| row.len()).filter(|&n| n > 1).collect();
+        counts.sort_unstable();
+        let Some(mode) =
+            counts.chunk_by(|a, b| a == b).max_by_key(|chunk| chunk.len()).map(|chunk| (chunk[0], chunk.len()))
+        else {
+            return (0, 0);
+        };
+        let of_mode = grid.rows.iter().filter(|(_, row)| row.len() == mode.0);
+        let numbers = of_mode.flat_map(|(_, row)| row.iter()).filter(|cell| cell.parse::<f64>().is_ok()).count();
+        (mode.1, numbers)
+    };
+    let scores = [',', ';', '\t', ' '].map(|d| (d, score(d)));
+    let most = scores.iter().map(|(_, (rows, _))| *rows).max().unwrap_or(0);
+    // A line or two may be a title, or have a cell too many.
+    let enough = |rows: usize| most > 0 && rows + 2 + most / 10 >= most && rows > 0;
+    let best = scores.iter().filter(|(_, (rows, _))| enough(*rows)).map(|(_, (_, numbers))| *numbers).max();
+    let found = scores.iter().find(|(_, (rows, numbers))| enough(*rows) && Some(*numbers) == best);
+    found.map_or(',', |(d, _)| *d)
+}
+
+/// Counts lines as an editor does. The reader's own count is one short in files whose lines end in `\r\n`: it takes a record to begin
+/// between the two.
+struct Lines<'a> {
+    text: &'a [u8],
+    at: usize,
+    line: u64,
+}
+
+impl Lines<'_> {
+    /// The line of the first byte at or after `byte` that ends no line; `byte` never falls from call to call.
+    fn of(&mut self, byte: u64) -> u64 {
+        let byte = usize::try_from(byte).unwrap_or(usize::MAX);
+        while let Some(&here) = self.text.get(self.at)
+            && (self.at < byte || here == b'\n' || here == b'\r')
+        {
+            self.at += 1;
+            let ends = here == b'\n' || here == b'\r' && self.text.get(self.at) != Some(&b'\n');
+            self.line += u64::from(ends);
+        }
+        self.line
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(text: &str) -> (char, Vec<(u64, Vec<String>)>) {
+        let source = Source::Text(text.to_owned(), None);
+        let grid = Grid::of(Utf8Path::new("t"), source, None).unwrap();
+        let Form::Delimited(delimiter) = grid.form else { panic!("{:?}", grid.form) };
+        (delimiter, grid.rows.iter().map(|(l, r)| (*l, r.iter().map(str::to_owned).collect())).collect())
+    }
+
+    #[test]
+    fn forms_of_one_table_read_alike() {
+        let forms = [
+            (',', "j1,x\n1.5,-2\n\n3,4e1\n"),
+            (';', "j1;x\r\n1,5;-2\r\n\r\n3;4e1\r\n"),
+            ('\t', "j1\tx\n1.5\t\u{2212}2\n\n3\t4e1"),
+            (' ', "j1   x\n  1,5 -2\n\n 3\t4e1\n"),
+            (',', "j1, x\n1.5, -2\n\n3, 4e1\n"),
+            (' ', "j1 x\r1.5 -2\r\r3 4e1\r"),
+        ];
+        for (expected, text) in forms {
+            let (delimiter, rows) = grid(text);
+            assert_eq!(delimiter, expected, "{text:?}");
+            let cells: Vec<(u64, [&str; 2])> = rows.iter().map(|(l, r)| (*l, [r[0].as_str(), r[1].as_str()])).collect();
+            assert_eq!(cells, [(1, ["j1", "x"]), (2, ["1.5", "-2"]), (4, ["3", "4e1"])], "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_comma_inside_of_names_is_no_delimiter() {
+        let text = "X, mm;Y, mm;Z, mm\n1,25;2,5;3,75\n4;5;6\n7;8;9\n10;11;12\n";
+        let (delimiter, rows) = grid(text);
+        assert_eq!((delimiter, rows[1].1[0].as_str()), (';', "1.25"));
+    }
+}

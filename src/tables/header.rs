@@ -1,0 +1,171 @@
+//! Where the names of a table's columns stand, if there are any, and where its numbers begin.
+//!
+//! In: a grid. Out: names, or none, and the rows below. The first row that is mostly numbers is the first row of the table; the row above it has
+//! the names, one that has nothing but units below the names goes with them, and what stands above is a title. Names that count the columns,
+//! 0, 1, 2, ..., are none.
+//! What goes wrong: rows of other lengths than the others, and names of another count than the columns; both are refused with the line.
+
+use super::grid::{Fields, Grid};
+use super::names::Unit;
+use crate::files::Result;
+
+/// A table's rows, and names where it has them.
+#[derive(Debug, Clone)]
+pub struct Headed {
+    /// One a column.
+    pub names: Option<Vec<String>>,
+    /// Line and cells, all of one length.
+    pub rows: Vec<(u64, Fields)>,
+}
+
+/// Columns from which on names that count them are no readings.
+const COUNTED: usize = 4;
+
+/// Finds the names of a grid.
+pub fn split(grid: &Grid) -> Result<Headed> {
+    let first = grid.rows.iter().position(|(_, row)| is_data(row));
+    let Some(mut first) = first else {
+        let hint = "a table has rows of numbers, with names of the columns above them or without";
+        return Err(grid.refuse(1, "no row of numbers".to_owned(), Some(hint)));
+    };
+    let mut names = None;
+    if first == 0 && counts(&grid.rows[0].1) && grid.rows.len() > 1 {
+        first = 1;
+    } else if first > 0 {
+        names = Some(above(grid, first));
+    }
+    let rows = even(grid, first, names.as_ref().map_or(0, |(_, names)| names.len()))?;
+    let width = rows.first().map_or(0, |(_, row)| row.len());
+    let names = names.map(|(line, names)| fitted(grid, line, names, &rows, width)).transpose()?;
+    Ok(Headed { names, rows })
+}
+
+/// More numbers than words.
+fn is_data(row: &Fields) -> bool {
+    let filled = row.iter().filter(|cell| !cell.trim().is_empty()).count();
+    let numbers = row.iter().filter(|cell| cell.parse::<f64>().is_ok()).count();
+    numbers > 0 && 2 * numbers >= filled
+}
+
+/// Whether a row counts its columns.
+fn counts(row: &Fields) -> bool {
+    let from = row[0].parse::<usize>().unwrap_or(usize::MAX);
+    from < 2 && row.len() >= COUNTED && row.iter().zip(from..).all(|(cell, i)| cell == i.to_string())
+}
+
+/// The names above a row, with the units below them, and their line.
+fn above(grid: &Grid, first: usize) -> (u64, Vec<String>) {
+    let cells = |at: usize| -> Vec<String> { grid.rows[at].1.iter().map(|c| c.trim().to_owned()).collect() };
+    let (line, last) = (grid.rows[first - 1].0, cells(first - 1));
+    let unit = |cell: &String| cell.is_empty() || Unit::of(cell.trim_matches(['[', ']', '(', ')'])).is_some();
+    if first > 1 && last.iter().all(unit) {
+        let names = cells(first - 2);
+        if names.len() == last.len() {
+            let joined = |(name, unit): (String, &String)| match unit.is_empty() {
+                true => name,
+                false => format!("{name} [{}]", unit.trim_matches(['[', ']', '(', ')'])),
+            };
+            return (grid.rows[first - 2].0, names.into_iter().zip(&last).map(joined).collect());
+        }
+    }
+    (line, last)
+}
+
+/// The rows from `first` on, made equally long: cells at the end that are empty everywhere are none.
+fn even(grid: &Grid, first: usize, names: usize) -> Result<Vec<(u64, Fields)>> {
+    let filled =
+        |row: &Fields| row.len() - row.iter().collect::<Vec<_>>().iter().rev().take_while(|c| c.is_empty()).count();
+    let mut lengths: Vec<usize> = grid.rows[first..].iter().map(|(_, row)| row.len()).collect();
+    lengths.sort_unstable();
+    let usual = lengths.chunk_by(|a, b| a == b).max_by_key(|chunk| chunk.len()).map_or(0, |chunk| chunk[0]);
+    let widest = grid.rows[first..].iter().map(|(_, row)| filled(row)).max().unwrap_or(0);
+    let width = if widest <= usual { usual.min(widest.max(names)) } else { usual };
+    let mut rows = Vec::with_capacity(grid.rows.len() - first);
+    for (line, row) in &grid.rows[first..] {
+        if row.len() < width.min(usual) || filled(row) > width {
+            let message = format!("{} cells, but most rows have {usual}", row.len());
+            return Err(grid.refuse(*line, message, Some("each row has a cell for each column; an empty one counts")));
+        }
+        rows.push((*line, if row.len() == width { row.clone() } else { Fields::new(row.iter().take(width)) }));
+    }
+    Ok(rows)
+}
+
+/// Names, one a column: without a comment's mark, with units put back to the names that blanks cut off, with one for numbers of rows.
+fn fitted(grid: &Grid, line: u64, mut names: Vec<String>, rows: &[(u64, Fields)], width: usize) -> Result<Vec<String>> {
+    if names.first().is_some_and(|name| matches!(name.as_str(), "#" | "%" | "//")) {
+        names.remove(0);
+    }
+    if let Some(first) = names.first_mut() {
+        *first = first.trim_start_matches(['#', '%']).trim().to_owned();
+    }
+    if names.len() > width {
+        let mut joined: Vec<String> = Vec::new();
+        for name in &names {
+            match joined.last_mut() {
+                Some(before) if name.starts_with(['[', '(']) => *before = format!("{before} {name}"),
+                _ => joined.push(name.clone()),
+            }
+        }
+        names = joined;
+    }
+    while names.len() > width && names.last().is_some_and(String::is_empty) {
+        names.pop();
+    }
+    // Names of rows have no name of their own.
+    let numbered = rows
+        .iter()
+        .enumerate()
+        .all(|(i, (_, row))| row[0].parse::<f64>().map_or(true, |v| v == i as f64 || v == (i + 1) as f64));
+    if names.len() + 1 == width && numbered {
+        names.insert(0, String::new());
+    }
+    if names.len() != width {
+        let message = format!("{} names for {width} columns", names.len());
+        return Err(grid.refuse(
+            line,
+            message,
+            Some("`--columns NAME,NAME,...` names the columns in their order, `-` skips one"),
+        ));
+    }
+    Ok(names)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use camino::{Utf8Path, Utf8PathBuf};
+
+    fn read(text: &str) -> Result<Headed> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = Utf8PathBuf::from_path_buf(folder.path().join("t.csv")).unwrap();
+        std::fs::write(&path, text).unwrap();
+        split(&Grid::read(Utf8Path::new(path.as_str()), "the table", "")?)
+    }
+
+    fn names(text: &str) -> Option<Vec<String>> {
+        read(text).unwrap().names
+    }
+
+    #[test]
+    fn names_are_found_wherever_they_stand() {
+        let rows = "1,2,3\n4,5,6.5\n7,8,9\n";
+        for header in ["a,b,c\n", "# a,b,c\n", "Table of today\na,b,c\n", "a,b,c,\n"] {
+            assert_eq!(names(&format!("{header}{rows}")).unwrap(), ["a", "b", "c"], "{header}");
+        }
+        assert_eq!(names(&format!("a,b,c\nmm,mm,\n{rows}")).unwrap(), ["a [mm]", "b [mm]", "c"]);
+        assert_eq!(names("# a [mm] b\n1.5 2\n3.5 4\n").unwrap(), ["a [mm]", "b"]);
+        assert_eq!(names("a b\nr1 1.5 2\nr2 3.5 4\n").unwrap(), ["", "a", "b"]);
+        assert_eq!(names(rows), None);
+        assert_eq!(names("0,1,2,3\n1.5,2,3,4\n"), None);
+        assert_eq!(read("0,1,2,3\n1.5,2,3,4\n").unwrap().rows.len(), 1);
+    }
+
+    #[test]
+    fn rows_of_other_lengths_are_refused_with_their_line() {
+        let said = |text: &str| crate::diagnostic::report(&read(text).unwrap_err());
+        assert!(said("a,b,c\n1,2,3\n4,5\n6,7,8\n").contains("t.csv:3"));
+        assert!(said("a,b\n1,2,3\n4,5,6\n9,9,9\n").contains("2 names for 3 columns"));
+        assert_eq!(read("a,b\n1,2,\n4,5,\n").unwrap().rows[0].1.len(), 2);
+    }
+}

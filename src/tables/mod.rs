@@ -1,0 +1,16 @@
+//! Tables as people have them: files of any common form as rows of cells, and names of columns as what they mean.
+//!
+//! ```text
+//!  source   a file's bytes -> text in whatever encoding, or the cells of a spreadsheet; what is no table is refused with how to export it
+//!  grid     text -> rows of cells: which delimiter, decimal comma, lines of a program; line numbers as an editor counts them
+//!  header   where the names of the columns stand, if there are any
+//!  names    a name -> a joint, a coordinate, a distance, its unit, and whether it was commanded
+//! ```
+
+pub mod grid;
+pub mod header;
+pub mod names;
+mod program_lines;
+mod source;
+
+pub use grid::{Fields, Grid};

@@ -1,0 +1,324 @@
+//! Names of columns as what they mean: joints, coordinates, distances, with units and with whether they were measured or commanded.
+//!
+//! In: a name in any case, with blanks, underscores, units in brackets or behind. Out: a [`Name`]. Words that say what a number is not (torques,
+//! velocities, errors, uncertainties, orientations) make it [`What::Other`]; words that say that a point was sent to the robot or computed, not
+//! measured, make it commanded.
+//! What goes wrong: `x y z` alone may be either, and a set of joints is one only where it is complete; who reads the table decides.
+
+/// A unit of a joint or of a length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// Degrees.
+    Deg,
+    /// Radians.
+    Rad,
+    /// Millimetres.
+    Mm,
+    /// Metres.
+    M,
+    /// Micrometres.
+    Um,
+}
+
+impl Unit {
+    /// From a word such as `mm`, `deg` or `°`.
+    pub fn of(word: &str) -> Option<Unit> {
+        match word.trim().to_lowercase().as_str() {
+            "deg" | "degree" | "degrees" | "°" | "º" | "grad" => Some(Unit::Deg),
+            "rad" | "radian" | "radians" => Some(Unit::Rad),
+            "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some(Unit::Mm),
+            "m" | "meter" | "meters" | "metre" | "metres" => Some(Unit::M),
+            "um" | "µm" | "μm" | "micron" | "microns" => Some(Unit::Um),
+            _ => None,
+        }
+    }
+
+    /// Whether it is one of angles.
+    pub fn is_angle(self) -> bool {
+        matches!(self, Unit::Deg | Unit::Rad)
+    }
+
+    /// In degrees or mm.
+    pub fn converted(self, value: f64) -> f64 {
+        match self {
+            Unit::Deg | Unit::Mm => value,
+            Unit::Rad => value.to_degrees(),
+            Unit::M => 1000.0 * value,
+            Unit::Um => value / 1000.0,
+        }
+    }
+
+    /// For a sentence.
+    pub fn word(self) -> &'static str {
+        match self {
+            Unit::Deg => "degrees",
+            Unit::Rad => "radians",
+            Unit::Mm => "mm",
+            Unit::M => "m",
+            Unit::Um => "um",
+        }
+    }
+
+    /// As `--units` has it.
+    pub fn flag(self) -> &'static str {
+        match self {
+            Unit::Deg => "deg",
+            Unit::Rad => "rad",
+            _ => self.word(),
+        }
+    }
+}
+
+/// What a column holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum What {
+    /// A joint's reading, by the number in its name.
+    Joint(usize),
+    /// A coordinate of a point: 0, 1 or 2.
+    Coordinate(usize),
+    /// An entry of a 4x4 matrix, row and column as they are counted.
+    Matrix(usize, usize),
+    /// A distance.
+    Distance,
+    /// A column of the measurements' own format, by its name.
+    Own(&'static str),
+    /// Nothing of these.
+    Other,
+}
+
+/// A column's name, understood.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Name {
+    /// What it holds.
+    pub what: What,
+    /// The unit that it states.
+    pub unit: Option<Unit>,
+    /// What else the name says, to tell one set of columns from another.
+    pub key: Vec<String>,
+    /// Whether the name says that it was measured (`Some(true)`), or that it was commanded or computed.
+    pub measured: Option<bool>,
+}
+
+/// Columns of the measurements' own format beside joints, points and distances.
+const OWN: [&str; 15] = [
+    "pose", "group", "role", "target", "status", "sigma_mm", "sxx_mm2", "sxy_mm2", "sxz_mm2", "syy_mm2", "syz_mm2",
+    "szz_mm2", "rx_rad", "ry_rad", "rz_rad",
+];
+
+const JOINT: &str = "j q joint joints theta θ th axis ax a jnt jt jointangle jointpos jointposition angle";
+
+/// Words beside a joint's name or a coordinate's that say nothing new.
+const PLAIN: &str = "angle angles pos position positions value values coord coordinate coordinates p point state reading \
+    xyz in";
+
+/// Words that say that a number is something else.
+const ELSE: &str = "tau torque torques force f current i vel velocity speed v qd dq acc temp temperature dif diff delta \
+    err error errors e res residual residuals dev deviation std sd sigma unc uncertainty u rms var cov \
+    rot rotation roll pitch yaw euler quat quaternion orientation offset normal min";
+
+const COMMANDED: &str = "cmd command commanded nominal nom n t target goal desired des d ref reference set setpoint plan \
+    planned theo theoretical ideal taught programmed fk calc calculated computed c model robot";
+
+const MEASURED: &str = "m meas measure measured measurement act actual laser tracker lt leica faro smr camera vicon ndi \
+    mocap observed obs real cmm marker reflector";
+
+impl Name {
+    /// Reads a name.
+    pub fn of(name: &str) -> Name {
+        let name = name.trim().trim_start_matches(['#', '%']).trim();
+        if let Some(own) = OWN.iter().find(|own| name.eq_ignore_ascii_case(own)) {
+            return Name { what: What::Own(own), unit: None, key: Vec::new(), measured: None };
+        }
+        let (mut words, mut unit) = words(name);
+        // `x_m` is in metres; a word before the number is no unit.
+        if words.len() > 1
+            && let Some(found) = words.last().and_then(|word| Unit::of(word))
+            && !(found == Unit::M && unit.is_some())
+        {
+            unit = unit.or(Some(found));
+            words.pop();
+        }
+        let other = Name { what: What::Other, unit, key: Vec::new(), measured: None };
+        if words.iter().any(|word| is_in(ELSE, word)) {
+            return other;
+        }
+        let Some((what, mut rest)) =
+            joint(&words).or_else(|| coordinate(&words)).or_else(|| matrix(&words)).or_else(|| distance(&words))
+        else {
+            return other;
+        };
+        let says = |list: &str, rest: &[String]| rest.iter().any(|word| is_in(list, word));
+        // `target 2` is a reflector, `target` alone where the robot was sent.
+        let counted = rest.windows(2).any(|two| two[0] == "target" && is_index(&two[1]));
+        rest.retain(|word| !(counted && word == "target" || is_in(PLAIN, word)));
+        let measured = match (says(COMMANDED, &rest), says(MEASURED, &rest)) {
+            (true, _) => Some(false),
+            (false, true) => Some(true),
+            _ => None,
+        };
+        Name { what, unit, key: rest, measured }
+    }
+}
+
+/// Whether a list of words has this one.
+fn is_in(list: &str, word: &str) -> bool {
+    list.split_whitespace().any(|listed| listed == word)
+}
+
+/// Whether a word counts things: a number or a single letter.
+pub fn is_index(word: &str) -> bool {
+    word.chars().count() == 1 || word.chars().all(|c| c.is_ascii_digit())
+}
+
+/// The words of a name, small, letters and digits apart, and the unit in brackets.
+pub fn words(name: &str) -> (Vec<String>, Option<Unit>) {
+    let mut unit = None;
+    let mut plain = String::new();
+    let mut rest = name;
+    while let Some(open) = rest.find(['[', '(', '{']) {
+        let close = rest[open..].find([']', ')', '}']).map_or(rest.len(), |c| open + c);
+        let inside = &rest[open + 1..close];
+        plain.push_str(&rest[..open]);
+        match Unit::of(inside) {
+            Some(found) => unit = unit.or(Some(found)),
+            None => plain.push_str(&format!(" {inside}")),
+        }
+        plain.push(' ');
+        rest = rest.get(close..).map_or("", |r| r.get(1..).unwrap_or(""));
+    }
+    plain.push_str(rest);
+    let mut words: Vec<String> = Vec::new();
+    let mut before = None;
+    for c in plain.chars() {
+        let kind = match c {
+            _ if c.is_ascii_digit() => 0,
+            _ if c.is_alphabetic() || c == '°' || c == 'µ' => 1,
+            _ => 2,
+        };
+        if kind < 2 {
+            match words.last_mut().filter(|_| before == Some(kind)) {
+                Some(word) => word.extend(c.to_lowercase()),
+                None => words.push(c.to_lowercase().collect()),
+            }
+        }
+        before = Some(kind);
+    }
+    (words, unit)
+}
+
+fn without(words: &[String], out: &[usize]) -> Vec<String> {
+    words.iter().enumerate().filter(|(i, _)| !out.contains(i)).map(|(_, word)| word.clone()).collect()
+}
+
+/// `joint 3`, `q3`, `theta_3_actual`: a word for joints and the only number. The word stays in the key: `q` and `theta` are two sets.
+fn joint(words: &[String]) -> Option<(What, Vec<String>)> {
+    let at = words.iter().position(|word| is_in(JOINT, word))?;
+    let numbers: Vec<usize> = (0..words.len()).filter(|&i| words[i].parse::<usize>().is_ok()).collect();
+    let [number] = numbers[..] else { return None };
+    if number < at {
+        return None;
+    }
+    let mut rest = without(words, &[at, number]);
+    rest.push(words[at].clone());
+    Some((What::Joint(words[number].parse().ok()?), rest))
+}
+
+fn axis(c: char) -> Option<usize> {
+    "xyz".find(c)
+}
+
+/// `x`, `px`, `xm`, `x_1`, `tracker x`.
+fn coordinate(words: &[String]) -> Option<(What, Vec<String>)> {
+    let single = |i: &usize| {
+        let mut chars = words[*i].chars();
+        let (first, second) = (chars.next()?, chars.next());
+        if chars.next().is_some() {
+            return None;
+        }
+        match (axis(first), second) {
+            (Some(a), None) => Some((a, None)),
+            // xm: measured; xc, xn, xt: computed, nominal, target.
+            (Some(a), Some(s)) if axis(s).is_none() => Some((a, Some(s))),
+            (None, Some(s)) if "pmtc".contains(first) => axis(s).map(|a| (a, Some(first).filter(|f| *f == 'm'))),
+            _ => None,
+        }
+    };
+    let found: Vec<(usize, (usize, Option<char>))> = (0..words.len()).filter_map(|i| Some((i, single(&i)?))).collect();
+    let [(at, (axis, mark))] = found[..] else { return None };
+    let mut rest = without(words, &[at]);
+    rest.extend(mark.map(String::from));
+    Some((What::Coordinate(axis), rest))
+}
+
+/// `m_03`, `T14`, `m_0_3`.
+fn matrix(words: &[String]) -> Option<(What, Vec<String>)> {
+    let digits: String = words.iter().skip(1).map(String::as_str).collect();
+    let [row, column] = digits.as_bytes() else { return None };
+    let entry = |b: &u8| b.is_ascii_digit().then(|| usize::from(b - b'0')).filter(|&d| d < 5);
+    let named = words.len() > 1 && words[0].chars().all(char::is_alphabetic);
+    named.then_some((What::Matrix(entry(row)?, entry(column)?), vec![words[0].clone()]))
+}
+
+fn distance(words: &[String]) -> Option<(What, Vec<String>)> {
+    let at = words.iter().position(|w| matches!(w.as_str(), "l" | "distance" | "dist" | "length" | "len"))?;
+    Some((What::Distance, without(words, &[at])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn what(name: &str) -> (What, Option<Unit>, Option<bool>) {
+        let name = Name::of(name);
+        (name.what, name.unit, name.measured)
+    }
+
+    #[test]
+    fn names_of_joints() {
+        for name in [
+            "j1",
+            "J1",
+            "Joint 1",
+            "joint_1",
+            "q1",
+            "Theta1",
+            "θ1",
+            "axis 1",
+            "A1",
+            "joint1_pos",
+            "JointAngle1",
+            "joint[1]",
+        ] {
+            assert_eq!(what(name).0, What::Joint(1), "{name}");
+        }
+        assert_eq!(what("J1 [deg]"), (What::Joint(1), Some(Unit::Deg), None));
+        assert_eq!(what("q_1(rad)"), (What::Joint(1), Some(Unit::Rad), None));
+        assert_eq!(what("j2_deg"), (What::Joint(2), Some(Unit::Deg), None));
+        for name in ["tau_1", "dq1", "joint_1_velocity", "j1_error", "number", "temperature 1"] {
+            assert_eq!(what(name).0, What::Other, "{name}");
+        }
+    }
+
+    #[test]
+    fn names_of_points() {
+        assert_eq!(what("X  [mm]"), (What::Coordinate(0), Some(Unit::Mm), None));
+        assert_eq!(what("y_m"), (What::Coordinate(1), Some(Unit::M), None));
+        assert_eq!(what("zm"), (What::Coordinate(2), None, Some(true)));
+        assert_eq!(what("X_meas"), (What::Coordinate(0), None, Some(true)));
+        assert_eq!(what("pz"), (What::Coordinate(2), None, None));
+        assert_eq!(what("MX Coord."), (What::Coordinate(0), None, Some(true)));
+        for name in ["x_t", "x_cmd", "Nominal X", "xc", "x_nominal [mm]", "target x"] {
+            assert_eq!((what(name).0, what(name).2), (What::Coordinate(0), Some(false)), "{name}");
+        }
+        for name in ["U(95) X  [mm]", "x_dif", "Rx", "rx", "dx", "vx", "x error", "fx"] {
+            assert_eq!(what(name).0, What::Other, "{name}");
+        }
+        assert_eq!(Name::of("x2").key, ["2"]);
+        assert_eq!(Name::of("target 2 x").key, ["2"]);
+        assert_eq!(what("m_03").0, What::Matrix(0, 3));
+        assert_eq!(what("T14").0, What::Matrix(1, 4));
+        assert_eq!(what("L").0, What::Distance);
+        assert_eq!(what("distance_mm"), (What::Distance, Some(Unit::Mm), None));
+        assert_eq!(what("pose").0, What::Own("pose"));
+    }
+}

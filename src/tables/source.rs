@@ -1,0 +1,193 @@
+//! A file's bytes as text or as the cells of a spreadsheet.
+//!
+//! In: a path, for spreadsheets with `#SHEET` behind it. Out: text decoded from UTF-8, UTF-16 or Latin-1 (as Windows has it, code page
+//! 1252), or cells. What goes wrong: files of MATLAB, NumPy and the like are no text; the message says how to export them.
+
+use std::io::{Cursor, Read};
+
+use calamine::{Data, Reader, Sheets, open_workbook_auto_from_rs};
+use camino::{Utf8Path, Utf8PathBuf};
+use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
+
+use crate::diagnostic::Place;
+use crate::files::{Error, Result};
+
+/// The longest table that is read, bytes.
+const MOST_BYTES: u64 = 2 << 30;
+
+/// The largest spreadsheet that is read, bytes: it is compressed, and read as a whole.
+const MOST_SHEET_BYTES: usize = 64 << 20;
+
+/// Bytes of a file that tell an encoding without a mark.
+const SEEN: usize = 4096;
+
+/// What a file holds.
+pub(super) enum Source {
+    /// Text, and its encoding where that is not UTF-8.
+    Text(String, Option<&'static str>),
+    /// Rows of cells with their line, the sheet's name, and whether there are other sheets.
+    Sheet { rows: Vec<(u64, Vec<String>)>, name: String, others: usize },
+}
+
+/// The file of a path that may name a sheet, and the sheet.
+pub(super) fn split(path: &Utf8Path) -> (Utf8PathBuf, Option<String>) {
+    match path.as_str().rsplit_once('#') {
+        Some((file, sheet)) if !path.exists() && !file.is_empty() && !sheet.is_empty() => {
+            (file.into(), Some(sheet.to_owned()))
+        }
+        _ => (path.to_owned(), None),
+    }
+}
+
+/// Reads a file; `what` names it in the message when it is not there, `hint` says what makes it.
+pub(super) fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<Source> {
+    let (file, sheet) = split(path);
+    let mut bytes = Vec::new();
+    let read = std::fs::File::open(&file).and_then(|f| f.take(MOST_BYTES + 1).read_to_end(&mut bytes));
+    match read {
+        Ok(_) if bytes.len() as u64 > MOST_BYTES => {
+            let message = format!("{what}: more than {} MB; no such file is that long", MOST_BYTES >> 20);
+            return Err(refuse(&file, message, None));
+        }
+        Ok(_) => {}
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            return Err(Error::Missing { what, path: file, hint: Some(hint.to_owned()) });
+        }
+        Err(source) => return Err(Error::Io { action: "read", path: file, source }),
+    }
+    if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(&[0xd0, 0xcf, 0x11, 0xe0]) {
+        return cells(bytes, &file, sheet.as_deref());
+    }
+    if sheet.is_some() {
+        return Err(refuse(&file, "a sheet is named behind `#`, but the file is no spreadsheet".to_owned(), None));
+    }
+    if let Some((kind, hint)) = foreign(&bytes, &file) {
+        return Err(refuse(&file, format!("{what}: {kind}, which is not read"), Some(hint.to_owned())));
+    }
+    let (text, encoding) = decoded(&bytes);
+    if text.contains('\0') {
+        let hint = "save it as CSV (comma, semicolon, tab or blanks) or as a spreadsheet (xlsx, xls, ods)";
+        return Err(refuse(&file, format!("{what}: not a text, and no spreadsheet"), Some(hint.to_owned())));
+    }
+    Ok(Source::Text(text, encoding))
+}
+
+fn refuse(path: &Utf8Path, message: String, hint: Option<String>) -> Error {
+    Error::Format { message, place: Place { path: path.to_owned(), line: None }, hint }
+}
+
+/// What a file of another program is, and how its table is exported.
+fn foreign(bytes: &[u8], path: &Utf8Path) -> Option<(&'static str, &'static str)> {
+    const MATLAB: &str = "in MATLAB: `writematrix(NAME, 'table.csv')` for each array that is needed, joints and points; \
+                          in Python: `numpy.savetxt('table.csv', scipy.io.loadmat('FILE.mat')['NAME'], delimiter=',')`";
+    let hdf5 = bytes.starts_with(b"\x89HDF\r\n\x1a\n");
+    if bytes.starts_with(b"MATLAB ") || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) {
+        return Some(("a MATLAB file (.mat)", MATLAB));
+    }
+    if hdf5 {
+        return Some(("an HDF5 file", "export the arrays that are needed as CSV, e.g. with `h5dump -y -w 0 -d NAME`"));
+    }
+    if bytes.starts_with(b"\x93NUMPY") {
+        return Some((
+            "a NumPy file",
+            "in Python: `numpy.savetxt('table.csv', numpy.load('FILE.npy'), delimiter=',')`",
+        ));
+    }
+    bytes.starts_with(&[0x1f, 0x8b]).then_some(("a compressed file", "unpack it first: `gunzip FILE`"))
+}
+
+/// Text from bytes, and the encoding's name where it is not UTF-8.
+fn decoded(bytes: &[u8]) -> (String, Option<&'static str>) {
+    let encoding = Encoding::for_bom(bytes).map(|(encoding, _)| encoding).or_else(|| utf_16_without_mark(bytes));
+    if let Some(encoding) = encoding {
+        let (text, _, _) = encoding.decode(bytes);
+        return (text.into_owned(), (encoding != UTF_8).then(|| encoding.name()));
+    }
+    match std::str::from_utf8(bytes) {
+        Ok(text) => (text.to_owned(), None),
+        Err(_) => (WINDOWS_1252.decode(bytes).0.into_owned(), Some("Latin-1")),
+    }
+}
+
+/// Numbers and names in UTF-16 have a zero in every other byte.
+fn utf_16_without_mark(bytes: &[u8]) -> Option<&'static Encoding> {
+    let seen = &bytes[..bytes.len().min(SEEN)];
+    let zeros = |from: usize| seen.iter().skip(from).step_by(2).filter(|b| **b == 0).count();
+    let (even, odd, half) = (zeros(0), zeros(1), seen.len() / 2);
+    match (even, odd) {
+        (0, odd) if odd > half * 3 / 4 && odd > 0 => Some(UTF_16LE),
+        (even, 0) if even > half * 3 / 4 && even > 0 => Some(UTF_16BE),
+        _ => None,
+    }
+}
+
+fn cells(bytes: Vec<u8>, path: &Utf8Path, sheet: Option<&str>) -> Result<Source> {
+    if bytes.len() > MOST_SHEET_BYTES {
+        let message = format!("a spreadsheet of more than {} MB", MOST_SHEET_BYTES >> 20);
+        return Err(refuse(path, message, Some("save the sheet as CSV".to_owned())));
+    }
+    let unreadable = |e: calamine::Error| {
+        refuse(path, format!("not readable as a spreadsheet: {e}"), Some("save the sheet as CSV".to_owned()))
+    };
+    let mut book: Sheets<_> = open_workbook_auto_from_rs(Cursor::new(bytes)).map_err(unreadable)?;
+    let names = book.sheet_names();
+    let name = match sheet {
+        None => names.first().cloned(),
+        Some(sheet) => names.iter().find(|name| name.eq_ignore_ascii_case(sheet)).cloned(),
+    };
+    let Some(name) = name else {
+        let message = format!("no sheet `{}`; the file has: {}", sheet.unwrap_or("1"), names.join(", "));
+        return Err(refuse(path, message, Some(format!("`{path}#SHEET` names a sheet"))));
+    };
+    let range = book.worksheet_range(&name).map_err(unreadable)?;
+    let first = range.start().map_or(0, |(row, _)| u64::from(row)) + 1;
+    let rows = range.rows().zip(first..).map(|(row, line)| (line, row.iter().map(cell).collect())).collect();
+    Ok(Source::Sheet { rows, name, others: names.len() - 1 })
+}
+
+fn cell(data: &Data) -> String {
+    match data {
+        Data::Int(v) => v.to_string(),
+        Data::Float(v) => v.to_string(),
+        Data::String(v) => v.trim().to_owned(),
+        Data::Bool(v) => v.to_string(),
+        Data::DateTimeIso(v) | Data::DurationIso(v) => v.clone(),
+        // A date is no number of a table of poses, and must not be taken for one.
+        Data::DateTime(v) => format!("date {v}"),
+        Data::Error(e) => e.to_string(),
+        Data::Empty => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn encodings_read_alike() {
+        let text = "X [mm];U [µm]\n1,5;2\n";
+        let utf16: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let big: Vec<u8> = text.encode_utf16().flat_map(u16::to_be_bytes).collect();
+        let marked = [vec![0xff, 0xfe], utf16.clone()].concat();
+        let latin: Vec<u8> = text.chars().map(|c| c as u8).collect();
+        for bytes in [text.as_bytes().to_vec(), utf16, big, marked, latin] {
+            assert_eq!(decoded(&bytes).0, text);
+        }
+        assert_eq!(decoded(&[b"\xef\xbb\xbf", text.as_bytes()].concat()).0, text);
+    }
+
+    #[test]
+    fn files_of_other_programs_are_refused_with_how_to_export_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = |name: &str, bytes: &[u8]| {
+            let path = Utf8PathBuf::from_path_buf(folder.path().join(name)).unwrap();
+            std::fs::write(&path, bytes).unwrap();
+            read(&path, "the table", "").err().map(|e| crate::diagnostic::report(&e)).unwrap()
+        };
+        assert!(refused("a.mat", b"MATLAB 5.0 MAT-file").contains("writematrix"));
+        assert!(refused("b.dat", b"MATLAB 5.0 MAT-file").contains("MATLAB file"));
+        assert!(refused("a.npy", b"\x93NUMPY\x01").contains("numpy.savetxt"));
+        assert!(refused("a.csv", b"\x00\x01\x02\xffabc").contains("no spreadsheet"));
+        assert!(refused("a.xlsx", b"PK\x03\x04 nothing").contains("not readable as a spreadsheet"));
+    }
+}
