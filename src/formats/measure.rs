@@ -9,10 +9,10 @@ use crate::imaging::{Board, Corners};
 use crate::measurements::{pose_fields, pose_header, quoted};
 use crate::statistics::median;
 use crate::stereo::Rig;
-use crate::stereo::target::TargetPose;
-use crate::stereo::target::finish::{Shape, Shared};
-use crate::stereo::target::rig_change::judgement::Judgement;
-use crate::stereo::target::series::{Knowledge, MeasuredPose, Series};
+use crate::stereo::board_pose::TargetPose;
+use crate::stereo::board_pose::finish::{Shape, Shared};
+use crate::stereo::board_pose::rig_change::judgement::Judgement;
+use crate::stereo::board_pose::series::{Knowledge, MeasuredPose, Series};
 
 /// Columns behind the joints.
 const COLUMNS: &str = "x_mm,y_mm,z_mm,sxx_mm2,sxy_mm2,sxz_mm2,syy_mm2,syz_mm2,szz_mm2,rx_rad,ry_rad,rz_rad,fit_rms_mm,corners,status,\
@@ -225,7 +225,7 @@ impl RigRecord {
             Judgement::Moved { since, .. } => ("moved", &[][..], Some(since.clone())),
             Judgement::Unexplained { .. } => ("unexplained", &[][..], None),
         };
-        let change = |e: &crate::stereo::target::rig_change::cause::Explanation| ChangeRecord {
+        let change = |e: &crate::stereo::board_pose::rig_change::cause::Explanation| ChangeRecord {
             what: e.cause.describe(e.amount, rig, board.square_mm),
             amount: e.amount,
             unit: e.cause.unit(),

@@ -4,7 +4,7 @@ use nalgebra::{Vector3, Vector6};
 
 use super::*;
 use crate::geometry::transform;
-use crate::stereo::target::series::{self, Knowledge, Seen};
+use crate::stereo::board_pose::series::{self, Knowledge, Seen};
 
 /// All poses of a world as a robot's run.
 fn run_of(corners: crate::imaging::Corners) -> Vec<Seen> {
@@ -45,7 +45,7 @@ fn the_targets_scatter_is_the_predicted_one() {
         // 60 poses: chi-square over its freedom is 1 +- 0.18; the target's shape is found as well and shared by all.
         assert!((0.5..1.7).contains(&(sum / 60.0)), "{sums}");
     }
-    assert_eq!(measured.judgement, crate::stereo::target::rig_change::judgement::Judgement::Agrees);
+    assert_eq!(measured.judgement, crate::stereo::board_pose::rig_change::judgement::Judgement::Agrees);
 }
 
 #[test]

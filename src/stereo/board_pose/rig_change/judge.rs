@@ -5,12 +5,12 @@
 //! points by less than the tolerance goes into their covariance: the calibration is believed only as far as the change reaches. A larger
 //! one ends the run.
 
+use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, moved_mm, stretch};
+use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
+use crate::stereo::board_pose::solve::estimate::{Estimate, estimate};
+use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
+use crate::stereo::board_pose::solve::prior::stretch_length_mm;
 use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::target::rig_change::cause::{Cause, Explanation, explanations, moved_mm, stretch};
-use crate::stereo::target::solve::bundle::{Bundle, Values};
-use crate::stereo::target::solve::estimate::{Estimate, estimate};
-use crate::stereo::target::solve::pose_block::{crossings, residual};
-use crate::stereo::target::solve::prior::stretch_length_mm;
 
 /// A cause that lowers chi-square by less than this is chance: four standard deviations.
 const CHANCE: f64 = 16.0;
@@ -39,7 +39,7 @@ pub struct Changed {
 }
 
 /// Names what changed, where more than chance did; and the estimate to go on with, in which the change is allowed for.
-pub(in crate::stereo::target) fn judge<'a>(
+pub(in crate::stereo::board_pose) fn judge<'a>(
     found: Estimate<'a>,
     usual: Option<Noise>,
 ) -> (Estimate<'a>, Option<Changed>) {
@@ -147,7 +147,7 @@ fn shape_evidence(fit: &Estimate<'_>) -> f64 {
 }
 
 /// Values for a target whose size is off by a large factor: every pose scaled with it.
-pub(in crate::stereo::target) fn scaled(values: &Values, bundle: &Bundle<'_>, factor: f64) -> Values {
+pub(in crate::stereo::board_pose) fn scaled(values: &Values, bundle: &Bundle<'_>, factor: f64) -> Values {
     let mut next = values.clone();
     for (deviation, at) in next.deviations_mm.iter_mut().zip(bundle.board.corners_mm()) {
         *deviation = at.coords * (factor - 1.0);

@@ -1,8 +1,8 @@
 //! What is found of the rig as a whole, and how it is said.
 
 use crate::stereo::Rig;
-use crate::stereo::target::rig_change::cause::{Cause, Explanation};
-use crate::stereo::target::rig_change::judge::Changed;
+use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation};
+use crate::stereo::board_pose::rig_change::judge::Changed;
 
 /// What is found of the rig as a whole.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,21 +7,21 @@ use crate::imaging::{Board, Corner, PairCorners, Side};
 use crate::measurements::RobotPose;
 use crate::statistics::median;
 use crate::stereo::Rig;
+use crate::stereo::board_pose::TargetPose;
+use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
+use crate::stereo::board_pose::rig_change::consistency::{self, Change, usual_excess};
+use crate::stereo::board_pose::rig_change::judge::{Changed, judge, scaled};
+use crate::stereo::board_pose::solve::alone::Known;
+use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
+use crate::stereo::board_pose::solve::estimate::{Estimate, estimate};
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
-use crate::stereo::target::TargetPose;
-use crate::stereo::target::rig_change::cause::{Cause, Explanation, stretch};
-use crate::stereo::target::rig_change::consistency::{self, Change, usual_excess};
-use crate::stereo::target::rig_change::judge::{Changed, judge, scaled};
-use crate::stereo::target::solve::alone::Known;
-use crate::stereo::target::solve::bundle::{Bundle, Values};
-use crate::stereo::target::solve::estimate::{Estimate, estimate};
 
-use crate::stereo::target::finish::{Shape, Shared};
-use crate::stereo::target::rig_change::judgement::Judgement;
-use crate::stereo::target::solve::prior::{RigPrior, ShapePrior};
-use crate::stereo::target::start::{Start, baseline_ratio, starts};
-use crate::stereo::target::turns;
+use crate::stereo::board_pose::finish::{Shape, Shared};
+use crate::stereo::board_pose::rig_change::judgement::Judgement;
+use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior};
+use crate::stereo::board_pose::start::{Start, baseline_ratio, starts};
+use crate::stereo::board_pose::turns;
 
 /// A change of the rig at one pose that lowers chi-square by more than this is none of chance: one pose in twenty million.
 pub(super) const POSE_LIMIT: f64 = 45.0;

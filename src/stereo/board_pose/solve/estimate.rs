@@ -12,20 +12,20 @@ use rayon::prelude::*;
 
 use crate::geometry::Transform;
 use crate::statistics::median;
+use crate::stereo::board_pose::solve::bundle::{Bundle, Normal, Promise, Values};
+use crate::stereo::board_pose::solve::edge_bend::edge_bends_mm;
+use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
+use crate::stereo::board_pose::solve::prior::{stretch_mode, weights};
+use crate::stereo::board_pose::start::enough;
 use crate::stereo::data::corner_noise::{Noise, whitener};
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::solve::bundle::{Bundle, Normal, Promise, Values};
-use crate::stereo::target::solve::edge_bend::edge_bends_mm;
-use crate::stereo::target::solve::pose_block::{crossings, residual};
-use crate::stereo::target::solve::prior::{stretch_mode, weights};
-use crate::stereo::target::start::enough;
 
 /// Whitened residuals beyond this are outliers.
-pub(in crate::stereo::target) const OUTLIER: f64 = 5.3;
+pub(in crate::stereo::board_pose) const OUTLIER: f64 = 5.3;
 
 /// Rounds of least squares with new weights.
 const ROUNDS: usize = 6;
@@ -47,7 +47,7 @@ const FIXED_POINT_STEPS: usize = 30;
 
 /// A minimum with its weights.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::target) struct Estimate<'a> {
+pub(in crate::stereo::board_pose) struct Estimate<'a> {
     /// The problem with the whiteners, the outliers and the shape's prior that were found.
     pub bundle: Bundle<'a>,
     /// The values.
@@ -63,7 +63,7 @@ pub(in crate::stereo::target) struct Estimate<'a> {
 }
 
 /// Finds the minimum. `usual` is the noise of the calibration's corners, where known. `None` where the corners do not determine the poses.
-pub(in crate::stereo::target) fn estimate<'a>(
+pub(in crate::stereo::board_pose) fn estimate<'a>(
     mut bundle: Bundle<'a>,
     start: Values,
     usual: Option<Noise>,

@@ -4,6 +4,6 @@
 //! `judgement` says it in words.
 
 pub mod cause;
-pub(in crate::stereo::target) mod consistency;
+pub(in crate::stereo::board_pose) mod consistency;
 pub mod judge;
 pub mod judgement;

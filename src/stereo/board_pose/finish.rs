@@ -7,18 +7,18 @@ use rayon::prelude::*;
 
 use crate::geometry::Transform;
 use crate::imaging::Side;
+use crate::stereo::board_pose::rig_change::cause::{named, stretch};
+use crate::stereo::board_pose::rig_change::consistency::{self, Change, usual_excess};
+use crate::stereo::board_pose::rig_change::judgement::Judgement;
+use crate::stereo::board_pose::series::{MeasuredPose, POSE_LIMIT, Refusal, Run, Series};
+use crate::stereo::board_pose::solve::alone::{Alone, Known};
+use crate::stereo::board_pose::solve::bundle::Bundle;
+use crate::stereo::board_pose::solve::estimate::Estimate;
+use crate::stereo::board_pose::solve::prior::frame_modes;
+use crate::stereo::board_pose::solve::window::Window;
+use crate::stereo::board_pose::start::{Start, enough};
+use crate::stereo::board_pose::{FEWEST_CORNERS, TargetPose};
 use crate::stereo::data::view::View;
-use crate::stereo::target::rig_change::cause::{named, stretch};
-use crate::stereo::target::rig_change::consistency::{self, Change, usual_excess};
-use crate::stereo::target::rig_change::judgement::Judgement;
-use crate::stereo::target::series::{MeasuredPose, POSE_LIMIT, Refusal, Run, Series};
-use crate::stereo::target::solve::alone::{Alone, Known};
-use crate::stereo::target::solve::bundle::Bundle;
-use crate::stereo::target::solve::estimate::Estimate;
-use crate::stereo::target::solve::prior::frame_modes;
-use crate::stereo::target::solve::window::Window;
-use crate::stereo::target::start::{Start, enough};
-use crate::stereo::target::{FEWEST_CORNERS, TargetPose};
 
 /// Standard deviations by which a pose's own chi-square may exceed one before its covariance grows.
 const POSE_SIGMAS: f64 = 3.0;

@@ -9,16 +9,16 @@ use nalgebra::{DMatrix, Matrix6, Vector6};
 use rayon::prelude::*;
 
 use crate::statistics::median;
+use crate::stereo::board_pose::solve::bundle::{Normal, PosePart};
+use crate::stereo::board_pose::solve::pose_block::Eliminated;
 use crate::stereo::solve::normal_equations::inverse6;
-use crate::stereo::target::solve::bundle::{Normal, PosePart};
-use crate::stereo::target::solve::pose_block::Eliminated;
 
 /// Median of chi-square with six degrees of freedom.
 const MEDIAN_CHI_SQUARE_6: f64 = 5.348;
 
 /// A change of `right_from_left`, rotation (rad) and translation (mm), and by how much it would lower chi-square.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stereo::target) struct Change {
+pub(in crate::stereo::board_pose) struct Change {
     /// The change.
     pub change: Vector6<f64>,
     /// Fall of chi-square.
@@ -26,20 +26,20 @@ pub(in crate::stereo::target) struct Change {
 }
 
 /// What a change at each pose alone would gain.
-pub(in crate::stereo::target) fn at_each(normal: &Normal, covariance: &DMatrix<f64>) -> Vec<Option<Change>> {
+pub(in crate::stereo::board_pose) fn at_each(normal: &Normal, covariance: &DMatrix<f64>) -> Vec<Option<Change>> {
     let of = |part: &PosePart| score(&part.change, &part.change_shared, &part.change_gradient, covariance);
     normal.poses.par_iter().map(|part| of(part.as_ref()?)).collect()
 }
 
 /// What a change would gain at a pose that had no part in the minimum.
-pub(in crate::stereo::target) fn of_outsider(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change> {
+pub(in crate::stereo::board_pose) fn of_outsider(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change> {
     // The gradient scatters with the pose's own corners and with the shared values, which its corners did not help to find.
     score(&part.change, &part.change_shared, &part.change_gradient, &-covariance)
 }
 
 /// Where a change from one pose on gains most, and what: the index of its first pose, and how much of the gain a change before the
 /// whole run does not have as well.
-pub(in crate::stereo::target) fn from_one_on(
+pub(in crate::stereo::board_pose) fn from_one_on(
     normal: &Normal,
     covariance: &DMatrix<f64>,
 ) -> Option<(usize, Change, f64)> {
@@ -72,7 +72,7 @@ pub(in crate::stereo::target) fn from_one_on(
 }
 
 /// How much larger the usual score of a pose is than chance: one where the model holds.
-pub(in crate::stereo::target) fn usual_excess(each: &[Option<Change>]) -> f64 {
+pub(in crate::stereo::board_pose) fn usual_excess(each: &[Option<Change>]) -> f64 {
     median(each.iter().flatten().map(|c| c.fall)).map_or(1.0, |m| (m / MEDIAN_CHI_SQUARE_6).max(1.0))
 }
 
