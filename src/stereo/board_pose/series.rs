@@ -9,11 +9,11 @@ use crate::statistics::median;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::TargetPose;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
-use crate::stereo::board_pose::rig_change::consistency::{self, Change, usual_excess};
-use crate::stereo::board_pose::rig_change::judge::{Changed, judge, scaled};
+use crate::stereo::board_pose::rig_change::consistency::{self, Along, Change};
+use crate::stereo::board_pose::rig_change::judge::{ALLOWED, Changed, judge, scaled};
 use crate::stereo::board_pose::solve::alone::Known;
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
-use crate::stereo::board_pose::solve::estimate::{Estimate, estimate};
+use crate::stereo::board_pose::solve::estimate::{Estimate, TELLING_POSES, estimate};
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
 
@@ -127,7 +127,7 @@ pub fn measure(known: &Knowledge, seen: Vec<Seen>) -> Series {
     let (found, changed) = judge(found, known.noise);
     let judgement = match (moved, changed) {
         (Some(moved), _) => moved,
-        (None, Some(changed)) if changed.moves_mm > known.tolerance_mm => Judgement::Contradicts(changed),
+        (None, Some(changed)) if changed.moves_mm > known.tolerance_mm && changed.beyond > ALLOWED => Judgement::Contradicts(changed),
         (None, Some(changed)) => Judgement::Allowed(changed),
         (None, None) => Judgement::Agrees,
     };
@@ -146,6 +146,8 @@ pub(super) struct Run<'a> {
     /// Poses that take part in the bundle.
     pub(super) taking_part: Vec<bool>,
     pub(super) moved: Option<Judgement>,
+    /// A change along the run that the points' uncertainty allows.
+    pub(super) along: Option<Along>,
     pub(super) notes: Vec<String>,
     /// Left and right corners the other way round.
     exchanged_pairs: Vec<PairCorners>,
@@ -181,7 +183,7 @@ impl<'a> Run<'a> {
         }
         let exchange = |p: PairCorners| PairCorners { pair: p.pair, left: p.right, right: p.left };
         let exchanged_pairs = pairs.into_iter().map(exchange).collect();
-        Run { known, at, refusals, starts, taking_part, moved: None, notes, exchanged_pairs }
+        Run { known, at, refusals, starts, taking_part, moved: None, along: None, notes, exchanged_pairs }
     }
 
     fn present(&self) -> impl Iterator<Item = usize> + '_ {
@@ -224,7 +226,7 @@ impl<'a> Run<'a> {
         let mut bundle = self.bundle();
         bundle.shape.stretch_mm = f64::INFINITY;
         let start = scaled(&self.values(&bundle), &bundle, factor);
-        let found = estimate(bundle, start, self.known.noise)?;
+        let found = estimate(bundle, start, self.known.noise, None)?;
         let left = Known::new(&found);
         let misfits = present.iter().filter_map(|&i| {
             left.fit(&found.bundle.views[i], found.values.poses[i].as_ref()?).map(|alone| alone.rms_px)
@@ -241,7 +243,7 @@ impl<'a> Run<'a> {
             .collect();
         let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY };
         let moves_mm = median(moves).unwrap_or(0.0);
-        Some(Judgement::Contradicts(Changed { explanations: vec![explanation], moves_mm, fall: f64::INFINITY }))
+        Some(Judgement::Contradicts(Changed { explanations: vec![explanation], moves_mm, beyond: f64::INFINITY, fall: f64::INFINITY }))
     }
 
     /// The bundle over the poses that fit together; the others are left out, and a rig that moved ends the run before it.
@@ -250,23 +252,17 @@ impl<'a> Run<'a> {
         for _ in 0..ROUNDS {
             let bundle = self.bundle();
             let values = self.values(&bundle);
-            let found = estimate(bundle, values, self.known.noise)?;
+            let found = estimate(bundle, values, self.known.noise, None)?;
             // The estimate does without poses of which too few corners fit.
             for (part, pose) in self.taking_part.iter_mut().zip(&found.values.poses) {
                 *part = *part && pose.is_some();
             }
             let each = consistency::at_each(&found.normal, &found.covariance);
-            let excess = usual_excess(&each);
             let worst = each.iter().flatten().map(|c| c.fall).fold(0.0, f64::max);
-            let tail = consistency::from_one_on(&found.normal, &found.covariance);
-            if let Some((k, change, _)) = tail.filter(|(k, change, gain)| {
-                let after = (*k..self.taking_part.len()).filter(|&i| self.taking_part[i]).count();
-                after >= 2 && *gain > self.moved_limit(after) * excess && change.fall > 1.5 * worst
-            }) {
-                self.end_at(k, &change);
+            if self.ends_early(&found, worst) {
                 continue;
             }
-            let limit = (POSE_LIMIT * excess).max(TOGETHER * worst);
+            let limit = POSE_LIMIT.max(TOGETHER * worst);
             let strays: Vec<usize> = (0..each.len()).filter(|&i| each[i].is_some_and(|c| c.fall > limit)).collect();
             let remain = self.taking_part.iter().filter(|part| **part).count() - strays.len();
             if strays.is_empty() || remain == 0 {
@@ -278,27 +274,67 @@ impl<'a> Run<'a> {
         last
     }
 
-    /// A calibration that does not say how well it is known is a little wrong everywhere, which many poses together would show: then
-    /// every pose after the change must show it.
-    fn moved_limit(&self, after: usize) -> f64 {
+    /// Leaves the poses from a change along the run on out, where it moves points by more than their uncertainty allows. `worst` is the
+    /// score of the worst pose by itself.
+    fn ends_early(&mut self, found: &Estimate<'a>, worst: f64) -> bool {
+        self.along = None;
+        let Some(along) = consistency::along(&found.normal, &found.covariance) else { return false };
+        let after = (along.from..self.taking_part.len()).filter(|&i| self.taking_part[i]).count();
+        // A calibration that does not say how well it is known is a little wrong everywhere, which many poses together would show: then
+        // every pose after the change must show it.
         let each = if self.known.rig.covariance.is_none() { EACH_POSE * after as f64 } else { 0.0 };
-        MOVED_LIMIT + each
+        if after < 2 || along.evidence <= MOVED_LIMIT || along.gain <= each || along.change.fall <= 1.5 * worst {
+            return false;
+        }
+        let beyond = self.beyond(found, &along);
+        match along.shares.iter().position(|share| share * share * beyond > ALLOWED) {
+            Some(k) => {
+                self.end_at(k, &along);
+                true
+            }
+            None => {
+                self.along = Some(along);
+                false
+            }
+        }
+    }
+
+    /// By how much a whole change exceeds the points' uncertainty, as chi-square with three degrees of freedom. The uncertainty is that of
+    /// poses on one side of the change: the common minimum takes it for noise.
+    fn beyond(&self, found: &Estimate<'a>, along: &Along) -> f64 {
+        let present: Vec<usize> = (0..self.taking_part.len()).filter(|&i| self.taking_part[i]).collect();
+        let before = present.iter().filter(|&&i| i < along.from).count();
+        let side = match () {
+            () if along.creeps => &present[..(present.len() / 4).max(TELLING_POSES).min(present.len())],
+            () if before >= TELLING_POSES.min(present.len() - before) => &present[..before],
+            () => &present[before..],
+        };
+        let (mut bundle, mut values) = (self.bundle(), found.values.clone());
+        values.rig.fill(0.0);
+        (0..values.poses.len()).filter(|i| !side.contains(i)).for_each(|i| values.poses[i] = None);
+        bundle.edge_bends_mm.clone_from(&found.bundle.edge_bends_mm);
+        let alone = estimate(bundle, values, self.known.noise, None);
+        let one_side = alone.as_ref().unwrap_or(found);
+        let shift_mm = |i: usize| {
+            let by_change = one_side.normal.poses[i].as_ref()?.by_change;
+            Some((by_change * along.change.change).fixed_rows::<3>(3).into_owned())
+        };
+        median(side.iter().filter_map(|&i| one_side.beyond(one_side, i, &shift_mm(i)?))).unwrap_or(f64::INFINITY)
     }
 
     /// The rig moved before pose `k`: nothing from there on counts.
-    fn end_at(&mut self, k: usize, change: &Change) {
+    fn end_at(&mut self, k: usize, along: &Along) {
         let since = self.at[k].pose.clone();
-        let [turned_deg, moved_mm] = size_of(change, &self.known.rig);
-        let reason = format!(
-            "the rig moved before pose {since}: the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the left"
-        );
+        let [turned_deg, moved_mm] = size_of(&along.change, &self.known.rig);
+        let judgement = Judgement::Moved { since, creeps: along.creeps, turned_deg, moved_mm };
+        let reason = judgement.describe(&self.known.rig, self.known.board.square_mm).unwrap_or_default();
         for i in k..self.at.len() {
             self.taking_part[i] = false;
             if self.refusals[i].is_none() {
                 self.refusals[i] = Some(Refusal { status: "rig moved", reason: reason.clone() });
             }
         }
-        self.moved = Some(Judgement::Moved { since, turned_deg, moved_mm });
+        self.moved = Some(judgement);
     }
 
     /// No pose is measured.

@@ -2,9 +2,10 @@
 //! reaches into the points.
 //!
 //! Every [`Cause`] is fitted with nothing known of it beforehand; the most likely one is named with its equals. A change that moves the
-//! points by less than the tolerance goes into their covariance: the calibration is believed only as far as the change reaches. A larger
-//! one ends the run.
+//! points by less than the tolerance, or than their own uncertainty allows, goes into their covariance: the calibration is believed only
+//! as far as the change reaches. A larger one ends the run.
 
+use crate::statistics::median;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, moved_mm, stretch};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
 use crate::stereo::board_pose::solve::estimate::{Estimate, estimate};
@@ -27,6 +28,9 @@ const COMPARED_ON: usize = 48;
 /// Whitened squares beyond this count as this much in the likelihood: outliers.
 const MOST_SQUARE: f64 = 28.0;
 
+/// Chi-square of three degrees of freedom that 95 % of all points stay below: a shift beyond it is more than a point's uncertainty allows.
+pub(in crate::stereo::board_pose) const ALLOWED: f64 = 7.815;
+
 /// What is found of the rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Changed {
@@ -34,6 +38,8 @@ pub struct Changed {
     pub explanations: Vec<Explanation>,
     /// By how much the points move with it, root mean square, mm.
     pub moves_mm: f64,
+    /// By how much that exceeds their uncertainty: chi-square with three degrees of freedom, the median over the poses.
+    pub beyond: f64,
     /// How many times less unlikely it makes what is seen: the fall of chi-square.
     pub fall: f64,
 }
@@ -65,11 +71,21 @@ pub(in crate::stereo::board_pose) fn judge<'a>(
     let on_rig = fitted.iter().map(|(_, e)| e).find(|e| e.cause != Cause::Pitch).unwrap_or(&first);
     let known = on_rig.amount.powi(2).max(f64::MIN_POSITIVE);
     let Some(free) = with_cause(&found, on_rig, f64::INFINITY, usual) else { return (found, None) };
-    let changed = Changed { explanations: equals, moves_mm: moved_mm(&found, &free), fall: best };
+    let changed = Changed { explanations: equals, moves_mm: moved_mm(&found, &free), beyond: beyond(&found, &free), fall: best };
     match with_cause(&found, on_rig, known, usual) {
         Some(allowed) => (allowed, Some(changed)),
         None => (free, Some(changed)),
     }
+}
+
+/// By how much the points move between two minima, in units of what the second leaves open of each and the first of what they share.
+fn beyond(known: &Estimate<'_>, free: &Estimate<'_>) -> f64 {
+    let poses = known.values.poses.iter().zip(&free.values.poses).enumerate();
+    let each = poses.filter_map(|(i, (a, b))| {
+        let shift_mm = b.as_ref()?.translation.vector - a.as_ref()?.translation.vector;
+        free.beyond(known, i, &shift_mm)
+    });
+    median(each).unwrap_or(0.0)
 }
 
 /// Some of the poses, evenly spread.
@@ -106,7 +122,7 @@ fn with_cause<'a>(
             bundle.shape.stretch_mm = bundle.shape.stretch_mm.hypot(variance.sqrt() * stretch_length_mm(bundle.board));
         }
     }
-    estimate(bundle, values, usual)
+    estimate(bundle, values, usual, Some(found.excess))
 }
 
 /// How much of a cause a fit with it found.

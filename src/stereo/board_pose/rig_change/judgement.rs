@@ -19,7 +19,9 @@ pub enum Judgement {
     Moved {
         /// First pose after it.
         since: String,
-        /// By how much the right camera turned, deg, and how far it went, mm.
+        /// True where it went on moving from pose to pose.
+        creeps: bool,
+        /// By how much the right camera turned, deg, and how far it went, mm, in all.
         turned_deg: f64,
         /// See above.
         moved_mm: f64,
@@ -54,7 +56,11 @@ impl Judgement {
             Judgement::Exchanged => {
                 "left and right pictures are exchanged: they fit this rig the other way round".to_owned()
             }
-            Judgement::Moved { since, turned_deg, moved_mm } => format!(
+            Judgement::Moved { since, creeps: true, turned_deg, moved_mm } => format!(
+                "the rig creeps: during the run the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the \
+                 left; from pose {since} on that is more than the points' uncertainty allows"
+            ),
+            Judgement::Moved { since, creeps: false, turned_deg, moved_mm } => format!(
                 "the rig moved before pose {since}: the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the left"
             ),
             Judgement::Unexplained { misfit_px } => format!(

@@ -71,6 +71,8 @@ pub(in crate::stereo::board_pose) struct PosePart {
     pub change_shared: DMatrix<f64>,
     /// Its gradient.
     pub change_gradient: Vector6<f64>,
+    /// Derivative of the pose by such a change that nobody knows of.
+    pub by_change: Matrix6<f64>,
     step_to: Vector6<f64>,
 }
 
@@ -201,6 +203,7 @@ impl Values {
 
 impl PosePart {
     fn of(part: Eliminated) -> PosePart {
+        let by_change = part.by_change();
         let Eliminated { mixed, pose_inverse, pose_gradient, change, change_shared, change_gradient, .. } = part;
         PosePart {
             own: pose_inverse,
@@ -208,6 +211,7 @@ impl PosePart {
             change,
             change_shared,
             change_gradient,
+            by_change,
             step_to: -(pose_inverse * pose_gradient),
         }
     }

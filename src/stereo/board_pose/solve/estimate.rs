@@ -7,14 +7,15 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector, Vector2};
+use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 use rayon::prelude::*;
 
 use crate::geometry::Transform;
 use crate::statistics::median;
+use crate::stereo::board_pose::rig_change::consistency::{at_each, usual_excess};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Normal, Promise, Values};
 use crate::stereo::board_pose::solve::edge_bend::edge_bends_mm;
-use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
+use crate::stereo::board_pose::solve::pose_block::{crossings, own_covariance, residual};
 use crate::stereo::board_pose::solve::prior::{stretch_mode, weights};
 use crate::stereo::board_pose::start::enough;
 use crate::stereo::data::corner_noise::{Noise, whitener};
@@ -34,7 +35,7 @@ const ROUNDS: usize = 6;
 const SETTLED: f64 = 0.01;
 
 /// Fewest poses that tell a target's print from noise.
-const TELLING_POSES: usize = 3;
+pub(in crate::stereo::board_pose) const TELLING_POSES: usize = 3;
 
 /// The certificate counts as much as this many crossings' worth of evidence on how far crossings deviate.
 const CERTIFICATE_COUNT: f64 = 0.1;
@@ -58,15 +59,19 @@ pub(in crate::stereo::board_pose) struct Estimate<'a> {
     pub covariance: DMatrix<f64>,
     /// How corners scatter.
     pub noise: Noise,
-    /// Factor on covariances for the information that neighbouring corners share; the whiteners hold it.
+    /// How much larger the usual disagreement of a pose with the common rig is than its corners' scatter allows, as a variance.
+    pub excess: f64,
+    /// Factor on covariances for the information that neighbouring corners share, and the poses' excess; the whiteners hold it.
     pub inflation: f64,
 }
 
-/// Finds the minimum. `usual` is the noise of the calibration's corners, where known. `None` where the corners do not determine the poses.
+/// Finds the minimum. `usual` is the noise of the calibration's corners, where known; `excess` is held where it is known. `None` where the
+/// corners do not determine the poses.
 pub(in crate::stereo::board_pose) fn estimate<'a>(
     mut bundle: Bundle<'a>,
     start: Values,
     usual: Option<Noise>,
+    known_excess: Option<f64>,
 ) -> Option<Estimate<'a>> {
     let mut values = start;
     let certificate = bundle.shape;
@@ -77,7 +82,7 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
     }
     let poses = values.poses.iter().flatten().count();
     let mut noise = Noise::from_median(&residuals(&bundle, &values, |_| true));
-    let mut inflation: f64 = 1.0;
+    let (mut inflation, mut excess) = (1.0, known_excess.unwrap_or(1.0));
     let mut normal = bundle.normal(&values, Loss::Squared)?;
     let mut covariance = DMatrix::zeros(0, 0);
     for round in 0..ROUNDS {
@@ -86,10 +91,13 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
         }
         bundle.weigh(&values, &noise);
         bundle.mark_outliers(&mut values);
-        inflate(&mut bundle.views, inflation);
+        inflate(&mut bundle.views, inflation * excess);
         (values, normal) = bundle.solve(values, Loss::Squared, Promise::RESULT)?;
         covariance = normal.covariance()?;
-        let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm);
+        let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm, excess);
+        if known_excess.is_none() {
+            excess = (excess * usual_excess(&at_each(&normal, &covariance))).max(1.0);
+        }
         if poses >= TELLING_POSES {
             settle_shape(&mut bundle, &values, (&normal, &covariance), certificate.in_plane_mm)?;
             bundle.edge_bends_mm = edge_bends_mm(&bundle, &values, &noise);
@@ -106,12 +114,26 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
         let settled = close(before.0.added_px, noise.added_px)
             && close(before.0.factor, noise.factor)
             && close(before.1, bundle.shape.in_plane_mm)
-            && close(before.2, bundle.shape.out_of_plane_mm);
+            && close(before.2, bundle.shape.out_of_plane_mm)
+            && close(before.3, excess);
         if settled && round > 0 {
             break;
         }
     }
-    Some(Estimate { bundle, values, normal, covariance, noise, inflation })
+    Some(Estimate { bundle, values, normal, covariance, noise, excess, inflation: inflation * excess })
+}
+
+impl Estimate<'_> {
+    /// By how much a shift of a pose's point exceeds its uncertainty, as chi-square with three degrees of freedom: its own, and what `known`
+    /// leaves open of all that the poses share.
+    pub fn beyond(&self, known: &Estimate<'_>, i: usize, shift_mm: &Vector3<f64>) -> Option<f64> {
+        let part = self.normal.poses[i].as_ref()?;
+        let own = own_covariance(&part.own, &part.change, &part.by_change, self.excess);
+        let by_shared = known.normal.poses[i].as_ref()?.by_shared.fixed_rows::<3>(3).into_owned();
+        let covariance =
+            own.fixed_view::<3, 3>(3, 3).into_owned() + &by_shared * &known.covariance * by_shared.transpose();
+        Some(shift_mm.dot(&(covariance.try_inverse()? * shift_mm)))
+    }
 }
 
 /// Residuals in px of the corners that are wanted, where they can be predicted, in the order of the poses.
