@@ -222,6 +222,7 @@ impl RigRecord {
             Judgement::Allowed(changed) => ("allowed", &changed.explanations[..], None),
             Judgement::Contradicts(changed) => ("contradicts", &changed.explanations[..], None),
             Judgement::Exchanged => ("exchanged", &[][..], None),
+            Judgement::Mirrored(_) => ("mirrored", &[][..], None),
             Judgement::Moved { since, .. } => ("moved", &[][..], Some(since.clone())),
             Judgement::Unexplained { .. } => ("unexplained", &[][..], None),
         };

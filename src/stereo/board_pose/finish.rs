@@ -135,9 +135,7 @@ impl Finisher<'_> {
             Some(change) => Some(*change),
             None => consistency::of_outsider(&alone.part, &self.found.covariance),
         };
-        if let Some(change) =
-            change.filter(|c| c.fall > POSE_LIMIT * alone.chi_square.clamp(1.0, OUTSIDER_LIMIT))
-        {
+        if let Some(change) = change.filter(|c| c.fall > POSE_LIMIT * alone.chi_square.clamp(1.0, OUTSIDER_LIMIT)) {
             return Err(self.two_moments(i, alone, &change));
         }
         if !self.run.taking_part[i] && alone.chi_square > OUTSIDER_LIMIT * self.found.excess {

@@ -10,6 +10,7 @@ use crate::stereo::Rig;
 use crate::stereo::board_pose::TargetPose;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
 use crate::stereo::board_pose::rig_change::consistency::{self, Along, Change};
+use crate::stereo::board_pose::rig_change::flip::Flip;
 use crate::stereo::board_pose::rig_change::judge::{ALLOWED, Changed, judge, scaled};
 use crate::stereo::board_pose::solve::alone::Known;
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
@@ -40,6 +41,9 @@ const ROUNDS: usize = 8;
 
 /// Corners that the rig misses by more than this share of the picture's width belong to another rig, or to another target.
 const GROSS_SHARE: f64 = 1e-3;
+
+/// Corners that miss the rig this many times as far as usual are looked at in pictures that are exchanged or the other way round.
+const UNUSUAL_MISFIT: f64 = 3.0;
 
 /// The pictures of one pose.
 #[derive(Debug, Clone, PartialEq)]
@@ -127,7 +131,9 @@ pub fn measure(known: &Knowledge, seen: Vec<Seen>) -> Series {
     let (found, changed) = judge(found, known.noise);
     let judgement = match (moved, changed) {
         (Some(moved), _) => moved,
-        (None, Some(changed)) if changed.moves_mm > known.tolerance_mm && changed.beyond > ALLOWED => Judgement::Contradicts(changed),
+        (None, Some(changed)) if changed.moves_mm > known.tolerance_mm && changed.beyond > ALLOWED => {
+            Judgement::Contradicts(changed)
+        }
         (None, Some(changed)) => Judgement::Allowed(changed),
         (None, None) => Judgement::Agrees,
     };
@@ -149,8 +155,8 @@ pub(super) struct Run<'a> {
     /// A change along the run that the points' uncertainty allows.
     pub(super) along: Option<Along>,
     pub(super) notes: Vec<String>,
-    /// Left and right corners the other way round.
-    exchanged_pairs: Vec<PairCorners>,
+    /// The corners as they were found.
+    pairs: Vec<PairCorners>,
 }
 
 impl<'a> Run<'a> {
@@ -181,9 +187,7 @@ impl<'a> Run<'a> {
         for ((start, view), pose) in starts.iter_mut().zip(views).zip(poses) {
             (start.view, start.pose) = (view, pose);
         }
-        let exchange = |p: PairCorners| PairCorners { pair: p.pair, left: p.right, right: p.left };
-        let exchanged_pairs = pairs.into_iter().map(exchange).collect();
-        Run { known, at, refusals, starts, taking_part, moved: None, along: None, notes, exchanged_pairs }
+        Run { known, at, refusals, starts, taking_part, moved: None, along: None, notes, pairs }
     }
 
     fn present(&self) -> impl Iterator<Item = usize> + '_ {
@@ -212,15 +216,29 @@ impl<'a> Run<'a> {
     fn gross(&self) -> Option<Judgement> {
         let limit = GROSS_SHARE * f64::from(self.known.rig.left.width);
         let misfit_px = self.misfit_px();
-        if misfit_px <= limit {
+        let views: Vec<View> = self.starts.iter().map(|s| s.view.clone()).collect();
+        let usual_px = self.known.noise.map_or(f64::INFINITY, |noise| noise.typical_px(&views));
+        if misfit_px <= limit.min(UNUSUAL_MISFIT * usual_px) {
             return None;
         }
         let better = |px: f64| px < 0.3 * misfit_px;
-        let present: Vec<usize> = self.present().collect();
-        let others = starts(&self.known.rig, &self.known.board, &self.exchanged_pairs);
-        if better(median(others.iter().map(|s| s.misfit_px)).unwrap_or(f64::INFINITY)) {
+        let fits = |pairs: &[PairCorners]| {
+            let others = starts(&self.known.rig, &self.known.board, pairs);
+            better(median(others.iter().map(|s| s.misfit_px)).unwrap_or(f64::INFINITY))
+        };
+        let exchange =
+            |p: &PairCorners| PairCorners { pair: p.pair.clone(), left: p.right.clone(), right: p.left.clone() };
+        if fits(&self.pairs.iter().map(exchange).collect::<Vec<_>>()) {
             return Some(Judgement::Exchanged);
         }
+        let flipped = |flip: &Flip| fits(&self.pairs.iter().map(|pair| self.flipped(pair, *flip)).collect::<Vec<_>>());
+        if let Some(flip) = Flip::ALL.into_iter().find(flipped) {
+            return Some(Judgement::Mirrored(flip));
+        }
+        if misfit_px <= limit {
+            return None;
+        }
+        let present: Vec<usize> = self.present().collect();
         let views: Vec<View> = present.iter().map(|&i| self.starts[i].view.clone()).collect();
         let factor = 1.0 / baseline_ratio(&self.known.rig, &views)?;
         let mut bundle = self.bundle();
@@ -243,7 +261,20 @@ impl<'a> Run<'a> {
             .collect();
         let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY };
         let moves_mm = median(moves).unwrap_or(0.0);
-        Some(Judgement::Contradicts(Changed { explanations: vec![explanation], moves_mm, beyond: f64::INFINITY, fall: f64::INFINITY }))
+        Some(Judgement::Contradicts(Changed {
+            explanations: vec![explanation],
+            moves_mm,
+            beyond: f64::INFINITY,
+            fall: f64::INFINITY,
+        }))
+    }
+
+    /// A pair as it would have been found in pictures that are the other way round, each with the camera that it has.
+    fn flipped(&self, pair: &PairCorners, flip: Flip) -> PairCorners {
+        let rig = &self.known.rig;
+        let [left, right] = [(&rig.left, &pair.left), (&rig.right, &pair.right)]
+            .map(|(camera, corners)| flip.of(&self.known.board, [camera.width, camera.height], corners));
+        PairCorners { pair: pair.pair.clone(), left, right }
     }
 
     /// The bundle over the poses that fit together; the others are left out, and a rig that moved ends the run before it.

@@ -15,6 +15,7 @@
 mod coverage;
 mod faults;
 mod pictures;
+mod rig_changes;
 mod robots;
 mod speed;
 mod worlds;
@@ -34,6 +35,7 @@ fn main() {
     }
     if runs("faults") {
         faults::run();
+        rig_changes::run();
     }
     if runs("speed") {
         speed::run_all();

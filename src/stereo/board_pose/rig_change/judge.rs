@@ -71,7 +71,8 @@ pub(in crate::stereo::board_pose) fn judge<'a>(
     let on_rig = fitted.iter().map(|(_, e)| e).find(|e| e.cause != Cause::Pitch).unwrap_or(&first);
     let known = on_rig.amount.powi(2).max(f64::MIN_POSITIVE);
     let Some(free) = with_cause(&found, on_rig, f64::INFINITY, usual) else { return (found, None) };
-    let changed = Changed { explanations: equals, moves_mm: moved_mm(&found, &free), beyond: beyond(&found, &free), fall: best };
+    let changed =
+        Changed { explanations: equals, moves_mm: moved_mm(&found, &free), beyond: beyond(&found, &free), fall: best };
     match with_cause(&found, on_rig, known, usual) {
         Some(allowed) => (allowed, Some(changed)),
         None => (free, Some(changed)),

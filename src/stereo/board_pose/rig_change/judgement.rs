@@ -2,6 +2,7 @@
 
 use crate::stereo::Rig;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation};
+use crate::stereo::board_pose::rig_change::flip::Flip;
 use crate::stereo::board_pose::rig_change::judge::Changed;
 
 /// What is found of the rig as a whole.
@@ -15,6 +16,8 @@ pub enum Judgement {
     Contradicts(Changed),
     /// Left and right pictures are exchanged.
     Exchanged,
+    /// All pictures are the other way round.
+    Mirrored(Flip),
     /// It moved during the run.
     Moved {
         /// First pose after it.
@@ -56,6 +59,9 @@ impl Judgement {
             Judgement::Exchanged => {
                 "left and right pictures are exchanged: they fit this rig the other way round".to_owned()
             }
+            Judgement::Mirrored(flip) => {
+                format!("all pictures are {}: they fit this rig the other way round", flip.describe())
+            }
             Judgement::Moved { since, creeps: true, turned_deg, moved_mm } => format!(
                 "the rig creeps: during the run the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the \
                  left; from pose {since} on that is more than the points' uncertainty allows"
@@ -78,6 +84,9 @@ impl Judgement {
                 "check `--square-mm` and `--squares` against the target; if they are right, the rig changed: `stereocal camera-check IMAGES`",
             ),
             Judgement::Exchanged => Some("exchange the names of left/ and right/"),
+            Judgement::Mirrored(_) => Some(
+                "take the pictures as the cameras give them, as at the calibration: see the cameras' settings and the program that saved them",
+            ),
             Judgement::Moved { .. } => Some(
                 "clamp the cameras, calibrate again with `stereocal camera-check IMAGES`, and take the poses from there on again",
             ),

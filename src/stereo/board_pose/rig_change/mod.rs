@@ -5,5 +5,6 @@
 
 pub mod cause;
 pub(in crate::stereo::board_pose) mod consistency;
+pub mod flip;
 pub mod judge;
 pub mod judgement;

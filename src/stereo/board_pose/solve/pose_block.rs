@@ -292,7 +292,6 @@ impl Eliminated {
     pub fn by_change(&self) -> Matrix6<f64> {
         -(self.pose_inverse * self.rig_mixed.fixed_rows::<6>(TRANSFORM).transpose())
     }
-
 }
 
 /// Covariance of a pose, which is `pose_inverse` from its corners, where `right_from_left` scatters from pose to pose so much that each tells
