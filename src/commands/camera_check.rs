@@ -16,6 +16,7 @@ use crate::imaging::overlay::SideBySide;
 use crate::imaging::{Board, Corners, Wanted, find_corners};
 use crate::report::drawing::pair_picture::PairPicture;
 use crate::report::drawing::picture::PairJpeg;
+use crate::stereo::board_pose::pair_excess::pair_excess;
 use crate::stereo::calibrate::{Calibration, calibrate};
 use crate::stereo::data::residuals;
 use crate::stereo::judge::assessment::{Demand, Judged};
@@ -55,7 +56,11 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let page = report::camera_check::page(&calibration, &judged, &corners, &pictures)?;
     out.write_json(
         "calibration.json",
-        &CalibrationFile::from(calibration.rig()).with_check(&calibration.own_noise, judged.coverage.corner_depths_mm),
+        &CalibrationFile::from(calibration.rig()).with_check(
+            &calibration.own_noise,
+            pair_excess(&calibration),
+            judged.coverage.corner_depths_mm,
+        ),
     )?;
     if !out.is_input("corners.csv") {
         out.write("corners.csv", corners_csv::to_csv(&calibration.mark(&corners)).as_bytes())?;

@@ -224,6 +224,7 @@ impl RigRecord {
             Judgement::Exchanged => ("exchanged", &[][..], None),
             Judgement::Mirrored(_) => ("mirrored", &[][..], None),
             Judgement::Moved { since, .. } => ("moved", &[][..], Some(since.clone())),
+            Judgement::Loose { .. } => ("loose", &[][..], None),
             Judgement::Unexplained { .. } => ("unexplained", &[][..], None),
         };
         let change = |e: &crate::stereo::board_pose::rig_change::cause::Explanation| ChangeRecord {

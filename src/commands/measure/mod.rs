@@ -75,7 +75,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
 /// The rig, the target and what is known of both.
 fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Knowledge> {
     let board = config.target_board.board(args.squares, args.square_mm)?;
-    let Calibrated { rig, noise, depths_mm } = calibration::read_with_check(rig_file)?;
+    let Calibrated { rig, noise, pair_excess, depths_mm } = calibration::read_with_check(rig_file)?;
     if rig.covariance.is_none() {
         progress::warn(format!(
             "{rig_file} holds no covariance: the points' uncertainties leave out that of the calibration"
@@ -87,7 +87,7 @@ fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Kno
         ));
     }
     let (crossing_mm, tolerance_mm) = (config.measure.crossing_mm, config.tolerance_mm);
-    Ok(Knowledge { rig, noise, depths_mm, board, crossing_mm, tolerance_mm })
+    Ok(Knowledge { rig, noise, pair_excess, depths_mm, board, crossing_mm, tolerance_mm })
 }
 
 /// Every pose of the list with its corners, or why there are none.

@@ -75,7 +75,7 @@ impl Run<'_> {
                 .collect()
         };
         let ended = match &judgement {
-            Judgement::Contradicts(_) | Judgement::Unexplained { .. } => {
+            Judgement::Contradicts(_) | Judgement::Loose { .. } | Judgement::Unexplained { .. } => {
                 judgement.describe(&self.known.rig, self.known.board.square_mm)
             }
             _ => None,

@@ -9,7 +9,7 @@ use crate::statistics::median;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::TargetPose;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
-use crate::stereo::board_pose::rig_change::consistency::{self, Along, Change};
+use crate::stereo::board_pose::rig_change::consistency::{self, Along, Change, MEDIAN_CHI_SQUARE_6};
 use crate::stereo::board_pose::rig_change::flip::Flip;
 use crate::stereo::board_pose::rig_change::judge::{ALLOWED, Changed, judge, scaled};
 use crate::stereo::board_pose::solve::alone::Known;
@@ -79,6 +79,8 @@ pub struct Knowledge {
     pub rig: Rig,
     /// How its corners scattered, where that is known.
     pub noise: Option<Noise>,
+    /// How far its pairs scattered about it beyond their corners' scatter, as [`Series::excess`], where that is known.
+    pub pair_excess: Option<f64>,
     /// Nearest and farthest corner of a board at the calibration, along the left camera's axis, mm, where that is known.
     pub depths_mm: Option<[f64; 2]>,
     /// The target as drawn.
@@ -134,6 +136,7 @@ pub fn measure(known: &Knowledge, seen: Vec<Seen>) -> Series {
         (None, Some(changed)) if changed.moves_mm > known.tolerance_mm && changed.beyond > ALLOWED => {
             Judgement::Contradicts(changed)
         }
+        _ if let Some(loose) = run.loose(&found) => loose,
         (None, Some(changed)) => Judgement::Allowed(changed),
         (None, None) => Judgement::Agrees,
     };
@@ -303,6 +306,15 @@ impl<'a> Run<'a> {
             last = Some(found);
         }
         last
+    }
+
+    /// Poses that scatter about the common rig so far that the usual one would not be believed where poses scatter as the pairs of the
+    /// calibration, and whose points are therefore of no use.
+    fn loose(&self, found: &Estimate<'_>) -> Option<Judgement> {
+        let times = found.excess / self.known.pair_excess?;
+        let sigma_mm = median((0..self.at.len()).filter_map(|i| found.own_sigma_mm(i)))?;
+        (MEDIAN_CHI_SQUARE_6 * times > POSE_LIMIT && sigma_mm > self.known.tolerance_mm)
+            .then(|| Judgement::Loose { times: times.sqrt(), sigma_mm })
     }
 
     /// Leaves the poses from a change along the run on out, where it moves points by more than their uncertainty allows. `worst` is the

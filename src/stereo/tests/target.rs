@@ -25,6 +25,7 @@ fn the_targets_scatter_is_the_predicted_one() {
     let known = Knowledge {
         rig: world.rig.clone(),
         noise: None,
+        pair_excess: None,
         depths_mm: None,
         board: world.board,
         crossing_mm: 0.01,
@@ -55,8 +56,15 @@ fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
     let corners = world.corners(30);
     let judged = |rig: &crate::stereo::Rig, square_mm: f64| {
         let board = crate::imaging::Board { square_mm, ..world.board };
-        let known =
-            Knowledge { rig: rig.clone(), noise: None, depths_mm: None, board, crossing_mm: 0.01, tolerance_mm: 0.05 };
+        let known = Knowledge {
+            rig: rig.clone(),
+            noise: None,
+            pair_excess: None,
+            depths_mm: None,
+            board,
+            crossing_mm: 0.01,
+            tolerance_mm: 0.05,
+        };
         let judgement = series::measure(&known, run_of(corners.clone())).judgement;
         judgement.describe(rig, square_mm).unwrap_or_default()
     };

@@ -100,7 +100,7 @@ const LINES: [Line; 7] = [
         what: "yaw at random from pose to pose, deg",
         sizes: &[0.001, 0.005, 0.02],
         plant: |w, deg| (knowledge(w), changing_run(w, shaken(w, deg, 0.0, 1))),
-        is_reason: |judgement, _| matches!(judgement, Judgement::Unexplained { .. }),
+        is_reason: |judgement, _| matches!(judgement, Judgement::Loose { .. }),
         clean: false,
     },
     Line {

@@ -6,6 +6,7 @@ use stereocal::simulate::draws::{Draws, Purpose};
 use stereocal::simulate::settings::Settings;
 use stereocal::simulate::world::World;
 use stereocal::stereo::Lens;
+use stereocal::stereo::board_pose::pair_excess::pair_excess;
 use stereocal::stereo::board_pose::series::{Knowledge, Seen};
 use stereocal::stereo::calibrate::calibrate;
 use stereocal::stereo::select::lens_ladder::Options;
@@ -39,6 +40,7 @@ fn known_from(world: &World, corners: &Corners) -> Knowledge {
     Knowledge {
         rig: found.rig().clone(),
         noise: Some(found.own_noise),
+        pair_excess: Some(pair_excess(&found)),
         depths_mm: None,
         board: world.target.drawing,
         crossing_mm: 0.01,

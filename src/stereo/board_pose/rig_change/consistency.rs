@@ -16,7 +16,7 @@ use crate::stereo::board_pose::solve::pose_block::Eliminated;
 use crate::stereo::solve::normal_equations::inverse6;
 
 /// Median of chi-square with six degrees of freedom.
-const MEDIAN_CHI_SQUARE_6: f64 = 5.348;
+pub(in crate::stereo::board_pose) const MEDIAN_CHI_SQUARE_6: f64 = 5.348;
 
 /// Numbers of a change.
 const NUMBERS: f64 = 6.0;

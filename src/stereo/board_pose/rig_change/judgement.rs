@@ -29,6 +29,13 @@ pub enum Judgement {
         /// See above.
         moved_mm: f64,
     },
+    /// It is another from pose to pose.
+    Loose {
+        /// How many times as far as the pairs of the calibration the poses scatter about it.
+        times: f64,
+        /// Standard deviation of a point for it, mm.
+        sigma_mm: f64,
+    },
     /// Nothing that is known of explains the pictures.
     Unexplained {
         /// Median over the poses of what is left, px.
@@ -69,6 +76,10 @@ impl Judgement {
             Judgement::Moved { since, creeps: false, turned_deg, moved_mm } => format!(
                 "the rig moved before pose {since}: the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the left"
             ),
+            Judgement::Loose { times, sigma_mm } => format!(
+                "the rig is another from pose to pose: the poses disagree with one rig {times:.1} times as far as the pairs of the calibration \
+                 did, and their points are known to {sigma_mm:.3} mm only; a camera is loose, or left and right are not of one moment"
+            ),
             Judgement::Unexplained { misfit_px } => format!(
                 "the calibration does not suit these pictures: the target's corners miss it by {misfit_px:.2} px, and no single change of \
                  the rig or of the target explains that"
@@ -87,7 +98,7 @@ impl Judgement {
             Judgement::Mirrored(_) => Some(
                 "take the pictures as the cameras give them, as at the calibration: see the cameras' settings and the program that saved them",
             ),
-            Judgement::Moved { .. } => Some(
+            Judgement::Moved { .. } | Judgement::Loose { .. } => Some(
                 "clamp the cameras, calibrate again with `stereocal camera-check IMAGES`, and take the poses from there on again",
             ),
             _ => Some(

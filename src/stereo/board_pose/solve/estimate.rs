@@ -7,7 +7,7 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
 
 use crate::geometry::Transform;
@@ -81,7 +81,7 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
         values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?.0;
     }
     let poses = values.poses.iter().flatten().count();
-    let mut noise = Noise::from_median(&residuals(&bundle, &values, |_| true));
+    let mut noise = at_least(usual, Noise::from_median(&residuals(&bundle, &values, |_| true)), &bundle.views);
     let (mut inflation, mut excess) = (1.0, known_excess.unwrap_or(1.0));
     let mut normal = bundle.normal(&values, Loss::Squared)?;
     let mut covariance = DMatrix::zeros(0, 0);
@@ -107,7 +107,10 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
         let active = residuals(&bundle, &values, |o| o.active);
         noise = match usual {
             Some(usual) if poses < TELLING_POSES => usual,
-            _ => Noise::from_mean(&active, (told + 6.0 * poses as f64).round() as usize),
+            _ => {
+                let here = Noise::from_mean(&active, (told + 6.0 * poses as f64).round() as usize);
+                at_least(usual, here, &bundle.views)
+            }
         };
         inflation = neighbours(&bundle, &values).inflation();
         let close = |a: f64, b: f64| (a - b).abs() <= SETTLED * b.abs().max(1e-5);
@@ -124,14 +127,23 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
 }
 
 impl Estimate<'_> {
+    /// Covariance of a pose's point without what all poses share, mm^2.
+    fn own_point_mm2(&self, i: usize) -> Option<Matrix3<f64>> {
+        let part = self.normal.poses[i].as_ref()?;
+        let own = own_covariance(&part.own, &part.change, &part.by_change, self.excess);
+        Some(own.fixed_view::<3, 3>(3, 3).into_owned())
+    }
+
+    /// Standard deviation of that along its longest axis, mm.
+    pub fn own_sigma_mm(&self, i: usize) -> Option<f64> {
+        Some(self.own_point_mm2(i)?.symmetric_eigenvalues().max().max(0.0).sqrt())
+    }
+
     /// By how much a shift of a pose's point exceeds its uncertainty, as chi-square with three degrees of freedom: its own, and what `known`
     /// leaves open of all that the poses share.
     pub fn beyond(&self, known: &Estimate<'_>, i: usize, shift_mm: &Vector3<f64>) -> Option<f64> {
-        let part = self.normal.poses[i].as_ref()?;
-        let own = own_covariance(&part.own, &part.change, &part.by_change, self.excess);
         let by_shared = known.normal.poses[i].as_ref()?.by_shared.fixed_rows::<3>(3).into_owned();
-        let covariance =
-            own.fixed_view::<3, 3>(3, 3).into_owned() + &by_shared * &known.covariance * by_shared.transpose();
+        let covariance = self.own_point_mm2(i)? + &by_shared * &known.covariance * by_shared.transpose();
         Some(shift_mm.dot(&(covariance.try_inverse()? * shift_mm)))
     }
 }
@@ -162,6 +174,12 @@ fn by_pose(
         wanted.filter_map(with_residual).collect()
     };
     bundle.views.par_iter().zip(&values.poses).map(of).collect()
+}
+
+/// What corners scatter here, but not less than at the calibration: what its lenses and its board left over is not the noise of pictures, and
+/// the target's crossings would be taken for it.
+fn at_least(usual: Option<Noise>, here: Noise, views: &[View]) -> Noise {
+    usual.filter(|usual| usual.typical_px(views) > here.typical_px(views)).unwrap_or(here)
 }
 
 fn inflate(views: &mut [View], inflation: f64) {
