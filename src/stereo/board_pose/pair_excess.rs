@@ -13,7 +13,10 @@ use crate::stereo::model::board_shape::lift;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::triangulate::RIG_NUMBERS;
 
-/// Finds it; at least one.
+/// Two standard deviations of the excess of one pair that chance alone makes, as the median of many has it.
+const CHANCE: f64 = 1.5;
+
+/// Finds it; one where it is not beyond chance.
 pub fn pair_excess(calibration: &Calibration) -> f64 {
     let (board, shared) = (&calibration.board, &calibration.values.shared);
     let height = |l: &[f64]| Vector3::new(0.0, 0.0, l.iter().zip(&shared.shape_mm).map(|(l, s)| l * s).sum());
@@ -26,5 +29,7 @@ pub fn pair_excess(calibration: &Calibration) -> f64 {
         let seen = SeenFrom { rig: &shared.rig, crossings: &places, board, pose, view };
         of_outsider(&PoseBlock::of(&seen, Loss::Squared)?.eliminate(&basis)?, &none)
     });
-    usual_excess(&each.collect::<Vec<_>>()).max(1.0)
+    let each: Vec<_> = each.collect();
+    let chance = 1.0 + CHANCE / (each.iter().flatten().count().max(1) as f64).sqrt();
+    Some(usual_excess(&each)).filter(|excess| *excess > chance).unwrap_or(1.0)
 }

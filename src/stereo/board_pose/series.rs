@@ -2,19 +2,19 @@
 
 use nalgebra::Vector3;
 
-use crate::geometry::{Transform, perturb};
+use crate::geometry::Transform;
 use crate::imaging::{Board, Corner, PairCorners, Side};
 use crate::measurements::RobotPose;
 use crate::statistics::median;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::TargetPose;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
-use crate::stereo::board_pose::rig_change::consistency::{self, Along, Change, MEDIAN_CHI_SQUARE_6};
+use crate::stereo::board_pose::rig_change::consistency::{self, Along};
 use crate::stereo::board_pose::rig_change::flip::Flip;
 use crate::stereo::board_pose::rig_change::judge::{ALLOWED, Changed, judge, scaled};
 use crate::stereo::board_pose::solve::alone::Known;
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
-use crate::stereo::board_pose::solve::estimate::{Estimate, TELLING_POSES, estimate};
+use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
 
@@ -26,12 +26,6 @@ use crate::stereo::board_pose::turns;
 
 /// A change of the rig at one pose that lowers chi-square by more than this is none of chance: one pose in twenty million.
 pub(super) const POSE_LIMIT: f64 = 45.0;
-
-/// The same for a change from one pose on, which is looked for at every pose.
-const MOVED_LIMIT: f64 = 60.0;
-
-/// The least that a pose after a change contributes to its score where the calibration holds no covariance.
-const EACH_POSE: f64 = 20.0;
 
 /// Poses that stray this far beyond the limit in relation to the worst are left out together with it.
 const TOGETHER: f64 = 0.2;
@@ -91,6 +85,12 @@ pub struct Knowledge {
     pub tolerance_mm: f64,
 }
 
+impl Knowledge {
+    pub(super) fn usual(&self) -> Usual {
+        Usual { noise: self.noise, excess: self.pair_excess.unwrap_or(1.0) }
+    }
+}
+
 /// Everything about a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
@@ -130,7 +130,7 @@ pub fn measure(known: &Knowledge, seen: Vec<Seen>) -> Series {
         return run.nothing(Judgement::Unexplained { misfit_px });
     };
     let moved = run.moved.clone();
-    let (found, changed) = judge(found, known.noise);
+    let (found, changed) = judge(found, known.usual());
     let judgement = match (moved, changed) {
         (Some(moved), _) => moved,
         (None, Some(changed)) if changed.moves_mm > known.tolerance_mm && changed.beyond > ALLOWED => {
@@ -201,7 +201,7 @@ impl<'a> Run<'a> {
         median(self.present().map(|i| self.starts[i].misfit_px)).unwrap_or(0.0)
     }
 
-    fn bundle(&self) -> Bundle<'a> {
+    pub(super) fn bundle(&self) -> Bundle<'a> {
         let crossing = self.known.crossing_mm;
         let shape = ShapePrior { in_plane_mm: crossing, out_of_plane_mm: crossing, stretch_mm: crossing };
         let views = self.starts.iter().map(|s| s.view.clone()).collect();
@@ -225,18 +225,20 @@ impl<'a> Run<'a> {
             return None;
         }
         let better = |px: f64| px < 0.3 * misfit_px;
-        let fits = |pairs: &[PairCorners]| {
-            let others = starts(&self.known.rig, &self.known.board, pairs);
-            better(median(others.iter().map(|s| s.misfit_px)).unwrap_or(f64::INFINITY))
+        let misfit = |pairs: Vec<PairCorners>| {
+            let others = starts(&self.known.rig, &self.known.board, &pairs);
+            median(others.iter().map(|s| s.misfit_px)).unwrap_or(f64::INFINITY)
         };
         let exchange =
             |p: &PairCorners| PairCorners { pair: p.pair.clone(), left: p.right.clone(), right: p.left.clone() };
-        if fits(&self.pairs.iter().map(exchange).collect::<Vec<_>>()) {
-            return Some(Judgement::Exchanged);
-        }
-        let flipped = |flip: &Flip| fits(&self.pairs.iter().map(|pair| self.flipped(pair, *flip)).collect::<Vec<_>>());
-        if let Some(flip) = Flip::ALL.into_iter().find(flipped) {
-            return Some(Judgement::Mirrored(flip));
+        let exchanged = (misfit(self.pairs.iter().map(exchange).collect()), Judgement::Exchanged);
+        let flipped = Flip::ALL.map(|flip| {
+            (misfit(self.pairs.iter().map(|pair| self.flipped(pair, flip)).collect()), Judgement::Mirrored(flip))
+        });
+        // A rig that is nearly its own mirror image fits both ways.
+        let others = std::iter::once(exchanged).chain(flipped).filter(|(px, _)| better(*px));
+        if let Some((_, judgement)) = others.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            return Some(judgement);
         }
         if misfit_px <= limit {
             return None;
@@ -247,7 +249,7 @@ impl<'a> Run<'a> {
         let mut bundle = self.bundle();
         bundle.shape.stretch_mm = f64::INFINITY;
         let start = scaled(&self.values(&bundle), &bundle, factor);
-        let found = estimate(bundle, start, self.known.noise, None)?;
+        let found = estimate(bundle, start, self.known.usual(), None)?;
         let left = Known::new(&found);
         let misfits = present.iter().filter_map(|&i| {
             left.fit(&found.bundle.views[i], found.values.poses[i].as_ref()?).map(|alone| alone.rms_px)
@@ -286,7 +288,7 @@ impl<'a> Run<'a> {
         for _ in 0..ROUNDS {
             let bundle = self.bundle();
             let values = self.values(&bundle);
-            let found = estimate(bundle, values, self.known.noise, None)?;
+            let found = estimate(bundle, values, self.known.usual(), None)?;
             // The estimate does without poses of which too few corners fit.
             for (part, pose) in self.taking_part.iter_mut().zip(&found.values.poses) {
                 *part = *part && pose.is_some();
@@ -306,78 +308,6 @@ impl<'a> Run<'a> {
             last = Some(found);
         }
         last
-    }
-
-    /// Poses that scatter about the common rig so far that the usual one would not be believed where poses scatter as the pairs of the
-    /// calibration, and whose points are therefore of no use.
-    fn loose(&self, found: &Estimate<'_>) -> Option<Judgement> {
-        let times = found.excess / self.known.pair_excess?;
-        let sigma_mm = median((0..self.at.len()).filter_map(|i| found.own_sigma_mm(i)))?;
-        (MEDIAN_CHI_SQUARE_6 * times > POSE_LIMIT && sigma_mm > self.known.tolerance_mm)
-            .then(|| Judgement::Loose { times: times.sqrt(), sigma_mm })
-    }
-
-    /// Leaves the poses from a change along the run on out, where it moves points by more than their uncertainty allows. `worst` is the
-    /// score of the worst pose by itself.
-    fn ends_early(&mut self, found: &Estimate<'a>, worst: f64) -> bool {
-        self.along = None;
-        let Some(along) = consistency::along(&found.normal, &found.covariance) else { return false };
-        let after = (along.from..self.taking_part.len()).filter(|&i| self.taking_part[i]).count();
-        // A calibration that does not say how well it is known is a little wrong everywhere, which many poses together would show: then
-        // every pose after the change must show it.
-        let each = if self.known.rig.covariance.is_none() { EACH_POSE * after as f64 } else { 0.0 };
-        if after < 2 || along.evidence <= MOVED_LIMIT || along.gain <= each || along.change.fall <= 1.5 * worst {
-            return false;
-        }
-        let beyond = self.beyond(found, &along);
-        match along.shares.iter().position(|share| share * share * beyond > ALLOWED) {
-            Some(k) => {
-                self.end_at(k, &along);
-                true
-            }
-            None => {
-                self.along = Some(along);
-                false
-            }
-        }
-    }
-
-    /// By how much a whole change exceeds the points' uncertainty, as chi-square with three degrees of freedom. The uncertainty is that of
-    /// poses on one side of the change: the common minimum takes it for noise.
-    fn beyond(&self, found: &Estimate<'a>, along: &Along) -> f64 {
-        let present: Vec<usize> = (0..self.taking_part.len()).filter(|&i| self.taking_part[i]).collect();
-        let before = present.iter().filter(|&&i| i < along.from).count();
-        let side = match () {
-            () if along.creeps => &present[..(present.len() / 4).max(TELLING_POSES).min(present.len())],
-            () if before >= TELLING_POSES.min(present.len() - before) => &present[..before],
-            () => &present[before..],
-        };
-        let (mut bundle, mut values) = (self.bundle(), found.values.clone());
-        values.rig.fill(0.0);
-        (0..values.poses.len()).filter(|i| !side.contains(i)).for_each(|i| values.poses[i] = None);
-        bundle.edge_bends_mm.clone_from(&found.bundle.edge_bends_mm);
-        let alone = estimate(bundle, values, self.known.noise, None);
-        let one_side = alone.as_ref().unwrap_or(found);
-        let shift_mm = |i: usize| {
-            let by_change = one_side.normal.poses[i].as_ref()?.by_change;
-            Some((by_change * along.change.change).fixed_rows::<3>(3).into_owned())
-        };
-        median(side.iter().filter_map(|&i| one_side.beyond(one_side, i, &shift_mm(i)?))).unwrap_or(f64::INFINITY)
-    }
-
-    /// The rig moved before pose `k`: nothing from there on counts.
-    fn end_at(&mut self, k: usize, along: &Along) {
-        let since = self.at[k].pose.clone();
-        let [turned_deg, moved_mm] = size_of(&along.change, &self.known.rig);
-        let judgement = Judgement::Moved { since, creeps: along.creeps, turned_deg, moved_mm };
-        let reason = judgement.describe(&self.known.rig, self.known.board.square_mm).unwrap_or_default();
-        for i in k..self.at.len() {
-            self.taking_part[i] = false;
-            if self.refusals[i].is_none() {
-                self.refusals[i] = Some(Refusal { status: "rig moved", reason: reason.clone() });
-            }
-        }
-        self.moved = Some(judgement);
     }
 
     /// No pose is measured.
@@ -414,12 +344,4 @@ fn same_pictures(a: &PairCorners, b: &PairCorners) -> bool {
     let same =
         |a: &[Corner], b: &[Corner]| !a.is_empty() && a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.px == b.px);
     same(&a.left, &b.left) || same(&a.right, &b.right)
-}
-
-/// Turn of the right camera, deg, and way of its centre, mm.
-fn size_of(change: &Change, rig: &Rig) -> [f64; 2] {
-    let c = &change.change;
-    let moved = perturb(&rig.right_from_left, Vector3::new(c[0], c[1], c[2]), Vector3::new(c[3], c[4], c[5]));
-    let way = moved.inverse().translation.vector - rig.right_from_left.inverse().translation.vector;
-    [Vector3::new(c[0], c[1], c[2]).norm().to_degrees(), way.norm()]
 }

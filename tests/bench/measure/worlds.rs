@@ -31,13 +31,13 @@ pub fn still_world(size_px: u32, target_um: f64, samples: usize, seed: u64) -> W
 
 /// What the calibration of a world's check pairs leaves `measure` with.
 pub fn knowledge(world: &World) -> Knowledge {
-    known_from(world, &noisy(world.check_corners(), 2 * world.settings.seed))
+    known_from(world, &noisy(world.check_corners(), 2 * world.settings.seed)).expect("a calibration")
 }
 
-fn known_from(world: &World, corners: &Corners) -> Knowledge {
+fn known_from(world: &World, corners: &Corners) -> Option<Knowledge> {
     let forced = Options { lens: Some(Lens::Brown4), shape: Some(false) };
-    let found = calibrate(corners, &forced).expect("a calibration");
-    Knowledge {
+    let found = calibrate(corners, &forced).ok()?;
+    Some(Knowledge {
         rig: found.rig().clone(),
         noise: Some(found.own_noise),
         pair_excess: Some(pair_excess(&found)),
@@ -45,7 +45,7 @@ fn known_from(world: &World, corners: &Corners) -> Knowledge {
         board: world.target.drawing,
         crossing_mm: 0.01,
         tolerance_mm: 0.05,
-    }
+    })
 }
 
 /// The run of a world's poses.
@@ -70,7 +70,7 @@ pub fn changing_run(world: &World, change: impl Fn(usize, &mut World)) -> Vec<Se
 }
 
 /// What a calibration leaves `measure` with whose pictures were as little simultaneous as `change` makes them.
-pub fn changing_knowledge(world: &World, change: impl Fn(usize, &mut World)) -> Knowledge {
+pub fn changing_knowledge(world: &World, change: impl Fn(usize, &mut World)) -> Option<Knowledge> {
     let mut corners = world.check_corners();
     for (i, pair) in corners.pairs.iter_mut().enumerate() {
         let mut other = world.clone();

@@ -8,10 +8,9 @@
 use crate::statistics::median;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, moved_mm, stretch};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
-use crate::stereo::board_pose::solve::estimate::{Estimate, estimate};
+use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
 use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
 use crate::stereo::board_pose::solve::prior::stretch_length_mm;
-use crate::stereo::data::corner_noise::Noise;
 
 /// A cause that lowers chi-square by less than this is chance: four standard deviations.
 const CHANCE: f64 = 16.0;
@@ -45,10 +44,7 @@ pub struct Changed {
 }
 
 /// Names what changed, where more than chance did; and the estimate to go on with, in which the change is allowed for.
-pub(in crate::stereo::board_pose) fn judge<'a>(
-    found: Estimate<'a>,
-    usual: Option<Noise>,
-) -> (Estimate<'a>, Option<Changed>) {
+pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual) -> (Estimate<'a>, Option<Changed>) {
     let scores = explanations(&found);
     let best = scores.iter().map(|e| e.fall).fold(0.0, f64::max);
     if best <= CHANCE {
@@ -105,12 +101,7 @@ fn subset<'a>(found: &Estimate<'a>) -> Estimate<'a> {
 }
 
 /// The minimum with a cause that has this variance before.
-fn with_cause<'a>(
-    found: &Estimate<'a>,
-    cause: &Explanation,
-    variance: f64,
-    usual: Option<Noise>,
-) -> Option<Estimate<'a>> {
+fn with_cause<'a>(found: &Estimate<'a>, cause: &Explanation, variance: f64, usual: Usual) -> Option<Estimate<'a>> {
     let mut bundle = found.bundle.clone();
     let mut values = found.values.clone();
     match cause.cause.direction(&bundle.rig_at(&values)) {

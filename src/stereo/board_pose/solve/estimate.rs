@@ -7,7 +7,7 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector2, Vector3};
 use rayon::prelude::*;
 
 use crate::geometry::Transform;
@@ -15,13 +15,14 @@ use crate::statistics::median;
 use crate::stereo::board_pose::rig_change::consistency::{at_each, usual_excess};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Normal, Promise, Values};
 use crate::stereo::board_pose::solve::edge_bend::edge_bends_mm;
-use crate::stereo::board_pose::solve::pose_block::{crossings, own_covariance, residual};
+use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
 use crate::stereo::board_pose::solve::prior::{stretch_mode, weights};
 use crate::stereo::board_pose::start::enough;
 use crate::stereo::data::corner_noise::{Noise, whitener};
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
+use crate::stereo::solve::normal_equations::inverse6;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::solve::uncertainty::invert;
 
@@ -65,12 +66,28 @@ pub(in crate::stereo::board_pose) struct Estimate<'a> {
     pub inflation: f64,
 }
 
-/// Finds the minimum. `usual` is the noise of the calibration's corners, where known; `excess` is held where it is known. `None` where the
+/// What pictures of the rig did at its calibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::stereo::board_pose) struct Usual {
+    /// How corners scattered, where that is known.
+    pub noise: Option<Noise>,
+    /// How far pairs scattered about the rig beyond that, as [`Estimate::excess`]; one where that is not known.
+    pub excess: f64,
+}
+
+impl Usual {
+    /// The excess in units of the noise that is found here.
+    pub fn excess_here(&self, here: &Noise, views: &[View]) -> f64 {
+        self.noise.map_or(1.0, |noise| self.excess * (noise.typical_px(views) / here.typical_px(views)).powi(2))
+    }
+}
+
+/// Finds the minimum. `usual` is what counts at least; `excess` is held where it is known. `None` where the
 /// corners do not determine the poses.
 pub(in crate::stereo::board_pose) fn estimate<'a>(
     mut bundle: Bundle<'a>,
     start: Values,
-    usual: Option<Noise>,
+    usual: Usual,
     known_excess: Option<f64>,
 ) -> Option<Estimate<'a>> {
     let mut values = start;
@@ -81,7 +98,7 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
         values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?.0;
     }
     let poses = values.poses.iter().flatten().count();
-    let mut noise = at_least(usual, Noise::from_median(&residuals(&bundle, &values, |_| true)), &bundle.views);
+    let mut noise = at_least(usual.noise, Noise::from_median(&residuals(&bundle, &values, |_| true)), &bundle.views);
     let (mut inflation, mut excess) = (1.0, known_excess.unwrap_or(1.0));
     let mut normal = bundle.normal(&values, Loss::Squared)?;
     let mut covariance = DMatrix::zeros(0, 0);
@@ -96,7 +113,9 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
         covariance = normal.covariance()?;
         let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm, excess);
         if known_excess.is_none() {
-            excess = (excess * usual_excess(&at_each(&normal, &covariance))).max(1.0);
+            excess = (excess * usual_excess(&at_each(&normal, &covariance)))
+                .max(usual.excess_here(&noise, &bundle.views))
+                .max(1.0);
         }
         if poses >= TELLING_POSES {
             settle_shape(&mut bundle, &values, (&normal, &covariance), certificate.in_plane_mm)?;
@@ -105,11 +124,11 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
         // How many of the shared unknowns the corners determine rather than what was known before.
         let told = covariance.component_mul(&normal.data).sum();
         let active = residuals(&bundle, &values, |o| o.active);
-        noise = match usual {
+        noise = match usual.noise {
             Some(usual) if poses < TELLING_POSES => usual,
             _ => {
                 let here = Noise::from_mean(&active, (told + 6.0 * poses as f64).round() as usize);
-                at_least(usual, here, &bundle.views)
+                at_least(usual.noise, here, &bundle.views)
             }
         };
         inflation = neighbours(&bundle, &values).inflation();
@@ -124,6 +143,20 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
         }
     }
     Some(Estimate { bundle, values, normal, covariance, noise, excess, inflation: inflation * excess })
+}
+
+/// Covariance of a pose, which is `pose_inverse` from its corners, where `right_from_left` scatters from pose to pose so much that each tells
+/// it `excess` times as badly as its corners say; the whiteners hold that. What the target's size and the rays leave undetermined of the
+/// scatter is the pose's. `change` and `by_change` are as a pose's part of the normal equations has them.
+pub(in crate::stereo::board_pose) fn own_covariance(
+    pose_inverse: &Matrix6<f64>,
+    change: &Matrix6<f64>,
+    by_change: &Matrix6<f64>,
+    excess: f64,
+) -> Matrix6<f64> {
+    let Some(change) = inverse6(change).filter(|_| excess > 1.0) else { return *pose_inverse };
+    let all = pose_inverse / excess + by_change * change * by_change.transpose() * (1.0 - 1.0 / excess);
+    0.5 * (all + all.transpose())
 }
 
 impl Estimate<'_> {

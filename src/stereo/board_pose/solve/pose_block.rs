@@ -294,20 +294,6 @@ impl Eliminated {
     }
 }
 
-/// Covariance of a pose, which is `pose_inverse` from its corners, where `right_from_left` scatters from pose to pose so much that each tells
-/// it `excess` times as badly as its corners say; the whiteners hold that. What the target's size and the rays leave undetermined of the
-/// scatter is the pose's. `change` and `by_change` are as [`Eliminated`] has them.
-pub(in crate::stereo::board_pose) fn own_covariance(
-    pose_inverse: &Matrix6<f64>,
-    change: &Matrix6<f64>,
-    by_change: &Matrix6<f64>,
-    excess: f64,
-) -> Matrix6<f64> {
-    let Some(change) = inverse6(change).filter(|_| excess > 1.0) else { return *pose_inverse };
-    let all = pose_inverse / excess + by_change * change * by_change.transpose() * (1.0 - 1.0 / excess);
-    0.5 * (all + all.transpose())
-}
-
 /// Sums over poses for what they share, with every pose eliminated.
 struct SharedSums<'a> {
     basis: &'a DMatrix<f64>,
