@@ -69,6 +69,7 @@ struct RigRecord {
     degrees_of_freedom: Option<f64>,
     /// How much larger the poses' disagreement with the common rig is than chance.
     excess: f64,
+    usual_excess: f64,
     changes: Vec<ChangeRecord>,
     /// First pose after the rig moved.
     moved_before: Option<String>,
@@ -191,7 +192,8 @@ impl MeasureFile {
 
     /// True where neither the corners' scatter nor the poses' disagreement is beyond what was known before.
     pub fn chi_square_is_usual(&self) -> bool {
-        self.chi_square.is_some_and(|chi| chi <= UNUSUAL_NOISE * UNUSUAL_NOISE) && self.rig.excess <= UNUSUAL_EXCESS
+        self.chi_square.is_some_and(|chi| chi <= UNUSUAL_NOISE * UNUSUAL_NOISE)
+            && self.rig.excess <= UNUSUAL_EXCESS * self.rig.usual_excess
     }
 
     /// Crossings of the target in a row.
@@ -239,6 +241,7 @@ impl RigRecord {
             chi_square: series.prior_chi_square.map(|c| c[0]),
             degrees_of_freedom: series.prior_chi_square.map(|c| c[1]),
             excess: series.excess,
+            usual_excess: series.usual_excess,
             changes: changes.iter().map(change).collect(),
             moved_before,
         }
@@ -340,7 +343,7 @@ fn grown(series: &Series) -> Vec<String> {
         })
     };
     let mut all: Vec<String> = series.poses.iter().filter_map(noted).collect();
-    if series.excess > UNUSUAL_EXCESS {
+    if series.excess > UNUSUAL_EXCESS * series.usual_excess {
         all.push(format!(
             "the poses disagree with one common rig {:.1} times as much as the corners' scatter allows: covariances are larger for it",
             series.excess.sqrt()

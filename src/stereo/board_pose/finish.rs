@@ -109,6 +109,7 @@ impl Run<'_> {
             prior_chi_square: Some(prior_chi_square(found)),
             chi_square: Some(sums.0 / sums.1.max(1.0) * against),
             excess: found.excess,
+            usual_excess: self.known.usual().excess_here(&found.noise, &found.bundle.views).max(1.0),
             notes: self.notes,
         }
     }

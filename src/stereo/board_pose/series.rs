@@ -112,6 +112,8 @@ pub struct Series {
     pub chi_square: Option<f64>,
     /// How much larger the poses' disagreement with the common rig is than chance; covariances hold it.
     pub excess: f64,
+    /// How much larger it was at the calibration, in units of the noise here; one where that is not known.
+    pub usual_excess: f64,
     /// What nothing could tell.
     pub notes: Vec<String>,
 }
@@ -335,6 +337,7 @@ impl<'a> Run<'a> {
             prior_chi_square: None,
             chi_square: None,
             excess: 1.0,
+            usual_excess: 1.0,
             notes: self.notes,
         }
     }
