@@ -17,6 +17,7 @@ use crate::imaging::overlay::SideBySide;
 use crate::imaging::{Board, Corners, Wanted, find_corners};
 use crate::report::drawing::pair_picture::PairPicture;
 use crate::report::drawing::picture::PairJpeg;
+use crate::stereo::board_pose::pair_excess::pair_excess;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::residuals;
 use crate::stereo::findings::standing::{self, Asked};
@@ -62,6 +63,7 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
         "calibration.json",
         &CalibrationFile::from(calibration.rig()).with_check(
             &calibration.own_noise,
+            pair_excess(&calibration),
             judged.coverage.corner_depths_mm,
             &judged.volume.volume,
             &calibration.standing.unconfirmed,

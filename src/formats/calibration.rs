@@ -56,6 +56,8 @@ pub struct Calibrated {
     pub rig: Rig,
     /// How corners scattered.
     pub noise: Option<Noise>,
+    /// How far pairs scattered about the rig beyond that, as a variance.
+    pub pair_excess: Option<f64>,
     /// Nearest and farthest corner of a board, along the left camera's axis, mm.
     pub depths_mm: Option<[f64; 2]>,
     /// The volume that the verdict was for.
@@ -69,6 +71,9 @@ pub struct Calibrated {
 struct NoiseRecord {
     factor: f64,
     added_px: f64,
+    /// How far pairs scattered about the rig beyond that, as a variance; one where they did not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pair_excess: Option<f64>,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -160,13 +165,15 @@ impl CalibrationFile {
     pub fn with_check(
         mut self,
         noise: &Noise,
+        pair_excess: f64,
         [nearest_mm, farthest_mm]: [f64; 2],
         volume: &Volume,
         unconfirmed: &[String],
     ) -> CalibrationFile {
         self.volume = Some(volume.clone());
         self.unconfirmed = unconfirmed.to_vec();
-        self.corner_noise = Some(NoiseRecord { factor: noise.factor, added_px: noise.added_px });
+        self.corner_noise =
+            Some(NoiseRecord { factor: noise.factor, added_px: noise.added_px, pair_excess: Some(pair_excess) });
         self.boards = Some(BoardsRecord { nearest_mm, farthest_mm });
         self
     }
@@ -244,11 +251,12 @@ pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
     const WHAT: &str = "the stereo calibration";
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
     let text = files::read_text(path, WHAT, Some(hint))?;
-    let (rig, noise, depths_mm, volume, unconfirmed) = match export::read(path, &text) {
-        Some(rig) => (rig, None, None, None, Vec::new()),
+    let (rig, noise, pair_excess, depths_mm, volume, unconfirmed) = match export::read(path, &text) {
+        Some(rig) => (rig, None, None, None, None, Vec::new()),
         None => {
             let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
-            (file.rig(), file.noise(), file.depths_mm(), file.volume, file.unconfirmed)
+            let pair_excess = file.corner_noise.and_then(|n| n.pair_excess).filter(|e| *e >= 1.0);
+            (file.rig(), file.noise(), pair_excess, file.depths_mm(), file.volume, file.unconfirmed)
         }
     };
     let rig = rig.map_err(|message| files::Error::Format {
@@ -256,7 +264,7 @@ pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
         place: Place { path: path.to_owned(), line: None },
         hint: None,
     })?;
-    Ok(Calibrated { rig, noise, depths_mm, volume, unconfirmed })
+    Ok(Calibrated { rig, noise, pair_excess, depths_mm, volume, unconfirmed })
 }
 
 #[cfg(test)]

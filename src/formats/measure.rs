@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 use crate::geometry::rotation_vector;
@@ -9,10 +10,11 @@ use crate::imaging::{Board, Corners};
 use crate::measurements::{pose_fields, pose_header, quoted};
 use crate::statistics::median;
 use crate::stereo::Rig;
-use crate::stereo::target::TargetPose;
-use crate::stereo::target::finish::{Shape, Shared};
-use crate::stereo::target::rig_change::judgement::Judgement;
-use crate::stereo::target::series::{Knowledge, MeasuredPose, Series};
+use crate::stereo::board_pose::TargetPose;
+use crate::stereo::board_pose::finish::{Shape, Shared};
+use crate::stereo::board_pose::rig_change::judgement::Judgement;
+use crate::stereo::board_pose::series::{Knowledge, MeasuredPose, Series};
+use crate::stereo::volume::Volume;
 
 /// Columns behind the joints.
 const COLUMNS: &str = "x_mm,y_mm,z_mm,sxx_mm2,sxy_mm2,sxz_mm2,syy_mm2,syz_mm2,szz_mm2,rx_rad,ry_rad,rz_rad,fit_rms_mm,corners,status,\
@@ -69,6 +71,7 @@ struct RigRecord {
     degrees_of_freedom: Option<f64>,
     /// How much larger the poses' disagreement with the common rig is than chance.
     excess: f64,
+    usual_excess: f64,
     changes: Vec<ChangeRecord>,
     /// First pose after the rig moved.
     moved_before: Option<String>,
@@ -155,7 +158,7 @@ impl MeasureFile {
         let mut warnings = corners.notes.clone();
         warnings.extend(series.notes.iter().cloned());
         warnings.extend(series.judgement.describe(rig, board.square_mm));
-        warnings.extend(unchecked_depths(series, known));
+        warnings.extend(outside(series, known));
         warnings.extend(scatter(series));
         warnings.extend(grown(series));
         MeasureFile {
@@ -191,7 +194,8 @@ impl MeasureFile {
 
     /// True where neither the corners' scatter nor the poses' disagreement is beyond what was known before.
     pub fn chi_square_is_usual(&self) -> bool {
-        self.chi_square.is_some_and(|chi| chi <= UNUSUAL_NOISE * UNUSUAL_NOISE) && self.rig.excess <= UNUSUAL_EXCESS
+        self.chi_square.is_some_and(|chi| chi <= UNUSUAL_NOISE * UNUSUAL_NOISE)
+            && self.rig.excess <= UNUSUAL_EXCESS * self.rig.usual_excess
     }
 
     /// Crossings of the target in a row.
@@ -222,10 +226,12 @@ impl RigRecord {
             Judgement::Allowed(changed) => ("allowed", &changed.explanations[..], None),
             Judgement::Contradicts(changed) => ("contradicts", &changed.explanations[..], None),
             Judgement::Exchanged => ("exchanged", &[][..], None),
+            Judgement::Mirrored(_) => ("mirrored", &[][..], None),
             Judgement::Moved { since, .. } => ("moved", &[][..], Some(since.clone())),
+            Judgement::Loose { .. } => ("loose", &[][..], None),
             Judgement::Unexplained { .. } => ("unexplained", &[][..], None),
         };
-        let change = |e: &crate::stereo::target::rig_change::cause::Explanation| ChangeRecord {
+        let change = |e: &crate::stereo::board_pose::rig_change::cause::Explanation| ChangeRecord {
             what: e.cause.describe(e.amount, rig, board.square_mm),
             amount: e.amount,
             unit: e.cause.unit(),
@@ -237,6 +243,7 @@ impl RigRecord {
             chi_square: series.prior_chi_square.map(|c| c[0]),
             degrees_of_freedom: series.prior_chi_square.map(|c| c[1]),
             excess: series.excess,
+            usual_excess: series.usual_excess,
             changes: changes.iter().map(change).collect(),
             moved_before,
         }
@@ -300,25 +307,34 @@ fn scatter(series: &Series) -> Option<String> {
     })
 }
 
-/// Poses much nearer or farther than the rig was checked for.
-fn unchecked_depths(series: &Series, known: &Knowledge) -> Option<String> {
-    /// Share of the depth by which a target may stand beyond the boards: what a lens does changes little over it.
+/// Poses outside of the volume that the calibration's verdict is for.
+fn outside(series: &Series, known: &Knowledge) -> Option<String> {
+    /// Share of the depth, and angle, by which a target may stand beyond the boards: what a lens does changes little over it.
     const BEYOND: f64 = 0.25;
+    const BEYOND_DEG: f64 = 15.0;
     /// Poses that are named.
     const NAMED: usize = 5;
-    let [near, far] = known.depths_mm?;
-    let unchecked = |m: &MeasuredPose| {
-        let depth = m.target.as_ref().ok()?.cam_from_board.translation.vector.z;
-        let beyond = depth < near * (1.0 - BEYOND) || depth > far * (1.0 + BEYOND);
-        beyond.then(|| format!("{} ({depth:.0} mm)", m.at.pose))
+    let volume = known.volume.as_ref()?;
+    let [near, far] = volume.depth_mm;
+    let [x0, x1, y0, y1] = volume.tilt_deg;
+    let wider = Volume { depth_mm: [near * (1.0 - BEYOND), far * (1.0 + BEYOND)], ..volume.clone() };
+    let is_outside = |m: &&MeasuredPose| {
+        let Ok(target) = &m.target else { return false };
+        let pose = &target.cam_from_board;
+        let normal = pose.rotation * Vector3::z();
+        let [about_x, about_y] = [1, 0].map(|axis: usize| normal[axis].atan2(normal.z).to_degrees());
+        let within = |angle: f64, low: f64, high: f64| (low - BEYOND_DEG..=high + BEYOND_DEG).contains(&angle);
+        !wider.holds(&known.rig, &Point3::from(pose.translation.vector))
+            || !within(about_x, x0, x1)
+            || !within(about_y, y0, y1)
     };
-    let poses: Vec<String> = series.poses.iter().filter_map(unchecked).collect();
-    let named = poses.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+    let poses: Vec<&str> = series.poses.iter().filter(is_outside).map(|m| m.at.pose.as_str()).collect();
+    let named = poses.iter().take(NAMED).copied().collect::<Vec<_>>().join(", ");
     let more = if poses.len() > NAMED { format!(" and {} more", poses.len() - NAMED) } else { String::new() };
     (!poses.is_empty()).then(|| {
         format!(
-            "nearer or farther than the boards stood at the calibration ({near:.0} to {far:.0} mm), where the rig was not checked: \
-             {named}{more}; calibrate over the depth in which the target stands"
+            "outside of where the boards were at the calibration ({near:.0} to {far:.0} mm away, tilted by {x0:.0} to {x1:.0} and {y0:.0} to {y1:.0} deg), \
+             where the rig was not checked: {named}{more}; calibrate with the board where the target stands, and as it is tilted"
         )
     })
 }
@@ -338,7 +354,7 @@ fn grown(series: &Series) -> Vec<String> {
         })
     };
     let mut all: Vec<String> = series.poses.iter().filter_map(noted).collect();
-    if series.excess > UNUSUAL_EXCESS {
+    if series.excess > UNUSUAL_EXCESS * series.usual_excess {
         all.push(format!(
             "the poses disagree with one common rig {:.1} times as much as the corners' scatter allows: covariances are larger for it",
             series.excess.sqrt()

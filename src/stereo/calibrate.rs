@@ -4,6 +4,7 @@
 //! not and why. Goes wrong: too few pairs, pairs that contradict each other, views too similar to tell the cameras.
 
 use crate::imaging::{Board, Corners, Side, Skipped};
+use crate::stereo::board_pose::print_share::PrintShare;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
 use crate::stereo::data::view::View;
@@ -20,7 +21,6 @@ use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::uncertainty::Uncertainty;
-use crate::stereo::target::print_share::PrintShare;
 use crate::stereo::{Error, Rig};
 
 /// A calibrated rig with all that it was made from.

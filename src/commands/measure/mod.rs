@@ -21,7 +21,7 @@ use crate::imaging::{Corners, PairCorners, Wanted, find_corners};
 use crate::measurements::{self, RobotPose};
 use crate::report::measure::Extras;
 use crate::stereo;
-use crate::stereo::target::series::{self, Knowledge, Refusal, Seen, Series};
+use crate::stereo::board_pose::series::{self, Knowledge, Refusal, Seen, Series};
 use crate::{progress, report};
 
 /// Runs the command.
@@ -87,7 +87,7 @@ fn list_of_poses(source: &Source<'_>) -> Utf8PathBuf {
 /// The rig, the target and what is known of both.
 fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Knowledge> {
     let board = config.target_board.board(args.squares, args.square_mm)?;
-    let Calibrated { rig, noise, depths_mm, .. } = calibration::read_with_check(rig_file)?;
+    let Calibrated { rig, noise, pair_excess, volume, unconfirmed, .. } = calibration::read_with_check(rig_file)?;
     if rig.covariance.is_none() {
         progress::warn(format!(
             "{rig_file} holds no covariance: the points' uncertainties leave out that of the calibration"
@@ -99,7 +99,12 @@ fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Kno
         ));
     }
     let (crossing_mm, tolerance_mm) = (config.measure.crossing_mm, config.tolerance_mm);
-    Ok(Knowledge { rig, noise, depths_mm, board, crossing_mm, tolerance_mm })
+    if let Some(last) = unconfirmed.first() {
+        progress::warn(format!(
+            "the calibration's last pairs contradict it (from pair {last} on): the rig may have changed since. Calibrate it as it is now"
+        ));
+    }
+    Ok(Knowledge { rig, noise, pair_excess, volume, board, crossing_mm, tolerance_mm })
 }
 
 /// Every pose of the list with its corners, or why there are none.

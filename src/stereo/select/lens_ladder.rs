@@ -9,13 +9,13 @@
 //! [`crate::stereo::judge::lengths::model_disagreement`] says what is at stake.
 
 use crate::imaging::Board;
+use crate::stereo::board_pose::print_share::PrintShare;
 use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::select::model_comparison::{Chance, LensScore, Trial, score, simplest};
 use crate::stereo::select::stated_uncertainty;
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::uncertainty;
-use crate::stereo::target::print_share::PrintShare;
 use crate::stereo::{Error, Lens};
 
 /// The lens of all cameras whose pictures do not ask for more. What hand-held pictures leave open of its terms is held by what is expected of

@@ -4,7 +4,7 @@ use nalgebra::{Vector3, Vector6};
 
 use super::*;
 use crate::geometry::transform;
-use crate::stereo::target::series::{self, Knowledge, Seen};
+use crate::stereo::board_pose::series::{self, Knowledge, Seen};
 
 /// All poses of a world as a robot's run.
 fn run_of(corners: crate::imaging::Corners) -> Vec<Seen> {
@@ -25,7 +25,8 @@ fn the_targets_scatter_is_the_predicted_one() {
     let known = Knowledge {
         rig: world.rig.clone(),
         noise: None,
-        depths_mm: None,
+        pair_excess: None,
+        volume: None,
         board: world.board,
         crossing_mm: 0.01,
         tolerance_mm: 0.05,
@@ -45,7 +46,7 @@ fn the_targets_scatter_is_the_predicted_one() {
         // 60 poses: chi-square over its freedom is 1 +- 0.18; the target's shape is found as well and shared by all.
         assert!((0.5..1.7).contains(&(sum / 60.0)), "{sums}");
     }
-    assert_eq!(measured.judgement, crate::stereo::target::rig_change::judgement::Judgement::Agrees);
+    assert_eq!(measured.judgement, crate::stereo::board_pose::rig_change::judgement::Judgement::Agrees);
 }
 
 #[test]
@@ -55,8 +56,15 @@ fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
     let corners = world.corners(30);
     let judged = |rig: &crate::stereo::Rig, square_mm: f64| {
         let board = crate::imaging::Board { square_mm, ..world.board };
-        let known =
-            Knowledge { rig: rig.clone(), noise: None, depths_mm: None, board, crossing_mm: 0.01, tolerance_mm: 0.05 };
+        let known = Knowledge {
+            rig: rig.clone(),
+            noise: None,
+            pair_excess: None,
+            volume: None,
+            board,
+            crossing_mm: 0.01,
+            tolerance_mm: 0.05,
+        };
         let judgement = series::measure(&known, run_of(corners.clone())).judgement;
         judgement.describe(rig, square_mm).unwrap_or_default()
     };

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use stereocal::simulate::world::World;
-use stereocal::stereo::target::series::{Knowledge, Seen, Series, measure};
+use stereocal::stereo::board_pose::series::{Knowledge, Seen, Series, measure};
 
 use crate::worlds::{knowledge, run as poses_of, world};
 
@@ -89,7 +89,7 @@ const FAULTS: [Fault; 15] = [
     },
 ];
 
-fn degrees(axis: Vector3<f64>, deg: f64) -> Isometry3<f64> {
+pub fn degrees(axis: Vector3<f64>, deg: f64) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_scaled_axis(axis * deg.to_radians()))
 }
 
@@ -141,7 +141,7 @@ fn drag(seen: &mut [Seen], count: usize) {
 }
 
 /// The largest deviation in sigmas of a pose that came without a word of its own, and the largest in mm.
-fn worst(series: &Series, world: &World) -> (f64, f64) {
+pub fn worst(series: &Series, world: &World) -> (f64, f64) {
     let mut worst = (0.0_f64, 0.0_f64);
     for (pose, truth) in series.poses.iter().zip(&world.poses) {
         let Ok(target) = &pose.target else { continue };

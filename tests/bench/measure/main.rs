@@ -1,6 +1,6 @@
 //! Benchmark `measure`: is what `measure` says true, does it notice what is wrong, and what does it cost.
 //!
-//! `cargo bench --bench measure -- coverage|pictures|robots|faults|speed`; without a word all of them. `coverage`, `robots` and `faults` work on the
+//! `cargo bench --bench measure -- coverage|pictures|robots|faults|changes|speed`; without a word all of them. `changes` is a part of `faults`. `coverage`, `robots` and `faults` work on the
 //! simulator's true corners with Gaussian noise, so that hundreds of poses cost seconds; `pictures` (of one size in px, where a number follows) and
 //! `speed` run the program on rendered pictures.
 #![allow(
@@ -15,6 +15,7 @@
 mod coverage;
 mod faults;
 mod pictures;
+mod rig_changes;
 mod robots;
 mod speed;
 mod worlds;
@@ -34,6 +35,9 @@ fn main() {
     }
     if runs("faults") {
         faults::run();
+    }
+    if runs("faults") || runs("changes") {
+        rig_changes::run();
     }
     if runs("speed") {
         speed::run_all();

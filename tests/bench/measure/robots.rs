@@ -15,7 +15,7 @@ use stereocal::identify::settings::{Extensions, Method, Settings};
 use stereocal::measurements::{self, Measurement, Observed};
 use stereocal::robot::Robot;
 use stereocal::simulate::world::World;
-use stereocal::stereo::target::series::measure;
+use stereocal::stereo::board_pose::series::measure;
 
 use crate::worlds::{knowledge, run as poses_of, still_world};
 

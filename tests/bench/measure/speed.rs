@@ -131,7 +131,7 @@ fn growth() {
         let (known, seen) = (crate::worlds::knowledge(&world), crate::worlds::run(&world));
         let count = seen.len() as f64;
         let start = Instant::now();
-        let series = stereocal::stereo::target::series::measure(&known, seen);
+        let series = stereocal::stereo::board_pose::series::measure(&known, seen);
         let ok = series.poses.iter().filter(|p| p.target.is_ok()).count();
         println!(
             "solver, {count:5} pairs: {:.2} ms a pair, {ok} measured",

@@ -6,9 +6,10 @@ use stereocal::simulate::draws::{Draws, Purpose};
 use stereocal::simulate::settings::Settings;
 use stereocal::simulate::world::World;
 use stereocal::stereo::Lens;
+use stereocal::stereo::board_pose::pair_excess::pair_excess;
+use stereocal::stereo::board_pose::series::{Knowledge, Seen};
 use stereocal::stereo::calibrate::calibrate;
 use stereocal::stereo::select::lens_ladder::Options;
-use stereocal::stereo::target::series::{Knowledge, Seen};
 
 /// Standard deviation of a corner's coordinate at 1280 px, as rendered pictures give it; at 5120 px the same corner is as sharp.
 pub const SIGMA_PX: f64 = 0.002;
@@ -30,17 +31,21 @@ pub fn still_world(size_px: u32, target_um: f64, samples: usize, seed: u64) -> W
 
 /// What the calibration of a world's check pairs leaves `measure` with.
 pub fn knowledge(world: &World) -> Knowledge {
-    let corners = noisy(world.check_corners(), 2 * world.settings.seed);
+    known_from(world, &noisy(world.check_corners(), 2 * world.settings.seed)).expect("a calibration")
+}
+
+fn known_from(world: &World, corners: &Corners) -> Option<Knowledge> {
     let forced = Options { lens: Some(Lens::Brown4), shape: Some(false) };
-    let found = calibrate(&corners, &forced).expect("a calibration");
-    Knowledge {
+    let found = calibrate(corners, &forced).ok()?;
+    Some(Knowledge {
         rig: found.rig().clone(),
         noise: Some(found.own_noise),
-        depths_mm: None,
+        pair_excess: Some(pair_excess(&found)),
+        volume: None,
         board: world.target.drawing,
         crossing_mm: 0.01,
         tolerance_mm: 0.05,
-    }
+    })
 }
 
 /// The run of a world's poses.
@@ -48,6 +53,32 @@ pub fn run(world: &World) -> Vec<Seen> {
     let corners = noisy(world.pose_corners(), 2 * world.settings.seed + 1);
     let poses = world.poses.iter().zip(corners.pairs);
     poses.map(|(pose, pair)| Seen { at: pose.commanded.clone(), corners: Ok(pair) }).collect()
+}
+
+/// The run where the world is another at each pose, as `change` makes it.
+pub fn changing_run(world: &World, change: impl Fn(usize, &mut World)) -> Vec<Seen> {
+    let mut corners = world.pose_corners();
+    for (i, pair) in corners.pairs.iter_mut().enumerate() {
+        let mut other = world.clone();
+        change(i, &mut other);
+        other.poses = vec![world.poses[i].clone()];
+        *pair = other.pose_corners().pairs.remove(0);
+    }
+    let corners = noisy(corners, 2 * world.settings.seed + 1);
+    let poses = world.poses.iter().zip(corners.pairs);
+    poses.map(|(pose, pair)| Seen { at: pose.commanded.clone(), corners: Ok(pair) }).collect()
+}
+
+/// What a calibration leaves `measure` with whose pictures were as little simultaneous as `change` makes them.
+pub fn changing_knowledge(world: &World, change: impl Fn(usize, &mut World)) -> Option<Knowledge> {
+    let mut corners = world.check_corners();
+    for (i, pair) in corners.pairs.iter_mut().enumerate() {
+        let mut other = world.clone();
+        change(i, &mut other);
+        other.check_poses = vec![world.check_poses[i]];
+        *pair = other.check_corners().pairs.remove(0);
+    }
+    known_from(world, &noisy(corners, 2 * world.settings.seed))
 }
 
 fn noisy(mut corners: Corners, seed: u64) -> Corners {

@@ -2,15 +2,15 @@
 //! reaches into the points.
 //!
 //! Every [`Cause`] is fitted with nothing known of it beforehand; the most likely one is named with its equals. A change that moves the
-//! points by less than the tolerance goes into their covariance: the calibration is believed only as far as the change reaches. A larger
-//! one ends the run.
+//! points by less than the tolerance, or than their own uncertainty allows, goes into their covariance: the calibration is believed only
+//! as far as the change reaches. A larger one ends the run.
 
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::target::rig_change::cause::{Cause, Explanation, explanations, moved_mm, stretch};
-use crate::stereo::target::solve::bundle::{Bundle, Values};
-use crate::stereo::target::solve::estimate::{Estimate, estimate};
-use crate::stereo::target::solve::pose_block::{crossings, residual};
-use crate::stereo::target::solve::prior::stretch_length_mm;
+use crate::statistics::median;
+use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, moved_mm, stretch};
+use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
+use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
+use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
+use crate::stereo::board_pose::solve::prior::stretch_length_mm;
 
 /// A cause that lowers chi-square by less than this is chance: four standard deviations.
 const CHANCE: f64 = 16.0;
@@ -27,6 +27,9 @@ const COMPARED_ON: usize = 48;
 /// Whitened squares beyond this count as this much in the likelihood: outliers.
 const MOST_SQUARE: f64 = 28.0;
 
+/// Chi-square of three degrees of freedom that 95 % of all points stay below: a shift beyond it is more than a point's uncertainty allows.
+pub(in crate::stereo::board_pose) const ALLOWED: f64 = 7.815;
+
 /// What is found of the rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Changed {
@@ -34,15 +37,14 @@ pub struct Changed {
     pub explanations: Vec<Explanation>,
     /// By how much the points move with it, root mean square, mm.
     pub moves_mm: f64,
+    /// By how much that exceeds their uncertainty: chi-square with three degrees of freedom, the median over the poses.
+    pub beyond: f64,
     /// How many times less unlikely it makes what is seen: the fall of chi-square.
     pub fall: f64,
 }
 
 /// Names what changed, where more than chance did; and the estimate to go on with, in which the change is allowed for.
-pub(in crate::stereo::target) fn judge<'a>(
-    found: Estimate<'a>,
-    usual: Option<Noise>,
-) -> (Estimate<'a>, Option<Changed>) {
+pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual) -> (Estimate<'a>, Option<Changed>) {
     let scores = explanations(&found);
     let best = scores.iter().map(|e| e.fall).fold(0.0, f64::max);
     if best <= CHANCE {
@@ -65,11 +67,22 @@ pub(in crate::stereo::target) fn judge<'a>(
     let on_rig = fitted.iter().map(|(_, e)| e).find(|e| e.cause != Cause::Pitch).unwrap_or(&first);
     let known = on_rig.amount.powi(2).max(f64::MIN_POSITIVE);
     let Some(free) = with_cause(&found, on_rig, f64::INFINITY, usual) else { return (found, None) };
-    let changed = Changed { explanations: equals, moves_mm: moved_mm(&found, &free), fall: best };
+    let changed =
+        Changed { explanations: equals, moves_mm: moved_mm(&found, &free), beyond: beyond(&found, &free), fall: best };
     match with_cause(&found, on_rig, known, usual) {
         Some(allowed) => (allowed, Some(changed)),
         None => (free, Some(changed)),
     }
+}
+
+/// By how much the points move between two minima, in units of what the second leaves open of each and the first of what they share.
+fn beyond(known: &Estimate<'_>, free: &Estimate<'_>) -> f64 {
+    let poses = known.values.poses.iter().zip(&free.values.poses).enumerate();
+    let each = poses.filter_map(|(i, (a, b))| {
+        let shift_mm = b.as_ref()?.translation.vector - a.as_ref()?.translation.vector;
+        free.beyond(known, i, &shift_mm)
+    });
+    median(each).unwrap_or(0.0)
 }
 
 /// Some of the poses, evenly spread.
@@ -88,12 +101,7 @@ fn subset<'a>(found: &Estimate<'a>) -> Estimate<'a> {
 }
 
 /// The minimum with a cause that has this variance before.
-fn with_cause<'a>(
-    found: &Estimate<'a>,
-    cause: &Explanation,
-    variance: f64,
-    usual: Option<Noise>,
-) -> Option<Estimate<'a>> {
+fn with_cause<'a>(found: &Estimate<'a>, cause: &Explanation, variance: f64, usual: Usual) -> Option<Estimate<'a>> {
     let mut bundle = found.bundle.clone();
     let mut values = found.values.clone();
     match cause.cause.direction(&bundle.rig_at(&values)) {
@@ -106,7 +114,7 @@ fn with_cause<'a>(
             bundle.shape.stretch_mm = bundle.shape.stretch_mm.hypot(variance.sqrt() * stretch_length_mm(bundle.board));
         }
     }
-    estimate(bundle, values, usual)
+    estimate(bundle, values, usual, Some(found.excess))
 }
 
 /// How much of a cause a fit with it found.
@@ -147,7 +155,7 @@ fn shape_evidence(fit: &Estimate<'_>) -> f64 {
 }
 
 /// Values for a target whose size is off by a large factor: every pose scaled with it.
-pub(in crate::stereo::target) fn scaled(values: &Values, bundle: &Bundle<'_>, factor: f64) -> Values {
+pub(in crate::stereo::board_pose) fn scaled(values: &Values, bundle: &Bundle<'_>, factor: f64) -> Values {
     let mut next = values.clone();
     for (deviation, at) in next.deviations_mm.iter_mut().zip(bundle.board.corners_mm()) {
         *deviation = at.coords * (factor - 1.0);

@@ -10,6 +10,8 @@
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
 
 use crate::imaging::Board;
+use crate::stereo::board_pose::solve::pose_block::{PoseBlock, SeenFrom, Totals, crossings};
+use crate::stereo::board_pose::solve::window::{SeenShares, Window};
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
 use crate::stereo::model::board_shape::{NUMBERS, lift};
@@ -17,8 +19,6 @@ use crate::stereo::model::parameters::Layout;
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::solve::pose_block::{PoseBlock, SeenFrom, Totals, crossings};
-use crate::stereo::target::solve::window::{SeenShares, Window};
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
 /// The print of a calibration board, and what it does.

@@ -10,9 +10,9 @@ use nalgebra::{DMatrix, DVector, Point3, Vector3};
 use crate::geometry::perturb;
 use crate::imaging::Board;
 use crate::stereo::Rig;
+use crate::stereo::board_pose::solve::pose_block::TRANSFORM;
 use crate::stereo::model::projection::CAMERA_NUMBERS;
 use crate::stereo::model::rig::Covariance;
-use crate::stereo::target::solve::pose_block::TRANSFORM;
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number, rig_number_name};
 
 /// How tightly the deviations are held free of shift, turn and tilt, as a multiple of what the corners say about them.
@@ -20,7 +20,7 @@ const HELD: f64 = 1e4;
 
 /// What the calibration says.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::target) struct RigPrior {
+pub(in crate::stereo::board_pose) struct RigPrior {
     /// The rig as calibrated.
     pub rig: Rig,
     /// Names of the numbers with a covariance.
@@ -114,7 +114,7 @@ fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// What is known of the target, as standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stereo::target) struct ShapePrior {
+pub(in crate::stereo::board_pose) struct ShapePrior {
     /// Of a crossing along x and along y, mm.
     pub in_plane_mm: f64,
     /// Of a crossing's height, mm.
@@ -124,7 +124,7 @@ pub(in crate::stereo::target) struct ShapePrior {
 }
 
 /// Unit vectors in the space of all deviations (x, y, z of every crossing): shifts, turn and tilts, which the frame takes up.
-pub(in crate::stereo::target) fn frame_modes(board: &Board) -> Vec<DVector<f64>> {
+pub(in crate::stereo::board_pose) fn frame_modes(board: &Board) -> Vec<DVector<f64>> {
     type Way = fn(&Point3<f64>) -> Vector3<f64>;
     let ways: [Way; 6] = [
         |_| Vector3::x(),
@@ -138,12 +138,12 @@ pub(in crate::stereo::target) fn frame_modes(board: &Board) -> Vec<DVector<f64>>
 }
 
 /// The unit vector of a common stretch.
-pub(in crate::stereo::target) fn stretch_mode(board: &Board) -> DVector<f64> {
+pub(in crate::stereo::board_pose) fn stretch_mode(board: &Board) -> DVector<f64> {
     mode(board, |p| p.coords)
 }
 
 /// Length of the vector of all deviations when the board is stretched by the whole of its size, mm.
-pub(in crate::stereo::target) fn stretch_length_mm(board: &Board) -> f64 {
+pub(in crate::stereo::board_pose) fn stretch_length_mm(board: &Board) -> f64 {
     board.corners_mm().map(|p| p.coords.norm_squared()).sum::<f64>().sqrt()
 }
 
@@ -156,7 +156,7 @@ fn mode(board: &Board, way: impl Fn(&Point3<f64>) -> Vector3<f64>) -> DVector<f6
 }
 
 /// The weights of all that is known before, as a matrix over the shared unknowns. `data` is what the corners say.
-pub(in crate::stereo::target) fn weights(
+pub(in crate::stereo::board_pose) fn weights(
     rig: &RigPrior,
     shape: &ShapePrior,
     board: &Board,

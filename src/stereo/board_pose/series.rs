@@ -2,35 +2,31 @@
 
 use nalgebra::Vector3;
 
-use crate::geometry::{Transform, perturb};
+use crate::geometry::Transform;
 use crate::imaging::{Board, Corner, PairCorners, Side};
 use crate::measurements::RobotPose;
 use crate::statistics::median;
 use crate::stereo::Rig;
+use crate::stereo::board_pose::TargetPose;
+use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
+use crate::stereo::board_pose::rig_change::consistency::{self, Along};
+use crate::stereo::board_pose::rig_change::flip::Flip;
+use crate::stereo::board_pose::rig_change::judge::{ALLOWED, Changed, judge, scaled};
+use crate::stereo::board_pose::solve::alone::Known;
+use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
+use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
-use crate::stereo::target::TargetPose;
-use crate::stereo::target::rig_change::cause::{Cause, Explanation, stretch};
-use crate::stereo::target::rig_change::consistency::{self, Change, usual_excess};
-use crate::stereo::target::rig_change::judge::{Changed, judge, scaled};
-use crate::stereo::target::solve::alone::Known;
-use crate::stereo::target::solve::bundle::{Bundle, Values};
-use crate::stereo::target::solve::estimate::{Estimate, estimate};
+use crate::stereo::volume::Volume;
 
-use crate::stereo::target::finish::{Shape, Shared};
-use crate::stereo::target::rig_change::judgement::Judgement;
-use crate::stereo::target::solve::prior::{RigPrior, ShapePrior};
-use crate::stereo::target::start::{Start, baseline_ratio, starts};
-use crate::stereo::target::turns;
+use crate::stereo::board_pose::finish::{Shape, Shared};
+use crate::stereo::board_pose::rig_change::judgement::Judgement;
+use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior};
+use crate::stereo::board_pose::start::{Start, baseline_ratio, starts};
+use crate::stereo::board_pose::turns;
 
 /// A change of the rig at one pose that lowers chi-square by more than this is none of chance: one pose in twenty million.
 pub(super) const POSE_LIMIT: f64 = 45.0;
-
-/// The same for a change from one pose on, which is looked for at every pose.
-const MOVED_LIMIT: f64 = 60.0;
-
-/// The least that a pose after a change contributes to its score where the calibration holds no covariance.
-const EACH_POSE: f64 = 20.0;
 
 /// Poses that stray this far beyond the limit in relation to the worst are left out together with it.
 const TOGETHER: f64 = 0.2;
@@ -40,6 +36,9 @@ const ROUNDS: usize = 8;
 
 /// Corners that the rig misses by more than this share of the picture's width belong to another rig, or to another target.
 const GROSS_SHARE: f64 = 1e-3;
+
+/// Corners that miss the rig this many times as far as usual are looked at in pictures that are exchanged or the other way round.
+const UNUSUAL_MISFIT: f64 = 3.0;
 
 /// The pictures of one pose.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,14 +74,22 @@ pub struct Knowledge {
     pub rig: Rig,
     /// How its corners scattered, where that is known.
     pub noise: Option<Noise>,
-    /// Nearest and farthest corner of a board at the calibration, along the left camera's axis, mm, where that is known.
-    pub depths_mm: Option<[f64; 2]>,
+    /// How far its pairs scattered about it beyond their corners' scatter, as [`Series::excess`], where that is known.
+    pub pair_excess: Option<f64>,
+    /// Where the boards were at the calibration, where that is known.
+    pub volume: Option<Volume>,
     /// The target as drawn.
     pub board: Board,
     /// Standard deviation of a crossing against the drawing, by the certificate, mm.
     pub crossing_mm: f64,
     /// Points that are wrong by more than this are of no use, mm.
     pub tolerance_mm: f64,
+}
+
+impl Knowledge {
+    pub(super) fn usual(&self) -> Usual {
+        Usual { noise: self.noise, excess: self.pair_excess.unwrap_or(1.0) }
+    }
 }
 
 /// Everything about a run.
@@ -106,6 +113,8 @@ pub struct Series {
     pub chi_square: Option<f64>,
     /// How much larger the poses' disagreement with the common rig is than chance; covariances hold it.
     pub excess: f64,
+    /// How much larger it was at the calibration, in units of the noise here; one where that is not known.
+    pub usual_excess: f64,
     /// What nothing could tell.
     pub notes: Vec<String>,
 }
@@ -124,10 +133,13 @@ pub fn measure(known: &Knowledge, seen: Vec<Seen>) -> Series {
         return run.nothing(Judgement::Unexplained { misfit_px });
     };
     let moved = run.moved.clone();
-    let (found, changed) = judge(found, known.noise);
+    let (found, changed) = judge(found, known.usual());
     let judgement = match (moved, changed) {
         (Some(moved), _) => moved,
-        (None, Some(changed)) if changed.moves_mm > known.tolerance_mm => Judgement::Contradicts(changed),
+        (None, Some(changed)) if changed.moves_mm > known.tolerance_mm && changed.beyond > ALLOWED => {
+            Judgement::Contradicts(changed)
+        }
+        _ if let Some(loose) = run.loose(&found) => loose,
         (None, Some(changed)) => Judgement::Allowed(changed),
         (None, None) => Judgement::Agrees,
     };
@@ -146,9 +158,11 @@ pub(super) struct Run<'a> {
     /// Poses that take part in the bundle.
     pub(super) taking_part: Vec<bool>,
     pub(super) moved: Option<Judgement>,
+    /// A change along the run that the points' uncertainty allows.
+    pub(super) along: Option<Along>,
     pub(super) notes: Vec<String>,
-    /// Left and right corners the other way round.
-    exchanged_pairs: Vec<PairCorners>,
+    /// The corners as they were found.
+    pairs: Vec<PairCorners>,
 }
 
 impl<'a> Run<'a> {
@@ -179,9 +193,7 @@ impl<'a> Run<'a> {
         for ((start, view), pose) in starts.iter_mut().zip(views).zip(poses) {
             (start.view, start.pose) = (view, pose);
         }
-        let exchange = |p: PairCorners| PairCorners { pair: p.pair, left: p.right, right: p.left };
-        let exchanged_pairs = pairs.into_iter().map(exchange).collect();
-        Run { known, at, refusals, starts, taking_part, moved: None, notes, exchanged_pairs }
+        Run { known, at, refusals, starts, taking_part, moved: None, along: None, notes, pairs }
     }
 
     fn present(&self) -> impl Iterator<Item = usize> + '_ {
@@ -192,7 +204,7 @@ impl<'a> Run<'a> {
         median(self.present().map(|i| self.starts[i].misfit_px)).unwrap_or(0.0)
     }
 
-    fn bundle(&self) -> Bundle<'a> {
+    pub(super) fn bundle(&self) -> Bundle<'a> {
         let crossing = self.known.crossing_mm;
         let shape = ShapePrior { in_plane_mm: crossing, out_of_plane_mm: crossing, stretch_mm: crossing };
         let views = self.starts.iter().map(|s| s.view.clone()).collect();
@@ -210,21 +222,37 @@ impl<'a> Run<'a> {
     fn gross(&self) -> Option<Judgement> {
         let limit = GROSS_SHARE * f64::from(self.known.rig.left.width);
         let misfit_px = self.misfit_px();
-        if misfit_px <= limit {
+        let views: Vec<View> = self.starts.iter().map(|s| s.view.clone()).collect();
+        let usual_px = self.known.noise.map_or(f64::INFINITY, |noise| noise.typical_px(&views));
+        if misfit_px <= limit.min(UNUSUAL_MISFIT * usual_px) {
             return None;
         }
         let better = |px: f64| px < 0.3 * misfit_px;
-        let present: Vec<usize> = self.present().collect();
-        let others = starts(&self.known.rig, &self.known.board, &self.exchanged_pairs);
-        if better(median(others.iter().map(|s| s.misfit_px)).unwrap_or(f64::INFINITY)) {
-            return Some(Judgement::Exchanged);
+        let misfit = |pairs: Vec<PairCorners>| {
+            let others = starts(&self.known.rig, &self.known.board, &pairs);
+            median(others.iter().map(|s| s.misfit_px)).unwrap_or(f64::INFINITY)
+        };
+        let exchange =
+            |p: &PairCorners| PairCorners { pair: p.pair.clone(), left: p.right.clone(), right: p.left.clone() };
+        let exchanged = (misfit(self.pairs.iter().map(exchange).collect()), Judgement::Exchanged);
+        let flipped = Flip::ALL.map(|flip| {
+            (misfit(self.pairs.iter().map(|pair| self.flipped(pair, flip)).collect()), Judgement::Mirrored(flip))
+        });
+        // A rig that is nearly its own mirror image fits both ways.
+        let others = std::iter::once(exchanged).chain(flipped).filter(|(px, _)| better(*px));
+        if let Some((_, judgement)) = others.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            return Some(judgement);
         }
+        if misfit_px <= limit {
+            return None;
+        }
+        let present: Vec<usize> = self.present().collect();
         let views: Vec<View> = present.iter().map(|&i| self.starts[i].view.clone()).collect();
         let factor = 1.0 / baseline_ratio(&self.known.rig, &views)?;
         let mut bundle = self.bundle();
         bundle.shape.stretch_mm = f64::INFINITY;
         let start = scaled(&self.values(&bundle), &bundle, factor);
-        let found = estimate(bundle, start, self.known.noise)?;
+        let found = estimate(bundle, start, self.known.usual(), None)?;
         let left = Known::new(&found);
         let misfits = present.iter().filter_map(|&i| {
             left.fit(&found.bundle.views[i], found.values.poses[i].as_ref()?).map(|alone| alone.rms_px)
@@ -241,7 +269,20 @@ impl<'a> Run<'a> {
             .collect();
         let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY };
         let moves_mm = median(moves).unwrap_or(0.0);
-        Some(Judgement::Contradicts(Changed { explanations: vec![explanation], moves_mm, fall: f64::INFINITY }))
+        Some(Judgement::Contradicts(Changed {
+            explanations: vec![explanation],
+            moves_mm,
+            beyond: f64::INFINITY,
+            fall: f64::INFINITY,
+        }))
+    }
+
+    /// A pair as it would have been found in pictures that are the other way round, each with the camera that it has.
+    fn flipped(&self, pair: &PairCorners, flip: Flip) -> PairCorners {
+        let rig = &self.known.rig;
+        let [left, right] = [(&rig.left, &pair.left), (&rig.right, &pair.right)]
+            .map(|(camera, corners)| flip.of(&self.known.board, [camera.width, camera.height], corners));
+        PairCorners { pair: pair.pair.clone(), left, right }
     }
 
     /// The bundle over the poses that fit together; the others are left out, and a rig that moved ends the run before it.
@@ -250,23 +291,17 @@ impl<'a> Run<'a> {
         for _ in 0..ROUNDS {
             let bundle = self.bundle();
             let values = self.values(&bundle);
-            let found = estimate(bundle, values, self.known.noise)?;
+            let found = estimate(bundle, values, self.known.usual(), None)?;
             // The estimate does without poses of which too few corners fit.
             for (part, pose) in self.taking_part.iter_mut().zip(&found.values.poses) {
                 *part = *part && pose.is_some();
             }
             let each = consistency::at_each(&found.normal, &found.covariance);
-            let excess = usual_excess(&each);
             let worst = each.iter().flatten().map(|c| c.fall).fold(0.0, f64::max);
-            let tail = consistency::from_one_on(&found.normal, &found.covariance);
-            if let Some((k, change, _)) = tail.filter(|(k, change, gain)| {
-                let after = (*k..self.taking_part.len()).filter(|&i| self.taking_part[i]).count();
-                after >= 2 && *gain > self.moved_limit(after) * excess && change.fall > 1.5 * worst
-            }) {
-                self.end_at(k, &change);
+            if self.ends_early(&found, worst) {
                 continue;
             }
-            let limit = (POSE_LIMIT * excess).max(TOGETHER * worst);
+            let limit = POSE_LIMIT.max(TOGETHER * worst);
             let strays: Vec<usize> = (0..each.len()).filter(|&i| each[i].is_some_and(|c| c.fall > limit)).collect();
             let remain = self.taking_part.iter().filter(|part| **part).count() - strays.len();
             if strays.is_empty() || remain == 0 {
@@ -276,29 +311,6 @@ impl<'a> Run<'a> {
             last = Some(found);
         }
         last
-    }
-
-    /// A calibration that does not say how well it is known is a little wrong everywhere, which many poses together would show: then
-    /// every pose after the change must show it.
-    fn moved_limit(&self, after: usize) -> f64 {
-        let each = if self.known.rig.covariance.is_none() { EACH_POSE * after as f64 } else { 0.0 };
-        MOVED_LIMIT + each
-    }
-
-    /// The rig moved before pose `k`: nothing from there on counts.
-    fn end_at(&mut self, k: usize, change: &Change) {
-        let since = self.at[k].pose.clone();
-        let [turned_deg, moved_mm] = size_of(change, &self.known.rig);
-        let reason = format!(
-            "the rig moved before pose {since}: the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the left"
-        );
-        for i in k..self.at.len() {
-            self.taking_part[i] = false;
-            if self.refusals[i].is_none() {
-                self.refusals[i] = Some(Refusal { status: "rig moved", reason: reason.clone() });
-            }
-        }
-        self.moved = Some(Judgement::Moved { since, turned_deg, moved_mm });
     }
 
     /// No pose is measured.
@@ -326,6 +338,7 @@ impl<'a> Run<'a> {
             prior_chi_square: None,
             chi_square: None,
             excess: 1.0,
+            usual_excess: 1.0,
             notes: self.notes,
         }
     }
@@ -335,12 +348,4 @@ fn same_pictures(a: &PairCorners, b: &PairCorners) -> bool {
     let same =
         |a: &[Corner], b: &[Corner]| !a.is_empty() && a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.px == b.px);
     same(&a.left, &b.left) || same(&a.right, &b.right)
-}
-
-/// Turn of the right camera, deg, and way of its centre, mm.
-fn size_of(change: &Change, rig: &Rig) -> [f64; 2] {
-    let c = &change.change;
-    let moved = perturb(&rig.right_from_left, Vector3::new(c[0], c[1], c[2]), Vector3::new(c[3], c[4], c[5]));
-    let way = moved.inverse().translation.vector - rig.right_from_left.inverse().translation.vector;
-    [Vector3::new(c[0], c[1], c[2]).norm().to_degrees(), way.norm()]
 }

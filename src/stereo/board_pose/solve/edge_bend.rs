@@ -8,12 +8,12 @@ use nalgebra::{Matrix2, Vector3};
 
 use crate::imaging::{Board, Side};
 use crate::stereo::Rig;
+use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
+use crate::stereo::board_pose::solve::estimate::OUTLIER;
+use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
+use crate::stereo::board_pose::solve::window::{Window, crossing_means};
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::observation::Observation;
-use crate::stereo::target::solve::bundle::{Bundle, Values};
-use crate::stereo::target::solve::estimate::OUTLIER;
-use crate::stereo::target::solve::pose_block::{crossings, residual};
-use crate::stereo::target::solve::window::{Window, crossing_means};
 
 /// Standard deviations by which the corners of a crossing must scatter beyond their noise.
 const TELLING: f64 = 4.0;
@@ -36,7 +36,7 @@ fn straight_part(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Vector3<f
 
 impl Bundle<'_> {
     /// Sets the crossings to what their corners, each through its own window, show on the whole; and with it what each corner sees.
-    pub(in crate::stereo::target) fn unbend(&mut self, values: &mut Values) {
+    pub(in crate::stereo::board_pose) fn unbend(&mut self, values: &mut Values) {
         let board = self.board;
         let windows = Window::means(board, &self.views);
         let off = crossing_means(board, &self.views, |o| o.seen_off_mm);
@@ -55,7 +55,12 @@ impl Bundle<'_> {
     }
 
     /// A corner with what its crossing's edges add to its covariance.
-    pub(in crate::stereo::target) fn with_edge_bend(&self, rig: &Rig, depth_mm: f64, o: &Observation) -> Observation {
+    pub(in crate::stereo::board_pose) fn with_edge_bend(
+        &self,
+        rig: &Rig,
+        depth_mm: f64,
+        o: &Observation,
+    ) -> Observation {
         let bend_px = self.edge_bends_mm[self.board.index(o.col, o.row)] * px_per_mm(rig, o.side, depth_mm);
         let mut o = *o;
         o.covariance_px2 += Matrix2::identity() * (bend_px * bend_px);
@@ -69,7 +74,7 @@ fn px_per_mm(rig: &Rig, side: Side, depth_mm: f64) -> f64 {
 }
 
 /// Standard deviation of what bent edges add to a corner along x and along y beyond its noise, mm, by crossing.
-pub(in crate::stereo::target) fn edge_bends_mm(bundle: &Bundle<'_>, values: &Values, noise: &Noise) -> Vec<f64> {
+pub(in crate::stereo::board_pose) fn edge_bends_mm(bundle: &Bundle<'_>, values: &Values, noise: &Noise) -> Vec<f64> {
     let rig = bundle.rig_at(values);
     let places = crossings(bundle.board, &values.deviations_mm);
     let mut sums = vec![Sums::default(); places.len()];
@@ -115,9 +120,9 @@ impl Sums {
 mod tests {
     use super::*;
     use crate::imaging::Squares;
+    use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior};
     use crate::stereo::data::view::View;
     use crate::stereo::synthetic::World;
-    use crate::stereo::target::solve::prior::{RigPrior, ShapePrior};
 
     fn board() -> Board {
         Board { squares: Squares { columns: 7, rows: 6 }, square_mm: 10.0 }

@@ -7,11 +7,11 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::stereo::Rig;
+use crate::stereo::board_pose::solve::estimate::Estimate;
+use crate::stereo::board_pose::solve::pose_block::TRANSFORM;
+use crate::stereo::board_pose::solve::prior::{stretch_length_mm, stretch_mode};
 use crate::stereo::data::observation::Side;
 use crate::stereo::model::projection::CAMERA_NUMBERS;
-use crate::stereo::target::solve::estimate::Estimate;
-use crate::stereo::target::solve::pose_block::TRANSFORM;
-use crate::stereo::target::solve::prior::{stretch_length_mm, stretch_mode};
 use crate::stereo::triangulate::RIG_NUMBERS;
 
 /// One thing that may have changed.
@@ -45,7 +45,7 @@ impl Cause {
     ];
 
     /// The change of the rig's numbers by one unit; `None` for the target's pitch.
-    pub(in crate::stereo::target) fn direction(self, rig: &Rig) -> Option<DVector<f64>> {
+    pub(in crate::stereo::board_pose) fn direction(self, rig: &Rig) -> Option<DVector<f64>> {
         let mut direction = DVector::zeros(RIG_NUMBERS);
         let mut focal = |side: Side| {
             let camera = rig.camera(side);
@@ -128,7 +128,7 @@ pub struct Explanation {
 }
 
 /// Every cause at the common minimum, by its score.
-pub(in crate::stereo::target) fn explanations(found: &Estimate<'_>) -> Vec<Explanation> {
+pub(in crate::stereo::board_pose) fn explanations(found: &Estimate<'_>) -> Vec<Explanation> {
     let rig = found.bundle.rig_at(&found.values);
     Cause::ALL
         .into_iter()
@@ -168,7 +168,7 @@ fn of_pitch(found: &Estimate<'_>) -> Option<Explanation> {
 }
 
 /// The target's size against the drawing, minus one, and its standard deviation.
-pub(in crate::stereo::target) fn stretch(found: &Estimate<'_>) -> [f64; 2] {
+pub(in crate::stereo::board_pose) fn stretch(found: &Estimate<'_>) -> [f64; 2] {
     let n = found.values.rig.len();
     let mode = stretch_mode(found.bundle.board);
     let m = mode.len();
@@ -179,7 +179,7 @@ pub(in crate::stereo::target) fn stretch(found: &Estimate<'_>) -> [f64; 2] {
 }
 
 /// Change of the mark points between two minima: the root of the mean square over the poses, mm.
-pub(in crate::stereo::target) fn moved_mm(a: &Estimate<'_>, b: &Estimate<'_>) -> f64 {
+pub(in crate::stereo::board_pose) fn moved_mm(a: &Estimate<'_>, b: &Estimate<'_>) -> f64 {
     let squares: Vec<f64> = a
         .values
         .poses
@@ -191,7 +191,7 @@ pub(in crate::stereo::target) fn moved_mm(a: &Estimate<'_>, b: &Estimate<'_>) ->
 }
 
 /// The matrix that takes the shared unknowns to the rig's named numbers and the crossings' deviations.
-pub(in crate::stereo::target) fn named(found: &Estimate<'_>) -> DMatrix<f64> {
+pub(in crate::stereo::board_pose) fn named(found: &Estimate<'_>) -> DMatrix<f64> {
     let rig = &found.bundle.rig;
     let (n, m) = (found.values.rig.len(), 3 * found.values.deviations_mm.len());
     let mut matrix = DMatrix::zeros(rig.places.len() + m, n + m);

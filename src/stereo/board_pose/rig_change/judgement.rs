@@ -1,8 +1,9 @@
 //! What is found of the rig as a whole, and how it is said.
 
 use crate::stereo::Rig;
-use crate::stereo::target::rig_change::cause::{Cause, Explanation};
-use crate::stereo::target::rig_change::judge::Changed;
+use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation};
+use crate::stereo::board_pose::rig_change::flip::Flip;
+use crate::stereo::board_pose::rig_change::judge::Changed;
 
 /// What is found of the rig as a whole.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,14 +16,25 @@ pub enum Judgement {
     Contradicts(Changed),
     /// Left and right pictures are exchanged.
     Exchanged,
+    /// All pictures are the other way round.
+    Mirrored(Flip),
     /// It moved during the run.
     Moved {
         /// First pose after it.
         since: String,
-        /// By how much the right camera turned, deg, and how far it went, mm.
+        /// True where it went on moving from pose to pose.
+        creeps: bool,
+        /// By how much the right camera turned, deg, and how far it went, mm, in all.
         turned_deg: f64,
         /// See above.
         moved_mm: f64,
+    },
+    /// It is another from pose to pose.
+    Loose {
+        /// How many times as far as the pairs of the calibration the poses scatter about it.
+        times: f64,
+        /// Standard deviation of a point for it, mm.
+        sigma_mm: f64,
     },
     /// Nothing that is known of explains the pictures.
     Unexplained {
@@ -54,8 +66,19 @@ impl Judgement {
             Judgement::Exchanged => {
                 "left and right pictures are exchanged: they fit this rig the other way round".to_owned()
             }
-            Judgement::Moved { since, turned_deg, moved_mm } => format!(
+            Judgement::Mirrored(flip) => {
+                format!("all pictures are {}: they fit this rig the other way round", flip.describe())
+            }
+            Judgement::Moved { since, creeps: true, turned_deg, moved_mm } => format!(
+                "the rig creeps: during the run the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the \
+                 left; from pose {since} on that is more than the points' uncertainty allows"
+            ),
+            Judgement::Moved { since, creeps: false, turned_deg, moved_mm } => format!(
                 "the rig moved before pose {since}: the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the left"
+            ),
+            Judgement::Loose { times, sigma_mm } => format!(
+                "the rig is another from pose to pose: the poses disagree with one rig {times:.1} times as far as the pairs of the calibration \
+                 did, and their points are known to {sigma_mm:.3} mm only; a camera is loose, or left and right are not of one moment"
             ),
             Judgement::Unexplained { misfit_px } => format!(
                 "the calibration does not suit these pictures: the target's corners miss it by {misfit_px:.2} px, and no single change of \
@@ -72,7 +95,10 @@ impl Judgement {
                 "check `--square-mm` and `--squares` against the target; if they are right, the rig changed: `stereocal camera-check IMAGES`",
             ),
             Judgement::Exchanged => Some("exchange the names of left/ and right/"),
-            Judgement::Moved { .. } => Some(
+            Judgement::Mirrored(_) => Some(
+                "take the pictures as the cameras give them, as at the calibration: see the cameras' settings and the program that saved them",
+            ),
+            Judgement::Moved { .. } | Judgement::Loose { .. } => Some(
                 "clamp the cameras, calibrate again with `stereocal camera-check IMAGES`, and take the poses from there on again",
             ),
             _ => Some(

@@ -5,10 +5,10 @@
 //! misprinted crossings, `edge_bend` where those are; `estimate` finds the weights with the values, and `alone` fits a pose with everything
 //! shared held.
 
-pub(in crate::stereo::target) mod alone;
-pub(in crate::stereo::target) mod bundle;
-pub(in crate::stereo::target) mod edge_bend;
-pub(in crate::stereo::target) mod estimate;
-pub(in crate::stereo::target) mod pose_block;
-pub(in crate::stereo::target) mod prior;
-pub(in crate::stereo::target) mod window;
+pub(in crate::stereo::board_pose) mod alone;
+pub(in crate::stereo::board_pose) mod bundle;
+pub(in crate::stereo::board_pose) mod edge_bend;
+pub(in crate::stereo::board_pose) mod estimate;
+pub(in crate::stereo::board_pose) mod pose_block;
+pub(in crate::stereo::board_pose) mod prior;
+pub(in crate::stereo::board_pose) mod window;

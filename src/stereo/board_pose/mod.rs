@@ -5,9 +5,10 @@
 //! `start` finds each pose by itself; `solve` is one least squares over all of them, within what is known before and through the windows
 //! that corners are measured in; `rig_change` finds poses and moments at which the rig is another, and what changed; `finish` makes the
 //! answers, and `series` is the list of these steps. `turns` numbers targets that look alike after a turn. `print_share` asks the same
-//! equations what a calibration board's own print does to a rig.
+//! equations what a calibration board's own print does to a rig, `pair_excess` how far the calibration's pairs scattered about it.
 
 pub mod finish;
+pub mod pair_excess;
 pub mod print_share;
 pub mod rig_change;
 pub mod series;

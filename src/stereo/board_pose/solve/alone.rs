@@ -5,14 +5,14 @@ use nalgebra::{DMatrix, Point3, Vector2, Vector3, Vector6};
 use crate::geometry::{Transform, perturb};
 use crate::imaging::{Board, Side};
 use crate::stereo::Rig;
+use crate::stereo::board_pose::solve::bundle::Promise;
+use crate::stereo::board_pose::solve::estimate::{Estimate, OUTLIER};
+use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, PoseSums, SeenFrom, crossings, residual};
+use crate::stereo::board_pose::start::enough;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::root_mean_square;
 use crate::stereo::data::view::View;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
-use crate::stereo::target::solve::bundle::Promise;
-use crate::stereo::target::solve::estimate::{Estimate, OUTLIER};
-use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, PoseSums, SeenFrom, crossings, residual};
-use crate::stereo::target::start::enough;
 use crate::stereo::triangulate::{common, triangulate};
 
 /// Steps of the search; the start is within a pixel.
@@ -22,7 +22,7 @@ const STEPS: usize = 20;
 const ROUNDS: usize = 3;
 
 /// The shared values as a pose sees them.
-pub(in crate::stereo::target) struct Known<'a> {
+pub(in crate::stereo::board_pose) struct Known<'a> {
     rig: Rig,
     crossings: Vec<Point3<f64>>,
     board: &'a Board,
@@ -31,7 +31,7 @@ pub(in crate::stereo::target) struct Known<'a> {
 }
 
 /// A pose on them.
-pub(in crate::stereo::target) struct Alone {
+pub(in crate::stereo::board_pose) struct Alone {
     /// `left_from_board`.
     pub pose: Transform,
     /// Its corners; outliers are inactive.

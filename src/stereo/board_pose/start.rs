@@ -11,6 +11,7 @@ use crate::geometry::Transform;
 use crate::imaging::{Board, PairCorners, Side};
 use crate::statistics::median;
 use crate::stereo::Rig;
+use crate::stereo::board_pose::FEWEST_CORNERS;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::of_view;
@@ -20,7 +21,6 @@ use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::parameters::Shared;
 use crate::stereo::pairs::numbering;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
-use crate::stereo::target::FEWEST_CORNERS;
 
 /// A pose before anything is known of the others.
 #[derive(Debug, Clone)]

@@ -7,25 +7,27 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector2, Vector3};
 use rayon::prelude::*;
 
 use crate::geometry::Transform;
 use crate::statistics::median;
+use crate::stereo::board_pose::rig_change::consistency::{at_each, usual_excess};
+use crate::stereo::board_pose::solve::bundle::{Bundle, Normal, Promise, Values};
+use crate::stereo::board_pose::solve::edge_bend::edge_bends_mm;
+use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
+use crate::stereo::board_pose::solve::prior::{stretch_mode, weights};
+use crate::stereo::board_pose::start::enough;
 use crate::stereo::data::corner_noise::{Noise, whitener};
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
+use crate::stereo::solve::normal_equations::inverse6;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::solve::bundle::{Bundle, Normal, Promise, Values};
-use crate::stereo::target::solve::edge_bend::edge_bends_mm;
-use crate::stereo::target::solve::pose_block::{crossings, residual};
-use crate::stereo::target::solve::prior::{stretch_mode, weights};
-use crate::stereo::target::start::enough;
 
 /// Whitened residuals beyond this are outliers.
-pub(in crate::stereo::target) const OUTLIER: f64 = 5.3;
+pub(in crate::stereo::board_pose) const OUTLIER: f64 = 5.3;
 
 /// Rounds of least squares with new weights.
 const ROUNDS: usize = 6;
@@ -34,7 +36,7 @@ const ROUNDS: usize = 6;
 const SETTLED: f64 = 0.01;
 
 /// Fewest poses that tell a target's print from noise.
-const TELLING_POSES: usize = 3;
+pub(in crate::stereo::board_pose) const TELLING_POSES: usize = 3;
 
 /// The certificate counts as much as this many crossings' worth of evidence on how far crossings deviate.
 const CERTIFICATE_COUNT: f64 = 0.1;
@@ -47,7 +49,7 @@ const FIXED_POINT_STEPS: usize = 30;
 
 /// A minimum with its weights.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::target) struct Estimate<'a> {
+pub(in crate::stereo::board_pose) struct Estimate<'a> {
     /// The problem with the whiteners, the outliers and the shape's prior that were found.
     pub bundle: Bundle<'a>,
     /// The values.
@@ -58,15 +60,35 @@ pub(in crate::stereo::target) struct Estimate<'a> {
     pub covariance: DMatrix<f64>,
     /// How corners scatter.
     pub noise: Noise,
-    /// Factor on covariances for the information that neighbouring corners share; the whiteners hold it.
+    /// How much larger the usual disagreement of a pose with the common rig is than its corners' scatter allows, as a variance.
+    pub excess: f64,
+    /// Factor on covariances for the information that neighbouring corners share, and the poses' excess; the whiteners hold it.
     pub inflation: f64,
 }
 
-/// Finds the minimum. `usual` is the noise of the calibration's corners, where known. `None` where the corners do not determine the poses.
-pub(in crate::stereo::target) fn estimate<'a>(
+/// What pictures of the rig did at its calibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::stereo::board_pose) struct Usual {
+    /// How corners scattered, where that is known.
+    pub noise: Option<Noise>,
+    /// How far pairs scattered about the rig beyond that, as [`Estimate::excess`]; one where that is not known.
+    pub excess: f64,
+}
+
+impl Usual {
+    /// The excess in units of the noise that is found here.
+    pub fn excess_here(&self, here: &Noise, views: &[View]) -> f64 {
+        self.noise.map_or(1.0, |noise| self.excess * (noise.typical_px(views) / here.typical_px(views)).powi(2))
+    }
+}
+
+/// Finds the minimum. `usual` is what counts at least; `excess` is held where it is known. `None` where the
+/// corners do not determine the poses.
+pub(in crate::stereo::board_pose) fn estimate<'a>(
     mut bundle: Bundle<'a>,
     start: Values,
-    usual: Option<Noise>,
+    usual: Usual,
+    known_excess: Option<f64>,
 ) -> Option<Estimate<'a>> {
     let mut values = start;
     let certificate = bundle.shape;
@@ -76,8 +98,8 @@ pub(in crate::stereo::target) fn estimate<'a>(
         values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?.0;
     }
     let poses = values.poses.iter().flatten().count();
-    let mut noise = Noise::from_median(&residuals(&bundle, &values, |_| true));
-    let mut inflation: f64 = 1.0;
+    let mut noise = at_least(usual.noise, Noise::from_median(&residuals(&bundle, &values, |_| true)), &bundle.views);
+    let (mut inflation, mut excess) = (1.0, known_excess.unwrap_or(1.0));
     let mut normal = bundle.normal(&values, Loss::Squared)?;
     let mut covariance = DMatrix::zeros(0, 0);
     for round in 0..ROUNDS {
@@ -86,10 +108,15 @@ pub(in crate::stereo::target) fn estimate<'a>(
         }
         bundle.weigh(&values, &noise);
         bundle.mark_outliers(&mut values);
-        inflate(&mut bundle.views, inflation);
+        inflate(&mut bundle.views, inflation * excess);
         (values, normal) = bundle.solve(values, Loss::Squared, Promise::RESULT)?;
         covariance = normal.covariance()?;
-        let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm);
+        let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm, excess);
+        if known_excess.is_none() {
+            excess = (excess * usual_excess(&at_each(&normal, &covariance)))
+                .max(usual.excess_here(&noise, &bundle.views))
+                .max(1.0);
+        }
         if poses >= TELLING_POSES {
             settle_shape(&mut bundle, &values, (&normal, &covariance), certificate.in_plane_mm)?;
             bundle.edge_bends_mm = edge_bends_mm(&bundle, &values, &noise);
@@ -97,21 +124,61 @@ pub(in crate::stereo::target) fn estimate<'a>(
         // How many of the shared unknowns the corners determine rather than what was known before.
         let told = covariance.component_mul(&normal.data).sum();
         let active = residuals(&bundle, &values, |o| o.active);
-        noise = match usual {
+        noise = match usual.noise {
             Some(usual) if poses < TELLING_POSES => usual,
-            _ => Noise::from_mean(&active, (told + 6.0 * poses as f64).round() as usize),
+            _ => {
+                let here = Noise::from_mean(&active, (told + 6.0 * poses as f64).round() as usize);
+                at_least(usual.noise, here, &bundle.views)
+            }
         };
         inflation = neighbours(&bundle, &values).inflation();
         let close = |a: f64, b: f64| (a - b).abs() <= SETTLED * b.abs().max(1e-5);
         let settled = close(before.0.added_px, noise.added_px)
             && close(before.0.factor, noise.factor)
             && close(before.1, bundle.shape.in_plane_mm)
-            && close(before.2, bundle.shape.out_of_plane_mm);
+            && close(before.2, bundle.shape.out_of_plane_mm)
+            && close(before.3, excess);
         if settled && round > 0 {
             break;
         }
     }
-    Some(Estimate { bundle, values, normal, covariance, noise, inflation })
+    Some(Estimate { bundle, values, normal, covariance, noise, excess, inflation: inflation * excess })
+}
+
+/// Covariance of a pose, which is `pose_inverse` from its corners, where `right_from_left` scatters from pose to pose so much that each tells
+/// it `excess` times as badly as its corners say; the whiteners hold that. What the target's size and the rays leave undetermined of the
+/// scatter is the pose's. `change` and `by_change` are as a pose's part of the normal equations has them.
+pub(in crate::stereo::board_pose) fn own_covariance(
+    pose_inverse: &Matrix6<f64>,
+    change: &Matrix6<f64>,
+    by_change: &Matrix6<f64>,
+    excess: f64,
+) -> Matrix6<f64> {
+    let Some(change) = inverse6(change).filter(|_| excess > 1.0) else { return *pose_inverse };
+    let all = pose_inverse / excess + by_change * change * by_change.transpose() * (1.0 - 1.0 / excess);
+    0.5 * (all + all.transpose())
+}
+
+impl Estimate<'_> {
+    /// Covariance of a pose's point without what all poses share, mm^2.
+    fn own_point_mm2(&self, i: usize) -> Option<Matrix3<f64>> {
+        let part = self.normal.poses[i].as_ref()?;
+        let own = own_covariance(&part.own, &part.change, &part.by_change, self.excess);
+        Some(own.fixed_view::<3, 3>(3, 3).into_owned())
+    }
+
+    /// Standard deviation of that along its longest axis, mm.
+    pub fn own_sigma_mm(&self, i: usize) -> Option<f64> {
+        Some(self.own_point_mm2(i)?.symmetric_eigenvalues().max().max(0.0).sqrt())
+    }
+
+    /// By how much a shift of a pose's point exceeds its uncertainty, as chi-square with three degrees of freedom: its own, and what `known`
+    /// leaves open of all that the poses share.
+    pub fn beyond(&self, known: &Estimate<'_>, i: usize, shift_mm: &Vector3<f64>) -> Option<f64> {
+        let by_shared = known.normal.poses[i].as_ref()?.by_shared.fixed_rows::<3>(3).into_owned();
+        let covariance = self.own_point_mm2(i)? + &by_shared * &known.covariance * by_shared.transpose();
+        Some(shift_mm.dot(&(covariance.try_inverse()? * shift_mm)))
+    }
 }
 
 /// Residuals in px of the corners that are wanted, where they can be predicted, in the order of the poses.
@@ -140,6 +207,12 @@ fn by_pose(
         wanted.filter_map(with_residual).collect()
     };
     bundle.views.par_iter().zip(&values.poses).map(of).collect()
+}
+
+/// What corners scatter here, but not less than at the calibration: what its lenses and its board left over is not the noise of pictures, and
+/// the target's crossings would be taken for it.
+fn at_least(usual: Option<Noise>, here: Noise, views: &[View]) -> Noise {
+    usual.filter(|usual| usual.typical_px(views) > here.typical_px(views)).unwrap_or(here)
 }
 
 fn inflate(views: &mut [View], inflation: f64) {

@@ -21,21 +21,21 @@ use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::triangulate::RIG_NUMBERS;
 
 /// Where the numbers of `right_from_left` begin among the rig's.
-pub(in crate::stereo::target) const TRANSFORM: usize = 2 * CAMERA_NUMBERS;
+pub(in crate::stereo::board_pose) const TRANSFORM: usize = 2 * CAMERA_NUMBERS;
 
 /// Poses whose sums are held at a time.
 const AT_ONCE: usize = 16;
 
 /// A square matrix over the rig's numbers.
-pub(in crate::stereo::target) type RigMatrix = SMatrix<f64, RIG_NUMBERS, RIG_NUMBERS>;
+pub(in crate::stereo::board_pose) type RigMatrix = SMatrix<f64, RIG_NUMBERS, RIG_NUMBERS>;
 
 /// Where each crossing is on the target, board's frame, mm, row by row.
-pub(in crate::stereo::target) fn crossings(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Point3<f64>> {
+pub(in crate::stereo::board_pose) fn crossings(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Point3<f64>> {
     board.corners_mm().zip(deviations_mm).map(|(at, deviation)| at + deviation).collect()
 }
 
 /// Predicted minus seen, px; what is seen of a misprinted crossing is in [`Observation::seen_off_mm`]. `None` for a corner behind its camera.
-pub(in crate::stereo::target) fn residual(
+pub(in crate::stereo::board_pose) fn residual(
     rig: &Rig,
     crossings: &[Point3<f64>],
     board: &Board,
@@ -52,7 +52,7 @@ pub(in crate::stereo::target) fn residual(
 }
 
 /// A target in front of the rig, and what was seen of it there.
-pub(in crate::stereo::target) struct SeenFrom<'a> {
+pub(in crate::stereo::board_pose) struct SeenFrom<'a> {
     /// The rig.
     pub rig: &'a Rig,
     /// Where each crossing is on the target, as [`crossings`] has them.
@@ -80,7 +80,7 @@ impl SeenFrom<'_> {
 }
 
 /// Sums over one pose's corners.
-pub(in crate::stereo::target) struct PoseBlock {
+pub(in crate::stereo::board_pose) struct PoseBlock {
     shared: CornerSums,
     rig_pose: SMatrix<f64, RIG_NUMBERS, 6>,
     crossings_pose: Vec<Matrix3x6<f64>>,
@@ -88,7 +88,7 @@ pub(in crate::stereo::target) struct PoseBlock {
 }
 
 /// The part of the pose alone.
-pub(in crate::stereo::target) struct PoseSums {
+pub(in crate::stereo::board_pose) struct PoseSums {
     matrix: Matrix6<f64>,
     gradient: Vector6<f64>,
     /// Half the robust sum of squares.
@@ -270,7 +270,7 @@ impl PoseBlock {
 }
 
 /// A pose's share with the pose eliminated.
-pub(in crate::stereo::target) struct Eliminated {
+pub(in crate::stereo::board_pose) struct Eliminated {
     /// Shared by pose, before the elimination.
     pub mixed: DMatrix<f64>,
     /// The rig's raw numbers by pose, before the elimination.
@@ -287,6 +287,13 @@ pub(in crate::stereo::target) struct Eliminated {
     pub change_gradient: Vector6<f64>,
 }
 
+impl Eliminated {
+    /// Derivative of the pose by a change of `right_from_left` that nobody knows of.
+    pub fn by_change(&self) -> Matrix6<f64> {
+        -(self.pose_inverse * self.rig_mixed.fixed_rows::<6>(TRANSFORM).transpose())
+    }
+}
+
 /// Sums over poses for what they share, with every pose eliminated.
 struct SharedSums<'a> {
     basis: &'a DMatrix<f64>,
@@ -297,7 +304,7 @@ struct SharedSums<'a> {
 }
 
 /// Sums over all poses for what they share, with every pose eliminated.
-pub(in crate::stereo::target) struct Totals {
+pub(in crate::stereo::board_pose) struct Totals {
     /// Shared by shared.
     pub matrix: DMatrix<f64>,
     /// Of the shared unknowns.

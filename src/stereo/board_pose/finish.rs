@@ -7,18 +7,18 @@ use rayon::prelude::*;
 
 use crate::geometry::Transform;
 use crate::imaging::Side;
+use crate::stereo::board_pose::rig_change::cause::{named, stretch};
+use crate::stereo::board_pose::rig_change::consistency::{self, Change};
+use crate::stereo::board_pose::rig_change::judgement::Judgement;
+use crate::stereo::board_pose::series::{MeasuredPose, POSE_LIMIT, Refusal, Run, Series};
+use crate::stereo::board_pose::solve::alone::{Alone, Known};
+use crate::stereo::board_pose::solve::bundle::Bundle;
+use crate::stereo::board_pose::solve::estimate::{Estimate, own_covariance};
+use crate::stereo::board_pose::solve::prior::frame_modes;
+use crate::stereo::board_pose::solve::window::Window;
+use crate::stereo::board_pose::start::{Start, enough};
+use crate::stereo::board_pose::{FEWEST_CORNERS, TargetPose};
 use crate::stereo::data::view::View;
-use crate::stereo::target::rig_change::cause::{named, stretch};
-use crate::stereo::target::rig_change::consistency::{self, Change, usual_excess};
-use crate::stereo::target::rig_change::judgement::Judgement;
-use crate::stereo::target::series::{MeasuredPose, POSE_LIMIT, Refusal, Run, Series};
-use crate::stereo::target::solve::alone::{Alone, Known};
-use crate::stereo::target::solve::bundle::Bundle;
-use crate::stereo::target::solve::estimate::Estimate;
-use crate::stereo::target::solve::prior::frame_modes;
-use crate::stereo::target::solve::window::Window;
-use crate::stereo::target::start::{Start, enough};
-use crate::stereo::target::{FEWEST_CORNERS, TargetPose};
 
 /// Standard deviations by which a pose's own chi-square may exceed one before its covariance grows.
 const POSE_SIGMAS: f64 = 3.0;
@@ -60,7 +60,6 @@ impl Run<'_> {
     pub(super) fn finish(self, found: &Estimate<'_>, judgement: Judgement) -> Series {
         let known = Known::new(found);
         let each = consistency::at_each(&found.normal, &found.covariance);
-        let excess = usual_excess(&each);
         let names = named(found);
         let shared_covariance = with_rim(found);
         let covariance = &names * &shared_covariance * names.transpose();
@@ -75,13 +74,13 @@ impl Run<'_> {
                 .collect()
         };
         let ended = match &judgement {
-            Judgement::Contradicts(_) | Judgement::Unexplained { .. } => {
+            Judgement::Contradicts(_) | Judgement::Loose { .. } | Judgement::Unexplained { .. } => {
                 judgement.describe(&self.known.rig, self.known.board.square_mm)
             }
             _ => None,
         };
         let finisher =
-            Finisher { run: &self, found, shared_covariance: &shared_covariance, known: &known, alone: &alone, excess };
+            Finisher { run: &self, found, shared_covariance: &shared_covariance, known: &known, alone: &alone };
         let targets: Vec<Result<TargetPose, Refusal>> = (0..self.at.len())
             .into_par_iter()
             .map(|i| match (&self.refusals[i], &ended) {
@@ -109,7 +108,8 @@ impl Run<'_> {
             usual_px,
             prior_chi_square: Some(prior_chi_square(found)),
             chi_square: Some(sums.0 / sums.1.max(1.0) * against),
-            excess,
+            excess: found.excess,
+            usual_excess: self.known.usual().excess_here(&found.noise, &found.bundle.views).max(1.0),
             notes: self.notes,
         }
     }
@@ -123,7 +123,6 @@ struct Finisher<'a> {
     shared_covariance: &'a DMatrix<f64>,
     known: &'a Known<'a>,
     alone: &'a [Option<Alone>],
-    excess: f64,
 }
 
 impl Finisher<'_> {
@@ -136,27 +135,32 @@ impl Finisher<'_> {
             Some(change) => Some(*change),
             None => consistency::of_outsider(&alone.part, &self.found.covariance),
         };
-        if let Some(change) =
-            change.filter(|c| c.fall > POSE_LIMIT * self.excess * alone.chi_square.clamp(1.0, OUTSIDER_LIMIT))
-        {
+        if let Some(change) = change.filter(|c| c.fall > POSE_LIMIT * alone.chi_square.clamp(1.0, OUTSIDER_LIMIT)) {
             return Err(self.two_moments(i, alone, &change));
         }
-        if !self.run.taking_part[i] && alone.chi_square > OUTSIDER_LIMIT * self.excess {
+        if !self.run.taking_part[i] && alone.chi_square > OUTSIDER_LIMIT * self.found.excess {
             let times = alone.chi_square.sqrt();
             return Err(Refusal {
                 status: "does not fit",
                 reason: format!("its corners miss the common rig and target {times:.1} times as far as at other poses"),
             });
         }
-        Ok(self.answer(alone))
+        Ok(self.answer(i, alone))
     }
 
-    fn answer(&self, alone: &Alone) -> TargetPose {
+    fn answer(&self, i: usize, alone: &Alone) -> TargetPose {
         let by_shared = -(alone.part.pose_inverse * alone.part.mixed.transpose());
         let through = &by_shared * self.shared_covariance * by_shared.transpose();
         let chance = 1.0 + POSE_SIGMAS * (2.0 / alone.freedom.max(1.0)).sqrt();
         let grown = if alone.chi_square > chance { alone.chi_square } else { 1.0 };
-        let own_covariance = alone.part.pose_inverse * grown * self.excess;
+        let by_change = alone.part.by_change();
+        let mut own_covariance =
+            own_covariance(&alone.part.pose_inverse, &alone.part.change, &by_change, self.found.excess) * grown;
+        if let Some(along) = &self.run.along {
+            // Whether the common rig is the one before or the one after is not known.
+            let moved = by_change * along.change.change * along.shares[i].max(1.0 - along.shares[i]);
+            own_covariance += moved * moved.transpose();
+        }
         let sensitivity = self.sensitivity(alone);
         let (change, gradient) = (&alone.part.change, &alone.part.change_gradient);
         let t = self.run.known.rig.right_from_left.translation.vector;
@@ -230,7 +234,7 @@ impl Finisher<'_> {
         let fits = |mixed: View, pose: &Transform| {
             let alone = self.known.fit(&mixed, pose);
             alone.is_some_and(|a| {
-                a.chi_square < PARTNER_LIMIT * self.excess
+                a.chi_square < PARTNER_LIMIT * self.found.excess
                     && 2 * mixed.observations.len() < 3 * a.view.observations.iter().filter(|o| o.active).count()
             })
         };

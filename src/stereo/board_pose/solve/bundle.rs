@@ -10,12 +10,12 @@ use rayon::prelude::*;
 use crate::geometry::{Transform, perturb};
 use crate::imaging::Board;
 use crate::stereo::Rig;
+use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, SeenFrom, Totals, crossings, residual};
+use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior, weights};
 use crate::stereo::data::view::View;
 use crate::stereo::solve::normal_equations::solve_scaled;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
-use crate::stereo::target::solve::pose_block::{Eliminated, PoseBlock, SeenFrom, Totals, crossings, residual};
-use crate::stereo::target::solve::prior::{RigPrior, ShapePrior, weights};
 
 /// Steps of one search at most; each squares what is left.
 const STEPS: usize = 12;
@@ -23,7 +23,7 @@ const STEPS: usize = 12;
 /// How close to the minimum a search goes: it is done when a step promises to lower the cost by less than this, in squared residuals of
 /// unit variance. A thousandth of a standard deviation lowers it by a millionth.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stereo::target) struct Promise(pub f64);
+pub(in crate::stereo::board_pose) struct Promise(pub f64);
 
 impl Promise {
     /// For values that are a result.
@@ -34,7 +34,7 @@ impl Promise {
 
 /// Values of all unknowns.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::target) struct Values {
+pub(in crate::stereo::board_pose) struct Values {
     /// Of the rig's prior.
     pub rig: DVector<f64>,
     /// The crossings' deviations from the drawing, mm.
@@ -45,7 +45,7 @@ pub(in crate::stereo::target) struct Values {
 
 /// The problem: what was seen and what is known before.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::target) struct Bundle<'a> {
+pub(in crate::stereo::board_pose) struct Bundle<'a> {
     /// The target as drawn.
     pub board: &'a Board,
     /// Every pose's corners.
@@ -60,7 +60,7 @@ pub(in crate::stereo::target) struct Bundle<'a> {
 
 /// A pose's part of the normal equations at the minimum.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::target) struct PosePart {
+pub(in crate::stereo::board_pose) struct PosePart {
     /// Covariance from its own corners, everything shared held.
     pub own: Matrix6<f64>,
     /// Derivative of the pose by the shared unknowns.
@@ -71,12 +71,14 @@ pub(in crate::stereo::target) struct PosePart {
     pub change_shared: DMatrix<f64>,
     /// Its gradient.
     pub change_gradient: Vector6<f64>,
+    /// Derivative of the pose by such a change that nobody knows of.
+    pub by_change: Matrix6<f64>,
     step_to: Vector6<f64>,
 }
 
 /// The normal equations.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::target) struct Normal {
+pub(in crate::stereo::board_pose) struct Normal {
     /// What the corners say of the shared unknowns.
     pub data: DMatrix<f64>,
     /// What is known before.
@@ -201,6 +203,7 @@ impl Values {
 
 impl PosePart {
     fn of(part: Eliminated) -> PosePart {
+        let by_change = part.by_change();
         let Eliminated { mixed, pose_inverse, pose_gradient, change, change_shared, change_gradient, .. } = part;
         PosePart {
             own: pose_inverse,
@@ -208,6 +211,7 @@ impl PosePart {
             change,
             change_shared,
             change_gradient,
+            by_change,
             step_to: -(pose_inverse * pose_gradient),
         }
     }

@@ -1,9 +1,0 @@
-//! Whether the rig, or the target, is another than was calibrated: at one pose, from one pose on, or during the whole run.
-//!
-//! `consistency` finds poses and moments at which the rig is another, `judge` fits every `cause` of a change of the whole run, and a
-//! `judgement` says it in words.
-
-pub mod cause;
-pub(in crate::stereo::target) mod consistency;
-pub mod judge;
-pub mod judgement;
