@@ -10,9 +10,11 @@
 
 mod boards;
 mod corner_floors;
+mod golden_corners;
 mod pictures;
 mod planted_faults;
 mod run;
+mod shot;
 mod worlds;
 
 mod compensate;
