@@ -10,6 +10,7 @@
 
 mod boards;
 mod corner_floors;
+mod damaged_corners;
 mod golden_corners;
 mod pictures;
 mod planted_faults;
