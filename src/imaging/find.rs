@@ -142,14 +142,7 @@ pub fn thumbnail(path: &Utf8Path, wanted: &Wanted<'_>) -> Option<Small> {
         let hash = cache.out.hash_of_picture(path)?;
         cache.read_thumbnail(&cache.entry(&hash, wanted.board, wanted.mosaic))
     });
-    known.or_else(|| Some(thumbnail_of(&picture(path, wanted.mosaic).ok()?, None)))
-}
-
-/// A picture decoded, by itself.
-pub(super) fn picture(path: &Utf8Path, mosaic: Option<Mosaic>) -> Result<Picture, String> {
-    let header = image::header(path)?;
-    let _claim = Claim::wait(&header);
-    image::decode(&image::read(path, &header)?, path, mosaic)
+    known.or_else(|| Some(thumbnail_of(&image::picture(path, wanted.mosaic).ok()?, None)))
 }
 
 /// What is in a picture file, and its thumbnail where the cache keeps it and the board was found.

@@ -193,10 +193,8 @@ impl Shares {
         let inside = |v: usize, k: isize, size: usize| v.saturating_add_signed(k).min(size - 1);
         let along = |at: &dyn Fn(isize) -> f32| (-reach..=reach).map(|k| weight(k) / total * at(k)).sum::<f32>();
         let place = |i: usize| (i % w, i / w);
-        let rows: Vec<f32> = (0..w * h)
-            .map(place)
-            .map(|(x, y)| along(&|k| self.values[y * w + inside(x, k, w)]))
-            .collect();
+        let rows: Vec<f32> =
+            (0..w * h).map(place).map(|(x, y)| along(&|k| self.values[y * w + inside(x, k, w)])).collect();
         let blurred = (0..w * h).map(place).map(|(x, y)| along(&|k| rows[inside(y, k, h) * w + x]));
         let blurred: Vec<f32> = blurred.collect();
         self.values.iter_mut().zip(blurred).for_each(|(v, b)| *v = (*v + amount * (*v - b)).clamp(0.0, 1.0));

@@ -6,6 +6,7 @@
 //! (lens distortion) is given. Goes wrong: too few pixels, no contrast, an edge that is not there; all end in `None`.
 
 mod crossing;
+mod evaluation;
 pub mod model;
 mod products;
 mod special;
@@ -13,8 +14,9 @@ pub mod window;
 
 use nalgebra::{Matrix2, Point2, SMatrix, SVector, Vector2};
 
+use evaluation::Evaluation;
 pub use model::Model;
-use model::{Evaluation, N};
+use model::N;
 use window::Window;
 
 /// Steps after which a fit that still moves is given up; a good start needs three to six.
