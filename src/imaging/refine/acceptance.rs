@@ -130,6 +130,12 @@ impl Board {
             && corner.fit.covariance_px2.trace() < MOST_SIGMAS.powi(2) * self.variance_px2
     }
 
+    /// True for a corner that is of use with the covariance that it has: not far less certain than the others.
+    pub(super) fn is_of_use(&self, corner: &Measured) -> bool {
+        let variance = corner.fit.covariance_px2.trace();
+        variance < MOST_VARIANCE_PX2 && variance < MOST_SIGMAS.powi(2) * self.variance_px2
+    }
+
     /// True for a corner that only a smaller window shows, if what is in that window is as good as elsewhere on the board.
     pub(super) fn holds_in_small_window(&self, corner: &Measured) -> bool {
         self.accepts(corner) && roughness(&corner.fit) < MOST_ROUGHNESS * self.roughness + AGREE_CONTRAST

@@ -40,7 +40,7 @@ fn coarse_fit(copy: &Image<u8>, cell: &Cell, window: &mut Window) -> Option<(Fit
         let halves = cell.edges.map(|e| e.normalize() * half);
         // A stretched copy reaches 255 without being clipped.
         window.collect(copy, 0.0, &Below(f64::MAX), &Frame { start: cell.place, halves, band_px: f64::MAX });
-        if let Some(first) = fit(&start, window)
+        if let Some(first) = fit(&start, window, None)
             && plausible(&first, &start, cell)
             && (first.model.blur_px.iter().all(|&s| s < 0.4 * half) || half >= most)
         {

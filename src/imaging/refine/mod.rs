@@ -5,9 +5,10 @@
 //! it (full), along edges that bend as the lens bends the board's lines (`curvature`): as the near windows show them, and at last as the
 //! full ones do. Where some of the full windows tell that edges bend much from crossing to crossing, all are cut down. Where the larger
 //! window does not agree with the smaller one, or the four arms of a corner not with each other (`acceptance`), something hides a part of
-//! it, and the largest window that is free of it is kept. Last, the board's corners share what they know of the light
-//! (`illumination`), which counts from the picture's veil (`veil`). Goes wrong: a corner without contrast, hidden, cut off by the border or
-//! saturated; it is dropped, the others stay.
+//! it, and the largest window that is free of it is kept. Stray light that adds to dark and bright alike is fitted where the board shows
+//! it (`stray`). Last, corners get the covariances that they have by what their arms tell (`scatter`), also those that no window shows well, and
+//! share what they know of the light (`illumination`), which counts from the picture's veil (`veil`). Goes wrong: a corner without contrast,
+//! hidden, or cut off by the border; it is dropped, the others stay.
 
 mod acceptance;
 mod cell;
@@ -17,6 +18,8 @@ pub mod fields;
 pub mod illumination;
 mod outlying_pixels;
 pub mod saddle_fit;
+mod scatter;
+mod stray;
 mod veil;
 mod windows;
 
@@ -29,6 +32,7 @@ use self::curvature::{Point, bends};
 use self::outlying_pixels::{Explained, few};
 use self::saddle_fit::window::{Below, Frame, Keep, Sample, Window};
 use self::saddle_fit::{Fit, Model, fit};
+use self::scatter::Scatter;
 use self::windows::{Windows, bends_by, usual};
 use super::Corner;
 use super::detect::Detected;
@@ -105,17 +109,76 @@ struct Full<'a, T> {
     clip_level: f64,
     /// The grey value from which light counts; the fits see what is above it.
     veil: f64,
+    /// Variance of the slope of stray light, (grey values per px)^2, where there is some.
+    stray: Option<f64>,
+}
+
+/// What a board's windows told, what is usual in them, and the corners that they show well.
+struct Seen {
+    windows: Lattice<Windows>,
+    board: acceptance::Board,
+    measured: Lattice<Measured>,
 }
 
 impl<T: Sample> Full<'_, T> {
     fn of<'a>(image: &'a Image<T>, clip_level: f64, detected: &Detected) -> Full<'a, T> {
         let places = detected.corners.map(|px| detected.level.to_picture(px));
-        Full { image, clip_level, veil: veil::level(image, clip_level, &places) }
+        Full { image, clip_level, veil: veil::level(image, clip_level, &places), stray: None }
     }
 
     fn measure(&self, detected: &Detected) -> Lattice<Measured> {
         let mut window = Window::default();
-        let coarse = coarse(detected, &mut window);
+        let mut seen = self.look(detected, &mut window);
+        let mut scatter = Scatter::of(&seen.measured);
+        // In the light of a clean board there is nothing to look for.
+        if !scatter.is_noise()
+            && self.stray.is_none()
+            && let Some(stray) = self.stray_light(&seen.windows, &mut window)
+        {
+            let within = Full { stray: Some(stray), ..*self };
+            seen = within.look(detected, &mut window);
+            scatter = Scatter::of(&seen.measured);
+        }
+        let Seen { windows, board, mut measured } = seen;
+        scatter.carry(&mut measured);
+        illumination::tie(&mut measured);
+        Lattice::from_fn(measured.columns, measured.rows, |col, row| {
+            let well = measured.get(col, row).copied();
+            well.or_else(|| self.best_left(windows.get(col, row)?, &board, &scatter, &mut window))
+        })
+    }
+
+    /// Variance of the slope of stray light by the near windows, in each of which it is fitted without a bound.
+    fn stray_light(&self, seen: &Lattice<Windows>, window: &mut Window) -> Option<f64> {
+        let unbound = Full { stray: Some(stray::UNBOUND), ..*self };
+        let slopes = seen.iter().filter_map(|(_, _, windows)| {
+            let near = windows.near.or(windows.full)?;
+            unbound.fit_from(&near, near_half_px(&windows.start), windows, window)?.fit.stray
+        });
+        stray::variance(&slopes.collect::<Vec<_>>())
+    }
+
+    /// Of a corner that no window shows well the one that is known best, by the scatter of its own arms; `None` where that is far worse than is usual.
+    fn best_left(
+        &self,
+        seen: &Windows,
+        board: &acceptance::Board,
+        scatter: &Scatter,
+        window: &mut Window,
+    ) -> Option<Measured> {
+        let near_px = near_half_px(&seen.start);
+        let between = seen.near.and_then(|near| self.fit_from(&near, BETWEEN * near_px, seen, window));
+        let all = [(seen.near, near_px), (between, BETWEEN * near_px), (seen.full, seen.most_half_px)];
+        let known = all.into_iter().filter_map(|(fit, half_px)| {
+            let fit = self.without_outlying(&fit?, half_px, &seen.cell, board, window);
+            Some(scatter.alone(fit)).filter(|fit| board.is_of_use(fit))
+        });
+        known.min_by(|a, b| a.fit.covariance_px2.trace().total_cmp(&b.fit.covariance_px2.trace()))
+    }
+
+    /// What the board's windows tell, from the first fits on.
+    fn look(&self, detected: &Detected, window: &mut Window) -> Seen {
+        let coarse = coarse(detected, window);
         let columns = coarse.columns;
         let at = |bends: &[[f64; 2]], col: usize, row: usize| bends[row * columns + col];
         let on_copy = |m: &Measured| Point { px: detected.level.to_picture(&m.px), counts: true };
@@ -137,7 +200,7 @@ impl<T: Sample> Full<'_, T> {
                 ..enlarged(&from.fit.model, scale)
             };
             // On a copy of full size the first fit is a measurement already.
-            Some(self.near(cell, start, (scale == 1.0).then_some(*from), &mut window))
+            Some(self.near(cell, start, (scale == 1.0).then_some(*from), window))
         });
         // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large ones from.
         let near_only: Vec<Measured> = near.iter().filter_map(|(_, _, windows)| windows.near).collect();
@@ -146,12 +209,11 @@ impl<T: Sample> Full<'_, T> {
         let near = Lattice::from_fn(columns, coarse.rows, |col, row| {
             Some(near.get(col, row)?.clone().rebent(at(&near_bends, col, row)))
         });
-        let (seen, board) = self.large(&near, &places, &mut window);
-        let mut measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            self.largest_free(seen.get(col, row)?, &board, &mut window)
+        let (windows, board) = self.large(&near, &places, window);
+        let measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            self.largest_free(windows.get(col, row)?, &board, window)
         });
-        illumination::tie(&mut measured);
-        measured
+        Seen { windows, board, measured }
     }
 
     /// A fit in the near window, where the full one is enough larger to tell more; otherwise what the copy told, if that is of full size.
@@ -291,7 +353,7 @@ impl<T: Sample> Full<'_, T> {
             let halves = cell.edges.map(|e| e.normalize() * half_px(e.norm(), margin).min(most_half_px));
             let band_px = BAND_BLURS * blur + 1.0;
             window.collect(self.image, self.veil, keep, &Frame { start: cell.place, halves, band_px });
-            let found = fit(&start, window)?;
+            let found = fit(&start, window, self.stray)?;
             let wider = found.model.blur_px[0].max(found.model.blur_px[1]);
             // The copy may have hidden how wide the blur is; the band must hold the whole edge.
             if BAND_BLURS * wider <= 1.2 * band_px {

@@ -2,77 +2,119 @@
 //!
 //! Each kind of pixel has them from the fewest columns that span its derivatives, and a linear map takes those to the model's parameters.
 
-use nalgebra::SMatrix;
+use nalgebra::{Matrix2, SMatrix};
 
 use super::crossing::Crossing;
 use super::model::{COLUMNS, Edge, Light, Model, N};
 use super::products::Products;
-use super::window::{Group, Groups, LANES, Window};
+use super::window::{Group, Groups, LANES, Lanes, Window};
 use crate::imaging::wide::widest;
 
 /// What the derivatives along an arm are made of: see [`along`].
 const ARM: usize = 8;
+/// The same where stray light is looked for, too, whose slopes along x and y have columns of their own after all others.
+pub const STRAY_COLUMNS: usize = COLUMNS + 2;
+const STRAY_ARM: usize = ARM + 2;
 
-/// Sums of products of the parameters' derivatives and the residual.
-pub type Sums = SMatrix<f64, COLUMNS, COLUMNS>;
+/// What all pixels of a window make of a model, by `C` columns: the parameters' derivatives, the residual, and perhaps those of stray light.
+pub struct Evaluation<const C: usize> {
+    /// Sums of the columns' products over all pixels.
+    pub sums: SMatrix<f64, C, C>,
+    /// For each edge, on either side of the crossing.
+    pub arms: [[Arm<C>; 2]; 2],
+}
 
-/// What all pixels of a window make of a model.
-pub struct Evaluation {
-    /// Sums over all of them.
-    pub sums: Sums,
-    /// For each edge, on either side of the crossing: by how much less the sum of squared residuals would be if that arm's edge were free to
-    /// lie and run otherwise.
-    pub arm_gains: [[f64; 2]; 2],
+/// What an arm tells by itself: where its edge would lie and run, a step aside and a turn, if it were free of the common model.
+#[derive(Debug, Clone, Copy)]
+pub struct Arm<const C: usize> {
+    /// Inverse of the normal matrix of step and turn; zero where the arm does not determine them.
+    inverse: Matrix2<f64>,
+    /// Sums of the products of the derivatives by step and turn with all columns.
+    by_columns: SMatrix<f64, 2, C>,
+}
+
+impl<const C: usize> Arm<C> {
+    /// By how much less the sum of squared residuals would be, after the columns of `parameters` had taken a step.
+    pub fn gain(&self, parameters: &[usize], step: &[f64]) -> f64 {
+        let taken = parameters.iter().zip(step).map(|(&at, by)| self.by_columns.column(at) * *by);
+        let gradient = taken.fold(self.by_columns.column(N).into_owned(), |left, taken| left - taken);
+        gradient.dot(&(self.inverse * gradient))
+    }
+
+    /// What that is in the mean, in units of the residuals' variance, where residuals are noise and nothing else: two, less what the common
+    /// fit of `parameters` has taken, whose covariance over that variance this is.
+    pub fn freedom<const P: usize>(&self, parameters: &[usize; P], inverse: &SMatrix<f64, P, P>) -> f64 {
+        if self.inverse == Matrix2::zeros() {
+            return 0.0;
+        }
+        let by = SMatrix::<f64, 2, P>::from_fn(|i, k| self.by_columns[(i, parameters[k])]);
+        2.0 - (self.inverse * by * inverse * by.transpose()).trace()
+    }
 }
 
 impl Model {
     /// Sums of products over all pixels of the window.
-    pub fn evaluate(&self, window: &Window) -> Evaluation {
+    pub fn evaluate(&self, window: &Window) -> Evaluation<COLUMNS> {
         widest(
             #[inline(always)]
-            || self.evaluate_lanes(window),
+            || self.evaluate_lanes::<COLUMNS, ARM>(window),
+        )
+    }
+
+    /// The same with the slopes of stray light, which is none yet.
+    pub fn evaluate_with_stray(&self, window: &Window) -> Evaluation<STRAY_COLUMNS> {
+        widest(
+            #[inline(always)]
+            || self.evaluate_lanes::<STRAY_COLUMNS, STRAY_ARM>(window),
         )
     }
 
     #[inline(always)]
-    fn evaluate_lanes(&self, window: &Window) -> Evaluation {
-        let mut total = self.at_crossing(&window.crossing);
-        let mut arm_gains = [[0.0; 2]; 2];
-        for (k, arms) in window.arms.iter().enumerate() {
+    fn evaluate_lanes<const C: usize, const A: usize>(&self, window: &Window) -> Evaluation<C> {
+        let mut total = self.at_crossing::<C>(&window.crossing);
+        let none = Arm { inverse: Matrix2::zeros(), by_columns: SMatrix::zeros() };
+        let mut arms = [[none; 2]; 2];
+        for (k, both) in window.arms.iter().enumerate() {
             let (edge, light) = (Edge::of(self, k), Light::of(self));
-            let mut both = SMatrix::zeros();
-            for ((groups, side), gain) in arms.iter().zip([-1.0, 1.0]).zip(&mut arm_gains[k]) {
-                let mut products = Products::<ARM>::new();
+            let map = self.arm_to_parameters(k);
+            let map = &map[..map.len() + C - STRAY_COLUMNS];
+            let mut sum = SMatrix::zeros();
+            for ((groups, side), arm) in both.iter().zip([-1.0, 1.0]).zip(&mut arms[k]) {
+                let mut products = Products::<A>::new();
                 // No closure: one that is not inlined would be compiled for the narrowest registers.
                 for group in &groups.groups {
                     along(&edge, &light, side, group, &mut products);
                 }
                 let sums = products.sums();
-                *gain = arm_gain(&sums);
-                both += sums;
+                *arm = by_itself(map, &sums);
+                sum += sums;
             }
-            add_mapped(&mut total, &self.arm_to_parameters(k), &both);
+            add_mapped(&mut total, map, &sum);
         }
         for (sums, alike) in window.flat.iter().zip([-1.0, 1.0]) {
-            add_mapped(&mut total, &self.flat_to_parameters(alike), sums);
+            let map = self.flat_to_parameters(alike);
+            add_mapped(&mut total, &map[..map.len() + C - STRAY_COLUMNS], sums);
         }
-        Evaluation { sums: total, arm_gains }
+        Evaluation { sums: total, arms }
     }
 
     #[inline(always)]
-    fn at_crossing(&self, groups: &Groups) -> Sums {
+    fn at_crossing<const C: usize>(&self, groups: &Groups) -> SMatrix<f64, C, C> {
         let crossing = Crossing::new(self);
-        let mut products = Products::<COLUMNS>::new();
-        let mut columns = [[0.0; LANES]; COLUMNS];
+        let mut products = Products::<C>::new();
+        let mut columns = [[0.0; LANES]; C];
         for group in &groups.groups {
-            crossing.columns(group, &mut columns);
+            if let Some((first, stray)) = columns.split_first_chunk_mut::<COLUMNS>() {
+                crossing.columns(group, first);
+                stray_columns(group, stray);
+            }
             products.add(&columns);
         }
         products.sums()
     }
 
     /// The parameters' derivatives from the columns of [`along`].
-    fn arm_to_parameters(&self, k: usize) -> [Share; 11] {
+    fn arm_to_parameters(&self, k: usize) -> [Share; 13] {
         let (sin, cos) = self.angles_rad[k].sin_cos();
         let bend = self.bend[k];
         [
@@ -87,11 +129,13 @@ impl Model {
             (8, 5, 1.0),
             (9, 6, 1.0),
             (N, 7, 1.0),
+            (COLUMNS, ARM, 1.0),
+            (COLUMNS + 1, ARM + 1, 1.0),
         ]
     }
 
     /// The parameters' derivatives where E is `alike`, from `(1, x, y, grey)`.
-    fn flat_to_parameters(&self, alike: f64) -> [Share; 12] {
+    fn flat_to_parameters(&self, alike: f64) -> [Share; 14] {
         let reflected = self.level + self.half_contrast * alike;
         let (x, y) = (self.light_slope.x, self.light_slope.y);
         [
@@ -107,6 +151,8 @@ impl Model {
             (N, 1, -reflected * x),
             (N, 2, -reflected * y),
             (N, 3, 1.0),
+            (COLUMNS, 1, 1.0),
+            (COLUMNS + 1, 2, 1.0),
         ]
     }
 }
@@ -115,7 +161,11 @@ impl Model {
 type Share = (usize, usize, f64);
 
 /// Adds the sums of the derivatives' products, from those of the columns that they are made of. Most shares are none, so they are listed.
-fn add_mapped<const C: usize>(total: &mut Sums, map: &[Share], sums: &SMatrix<f64, C, C>) {
+fn add_mapped<const C: usize, const A: usize>(
+    total: &mut SMatrix<f64, C, C>,
+    map: &[Share],
+    sums: &SMatrix<f64, A, A>,
+) {
     for &(row, a, share) in map {
         for &(column, b, other) in map {
             total[(row, column)] += share * other * sums[(a, b)];
@@ -126,11 +176,12 @@ fn add_mapped<const C: usize>(total: &mut Sums, map: &[Share], sums: &SMatrix<f6
 /// On an arm of an edge, E is `side` times the edge's erf, and every derivative is a combination of: the derivative by u, the same times
 /// the place along the edge, the same in blurs from it; light; light times E; x and y times what is reflected; the residual.
 #[inline(always)]
-fn along(edge: &Edge, light: &Light, side: f32, group: &Group, products: &mut Products<ARM>) {
+fn along<const A: usize>(edge: &Edge, light: &Light, side: f32, group: &Group, products: &mut Products<A>) {
     let across = edge.across(group);
     let Light { level, half_contrast, slope } = *light;
-    let mut columns = [[0.0; LANES]; ARM];
-    let [by_u, by_angle, by_blur, lit, by_contrast, by_slope_x, by_slope_y, residual] = &mut columns;
+    let mut columns = [[0.0; LANES]; A];
+    let Some((first, stray)) = columns.split_first_chunk_mut::<ARM>() else { return };
+    let [by_u, by_angle, by_blur, lit, by_contrast, by_slope_x, by_slope_y, residual] = first;
     for l in 0..LANES {
         let (x, y, weight) = (group.x[l], group.y[l], group.weight[l]);
         lit[l] = weight * (1.0 + slope[0] * x + slope[1] * y);
@@ -146,14 +197,30 @@ fn along(edge: &Edge, light: &Light, side: f32, group: &Group, products: &mut Pr
         by_angle[l] = by_u[l] * across.along[l];
         by_blur[l] = by_u[l] * across.z[l];
     }
+    stray_columns(group, stray);
     products.add(&columns);
 }
 
-/// What a line of its own, a step aside and a turn, would take off an arm's sum of squares; from the products of [`along`]'s columns.
-fn arm_gain(sums: &SMatrix<f64, ARM, ARM>) -> f64 {
-    let matrix = sums.fixed_view::<2, 2>(0, 0).into_owned();
-    let gradient = sums.fixed_view::<2, 1>(0, ARM - 1).into_owned();
-    matrix.cholesky().map_or(0.0, |cholesky| gradient.dot(&cholesky.solve(&gradient)))
+/// The columns of stray light that grows along x and along y, where there are any.
+#[inline(always)]
+fn stray_columns(group: &Group, columns: &mut [Lanes]) {
+    if let [by_x, by_y] = columns {
+        for l in 0..LANES {
+            (by_x[l], by_y[l]) = (group.weight[l] * group.x[l], group.weight[l] * group.y[l]);
+        }
+    }
+}
+
+/// An arm by the products of [`along`]'s columns, of which the first two are the derivatives by its step and its turn.
+fn by_itself<const C: usize, const A: usize>(map: &[Share], sums: &SMatrix<f64, A, A>) -> Arm<C> {
+    let inverse = sums.fixed_view::<2, 2>(0, 0).into_owned().cholesky().map_or(Matrix2::zeros(), |c| c.inverse());
+    let mut by_columns = SMatrix::zeros();
+    for &(to, column, share) in map {
+        for i in 0..2 {
+            by_columns[(i, to)] += share * sums[(i, column)];
+        }
+    }
+    Arm { inverse, by_columns }
 }
 
 #[cfg(test)]
