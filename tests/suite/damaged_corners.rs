@@ -4,6 +4,8 @@
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::{Point2, Vector3};
 use stereocal::geometry::transform;
+use stereocal::imaging::Board;
+use stereocal::imaging::find::corners_in;
 use stereocal::imaging::image::{Image, Picture, decode};
 use stereocal::simulate::draws::{Draws, Purpose};
 use stereocal::simulate::picture::picture_faults::{PictureFault, Shares};
@@ -116,12 +118,26 @@ struct Kind {
     picture: fn(&Shot, u64) -> Picture,
 }
 
+/// The 9x7 squares in the middle of what was printed, as whoever counts whole squares names the board.
+fn named(shot: Shot) -> Shot {
+    let board = Board { squares: "9x7".parse().unwrap(), ..shot.board };
+    let first = |printed: usize, named: usize| (printed - named) / 2;
+    let (left, top) = (first(shot.board.columns(), board.columns()), first(shot.board.rows(), board.rows()));
+    let place = |k: usize| shot.truth[shot.board.index(board.place(k).0 + left, board.place(k).1 + top)];
+    Shot { truth: (0..board.corner_count()).map(place).collect(), board, ..shot }
+}
+
 fn as_it_is(shot: &Shot, _: u64) -> Picture {
     shot.eight().into()
 }
 
 fn same(setup: Setup, _: u64) -> Setup {
     setup
+}
+
+/// A print of 11x9 squares of which the outermost are cut to a share.
+fn larger_print_cut_to(setup: Setup, share: f64, wall: f64) -> Setup {
+    Setup { squares: "11x9", covers: cut_to((11, 9), share, wall), ..setup }
 }
 
 const GLARE: PictureFault = PictureFault::Glare { at: (0.42, 0.45), radius: 0.13, add: 0.5 };
@@ -177,6 +193,22 @@ fn kinds() -> Vec<Kind> {
             setup: |setup, _| Setup { covers: cut_to((9, 7), 0.8, 0.3), ..setup },
             picture: as_it_is,
         },
+        Kind { name: "slivers of 0.15", setup: |setup, _| larger_print_cut_to(setup, 0.15, 0.3), picture: as_it_is },
+        Kind { name: "slivers of 0.3", setup: |setup, _| larger_print_cut_to(setup, 0.3, 0.05), picture: as_it_is },
+        Kind {
+            name: "slivers of 0.5, JPEG 75",
+            setup: |setup, _| larger_print_cut_to(setup, 0.5, 0.85),
+            picture: |shot, _| jpeg(shot.eight(), 75),
+        },
+        Kind {
+            name: "sliver on one side",
+            setup: |setup, _| Setup {
+                squares: "10x7",
+                covers: vec![cover(&[(92.4, -400.0), (400.0, -400.0), (400.0, 400.0), (92.4, 400.0)], 0.85)],
+                ..setup
+            },
+            picture: as_it_is,
+        },
     ]
 }
 
@@ -193,7 +225,7 @@ fn outcome(kind: &Kind) -> Outcome {
     let (mut all, mut refused, mut corners) = (Vec::<Deviations>::new(), Vec::new(), 0);
     for (k, setup) in setups().into_iter().enumerate() {
         let seed = k as u64 + 1;
-        let shot = (kind.setup)(setup, seed).take();
+        let shot = named((kind.setup)(setup, seed).take());
         let picture = (kind.picture)(&shot, seed);
         corners += shot.truth.len();
         match shot.corners(&picture) {
@@ -230,4 +262,27 @@ fn damaged_pictures_give_nearly_all_corners_with_true_covariances() {
         }
     }
     assert!(short.is_empty(), "{short:#?}");
+}
+
+#[test]
+fn a_board_that_is_larger_is_refused_with_its_size() {
+    let mut named_right = 0;
+    for (k, setup) in setups().into_iter().enumerate() {
+        let seed = k as u64 + 1;
+        // With a margin, cut at the end of its squares, and held.
+        let covers = [vec![], cut_to((10, 8), 1.0, 0.3), fingers(seed, (10, 8), 0.35)];
+        for (way, covers) in covers.into_iter().enumerate() {
+            let shot = Setup { squares: "10x8", covers, ..setup.clone() }.take();
+            let picture = shot.eight().into();
+            for squares in ["9x7", "10x7", "9x8", "8x6"] {
+                let board = Board { squares: squares.parse().unwrap(), square_mm: SQUARE_MM };
+                let refusal = corners_in(&picture, board).expect_err(squares);
+                named_right += usize::from(refusal.seen == Some(shot.board.squares));
+                let known = way == 2 || refusal.seen == Some(shot.board.squares);
+                assert!(known, "{squares}, picture {seed}, {way}: {}, {:?}", refusal.reason, refusal.seen);
+            }
+        }
+    }
+    // Fingers over its corners leave some boards without a size.
+    assert!(named_right >= 2 * 12 * 4 + 12, "{named_right}");
 }

@@ -2,9 +2,10 @@
 
 use nalgebra::{Point2, Vector3};
 use stereocal::geometry::transform;
+use stereocal::imaging::find::corners_in;
 use stereocal::imaging::image::{Image, Picture};
 use stereocal::imaging::lattice::Lattice;
-use stereocal::imaging::{Board, Corner, detect, refine};
+use stereocal::imaging::{Board, Corner};
 use stereocal::simulate::draws::NormalTable;
 use stereocal::simulate::physical_board::{PhysicalBoard, Workmanship};
 use stereocal::simulate::picture::backdrop::Backdrop;
@@ -119,8 +120,7 @@ impl Shot {
 
     /// The board's corners in a picture of this shot; the reason where there are none.
     pub fn corners(&self, picture: &Picture) -> Result<Lattice<Corner>, String> {
-        let detected = detect::detect(picture, self.board).map_err(|refusal| refusal.reason)?;
-        Ok(refine::refine(picture, &detected))
+        corners_in(picture, self.board).map_err(|refusal| refusal.reason)
     }
 
     /// How far corners are off. A board that looks the same after a turn may be numbered from any of its ends.

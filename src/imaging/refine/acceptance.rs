@@ -59,6 +59,16 @@ pub(super) fn plausible(fit: &Fit, start: &Model, cell: &Cell) -> bool {
         && fit.covariance_px2.trace() < MOST_VARIANCE_PX2
 }
 
+/// The usual variance (both axes together) of corners, px^2.
+pub(super) fn usual_variance<'a>(corners: impl Iterator<Item = &'a Measured>) -> f64 {
+    median(corners.map(|m| m.fit.covariance_px2.trace())).unwrap_or(f64::INFINITY)
+}
+
+/// True for a corner that is of use with the covariance that it has: not far less certain than is usual.
+pub(super) fn is_of_use(corner: &Measured, usual_px2: f64) -> bool {
+    corner.fit.covariance_px2.trace() < MOST_VARIANCE_PX2.min(MOST_SIGMAS.powi(2) * usual_px2)
+}
+
 /// Variance (both axes together) of the difference between a corner's places in two windows, px^2. The larger window holds the smaller
 /// one's pixels, so it is the smaller one's variance less the larger one's.
 fn difference_px2(small: &Measured, large: &Measured) -> f64 {
@@ -94,7 +104,7 @@ impl Board {
                 .unwrap_or(1.0)
                 .max(1.0),
             roughness: median(corners.iter().map(|m| roughness(&m.fit))).unwrap_or(f64::INFINITY),
-            variance_px2: median(corners.iter().map(|m| m.fit.covariance_px2.trace())).unwrap_or(f64::INFINITY),
+            variance_px2: usual_variance(corners.iter()),
             bent_px2: if bent { apart_px2 - by_noise_px2 } else { 0.0 },
         }
     }
@@ -128,12 +138,6 @@ impl Board {
     pub(super) fn accepts(&self, corner: &Measured) -> bool {
         corner.fit.arm_misfit.iter().flatten().all(|&misfit| misfit < MOST_ARM_MISFIT * self.arm_misfit)
             && corner.fit.covariance_px2.trace() < MOST_SIGMAS.powi(2) * self.variance_px2
-    }
-
-    /// True for a corner that is of use with the covariance that it has: not far less certain than the others.
-    pub(super) fn is_of_use(&self, corner: &Measured) -> bool {
-        let variance = corner.fit.covariance_px2.trace();
-        variance < MOST_VARIANCE_PX2 && variance < MOST_SIGMAS.powi(2) * self.variance_px2
     }
 
     /// True for a corner that only a smaller window shows, if what is in that window is as good as elsewhere on the board.

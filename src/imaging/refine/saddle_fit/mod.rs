@@ -237,6 +237,7 @@ impl Fit {
             covariance_px2: self.covariance_px2 * factor,
             place_by_light: self.place_by_light * factor,
             light_covariance: self.light_covariance * factor,
+            stray: self.stray.map(|(slope, own)| (slope, own * factor)),
             ..self
         }
     }
