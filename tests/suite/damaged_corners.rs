@@ -72,7 +72,7 @@ fn cover(corners: &[(f64, f64)], tone: f64) -> Patch {
 /// What is left of a board of so many squares where its outermost ones are cut to a share, before a wall of some grey.
 fn cut_to(squares: (usize, usize), share: f64, wall: f64) -> Vec<Patch> {
     let half = |n: usize| (n as f64 / 2.0 - 1.0 + share) * SQUARE_MM;
-    let (w, h, far) = (half(squares.0), half(squares.1), 1e3);
+    let (w, h, far) = (half(squares.0), half(squares.1), 300.0);
     let sides = [
         [(-far, -far), (far, -far), (far, -h), (-far, -h)],
         [(-far, h), (far, h), (far, far), (-far, far)],
@@ -204,7 +204,7 @@ fn kinds() -> Vec<Kind> {
             name: "sliver on one side",
             setup: |setup, _| Setup {
                 squares: "10x7",
-                covers: vec![cover(&[(92.4, -400.0), (400.0, -400.0), (400.0, 400.0), (92.4, 400.0)], 0.85)],
+                covers: vec![cover(&[(92.4, -300.0), (300.0, -300.0), (300.0, 300.0), (92.4, 300.0)], 0.85)],
                 ..setup
             },
             picture: as_it_is,

@@ -17,7 +17,9 @@ const MOST_TURN_RAD: f64 = 0.35;
 /// Widest blur, as a share of a square: beyond it no square has a level of its own.
 const MOST_BLUR_SQUARES: f64 = 0.5;
 /// Share of the light that may change over a square. Light does not; a fit that says so has taken a neighbour's edge for its gradient.
-const MOST_LIGHT_CHANGE: f64 = 0.3;
+pub(super) const MOST_LIGHT_CHANGE: f64 = 0.3;
+/// The same for a corner that is known by no window otherwise, in the edge of a highlight: all of it.
+pub(super) const ALL_LIGHT: f64 = 1.0;
 /// Largest variance (both axes together) of a corner, px^2: half a pixel is what the eye sees.
 const MOST_VARIANCE_PX2: f64 = 0.25;
 
@@ -48,14 +50,14 @@ const MOST_ROUGHNESS: f64 = 1.5;
 /// The same for a corner in whose window pixels may be that do not belong: noise alone scatters less.
 const ROUGH: f64 = 1.15;
 
-/// False for a fit that wandered off, turned away, or found no contrast.
-pub(super) fn plausible(fit: &Fit, start: &Model, cell: &Cell) -> bool {
+/// False for a fit that wandered off, turned away, or found no contrast, or a light that changes by more than a share of it over a square.
+pub(super) fn plausible(fit: &Fit, start: &Model, cell: &Cell, most_light_change: f64) -> bool {
     let turned = (0..2).map(|k| (fit.model.angles_rad[k] - start.angles_rad[k]).abs()).fold(0.0, f64::max);
     fit.model.corner.norm() < (MOST_MOVE_SQUARES * cell.side()).min(MOST_MOVE_PX)
         && turned < MOST_TURN_RAD
         && fit.model.blur_px.iter().all(|&s| s < MOST_BLUR_SQUARES * cell.side())
         && fit.model.half_contrast.abs() > fit.residual
-        && fit.model.light_slope.norm() * cell.side() < MOST_LIGHT_CHANGE
+        && fit.model.light_slope.norm() * cell.side() < most_light_change
         && fit.covariance_px2.trace() < MOST_VARIANCE_PX2
 }
 

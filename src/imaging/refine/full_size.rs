@@ -34,23 +34,38 @@ const NEAR_HALF_PX: f64 = 10.0;
 const NEAR_HALF_BLURS: f64 = 7.0;
 /// Half of the window that is tried where the full one is not free, as a multiple of the near one's.
 const BETWEEN: f64 = 2.8;
+/// The same of one that stays within what is left of squares that are cut or hidden.
+const SMALLEST: f64 = 0.5;
 /// A near window that is not smaller than this share of the full one would tell nothing of its own.
 const NEAR_SHARE: f64 = 0.7;
 
 /// The picture at full size.
 pub(super) struct Full<'a, T> {
-    pub(super) image: &'a Image<T>,
-    pub(super) clip_level: f64,
+    image: &'a Image<T>,
+    clip_level: f64,
     /// The grey value from which light counts; the fits see what is above it.
-    pub(super) veil: f64,
+    veil: f64,
     /// Variance of the slope of stray light, (grey values per px)^2, where there is some.
-    pub(super) stray: Option<f64>,
+    stray: Option<f64>,
+    /// Share of the light that may change over a square.
+    most_light_change: f64,
 }
 
 impl<T: Sample> Full<'_, T> {
     pub(super) fn of<'a>(image: &'a Image<T>, clip_level: f64, detected: &Detected) -> Full<'a, T> {
         let places = detected.corners.map(|px| detected.level.to_picture(px));
-        Full { image, clip_level, veil: veil::level(image, clip_level, &places), stray: None }
+        Full {
+            image,
+            clip_level,
+            veil: veil::level(image, clip_level, &places),
+            stray: None,
+            most_light_change: acceptance::MOST_LIGHT_CHANGE,
+        }
+    }
+
+    /// The same picture with stray light whose slope has this variance.
+    pub(super) fn with_stray(&self, variance: f64) -> Self {
+        Full { stray: Some(variance), ..*self }
     }
 
     /// A fit in the near window, where the full one is enough larger to tell more; otherwise what the copy told, if that is of full size.
@@ -134,13 +149,17 @@ impl<T: Sample> Full<'_, T> {
         between.or_else(|| board.holds_in_small_window(near).then_some(*near))
     }
 
-    /// What the three windows of a corner tell that none of them shows well, without outlying pixels.
+    /// What the windows of a corner tell that none of them shows well, and one that is smaller still, without outlying pixels.
     pub(super) fn windows_left(&self, seen: &Windows, board: &acceptance::Board, window: &mut Window) -> Vec<Measured> {
+        let any = Full { most_light_change: acceptance::ALL_LIGHT, ..*self };
         let near_px = near_half_px(&seen.start);
-        let between = seen.near.and_then(|near| self.between(&near, seen, window));
-        let all = [(seen.near, near_px), (between, BETWEEN * near_px), (seen.full, seen.most_half_px)];
+        let small_px = SMALLEST * near_px;
+        let near = seen.near.or_else(|| any.fit_within(near_px, &seen.cell, &seen.start, window));
+        let small = any.fit_within(small_px, &seen.cell, &seen.start, window);
+        let between = near.and_then(|near| any.between(&near, seen, window));
+        let all = [(small, small_px), (near, near_px), (between, BETWEEN * near_px), (seen.full, seen.most_half_px)];
         let cleaned = |(fit, half_px): (Option<Measured>, f64)| {
-            Some(self.without_outlying(&fit?, half_px, &seen.cell, board, window))
+            Some(any.without_outlying(&fit?, half_px, &seen.cell, board, window))
         };
         all.into_iter().filter_map(cleaned).collect()
     }
@@ -193,7 +212,7 @@ impl<T: Sample> Full<'_, T> {
             let wider = found.model.blur_px[0].max(found.model.blur_px[1]);
             // The copy may have hidden how wide the blur is; the band must hold the whole edge.
             if BAND_BLURS * wider <= 1.2 * band_px {
-                let fits = plausible(&found, &start, cell);
+                let fits = plausible(&found, &start, cell, self.most_light_change);
                 return fits.then(|| Measured { px: found.place(&cell.place), fit: found, reach: cell.reach(&halves) });
             }
             if wider > 0.5 * cell.side() {

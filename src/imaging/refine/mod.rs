@@ -98,7 +98,7 @@ impl<T: Sample> Full<'_, T> {
         // Where corners scatter as noise does there is nothing to look for.
         if !scatter.is_noise() {
             if let Some(stray) = self.stray_light(&seen.windows, &mut window) {
-                seen = Full { stray: Some(stray), ..*self }.look(detected, &mut window);
+                seen = self.with_stray(stray).look(detected, &mut window);
                 scatter = Scatter::of(&seen.measured);
             }
             scatter.carry(&mut seen.measured);
@@ -118,7 +118,7 @@ impl<T: Sample> Full<'_, T> {
 
     /// Variance of the slope of stray light by the near windows, in each of which it is fitted without a bound.
     fn stray_light(&self, seen: &Lattice<Windows>, window: &mut Window) -> Option<f64> {
-        let unbound = Full { stray: Some(stray::UNBOUND), ..*self };
+        let unbound = self.with_stray(stray::UNBOUND);
         let mut fits = Lattice::from_fn(seen.columns, seen.rows, |col, row| {
             let windows = seen.get(col, row)?;
             let near = windows.near.or(windows.full)?;
@@ -209,6 +209,7 @@ fn by_variance(a: &Measured, b: &Measured) -> std::cmp::Ordering {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imaging::image::Image;
     use crate::imaging::{Board, detect};
     use statrs::function::erf::erf;
 
