@@ -99,9 +99,8 @@ fn all_faults(size: u32, floor_px: f64) {
     let twelve: Vec<u16> = twelve.enumerate().map(|(k, v)| if k == 4711 { 65_535 } else { v }).collect();
     let twelve = Picture::from(Image { width: shot.image.width, height: shot.image.height, pixels: twelve });
     check(&twelve, "12 bits in 16, one hot pixel", 1.2, MOST_SIGMAS, 1.0);
-    // The code's errors are not those of a camera: only the floor is asked of them.
     for quality in [90, 40] {
-        check(&jpeg(&shot, quality), &format!("JPEG {quality}"), 6.0, f64::INFINITY, 0.83);
+        check(&jpeg(&shot, quality), &format!("JPEG {quality}"), 6.0, MOST_SIGMAS, 0.98);
     }
     assert!(short.is_empty(), "{short:#?}");
     let chi2 = deviations(&shot, &clean, "as it is").chi2;

@@ -1,12 +1,17 @@
-//! Golden pictures: what imaging finds in clean pictures, as the program itself once wrote it (`golden_corners.txt`).
+//! Golden pictures: what imaging finds in clean and in damaged pictures, as the program itself once wrote it (`golden_corners.txt`,
+//! `golden_damaged.txt`).
 //!
 //! Corners of clean pictures are what everything else builds on; a change that is meant for damaged pictures must not move them. The text has
-//! every bit of every number: `STEREOCAL_GOLDEN=/tmp/now.txt` writes the present ones, which are the same bytes on the machine that wrote
+//! every bit of every number: `STEREOCAL_GOLDEN=/tmp` writes the present ones, which are the same bytes on the machine that wrote
 //! the golden ones. The test itself allows a fiftieth of a sigma: the system's sine, cosine and exponential may differ in their last bit from
 //! processor to processor, which now and then rounds a grey value of a rendered picture the other way.
 
 use std::fmt::Write;
 
+use stereocal::imaging::Corner;
+use stereocal::imaging::lattice::Lattice;
+
+use crate::damaged_corners::small_picture;
 use crate::shot::Setup;
 
 /// Most by which a place may differ from the golden one, as a share of its standard deviation, and a covariance, as a share of itself.
@@ -25,19 +30,17 @@ fn clean() -> Vec<(&'static str, Setup)> {
     ]
 }
 
-/// Name, column, row, place and covariance of each corner, a line each.
-fn written() -> String {
-    let mut text = String::new();
-    for (name, setup) in clean() {
-        let shot = setup.take();
-        let corners = shot.corners(&shot.eight().into()).unwrap_or_else(|reason| panic!("{name}: {reason}"));
-        for (col, row, c) in corners.iter() {
-            let s = c.covariance_px2.unwrap_or_else(|| panic!("{name}: {col} {row} has no covariance"));
-            let (x, y) = (c.px.x, c.px.y);
+/// Kinds of damaged pictures.
+const DAMAGED: [&str; 5] = ["JPEG 75", "sharpened", "clipped", "glare", "cut to 0.3"];
+
+/// Name, column, row, place and covariance of each corner that has one, a line each.
+fn write(text: &mut String, name: &str, corners: &Lattice<Corner>) {
+    for (col, row, c) in corners.iter() {
+        if let Some(s) = c.covariance_px2 {
+            let (name, x, y) = (name.replace(' ', "-"), c.px.x, c.px.y);
             writeln!(text, "{name} {col} {row} {x} {y} {} {} {}", s[(0, 0)], s[(0, 1)], s[(1, 1)]).unwrap();
         }
     }
-    text
 }
 
 fn numbers(line: &str) -> [f64; 7] {
@@ -45,11 +48,9 @@ fn numbers(line: &str) -> [f64; 7] {
     numbers.try_into().unwrap()
 }
 
-#[test]
-fn corners_of_clean_pictures_stay_where_they_are() {
-    let (golden, now) = (include_str!("golden_corners.txt"), written());
-    if let Ok(file) = std::env::var("STEREOCAL_GOLDEN") {
-        std::fs::write(file, &now).unwrap();
+fn same(golden: &str, now: &str, file: &str) {
+    if let Ok(folder) = std::env::var("STEREOCAL_GOLDEN") {
+        std::fs::write(format!("{folder}/{file}"), now).unwrap();
     }
     assert_eq!(golden.lines().count(), now.lines().count());
     for (golden, now) in golden.lines().zip(now.lines()) {
@@ -60,4 +61,27 @@ fn corners_of_clean_pictures_stay_where_they_are() {
         let covariance = (xx1 - xx).abs().max((xy1 - xy).abs()).max((yy1 - yy).abs()) / xx.min(yy);
         assert!((col, row) == (col1, row1) && place < MOST_SIGMAS && covariance < MOST_SIGMAS, "{golden}\n{now}");
     }
+}
+
+#[test]
+fn corners_of_clean_pictures_stay_where_they_are() {
+    let mut now = String::new();
+    for (name, setup) in clean() {
+        let shot = setup.take();
+        let corners = shot.corners(&shot.eight().into()).unwrap_or_else(|reason| panic!("{name}: {reason}"));
+        assert!(corners.iter().all(|(_, _, c)| c.covariance_px2.is_some()), "{name}");
+        write(&mut now, name, &corners);
+    }
+    same(include_str!("golden_corners.txt"), &now, "golden_corners.txt");
+}
+
+#[test]
+fn corners_of_damaged_pictures_stay_where_they_are() {
+    let mut now = String::new();
+    for name in DAMAGED {
+        let (shot, picture) = small_picture(name);
+        let corners = shot.corners(&picture).unwrap_or_else(|reason| panic!("{name}: {reason}"));
+        write(&mut now, name, &corners);
+    }
+    same(include_str!("golden_damaged.txt"), &now, "golden_damaged.txt");
 }

@@ -57,12 +57,16 @@ enum End {
 
 fn beyond(copy: &Grey8, grid: &Places) -> End {
     let Some(usual) = usual(copy, grid) else { return End::Squares };
-    let seen = |row: usize| contrast(copy, grid, (-1, row as isize), IN_SQUARES, None);
-    let alike = (0..grid.rows).filter_map(seen).filter(|c| c / usual > CONTRAST).count();
-    if alike as f64 >= SHARE * grid.rows as f64 {
-        return if is_cut(copy, grid, -1) { End::CutLine } else { End::Line };
+    let goes_on = |steps: f64| {
+        let seen = (0..grid.rows).filter_map(|row| contrast(copy, grid, (-1, row as isize), steps, None));
+        seen.filter(|c| c / usual > CONTRAST).count() as f64 >= SHARE * grid.rows as f64
+    };
+    match is_cut(copy, grid, -1) {
+        false if goes_on(IN_SQUARES) => End::Line,
+        true if NEARER.into_iter().any(goes_on) => End::CutLine,
+        _ if is_cut(copy, grid, 0) => End::CutSquares,
+        _ => End::Squares,
     }
-    if is_cut(copy, grid, 0) { End::CutSquares } else { End::Squares }
 }
 
 /// The grid without outer lines of which the board, which is smaller, can have none: only parts of squares lie beyond them, or none. `None` where
@@ -71,33 +75,30 @@ pub(super) fn without_cut_lines(copy: &Grey8, grid: &Places, board: Board) -> Op
     let (columns, rows) = (board.columns(), board.rows());
     let ways = [(columns, rows), (rows, columns)];
     let mut fitting = ways.into_iter().take(if columns == rows { 1 } else { 2 }).filter_map(|(columns, rows)| {
-        let narrower = without_cut_columns(copy, grid.clone(), columns)?;
-        without_cut_columns(copy, narrower.quarter_turn(), rows)
+        let (narrower, is_chosen) = without_cut_columns(copy, grid.clone(), columns)?;
+        let (lower, is_chosen_too) = without_cut_columns(copy, narrower.quarter_turn(), rows)?;
+        Some((lower, is_chosen || is_chosen_too))
     });
-    let first = fitting.next()?;
-    fitting.next().is_none().then_some(first)
+    let (first, is_chosen) = fitting.next()?;
+    (fitting.next().is_none() && !is_chosen).then_some(first)
 }
 
-fn without_cut_columns(copy: &Grey8, mut grid: Places, columns: usize) -> Option<Places> {
+/// The grid with so many columns at the most, and whether one of two that are alike was left out.
+fn without_cut_columns(copy: &Grey8, mut grid: Places, columns: usize) -> Option<(Places, bool)> {
+    let filled = |grid: &Places| (0..grid.rows).filter(|&row| grid.get(0, row).is_some()).count();
+    let mut is_chosen = false;
     while grid.columns > columns {
         let turned = grid.half_turn();
-        let first = match [is_cut(copy, &grid, 0), is_cut(copy, &turned, 0)] {
-            [true, false] => grid,
-            [false, true] => turned,
-            [true, true] if grid.columns > columns + 1 => grid,
-            [true, true] => {
-                let filled = |grid: &Places| (0..grid.rows).filter(|&row| grid.get(0, row).is_some()).count();
-                match filled(&grid).cmp(&filled(&turned)) {
-                    std::cmp::Ordering::Less => grid,
-                    std::cmp::Ordering::Greater => turned,
-                    std::cmp::Ordering::Equal => return None,
-                }
-            }
-            [false, false] => return None,
-        };
-        grid = Lattice::from_fn(first.columns - 1, first.rows, |col, row| first.get(col + 1, row).copied());
+        let (first, last) = (is_cut(copy, &grid, 0), is_cut(copy, &turned, 0));
+        if !first && !last {
+            return None;
+        }
+        is_chosen |= first && last && grid.columns == columns + 1 && filled(&grid) == filled(&turned);
+        let from_first = first && (!last || filled(&grid) <= filled(&turned));
+        let ahead = if from_first { grid } else { turned };
+        grid = Lattice::from_fn(ahead.columns - 1, ahead.rows, |col, row| ahead.get(col + 1, row).copied());
     }
-    Some(grid)
+    Some((grid, is_chosen))
 }
 
 /// True where before a column, the first or one further out, there are parts of squares at the most.
