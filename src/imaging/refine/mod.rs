@@ -56,19 +56,6 @@ pub struct Measured {
     pub reach: [f64; 2],
 }
 
-impl Seen {
-    /// How the corners scatter. Where crossings are off their places edges bend there, which large windows show and near ones do not: that is the
-    /// board, not the picture.
-    fn scatter(&self) -> Scatter {
-        let near = Lattice::from_fn(self.measured.columns, self.measured.rows, |col, row| {
-            self.measured.get(col, row)?;
-            self.windows.get(col, row)?.near.filter(|near| self.board.accepts(near))
-        });
-        let tell = 2 * near.count() > self.measured.count();
-        if tell && Scatter::of(&near).is_noise() { Scatter::NOISE } else { Scatter::of(&self.measured) }
-    }
-}
-
 /// Measures all corners of a board.
 pub fn refine(picture: &Picture, detected: &Detected) -> Lattice<Corner> {
     let measured = measure(picture, detected);
@@ -107,12 +94,12 @@ impl<T: Sample> Full<'_, T> {
     fn measure(&self, detected: &Detected) -> Lattice<Measured> {
         let mut window = Window::default();
         let mut seen = self.look(detected, &mut window);
-        let mut scatter = seen.scatter();
+        let mut scatter = Scatter::of(&seen.measured);
         // Where corners scatter as noise does there is nothing to look for.
         if !scatter.is_noise() {
             if let Some(stray) = self.stray_light(&seen.windows, &mut window) {
                 seen = self.with_stray(stray).look(detected, &mut window);
-                scatter = seen.scatter();
+                scatter = Scatter::of(&seen.measured);
             }
             scatter.carry(&mut seen.measured);
         }

@@ -36,7 +36,7 @@ pub(super) struct Scatter {
 
 impl Scatter {
     /// What noise does.
-    pub(super) const NOISE: Scatter = Scatter { usual: 1.0, alike: f64::INFINITY };
+    const NOISE: Scatter = Scatter { usual: 1.0, alike: f64::INFINITY };
 
     /// Of the corners that a board's fits found.
     pub(super) fn of(corners: &Lattice<Measured>) -> Scatter {
