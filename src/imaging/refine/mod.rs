@@ -111,7 +111,7 @@ impl<T: Sample> Full<'_, T> {
             well.or_else(|| {
                 let known = self.windows_left(windows.get(col, row)?, &board, &mut window);
                 let known = known.into_iter().map(|corner| scatter.alone(corner));
-                known.filter(|corner| acceptance::is_of_use(corner, usual_px2)).min_by(|a, b| by_variance(a, b))
+                known.filter(|corner| acceptance::is_of_use(corner, usual_px2)).min_by(by_variance)
             })
         })
     }

@@ -52,7 +52,7 @@ impl Scatter {
         let pooled = told.iter().map(|(misfit, _)| misfit).sum::<f64>() / freedom;
         match alike(&told) {
             Some(alike) => {
-                let mean = told.iter().map(|told| centred_log(told)).sum::<f64>() / told.len() as f64;
+                let mean = told.iter().map(centred_log).sum::<f64>() / told.len() as f64;
                 Scatter { usual: (mean + digamma(alike / 2.0) - (alike / 2.0).ln()).exp(), alike }
             }
             None if (pooled - 1.0).abs() < BEYOND_CHANCE * (2.0 / freedom).sqrt() => Scatter::NOISE,
