@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use camino::Utf8Path;
+use nalgebra::Matrix2;
 use rayon::prelude::*;
 
 use super::detect::{self, Detected, Refusal, continuation};
@@ -141,14 +142,7 @@ pub fn thumbnail(path: &Utf8Path, wanted: &Wanted<'_>) -> Option<Small> {
         let hash = cache.out.hash_of_picture(path)?;
         cache.read_thumbnail(&cache.entry(&hash, wanted.board, wanted.mosaic))
     });
-    known.or_else(|| Some(thumbnail_of(&picture(path, wanted.mosaic).ok()?, None)))
-}
-
-/// A picture decoded, by itself.
-pub(super) fn picture(path: &Utf8Path, mosaic: Option<Mosaic>) -> Result<Picture, String> {
-    let header = image::header(path)?;
-    let _claim = Claim::wait(&header);
-    image::decode(&image::read(path, &header)?, path, mosaic)
+    known.or_else(|| Some(thumbnail_of(&image::picture(path, wanted.mosaic).ok()?, None)))
 }
 
 /// What is in a picture file, and its thumbnail where the cache keeps it and the board was found.
@@ -177,10 +171,16 @@ fn thumbnail_of(picture: &Picture, detected: Option<&Detected>) -> Small {
     }
 }
 
+/// The board's corners in a picture; the reason where there are none.
+pub fn corners_in(picture: &Picture, board: Board) -> Look {
+    corners_of(picture, &detect::detect(picture, board)?, board)
+}
+
 /// The corners of a board that was found.
 fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
     let places = detected.corners.map(|p| detected.level.to_picture(p));
-    if let Some(shift_px) = fields::shift_between_fields(picture, &places) {
+    let shift_px = fields::shift_between_fields(picture, &places).unwrap_or(0.0);
+    if shift_px > fields::ONE_PICTURE_PX {
         return Err(format!(
             "is interlaced: its even and odd rows were taken at two moments, the board moved by {shift_px:.1} px or more between them"
         )
@@ -198,7 +198,13 @@ fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
             seen: detect::size_seen(detected).filter(|seen| *seen != squares),
         });
     }
-    Ok(refine::refine(picture, detected))
+    let mut corners = refine::refine(picture, detected);
+    if shift_px > 0.0 {
+        for covariance_px2 in corners.cells.iter_mut().flatten().filter_map(|corner| corner.covariance_px2.as_mut()) {
+            *covariance_px2 += Matrix2::identity() * (shift_px / 2.0).powi(2);
+        }
+    }
+    Ok(corners)
 }
 
 fn draw(pairs: &[PairCorners], files: &[PairFiles], mosaic: Option<Mosaic>, out: &OutDir) -> Result<()> {

@@ -114,7 +114,7 @@ pub fn png(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> 
 }
 
 fn small(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<Small> {
-    Some(Small::of(&super::find::picture(path, mosaic).ok()?, COARSE_PX))
+    Some(Small::of(&super::image::picture(path, mosaic).ok()?, COARSE_PX))
 }
 
 fn grey(copy: &Grey8) -> GrayImage {

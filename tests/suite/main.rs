@@ -10,9 +10,12 @@
 
 mod boards;
 mod corner_floors;
+mod damaged_corners;
+mod golden_corners;
 mod pictures;
 mod planted_faults;
 mod run;
+mod shot;
 mod spreadsheet;
 mod tables;
 mod worlds;

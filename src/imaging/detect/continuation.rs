@@ -1,12 +1,15 @@
-//! Is the board larger than what was asked for?
+//! Where does a board end?
 //!
 //! A detector told to look for 9x6 squares may find them inside a board of 10x7. Where one square beyond the grid's border a
 //! whole line of corners looks just like those inside, the board goes on, and which part of it was found is
-//! chance: left and right would not show the same corners.
+//! chance: left and right would not show the same corners. But squares that were cut, with the paper or by it, are not counted by whoever
+//! counts a board's squares: a line of corners beyond which there are only parts of squares, or none, is no line of the board's
+//! if the board has none left for it.
 
 use nalgebra::{Point2, Vector2};
 
 use super::Detected;
+use crate::imaging::Board;
 use crate::imaging::image::Grey8;
 use crate::imaging::lattice::{Lattice, Places};
 use crate::statistics::median;
@@ -17,41 +20,126 @@ const SHARE: f64 = 0.75;
 const CONTRAST: f64 = 0.7;
 /// What of the contrast of most corners one of the grid shows at least: a corner of one square shows none, one in half a shadow a half.
 const END_CONTRAST: f64 = 0.25;
+/// Where the four squares of a corner are looked at, in steps along both edges; where squares are cut, nearer.
+const IN_SQUARES: f64 = 0.4;
+const NEARER: [f64; 3] = [IN_SQUARES, 0.25, 0.15];
+/// Where a whole square still is, in steps from the corner, and what of the usual contrast it shows there.
+const WHOLE: f64 = 0.85;
+const WHOLE_CONTRAST: f64 = 0.5;
+/// Of so many corners of a line one may seem to have a whole square beyond it by chance.
+const BY_CHANCE: usize = 4;
 
 /// How many columns and rows of corners the board has beyond those found; counts one line on each side at the most.
 pub fn lines_beyond(detected: &Detected) -> (usize, usize) {
     let (grid, copy) = (&detected.corners, &detected.copy);
-    let (columns, rows) = (grid.columns as isize, grid.rows as isize);
-    let inside = grid.iter().filter_map(|(col, row, _)| contrast(copy, grid, col as isize, row as isize));
-    let Some(usual) = median(inside) else { return (0, 0) };
-    let goes_on = |line: &mut dyn Iterator<Item = (isize, isize)>, length: isize| {
-        let alike = line.filter_map(|(col, row)| contrast(copy, grid, col, row)).filter(|c| c / usual > CONTRAST);
-        alike.count() as f64 >= SHARE * length as f64
+    // Each turn brings another side to the front.
+    let [left, bottom, right, top] = [0, 1, 2, 3].map(|quarters| beyond(copy, &grid.turned(quarters)));
+    let count = |a: End, b: End| match (a, b) {
+        // Which of the two lines of cut squares is the board's cannot be told.
+        (End::CutLine, End::CutSquares) | (End::CutSquares, End::CutLine) => 1,
+        _ => usize::from(a == End::Line) + usize::from(b == End::Line),
     };
-    let column = |col: isize| goes_on(&mut (0..rows).map(|row| (col, row)), rows);
-    let row = |row: isize| goes_on(&mut (0..columns).map(|col| (col, row)), columns);
-    (usize::from(column(-1)) + usize::from(column(columns)), usize::from(row(-1)) + usize::from(row(rows)))
+    (count(left, right), count(bottom, top))
+}
+
+/// What lies before the first column of a grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    /// Another line of corners, with whole squares before it.
+    Line,
+    /// Another line of corners, with parts of squares before it.
+    CutLine,
+    /// Parts of squares.
+    CutSquares,
+    /// Whole squares, or what is not in view.
+    Squares,
+}
+
+fn beyond(copy: &Grey8, grid: &Places) -> End {
+    let Some(usual) = usual(copy, grid) else { return End::Squares };
+    let goes_on = |steps: f64| {
+        let seen = (0..grid.rows).filter_map(|row| contrast(copy, grid, (-1, row as isize), steps, None));
+        seen.filter(|c| c / usual > CONTRAST).count() as f64 >= SHARE * grid.rows as f64
+    };
+    match is_cut(copy, grid, -1) {
+        false if goes_on(IN_SQUARES) => End::Line,
+        true if NEARER.into_iter().any(goes_on) => End::CutLine,
+        _ if is_cut(copy, grid, 0) => End::CutSquares,
+        _ => End::Squares,
+    }
+}
+
+/// The grid without outer lines of which the board, which is smaller, can have none: only parts of squares lie beyond them, or none. `None` where
+/// it is not known which lines those are, or where there are whole squares.
+pub(super) fn without_cut_lines(copy: &Grey8, grid: &Places, board: Board) -> Option<Places> {
+    let (columns, rows) = (board.columns(), board.rows());
+    let ways = [(columns, rows), (rows, columns)];
+    let mut fitting = ways.into_iter().take(if columns == rows { 1 } else { 2 }).filter_map(|(columns, rows)| {
+        let (narrower, is_chosen) = without_cut_columns(copy, grid.clone(), columns)?;
+        let (lower, is_chosen_too) = without_cut_columns(copy, narrower.quarter_turn(), rows)?;
+        Some((lower, is_chosen || is_chosen_too))
+    });
+    let (first, is_chosen) = fitting.next()?;
+    (fitting.next().is_none() && !is_chosen).then_some(first)
+}
+
+/// The grid with so many columns at the most, and whether one of two that are alike was left out.
+fn without_cut_columns(copy: &Grey8, mut grid: Places, columns: usize) -> Option<(Places, bool)> {
+    let filled = |grid: &Places| (0..grid.rows).filter(|&row| grid.get(0, row).is_some()).count();
+    let mut is_chosen = false;
+    while grid.columns > columns {
+        let turned = grid.half_turn();
+        let (first, last) = (is_cut(copy, &grid, 0), is_cut(copy, &turned, 0));
+        if !first && !last {
+            return None;
+        }
+        is_chosen |= first && last && grid.columns == columns + 1 && filled(&grid) == filled(&turned);
+        let from_first = first && (!last || filled(&grid) <= filled(&turned));
+        let ahead = if from_first { grid } else { turned };
+        grid = Lattice::from_fn(ahead.columns - 1, ahead.rows, |col, row| ahead.get(col + 1, row).copied());
+    }
+    Some((grid, is_chosen))
+}
+
+/// True where before a column, the first or one further out, there are parts of squares at the most.
+fn is_cut(copy: &Grey8, grid: &Places, column: isize) -> bool {
+    let Some(usual) = usual(copy, grid) else { return false };
+    let before = |row: usize| contrast(copy, grid, (column, row as isize), IN_SQUARES, Some(WHOLE));
+    let known: Vec<f64> = (0..grid.rows).filter_map(before).collect();
+    let whole = known.iter().filter(|c| **c / usual > WHOLE_CONTRAST).count();
+    !known.is_empty() && whole * BY_CHANCE <= known.len()
+}
+
+/// Contrast of most corners, with the sign that the order of colours gives it.
+fn usual(copy: &Grey8, grid: &Places) -> Option<f64> {
+    let seen =
+        grid.iter().filter_map(|(col, row, _)| contrast(copy, grid, (col as isize, row as isize), IN_SQUARES, None));
+    median(seen)
 }
 
 /// The grid without what is no crossing of four squares: at a board's end the outer corners of its dark squares on a light margin.
 pub(super) fn without_ends(copy: &Grey8, grid: Places) -> Places {
-    let seen = grid.iter().filter_map(|(col, row, _)| contrast(copy, &grid, col as isize, row as isize));
-    let mut seen: Vec<f64> = seen.map(f64::abs).collect();
+    let at = |col: usize, row: usize, steps: f64| contrast(copy, &grid, (col as isize, row as isize), steps, None);
+    let mut seen: Vec<f64> = grid.iter().filter_map(|(col, row, _)| at(col, row, IN_SQUARES)).map(f64::abs).collect();
     seen.sort_by(f64::total_cmp);
     // On a board of nine corners those at its end may be nearly as many.
     let Some(usual) = seen.get(3 * seen.len() / 4).copied() else { return grid };
     Lattice::from_fn(grid.columns, grid.rows, |col, row| {
-        let crosses = contrast(copy, &grid, col as isize, row as isize).is_none_or(|c| c.abs() > END_CONTRAST * usual);
+        let mut seen = NEARER.into_iter().filter_map(|steps| at(col, row, steps)).peekable();
+        let crosses = seen.peek().is_none() || seen.any(|c| c.abs() > END_CONTRAST * usual);
         grid.get(col, row).copied().filter(|_| crosses)
     })
 }
 
-/// Contrast of the four squares round a corner of the grid, or round a place one square beyond it, with the sign that
-/// the order of colours gives it: the lesser of both differences between neighbours across an edge and their
-/// neighbours across the other. `None` outside of the picture.
-fn contrast(copy: &Grey8, grid: &Places, col: isize, row: isize) -> Option<f64> {
+/// Contrast of the four squares round a corner of the grid, or round a place one square beyond it, so many steps along both edges from it, with the
+/// sign that the order of colours gives it: the lesser of both differences between neighbours across an edge and their
+/// neighbours across the other. `before`: how many steps against the columns' order. `None` outside of the picture.
+fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, isize), steps: f64, before: Option<f64>) -> Option<f64> {
     let (place, along, across) = local(grid, col, row)?;
-    let at = |a: f64, b: f64| copy.mean_at(place + (along * a + across * b) * 0.4);
+    let before = before.unwrap_or(steps);
+    let at = |a: f64, b: f64| {
+        copy.mean_at(place + along * if a < 0.0 { a * before } else { a * steps } + across * b * steps)
+    };
     let (pp, pm, mp, mm) = (at(1.0, 1.0)?, at(1.0, -1.0)?, at(-1.0, 1.0)?, at(-1.0, -1.0)?);
     let sign = if (col + row).rem_euclid(2) == 0 { 1.0 } else { -1.0 };
     let differences = [pp - pm, pp - mp, mm - pm, mm - mp].map(|d| sign * d);
@@ -119,6 +207,68 @@ mod tests {
         let inner = |col: usize, row: usize| (1..7).contains(&col) && (1..6).contains(&row);
         assert!(kept.iter().all(|(col, row, _)| inner(col, row)));
         assert_eq!(kept.count(), 30);
+    }
+
+    /// What is left of a board of 9x8 squares of 12 px before a dark wall where its outer squares are cut to a share, with its whole grid of corners.
+    fn cut(share: f64) -> (Grey8, Places) {
+        let (left, right) = (24.0 - 12.0 * share, 24.0 + 7.0 * 12.0 + 12.0 * share);
+        let bottom = 24.0 + 6.0 * 12.0 + 12.0 * share;
+        let colour = |x: usize, y: usize| {
+            let inside = |v: usize, to: f64| v as f64 >= left && (v as f64) < to;
+            let black = (x / 12 + y / 12).is_multiple_of(2);
+            if !inside(x, right) || !inside(y, bottom) {
+                70
+            } else if black {
+                40
+            } else {
+                200
+            }
+        };
+        let copy =
+            Grey8 { width: 144, height: 132, pixels: (0..144 * 132).map(|k| colour(k % 144, k / 144)).collect() };
+        let place = |v: usize| (24 + 12 * v) as f64 - 0.5;
+        (copy, Lattice::from_fn(8, 7, |col, row| Some(Point2::new(place(col), place(row)))))
+    }
+
+    #[test]
+    fn lines_of_cut_squares_are_left_out_where_the_board_has_none_for_them() {
+        let board = |squares: &str| Board { squares: squares.parse().unwrap(), square_mm: 1.0 };
+        for share in [0.3, 0.5, 0.7] {
+            let (copy, grid) = cut(share);
+            let kept = without_cut_lines(&copy, &grid, board("7x6")).unwrap();
+            assert_eq!((kept.columns.max(kept.rows), kept.columns.min(kept.rows), kept.count()), (6, 5, 30), "{share}");
+            assert!(kept.iter().all(|(_, _, p)| (30.0..110.0).contains(&p.x) && (30.0..100.0).contains(&p.y)));
+            // Which of two lines that are alike is not the board's cannot be told; and there are no more of them.
+            assert_eq!(without_cut_lines(&copy, &grid, board("8x7")), None);
+            assert_eq!(without_cut_lines(&copy, &grid, board("6x5")), None);
+            let detected = |corners: Places| Detected { corners, copy: copy.clone(), level: Level::Reduced(1) };
+            let inner = Lattice::from_fn(6, 5, |col, row| grid.get(col + 1, row + 1).copied());
+            assert_eq!(lines_beyond(&detected(inner)), (0, 0));
+            let part = Lattice::from_fn(7, 7, |col, row| grid.get(col, row).copied());
+            assert_eq!(lines_beyond(&detected(part)), (1, 0));
+            assert_eq!(lines_beyond(&detected(grid)), (0, 0));
+        }
+    }
+
+    #[test]
+    fn lines_of_whole_squares_are_the_boards() {
+        let (copy, grid) = cut(1.0);
+        for squares in ["7x6", "8x7", "8x8", "9x7"] {
+            let board = Board { squares: squares.parse().unwrap(), square_mm: 1.0 };
+            assert_eq!(without_cut_lines(&copy, &grid, board), None, "{squares}");
+        }
+    }
+
+    #[test]
+    fn a_line_with_one_corner_that_is_none_is_left_out() {
+        // A few chance corners beyond the board's last squares, as a clip makes them.
+        let Detected { corners, copy, .. } = found(0..6, 0..5);
+        let grid = Lattice::from_fn(7, 5, |col, row| match corners.get(col, row) {
+            Some(p) => Some(*p),
+            None => Some(Point2::new(95.5, 23.5 + 12.0 * row as f64)).filter(|_| row < 3),
+        });
+        let board = Board { squares: "7x6".parse().unwrap(), square_mm: 1.0 };
+        assert_eq!(without_cut_lines(&copy, &grid, board).map(|grid| grid.count()), Some(30));
     }
 
     #[test]

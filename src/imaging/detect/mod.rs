@@ -167,7 +167,7 @@ fn at_a_glance(picture: &Picture, board: Board) -> Option<Detected> {
         return None;
     }
     let copy = level.copy(picture);
-    let grid = of_size(&copy, &grown(&copy, board.corner_count())?, board)?;
+    let grid = fitting(&copy, &grown(&copy, board.corner_count())?, board)?;
     if grid.count() < board.corner_count() || grid.least_step_px()? < LARGE_PX {
         return None;
     }
@@ -183,7 +183,7 @@ fn found(small: &Grey8, attempt: Attempt, board: Board, search: &mut Search) -> 
         return Some(whole(board, corners));
     }
     let grid = grown(small, board.corner_count())?;
-    let fitting = of_size(small, &grid, board);
+    let fitting = fitting(small, &grid, board);
     if fitting.is_none() && search.seen.as_ref().is_none_or(|(seen, _)| tells(&grid) > tells(seen)) {
         search.seen = Some((grid, attempt.level));
     }
@@ -227,6 +227,11 @@ fn grown(small: &Grey8, enough: usize) -> Option<Places> {
 
 fn whole(board: Board, corners: Vec<Point2<f64>>) -> Places {
     Lattice { columns: board.columns(), rows: board.rows(), cells: corners.into_iter().map(Some).collect() }
+}
+
+/// A grid as the board's, without lines of squares that are cut where those are too many.
+fn fitting(small: &Grey8, grid: &Places, board: Board) -> Option<Places> {
+    of_size(small, grid, board).or_else(|| of_size(small, &continuation::without_cut_lines(small, grid, board)?, board))
 }
 
 /// A grid as the board's, where it is known which of the board's corners are missing: it is as long and as wide as the board, or

@@ -6,7 +6,7 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::{Mosaic, Picture, UNDECODABLE, channels, integrity, limits, mosaic};
+use super::{Claim, Mosaic, Picture, UNDECODABLE, channels, integrity, limits, mosaic};
 
 /// Decodes the bytes of a file; the reason where that is not possible or the file is cut or damaged. `path` only helps to tell the
 /// format. A grey picture that is a raw colour mosaic needs its pattern.
@@ -22,6 +22,13 @@ pub fn decode(bytes: &[u8], path: &Utf8Path, pattern: Option<Mosaic>) -> Result<
         DynamicImage::ImageRgba16(rgb) => Ok(channels::grey(&rgb, 4, size).into()),
         _ => Err(floating_point()),
     }
+}
+
+/// A picture file read and decoded, by itself.
+pub fn picture(path: &Utf8Path, pattern: Option<Mosaic>) -> Result<Picture, String> {
+    let header = limits::header(path)?;
+    let _claim = Claim::wait(&header);
+    decode(&limits::read(path, &header)?, path, pattern)
 }
 
 /// Decodes the bytes of a file to its own colours and depth, whole numbers only.

@@ -5,7 +5,8 @@
 
 use image::ImageFormat;
 
-use super::{UNDECODABLE, jpeg_scan};
+use super::UNDECODABLE;
+use super::jpeg_scan::{self, segment};
 
 /// The reason for a file that ends early or was changed.
 pub(super) fn cut_or_damaged(format: &str, detail: &str) -> String {
@@ -45,21 +46,6 @@ fn png(bytes: &[u8]) -> Result<(), String> {
         }
         at += 12 + length;
     }
-}
-
-/// The segment at a place: its marker, its body, and where the next one begins.
-pub(super) fn segment(bytes: &[u8], at: usize) -> Option<(u8, &[u8], usize)> {
-    let mut at = at;
-    // Fill bytes may stand before a marker.
-    while bytes.get(at..at + 2)? == [0xFF, 0xFF] {
-        at += 1;
-    }
-    let [0xFF, marker] = *bytes.get(at..at + 2)? else { return None };
-    if marker == 0xD9 {
-        return Some((marker, &[], at + 2));
-    }
-    let length = usize::from(u16::from_be_bytes([*bytes.get(at + 2)?, *bytes.get(at + 3)?]));
-    Some((marker, bytes.get(at + 4..at + 2 + length.max(2))?, at + 2 + length.max(2)))
 }
 
 /// Segments up to the first scan, its data block by block, then an end marker.

@@ -5,8 +5,6 @@
 //! what is wrong. Method: ITU-T T.81, annex F. Baseline and extended sequential pictures with Huffman codes; a progressive one is left
 //! to its decoder.
 
-use super::integrity::segment;
-
 /// Symbol and length of the code that a word of 16 bits begins with; length 0 where there is none.
 type Codes = Vec<(u8, u8)>;
 
@@ -228,6 +226,21 @@ impl<'a> Bits<'a> {
         // Some writers put fill bytes before a marker.
         (self.held < self.made_up + 8 && self.made_up > 0).then_some(self.at)
     }
+}
+
+/// The segment at a place: its marker, its body, and where the next one begins.
+pub(super) fn segment(bytes: &[u8], at: usize) -> Option<(u8, &[u8], usize)> {
+    let mut at = at;
+    // Fill bytes may stand before a marker.
+    while bytes.get(at..at + 2)? == [0xFF, 0xFF] {
+        at += 1;
+    }
+    let [0xFF, marker] = *bytes.get(at..at + 2)? else { return None };
+    if marker == 0xD9 {
+        return Some((marker, &[], at + 2));
+    }
+    let length = usize::from(u16::from_be_bytes([*bytes.get(at + 2)?, *bytes.get(at + 3)?]));
+    Some((marker, bytes.get(at + 4..at + 2 + length.max(2))?, at + 2 + length.max(2)))
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ pub mod raster;
 
 use nalgebra::Point2;
 
-pub use decode::decode;
+pub use decode::{decode, picture};
 pub use limits::{Claim, Header, header, read};
 pub use mosaic::Mosaic;
 

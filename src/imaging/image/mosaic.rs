@@ -2,7 +2,7 @@
 //!
 //! A raw mosaic looks like a grey picture with a pattern of period two, and measured as one it gives corners of which nobody knows the
 //! error. So it is recognised (in even light the four pixels of a cell differ alike all over the picture) and refused with the patterns
-//! that it may have; with its pattern named it is read. A board is black and white: behind each filter its grey is a linear function of
+//! that it may have; with its pattern named it is read, and without where the filters hardly differ. A board is black and white: behind each filter its grey is a linear function of
 //! the green one. The two are matched, over bright and over dark areas, and every pixel stays a measurement of its own,
 //! with its own noise; interpolated colours would be neither. Goes wrong: a lens that images red and blue in other places than
 //! green widens the edges a little; a white balance that makes all filters alike leaves no pattern and no harm.
@@ -75,6 +75,9 @@ const FLAT: f64 = 0.06;
 /// Share by which pixels of a cell differ from their mean in a mosaic, at the least. Unequal rows of a sensor with several amplifiers
 /// differ by a percent or two.
 const COLOURED: f64 = 0.04;
+/// Share up to which the filters are told apart by the picture alone: under infrared light, or where the camera has matched them but for a little,
+/// all see nearly the same. Red and blue filters under a light that one sees by differ from green by several times this.
+const NEARLY_ALIKE: f64 = 0.1;
 /// Share by which the two greens may differ.
 const GREENS_ALIKE: f64 = 0.03;
 /// Fewest flat cells that tell anything.
@@ -109,8 +112,12 @@ where
     match (pattern, seen) {
         (None, None) => Ok(image.into()),
         (None, Some((greens, share))) => {
-            let fitting: Vec<String> =
-                ALL.iter().filter(|p| p.greens() == greens).map(|p| format!("`--bayer {p}`")).collect();
+            let mut fitting = ALL.into_iter().filter(|pattern| pattern.greens() == greens);
+            // Which of them it is makes no difference to the match.
+            if let (true, Some(pattern)) = (share < NEARLY_ALIKE, fitting.clone().next()) {
+                return Ok(matched(&image, &cells, pattern).into());
+            }
+            let fitting: Vec<String> = fitting.by_ref().map(|p| format!("`--bayer {p}`")).collect();
             Err(format!(
                 "is a raw colour mosaic (neighbouring pixels differ by {:.0} %): {} reads it, by the camera's data sheet",
                 100.0 * share,
@@ -240,6 +247,23 @@ mod tests {
         assert_eq!(grey(image.clone(), None).unwrap(), Picture::from(image));
         // Two amplifiers that differ by two percent.
         assert!(grey(mosaic([1.0, 1.0, 0.98, 0.98], 8.0), None).is_ok());
+    }
+
+    #[test]
+    fn filters_that_hardly_differ_are_matched_unasked() {
+        for gains in [[0.95, 1.0, 1.0, 1.0], [1.0, 0.94, 0.93, 1.0], [0.95, 1.0, 1.0, 1.06]] {
+            let picture = grey(mosaic(gains, 8.0), None).unwrap();
+            let Grey::Sixteen(image) = &picture.grey else { panic!("8 bits") };
+            let mean = |phase: usize| {
+                let cells = (0..64).map(|k| (4 + k % 8 * 2 + phase % 2, 4 + k / 8 * 2 + phase / 2));
+                cells.map(|(x, y)| f64::from(image.pixels[y * 400 + x]) / 257.0).sum::<f64>() / 64.0
+            };
+            let means = [0, 1, 2, 3].map(mean);
+            assert!(means.iter().all(|m| (m / means[0] - 1.0).abs() < 0.01), "{gains:?}: {means:?}");
+        }
+        // By as little as amplifiers differ nothing is changed.
+        let image = mosaic([0.985, 1.0, 1.0, 1.0], 8.0);
+        assert_eq!(grey(image.clone(), None).unwrap(), Picture::from(image));
     }
 
     #[test]

@@ -17,7 +17,9 @@ const MOST_TURN_RAD: f64 = 0.35;
 /// Widest blur, as a share of a square: beyond it no square has a level of its own.
 const MOST_BLUR_SQUARES: f64 = 0.5;
 /// Share of the light that may change over a square. Light does not; a fit that says so has taken a neighbour's edge for its gradient.
-const MOST_LIGHT_CHANGE: f64 = 0.3;
+pub(super) const MOST_LIGHT_CHANGE: f64 = 0.3;
+/// The same for a corner that is known by no window otherwise, in the edge of a highlight: all of it.
+pub(super) const ALL_LIGHT: f64 = 1.0;
 /// Largest variance (both axes together) of a corner, px^2: half a pixel is what the eye sees.
 const MOST_VARIANCE_PX2: f64 = 0.25;
 
@@ -48,15 +50,25 @@ const MOST_ROUGHNESS: f64 = 1.5;
 /// The same for a corner in whose window pixels may be that do not belong: noise alone scatters less.
 const ROUGH: f64 = 1.15;
 
-/// False for a fit that wandered off, turned away, or found no contrast.
-pub(super) fn plausible(fit: &Fit, start: &Model, cell: &Cell) -> bool {
+/// False for a fit that wandered off, turned away, or found no contrast, or a light that changes by more than a share of it over a square.
+pub(super) fn plausible(fit: &Fit, start: &Model, cell: &Cell, most_light_change: f64) -> bool {
     let turned = (0..2).map(|k| (fit.model.angles_rad[k] - start.angles_rad[k]).abs()).fold(0.0, f64::max);
     fit.model.corner.norm() < (MOST_MOVE_SQUARES * cell.side()).min(MOST_MOVE_PX)
         && turned < MOST_TURN_RAD
         && fit.model.blur_px.iter().all(|&s| s < MOST_BLUR_SQUARES * cell.side())
         && fit.model.half_contrast.abs() > fit.residual
-        && fit.model.light_slope.norm() * cell.side() < MOST_LIGHT_CHANGE
+        && fit.model.light_slope.norm() * cell.side() < most_light_change
         && fit.covariance_px2.trace() < MOST_VARIANCE_PX2
+}
+
+/// The usual variance (both axes together) of corners, px^2.
+pub(super) fn usual_variance<'a>(corners: impl Iterator<Item = &'a Measured>) -> f64 {
+    median(corners.map(|m| m.fit.covariance_px2.trace())).unwrap_or(f64::INFINITY)
+}
+
+/// True for a corner that is of use with the covariance that it has: not far less certain than is usual.
+pub(super) fn is_of_use(corner: &Measured, usual_px2: f64) -> bool {
+    corner.fit.covariance_px2.trace() < MOST_VARIANCE_PX2.min(MOST_SIGMAS.powi(2) * usual_px2)
 }
 
 /// Variance (both axes together) of the difference between a corner's places in two windows, px^2. The larger window holds the smaller
@@ -94,7 +106,7 @@ impl Board {
                 .unwrap_or(1.0)
                 .max(1.0),
             roughness: median(corners.iter().map(|m| roughness(&m.fit))).unwrap_or(f64::INFINITY),
-            variance_px2: median(corners.iter().map(|m| m.fit.covariance_px2.trace())).unwrap_or(f64::INFINITY),
+            variance_px2: usual_variance(corners.iter()),
             bent_px2: if bent { apart_px2 - by_noise_px2 } else { 0.0 },
         }
     }

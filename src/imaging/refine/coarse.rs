@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use super::Measured;
-use super::acceptance::plausible;
+use super::acceptance::{MOST_LIGHT_CHANGE, plausible};
 use super::cell::Cell;
 use super::saddle_fit::window::{Below, Frame, Window};
 use super::saddle_fit::{Fit, Model, fit};
@@ -40,8 +40,8 @@ fn coarse_fit(copy: &Image<u8>, cell: &Cell, window: &mut Window) -> Option<(Fit
         let halves = cell.edges.map(|e| e.normalize() * half);
         // A stretched copy reaches 255 without being clipped.
         window.collect(copy, 0.0, &Below(f64::MAX), &Frame { start: cell.place, halves, band_px: f64::MAX });
-        if let Some(first) = fit(&start, window)
-            && plausible(&first, &start, cell)
+        if let Some(first) = fit(&start, window, None)
+            && plausible(&first, &start, cell, MOST_LIGHT_CHANGE)
             && (first.model.blur_px.iter().all(|&s| s < 0.4 * half) || half >= most)
         {
             return Some((first, cell.reach(&halves)));

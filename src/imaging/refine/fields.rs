@@ -24,6 +24,9 @@ const COMMON: f64 = 0.5;
 /// Least shift that matters, px. Sensors with two read-out paths have rows of unequal gain, which shifts nothing; colours that a camera
 /// interpolates from its mosaic leave up to 0.05 px in pictures of one moment.
 const LEAST_SHIFT_PX: f64 = 0.06;
+/// Fields nearer to each other than this, px, are one picture: the box of a pixel alone blurs as much, 1/sqrt(12). A corner is then that of the
+/// mean of two moments, and as uncertain as half of what lies between them.
+pub const ONE_PICTURE_PX: f64 = 0.289;
 /// Half of what is looked at round a corner, px and in squares.
 const HALF_PX: f64 = 40.0;
 const HALF_SQUARES: f64 = 0.45;

@@ -133,6 +133,8 @@ mod tests {
                 light_covariance: Matrix2::identity() * 1e-8,
                 residual: 1.0,
                 arm_misfit: [[1.0; 2]; 2],
+                arm_freedom: 4.0,
+                stray: None,
                 pixels: 100,
                 left_out: 0,
                 steps: 3,

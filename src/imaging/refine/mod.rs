@@ -5,61 +5,45 @@
 //! it (full), along edges that bend as the lens bends the board's lines (`curvature`): as the near windows show them, and at last as the
 //! full ones do. Where some of the full windows tell that edges bend much from crossing to crossing, all are cut down. Where the larger
 //! window does not agree with the smaller one, or the four arms of a corner not with each other (`acceptance`), something hides a part of
-//! it, and the largest window that is free of it is kept. Last, the board's corners share what they know of the light
-//! (`illumination`), which counts from the picture's veil (`veil`). Goes wrong: a corner without contrast, hidden, cut off by the border or
-//! saturated; it is dropped, the others stay.
+//! it, and the largest window that is free of it is kept. Stray light that adds to dark and bright alike is fitted where the board shows
+//! it (`stray`). Last, corners get the covariances that they have by what their arms tell (`scatter`), also those that no window shows well, and
+//! share what they know of the light (`illumination`), which counts from the picture's veil (`veil`). Goes wrong: a corner without contrast,
+//! hidden, or cut off by the border; it is dropped, the others stay.
 
 mod acceptance;
 mod cell;
 mod coarse;
 mod curvature;
 pub mod fields;
+mod full_size;
 pub mod illumination;
 mod outlying_pixels;
 pub mod saddle_fit;
+mod scatter;
+mod stray;
 mod veil;
 mod windows;
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
-use self::acceptance::plausible;
 use self::cell::Cell;
 use self::coarse::{coarse, enlarged};
 use self::curvature::{Point, bends};
-use self::outlying_pixels::{Explained, few};
-use self::saddle_fit::window::{Below, Frame, Keep, Sample, Window};
-use self::saddle_fit::{Fit, Model, fit};
+use self::full_size::Full;
+use self::saddle_fit::window::{Sample, Window};
+use self::saddle_fit::{Fit, Model};
+use self::scatter::Scatter;
 use self::windows::{Windows, bends_by, usual};
 use super::Corner;
 use super::detect::Detected;
-use super::image::{Grey, Image, Picture};
+use super::image::{Grey, Picture};
 use super::lattice::{Lattice, Places};
 
-/// Pixels farther than this many blurs from both edges tell only the two grey levels.
-const BAND_BLURS: f64 = 3.5;
-/// The next edge's blur reaches this many blurs into the square.
-const MARGIN_BLURS: f64 = 3.0;
-
-/// Half of the largest window, px. The gain goes with the root of the window, the time with the window; at this size the bend of the
-/// edges, known from the board's other corners, is still known well enough.
-const MOST_HALF_PX: f64 = 250.0;
-/// The same where light is clipped: what the edges then miss of it does not fall with the window.
-const MOST_CLIPPED_HALF_PX: f64 = 80.0;
-/// What a window leaves of each edge at least, as a share of it. Edges bend at crossings that are off their places; from windows that reach
-/// from crossing to crossing nobody could tell which crossing it is.
-const LEAST_MARGIN: f64 = 0.15;
 /// How good places on the copy are at least, px.
 const GOOD_PX: f64 = 0.1;
-/// Half of the near window, px and in blurs: the least that holds an arm on each side of the crossing.
-const NEAR_HALF_PX: f64 = 10.0;
-const NEAR_HALF_BLURS: f64 = 7.0;
-/// Half of the window that is tried where the full one is not free, as a multiple of the near one's.
-const BETWEEN: f64 = 2.8;
 /// One corner of so many is tried in its full window to see how much edges bend, and so many at the least.
 const TRIED: usize = 3;
 const LEAST_TRIED: usize = 9;
-/// A near window that is not smaller than this share of the full one would tell nothing of its own.
-const NEAR_SHARE: f64 = 0.7;
 
 /// A corner and all that its fit tells.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,23 +83,54 @@ pub fn measure(picture: &Picture, detected: &Detected) -> Lattice<Measured> {
     }
 }
 
-/// The picture at full size.
-struct Full<'a, T> {
-    image: &'a Image<T>,
-    clip_level: f64,
-    /// The grey value from which light counts; the fits see what is above it.
-    veil: f64,
+/// What a board's windows told, what is usual in them, and the corners that they show well.
+struct Seen {
+    windows: Lattice<Windows>,
+    board: acceptance::Board,
+    measured: Lattice<Measured>,
 }
 
 impl<T: Sample> Full<'_, T> {
-    fn of<'a>(image: &'a Image<T>, clip_level: f64, detected: &Detected) -> Full<'a, T> {
-        let places = detected.corners.map(|px| detected.level.to_picture(px));
-        Full { image, clip_level, veil: veil::level(image, clip_level, &places) }
-    }
-
     fn measure(&self, detected: &Detected) -> Lattice<Measured> {
         let mut window = Window::default();
-        let coarse = coarse(detected, &mut window);
+        let mut seen = self.look(detected, &mut window);
+        let mut scatter = Scatter::of(&seen.measured);
+        // Where corners scatter as noise does there is nothing to look for.
+        if !scatter.is_noise() {
+            if let Some(stray) = self.stray_light(&seen.windows, &mut window) {
+                seen = self.with_stray(stray).look(detected, &mut window);
+                scatter = Scatter::of(&seen.measured);
+            }
+            scatter.carry(&mut seen.measured);
+        }
+        let Seen { windows, board, mut measured } = seen;
+        illumination::tie(&mut measured);
+        let usual_px2 = acceptance::usual_variance(measured.iter().map(|(_, _, m)| m));
+        Lattice::from_fn(measured.columns, measured.rows, |col, row| {
+            let well = measured.get(col, row).copied();
+            well.or_else(|| {
+                let known = self.windows_left(windows.get(col, row)?, &board, &mut window);
+                let known = known.into_iter().map(|corner| scatter.alone(corner));
+                known.filter(|corner| acceptance::is_of_use(corner, usual_px2)).min_by(by_variance)
+            })
+        })
+    }
+
+    /// Variance of the slope of stray light by the near windows, in each of which it is fitted without a bound.
+    fn stray_light(&self, seen: &Lattice<Windows>, window: &mut Window) -> Option<f64> {
+        let unbound = self.with_stray(stray::UNBOUND);
+        let mut fits = Lattice::from_fn(seen.columns, seen.rows, |col, row| {
+            let windows = seen.get(col, row)?;
+            let near = windows.near.or(windows.full)?;
+            unbound.fit_from(&near, full_size::near_half_px(&windows.start), windows, window)
+        });
+        Scatter::of(&fits).carry(&mut fits);
+        stray::variance(&fits.iter().filter_map(|(_, _, fit)| fit.fit.stray).collect::<Vec<_>>())
+    }
+
+    /// What the board's windows tell, from the first fits on.
+    fn look(&self, detected: &Detected, window: &mut Window) -> Seen {
+        let coarse = coarse(detected, window);
         let columns = coarse.columns;
         let at = |bends: &[[f64; 2]], col: usize, row: usize| bends[row * columns + col];
         let on_copy = |m: &Measured| Point { px: detected.level.to_picture(&m.px), counts: true };
@@ -137,7 +152,7 @@ impl<T: Sample> Full<'_, T> {
                 ..enlarged(&from.fit.model, scale)
             };
             // On a copy of full size the first fit is a measurement already.
-            Some(self.near(cell, start, (scale == 1.0).then_some(*from), &mut window))
+            Some(self.near(cell, start, (scale == 1.0).then_some(*from), window))
         });
         // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large ones from.
         let near_only: Vec<Measured> = near.iter().filter_map(|(_, _, windows)| windows.near).collect();
@@ -146,21 +161,11 @@ impl<T: Sample> Full<'_, T> {
         let near = Lattice::from_fn(columns, coarse.rows, |col, row| {
             Some(near.get(col, row)?.clone().rebent(at(&near_bends, col, row)))
         });
-        let (seen, board) = self.large(&near, &places, &mut window);
-        let mut measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            self.largest_free(seen.get(col, row)?, &board, &mut window)
+        let (windows, board) = self.large(&near, &places, window);
+        let measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            self.largest_free(windows.get(col, row)?, &board, window)
         });
-        illumination::tie(&mut measured);
-        measured
-    }
-
-    /// A fit in the near window, where the full one is enough larger to tell more; otherwise what the copy told, if that is of full size.
-    fn near(&self, cell: Cell, start: Model, coarse: Option<Measured>, window: &mut Window) -> Windows {
-        let full_px = half_px(cell.side(), margin_px(&start, &cell));
-        let near_px = near_half_px(&start);
-        let alone = near_px > NEAR_SHARE * full_px;
-        let near = if alone { coarse } else { self.fit_within(near_px, &cell, &start, window) };
-        Windows { cell, start, alone, most_half_px: MOST_HALF_PX, near, full: None }
+        Seen { windows, board, measured }
     }
 
     /// The fits in full windows, or where edges bend too much for these in smaller ones, along edges that bend as these windows show it;
@@ -195,134 +200,16 @@ impl<T: Sample> Full<'_, T> {
         let smaller = board.straight_share();
         if share == 1.0 && smaller < 1.0 { within(smaller) } else { (seen, board) }
     }
-
-    /// A fit in the full window or in a share of it, started where the one in the near window ended: most steps are taken where they are
-    /// cheap, and the blur is that of the picture, not of the copy, so fewer pixels count as near an edge.
-    fn full(&self, seen: Windows, share: f64, window: &mut Window) -> Windows {
-        let mut within = |half_px: f64| match &seen.near {
-            _ if seen.alone => self.fit_within(half_px, &seen.cell, &seen.start, window),
-            None => None,
-            Some(near) => self.fit_from(near, half_px, &seen, window),
-        };
-        // What is hardly larger than the near window is not made smaller.
-        let share_px = share * half_px(seen.cell.side(), margin_px(&seen.start, &seen.cell));
-        let most_half_px = if seen.alone || share == 1.0 { MOST_HALF_PX } else { share_px };
-        let full = within(most_half_px);
-        let reach_px = |full: &Measured| full.reach[0] * seen.cell.edges[0].norm();
-        let clips = full.is_some_and(|full| full.fit.left_out > 0 && reach_px(&full) > MOST_CLIPPED_HALF_PX);
-        if clips {
-            return Windows { full: within(MOST_CLIPPED_HALF_PX), most_half_px: MOST_CLIPPED_HALF_PX, ..seen };
-        }
-        Windows { full, most_half_px, ..seen }
-    }
-
-    /// A corner whose pixels lie farther from the model than is usual on the board, fitted again without those that it cannot explain, where
-    /// they are few.
-    fn without_outlying(
-        &self,
-        first: &Measured,
-        most_half_px: f64,
-        cell: &Cell,
-        board: &acceptance::Board,
-        window: &mut Window,
-    ) -> Measured {
-        let clips = first.fit.left_out > 0;
-        if !clips && !board.is_rough(first) {
-            return *first;
-        }
-        let mut best = *first;
-        // The first fit was pulled by what the second one leaves out: a third one sees that, too.
-        for _ in 0..2 {
-            let keep = Explained::by(&best, board.roughness(), self.clip_level - self.veil, clips);
-            let start = Model { corner: Vector2::zeros(), ..best.fit.model };
-            let again = self.fit_kept(most_half_px, &Cell { place: best.px, ..*cell }, &start, &keep, window);
-            let dropped = |again: &Measured| again.fit.left_out.saturating_sub(first.fit.left_out);
-            match again {
-                Some(again) if clips || few(dropped(&again), again.fit.pixels) => best = again,
-                _ => break,
-            }
-        }
-        best
-    }
-
-    /// The largest window that nothing reaches into: the full one, one between, the near one, or none.
-    fn largest_free(&self, seen: &Windows, board: &acceptance::Board, window: &mut Window) -> Option<Measured> {
-        let seen = Windows {
-            near: seen
-                .near
-                .map(|near| self.without_outlying(&near, near_half_px(&seen.start), &seen.cell, board, window)),
-            full: seen.full.map(|full| self.without_outlying(&full, seen.most_half_px, &seen.cell, board, window)),
-            ..*seen
-        };
-        if let Some(full) = seen.free(board) {
-            return Some(*full);
-        }
-        let near = seen.near.as_ref()?;
-        let between = self.fit_from(near, BETWEEN * near_half_px(&seen.start), &seen, window);
-        let between = between.filter(|between| board.agrees(near, between) && board.holds_in_small_window(between));
-        between.or_else(|| board.holds_in_small_window(near).then_some(*near))
-    }
-
-    /// A fit in a larger window, from what a smaller one told.
-    fn fit_from(&self, near: &Measured, most_half_px: f64, seen: &Windows, window: &mut Window) -> Option<Measured> {
-        // A window in the middle of which the corner is: what the light's gradient adds on one side it takes on the other.
-        let start = Model { corner: Vector2::zeros(), bend: seen.start.bend, ..near.fit.model };
-        self.fit_within(most_half_px, &Cell { place: near.px, ..seen.cell }, &start, window)
-    }
-
-    /// A fit in a window that reaches up to `most_half_px` along each edge.
-    fn fit_within(&self, most_half_px: f64, cell: &Cell, start: &Model, window: &mut Window) -> Option<Measured> {
-        self.fit_kept(most_half_px, cell, start, &Below(self.clip_level - self.veil), window)
-    }
-
-    /// The same with the pixels that are to be kept.
-    fn fit_kept(
-        &self,
-        most_half_px: f64,
-        cell: &Cell,
-        start: &Model,
-        keep: &impl Keep,
-        window: &mut Window,
-    ) -> Option<Measured> {
-        let mut start = *start;
-        loop {
-            let blur = start.blur_px[0].max(start.blur_px[1]);
-            let margin = margin_px(&start, cell);
-            let halves = cell.edges.map(|e| e.normalize() * half_px(e.norm(), margin).min(most_half_px));
-            let band_px = BAND_BLURS * blur + 1.0;
-            window.collect(self.image, self.veil, keep, &Frame { start: cell.place, halves, band_px });
-            let found = fit(&start, window)?;
-            let wider = found.model.blur_px[0].max(found.model.blur_px[1]);
-            // The copy may have hidden how wide the blur is; the band must hold the whole edge.
-            if BAND_BLURS * wider <= 1.2 * band_px {
-                let fits = plausible(&found, &start, cell);
-                return fits.then(|| Measured { px: found.place(&cell.place), fit: found, reach: cell.reach(&halves) });
-            }
-            if wider > 0.5 * cell.side() {
-                return None;
-            }
-            start = Model { blur_px: found.model.blur_px, ..start };
-        }
-    }
 }
 
-/// Half of the largest window along an edge of this length, px.
-fn half_px(edge_px: f64, margin_px: f64) -> f64 {
-    (edge_px - margin_px.max(LEAST_MARGIN * edge_px)).max(0.5 * edge_px).min(MOST_HALF_PX)
-}
-
-/// How far a window stays off the next edges, px. Oblique edges come nearer to each other.
-fn margin_px(start: &Model, cell: &Cell) -> f64 {
-    (MARGIN_BLURS * start.blur_px[0].max(start.blur_px[1]) + 1.0) / cell.skew()
-}
-
-fn near_half_px(start: &Model) -> f64 {
-    NEAR_HALF_PX.max(NEAR_HALF_BLURS * start.blur_px[0].max(start.blur_px[1]))
+fn by_variance(a: &Measured, b: &Measured) -> std::cmp::Ordering {
+    a.fit.covariance_px2.trace().total_cmp(&b.fit.covariance_px2.trace())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imaging::image::Image;
     use crate::imaging::{Board, detect};
     use statrs::function::erf::erf;
 

@@ -62,6 +62,13 @@ pub enum PictureFault {
     Gamma(f32),
     /// Everything above a level reads as that level.
     ClipAt(f32),
+    /// An unsharp mask, as cameras sharpen: what a Gaussian blur takes away is added once more, and clipped at the ends of the range.
+    Sharpened {
+        /// How much of it.
+        amount: f32,
+        /// Standard deviation of the blur, px.
+        radius_px: f32,
+    },
     /// Numbers of a camera that uses only part of its range.
     Levels {
         /// What 0 becomes.
@@ -152,6 +159,7 @@ impl Shares {
             }
             PictureFault::Gamma(power) => self.values.iter_mut().for_each(|v| *v = v.powf(power)),
             PictureFault::ClipAt(level) => self.values.iter_mut().for_each(|v| *v = v.min(level)),
+            PictureFault::Sharpened { amount, radius_px } => self.sharpen(amount, radius_px),
             PictureFault::Levels { black, white } => {
                 self.values.iter_mut().for_each(|v| *v = black + (white - black) * *v);
             }
@@ -175,6 +183,21 @@ impl Shares {
         for (y, row) in self.values.chunks_exact_mut(self.width).enumerate() {
             row.iter_mut().enumerate().for_each(|(x, v)| *v = change(x as f64, y as f64, *v));
         }
+    }
+
+    fn sharpen(&mut self, amount: f32, radius_px: f32) {
+        let (w, h) = (self.width, self.height);
+        let reach = (3.0 * radius_px).ceil() as isize;
+        let weight = |k: isize| (-0.5 * (k as f32 / radius_px).powi(2)).exp();
+        let total: f32 = (-reach..=reach).map(weight).sum();
+        let inside = |v: usize, k: isize, size: usize| v.saturating_add_signed(k).min(size - 1);
+        let along = |at: &dyn Fn(isize) -> f32| (-reach..=reach).map(|k| weight(k) / total * at(k)).sum::<f32>();
+        let place = |i: usize| (i % w, i / w);
+        let rows: Vec<f32> =
+            (0..w * h).map(place).map(|(x, y)| along(&|k| self.values[y * w + inside(x, k, w)])).collect();
+        let blurred = (0..w * h).map(place).map(|(x, y)| along(&|k| rows[inside(y, k, h) * w + x]));
+        let blurred: Vec<f32> = blurred.collect();
+        self.values.iter_mut().zip(blurred).for_each(|(v, b)| *v = (*v + amount * (*v - b)).clamp(0.0, 1.0));
     }
 
     fn turn_quarter(&mut self) {
@@ -253,6 +276,17 @@ mod tests {
         let mut picture = ramp();
         picture.interlace(&Shares { values: vec![1.0; 6], ..ramp() });
         assert_eq!(picture.values, [0.0, 0.1, 0.2, 1.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn sharpening_leaves_even_grey_and_overshoots_at_an_edge() {
+        let values: Vec<f32> = (0..40 * 9).map(|k| if k % 40 < 20 { 0.3 } else { 0.6 }).collect();
+        let mut picture = Shares { width: 40, height: 9, values };
+        picture.suffer(&PictureFault::Sharpened { amount: 1.0, radius_px: 1.0 }, 1, 0);
+        let row = &picture.values[160..200];
+        assert!((row[5] - 0.3).abs() < 1e-6 && (row[35] - 0.6).abs() < 1e-6);
+        // The first pixel beyond the edge keeps what a Gaussian of one px has beyond half a px of it: three tenths of the step.
+        assert!((row[20] - 0.6 - 0.09).abs() < 0.02 && (row[19] + row[20] - 0.9).abs() < 1e-6, "{row:?}");
     }
 
     #[test]

@@ -85,7 +85,8 @@ impl Problem {
         let (mut noise, mut loss) = Noise::likeliest(&residuals::active(&views, &values).ok_or_else(unseen)?, unknowns);
         for _ in 0..MOST_ROUNDS {
             noise.apply(&mut views);
-            let solution = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, Search::NEAR);
+            let search = if loss == Loss::Squared { Search::NEAR } else { Search::ROBUST };
+            let solution = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search);
             // A lens that was asked for may have numbers that these views do not tell apart; the covariance says which.
             if !matches!(solution.stop, Stop::Minimum | Stop::Valley) {
                 return Err(Error::NotConverged { steps: solution.steps });
@@ -93,7 +94,7 @@ impl Problem {
             values = solution.values;
             let before = (noise, loss);
             (noise, loss) = Noise::likeliest(&residuals::active(&views, &values).ok_or_else(unseen)?, unknowns);
-            let moved = |a: f64, b: f64| (a - b).abs() > 1e-6 * b;
+            let moved = |a: f64, b: f64| (a - b).abs() > 1e-4 * b;
             if loss == before.1 && !moved(before.0.added_px, noise.added_px) && !moved(before.0.factor, noise.factor) {
                 break;
             }
@@ -102,7 +103,11 @@ impl Problem {
         let left = residuals::active(&views, &values).ok_or_else(unseen)?;
         let whitened = |o: &Observation, r: &Vector2<f64>| o.whiten(*r).norm_squared();
         let loss_factor = loss.variance_factor(left.iter().map(|(o, r)| whitened(o, r)));
-        weigh(&mut views, &values, loss);
+        if loss != Loss::Squared {
+            weigh(&mut views, &values, loss);
+            let (loss, search) = (Loss::Squared, Search::NEAR);
+            values = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search).values;
+        }
         let squares: Vec<f64> = left.iter().map(|(_, r)| r.norm_squared()).collect();
         let rms_px = residuals::root_mean_square(&squares).unwrap_or(0.0);
         Ok(Solved { problem: Problem { views, values, priors }, noise, loss, loss_factor, rms_px })

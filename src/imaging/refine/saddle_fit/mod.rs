@@ -6,6 +6,7 @@
 //! (lens distortion) is given. Goes wrong: too few pixels, no contrast, an edge that is not there; all end in `None`.
 
 mod crossing;
+mod evaluation;
 pub mod model;
 mod products;
 mod special;
@@ -13,21 +14,25 @@ pub mod window;
 
 use nalgebra::{Matrix2, Point2, SMatrix, SVector, Vector2};
 
+use evaluation::{Arm, Evaluation};
 pub use model::Model;
-use model::{Evaluation, N};
+use model::{COLUMNS, N};
 use window::Window;
 
 /// Steps after which a fit that still moves is given up; a good start needs three to six.
 const MAX_STEPS: usize = 40;
 /// Least blur, px: that of the box of a pixel alone, 1/sqrt(12). Sharpened pictures would fit less, with a slope that no pixel sees.
 const LEAST_BLUR_PX: f64 = 0.3;
+/// The same for fits that do not settle with the former: an edge so steep between two rows of pixels may lie anywhere there, one that is as wide as
+/// the pixels are apart lies in one place. What the profile then misses is alike on both sides.
+const SMOOTH_BLUR_PX: f64 = 0.5;
 
 /// Sum of squared residuals at a model, with its normal matrix and gradient.
 struct Equations {
     cost: f64,
     matrix: Normal,
     gradient: Column,
-    arm_gains: [[f64; 2]; 2],
+    arms: [[Arm<COLUMNS>; 2]; 2],
 }
 
 type Normal = SMatrix<f64, N, N>;
@@ -48,6 +53,10 @@ pub struct Fit {
     pub light_covariance: Matrix2<f64>,
     /// For each edge, on either side of the crossing: chi-squared (two degrees of freedom) of that arm's edge against the common model.
     pub arm_misfit: [[f64; 2]; 2],
+    /// What the sum of these is in the mean where residuals are noise and nothing else: the common model has taken a part of it.
+    pub arm_freedom: f64,
+    /// Slope of stray light, grey values per px, and its covariance, where it was looked for.
+    pub stray: Option<(Vector2<f64>, Matrix2<f64>)>,
     /// Number of pixels.
     pub pixels: usize,
     /// Number of pixels in the window that were left out: saturated, or not explained by a first fit.
@@ -57,11 +66,12 @@ pub struct Fit {
 }
 
 impl Model {
-    fn add(&self, d: &Column) -> Model {
+    /// The model after a step, with blurs of `least` px at the least.
+    fn add(&self, d: &Column, least: f64) -> Model {
         Model {
             corner: self.corner + Vector2::new(d[0], d[1]),
             angles_rad: [self.angles_rad[0] + d[2], self.angles_rad[1] + d[3]],
-            blur_px: [(self.blur_px[0] + d[4]).max(LEAST_BLUR_PX), (self.blur_px[1] + d[5]).max(LEAST_BLUR_PX)],
+            blur_px: [(self.blur_px[0] + d[4]).max(least), (self.blur_px[1] + d[5]).max(least)],
             level: self.level + d[6],
             half_contrast: self.half_contrast + d[7],
             light_slope: self.light_slope + Vector2::new(d[8], d[9]),
@@ -70,9 +80,9 @@ impl Model {
     }
 
     /// Takes a blur at its bound out of the equations where they would push it below.
-    fn hold_least_blur(&self, matrix: &mut Normal, gradient: &mut Column) {
+    fn hold_least_blur(&self, matrix: &mut Normal, gradient: &mut Column, least: f64) {
         for k in [0, 1] {
-            if self.blur_px[k] <= LEAST_BLUR_PX && gradient[4 + k] <= 0.0 {
+            if self.blur_px[k] <= least && gradient[4 + k] <= 0.0 {
                 matrix.fill_row(4 + k, 0.0);
                 matrix.fill_column(4 + k, 0.0);
                 matrix[(4 + k, 4 + k)] = 1.0;
@@ -83,12 +93,12 @@ impl Model {
 
     /// The equations of a least-squares step.
     fn equations(&self, window: &Window) -> Equations {
-        let Evaluation { sums, arm_gains } = self.evaluate(window);
+        let Evaluation { sums, arms } = self.evaluate(window);
         Equations {
             cost: sums[(N, N)],
             matrix: sums.fixed_view::<N, N>(0, 0).into_owned(),
             gradient: sums.fixed_view::<N, 1>(0, N).into_owned(),
-            arm_gains,
+            arms,
         }
     }
 }
@@ -104,35 +114,61 @@ fn with_levels(start: &Model, window: &Window) -> Option<Model> {
     Some(Model { level: d[0], half_contrast: d[1], ..even })
 }
 
-/// Fits the model to the window's pixels. `None` where the pixels don't determine it or the fit does not settle.
-pub fn fit(start: &Model, window: &Window) -> Option<Fit> {
+/// Fits the model to the window's pixels. `None` where the pixels don't determine it or the fit does not settle. `stray` is the variance of the
+/// slope of stray light that the board's pictures have, (grey values per px)^2, where they have any.
+pub fn fit(start: &Model, window: &Window, stray: Option<f64>) -> Option<Fit> {
     let count = window.count();
     if window.near() < 3 * N {
         return None;
     }
     let freedom = (count - N) as f64;
-    let (model, mut last, steps) = settled(with_levels(start, window)?, window, freedom)?;
-    // Rounding to whole grey values alone leaves 1/12.
-    let variance = (last.cost / freedom).max(1.0 / 12.0);
-    model.hold_least_blur(&mut last.matrix, &mut last.gradient);
-    let inverse = last.matrix.cholesky()?.inverse();
-    let part = |row: usize, column: usize| inverse.fixed_view::<2, 2>(row, column) * variance;
-    let fit = Fit {
-        model,
-        covariance_px2: part(0, 0),
-        residual: variance.sqrt(),
-        place_by_light: part(0, 8),
-        light_covariance: part(8, 8),
-        arm_misfit: last.arm_gains.map(|sides| sides.map(|gain| gain / variance)),
-        pixels: count,
-        left_out: window.left_out,
-        steps,
+    let start = with_levels(start, window)?;
+    let (model, last, steps) = settled(start, window, freedom, LEAST_BLUR_PX)
+        .or_else(|| settled(start.add(&Column::zeros(), SMOOTH_BLUR_PX), window, freedom, SMOOTH_BLUR_PX))?;
+    let fit = match stray {
+        Some(variance) => with_stray(&model, window, freedom, variance)?,
+        None => plain(&model, &last, freedom)?,
     };
+    let fit = Fit { pixels: count, left_out: window.left_out, steps, ..fit };
     (fit.covariance_px2.iter().all(|v| v.is_finite()) && last.cost.is_finite()).then_some(fit)
 }
 
+/// Rounding to whole grey values alone leaves this variance.
+const LEAST_VARIANCE: f64 = 1.0 / 12.0;
+
+/// What the equations at the end of a fit tell of it.
+fn plain(model: &Model, last: &Equations, freedom: f64) -> Option<Fit> {
+    const PARAMETERS: [usize; N] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9];
+    let variance = (last.cost / freedom).max(LEAST_VARIANCE);
+    // A blur at its bound is not known the better for it.
+    let inverse = last.matrix.cholesky()?.inverse();
+    let arms = last.arms.map(|sides| sides.map(|arm| arm.gain(&[], &[]) / variance));
+    let arm_freedom = last.arms.iter().flatten().map(|arm| arm.freedom(&PARAMETERS, &inverse)).sum();
+    Some(Fit::of(*model, &inverse, variance, arms, arm_freedom))
+}
+
+/// Parameters of a fit that holds stray light, too: light that does not come from the board but from a reflection on it, and adds to dark and
+/// bright alike. Taken as light on the board its slope would move the edges. A fit is linear near its end: one step takes it there.
+fn with_stray(model: &Model, window: &Window, freedom: f64, slope_variance: f64) -> Option<Fit> {
+    const PARAMETERS: [usize; N + 2] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, COLUMNS, COLUMNS + 1];
+    let Evaluation { sums, arms } = model.evaluate_with_stray(window);
+    let mut matrix = SMatrix::<f64, { N + 2 }, { N + 2 }>::from_fn(|i, k| sums[(PARAMETERS[i], PARAMETERS[k])]);
+    let gradient = SVector::<f64, { N + 2 }>::from_fn(|i, _| sums[(PARAMETERS[i], N)]);
+    let mut variance = (sums[(N, N)] / freedom).max(LEAST_VARIANCE);
+    let weight = variance / slope_variance;
+    (matrix[(N, N)], matrix[(N + 1, N + 1)]) = (matrix[(N, N)] + weight, matrix[(N + 1, N + 1)] + weight);
+    let cholesky = matrix.cholesky()?;
+    let (step, inverse) = (cholesky.solve(&gradient), cholesky.inverse());
+    variance = ((sums[(N, N)] - step.dot(&gradient)) / freedom).max(LEAST_VARIANCE);
+    let misfit = arms.map(|sides| sides.map(|arm| arm.gain(&PARAMETERS, step.as_slice()) / variance));
+    let arm_freedom = arms.iter().flatten().map(|arm| arm.freedom(&PARAMETERS, &inverse)).sum();
+    let model = model.add(&step.fixed_rows::<N>(0).into_owned(), LEAST_BLUR_PX);
+    let slope = (Vector2::new(step[N], step[N + 1]), inverse.fixed_view::<2, 2>(N, N) * variance);
+    Some(Fit { stray: Some(slope), ..Fit::of(model, &inverse, variance, misfit, arm_freedom) })
+}
+
 /// The model at the end of all steps, the equations one short step before it, and the number of steps.
-fn settled(start: Model, window: &Window, freedom: f64) -> Option<(Model, Equations, usize)> {
+fn settled(start: Model, window: &Window, freedom: f64, least_blur_px: f64) -> Option<(Model, Equations, usize)> {
     /// Where the undamped step would gain less than this share of one pixel's variance, nothing moves by more than a third of its sigma;
     /// that step is still taken, and steps shrink at least tenfold by then, so less than a thirtieth is left. Of 2400 corners half were
     /// within 0.0002 sigma of where further steps took them, and 99 of 100 within 0.002.
@@ -145,21 +181,22 @@ fn settled(start: Model, window: &Window, freedom: f64) -> Option<(Model, Equati
     let mut at = model.equations(window);
     let mut damping = 1e-3;
     for steps in 1..=MAX_STEPS {
-        model.hold_least_blur(&mut at.matrix, &mut at.gradient);
+        let (mut matrix, mut gradient) = (at.matrix, at.gradient);
+        model.hold_least_blur(&mut matrix, &mut gradient, least_blur_px);
         // A damped step gains little because it is short: only the undamped one tells how far the end is.
-        let whole = at.matrix.cholesky()?.solve(&at.gradient);
+        let whole = matrix.cholesky()?.solve(&gradient);
         if !whole.iter().all(|v| v.is_finite()) {
             return None;
         }
         let grey = model.level.abs() + model.half_contrast.abs();
-        if at.gradient.dot(&whole) < SETTLED * (at.cost / freedom).max((LEAST_RESIDUAL * grey).powi(2)) {
-            return Some((model.add(&whole), at, steps));
+        if gradient.dot(&whole) < SETTLED * (at.cost / freedom).max((LEAST_RESIDUAL * grey).powi(2)) {
+            return Some((model.add(&whole, least_blur_px), at, steps));
         }
-        let mut damped = at.matrix;
+        let mut damped = matrix;
         for i in 0..N {
             damped[(i, i)] *= 1.0 + damping;
         }
-        let next = model.add(&damped.cholesky()?.solve(&at.gradient));
+        let next = model.add(&damped.cholesky()?.solve(&gradient), least_blur_px);
         let there = next.equations(window);
         // The gain that counts is the one that came out, as far as rounding lets it be seen.
         let rounding = 2.0 * ROUNDING * grey * (at.cost * freedom).sqrt();
@@ -177,6 +214,40 @@ fn settled(start: Model, window: &Window, freedom: f64) -> Option<(Model, Equati
 }
 
 impl Fit {
+    fn of<const P: usize>(
+        model: Model,
+        inverse: &SMatrix<f64, P, P>,
+        variance: f64,
+        arm_misfit: [[f64; 2]; 2],
+        arm_freedom: f64,
+    ) -> Fit {
+        let part = |row: usize, column: usize| inverse.fixed_view::<2, 2>(row, column) * variance;
+        Fit {
+            model,
+            covariance_px2: part(0, 0),
+            residual: variance.sqrt(),
+            place_by_light: part(0, 8),
+            light_covariance: part(8, 8),
+            arm_misfit,
+            arm_freedom,
+            stray: None,
+            pixels: 0,
+            left_out: 0,
+            steps: 0,
+        }
+    }
+
+    /// The fit with all its covariances `factor` times as large.
+    pub fn scattering(self, factor: f64) -> Fit {
+        Fit {
+            covariance_px2: self.covariance_px2 * factor,
+            place_by_light: self.place_by_light * factor,
+            light_covariance: self.light_covariance * factor,
+            stray: self.stray.map(|(slope, own)| (slope, own * factor)),
+            ..self
+        }
+    }
+
     /// The corner in the picture whose window started at `start`, px.
     pub fn place(&self, start: &Point2<f64>) -> Point2<f64> {
         start + self.model.corner
@@ -214,7 +285,7 @@ mod tests {
                 half_contrast: 0.0,
                 ..truth
             };
-            let fit = fit(&start, &window).unwrap();
+            let fit = fit(&start, &window, None).unwrap();
             // Limited by the stop rule, not by the pixels.
             assert!((fit.model.corner - truth.corner).norm() < 1e-4, "{:?}", fit.model);
             assert!((fit.model.blur_px[1] - 1.3).abs() < 1e-3 && (fit.model.angles_rad[0] - 0.1).abs() < 1e-3);
@@ -225,8 +296,8 @@ mod tests {
     #[test]
     fn a_flat_or_empty_window_has_no_corner() {
         let start = Model::example();
-        assert_eq!(fit(&start, &Window::default()), None);
+        assert_eq!(fit(&start, &Window::default(), None), None);
         let flat = window(&Model { half_contrast: 0.0, light_slope: Vector2::zeros(), ..start }, 10, f64::MAX);
-        assert!(fit(&start, &flat).is_none_or(|f| f.covariance_px2[(0, 0)] > 1.0));
+        assert!(fit(&start, &flat, None).is_none_or(|f| f.covariance_px2[(0, 0)] > 1.0));
     }
 }

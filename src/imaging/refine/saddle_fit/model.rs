@@ -9,38 +9,18 @@
 //! ```
 //!
 //! E is the sign pattern of two crossing lines under a Gaussian blur: the normal integral's dependence on the
-//! correlation is that of Drezner and Wesolowsky (1990). Here are the sums of the derivatives' products that a
-//! least-squares step needs; each kind of pixel has them from the fewest columns that span its derivatives, and a linear map
-//! takes those to the model's parameters.
+//! correlation is that of Drezner and Wesolowsky (1990).
 
-use nalgebra::{SMatrix, Vector2};
+use nalgebra::Vector2;
 
-use super::crossing::Crossing;
-use super::products::Products;
 use super::special::{erf_from, exp_negative};
-use super::window::{Group, Groups, LANES, Lanes, Window};
-use crate::imaging::wide::widest;
+use super::window::{Group, LANES, Lanes};
 use std::f32::consts::{FRAC_1_SQRT_2, FRAC_2_SQRT_PI};
 
 /// Number of parameters: c (2), edge angles (2), blurs (2), m, A/2, g (2).
 pub const N: usize = 10;
 /// The parameters' derivatives and the residual.
 pub const COLUMNS: usize = N + 1;
-/// What the derivatives along an arm are made of: see [`along`].
-const ARM: usize = 8;
-
-/// Sums of products of the parameters' derivatives and the residual.
-pub type Sums = SMatrix<f64, COLUMNS, COLUMNS>;
-
-/// What all pixels of a window make of a model.
-pub struct Evaluation {
-    /// Sums over all of them.
-    pub sums: Sums,
-    /// For each edge, on either side of the crossing: by how much less the sum of squared residuals would be if that arm's edge were free to
-    /// lie and run otherwise.
-    pub arm_gains: [[f64; 2]; 2],
-}
-
 /// The corner; places relative to the window's start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Model {
@@ -142,137 +122,6 @@ impl Edge {
     }
 }
 
-impl Model {
-    /// Sums of products over all pixels of the window.
-    pub fn evaluate(&self, window: &Window) -> Evaluation {
-        widest(
-            #[inline(always)]
-            || self.evaluate_lanes(window),
-        )
-    }
-
-    #[inline(always)]
-    fn evaluate_lanes(&self, window: &Window) -> Evaluation {
-        let mut total = self.at_crossing(&window.crossing);
-        let mut arm_gains = [[0.0; 2]; 2];
-        for (k, arms) in window.arms.iter().enumerate() {
-            let (edge, light) = (Edge::of(self, k), Light::of(self));
-            let mut both = SMatrix::zeros();
-            for ((groups, side), gain) in arms.iter().zip([-1.0, 1.0]).zip(&mut arm_gains[k]) {
-                let mut products = Products::<ARM>::new();
-                // No closure: one that is not inlined would be compiled for the narrowest registers.
-                for group in &groups.groups {
-                    along(&edge, &light, side, group, &mut products);
-                }
-                let sums = products.sums();
-                *gain = arm_gain(&sums);
-                both += sums;
-            }
-            add_mapped(&mut total, &self.arm_to_parameters(k), &both);
-        }
-        for (sums, alike) in window.flat.iter().zip([-1.0, 1.0]) {
-            add_mapped(&mut total, &self.flat_to_parameters(alike), sums);
-        }
-        Evaluation { sums: total, arm_gains }
-    }
-
-    #[inline(always)]
-    fn at_crossing(&self, groups: &Groups) -> Sums {
-        let crossing = Crossing::new(self);
-        let mut products = Products::<COLUMNS>::new();
-        let mut columns = [[0.0; LANES]; COLUMNS];
-        for group in &groups.groups {
-            crossing.columns(group, &mut columns);
-            products.add(&columns);
-        }
-        products.sums()
-    }
-
-    /// The parameters' derivatives from the columns of [`along`].
-    fn arm_to_parameters(&self, k: usize) -> [Share; 11] {
-        let (sin, cos) = self.angles_rad[k].sin_cos();
-        let bend = self.bend[k];
-        [
-            (0, 0, sin),
-            (0, 1, -bend * cos),
-            (1, 0, -cos),
-            (1, 1, -bend * sin),
-            (2 + k, 1, -1.0),
-            (4 + k, 2, -1.0),
-            (6, 3, 1.0),
-            (7, 4, 1.0),
-            (8, 5, 1.0),
-            (9, 6, 1.0),
-            (N, 7, 1.0),
-        ]
-    }
-
-    /// The parameters' derivatives where E is `alike`, from `(1, x, y, grey)`.
-    fn flat_to_parameters(&self, alike: f64) -> [Share; 12] {
-        let reflected = self.level + self.half_contrast * alike;
-        let (x, y) = (self.light_slope.x, self.light_slope.y);
-        [
-            (6, 0, 1.0),
-            (6, 1, x),
-            (6, 2, y),
-            (7, 0, alike),
-            (7, 1, alike * x),
-            (7, 2, alike * y),
-            (8, 1, reflected),
-            (9, 2, reflected),
-            (N, 0, -reflected),
-            (N, 1, -reflected * x),
-            (N, 2, -reflected * y),
-            (N, 3, 1.0),
-        ]
-    }
-}
-
-/// A parameter, a column, and how much of the column the derivative by the parameter holds.
-type Share = (usize, usize, f64);
-
-/// Adds the sums of the derivatives' products, from those of the columns that they are made of. Most shares are none, so they are listed.
-fn add_mapped<const C: usize>(total: &mut Sums, map: &[Share], sums: &SMatrix<f64, C, C>) {
-    for &(row, a, share) in map {
-        for &(column, b, other) in map {
-            total[(row, column)] += share * other * sums[(a, b)];
-        }
-    }
-}
-
-/// On an arm of an edge, E is `side` times the edge's erf, and every derivative is a combination of: the derivative by u, the same times
-/// the place along the edge, the same in blurs from it; light; light times E; x and y times what is reflected; the residual.
-#[inline(always)]
-fn along(edge: &Edge, light: &Light, side: f32, group: &Group, products: &mut Products<ARM>) {
-    let across = edge.across(group);
-    let Light { level, half_contrast, slope } = *light;
-    let mut columns = [[0.0; LANES]; ARM];
-    let [by_u, by_angle, by_blur, lit, by_contrast, by_slope_x, by_slope_y, residual] = &mut columns;
-    for l in 0..LANES {
-        let (x, y, weight) = (group.x[l], group.y[l], group.weight[l]);
-        lit[l] = weight * (1.0 + slope[0] * x + slope[1] * y);
-        let pattern = side * across.value[l];
-        let reflected = level + half_contrast * pattern;
-        by_contrast[l] = lit[l] * pattern;
-        by_slope_x[l] = weight * x * reflected;
-        by_slope_y[l] = weight * y * reflected;
-        residual[l] = weight * group.grey[l] - lit[l] * reflected;
-    }
-    for l in 0..LANES {
-        by_u[l] = lit[l] * (half_contrast * side) * across.slope[l];
-        by_angle[l] = by_u[l] * across.along[l];
-        by_blur[l] = by_u[l] * across.z[l];
-    }
-    products.add(&columns);
-}
-
-/// What a line of its own, a step aside and a turn, would take off an arm's sum of squares; from the products of [`along`]'s columns.
-fn arm_gain(sums: &SMatrix<f64, ARM, ARM>) -> f64 {
-    let matrix = sums.fixed_view::<2, 2>(0, 0).into_owned();
-    let gradient = sums.fixed_view::<2, 1>(0, ARM - 1).into_owned();
-    matrix.cholesky().map_or(0.0, |cholesky| gradient.dot(&cholesky.solve(&gradient)))
-}
-
 #[cfg(test)]
 impl Model {
     /// A corner between unequal edges that are not upright, under uneven light.
@@ -285,85 +134,6 @@ impl Model {
             half_contrast: 70.0,
             light_slope: Vector2::new(-2e-3, 1.5e-3),
             bend: [1e-3, -2e-3],
-        }
-    }
-
-    /// The grey value at a place.
-    pub fn grey(&self, (x, y): (f64, f64)) -> f64 {
-        let mut columns = [[0.0; LANES]; COLUMNS];
-        Crossing::new(self).columns(&tests::group(x, y), &mut columns);
-        (-columns[N][0]).into()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    pub fn group(x: f64, y: f64) -> Group {
-        Group { x: [x as f32; LANES], y: [y as f32; LANES], grey: [0.0; LANES], weight: [1.0; LANES] }
-    }
-
-    #[test]
-    fn derivatives_match_central_differences() {
-        type Change = fn(&mut Model, f64);
-        let changes: [Change; N] = [
-            |m, h| m.corner.x += h,
-            |m, h| m.corner.y += h,
-            |m, h| m.angles_rad[0] += h,
-            |m, h| m.angles_rad[1] += h,
-            |m, h| m.blur_px[0] += h,
-            |m, h| m.blur_px[1] += h,
-            |m, h| m.level += h,
-            |m, h| m.half_contrast += h,
-            |m, h| m.light_slope.x += h,
-            |m, h| m.light_slope.y += h,
-        ];
-        for (x, y) in [(0.0, 0.0), (1.0, 0.5), (-2.0, 1.0), (0.4, -3.0)] {
-            let mut columns = [[0.0; LANES]; COLUMNS];
-            Crossing::new(&Model::example()).columns(&group(x, y), &mut columns);
-            for (i, (change, column)) in changes.iter().zip(&columns).enumerate() {
-                let h = 1e-3;
-                let at = |h: f64| {
-                    let mut changed = Model::example();
-                    change(&mut changed, h);
-                    changed.grey((x, y))
-                };
-                let numeric = (at(h) - at(-h)) / (2.0 * h);
-                // The approximation of erf is good to 4e-7 of 70 grey values, over a step of 1e-3; the second-order
-                // part of a bend's turn is left out of the derivative by angle.
-                let derivative = f64::from(column[0]);
-                assert!((numeric - derivative).abs() < 0.15 + 5e-3 * numeric.abs(), "{i} at {x},{y}: {numeric}");
-            }
-        }
-    }
-
-    #[test]
-    fn pixels_far_from_an_edge_give_the_same_sums_by_the_shorter_way() {
-        let model = Model::example();
-        let places = |from: (f64, f64)| (0..40).map(move |i| (from.0 + f64::from(i % 8), from.1 + f64::from(i / 8)));
-        let grey = |(x, y): (f64, f64)| (100.0 + 3.0 * x - y).rem_euclid(50.0);
-        let all = |from: (f64, f64)| {
-            let mut groups = Groups::default();
-            places(from).for_each(|p| groups.push(p.0 as f32, p.1 as f32, grey(p) as f32));
-            groups
-        };
-        let full = |from| model.evaluate(&Window { crossing: all(from), ..Window::default() }).sums;
-        // The edges run to the right and down; u_1 grows downwards, u_2 to the left.
-        let (mut right, mut up) = (Window::default(), Window::default());
-        right.arms[0][0] = all((12.0, -1.0));
-        up.arms[1][0] = all((-6.0, -16.0));
-        let mut lower_right = Window::default();
-        for p in places((15.0, 15.0)) {
-            let v = nalgebra::Vector4::new(1.0, p.0, p.1, grey(p));
-            lower_right.flat[0] += v * v.transpose();
-        }
-        for (from, window) in [((12.0, -1.0), right), ((-6.0, -16.0), up), ((15.0, 15.0), lower_right)] {
-            let (long, short) = (full(from), model.evaluate(&window).sums);
-            for (a, b) in (0..COLUMNS).flat_map(|a| (0..=a).map(move |b| (a, b))) {
-                let scale = (long[(a, a)] * long[(b, b)]).sqrt().max(1.0);
-                assert!((long[(a, b)] - short[(a, b)]).abs() < 1e-4 * scale, "{from:?} {a} {b}: {long} {short}");
-            }
         }
     }
 }

@@ -1,0 +1,238 @@
+//! Fits at full size: one corner in one window.
+//!
+//! In: a corner's surroundings and what its fit starts from. Out: the fit, or none where it is not plausible. Three windows: a near one, just large
+//! enough to hold an arm on each side of the crossing; the full one, as large as the squares and the picture's light allow; and what lies between.
+
+use nalgebra::Vector2;
+
+use super::Measured;
+use super::acceptance::{self, plausible};
+use super::cell::Cell;
+use super::outlying_pixels::{Explained, few};
+use super::saddle_fit::window::{Below, Frame, Keep, Sample, Window};
+use super::saddle_fit::{Model, fit};
+use super::veil;
+use super::windows::Windows;
+use crate::imaging::detect::Detected;
+use crate::imaging::image::Image;
+
+/// Pixels farther than this many blurs from both edges tell only the two grey levels.
+const BAND_BLURS: f64 = 3.5;
+/// The next edge's blur reaches this many blurs into the square.
+const MARGIN_BLURS: f64 = 3.0;
+
+/// Half of the largest window, px. The gain goes with the root of the window, the time with the window; at this size the bend of the
+/// edges, known from the board's other corners, is still known well enough.
+const MOST_HALF_PX: f64 = 250.0;
+/// The same where light is clipped: what the edges then miss of it does not fall with the window.
+const MOST_CLIPPED_HALF_PX: f64 = 80.0;
+/// What a window leaves of each edge at least, as a share of it. Edges bend at crossings that are off their places; from windows that reach
+/// from crossing to crossing nobody could tell which crossing it is.
+const LEAST_MARGIN: f64 = 0.15;
+/// Half of the near window, px and in blurs: the least that holds an arm on each side of the crossing.
+const NEAR_HALF_PX: f64 = 10.0;
+const NEAR_HALF_BLURS: f64 = 7.0;
+/// Half of the window that is tried where the full one is not free, as a multiple of the near one's.
+const BETWEEN: f64 = 2.8;
+/// The same of one that stays within what is left of squares that are cut or hidden.
+const SMALLEST: f64 = 0.5;
+/// A near window that is not smaller than this share of the full one would tell nothing of its own.
+const NEAR_SHARE: f64 = 0.7;
+
+/// The picture at full size.
+pub(super) struct Full<'a, T> {
+    image: &'a Image<T>,
+    clip_level: f64,
+    /// The grey value from which light counts; the fits see what is above it.
+    veil: f64,
+    /// Variance of the slope of stray light, (grey values per px)^2, where there is some.
+    stray: Option<f64>,
+    /// Share of the light that may change over a square.
+    most_light_change: f64,
+}
+
+impl<T: Sample> Full<'_, T> {
+    pub(super) fn of<'a>(image: &'a Image<T>, clip_level: f64, detected: &Detected) -> Full<'a, T> {
+        let places = detected.corners.map(|px| detected.level.to_picture(px));
+        Full {
+            image,
+            clip_level,
+            veil: veil::level(image, clip_level, &places),
+            stray: None,
+            most_light_change: acceptance::MOST_LIGHT_CHANGE,
+        }
+    }
+
+    /// The same picture with stray light whose slope has this variance.
+    pub(super) fn with_stray(&self, variance: f64) -> Self {
+        Full { stray: Some(variance), ..*self }
+    }
+
+    /// A fit in the near window, where the full one is enough larger to tell more; otherwise what the copy told, if that is of full size.
+    pub(super) fn near(&self, cell: Cell, start: Model, coarse: Option<Measured>, window: &mut Window) -> Windows {
+        let full_px = half_px(cell.side(), margin_px(&start, &cell));
+        let near_px = near_half_px(&start);
+        let alone = near_px > NEAR_SHARE * full_px;
+        let near = if alone { coarse } else { self.fit_within(near_px, &cell, &start, window) };
+        Windows { cell, start, alone, most_half_px: MOST_HALF_PX, near, full: None }
+    }
+
+    /// A fit in the full window or in a share of it, started where the one in the near window ended: most steps are taken where they are
+    /// cheap, and the blur is that of the picture, not of the copy, so fewer pixels count as near an edge.
+    pub(super) fn full(&self, seen: Windows, share: f64, window: &mut Window) -> Windows {
+        let mut within = |half_px: f64| match &seen.near {
+            _ if seen.alone => self.fit_within(half_px, &seen.cell, &seen.start, window),
+            None => None,
+            Some(near) => self.fit_from(near, half_px, &seen, window),
+        };
+        // What is hardly larger than the near window is not made smaller.
+        let share_px = share * half_px(seen.cell.side(), margin_px(&seen.start, &seen.cell));
+        let most_half_px = if seen.alone || share == 1.0 { MOST_HALF_PX } else { share_px };
+        let full = within(most_half_px);
+        let reach_px = |full: &Measured| full.reach[0] * seen.cell.edges[0].norm();
+        let clips = full.is_some_and(|full| full.fit.left_out > 0 && reach_px(&full) > MOST_CLIPPED_HALF_PX);
+        if clips {
+            return Windows { full: within(MOST_CLIPPED_HALF_PX), most_half_px: MOST_CLIPPED_HALF_PX, ..seen };
+        }
+        Windows { full, most_half_px, ..seen }
+    }
+
+    /// A corner whose pixels lie farther from the model than is usual on the board, fitted again without those that it cannot explain, where
+    /// they are few.
+    pub(super) fn without_outlying(
+        &self,
+        first: &Measured,
+        most_half_px: f64,
+        cell: &Cell,
+        board: &acceptance::Board,
+        window: &mut Window,
+    ) -> Measured {
+        let clips = first.fit.left_out > 0;
+        if !clips && !board.is_rough(first) {
+            return *first;
+        }
+        let mut best = *first;
+        // The first fit was pulled by what the second one leaves out: a third one sees that, too.
+        for _ in 0..2 {
+            let keep = Explained::by(&best, board.roughness(), self.clip_level - self.veil, clips);
+            let start = Model { corner: Vector2::zeros(), ..best.fit.model };
+            let again = self.fit_kept(most_half_px, &Cell { place: best.px, ..*cell }, &start, &keep, window);
+            let dropped = |again: &Measured| again.fit.left_out.saturating_sub(first.fit.left_out);
+            match again {
+                Some(again) if clips || few(dropped(&again), again.fit.pixels) => best = again,
+                _ => break,
+            }
+        }
+        best
+    }
+
+    /// The largest window that nothing reaches into: the full one, one between, the near one, or none.
+    pub(super) fn largest_free(
+        &self,
+        seen: &Windows,
+        board: &acceptance::Board,
+        window: &mut Window,
+    ) -> Option<Measured> {
+        let seen = Windows {
+            near: seen
+                .near
+                .map(|near| self.without_outlying(&near, near_half_px(&seen.start), &seen.cell, board, window)),
+            full: seen.full.map(|full| self.without_outlying(&full, seen.most_half_px, &seen.cell, board, window)),
+            ..*seen
+        };
+        if let Some(full) = seen.free(board) {
+            return Some(*full);
+        }
+        let near = seen.near.as_ref()?;
+        let between = self.between(near, &seen, window);
+        let between = between.filter(|between| board.agrees(near, between) && board.holds_in_small_window(between));
+        between.or_else(|| board.holds_in_small_window(near).then_some(*near))
+    }
+
+    /// What the windows of a corner tell that none of them shows well, and one that is smaller still, without outlying pixels.
+    pub(super) fn windows_left(&self, seen: &Windows, board: &acceptance::Board, window: &mut Window) -> Vec<Measured> {
+        let any = Full { most_light_change: acceptance::ALL_LIGHT, ..*self };
+        let near_px = near_half_px(&seen.start);
+        let small_px = SMALLEST * near_px;
+        let near = seen.near.or_else(|| any.fit_within(near_px, &seen.cell, &seen.start, window));
+        let small = any.fit_within(small_px, &seen.cell, &seen.start, window);
+        let between = near.and_then(|near| any.between(&near, seen, window));
+        let all = [(small, small_px), (near, near_px), (between, BETWEEN * near_px), (seen.full, seen.most_half_px)];
+        let cleaned = |(fit, half_px): (Option<Measured>, f64)| {
+            Some(any.without_outlying(&fit?, half_px, &seen.cell, board, window))
+        };
+        all.into_iter().filter_map(cleaned).collect()
+    }
+
+    fn between(&self, near: &Measured, seen: &Windows, window: &mut Window) -> Option<Measured> {
+        self.fit_from(near, BETWEEN * near_half_px(&seen.start), seen, window)
+    }
+
+    /// A fit in a larger window, from what a smaller one told.
+    pub(super) fn fit_from(
+        &self,
+        near: &Measured,
+        most_half_px: f64,
+        seen: &Windows,
+        window: &mut Window,
+    ) -> Option<Measured> {
+        // A window in the middle of which the corner is: what the light's gradient adds on one side it takes on the other.
+        let start = Model { corner: Vector2::zeros(), bend: seen.start.bend, ..near.fit.model };
+        self.fit_within(most_half_px, &Cell { place: near.px, ..seen.cell }, &start, window)
+    }
+
+    /// A fit in a window that reaches up to `most_half_px` along each edge.
+    pub(super) fn fit_within(
+        &self,
+        most_half_px: f64,
+        cell: &Cell,
+        start: &Model,
+        window: &mut Window,
+    ) -> Option<Measured> {
+        self.fit_kept(most_half_px, cell, start, &Below(self.clip_level - self.veil), window)
+    }
+
+    /// The same with the pixels that are to be kept.
+    pub(super) fn fit_kept(
+        &self,
+        most_half_px: f64,
+        cell: &Cell,
+        start: &Model,
+        keep: &impl Keep,
+        window: &mut Window,
+    ) -> Option<Measured> {
+        let mut start = *start;
+        loop {
+            let blur = start.blur_px[0].max(start.blur_px[1]);
+            let margin = margin_px(&start, cell);
+            let halves = cell.edges.map(|e| e.normalize() * half_px(e.norm(), margin).min(most_half_px));
+            let band_px = BAND_BLURS * blur + 1.0;
+            window.collect(self.image, self.veil, keep, &Frame { start: cell.place, halves, band_px });
+            let found = fit(&start, window, self.stray)?;
+            let wider = found.model.blur_px[0].max(found.model.blur_px[1]);
+            // The copy may have hidden how wide the blur is; the band must hold the whole edge.
+            if BAND_BLURS * wider <= 1.2 * band_px {
+                let fits = plausible(&found, &start, cell, self.most_light_change);
+                return fits.then(|| Measured { px: found.place(&cell.place), fit: found, reach: cell.reach(&halves) });
+            }
+            if wider > 0.5 * cell.side() {
+                return None;
+            }
+            start = Model { blur_px: found.model.blur_px, ..start };
+        }
+    }
+}
+
+/// Half of the largest window along an edge of this length, px.
+fn half_px(edge_px: f64, margin_px: f64) -> f64 {
+    (edge_px - margin_px.max(LEAST_MARGIN * edge_px)).max(0.5 * edge_px).min(MOST_HALF_PX)
+}
+
+/// How far a window stays off the next edges, px. Oblique edges come nearer to each other.
+fn margin_px(start: &Model, cell: &Cell) -> f64 {
+    (MARGIN_BLURS * start.blur_px[0].max(start.blur_px[1]) + 1.0) / cell.skew()
+}
+
+pub(super) fn near_half_px(start: &Model) -> f64 {
+    NEAR_HALF_PX.max(NEAR_HALF_BLURS * start.blur_px[0].max(start.blur_px[1]))
+}
