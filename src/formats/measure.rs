@@ -71,6 +71,7 @@ struct RigRecord {
     degrees_of_freedom: Option<f64>,
     /// How much larger the poses' disagreement with the common rig is than chance.
     excess: f64,
+    /// The same at the calibration, in units of the noise here.
     usual_excess: f64,
     changes: Vec<ChangeRecord>,
     /// First pose after the rig moved.

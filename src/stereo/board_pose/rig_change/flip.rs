@@ -30,7 +30,7 @@ impl Flip {
     pub fn of(self, board: &Board, [width, height]: [u32; 2], corners: &[Corner]) -> Vec<Corner> {
         let (x, y) = (self != Flip::UpsideDown, self != Flip::Mirrored);
         let flip = |corner: &Corner| {
-            let mut corner = corner.clone();
+            let mut corner = *corner;
             if x {
                 corner.px.x = f64::from(width) - 1.0 - corner.px.x;
                 corner.col = board.columns() - 1 - corner.col;
