@@ -11,7 +11,7 @@ use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::pairs::candidates::Candidates;
-use crate::stereo::pairs::series::{self, Series};
+use crate::stereo::pairs::series::{self, PairMisfit, Series};
 use crate::stereo::pairs::{Discarded, DiscardedPair, Standing};
 use crate::stereo::select::lens_ladder;
 use crate::stereo::select::lens_ladder::Options;
@@ -46,6 +46,8 @@ pub struct Calibration {
     pub inflation: f64,
     /// What is expected of cameras and board before any picture.
     pub priors: Priors,
+    /// How far the pairs miss the rig, beside what each camera leaves of its own pictures.
+    pub misfit: PairMisfit,
     /// How many of the first or last pairs are in it although they contradict the others.
     pub runs: usize,
     /// How the pairs scatter about the common rig; the covariance allows for more than the corners' noise lets expect.
@@ -104,7 +106,7 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
 /// can be found over the series.
 pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Result<Calibration, Error> {
     let candidates = Candidates::new(corners)?;
-    let Series { problem: start, discarded, runs } = series::find(&candidates, runs)?;
+    let Series { problem: start, discarded, runs, misfit } = series::find(&candidates, runs)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
     let lens_ladder::Choice { layout, near, priors, scores: lens_scores } =
         lens_ladder::choose(&start, &corners.board, options).map_err(|e| e.without(&skipped))?;
@@ -138,6 +140,7 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
         inflation,
         priors,
         runs,
+        misfit,
         skipped,
         discarded: Discarded::new(&views, discarded),
         standing: Standing::default(),

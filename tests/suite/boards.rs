@@ -23,7 +23,17 @@ fn copied(folder: &Path) -> PathBuf {
 fn check(folder: &Path, more: &[&str]) -> (Option<i32>, String) {
     let arguments = [&["camera-check", "pictures", "--lens", "radial2"], more].concat();
     let output = stereocal(folder, &arguments);
-    (output.status.code(), stderr(&output) + &stdout(&output))
+    (output.status.code(), stderr(&output) + &stdout(&output) + &not_used(folder))
+}
+
+/// A line a pair that is not used, as camera-check.json has them: the screen has a line a cause.
+fn not_used(folder: &Path) -> String {
+    let Ok(text) = std::fs::read_to_string(folder.join("out/camera-check.json")) else { return String::new() };
+    let file: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let line = |skipped: &serde_json::Value| {
+        format!("pair {} is not used: {}\n", skipped["pair"].as_str().unwrap(), skipped["reason"].as_str().unwrap())
+    };
+    file["pairs_skipped"].as_array().unwrap().iter().map(line).collect()
 }
 
 #[test]

@@ -72,20 +72,20 @@ fn poses_beyond_the_depth_of_the_boards_are_named() {
     calibrated(world, "4");
     let path = world.join("out/calibration.json");
     let rig: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
-    let depth = |name: &str| rig.pointer(&format!("/boards/{name}")).and_then(Value::as_f64).unwrap();
-    let (nearest, farthest) = (depth("nearest_mm"), depth("farthest_mm"));
+    let depth = |end: usize| rig.pointer(&format!("/volume/depth_mm/{end}")).and_then(Value::as_f64).unwrap();
+    let (nearest, farthest) = (depth(0), depth(1));
     assert!(nearest > 100.0 && farthest > nearest && farthest < 2000.0, "{nearest} {farthest}");
     // Boards that stood elsewhere, by shares of their depth.
     for (share, named) in [(1.0, false), (1.05, false), (1.6, true), (0.5, true)] {
         let mut other = rig.clone();
-        other["boards"] = serde_json::json!({ "nearest_mm": share * nearest, "farthest_mm": share * farthest });
+        other["volume"]["depth_mm"] = serde_json::json!([share * nearest, share * farthest]);
         std::fs::write(world.join("rig.json"), other.to_string()).unwrap();
         let measured =
             stereocal(world, &["measure", "poses/", "--calibration", "rig.json", "--out", "other", "--force"]);
         assert_eq!(measured.status.code(), Some(0), "{}", stderr(&measured));
         let said = stderr(&measured);
-        assert_eq!(said.contains("nearer or farther than the boards stood"), named, "{share}: {said}");
-        assert!(!named || said.contains(" mm), ") && said.contains(" more;"), "{said}");
+        assert_eq!(said.contains("outside of where the boards were"), named, "{share}: {said}");
+        assert!(!named || said.contains(" more;"), "{said}");
     }
 }
 

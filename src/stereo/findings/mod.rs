@@ -38,6 +38,9 @@ const FEWEST_EACH: usize = 2;
 const PERMUTED_FROM: usize = 12;
 const PERMUTATIONS: usize = 400;
 
+/// Pairs that are named as the worst.
+const WORST: usize = 5;
+
 /// Fewest pairs in which a change is looked for.
 const FEWEST: usize = 6;
 
@@ -76,6 +79,31 @@ pub struct Finding {
     /// Place of the first pair of a step.
     #[serde(skip)]
     pub first: usize,
+}
+
+/// Whether the pictures of the pairs were taken at one moment: all pairs miss their rig by several times what each camera leaves of its own
+/// pictures, so that it is neither the corners nor a lens.
+pub fn not_simultaneous(calibration: &Calibration) -> Option<Finding> {
+    /// A lens or a rig that lacks something leaves no more than about this many times what single pictures do.
+    const TIMES: f64 = 3.0;
+    let misfit = &calibration.misfit;
+    (misfit.usual_px > TIMES * misfit.alone_px).then(|| Finding {
+        cause: Cause::NotSimultaneous.word().to_owned(),
+        kind: Kind::Pair,
+        pairs: misfit.worst_first.clone(),
+        size: Some(misfit.usual_px),
+        unit: "px",
+        effect_mm: None,
+        action: format!(
+            "the pictures of the pairs were not taken at one moment: half of the pairs miss the rig by {:.2} px and more, each camera alone \
+             by {:.2} px; the worst are {}. Trigger both cameras at once, or hold the board still",
+            misfit.usual_px,
+            misfit.alone_px,
+            misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ")
+        ),
+        step: None,
+        first: 0,
+    })
 }
 
 /// What happened to single pairs that are not used, a finding a cause; pairs without a board or shown twice are none.

@@ -34,6 +34,12 @@ pub struct Asked {
 
 /// Calibrates the rig that stands now, and says what happened to it before.
 pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
+    let (found, mut told) = standing(corners, asked)?;
+    told.extend(findings::not_simultaneous(&found));
+    Ok((found, told))
+}
+
+fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
     let with_runs = calibrate_with(corners, &asked.options, true);
     let mut told = with_runs.as_ref().ok().and_then(|found| change(found, asked));
     if let (Ok(all), Some(change)) = (&with_runs, &mut told)

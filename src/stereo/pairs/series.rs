@@ -49,6 +49,19 @@ pub struct Series {
     pub discarded: Vec<DiscardedPair>,
     /// How many pairs of runs that contradict the others stayed.
     pub runs: usize,
+    /// How far the pairs miss their rig.
+    pub misfit: PairMisfit,
+}
+
+/// How far pairs miss their common rig, beside what each camera leaves of its own pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairMisfit {
+    /// Median over the pairs, px.
+    pub usual_px: f64,
+    /// Median over the pictures of what their camera alone leaves, px.
+    pub alone_px: f64,
+    /// The pairs, the worst first.
+    pub worst_first: Vec<String>,
 }
 
 impl Series {
@@ -102,11 +115,16 @@ pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
         .collect();
     check(candidates, &misfits, usual_px, &members, &discarded)?;
     let values = Values { shared, poses: members.iter().filter_map(|&i| Some(misfits[i]?.1)).collect() };
+    let px = |i: &usize| misfits[*i].map_or(0.0, |(px, _)| px);
+    let mut worst = members.clone();
+    worst.sort_by(|a, b| px(b).total_cmp(&px(a)).then(a.cmp(b)));
+    let worst_first = worst.iter().map(|&i| views[i].pair.clone()).collect();
+    let misfit = PairMisfit { usual_px, alone_px: alone_px_of(candidates), worst_first };
     let views = members.iter().map(|&i| views[i].clone()).collect();
     let mut discarded: Vec<DiscardedPair> = discarded.into_iter().chain(candidates.discarded.iter().cloned()).collect();
     discarded.sort_by(|a, b| a.pair.cmp(&b.pair));
     let runs = runs_kept.len();
-    Ok(Series { problem: Problem { views, values, priors }, discarded, runs })
+    Ok(Series { problem: Problem { views, values, priors }, discarded, runs, misfit })
 }
 
 /// The pairs with the numbering that they agree on, and the rig in the middle of their own.
@@ -169,6 +187,11 @@ fn ends(open: &[usize], count: usize, misfits: &[Misfit]) -> Vec<usize> {
     [first, last].into_iter().filter(|run| run.len() >= 2).flatten().collect()
 }
 
+/// What each camera usually leaves of its own pictures, px.
+fn alone_px_of(candidates: &Candidates) -> f64 {
+    median(candidates.cameras.iter().flat_map(|camera| camera.median_px.iter().flatten().copied())).unwrap_or(0.0)
+}
+
 /// Refuses where there is no telling which pairs are right, or too few are left.
 fn check(
     candidates: &Candidates,
@@ -178,8 +201,7 @@ fn check(
     discarded: &[DiscardedPair],
 ) -> Result<(), Error> {
     let total = candidates.views.len();
-    let alone = candidates.cameras.iter().flat_map(|camera| camera.median_px.iter().flatten().copied());
-    let alone_px = median(alone).unwrap_or(0.0);
+    let alone_px = alone_px_of(candidates);
     let width_px = f64::from(candidates.width_px);
     let none = usual_px > SEVERAL * alone_px && usual_px > LARGEST_SHARE * width_px;
     if none || 2 * members.len() <= total {
