@@ -109,11 +109,13 @@ fn table(args: &RobotImport, name: &str) -> Result<Robot> {
     }
 }
 
+/// The joints, rad, and the measured points of one placement.
+type Placement = (Vec<Vec<f64>>, Vec<Point3<f64>>);
+
 /// What a robot leaves of the measured points of the placement that has most of them, its tool and the sensor solved for, mm.
 fn left_mm(robot: &Robot, source: &Source) -> Option<f64> {
     let (rows, _) = source.read(robot).ok()?;
-    let mut groups: std::collections::BTreeMap<&str, (Vec<Vec<f64>>, Vec<Point3<f64>>)> =
-        std::collections::BTreeMap::new();
+    let mut groups: std::collections::BTreeMap<&str, Placement> = std::collections::BTreeMap::new();
     for row in rows.iter().filter(|row| row.target == rows[0].target) {
         if let Observed::Position { point_mm, .. } = row.observed {
             let group = groups.entry(&row.at.group).or_default();

@@ -79,6 +79,9 @@ pub struct Linearised<'a> {
     columns: usize,
 }
 
+/// A label for each row of a placement by the poses that its rows are of; `None` for a row that is left aside.
+type LabelsOfPoses<'a> = dyn Fn(&[Option<usize>]) -> Vec<Option<usize>> + 'a;
+
 impl<'a> Linearised<'a> {
     /// Where the rows are at these offsets.
     pub fn new(rows: &'a Rows, offsets: &[f64]) -> Linearised<'a> {
@@ -93,12 +96,7 @@ impl<'a> Linearised<'a> {
     }
 
     /// Cells of these labels, one a residual of each placement; `fold` is that of a placement's label.
-    fn cells(
-        &self,
-        labels: &dyn Fn(&[Option<usize>]) -> Vec<Option<usize>>,
-        fold: &dyn Fn(usize, usize) -> usize,
-        whole_placements: bool,
-    ) -> Cells {
+    fn cells(&self, labels: &LabelsOfPoses<'_>, fold: &dyn Fn(usize, usize) -> usize, whole_placements: bool) -> Cells {
         let mut cells = Vec::new();
         for (b, (linear, at_zero, poses)) in self.blocks.iter().enumerate() {
             let labels = labels(poses);

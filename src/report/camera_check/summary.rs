@@ -147,10 +147,13 @@ fn next(judged: &Judged) -> impl Iterator<Item = &str> {
 
 pub(super) fn explanation(judged: &Judged) -> String {
     let extremes = &judged.accuracy.extremes;
+    let pairs = judged.accuracy.pairs.iter();
+    let worst = pairs.max_by(|a, b| a.max_abs_error_mm.total_cmp(&b.max_abs_error_mm));
     format!(
-        "nineteen of twenty held-out lengths within {:.4} mm, largest error {:.4} mm (may be {:.4}), tolerance {} mm",
+        "nineteen of twenty held-out lengths within {:.4} mm, largest error {:.4} mm in pair {} (may be {:.4}), tolerance {} mm",
         extremes.one_in_twenty_mm,
         extremes.max_abs_error_mm,
+        worst.map_or("", |pair| &pair.pair),
         extremes.largest.at_most_mm(),
         judged.tolerance_mm
     )

@@ -168,7 +168,7 @@ pub fn look(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Findin
 /// The pattern of one cause that is least a matter of chance, where one is not: every step and the drift of every cause by the F test, and, where
 /// there are pairs enough, against the same pairs in another order.
 fn significant(linear: &Linear, hypotheses: &[Hypothesis]) -> Option<Pattern> {
-    let count = linear.len();
+    let count = linear.pairs();
     let step = |first: usize| Pattern {
         kind: Kind::Step,
         first,

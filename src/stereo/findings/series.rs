@@ -85,13 +85,13 @@ impl Linear {
     }
 
     /// How many pairs there are.
-    pub fn len(&self) -> usize {
+    pub fn pairs(&self) -> usize {
         self.matrices.len()
     }
 
     /// One direction over the series.
     pub fn line(&self, direction: &DVector<f64>) -> Line {
-        let n = self.len();
+        let n = self.pairs();
         let products: Vec<DVector<f64>> = self.matrices.iter().map(|m| m * direction).collect();
         let moved: Vec<DVector<f64>> = products.iter().map(|p| &self.inverse * p).collect();
         let own: Vec<f64> = products.iter().map(|p| direction.dot(p)).collect();
@@ -107,7 +107,7 @@ impl Linear {
 
     /// A change along these directions that each pair has by so much as the pattern says. `None` where the pairs do not determine it.
     pub fn change(&self, directions: &[DVector<f64>], pattern: &[f64]) -> Option<Change> {
-        let (n, all) = (self.len(), directions.len());
+        let (n, all) = (self.pairs(), directions.len());
         // Each direction's slope of the gradient, summed over the pairs, and what the shared numbers do about it.
         let products: Vec<Vec<DVector<f64>>> =
             directions.iter().map(|d| self.matrices.iter().map(|m| m * d).collect()).collect();
@@ -147,7 +147,7 @@ impl Linear {
                 squares += direction.dot(&left).powi(2) / information.max(f64::MIN_POSITIVE);
             }
         }
-        let freedom = (directions.len() * self.len().saturating_sub(2)).max(1) as f64;
+        let freedom = (directions.len() * self.pairs().saturating_sub(2)).max(1) as f64;
         (squares / freedom).max(1.0)
     }
 }

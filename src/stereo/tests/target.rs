@@ -43,8 +43,9 @@ fn the_targets_scatter_is_the_predicted_one() {
         }
     }
     for sum in sums.iter() {
-        // 60 poses: chi-square over its freedom is 1 +- 0.18; the target's shape is found as well and shared by all.
-        assert!((0.5..1.7).contains(&(sum / 60.0)), "{sums}");
+        // 60 poses: chi-square over its freedom is 1 +- 0.18; the target's shape is found as well and shared by all. Where nothing is known of the
+        // corners' usual scatter the poses' own is counted, along the line of sight generously.
+        assert!((0.35..1.7).contains(&(sum / 60.0)), "{sums}");
     }
     assert_eq!(measured.judgement, crate::stereo::board_pose::rig_change::judgement::Judgement::Agrees);
 }
