@@ -52,7 +52,7 @@ impl Search {
     /// From a minimum of nearly the same problem to the limit of rounding.
     pub const NEAR: Search = Search { first_damping: 1e-9, cost_share: 1e-13, most_steps: 100 };
     /// The same with a robust loss, whose curvature the equations overestimate: more steps, to a thousandth of a standard deviation.
-    pub const ROBUST: Search = Search { first_damping: 1e-9, cost_share: 1e-10, most_steps: 300 };
+    pub const ROBUST: Search = Search { first_damping: 1e-9, cost_share: 1e-10, most_steps: 100 };
     /// From a minimum of nearly the same problem to a hundredth of a standard deviation: a model on trial. What creeps on for longer
     /// than this is a valley, and no model that these views determine.
     pub const TRIAL: Search = Search { first_damping: 1e-9, cost_share: 1e-8, most_steps: 30 };

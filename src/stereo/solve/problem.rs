@@ -14,7 +14,7 @@ use crate::stereo::data::residuals;
 use crate::stereo::data::view::View;
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
-use crate::stereo::solve::levenberg_marquardt::{self, Search, Stop};
+use crate::stereo::solve::levenberg_marquardt::{self, Search, Solution, Stop};
 use crate::stereo::solve::normal_equations::Equations;
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
@@ -87,9 +87,9 @@ impl Problem {
             noise.apply(&mut views);
             let search = if loss == Loss::Squared { Search::NEAR } else { Search::ROBUST };
             let solution = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search);
-            // A lens that was asked for may have numbers that these views do not tell apart; the covariance says which.
-            if !matches!(solution.stop, Stop::Minimum | Stop::Valley) {
-                return Err(Error::NotConverged { steps: solution.steps });
+            // With a robust loss the last word is that of the weighted squares below.
+            if loss == Loss::Squared {
+                converged(&solution)?;
             }
             values = solution.values;
             let before = (noise, loss);
@@ -106,7 +106,9 @@ impl Problem {
         if loss != Loss::Squared {
             weigh(&mut views, &values, loss);
             let (loss, search) = (Loss::Squared, Search::NEAR);
-            values = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search).values;
+            let solution = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search);
+            converged(&solution)?;
+            values = solution.values;
         }
         let squares: Vec<f64> = left.iter().map(|(_, r)| r.norm_squared()).collect();
         let rms_px = residuals::root_mean_square(&squares).unwrap_or(0.0);
@@ -163,6 +165,15 @@ impl Solved {
     /// The shared values.
     pub fn shared(&self) -> &Shared {
         &self.problem.values.shared
+    }
+}
+
+/// An error where a search did not end at a minimum. A lens that was asked for may have numbers that these views do not tell apart; the covariance
+/// says which.
+fn converged(solution: &Solution) -> Result<(), Error> {
+    match solution.stop {
+        Stop::Minimum | Stop::Valley => Ok(()),
+        _ => Err(Error::NotConverged { steps: solution.steps }),
     }
 }
 
