@@ -98,7 +98,7 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
         values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?.0;
     }
     let poses = values.poses.iter().flatten().count();
-    let mut noise = at_least(usual.noise, Noise::from_median(&residuals(&bundle, &values, |_| true)), &bundle.views);
+    let mut noise = at_least(usual.noise, Noise::from_median(&residuals(&bundle, &values, |_| true)));
     let (mut inflation, mut excess) = (1.0, known_excess.unwrap_or(1.0));
     let mut normal = bundle.normal(&values, Loss::Squared)?;
     let mut covariance = DMatrix::zeros(0, 0);
@@ -128,7 +128,7 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
             Some(usual) if poses < TELLING_POSES => usual,
             _ => {
                 let here = Noise::from_mean(&active, (told + 6.0 * poses as f64).round() as usize);
-                at_least(usual.noise, here, &bundle.views)
+                at_least(usual.noise, here)
             }
         };
         inflation = neighbours(&bundle, &values).inflation();
@@ -211,8 +211,9 @@ fn by_pose(
 
 /// What corners scatter here, but not less than at the calibration: what its lenses and its board left over is not the noise of pictures, and
 /// the target's crossings would be taken for it.
-fn at_least(usual: Option<Noise>, here: Noise, views: &[View]) -> Noise {
-    usual.filter(|usual| usual.typical_px(views) > here.typical_px(views)).unwrap_or(here)
+fn at_least(usual: Option<Noise>, here: Noise) -> Noise {
+    let added_px = usual.map_or(0.0, |usual| usual.added_px).max(here.added_px);
+    Noise { added_px, ..here }
 }
 
 fn inflate(views: &mut [View], inflation: f64) {
