@@ -8,6 +8,7 @@
 //! What goes wrong: two faults at once are found one after the other only where each alone brings an improvement. What the target's
 //! unknown place undoes (the sign of the last joint with a target on its axis) is not seen and costs nothing.
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::dataset::{Dataset, Kind, Reading};
@@ -333,6 +334,7 @@ impl Hypothesis {
             }
             Hypothesis::Lengths(factor, _) => {
                 for pose in &mut set.poses {
+                    pose.on_body_mm = pose.on_body_mm.map(|part| part * factor);
                     match &mut pose.reading {
                         Reading::Position { point_mm, covariance_mm2, .. } => {
                             point_mm.coords *= factor;
@@ -370,6 +372,7 @@ impl Hypothesis {
             Hypothesis::StandardDh => robot = from_standard(&robot),
             Hypothesis::Mirrored => {
                 for pose in &mut set.poses {
+                    pose.on_body_mm = pose.on_body_mm.map(|part| Vector3::new(-part.x, part.y, part.z));
                     if let Reading::Position { point_mm, covariance_mm2, .. } = &mut pose.reading {
                         point_mm.x = -point_mm.x;
                         if let Some(c) = covariance_mm2 {

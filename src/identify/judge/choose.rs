@@ -132,7 +132,7 @@ pub fn identify(
     step("gross errors");
     let first = session.reference(ROWS_TELL);
     let mut gross = session.drop_outliers(by_points, &first)?;
-    if model == Model::Pose {
+    if model == Model::Pose && set.body_unknowns().is_empty() {
         session.extras.extend((0..3).map(Extra::Target));
     }
     step("models of the robot");

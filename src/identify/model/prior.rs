@@ -185,6 +185,21 @@ impl Tolerance {
         spread
     }
 
+    /// Covariance of all parameters given the base parameters: what these tolerances leave open where no pose tells more.
+    pub fn left_open(&self, base: &Base, parameters: &[Parameter]) -> DMatrix<f64> {
+        let variances = DVector::from_iterator(parameters.len(), parameters.iter().map(|&p| self.of(p).powi(2)));
+        let mut sums = DMatrix::zeros(base.free.len(), parameters.len());
+        for (k, &i) in base.free.iter().enumerate() {
+            sums[(k, i)] = variances[i];
+        }
+        for (c, &i) in base.dependent.iter().enumerate() {
+            for k in 0..base.free.len() {
+                sums[(k, i)] = base.coefficients[(k, c)] * variances[i];
+            }
+        }
+        DMatrix::from_diagonal(&variances) - self.spread(base, parameters) * sums
+    }
+
     /// The tolerance of greatest evidence for all parameters as they are, whether or not the data tell them apart; with the evidence.
     /// `normal` and `gradient` as in [`Linearised`].
     pub fn from_evidence_of_all(
@@ -223,20 +238,21 @@ impl Linearised<'_> {
         evidence(&tolerance.covariance(self.base, self.parameters, self.extras), self.normal, self.gradient)
     }
 
-    fn free(&self) -> Vec<Parameter> {
-        self.base.free.iter().map(|&i| self.parameters[i]).collect()
+    /// The parameters that base parameters are of, or stand for: their tolerances are what the data tell.
+    fn seen(&self) -> Vec<Parameter> {
+        (0..self.parameters.len()).filter(|i| !self.base.zero.contains(i)).map(|i| self.parameters[i]).collect()
     }
 
     /// The tolerance of greatest evidence.
     pub fn most_probable(&self) -> Tolerance {
-        best_of_grid(&self.free(), self.extras, &|t| self.evidence(t)).0
+        best_of_grid(&self.seen(), self.extras, &|t| self.evidence(t)).0
     }
 
     /// The largest standard deviations, kind by kind, that the data make next to as probable as these: few poses say little of how well
     /// a robot was made, and what they leave open is as uncertain as it may be.
     pub fn at_most(&self, tolerance: &Tolerance) -> Tolerance {
         let least = self.evidence(tolerance) - DOUBT;
-        let present = presence(&self.free(), self.extras);
+        let present = presence(&self.seen(), self.extras);
         let mut most = *tolerance;
         for kind in (0..KINDS).filter(|&k| present[k]) {
             let larger = GRID.iter().filter(|v| **v > tolerance.values()[kind] && **v <= LARGEST[kind]);
@@ -344,5 +360,8 @@ mod tests {
         // Equal tolerances share a correction equally.
         let spread = tolerance.spread(&base, &parameters);
         assert!(spread.iter().all(|s| (s - 1.0 / 3.0).abs() < 1e-12), "{spread}");
+        // The sum is known, and each of three has two thirds of its variance left.
+        let open = tolerance.left_open(&base, &parameters);
+        assert!((open[(0, 0)] - 4.0 * 2.0 / 3.0).abs() < 1e-12 && open.sum().abs() < 1e-12, "{open}");
     }
 }

@@ -321,6 +321,7 @@ impl Inputs<'_> {
             Reading::Position { point_mm, covariance_mm2, rotation_rad } => Some(Spot {
                 pose,
                 point_mm: *point_mm,
+                on_body_mm: self.recipe.set.poses[row].on_body_mm,
                 covariance_mm2: covariance_mm2.unwrap_or_else(Matrix3::zeros),
                 rotation: rotation_rad.map(|r| Rotation3::new(r).into_inner()),
                 weight: self.weight(row),
@@ -334,7 +335,7 @@ impl Inputs<'_> {
         let reference = self.recipe.set.reference(group, self.recipe.rows)?;
         let center = self.spot(reference)?;
         let length = |&i: &usize| {
-            let spot = self.spot(i)?;
+            let spot = self.spot(i).filter(|spot| spot.on_body_mm.is_none())?;
             let apart = spot.point_mm - center.point_mm;
             let length_mm = apart.norm();
             if i == reference || length_mm <= 0.0 {
@@ -350,7 +351,10 @@ impl Inputs<'_> {
     }
 
     fn pairs(&self, group: usize) -> Vec<Block> {
-        let spots: Vec<Spot> = self.by_group[group].iter().filter_map(|&i| self.spot(i)).collect();
+        let spots: Vec<Spot> = self.by_group[group]
+            .iter()
+            .filter_map(|&i| self.spot(i).filter(|spot| spot.on_body_mm.is_none()))
+            .collect();
         let chunks = spots.len().div_ceil(CHUNK).max(1);
         // Every chunk takes every so-manieth pose, so that each spans the group.
         let chunk = |k: usize| spots.iter().skip(k).step_by(chunks).cloned().collect::<Vec<_>>();
@@ -370,8 +374,9 @@ impl Inputs<'_> {
             .filter(|spots| spots.len() >= 3)
             .collect();
         let frames: Vec<Transform> = lists.iter().map(|spots| robust_frame(spots, self.places)).collect();
-        let flange_from_target = if oriented { mean_target(&lists, &frames, self.places) } else { Matrix3::identity() };
-        let target = if oriented { Points::target_extras(self.recipe.extras) } else { Vec::new() };
+        let turned = oriented || lists.iter().flatten().any(|spot| spot.on_body_mm.is_some());
+        let flange_from_target = if turned { mean_target(&lists, &frames, self.places) } else { Matrix3::identity() };
+        let target = if turned { Points::target_extras(self.recipe.extras) } else { Vec::new() };
         let scatter = &self.recipe.scatter;
         let block = |(spots, sensor_from_base): (Vec<Spot>, Transform)| {
             let target = target.clone();
@@ -392,6 +397,9 @@ const FRAME_ROUNDS: usize = 15;
 
 /// A frame that gross errors hardly move: least sum of distances, by reweighting (Weiszfeld's way).
 fn robust_frame(spots: &[Spot], places: &[Place]) -> Transform {
+    // How a body of several targets is turned on the flange is not known yet: its mark points come first.
+    let whole: Vec<&Spot> = spots.iter().filter(|spot| spot.on_body_mm.is_none()).collect();
+    let spots = if whole.len() >= 3 { whole } else { spots.iter().collect() };
     let mut weights: Vec<f64> = spots.iter().map(|s| s.weight * s.weight).collect();
     let mut frame = Transform::identity();
     for _ in 0..FRAME_ROUNDS {
@@ -400,7 +408,7 @@ fn robust_frame(spots: &[Spot], places: &[Place]) -> Transform {
         let mut sorted = misses.clone();
         sorted.sort_by(f64::total_cmp);
         let floor = (0.1 * sorted[sorted.len() / 2]).max(1e-9);
-        weights = misses.iter().zip(spots).map(|(m, s)| s.weight * s.weight / m.max(floor)).collect();
+        weights = misses.iter().zip(&spots).map(|(m, s)| s.weight * s.weight / m.max(floor)).collect();
     }
     frame
 }
@@ -436,7 +444,8 @@ fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
     })
 }
 
-/// Mean of `flange_from_target` over all poses.
+/// Mean of `flange_from_target` over all poses: of those with an orientation, and of those that show a part of the body, which stands in some
+/// direction from the mark point.
 fn mean_target(lists: &[Vec<Spot>], frames: &[Transform], places: &[Place]) -> Matrix3<f64> {
     let mut sum = Matrix3::zeros();
     for (spots, frame) in lists.iter().zip(frames) {
@@ -444,6 +453,11 @@ fn mean_target(lists: &[Vec<Spot>], frames: &[Transform], places: &[Place]) -> M
         for spot in spots {
             if let Some(measured) = &spot.rotation {
                 sum += (rotation * places[spot.pose].rotation).transpose() * measured;
+            }
+            if let Some(part) = spot.on_body_mm {
+                let from_mark = spot.point_mm - frame * places[spot.pose].point_mm;
+                let on_flange = (rotation * places[spot.pose].rotation).transpose() * from_mark;
+                sum += on_flange * part.transpose() / part.norm_squared().max(f64::MIN_POSITIVE);
             }
         }
     }

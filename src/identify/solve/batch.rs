@@ -57,6 +57,7 @@ impl BatchCost {
         for block in &rows.blocks {
             blocks.push(match block {
                 Block::Points(Points { field: Some(_), .. }) => return None,
+                Block::Points(p) if p.spots.iter().any(|spot| spot.on_body_mm.is_some()) => return None,
                 Block::Center(c) => BatchBlock::Center {
                     center: c.center,
                     pose: c.lengths.iter().map(|l| l.pose).collect(),

@@ -236,12 +236,19 @@ impl Formulation {
         fit.normal(&self.free_fit.x)
     }
 
-    /// Covariance of all parameters of the robot: what is determined, and what the tolerance leaves open where it holds them.
+    /// Covariance of all parameters of the robot as far as the poses determine them.
     pub fn robot_covariance(&self) -> DMatrix<f64> {
         let rank = self.base.rank();
         let spread = self.spread();
         let of_base = self.covariance().view((0, 0), (rank, rank)).into_owned();
         &spread * of_base * spread.transpose()
+    }
+
+    /// The same with what no pose tells: the tolerance of parameters that only act together, or that nothing saw. At the poses that were
+    /// fitted it makes no difference, at others it may.
+    pub fn whole_covariance(&self) -> DMatrix<f64> {
+        let determined = self.robot_covariance();
+        if self.held { determined + self.most.left_open(&self.base, self.parameters()) } else { determined }
     }
 
     /// Base parameters about which the data say next to nothing: as uncertain as before.
