@@ -185,21 +185,6 @@ impl Tolerance {
         spread
     }
 
-    /// Covariance of all parameters given the base parameters: what these tolerances leave open where no pose tells more.
-    pub fn left_open(&self, base: &Base, parameters: &[Parameter]) -> DMatrix<f64> {
-        let variances = DVector::from_iterator(parameters.len(), parameters.iter().map(|&p| self.of(p).powi(2)));
-        let mut sums = DMatrix::zeros(base.free.len(), parameters.len());
-        for (k, &i) in base.free.iter().enumerate() {
-            sums[(k, i)] = variances[i];
-        }
-        for (c, &i) in base.dependent.iter().enumerate() {
-            for k in 0..base.free.len() {
-                sums[(k, i)] = base.coefficients[(k, c)] * variances[i];
-            }
-        }
-        DMatrix::from_diagonal(&variances) - self.spread(base, parameters) * sums
-    }
-
     /// The tolerance of greatest evidence for all parameters as they are, whether or not the data tell them apart; with the evidence.
     /// `normal` and `gradient` as in [`Linearised`].
     pub fn from_evidence_of_all(
@@ -360,8 +345,5 @@ mod tests {
         // Equal tolerances share a correction equally.
         let spread = tolerance.spread(&base, &parameters);
         assert!(spread.iter().all(|s| (s - 1.0 / 3.0).abs() < 1e-12), "{spread}");
-        // The sum is known, and each of three has two thirds of its variance left.
-        let open = tolerance.left_open(&base, &parameters);
-        assert!((open[(0, 0)] - 4.0 * 2.0 / 3.0).abs() < 1e-12 && open.sum().abs() < 1e-12, "{open}");
     }
 }

@@ -11,7 +11,8 @@ use super::placement::Placement;
 use crate::geometry::{Transform, rotation_matrix, transform_from_matrix};
 use crate::identify::residuals::eliminate::Block;
 use crate::identify::residuals::points::Points;
-use crate::identify::residuals::rows::{Rows, nearest_rotation};
+use crate::identify::residuals::rows::Rows;
+use crate::identify::residuals::starts::nearest_rotation;
 use crate::identify::residuals::touch::{Known, Touch};
 use crate::identify::residuals::weights::{Scatter, Spot};
 

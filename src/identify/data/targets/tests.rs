@@ -241,7 +241,7 @@ fn single_targets_tell_as_much_of_the_robot_as_their_points() {
             // The marks differ from the world's tool: flanges are compared at a point that all have.
             let at = |robot: &Robot, q: &[f64]| robot.base_from_flange(q) * Point3::new(0.0, 0.0, 30.0);
             let joints: Vec<Vec<f64>> = world.rows.iter().map(|r| r.at.joints_rad()).collect();
-            let frame = crate::identify::residuals::rows::fitted_frame(
+            let frame = crate::identify::residuals::starts::fitted_frame(
                 joints.iter().map(|q| (at(robot, q), at(&world.truth, q), 1.0)),
             );
             let miss = |q: &Vec<f64>| (frame * at(robot, q) - at(&world.truth, q)).norm();
