@@ -169,9 +169,9 @@ fn rectified(
 
 /// The boards that may be in the pictures.
 fn boards(args: &Rectify, config: &Config) -> Result<Vec<Board>> {
-    let check = config.check_board.board(args.squares, None)?;
-    let target = config.target_board.board(args.squares, None)?;
-    Ok(if check.squares == target.squares { vec![check] } else { vec![check, target] })
+    let check = config.check_board.board(args.board, args.squares, None)?;
+    let target = config.target_board.board(args.board, args.squares, None)?;
+    Ok(if check.key() == target.key() { vec![check] } else { vec![check, target] })
 }
 
 /// The first of the boards that the pictures show, and its corners in the rectified pictures.

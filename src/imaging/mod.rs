@@ -1,6 +1,7 @@
 //! From a folder of pictures to the corners of the board in each, in an order both cameras agree on.
 
 pub mod board;
+pub mod coded;
 pub mod corners;
 pub mod detect;
 pub mod find;
@@ -37,6 +38,14 @@ pub enum Error {
     BoardSize {
         /// What was typed.
         found: String,
+    },
+    /// A board's name was not understood.
+    #[error("`{found}` names no board: {why}")]
+    BoardName {
+        /// What was typed.
+        found: String,
+        /// What is wrong with it.
+        why: String,
     },
     /// The folder is not there.
     #[error("folder not found")]
@@ -133,7 +142,7 @@ impl Explain for Error {
     fn place(&self) -> Option<String> {
         match self {
             Error::Files(e) => e.place(),
-            Error::BoardSize { .. } | Error::SameName { .. } => None,
+            Error::BoardSize { .. } | Error::BoardName { .. } | Error::SameName { .. } => None,
             Error::NoFolder { path }
             | Error::NotAFolder { path }
             | Error::NotRight { path, .. }
@@ -148,6 +157,10 @@ impl Explain for Error {
         match self {
             Error::Files(e) => e.hint(),
             Error::BoardSize { .. } => Some("`--squares 20x20` is a board with 19x19 inner corners".to_owned()),
+            Error::BoardName { .. } => Some(
+                "`--board checker:20x20:10`, or `--board charuco:11x8:15:11:DICT_5X5_100` (columns, rows, square and marker in mm as printed)"
+                    .to_owned(),
+            ),
             Error::NoFolder { .. } | Error::NotAFolder { .. } => Some(
                 "a folder of pairs holds left/ and right/ with equal names, or left*/right*, *_left/*_right, *_L/*_R names"
                     .to_owned(),

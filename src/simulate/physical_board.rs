@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     fn made(workmanship: Workmanship) -> PhysicalBoard {
-        PhysicalBoard::new(Board { squares: "20x20".parse().unwrap(), square_mm: 10.0 }, workmanship, 3, 0)
+        PhysicalBoard::new(Board::checker("20x20".parse().unwrap(), 10.0), workmanship, 3, 0)
     }
 
     const PERFECT: Workmanship =

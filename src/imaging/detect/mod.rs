@@ -302,7 +302,7 @@ mod tests {
 
     #[test]
     fn large_squares_are_found_on_a_smaller_copy_than_small_ones() {
-        let board = Board { squares: "8x6".parse().unwrap(), square_mm: 10.0 };
+        let board = Board::checker("8x6".parse().unwrap(), 10.0);
         let (glance, first) = (Level::Skimmed(4), Level::Reduced(2));
         for (side, level) in [(170, glance), (48, glance), (40, first), (20, first)] {
             let detected = detect(&picture(2048, side), board).unwrap();
@@ -317,9 +317,9 @@ mod tests {
 
     #[test]
     fn a_part_of_a_board_is_not_what_is_seen_at_a_glance() {
-        let board = Board { squares: "9x6".parse().unwrap(), square_mm: 10.0 };
+        let board = Board::checker("9x6".parse().unwrap(), 10.0);
         assert!(at_a_glance(&picture(2048, 170), board).is_none());
-        let smaller = Board { squares: "7x6".parse().unwrap(), square_mm: 10.0 };
+        let smaller = Board::checker("7x6".parse().unwrap(), 10.0);
         assert!(at_a_glance(&picture(2048, 170), smaller).is_none());
         assert!(detect(&picture(2048, 170), smaller).is_err());
     }

@@ -36,7 +36,7 @@ impl Cache<'_> {
     pub fn entry(&self, picture_hash: &str, board: Board, mosaic: Option<Mosaic>) -> String {
         let mut hash = Xxh3Default::new();
         hash.update(ALGORITHM.as_bytes());
-        hash.update(board.squares.to_string().as_bytes());
+        hash.update(board.key().as_bytes());
         hash.update(mosaic.map_or("grey", Mosaic::name).as_bytes());
         hash.update(picture_hash.as_bytes());
         format!("{:032x}", hash.digest128())
@@ -148,7 +148,7 @@ mod tests {
     use crate::imaging::{detect, refine};
 
     fn board() -> Board {
-        Board { squares: "4x3".parse().unwrap(), square_mm: 10.0 }
+        Board::checker("4x3".parse().unwrap(), 10.0)
     }
 
     #[test]
@@ -191,7 +191,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = OutDir::open(camino::Utf8Path::from_path(dir.path()).unwrap()).unwrap();
         let cache = Cache { out: &out, thumbnails: true };
-        let other = Board { squares: "5x3".parse().unwrap(), square_mm: 10.0 };
+        let other = Board::checker("5x3".parse().unwrap(), 10.0);
         let entry = |hash: &str, board, mosaic| cache.entry(hash, board, mosaic);
         let first = entry("a", board(), None);
         assert_eq!(first, entry("a", board(), None));
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn the_algorithm_is_named_by_what_it_finds() {
-        let board = Board { squares: "9x7".parse().unwrap(), square_mm: 10.0 };
+        let board = Board::checker("9x7".parse().unwrap(), 10.0);
         let eight = |size: usize, side: f64, zigzag: f64| {
             let pixels = golden_picture(size, side, 255.0, zigzag).into_iter().map(|v| v as u8).collect();
             Picture::from(Image { width: size, height: size, pixels })

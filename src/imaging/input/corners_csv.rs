@@ -229,7 +229,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = Utf8Path::from_path(dir.path()).unwrap().join("corners.csv");
         std::fs::write(&path, text).unwrap();
-        read(&path, Board { squares: squares.parse().unwrap(), square_mm: 10.0 }, size)
+        read(&path, Board::checker(squares.parse().unwrap(), 10.0), size)
     }
 
     #[test]
@@ -241,7 +241,7 @@ mod tests {
             |col, row, x: f64| Corner { col, row, px: px(x), covariance_px2, blur_px, reach: None, used: true };
         let plain = |c: Corner| Corner { covariance_px2: None, blur_px: None, used: false, ..c };
         let corners = Corners {
-            board: Board { squares: "4x3".parse().unwrap(), square_mm: 10.0 },
+            board: Board::checker("4x3".parse().unwrap(), 10.0),
             left_size: (640, 480),
             right_size: (320, 240),
             pairs: vec![PairCorners {

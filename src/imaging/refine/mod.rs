@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn bent_edges_are_seen_in_windows_that_are_alike_and_small_where_they_bend_much() {
-        let board = Board { squares: "8x7".parse().unwrap(), square_mm: 10.0 };
+        let board = Board::checker("8x7".parse().unwrap(), 10.0);
         let mean_reach = |zigzag_px: f64| {
             let picture = zigzag_board(zigzag_px);
             let measured = measure(&picture, &detect::detect(&picture, board).unwrap());

@@ -18,7 +18,7 @@ use crate::stereo::init::single_camera::as_left;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::pairs::Cause;
 use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::pairs::numbering::{renumbered, turns_of_outline};
+use crate::stereo::pairs::numbering::renumbered;
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
@@ -84,7 +84,7 @@ pub fn moved_between(series: &Series, i: usize, misfit_px: Option<f64>, usual_px
         return (Cause::OtherBoard, reason);
     }
     let turn = |quarters| rotation_vector(&(right * renumbered(quarters) * left.inverse())).norm();
-    let turned = turns_of_outline(series.board).into_iter().map(turn).fold(f64::INFINITY, f64::min);
+    let turned = series.board.turns_of_outline().into_iter().map(turn).fold(f64::INFINITY, f64::min);
     let reason = format!(
         "its pictures were not taken at one moment: between them the board (or a camera) moved by about {:.1} mm and {:.1} deg{missed}. Clamp \
          the board and trigger both cameras at once",
@@ -160,7 +160,7 @@ impl Scene<'_> {
     /// True where the view fits on a rig in one of the numberings that the board's outline allows.
     fn fits(&self, shared: &Shared, view: &View) -> bool {
         let limit = self.series.limit_px;
-        turns_of_outline(self.series.board).into_iter().any(|quarters| {
+        self.series.board.turns_of_outline().into_iter().any(|quarters| {
             let mut turned = view.clone();
             turned.turn_right(self.series.board, quarters);
             misfit_px(shared, &turned).is_some_and(|(px, _)| px <= limit)
@@ -180,7 +180,7 @@ impl Scene<'_> {
             turned.turn_right(self.series.board, quarters);
             misfit_px(shared, &turned).is_some_and(|(px, _)| px <= self.series.limit_px)
         };
-        if turns_of_outline(self.series.board).iter().filter(|&&quarters| quarters != 0).any(turned) {
+        if self.series.board.turns_of_outline().iter().filter(|&&quarters| quarters != 0).any(turned) {
             let reason = "the corners are numbered from another end of the board in the right picture than in the left";
             return Some((Cause::Numbering, reason.to_owned()));
         }

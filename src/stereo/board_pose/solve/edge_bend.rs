@@ -125,7 +125,7 @@ mod tests {
     use crate::stereo::synthetic::World;
 
     fn board() -> Board {
-        Board { squares: Squares { columns: 7, rows: 6 }, square_mm: 10.0 }
+        Board::checker(Squares { columns: 7, rows: 6 }, 10.0)
     }
 
     /// Deviations without any at the rim, 0.01 mm, from numbers that no line fits.

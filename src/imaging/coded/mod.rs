@@ -1,0 +1,3 @@
+//! Boards whose markers number their corners.
+
+pub mod dictionary;
