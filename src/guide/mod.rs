@@ -71,7 +71,8 @@ impl Page {
         let mut plain = String::with_capacity(self.text.len());
         let mut rest = self.text;
         while let Some((before, after)) = rest.split_once("![") {
-            let Some((words, behind)) = after.split_once("](").and_then(|(words, path)| Some((words, path.split_once(')')?.1)))
+            let Some((words, behind)) =
+                after.split_once("](").and_then(|(words, path)| Some((words, path.split_once(')')?.1)))
             else {
                 break;
             };

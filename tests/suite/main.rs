@@ -35,7 +35,7 @@ mod pipeline;
 mod plan;
 mod provenance;
 mod published;
-mod real;
 mod readme;
+mod real;
 mod rectify;
 mod report;

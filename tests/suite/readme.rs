@@ -118,9 +118,12 @@ pub fn show_this_run(run: &[Printed]) {
 fn a_line_may_differ_in_its_last_digit_alone() {
     assert!(same("within 0.0024 mm, 16 of 16", "within 0.0025 mm, 16 of 16"));
     assert!(same("tilted by -27 deg, 99.8 %", "tilted by -27 deg, 99.7 %"));
-    for printed in
-        ["within 0.0026 mm, 16 of 16", "within 0.0024 mm, 15 of 16", "within 0.002 mm, 16 of 16", "within 0.0024 px, 16 of 16"]
-    {
+    for printed in [
+        "within 0.0026 mm, 16 of 16",
+        "within 0.0024 mm, 15 of 16",
+        "within 0.002 mm, 16 of 16",
+        "within 0.0024 px, 16 of 16",
+    ] {
         assert!(!same("within 0.0024 mm, 16 of 16", printed), "{printed}");
     }
     assert!(!same("largest 0.0060.", "largest 0.0060. And more"));

@@ -23,7 +23,8 @@ pub fn run(args: &Guide, run: Run) -> Result<Outcome> {
 
 fn list() -> String {
     let pages: String = PAGES.iter().map(|page| format!("{:<12} {}\n", page.topic, page.title())).collect();
-    pages + "\n`stereocal guide TOPIC` prints a page, `stereocal guide --html DIR` makes one HTML file of all, with pictures\n"
+    pages
+        + "\n`stereocal guide TOPIC` prints a page, `stereocal guide --html DIR` makes one HTML file of all, with pictures\n"
 }
 
 fn write(folder: &Utf8Path, run: Run) -> Result<String> {
