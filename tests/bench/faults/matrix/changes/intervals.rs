@@ -4,6 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use serde_json::Value;
+use stereocal::stereo::{Camera, Rig};
 
 use super::super::said::Said;
 use super::super::set::Set;
@@ -26,48 +27,57 @@ struct Line {
     /// Factor on the corners' scatter that they do not say.
     noise: f64,
     plant: Plant,
+    /// Whether the rig changes evenly, so that it has a moment; else it is the one about which the pairs scatter.
+    drifts: bool,
 }
 
 const LINES: [Line; 12] = [
-    Line { name: "nothing", noise: 1.0, plant: |_, _| () },
+    Line { name: "nothing", noise: 1.0, plant: |_, _| (), drifts: false },
     Line {
         name: "focal drift 20 ppm",
         noise: 1.0,
         plant: |set, _| along(set, |set, k, s| plants::focus(set, k, 20.0 * s)),
+        drifts: true,
     },
     Line {
         name: "focal drift 100 ppm",
         noise: 1.0,
         plant: |set, _| along(set, |set, k, s| plants::focus(set, k, 100.0 * s)),
+        drifts: true,
     },
     Line {
         name: "focal drift 500 ppm",
         noise: 1.0,
         plant: |set, _| along(set, |set, k, s| plants::focus(set, k, 500.0 * s)),
+        drifts: true,
     },
     Line {
         name: "yaw drift 0.002 deg",
         noise: 1.0,
         plant: |set, _| along(set, |set, k, s| plants::yaw(set, k, 0.002 * s)),
+        drifts: true,
     },
     Line {
         name: "yaw drift 0.01 deg",
         noise: 1.0,
         plant: |set, _| along(set, |set, k, s| plants::yaw(set, k, 0.01 * s)),
+        drifts: true,
     },
     Line {
         name: "baseline creep 50 um",
         noise: 1.0,
         plant: |set, _| along(set, |set, k, s| plants::longer(set, k, 50.0 * s)),
+        drifts: true,
     },
-    Line { name: "random yaw 0.002 deg", noise: 1.0, plant: |set, _| plants::random_yaw(set, 0.002) },
-    Line { name: "random yaw 0.01 deg", noise: 1.0, plant: |set, _| plants::random_yaw(set, 0.01) },
-    Line { name: "noise all over, 8 times", noise: 8.0, plant: |_, _| () },
-    Line { name: "board bowed by 100 um", noise: 1.0, plant: |set, _| bowed(set, 100.0) },
+    Line { name: "random yaw 0.002 deg", noise: 1.0, plant: |set, _| plants::random_yaw(set, 0.002), drifts: false },
+    Line { name: "random yaw 0.01 deg", noise: 1.0, plant: |set, _| plants::random_yaw(set, 0.01), drifts: false },
+    Line { name: "noise all over, 8 times", noise: 8.0, plant: |_, _| (), drifts: false },
+    Line { name: "board bowed by 100 um", noise: 1.0, plant: |set, _| bowed(set, 100.0), drifts: false },
     Line {
         name: "not simultaneous, 20 ms",
         noise: 1.0,
         plant: |set, _| (0..set.pairs.len()).for_each(|k| plants::late(set, k, 20.0)),
+        drifts: false,
     },
 ];
 
@@ -86,14 +96,25 @@ fn bowed(set: &mut Set, um: f64) {
     set.pairs.iter_mut().flat_map(|pair| &mut pair.sides).for_each(|side| side.board = board.clone());
 }
 
-/// The set with the rig of the moment that the ledger names: that of the last pair where nothing else is said.
-fn at_moment(set: Set, said: &Said) -> Set {
-    let moment = said.check.as_ref().and_then(|check| check["moment"].as_str().map(str::to_owned));
-    let pair = moment.and_then(|name| set.pairs.iter().find(|pair| pair.name == name).cloned());
-    match pair {
-        Some(pair) => Set { rig: rig_of(&set, &pair), ..set },
-        None => set,
-    }
+/// The set with the rig of the moment that is named: between two pairs of the series; that of the last pair where nothing is said.
+fn at_moment(set: Set, said: &Said, drifts: bool) -> Set {
+    let named = |k: usize| {
+        let name = said.check.as_ref()?["moment"][k].as_str()?.to_owned();
+        Some(rig_of(&set, set.pairs.iter().find(|pair| pair.name == name)?))
+    };
+    let Some((before, after)) = named(0).zip(named(1)).filter(|_| drifts) else { return set };
+    let middle = |a: &Camera, b: &Camera| {
+        let half = |a: f64, b: f64| 0.5 * (a + b);
+        Camera { fx: half(a.fx, b.fx), fy: half(a.fy, b.fy), cx: half(a.cx, b.cx), cy: half(a.cy, b.cy), ..*a }
+    };
+    let right_from_left = before.right_from_left.lerp_slerp(&after.right_from_left, 0.5);
+    let rig = Rig {
+        left: middle(&before.left, &after.left),
+        right: middle(&before.right, &after.right),
+        right_from_left,
+        covariance: None,
+    };
+    Set { rig, ..set }
 }
 
 /// Prints a line a case and size.
@@ -123,7 +144,7 @@ fn one(program: &Path, seed: u64, line: &Line, px: u32) {
             let said = world.check(program, &world.corners(&set));
             let found = said.check.as_ref().map(|check| causes(check)).unwrap_or_default();
             let file = said.calibration.clone()?;
-            Some((truth::compare(&at_moment(set, &said), &file, BOARDS)?.lengths, found))
+            Some((truth::compare(&at_moment(set, &said, line.drifts), &file, BOARDS)?.lengths, found))
         })
         .collect();
     let lengths: Vec<truth::Off> = each.iter().flatten().flat_map(|(lengths, _)| lengths.iter().copied()).collect();
