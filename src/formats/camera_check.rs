@@ -74,8 +74,8 @@ struct PairRecord {
     mean_error_y10_mm: Option<f64>,
     mean_error_x70_mm: Option<f64>,
     mean_error_y70_mm: Option<f64>,
-    max_abs_error_mm: f64,
-    gap_rms_mm: f64,
+    max_abs_error_mm: Option<f64>,
+    gap_rms_mm: Option<f64>,
 }
 
 impl CameraCheckFile {

@@ -8,6 +8,7 @@ use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use super::Error;
+use super::coded::Layout;
 use super::coded::dictionary::Dictionary;
 
 /// Number of squares of a board; of a plain one the larger number first, of one with markers as printed.
@@ -78,6 +79,8 @@ pub enum Kind {
         marker_mm: f64,
         /// The markers' codes.
         dictionary: Dictionary,
+        /// Which squares hold the markers, where that is said; else it is what is seen.
+        layout: Option<Layout>,
     },
 }
 
@@ -108,17 +111,30 @@ impl Board {
     pub fn scaled(self, factor: f64) -> Board {
         let kind = match self.kind {
             Kind::Checker => Kind::Checker,
-            Kind::Charuco { marker_mm, dictionary } => Kind::Charuco { marker_mm: marker_mm * factor, dictionary },
+            Kind::Charuco { marker_mm, dictionary, layout } => {
+                Kind::Charuco { marker_mm: marker_mm * factor, dictionary, layout }
+            }
         };
         Board { square_mm: self.square_mm * factor, kind, ..self }
+    }
+
+    /// The board with markers in these squares.
+    pub fn with_layout(self, layout: Layout) -> Board {
+        match self.kind {
+            Kind::Checker => self,
+            Kind::Charuco { marker_mm, dictionary, .. } => {
+                Board { kind: Kind::Charuco { marker_mm, dictionary, layout: Some(layout) }, ..self }
+            }
+        }
     }
 
     /// Says all that pictures of the board depend on; lengths only as ratios.
     pub fn key(&self) -> String {
         match self.kind {
             Kind::Checker => self.squares.to_string(),
-            Kind::Charuco { marker_mm, dictionary } => {
-                format!("charuco {} {} {}", self.squares, marker_mm / self.square_mm, dictionary.name())
+            Kind::Charuco { marker_mm, dictionary, layout } => {
+                let (share, name) = (marker_mm / self.square_mm, dictionary.name());
+                format!("charuco {} {share} {name}{}", self.squares, of_layout(layout))
             }
         }
     }
@@ -207,10 +223,19 @@ impl fmt::Display for Board {
         let (squares, square_mm) = (self.squares, self.square_mm);
         match self.kind {
             Kind::Checker => write!(f, "checker:{squares}:{square_mm}"),
-            Kind::Charuco { marker_mm, dictionary } => {
-                write!(f, "charuco:{squares}:{square_mm}:{marker_mm}:{}", dictionary.name())
+            Kind::Charuco { marker_mm, dictionary, layout } => {
+                write!(f, "charuco:{squares}:{square_mm}:{marker_mm}:{}{}", dictionary.name(), of_layout(layout))
             }
         }
+    }
+}
+
+/// The end of a board's name that says its layout.
+fn of_layout(layout: Option<Layout>) -> &'static str {
+    match layout {
+        None => "",
+        Some(Layout::New) => ":new",
+        Some(Layout::Old) => ":old",
     }
 }
 
@@ -231,13 +256,19 @@ impl FromStr for Board {
         };
         match (kind.trim().to_ascii_lowercase().as_str(), fields.as_slice()) {
             ("checker", [squares, square_mm]) => Ok(Board::checker(squares.parse()?, length(square_mm)?)),
-            ("charuco", [squares, square_mm, marker_mm, dictionary]) => {
+            ("charuco", [squares, square_mm, marker_mm, dictionary, layout @ ..]) if layout.len() <= 1 => {
+                let layout = match layout.first().map(|word| word.to_ascii_lowercase()).as_deref() {
+                    None => None,
+                    Some("new") => Some(Layout::New),
+                    Some("old" | "legacy") => Some(Layout::Old),
+                    Some(other) => return Err(refuse(format!("`{other}` is no layout; there are `old` and `new`"))),
+                };
                 let (square_mm, marker_mm) = (length(square_mm)?, length(marker_mm)?);
                 let dictionary = Dictionary::named(dictionary).map_err(&refuse)?;
                 let board = Board {
                     squares: Squares::as_printed(squares)?,
                     square_mm,
-                    kind: Kind::Charuco { marker_mm, dictionary },
+                    kind: Kind::Charuco { marker_mm, dictionary, layout },
                 };
                 board.check_markers().map(|()| board).map_err(refuse)
             }
@@ -253,7 +284,7 @@ impl FromStr for Board {
 impl Board {
     /// Why there can be no such board, where there can be none.
     fn check_markers(&self) -> Result<(), String> {
-        let Kind::Charuco { marker_mm, dictionary } = self.kind else { return Ok(()) };
+        let Kind::Charuco { marker_mm, dictionary, .. } = self.kind else { return Ok(()) };
         if marker_mm >= self.square_mm {
             return Err(format!("a marker of {marker_mm} mm does not fit into a square of {} mm", self.square_mm));
         }
@@ -293,7 +324,8 @@ mod tests {
 
     #[test]
     fn boards_read_back_as_they_are_named() {
-        for text in ["checker:20x20:10", "charuco:4x5:54:40.5:DICT_4X4_1000", "charuco:11x8:15:11:DICT_ARUCO_ORIGINAL"]
+        for text in
+            ["checker:20x20:10", "charuco:4x5:54:40.5:DICT_4X4_1000", "charuco:11x8:15:11:DICT_ARUCO_ORIGINAL:old"]
         {
             let board: Board = text.parse().unwrap();
             assert_eq!(board.to_string(), text);

@@ -104,7 +104,7 @@ pub enum Error {
         skipped: Vec<Skipped>,
     },
     /// The board was not found often enough.
-    #[error("only {found} of {total} pairs show the whole {} board; {needed} are needed{}", .board.squares, reasons(.skipped))]
+    #[error("only {found} of {total} pairs show {}; {needed} are needed{}", shown(.board), reasons(.skipped))]
     TooFewPairs {
         /// Pairs with the board in both pictures.
         found: usize,
@@ -126,6 +126,15 @@ pub enum Error {
 /// What pictures are read.
 const SAVED_AS: &str = "save the pictures as the camera gives them: PNG, TIFF, BMP, JPEG or PGM of 8 or 16 bits a pixel, up to 300 million \
                         px and 1 GiB when decoded";
+
+/// What pictures have to show of a board.
+fn shown(board: &Board) -> String {
+    if board.is_coded() {
+        format!("a part of the {} board with a marker", board.squares)
+    } else {
+        format!("the whole {} board", board.squares)
+    }
+}
 
 /// The first few pairs that were skipped, a line each.
 fn reasons(skipped: &[Skipped]) -> String {
@@ -181,6 +190,9 @@ impl Explain for Error {
                 let (columns, rows) = (squares.columns - 1, squares.rows - 1);
                 Some(format!("`--squares {squares}`: the pictures show a board with {columns}x{rows} inner corners"))
             }
+            Error::TooFewPairs { board, .. } if board.is_coded() => Some(format!(
+                "`--board {board}` must be the board as printed: columns x rows, square and marker in mm, dictionary"
+            )),
             Error::TooFewPairs { board, .. } => {
                 let (columns, rows) = (board.columns(), board.rows());
                 Some(format!(

@@ -142,7 +142,7 @@ impl<T: Sample> Full<'_, T> {
         let scale = detected.level.scale();
         let near: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
             let from = coarse.get(col, row)?;
-            let cell = Cell::of(&places, col, row)?;
+            let cell = Cell::of(&places, col, row)?.with_markers(&places, (col, row), detected.print);
             let start = Model {
                 corner: Vector2::zeros(),
                 bend: at(&coarse_bends, col, row),

@@ -287,7 +287,7 @@ mod tests {
         let halves = model.angles_rad.map(|a| Vector2::new(a.cos(), a.sin()) * half as f64);
         let start = Point2::new(half as f64, half as f64);
         let mut window = Window::default();
-        window.collect(&picture, 0.0, &Below(65_535.0), &Frame { start, halves, band_px });
+        window.collect(&picture, 0.0, &Below(65_535.0), &Frame { start, halves, band_px, hidden: [None; 2] });
         window
     }
 
