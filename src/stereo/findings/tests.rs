@@ -154,10 +154,11 @@ fn a_rig_that_drifts_is_that_of_the_middle_and_no_picture_was_late() {
             assert_eq!(found.moment(), ["05", "06"]);
             let off = (found.rig().right_from_left.rotation * turned(0.5).rotation.inverse()).scaled_axis().y;
             let at = found.layout.transform_start() + 1;
-            let sigma = found.uncertainty.shared[(at, at)].sqrt();
-            assert!(off.abs() < 4.0 * sigma, "{size_deg} deg in world {w}: {off} against {sigma}");
+            // One linear step from the common rig, with the weights that the drift itself made smaller at both ends.
+            let limit = 4.0 * found.uncertainty.shared[(at, at)].sqrt() + 0.03 * size_deg.to_radians();
+            assert!(off.abs() < limit, "{size_deg} deg in world {w}: {off} against {limit}");
             let since = found.since_moment[0][at];
-            assert!((since - 0.5 * size_deg.to_radians()).abs() < 4.0 * sigma, "{since}");
+            assert!((since - 0.5 * size_deg.to_radians()).abs() < limit, "{since} against {limit}");
         }
     }
 }

@@ -142,7 +142,7 @@ fn one(program: &Path, seed: u64, line: &Line, px: u32) {
             let mut set = world.plan.set();
             (line.plant)(&mut set, 0.0);
             let said = world.check(program, &world.corners(&set));
-            let found = said.check.as_ref().map(|check| causes(check)).unwrap_or_default();
+            let found = said.check.as_ref().map(causes).unwrap_or_default();
             let file = said.calibration.clone()?;
             Some((truth::compare(&at_moment(set, &said, line.drifts), &file, BOARDS)?.lengths, found))
         })
