@@ -14,7 +14,6 @@ use crate::files::provenance::Run;
 use crate::files::{self, OutDir};
 use crate::formats::targets::{self, Row};
 use crate::programs::{self, Joints, Language};
-use crate::progress;
 use crate::robot::{Error, Robot, file};
 
 /// Length of the list of refused targets on the terminal.
@@ -52,11 +51,7 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let program = program.transpose()?;
     let rows = match &program {
         Some(program) => program.rows(&nominal),
-        None => {
-            let (rows, said) = targets::read(&args.targets, &nominal)?;
-            said.into_iter().for_each(progress::note);
-            rows
-        }
+        None => targets::read(&args.targets, &nominal)?,
     };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let run = Run { force: args.output.force, ..run };
