@@ -10,6 +10,7 @@ use camino::Utf8Path;
 use crate::compensate::{Target, pose};
 use crate::csv_table::{Fields, Table, quoted};
 use crate::files::Result;
+use crate::progress;
 use crate::robot::Robot;
 
 const HINT: &str =
@@ -29,7 +30,7 @@ pub struct Row {
 }
 
 /// Reads targets for a robot; says what was taken of columns that have other names than these.
-pub fn read(path: &Utf8Path, robot: &Robot) -> Result<(Vec<Row>, Option<String>)> {
+pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
     let table = Table::read(path, "the targets", HINT);
     let own = |table: &Table| ["j1_deg", "j1_mm", "x_mm"].iter().any(|name| table.column(name).is_some());
     let table = match table {
@@ -72,11 +73,11 @@ pub fn read(path: &Utf8Path, robot: &Robot) -> Result<(Vec<Row>, Option<String>)
         };
         Ok(Row { name: row[name].to_owned(), line: *line, target, given })
     };
-    Ok((table.rows.iter().map(row).collect::<Result<Vec<Row>>>()?, None))
+    table.rows.iter().map(row).collect()
 }
 
 /// Readings in a table whose columns have other names, or none: as measurements are read.
-fn of_other_names(path: &Utf8Path, robot: &Robot) -> Result<(Vec<Row>, Option<String>)> {
+fn of_other_names(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
     let (poses, said) = crate::measurements::Source::of(path.to_owned()).readings(robot)?;
     let row = |(line, name, given): (u64, String, Vec<f64>)| Row {
         name,
@@ -84,7 +85,8 @@ fn of_other_names(path: &Utf8Path, robot: &Robot) -> Result<(Vec<Row>, Option<St
         target: Target::Readings(radians(&given, robot)),
         given: Some(given),
     };
-    Ok((poses.into_iter().map(row).collect(), Some(said)))
+    progress::note(said);
+    Ok(poses.into_iter().map(row).collect())
 }
 
 fn joint_columns(table: &Table, robot: &Robot) -> Result<Vec<usize>> {

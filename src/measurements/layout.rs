@@ -1,8 +1,8 @@
 //! Which columns are the joints and which the points where no name says it, or names that are not known: every way that the counts allow, for the
 //! nominal robot to decide.
 //!
-//! Columns of zeros, of words and of the row's number are none of them, nor columns whose names say that they are something else. Joints stand side by side, as many as the robot has; so do the three
-//! numbers of a point. Where columns remain that are as many points side by side, and these keep their distances from row to row or are one
+//! Columns of zeros, of words and of the row's number are none of them, nor columns whose names say that they are something else. Joints stand
+//! side by side, as many as the robot has; so do the three numbers of a point. Where columns remain that are as many points side by side, and these keep their distances from row to row or are one
 //! point, they are several targets, or several readings.
 
 use nalgebra::Point3;
@@ -82,10 +82,21 @@ fn blocks(parts: &[Part], free: &[Vec<At>], count: usize, known: bool) -> Vec<Ve
 }
 
 /// Whether two points keep their distance from row to row, and are not one.
-pub(super) fn keeps_distance(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> bool {
+fn keeps_distance(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> bool {
+    is_kept(distances(parts, a, b))
+}
+
+/// Whether two points are at other distances from row to row.
+pub(super) fn changes_distance(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> bool {
+    let apart = distances(parts, a, b);
+    apart.len() > 1 && !is_kept(apart)
+}
+
+/// How far two points are from each other in the rows that have both.
+fn distances(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> Vec<f64> {
     let rows = parts[a[0].part].rows.len().min(parts[b[0].part].rows.len());
     let apart = |row: usize| Some((point(parts, row, a)? - point(parts, row, b)?).norm());
-    is_kept((0..rows).take(ROWS).filter_map(apart).collect())
+    (0..rows).take(ROWS).filter_map(apart).collect()
 }
 
 /// Whether these distances are one, but for gross errors at less than half of the rows.

@@ -155,7 +155,7 @@ impl Source {
         let picked = pick::by_names(parts, count)?;
         if let [(_, first), .., (_, second)] = &picked.points[..]
             && !assemble::are_readings(parts, &picked)
-            && !layout::keeps_distance(parts, first, second)
+            && layout::changes_distance(parts, first, second)
         {
             return Err(pick::asked(parts, first, second));
         }

@@ -1,7 +1,7 @@
 //! A file as rows of cells: which delimiter it has.
 //!
 //! The delimiter is the one with which most of the first rows have equally many cells, and of those that do equally well the one that makes
-//! most cells numbers; comma, semicolon, tab, bar and blanks in this order. Numbers are written as [`super::numbers`] reads them. Rows of a
+//! most cells numbers; comma, semicolon, tab, bar and blanks in this order. Numbers may have a decimal comma, or thousands set apart. Rows of a
 //! program's list, each in brackets, are rows without them.
 //! Time and memory grow with the file's length alone.
 

@@ -409,6 +409,31 @@ fn traps_are_refused_for_what_they_are() {
 }
 
 #[test]
+fn targets_to_compensate_may_have_any_names() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(12);
+    let read = |name: &str, text: String| stereocal::formats::targets::read(&folder.file(name, text), &robot);
+    let joints = |q: &[f64], _: &[f64; 3]| q.to_vec();
+    let turned = |q: &[f64], _: &[f64; 3]| q.iter().map(|v| v.to_radians()).collect::<Vec<_>>();
+    for (name, text) in [
+        ("named.csv", text("Joint 1;Joint 2;Joint 3;Joint 4;Joint 5;Joint 6", &rows, ";", joints)),
+        ("letters.csv", text("S,L,U,R,B,T", &rows, ",", joints)),
+        ("bare.txt", text("", &rows, " ", joints)),
+        ("radians.csv", text("q1 [rad],q2 [rad],q3 [rad],q4 [rad],q5 [rad],q6 [rad]", &rows, ",", turned)),
+    ] {
+        let found = read(name, text).unwrap_or_else(|e| panic!("{name}: {}", report(&e)));
+        for (row, (joints, _)) in found.iter().zip(&rows) {
+            let given = row.given.as_ref().expect("readings");
+            assert!(given.iter().zip(joints).all(|(a, b)| (a - b).abs() < SAME), "{name}: {given:?} {joints:?}");
+        }
+        assert_eq!(found.len(), rows.len(), "{name}");
+    }
+    let small = text("q1,q2,q3,q4,q5,q6", &rows, ",", |q, _| q.iter().map(|v| v / 70.0).collect());
+    let said = read("small.csv", small).err().map(|e| report(&e)).expect("either unit would do");
+    assert!(said.contains("degrees or radians") && said.contains("hint:"), "{said}");
+}
+
+#[test]
 fn sheets_are_named_behind_the_file() {
     let folder = Folder(workplace());
     let (robot, rows) = world(20);

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::conventions::Mended;
 use super::dataset::{Dataset, Reading};
 use super::sessions::{self, Along, Session};
+use super::still::{constant_joints, repeated};
 use super::{conventions, covariances, known, orientations};
 use crate::identify::judge::choose::Identification;
 use crate::identify::judge::scale::CommonScale;
@@ -387,35 +388,4 @@ fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
             if ratio < 10.0 { 1 } else { 0 },
         )
     })
-}
-
-/// Joints within this, rad or mm, are the same.
-const SAME_JOINT: f64 = 1e-9;
-
-/// Rows of the same group at the same joints.
-fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
-    let mut order: Vec<usize> = (0..set.poses.len()).collect();
-    let key = |i: usize| (set.poses[i].group, &set.poses[i].joints_rad);
-    order.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
-    let same = |a: usize, b: usize| {
-        let pairs = set.poses[a].joints_rad.iter().zip(&set.poses[b].joints_rad);
-        set.poses[a].group == set.poses[b].group && pairs.into_iter().all(|(p, q)| (p - q).abs() <= SAME_JOINT)
-    };
-    let mut rows: Vec<usize> = order.windows(2).filter(|w| same(w[0], w[1])).flat_map(|w| [w[0], w[1]]).collect();
-    rows.sort_unstable();
-    rows.dedup();
-    let names: Vec<String> = rows.iter().map(|&r| set.poses[r].name.clone()).collect();
-    (!names.is_empty()).then(|| {
-        (
-            names,
-            "poses that the robot came back to: they say how well it repeats, and nothing about its links".to_owned(),
-        )
-    })
-}
-
-/// Joints that do not move.
-fn constant_joints(set: &Dataset) -> Vec<usize> {
-    let Some(first) = set.poses.first() else { return Vec::new() };
-    let constant = |j: &usize| set.poses.iter().all(|p| (p.joints_rad[*j] - first.joints_rad[*j]).abs() <= SAME_JOINT);
-    (0..first.joints_rad.len()).filter(constant).collect()
 }

@@ -9,4 +9,5 @@ pub mod orientations;
 pub mod repeats;
 pub mod sessions;
 pub mod shared;
+mod still;
 pub mod targets;

@@ -4,8 +4,10 @@
 //! all others pulls the fit towards itself, and a fit that lets it go may leave it by more than its own error: the variance of the
 //! prediction counts as well as the row's own ("deletion residuals": Cook and Weisberg, "Residuals and influence in regression", 1982).
 //! What the others say of a row far from them is extrapolated, and what the model lacks grows with it as noise does: where the prediction is
-//! less certain than the reading, a row must be as many times further off. A row is named against most of the others: where more than half of
-//! all would be left out, none is.
+//! less certain than the reading, a row must be as many times further off, in its variance: up to the count of the numbers that predict it, for a
+//! prediction is a weighted sum of them, and where all that they scatter by is what the model lacks, pulling one way, its square is at most as
+//! many times the variance that independent errors would give it (Cauchy and Schwarz). A row is named against most of the others: where more
+//! than half of all would be left out, none is.
 //! A row that was left out goes back where the others predict it: within two thirds of the standard deviations that it was left out for,
 //! their size that of the other rows' residuals. A row that was kept is doubtful where the others are so far from it as one set in a
 //! thousand would have such a row by chance.
@@ -30,10 +32,6 @@ const ROUNDS: usize = 4;
 
 /// Steps of the trust region after a change of the rows.
 const STEPS: usize = 6;
-
-/// Variance of a prediction over a reading's, beyond which the prior says how far off a prediction may be, and not what the model lacks: a built
-/// robot's links are off by tens of what its readings scatter by.
-const MOST_EXTRAPOLATED: f64 = 30.0;
 
 /// Share of a row that the others must say for it to be held against them.
 const LEAST_OTHERS: f64 = 0.05;
@@ -164,6 +162,8 @@ impl Robust<'_> {
         }
         let covariance = pseudo_inverse(normal);
         let weight = |row: usize| self.weights.get(row).copied().unwrap_or(1.0);
+        let predicting = parts.iter().flat_map(|(poses, ..)| poses.iter().flatten());
+        let most = predicting.filter(|&&pose| weight(rows.rows[pose]) > UNHEARD).count().max(1) as f64;
         let (mut squares, mut numbers, mut unknowns) = (0.0, 0usize, 0);
         let mut deleted = vec![Deleted::default(); self.task.set.poses.len()];
         let mut of_known = vec![0.0; self.task.set.known.len()];
@@ -195,7 +195,7 @@ impl Robust<'_> {
                     continue;
                 }
                 let (square, odds) = square_of_deleted(&residual, leverage, weight(row)).unwrap_or((0.0, 1.0));
-                let square = square / odds.clamp(1.0, MOST_EXTRAPOLATED);
+                let square = square / odds.clamp(1.0, most);
                 if square > deleted[row].square {
                     deleted[row] = Deleted { square, numbers: at.len(), ..deleted[row] };
                 }
