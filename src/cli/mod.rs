@@ -1,5 +1,6 @@
 //! The command line as typed. What it means is decided in [`crate::commands`].
 
+mod board;
 mod cameras;
 mod robot;
 mod simulate;
@@ -8,6 +9,7 @@ pub mod unexpected;
 use camino::Utf8PathBuf;
 use clap::{Args, Parser, Subcommand};
 
+pub use self::board::PrintBoard;
 pub use self::cameras::{
     BoardShape, CalibrationFormat, CameraCheck, Export, ExportCalibration, ExportWhat, Measure, Rectify,
 };
@@ -56,6 +58,8 @@ pub enum Command {
     Identify(Identify),
     /// Judge robots by the verify rows of measurements, without fitting any
     Verify(Verify),
+    /// Write a board to print, in true size
+    Board(PrintBoard),
     /// Join camera check, measurements and robot into one file to sign
     Report(Report),
     /// Undistort and rectify pairs of pictures, for eyes and for dense stereo

@@ -1,5 +1,6 @@
 //! One file or folder a command; each reads as the list of its stages, and nothing else knows their order.
 
+pub mod board;
 pub mod camera_check;
 pub mod compensate;
 pub mod error;
@@ -50,6 +51,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Measure(args) => measure::run(&args, &config, run),
         Command::Identify(args) => identify::run(&args, &config, run),
         Command::Verify(args) => verify::run(&args, &config),
+        Command::Board(args) => board::run(&args, &config, run),
         Command::Rectify(args) => rectify::run(&args, &config, run),
         Command::Report(args) => report::run(&args, &config, run),
         Command::Simulate(args) => simulate::run(&args, &config, run),

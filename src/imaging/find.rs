@@ -80,7 +80,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     };
     bar.finish_and_clear();
     let other = other_size(&seen);
-    notes.extend(printed(&wanted.board, &seen));
+    printed(&wanted.board, &seen).iter().for_each(progress::note);
     let (found, skipped) = sort_out(&pairing.pairs, seen, wanted.board);
     let total = pairing.pairs.len();
     if found.len() < wanted.needed {

