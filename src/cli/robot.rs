@@ -173,6 +173,9 @@ pub struct Compensate {
     /// Pulses a degree of each joint, for Yaskawa jobs in pulses
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true)]
     pub pulses_per_deg: Vec<f64>,
+    /// Correct a program's joint targets although other motions stay as they are; these are named, and the exit status is 1
+    #[arg(long)]
+    pub joint_targets_only: bool,
     /// Results.
     #[command(flatten)]
     pub output: Output,

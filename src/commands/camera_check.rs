@@ -63,11 +63,10 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     out.write_json(
         "calibration.json",
         &CalibrationFile::from(calibration.rig()).with_check(
-            &calibration.own_noise,
+            &calibration,
             pair_excess(&calibration),
             judged.coverage.corner_depths_mm,
             &judged.volume.volume,
-            &calibration.standing.unconfirmed,
         ),
     )?;
     if !out.is_input("corners.csv") {

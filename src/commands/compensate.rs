@@ -13,10 +13,11 @@ use crate::diagnostic::{Place, Status};
 use crate::files::provenance::Run;
 use crate::files::{self, OutDir};
 use crate::formats::targets::{self, Row};
-use crate::programs::{self, Joints, Language};
+use crate::programs::{self, Cause, Instruction, Joints, Language};
+use crate::progress;
 use crate::robot::{Error, Robot, file};
 
-/// Length of the list of refused targets on the terminal.
+/// Length of the lists of refused targets and of motions that stay as they are on the terminal.
 const MOST_SAID: usize = 20;
 
 /// What `compensate.json` says.
@@ -32,7 +33,29 @@ struct Summary {
     before_max_mm: Option<f64>,
     /// Those without.
     refused: Vec<Refused>,
+    /// Of a program: every instruction that moves the robot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    motions: Option<Vec<Moved>>,
 }
+
+/// A motion of a program.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Moved {
+    line: u64,
+    instruction: String,
+    target: String,
+    /// `compensated` or `unchanged`.
+    done: &'static str,
+    /// Why it is unchanged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<String>,
+}
+
+/// What to do about motions that are not corrected.
+const LEFT_HINT: &str = "`--joint-targets-only` corrects the joint targets and names the motions that it leaves as they are; \
+                         their poses can be compensated as a CSV of name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad";
+const CSV_HINT: &str =
+    "give the targets as a CSV of name,j1_deg,...,jN_deg or name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad";
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Refused {
@@ -47,11 +70,14 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     check(args, &nominal, &identified)?;
     let slides: Vec<bool> = nominal.joints.iter().map(|j| j.slides).collect();
     let joints = Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg };
-    let program = Language::of(&args.targets).map(|language| Program::read(&args.targets, language, joints));
-    let program = program.transpose()?;
+    let program = Language::of(&args.targets).map(|language| Program::read(args, language, joints)).transpose()?;
     let rows = match &program {
         Some(program) => program.rows(&nominal),
-        None => targets::read(&args.targets, &nominal)?,
+        None => {
+            let (rows, said) = targets::read(&args.targets, &nominal)?;
+            said.into_iter().for_each(progress::note);
+            rows
+        }
     };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let run = Run { force: args.output.force, ..run };
@@ -71,16 +97,19 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     });
     out.write("compensated.csv", targets::to_csv(&nominal, table).as_bytes())?;
     if let Some(program) = &program {
-        let changed = program.targets.iter().zip(&found);
+        let changed = program.targets().zip(&found);
         let changed: Vec<_> = changed.filter_map(|(t, f)| Some((t, in_file(f.readings.as_ref().ok()?)))).collect();
         let text = programs::with_readings(program.language, &program.text, joints, &changed);
         out.write(&program_name, text.as_bytes())?;
     }
-    let summary = Summary::new(&rows, &found);
+    let motions = program.as_ref().map(|program| program.outcome(&found));
+    let summary = Summary::new(&rows, &found, motions.as_deref());
     let json = out.write_json("compensate.json", &summary)?;
-    let status = if summary.refused.is_empty() { Status::Done } else { Status::OutOfTolerance };
+    let whole =
+        motions.as_ref().is_none_or(|motions| !motions.is_empty() && motions.iter().all(|m| m.moves_by.is_ok()));
+    let status = if summary.refused.is_empty() && whole { Status::Done } else { Status::OutOfTolerance };
     let written = out.join(if program.is_some() { &program_name } else { "compensated.csv" });
-    let stdout = if args.output.json { json } else { said(&summary, &written) };
+    let stdout = if args.output.json { json } else { said(&summary, motions.as_deref(), &written) };
     Ok(Outcome { stdout, status })
 }
 
@@ -104,33 +133,53 @@ fn check(args: &Compensate, nominal: &Robot, identified: &Robot) -> Result<()> {
     Ok(config::reject(problems)?)
 }
 
-/// A robot program with its joint targets.
+/// A robot program, and which of its joint targets it moves by.
 struct Program {
     language: Language,
     text: String,
-    targets: Vec<programs::Target>,
+    read: programs::Program,
+    moved_by: Vec<usize>,
 }
 
 impl Program {
-    fn read(path: &Utf8Path, language: Language, joints: Joints) -> files::Result<Program> {
+    fn read(args: &Compensate, language: Language, joints: Joints) -> files::Result<Program> {
+        let path = &args.targets;
         let text = files::read_text(path, "the robot program", None)?;
-        let refuse = |message: String, hint: String| {
-            let place = Place { path: path.to_owned(), line: None };
-            files::Error::Format { message, place, hint: Some(hint) }
+        let refuse = |message: String, hint: &str| {
+            let place = Place { path: path.clone(), line: None };
+            files::Error::Format { message, place, hint: Some(hint.to_owned()) }
         };
-        let targets = programs::targets(language, &text, joints).map_err(|message| {
-            refuse(message, "`--pulses-per-deg N,N,...`, from the controller's parameters".into())
-        })?;
-        if targets.is_empty() {
+        let read = programs::Program::read(language, &text, joints)
+            .map_err(|message| refuse(message, "`--pulses-per-deg N,N,...`, from the controller's parameters"))?;
+        if !args.joint_targets_only
+            && let Some(first) = read.motions.iter().find(|motion| motion.moves_by.is_err())
+        {
+            return Err(refuse(counted(&read.motions, first), LEFT_HINT));
+        }
+        let moved_by = read.moved_by(language);
+        if moved_by.is_empty() {
+            let count = joints.slides.len();
             let message =
-                format!("no joint target of {} numbers in this {} program", joints.slides.len(), language.name());
-            let hint = "Cartesian targets are not changed in programs: give them as CSV, name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad";
-            return Err(refuse(message, hint.to_owned()));
+                format!("nothing in this {} program moves to a joint target of {count} numbers", language.name());
+            return Err(refuse(message, CSV_HINT));
         }
-        if targets.len() > MOST_ROWS {
-            return Err(refuse(format!("more than {MOST_ROWS} targets"), "split the program".to_owned()));
+        if read.motions.is_empty() && !args.joint_targets_only {
+            let message =
+                format!("{} joint targets, but no instruction that moves to them, in this file", moved_by.len());
+            return Err(refuse(
+                message,
+                "`--joint-targets-only` corrects them, where everything that uses them is a motion",
+            ));
         }
-        Ok(Program { language, text, targets })
+        if moved_by.len() > MOST_ROWS {
+            return Err(refuse(format!("more than {MOST_ROWS} targets"), "split the program"));
+        }
+        Ok(Program { language, text, read, moved_by })
+    }
+
+    /// The joint targets that are corrected, in the order of the text.
+    fn targets(&self) -> impl Iterator<Item = &programs::Target> {
+        self.moved_by.iter().filter_map(|&k| self.read.targets.get(k))
     }
 
     fn rows(&self, nominal: &Robot) -> Vec<Row> {
@@ -138,12 +187,35 @@ impl Program {
             let target = Target::Readings(targets::radians(&t.readings, nominal));
             Row { name: t.name.clone(), line: t.line, target, given: Some(t.readings.clone()) }
         };
-        self.targets.iter().map(row).collect()
+        self.targets().map(row).collect()
+    }
+
+    /// The motions, those among the unchanged ones that move to a target whose correction was refused.
+    fn outcome(&self, found: &[Compensated]) -> Vec<Instruction> {
+        let refusal = |k: &usize| {
+            let place = self.moved_by.binary_search(k).ok()?;
+            found.get(place)?.readings.as_ref().err().map(|refusal| Cause::Refused(refusal.to_string()))
+        };
+        let outcome = |motion: &Instruction| {
+            let moves_by = motion.moves_by.clone().and_then(|targets| match targets.iter().find_map(refusal) {
+                Some(cause) => Err(cause),
+                None => Ok(targets),
+            });
+            Instruction { moves_by, ..motion.clone() }
+        };
+        self.read.motions.iter().map(outcome).collect()
     }
 }
 
+/// "7 motions, 2 through joint targets; line 14: MoveL p10 is Cartesian".
+fn counted(motions: &[Instruction], first: &Instruction) -> String {
+    let through = motions.iter().filter(|m| m.moves_by.is_ok()).count();
+    let s = if motions.len() == 1 { "" } else { "s" };
+    format!("{} motion{s}, {through} through joint targets; {first}", motions.len())
+}
+
 impl Summary {
-    fn new(rows: &[Row], found: &[Compensated]) -> Summary {
+    fn new(rows: &[Row], found: &[Compensated], motions: Option<&[Instruction]>) -> Summary {
         let refused = rows.iter().zip(found).filter_map(|(row, found)| {
             let reason = found.readings.as_ref().err()?.to_string();
             Some(Refused { name: row.name.clone(), line: row.line, reason })
@@ -156,20 +228,52 @@ impl Summary {
             before_mean_mm: (!misses.is_empty()).then(|| misses.iter().sum::<f64>() / misses.len() as f64),
             before_max_mm: misses.iter().copied().reduce(f64::max),
             refused,
+            motions: motions.map(|motions| motions.iter().map(Moved::new).collect()),
         }
     }
 }
 
-fn said(summary: &Summary, written: &Utf8Path) -> String {
+impl Moved {
+    fn new(motion: &Instruction) -> Moved {
+        Moved {
+            line: motion.line,
+            instruction: motion.word.clone(),
+            target: motion.target.clone(),
+            done: if motion.moves_by.is_ok() { "compensated" } else { "unchanged" },
+            reason: motion.moves_by.as_ref().err().map(Cause::to_string),
+        }
+    }
+}
+
+fn said(summary: &Summary, motions: Option<&[Instruction]>, written: &Utf8Path) -> String {
     let mut text = format!("{} of {} targets compensated: {written}\n", summary.compensated, summary.targets);
+    if let Some(motions) = motions {
+        let through = motions.iter().filter(|m| m.moves_by.is_ok()).count();
+        text += &match motions.len() {
+            0 => "no instruction in this file moves to them: whether each use of them is a motion is not known\n"
+                .to_owned(),
+            all if all == through => format!("all {all} motions move to them\n"),
+            all => format!("{through} of {all} motions move to them; {} left as written\n", all - through),
+        };
+    }
     if let (Some(mean), Some(max)) = (summary.before_mean_mm, summary.before_max_mm) {
-        text += &format!("without it the real tool would be off by {mean:.3} mm in the mean, {max:.3} at the most\n");
+        text += &format!("without it the real tool would be off by {mean:.3} mm on average, {max:.3} at most\n");
     }
-    for refused in summary.refused.iter().take(MOST_SAID) {
-        text += &format!("not compensated: {} (line {}): {}\n", refused.name, refused.line, refused.reason);
-    }
-    if summary.refused.len() > MOST_SAID {
-        text += &format!("... and {} more, named in compensated.csv\n", summary.refused.len() - MOST_SAID);
-    }
+    let left: Vec<String> = match motions {
+        Some(motions) => motions.iter().filter(|m| m.moves_by.is_err()).map(|m| format!("left: {m}")).collect(),
+        None => Vec::new(),
+    };
+    let refused = |r: &Refused| format!("not compensated: {} (line {}): {}", r.name, r.line, r.reason);
+    listed(&mut text, summary.refused.iter().map(refused), summary.refused.len(), "compensated.csv");
+    let count = left.len();
+    listed(&mut text, left.into_iter(), count, "compensate.json");
     text
+}
+
+/// At most so many lines of a list, and where the others are named.
+fn listed(text: &mut String, lines: impl Iterator<Item = String>, count: usize, file: &str) {
+    lines.take(MOST_SAID).for_each(|line| *text += &format!("{line}\n"));
+    if count > MOST_SAID {
+        *text += &format!("... and {} more, named in {file}\n", count - MOST_SAID);
+    }
 }

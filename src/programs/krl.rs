@@ -2,8 +2,32 @@
 
 use std::fmt::Write as _;
 
+use super::instruction::{Cause, Instruction};
 use super::scan;
+use super::variables::{Syntax, Variables};
 use super::{Motion, Target, Written};
+
+/// Motions to axis values or poses.
+const EITHER: [&str; 2] = ["PTP", "SPTP"];
+/// Motions to poses.
+const CARTESIAN: [&str; 5] = ["LIN", "CIRC", "SLIN", "SCIRC", "SPL"];
+/// Motions from where the robot stands.
+const RELATIVE: [&str; 7] = ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL", "SPL_REL"];
+/// What moves nothing: a motion to where the robot stands.
+const HERE: [&str; 2] = ["$AXIS_ACT", "$POS_ACT"];
+
+const SYNTAX: Syntax = Syntax {
+    assign: "=",
+    end: '\n',
+    any_case: true,
+    routines: &["DEF", "DEFFCT"],
+    changes: &[],
+    cartesian: |value| {
+        let first = scan::words(value).next().map_or("", |word| &value[word]);
+        value.starts_with('{')
+            && ["X", "Y", "Z", "A", "B", "C", "POS", "E6POS", "FRAME"].contains(&first.to_ascii_uppercase().as_str())
+    },
+};
 
 /// Names of the axes: those of the robot, then external ones.
 fn axes(count: usize) -> Vec<String> {
@@ -13,18 +37,60 @@ fn axes(count: usize) -> Vec<String> {
 /// Aggregates of all axes, with or without their type before them.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
     let names = axes(count);
+    let text = &scan::code(text, ";");
     let aggregate = |at: usize| {
-        if scan::in_comment(text, at, ";") {
-            return None;
-        }
         let typed = ["E6AXIS", "AXIS"].iter().find_map(|t| scan::word(text, at + 1, t));
         let from = typed.and_then(|end| scan::word(text, end, ":")).unwrap_or(at + 1);
         let (numbers, _) = scan::labelled(text, from, &names, &[","])?;
         let before = text[..at].trim_end();
         let name = before.strip_suffix('=').and_then(|b| b.split_whitespace().last()).map(str::to_owned);
-        scan::target(text, name, numbers)
+        scan::target(text, name, numbers, Some(at))
     };
     text.match_indices('{').filter_map(|(at, _)| aggregate(at)).collect()
+}
+
+/// Every instruction that moves.
+pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
+    let code = scan::code(text, ";");
+    let variables = Variables::read(&code, SYNTAX, targets);
+    let mut found = Vec::new();
+    let mut last = "";
+    for word in scan::words(&code) {
+        let name = code[word.clone()].to_ascii_uppercase();
+        let before = std::mem::replace(&mut last, &code[word.clone()]);
+        let end = code[word.end..].find('\n').map_or(code.len(), |length| word.end + length);
+        let behind = code[word.end..end].trim();
+        let declared = SYNTAX.routines.iter().any(|r| r.eq_ignore_ascii_case(before));
+        if name == "RSI_MOVECORR" && !declared {
+            found.push(Instruction::new(text, word.clone(), word.end..word.end, Err(Cause::Led)));
+        }
+        let of = |words: &[&str]| words.contains(&name.as_str());
+        let moves = of(&EITHER) || of(&CARTESIAN) || of(&RELATIVE) || name == "ASYPTP";
+        if !moves || declared || behind.is_empty() || behind.starts_with(['=', '(', ')', ',', '.', '[']) {
+            continue;
+        }
+        let at = point(&code, word.end..end);
+        if HERE.iter().any(|here| here.eq_ignore_ascii_case(&code[at.clone()])) {
+            continue;
+        }
+        let moves_by = match () {
+            () if of(&EITHER) => variables.expression(&code, at.clone(), targets),
+            () if of(&CARTESIAN) => Err(Cause::Cartesian),
+            () if of(&RELATIVE) => Err(Cause::Offset),
+            () => Err(Cause::External),
+        };
+        found.push(Instruction::new(text, word, at, moves_by));
+    }
+    found
+}
+
+/// The first point behind a word, without the blending and the settings behind it.
+fn point(code: &str, at: std::ops::Range<usize>) -> std::ops::Range<usize> {
+    let first = scan::parts(code, at).swap_remove(0);
+    let text = &code[first.clone()];
+    let settings = ["C_PTP", "C_DIS", "C_VEL", "C_ORI", "C_SPL", "WITH"];
+    let stop = scan::words(text).find(|w| settings.iter().any(|s| s.eq_ignore_ascii_case(&text[w.clone()])));
+    scan::trimmed(code, first.start..stop.map_or(first.end, |w| first.start + w.start))
 }
 
 pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(String, String)> {

@@ -1,19 +1,24 @@
 //! Robot programs: joint targets read out of the makers' languages, put back in place, and lists of stops written as programs.
 //!
-//! In: a program's text, or a list of stops. Out: readings in deg (mm where a joint slides), the text with other readings and nothing
-//! else changed, or a program that moves, waits, triggers and logs. Only targets written as numbers in joint coordinates are seen;
-//! Cartesian ones stay as they are. What goes wrong: pulses (Yaskawa) without their number a degree.
+//! In: a program's text, or a list of stops. Out: every instruction that moves the robot with the joint targets that it moves by, their
+//! readings in deg (mm where a joint slides), the text with other readings and nothing else changed; or a program that moves, waits,
+//! triggers and logs. Only targets written as numbers in joint coordinates can be changed; an instruction that moves by anything
+//! else is named with the reason. What goes wrong: pulses (Yaskawa) without their number a degree.
 
 mod fanuc;
+mod instruction;
 mod krl;
 mod rapid;
 mod scan;
 mod urscript;
+mod variables;
 mod yaskawa;
 
 use std::ops::Range;
 
 use camino::Utf8Path;
+
+pub use self::instruction::{Cause, Instruction, Program};
 
 /// A maker's language.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,6 +89,8 @@ pub struct Target {
     pub readings: Vec<f64>,
     /// Where each of its numbers stands in the text.
     places: Vec<Range<usize>>,
+    /// Where it stands as a whole, with its brackets.
+    whole: Range<usize>,
     /// Whether they are pulses.
     pulses: bool,
 }
@@ -108,8 +115,20 @@ impl Joints<'_> {
     }
 }
 
-/// All joint targets of a program, in its order. An error says what could not be understood.
+/// The joint targets of a program, in its order: those that it moves by, and what is plainly one though nothing moves by it.
 pub fn targets(language: Language, text: &str, joints: Joints) -> Result<Vec<Target>, String> {
+    let program = Program::read(language, text, joints)?;
+    if language != Language::UrScript {
+        return Ok(program.targets);
+    }
+    // A list is a joint target where something moves by it, or where its name says so, as PolyScope's do.
+    let moved = program.moved_by(language);
+    let kept = |(k, t): (usize, Target)| (moved.binary_search(&k).is_ok() || t.name.ends_with('q')).then_some(t);
+    Ok(program.targets.into_iter().enumerate().filter_map(kept).collect())
+}
+
+/// Every list of joint values, in the order of the text.
+fn all_targets(language: Language, text: &str, joints: Joints) -> Result<Vec<Target>, String> {
     let found = match language {
         Language::UrScript => urscript::targets(text, joints.count()),
         Language::Rapid => rapid::targets(text, joints.count()),

@@ -2,20 +2,47 @@
 
 use std::fmt::Write as _;
 
+use std::ops::Range;
+
+use super::instruction::{Cause, Instruction};
 use super::scan;
+use super::variables::{Syntax, Variables};
 use super::{Motion, Target, Written};
 
 /// Robot axes of a jointtarget; more are external ones.
 const AXES: usize = 6;
 
+/// How the words of instructions that move to poses of the tool begin; they have a point, a speed, a zone and a tool at the least.
+const CARTESIAN: [&str; 22] = [
+    "MoveJ", "MoveL", "MoveC", "TriggJ", "TriggL", "TriggC", "SearchL", "SearchC", "ArcL", "ArcC", "ArcJ", "SpotL",
+    "SpotJ", "SpotML", "SpotMJ", "DispL", "DispC", "PaintL", "PaintC", "NutL", "NutJ", "ContactL",
+];
+/// Those that move to joint targets.
+const JOINT: [&str; 2] = ["MoveAbsJ", "TriggAbsJ"];
+/// Those that move external axes alone.
+const EXTERNAL: [&str; 6] = ["MoveExtJ", "SearchExtJ", "IndAMove", "IndCMove", "IndDMove", "IndRMove"];
+/// Those that follow a sensor or a force.
+const LED: [&str; 6] = ["EGMRun", "EGMMove", "FCPress", "FCAct", "CapL", "CapC"];
+
+const SYNTAX: Syntax = Syntax {
+    assign: ":=",
+    end: ';',
+    any_case: true,
+    routines: &["PROC", "FUNC", "TRAP"],
+    changes: &["Add", "Incr", "Decr", "Clear"],
+    // A pose begins with three numbers, and no joint target does.
+    cartesian: |_| false,
+};
+
 /// Values of joint targets: two lists of which the first has a robot's axes. Poses begin with three numbers.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
     let first = count.min(AXES);
+    let text = &scan::code(text, "!");
     let value = |at: usize| {
         let inner = scan::word(text, at + 1, "[")?;
         let (mut numbers, end) = scan::list(text, inner, AXES + 1);
         // Axes that the arm lacks are written as zero.
-        if scan::in_comment(text, at, "!") || !(numbers.len() == first || numbers.len() == AXES) {
+        if !(numbers.len() == first || numbers.len() == AXES) {
             return None;
         }
         let end = scan::word(text, end, "]")?;
@@ -26,9 +53,117 @@ pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
         }
         let before = text[..at].trim_end();
         let name = before.strip_suffix(":=").and_then(|b| b.split_whitespace().last()).map(str::to_owned);
-        scan::target(text, name, numbers).filter(|t| t.readings.len() == count)
+        scan::target(text, name, numbers, Some(at)).filter(|t| t.readings.len() == count)
     };
     text.match_indices('[').filter_map(|(at, _)| value(at)).collect()
+}
+
+/// Every instruction that moves: those whose words are known, and any other one that is given a speed or a zone.
+pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
+    let code = scan::code(text, "!");
+    let variables = Variables::read(&code, SYNTAX, targets);
+    let mut from = 0;
+    let statements = code.match_indices(';').map(|(end, _)| std::mem::replace(&mut from, end + 1)..end);
+    let motion = |at: Range<usize>| {
+        let (word, kind) = known(&code, at.clone()).or_else(|| unknown(&code, at.clone()))?;
+        let arguments = arguments(&code, word.end..at.end);
+        let place = if begins(&code[word.clone()], "Search") { 2 } else { 0 };
+        let target = arguments.get(place).or(arguments.first()).cloned().unwrap_or(word.end..word.end);
+        let moves_by = match kind {
+            None => variables.expression(&code, target.clone(), targets),
+            Some(cause) => Err(cause),
+        };
+        Some(Instruction::new(text, word, target, moves_by))
+    };
+    statements.filter_map(motion).collect()
+}
+
+fn begins(word: &str, head: &str) -> bool {
+    word.get(..head.len()).is_some_and(|w| w.eq_ignore_ascii_case(head))
+}
+
+/// The known word that moves in a statement, and why it is not corrected; `None` where it moves to a joint target.
+fn known(code: &str, at: Range<usize>) -> Option<(Range<usize>, Option<Cause>)> {
+    let mut last = "";
+    for word in scan::words(&code[at.clone()]) {
+        let word = at.start + word.start..at.start + word.end;
+        let name = &code[word.clone()];
+        let declared = SYNTAX.routines.iter().any(|r| r.eq_ignore_ascii_case(std::mem::replace(&mut last, name)));
+        let before = code[..word.start].ends_with(['\\', '.', ',', '(', '=']);
+        let behind = code[word.end..at.end].trim_start();
+        if declared || before || behind.is_empty() || behind.starts_with(['(', ':', '.', ',', ')', '=']) {
+            continue;
+        }
+        let of = |words: &[&str]| words.iter().any(|w| begins(name, w));
+        let given = arguments(code, word.end..at.end).len();
+        let kind = match () {
+            () if of(&JOINT) => None,
+            () if of(&EXTERNAL) => Some(Cause::External),
+            () if of(&LED) => Some(Cause::Led),
+            // A routine may have such a name, as in `MoveLeft 10;`.
+            () if of(&CARTESIAN) && given > 2 => Some(Cause::Cartesian),
+            () => continue,
+        };
+        return Some((word, kind));
+    }
+    None
+}
+
+/// The word of a statement that is given a speed or a zone among its arguments: a routine that moves, or an instruction of an option.
+fn unknown(code: &str, at: Range<usize>) -> Option<(Range<usize>, Option<Cause>)> {
+    let parts = scan::parts(code, at.clone());
+    let numbered = |text: &str, head: char| {
+        let mut chars = text.chars();
+        chars.next().is_some_and(|c| c.eq_ignore_ascii_case(&head))
+            && chars.as_str().starts_with(|c: char| c.is_ascii_digit())
+            && chars.all(|c| c.is_ascii_digit())
+    };
+    let motion = |part: &Range<usize>| {
+        let text = code[part.clone()].split('\\').next().unwrap_or_default().trim();
+        text.eq_ignore_ascii_case("fine")
+            || text.eq_ignore_ascii_case("vmax")
+            || numbered(text, 'v')
+            || numbered(text, 'z')
+    };
+    parts.iter().skip(1).find(|part| motion(part))?;
+    // The word before the first argument: the last one but the argument's own.
+    let first = parts.first()?.clone();
+    let mut words: Vec<Range<usize>> = Vec::new();
+    let mut brackets = 0usize;
+    let mut seen = first.start;
+    for word in scan::words(&code[first.clone()]).map(|w| first.start + w.start..first.start + w.end) {
+        for c in code[seen..word.start].chars() {
+            match c {
+                '(' | '[' | '{' => brackets += 1,
+                ')' | ']' | '}' => brackets = brackets.saturating_sub(1),
+                _ => {}
+            }
+        }
+        seen = word.end;
+        if brackets == 0 && !code[..word.start].ends_with(['\\', '.']) {
+            words.push(word);
+        }
+    }
+    let literal = code[..first.end].ends_with(']');
+    let word = words.iter().rev().nth(usize::from(!literal))?.clone();
+    Some((word, Some(Cause::Elsewhere)))
+}
+
+/// Arguments without switches (`\Conc`) and without what is optional behind them (`\NoEOffs`).
+fn arguments(code: &str, at: Range<usize>) -> Vec<Range<usize>> {
+    let plain = |part: Range<usize>| {
+        let mut depth = 0usize;
+        let optional = code[part.clone()].find(|c: char| {
+            match c {
+                '(' | '[' | '{' => depth += 1,
+                ')' | ']' | '}' => depth = depth.saturating_sub(1),
+                _ => {}
+            }
+            c == '\\' && depth == 0
+        });
+        (optional != Some(0)).then(|| scan::trimmed(code, part.start..optional.map_or(part.end, |k| part.start + k)))
+    };
+    scan::parts(code, at).into_iter().filter_map(plain).collect()
 }
 
 fn jointtarget(list: &[String]) -> String {

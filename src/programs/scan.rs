@@ -53,20 +53,93 @@ pub fn labelled(text: &str, at: usize, labels: &[String], between: &[&str]) -> O
     Some((numbers, end))
 }
 
-/// A target of these numbers; named by its line where it has no name.
-pub fn target(text: &str, name: Option<String>, numbers: Vec<Number>) -> Option<Target> {
-    let line = line(text, numbers.first()?.1.start);
+/// A target of these numbers; named by its line where it has no name. `open` is the bracket that it begins with, where it has one.
+pub fn target(text: &str, name: Option<String>, numbers: Vec<Number>, open: Option<usize>) -> Option<Target> {
+    let (first, last) = (numbers.first()?.1.start, numbers.last()?.1.end);
+    let line = line(text, first);
+    let whole = open.and_then(|open| Some(open..closed(text, open)?)).unwrap_or(first..last);
     let (readings, places) = numbers.into_iter().unzip();
-    Some(Target { name: name.unwrap_or_else(|| format!("line {line}")), line, readings, places, pulses: false })
+    Some(Target { name: name.unwrap_or_else(|| format!("line {line}")), line, readings, places, whole, pulses: false })
 }
 
 /// Line of a place, from 1.
-fn line(text: &str, at: usize) -> u64 {
+pub fn line(text: &str, at: usize) -> u64 {
     1 + text[..at].bytes().filter(|b| *b == b'\n').count() as u64
 }
 
-/// Whether the place stands in a line that begins with a mark of comments.
-pub fn in_comment(text: &str, at: usize, mark: &str) -> bool {
-    let start = text[..at].rfind('\n').map_or(0, |end| end + 1);
-    text[start..at].trim_start().starts_with(mark)
+/// The text with blanks in place of comments (from `mark` to the line's end) and of what stands in double quotes; of the same length.
+pub fn code(text: &str, mark: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let (mut quoted, mut comment) = (false, false);
+    for (at, c) in text.char_indices() {
+        match c {
+            '\n' => (quoted, comment) = (false, false),
+            '"' if !comment => quoted = !quoted,
+            _ if !quoted && !comment => comment = text[at..].starts_with(mark),
+            _ => {}
+        }
+        if (quoted || comment || c == '"') && c != '\n' {
+            (0..c.len_utf8()).for_each(|_| out.push(' '));
+        } else {
+            out.push(c);
+        }
+    }
+    out
+}
+
+/// Places of the words: letters, digits, `_`, and KUKA's `$` and `#`. Numbers are words too.
+pub fn words(code: &str) -> impl Iterator<Item = Range<usize>> + '_ {
+    let part = |c: char| c.is_alphanumeric() || "_$#".contains(c);
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        let start = at + code[at..].find(part)?;
+        at = code[start..].find(|c| !part(c)).map_or(code.len(), |length| start + length);
+        Some(start..at)
+    })
+}
+
+/// Whether it is a name and no number.
+pub fn is_name(word: &str) -> bool {
+    word.starts_with(|c: char| c.is_alphabetic() || "_$#".contains(c))
+}
+
+/// The place behind the bracket that closes the one at `open`.
+pub fn closed(code: &str, open: usize) -> Option<usize> {
+    let mut depth = 0usize;
+    for (at, c) in code[open..].char_indices() {
+        match c {
+            '(' | '[' | '{' => depth += 1,
+            ')' | ']' | '}' => depth = depth.checked_sub(1)?,
+            _ => {}
+        }
+        if depth == 0 {
+            return Some(open + at + c.len_utf8());
+        }
+    }
+    None
+}
+
+/// The parts between the commas of `range` that stand in no bracket, without blanks around them.
+pub fn parts(code: &str, range: Range<usize>) -> Vec<Range<usize>> {
+    let (mut depth, mut from, mut found) = (0usize, range.start, Vec::new());
+    for (at, c) in code[range.clone()].char_indices() {
+        match c {
+            '(' | '[' | '{' => depth += 1,
+            ')' | ']' | '}' => depth = depth.saturating_sub(1),
+            ',' if depth == 0 => {
+                found.push(trimmed(code, from..range.start + at));
+                from = range.start + at + 1;
+            }
+            _ => {}
+        }
+    }
+    found.push(trimmed(code, from..range.end));
+    found
+}
+
+/// The range without blanks at its ends.
+pub fn trimmed(code: &str, range: Range<usize>) -> Range<usize> {
+    let part = &code[range.clone()];
+    let start = range.start + part.len() - part.trim_start().len();
+    start..start + part.trim().len()
 }

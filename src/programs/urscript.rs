@@ -2,30 +2,112 @@
 
 use std::fmt::Write as _;
 
+use super::instruction::{Cause, Instruction};
 use super::scan;
+use super::variables::{Syntax, Variables};
 use super::{Motion, Target, Written};
 
-/// Calls whose first argument is a list of joint angles.
-const MOVES: [&str; 4] = ["movej(", "movel(", "movep(", "servoj("];
+/// Calls that move to their first arguments, lists of joint angles or poses, and how many of these they have.
+const MOVES: [(&str, usize); 7] =
+    [("movej", 1), ("movel", 1), ("movep", 1), ("movec", 2), ("servoj", 1), ("optimovej", 1), ("optimovel", 1)];
+/// Calls that move by a speed, a force or a path that is set elsewhere, or follow poses.
+const LED: [&str; 10] = [
+    "servoc",
+    "servol",
+    "speedj",
+    "speedl",
+    "force_mode",
+    "freedrive_mode",
+    "teach_mode",
+    "path_offset_set",
+    "screw_driving",
+    "track_conveyor_linear",
+];
+/// Functions whose value is a pose, or joint angles that belong to one.
+const POSES: [&str; 10] = [
+    "p[",
+    "get_inverse_kin",
+    "get_actual_tcp_pose",
+    "get_target_tcp_pose",
+    "get_forward_kin",
+    "pose_trans",
+    "pose_add",
+    "pose_sub",
+    "pose_inv",
+    "interpolate_pose",
+];
+
+const SYNTAX: Syntax = Syntax {
+    assign: "=",
+    end: '\n',
+    any_case: false,
+    routines: &["def", "thread"],
+    changes: &[],
+    cartesian: |value| POSES.iter().any(|p| value.starts_with(p)),
+};
 
 /// Full speed of a joint, rad/s.
 const FULL_SPEED: f64 = std::f64::consts::PI;
 
-/// Lists of angles that a move takes, or that a variable with a name ending in `q` holds, as PolyScope writes them.
+/// Lists of angles that a call of a motion takes, or that stand alone or in a list behind a variable's name.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
+    let text = &scan::code(text, "#");
     let list = |at: usize| {
         let before = text[..at].trim_end();
-        let moved = MOVES.iter().any(|m| before.ends_with(m));
-        let kept = before.strip_suffix('=').map(str::trim_end).is_some_and(|name| name.ends_with('q'));
-        if !(moved || kept) || scan::in_comment(text, at, "#") {
+        if !before.ends_with(['(', '=', ',', '[']) {
             return None;
         }
         let (numbers, end) = scan::list(text, at + 1, count + 1);
         scan::word(text, end, "]").filter(|_| numbers.len() == count)?;
-        let name = kept.then(|| before.trim_end_matches('=').split_whitespace().last().unwrap_or_default().to_owned());
-        scan::target(text, name, numbers)
+        let assigned = before.strip_suffix('=');
+        let name = assigned.map(|before| before.split_whitespace().last().unwrap_or_default().to_owned());
+        scan::target(text, name, numbers, Some(at))
     };
     text.match_indices('[').filter_map(|(at, _)| list(at)).collect()
+}
+
+/// Every call that moves.
+pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
+    let code = scan::code(text, "#");
+    let variables = Variables::read(&code, SYNTAX, targets);
+    let mut found = Vec::new();
+    let mut last = "";
+    for word in scan::words(&code) {
+        let name = &code[word.clone()];
+        let before = std::mem::replace(&mut last, name);
+        let Some(open) = scan::word(&code, word.end, "(").filter(|_| !SYNTAX.routines.contains(&before)) else {
+            continue;
+        };
+        let end = scan::closed(&code, open - 1).map_or(code.len(), |end| end - 1);
+        let arguments = scan::parts(&code, open..end);
+        if LED.contains(&name) {
+            found.push(Instruction::new(text, word, open..open, Err(Cause::Led)));
+            continue;
+        }
+        let Some((_, count)) = MOVES.iter().find(|(move_, _)| *move_ == name) else { continue };
+        let mut moves_by = Ok(Vec::new());
+        for argument in arguments.iter().take(*count) {
+            let at = unnamed(&code, argument.clone());
+            let held = variables.expression(&code, at, targets);
+            moves_by = moves_by.and_then(|mut all: Vec<usize>| {
+                all.extend(held?);
+                Ok(all)
+            });
+        }
+        let shown = arguments[0].start..arguments[arguments.len().min(*count) - 1].end;
+        found.push(Instruction::new(text, word, shown, moves_by));
+    }
+    found
+}
+
+/// An argument without the name before it, as in `movej(q=[...])`.
+fn unnamed(code: &str, at: std::ops::Range<usize>) -> std::ops::Range<usize> {
+    let text = &code[at.clone()];
+    let named = text.find('=').filter(|&k| text[..k].trim().chars().all(|c| c.is_alphanumeric() || c == '_'));
+    match named {
+        Some(k) if !text[k + 1..].starts_with('=') => scan::trimmed(code, at.start + k + 1..at.end),
+        _ => at,
+    }
 }
 
 pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(String, String)> {

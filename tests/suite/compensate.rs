@@ -134,7 +134,20 @@ fn programs_keep_everything_but_their_joint_targets() {
         rad(&q[1])
     );
     std::fs::write(folder.path().join("main.script"), &text).unwrap();
-    run(folder.path(), &["main.script"], 0);
+    let said = run(folder.path(), &["main.script"], 2);
+    assert!(
+        said.contains("3 motions, 2 through joint targets; line 4: movel p[0.1,0.2,0.3,0,0,0] is Cartesian")
+            && said.contains("--joint-targets-only")
+            && !folder.path().join("out").exists(),
+        "{said}"
+    );
+    let said = run(folder.path(), &["main.script", "--joint-targets-only"], 1);
+    assert!(
+        said.contains("2 of 2 targets compensated")
+            && said.contains("2 of 3 motions move to them; 1 left as written")
+            && said.contains("left: line 4: movel p[0.1,0.2,0.3,0,0,0] is Cartesian"),
+        "{said}"
+    );
     let changed = std::fs::read_to_string(folder.path().join("out/compensated/main.script")).unwrap();
     assert!(
         changed.contains("], a=1.4, v=1.05) # there\n") && changed.contains("  movel(p[0.1,0.2,0.3,0,0,0])\nend\n")
@@ -143,12 +156,40 @@ fn programs_keep_everything_but_their_joint_targets() {
     let found: Vec<f64> = list.split(',').map(|v| v.trim().parse().unwrap()).collect();
     let off = nominal.base_from_flange(&radians(&q[0])).inverse() * real.base_from_flange(&found);
     assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD);
+    let whole = text.replace("  movel(p[0.1,0.2,0.3,0,0,0])\n", "");
+    std::fs::write(folder.path().join("whole.script"), &whole).unwrap();
+    let said = run(folder.path(), &["whole.script", "--out", "whole"], 0);
+    assert!(said.contains("all 2 motions move to them"), "{said}");
     std::fs::write(folder.path().join("none.script"), "movel(p[0.1,0.2,0.3,0,0,0])\n").unwrap();
-    let said = run(folder.path(), &["none.script", "--out", "x"], 2);
+    let said = run(folder.path(), &["none.script", "--out", "x", "--joint-targets-only"], 2);
     assert!(
-        said.contains("no joint target of 6 numbers in this URScript program") && said.contains("as CSV"),
+        said.contains("nothing in this URScript program moves to a joint target of 6 numbers") && said.contains("CSV"),
         "{said}"
     );
+    // A list of numbers by which nothing moves is nobody's target, whatever its name ends in.
+    let list = rad(&q[0]);
+    let pose = "p[0.1,0.2,0.3,0,0,0]";
+    let text = format!(
+        "Waypoint_1_p={pose}\nWaypoint_1_q=[{list}]\nmovej(get_inverse_kin(Waypoint_1_p, qnear=Waypoint_1_q))\nmovej([{list}])\n"
+    );
+    std::fs::write(folder.path().join("polyscope.script"), &text).unwrap();
+    run(folder.path(), &["polyscope.script", "--out", "x"], 2);
+    run(folder.path(), &["polyscope.script", "--out", "x", "--joint-targets-only"], 1);
+    let changed = std::fs::read_to_string(folder.path().join("x/compensated/polyscope.script")).unwrap();
+    assert!(changed.starts_with(text.rsplit_once("movej([").unwrap().0) && changed != text, "{changed}");
+    let json = std::fs::read_to_string(folder.path().join("x/compensate.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let done: Vec<&str> = json["motions"].as_array().unwrap().iter().map(|m| m["done"].as_str().unwrap()).collect();
+    assert_eq!(done, ["unchanged", "compensated"]);
+    // A file of data alone: what moves to it stands elsewhere.
+    let data = format!(
+        "MODULE d\nCONST jointtarget j:=[[{}],[9E9,9E9,9E9,9E9,9E9,9E9]];\nENDMODULE\n",
+        q[0].iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+    );
+    std::fs::write(folder.path().join("data.mod"), data).unwrap();
+    let said = run(folder.path(), &["data.mod", "--out", "data"], 2);
+    assert!(said.contains("1 joint target, but no instruction that moves to it, in this file"), "{said}");
+    run(folder.path(), &["data.mod", "--out", "data", "--joint-targets-only"], 1);
     std::fs::write(folder.path().join("job.jbi"), "///POSTYPE PULSE\n///PULSE\nC00000=1,2,3,4,5,6\n").unwrap();
     let said = run(folder.path(), &["job.jbi", "--out", "x"], 2);
     assert!(said.contains("pulses a degree") && said.contains("--pulses-per-deg"), "{said}");

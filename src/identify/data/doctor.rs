@@ -90,7 +90,12 @@ pub fn is_explained(found: &Identification) -> bool {
 
 /// What was found along the way: gross errors, sessions, drifts, covariances that are off.
 pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Finding> {
-    let names = |rows: &[usize]| rows.iter().map(|&r| set.poses[r].name.clone()).collect::<Vec<_>>();
+    [of_readings(set, found), of_sensor(found), of_rows(set, found), of_robot(set, found), along_the_rows(along)]
+        .concat()
+}
+
+/// What the readings are, and what they cannot tell.
+fn of_readings(set: &Dataset, found: &Identification) -> Vec<Finding> {
     let mut list = Vec::new();
     let mut add = |finding: String, rows: Vec<String>, action: &str| {
         list.push(Finding { finding, rows, action: action.to_owned() });
@@ -135,6 +140,15 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "the scale stays nominal; `--known-distances` gives it",
         );
     }
+    list
+}
+
+/// What all readings of a sensor share.
+fn of_sensor(found: &Identification) -> Vec<Finding> {
+    let mut list = Vec::new();
+    let mut add = |finding: String, rows: Vec<String>, action: &str| {
+        list.push(Finding { finding, rows, action: action.to_owned() });
+    };
     if let Some((zero_mm, sigma_mm)) = zero(found) {
         let (size, way) = (zero_mm.abs(), if zero_mm > 0.0 { "long" } else { "short" });
         add(
@@ -159,6 +173,16 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "it counts as one error of the placement, not as one of each point, and less is promised for it; more placements make it less",
         );
     }
+    list
+}
+
+/// Rows that are far from what the others predict.
+fn of_rows(set: &Dataset, found: &Identification) -> Vec<Finding> {
+    let names = |rows: &[usize]| rows.iter().map(|&r| set.poses[r].name.clone()).collect::<Vec<_>>();
+    let mut list = Vec::new();
+    let mut add = |finding: String, rows: Vec<String>, action: &str| {
+        list.push(Finding { finding, rows, action: action.to_owned() });
+    };
     if !found.outliers.is_empty() {
         let share = 100.0 * found.outliers.len() as f64 / (found.fitted.len() + found.outliers.len()) as f64;
         add(
@@ -190,6 +214,15 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
             "they are counted in the figures; measure them again",
         );
     }
+    list
+}
+
+/// What no built robot is, or what another one would be as well.
+fn of_robot(set: &Dataset, found: &Identification) -> Vec<Finding> {
+    let mut list = Vec::new();
+    let mut add = |finding: String, rows: Vec<String>, action: &str| {
+        list.push(Finding { finding, rows, action: action.to_owned() });
+    };
     if let Some(far) = far(found, &link_limit) {
         add(
             format!(
@@ -213,7 +246,6 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
     if let Some(scale) = CommonScale::new(set, found).filter(CommonScale::is_told) {
         add(scale.sentence(), Vec::new(), "the robot that was found has this scale; check it on a known length");
     }
-    list.extend(along_the_rows(along));
     list
 }
 

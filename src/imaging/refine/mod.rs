@@ -94,15 +94,14 @@ impl<T: Sample> Full<'_, T> {
     fn measure(&self, detected: &Detected) -> Lattice<Measured> {
         let mut window = Window::default();
         let mut seen = self.look(detected, &mut window);
-        let mut scatter = Scatter::of(&seen.measured);
-        // Where corners scatter as noise does there is nothing to look for.
-        if !scatter.is_noise() {
-            if let Some(stray) = self.stray_light(&seen.windows, &mut window) {
-                seen = self.with_stray(stray).look(detected, &mut window);
-                scatter = Scatter::of(&seen.measured);
-            }
-            scatter.carry(&mut seen.measured);
+        // Where corners are as noise makes them there is nothing to look for.
+        if scatter::miss_the_model(&seen.measured)
+            && let Some(stray) = self.stray_light(&seen.windows, &mut window)
+        {
+            seen = self.with_stray(stray).look(detected, &mut window);
         }
+        let scatter = Scatter::of(&seen.measured);
+        scatter.carry(&mut seen.measured);
         let Seen { windows, board, mut measured } = seen;
         illumination::tie(&mut measured);
         let usual_px2 = acceptance::usual_variance(measured.iter().map(|(_, _, m)| m));

@@ -58,24 +58,24 @@ pub fn explain(series: &Series, strays: &[usize]) -> Vec<Option<(Cause, String)>
 }
 
 /// What happened to a pair in which nothing was mixed up: another board, where one number explains it, or something that moved between its two
-/// pictures. `misfit_px` is by how much it misses the rig, `usual_px` what pairs usually do.
-pub fn moved_between(series: &Series, i: usize, misfit_px: Option<f64>, usual_px: f64) -> (Cause, String) {
+/// pictures. `missed_px` is by how much it misses the rig, `usual_px` what pairs usually do.
+pub fn moved_between(series: &Series, i: usize, missed_px: Option<f64>, usual_px: f64) -> (Cause, String) {
     let view = &series.views[i];
     let scene = Scene { series, views: Vec::new() };
     let [left, right] = scene.alone(view);
     let Some((left, right)) = left.zip(right) else {
         return (Cause::Unknown, "its corners form no board on one of the cameras".to_owned());
     };
-    let missed = misfit_px.map_or(String::new(), |px| {
+    let missed = missed_px.map_or(String::new(), |px| {
         format!(" (its corners miss the rig by {px:.2} px, those of others by {usual_px:.2} px)")
     });
     let apart = right.translation.vector - left.translation.vector;
     // A board whose squares are larger by a share is taken for nearer by each camera along its own rays: the two places are apart along the
     // baseline, by that share of it.
     let centre = series.shared.rig.right_from_left.inverse().translation.vector;
-    let share = -apart.dot(&centre) / centre.norm_squared();
+    let share = apart.dot(&centre) / centre.norm_squared();
     let (larger, share) = of_best_size(series.shared, view, share);
-    if misfit_px.is_some() && scene.fits(series.shared, &larger) {
+    if missed_px.is_some() && misfit_px(series.shared, &larger).is_some_and(|(px, _)| px <= series.limit_px) {
         let percent = 100.0 * share.abs();
         let which = if share > 0.0 { "larger" } else { "smaller" };
         let reason = format!(

@@ -163,7 +163,7 @@ mod tests {
                 board: &board,
                 views: vec![view],
                 rig: RigPrior::new(&World::new(1, 1).rig),
-                shape: ShapePrior { in_plane_mm: 0.01, out_of_plane_mm: 0.01, stretch_mm: 0.01 },
+                shape: ShapePrior { in_plane_mm: 0.01, out_of_plane_mm: 0.01, bent_mm: 0.01, stretch_mm: 0.01 },
                 edge_bends_mm: vec![0.0; truth.len()],
             };
             let mut values =

@@ -1,0 +1,208 @@
+//! What a program writes into its variables.
+//!
+//! In: the code without comments and strings, and the joint targets written as numbers in it. Out: by variable, the targets that it can hold.
+//! A variable that is given anything else anywhere (a computed value, one of its fields, a routine's parameter) holds what this file
+//! does not say. Variables of one name in several routines are taken together, so that doubt about one is doubt about all.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use super::instruction::Cause;
+use super::{Target, scan};
+
+/// How a language writes values into variables.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Syntax {
+    /// Between a name and its value.
+    pub assign: &'static str,
+    /// The end of a value outside of brackets.
+    pub end: char,
+    /// Whether capital and small letters are the same.
+    pub any_case: bool,
+    /// The words before a routine's name and its parameters.
+    pub routines: &'static [&'static str],
+    /// Instructions that change the variable behind them.
+    pub changes: &'static [&'static str],
+    /// Whether a value is Cartesian.
+    pub cartesian: fn(&str) -> bool,
+}
+
+/// One of the values of a variable.
+#[derive(Debug, Clone)]
+enum Value {
+    /// Joint targets as numbers, by their places in the list of targets.
+    Targets(Range<usize>),
+    /// What another variable holds.
+    Of(String),
+    /// Something that no joint target in this file shows.
+    Other(Cause),
+}
+
+/// All variables of a program.
+#[derive(Debug)]
+pub(super) struct Variables {
+    syntax: Syntax,
+    values: BTreeMap<String, Vec<Value>>,
+}
+
+impl Variables {
+    /// Collects every value that is written into a variable.
+    pub(super) fn read(code: &str, syntax: Syntax, targets: &[Target]) -> Variables {
+        let mut variables = Variables { syntax, values: BTreeMap::new() };
+        let mut brackets = 0usize;
+        let (mut seen, mut last) = (0, "");
+        for word in scan::words(code) {
+            for c in code[seen..word.start].chars() {
+                match c {
+                    '(' => brackets += 1,
+                    ')' => brackets = brackets.saturating_sub(1),
+                    _ => {}
+                }
+            }
+            seen = word.end;
+            let name = &code[word.clone()];
+            if syntax.routines.iter().any(|r| r.eq_ignore_ascii_case(last)) {
+                variables.parameters(code, word.end);
+            } else if syntax.changes.iter().any(|c| c.eq_ignore_ascii_case(last)) {
+                variables.add(name, Value::Other(Cause::Elsewhere));
+            }
+            last = name;
+            if brackets == 0 && scan::is_name(name) && !code[..word.start].ends_with(['\\', '.']) {
+                variables.assigned(code, word, targets);
+            }
+        }
+        variables
+    }
+
+    /// The targets that a variable can hold, or why they are not known.
+    pub(super) fn held(&self, name: &str) -> Result<Vec<usize>, Cause> {
+        let mut found = BTreeSet::new();
+        let mut visited = BTreeSet::new();
+        let mut open = vec![self.key(name)];
+        while let Some(name) = open.pop() {
+            if !visited.insert(name.clone()) {
+                continue;
+            }
+            for value in self.values.get(&name).ok_or(Cause::Elsewhere)? {
+                match value {
+                    Value::Targets(range) => found.extend(range.clone()),
+                    Value::Of(other) => open.push(other.clone()),
+                    Value::Other(cause) => return Err(cause.clone()),
+                }
+            }
+        }
+        if found.is_empty() { Err(Cause::Elsewhere) } else { Ok(found.into_iter().collect()) }
+    }
+
+    /// What an expression is: one joint target as numbers, or a variable, an element of one included.
+    pub(super) fn expression(&self, code: &str, at: Range<usize>, targets: &[Target]) -> Result<Vec<usize>, Cause> {
+        match self.value(code, at, targets, true) {
+            Value::Targets(range) => Ok(range.collect()),
+            Value::Of(name) => self.held(&name),
+            Value::Other(cause) => Err(cause),
+        }
+    }
+
+    fn key(&self, name: &str) -> String {
+        if self.syntax.any_case { name.to_ascii_uppercase() } else { name.to_owned() }
+    }
+
+    fn add(&mut self, name: &str, value: Value) {
+        let key = self.key(name);
+        self.values.entry(key).or_default().push(value);
+    }
+
+    /// Parameters of a routine hold what its callers say.
+    fn parameters(&mut self, code: &str, at: usize) {
+        // The type of a function's value stands before its name.
+        let name = |c: char| c.is_alphanumeric() || c == '_' || c == ' ';
+        let open = at + code[at..].len() - code[at..].trim_start_matches(name).len();
+        let Some(end) =
+            Some(open).filter(|&open| code[open..].starts_with('(')).and_then(|open| scan::closed(code, open))
+        else {
+            return;
+        };
+        for word in scan::words(&code[open..end]) {
+            self.add(&code[open + word.start..open + word.end], Value::Other(Cause::Elsewhere));
+        }
+    }
+
+    /// The value behind a word, where one is assigned to it, to an element or to a field of it.
+    fn assigned(&mut self, code: &str, word: Range<usize>, targets: &[Target]) {
+        let (mut at, mut field) = (word.end, false);
+        loop {
+            let rest = &code[at..];
+            let blank = rest.len() - rest.trim_start_matches([' ', '\t']).len();
+            match rest[blank..].chars().next() {
+                Some('[' | '{') => match scan::closed(code, at + blank) {
+                    Some(end) => at = end,
+                    None => return,
+                },
+                Some('.') => {
+                    field = true;
+                    at = scan::words(&code[at..]).next().map_or(code.len(), |w| at + w.end);
+                }
+                _ => break,
+            }
+        }
+        let Some(from) = scan::word(code, at, self.syntax.assign) else { return };
+        if code[at..from].contains('\n') || code[from..].starts_with('=') {
+            return;
+        }
+        let value = if field {
+            Value::Other(Cause::Elsewhere)
+        } else {
+            self.value(code, from..self.end(code, from), targets, false)
+        };
+        let name = &code[word];
+        self.add(name, value);
+    }
+
+    fn end(&self, code: &str, from: usize) -> usize {
+        let mut depth = 0usize;
+        for (at, c) in code[from..].char_indices() {
+            match c {
+                '(' | '[' | '{' => depth += 1,
+                ')' | ']' | '}' => depth = depth.saturating_sub(1),
+                _ if c == self.syntax.end && depth == 0 => return from + at,
+                _ => {}
+            }
+        }
+        code.len()
+    }
+
+    /// What stands at a place; of a list of targets all, where it is not to be a `single` one.
+    fn value(&self, code: &str, at: Range<usize>, targets: &[Target], single: bool) -> Value {
+        let at = scan::trimmed(code, at);
+        let text = &code[at.clone()];
+        let from = targets.partition_point(|t| t.whole.start < at.start);
+        let to = from + targets[from..].partition_point(|t| t.whole.start < at.end);
+        if from < to && only_numbers(code, at.clone(), &targets[from..to]) && !(single && to > from + 1) {
+            return Value::Targets(from..to);
+        }
+        if (self.syntax.cartesian)(text) {
+            return Value::Other(Cause::Cartesian);
+        }
+        if text.starts_with(['[', '{']) && from == to {
+            return Value::Other(Cause::Incomplete);
+        }
+        let mut words = scan::words(text);
+        let Some(first) = words.next().filter(|w| w.start == 0 && scan::is_name(&text[w.clone()])) else {
+            return Value::Other(Cause::Elsewhere);
+        };
+        let rest = text[first.end..].trim_start();
+        let element = rest.starts_with(['[', '{']) && scan::closed(rest, 0) == Some(rest.len());
+        if rest.is_empty() || element {
+            return Value::Of(self.key(&text[first]));
+        }
+        Value::Other(if rest.starts_with(['+', '-', ':']) { Cause::Offset } else { Cause::Elsewhere })
+    }
+}
+
+/// Whether nothing but these targets, brackets and commas stand at a place.
+fn only_numbers(code: &str, at: Range<usize>, targets: &[Target]) -> bool {
+    let ends = std::iter::once(at.start).chain(targets.iter().map(|t| t.whole.end));
+    let starts = targets.iter().map(|t| t.whole.start).chain([at.end]);
+    let mut between = ends.zip(starts).filter_map(|(end, start)| code.get(end..start));
+    between.all(|text| text.chars().all(|c| c.is_whitespace() || "[]{},".contains(c)))
+}
