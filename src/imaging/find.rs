@@ -88,7 +88,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
             found: found.len(),
             total,
             needed: wanted.needed,
-            board: wanted.board,
+            board: Box::new(wanted.board),
             path: pairing.place.clone(),
             skipped,
             other,

@@ -112,8 +112,8 @@ pub enum Error {
         total: usize,
         /// Pairs needed.
         needed: usize,
-        /// The board that was looked for.
-        board: Board,
+        /// The board that was looked for; boxed, for errors are returned everywhere.
+        board: Box<Board>,
         /// The folder.
         path: Utf8PathBuf,
         /// The others, and why.

@@ -64,7 +64,7 @@ fn least_squares(points: &[(f64, f64, Point2<f64>)]) -> Option<Matrix3<f64>> {
     }
     let eigen = matrix.symmetric_eigen();
     let (least, most) = (eigen.eigenvalues.min(), eigen.eigenvalues.max());
-    if !(least > 1e-9 * most) {
+    if least.is_nan() || least <= 1e-9 * most {
         return None;
     }
     let h = matrix.cholesky()?.solve(&right);

@@ -54,7 +54,7 @@ fn parts_of_a_board_calibrate_as_well_as_they_say() {
 #[test]
 fn a_picture_of_a_pair_counts_alone() {
     let world = world(12);
-    let alone = |i: usize, right: bool, _: usize, _: usize| i >= 9 || right == (i % 3 == 0) || i % 3 == 2;
+    let alone = |i: usize, right: bool, _: usize, _: usize| i >= 9 || right == i.is_multiple_of(3) || i % 3 == 2;
     let some = calibrate(&seen(&world, 3, alone), &BROWN4).unwrap();
     assert_eq!(some.views.len(), 12);
     let without =
