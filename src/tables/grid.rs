@@ -211,7 +211,11 @@ fn without_brackets(text: &str) -> Option<String> {
     let of_numbers = |c: char| c.is_ascii_digit() || " \t\r,;.+-eE".contains(c);
     let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
     let rows = lines.iter().filter(|line| line.chars().all(|c| is_bracket(c) || of_numbers(c)));
-    if !text.contains(is_bracket) || 2 * rows.count() <= lines.len() {
+    // Names with units in brackets, `J1 [deg]`, close what they open and stand once; a list is opened on one line and closed on another, or on each.
+    let closed = |line: &&&str| line.matches(['[', '{', '(']).count() == line.matches([']', '}', ')']).count();
+    let bracketed = lines.iter().filter(|line| line.contains(is_bracket)).count();
+    let is_list = 2 * bracketed > lines.len() || lines.iter().any(|line| !closed(&line));
+    if !is_list || 2 * rows.count() <= lines.len() {
         return None;
     }
     let bare = |line: &str| {

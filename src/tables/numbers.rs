@@ -57,6 +57,7 @@ fn is_decimal_comma(cell: &str) -> bool {
     let digits = before.trim_start_matches(['+', '-']);
     let behind = after.split(['e', 'E']).next().unwrap_or("");
     is_number(&cell.replacen(',', ".", 1))
+        && !behind.is_empty()
         && (behind.len() != 3 || digits.is_empty() || digits.len() > 3 || digits == "0")
 }
 
