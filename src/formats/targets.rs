@@ -30,7 +30,7 @@ pub struct Row {
 
 /// Reads targets for a robot.
 pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
-    let table = Table::read(path, "the targets", HINT)?;
+    let table = Table::read(path, "targets file", HINT)?;
     // `plan` and `measure` call it a pose.
     let name = match table.column("pose") {
         Some(pose) if table.column("name").is_none() => pose,
