@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::diagnostic::Explain;
 use crate::files;
-use crate::imaging::board::{Board, Squares};
+use crate::imaging::board::{Board, SQUARES_MM, Squares};
 
 /// The file that is read when none is named.
 pub const DEFAULT_FILE: &str = "stereocal.toml";
@@ -68,12 +68,32 @@ pub struct Config {
 
 /// A board in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(try_from = "BoardFields")]
+pub struct BoardSettings(Board);
+
+/// A board as the file says it: by its name, or by its squares and their size.
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct BoardSettings {
-    /// Number of squares.
-    pub squares: Squares,
-    /// Side of a square, mm.
-    pub square_mm: f64,
+struct BoardFields {
+    board: Option<Board>,
+    squares: Option<Squares>,
+    square_mm: Option<f64>,
+}
+
+impl TryFrom<BoardFields> for BoardSettings {
+    type Error = &'static str;
+
+    fn try_from(fields: BoardFields) -> Result<BoardSettings, &'static str> {
+        match fields {
+            BoardFields { board: Some(board), squares: None, square_mm: None } => Ok(BoardSettings(board)),
+            BoardFields { board: Some(_), .. } => Err("`board` says squares and size already: it stands alone"),
+            BoardFields { board: None, squares: None, .. } => Err("missing field `squares`, or `board`"),
+            BoardFields { board: None, square_mm: None, .. } => Err("missing field `square_mm`"),
+            BoardFields { squares: Some(squares), square_mm: Some(mm), .. } => {
+                Ok(BoardSettings(Board::checker(squares, mm)))
+            }
+        }
+    }
 }
 
 /// What is known of the target on the robot.
@@ -92,10 +112,13 @@ impl Default for MeasureSettings {
 }
 
 impl BoardSettings {
-    /// The board, with what was given on the command line instead of the file's values.
-    pub fn board(&self, squares: Option<Squares>, square_mm: Option<f64>) -> Result<Board> {
-        let board = Board { squares: squares.unwrap_or(self.squares), square_mm: square_mm.unwrap_or(self.square_mm) };
-        let mut problems = Vec::new();
+    /// The board, with what was given on the command line instead of the file's values: a board, or squares and their size.
+    pub fn board(&self, named: Option<Board>, squares: Option<Squares>, square_mm: Option<f64>) -> Result<Board> {
+        let (BoardSettings(own), mut problems) = (self, Vec::new());
+        let board = named.unwrap_or(match (squares, square_mm) {
+            (None, None) => *own,
+            _ => Board::checker(squares.unwrap_or(own.squares), square_mm.unwrap_or(own.square_mm)),
+        });
         within(&mut problems, "square_mm", board.square_mm, SQUARES_MM);
         reject(problems)?;
         Ok(board)
@@ -106,8 +129,8 @@ impl Default for Config {
     fn default() -> Config {
         Config {
             out: "out".into(),
-            check_board: BoardSettings { squares: Squares { columns: 20, rows: 20 }, square_mm: 10.0 },
-            target_board: BoardSettings { squares: Squares { columns: 7, rows: 6 }, square_mm: 10.0 },
+            check_board: BoardSettings(Board::checker(Squares { columns: 20, rows: 20 }, 10.0)),
+            target_board: BoardSettings(Board::checker(Squares { columns: 7, rows: 6 }, 10.0)),
             tolerance_mm: 0.05,
             measure: MeasureSettings::default(),
             measurements: crate::measurements::source::Known::default(),
@@ -135,17 +158,14 @@ impl Config {
     fn validate(&self) -> Result<()> {
         let mut problems = Vec::new();
         within(&mut problems, "tolerance_mm", self.tolerance_mm, TOLERANCES_MM);
-        within(&mut problems, "check_board.square_mm", self.check_board.square_mm, SQUARES_MM);
-        within(&mut problems, "target_board.square_mm", self.target_board.square_mm, SQUARES_MM);
+        within(&mut problems, "check_board.square_mm", self.check_board.0.square_mm, SQUARES_MM);
+        within(&mut problems, "target_board.square_mm", self.target_board.0.square_mm, SQUARES_MM);
         positive(&mut problems, "measure.crossing_mm", self.measure.crossing_mm);
         self.measurements.validate(&mut problems);
         self.identify.validate(&mut problems);
         reject(problems)
     }
 }
-
-/// Sides of squares, mm: from a wafer's to a car park's.
-pub const SQUARES_MM: RangeInclusive<f64> = 1e-3..=1e5;
 
 /// Tolerances and uncertainties of lengths, mm.
 pub const TOLERANCES_MM: RangeInclusive<f64> = 1e-6..=1e4;

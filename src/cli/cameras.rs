@@ -5,7 +5,7 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use super::{ExportRobot, Output, between};
 use crate::imaging::input::pairs::{PairBy, Source};
-use crate::imaging::{Mosaic, Squares};
+use crate::imaging::{Board, Mosaic, Squares};
 use crate::stereo::Lens;
 use crate::stereo::volume::Extent;
 
@@ -43,6 +43,9 @@ pub struct CameraCheck {
     /// Corners from a CSV file instead of pictures
     #[arg(long, value_name = "FILE")]
     pub corners: Option<Utf8PathBuf>,
+    /// The check board by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
+    #[arg(long, value_name = "BOARD", conflicts_with_all = ["squares", "square_mm"])]
+    pub board: Option<Board>,
     /// Squares of the check board, not inner corners; key `check_board.squares` [default: 20x20]
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,
@@ -77,6 +80,9 @@ pub struct CameraCheck {
     /// Pictures of a second board, which takes no part in the calibration: checks the scale
     #[arg(long, value_name = "DIR")]
     pub check_images: Option<Utf8PathBuf>,
+    /// The second board by its name, as for --board [default: as the first]
+    #[arg(long, value_name = "BOARD", requires = "check_images", conflicts_with_all = ["check_squares", "check_square_mm"])]
+    pub check_board: Option<Board>,
     /// Squares of the second board [default: as the first]
     #[arg(long, value_name = "CxR", requires = "check_images")]
     pub check_squares: Option<Squares>,
@@ -118,6 +124,9 @@ pub struct Measure {
     /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
+    /// The target by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
+    #[arg(long, value_name = "BOARD", conflicts_with_all = ["squares", "square_mm"])]
+    pub board: Option<Board>,
     /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,
@@ -159,7 +168,11 @@ pub struct Rectify {
     /// each other lose what is near from view
     #[arg(long)]
     pub zero_disparity: bool,
-    /// Squares of the board by which the rows are compared [default: the board that calibrated, else those of keys `check_board` and `target_board`]
+    /// The board by which the rows are compared, by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
+    /// marker in mm, dictionary) [default: the board that calibrated, else those of the keys `check_board` and `target_board`]
+    #[arg(long, value_name = "BOARD", conflicts_with_all = ["squares"])]
+    pub board: Option<Board>,
+    /// Squares of the board by which the rows are compared
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,
     /// Filters of pictures that are raw colour mosaics: RGGB, BGGR, GRBG or GBRG

@@ -72,7 +72,7 @@ pub enum Command {
     Robot(RobotCommand),
     /// Write a commented stereocal.toml, a robot.toml and a poses.csv to start from
     Init(Init),
-    /// Print a page of the guide: boards, cameras, pictures, poses, a day in the cell, a robot's way, tables, warnings
+    /// Print a page of the guide, or make one HTML file of all pages
     Guide(Guide),
     /// Print a shell's completions
     Completions(Completions),
@@ -95,7 +95,14 @@ pub struct Init {
 #[derive(Debug, Args)]
 pub struct Guide {
     /// Which page [default: the list of them]
+    #[arg(conflicts_with = "html")]
     pub topic: Option<String>,
+    /// Folder for `guide.html`: all pages in one file, with their pictures
+    #[arg(long, value_name = "DIR")]
+    pub html: Option<Utf8PathBuf>,
+    /// Replace a guide.html that stereocal did not write, or that was changed since
+    #[arg(long, requires = "html")]
+    pub force: bool,
 }
 
 /// `stereocal completions`

@@ -4,7 +4,7 @@ use camino::Utf8PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::{Output, between, count};
-use crate::imaging::Squares;
+use crate::imaging::{Board, Squares};
 
 /// `stereocal identify`
 #[derive(Debug, Args)]
@@ -123,6 +123,9 @@ pub struct Plan {
     /// Pose repeatability (ISO 9283 RP), mm
     #[arg(long, value_name = "MM", default_value_t = 0.02, value_parser = between(0.0, 100.0))]
     pub repeatability_mm: f64,
+    /// The target by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
+    #[arg(long, value_name = "BOARD", conflicts_with_all = ["squares", "square_mm"])]
+    pub board: Option<Board>,
     /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,

@@ -10,6 +10,7 @@ use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::CalibrationFile;
 use crate::formats::camera_check::CameraCheckFile;
+use crate::imaging::board::SQUARES_MM;
 use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
 use crate::imaging::input::pairs::{Pairing, Source};
@@ -63,11 +64,10 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
         "calibration.json",
         &CalibrationFile::from(calibration.rig())
             .with_check(
-                &calibration.own_noise,
+                &calibration,
                 pair_excess(&calibration),
                 judged.coverage.corner_depths_mm,
                 &judged.volume.volume,
-                &calibration.standing.unconfirmed,
             )
             .with_board(&calibration.board),
     )?;
@@ -131,13 +131,13 @@ fn open(args: &CameraCheck, config: &Config, run: Run) -> Result<OutDir> {
 fn board(args: &CameraCheck, config: &Config) -> Result<Board> {
     /// Temperature at which lengths are certified (ISO 1), deg C.
     const REFERENCE_C: f64 = 20.0;
-    let board = config.check_board.board(args.squares, args.square_mm)?;
+    let board = config.check_board.board(args.board, args.squares, args.square_mm)?;
     let (Some(celsius), Some(ppm)) = (args.board_temperature_c, args.expansion_ppm_per_k) else { return Ok(board) };
     let growth = 1.0 + 1e-6 * ppm * (celsius - REFERENCE_C);
     let mut problems = Vec::new();
     config::positive(&mut problems, "the board's thermal growth", growth);
     config::reject(problems)?;
-    Ok(Board { square_mm: board.square_mm * growth, ..board })
+    Ok(board.scaled(growth))
 }
 
 fn options(args: &CameraCheck) -> Options {
@@ -174,12 +174,12 @@ fn second_board(
     out: &OutDir,
 ) -> Result<Option<SecondBoard>> {
     let Some(images) = &args.check_images else { return Ok(None) };
-    let board = Board {
-        squares: args.check_squares.unwrap_or(board.squares),
-        square_mm: args.check_square_mm.unwrap_or(board.square_mm),
-    };
+    let board = args.check_board.unwrap_or(match (args.check_squares, args.check_square_mm) {
+        (None, None) => board,
+        (squares, mm) => Board::checker(squares.unwrap_or(board.squares), mm.unwrap_or(board.square_mm)),
+    });
     let mut problems = Vec::new();
-    config::within(&mut problems, "check_square_mm", board.square_mm, config::SQUARES_MM);
+    config::within(&mut problems, "check_square_mm", board.square_mm, SQUARES_MM);
     config::reject(problems)?;
     let (mosaic, cache) = (args.bayer, Some(Cache { out, thumbnails: false }));
     let pairing = Source::folder("camera-check", images).pairs(out)?;

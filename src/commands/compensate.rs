@@ -14,6 +14,7 @@ use crate::files::provenance::Run;
 use crate::files::{self, OutDir};
 use crate::formats::targets::{self, Row};
 use crate::programs::{self, Cause, Instruction, Joints, Language};
+use crate::progress;
 use crate::robot::{Error, Robot, file};
 
 /// Length of the lists of refused targets and of motions that stay as they are on the terminal.
@@ -72,7 +73,11 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let program = Language::of(&args.targets).map(|language| Program::read(args, language, joints)).transpose()?;
     let rows = match &program {
         Some(program) => program.rows(&nominal),
-        None => targets::read(&args.targets, &nominal)?,
+        None => {
+            let (rows, said) = targets::read(&args.targets, &nominal)?;
+            said.into_iter().for_each(progress::note);
+            rows
+        }
     };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let run = Run { force: args.output.force, ..run };

@@ -57,7 +57,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Compensate(args) => compensate::run(&args, &config, run),
         Command::Export(args) => export::run(&args, &config, run),
         Command::Init(args) => start::init::run(&args, run),
-        Command::Guide(args) => start::guide::run(&args),
+        Command::Guide(args) => start::guide::run(&args, run),
         Command::Completions(args) => Ok(start::shell::completions(&args)),
         Command::Man(args) => start::shell::man(&args, run),
         Command::Robot(args) => robot::run(&args, &config, run),

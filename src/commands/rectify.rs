@@ -167,13 +167,14 @@ fn rectified(
     Ok([one(Side::Left, &files.left)?, one(Side::Right, &files.right)?])
 }
 
-/// The boards that may be in the pictures: without `--squares` the one that calibrated first.
+/// The boards that may be in the pictures: where none is named the one that calibrated first.
 fn boards(args: &Rectify, config: &Config, calibrated: Option<Board>) -> Result<Vec<Board>> {
-    let check = config.check_board.board(args.squares, None)?;
-    let target = config.target_board.board(args.squares, None)?;
+    let check = config.check_board.board(args.board, args.squares, None)?;
+    let target = config.target_board.board(args.board, args.squares, None)?;
+    let named = args.board.is_some() || args.squares.is_some();
     let mut boards = Vec::new();
-    for board in calibrated.filter(|_| args.squares.is_none()).into_iter().chain([check, target]) {
-        if boards.iter().all(|other: &Board| other.squares != board.squares) {
+    for board in calibrated.filter(|_| !named).into_iter().chain([check, target]) {
+        if boards.iter().all(|other: &Board| other.key() != board.key()) {
             boards.push(board);
         }
     }

@@ -59,8 +59,8 @@ fn settings(args: &Simulate, config: &Config) -> Result<Settings> {
         Preset::Small => Settings::small(),
     };
     s.seed = args.seed;
-    s.check_board = config.check_board.board(None, None)?;
-    s.target_board = config.target_board.board(None, None)?;
+    s.check_board = config.check_board.board(None, None, None)?;
+    s.target_board = config.target_board.board(None, None, None)?;
     s.optics = optics(args.lens_blur, s.optics);
     replace(&mut s.size_px, args.size);
     replace(&mut s.orientation, args.orientation);

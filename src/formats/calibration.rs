@@ -1,7 +1,7 @@
 //! `calibration.json`: a rig as a file.
 
 use camino::{Utf8Path, Utf8PathBuf};
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{checked, export};
@@ -9,6 +9,7 @@ use crate::diagnostic::Place;
 use crate::files::{self, OutDir, Result};
 use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
+use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::model::rig::{Covariance, Rig};
 use crate::stereo::volume::Volume;
@@ -44,6 +45,9 @@ pub struct CalibrationFile {
     /// Whether the last pairs confirmed the rig; empty where they did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     unconfirmed: Vec<String>,
+    /// How the rig had changed at the last pair since the moment for which it and its covariance are, each change in the covariance's order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    changes_since: Vec<Vec<f64>>,
 }
 
 /// Distances of the boards' corners from the left camera along its axis.
@@ -162,23 +166,25 @@ impl From<&Rig> for CalibrationFile {
             volume: None,
             board: None,
             unconfirmed: Vec::new(),
+            changes_since: Vec::new(),
         }
     }
 }
 
 impl CalibrationFile {
-    /// The same with how corners scattered, between which depths the boards' corners were, the volume that the verdict was for, and the last
-    /// pairs where they contradict the rig.
+    /// The same with how corners scattered, between which depths the boards' corners were, the volume that the verdict was for, the last
+    /// pairs where they contradict the rig, and how it changed since the moment that it is that of.
     pub fn with_check(
         mut self,
-        noise: &Noise,
+        calibration: &Calibration,
         pair_excess: f64,
         [nearest_mm, farthest_mm]: [f64; 2],
         volume: &Volume,
-        unconfirmed: &[String],
     ) -> CalibrationFile {
+        let noise = &calibration.own_noise;
         self.volume = Some(volume.clone());
-        self.unconfirmed = unconfirmed.to_vec();
+        self.unconfirmed = calibration.standing.unconfirmed.clone();
+        self.changes_since = calibration.since_moment.iter().map(|step| step.as_slice().to_vec()).collect();
         self.corner_noise =
             Some(NoiseRecord { factor: noise.factor, added_px: noise.added_px, pair_excess: Some(pair_excess) });
         self.boards = Some(BoardsRecord { nearest_mm, farthest_mm });
@@ -187,13 +193,12 @@ impl CalibrationFile {
 
     /// The same with the board that calibrated.
     pub fn with_board(mut self, board: &Board) -> CalibrationFile {
-        self.board = Some(format!("{CHECKER}{}:{}", board.squares, board.square_mm));
+        self.board = Some(board.to_string());
         self
     }
 
     fn board(&self) -> Option<Board> {
-        let (squares, square_mm) = self.board.as_ref()?.strip_prefix(CHECKER)?.split_once(':')?;
-        Some(Board { squares: squares.parse().ok()?, square_mm: square_mm.parse().ok()? })
+        self.board.as_ref()?.parse().ok()
     }
 
     fn depths_mm(&self) -> Option<[f64; 2]> {
@@ -226,7 +231,15 @@ impl CalibrationFile {
             format!("right_from_left.translation_mm has {} numbers; three are needed", translation_mm.len())
         })?;
         let rotation = ("right_from_left.rotation", Matrix3::from_fn(|i, j| rotation[i][j]));
-        let covariance = self.covariance.as_ref().map(|c| c.covariance()).transpose()?;
+        let mut covariance = self.covariance.as_ref().map(|c| c.covariance()).transpose()?;
+        for change in &self.changes_since {
+            let Some(covariance) = covariance.as_mut().filter(|c| c.order.len() == change.len()) else {
+                return Err("changes_since has a row that is not as long as covariance.order".to_owned());
+            };
+            // What is measured later is measured after the change.
+            let step = DVector::from_column_slice(change);
+            covariance.matrix += &step * step.transpose();
+        }
         checked::rig((left, right), rotation, t, covariance)
     }
 }
@@ -240,9 +253,6 @@ impl CovarianceRecord {
         Ok(Covariance { order: self.order.clone(), matrix: DMatrix::from_fn(n, n, |i, j| self.matrix[i][j]) })
     }
 }
-
-/// How the name of a checkerboard begins.
-const CHECKER: &str = "checker:";
 
 /// The own format's name in a results folder.
 const OWN_NAME: &str = "calibration.json";

@@ -32,6 +32,8 @@ pub struct CameraCheckFile {
     within_95_mm: f64,
     /// What the verdict is for.
     volume: Volume,
+    /// The pairs at the moment for which the rig and its covariance are.
+    moment: [String; 2],
     /// What happened over the pairs, and to pairs that are not used.
     findings: Vec<Finding>,
     /// Of the length whose error may be largest: its own.
@@ -72,8 +74,8 @@ struct PairRecord {
     mean_error_y10_mm: Option<f64>,
     mean_error_x70_mm: Option<f64>,
     mean_error_y70_mm: Option<f64>,
-    max_abs_error_mm: f64,
-    gap_rms_mm: f64,
+    max_abs_error_mm: Option<f64>,
+    gap_rms_mm: Option<f64>,
 }
 
 impl CameraCheckFile {
@@ -104,6 +106,7 @@ impl CameraCheckFile {
             max_abs_error_mm: accuracy.extremes.max_abs_error_mm,
             within_95_mm: accuracy.extremes.one_in_twenty_mm,
             volume: judged.volume.volume.clone(),
+            moment: calibration.moment(),
             findings: judged.findings.iter().cloned().chain(findings::of_pairs(&calibration.discarded.pairs)).collect(),
             expanded_uncertainty_mm: worst.expanded_uncertainty_mm(),
             uncertainty_shares_mm: [

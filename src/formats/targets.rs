@@ -28,9 +28,15 @@ pub struct Row {
     pub given: Option<Vec<f64>>,
 }
 
-/// Reads targets for a robot.
-pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
-    let table = Table::read(path, "targets file", HINT)?;
+/// Reads targets for a robot; says what was taken of columns that have other names than these.
+pub fn read(path: &Utf8Path, robot: &Robot) -> Result<(Vec<Row>, Option<String>)> {
+    let table = Table::read(path, "targets file", HINT);
+    let own = |table: &Table| ["j1_deg", "j1_mm", "x_mm"].iter().any(|name| table.column(name).is_some());
+    let table = match table {
+        Ok(table) if own(&table) => table,
+        Err(e @ crate::files::Error::Missing { .. }) => return Err(e),
+        _ => return of_other_names(path, robot),
+    };
     // `plan` and `measure` call it a pose.
     let name = match table.column("pose") {
         Some(pose) if table.column("name").is_none() => pose,
@@ -66,7 +72,19 @@ pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
         };
         Ok(Row { name: row[name].to_owned(), line: *line, target, given })
     };
-    table.rows.iter().map(row).collect()
+    Ok((table.rows.iter().map(row).collect::<Result<Vec<Row>>>()?, None))
+}
+
+/// Readings in a table whose columns have other names, or none: as measurements are read.
+fn of_other_names(path: &Utf8Path, robot: &Robot) -> Result<(Vec<Row>, Option<String>)> {
+    let (poses, said) = crate::measurements::Source::of(path.to_owned()).readings(robot)?;
+    let row = |(line, name, given): (u64, String, Vec<f64>)| Row {
+        name,
+        line,
+        target: Target::Readings(radians(&given, robot)),
+        given: Some(given),
+    };
+    Ok((poses.into_iter().map(row).collect(), Some(said)))
 }
 
 fn joint_columns(table: &Table, robot: &Robot) -> Result<Vec<usize>> {

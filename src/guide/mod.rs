@@ -1,24 +1,7 @@
-//! The guide for the practitioner: how to make boards, mount cameras, take pictures and choose poses.
+//! The guide for the practitioner: how to make boards, mount cameras, take pictures and choose poses, and what the program reaches.
 //!
-//! The pages stand here as part of the documentation; `stereocal guide TOPIC` prints them without a network. The commands in their
-//! `sh` blocks are run by a test, with the files that stand in `csv NAME` blocks.
-
-#[doc = include_str!("boards.md")]
-pub mod boards {}
-#[doc = include_str!("cameras.md")]
-pub mod cameras {}
-#[doc = include_str!("pictures.md")]
-pub mod pictures {}
-#[doc = include_str!("poses.md")]
-pub mod poses {}
-#[doc = include_str!("day.md")]
-pub mod day {}
-#[doc = include_str!("robot.md")]
-pub mod robot {}
-#[doc = include_str!("tables.md")]
-pub mod tables {}
-#[doc = include_str!("warnings.md")]
-pub mod warnings {}
+//! `stereocal guide TOPIC` prints a page without a network, `stereocal guide --html DIR` makes one HTML file of all. The commands in
+//! `sh` blocks are run by a test, with the files that stand in `csv NAME` blocks; the pictures of boards are rendered and read by another.
 
 /// A page of the guide.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,8 +12,8 @@ pub struct Page {
     pub text: &'static str,
 }
 
-/// All pages, in the order in which they are needed.
-pub const PAGES: [Page; 9] = [
+/// All pages: first those that are needed in the cell, in that order, then those that are looked up.
+pub const PAGES: [Page; 13] = [
     Page { topic: "day", text: include_str!("day.md") },
     Page { topic: "boards", text: include_str!("boards.md") },
     Page { topic: "cameras", text: include_str!("cameras.md") },
@@ -39,7 +22,37 @@ pub const PAGES: [Page; 9] = [
     Page { topic: "robot", text: include_str!("robot.md") },
     Page { topic: "tables", text: include_str!("tables.md") },
     Page { topic: "warnings", text: include_str!("warnings.md") },
+    Page { topic: "accuracy", text: include_str!("accuracy.md") },
+    Page { topic: "limits", text: include_str!("limits.md") },
+    Page { topic: "peers", text: include_str!("peers.md") },
+    Page { topic: "formats", text: include_str!("formats.md") },
     Page { topic: "conventions", text: include_str!("../CONVENTIONS.md") },
+];
+
+/// A picture that stands in a page.
+#[derive(Debug, Clone, Copy)]
+pub struct Picture {
+    /// Where a page says that it is.
+    pub path: &'static str,
+    /// The file.
+    pub bytes: &'static [u8],
+}
+
+macro_rules! pictures {
+    ($($path:literal),* $(,)?) => { [$(Picture { path: $path, bytes: include_bytes!($path) }),*] };
+}
+
+/// All pictures of the pages.
+pub const PICTURES: [Picture; 9] = pictures![
+    "pictures/way.svg",
+    "pictures/good.png",
+    "pictures/glare.png",
+    "pictures/cut.png",
+    "pictures/blurred.png",
+    "pictures/dark.png",
+    "pictures/small.png",
+    "pictures/spread.png",
+    "pictures/alike.png",
 ];
 
 /// The page of a topic.
@@ -51,6 +64,22 @@ impl Page {
     /// Its title.
     pub fn title(&self) -> &'static str {
         self.text.lines().next().unwrap_or_default().trim_start_matches(['#', ' '])
+    }
+
+    /// The page as a terminal shows it: what a picture shows in words in place of the picture.
+    pub fn plain(&self) -> String {
+        let mut plain = String::with_capacity(self.text.len());
+        let mut rest = self.text;
+        while let Some((before, after)) = rest.split_once("![") {
+            let Some((words, behind)) =
+                after.split_once("](").and_then(|(words, path)| Some((words, path.split_once(')')?.1)))
+            else {
+                break;
+            };
+            plain.extend([before, "[picture: ", words, "]"]);
+            rest = behind;
+        }
+        plain + rest
     }
 }
 
@@ -66,5 +95,26 @@ mod tests {
             assert_eq!(page(found.topic), Some(found));
         }
         assert_eq!(page("nothing"), None);
+    }
+
+    #[test]
+    fn every_picture_stands_in_a_page_and_every_page_has_its_pictures() {
+        let asked: Vec<&str> = PAGES
+            .iter()
+            .flat_map(|page| page.text.split("](pictures/").skip(1))
+            .filter_map(|rest| rest.split(')').next())
+            .collect();
+        for name in &asked {
+            assert!(PICTURES.iter().any(|picture| picture.path == format!("pictures/{name}")), "{name}");
+        }
+        for picture in PICTURES {
+            assert!(asked.iter().any(|name| picture.path.ends_with(name)), "{} stands in no page", picture.path);
+        }
+    }
+
+    #[test]
+    fn a_terminal_reads_what_a_picture_shows() {
+        let page = Page { topic: "t", text: "a ![a board](pictures/x.png) b\n![c](d) ![open" };
+        assert_eq!(page.plain(), "a [picture: a board] b\n[picture: c] ![open");
     }
 }

@@ -183,7 +183,7 @@ impl Record {
 fn tool(set: &Dataset, nominal: &Robot) -> Option<([f64; 3], f64)> {
     /// Times that the chain must come nearer by a tool of its own.
     const FAR_NEARER: f64 = 3.0;
-    let of_group = |g: usize| set.rows(|p| p.group == g);
+    let of_group = |g: usize| set.rows(|p| p.group == g && p.on_body_mm.is_none());
     let rows = (0..set.groups.len()).map(of_group).max_by_key(Vec::len)?;
     let point = |&r: &usize| match set.poses[r].reading {
         Reading::Position { point_mm, .. } => Some((set.poses[r].joints_rad.clone(), point_mm)),

@@ -1,18 +1,21 @@
-//! The checkerboard as its certificate describes it.
+//! The board as its certificate describes it: a plain checkerboard, or one whose light squares hold markers that number its corners.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use super::Error;
+use super::coded::Layout;
+use super::coded::dictionary::Dictionary;
 
-/// Number of squares of a board, the larger number first.
+/// Number of squares of a board; of a plain one the larger number first, of one with markers as printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Squares {
-    /// Squares along x, the longer side.
+    /// Squares along x, the longer side of a plain board.
     pub columns: usize,
     /// Squares along y.
     pub rows: usize,
@@ -23,6 +26,14 @@ impl FromStr for Squares {
 
     /// Reads `20x20`. `6x7` and `7x6` are the same board.
     fn from_str(text: &str) -> Result<Squares, Error> {
+        let Squares { columns, rows } = Squares::as_printed(text)?;
+        Ok(Squares { columns: columns.max(rows), rows: columns.min(rows) })
+    }
+}
+
+impl Squares {
+    /// Reads `8x11` as eight columns of eleven squares.
+    pub fn as_printed(text: &str) -> Result<Squares, Error> {
         let refuse = || Error::BoardSize { found: text.to_owned() };
         let (a, b) = text.split_once(['x', 'X']).ok_or_else(refuse)?;
         let a: usize = a.trim().parse().map_err(|_| refuse())?;
@@ -31,7 +42,7 @@ impl FromStr for Squares {
         if a.min(b) < 3 || a.max(b) > 200 {
             return Err(refuse());
         }
-        Ok(Squares { columns: a.max(b), rows: a.min(b) })
+        Ok(Squares { columns: a, rows: b })
     }
 }
 
@@ -54,16 +65,80 @@ impl fmt::Display for Squares {
     }
 }
 
-/// A checkerboard: so many squares of such a size.
+/// Sides of squares, mm: from a wafer's to a car park's.
+pub const SQUARES_MM: RangeInclusive<f64> = 1e-3..=1e5;
+
+/// What tells a board's corners apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// Its outline and colours alone: it has to be seen whole, but for what the picture's border cuts off.
+    Checker,
+    /// Markers in every other square, numbered row by row: any part with a marker will do.
+    Charuco {
+        /// Side of a marker, its border included, mm.
+        marker_mm: f64,
+        /// The markers' codes.
+        dictionary: Dictionary,
+        /// Which squares hold the markers, where that is said; else it is what is seen.
+        layout: Option<Layout>,
+    },
+}
+
+/// A board of squares: so many, of such a size.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(try_from = "String")]
 pub struct Board {
     /// Number of squares.
     pub squares: Squares,
     /// Side of a square, mm.
     pub square_mm: f64,
+    /// What tells its corners apart.
+    pub kind: Kind,
 }
 
 impl Board {
+    /// A plain checkerboard.
+    pub fn checker(squares: Squares, square_mm: f64) -> Board {
+        Board { squares, square_mm, kind: Kind::Checker }
+    }
+
+    /// True for a board whose markers number its corners: any of them may be seen, in both pictures of a pair or in one.
+    pub fn is_coded(&self) -> bool {
+        self.kind != Kind::Checker
+    }
+
+    /// The board with all its lengths so many times as large.
+    pub fn scaled(self, factor: f64) -> Board {
+        let kind = match self.kind {
+            Kind::Checker => Kind::Checker,
+            Kind::Charuco { marker_mm, dictionary, layout } => {
+                Kind::Charuco { marker_mm: marker_mm * factor, dictionary, layout }
+            }
+        };
+        Board { square_mm: self.square_mm * factor, kind, ..self }
+    }
+
+    /// The board with markers in these squares.
+    pub fn with_layout(self, layout: Layout) -> Board {
+        match self.kind {
+            Kind::Checker => self,
+            Kind::Charuco { marker_mm, dictionary, .. } => {
+                Board { kind: Kind::Charuco { marker_mm, dictionary, layout: Some(layout) }, ..self }
+            }
+        }
+    }
+
+    /// Says all that pictures of the board depend on; lengths only as ratios.
+    pub fn key(&self) -> String {
+        match self.kind {
+            Kind::Checker => self.squares.to_string(),
+            Kind::Charuco { marker_mm, dictionary, layout } => {
+                let (share, name) = (marker_mm / self.square_mm, dictionary.name());
+                format!("charuco {} {share} {name}{}", self.squares, of_layout(layout))
+            }
+        }
+    }
+
     /// Number of inner corners along x.
     pub fn columns(&self) -> usize {
         self.squares.columns - 1
@@ -110,9 +185,123 @@ impl Board {
     }
 
     /// True where turning the board by 180 degrees in its plane leaves the same picture: both counts of squares odd, or both even.
-    /// (An odd number of squares one way only swaps black and white.)
+    /// (An odd number of squares one way only swaps black and white.) Markers tell it from its turned self.
     pub fn looks_the_same_after_half_turn(&self) -> bool {
-        self.squares.columns % 2 == self.squares.rows % 2
+        !self.is_coded() && self.squares.columns % 2 == self.squares.rows % 2
+    }
+
+    /// The smallest turn, in quarter turns, after which the board looks the same; `None` where only a whole turn does.
+    pub fn symmetry(&self) -> Option<usize> {
+        let square = self.squares.columns == self.squares.rows;
+        match (self.looks_the_same_after_half_turn(), square && self.squares.columns % 2 == 1) {
+            (false, _) => None,
+            (true, false) => Some(2),
+            (true, true) => Some(1),
+        }
+    }
+
+    /// Quarter turns after which the board looks the same: what a picture leaves open.
+    pub fn turns_left_open(&self) -> Vec<usize> {
+        self.symmetry().map_or(vec![0], |step| (0..4).step_by(step).collect())
+    }
+
+    /// Quarter turns after which the board's outline is the same, whatever its colours: all four of a square board, none and two of another;
+    /// none but the first where every corner has a number of its own.
+    pub fn turns_of_outline(&self) -> Vec<usize> {
+        let step = match (self.is_coded(), self.columns() == self.rows()) {
+            (true, _) => 4,
+            (false, true) => 1,
+            (false, false) => 2,
+        };
+        (0..4).step_by(step).collect()
+    }
+}
+
+impl fmt::Display for Board {
+    /// As it is named on the command line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (squares, square_mm) = (self.squares, self.square_mm);
+        match self.kind {
+            Kind::Checker => write!(f, "checker:{squares}:{square_mm}"),
+            Kind::Charuco { marker_mm, dictionary, layout } => {
+                write!(f, "charuco:{squares}:{square_mm}:{marker_mm}:{}{}", dictionary.name(), of_layout(layout))
+            }
+        }
+    }
+}
+
+/// The end of a board's name that says its layout.
+fn of_layout(layout: Option<Layout>) -> &'static str {
+    match layout {
+        None => "",
+        Some(Layout::New) => ":new",
+        Some(Layout::Old) => ":old",
+    }
+}
+
+impl FromStr for Board {
+    type Err = Error;
+
+    /// Reads `checker:20x20:10` or `charuco:11x8:15:11:DICT_5X5_100`. Squares of a board with markers are counted as printed: columns first.
+    fn from_str(text: &str) -> Result<Board, Error> {
+        let refuse = |why: String| Error::BoardName { found: text.to_owned(), why };
+        let (kind, rest) = text.split_once(':').ok_or_else(|| refuse("it has no `:`".to_owned()))?;
+        let fields: Vec<&str> = rest.split(':').map(str::trim).collect();
+        let length = |text: &str| match text.parse::<f64>() {
+            Ok(mm) if SQUARES_MM.contains(&mm) => Ok(mm),
+            _ => {
+                let (least, most) = SQUARES_MM.into_inner();
+                Err(refuse(format!("`{text}` is no length from {least} to {most} mm")))
+            }
+        };
+        match (kind.trim().to_ascii_lowercase().as_str(), fields.as_slice()) {
+            ("checker", [squares, square_mm]) => Ok(Board::checker(squares.parse()?, length(square_mm)?)),
+            ("charuco", [squares, square_mm, marker_mm, dictionary, layout @ ..]) if layout.len() <= 1 => {
+                let layout = match layout.first().map(|word| word.to_ascii_lowercase()).as_deref() {
+                    None => None,
+                    Some("new") => Some(Layout::New),
+                    Some("old" | "legacy") => Some(Layout::Old),
+                    Some(other) => return Err(refuse(format!("`{other}` is no layout; there are `old` and `new`"))),
+                };
+                let (square_mm, marker_mm) = (length(square_mm)?, length(marker_mm)?);
+                let dictionary = Dictionary::named(dictionary).map_err(&refuse)?;
+                let board = Board {
+                    squares: Squares::as_printed(squares)?,
+                    square_mm,
+                    kind: Kind::Charuco { marker_mm, dictionary, layout },
+                };
+                board.check_markers().map(|()| board).map_err(refuse)
+            }
+            ("checker", _) => Err(refuse("a checkerboard is `checker:COLSxROWS:SQUARE_MM`".to_owned())),
+            ("charuco", _) => {
+                Err(refuse("a ChArUco board is `charuco:COLSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY`".to_owned()))
+            }
+            (other, _) => Err(refuse(format!("there is no kind of board named `{other}`"))),
+        }
+    }
+}
+
+impl Board {
+    /// Why there can be no such board, where there can be none.
+    fn check_markers(&self) -> Result<(), String> {
+        let Kind::Charuco { marker_mm, dictionary, .. } = self.kind else { return Ok(()) };
+        if marker_mm >= self.square_mm {
+            return Err(format!("a marker of {marker_mm} mm does not fit into a square of {} mm", self.square_mm));
+        }
+        // The old layout of an even number of rows has markers in the other squares, and as many.
+        let markers = self.squares.columns * self.squares.rows / 2;
+        if markers > dictionary.count() {
+            let (name, count) = (dictionary.name(), dictionary.count());
+            return Err(format!("{} squares hold {markers} markers, {name} has {count}", self.squares));
+        }
+        Ok(())
+    }
+}
+
+impl TryFrom<String> for Board {
+    type Error = Error;
+    fn try_from(text: String) -> Result<Board, Error> {
+        text.parse()
     }
 }
 
@@ -134,8 +323,43 @@ mod tests {
     }
 
     #[test]
+    fn boards_read_back_as_they_are_named() {
+        for text in
+            ["checker:20x20:10", "charuco:4x5:54:40.5:DICT_4X4_1000", "charuco:11x8:15:11:DICT_ARUCO_ORIGINAL:old"]
+        {
+            let board: Board = text.parse().unwrap();
+            assert_eq!(board.to_string(), text);
+        }
+        let short: Board = "CharUco:4x5:54:40.5:4x4_50".parse().unwrap();
+        assert_eq!(short.to_string(), "charuco:4x5:54:40.5:DICT_4X4_50");
+    }
+
+    #[test]
+    fn boards_that_cannot_be_are_refused_with_the_reason() {
+        for (text, why) in [
+            ("20x20", "no `:`"),
+            ("checker:20x20", "checker:COLSxROWS:SQUARE_MM"),
+            ("dots:20x20:10", "no kind of board"),
+            ("charuco:4x5:54:60:DICT_4X4_50", "does not fit"),
+            ("charuco:4x5:54:40:DICT_4X4_51", "DICT_4X4_50"),
+            ("charuco:20x20:54:40:DICT_4X4_50", "200 markers"),
+            ("charuco:4x5:0:40:DICT_4X4_50", "no length"),
+        ] {
+            let error = text.parse::<Board>().unwrap_err().to_string();
+            assert!(error.contains(why), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn only_boards_that_look_the_same_are_ambiguous() {
+        let of = |squares: &str| Board::checker(squares.parse().unwrap(), 10.0).symmetry();
+        assert_eq!(["10x7", "7x5", "8x6", "20x20", "7x7"].map(of), [None, Some(2), Some(2), Some(2), Some(1)]);
+        assert_eq!("charuco:7x7:20:14:DICT_4X4_50".parse::<Board>().unwrap().turns_left_open(), [0]);
+    }
+
+    #[test]
     fn corners_are_centred() {
-        let board = Board { squares: "7x6".parse().unwrap(), square_mm: 10.0 };
+        let board = Board::checker("7x6".parse().unwrap(), 10.0);
         assert_eq!(board.corner_count(), 30);
         let sum: nalgebra::Vector3<f64> = (0..board.rows())
             .flat_map(|row| (0..board.columns()).map(move |col| (col, row)))

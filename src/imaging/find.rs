@@ -9,9 +9,10 @@ use camino::Utf8Path;
 use nalgebra::Matrix2;
 use rayon::prelude::*;
 
+use super::coded::{self, Layout, Print};
 use super::detect::{self, Detected, Refusal, continuation};
 use super::image::{self, Claim, Header, Mosaic, Picture};
-use super::input::cache::{Cache, Look};
+use super::input::cache::{Cache, Look, Sighting};
 use super::input::pairs::{PairFiles, Pairing};
 use super::lattice::{Lattice, Places};
 use super::pyramid::Small;
@@ -57,9 +58,30 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
             [left, right]
         })
         .collect();
+    let again = |side: Look, path: &Utf8Path, header: &Announced, sizes: [(u32, u32); 2], board: Board| match side {
+        Err(refusal) if refusal.reason == coded::BY_LAYOUT => {
+            look(path, header, &Wanted { board, ..*wanted }, sizes, &bar)
+        }
+        known => known,
+    };
+    let seen = match common_layout(&seen) {
+        None => seen,
+        Some(layout) => {
+            let board = wanted.board.with_layout(layout);
+            let all = seen.into_par_iter().zip(&pairing.pairs).zip(&headers);
+            all.map(|(([one, other], files), [left, right])| {
+                [
+                    again(one, &files.left, left, sizes, board),
+                    again(other, &files.right, right, [sizes[1], sizes[0]], board),
+                ]
+            })
+            .collect()
+        }
+    };
     bar.finish_and_clear();
     let other = other_size(&seen);
-    let (found, skipped) = sort_out(&pairing.pairs, seen);
+    notes.extend(printed(&wanted.board, &seen));
+    let (found, skipped) = sort_out(&pairing.pairs, seen, wanted.board);
     let total = pairing.pairs.len();
     if found.len() < wanted.needed {
         return Err(Error::TooFewPairs {
@@ -113,7 +135,7 @@ fn look(
 pub fn find_pair(files: &PairFiles, wanted: &Wanted<'_>) -> Result<PairCorners, String> {
     let alone = |path: &Utf8Path| read_and_look(path, &image::header(path)?, wanted);
     let looks = rayon::join(|| alone(&files.left), || alone(&files.right));
-    let (found, skipped) = sort_out(std::slice::from_ref(files), vec![[looks.0, looks.1]]);
+    let (found, skipped) = sort_out(std::slice::from_ref(files), vec![[looks.0, looks.1]], wanted.board);
     let reason = || skipped.into_iter().next().map_or_else(|| "no board".to_owned(), |s| s.reason);
     number_alike(found, wanted.board).into_iter().next().ok_or_else(reason)
 }
@@ -172,8 +194,8 @@ fn thumbnail_of(picture: &Picture, detected: Option<&Detected>) -> Small {
 }
 
 /// The board's corners in a picture; the reason where there are none.
-pub fn corners_in(picture: &Picture, board: Board) -> Look {
-    corners_of(picture, &detect::detect(picture, board)?, board)
+pub fn corners_in(picture: &Picture, board: Board) -> Result<Lattice<Corner>, Refusal> {
+    Ok(corners_of(picture, &detect::detect(picture, board)?, board)?.corners)
 }
 
 /// The corners of a board that was found.
@@ -186,7 +208,8 @@ fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
         )
         .into());
     }
-    let (columns, rows) = continuation::lines_beyond(detected);
+    // Markers say which corners are the board's.
+    let (columns, rows) = if board.is_coded() { (0, 0) } else { continuation::lines_beyond(detected) };
     if columns + rows > 0 {
         let squares = board.squares;
         return Err(Refusal {
@@ -204,7 +227,28 @@ fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
             *covariance_px2 += Matrix2::identity() * (shift_px / 2.0).powi(2);
         }
     }
-    Ok(corners)
+    Ok(Sighting { corners, print: detected.print })
+}
+
+/// Which squares hold the markers in all pictures that tell it; `None` where they contradict each other, or none tells.
+fn common_layout(seen: &[[Look; 2]]) -> Option<Layout> {
+    let mut layouts = seen.iter().flatten().filter_map(|look| Some(look.as_ref().ok()?.print?.layout));
+    let first = layouts.next()?;
+    layouts.all(|layout| layout == first).then_some(first)
+}
+
+/// How most pictures show the board's markers, for a person.
+fn printed(board: &Board, seen: &[[Look; 2]]) -> Option<String> {
+    let prints: Vec<Print> = seen.iter().flatten().filter_map(|look| look.as_ref().ok()?.print).collect();
+    let most = |is: &dyn Fn(&Print) -> bool| 2 * prints.iter().filter(|print| is(print)).count() > prints.len();
+    let layout = match Layout::of(board).len() {
+        2 if most(&|print| print.layout == Layout::Old) => Some("OpenCV's layout before 4.6"),
+        2 => Some("OpenCV's layout since 4.6"),
+        _ => None,
+    };
+    let inverted = most(&|print| print.inverted).then_some("printed white on black");
+    let said: Vec<&str> = layout.into_iter().chain(inverted).collect();
+    (!prints.is_empty() && !said.is_empty()).then(|| format!("the board's markers: {}", said.join(", ")))
 }
 
 fn draw(pairs: &[PairCorners], files: &[PairFiles], mosaic: Option<Mosaic>, out: &OutDir) -> Result<()> {
@@ -243,13 +287,23 @@ fn other_size(seen: &[[Look; 2]]) -> Option<Squares> {
     (2 * count > refused.len()).then_some(Squares { columns, rows })
 }
 
-fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>) -> (Vec<Found>, Vec<Skipped>) {
+/// What was found in both pictures of a pair, or of a board with markers in one of them.
+fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>, board: Board) -> (Vec<Found>, Vec<Skipped>) {
+    let nothing = || Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
     let (mut found, mut skipped) = (Vec::new(), Vec::new());
     for (files, sides) in files.iter().zip(seen) {
         let pair = files.pair.clone();
         let reason = match sides.map(|look| look.map_err(|refusal| refusal.reason)) {
             [Ok(left), Ok(right)] => {
-                found.push((pair, left, right));
+                found.push((pair, left.corners, right.corners));
+                continue;
+            }
+            [Ok(left), Err(_)] if board.is_coded() => {
+                found.push((pair, left.corners, nothing()));
+                continue;
+            }
+            [Err(_), Ok(right)] if board.is_coded() => {
+                found.push((pair, nothing(), right.corners));
                 continue;
             }
             [Err(left), Err(right)] if left == right => format!("both pictures: {left}"),

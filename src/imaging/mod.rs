@@ -1,6 +1,7 @@
 //! From a folder of pictures to the corners of the board in each, in an order both cameras agree on.
 
 pub mod board;
+pub mod coded;
 pub mod corners;
 pub mod detect;
 pub mod find;
@@ -37,6 +38,14 @@ pub enum Error {
     BoardSize {
         /// What was typed.
         found: String,
+    },
+    /// A board's name was not understood.
+    #[error("`{found}` names no board: {why}")]
+    BoardName {
+        /// What was typed.
+        found: String,
+        /// What is wrong with it.
+        why: String,
     },
     /// The folder is not there.
     #[error("folder not found")]
@@ -95,7 +104,7 @@ pub enum Error {
         skipped: Vec<Skipped>,
     },
     /// The board was not found often enough.
-    #[error("only {found} of {total} pairs show the whole {} board; {needed} are needed{}", .board.squares, reasons(.skipped))]
+    #[error("only {found} of {total} pairs show {}; {needed} are needed{}", shown(.board), reasons(.skipped))]
     TooFewPairs {
         /// Pairs with the board in both pictures.
         found: usize,
@@ -118,6 +127,15 @@ pub enum Error {
 const SAVED_AS: &str = "save the pictures as the camera gives them: PNG, TIFF, BMP, JPEG or PGM of 8 or 16 bits a pixel, up to 300 million \
                         px and 1 GiB when decoded";
 
+/// What pictures have to show of a board.
+fn shown(board: &Board) -> String {
+    if board.is_coded() {
+        format!("a part of the {} board with a marker", board.squares)
+    } else {
+        format!("the whole {} board", board.squares)
+    }
+}
+
 /// The first few pairs that were skipped, a line each.
 fn reasons(skipped: &[Skipped]) -> String {
     /// More would push the message itself off the screen.
@@ -133,7 +151,7 @@ impl Explain for Error {
     fn place(&self) -> Option<String> {
         match self {
             Error::Files(e) => e.place(),
-            Error::BoardSize { .. } | Error::SameName { .. } => None,
+            Error::BoardSize { .. } | Error::BoardName { .. } | Error::SameName { .. } => None,
             Error::NoFolder { path }
             | Error::NotAFolder { path }
             | Error::NotRight { path, .. }
@@ -148,6 +166,10 @@ impl Explain for Error {
         match self {
             Error::Files(e) => e.hint(),
             Error::BoardSize { .. } => Some("`--squares 20x20` is a board with 19x19 inner corners".to_owned()),
+            Error::BoardName { .. } => Some(
+                "`--board checker:20x20:10`, or `--board charuco:11x8:15:11:DICT_5X5_100` (columns, rows, square and marker in mm as printed)"
+                    .to_owned(),
+            ),
             Error::NoFolder { .. } | Error::NotAFolder { .. } => Some(
                 "a folder of pairs holds left/ and right/ with equal names, or left*/right*, *_left/*_right, *_L/*_R names"
                     .to_owned(),
@@ -168,6 +190,9 @@ impl Explain for Error {
                 let (columns, rows) = (squares.columns - 1, squares.rows - 1);
                 Some(format!("`--squares {squares}`: the pictures show a board with {columns}x{rows} inner corners"))
             }
+            Error::TooFewPairs { board, .. } if board.is_coded() => Some(format!(
+                "`--board {board}` must be the board as printed: columns x rows, square and marker in mm, dictionary"
+            )),
             Error::TooFewPairs { board, .. } => {
                 let (columns, rows) = (board.columns(), board.rows());
                 Some(format!(

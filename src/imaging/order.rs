@@ -13,19 +13,9 @@ use nalgebra::Vector2;
 use super::Board;
 use super::lattice::Places;
 
-/// The smallest turn, in quarter turns, after which the board looks the same; `None` where only a whole turn does.
-pub fn ambiguity(board: Board) -> Option<usize> {
-    let square = board.squares.columns == board.squares.rows;
-    match (board.looks_the_same_after_half_turn(), square && board.squares.columns % 2 == 1) {
-        (false, _) => None,
-        (true, false) => Some(2),
-        (true, true) => Some(1),
-    }
-}
-
 /// For each pair the quarter turns that its left and its right grid need.
 pub fn agreed_turns(pairs: &[(Places, Places)], board: Board) -> Vec<(usize, usize)> {
-    let Some(step) = ambiguity(board) else { return vec![(0, 0); pairs.len()] };
+    let Some(step) = board.symmetry() else { return vec![(0, 0); pairs.len()] };
     let period = step as f64 * FRAC_PI_2;
     let angles: Vec<(f64, f64)> = pairs.iter().map(|(l, r)| (direction(l), direction(r))).collect();
     let left_reference = common_angle(angles.iter().map(|a| a.0), period);
@@ -80,7 +70,7 @@ mod tests {
     use super::*;
 
     fn board(squares: &str) -> Board {
-        Board { squares: squares.parse().unwrap(), square_mm: 10.0 }
+        Board::checker(squares.parse().unwrap(), 10.0)
     }
 
     fn grid(board: Board, angle: f64) -> Places {
@@ -89,12 +79,6 @@ mod tests {
             let p = board.corner_mm(col, row);
             Some(Point2::new(cos * p.x - sin * p.y, sin * p.x + cos * p.y))
         })
-    }
-
-    #[test]
-    fn only_boards_that_look_the_same_are_ambiguous() {
-        let turns = ["10x7", "7x5", "8x6", "20x20", "7x7"].map(|s| ambiguity(board(s)));
-        assert_eq!(turns, [None, Some(2), Some(2), Some(2), Some(1)]);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::judge::{Basis, Way};
 use super::layout::is_kept;
 use super::part::{At, Kind, Part};
-use super::pick::listed;
+use super::pick::{Picked, listed};
 use super::{Measurement, from_table};
 use crate::csv_table::Table;
 use crate::files::Result;
@@ -14,7 +14,8 @@ use crate::tables::Fields;
 use crate::tables::grid::Form;
 use crate::tables::names::{Name, What};
 
-/// Readings within this share of what the rows are apart are of one point.
+/// Readings within this share of what the rows are apart are of one point: an instrument repeats to hundredths of a millimetre, rows are a hundred
+/// and more apart, and what was commanded differs from what was measured by tenths at the least.
 const ONE_POINT: f64 = 1e-3;
 
 /// Makes files with a multiple of the others' rows, so many readings a pose, as long as these: one row a pose, the readings side by side.
@@ -78,6 +79,17 @@ fn coordinates(part: &Part) -> Option<[usize; 3]> {
         (Some(x), Some(y), Some(z)) => Some([x, y, z]),
         _ => part.free().first_chunk::<3>().copied(),
     }
+}
+
+/// Whether what looks like several targets is one that was read several times.
+pub(super) fn are_readings(parts: &[Part], picked: &Picked) -> bool {
+    let [(_, first), (_, second), ..] = &picked.points[..] else { return false };
+    let rows = parts[first[0].part].rows.len().min(parts[second[0].part].rows.len());
+    let point = |row: usize, at: &[At; 3]| super::layout::point(parts, row, at);
+    let apart = |a: Option<nalgebra::Point3<f64>>, b: Option<nalgebra::Point3<f64>>| Some((a? - b?).norm());
+    let mean = |v: Vec<f64>| v.iter().sum::<f64>() / v.len().max(1) as f64;
+    let within = mean((0..rows).filter_map(|row| apart(point(row, first), point(row, second))).collect());
+    within < ONE_POINT * mean((1..rows).filter_map(|row| apart(point(row - 1, first), point(row, first))).collect())
 }
 
 /// What was taken of a set of files.
@@ -180,17 +192,8 @@ impl Taken<'_> {
         vec![pose, group, given("role").unwrap_or_else(|| "sample".to_owned())]
     }
 
-    /// Whether what looks like several targets is one that was read several times.
     fn targets_as_readings(&self) -> bool {
-        let points = &self.way.picked.points;
-        let rows = self.parts[self.way.picked.joints[0].part].rows.len();
-        let point = |row: usize, k: usize| super::layout::point(self.parts, row, &points[k].1);
-        let apart = |a: Option<nalgebra::Point3<f64>>, b: Option<nalgebra::Point3<f64>>| Some((a? - b?).norm());
-        let mean = |v: Vec<f64>| v.iter().sum::<f64>() / v.len().max(1) as f64;
-        points.len() > 1 && {
-            let within = mean((0..rows).filter_map(|row| apart(point(row, 0), point(row, 1))).collect());
-            within < ONE_POINT * mean((1..rows).filter_map(|row| apart(point(row - 1, 0), point(row, 0))).collect())
-        }
+        are_readings(self.parts, &self.way.picked)
     }
 
     /// What was taken, in one line.

@@ -1,8 +1,8 @@
 //! Columns and units held against the nominal robot: the right ones leave what a built robot is off by, wrong ones what the points are apart.
 //!
 //! In: ways to read a table. Out: the one that is taken, and how sure it is. The tool and the sensor's place are solved for each (see
-//! [`Robot::fit_tool`]); what is left is judged as a share of the spread of the predicted or the measured points, whichever is less. A way is taken where it is near and every other
-//! one leaves several times as much.
+//! [`Robot::fit_tool`]); what is left is judged as a share of the spread of the predicted or the measured points, whichever is less. A way is taken
+//! where it is near, no choice of other columns is, and other units leave several times as much.
 //! What goes wrong: poses that hardly vary, and a robot file with other conventions, decide nothing; the sizes of the numbers do then, where
 //! they can.
 
@@ -11,19 +11,30 @@ use std::f64::consts::TAU;
 use nalgebra::Point3;
 
 use super::layout::point;
-use super::part::Part;
+use super::part::{At, Part};
 use super::pick::Picked;
 use crate::robot::Robot;
 use crate::tables::names::Unit;
 
-/// What is left as a share of the points' spread at the most where columns and units are right and the robot's file is of this robot.
+/// What is left as a share of the points' spread at the most where columns and units are right and the robot's file is of this robot: a robot of a
+/// metre's reach that is off by five hundredths of it is none that was built. Points that have nothing to do with the joints leave a share whose
+/// square is distributed as Beta(f / 2, 9 / 2), f = 3 n - 9 numbers of n rows being left beside placement and tool: less than this with a
+/// probability of 4e-7 for five rows, and with 1e-3 for four, which is too much where a thousand choices of columns are tried.
 const NEAR: f64 = 0.05;
 
-/// How many times more another way must leave.
+/// Rows from which on chance does not come near.
+const FEWEST: usize = 5;
+
+/// How many times more another unit must leave: the ratio of two mean squares of f = 6 numbers, those of five rows, exceeds the square of it by
+/// chance in one of five hundred.
 const CLEAR: f64 = 4.0;
 
-/// How many times more a unit that a name states must leave than another for the name to be wrong: an order of magnitude.
+/// How many times more a unit that a name states must leave than another for the name to be wrong: the square of it is exceeded by chance in one
+/// of a hundred thousand for five rows, and a name is worth more than a guess.
 const WRONG: f64 = 10.0;
+
+/// A nominal robot that predicts points to this, mm, has computed them: no instrument reads points of a moving arm to a micrometre.
+const COMPUTED_MM: f64 = 1e-3;
 
 /// Points beyond this are in no metres.
 const METRES: f64 = 10.0;
@@ -42,6 +53,15 @@ pub(super) struct Way {
     pub lengths: Unit,
     /// Share of the points' spread that is left; `None` where nothing can be said.
     pub left: Option<f64>,
+    /// The same in mm.
+    left_mm: f64,
+}
+
+impl Way {
+    /// Whether the points are the nominal robot's own.
+    pub fn is_computed(&self) -> bool {
+        self.left.is_some() && self.left_mm < COMPUTED_MM
+    }
 }
 
 /// How a way was found.
@@ -78,6 +98,8 @@ pub(super) struct Forced {
 
 /// Judges all ways.
 pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Forced) -> Verdict {
+    let unknown = |at: &At| parts[at.part].spare().contains(&at.column);
+    let guessed = |p: &Picked| p.joints.iter().any(unknown) || p.points.iter().flat_map(|(_, at)| at).any(unknown);
     let mut ways: Vec<Way> = Vec::new();
     for picked in candidates {
         for joints in [Unit::Deg, Unit::Rad].into_iter().filter(|u| forced.joints.is_none_or(|f| f == *u)) {
@@ -87,8 +109,9 @@ pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, force
                 let wanted = stated
                     .map_or(lengths != Unit::Um, |s| s == lengths || forced.lengths.is_none() && lengths != Unit::Um);
                 if wanted {
-                    let left = left(parts, picked, robot, joints, lengths);
-                    ways.push(Way { picked: picked.clone(), joints, lengths, left });
+                    let (left, left_mm) = left(parts, picked, robot, joints, lengths).unzip();
+                    let left_mm = left_mm.unwrap_or(f64::INFINITY);
+                    ways.push(Way { picked: picked.clone(), joints, lengths, left, left_mm });
                 }
             }
         }
@@ -96,19 +119,20 @@ pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, force
     ways.sort_by(|a, b| a.left.unwrap_or(f64::INFINITY).total_cmp(&b.left.unwrap_or(f64::INFINITY)));
     let Some(best) = ways.first().cloned() else { return Verdict::None };
     let near = |way: &Way| way.left.is_some_and(|left| left < NEAR);
-    let rival = |way: &&Way, times: f64| {
-        let differs = way.picked != best.picked || way.joints != best.joints || way.lengths != best.lengths;
-        differs && way.left.is_some_and(|left| left < times * best.left.unwrap_or(f64::INFINITY))
+    // Of the same columns in other units.
+    let rival = |way: &&Way| {
+        let differs = way.picked == best.picked && (way.joints != best.joints || way.lengths != best.lengths);
+        differs && way.left.is_some_and(|left| left < CLEAR * best.left.unwrap_or(f64::INFINITY))
     };
     let is_stated = |way: &Way| {
         way.picked.joint_unit.or(forced.joints).is_none_or(|u| u == way.joints)
             && way.picked.length_unit.or(forced.lengths).is_none_or(|u| u == way.lengths)
     };
-    let only = candidates.len() == 1;
+    // Columns whose names are not known are taken on the robot's word alone.
+    let only = candidates.len() == 1 && !guessed(&candidates[0]);
     let says_all = |p: &Picked| p.joint_unit.or(forced.joints).is_some() && p.length_unit.or(forced.lengths).is_some();
     if only && says_all(&candidates[0]) {
-        let stated = ways.iter().find(|way| is_stated(way)).cloned();
-        let Some(stated) = stated else { return Verdict::None };
+        let Some(stated) = nearest_stated(&ways, &best, &is_stated) else { return Verdict::None };
         let wrong =
             near(&best) && !is_stated(&best) && stated.left.is_some_and(|s| best.left.is_some_and(|b| s > WRONG * b));
         return match wrong {
@@ -117,24 +141,32 @@ pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, force
         };
     }
     if near(&best) {
-        let others: Vec<&Way> = ways.iter().filter(|way| rival(way, CLEAR)).collect();
-        if others.is_empty() {
+        // Points that were commanded or computed are nearer to the nominal robot than those that were measured: two that are near are asked about.
+        let others: Vec<&Way> = ways.iter().filter(|way| way.picked != best.picked && near(way)).collect();
+        if let Some(other) = others.first() {
+            let (first, second) = apart(&best, &others).unwrap_or((best.clone(), (*other).clone()));
+            return Verdict::Open(first, second);
+        }
+        if !ways.iter().any(|way| rival(&way)) {
             if is_stated(&best) {
                 return Verdict::Taken(best, Basis::Robot);
             }
-            if let Some(stated) = ways.iter().find(|way| is_stated(way) && way.picked == best.picked) {
-                return Verdict::WrongUnit { stated: stated.clone(), better: best };
+            if let Some(stated) = nearest_stated(&ways, &best, &is_stated) {
+                return Verdict::WrongUnit { stated, better: best };
             }
-        }
-        if let Some(other) = others.iter().find(|way| way.picked != best.picked && near(way)) {
-            let (first, second) = apart(&best, &others).unwrap_or((best.clone(), (*other).clone()));
-            return Verdict::Open(first, second);
         }
     }
     if !only {
         return Verdict::None;
     }
     by_sizes(parts, &candidates[0], forced)
+}
+
+/// The way in the units that are stated, of the best one's columns: that which differs from it in one unit, where there is one.
+fn nearest_stated(ways: &[Way], best: &Way, is_stated: &dyn Fn(&Way) -> bool) -> Option<Way> {
+    let differences = |way: &Way| usize::from(way.joints != best.joints) + usize::from(way.lengths != best.lengths);
+    let of_columns = ways.iter().filter(|way| way.picked == best.picked && is_stated(way));
+    of_columns.min_by_key(|way| differences(way)).cloned()
 }
 
 /// Two of the ways that have no column in common, the first ones: y and z of one point with x of the next are a point as well, turned.
@@ -150,34 +182,39 @@ fn apart(best: &Way, others: &[&Way]) -> Option<(Way, Way)> {
     Some((first.clone(), (*second).clone()))
 }
 
+/// Degrees, where a joint is beyond a turn in radians.
+pub(super) fn angle_by_size(parts: &[Part], picked: &Picked) -> Option<Unit> {
+    (largest(parts, &mut picked.joints.iter().copied()) > TAU).then_some(Unit::Deg)
+}
+
+/// The largest number of these columns.
+fn largest(parts: &[Part], columns: &mut dyn Iterator<Item = At>) -> f64 {
+    let mut most = 0.0f64;
+    for at in columns {
+        for row in 0..parts[at.part].rows.len() {
+            most = most.max(parts[at.part].optional(row, at.column).ok().flatten().unwrap_or(0.0).abs());
+        }
+    }
+    most
+}
+
 /// Units by the sizes of the numbers, where they leave no choice.
 fn by_sizes(parts: &[Part], picked: &Picked, forced: Forced) -> Verdict {
-    let largest = |columns: &mut dyn Iterator<Item = super::part::At>| {
-        let mut most = 0.0f64;
-        for at in columns {
-            for row in 0..parts[at.part].rows.len() {
-                most = most.max(parts[at.part].optional(row, at.column).ok().flatten().unwrap_or(0.0).abs());
-            }
-        }
-        most
-    };
-    let joints = forced
-        .joints
-        .or(picked.joint_unit)
-        .or_else(|| (largest(&mut picked.joints.iter().copied()) > TAU).then_some(Unit::Deg));
+    let joints = forced.joints.or(picked.joint_unit).or_else(|| angle_by_size(parts, picked));
     let mut measured = picked.points.iter().flat_map(|(_, at)| *at).chain(picked.distance);
     let lengths =
-        forced.lengths.or(picked.length_unit).or_else(|| (largest(&mut measured) > METRES).then_some(Unit::Mm));
+        forced.lengths.or(picked.length_unit).or_else(|| (largest(parts, &mut measured) > METRES).then_some(Unit::Mm));
     match (joints, lengths) {
         (Some(joints), Some(lengths)) => {
-            Verdict::Taken(Way { picked: picked.clone(), joints, lengths, left: None }, Basis::Sizes)
+            let way = Way { picked: picked.clone(), joints, lengths, left: None, left_mm: f64::INFINITY };
+            Verdict::Taken(way, Basis::Sizes)
         }
         (joints, _) => Verdict::NoUnit { joints: joints.is_none() },
     }
 }
 
-/// What the nominal robot leaves of these columns in these units, as a share of the spread of the points.
-fn left(parts: &[Part], picked: &Picked, robot: &Robot, joints: Unit, lengths: Unit) -> Option<f64> {
+/// What the nominal robot leaves of these columns in these units, as a share of the spread of the points and in mm.
+fn left(parts: &[Part], picked: &Picked, robot: &Robot, joints: Unit, lengths: Unit) -> Option<(f64, f64)> {
     let (_, at) = picked.points.first()?;
     let rows = parts[picked.joints[0].part].rows.len();
     let (mut readings, mut points) = (Vec::new(), Vec::<Point3<f64>>::new());
@@ -196,11 +233,11 @@ fn left(parts: &[Part], picked: &Picked, robot: &Robot, joints: Unit, lengths: U
             points.push(point.map(|v| lengths.converted(v)));
         }
     }
-    let fit = robot.fit_tool(&readings, &points)?;
+    let fit = robot.fit_tool(&readings, &points).filter(|_| readings.len() >= FEWEST)?;
     let predicted: Vec<Point3<f64>> = readings.iter().map(|q| robot.target_mm(q)).collect();
     let mean = predicted.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / predicted.len() as f64;
     let spread = predicted.iter().map(|p| (p.coords - mean).norm_squared()).sum::<f64>() / predicted.len() as f64;
     // Tiny motions under a tool that all but cancels them would come near to points that are small by a wrong unit.
     let least = spread.sqrt().min(fit.spread_mm);
-    (least > 0.0).then(|| fit.left_mm / least)
+    (least > 0.0).then(|| (fit.left_mm / least, fit.left_mm))
 }

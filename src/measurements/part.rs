@@ -64,8 +64,7 @@ impl Part {
         };
         let width = headed.rows.first().map_or(0, |(_, row)| row.len());
         let kinds = (0..width).map(|column| kind(&headed.rows, column)).collect();
-        let mut meanings: Option<Vec<Name>> =
-            headed.names.as_ref().map(|names| names.iter().map(|name| Name::of(name)).collect());
+        let mut meanings: Option<Vec<Name>> = headed.names.as_ref().map(|names| understood(names));
         if let Form::Program { degrees, .. } = grid.form {
             meanings = Some((0..width).map(|column| of_program(column, joints, degrees)).collect());
         }
@@ -98,6 +97,28 @@ impl Part {
             return Vec::new();
         }
         (0..self.width()).filter(|&c| self.kinds[c] == Kind::Numbers).collect()
+    }
+
+    /// Columns of numbers whose names are of no word that is known.
+    pub fn spare(&self) -> Vec<usize> {
+        let unknown = |name: &Name| name.what == What::Other && name.measured.is_none();
+        match &self.meanings {
+            Some(meanings) if self.is_named() && !self.is_program() => {
+                (0..self.width()).filter(|&c| self.kinds[c] == Kind::Numbers && unknown(&meanings[c])).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// What is wrong with a column of numbers that has a word in it.
+    pub fn mixed(&self) -> Option<Error> {
+        let number = |row: &(u64, Fields), column: usize| row.1[column].parse::<f64>().is_ok();
+        self.kinds.iter().enumerate().find_map(|(column, kind)| match kind {
+            Kind::Mixed(row) if 2 * self.rows.iter().filter(|r| number(r, column)).count() > self.rows.len() => {
+                self.optional(*row, column).err()
+            }
+            _ => None,
+        })
     }
 
     /// A column as a message calls it.
@@ -149,6 +170,24 @@ impl Part {
     pub fn refuse(&self, message: String, hint: Option<&str>) -> Error {
         self.grid.refuse(self.rows.first().map_or(1, |(line, _)| *line), message, hint)
     }
+}
+
+/// Letters by which Yaskawa's controllers call the joints of six axes, and of seven.
+const LETTERED: [&str; 2] = ["slurbt", "slerubt"];
+
+/// Names as what they mean, those of a controller that calls its joints by letters included.
+fn understood(names: &[String]) -> Vec<Name> {
+    let mut meanings: Vec<Name> = names.iter().map(|name| Name::of(name)).collect();
+    let words: Vec<String> = names.iter().map(|name| crate::tables::names::words(name).0.concat()).collect();
+    for letters in LETTERED {
+        let is_it = |window: &[String]| window.iter().zip(letters.chars()).all(|(word, c)| *word == c.to_string());
+        if let Some(first) = words.windows(letters.len()).position(is_it) {
+            for (joint, name) in meanings[first..first + letters.len()].iter_mut().enumerate() {
+                *name = Name { what: What::Joint(joint + 1), key: vec![letters.to_owned()], ..name.clone() };
+            }
+        }
+    }
+    meanings
 }
 
 /// Numbers of a program's line beyond the robot's joints are those of axes that it does not have.

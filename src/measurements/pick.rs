@@ -89,6 +89,14 @@ pub(super) fn by_names(parts: &[Part], count: usize) -> Result<Picked> {
     }
 }
 
+/// The joints alone, of a table that measured nothing.
+pub(super) fn joints_alone(parts: &[Part], count: usize) -> Result<Picked> {
+    let joints = joints(parts, count)?;
+    let unit = |at: &At| parts[at.part].meanings.as_ref().and_then(|m| m[at.column].unit);
+    let joint_unit = joints.iter().find_map(unit).filter(|unit| unit.is_angle());
+    Ok(Picked { joints, joint_unit, ..Picked::default() })
+}
+
 /// Whether a file names as many joints as the robot has; a quaternion `Q0..Q3` is none.
 pub(super) fn names_joints(part: &Part, count: usize) -> bool {
     let number = |n: &Name| if let What::Joint(i) = n.what { Some(i) } else { None };
@@ -115,7 +123,8 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
         // Where the robot was sent and where it says that it is: the identified robot corrects commands.
         let (first, second) = (&complete[0].0, &complete[1].0);
         let message = format!("two sets of joints would do: {} and {}", listed(parts, first), listed(parts, second));
-        let hint = format!("`--columns {}` takes the first", columns_flag(parts, first, &[], None));
+        let flag = |joints: &[At]| columns_flag(parts, joints, &points_for_flag(parts), None);
+        let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(first), flag(second));
         return Err(parts[first[0].part].refuse(message, Some(&hint)));
     }
     match (complete.pop(), largest) {
@@ -131,6 +140,11 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
         }
         _ => Ok(Vec::new()),
     }
+}
+
+/// The measured point, for a message about joints; nothing where it is not clear.
+fn points_for_flag(parts: &[Part]) -> Vec<At> {
+    points(parts).ok().and_then(|sets| sets.first().map(|(_, at, _)| at.to_vec())).unwrap_or_default()
 }
 
 /// The measured points: the name of each target, its columns, and whether they call themselves measured.

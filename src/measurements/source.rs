@@ -11,7 +11,7 @@ use serde::Deserialize;
 use super::assemble::{self, Taken};
 use super::judge::{self, Basis, Forced, Verdict, Way};
 use super::layout;
-use super::part::Part;
+use super::part::{At, Part};
 use super::pick::{self, Picked, columns_flag, listed};
 use super::{Measurement, read};
 use crate::files::Result;
@@ -97,18 +97,72 @@ impl Source {
             let taken = Taken { parts: &set, way: &way, basis, slides: &slides, number: several.then_some(number + 1) };
             rows.extend(taken.rows()?);
             said.push(taken.sentence());
+            if way.is_computed() {
+                said.push(
+                    "the nominal robot predicts these points to a micrometre: they were computed from the joints, not measured"
+                        .to_owned(),
+                );
+            }
         }
         Ok((rows, said))
+    }
+
+    /// The readings of the first file alone, whatever else stands beside them: line, name and readings in deg (mm); and what was taken.
+    pub fn readings(&self, robot: &Robot) -> Result<(Vec<(u64, String, Vec<f64>)>, String)> {
+        let count = robot.joints.len();
+        let parts: Vec<Part> = self.files.iter().take(1).map(|file| Part::read(file, count)).collect::<Result<_>>()?;
+        let mut picked = pick::joints_alone(&parts, count)?;
+        let free: Vec<At> = parts[0].free().into_iter().map(|column| At { part: 0, column }).collect();
+        if picked.joints.is_empty() && free.len() == count {
+            picked.joints = free;
+        }
+        if picked.joints.is_empty() {
+            let hint = "columns `name,j1_deg,j2_deg,...`, or as many columns of numbers as the robot has joints";
+            let found = format!("{} of {} columns are numbers", parts[0].free().len(), parts[0].width());
+            return Err(parts[0].refuse(format!("no columns of {count} joints: {found}"), Some(hint)));
+        }
+        let unit = self.forced().joints.or(picked.joint_unit).or_else(|| judge::angle_by_size(&parts, &picked));
+        let Some(unit) = unit else {
+            let message =
+                "whether the joints are degrees or radians is said by no name, and the numbers could be either";
+            return Err(parts[0]
+                .refuse(message.to_owned(), Some("name the columns j1_deg, j2_deg, ... or q1 [rad], q2 [rad], ...")));
+        };
+        let name = parts[0].meanings.iter().flatten().position(|n| matches!(n.what, What::Own("pose")));
+        let name = name.or_else(|| parts[0].names.iter().flatten().position(|n| n.eq_ignore_ascii_case("name")));
+        let row = |row: usize| {
+            let (line, cells) = &parts[0].rows[row];
+            let reading = |(at, joint): (&At, &crate::robot::Joint)| {
+                let value = parts[0].number(row, at.column)?;
+                Ok(if joint.slides { value } else { unit.converted(value) })
+            };
+            let readings = picked.joints.iter().zip(&robot.joints).map(reading).collect::<Result<Vec<f64>>>()?;
+            Ok((*line, name.map_or_else(|| (row + 1).to_string(), |column| cells[column].to_owned()), readings))
+        };
+        let said = format!(
+            "{}: {} targets; joints from {} in {}",
+            parts[0].file_name(),
+            parts[0].rows.len(),
+            listed(&parts, &picked.joints),
+            unit.word()
+        );
+        Ok(((0..parts[0].rows.len()).map(row).collect::<Result<Vec<_>>>()?, said))
     }
 
     /// The columns and units of a set of files.
     fn way(&self, parts: &[Part], robot: &Robot) -> Result<(Way, Basis)> {
         let count = robot.joints.len();
         let picked = pick::by_names(parts, count)?;
+        if let [(_, first), .., (_, second)] = &picked.points[..]
+            && !assemble::are_readings(parts, &picked)
+            && !layout::keeps_distance(parts, first, second)
+        {
+            return Err(pick::asked(parts, first, second));
+        }
         let complete = picked.joints.len() == count && picked.is_measured();
         let candidates = if complete { vec![picked.clone()] } else { layout::candidates(parts, &picked, count) };
         if candidates.is_empty() {
-            return Err(lacking(parts, &picked, count));
+            return Err(parts.iter().find_map(Part::mixed).unwrap_or_else(|| lacking(parts, &picked, count)));
         }
         match judge::decide(parts, &candidates, robot, self.forced()) {
             Verdict::Taken(way, basis) => Ok((way, basis)),
@@ -124,7 +178,7 @@ impl Source {
                 );
                 Err(parts[0].refuse(message, Some(hint)))
             }
-            Verdict::None => Err(unplaced(parts, &candidates[0])),
+            Verdict::None => Err(parts.iter().find_map(Part::mixed).unwrap_or_else(|| unplaced(parts, &candidates[0]))),
         }
     }
 }
@@ -191,8 +245,10 @@ fn sets(parts: Vec<Part>, count: usize) -> Vec<Vec<Part>> {
     let lone = |p: &Part| joints(p) != measured(p);
     // A file without names may be either; beside one that lacks the other half it is what that one lacks.
     let lacking = parts.iter().any(|p| p.is_named() && lone(p));
+    // Names that are not known may be those of joints.
+    let alone = parts.iter().all(|p| p.is_named() && measured(p));
     let whole = |p: &Part| match p.is_named() {
-        true => joints(p) && measured(p),
+        true => measured(p) && (joints(p) || alone && p.spare().len() >= count),
         false => !lacking && p.free().len() >= count + 3,
     };
     let mut list: Vec<Vec<Part>> = Vec::new();
@@ -244,7 +300,13 @@ fn unplaced(parts: &[Part], first: &Picked) -> crate::files::Error {
         "`--columns {}` if these are the columns; look at `--robot`, too: its file must be of this robot",
         columns_flag(parts, &first.joints, &first.points.first().map_or(Vec::new(), |(_, at)| at.to_vec()), None)
     );
-    let message = "no name says which columns are the joints and which the point, and no choice of them comes near to the nominal robot".to_owned();
+    let what = match parts.iter().any(|p| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance))) {
+        true => "the joints",
+        false if parts.iter().any(|p| p.names_any(|w| matches!(w, What::Joint(_)))) => "the point",
+        false => "the joints and which the point",
+    };
+    let message =
+        format!("no name says which columns are {what}, and no choice of them comes near to the nominal robot");
     parts[0].refuse(message, Some(&hint))
 }
 

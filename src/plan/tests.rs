@@ -19,7 +19,7 @@ fn robot() -> Robot {
 }
 
 fn scene() -> Scene {
-    let board = crate::config::Config::default().target_board.board(None, None).unwrap();
+    let board = crate::config::Config::default().target_board.board(None, None, None).unwrap();
     Scene::new(true_rig(5120), board, 0.03, 35f64.to_radians(), 120.0, 8.0).unwrap()
 }
 

@@ -1,6 +1,7 @@
 //! What people look at: tables for the terminal, figures and HTML pages. Computes no metric of its own.
 
 pub mod blur;
+pub mod book;
 pub mod camera_check;
 pub mod day;
 pub mod drawing;

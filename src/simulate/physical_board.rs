@@ -9,6 +9,7 @@ use nalgebra::{Point2, Point3};
 use super::draws::{Draws, Purpose};
 use super::picture::scene::Patch;
 use crate::imaging::Board;
+use crate::imaging::coded::faces::Face;
 
 /// How a board deviates from its drawing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -139,6 +140,16 @@ impl PhysicalBoard {
         [at(0, 0, -1.0, -1.0), at(1, 0, 1.0, -1.0), at(1, 1, 1.0, 1.0), at(0, 1, -1.0, 1.0)]
     }
 
+    /// The four corners of a face in one of the squares, in order round it, mm: it moves with the square's crossings. The ink's spread is not
+    /// that of markers, whose faces tell no place.
+    pub fn face_mm(&self, face: &Face) -> [Point2<f64>; 4] {
+        let (i, j) = face.square;
+        let [a, b, c, d] = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(di, dj)| self.crossing_mm(i + di, j + dj).coords);
+        let at = |u: f64, v: f64| Point2::from((a * (1.0 - u) + b * u) * (1.0 - v) + (d * (1.0 - u) + c * u) * v);
+        let Face { from, to, .. } = face;
+        [(from[0], from[1]), (to[0], from[1]), (to[0], to[1]), (from[0], to[1])].map(|(u, v)| at(u, v))
+    }
+
     /// Where two black squares that meet at an inner crossing overlap because of the ink's spread, mm.
     pub fn overlap_mm(&self, i: usize, j: usize) -> [Point2<f64>; 4] {
         let s = self.workmanship.ink_spread_um * 1e-3;
@@ -152,7 +163,7 @@ mod tests {
     use super::*;
 
     fn made(workmanship: Workmanship) -> PhysicalBoard {
-        PhysicalBoard::new(Board { squares: "20x20".parse().unwrap(), square_mm: 10.0 }, workmanship, 3, 0)
+        PhysicalBoard::new(Board::checker("20x20".parse().unwrap(), 10.0), workmanship, 3, 0)
     }
 
     const PERFECT: Workmanship =

@@ -3,11 +3,14 @@
 //! In: the corners of all pairs. Out: the rig with its covariance, the pairs that were used with their residuals, the pairs that were
 //! not and why. Goes wrong: too few pairs, pairs that contradict each other, views too similar to tell the cameras.
 
+use nalgebra::DVector;
+
 use crate::imaging::{Board, Corners, Side, Skipped};
 use crate::stereo::board_pose::print_share::PrintShare;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
 use crate::stereo::data::view::View;
+use crate::stereo::init::board_pose;
 use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::pairs::candidates::Candidates;
@@ -62,6 +65,8 @@ pub struct Calibration {
     pub discarded: Discarded,
     /// Which pairs the rig is that of.
     pub standing: Standing,
+    /// How the rig has changed since the moment that it is that of, each change as a step of the shared numbers.
+    pub since_moment: Vec<DVector<f64>>,
     /// How the lenses that were tried predict held-out pairs; empty where the lens was forced.
     pub lens_scores: Vec<LensScore>,
 }
@@ -70,6 +75,29 @@ impl Calibration {
     /// The rig with its covariance.
     pub fn rig(&self) -> &Rig {
         &self.values.shared.rig
+    }
+
+    /// The covariance for what the rig measures from the last pair on: the one at its moment, and how it has changed since.
+    pub fn covariance_now(&self) -> Option<Covariance> {
+        let mut covariance = self.rig().covariance.clone()?;
+        self.since_moment.iter().for_each(|step| covariance.matrix += step * step.transpose());
+        Some(covariance)
+    }
+
+    /// The pairs at the moment that the rig is that of: the middle of those that were used.
+    pub fn moment(&self) -> [String; 2] {
+        let count = self.views.len();
+        [(count - 1) / 2, count / 2].map(|i| self.views[i].pair.clone())
+    }
+
+    /// Moves the rig by a step of the shared numbers, and the boards with it.
+    pub fn move_rig(&mut self, step: &DVector<f64>) {
+        self.values.shared = self.layout.step(&self.values.shared, step.as_slice());
+        for (pose, view) in self.values.poses.iter_mut().zip(&self.views) {
+            if let Some(fit) = board_pose::follow(&self.values.shared, view, *pose) {
+                *pose = fit.left_from_board;
+            }
+        }
     }
 
     /// The pairs with the values reached, to solve again in part or with another model.
@@ -144,6 +172,7 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
         skipped,
         discarded: Discarded::new(&views, discarded),
         standing: Standing::default(),
+        since_moment: Vec::new(),
         lens_scores,
         views,
         values,

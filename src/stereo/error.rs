@@ -20,6 +20,14 @@ pub enum Error {
         /// The others.
         skipped: Vec<Skipped>,
     },
+    /// No board was seen by both cameras at once.
+    #[error(
+        "the cameras have nothing in common: none of {pairs} pairs shows the same corner of the board in both pictures"
+    )]
+    NothingInCommon {
+        /// Pairs with a board in one picture at least.
+        pairs: usize,
+    },
     /// Too few corners for so many unknowns.
     #[error("{corners} corners give {} numbers for {unknowns} unknowns", 2 * .corners)]
     TooFewCorners {
@@ -190,6 +198,9 @@ impl Explain for Error {
             match self {
                 Error::TooFewPairs { .. } => {
                     "photograph more pairs; `--squares CxR` must be the board's squares, not its inner corners"
+                }
+                Error::NothingInCommon { .. } => {
+                    "photograph the board where both cameras see it at once, and check that equal names belong together"
                 }
                 Error::TooFewCorners { .. } => "photograph more pairs, or `--lens radial2` for fewer unknowns",
                 Error::NoCamera { .. } => "`--squares CxR` must be the board's squares, not its inner corners",

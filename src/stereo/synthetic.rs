@@ -41,7 +41,7 @@ impl World {
         right.distortion[..4].copy_from_slice(&[-0.08, 0.05, -2e-4, 5e-4]);
         let right_from_left = transform(Vector3::new(0.01, 0.35, -0.005), Vector3::new(-190.0, 2.0, 30.0));
         let rig = Rig { left, right, right_from_left, covariance: None };
-        let board = Board { squares: Squares { columns: 12, rows: 9 }, square_mm: 15.0 };
+        let board = Board::checker(Squares { columns: 12, rows: 9 }, 15.0);
         let mut draws = Draws::new(seed, Purpose::CheckPoses, 0);
         let mut between = |low: f64, high: f64| draws.uniform(low, high);
         let poses = (0..pairs)
@@ -75,7 +75,7 @@ impl World {
             right_from_left: transform(Vector3::new(0.002, 0.41, 0.005), Vector3::new(-213.0, -2.5, 45.0)),
             covariance: None,
         };
-        world.board = Board { squares: Squares { columns: 20, rows: 20 }, square_mm: 10.0 };
+        world.board = Board::checker(Squares { columns: 20, rows: 20 }, 10.0);
         world.sigma_px = 0.005;
         let mut draws = Draws::new(seed, Purpose::CheckPoses, 1);
         let mut between = |low: f64, high: f64| draws.uniform(low, high);

@@ -1,11 +1,13 @@
-//! A file as rows of cells: which delimiter it has, and whether its numbers have a decimal comma.
+//! A file as rows of cells: which delimiter it has.
 //!
 //! The delimiter is the one with which most of the first rows have equally many cells, and of those that do equally well the one that makes
-//! most cells numbers; comma, semicolon, tab and blanks in this order. Where it is no comma, numbers may have a decimal comma.
+//! most cells numbers; comma, semicolon, tab, bar and blanks in this order. Numbers are written as [`super::numbers`] reads them. Rows of a
+//! program's list, each in brackets, are rows without them.
 //! Time and memory grow with the file's length alone.
 
 use camino::{Utf8Path, Utf8PathBuf};
 
+use super::numbers::Style;
 use super::program_lines;
 use super::source::{self, Source};
 use crate::diagnostic::Place;
@@ -116,6 +118,7 @@ impl Grid {
                 if let Some((rows, form)) = joints.and_then(|joints| program_lines::read(path, &text, joints)) {
                     return Ok(Grid { rows, ..empty(form, encoding) });
                 }
+                let text = without_brackets(&text).unwrap_or(text);
                 let delimiter = delimiter(&text);
                 let mut grid = empty(Form::Delimited(delimiter), encoding);
                 grid.fill(&text, delimiter, usize::MAX)?;
@@ -135,9 +138,9 @@ impl Grid {
             let start = text.as_ptr() as usize;
             for row in text.split(['\n', '\r']).filter(|row| !row.trim().is_empty()).take(most) {
                 let line = lines.of((row.as_ptr() as usize - start) as u64);
-                let cells: Vec<String> = row.split_whitespace().map(|cell| tidy(cell, true)).collect();
-                self.push(line, cells.iter().map(String::as_str))?;
+                self.push(line, row.split_whitespace().map(unguarded))?;
             }
+            self.tidy(true);
             return Ok(());
         }
         let mut reader = csv::ReaderBuilder::new()
@@ -150,14 +153,19 @@ impl Grid {
         let mut lines = Lines { text: text.as_bytes(), at: 0, line: 1 };
         while self.rows.len() < most && reader.read_record(&mut record).map_err(|e| self.unreadable(&e))? {
             let line = lines.of(record.position().map_or(0, csv::Position::byte));
-            let cells: Vec<String> = record.iter().map(|cell| tidy(cell, delimiter != ',')).collect();
-            self.push(line, cells.iter().map(String::as_str))?;
+            // A bar at both ends of a row is its frame.
+            let framed = delimiter == '|' && record.len() > 2 && record.get(0) == Some("");
+            let cells = record.iter().skip(usize::from(framed)).map(unguarded);
+            self.push(line, cells)?;
         }
+        self.tidy(delimiter != ',');
         Ok(())
     }
 
     fn push<'a>(&mut self, line: u64, cells: impl Iterator<Item = &'a str> + Clone) -> Result<()> {
-        if cells.clone().all(|cell| cell.trim().is_empty()) {
+        // A rule drawn under the names is no row.
+        let drawn = if self.rows.len() == 1 { ['-', '=', ':'].as_slice() } else { &[] };
+        if cells.clone().all(|cell| cell.trim().trim_matches(drawn).is_empty()) {
             return Ok(());
         }
         if self.rows.len() > MOST_ROWS {
@@ -170,6 +178,17 @@ impl Grid {
         }
         self.rows.push((line, fields));
         Ok(())
+    }
+
+    /// Writes all numbers as a program reads them; `free` says that a comma may stand inside of a number without quotes around it.
+    fn tidy(&mut self, free: bool) {
+        let style = Style::of(self.rows.iter().flat_map(|(_, row)| row.iter()), free);
+        for (_, row) in &mut self.rows {
+            let cells: Vec<Option<String>> = row.iter().map(|cell| style.number(cell)).collect();
+            if cells.iter().any(Option::is_some) {
+                *row = Fields::new(cells.iter().zip(row.iter()).map(|(new, old)| new.as_deref().unwrap_or(old)));
+            }
+        }
     }
 
     fn unreadable(&self, e: &csv::Error) -> Error {
@@ -185,21 +204,21 @@ impl Grid {
     }
 }
 
-/// A cell without the apostrophe before a formula, a number with a decimal point.
-fn tidy(cell: &str, comma_is_decimal: bool) -> String {
-    let cell = unguarded(cell);
-    // A minus sign as typesetters have it.
-    let number = cell.replace('\u{2212}', "-");
-    if number.parse::<f64>().is_ok() {
-        return number;
+/// A list of rows as programs write it, `[[1, 2], [3, 4]]`, `data = [1 2; 3 4]` on a line each: without the brackets. `None` where most lines are
+/// none of its rows.
+fn without_brackets(text: &str) -> Option<String> {
+    let is_bracket = |c: char| matches!(c, '[' | ']' | '{' | '}' | '(' | ')');
+    let of_numbers = |c: char| c.is_ascii_digit() || " \t\r,;.+-eE".contains(c);
+    let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
+    let rows = lines.iter().filter(|line| line.chars().all(|c| is_bracket(c) || of_numbers(c)));
+    if !text.contains(is_bracket) || 2 * rows.count() <= lines.len() {
+        return None;
     }
-    if comma_is_decimal && number.matches(',').count() == 1 && !number.contains('.') {
-        let pointed = number.replace(',', ".");
-        if pointed.parse::<f64>().is_ok() {
-            return pointed;
-        }
-    }
-    cell.to_owned()
+    let bare = |line: &str| {
+        let bare: String = line.chars().map(|c| if is_bracket(c) { ' ' } else { c }).collect();
+        bare.trim().trim_end_matches([',', ';']).trim_end().to_owned()
+    };
+    Some(text.lines().map(|line| bare(line) + "\n").collect())
 }
 
 /// Whether a spreadsheet would compute this cell (OWASP, "CSV Injection"). A number, of either sign, is no formula.
@@ -235,7 +254,7 @@ fn delimiter(text: &str) -> char {
         let numbers = of_mode.flat_map(|(_, row)| row.iter()).filter(|cell| cell.parse::<f64>().is_ok()).count();
         (mode.1, numbers)
     };
-    let scores = [',', ';', '\t', ' '].map(|d| (d, score(d)));
+    let scores = [',', ';', '\t', '|', ' '].map(|d| (d, score(d)));
     let most = scores.iter().map(|(_, (rows, _))| *rows).max().unwrap_or(0);
     // A line or two may be a title, or have a cell too many.
     let enough = |rows: usize| most > 0 && rows + 2 + most / 10 >= most && rows > 0;

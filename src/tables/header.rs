@@ -31,8 +31,10 @@ pub fn split(grid: &Grid) -> Result<Headed> {
     let mut names = None;
     if first == 0 && counts(&grid.rows[0].1) && grid.rows.len() > 1 {
         first = 1;
-    } else if first > 0 {
-        names = Some(above(grid, first));
+    } else {
+        // Names may be numbers, too: the joints' 1 to 6 beside x, y and z.
+        first += usize::from(names_below(grid, first));
+        names = (first > 0).then(|| above(grid, first));
     }
     let rows = even(grid, first, names.as_ref().map_or(0, |(_, names)| names.len()))?;
     let width = rows.first().map_or(0, |(_, row)| row.len());
@@ -45,6 +47,23 @@ fn is_data(row: &Fields) -> bool {
     let filled = row.iter().filter(|cell| !cell.trim().is_empty()).count();
     let numbers = row.iter().filter(|cell| cell.parse::<f64>().is_ok()).count();
     numbers > 0 && 2 * numbers >= filled
+}
+
+/// Whether a row counts some of its columns, and has words for others that have numbers in all rows below it.
+fn names_below(grid: &Grid, row: usize) -> bool {
+    let (cells, below) = (&grid.rows[row].1, &grid.rows[row + 1..]);
+    let counted: Vec<usize> = cells.iter().filter_map(|cell| cell.parse().ok()).collect();
+    let counts = counted.first().is_some_and(|&first| first < 2 && counted.iter().zip(first..).all(|(n, i)| *n == i));
+    let is_word = |cell: &str| !cell.is_empty() && cell.parse::<f64>().is_err();
+    let numbers = |column: usize| below.iter().all(|(_, r)| column < r.len() && r[column].parse::<f64>().is_ok());
+    counts && below.len() > 1 && (0..cells.len()).any(|column| is_word(&cells[column]) && numbers(column))
+}
+
+/// Whether a row is a comment. What a spreadsheet writes for a value that it does not have is none.
+fn is_comment(row: &Fields) -> bool {
+    const ERRORS: [&str; 7] = ["#N/A", "#REF!", "#DIV/0!", "#VALUE!", "#NAME?", "#NUM!", "#NULL!"];
+    ["#", "%", "//"].iter().any(|mark| row[0].starts_with(mark))
+        && !ERRORS.iter().any(|error| row[0].starts_with(error))
 }
 
 /// Whether a row counts its columns.
@@ -75,20 +94,21 @@ fn above(grid: &Grid, first: usize) -> (u64, Vec<String>) {
 fn even(grid: &Grid, first: usize, names: usize) -> Result<Vec<(u64, Fields)>> {
     let filled =
         |row: &Fields| row.len() - row.iter().collect::<Vec<_>>().iter().rev().take_while(|c| c.is_empty()).count();
-    let mut lengths: Vec<usize> = grid.rows[first..].iter().map(|(_, row)| row.len()).collect();
+    let rows: Vec<&(u64, Fields)> = grid.rows[first..].iter().filter(|(_, row)| !is_comment(row)).collect();
+    let mut lengths: Vec<usize> = rows.iter().map(|(_, row)| row.len()).collect();
     lengths.sort_unstable();
     let usual = lengths.chunk_by(|a, b| a == b).max_by_key(|chunk| chunk.len()).map_or(0, |chunk| chunk[0]);
-    let widest = grid.rows[first..].iter().map(|(_, row)| filled(row)).max().unwrap_or(0);
+    let widest = rows.iter().map(|(_, row)| filled(row)).max().unwrap_or(0);
     let width = if widest <= usual { usual.min(widest.max(names)) } else { usual };
-    let mut rows = Vec::with_capacity(grid.rows.len() - first);
-    for (line, row) in &grid.rows[first..] {
+    let mut even = Vec::with_capacity(rows.len());
+    for (line, row) in rows {
         if row.len() < width.min(usual) || filled(row) > width {
             let message = format!("{} cells, but most rows have {usual}", row.len());
             return Err(grid.refuse(*line, message, Some("each row has a cell for each column; an empty one counts")));
         }
-        rows.push((*line, if row.len() == width { row.clone() } else { Fields::new(row.iter().take(width)) }));
+        even.push((*line, if row.len() == width { row.clone() } else { Fields::new(row.iter().take(width)) }));
     }
-    Ok(rows)
+    Ok(even)
 }
 
 /// Names, one a column: without a comment's mark, with units put back to the names that blanks cut off, with one for numbers of rows.
@@ -157,6 +177,8 @@ mod tests {
         assert_eq!(names("# a [mm] b\n1.5 2\n3.5 4\n").unwrap(), ["a [mm]", "b"]);
         assert_eq!(names("a b\nr1 1.5 2\nr2 3.5 4\n").unwrap(), ["", "a", "b"]);
         assert_eq!(names(rows), None);
+        assert_eq!(names(&format!("1,2,x\n{rows}")).unwrap(), ["1", "2", "x"]);
+        assert_eq!(read(&format!("a,b,c\n{rows}# pause; then on\n1,2,3\n% end\n")).unwrap().rows.len(), 4);
         assert_eq!(names("0,1,2,3\n1.5,2,3,4\n"), None);
         assert_eq!(read("0,1,2,3\n1.5,2,3,4\n").unwrap().rows.len(), 1);
     }

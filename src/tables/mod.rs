@@ -3,6 +3,7 @@
 //! ```text
 //!  source   a file's bytes -> text in whatever encoding, or the cells of a spreadsheet; what is no table is refused with how to export it
 //!  grid     text -> rows of cells: which delimiter, decimal comma, lines of a program; line numbers as an editor counts them
+//!  numbers  a cell with a decimal comma, or with thousands set apart, as a number
 //!  header   where the names of the columns stand, if there are any
 //!  names    a name -> a joint, a coordinate, a distance, its unit, and whether it was commanded
 //! ```
@@ -10,6 +11,7 @@
 pub mod grid;
 pub mod header;
 pub mod names;
+mod numbers;
 mod program_lines;
 mod source;
 

@@ -95,7 +95,7 @@ pub struct Name {
     pub unit: Option<Unit>,
     /// What else the name says, to tell one set of columns from another.
     pub key: Vec<String>,
-    /// Whether the name says that it was measured (`Some(true)`), or that it was commanded or computed.
+    /// Whether the name says that it was measured (`Some(true)`), or that it was commanded, computed or is something else.
     pub measured: Option<bool>,
 }
 
@@ -138,9 +138,10 @@ impl Name {
             unit = unit.or(Some(found));
             words.pop();
         }
-        let other = Name { what: What::Other, unit, key: Vec::new(), measured: None };
+        let commanded = words.iter().any(|word| is_in(COMMANDED, word)).then_some(false);
+        let other = Name { what: What::Other, unit, key: Vec::new(), measured: commanded };
         if words.iter().any(|word| is_in(ELSE, word)) {
-            return other;
+            return Name { measured: Some(false), ..other };
         }
         let Some((what, mut rest)) =
             joint(&words).or_else(|| coordinate(&words)).or_else(|| matrix(&words)).or_else(|| distance(&words))

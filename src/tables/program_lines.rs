@@ -9,6 +9,9 @@ use camino::Utf8Path;
 use super::grid::{Fields, Form};
 use crate::programs::{self, Joints, Language};
 
+/// Lines in which words tell a program from a table.
+const SEEN: usize = 60;
+
 /// The targets with their lines, and the form. `None` where the text is no program.
 pub(super) fn read(path: &Utf8Path, text: &str, joints: usize) -> Option<(Vec<(u64, Fields)>, Form)> {
     let lines = text.lines().filter(|line| !line.trim().is_empty()).count();
@@ -29,7 +32,11 @@ pub(super) fn read(path: &Utf8Path, text: &str, joints: usize) -> Option<(Vec<(u
     }
     let rows: Vec<(u64, Fields)> =
         text.lines().zip(1..).filter_map(|(line, number)| Some((number, list(line, joints)?))).collect();
-    (2 * rows.len() > lines).then(|| {
+    // Lines of nothing but numbers in brackets, with more of them than joints and a point behind them, are a table's.
+    let is_word = |line: &str| line.chars().any(|c| c.is_alphabetic() && !matches!(c, 'e' | 'E'));
+    let table = !text.lines().take(lines.min(SEEN)).any(is_word)
+        && rows.iter().all(|(_, row)| row.len() >= joints + 3 || row.len() < joints);
+    (2 * rows.len() > lines && !table).then(|| {
         let others = lines - rows.len();
         (rows, Form::Program { others, degrees: false })
     })

@@ -93,6 +93,13 @@ fn foreign(bytes: &[u8], path: &Utf8Path) -> Option<(&'static str, &'static str)
             "in Python: `numpy.savetxt('table.csv', numpy.load('FILE.npy'), delimiter=',')`",
         ));
     }
+    let start = bytes.iter().find(|b| !b.is_ascii_whitespace());
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) || start == Some(&b'{') {
+        return Some((
+            "a JSON file",
+            "in Python: `pandas.json_normalize(json.load(open('FILE.json'))).to_csv('table.csv')`, lists first made columns",
+        ));
+    }
     bytes.starts_with(&[0x1f, 0x8b]).then_some(("a compressed file", "unpack it first: `gunzip FILE`"))
 }
 
@@ -132,7 +139,11 @@ fn cells(bytes: Vec<u8>, path: &Utf8Path, sheet: Option<&str>) -> Result<Source>
     let mut book: Sheets<_> = open_workbook_auto_from_rs(Cursor::new(bytes)).map_err(unreadable)?;
     let names = book.sheet_names();
     let name = match sheet {
-        None => names.first().cloned(),
+        // A cover page is no table: the first sheet that is one.
+        None => {
+            let mut tables = names.iter().filter(|name| book.worksheet_range(name).is_ok_and(|range| is_table(&range)));
+            tables.next().or(names.first()).cloned()
+        }
         Some(sheet) => names.iter().find(|name| name.eq_ignore_ascii_case(sheet)).cloned(),
     };
     let Some(name) = name else {
@@ -143,6 +154,14 @@ fn cells(bytes: Vec<u8>, path: &Utf8Path, sheet: Option<&str>) -> Result<Source>
     let first = range.start().map_or(0, |(row, _)| u64::from(row)) + 1;
     let rows = range.rows().zip(first..).map(|(row, line)| (line, row.iter().map(cell).collect())).collect();
     Ok(Source::Sheet { rows, name, others: names.len() - 1 })
+}
+
+/// Whether some rows of a sheet hold the numbers of a point at the least.
+fn is_table(range: &calamine::Range<Data>) -> bool {
+    const ROWS: usize = 2;
+    const NUMBERS: usize = 3;
+    let number = |data: &&Data| cell(data).parse::<f64>().is_ok();
+    range.rows().filter(|row| row.iter().filter(number).count() >= NUMBERS).take(ROWS).count() == ROWS
 }
 
 fn cell(data: &Data) -> String {

@@ -293,7 +293,7 @@ fn a_board_that_is_larger_is_refused_with_its_size() {
             let shot = Setup { squares: "10x8", covers, ..setup.clone() }.take();
             let picture = shot.eight().into();
             for squares in ["9x7", "10x7", "9x8", "8x6"] {
-                let board = Board { squares: squares.parse().unwrap(), square_mm: SQUARE_MM };
+                let board = Board::checker(squares.parse().unwrap(), SQUARE_MM);
                 let refusal = corners_in(&picture, board).expect_err(squares);
                 named_right += usize::from(refusal.seen == Some(shot.board.squares));
                 let known = way == 2 || refusal.seen == Some(shot.board.squares);

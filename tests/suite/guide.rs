@@ -1,7 +1,9 @@
-//! The guide's pages: the commands in their `sh` blocks are run one after the other in one clean folder.
+//! The guide's pages: the commands in their `sh` blocks are run one after the other in one clean folder. Those of the page `day` are
+//! the run that the READMEs show.
 
 use stereocal::guide::PAGES;
 
+use crate::readme::{Printed, show_this_run};
 use crate::run::{stderr, stdout, stereocal, workplace};
 
 /// The commands of a page, without the program's name.
@@ -37,7 +39,7 @@ fn files(text: &str) -> Vec<(&str, String)> {
 #[test]
 fn every_command_of_the_guide_does_what_it_says() {
     let folder = workplace();
-    let mut count = 0;
+    let (mut count, mut run) = (0, Vec::new());
     for page in PAGES {
         for (name, text) in files(page.text) {
             std::fs::write(folder.path().join(name), text).unwrap();
@@ -46,10 +48,14 @@ fn every_command_of_the_guide_does_what_it_says() {
             let output = stereocal(folder.path(), &command);
             let status = output.status.code();
             assert_eq!(status, Some(0), "{}: {command:?}: {}{}", page.topic, stdout(&output), stderr(&output));
+            if page.topic == "day" {
+                run.push(Printed { command: format!("stereocal {}", command.join(" ")), stdout: stdout(&output) });
+            }
             count += 1;
         }
     }
     assert!(count >= 8, "{count} commands");
+    show_this_run(&run);
 }
 
 #[test]
@@ -58,8 +64,11 @@ fn a_page_that_is_not_there_is_said_with_those_that_are() {
     let list = stdout(&stereocal(folder.path(), &["guide"]));
     for page in PAGES {
         assert!(list.contains(page.topic) && list.contains(page.title()), "{list}");
-        assert_eq!(stdout(&stereocal(folder.path(), &["guide", page.topic])), page.text);
+        assert_eq!(stdout(&stereocal(folder.path(), &["guide", page.topic])), page.plain());
     }
+    assert!(stdout(&stereocal(folder.path(), &["guide", "--html", "book"])).contains("book/guide.html"));
+    let book = std::fs::read_to_string(folder.path().join("book/guide.html")).unwrap();
+    assert!(PAGES.iter().all(|page| book.contains(page.title())));
     let output = stereocal(folder.path(), &["guide", "nothing"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("no page nothing") && stderr(&output).contains("boards"), "{}", stderr(&output));

@@ -40,3 +40,8 @@ pub fn shared(path: &str) -> Option<PathBuf> {
     eprintln!("skipped: {} is not here", found.display());
     None
 }
+
+/// Whether files of the repository that a test compares are to be written anew: `STEREOCAL_REFRESH=1`.
+pub fn refreshes() -> bool {
+    std::env::var_os("STEREOCAL_REFRESH").is_some_and(|value| value == "1")
+}

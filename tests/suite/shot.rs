@@ -70,7 +70,7 @@ pub struct Shot {
 impl Setup {
     /// Takes the picture.
     pub fn take(&self) -> Shot {
-        let board = Board { squares: self.squares.parse().unwrap(), square_mm: self.square_mm };
+        let board = Board::checker(self.squares.parse().unwrap(), self.square_mm);
         let workmanship = Workmanship {
             pitch_um: 0.0,
             bow_um: (0.0, 0.0),

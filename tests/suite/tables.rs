@@ -132,6 +132,104 @@ fn one_table_in_every_form() {
 }
 
 #[test]
+fn names_that_are_not_known_are_taken_on_the_robots_word() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(40);
+    let six = |word: &str| (1..=6).map(|i| format!("{word}{i}")).collect::<Vec<_>>().join(",");
+    for names in [
+        six("Achse "),
+        six("\u{5173}\u{8282}"),
+        six("\u{cd95} "),
+        six("position_"),
+        "S,L,U,R,B,T".to_owned(),
+        "base,shoulder,elbow,wrist1,wrist2,wrist3".to_owned(),
+    ] {
+        let file = folder.file("named.csv", text(&format!("{names},X,Y,Z"), &rows, ",", joined));
+        let (found, said) = source(&[&file]).read(&robot).unwrap_or_else(|e| panic!("{names}: {}", report(&e)));
+        same(&found, &rows, &names);
+        assert!(said[0].contains("which the nominal robot confirms"), "{names}: {said:?}");
+    }
+    let points = folder.file("points.csv", text("J1,J2,J3,J4,J5,J6,one,two,three", &rows, ",", joined));
+    same(&source(&[&points]).read(&robot).expect("points").0, &rows, "points");
+    // Torques are no joints, and no point is among what has nothing to do with the joints.
+    let torques = |q: &[f64], p: &[f64; 3]| [q.iter().map(|v| v.sin()).collect(), joined(q, p)].concat();
+    let tau = folder.file("tau.csv", text(&format!("{},{},X,Y,Z", six("tau_"), six("Ax ")), &rows, ",", torques));
+    same(&source(&[&tau]).read(&robot).expect("torques left alone").0, &rows, "torques");
+    let other = |q: &[f64], p: &[f64; 3]| joined(q, &p.map(|v| (1e3 * v).sin()));
+    let none = folder.file("none.csv", text("J1,J2,J3,J4,J5,J6,one,two,three", &rows, ",", other));
+    refused(&source(&[&none]), &robot, &["no name says which columns are the point", "near to the nominal robot"]);
+}
+
+#[test]
+fn numbers_as_people_write_them() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    let header = "J1;J2;J3;J4;J5;J6;X;Y;Z";
+    let grouped = |value: f64, by: char, point: char| {
+        let plain = format!("{value:.9}");
+        let (whole, decimals) = plain.split_once('.').expect("nine decimals");
+        let (sign, digits) = whole.strip_prefix('-').map_or(("", whole), |digits| ("-", digits));
+        let mut out = String::new();
+        for (i, c) in digits.chars().enumerate() {
+            if i > 0 && (digits.len() - i) % 3 == 0 {
+                out.push(by);
+            }
+            out.push(c);
+        }
+        format!("{sign}{out}{point}{decimals}")
+    };
+    let table = |write: &dyn Fn(f64) -> String, delimiter: &str| {
+        let line = |(q, p): &(Vec<f64>, [f64; 3])| {
+            joined(q, p).iter().map(|v| write(*v)).collect::<Vec<_>>().join(delimiter) + "\n"
+        };
+        format!("{}\n{}", header.replace(';', delimiter), rows.iter().map(line).collect::<String>())
+    };
+    let plain = table(&|v| v.to_string(), ",");
+    for (name, text) in [
+        ("commas.csv", table(&|v| grouped(v, ',', '.'), ";")),
+        ("points.csv", table(&|v| grouped(v, '.', ','), ";")),
+        ("blanks.csv", table(&|v| grouped(v, '\u{a0}', ','), ";")),
+        ("quoted.csv", table(&|v| format!("\"{}\"", v.to_string().replace('.', ",")), ",")),
+        ("bars.txt", table(&|v| v.to_string(), "|")),
+        ("lists.txt", plain.lines().skip(1).map(|line| format!("[{line}],\n")).collect()),
+        ("comments.csv", format!("{plain}# pause; and on\n")),
+    ] {
+        let file = folder.file(name, text);
+        let (found, _) = source(&[&file]).read(&robot).unwrap_or_else(|e| panic!("{name}: {}", report(&e)));
+        assert_eq!(found.len(), rows.len(), "{name}");
+        for (row, (_, point)) in found.iter().zip(&rows) {
+            let Observed::Position { point_mm, .. } = row.observed else { panic!("{name}") };
+            // Nine decimals.
+            assert!((point_mm - Point3::from(*point)).norm() < 2.0 * SAME, "{name}: {point_mm} {point:?}");
+        }
+    }
+    let both = plain.replacen("\n", "\n\"1,234.5\",\"2,5\",3,4,5,6,7,8,9\n", 1);
+    refused(&source(&[&folder.file("both.csv", both)]), &robot, &["is not a number: `1,234.5`"]);
+    refused(&source(&[&folder.file("a.json", "{\"q\": [1, 2, 3]}")]), &robot, &["a JSON file", "to_csv"]);
+}
+
+#[test]
+fn computed_points_are_asked_about_and_said() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    let radians = |q: &[f64]| q.iter().map(|v| v.to_radians()).collect::<Vec<f64>>();
+    let computed = |q: &[f64]| robot.target_mm(&radians(q)).coords.iter().copied().collect::<Vec<f64>>();
+    let both = |q: &[f64], p: &[f64; 3]| [q.to_vec(), p.to_vec(), computed(q)].concat();
+    // Nearer to the nominal robot than any measured point, and not what was measured.
+    let file = folder.file("both.csv", text("", &rows, ",", both));
+    refused(&source(&[&file]), &robot, &["two points would do, columns 7 to 9 and columns 10 to 12"]);
+    let alone = folder
+        .file("alone.csv", text("J1,J2,J3,J4,J5,J6,X,Y,Z", &rows, ",", |q, _| [q.to_vec(), computed(q)].concat()));
+    let (_, said) = source(&[&alone]).read(&robot).expect("a point");
+    assert!(said[1].contains("computed from the joints, not measured"), "{said:?}");
+    // Two points a row that keep no distance are no two targets.
+    let header = "J1,J2,J3,J4,J5,J6,X1,Y1,Z1,X2,Y2,Z2";
+    let moved = |q: &[f64], p: &[f64; 3]| [joined(q, p), p.map(|v| v + (7.0 * v).sin()).to_vec()].concat();
+    let two = folder.file("two.csv", text(header, &rows, ",", moved));
+    refused(&source(&[&two]), &robot, &["two points would do, X1 to Z1 and X2 to Z2"]);
+}
+
+#[test]
 fn files_that_complete_each_other_are_joined_and_complete_ones_stacked() {
     let folder = Folder(workplace());
     let (robot, rows) = world(30);
@@ -279,6 +377,19 @@ fn traps_are_refused_for_what_they_are() {
     );
     let kept = Source { units: Some("deg".to_owned()), ..one("wrong.csv", wrong.as_bytes()) };
     assert!(kept.read(&robot).is_ok(), "a flag is not doubted");
+    // Lengths in metres under a name that says mm: the joints are not to blame.
+    let metres = |q: &[f64], p: &[f64; 3]| joined(q, &p.map(|v| v / 1000.0));
+    let wrong = text("J1,J2,J3,J4,J5,J6,x_mm,y_mm,z_mm", &rows, ",", metres);
+    refused(&one("metres.csv", wrong.as_bytes()), &robot, &["call the points (x_mm to z_mm) mm", "`--units m`"]);
+    let wrong = text("J1,J2,J3,J4,J5,J6,x_m,y_m,z_m", &rows, ",", joined);
+    refused(&one("millimetres.csv", wrong.as_bytes()), &robot, &["call the points (x_m to z_m) m,", "`--units mm`"]);
+    let mut lines: Vec<String> = text("", &rows, ",", joined).lines().map(str::to_owned).collect();
+    lines[7] = lines[7].rsplit_once(',').map_or(String::new(), |(head, _)| format!("{head},lost"));
+    refused(
+        &one("bare.csv", lines.join("\n").as_bytes()),
+        &robot,
+        &["`column 9` is not a number: `lost`", "bare.csv:8"],
+    );
     let few = plain.replace("J6,X", "K,X");
     refused(&one("few.csv", few.as_bytes()), &robot, &["5 columns of joints, but the robot has 6"]);
     refused(

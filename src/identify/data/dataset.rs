@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
 use super::repeats::{self, Repeats};
 use super::targets::{self, Targets};
 use crate::identify::Error;
+use crate::identify::residuals::weights::Extra;
 use crate::measurements::{Measurement, Observed, Role};
 
 /// Variance that singular covariances get on top, mm^2: a micrometre, the resolution of a good instrument.
@@ -70,6 +71,8 @@ pub struct Pose {
     pub joints_rad: Vec<f64>,
     /// What was read.
     pub reading: Reading,
+    /// Where on a body of several targets the point stands, from its mark point and in the body's frame, mm; `None` for the mark point itself.
+    pub on_body_mm: Option<Vector3<f64>>,
 }
 
 /// One placement of the sensor.
@@ -170,6 +173,7 @@ impl Dataset {
                         role: row.at.role,
                         joints_rad: row.at.joints_rad(),
                         reading,
+                        on_body_mm: set.targets.as_ref().and_then(|t| t.part_mm(&row.target)),
                     });
                 }
                 Err(reason) => set.skipped.push(Skipped { pose: row.at.pose.clone(), reason }),
@@ -232,7 +236,7 @@ impl Dataset {
         }
         let points: Vec<(usize, Point3<f64>)> = fitted
             .iter()
-            .filter(|&&i| self.poses[i].group == group)
+            .filter(|&&i| self.poses[i].group == group && self.poses[i].on_body_mm.is_none())
             .filter_map(|&i| match self.poses[i].reading {
                 Reading::Position { point_mm, .. } => Some((i, point_mm)),
                 _ => None,
@@ -264,9 +268,19 @@ impl Dataset {
         self.kind == Kind::Distances && self.groups.iter().any(|g| g.center.is_some())
     }
 
-    /// Whether every pose that may be fitted has an orientation.
+    /// Whether every pose has an orientation, but for those that show a part of a body of several targets.
     pub fn has_rotations(&self) -> bool {
-        self.poses.iter().all(|p| matches!(p.reading, Reading::Position { rotation_rad: Some(_), .. }))
+        let mut whole = self.poses.iter().filter(|p| p.on_body_mm.is_none()).peekable();
+        whole.peek().is_some() && whole.all(|p| matches!(p.reading, Reading::Position { rotation_rad: Some(_), .. }))
+    }
+
+    /// Unknowns of the sensor without which no point can be predicted: how the body of several targets is turned on the flange, where poses
+    /// show a part of it.
+    pub fn body_unknowns(&self) -> &'static [Extra] {
+        match self.poses.iter().any(|p| p.on_body_mm.is_some()) {
+            true => &[Extra::Target(0), Extra::Target(1), Extra::Target(2)],
+            false => &[],
+        }
     }
 }
 

@@ -101,14 +101,15 @@ pub fn suppose_scale(set: &mut Dataset) {
     set.supposed_scale = Some(scale);
 }
 
-/// What the sensor leaves unknown: the errors that all rows share, or the zero of distances to a centre.
+/// What the sensor leaves unknown: the errors that all rows share, or the zero of distances to a centre; and how a body is turned.
 pub fn unknowns(set: &Dataset, settings: &Settings) -> Vec<Extra> {
-    match set.shared.first() {
+    let own = match set.shared.first() {
         Some(shared) => (0..shared.ncols()).map(Extra::Shared).collect(),
         // Its tolerance comes from the evidence, so that a zero that is right costs nothing.
         _ if set.to_centers() && settings.wire_offset => vec![Extra::Zero],
         _ => Vec::new(),
-    }
+    };
+    [own, set.body_unknowns().to_vec()].concat()
 }
 
 /// Columns of the leading shared errors and own covariance, row by row.

@@ -129,22 +129,7 @@ pub fn identify(
     let extras = if model == Model::PairwiseDistance { Vec::new() } else { shared::unknowns(set, settings) };
     let mut session = Session { set, robot, settings, seed, rows: set.fit_rows(), extras, smooth: None, step };
     let by_points = if set.kind == Kind::Positions { Model::Position } else { model };
-    step("gross errors");
-    let first = session.reference(ROWS_TELL);
-    let mut gross = session.drop_outliers(by_points, &first)?;
-    if model == Model::Pose {
-        session.extras.extend((0..3).map(Extra::Target));
-    }
-    step("models of the robot");
-    let (terms, judged) = match settings.extensions {
-        Extensions::None => (Terms::default(), Vec::new()),
-        Extensions::Auto => session.climb(by_points)?,
-    };
-    if terms.chain == Chain::Mdh && terms != first && session.tells(&terms, ROWS_TELL) {
-        // A row that a poorer model could not follow is no gross error, and a richer one follows too much.
-        session.rows = set.fit_rows();
-        gross = session.drop_outliers(by_points, &terms)?;
-    }
+    let (terms, judged, gross) = session.model(model, by_points)?;
     let methods = settings.method.map_or(Method::ALL.to_vec(), |m| vec![m]);
     let fitted_terms = if terms == Terms::NOMINAL { Terms::default() } else { terms };
     if matches!(model, Model::Position | Model::Pose) {
@@ -153,18 +138,15 @@ pub fn identify(
     let (mut candidates, deletions) = session.run_methods(model, fitted_terms, &methods)?;
     let held_out = |t: &Terms| judged.iter().find(|j| j.terms == t.name()).and_then(|j| j.held_out_mm);
     let nominal_held_out_mm = held_out(&Terms::NOMINAL);
-    let mut chosen = best(&candidates);
+    let chosen = best(&candidates);
     let least = candidates[chosen].cost();
     candidates
         .iter_mut()
         .filter(|c| c.cost() <= least * (1.0 + SAME_COST))
         .for_each(|c| c.held_out_mm = held_out(&fitted_terms));
-    for &other in models.iter().filter(|&&m| m != model) {
-        if settings.method.is_none()
-            && let Ok(candidate) = session.run(other, fitted_terms, Method::TrustRegion)
-        {
-            candidates.push(candidate);
-        }
+    if settings.method.is_none() {
+        let others = models.iter().filter(|&&m| m != model);
+        candidates.extend(others.filter_map(|&m| session.run(m, fitted_terms, Method::TrustRegion).ok()));
     }
     let (scatter, values) = match &candidates[chosen].found {
         Some((formulation, _)) => (formulation.rows.scatter, formulation.extras().to_vec()),
@@ -192,14 +174,18 @@ pub fn identify(
         && settings.method.is_none()
         && found.against_nominal(set, robot, settings) == Against::Worse;
     if terms == Terms::NOMINAL || found.vetoed {
-        let held_out_mm = nominal_held_out_mm;
-        let robot = robot.clone();
-        found.candidates.push(Candidate { name: "nominal", model, found: None, robot, held_out_mm });
-        chosen = found.candidates.len() - 1;
-        found.chosen = chosen;
-        found.terms = Terms::NOMINAL;
+        found.keep_nominal(robot, model, nominal_held_out_mm);
     }
     Ok(found)
+}
+
+impl Identification {
+    fn keep_nominal(&mut self, robot: &Robot, model: Model, held_out_mm: Option<f64>) {
+        let robot = robot.clone();
+        self.candidates.push(Candidate { name: "nominal", model, found: None, robot, held_out_mm });
+        self.chosen = self.candidates.len() - 1;
+        self.terms = Terms::NOMINAL;
+    }
 }
 
 /// The models that the data allow, or the one that was asked for.
@@ -244,6 +230,27 @@ impl Session<'_> {
             smooth: self.smooth.map(|told| told.error),
             settings,
         }
+    }
+
+    /// Gross errors, and the terms that are worth taking; rows that fit far worse than the rest are then left out.
+    fn model(&mut self, model: Model, by_points: Model) -> Result<(Terms, Vec<Judged>, Gross), Error> {
+        (self.step)("gross errors");
+        let first = self.reference(ROWS_TELL);
+        let mut gross = self.drop_outliers(by_points, &first)?;
+        if model == Model::Pose && self.set.body_unknowns().is_empty() {
+            self.extras.extend((0..3).map(Extra::Target));
+        }
+        (self.step)("models of the robot");
+        let (terms, judged) = match self.settings.extensions {
+            Extensions::None => (Terms::default(), Vec::new()),
+            Extensions::Auto => self.climb(by_points)?,
+        };
+        if terms.chain == Chain::Mdh && terms != first && self.tells(&terms, ROWS_TELL) {
+            // A row that a poorer model could not follow is no gross error, and a richer one follows too much.
+            self.rows = self.set.fit_rows();
+            gross = self.drop_outliers(by_points, &terms)?;
+        }
+        Ok((terms, judged, gross))
     }
 
     /// Numbers that were measured, less the unknowns of the placements.

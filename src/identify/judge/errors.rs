@@ -59,7 +59,7 @@ pub struct RowError {
     /// Row of the data set.
     pub row: usize,
     /// Predicted minus measured distance to the group's reference, mm; of a touch, to the mean of its group's predicted points.
-    /// `None` for the reference itself.
+    /// `None` for the reference itself, and for a point of a body that is not its mark point.
     pub distance_mm: Option<f64>,
     /// Predicted minus measured point, mm, in the sensor's frame; of a touch, from the mean.
     pub point_mm: Option<Vector3<f64>>,
@@ -135,47 +135,64 @@ impl Judge<'_> {
         list
     }
 
-    fn placed(&self, robot: &Robot, rows: &[usize], model: Model) -> Rows {
-        Rows::new(&Recipe {
+    fn placed(&self, robot: &Robot, rows: &[usize], model: Model) -> (Rows, Vec<f64>) {
+        // How a body is turned on this robot's flange its rows say anew.
+        let of_sensor = |(extra, _): &(&Extra, &f64)| !matches!(extra, Extra::Target(_));
+        let (extras, values): (Vec<Extra>, Vec<f64>) = self.extras.iter().zip(self.values).filter(of_sensor).unzip();
+        let rows = Rows::new(&Recipe {
             set: self.set,
             robot,
             levers: robot,
             parameters: &[],
-            extras: self.extras,
+            extras: &extras,
             rows,
             weights: &[],
             model,
             scatter: self.scatter,
             wire_offset: self.wire_offset,
-        })
+        });
+        (rows, values)
     }
 
     fn extra(&self, of: Extra) -> f64 {
         self.extras.iter().zip(self.values).filter(|(e, _)| **e == of).map(|(_, v)| *v).sum()
     }
 
-    /// A predicted and a measured point, the sensor's own errors taken off, and its covariance.
-    fn point(&self, robot: &Robot, row: usize) -> Option<(Point3<f64>, Point3<f64>, Matrix3<f64>)> {
+    /// A predicted and a measured point, the sensor's own errors taken off, and its covariance; `flange_from_body` is how a body of several
+    /// targets is turned.
+    fn point(
+        &self,
+        robot: &Robot,
+        row: usize,
+        flange_from_body: &Matrix3<f64>,
+    ) -> Option<(Point3<f64>, Point3<f64>, Matrix3<f64>)> {
         let Reading::Position { point_mm, covariance_mm2, .. } = &self.set.poses[row].reading else { return None };
         let mut measured = *point_mm;
         for (extra, value) in self.extras.iter().zip(self.values) {
             measured -= extra.of_point(point_mm, self.set.shared.get(row)) * *value;
         }
-        let predicted = robot.target_mm(&self.set.poses[row].joints_rad);
+        let pose = &self.set.poses[row];
+        let mut predicted = robot.target_mm(&pose.joints_rad);
+        if let Some(part) = pose.on_body_mm {
+            predicted += robot.base_from_flange(&pose.joints_rad).rotation * (flange_from_body * part);
+        }
         Some((predicted, measured, covariance_mm2.unwrap_or_else(Matrix3::zeros)))
     }
 
     fn of_points(&self, robot: &Robot, group: usize, placing: &[usize], judged: &[usize], list: &mut Vec<RowError>) {
-        let rows = self.placed(robot, placing, Model::Position);
-        let frame: Option<Transform> = rows.unknowns(self.values).into_iter().find_map(|u| match u {
+        let (rows, values) = self.placed(robot, placing, Model::Position);
+        let turn =
+            rows.blocks.iter().find_map(|b| if let Block::Points(p) = b { Some(p.flange_from_target) } else { None });
+        let turn = turn.unwrap_or_else(Matrix3::identity);
+        let frame: Option<Transform> = rows.unknowns(&values).into_iter().find_map(|u| match u {
             Unknowns::Frame(frame) => Some(frame),
             _ => None,
         });
-        let reference = self.set.reference(group, placing).and_then(|r| self.point(robot, r));
+        let reference = self.set.reference(group, placing).and_then(|r| self.point(robot, r, &turn));
         for &row in judged {
-            let Some((predicted, measured, covariance_mm2)) = self.point(robot, row) else { continue };
+            let Some((predicted, measured, covariance_mm2)) = self.point(robot, row, &turn) else { continue };
             let (mut distance_mm, mut variance_mm2) = (None, 0.0);
-            if let Some((p0, x0, c0)) = &reference {
+            if let Some((p0, x0, c0)) = reference.as_ref().filter(|_| self.set.poses[row].on_body_mm.is_none()) {
                 let apart = measured - x0;
                 if apart.norm() > 0.0 {
                     let u = apart.normalize();
@@ -197,9 +214,9 @@ impl Judge<'_> {
         }
         let center = self.set.groups[group].center.map(|c| (predicted(c), self.extra(Extra::Zero)));
         let placed = center.or_else(|| {
-            let rows = self.placed(robot, placing, Model::CenterDistance);
+            let (rows, values) = self.placed(robot, placing, Model::CenterDistance);
             let wire = rows.blocks.iter().position(|b| matches!(b, Block::Wire(_)))?;
-            match rows.unknowns(self.values).get(wire) {
+            match rows.unknowns(&values).get(wire) {
                 Some(Unknowns::Anchor(anchor, zero)) => Some((Point3::from(*anchor), *zero)),
                 _ => None,
             }

@@ -223,20 +223,21 @@ impl Linearised<'_> {
         evidence(&tolerance.covariance(self.base, self.parameters, self.extras), self.normal, self.gradient)
     }
 
-    fn free(&self) -> Vec<Parameter> {
-        self.base.free.iter().map(|&i| self.parameters[i]).collect()
+    /// The parameters that base parameters are of, or stand for: their tolerances are what the data tell.
+    fn seen(&self) -> Vec<Parameter> {
+        (0..self.parameters.len()).filter(|i| !self.base.zero.contains(i)).map(|i| self.parameters[i]).collect()
     }
 
     /// The tolerance of greatest evidence.
     pub fn most_probable(&self) -> Tolerance {
-        best_of_grid(&self.free(), self.extras, &|t| self.evidence(t)).0
+        best_of_grid(&self.seen(), self.extras, &|t| self.evidence(t)).0
     }
 
     /// The largest standard deviations, kind by kind, that the data make next to as probable as these: few poses say little of how well
     /// a robot was made, and what they leave open is as uncertain as it may be.
     pub fn at_most(&self, tolerance: &Tolerance) -> Tolerance {
         let least = self.evidence(tolerance) - DOUBT;
-        let present = presence(&self.free(), self.extras);
+        let present = presence(&self.seen(), self.extras);
         let mut most = *tolerance;
         for kind in (0..KINDS).filter(|&k| present[k]) {
             let larger = GRID.iter().filter(|v| **v > tolerance.values()[kind] && **v <= LARGEST[kind]);

@@ -72,7 +72,7 @@ impl Expected {
         let count = kinematics.parameters().len();
         let robot = nominal.shifted(kinematics.parameters(), &offsets[..count]);
         let places = Kinematics::new(nominal, &robot, kinematics.parameters(), &joints).places(&offsets[..count], true);
-        let covariance = formulation.robot_covariance();
+        let covariance = formulation.whole_covariance();
         let scatter = formulation.rows.scatter.point_mm;
         // Readings are off by what placements share, too.
         let smooth_mm2 = formulation.rows.left_by_smooth_mm2();

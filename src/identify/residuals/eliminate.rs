@@ -114,7 +114,7 @@ impl Block {
             Block::Center(center) => counted(&mut center.lengths.iter().map(|l| l.weight)),
             Block::Wire(wire) => counted(&mut wire.lengths.iter().map(|l| l.weight)),
             Block::Touch(touch) => 3 * counted(&mut touch.contacts.iter().map(|c| c.weight)) + touch.known.len(),
-            Block::Points(points) => points.rows_a_spot() * counted(&mut points.spots.iter().map(|s| s.weight)),
+            Block::Points(points) => points.count(),
             Block::Pairwise(pairs) => pairs.count(),
         };
         numbers.saturating_sub(self.unknown_count())

@@ -6,5 +6,6 @@ pub mod pairwise;
 pub mod points;
 pub mod rows;
 pub mod smooth;
+pub mod starts;
 pub mod touch;
 pub mod weights;

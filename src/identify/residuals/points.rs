@@ -29,9 +29,15 @@ pub struct Points {
 }
 
 impl Points {
-    /// Three residuals a point, three more an orientation.
+    /// Three residuals a point, three more an orientation; those of an orientation that was not measured are zero.
     pub fn rows_a_spot(&self) -> usize {
         if self.oriented { 6 } else { 3 }
+    }
+
+    /// Numbers that were measured with some weight.
+    pub fn count(&self) -> usize {
+        let of_spot = |s: &Spot| if self.oriented && s.rotation.is_some() { 6 } else { 3 };
+        self.spots.iter().filter(|s| s.weight > 0.0).map(of_spot).sum()
     }
 
     /// Indices and axes of the extra unknowns that turn the target.
@@ -49,8 +55,20 @@ impl Points {
         Rotation3::from_scaled_axis(turn).into_inner() * self.flange_from_target
     }
 
-    fn point_residual(&self, place: &Place, extras: &[f64], frame: &Transform, spot: &Spot) -> Vector3<f64> {
-        let mut residual = frame * place.point_mm - spot.point_mm;
+    /// From the mark point to what a spot shows of a body of several targets, base frame, mm; `None` where it shows the mark point.
+    fn on_body(place: &Place, flange_from_target: &Matrix3<f64>, spot: &Spot) -> Option<Vector3<f64>> {
+        spot.on_body_mm.map(|part| place.rotation * (flange_from_target * part))
+    }
+
+    fn point_residual(
+        place: &Place,
+        extras: &[f64],
+        frame: &Transform,
+        flange_from_target: &Matrix3<f64>,
+        spot: &Spot,
+    ) -> Vector3<f64> {
+        let part = Points::on_body(place, flange_from_target, spot).unwrap_or_else(Vector3::zeros);
+        let mut residual = frame * (place.point_mm + part) - spot.point_mm;
         for (column, e) in spot.extra.column_iter().zip(extras) {
             residual += column * *e;
         }
@@ -70,9 +88,10 @@ impl Points {
         let mut design = DMatrix::zeros(rows * self.spots.len(), 6);
         for (i, spot) in self.spots.iter().enumerate() {
             let (place, row) = (&places[spot.pose], rows * i);
-            let turned = frame.rotation * place.point_mm.coords;
+            let part = Points::on_body(place, &flange_from_target, spot).unwrap_or_else(Vector3::zeros);
+            let turned = frame.rotation * (place.point_mm.coords + part);
             let whiten = scatter.whitener(&spot.covariance_mm2) * spot.weight;
-            let residual = self.point_residual(place, extras, frame, spot);
+            let residual = Points::point_residual(place, extras, frame, &flange_from_target, spot);
             residuals.fixed_rows_mut::<3>(row).copy_from(&(whiten * residual));
             design.fixed_view_mut::<3, 3>(row, 0).copy_from(&(-whiten * skew(&turned)));
             design.fixed_view_mut::<3, 3>(row, 3).copy_from(&whiten);
@@ -97,7 +116,7 @@ impl Points {
     pub(super) fn outer(&self, places: &[Place], extras: &[f64], scatter: &Scatter, frame: &Transform) -> DMatrix<f64> {
         let rows = self.rows_a_spot();
         let robot = places.first().map_or(0, |p| p.point_columns.ncols());
-        let rotation = rotation_matrix(frame);
+        let (rotation, flange_from_target) = (rotation_matrix(frame), self.turned_target(extras));
         let mut jacobian = DMatrix::zeros(rows * self.spots.len(), robot + extras.len());
         for (i, spot) in self.spots.iter().enumerate() {
             let (place, row) = (&places[spot.pose], rows * i);
@@ -106,7 +125,16 @@ impl Points {
             for (k, column) in spot.extra.column_iter().enumerate() {
                 jacobian.fixed_view_mut::<3, 1>(row, robot + k).copy_from(&(whiten * column));
             }
-            if self.oriented {
+            if let Some(part) = Points::on_body(place, &flange_from_target, spot) {
+                let swing = -(whiten * rotation * skew(&part));
+                let mut of_robot = jacobian.view_mut((row, 0), (3, robot));
+                of_robot += swing * &place.rotation_columns;
+                for &(k, axis) in &self.target {
+                    let mut of_turn = jacobian.fixed_view_mut::<3, 1>(row, robot + k);
+                    of_turn += swing * place.rotation.column(axis) * RAD_PER_MRAD;
+                }
+            }
+            if self.oriented && spot.rotation.is_some() {
                 let weight = spot.weight / scatter.rotation_rad;
                 let turn = rotation * weight;
                 jacobian.view_mut((row + 3, 0), (3, robot)).copy_from(&(turn * &place.rotation_columns));
@@ -124,7 +152,9 @@ impl Points {
 
     /// The smooth error at the spots, mm, as far as it is known.
     pub(super) fn smooth_mm(&self, places: &[Place], extras: &[f64], frame: &Transform) -> Vec<Vector3<f64>> {
-        let residual = |spot: &Spot| self.point_residual(&places[spot.pose], extras, frame, spot);
+        let flange_from_target = self.turned_target(extras);
+        let residual =
+            |spot: &Spot| Points::point_residual(&places[spot.pose], extras, frame, &flange_from_target, spot);
         match &self.field {
             Some(field) => field.most_probable(&self.spots.iter().map(residual).collect::<Vec<_>>()),
             None => vec![Vector3::zeros(); self.spots.len()],
@@ -137,7 +167,7 @@ impl Points {
         let smooth = self.smooth_mm(places, extras, frame);
         for (spot, smooth) in self.spots.iter().zip(smooth) {
             let place = &places[spot.pose];
-            let residual = self.point_residual(place, extras, frame, spot) - smooth;
+            let residual = Points::point_residual(place, extras, frame, &flange_from_target, spot) - smooth;
             list.push((spot.pose, spot.weight, Raw::Point(residual, spot.covariance_mm2)));
             if let (true, Some(measured)) = (self.oriented, &spot.rotation) {
                 let sensor_from_flange = rotation_matrix(frame) * place.rotation;

@@ -6,13 +6,14 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector, Vector3};
 
 use super::distances::{Center, Wire};
-use super::eliminate::{Block, Evaluated, Raw, Unknowns, pseudo_inverse};
+use super::eliminate::{Block, Evaluated, Raw, Unknowns};
 use super::pairwise::{CHUNK, Pairs};
 use super::points::Points;
 use super::smooth::Field;
+use super::starts::{first_anchor, mean_target, middle, robust_frame};
 use super::touch::{Contact, Known, Touch};
 use super::weights::{Extra, Length, Scatter, Spot};
-use crate::geometry::{Transform, transform_from_matrix};
+use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, Reading};
 use crate::identify::model::kinematics::{Kinematics, Place};
 use crate::identify::settings::Model;
@@ -321,6 +322,7 @@ impl Inputs<'_> {
             Reading::Position { point_mm, covariance_mm2, rotation_rad } => Some(Spot {
                 pose,
                 point_mm: *point_mm,
+                on_body_mm: self.recipe.set.poses[row].on_body_mm,
                 covariance_mm2: covariance_mm2.unwrap_or_else(Matrix3::zeros),
                 rotation: rotation_rad.map(|r| Rotation3::new(r).into_inner()),
                 weight: self.weight(row),
@@ -334,7 +336,7 @@ impl Inputs<'_> {
         let reference = self.recipe.set.reference(group, self.recipe.rows)?;
         let center = self.spot(reference)?;
         let length = |&i: &usize| {
-            let spot = self.spot(i)?;
+            let spot = self.spot(i).filter(|spot| spot.on_body_mm.is_none())?;
             let apart = spot.point_mm - center.point_mm;
             let length_mm = apart.norm();
             if i == reference || length_mm <= 0.0 {
@@ -350,7 +352,10 @@ impl Inputs<'_> {
     }
 
     fn pairs(&self, group: usize) -> Vec<Block> {
-        let spots: Vec<Spot> = self.by_group[group].iter().filter_map(|&i| self.spot(i)).collect();
+        let spots: Vec<Spot> = self.by_group[group]
+            .iter()
+            .filter_map(|&i| self.spot(i).filter(|spot| spot.on_body_mm.is_none()))
+            .collect();
         let chunks = spots.len().div_ceil(CHUNK).max(1);
         // Every chunk takes every so-manieth pose, so that each spans the group.
         let chunk = |k: usize| spots.iter().skip(k).step_by(chunks).cloned().collect::<Vec<_>>();
@@ -370,8 +375,9 @@ impl Inputs<'_> {
             .filter(|spots| spots.len() >= 3)
             .collect();
         let frames: Vec<Transform> = lists.iter().map(|spots| robust_frame(spots, self.places)).collect();
-        let flange_from_target = if oriented { mean_target(&lists, &frames, self.places) } else { Matrix3::identity() };
-        let target = if oriented { Points::target_extras(self.recipe.extras) } else { Vec::new() };
+        let turned = oriented || lists.iter().flatten().any(|spot| spot.on_body_mm.is_some());
+        let flange_from_target = if turned { mean_target(&lists, &frames, self.places) } else { Matrix3::identity() };
+        let target = if turned { Points::target_extras(self.recipe.extras) } else { Vec::new() };
         let scatter = &self.recipe.scatter;
         let block = |(spots, sensor_from_base): (Vec<Spot>, Transform)| {
             let target = target.clone();
@@ -385,94 +391,4 @@ impl Inputs<'_> {
         };
         lists.into_iter().zip(frames).map(block).collect()
     }
-}
-
-/// Rounds of reweighting a first frame.
-const FRAME_ROUNDS: usize = 15;
-
-/// A frame that gross errors hardly move: least sum of distances, by reweighting (Weiszfeld's way).
-fn robust_frame(spots: &[Spot], places: &[Place]) -> Transform {
-    let mut weights: Vec<f64> = spots.iter().map(|s| s.weight * s.weight).collect();
-    let mut frame = Transform::identity();
-    for _ in 0..FRAME_ROUNDS {
-        frame = fitted_frame(spots.iter().zip(&weights).map(|(s, w)| (places[s.pose].point_mm, s.point_mm, *w)));
-        let misses: Vec<f64> = spots.iter().map(|s| (frame * places[s.pose].point_mm - s.point_mm).norm()).collect();
-        let mut sorted = misses.clone();
-        sorted.sort_by(f64::total_cmp);
-        let floor = (0.1 * sorted[sorted.len() / 2]).max(1e-9);
-        weights = misses.iter().zip(spots).map(|(m, s)| s.weight * s.weight / m.max(floor)).collect();
-    }
-    frame
-}
-
-/// The rigid transform `b_from_a` that brings pairs (a, b, weight) of points together best (Kabsch, 1976).
-pub fn fitted_frame(pairs: impl Iterator<Item = (Point3<f64>, Point3<f64>, f64)>) -> Transform {
-    let pairs: Vec<_> = pairs.collect();
-    let n = pairs.iter().map(|(_, _, w)| w).sum::<f64>().max(f64::MIN_POSITIVE);
-    let mean_a = pairs.iter().map(|(a, _, w)| a.coords * *w).sum::<Vector3<f64>>() / n;
-    let mean_b = pairs.iter().map(|(_, b, w)| b.coords * *w).sum::<Vector3<f64>>() / n;
-    let covariance: Matrix3<f64> =
-        pairs.iter().map(|(a, b, w)| (b.coords - mean_b) * (a.coords - mean_a).transpose() * *w).sum();
-    let rotation = nearest_rotation(&covariance);
-    transform_from_matrix(rotation, mean_b - rotation * mean_a)
-}
-
-/// The rotation R with the largest trace of R' M.
-pub fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
-    let svd = matrix.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Matrix3::identity() };
-    let mut sign = Matrix3::identity();
-    let smallest = svd.singular_values.imin();
-    sign[(smallest, smallest)] = (u * v_t).determinant().signum();
-    u * sign * v_t
-}
-
-/// Coordinate by coordinate the median.
-fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
-    Vector3::from_fn(|axis, _| {
-        let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied().unwrap_or(0.0)
-    })
-}
-
-/// Mean of `flange_from_target` over all poses.
-fn mean_target(lists: &[Vec<Spot>], frames: &[Transform], places: &[Place]) -> Matrix3<f64> {
-    let mut sum = Matrix3::zeros();
-    for (spots, frame) in lists.iter().zip(frames) {
-        let rotation = crate::geometry::rotation_matrix(frame);
-        for spot in spots {
-            if let Some(measured) = &spot.rotation {
-                sum += (rotation * places[spot.pose].rotation).transpose() * measured;
-            }
-        }
-    }
-    Rotation3::from_matrix_unchecked(nearest_rotation(&sum)).into_inner()
-}
-
-/// Rounds of reweighting a first anchor.
-const ANCHOR_ROUNDS: usize = 10;
-
-/// Where a wire's anchor may be: |p|^2 - 2 p.c + |c|^2 = L^2 is linear in c and |c|^2; reweighted against gross errors.
-fn first_anchor(places: &[Place], lengths: &[Length]) -> Vector3<f64> {
-    let n = lengths.len();
-    let mean = lengths.iter().map(|l| places[l.pose].point_mm.coords).sum::<Vector3<f64>>() / n.max(1) as f64;
-    let arm = |l: &Length| places[l.pose].point_mm.coords - mean;
-    let mut weights: Vec<f64> = lengths.iter().map(|l| l.weight).collect();
-    let mut anchor = mean;
-    for _ in 0..ANCHOR_ROUNDS {
-        let entry = |r: usize, c: usize| weights[r] * if c < 3 { 2.0 * arm(&lengths[r])[c] } else { 1.0 };
-        let design = DMatrix::from_fn(n, 4, entry);
-        let rhs =
-            DVector::from_fn(n, |r, _| weights[r] * (arm(&lengths[r]).norm_squared() - lengths[r].length_mm.powi(2)));
-        let solution = pseudo_inverse(design.tr_mul(&design)) * design.tr_mul(&rhs);
-        anchor = mean + solution.fixed_rows::<3>(0);
-        let misses: Vec<f64> =
-            lengths.iter().map(|l| ((places[l.pose].point_mm.coords - anchor).norm() - l.length_mm).abs()).collect();
-        let mut sorted = misses.clone();
-        sorted.sort_by(f64::total_cmp);
-        let floor = (0.1 * sorted[n / 2]).max(1e-9);
-        weights = misses.iter().zip(lengths).map(|(m, l)| l.weight / m.max(floor).sqrt()).collect();
-    }
-    anchor
 }

@@ -81,6 +81,8 @@ pub struct Spot {
     pub point_mm: Point3<f64>,
     /// Its own covariance, mm^2.
     pub covariance_mm2: Matrix3<f64>,
+    /// Where it stands on a body of several targets, in the body's frame, mm; `None` for the mark point.
+    pub on_body_mm: Option<Vector3<f64>>,
     /// `sensor_from_target`, where the model uses it.
     pub rotation: Option<Matrix3<f64>>,
     /// Root of the row's weight, 0 to 1.

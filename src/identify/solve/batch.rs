@@ -11,7 +11,8 @@ use super::placement::Placement;
 use crate::geometry::{Transform, rotation_matrix, transform_from_matrix};
 use crate::identify::residuals::eliminate::Block;
 use crate::identify::residuals::points::Points;
-use crate::identify::residuals::rows::{Rows, nearest_rotation};
+use crate::identify::residuals::rows::Rows;
+use crate::identify::residuals::starts::nearest_rotation;
 use crate::identify::residuals::touch::{Known, Touch};
 use crate::identify::residuals::weights::{Scatter, Spot};
 
@@ -57,6 +58,7 @@ impl BatchCost {
         for block in &rows.blocks {
             blocks.push(match block {
                 Block::Points(Points { field: Some(_), .. }) => return None,
+                Block::Points(p) if p.spots.iter().any(|spot| spot.on_body_mm.is_some()) => return None,
                 Block::Center(c) => BatchBlock::Center {
                     center: c.center,
                     pose: c.lengths.iter().map(|l| l.pose).collect(),

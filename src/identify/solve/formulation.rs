@@ -19,7 +19,7 @@ use crate::identify::residuals::eliminate::{product, pseudo_inverse};
 use crate::identify::residuals::rows::Rows;
 use crate::identify::residuals::weights::{Extra, Scatter};
 use crate::identify::settings::{Model, Prior, Settings};
-use crate::robot::{Parameter, Unit};
+use crate::robot::{Parameter, Robot, Unit};
 
 /// Rounds of fitting and of estimating scatter and prior from the residuals.
 const ROUNDS: usize = 4;
@@ -72,77 +72,28 @@ pub struct Formulation {
 impl Formulation {
     /// Base parameters, weights, prior and box.
     pub fn new(task: &Task) -> Result<Formulation, Error> {
-        let settings = task.settings;
-        let mut levers = task.robot.clone();
-        let mut scatter = Scatter { smooth: task.smooth, ..Scatter::of_point(FIRST_SCATTER_MM) };
-        let mut rows = Rows::new(&task.recipe(scatter, &[], &levers));
-        let mut base = task.base(&rows)?;
-        task.check_count(&rows, &base)?;
-        let mut count = base.rank() + task.extras.len();
-        let mut free = vec![f64::INFINITY; count];
-        let held = settings.prior == Prior::Evidence;
-        let mut tolerance = Tolerance::default();
-        let mut x = vec![0.0; count];
-        let mut effective = 0.0;
-        // From the side of noise: what the parameters have not explained yet counts as scatter, so that a few rows are not followed
-        // to the last digit by a prior that makes room for it.
-        scatter = estimate_scatter(&rows, &vec![0.0; rows.offset_count()], effective, scatter);
+        let held = task.settings.prior == Prior::Evidence;
+        let mut estimate = Estimate::new(task)?;
         for round in 0..ESTIMATES {
-            let before = scatter;
-            rows = Rows::new(&task.recipe(scatter, &[], &levers));
-            let spread = tolerance.spread(&base, task.parameters);
-            if held {
-                let (normal, gradient) =
-                    Fit::new(Cow::Borrowed(&rows), &base, spread, &free, DMatrix::zeros(0, count)).normal(&x);
-                tolerance = linearised(&base, task, &normal, &gradient).most_probable();
-            }
-            let prior = prior_rows(&tolerance, &base, task, held || round == 0);
-            let spread = tolerance.spread(&base, task.parameters);
-            let fit = Fit::new(Cow::Borrowed(&rows), &base, spread, &free, prior.clone());
-            x = trust_region::solve(&fit, &x, &settings.trust_region).x;
-            let offsets = fit.offsets(&x);
-            effective = determined(&fit, &x, &prior);
-            scatter = estimate_scatter(&rows, &offsets, effective, scatter);
-            levers = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
-            if round < BASES
-                && let Some(richer) = task.richer(&rows, &offsets, &base)
-            {
-                x = [richer.coordinates(&offsets), x.split_off(base.rank())].concat();
-                (base, count) = (richer, x.len());
-                free = vec![f64::INFINITY; count];
-            }
-            let change = (scatter.point_mm / before.point_mm).ln().abs() + (scatter.stated / before.stated).ln().abs();
+            let before = estimate.scatter;
+            estimate.round(round, held);
+            let after = estimate.scatter;
+            let change = (after.point_mm / before.point_mm).ln().abs() + (after.stated / before.stated).ln().abs();
             if round + 1 >= ROUNDS && change < SAME_SCATTER {
                 break;
             }
         }
-        rows = Rows::new(&task.recipe(scatter, &[], &levers));
-        let prior = prior_rows(&tolerance, &base, task, held);
+        let Estimate { tolerance, effective, .. } = estimate;
+        let (rows, base, free_fit) = estimate.settled(held)?;
+        let free = vec![f64::INFINITY; free_fit.x.len()];
         let spread = tolerance.spread(&base, task.parameters);
-        let mut free_fit = None;
-        for _ in 0..ROUNDS {
-            let fit = Fit::new(Cow::Borrowed(&rows), &base, spread.clone(), &free, prior.clone());
-            let solved = trust_region::solve(&fit, &x, &settings.trust_region);
-            let moved = solved.x.iter().zip(&x).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            x.clone_from(&solved.x);
-            let offsets = fit.offsets(&x);
-            levers = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
-            free_fit = Some(solved);
-            let settled = moved < SAME_CHAIN
-                || !task.parameters.iter().any(|p| matches!(p, Parameter::Gravity(..) | Parameter::Bending(..)));
-            rows = Rows::new(&task.recipe(scatter, &[], &levers));
-            if settled {
-                break;
-            }
-        }
-        let free_fit = free_fit.ok_or(Error::NotFinite)?;
-        let (normal, gradient) =
-            Fit::new(Cow::Borrowed(&rows), &base, spread, &free, DMatrix::zeros(0, count)).normal(&x);
+        let none = DMatrix::zeros(0, free_fit.x.len());
+        let (normal, gradient) = Fit::new(Cow::Borrowed(&rows), &base, spread, &free, none).normal(&free_fit.x);
         let most = match held {
             true => linearised(&base, task, &normal, &gradient).at_most(&tolerance),
             false => tolerance,
         };
-        let (bounds, widened) = bounds(&base, task.parameters, &free_fit.x, settings);
+        let (bounds, widened) = bounds(&base, task.parameters, &free_fit.x, task.settings);
         Ok(Formulation {
             model: task.model,
             rows,
@@ -236,12 +187,28 @@ impl Formulation {
         fit.normal(&self.free_fit.x)
     }
 
-    /// Covariance of all parameters of the robot: what is determined, and what the tolerance leaves open where it holds them.
+    /// Covariance of all parameters of the robot as far as the poses determine them.
     pub fn robot_covariance(&self) -> DMatrix<f64> {
         let rank = self.base.rank();
         let spread = self.spread();
         let of_base = self.covariance().view((0, 0), (rank, rank)).into_owned();
         &spread * of_base * spread.transpose()
+    }
+
+    /// The same with what the poses tell next to nothing of: parameters that only act together, or that nothing saw, as uncertain as they were
+    /// before. At the poses that were fitted it makes no difference, at others it may.
+    pub fn whole_covariance(&self) -> DMatrix<f64> {
+        if !self.held || !self.scale_seen {
+            return self.robot_covariance();
+        }
+        let (_, jacobian) = self.rows.evaluate(&self.offsets_of(), true);
+        let data = product(&jacobian, &jacobian);
+        let sds = self.most.standard_deviations(self.parameters(), &self.rows.extras);
+        let before = DVector::from_iterator(sds.len(), sds.iter().map(|sd| sd.powi(-2)));
+        let covariance = pseudo_inverse(&data + DMatrix::from_diagonal(&before));
+        let more = &covariance * data * &covariance * (self.common - 1.0);
+        let count = self.parameters().len();
+        (covariance + more).view((0, 0), (count, count)).into_owned()
     }
 
     /// Base parameters about which the data say next to nothing: as uncertain as before.
@@ -253,6 +220,89 @@ impl Formulation {
         let after = self.covariance();
         let weak = |&k: &usize| after[(k, k)].sqrt() > 0.9 * before[(k, k)].sqrt();
         (0..self.base.rank()).filter(weak).map(|k| self.base.free[k]).collect()
+    }
+}
+
+/// A fit whose scatter and prior are estimated from its residuals, round by round.
+struct Estimate<'a> {
+    task: &'a Task<'a>,
+    base: Base,
+    scatter: Scatter,
+    tolerance: Tolerance,
+    /// Base parameters and extras.
+    x: Vec<f64>,
+    /// The robot on whose chain weights have their levers.
+    levers: Robot,
+    /// Number of unknowns that the data have determined.
+    effective: f64,
+}
+
+impl<'a> Estimate<'a> {
+    /// From the side of noise: what the parameters have not explained yet counts as scatter, so that a few rows are not followed to the last
+    /// digit by a prior that makes room for it.
+    fn new(task: &'a Task<'a>) -> Result<Estimate<'a>, Error> {
+        let levers = task.robot.clone();
+        let scatter = Scatter { smooth: task.smooth, ..Scatter::of_point(FIRST_SCATTER_MM) };
+        let rows = Rows::new(&task.recipe(scatter, &[], &levers));
+        let base = task.base(&rows)?;
+        task.check_count(&rows, &base)?;
+        let x = vec![0.0; base.rank() + task.extras.len()];
+        let scatter = estimate_scatter(&rows, &vec![0.0; rows.offset_count()], 0.0, scatter);
+        Ok(Estimate { task, base, scatter, tolerance: Tolerance::default(), x, levers, effective: 0.0 })
+    }
+
+    fn round(&mut self, round: usize, held: bool) {
+        let task = self.task;
+        let rows = Rows::new(&task.recipe(self.scatter, &[], &self.levers));
+        let free = vec![f64::INFINITY; self.x.len()];
+        if held {
+            let spread = self.tolerance.spread(&self.base, task.parameters);
+            let none = DMatrix::zeros(0, self.x.len());
+            let (normal, gradient) = Fit::new(Cow::Borrowed(&rows), &self.base, spread, &free, none).normal(&self.x);
+            self.tolerance = linearised(&self.base, task, &normal, &gradient).most_probable();
+        }
+        let prior = prior_rows(&self.tolerance, &self.base, task, held || round == 0);
+        let spread = self.tolerance.spread(&self.base, task.parameters);
+        let fit = Fit::new(Cow::Borrowed(&rows), &self.base, spread, &free, prior.clone());
+        let x = trust_region::solve(&fit, &self.x, &task.settings.trust_region).x;
+        let offsets = fit.offsets(&x);
+        self.effective = determined(&fit, &x, &prior);
+        self.scatter = estimate_scatter(&rows, &offsets, self.effective, self.scatter);
+        self.levers = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
+        self.x = x;
+        if round < BASES
+            && let Some(richer) = task.richer(&rows, &offsets, &self.base)
+        {
+            let of_base = richer.coordinates(&offsets);
+            self.x = [of_base, self.x.split_off(self.base.rank())].concat();
+            self.base = richer;
+        }
+    }
+
+    /// The fit with scatter and prior as they are, on rows whose levers are on the robot that it ends at.
+    fn settled(self, held: bool) -> Result<(Rows, Base, Solution), Error> {
+        let Estimate { task, base, scatter, tolerance, mut x, levers, .. } = self;
+        let mut rows = Rows::new(&task.recipe(scatter, &[], &levers));
+        let prior = prior_rows(&tolerance, &base, task, held);
+        let spread = tolerance.spread(&base, task.parameters);
+        let free = vec![f64::INFINITY; x.len()];
+        let mut free_fit = None;
+        for _ in 0..ROUNDS {
+            let fit = Fit::new(Cow::Borrowed(&rows), &base, spread.clone(), &free, prior.clone());
+            let solved = trust_region::solve(&fit, &x, &task.settings.trust_region);
+            let moved = solved.x.iter().zip(&x).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            x.clone_from(&solved.x);
+            let offsets = fit.offsets(&x);
+            let levers = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
+            free_fit = Some(solved);
+            let settled = moved < SAME_CHAIN
+                || !task.parameters.iter().any(|p| matches!(p, Parameter::Gravity(..) | Parameter::Bending(..)));
+            rows = Rows::new(&task.recipe(scatter, &[], &levers));
+            if settled {
+                break;
+            }
+        }
+        Ok((rows, base, free_fit.ok_or(Error::NotFinite)?))
     }
 }
 

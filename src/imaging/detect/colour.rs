@@ -7,7 +7,7 @@ use crate::imaging::image::Grey8;
 use crate::imaging::lattice::Places;
 
 /// Numbers the rows so that columns, rows and the viewing direction are right-handed.
-pub(super) fn right_handed(grid: Places) -> Places {
+pub fn right_handed(grid: Places) -> Places {
     let mut sum = 0.0;
     for (col, row, p) in grid.iter() {
         if let (Some(x), Some(y)) = (grid.get(col + 1, row), grid.get(col, row + 1)) {

@@ -183,7 +183,7 @@ mod tests {
             let (x, y) = ((cols.start + col + 2) * 12, (rows.start + row + 2) * 12);
             Some(Point2::new(x as f64 - 0.5, y as f64 - 0.5))
         });
-        Detected { corners, copy, level: Level::Reduced(1) }
+        Detected { corners, copy, level: Level::Reduced(1), print: None }
     }
 
     #[test]
@@ -232,7 +232,7 @@ mod tests {
 
     #[test]
     fn lines_of_cut_squares_are_left_out_where_the_board_has_none_for_them() {
-        let board = |squares: &str| Board { squares: squares.parse().unwrap(), square_mm: 1.0 };
+        let board = |squares: &str| Board::checker(squares.parse().unwrap(), 1.0);
         for share in [0.3, 0.5, 0.7] {
             let (copy, grid) = cut(share);
             let kept = without_cut_lines(&copy, &grid, board("7x6")).unwrap();
@@ -241,7 +241,8 @@ mod tests {
             // Which of two lines that are alike is not the board's cannot be told; and there are no more of them.
             assert_eq!(without_cut_lines(&copy, &grid, board("8x7")), None);
             assert_eq!(without_cut_lines(&copy, &grid, board("6x5")), None);
-            let detected = |corners: Places| Detected { corners, copy: copy.clone(), level: Level::Reduced(1) };
+            let detected =
+                |corners: Places| Detected { corners, copy: copy.clone(), level: Level::Reduced(1), print: None };
             let inner = Lattice::from_fn(6, 5, |col, row| grid.get(col + 1, row + 1).copied());
             assert_eq!(lines_beyond(&detected(inner)), (0, 0));
             let part = Lattice::from_fn(7, 7, |col, row| grid.get(col, row).copied());
@@ -254,7 +255,7 @@ mod tests {
     fn lines_of_whole_squares_are_the_boards() {
         let (copy, grid) = cut(1.0);
         for squares in ["7x6", "8x7", "8x8", "9x7"] {
-            let board = Board { squares: squares.parse().unwrap(), square_mm: 1.0 };
+            let board = Board::checker(squares.parse().unwrap(), 1.0);
             assert_eq!(without_cut_lines(&copy, &grid, board), None, "{squares}");
         }
     }
@@ -267,7 +268,7 @@ mod tests {
             Some(p) => Some(*p),
             None => Some(Point2::new(95.5, 23.5 + 12.0 * row as f64)).filter(|_| row < 3),
         });
-        let board = Board { squares: "7x6".parse().unwrap(), square_mm: 1.0 };
+        let board = Board::checker("7x6".parse().unwrap(), 1.0);
         assert_eq!(without_cut_lines(&copy, &grid, board).map(|grid| grid.count()), Some(30));
     }
 

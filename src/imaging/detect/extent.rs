@@ -148,7 +148,7 @@ mod tests {
 
     /// What is in view of a board whose first inner corner lies at a place, completed; the count of its corners, all at their places.
     fn seen(squares: &str, at: (f64, f64), hidden: impl Fn(f64, f64) -> bool) -> Option<usize> {
-        let board = Board { squares: squares.parse().unwrap(), square_mm: 1.0 };
+        let board = Board::checker(squares.parse().unwrap(), 1.0);
         let (w, h) = (120, 100);
         let colour = |x: f64, y: f64| {
             let (i, j) = (((x - at.0) / SIDE).floor() as isize + 1, ((y - at.1) / SIDE).floor() as isize + 1);

@@ -25,6 +25,10 @@ const STRAY: f64 = 0.3;
 const WEAKER: i16 = 4;
 /// What of the contrast at its ends an edge shows at least, along each of its halves.
 const EDGE_CONTRAST: f64 = 0.25;
+/// Length of the ways along an edge that are looked at, as a share of it.
+const ALONG: f64 = 0.4;
+/// How far from an edge both squares are looked at, as a share of such a way: where they certainly are, even on an oblique board.
+const ASIDE: f64 = 0.4;
 /// How far the bright axes of neighbours may be from perpendicular, rad.
 const SLANT: f64 = 0.6;
 
@@ -60,10 +64,45 @@ pub fn largest_grid(picture: &Grey8, enough: usize) -> Option<Places> {
     as_grid(&best, &candidates).filter(|grid| grid.columns >= 3 && grid.rows >= 3)
 }
 
+/// All grids of four corners and more in a picture of a board with markers, the largest first: parts of a board that something divides. Edges are
+/// looked at within the `margin` round a marker, a share of a square.
+pub fn grids(picture: &Grey8, margin: f64) -> Vec<Places> {
+    /// A square with a marker in it.
+    const FEWEST: usize = 4;
+    let candidates = candidates(picture);
+    let near = Near { aside: margin / 2.0 / ALONG, ..Near::new(picture, &candidates) };
+    let mut taken = vec![false; candidates.len()];
+    let mut found: Vec<Vec<(Place, usize)>> = Vec::new();
+    let mut seeds = 0;
+    for first in 0..candidates.len() {
+        if taken[first] {
+            continue;
+        }
+        if seeds == MOST_SEEDS {
+            break;
+        }
+        seeds += 1;
+        let grown = grow(&candidates, &near, first, longest_step(picture, 1));
+        if grown.len() >= FEWEST {
+            let is_new = grown.iter().any(|&(_, i)| !taken[i]);
+            grown.iter().for_each(|&(_, i)| taken[i] = true);
+            if is_new {
+                found.push(grown);
+            }
+        }
+    }
+    // Stable: equal ones stay in the order of their seeds.
+    found.sort_by_key(|grown| std::cmp::Reverse(grown.len()));
+    let grids = found.iter().filter_map(|grown| as_grid(grown, &candidates));
+    grids.filter(|grid| grid.columns >= 2 && grid.rows >= 2).collect()
+}
+
 /// Candidates by cells of the picture.
 struct Near<'a> {
     picture: &'a Grey8,
     candidates: &'a [Candidate],
+    /// Where the squares beside an edge are looked at, as a share of the way along it.
+    aside: f64,
     /// Cells in a row.
     columns: usize,
     /// Row by row; each candidate with its place, which is all that most questions are about.
@@ -77,7 +116,7 @@ impl<'a> Near<'a> {
     fn new(picture: &'a Grey8, candidates: &'a [Candidate]) -> Near<'a> {
         let cells_of = |size: usize| cell_of(size as f64, usize::MAX) + 1;
         let (columns, rows) = (cells_of(picture.width), cells_of(picture.height));
-        let mut near = Near { picture, candidates, columns, cells: vec![Vec::new(); columns * rows] };
+        let mut near = Near { picture, candidates, aside: ASIDE, columns, cells: vec![Vec::new(); columns * rows] };
         for (i, c) in candidates.iter().enumerate() {
             let [x, y] = near.cell(&c.at);
             near.cells[y * columns + x].push((c.at, i));
@@ -128,13 +167,12 @@ impl Near<'_> {
         let bright_left = (a.axis - step.y.atan2(step.x)).rem_euclid(PI) < FRAC_PI_2;
         let sign = if bright_left { 1.0 } else { -1.0 };
         let least = EDGE_CONTRAST * a.contrast.max(b.contrast);
-        [0.1, 0.5].into_iter().all(|from| sign * self.across(a.at + step * from, step * 0.4) > least)
+        [0.1, 0.5].into_iter().all(|from| sign * self.across(a.at + step * from, step * ALONG) > least)
     }
 
     /// Mean grey on the left of a way less that on its right.
     fn across(&self, from: Point2<f64>, way: Vector2<f64>) -> f64 {
-        // To where the squares on both sides certainly are, even on an oblique board: the way is 0.4 of an edge.
-        let aside = Vector2::new(-way.y, way.x) * 0.4;
+        let aside = Vector2::new(-way.y, way.x) * self.aside;
         let samples = (way.norm().ceil() as usize).clamp(2, 32);
         let step = way / samples as f64;
         let sums = [from + aside, from - aside].map(|from| self.sum(from + 0.5 * step, step, samples));

@@ -16,8 +16,11 @@ mod saddles;
 
 use nalgebra::Point2;
 
-use self::colour::{right_handed, turn_by_colours};
+pub use self::colour::right_handed;
+use self::colour::turn_by_colours;
+pub use self::growth::grids;
 use self::growth::largest_grid;
+use super::coded::{self, Print};
 use super::image::{Grey8, Picture};
 use super::lattice::{Lattice, Places};
 use super::pyramid::{Level, factor_for};
@@ -41,6 +44,8 @@ pub struct Detected {
     pub copy: Grey8,
     /// Its size; never doubled.
     pub level: Level,
+    /// How its markers are printed, where it has any.
+    pub print: Option<Print>,
 }
 
 /// Why a picture gave no corners.
@@ -105,6 +110,9 @@ impl Search {
 
 /// Looks for the board; the reason where it was not found.
 pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
+    if board.is_coded() {
+        return coded::detect(picture, board);
+    }
     if let Some(detected) = at_a_glance(picture, board) {
         return Ok(detected);
     }
@@ -172,7 +180,7 @@ fn at_a_glance(picture: &Picture, board: Board) -> Option<Detected> {
         return None;
     }
     let corners = turn_by_colours(&copy, right_handed(grid), board);
-    Some(Detected { corners, copy, level })
+    Some(Detected { corners, copy, level, print: None })
 }
 
 /// The board, or a part of it, by one attempt; another grid is kept as seen.
@@ -250,13 +258,13 @@ fn of_size(small: &Grey8, grid: &Places, board: Board) -> Option<Places> {
 }
 
 /// What was found on a copy, on one that is no finer than the picture.
-fn on_a_copy(picture: &Picture, level: Level, small: &Grey8, corners: Places) -> Detected {
+pub fn on_a_copy(picture: &Picture, level: Level, small: &Grey8, corners: Places) -> Detected {
     match level {
-        Level::Reduced(_) | Level::Skimmed(_) => Detected { corners, copy: small.clone(), level },
+        Level::Reduced(_) | Level::Skimmed(_) => Detected { corners, copy: small.clone(), level, print: None },
         Level::Doubled => {
             let level = Level::Reduced(1);
             let corners = corners.map(|p| level.to_copy(&Level::Doubled.to_picture(p)));
-            Detected { corners, copy: level.copy(picture), level }
+            Detected { corners, copy: level.copy(picture), level, print: None }
         }
     }
 }
@@ -302,7 +310,7 @@ mod tests {
 
     #[test]
     fn large_squares_are_found_on_a_smaller_copy_than_small_ones() {
-        let board = Board { squares: "8x6".parse().unwrap(), square_mm: 10.0 };
+        let board = Board::checker("8x6".parse().unwrap(), 10.0);
         let (glance, first) = (Level::Skimmed(4), Level::Reduced(2));
         for (side, level) in [(170, glance), (48, glance), (40, first), (20, first)] {
             let detected = detect(&picture(2048, side), board).unwrap();
@@ -317,9 +325,9 @@ mod tests {
 
     #[test]
     fn a_part_of_a_board_is_not_what_is_seen_at_a_glance() {
-        let board = Board { squares: "9x6".parse().unwrap(), square_mm: 10.0 };
+        let board = Board::checker("9x6".parse().unwrap(), 10.0);
         assert!(at_a_glance(&picture(2048, 170), board).is_none());
-        let smaller = Board { squares: "7x6".parse().unwrap(), square_mm: 10.0 };
+        let smaller = Board::checker("7x6".parse().unwrap(), 10.0);
         assert!(at_a_glance(&picture(2048, 170), smaller).is_none());
         assert!(detect(&picture(2048, 170), smaller).is_err());
     }

@@ -9,6 +9,7 @@ use nalgebra::{Matrix2, Point2};
 use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
 
 use crate::files::OutDir;
+use crate::imaging::coded::{Layout, Print};
 use crate::imaging::detect::Refusal;
 use crate::imaging::image::Grey8;
 use crate::imaging::lattice::Lattice;
@@ -17,10 +18,19 @@ use crate::imaging::{Board, Corner, Mosaic};
 
 /// Names the algorithm by what it finds: a hash of the corners of the golden pictures below. A change that moves a corner fails the test
 /// `the_algorithm_is_named_by_what_it_finds`, which says the new name.
-const ALGORITHM: &str = "corners 92b18f9e9bafd878";
+const ALGORITHM: &str = "corners 137b2dac1f53389a";
+
+/// A board in a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sighting {
+    /// Its corners.
+    pub corners: Lattice<Corner>,
+    /// How its markers are printed, where it has any.
+    pub print: Option<Print>,
+}
 
 /// What was found in a picture, or why nothing.
-pub type Look = Result<Lattice<Corner>, Refusal>;
+pub type Look = Result<Sighting, Refusal>;
 
 /// A place for what was found.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +46,7 @@ impl Cache<'_> {
     pub fn entry(&self, picture_hash: &str, board: Board, mosaic: Option<Mosaic>) -> String {
         let mut hash = Xxh3Default::new();
         hash.update(ALGORITHM.as_bytes());
-        hash.update(board.squares.to_string().as_bytes());
+        hash.update(board.key().as_bytes());
         hash.update(mosaic.map_or("grey", Mosaic::name).as_bytes());
         hash.update(picture_hash.as_bytes());
         format!("{:032x}", hash.digest128())
@@ -99,8 +109,12 @@ fn text(look: &Look) -> String {
             let seen = seen.map_or("-".to_owned(), |squares| squares.to_string());
             body.push_str(&format!("none {seen} {}\n", reason.replace('\n', " ")));
         }
-        Ok(grid) => {
-            for (_, _, c) in grid.iter() {
+        Ok(Sighting { corners, print }) => {
+            if let Some(Print { share, layout, inverted }) = print {
+                let old = u8::from(*layout == Layout::Old);
+                body.push_str(&format!("print {share} {old} {}\n", u8::from(*inverted)));
+            }
+            for (_, _, c) in corners.iter() {
                 let [xx, xy, yy] = c.covariance_px2.map_or([f64::NAN; 3], |s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]]);
                 let (x, y, blur, used) = (c.px.x, c.px.y, c.blur_px.unwrap_or(f64::NAN), u8::from(c.used));
                 let [along_rows, along_columns] = c.reach.unwrap_or([f64::NAN; 2]);
@@ -123,6 +137,15 @@ fn parse(text: &str, board: Board) -> Option<Look> {
         let seen = if seen == "-" { None } else { Some(seen.parse().ok()?) };
         return Some(Err(Refusal { reason: reason.strip_suffix('\n')?.to_owned(), seen }));
     }
+    let (print, body) = match body.strip_prefix("print ") {
+        None => (None, body),
+        Some(rest) => {
+            let (line, rest) = rest.split_once('\n')?;
+            let [share, old, inverted] = line.split(' ').collect::<Vec<_>>().try_into().ok()?;
+            let layout = if old == "1" { Layout::Old } else { Layout::New };
+            (Some(Print { share: share.parse().ok()?, layout, inverted: inverted == "1" }), rest)
+        }
+    };
     let mut grid: Lattice<Corner> = Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
     for line in body.lines() {
         let numbers: Vec<f64> = line.split(' ').map(|n| n.parse().ok()).collect::<Option<_>>()?;
@@ -138,7 +161,7 @@ fn parse(text: &str, board: Board) -> Option<Look> {
         let corner = Corner { col, row, px, covariance_px2, blur_px, reach, used: used != 0.0 };
         *grid.cells.get_mut(row * board.columns() + col)? = Some(corner);
     }
-    Some(Ok(grid))
+    Some(Ok(Sighting { corners: grid, print }))
 }
 
 #[cfg(test)]
@@ -148,18 +171,22 @@ mod tests {
     use crate::imaging::{detect, refine};
 
     fn board() -> Board {
-        Board { squares: "4x3".parse().unwrap(), square_mm: 10.0 }
+        Board::checker("4x3".parse().unwrap(), 10.0)
     }
 
     #[test]
     fn entries_read_back_exactly_and_broken_ones_not_at_all() {
-        let look: Look = Ok(Lattice::from_fn(3, 2, |col, row| {
+        let corners = Lattice::from_fn(3, 2, |col, row| {
             let covariance_px2 = (col > 0).then(|| Matrix2::new(1.0 / 3e5, 1e-8, 1e-8, 2e-6));
             let px = Point2::new(1.0 / 3.0 + col as f64, row as f64);
             let blur_px = (col > 0).then_some(1.0 / 3.0);
             let reach = (col > 0).then_some([0.1, 2.0 / 3.0]);
             (row + col < 3).then_some(Corner { col, row, px, covariance_px2, blur_px, reach, used: col > 0 })
-        }));
+        });
+        let print = Some(Print { share: 0.7, layout: Layout::Old, inverted: true });
+        let coded: Look = Ok(Sighting { corners: corners.clone(), print });
+        assert_eq!(parse(&text(&coded), board()), Some(coded));
+        let look: Look = Ok(Sighting { corners, print: None });
         let written = text(&look);
         assert_eq!(parse(&written, board()), Some(look));
         for cut in 0..written.len() {
@@ -191,7 +218,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = OutDir::open(camino::Utf8Path::from_path(dir.path()).unwrap()).unwrap();
         let cache = Cache { out: &out, thumbnails: true };
-        let other = Board { squares: "5x3".parse().unwrap(), square_mm: 10.0 };
+        let other = Board::checker("5x3".parse().unwrap(), 10.0);
         let entry = |hash: &str, board, mosaic| cache.entry(hash, board, mosaic);
         let first = entry("a", board(), None);
         assert_eq!(first, entry("a", board(), None));
@@ -230,7 +257,7 @@ mod tests {
 
     #[test]
     fn the_algorithm_is_named_by_what_it_finds() {
-        let board = Board { squares: "9x7".parse().unwrap(), square_mm: 10.0 };
+        let board = Board::checker("9x7".parse().unwrap(), 10.0);
         let eight = |size: usize, side: f64, zigzag: f64| {
             let pixels = golden_picture(size, side, 255.0, zigzag).into_iter().map(|v| v as u8).collect();
             Picture::from(Image { width: size, height: size, pixels })

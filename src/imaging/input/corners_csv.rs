@@ -1,7 +1,7 @@
 //! `corners.csv`: corners of all pairs as text, from this program or from any other detector.
 //!
 //! In: a CSV file with the columns `pair,side,col,row,x_px,y_px` and optionally
-//! `sxx_px2,sxy_px2,syy_px2,used,blur_px,width_px,height_px`, rows in any order. Out: [`Corners`], and back. Raw (distorted)
+//! `sxx_px2,sxy_px2,syy_px2,used,blur_px,width_px,height_px`, rows in any order; where the board has markers `id` may stand for `col` and `row`. Out: [`Corners`], and back. Raw (distorted)
 //! pixels, pixel (0, 0) is the centre of the top-left pixel. Width and height are those of the picture, one size for each side; a
 //! file without them needs them said.
 
@@ -22,8 +22,8 @@ pub const HEADER: &str = "pair,side,col,row,x_px,y_px,sxx_px2,sxy_px2,syy_px2,us
 
 /// The text of `corners.csv`. Numbers are written so that they read back exactly.
 pub fn to_csv(corners: &Corners) -> String {
-    let mut text = String::from(HEADER);
-    text.push('\n');
+    let board = corners.board;
+    let mut text = format!("{HEADER}{}\n", if board.is_coded() { ",id" } else { "" });
     for pair in &corners.pairs {
         let sides = [(Side::Left, &pair.left, corners.left_size), (Side::Right, &pair.right, corners.right_size)];
         for (side, list, (w, h)) in sides {
@@ -33,7 +33,11 @@ pub fn to_csv(corners: &Corners) -> String {
                 let blur = c.blur_px.map_or_else(String::new, |blur| blur.to_string());
                 let (name, side, used) = (quoted(&pair.pair), side.name(), u8::from(c.used));
                 let (col, row, x, y) = (c.col, c.row, c.px.x, c.px.y);
-                let _ = writeln!(text, "{name},{side},{col},{row},{x},{y},{s},{used},{blur},{w},{h}");
+                let _ = write!(text, "{name},{side},{col},{row},{x},{y},{s},{used},{blur},{w},{h}");
+                if board.is_coded() {
+                    let _ = write!(text, ",{}", board.index(col, row));
+                }
+                text.push('\n');
             }
         }
     }
@@ -44,18 +48,19 @@ pub fn to_csv(corners: &Corners) -> String {
 ///
 /// Refused with the line: bad numbers, an unknown side, a corner that stands there twice or does not exist on the board or in the
 /// picture, a size that differs from that of the side's other pictures or from `size`.
-/// A file whose columns run along the shorter side is turned by 90 degrees. Pairs seen by one camera only are skipped.
+/// A file whose columns run along the shorter side is turned by 90 degrees. Pairs seen by one camera only are skipped, but for boards whose
+/// corners have numbers of their own.
 pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<Corners> {
     let hint = "`stereocal camera-check IMAGES` writes corners.csv beside its report";
     let table = Table::read(path, "corners file", hint)?;
-    let mut rows = parse(&table)?;
+    let mut rows = parse(&table, board)?;
     let mut notes = Vec::new();
     if fit_to_board(&table, &mut rows, board)? {
         notes.push("the columns of the corners file run along the shorter side: turned by 90 degrees".to_owned());
     }
     let [left_size, right_size] =
         [size_of(&table, &rows, Side::Left, size)?, size_of(&table, &rows, Side::Right, size)?];
-    let (pairs, skipped) = gather(rows);
+    let (pairs, skipped) = gather(rows, board);
     Ok(Corners { board, left_size, right_size, pairs, skipped, notes })
 }
 
@@ -99,9 +104,14 @@ fn inside(px: &Point2<f64>, (w, h): (u32, u32)) -> bool {
     (-0.5..=f64::from(w) - 0.5).contains(&px.x) && (-0.5..=f64::from(h) - 0.5).contains(&px.y)
 }
 
-fn parse(table: &Table) -> Result<Vec<Row>> {
+fn parse(table: &Table, board: Board) -> Result<Vec<Row>> {
     let (pair, side) = (table.require("pair")?, table.require("side")?);
-    let (col, row) = (table.require("col")?, table.require("row")?);
+    let id = table.column("id").filter(|_| board.is_coded());
+    let place = match (id, table.column("col"), table.column("row")) {
+        (Some(_), Some(col), Some(row)) => Some((col, row)),
+        (Some(_), ..) => None,
+        (None, ..) => Some((table.require("col")?, table.require("row")?)),
+    };
     let (x, y) = (table.require("x_px")?, table.require("y_px")?);
     let covariance = ["sxx_px2", "sxy_px2", "syy_px2"].map(|name| table.column(name));
     let used = table.column("used");
@@ -125,7 +135,21 @@ fn parse(table: &Table) -> Result<Vec<Row>> {
                 table.refuse(line, format!("`{}` is not a count: `{}`", table.header[column], &fields[column]))
             })
         };
-        let (col, row) = (count(col)?, count(row)?);
+        let by_place = match place {
+            Some((col, row)) => Some((count(col)?, count(row)?)),
+            None => None,
+        };
+        let by_id = match id {
+            Some(id) => Some(board.place(count(id)?)),
+            None => None,
+        };
+        if let (Some((col, row)), Some((c, r))) = (by_place, by_id)
+            && by_place != by_id
+        {
+            let message = format!("corner {col},{row} has the id of {c},{r} on a board of {} squares", board.squares);
+            return Err(table.refuse(line, message));
+        }
+        let Some((col, row)) = by_place.or(by_id) else { continue };
         if let Some(first) = seen.insert((name.clone(), side, col, row), line) {
             let message = format!("corner {col},{row} of the {} picture of {name} stands in line {first}", side.name());
             return Err(table.refuse(line, message));
@@ -170,7 +194,8 @@ fn fit_to_board(table: &Table, rows: &mut [Row], board: Board) -> Result<bool> {
     if rows.iter().all(|r| r.corner.col < columns && r.corner.row < lines) {
         return Ok(false);
     }
-    if rows.iter().all(|r| r.corner.col < lines && r.corner.row < columns) {
+    // The order of a board with markers is a part of it.
+    if !board.is_coded() && rows.iter().all(|r| r.corner.col < lines && r.corner.row < columns) {
         for row in rows {
             // A quarter turn, not a transposition: a mirrored board would lie behind the camera.
             (row.corner.col, row.corner.row) = (row.corner.row, lines - 1 - row.corner.col);
@@ -186,11 +211,15 @@ fn fit_to_board(table: &Table, rows: &mut [Row], board: Board) -> Result<bool> {
             board.squares
         ),
         place: Place { path: table.path.to_owned(), line: Some(line) },
-        hint: Some(format!("`--squares {}x{}` if the board has that many squares", col + 2, row + 2)),
+        hint: Some(if board.is_coded() {
+            format!("a board of {}x{} squares or more, columns first as printed, has such corners", col + 2, row + 2)
+        } else {
+            format!("`--squares {}x{}` if the board has that many squares", col + 2, row + 2)
+        }),
     })
 }
 
-fn gather(rows: Vec<Row>) -> (Vec<PairCorners>, Vec<Skipped>) {
+fn gather(rows: Vec<Row>, board: Board) -> (Vec<PairCorners>, Vec<Skipped>) {
     let mut pairs: BTreeMap<String, PairCorners> = BTreeMap::new();
     for row in rows {
         let pair =
@@ -205,6 +234,12 @@ fn gather(rows: Vec<Row>) -> (Vec<PairCorners>, Vec<Skipped>) {
     let mut pairs: Vec<PairCorners> = pairs.into_values().collect();
     pairs.sort_by(|a, b| natural_order(&a.pair, &b.pair));
     for mut pair in pairs {
+        pair.left.sort_by_key(|c| (c.row, c.col));
+        pair.right.sort_by_key(|c| (c.row, c.col));
+        if board.is_coded() {
+            kept.push(pair);
+            continue;
+        }
         for (list, side) in [(&pair.left, Side::Left), (&pair.right, Side::Right)] {
             if list.is_empty() {
                 let reason = format!("no corners in the {} picture", side.name());
@@ -214,8 +249,6 @@ fn gather(rows: Vec<Row>) -> (Vec<PairCorners>, Vec<Skipped>) {
         if pair.left.is_empty() || pair.right.is_empty() {
             continue;
         }
-        pair.left.sort_by_key(|c| (c.row, c.col));
-        pair.right.sort_by_key(|c| (c.row, c.col));
         kept.push(pair);
     }
     (kept, skipped)
@@ -229,7 +262,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = Utf8Path::from_path(dir.path()).unwrap().join("corners.csv");
         std::fs::write(&path, text).unwrap();
-        read(&path, Board { squares: squares.parse().unwrap(), square_mm: 10.0 }, size)
+        read(&path, Board::checker(squares.parse().unwrap(), 10.0), size)
     }
 
     #[test]
@@ -241,7 +274,7 @@ mod tests {
             |col, row, x: f64| Corner { col, row, px: px(x), covariance_px2, blur_px, reach: None, used: true };
         let plain = |c: Corner| Corner { covariance_px2: None, blur_px: None, used: false, ..c };
         let corners = Corners {
-            board: Board { squares: "4x3".parse().unwrap(), square_mm: 10.0 },
+            board: Board::checker("4x3".parse().unwrap(), 10.0),
             left_size: (640, 480),
             right_size: (320, 240),
             pairs: vec![PairCorners {
@@ -314,6 +347,31 @@ mod tests {
             (Point2::new(0.0, 0.0), Point2::new(0.0, 20.0), Point2::new(10.0, 0.0))
         );
         assert_eq!(corners.notes.len(), 1);
+    }
+
+    #[test]
+    fn corners_of_a_board_with_markers_have_ids_and_may_be_seen_by_one_camera() {
+        let board: Board = "charuco:4x5:20:14:DICT_4X4_50".parse().unwrap();
+        let read = |text: &str| {
+            let dir = tempfile::tempdir().unwrap();
+            let path = Utf8Path::from_path(dir.path()).unwrap().join("corners.csv");
+            std::fs::write(&path, text).unwrap();
+            read(&path, board, Some((640, 480)))
+        };
+        let corners = read("pair,side,id,x_px,y_px\na,left,0,1,2\na,left,10,3,4\nb,right,11,5,6\n").unwrap();
+        let places: Vec<_> = corners.pairs[0].left.iter().map(|c| (c.col, c.row)).collect();
+        assert_eq!((places, corners.pairs[1].left.len()), (vec![(0, 0), (1, 3)], 0));
+        let with_size = |text: &str| text.lines().map(|line| format!("{line}\n")).collect::<String>();
+        let back = read(&with_size(&to_csv(&corners))).unwrap();
+        assert_eq!(back, corners);
+        for (text, why) in [
+            ("pair,side,col,row,id,x_px,y_px\na,left,1,1,5,1,2\n", "has the id of 2,1"),
+            ("pair,side,id,x_px,y_px\na,left,12,1,2\n", "row 4"),
+            ("pair,side,col,row,x_px,y_px\na,left,3,0,1,2\n", "col 3"),
+        ] {
+            let message = format!("{}", read(text).unwrap_err());
+            assert!(message.contains(why), "{message}");
+        }
     }
 
     #[test]

@@ -1,8 +1,23 @@
-//! What surrounds a corner: its edges, as long as its squares.
+//! What surrounds a corner: its edges, as long as its squares, and the markers in two of these.
 
 use nalgebra::{Point2, Vector2};
 
+use super::saddle_fit::window::Quad;
+use crate::imaging::coded::Print;
+use crate::imaging::coded::local_map;
+use crate::imaging::coded::marker::{mapped, square_map};
 use crate::imaging::lattice::Places;
+
+/// What a marker's outline reaches beyond it, blurs, and how far from where it should be it may be printed, px.
+const HALO_BLURS: f64 = 3.0;
+const HALO_PX: f64 = 1.0;
+/// Least margin between an edge and a marker beside it in which the edge is seen by itself, px and in blurs.
+const LEAST_MARGIN_PX: f64 = 2.0;
+const LEAST_MARGIN_BLURS: f64 = 3.0;
+
+/// A square with a marker, from the corner on: where its own four corners lie, relative to the corner.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) struct Marked([Vector2<f64>; 4]);
 
 /// A corner's surroundings: vectors along the two edges, as long as to the nearer neighbour.
 #[derive(Clone, Copy)]
@@ -11,6 +26,10 @@ pub(super) struct Cell {
     pub(super) place: Point2<f64>,
     /// Along the rows and along the columns, px.
     pub(super) edges: [Vector2<f64>; 2],
+    /// Side of the markers, as a share of a square's.
+    pub(super) share: f64,
+    /// The squares that hold them.
+    pub(super) marked: [Option<Marked>; 2],
 }
 
 impl Cell {
@@ -28,8 +47,52 @@ impl Cell {
                 (one, other) => one.or(other),
             }
         };
-        let cell = Cell { place, edges: [edge(1, 0)?, edge(0, 1)?] };
+        let cell = Cell { place, edges: [edge(1, 0)?, edge(0, 1)?], share: 0.0, marked: [None; 2] };
         (cell.side() * cell.skew() > LEAST_HEIGHT_PX).then_some(cell)
+    }
+
+    /// The same on a board with markers.
+    pub(super) fn with_markers(self, places: &Places, (col, row): (usize, usize), print: Option<Print>) -> Cell {
+        let Some(Print { share, layout, .. }) = print else { return self };
+        let (col, row) = (col as isize, row as isize);
+        // The square after the corner both ways or one of its neighbours: markers stand in two that lie opposite.
+        let after = if layout.holds_marker(col + 1, row + 1) { [(0, 0), (-1, -1)] } else { [(-1, 0), (0, -1)] };
+        let marked = after.map(|(c, r)| {
+            let known = local_map::square(places, (col + c, row + r)).map(|corners| corners.map(|p| p - self.place));
+            let [a, b] = self.edges;
+            let edges_only = || {
+                let first = a * c as f64 + b * r as f64;
+                [first, first + a, first + a + b, first + b]
+            };
+            Some(Marked(known.unwrap_or_else(edges_only)))
+        });
+        Cell { share, marked, ..self }
+    }
+
+    /// Distance from an edge to the markers beside it, px; infinite without markers.
+    fn margin_px(&self) -> f64 {
+        if self.marked == [None; 2] {
+            return f64::INFINITY;
+        }
+        (1.0 - self.share) / 2.0 * self.side() * self.skew()
+    }
+
+    /// What a window of such a blur leaves out; `None` where markers stand too near for the edges to be seen by themselves.
+    pub(super) fn hidden(&self, blur_px: f64) -> Option<[Option<Quad>; 2]> {
+        let is_clear = self.margin_px() >= LEAST_MARGIN_PX.max(LEAST_MARGIN_BLURS * blur_px);
+        is_clear.then(|| self.hidden_by(HALO_BLURS * blur_px + HALO_PX))
+    }
+
+    /// The markers beside the corner, larger by a halo, px.
+    pub(super) fn hidden_by(&self, halo_px: f64) -> [Option<Quad>; 2] {
+        // What an edge's own blur shows of a marker is nothing where it begins within the halo.
+        let near = ((1.0 - self.share) / 2.0 - halo_px / (self.side() * self.skew())).max(0.0);
+        self.marked.map(|marked| {
+            let corners = marked?.0.map(Point2::from);
+            let map = square_map(&corners)?;
+            let far = 1.0 - near;
+            Some(Quad([(near, near), (far, near), (far, far), (near, far)].map(|(x, y)| mapped(&map, x, y).coords)))
+        })
     }
 
     /// Length of the shorter edge, px.

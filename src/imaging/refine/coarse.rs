@@ -14,10 +14,14 @@ use crate::imaging::lattice::Lattice;
 /// Half of the first window on the copy, px.
 const FIRST_HALF_PX: f64 = 6.0;
 
+/// How far from a marker's outline pixels are left out, blurs.
+const HALO_BLURS: f64 = 1.0;
+
 /// A first fit of each corner on the reduced copy.
 pub(super) fn coarse(detected: &Detected, window: &mut Window) -> Lattice<Measured> {
     Lattice::from_fn(detected.corners.columns, detected.corners.rows, |col, row| {
         let cell = Cell::of(&detected.corners, col, row)?;
+        let cell = cell.with_markers(&detected.corners, (col, row), detected.print);
         let (fit, reach) = coarse_fit(&detected.copy, &cell, window)?;
         Some(Measured { px: fit.place(&cell.place), fit, reach })
     })
@@ -39,7 +43,10 @@ fn coarse_fit(copy: &Image<u8>, cell: &Cell, window: &mut Window) -> Option<(Fit
         };
         let halves = cell.edges.map(|e| e.normalize() * half);
         // A stretched copy reaches 255 without being clipped.
-        window.collect(copy, 0.0, &Below(f64::MAX), &Frame { start: cell.place, halves, band_px: f64::MAX });
+        // A first fit is but a start: what the blur of a marker does to it matters less than pixels.
+        let hidden = cell.hidden_by(HALO_BLURS * start.blur_px[0]);
+        let frame = Frame { start: cell.place, halves, band_px: f64::MAX, hidden };
+        window.collect(copy, 0.0, &Below(f64::MAX), &frame);
         if let Some(first) = fit(&start, window, None)
             && plausible(&first, &start, cell, MOST_LIGHT_CHANGE)
             && (first.model.blur_px.iter().all(|&s| s < 0.4 * half) || half >= most)

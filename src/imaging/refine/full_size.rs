@@ -57,7 +57,8 @@ impl<T: Sample> Full<'_, T> {
         Full {
             image,
             clip_level,
-            veil: veil::level(image, clip_level, &places),
+            // The middles of squares with markers are neither light nor dark.
+            veil: if detected.print.is_none() { veil::level(image, clip_level, &places) } else { 0.0 },
             stray: None,
             most_light_change: acceptance::MOST_LIGHT_CHANGE,
         }
@@ -207,7 +208,8 @@ impl<T: Sample> Full<'_, T> {
             let margin = margin_px(&start, cell);
             let halves = cell.edges.map(|e| e.normalize() * half_px(e.norm(), margin).min(most_half_px));
             let band_px = BAND_BLURS * blur + 1.0;
-            window.collect(self.image, self.veil, keep, &Frame { start: cell.place, halves, band_px });
+            let hidden = cell.hidden(blur)?;
+            window.collect(self.image, self.veil, keep, &Frame { start: cell.place, halves, band_px, hidden });
             let found = fit(&start, window, self.stray)?;
             let wider = found.model.blur_px[0].max(found.model.blur_px[1]);
             // The copy may have hidden how wide the blur is; the band must hold the whole edge.

@@ -107,7 +107,7 @@ fn draw(corner: &mut Measured, light: Vector2<f64>, variance: f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::saddle_fit::{Fit, Model};
+    use super::super::saddle_fit::{Fit, Misfit, Model};
     use super::*;
 
     /// A board of fits whose places are off by what their gradients are off by, times a blur of 2 px squared; deviations of
@@ -133,7 +133,7 @@ mod tests {
                 light_covariance: Matrix2::identity() * 1e-8,
                 residual: 1.0,
                 arm_misfit: [[1.0; 2]; 2],
-                arm_freedom: 4.0,
+                misfits: [Misfit::default(); 2],
                 stray: None,
                 pixels: 100,
                 left_out: 0,

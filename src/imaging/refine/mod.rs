@@ -94,15 +94,14 @@ impl<T: Sample> Full<'_, T> {
     fn measure(&self, detected: &Detected) -> Lattice<Measured> {
         let mut window = Window::default();
         let mut seen = self.look(detected, &mut window);
-        let mut scatter = Scatter::of(&seen.measured);
-        // Where corners scatter as noise does there is nothing to look for.
-        if !scatter.is_noise() {
-            if let Some(stray) = self.stray_light(&seen.windows, &mut window) {
-                seen = self.with_stray(stray).look(detected, &mut window);
-                scatter = Scatter::of(&seen.measured);
-            }
-            scatter.carry(&mut seen.measured);
+        // Where corners are as noise makes them there is nothing to look for.
+        if scatter::miss_the_model(&seen.measured)
+            && let Some(stray) = self.stray_light(&seen.windows, &mut window)
+        {
+            seen = self.with_stray(stray).look(detected, &mut window);
         }
+        let scatter = Scatter::of(&seen.measured);
+        scatter.carry(&mut seen.measured);
         let Seen { windows, board, mut measured } = seen;
         illumination::tie(&mut measured);
         let usual_px2 = acceptance::usual_variance(measured.iter().map(|(_, _, m)| m));
@@ -143,7 +142,7 @@ impl<T: Sample> Full<'_, T> {
         let scale = detected.level.scale();
         let near: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
             let from = coarse.get(col, row)?;
-            let cell = Cell::of(&places, col, row)?;
+            let cell = Cell::of(&places, col, row)?.with_markers(&places, (col, row), detected.print);
             let start = Model {
                 corner: Vector2::zeros(),
                 bend: at(&coarse_bends, col, row),
@@ -245,7 +244,7 @@ mod tests {
 
     #[test]
     fn bent_edges_are_seen_in_windows_that_are_alike_and_small_where_they_bend_much() {
-        let board = Board { squares: "8x7".parse().unwrap(), square_mm: 10.0 };
+        let board = Board::checker("8x7".parse().unwrap(), 10.0);
         let mean_reach = |zigzag_px: f64| {
             let picture = zigzag_board(zigzag_px);
             let measured = measure(&picture, &detect::detect(&picture, board).unwrap());

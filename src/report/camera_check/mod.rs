@@ -27,7 +27,8 @@ use self::summary::{advice, deciding, word};
 pub fn worst_first(judged: &Judged) -> Vec<usize> {
     let pairs = &judged.accuracy.pairs;
     let mut order: Vec<usize> = (0..pairs.len()).collect();
-    order.sort_by(|&a, &b| pairs[b].max_abs_error_mm.total_cmp(&pairs[a].max_abs_error_mm));
+    let worst = |i: usize| pairs[i].max_abs_error_mm.unwrap_or(-1.0);
+    order.sort_by(|&a, &b| worst(b).total_cmp(&worst(a)));
     order
 }
 
@@ -173,10 +174,10 @@ fn pairs(calibration: &Calibration, judged: &Judged) -> Markup {
             };
             vec![
                 pair.pair.clone(),
-                number(Some(pair.max_abs_error_mm), 4),
+                number(pair.max_abs_error_mm, 4),
                 number(pair.mean_error_x_long_mm, 4),
                 number(pair.mean_error_y_long_mm, 4),
-                number(Some(pair.gap_rms_mm), 4),
+                number(pair.gap_rms_mm, 4),
                 number(rms(Side::Left), 3),
                 number(rms(Side::Right), 3),
                 view.active(Side::Left).count().to_string(),

@@ -140,13 +140,13 @@ fn next(judged: &Judged) -> impl Iterator<Item = &str> {
 
 pub(super) fn explanation(judged: &Judged) -> String {
     let extremes = &judged.accuracy.extremes;
-    let pairs = judged.accuracy.pairs.iter();
-    let worst = pairs.max_by(|a, b| a.max_abs_error_mm.total_cmp(&b.max_abs_error_mm));
+    let pairs = judged.accuracy.pairs.iter().filter_map(|pair| Some((pair.max_abs_error_mm?, &pair.pair)));
+    let worst = pairs.max_by(|a, b| a.0.total_cmp(&b.0));
     format!(
         "95 % of held-out lengths within {:.4} mm, largest error {:.4} mm in pair {} ({:.4} with its uncertainty), tolerance {} mm",
         extremes.one_in_twenty_mm,
         extremes.max_abs_error_mm,
-        worst.map_or("", |pair| &pair.pair),
+        worst.map_or("", |(_, pair)| pair.as_str()),
         extremes.largest.at_most_mm(),
         judged.tolerance_mm
     )

@@ -7,6 +7,8 @@ use super::outline::{self, Outline};
 use super::psf::Optics;
 use super::sensor::{Lighting, Sensor};
 use crate::geometry::Transform;
+use crate::imaging::coded::Layout;
+use crate::imaging::coded::faces::{Face, faces};
 use crate::simulate::physical_board::PhysicalBoard;
 use crate::stereo::Camera;
 
@@ -105,6 +107,7 @@ impl Scene<'_> {
         layers.extend(self.plate_layer(w + self.print.rim_mm, h + self.print.rim_mm, self.print.rim));
         layers.extend(self.plate_layer(w, h, self.print.white));
         layers.push(self.black_layer());
+        layers.extend(self.marker_layers());
         layers.extend(self.board.covers.iter().filter_map(|patch| self.patch_layer(patch)));
         layers
     }
@@ -138,6 +141,17 @@ impl Scene<'_> {
             }
         }
         Layer { outlines, tone: (self.print.black, 0.0, 0.0) }
+    }
+
+    /// The markers in the board's light squares, then what is white on them; none for a plain board.
+    fn marker_layers(&self) -> Vec<Layer> {
+        let faces = faces(&self.board.drawing, Layout::New);
+        let layer = |faces: &[Face], value: f64| Layer {
+            outlines: faces.iter().filter_map(|face| self.board_outline(&self.board.face_mm(face))).collect(),
+            tone: (value, 0.0, 0.0),
+        };
+        let layers = [layer(&faces.markers, self.print.black), layer(&faces.bits, self.print.white)];
+        layers.into_iter().filter(|layer| !layer.outlines.is_empty()).collect()
     }
 
     fn patch_layer(&self, patch: &Patch) -> Option<Layer> {

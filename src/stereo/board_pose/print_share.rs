@@ -10,7 +10,8 @@
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
 
 use crate::imaging::Board;
-use crate::stereo::board_pose::solve::pose_block::{PoseBlock, SeenFrom, Totals, crossings};
+use crate::stereo::board_pose::solve::pose_block::{PoseBlock, SeenFrom, crossings};
+use crate::stereo::board_pose::solve::totals::Totals;
 use crate::stereo::board_pose::solve::window::{SeenShares, Window};
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;

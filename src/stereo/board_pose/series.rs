@@ -206,7 +206,8 @@ impl<'a> Run<'a> {
 
     pub(super) fn bundle(&self) -> Bundle<'a> {
         let crossing = self.known.crossing_mm;
-        let shape = ShapePrior { in_plane_mm: crossing, out_of_plane_mm: crossing, stretch_mm: crossing };
+        let shape =
+            ShapePrior { in_plane_mm: crossing, out_of_plane_mm: crossing, bent_mm: crossing, stretch_mm: crossing };
         let views = self.starts.iter().map(|s| s.view.clone()).collect();
         let edge_bends_mm = vec![0.0; self.known.board.corner_count()];
         Bundle { board: &self.known.board, views, rig: RigPrior::new(&self.known.rig), shape, edge_bends_mm }

@@ -5,7 +5,7 @@
 //! of one group is against another's (the camera was moved between them) the pictures alone do not tell.
 
 use crate::geometry::{Transform, rotation_vector};
-use crate::imaging::{Board, order};
+use crate::imaging::Board;
 use crate::measurements::{RobotPose, Role};
 use crate::stereo::data::view::View;
 use crate::stereo::pairs::numbering::renumbered;
@@ -15,7 +15,7 @@ const NEARLY_EQUAL: f64 = 0.35;
 
 /// The views with their poses, numbered alike, and what could not be told.
 pub fn settle(board: &Board, at: &[&RobotPose], views: &mut [View], poses: &mut [Option<Transform>]) -> Vec<String> {
-    let Some(step) = order::ambiguity(*board) else { return Vec::new() };
+    let Some(step) = board.symmetry() else { return Vec::new() };
     let mut notes = Vec::new();
     let mut groups: Vec<&str> = Vec::new();
     for pose in at {

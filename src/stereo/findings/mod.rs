@@ -19,9 +19,13 @@ use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use crate::statistics::median;
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::data::view::View;
 use crate::stereo::findings::hypothesis::{Hypothesis, any_place};
 use crate::stereo::findings::series::{Change, Line, Linear};
+use crate::stereo::pairs::misfit::misfit_px;
+use crate::stereo::pairs::series::PairMisfit;
 use crate::stereo::pairs::{Cause, DiscardedPair};
 use crate::stereo::volume::lengths::VolumeLengths;
 
@@ -73,20 +77,51 @@ pub struct Finding {
     pub effect_mm: Option<f64>,
     /// What happened and what to do, for a person.
     pub action: String,
-    /// From the common rig to the one at the last pair, in the layout's order.
+    /// The change of the shared numbers over the pairs that the common rig was made from.
     #[serde(skip)]
-    pub step: Option<DVector<f64>>,
-    /// Place of the first pair of a step.
-    #[serde(skip)]
-    pub first: usize,
+    pub along: Option<Along>,
 }
 
-/// Whether the pictures of the pairs were taken at one moment: all pairs miss their rig by several times what each camera leaves of its own
-/// pictures, so that it is neither the corners nor a lens.
-pub fn not_simultaneous(calibration: &Calibration) -> Option<Finding> {
+/// How the shared numbers change over the pairs, in the layout's order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Along {
+    /// From the rig without any of the change to the one with all of it.
+    whole: DVector<f64>,
+    /// From the rig without any of it to the common one.
+    common: DVector<f64>,
+    /// Which share of it each pair has.
+    by_pair: DVector<f64>,
+    /// Variance of its size over the square of that.
+    relative_variance: f64,
+}
+
+impl Along {
+    /// From the common rig to the one with a share of the change.
+    pub fn to(&self, share: f64) -> DVector<f64> {
+        &self.whole * share - &self.common
+    }
+
+    /// From the common rig to the one at the last pair.
+    pub fn to_last(&self) -> DVector<f64> {
+        self.to(1.0)
+    }
+
+    /// Standard deviation of the step from the common rig to the one with a share of the change, along that step.
+    pub fn sigma_of(&self, share: f64) -> DVector<f64> {
+        self.to(share) * self.relative_variance.sqrt()
+    }
+}
+
+/// Whether the pictures of the pairs were taken at one moment: all pairs miss their rig, with what changed over them taken out, by several
+/// times what each camera leaves of its own pictures, so that it is neither the corners nor a lens.
+pub fn not_simultaneous(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
     /// A lens or a rig that lacks something leaves no more than about this many times what single pictures do.
     const TIMES: f64 = 3.0;
-    let misfit = &calibration.misfit;
+    let told = |finding: &Finding| finding.along.clone().filter(|along| along.by_pair.len() == calibration.views.len());
+    let misfit = &match changes.iter().find_map(told) {
+        Some(along) => misfit_without(calibration, &along),
+        None => calibration.misfit.clone(),
+    };
     (misfit.usual_px > TIMES * misfit.alone_px).then(|| Finding {
         cause: Cause::NotSimultaneous.word().to_owned(),
         kind: Kind::Pair,
@@ -101,9 +136,24 @@ pub fn not_simultaneous(calibration: &Calibration) -> Option<Finding> {
             misfit.alone_px,
             misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ")
         ),
-        step: None,
-        first: 0,
+        along: None,
     })
+}
+
+/// How far the pairs miss the rig, each its own along a change.
+fn misfit_without(calibration: &Calibration, along: &Along) -> PairMisfit {
+    let of = |(view, share): (&View, &f64)| {
+        let shared = calibration.layout.step(&calibration.values.shared, along.to(*share).as_slice());
+        misfit_px(&shared, view).map_or(f64::INFINITY, |(px, _)| px)
+    };
+    let px: Vec<f64> = calibration.views.par_iter().zip(along.by_pair.as_slice()).map(of).collect();
+    let mut worst: Vec<usize> = (0..px.len()).collect();
+    worst.sort_by(|a, b| px[*b].total_cmp(&px[*a]).then(a.cmp(b)));
+    PairMisfit {
+        usual_px: median(px.iter().copied()).unwrap_or(0.0),
+        alone_px: calibration.misfit.alone_px,
+        worst_first: worst.into_iter().map(|i| calibration.views[i].pair.clone()).collect(),
+    }
 }
 
 /// What happened to single pairs that are not used, a finding a cause; pairs without a board or shown twice are none.
@@ -120,8 +170,7 @@ pub fn of_pairs(discarded: &[DiscardedPair]) -> Vec<Finding> {
                 unit: "",
                 effect_mm: None,
                 action: pair.reason.clone(),
-                step: None,
-                first: 0,
+                along: None,
             }),
         }
     }
@@ -255,7 +304,6 @@ fn finding(
             any.iter().zip(shown.change.amounts.iter()).fold(DVector::zeros(any[0].len()), |sum, (d, a)| sum + d * *a)
         }
     };
-    let mean = best.by_pair.mean();
     let changes = lengths.changes_by_step_mm(&calibration.layout, &whole);
     let effect_mm = changes.into_iter().fold(0.0, |most: f64, mm| most.max(mm.abs()));
     let at = calibration.layout.transform_start();
@@ -274,7 +322,11 @@ fn finding(
         Some((first, [])) => first.clone(),
         Some((first, others)) => format!("{first} (or {})", others.join(", or ")),
     };
-    let action = format!("{what} by {size:.3} {unit} {which}, which moves a length by up to {effect_mm:.4} mm");
+    let mut action = format!("{what} by {size:.3} {unit} {which}, which moves a length by up to {effect_mm:.4} mm");
+    if best.kind == Kind::Drift {
+        let [before, after] = calibration.moment();
+        action += &format!("; the rig is that of the middle of the series, at pairs {before} and {after}");
+    }
     Some(Finding {
         cause: causes.iter().map(|cause| cause.word()).collect::<Vec<_>>().join("|"),
         kind: best.kind,
@@ -283,7 +335,11 @@ fn finding(
         unit,
         effect_mm: Some(effect_mm),
         action,
-        step: Some(whole * (1.0 - mean)),
-        first: best.first,
+        along: Some(Along {
+            whole,
+            common: shown.change.common.clone(),
+            by_pair: best.by_pair.clone(),
+            relative_variance: shown.change.scatter / shown.change.gain,
+        }),
     })
 }

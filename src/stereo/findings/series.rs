@@ -20,6 +20,8 @@ const PLACES_FROM: usize = 12;
 pub struct Change {
     /// In each of its directions, in units of them.
     pub amounts: DVector<f64>,
+    /// What all pairs share takes up of it, so that the rig of a pair is the common one, this less, and its own part of the change.
+    pub common: DVector<f64>,
     /// By how much chi-squared falls.
     pub gain: f64,
     /// Variance of the pairs' residuals about the rig, with the change, over what their corners let expect.
@@ -124,8 +126,9 @@ impl Linear {
         });
         let amounts = invert(&matrix)? * &right;
         let gain = amounts.dot(&right);
-        let scatter = self.scatter(directions, pattern, &moved, &amounts);
-        (gain.is_finite() && scatter.is_finite()).then_some(Change { amounts, gain, scatter })
+        let common = moved.iter().zip(amounts.iter()).fold(zero(), |sum, (m, a)| sum + m * *a);
+        let scatter = self.scatter(directions, pattern, &common, &amounts);
+        (gain.is_finite() && scatter.is_finite()).then_some(Change { amounts, common, gain, scatter })
     }
 
     /// The pairs' scatter along these directions with the change taken out, at least what their corners let expect.
@@ -133,15 +136,13 @@ impl Linear {
         &self,
         directions: &[DVector<f64>],
         pattern: &[f64],
-        moved: &[DVector<f64>],
+        common: &DVector<f64>,
         amounts: &DVector<f64>,
     ) -> f64 {
-        let zero = || DVector::zeros(self.inverse.nrows());
-        let common = moved.iter().zip(amounts.iter()).fold(zero(), |sum, (m, a)| sum + m * *a);
-        let own = directions.iter().zip(amounts.iter()).fold(zero(), |sum, (d, a)| sum + d * *a);
+        let own = directions.iter().zip(amounts.iter()).fold(common * 0.0, |sum, (d, a)| sum + d * *a);
         let mut squares = 0.0;
         for (i, x) in pattern.iter().enumerate() {
-            let left = &self.gradients[i] + &self.matrices[i] * (&own * *x - &common);
+            let left = &self.gradients[i] + &self.matrices[i] * (&own * *x - common);
             for direction in directions {
                 let information = direction.dot(&(&self.matrices[i] * direction));
                 squares += direction.dot(&left).powi(2) / information.max(f64::MIN_POSITIVE);

@@ -2,8 +2,9 @@
 //!
 //! In: the corners of all pairs. Out: a calibration with what was found over the series, and whether its last pairs confirm it. Method: all pairs
 //! make one rig. A step changes that only where it moves a length by more than a share of the tolerance, and where enough pairs since then
-//! make a rig that is surer than the one of all with the step in its uncertainty. What stays in is part of the uncertainty: the
-//! step or drift from the common rig to the last pair is a bias known to its own size (GUM, F.2.4.5).
+//! make a rig that is surer than the one of all with the step in its uncertainty. A step that stays in is part of the uncertainty, a bias known
+//! to its own size (GUM, F.2.4.5). Of a rig that drifts the middle of the series is known best: the rig is that one, and what it drifted
+//! since then goes into what is measured later.
 
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
@@ -17,6 +18,9 @@ use crate::stereo::volume::lengths::VolumeLengths;
 
 /// A change that moves a length by less than this share of the tolerance changes nothing.
 pub const MATERIAL_SHARE: f64 = 0.1;
+
+/// Share of a drift in the middle of the series.
+const MIDDLE: f64 = 0.5;
 
 /// Squares of the lengths that a change is judged by: 70 mm on the paper's board.
 const LONG_SQUARES: usize = 7;
@@ -35,7 +39,8 @@ pub struct Asked {
 /// Calibrates the rig that stands now, and says what happened to it before.
 pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
     let (found, mut told) = standing(corners, asked)?;
-    told.extend(findings::not_simultaneous(&found));
+    let late = findings::not_simultaneous(&found, &told);
+    told.extend(late);
     Ok((found, told))
 }
 
@@ -124,7 +129,7 @@ fn another_rig(told: Option<Finding>, pairs: Vec<String>) -> Finding {
             "a camera moved or was focused: from pair {first} on the pairs are of another rig than those before. Clamp both cameras"
         );
         let cause = format!("{}|{}", Cause::CameraMoved.word(), Cause::Focus.word());
-        Finding { cause, kind: Kind::Step, pairs, size: None, unit: "", effect_mm: None, action, step: None, first: 0 }
+        Finding { cause, kind: Kind::Step, pairs, size: None, unit: "", effect_mm: None, action, along: None }
     })
 }
 
@@ -210,10 +215,16 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
     (worst(&calibration) < with_step).then_some(Later { corners, calibration, change: further })
 }
 
-/// A change that stays in the rig is part of its uncertainty; where its last pairs are those of another rig, that is said.
+/// A change that stays in the rig: of one that drifts the rig is that of the middle of the series, and what it drifted since then is told beside
+/// it; a step is part of the uncertainty. Where the last pairs are those of another rig, that is said.
 fn stays(found: &mut Calibration, change: &Finding, asked: &Asked) {
-    if let Some(step) = &change.step {
-        found.uncertainty.shared += step * step.transpose();
+    if let Some(along) = &change.along {
+        let within = if change.kind == Kind::Drift { along.sigma_of(MIDDLE) } else { along.to_last() };
+        found.uncertainty.shared += &within * within.transpose();
+        if change.kind == Kind::Drift {
+            found.move_rig(&along.to(MIDDLE));
+            found.since_moment.push(along.to_last() - along.to(MIDDLE));
+        }
         let matrix = found.uncertainty.shared.clone();
         found.values.shared.rig.covariance = Some(Covariance { order: found.layout.names(), matrix });
     }

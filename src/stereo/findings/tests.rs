@@ -133,6 +133,54 @@ fn two_pairs_out_of_step() {
 }
 
 #[test]
+fn a_rig_that_drifts_is_that_of_the_middle_and_no_picture_was_late() {
+    for size_deg in [0.01_f64, 0.05] {
+        for (w, world) in worlds(12, 21).into_iter().enumerate() {
+            let turned = |share: f64| {
+                let turn = transform(Vector3::y() * size_deg.to_radians() * share, Vector3::zeros());
+                turn * world.rig.right_from_left
+            };
+            let mut corners = world.corners(22);
+            for i in 0..12 {
+                let at = planted(&world, 22, std::iter::once(i), |other| {
+                    other.rig.right_from_left = turned(i as f64 / 11.0);
+                });
+                corners.pairs[i] = at.pairs[i].clone();
+            }
+            let (found, told) = standing(&corners);
+            let causes: Vec<&str> = told.iter().map(|finding| finding.cause.as_str()).collect();
+            assert!(causes.len() == 1 && causes[0].contains("yaw"), "{size_deg} deg in world {w}: {causes:?}");
+            assert!(found.skipped.is_empty() && found.since_moment.len() == 1, "{:?}", found.skipped);
+            assert_eq!(found.moment(), ["05", "06"]);
+            let off = (found.rig().right_from_left.rotation * turned(0.5).rotation.inverse()).scaled_axis().y;
+            let at = found.layout.transform_start() + 1;
+            let sigma = found.uncertainty.shared[(at, at)].sqrt();
+            assert!(off.abs() < 4.0 * sigma, "{size_deg} deg in world {w}: {off} against {sigma}");
+            let since = found.since_moment[0][at];
+            assert!((since - 0.5 * size_deg.to_radians()).abs() < 4.0 * sigma, "{since}");
+        }
+    }
+}
+
+#[test]
+fn another_board_in_two_pairs() {
+    for percent in [0.1, 0.3, 1.0, 3.0] {
+        for (w, world) in worlds(12, 13).into_iter().enumerate() {
+            let corners =
+                planted(&world, 14, [3, 7].into_iter(), |other| other.board.square_mm *= 1.0 + percent / 100.0);
+            let (found, told) = standing(&corners);
+            assert_eq!(
+                causes(&found),
+                [("03", Cause::OtherBoard), ("07", Cause::OtherBoard)],
+                "{percent} % in world {w}: {:?}",
+                found.skipped
+            );
+            assert!(told.is_empty(), "{told:?}");
+        }
+    }
+}
+
+#[test]
 fn interlaced_pictures() {
     for world in worlds(12, 11) {
         for shift_px in [0.2, 1.0] {

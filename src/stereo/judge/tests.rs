@@ -1,9 +1,11 @@
 //! Faults planted in corners of known worlds: each must be noticed and named by a line of the ledger, and clean corners by none.
 
-use nalgebra::{Matrix2, Vector2, Vector3};
+use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
-use crate::geometry::transform;
-use crate::imaging::{Corner, Corners};
+use crate::geometry::{Transform, transform};
+use crate::imaging::{Corner, Corners, PairCorners};
+use crate::stereo::Rig;
+use crate::stereo::data::view::View;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::judge::assessment::{Demand, Judged};
 use crate::stereo::judge::lengths::held_out;
@@ -11,6 +13,7 @@ use crate::stereo::judge::lengths::second_board::second_board;
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::select::lens_ladder::Options;
 use crate::stereo::synthetic::World;
+use crate::stereo::triangulate::{common, triangulate};
 use crate::stereo::volume::Extent;
 
 /// Corners of 0.004 px on this rig: lengths to some 0.03 mm.
@@ -22,12 +25,35 @@ fn world(pairs: usize, seed: u64) -> World {
 }
 
 fn judge_with(corners: &Corners, second: Option<&Corners>) -> Judged {
+    calibrated_and_judged(corners, second).1
+}
+
+fn calibrated_and_judged(corners: &Corners, second: Option<&Corners>) -> (Rig, Judged) {
     let asked = Asked { options: Options::default(), tolerance_mm: TOLERANCE_MM, extent: Extent::Boards };
     let (found, findings) = calibrate_standing(corners, &asked).unwrap();
     let accuracy = held_out::hold_out(&found, None).unwrap();
     let second = second.map(|corners| second_board(&found, corners, None));
     let demand = Demand { tolerance_mm: TOLERANCE_MM, board_uncertainty_mm: None, extent: Extent::Boards };
-    Judged::new(&found, findings, accuracy, second, &demand)
+    let rig = found.rig().clone();
+    (rig, Judged::new(&found, findings, accuracy, second, &demand))
+}
+
+/// The largest error with which a rig measures lengths between the corners of the world's boards, mm, from places without noise.
+fn largest_true_error_mm(world: &World, rig: &Rig) -> f64 {
+    let exact = World { sigma_px: 0.0, ..world.clone() }.corners(1);
+    let of_pair = |(pair, pose): (&PairCorners, &Transform)| {
+        let view = View::new(&world.board, pair, 0);
+        let points: Vec<_> = common(&view)
+            .into_iter()
+            .map(|(left, right)| (pose * left.board_mm, triangulate(rig, left, right).unwrap().point_mm))
+            .collect();
+        let off = |(i, (a, a1)): (usize, &(Point3<f64>, Point3<f64>))| {
+            let errors = points[i..].iter().map(|(b, b1)| ((b1 - a1).norm() - (b - a).norm()).abs());
+            errors.fold(0.0, f64::max)
+        };
+        points.iter().enumerate().map(off).fold(0.0, f64::max)
+    };
+    exact.pairs.iter().zip(&world.poses).map(of_pair).fold(0.0, f64::max)
 }
 
 fn judge(corners: &Corners) -> Judged {
@@ -58,10 +84,10 @@ fn clean_corners_pass_without_a_warning() {
 }
 
 #[test]
-fn an_s_shaped_board_does_not_pass() {
+fn an_s_shaped_board_does_not_pass_unless_lengths_are_good() {
     let world = world(14, 54);
     let edge = world.board.corner_mm(world.board.columns() - 1, 0).x;
-    for height_mm in [0.05, 0.2] {
+    for height_mm in [0.05, 0.1, 0.2, 0.5] {
         let corners = changed(world.corners(55), |i, left, corner| {
             let flat = world.board.corner_mm(corner.col, corner.row);
             let u = flat.x / edge;
@@ -70,8 +96,16 @@ fn an_s_shaped_board_does_not_pass() {
             let (a, b) = (seen(flat), seen(bent));
             corner.px += if left { b.0 - a.0 } else { b.1 - a.1 };
         });
-        let judged = judge(&corners);
-        assert_ne!(judged.verdict, Verdict::Pass, "{height_mm} mm: {:#?}", judged.evidence);
+        let (rig, judged) = calibrated_and_judged(&corners, None);
+        let off_mm = largest_true_error_mm(&world, &rig);
+        let trusted_mm = judged.trusted_mm().unwrap_or(f64::INFINITY);
+        assert!(trusted_mm > off_mm, "{height_mm} mm: {off_mm} {:#?}", judged.evidence);
+        assert!(
+            judged.verdict != Verdict::Pass || off_mm < TOLERANCE_MM,
+            "{height_mm} mm: {off_mm} {:#?}",
+            judged.evidence
+        );
+        assert!(height_mm < 0.2 || judged.verdict != Verdict::Pass, "{height_mm} mm: {:#?}", judged.evidence);
         assert!(line(&judged, "residual correlation").value.is_some_and(|mm| mm > 0.02), "{:#?}", judged.evidence);
     }
 }

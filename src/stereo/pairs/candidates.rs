@@ -1,11 +1,12 @@
-//! The pairs that may make up a rig: those with a board in both pictures, each once.
+//! The pairs that may make up a rig: those with a board in both pictures, each once; of boards whose corners have numbers of their own also those
+//! that one picture shows.
 
 use rayon::prelude::*;
 
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
 use crate::stereo::Error;
 use crate::stereo::data::view::View;
-use crate::stereo::init::homography::FEWEST_CORNERS;
+use crate::stereo::init::homography::{FEWEST_CORNERS, homography, pixel_pairs};
 use crate::stereo::init::single_camera::{self, OneCamera};
 use crate::stereo::pairs::discarded::too_few_pairs;
 use crate::stereo::pairs::{Cause, DiscardedPair, FEWEST_PAIRS};
@@ -31,7 +32,7 @@ impl Candidates {
         let not_found = |s: &crate::imaging::Skipped| DiscardedPair::new(&s.pair, Cause::NoBoard, s.reason.clone());
         let mut discarded: Vec<DiscardedPair> = corners.skipped.iter().map(not_found).collect();
         let mut views = Vec::new();
-        let fewest = FEWEST_CORNERS.max(fewest_corners(&corners.board));
+        let fewest = if corners.board.is_coded() { 0 } else { FEWEST_CORNERS.max(fewest_corners(&corners.board)) };
         for (i, pair) in corners.pairs.iter().enumerate() {
             if let Some(first) = corners.pairs[..i].iter().find(|first| same_corners(first, pair)) {
                 let reason = format!("the same pictures as pair {}", first.pair);
@@ -40,7 +41,8 @@ impl Candidates {
             }
             let view = View::new(&corners.board, pair, fewest);
             let [left, right] = Side::BOTH.map(|side| view.active(side).count());
-            if left.min(right) < fewest {
+            let is_enough = if corners.board.is_coded() { tells_a_pose(&view) } else { left.min(right) >= fewest };
+            if !is_enough {
                 let reason = format!("too few corners: {left} left, {right} right");
                 discarded.push(DiscardedPair::new(&view.pair, Cause::NoBoard, reason));
             } else {
@@ -49,6 +51,10 @@ impl Candidates {
         }
         if views.len() < FEWEST_PAIRS {
             return Err(too_few_pairs(views.len(), &discarded));
+        }
+        let both = |view: &&View| Side::BOTH.into_iter().all(|side| view.active(side).next().is_some());
+        if views.iter().filter(both).count() == 0 {
+            return Err(Error::NothingInCommon { pairs: views.len() });
         }
         let sizes = [corners.left_size, corners.right_size];
         let cameras: Vec<Option<OneCamera>> = Side::BOTH
@@ -59,6 +65,11 @@ impl Candidates {
         let cameras = [of(Side::Left)?, of(Side::Right)?];
         Ok(Candidates { board: corners.board, views, cameras, width_px: sizes[0].0.max(sizes[1].0), discarded })
     }
+}
+
+/// True where one of the pictures tells how the board lies; whatever the other one shows then counts as well.
+fn tells_a_pose(view: &View) -> bool {
+    Side::BOTH.into_iter().any(|side| homography(&pixel_pairs(view.active(side))).is_some())
 }
 
 /// True for corners of the same pictures: no two pictures have the same noise.

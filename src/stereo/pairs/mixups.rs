@@ -18,7 +18,7 @@ use crate::stereo::init::single_camera::as_left;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::pairs::Cause;
 use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::pairs::numbering::{renumbered, turns_of_outline};
+use crate::stereo::pairs::numbering::renumbered;
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
@@ -58,24 +58,24 @@ pub fn explain(series: &Series, strays: &[usize]) -> Vec<Option<(Cause, String)>
 }
 
 /// What happened to a pair in which nothing was mixed up: another board, where one number explains it, or something that moved between its two
-/// pictures. `misfit_px` is by how much it misses the rig, `usual_px` what pairs usually do.
-pub fn moved_between(series: &Series, i: usize, misfit_px: Option<f64>, usual_px: f64) -> (Cause, String) {
+/// pictures. `missed_px` is by how much it misses the rig, `usual_px` what pairs usually do.
+pub fn moved_between(series: &Series, i: usize, missed_px: Option<f64>, usual_px: f64) -> (Cause, String) {
     let view = &series.views[i];
     let scene = Scene { series, views: Vec::new() };
     let [left, right] = scene.alone(view);
     let Some((left, right)) = left.zip(right) else {
         return (Cause::Unknown, "its corners form no board on one of the cameras".to_owned());
     };
-    let missed = misfit_px.map_or(String::new(), |px| {
+    let missed = missed_px.map_or(String::new(), |px| {
         format!(" (its corners miss the rig by {px:.2} px, those of others by {usual_px:.2} px)")
     });
     let apart = right.translation.vector - left.translation.vector;
     // A board whose squares are larger by a share is taken for nearer by each camera along its own rays: the two places are apart along the
     // baseline, by that share of it.
     let centre = series.shared.rig.right_from_left.inverse().translation.vector;
-    let share = -apart.dot(&centre) / centre.norm_squared();
+    let share = apart.dot(&centre) / centre.norm_squared();
     let (larger, share) = of_best_size(series.shared, view, share);
-    if misfit_px.is_some() && scene.fits(series.shared, &larger) {
+    if missed_px.is_some() && misfit_px(series.shared, &larger).is_some_and(|(px, _)| px <= series.limit_px) {
         let percent = 100.0 * share.abs();
         let which = if share > 0.0 { "larger" } else { "smaller" };
         let reason = format!(
@@ -84,7 +84,7 @@ pub fn moved_between(series: &Series, i: usize, misfit_px: Option<f64>, usual_px
         return (Cause::OtherBoard, reason);
     }
     let turn = |quarters| rotation_vector(&(right * renumbered(quarters) * left.inverse())).norm();
-    let turned = turns_of_outline(series.board).into_iter().map(turn).fold(f64::INFINITY, f64::min);
+    let turned = series.board.turns_of_outline().into_iter().map(turn).fold(f64::INFINITY, f64::min);
     let reason = format!(
         "its pictures were not taken at one moment: between them the board (or a camera) moved by about {:.1} mm and {:.1} deg{missed}. Clamp \
          the board and trigger both cameras at once",
@@ -160,7 +160,7 @@ impl Scene<'_> {
     /// True where the view fits on a rig in one of the numberings that the board's outline allows.
     fn fits(&self, shared: &Shared, view: &View) -> bool {
         let limit = self.series.limit_px;
-        turns_of_outline(self.series.board).into_iter().any(|quarters| {
+        self.series.board.turns_of_outline().into_iter().any(|quarters| {
             let mut turned = view.clone();
             turned.turn_right(self.series.board, quarters);
             misfit_px(shared, &turned).is_some_and(|(px, _)| px <= limit)
@@ -180,7 +180,7 @@ impl Scene<'_> {
             turned.turn_right(self.series.board, quarters);
             misfit_px(shared, &turned).is_some_and(|(px, _)| px <= self.series.limit_px)
         };
-        if turns_of_outline(self.series.board).iter().filter(|&&quarters| quarters != 0).any(turned) {
+        if self.series.board.turns_of_outline().iter().filter(|&&quarters| quarters != 0).any(turned) {
             let reason = "the corners are numbered from another end of the board in the right picture than in the left";
             return Some((Cause::Numbering, reason.to_owned()));
         }

@@ -2,7 +2,7 @@
 
 pub mod candidates;
 pub mod discarded;
-mod misfit;
+pub mod misfit;
 mod mixups;
 pub mod numbering;
 pub mod series;

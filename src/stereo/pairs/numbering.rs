@@ -11,7 +11,7 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::Vector3;
 
 use crate::geometry::{Transform, rotation_vector, transform};
-use crate::imaging::{Board, order};
+use crate::imaging::Board;
 use crate::stereo::Side;
 use crate::stereo::data::view::View;
 use crate::stereo::init::board_pose;
@@ -23,24 +23,13 @@ pub fn renumbered(quarters: usize) -> Transform {
     transform(Vector3::z() * (-FRAC_PI_2 * quarters as f64), Vector3::zeros())
 }
 
-/// Quarter turns after which a board's outline is the same: all four of a square board, none and two of another.
-pub fn turns_of_outline(board: &Board) -> Vec<usize> {
-    let step = if board.columns() == board.rows() { 1 } else { 2 };
-    (0..4).step_by(step).collect()
-}
-
-/// Quarter turns after which a board's colours are the same, too: what a picture leaves open.
-pub fn turns_left_open(board: &Board) -> Vec<usize> {
-    order::ambiguity(*board).map_or(vec![0], |step| (0..4).step_by(step).collect())
-}
-
 /// The turn of the right picture's numbering after which both pictures of a pair show one board on a rig that is known.
 /// `None` where one of the pictures gives no pose.
 pub fn on_rig(shared: &Shared, board: &Board, view: &View) -> Option<usize> {
     let [left, right] = Side::BOTH.map(|side| board_pose::of_picture(shared, view, side));
     let (left, right) = (left?, right?);
     let angle = |quarters: usize| rotation_vector(&(right * renumbered(quarters) * left.inverse())).norm();
-    turns_left_open(board).into_iter().min_by(|a, b| angle(*a).total_cmp(&angle(*b)))
+    board.turns_left_open().into_iter().min_by(|a, b| angle(*a).total_cmp(&angle(*b)))
 }
 
 /// Where the right camera stands as most pairs have it, and the turn of each pair's right numbering that agrees with it.

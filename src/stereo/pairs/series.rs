@@ -133,8 +133,8 @@ fn numbered(candidates: &Candidates) -> Result<(Vec<View>, Shared), Error> {
     let both: Vec<Option<(Transform, Transform)>> =
         left.poses.iter().zip(&right.poses).map(|(l, r)| l.zip(*r)).collect();
     let distances = both.iter().flatten().map(|(l, _)| l.translation.vector.norm());
-    let distance_mm = median(distances).ok_or(Error::NoCamera { side: Side::Left })?;
-    let open = numbering::turns_left_open(&candidates.board);
+    let distance_mm = median(distances).ok_or(Error::NothingInCommon { pairs: both.len() })?;
+    let open = candidates.board.turns_left_open();
     let (right_from_left, turns) =
         numbering::agreed(&open, &both, distance_mm).ok_or(Error::NoCamera { side: Side::Right })?;
     let mut views = candidates.views.clone();

@@ -87,11 +87,9 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
 }
 
 /// A lens of fewer terms than the simplest of the ladder, where the pairs say so: the logarithm of its evidence (Laplace's approximation; what is
-/// expected of the terms that it lacks is part of it) is larger by a margin. Corners that are measured well tell a term that is not there
+/// expected of the terms that it lacks is part of it) is larger. Corners that are measured well tell a term that is not there
 /// from one that is; hand-held pictures do not, and keep all of them.
 fn fewer_terms(problem: &Problem, five: &Trial, chance: &Chance) -> Option<Trial> {
-    /// Twenty to one.
-    const MARGIN: f64 = 3.0;
     if five.layout.left != Some(SIMPLEST) {
         return None;
     }
@@ -104,7 +102,7 @@ fn fewer_terms(problem: &Problem, five: &Trial, chance: &Chance) -> Option<Trial
     let fewer = Lens::LADDER.into_iter().filter(|lens| *lens < SIMPLEST);
     let trials = fewer.filter_map(|lens| Trial::new(problem, Layout::rig(lens, five.layout.shape)));
     let best = trials.filter_map(|trial| Some((evidence(&trial)?, trial))).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (best.0 > MARGIN).then_some(best.1)
+    (best.0 > 0.0).then_some(best.1)
 }
 
 /// The simplest lens and those that are richer, each from where the one before it that has a minimum ended: a richer lens begins as a

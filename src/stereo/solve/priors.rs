@@ -18,6 +18,10 @@ const RADIAL_AT_CORNER: [f64; 3] = [0.2, 0.1, 0.05];
 const RATIONAL_AT_CORNER: [f64; 3] = [1.0, 1.0, 1.0];
 /// Tangential distortion, p1 and p2.
 const TANGENTIAL: f64 = 1e-3;
+/// What a thin prism does, s1 to s4: as much as a lens off its axis.
+const PRISM: f64 = 2e-3;
+/// By how much a sensor is tilted, rad: more than any that is not meant to be.
+const TILT_RAD: f64 = 0.05;
 /// How far the picture's centre lies from its middle, as a share of the width.
 const CENTRE_SHARE: f64 = 0.015;
 /// By how much fx and fy differ; pixels whose sides differ by more than the second number are not meant to be square.
@@ -125,6 +129,8 @@ impl Priors {
         }
         one(6, 0.0, TANGENTIAL);
         one(7, 0.0, TANGENTIAL);
+        (12..16).for_each(|at| one(at, 0.0, PRISM));
+        (16..18).for_each(|at| one(at, 0.0, TILT_RAD));
         if (camera.fx / camera.fy).ln().abs() < NOT_SQUARE {
             let terms = vec![(Number::Camera(side, 0), 1.0), (Number::Camera(side, 1), -1.0)];
             self.all.push(Expectation { terms, value: 0.0, sigma: ASPECT * focal });

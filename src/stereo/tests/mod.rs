@@ -1,6 +1,7 @@
 //! The calibration as a whole against known truth: recovery, predicted scatter, symmetry, and what must be refused.
 
 mod models;
+mod partial;
 mod recovery;
 mod refusals;
 mod scatter;

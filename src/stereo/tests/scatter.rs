@@ -127,7 +127,7 @@ impl Ratio {
 
 /// The four sides of a square of 70 mm in six poses, measured by a calibrated rig in corners as noisy as the world's.
 fn lengths_of_70_mm(calibration: &Calibration, world: &World, seed: u64, ratio: &mut Ratio) {
-    let board = crate::imaging::Board { squares: "9x9".parse().unwrap(), square_mm: 10.0 };
+    let board = crate::imaging::Board::checker("9x9".parse().unwrap(), 10.0);
     let world = World { board, poses: World::new(6, 77).poses, ..world.clone() };
     let covariance = RigCovariance::new(calibration.rig().covariance.as_ref().unwrap());
     for pair in &world.corners(seed).pairs {

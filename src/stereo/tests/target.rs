@@ -21,7 +21,7 @@ fn run_of(corners: crate::imaging::Corners) -> Vec<Seen> {
 #[test]
 fn the_targets_scatter_is_the_predicted_one() {
     let mut world = World::new(60, 23);
-    world.board = crate::imaging::Board { squares: "7x6".parse().unwrap(), square_mm: 10.0 };
+    world.board = crate::imaging::Board::checker("7x6".parse().unwrap(), 10.0);
     let known = Knowledge {
         rig: world.rig.clone(),
         noise: None,
@@ -53,7 +53,7 @@ fn the_targets_scatter_is_the_predicted_one() {
 #[test]
 fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
     let mut world = World::new(30, 29);
-    world.board = crate::imaging::Board { squares: "7x6".parse().unwrap(), square_mm: 10.0 };
+    world.board = crate::imaging::Board::checker("7x6".parse().unwrap(), 10.0);
     let corners = world.corners(30);
     let judged = |rig: &crate::stereo::Rig, square_mm: f64| {
         let board = crate::imaging::Board { square_mm, ..world.board };

@@ -104,7 +104,7 @@ impl VolumeLengths {
     pub fn new(calibration: &Calibration, extent: Extent, length_mm: f64, share: f64) -> VolumeLengths {
         let volume = Volume::of(calibration, extent);
         let rig = calibration.rig();
-        let Some(covariance) = rig.covariance.as_ref().map(RigCovariance::new) else {
+        let Some(covariance) = calibration.covariance_now().as_ref().map(RigCovariance::new) else {
             return VolumeLengths { volume, length_mm, ..VolumeLengths::default() };
         };
         let sigma_px = calibration.noise.typical_px(&calibration.views) * share.sqrt();

@@ -39,7 +39,7 @@ fn core_s() -> f64 {
 }
 
 fn row(size: u32, sectors_too: bool) {
-    let drawing = Board { squares: "20x20".parse().expect("a board"), square_mm: 10.0 };
+    let drawing = Board::checker("20x20".parse().expect("a board"), 10.0);
     let workmanship =
         Workmanship { pitch_um: 0.0, bow_um: (0.0, 0.0), ink_spread_um: 0.0, scale_ppm: 0.0, margin_mm: 10.0 };
     let board = PhysicalBoard::new(drawing, workmanship, 1, 0);

@@ -42,7 +42,7 @@ pub fn table(pairs: usize) {
     println!("boards at tilts to 60 degrees and all turns, blur 0.6 to 2.5 px, uneven light, clutter; {SIZE} px");
     println!("board   pairs  found in both  wrong order  wrong place  corners not measured");
     for (squares, square_mm) in [("20x20", 10.0), ("10x7", 18.0), ("7x7", 20.0)] {
-        let drawing = Board { squares: squares.parse().expect("a board"), square_mm };
+        let drawing = Board::checker(squares.parse().expect("a board"), square_mm);
         let count = run(drawing, pairs.div_ceil(3));
         let share = 100.0 * count.found as f64 / count.pairs as f64;
         let (order, place) = (count.wrong_order, count.wrong_place);

@@ -96,6 +96,11 @@ fn main() {
     for judgement in matrix::measure::run(&studio, &wanted.program, &of_measure, (wanted.seed, px), &line) {
         *counts.entry(judgement).or_insert(0) += 1;
     }
+    if !wanted.large {
+        for judgement in matrix::changes::run(&wanted.program, wanted.seed, &|name| wanted.chooses(name)) {
+            *counts.entry(judgement).or_insert(0) += 1;
+        }
+    }
     println!();
     for judgement in [
         Judgement::Right,

@@ -48,7 +48,7 @@ pub fn targets(folder: &Utf8Path) -> Vec<Target> {
             drop(measurements::read(path))
         }),
         target("corners", "corners.csv", written.named("corners.csv"), |path| {
-            let board = Board { squares: "20x20".parse().expect("a board"), square_mm: 10.0 };
+            let board = Board::checker("20x20".parse().expect("a board"), 10.0);
             drop(corners_csv::read(path, board, None));
         }),
         target("robot", "robot.toml", written.named("robot.toml"), |path| drop(robot::file::read(path))),

@@ -43,6 +43,12 @@ fn creep(judgement: &Judgement, _: &World) -> bool {
     matches!(judgement, Judgement::Moved { creeps: true, .. })
 }
 
+/// That it creeps, or, of one so small that it costs no pose, what it is on the average of the run, among its equals.
+fn focus(judgement: &Judgement, world: &World) -> bool {
+    let said = judgement.describe(&world.rig, world.target.drawing.square_mm).unwrap_or_default();
+    creep(judgement, world) || (matches!(judgement, Judgement::Allowed(_)) && said.contains("focal length"))
+}
+
 const LINES: [Line; 7] = [
     Line {
         what: "right camera turned at pose 7, deg",
@@ -94,7 +100,7 @@ const LINES: [Line; 7] = [
             };
             Some((knowledge(w), changing_run(w, focus)))
         },
-        is_reason: creep,
+        is_reason: focus,
         clean: false,
     },
     Line {
@@ -212,6 +218,6 @@ fn one_line(line: &Line, size: f64, counts: &mut Counts) {
         line.what,
         ok,
         poses,
-        said.unwrap_or_default().chars().take(140).collect::<String>()
+        said.unwrap_or_default().chars().take(260).collect::<String>()
     );
 }

@@ -65,7 +65,7 @@ fn settings() -> Settings {
 
 fn table(name: &str, nominal: &Robot, robots: u64) {
     let rig: Rig = true_rig(5120);
-    let board = stereocal::config::Config::default().target_board.board(None, None).unwrap();
+    let board = stereocal::config::Config::default().target_board.board(None, None, None).unwrap();
     let scene = Scene::new(rig, board, 0.03, 35f64.to_radians(), 120.0, 8.0).unwrap();
     let settings = settings();
     let found = plan(nominal, &scene, &settings, None).unwrap();

@@ -8,13 +8,18 @@ use stereocal::identify::data::dataset::Dataset;
 use stereocal::identify::residuals::weights::Scatter;
 use stereocal::identify::settings::Method;
 use stereocal::identify::solve::task::Task;
+use stereocal::measurements::{Measurement, Role};
 use stereocal::robot::{Parameter, Robot, Unit};
 
 use crate::simulated::{Outcome, against_truth, judged};
+use crate::targets::of_targets;
 use crate::worlds::{Plan, arms, measured};
 
 /// Standard deviation of an unknown tool, mm.
 const TOOL_MM: f64 = 200.0;
+
+/// Standard deviation of an angle about which nothing is known, mrad.
+const UNKNOWN_MRAD: f64 = 3000.0;
 
 /// Rounds of linear least squares.
 const ROUNDS: usize = 6;
@@ -37,7 +42,10 @@ pub fn table(runs: u64) {
             ("36 poses, one axis after the other", Plan { samples: 36, ..sweep }),
             ("40 poses, three readings each", Plan { samples: 40, readings: 3, ..Plan::default() }),
             ("40 poses, tool off by 200 mm", Plan { samples: 40, no_tool: true, ..Plan::default() }),
-            ("40 poses, none to verify, no centre", Plan { samples: 40, ..Plan::default() }),
+            ("46 poses, most show one of 3 targets", Plan { samples: 46, parts: true, ..Plan::default() }),
+            ("40 poses, none to verify, no centre", Plan { samples: 40, unverified: true, ..Plan::default() }),
+            ("36 by axes, none to verify", Plan { samples: 36, unverified: true, ..sweep }),
+            ("40 poses, last axis never turned", Plan { samples: 40, still: true, ..Plan::default() }),
         ] {
             line(name, what, &nominal, plan, runs);
         }
@@ -50,8 +58,11 @@ fn line(name: &str, what: &str, nominal: &Robot, plan: Plan, runs: u64) {
         .into_par_iter()
         .filter_map(|seed| {
             let (nominal, truth, rows) = measured(nominal, plan, seed);
+            let rows = if plan.parts { shown_in_part(&truth, &rows, plan, seed) } else { rows };
             let set = Dataset::new(&rows).expect("rows");
-            let (outcome, _) = judged(&nominal, &truth, &set, &settings)?;
+            let samples: Vec<_> = rows.iter().filter(|r| r.at.role == Role::Sample).cloned().collect();
+            let seen = if plan.unverified { Dataset::new(&samples).expect("rows") } else { set.clone() };
+            let (outcome, _) = judged(&nominal, &truth, (&seen, &set), &settings)?;
             Some((outcome, against_truth(&set, &truth, &bound(&nominal, &set, plan, &settings))))
         })
         .collect();
@@ -70,6 +81,14 @@ fn line(name: &str, what: &str, nominal: &Robot, plan: Plan, runs: u64) {
     );
 }
 
+/// Three targets a pose, of which only the first poses show all.
+fn shown_in_part(truth: &Robot, rows: &[Measurement], plan: Plan, seed: u64) -> Vec<Measurement> {
+    let whole = plan.samples * 2 / 5;
+    let all = of_targets(truth, rows, 3, plan.noise_mm, seed);
+    let shows = |i: &usize| i / 3 < whole || all[*i].at.role == Role::Verify || i % 3 == (i / 3) % 3;
+    (0..all.len()).filter(shows).map(|i| all[i].clone()).collect()
+}
+
 /// Least squares of all MDH parameters with noise and tolerance as they are.
 fn bound(nominal: &Robot, set: &Dataset, plan: Plan, settings: &Settings) -> Robot {
     let parameters = nominal.mdh_parameters();
@@ -81,14 +100,16 @@ fn bound(nominal: &Robot, set: &Dataset, plan: Plan, settings: &Settings) -> Rob
     let rows = set.fit_rows();
     let task = Task::plain(set, nominal, &parameters, &rows, settings);
     let rows = task.rows_at(Scatter::of_point(plan.noise_mm), nominal);
-    let mut x = vec![0.0; parameters.len()];
+    let mut x = vec![0.0; rows.offset_count()];
     for _ in 0..ROUNDS {
         let (residuals, jacobian) = rows.evaluate(&x, true);
         let mut normal = jacobian.tr_mul(&jacobian);
         let mut gradient = jacobian.tr_mul(&residuals);
-        for (i, p) in parameters.iter().enumerate() {
-            normal[(i, i)] += sd(p).powi(-2);
-            gradient[i] += x[i] / sd(p).powi(2);
+        for i in 0..x.len() {
+            // How a body of targets is turned nobody knows.
+            let sd = parameters.get(i).map_or(UNKNOWN_MRAD, sd);
+            normal[(i, i)] += sd.powi(-2);
+            gradient[i] += x[i] / sd.powi(2);
         }
         let step: DMatrix<f64> = normal
             .cholesky()
@@ -96,5 +117,5 @@ fn bound(nominal: &Robot, set: &Dataset, plan: Plan, settings: &Settings) -> Rob
             .solve(&DMatrix::from_column_slice(x.len(), 1, gradient.as_slice()));
         x.iter_mut().zip(step.iter()).for_each(|(x, s)| *x -= s);
     }
-    nominal.shifted(&parameters, &x)
+    nominal.shifted(&parameters, &x[..parameters.len()])
 }

@@ -83,15 +83,21 @@ fn line(name: &str, what: &str, nominal: &Robot, plan: Plan, runs: u64) {
 fn outcome(nominal: &Robot, plan: Plan, seed: u64) -> Option<Outcome> {
     let (nominal, truth, rows) = measured(nominal, plan, seed);
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
-    judged(&nominal, &truth, &Dataset::new(&rows).expect("rows"), &settings).map(|(outcome, _)| outcome)
+    let set = Dataset::new(&rows).expect("rows");
+    judged(&nominal, &truth, (&set, &set), &settings).map(|(outcome, _)| outcome)
 }
 
-/// What becomes of a robot, and the one that is kept.
-pub fn judged(nominal: &Robot, truth: &Robot, set: &Dataset, settings: &Settings) -> Option<(Outcome, Robot)> {
-    let found = identify(set, nominal, settings, 1, &|_| {}).ok()?;
+/// What becomes of a robot, and the one that is kept; what is identified from are the first poses of the set.
+pub fn judged(
+    nominal: &Robot,
+    truth: &Robot,
+    (seen, set): (&Dataset, &Dataset),
+    settings: &Settings,
+) -> Option<(Outcome, Robot)> {
+    let found = identify(seen, nominal, settings, 1, &|_| {}).ok()?;
     let robot = &found.candidates[found.chosen].robot;
     // As with all methods, where the verify rows may keep the nominal robot.
-    let kept = if found.against_nominal(set, nominal, settings) == Against::Worse { nominal } else { robot };
+    let kept = if found.against_nominal(seen, nominal, settings) == Against::Worse { nominal } else { robot };
     let errors_mm = [nominal, kept].map(|robot| against_truth(set, truth, robot));
     let mut outcome = Outcome { errors_mm, ..Outcome::default() };
     if let Some((formulation, _)) = &found.candidates[found.chosen].found {

@@ -52,7 +52,7 @@ fn line(name: &str, what: &str, nominal: &Robot, plan: Plan, (count, model): (us
             let (nominal, truth, rows) = measured(nominal, plan, seed);
             let rows = if count == 1 { rows } else { of_targets(&truth, &rows, count, plan.noise_mm, seed) };
             let set = Dataset::new(&rows).expect("rows");
-            let (outcome, kept) = judged(&nominal, &truth, &set, &settings)?;
+            let (outcome, kept) = judged(&nominal, &truth, (&set, &set), &settings)?;
             let further = |robot: &Robot| Robot { tool_mm: robot.tool_mm + Vector3::from(FURTHER_MM), ..robot.clone() };
             Some((outcome, against_truth(&set, &further(&truth), &further(&kept))))
         })
@@ -75,7 +75,7 @@ fn line(name: &str, what: &str, nominal: &Robot, plan: Plan, (count, model): (us
 }
 
 /// The rows with so many targets a pose, whose mean is the truth's mark point.
-fn of_targets(truth: &Robot, rows: &[Measurement], count: usize, noise_mm: f64, seed: u64) -> Vec<Measurement> {
+pub fn of_targets(truth: &Robot, rows: &[Measurement], count: usize, noise_mm: f64, seed: u64) -> Vec<Measurement> {
     let mut random = Pcg64Mcg::seed_from_u64(seed ^ 0x7a26);
     let mean = ROUND[..count].iter().map(|p| Vector3::from(*p)).sum::<Vector3<f64>>() / count as f64;
     let mut all = Vec::new();

@@ -41,6 +41,12 @@ pub struct Plan {
     pub error_mrad: f64,
     /// Whether the poses to fit turn one axis after the other, all others where they were.
     pub one_axis: bool,
+    /// Whether the last axis stands still in the poses to fit.
+    pub still: bool,
+    /// Whether there is nothing to verify: the other poses are for the truth alone.
+    pub unverified: bool,
+    /// Whether three targets are measured, of which most poses to fit show one.
+    pub parts: bool,
     /// Readings of each pose to fit.
     pub readings: usize,
     /// Whether the file of the nominal robot knows nothing of the tool.
@@ -59,6 +65,9 @@ impl Default for Plan {
             error_mm: 0.5,
             error_mrad: 1.0,
             one_axis: false,
+            still: false,
+            unverified: false,
+            parts: false,
             readings: 1,
             no_tool: false,
         }
@@ -133,13 +142,18 @@ pub fn measured(nominal: &Robot, plan: Plan, seed: u64) -> (Robot, Robot, Vec<Me
     let mut of_sensors = Pcg64Mcg::seed_from_u64(seed ^ 0x5eed);
     let phases: Vec<f64> = (0..3 * plan.groups).map(|_| std::f64::consts::TAU * of_sensors.random::<f64>()).collect();
     let home: Vec<f64> = truth.joints.iter().map(|j| 0.4 * drawn(j, &mut random)).collect();
-    let each = plan.samples.div_ceil(home.len());
+    let axes = home.len();
     let pose = |i: usize, random: &mut Pcg64Mcg| -> Vec<f64> {
-        let joints: Vec<f64> = truth.joints.iter().map(|j| drawn(j, random)).collect();
+        let mut joints: Vec<f64> = truth.joints.iter().map(|j| drawn(j, random)).collect();
+        if plan.still && i < plan.samples {
+            joints[axes - 1] = home[axes - 1];
+        }
         if !plan.one_axis || i >= plan.samples {
             return joints;
         }
-        let (axis, step) = (i / each, (i % each) as f64 / (each - 1).max(1) as f64);
+        let axis = i * axes / plan.samples;
+        let (first, next) = ((axis * plan.samples).div_ceil(axes), ((axis + 1) * plan.samples).div_ceil(axes));
+        let step = (i - first) as f64 / (next - first - 1).max(1) as f64;
         let mut joints = home.clone();
         joints[axis] = if truth.joints[axis].slides { 20.0 + 160.0 * step } else { 1.2 * (2.0 * step - 1.0) };
         joints

@@ -2,7 +2,8 @@
 //!
 //! In: rows with the names of their targets. Out: one row a pose, its mark point the mean of all targets, its orientation that of the body
 //! that they make, and what was found wrong at poses where the targets do not stand to each other as elsewhere. Targets on a line, or
-//! two, tell no turn about it: then there is the mean alone, of poses that show all of them.
+//! two, tell no turn about it: then there is the mean alone. A pose that shows fewer than that takes is a point of the body: the mean of what
+//! it shows, and where that stands on the body.
 //! What a robot does wrong at a pose, all its targets share; as rows of their own they would count it several times.
 //! What goes wrong: targets that are no rigid body, or that no pose shows together; both are errors.
 
@@ -12,7 +13,7 @@ mod sorter;
 
 use std::collections::BTreeMap;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
 use super::doctor::Finding;
@@ -39,9 +40,20 @@ pub struct Targets {
     pub places_mm: Vec<Option<[f64; 3]>>,
     /// Whether they tell an orientation.
     pub oriented: bool,
+    /// Poses that show too few of them for a turn: points of the body, by the names of what they show, and where that stands, mm.
+    pub parts: BTreeMap<String, Part>,
     /// What was wrong at single poses.
     #[serde(skip)]
     pub findings: Vec<Finding>,
+}
+
+/// What poses show of a body where they show too little of it for a turn.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Part {
+    /// From the mark point, in the frame of the targets' places, mm.
+    pub place_mm: [f64; 3],
+    /// Poses.
+    pub poses: usize,
 }
 
 impl Targets {
@@ -52,7 +64,16 @@ impl Targets {
             self.names.join(", "),
             self.scatter_mm,
             if self.oriented { "" } else { ", without an orientation, for they stand on a line" }
-        )
+        ) + &match self.parts.values().map(|part| part.poses).sum() {
+            0 => String::new(),
+            1 => "; 1 pose shows fewer: what it shows is a point of the body".to_owned(),
+            n => format!("; {n} poses show fewer: what they show is a point of the body"),
+        }
+    }
+
+    /// Where on the body the targets of this name stand, from the mark point, mm; `None` where it is the mark point.
+    pub fn part_mm(&self, name: &str) -> Option<Vector3<f64>> {
+        self.parts.get(name).map(|part| part.place_mm.into())
     }
 }
 
@@ -94,21 +115,30 @@ pub fn as_one(rows: &[Measurement]) -> Result<Option<(Vec<Measurement>, Targets)
     sorter.check_rigid(scatter_mm, &names)?;
     let judged: Vec<Judged> = poses.iter().map(|pose| sorter.judge(pose)).collect();
     let findings = findings(&poses, &judged, &moved, &names, &sorter);
+    let part_name = |targets: &[usize]| targets.iter().map(|&t| names[t].as_str()).collect::<Vec<_>>().join(" + ");
+    let mut parts: BTreeMap<String, Part> = BTreeMap::new();
+    let one = |(pose, judged): (&Shown, Judged)| {
+        let (observed, target) = match judged {
+            Judged::Taken { observed, .. } => (observed, String::new()),
+            Judged::Part { observed, targets, place_mm } => {
+                let name = part_name(&targets);
+                parts.entry(name.clone()).or_insert(Part { place_mm: place_mm.into(), poses: 0 }).poses += 1;
+                (observed, name)
+            }
+            Judged::Refused { reason, .. } => (Observed::Missing { reason }, String::new()),
+        };
+        Measurement { at: pose.first.at.clone(), target, observed }
+    };
+    let rows = poses.iter().zip(judged).map(one).collect();
     let targets = Targets {
         scatter_mm,
         places_mm: sorter.body.places_mm.iter().map(|p| p.map(Into::into)).collect(),
         oriented: !sorter.body.is_line(),
         names,
+        parts,
         findings,
     };
-    let one = |(pose, judged): (&Shown, Judged)| {
-        let observed = match judged {
-            Judged::Taken { observed, .. } => observed,
-            Judged::Refused { reason, .. } => Observed::Missing { reason },
-        };
-        Measurement { at: pose.first.at.clone(), target: String::new(), observed }
-    };
-    Ok(Some((poses.iter().zip(judged).map(one).collect(), targets)))
+    Ok(Some((rows, targets)))
 }
 
 /// The rows by pose, in order of appearance.

@@ -24,6 +24,8 @@ const RIGID: f64 = 0.05;
 pub(super) enum Judged {
     /// The mark point, its covariance where readings state theirs, and the orientation.
     Taken { observed: Observed, left_out: Option<usize>, exchanged: Option<(usize, usize)> },
+    /// The mean of these targets, which tell no turn, and where that stands on the body.
+    Part { observed: Observed, targets: Vec<usize>, place_mm: Vector3<f64> },
     /// Not to be had, and whether that is because the targets don't stand as elsewhere.
     Refused { reason: String, misfit: bool },
 }
@@ -134,15 +136,14 @@ impl Sorter {
     pub(super) fn judge(&self, pose: &Shown) -> Judged {
         let sightings: Vec<Sighting> =
             pose.sightings.iter().filter(|s| self.body.places_mm[s.target].is_some()).copied().collect();
-        let refused = |reason: String| Judged::Refused { reason, misfit: false };
         if sightings.is_empty() {
-            return refused(pose.reason.unwrap_or("none of the targets").to_owned());
+            let reason = pose.reason.unwrap_or("none of the targets").to_owned();
+            return Judged::Refused { reason, misfit: false };
         }
-        let enough =
+        let whole =
             if self.body.is_line() { sightings.len() == self.body.count() } else { self.body.tells_turn(&sightings) };
-        if !enough {
-            let needed = if self.body.is_line() { "all of them" } else { "three off a line" };
-            return refused(format!("{} of {} targets; {needed} are needed", sightings.len(), self.body.count()));
+        if !whole {
+            return self.part(&sightings);
         }
         let taken = |sightings: &[Sighting], left_out, exchanged| {
             self.observed(sightings).map(|observed| Judged::Taken { observed, left_out, exchanged })
@@ -154,15 +155,27 @@ impl Sorter {
         } else {
             self.without_one(&sightings).and_then(|(out, rest)| taken(&rest, Some(out), None))
         };
-        found.unwrap_or_else(|| {
-            let freedom = self
-                .chi_square(&sightings)
-                .map_or(0.0, |(chi_square, freedom)| (chi_square / (self.variance * freedom as f64)).sqrt());
-            let reason = format!(
-                "the targets do not stand to each other as at the other poses: {freedom:.0} times their usual scatter"
-            );
-            Judged::Refused { reason, misfit: true }
-        })
+        found.unwrap_or_else(|| self.misfit(self.chi_square(&sightings)))
+    }
+
+    fn misfit(&self, chi_square: Option<(f64, usize)>) -> Judged {
+        let times =
+            chi_square.map_or(0.0, |(chi_square, freedom)| (chi_square / (self.variance * freedom as f64)).sqrt());
+        let reason = format!(
+            "the targets do not stand to each other as at the other poses: {times:.0} times their usual scatter"
+        );
+        Judged::Refused { reason, misfit: true }
+    }
+
+    /// Too few targets for a turn: their mean, as a point of the body, where the distances between them are right.
+    fn part(&self, sightings: &[Sighting]) -> Judged {
+        let along = self.chi_square_along(sightings);
+        if along.is_some_and(|(chi_square, freedom)| chi_square > self.limit(freedom)) {
+            return self.misfit(along);
+        }
+        let places: Vec<Vector3<f64>> = sightings.iter().filter_map(|s| self.body.places_mm[s.target]).collect();
+        let place_mm = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
+        Judged::Part { observed: self.mean(sightings), targets: sightings.iter().map(|s| s.target).collect(), place_mm }
     }
 
     /// With the names of two targets exchanged, where that makes it fit.
@@ -197,15 +210,7 @@ impl Sorter {
 
     fn observed(&self, pose: &[Sighting]) -> Option<Observed> {
         if self.body.is_line() {
-            let count = pose.len() as f64;
-            let mean = pose.iter().map(|s| s.point_mm.coords).sum::<Vector3<f64>>() / count;
-            let covariance =
-                pose.iter().filter_map(|s| s.precision.try_inverse()).sum::<Matrix3<f64>>() / (count * count);
-            return Some(Observed::Position {
-                point_mm: Point3::from(mean),
-                covariance_mm2: self.stated.then_some(covariance),
-                rotation_rad: None,
-            });
+            return Some(self.mean(pose));
         }
         let placed = self.body.placed(pose)?;
         Some(Observed::Position {
@@ -213,5 +218,17 @@ impl Sorter {
             covariance_mm2: self.stated.then_some(placed.covariance_mm2),
             rotation_rad: Some(rotation_vector(&placed.sensor_from_body)),
         })
+    }
+
+    /// The mean of targets, without an orientation.
+    fn mean(&self, pose: &[Sighting]) -> Observed {
+        let count = pose.len() as f64;
+        let mean = pose.iter().map(|s| s.point_mm.coords).sum::<Vector3<f64>>() / count;
+        let covariance = pose.iter().filter_map(|s| s.precision.try_inverse()).sum::<Matrix3<f64>>() / (count * count);
+        Observed::Position {
+            point_mm: Point3::from(mean),
+            covariance_mm2: self.stated.then_some(covariance),
+            rotation_rad: None,
+        }
     }
 }

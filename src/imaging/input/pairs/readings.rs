@@ -1,13 +1,14 @@
 //! Ways to read what lies in a folder as pictures of two cameras.
 //!
-//! In: the folders that hold pictures. Out: every reading with at least one pair: two folders, or one folder whose names say the side, with
-//! what told left from right. Words tell most, then letters, then two names that differ in one number or letter, then nothing but that
+//! In: the folders that hold pictures. Out: every reading with at least one pair: two folders, one folder whose names say the side, or a folder
+//! for each pair, with what told left from right. Words tell most, then letters, then two names that differ in one number or letter, then nothing but that
 //! there are two. [`choose`] takes the best of them, or says that several are as good.
 
 use std::collections::BTreeMap;
 
 use camino::{Utf8Path, Utf8PathBuf};
 
+use super::PairFiles;
 use super::listing::Folder;
 use super::matching::{self, Matched, PairBy, by_key};
 use super::names::{Open, Reach, SEPARATORS, natural_order, tokens};
@@ -74,6 +75,7 @@ pub fn two_folders(left: &Folder, right: &Folder, told: Told, by: Option<PairBy>
 pub fn all(folders: &[Folder], by: Option<PairBy>) -> Vec<Result<Reading>> {
     let mut readings: Vec<Result<Reading>> = folders.iter().flat_map(|folder| by_names(folder, by)).collect();
     let below: Vec<&Folder> = folders.iter().filter(|folder| folder.depth > 0).collect();
+    readings.extend(by_folders(&below).map(Ok));
     if below.len() > MOST_COMPARED {
         return readings;
     }
@@ -87,6 +89,37 @@ pub fn all(folders: &[Folder], by: Option<PairBy>) -> Vec<Result<Reading>> {
         }
     }
     readings
+}
+
+/// A folder for each pair: two pictures in each of them, called alike in all and by words for the side.
+fn by_folders(below: &[&Folder]) -> Option<Reading> {
+    let (first, rest) = below.split_first().filter(|(_, rest)| !rest.is_empty())?;
+    let names = |folder: &Folder| -> Option<[String; 2]> {
+        let [a, b] = folder.pictures.as_slice() else { return None };
+        Some([stem(a).to_owned(), stem(b).to_owned()])
+    };
+    let called = names(first)?;
+    let alike = |folder: &&&Folder| folder.depth == first.depth && names(folder).is_some_and(|names| names == called);
+    if rest.iter().filter(alike).count() < rest.len() {
+        return None;
+    }
+    let (told, side) = Reach::ALL.into_iter().zip([Told::Words, Told::Letters]).find_map(|(reach, told)| {
+        let [a, b] = [&called[0], &called[1]].map(|name| Open::new(name, reach));
+        a.side_beside(&b).map(|side| (told, side))
+    })?;
+    let (left, right) = if side == Side::Left { (0, 1) } else { (1, 0) };
+    let picture = |at: usize| below.iter().map(move |folder| folder.pictures[at].clone());
+    let pairs = below.iter().zip(picture(left).zip(picture(right)));
+    let pairs = pairs.map(|(folder, (left, right))| PairFiles { pair: folder.below.clone(), left, right }).collect();
+    Some(Reading {
+        told,
+        depth: first.depth - 1,
+        places: below.iter().map(|folder| folder.path.clone()).collect(),
+        sides: [picture(left).collect(), picture(right).collect()],
+        matched: Matched { by: PairBy::Name, pairs, single: Vec::new() },
+        sideless: 0,
+        other: below.iter().map(|folder| folder.other).sum(),
+    })
 }
 
 /// What tells the sides of two folders, and the side of the first; `None` where they are not the two sides of something.

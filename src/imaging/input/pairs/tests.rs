@@ -251,6 +251,18 @@ fn pictures_of_one_camera_are_no_pairs() {
 }
 
 #[test]
+fn a_folder_may_hold_one_pair() {
+    let found = pairing(&["pair_2/left.png", "pair_2/right.png", "pair_10/left.png", "pair_10/right.png"]);
+    assert_eq!(found.pairs.iter().map(|p| p.pair.as_str()).collect::<Vec<_>>(), ["pair_2", "pair_10"]);
+    assert_eq!(found.taken, "2 pairs by name: left pair_*/left.png, right pair_*/right.png");
+    assert_eq!(names(&["001/cam_L.png", "001/cam_R.png", "002/cam_L.png", "002/cam_R.png"]), ["001", "002"]);
+    // Two cameras with two pictures each are no two pairs of folders.
+    assert_eq!(names(&["cam1/1.png", "cam1/2.png", "cam2/1.png", "cam2/2.png"]), ["1", "2"]);
+    let said = complaint(&["a/left.png", "a/right.png", "b/left.png", "b/right.png", "b/top.png"], None);
+    assert!(said.contains("in 2 ways"), "{said}");
+}
+
+#[test]
 fn two_folders_are_given_in_their_order() {
     let (_keep, path) = folder(&["z/b1.png", "z/b2.png", "a/raw/1.png", "a/raw/2.png", "out/x.txt", "f.json"]);
     let (z, a, out, file) = (path.join("z"), path.join("a"), path.join("out"), path.join("f.json"));

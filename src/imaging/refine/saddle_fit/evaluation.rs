@@ -2,7 +2,7 @@
 //!
 //! Each kind of pixel has them from the fewest columns that span its derivatives, and a linear map takes those to the model's parameters.
 
-use nalgebra::{Matrix2, SMatrix};
+use nalgebra::{Matrix2, Matrix4, Matrix4x2, SMatrix, Vector2, Vector4};
 
 use super::crossing::Crossing;
 use super::model::{COLUMNS, Edge, Light, Model, N};
@@ -24,10 +24,21 @@ pub struct Evaluation<const C: usize> {
     pub arms: [[Arm<C>; 2]; 2],
 }
 
+/// A chi-squared, and what it is in the mean where residuals are noise and nothing else.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Misfit {
+    /// Sum of squares over the residuals' variance.
+    pub chi_square: f64,
+    /// Its mean under noise.
+    pub freedom: f64,
+}
+
 /// What an arm tells by itself: where its edge would lie and run, a step aside and a turn, if it were free of the common model.
 #[derive(Debug, Clone, Copy)]
 pub struct Arm<const C: usize> {
-    /// Inverse of the normal matrix of step and turn; zero where the arm does not determine them.
+    /// Normal matrix of step and turn.
+    normal: Matrix2<f64>,
+    /// Its inverse; zero where the arm does not determine them.
     inverse: Matrix2<f64>,
     /// Sums of the products of the derivatives by step and turn with all columns.
     by_columns: SMatrix<f64, 2, C>,
@@ -36,20 +47,49 @@ pub struct Arm<const C: usize> {
 impl<const C: usize> Arm<C> {
     /// By how much less the sum of squared residuals would be, after the columns of `parameters` had taken a step.
     pub fn gain(&self, parameters: &[usize], step: &[f64]) -> f64 {
-        let taken = parameters.iter().zip(step).map(|(&at, by)| self.by_columns.column(at) * *by);
-        let gradient = taken.fold(self.by_columns.column(N).into_owned(), |left, taken| left - taken);
+        let gradient = self.gradient(parameters, step);
         gradient.dot(&(self.inverse * gradient))
     }
 
-    /// What that is in the mean, in units of the residuals' variance, where residuals are noise and nothing else: two, less what the common
-    /// fit of `parameters` has taken, whose covariance over that variance this is.
-    pub fn freedom<const P: usize>(&self, parameters: &[usize; P], inverse: &SMatrix<f64, P, P>) -> f64 {
-        if self.inverse == Matrix2::zeros() {
-            return 0.0;
-        }
-        let by = SMatrix::<f64, 2, P>::from_fn(|i, k| self.by_columns[(i, parameters[k])]);
-        2.0 - (self.inverse * by * inverse * by.transpose()).trace()
+    fn gradient(&self, parameters: &[usize], step: &[f64]) -> Vector2<f64> {
+        let taken = parameters.iter().zip(step).map(|(&at, by)| self.by_columns.column(at) * *by);
+        taken.fold(self.by_columns.column(N).into_owned(), |left, taken| left - taken)
     }
+}
+
+/// What the two arms of an edge miss the common model by, as `[bent, apart]`: the one how they run through the crossing aside of it and turn against
+/// each other, the other how far they are apart there and turn alike. Each is free of the other; chi-squared in units of the residuals' variance
+/// times it, and what that is in the mean where residuals are noise and nothing else: two, less what the common fit of `parameters` has taken, whose
+/// covariance over that variance `inverse` is. `None` where one arm does not determine its edge.
+pub fn misfits<const C: usize, const P: usize>(
+    arms: &[Arm<C>; 2],
+    (parameters, step): (&[usize; P], &[f64]),
+    inverse: &SMatrix<f64, P, P>,
+) -> Option<[Misfit; 2]> {
+    if arms.iter().any(|arm| arm.inverse == Matrix2::zeros()) {
+        return None;
+    }
+    // Step and turn of either arm.
+    let bent = Matrix4x2::new(1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, -1.0);
+    let apart = Matrix4x2::new(1.0, 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0);
+    let mut normal = Matrix4::zeros();
+    let mut inverses = Matrix4::zeros();
+    let mut gradient = Vector4::zeros();
+    let mut by = SMatrix::<f64, 4, P>::zeros();
+    for (k, arm) in arms.iter().enumerate() {
+        normal.fixed_view_mut::<2, 2>(2 * k, 2 * k).copy_from(&arm.normal);
+        inverses.fixed_view_mut::<2, 2>(2 * k, 2 * k).copy_from(&arm.inverse);
+        gradient.fixed_rows_mut::<2>(2 * k).copy_from(&arm.gradient(parameters, step));
+        for i in 0..2 {
+            (0..P).for_each(|p| by[(2 * k + i, p)] = arm.by_columns[(i, parameters[p])]);
+        }
+    }
+    let taken = by * inverse * by.transpose();
+    let without = |other: Matrix4x2<f64>| {
+        let left = inverses - other * (other.transpose() * normal * other).try_inverse()? * other.transpose();
+        Some(Misfit { chi_square: gradient.dot(&(left * gradient)), freedom: 2.0 - (left * taken).trace() })
+    };
+    Some([without(apart)?, without(bent)?])
 }
 
 impl Model {
@@ -72,7 +112,7 @@ impl Model {
     #[inline(always)]
     fn evaluate_lanes<const C: usize, const A: usize>(&self, window: &Window) -> Evaluation<C> {
         let mut total = self.at_crossing::<C>(&window.crossing);
-        let none = Arm { inverse: Matrix2::zeros(), by_columns: SMatrix::zeros() };
+        let none = Arm { normal: Matrix2::zeros(), inverse: Matrix2::zeros(), by_columns: SMatrix::zeros() };
         let mut arms = [[none; 2]; 2];
         for (k, both) in window.arms.iter().enumerate() {
             let (edge, light) = (Edge::of(self, k), Light::of(self));
@@ -213,14 +253,15 @@ fn stray_columns(group: &Group, columns: &mut [Lanes]) {
 
 /// An arm by the products of [`along`]'s columns, of which the first two are the derivatives by its step and its turn.
 fn by_itself<const C: usize, const A: usize>(map: &[Share], sums: &SMatrix<f64, A, A>) -> Arm<C> {
-    let inverse = sums.fixed_view::<2, 2>(0, 0).into_owned().cholesky().map_or(Matrix2::zeros(), |c| c.inverse());
+    let normal = sums.fixed_view::<2, 2>(0, 0).into_owned();
+    let inverse = normal.cholesky().map_or(Matrix2::zeros(), |c| c.inverse());
     let mut by_columns = SMatrix::zeros();
     for &(to, column, share) in map {
         for i in 0..2 {
             by_columns[(i, to)] += share * sums[(i, column)];
         }
     }
-    Arm { inverse, by_columns }
+    Arm { normal, inverse, by_columns }
 }
 
 #[cfg(test)]

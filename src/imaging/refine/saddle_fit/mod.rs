@@ -14,7 +14,8 @@ pub mod window;
 
 use nalgebra::{Matrix2, Point2, SMatrix, SVector, Vector2};
 
-use evaluation::{Arm, Evaluation};
+pub use evaluation::Misfit;
+use evaluation::{Arm, Evaluation, misfits};
 pub use model::Model;
 use model::{COLUMNS, N};
 use window::Window;
@@ -53,8 +54,8 @@ pub struct Fit {
     pub light_covariance: Matrix2<f64>,
     /// For each edge, on either side of the crossing: chi-squared (two degrees of freedom) of that arm's edge against the common model.
     pub arm_misfit: [[f64; 2]; 2],
-    /// What the sum of these is in the mean where residuals are noise and nothing else: the common model has taken a part of it.
-    pub arm_freedom: f64,
+    /// By how much both edges bend at the crossing, and by how much their arms are apart there, beyond the common model.
+    pub misfits: [Misfit; 2],
     /// Slope of stray light, grey values per px, and its covariance, where it was looked for.
     pub stray: Option<(Vector2<f64>, Matrix2<f64>)>,
     /// Number of pixels.
@@ -143,8 +144,8 @@ fn plain(model: &Model, last: &Equations, freedom: f64) -> Option<Fit> {
     // A blur at its bound is not known the better for it.
     let inverse = last.matrix.cholesky()?.inverse();
     let arms = last.arms.map(|sides| sides.map(|arm| arm.gain(&[], &[]) / variance));
-    let arm_freedom = last.arms.iter().flatten().map(|arm| arm.freedom(&PARAMETERS, &inverse)).sum();
-    Some(Fit::of(*model, &inverse, variance, arms, arm_freedom))
+    let misfits = of_both_edges(&last.arms, (&PARAMETERS, &[]), &inverse, variance);
+    Some(Fit::of(*model, &inverse, variance, arms, misfits))
 }
 
 /// Parameters of a fit that holds stray light, too: light that does not come from the board but from a reflection on it, and adds to dark and
@@ -161,10 +162,27 @@ fn with_stray(model: &Model, window: &Window, freedom: f64, slope_variance: f64)
     let (step, inverse) = (cholesky.solve(&gradient), cholesky.inverse());
     variance = ((sums[(N, N)] - step.dot(&gradient)) / freedom).max(LEAST_VARIANCE);
     let misfit = arms.map(|sides| sides.map(|arm| arm.gain(&PARAMETERS, step.as_slice()) / variance));
-    let arm_freedom = arms.iter().flatten().map(|arm| arm.freedom(&PARAMETERS, &inverse)).sum();
+    let misfits = of_both_edges(&arms, (&PARAMETERS, step.as_slice()), &inverse, variance);
     let model = model.add(&step.fixed_rows::<N>(0).into_owned(), LEAST_BLUR_PX);
     let slope = (Vector2::new(step[N], step[N + 1]), inverse.fixed_view::<2, 2>(N, N) * variance);
-    Some(Fit { stray: Some(slope), ..Fit::of(model, &inverse, variance, misfit, arm_freedom) })
+    Some(Fit { stray: Some(slope), ..Fit::of(model, &inverse, variance, misfit, misfits) })
+}
+
+/// The misfits of both edges together, in units of the residuals' variance.
+fn of_both_edges<const C: usize, const P: usize>(
+    arms: &[[Arm<C>; 2]; 2],
+    taken: (&[usize; P], &[f64]),
+    inverse: &SMatrix<f64, P, P>,
+    variance: f64,
+) -> [Misfit; 2] {
+    let mut sum = [Misfit::default(); 2];
+    for edge in arms.iter().filter_map(|sides| misfits(sides, taken, inverse)) {
+        for (sum, edge) in sum.iter_mut().zip(edge) {
+            sum.chi_square += edge.chi_square / variance;
+            sum.freedom += edge.freedom;
+        }
+    }
+    sum
 }
 
 /// The model at the end of all steps, the equations one short step before it, and the number of steps.
@@ -219,7 +237,7 @@ impl Fit {
         inverse: &SMatrix<f64, P, P>,
         variance: f64,
         arm_misfit: [[f64; 2]; 2],
-        arm_freedom: f64,
+        misfits: [Misfit; 2],
     ) -> Fit {
         let part = |row: usize, column: usize| inverse.fixed_view::<2, 2>(row, column) * variance;
         Fit {
@@ -229,7 +247,7 @@ impl Fit {
             place_by_light: part(0, 8),
             light_covariance: part(8, 8),
             arm_misfit,
-            arm_freedom,
+            misfits,
             stray: None,
             pixels: 0,
             left_out: 0,
@@ -269,7 +287,7 @@ mod tests {
         let halves = model.angles_rad.map(|a| Vector2::new(a.cos(), a.sin()) * half as f64);
         let start = Point2::new(half as f64, half as f64);
         let mut window = Window::default();
-        window.collect(&picture, 0.0, &Below(65_535.0), &Frame { start, halves, band_px });
+        window.collect(&picture, 0.0, &Below(65_535.0), &Frame { start, halves, band_px, hidden: [None; 2] });
         window
     }
 

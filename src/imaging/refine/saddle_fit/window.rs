@@ -74,6 +74,28 @@ pub struct Frame {
     pub halves: [Vector2<f64>; 2],
     /// Distance from an edge up to which pixels see it, px.
     pub band_px: f64,
+    /// What is printed in two of the squares and is none of the corner's: pixels in it are no part of the window.
+    pub hidden: [Option<Quad>; 2],
+}
+
+/// A convex shape of four corners in order round it, relative to the middle of a window, px.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quad(pub [Vector2<f64>; 4]);
+
+impl Quad {
+    /// The places of a row of pixels in it, from the least to the greatest x; `None` where the row passes it by.
+    #[inline(always)]
+    fn interval(&self, dy: f64) -> Option<(f64, f64)> {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for k in 0..4 {
+            let (a, b) = (self.0[k], self.0[(k + 1) % 4]);
+            if (a.y <= dy) != (b.y <= dy) {
+                let x = a.x + (dy - a.y) / (b.y - a.y) * (b.x - a.x);
+                (low, high) = (low.min(x), high.max(x));
+            }
+        }
+        (low <= high).then_some((low, high))
+    }
 }
 
 /// Which pixels a window takes.
@@ -157,11 +179,29 @@ impl Window {
             let row = &pixels[y * width..(y + 1) * width];
             let inside = cut.columns(&cut.inside, dy, width);
             let near = cut.bands.map(|band| cut.columns(&[band], dy, width));
+            let hidden = frame.hidden.map(|quad| {
+                let interval = quad.and_then(|quad| quad.interval(dy));
+                interval.map_or(0..0, |(low, high)| whole(cut.start.x + low, cut.start.x + high, width))
+            });
             // Each of these is where one run of equal pixels ends and the next begins.
-            let mut ends = [inside.start, near[0].start, near[0].end, near[1].start, near[1].end, inside.end];
+            let mut ends = [
+                inside.start,
+                near[0].start,
+                near[0].end,
+                near[1].start,
+                near[1].end,
+                hidden[0].start,
+                hidden[0].end,
+                hidden[1].start,
+                hidden[1].end,
+                inside.end,
+            ];
             ends.iter_mut().for_each(|end| *end = (*end).clamp(inside.start, inside.end.max(inside.start)));
             ends.sort_unstable();
             for run in ends.windows(2).map(|ends| ends[0]..ends[1]).filter(|run| !run.is_empty()) {
+                if hidden.iter().any(|hidden| hidden.contains(&run.start)) {
+                    continue;
+                }
                 let dx = run.start as f64 - cut.start.x;
                 let side = cut.bands.map(|band| usize::from(band.at(dx, dy) > 0.0));
                 match [0, 1].map(|k| near[k].contains(&run.start)) {
@@ -385,7 +425,7 @@ mod tests {
                 }
             }
             for band_px in [f64::MAX, 6.0, 0.4] {
-                window.collect(&picture, 0.0, &Below(256.0), &Frame { start, halves, band_px });
+                window.collect(&picture, 0.0, &Below(256.0), &Frame { start, halves, band_px, hidden: [None; 2] });
                 // Sums of a few thousand products of numbers with seven digits.
                 assert!((total(&window) - expected).amax() < 1e-7 * expected.amax(), "{halves:?} {band_px}");
                 assert_eq!(window.count(), expected[(0, 0)] as usize);
@@ -395,10 +435,40 @@ mod tests {
     }
 
     #[test]
+    fn what_is_hidden_is_left_out_and_nothing_else() {
+        let (picture, mut window) = (ramp(), Window::default());
+        let start = Point2::new(49.3, 50.2);
+        let halves = [Vector2::new(30.0, 8.0), Vector2::new(-8.0, 30.0)];
+        let corners = [(6.0, 9.0), (28.0, 12.0), (21.0, 33.0), (4.0, 27.0)].map(|(x, y)| Vector2::new(x, y));
+        let inside =
+            |d: Vector2<f64>| (0..4).all(|k| (corners[(k + 1) % 4] - corners[k]).perp(&(d - corners[k])) >= 0.0);
+        let inverse = Matrix2::from_columns(&halves).try_inverse().unwrap();
+        let mut expected = Matrix4::zeros();
+        for (x, y) in (0..100 * 100).map(|k| (k % 100, k / 100)) {
+            let d = Vector2::new(f64::from(x), f64::from(y)) - start.coords;
+            if (inverse * d).amax() <= 1.0 && !inside(d) {
+                let v = Vector4::new(1.0, d.x, d.y, f64::from(x + y));
+                expected += v * v.transpose();
+            }
+        }
+        for band_px in [f64::MAX, 6.0] {
+            let frame = Frame { start, halves, band_px, hidden: [None, Some(Quad(corners))] };
+            window.collect(&picture, 0.0, &Below(256.0), &frame);
+            assert!((total(&window) - expected).amax() < 1e-7 * expected.amax(), "{band_px}");
+            assert_eq!((window.count(), window.left_out), (expected[(0, 0)] as usize, 0));
+        }
+    }
+
+    #[test]
     fn pixels_are_sorted_by_the_edges_they_see() {
         let (picture, mut window) = (ramp(), Window::default());
         let halves = [Vector2::new(30.0, 3.0), Vector2::new(-9.0, 28.0)];
-        window.collect(&picture, 0.0, &Below(256.0), &Frame { start: Point2::new(50.0, 50.0), halves, band_px: 5.0 });
+        window.collect(
+            &picture,
+            0.0,
+            &Below(256.0),
+            &Frame { start: Point2::new(50.0, 50.0), halves, band_px: 5.0, hidden: [None; 2] },
+        );
         let normals = halves.map(|v| Vector2::new(-v.y, v.x).normalize());
         let across = |group: &Group, l: usize| normals.map(|n| n.dot(&Vector2::new(group.x[l], group.y[l]).cast()));
         let each = |groups: &Groups, holds: &dyn Fn([f64; 2]) -> bool| {
@@ -420,7 +490,12 @@ mod tests {
         let picture = Image { width: side, height: side, pixels: vec![100u8; side * side] };
         let halves = [Vector2::new(half, 0.0), Vector2::new(0.0, half)];
         let mut window = Window::default();
-        window.collect(&picture, 0.0, &Below(256.0), &Frame { start: Point2::new(200.0, 200.0), halves, band_px: 5.0 });
+        window.collect(
+            &picture,
+            0.0,
+            &Below(256.0),
+            &Frame { start: Point2::new(200.0, 200.0), halves, band_px: 5.0, hidden: [None; 2] },
+        );
         // Bands of 11 px along 361; of the 350 rows outside the band across, those that 3 divides.
         assert_eq!(window.near(), 2 * 11 * 361 - 11 * 11);
         let rows = (20..=380).filter(|y: &usize| y.abs_diff(200) > 5 && y.is_multiple_of(3)).count();
@@ -434,6 +509,7 @@ mod tests {
             start: Point2::new(0.0, 0.0),
             halves: [Vector2::new(5.0, 0.0), Vector2::new(0.0, 5.0)],
             band_px: f64::MAX,
+            hidden: [None; 2],
         };
         let mut window = Window::default();
         window.collect(&picture, 0.0, &Below(256.0), &frame);

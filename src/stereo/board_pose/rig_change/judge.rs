@@ -5,15 +5,20 @@
 //! points by less than the tolerance, or than their own uncertainty allows, goes into their covariance: the calibration is believed only
 //! as far as the change reaches. A larger one ends the run.
 
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
 use crate::statistics::median;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, moved_mm, stretch};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
 use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
 use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
-use crate::stereo::board_pose::solve::prior::stretch_length_mm;
+use crate::stereo::board_pose::solve::prior::{bent_modes, stretch_length_mm};
 
-/// A cause that lowers chi-square by less than this is chance: four standard deviations.
+/// A cause that lowers chi-square by less than this is chance, where the scatter of the poses is known before: four standard deviations.
 const CHANCE: f64 = 16.0;
+
+/// The probability of that.
+const CHANCE_PROBABILITY: f64 = 6.3e-5;
 
 /// Causes whose score reaches this share of the best one's are fitted.
 const COMPETES: f64 = 0.05;
@@ -47,7 +52,7 @@ pub struct Changed {
 pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual) -> (Estimate<'a>, Option<Changed>) {
     let scores = explanations(&found);
     let best = scores.iter().map(|e| e.fall).fold(0.0, f64::max);
-    if best <= CHANCE {
+    if best <= chance(&found, usual) {
         return (found, None);
     }
     let some = subset(&found);
@@ -73,6 +78,15 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
         Some(allowed) => (allowed, Some(changed)),
         None => (free, Some(changed)),
     }
+}
+
+/// By how much chance alone lowers chi-square. Where the poses scatter more than the pairs of the calibration did, by how much is known from as
+/// many poses as there are: the limit is then that of F.
+fn chance(found: &Estimate<'_>, usual: Usual) -> f64 {
+    let poses = found.values.poses.iter().flatten().count() as f64;
+    let own = found.excess > usual.excess_here(&found.noise, &found.bundle.views).max(1.0);
+    let limit = FisherSnedecor::new(1.0, poses - 1.0).map(|f| f.inverse_cdf(1.0 - CHANCE_PROBABILITY));
+    limit.ok().filter(|_| own).map_or(CHANCE, |limit| limit.max(CHANCE))
 }
 
 /// By how much the points move between two minima, in units of what the second leaves open of each and the first of what they share.
@@ -151,7 +165,8 @@ fn shape_evidence(fit: &Estimate<'_>) -> f64 {
     // The largest six hold the frame.
     let told: f64 = values[..m.saturating_sub(6)].iter().map(|v| v.max(f64::MIN_POSITIVE).ln()).sum();
     let (flat, deep) = (fit.bundle.shape.in_plane_mm, fit.bundle.shape.out_of_plane_mm);
-    told + 2.0 * (2.0 * flat.ln() + deep.ln()) * (m as f64 / 3.0)
+    let bent = bent_modes(fit.bundle.board).len() as f64 * (fit.bundle.shape.bent_mm / deep).ln();
+    told + 2.0 * ((2.0 * flat.ln() + deep.ln()) * (m as f64 / 3.0) + bent)
 }
 
 /// Values for a target whose size is off by a large factor: every pose scaled with it.

@@ -125,7 +125,7 @@ mod tests {
     use crate::stereo::synthetic::World;
 
     fn board() -> Board {
-        Board { squares: Squares { columns: 7, rows: 6 }, square_mm: 10.0 }
+        Board::checker(Squares { columns: 7, rows: 6 }, 10.0)
     }
 
     /// Deviations without any at the rim, 0.01 mm, from numbers that no line fits.
@@ -163,7 +163,7 @@ mod tests {
                 board: &board,
                 views: vec![view],
                 rig: RigPrior::new(&World::new(1, 1).rig),
-                shape: ShapePrior { in_plane_mm: 0.01, out_of_plane_mm: 0.01, stretch_mm: 0.01 },
+                shape: ShapePrior { in_plane_mm: 0.01, out_of_plane_mm: 0.01, bent_mm: 0.01, stretch_mm: 0.01 },
                 edge_bends_mm: vec![0.0; truth.len()],
             };
             let mut values =

@@ -16,7 +16,7 @@ use crate::stereo::board_pose::rig_change::consistency::{at_each, usual_excess};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Normal, Promise, Values};
 use crate::stereo::board_pose::solve::edge_bend::edge_bends_mm;
 use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
-use crate::stereo::board_pose::solve::prior::{stretch_mode, weights};
+use crate::stereo::board_pose::solve::prior::{bent_modes, stretch_mode, weights};
 use crate::stereo::board_pose::start::enough;
 use crate::stereo::data::corner_noise::{Noise, whitener};
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
@@ -261,7 +261,7 @@ impl Bundle<'_> {
     }
 }
 
-/// Finds how far the crossings deviate in the plane and out of it, everything else as linearised; with the covariance of the shared
+/// Finds how far the crossings deviate in the plane and out of it, and how far the target as a whole is bent, everything else as linearised; with the covariance of the shared
 /// unknowns as the deviations were thought to be before.
 fn settle_shape(
     bundle: &mut Bundle<'_>,
@@ -274,16 +274,20 @@ fn settle_shape(
     let stretch = stretch_mode(bundle.board);
     let crossings = values.deviations_mm.len() as f64;
     // Shifts, turns, tilts and the stretch are not the print's.
-    let free = [2.0 * crossings - 4.0, crossings - 3.0];
+    let bent = bent_modes(bundle.board);
+    let ways = bent.len() as f64;
+    let free = [2.0 * crossings - 4.0, crossings - 3.0 - ways, ways];
     let right = &normal.data * Bundle::shared(values) - &normal.gradient;
     let mut covariance = Cow::Borrowed(covariance);
     for _ in 0..FIXED_POINT_STEPS {
-        let before = [bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm];
+        let before = [bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm, bundle.shape.bent_mm];
         let shape: DVector<f64> = (covariance.as_ref() * &right).rows(n, m).into_owned();
         let block = covariance.view((n, n), (m, m));
         let along = stretch.dot(&shape);
-        let mut squares = [-along * along, 0.0];
-        let mut traces = [-stretch.dot(&(block * &stretch)), 0.0];
+        let square: f64 = bent.iter().map(|way| way.dot(&shape).powi(2)).sum();
+        let trace: f64 = bent.iter().map(|way| way.dot(&(block * way))).sum();
+        let mut squares = [-along * along, -square, square];
+        let mut traces = [-stretch.dot(&(block * &stretch)), -trace, trace];
         for i in 0..m {
             squares[usize::from(i % 3 == 2)] += shape[i] * shape[i];
             traces[usize::from(i % 3 == 2)] += block[(i, i)];
@@ -293,8 +297,8 @@ fn settle_shape(
             let sum = squares[k].max(0.0) + CERTIFICATE_COUNT * certificate_mm.powi(2);
             (sum / (told + CERTIFICATE_COUNT)).sqrt().max(SMALLEST_MM)
         };
-        let next = [settle(0), settle(1)];
-        (bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm) = (next[0], next[1]);
+        let next = [settle(0), settle(1), settle(2)];
+        [bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm, bundle.shape.bent_mm] = next;
         if next.iter().zip(before).all(|(next, before)| (next / before - 1.0).abs() < SETTLED) {
             break;
         }

@@ -11,12 +11,16 @@ use crate::geometry::perturb;
 use crate::imaging::Board;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::pose_block::TRANSFORM;
+use crate::stereo::model::board_shape::{self, lift};
 use crate::stereo::model::projection::CAMERA_NUMBERS;
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number, rig_number_name};
 
 /// How tightly the deviations are held free of shift, turn and tilt, as a multiple of what the corners say about them.
 const HELD: f64 = 1e4;
+
+/// Share of a way of being bent that shift, tilts and the other ways must leave of it.
+const LEAST_OWN: f64 = 1e-6;
 
 /// What the calibration says.
 #[derive(Debug, Clone)]
@@ -119,6 +123,8 @@ pub(in crate::stereo::board_pose) struct ShapePrior {
     pub in_plane_mm: f64,
     /// Of a crossing's height, mm.
     pub out_of_plane_mm: f64,
+    /// Of each way in which the target as a whole is bent, as the length of the vector of all deviations, mm.
+    pub bent_mm: f64,
     /// Of the common stretch, as the length of the vector of all deviations, mm; infinite where nothing is known of the size.
     pub stretch_mm: f64,
 }
@@ -135,6 +141,21 @@ pub(in crate::stereo::board_pose) fn frame_modes(board: &Board) -> Vec<DVector<f
         |p| Vector3::new(0.0, 0.0, p.y),
     ];
     ways.iter().map(|way| mode(board, way)).collect()
+}
+
+/// Orthogonal unit vectors of a bow along either axis and of a twist, without shift and tilts.
+pub(in crate::stereo::board_pose) fn bent_modes(board: &Board) -> Vec<DVector<f64>> {
+    let mut found: Vec<DVector<f64>> = frame_modes(board);
+    let frame = found.len();
+    for k in 0..board_shape::NUMBERS {
+        let mut way = mode(board, |p| Vector3::new(0.0, 0.0, lift(board, p)[k]));
+        for other in &found {
+            way -= other * other.dot(&way);
+        }
+        // A board of two rows of crossings has no bow along them.
+        found.extend(way.try_normalize(LEAST_OWN));
+    }
+    found.split_off(frame)
 }
 
 /// The unit vector of a common stretch.
@@ -178,6 +199,9 @@ pub(in crate::stereo::board_pose) fn weights(
     };
     for mode in frame_modes(board) {
         add(&mode, HELD * largest);
+    }
+    for mode in bent_modes(board) {
+        add(&mode, shape.bent_mm.powi(-2) - shape.out_of_plane_mm.powi(-2));
     }
     add(&stretch_mode(board), shape.stretch_mm.powi(-2) - shape.in_plane_mm.powi(-2));
     weights

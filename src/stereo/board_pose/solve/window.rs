@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn a_window_sees_as_much_of_straight_lines_as_there_is() {
-        let board = Board { squares: Squares { columns: 7, rows: 6 }, square_mm: 10.0 };
+        let board = Board::checker(Squares { columns: 7, rows: 6 }, 10.0);
         let window = |reach| Window { board: &board, place: (2, 0), reach };
         for axis in 0..2 {
             for reach in [[0.0, 0.0], [0.3, 0.8]] {
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn means_are_over_the_corners_in_use() {
-        let board = Board { squares: Squares { columns: 4, rows: 4 }, square_mm: 10.0 };
+        let board = Board::checker(Squares { columns: 4, rows: 4 }, 10.0);
         let observation = |reach, active| {
             let mut o = Observation::of_point(Side::Left, Point2::origin(), 0.01);
             (o.col, o.row, o.reach, o.active) = (1, 2, [reach; 2], active);

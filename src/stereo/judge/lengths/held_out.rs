@@ -16,7 +16,7 @@ use crate::stereo::judge::verdict::{Expansion, Extremes, Verdict};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::select::cross_validation::{self, FOLDS, Without};
 use crate::stereo::solve::uncertainty;
-use crate::stereo::triangulate::RigCovariance;
+use crate::stereo::triangulate::{RigCovariance, common};
 use crate::stereo::{Error, Rig};
 
 /// The short and the long range of Fig. 6 (b), in squares: 10 and 70 mm on the paper's board.
@@ -36,10 +36,10 @@ pub struct HeldOutPair {
     pub mean_error_x_long_mm: Option<f64>,
     /// Along y.
     pub mean_error_y_long_mm: Option<f64>,
-    /// Largest absolute error of any range, mm.
-    pub max_abs_error_mm: f64,
-    /// Root mean square of the distance between the two rays of a corner, mm.
-    pub gap_rms_mm: f64,
+    /// Largest absolute error of any range, mm; `None` where both pictures show no length.
+    pub max_abs_error_mm: Option<f64>,
+    /// Root mean square of the distance between the two rays of a corner, mm; `None` where both show none.
+    pub gap_rms_mm: Option<f64>,
     /// Errors of the long range, x then y, mm: Fig. 6 (a).
     pub long_errors_mm: Vec<f64>,
 }
@@ -105,6 +105,9 @@ struct Folds {
 /// An error where the pairs without some of them do not determine the cameras.
 pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accuracy, Error> {
     let undetermined = || Error::undetermined().without(&calibration.skipped);
+    if calibration.views.iter().all(|view| common(view).is_empty()) {
+        return Err(Error::NothingInCommon { pairs: calibration.views.len() });
+    }
     let folds = folds(calibration).ok_or_else(undetermined)?;
     let mut measured: Vec<Measured> = calibration
         .views
@@ -187,7 +190,7 @@ fn pair(view: &View, measured: &Measured, short: [usize; 2], long: [usize; 2]) -
         mean_error_x_long_mm: mean_of(Axis::X, long[0]),
         mean_error_y_long_mm: mean_of(Axis::Y, long[1]),
         max_abs_error_mm: measured.worst_mm(),
-        gap_rms_mm: mean(&gaps).unwrap_or(0.0).sqrt(),
+        gap_rms_mm: mean(&gaps).map(f64::sqrt),
         long_errors_mm: measured.errors(Axis::X, long[0]).chain(measured.errors(Axis::Y, long[1])).collect(),
     }
 }

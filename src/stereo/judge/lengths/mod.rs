@@ -150,8 +150,8 @@ fn range(board: &Board, measured: &[Measured], axis: Axis, squares: usize) -> Op
 }
 
 impl Measured {
-    pub(super) fn worst_mm(&self) -> f64 {
-        self.lengths.iter().fold(0.0, |max: f64, l| max.max(l.error_mm.abs()))
+    pub(super) fn worst_mm(&self) -> Option<f64> {
+        self.lengths.iter().map(|l| l.error_mm.abs()).reduce(f64::max)
     }
 
     /// Sum of the measured over the sum of the nominal lengths, minus one.

@@ -2,6 +2,7 @@
 
 pub mod boards;
 pub mod cameras;
+pub mod changes;
 pub mod clean;
 pub mod judge;
 pub mod light;

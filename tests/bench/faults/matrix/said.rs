@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
+use stereocal::imaging::Board;
 
 use super::set::Set;
 
@@ -18,6 +19,8 @@ pub struct Said {
     pub words: Vec<String>,
     /// `calibration.json`, where it was written.
     pub calibration: Option<Value>,
+    /// `camera-check.json`, of a run that came to a verdict.
+    pub check: Option<Value>,
 }
 
 /// Runs `camera-check` on a set's folder.
@@ -29,7 +32,19 @@ pub fn camera_check(program: &Path, folder: &Path, set: &Set) -> Said {
         command.args(["--check-images", "second", "--check-squares", &second.typed.squares.to_string()]);
         command.args(["--check-square-mm", &second.typed.square_mm.to_string()]);
     }
-    let output = command.args(&set.arguments).output().expect("the program starts");
+    read(command.args(&set.arguments), folder)
+}
+
+/// Runs `camera-check` on the corners in `corners.csv` of a folder.
+pub fn camera_check_of_corners(program: &Path, folder: &Path, typed: &Board, tolerance_mm: f64) -> Said {
+    let mut command = Command::new(program);
+    command.current_dir(folder).args(["camera-check", "--corners", "corners.csv", "--out", "out"]);
+    command.args(["--squares", &typed.squares.to_string(), "--square-mm", &typed.square_mm.to_string()]);
+    read(command.args(["--tolerance-mm", &tolerance_mm.to_string()]), folder)
+}
+
+fn read(command: &mut Command, folder: &Path) -> Said {
+    let output = command.output().expect("the program starts");
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     let read = |name: &str| -> Option<Value> {
         serde_json::from_str(&std::fs::read_to_string(folder.join("out").join(name)).ok()?).ok()
@@ -47,6 +62,7 @@ pub fn camera_check(program: &Path, folder: &Path, set: &Set) -> Said {
         claimed_mm: check.as_ref().and_then(|c| c["max_abs_error_mm"].as_f64()),
         words,
         calibration: read("calibration.json").filter(|_| matches!(status, Some(0 | 1))),
+        check,
     }
 }
 

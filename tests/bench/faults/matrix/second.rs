@@ -22,7 +22,7 @@ fn with_second(seed: u64, px: u32, typed: Board, true_share: f64, moved: Transfo
 }
 
 fn board(squares: &str, square_mm: f64) -> Board {
-    Board { squares: squares.parse().expect("a board"), square_mm }
+    Board::checker(squares.parse().expect("a board"), square_mm)
 }
 
 pub fn cases() -> Vec<Case> {

@@ -74,7 +74,7 @@ impl Plan {
 
     /// Another board, its squares such that it is about as large as the usual one.
     pub fn board(mut self, squares: &str, square_mm: f64) -> Plan {
-        self.settings.check_board = Board { squares: squares.parse().expect("a board"), square_mm };
+        self.settings.check_board = Board::checker(squares.parse().expect("a board"), square_mm);
         self
     }
 

@@ -5,9 +5,11 @@
 
 use nalgebra::{Matrix3, Point2, Point3, Rotation3, Vector2, Vector3};
 use serde_json::Value;
+use stereocal::geometry::Transform;
 use stereocal::imaging::Board;
 use stereocal::simulate::check_poses::{self, Holding};
 use stereocal::simulate::physical_board::{PhysicalBoard, Workmanship};
+use stereocal::stereo::{Camera, Rig};
 
 use super::set::Set;
 
@@ -97,6 +99,14 @@ impl Eye {
 }
 
 impl Written {
+    fn of(rig: &Rig) -> Written {
+        let eye =
+            |c: &Camera| Eye { focal: Vector2::new(c.fx, c.fy), middle: Vector2::new(c.cx, c.cy), lens: c.distortion };
+        let pose = &rig.right_from_left;
+        let rotation = *pose.rotation.to_rotation_matrix().matrix();
+        Written { eyes: [eye(&rig.left), eye(&rig.right)], rotation, translation: pose.translation.vector }
+    }
+
     fn read(json: &Value) -> Option<Written> {
         let pose = &json["right_from_left"];
         let at = |v: &Value, k: usize| v[k].as_f64();
@@ -156,7 +166,7 @@ impl Written {
 }
 
 /// Fresh boards, the tilts up to 45 degrees, in the volume in which the set's boards were held.
-fn boards(set: &Set) -> Vec<(PhysicalBoard, stereocal::geometry::Transform)> {
+fn boards(set: &Set, count: usize) -> Vec<(PhysicalBoard, Transform)> {
     let perfect =
         Workmanship { pitch_um: 0.0, bow_um: (0.0, 0.0), scale_ppm: 0.0, ..set.plan.settings.check_workmanship };
     let drawing = Board { square_mm: set.typed.square_mm * set.scale, ..set.typed };
@@ -166,7 +176,7 @@ fn boards(set: &Set) -> Vec<(PhysicalBoard, stereocal::geometry::Transform)> {
     let field = set.field.unwrap_or_else(|| set.plan.drawing.left_from_field());
     let seen = |at: &_| check_poses::seen_by_both(&set.rig, &board, at);
     let seed = set.plan.settings.seed.wrapping_add(7001);
-    let poses: Vec<_> = (0..BOARDS).filter_map(|k| check_poses::pose(&field, &holding, k, seed, &seen)).collect();
+    let poses: Vec<_> = (0..count).filter_map(|k| check_poses::pose(&field, &holding, k, seed, &seen)).collect();
     assert!(!poses.is_empty(), "no fresh board is seen by both cameras");
     poses.into_iter().map(|at| (board.clone(), at)).collect()
 }
@@ -204,13 +214,28 @@ impl Grid {
     }
 }
 
-/// Compares. `None` where `calibration.json` is no rig.
-pub fn deviation(set: &Set, calibration: &Value) -> Option<Deviation> {
+/// A length or a point of a fresh board: how far it is off, mm, and over its own standard deviation.
+#[derive(Debug, Clone, Copy)]
+pub struct Off {
+    pub mm: f64,
+    pub sigmas: f64,
+}
+
+/// Lengths and points of fresh boards.
+#[derive(Debug, Clone, Default)]
+pub struct Comparison {
+    pub lengths: Vec<Off>,
+    pub points: Vec<Off>,
+    /// False where the file has no covariance.
+    pub sigmas_known: bool,
+}
+
+/// Compares so many fresh boards. `None` where `calibration.json` is no rig.
+pub fn compare(set: &Set, calibration: &Value, boards: usize) -> Option<Comparison> {
     let written = Written::read(calibration)?;
     let sides = deviated(calibration, &written);
-    let mut worst = Deviation::default();
-    let mut most = (0.0f64, 0.0f64);
-    for (board, left_from_board) in boards(set) {
+    let mut found = Comparison { sigmas_known: sides.is_some(), ..Comparison::default() };
+    for (board, left_from_board) in self::boards(set, boards) {
         let grid = Grid::new(board.drawing.columns(), board.drawing.rows());
         let truth: Vec<Point3<f64>> =
             grid.corners.iter().map(|&(col, row)| left_from_board * board.corner_mm(col, row)).collect();
@@ -221,23 +246,52 @@ pub fn deviation(set: &Set, calibration: &Value) -> Option<Deviation> {
         let changed: Vec<[Vec<Vector3<f64>>; 2]> =
             sides.iter().flatten().map(|(a, b)| [measured(a), measured(b)]).collect();
         for &(i, j) in &grid.lengths {
-            let error = ((points[i] - points[j]).norm() - (truth[i] - truth[j]).norm()).abs();
+            let mm = (points[i] - points[j]).norm() - (truth[i] - truth[j]).norm();
             let half = |p: &[Vec<Vector3<f64>>; 2]| 0.5 * ((p[0][i] - p[0][j]).norm() - (p[1][i] - p[1][j]).norm());
             let variance: f64 = changed.iter().map(|p| half(p).powi(2)).sum();
-            worst.length_mm = worst.length_mm.max(error);
-            most.0 = most.0.max(error / variance.sqrt().max(1e-9));
+            found.lengths.push(Off { mm: mm.abs(), sigmas: mm.abs() / variance.sqrt().max(1e-9) });
         }
         for (k, point) in truth.iter().enumerate() {
             let halves = changed.iter().map(|p| 0.5 * (p[0][k] - p[1][k]));
             let covariance: Matrix3<f64> = halves.map(|h| h * h.transpose()).sum();
             let off = points[k] - point.coords;
             let squared = covariance.try_inverse().map_or(0.0, |inverse| off.dot(&(inverse * off)));
-            most.1 = most.1.max(squared.max(0.0).sqrt());
+            found.points.push(Off { mm: off.norm(), sigmas: squared.max(0.0).sqrt() });
         }
     }
-    worst.length_sigmas = sides.as_ref().map(|_| most.0);
-    worst.point_sigmas = sides.as_ref().filter(|_| !set.lengths_only).map(|_| most.1);
-    Some(worst)
+    Some(found)
+}
+
+/// The worst of all of them.
+pub fn deviation(set: &Set, calibration: &Value) -> Option<Deviation> {
+    let found = compare(set, calibration, BOARDS)?;
+    let most = |list: &[Off], of: fn(&Off) -> f64| list.iter().map(of).fold(0.0, f64::max);
+    Some(Deviation {
+        length_mm: most(&found.lengths, |off| off.mm),
+        length_sigmas: found.sigmas_known.then(|| most(&found.lengths, |off| off.sigmas)),
+        point_sigmas: (found.sigmas_known && !set.lengths_only).then(|| most(&found.points, |off| off.sigmas)),
+    })
+}
+
+/// The largest change of a length of fresh boards where another rig takes the pictures than the set's, mm.
+pub fn effect_mm(set: &Set, taking: &Rig, boards: usize) -> f64 {
+    let taken = Set { rig: taking.clone(), ..set.clone() };
+    let written = Written::of(&set.rig);
+    let of_board = |(board, left_from_board): (PhysicalBoard, Transform)| {
+        let grid = Grid::new(board.drawing.columns(), board.drawing.rows());
+        let at = |&(col, row): &(usize, usize)| left_from_board * board.corner_mm(col, row);
+        let truth: Vec<Point3<f64>> = grid.corners.iter().map(at).collect();
+        let points: Vec<Vector3<f64>> = truth
+            .iter()
+            .map(|point| {
+                let px = pictures(&taken, point);
+                written.point(px[0], px[1])
+            })
+            .collect();
+        let change = |&(i, j): &(usize, usize)| ((points[i] - points[j]).norm() - (truth[i] - truth[j]).norm()).abs();
+        grid.lengths.iter().map(change).fold(0.0, f64::max)
+    };
+    self::boards(set, boards).into_iter().map(of_board).fold(0.0, f64::max)
 }
 
 /// Where a point is in the pictures that were written.

@@ -1,0 +1,112 @@
+use super::*;
+use crate::identify::synthetic;
+use crate::measurements::{Measurement, Observed};
+
+/// Wire lengths to an anchor that moves by 5 mm after `moved` rows.
+fn wire(moved: usize) -> (synthetic::World, Vec<Measurement>) {
+    let world = synthetic::planned(120, 20, 25.0, 0.0, 5, &|_| {});
+    let rows: Vec<Measurement> = world
+        .rows
+        .iter()
+        .filter(|r| r.at.role != Role::Center)
+        .enumerate()
+        .map(|(i, row)| {
+            let anchor = nalgebra::Point3::new(600.0, if i < moved { 300.0 } else { 305.0 }, 0.0);
+            // A ripple of 0.05 mm stands for noise.
+            let distance_mm =
+                (world.truth.target_mm(&row.at.joints_rad()) - anchor).norm() + 0.05 * (1.7 * i as f64).sin();
+            let mut at = row.at.clone();
+            at.group = "wire".into();
+            Measurement { at, target: String::new(), observed: Observed::Distance { distance_mm, sigma_mm: None } }
+        })
+        .collect();
+    (world, rows)
+}
+
+#[test]
+fn an_anchor_that_moved_is_found_where_it_moved() {
+    let (world, rows) = wire(70);
+    let set = Dataset::new(&rows).unwrap();
+    let (cut, Along { sessions, .. }) = find(&set, &world.nominal, &Settings::default());
+    assert_eq!(sessions.len(), 2, "{sessions:?}");
+    assert!(sessions[0].count.abs_diff(70) <= 1, "{sessions:?}");
+    assert_eq!(cut.groups.len(), 2);
+}
+
+#[test]
+fn gross_errors_hide_no_session_and_make_none() {
+    for off_mm in [10.0, 100.0, 2000.0] {
+        for (moved, sessions) in [(70, 2), (1000, 0)] {
+            let (world, mut rows) = wire(moved);
+            for i in [7, 31, 32, 55, 76, 90, 108] {
+                if let Observed::Distance { distance_mm, .. } = &mut rows[i].observed {
+                    *distance_mm += off_mm;
+                }
+            }
+            let set = Dataset::new(&rows).unwrap();
+            let (_, along) = find(&set, &world.nominal, &Settings::default());
+            assert_eq!(along.sessions.len(), sessions, "{off_mm} mm, {moved}: {:?}", along.sessions);
+            let first = along.sessions.first().map_or(70, |session| session.count);
+            assert!(first.abs_diff(70) <= 2, "{off_mm} mm: {:?}", along.sessions);
+        }
+    }
+}
+
+#[test]
+fn an_anchor_that_stayed_is_one_session() {
+    let (world, rows) = wire(1000);
+    let set = Dataset::new(&rows).unwrap();
+    assert!(find(&set, &world.nominal, &Settings::default()).1.sessions.is_empty());
+}
+
+/// Distances to the first pose, and everything but it moved by so much: evenly along the rows, or at once after 40 of them.
+fn to_center(moved_mm: f64, evenly: bool) -> (synthetic::World, Dataset) {
+    let world = synthetic::planned(120, 20, 25.0, 0.0, 5, &|_| {});
+    let mut rows: Vec<Measurement> = world
+        .rows
+        .iter()
+        .enumerate()
+        .filter(|(i, r)| *i == 0 || r.at.role != Role::Center)
+        .map(|(_, r)| r.clone())
+        .collect();
+    let from = world.truth.target_mm(&rows[0].at.joints_rad());
+    let count = rows.len() as f64;
+    for (i, row) in rows.iter_mut().enumerate() {
+        let share = if evenly { i as f64 / count } else { f64::from(u8::from(i > 40)) };
+        let place = world.truth.target_mm(&row.at.joints_rad()) + moved_mm * share * nalgebra::Vector3::y();
+        // A ripple of 0.02 mm stands for noise, 0.3 mm for a zero that is off.
+        let distance_mm = if i == 0 { 0.0 } else { (place - from).norm() + 0.02 * (1.7 * i as f64).sin() + 0.3 };
+        row.at.group = "one".into();
+        row.observed = Observed::Distance { distance_mm, sigma_mm: None };
+    }
+    let set = Dataset::new(&rows).unwrap();
+    (world, set)
+}
+
+#[test]
+fn a_base_that_moved_is_found_in_distances_to_a_centre() {
+    for moved_mm in [0.2, 1.0, 5.0] {
+        let (world, set) = to_center(moved_mm, false);
+        let (_, along) = find(&set, &world.nominal, &Settings::default());
+        assert!(along.sessions.len() == 2 && along.sessions[0].count.abs_diff(40) <= 2, "{moved_mm}: {along:?}");
+        let (world, set) = to_center(moved_mm, true);
+        let (_, along) = find(&set, &world.nominal, &Settings::default());
+        assert!(!along.drifting.is_empty() || along.sessions.len() > 1, "{moved_mm}: {along:?}");
+    }
+    let (world, set) = to_center(0.0, false);
+    assert_eq!(find(&set, &world.nominal, &Settings::default()).1, Along::default());
+}
+
+#[test]
+fn a_socket_that_moved_is_found_where_it_moved() {
+    for moved_mm in [0.3, 1.0, 5.0] {
+        let (world, _) = synthetic::touched(moved_mm, 2);
+        let set = Dataset::new(&world.rows).unwrap();
+        let (_, along) = find(&set, &world.nominal, &Settings::default());
+        let parts: Vec<&str> = along.sessions.iter().map(|s| s.first.as_str()).collect();
+        assert_eq!(parts, ["s2_0", "s2_6"], "{moved_mm}");
+    }
+    let (world, _) = synthetic::touched(0.0, 2);
+    let set = Dataset::new(&world.rows).unwrap();
+    assert_eq!(find(&set, &world.nominal, &Settings::default()).1, Along::default());
+}

@@ -1,0 +1,96 @@
+//! What else a board could be whose markers do not number it as the one that was named.
+//!
+//! In: grids of corners without a number. Out: the reason, for a person. Method: the same markers are read once more as on other boards: of another
+//! dictionary, of other counts, with markers of another size, mirrored; the first that they fit is named.
+
+use super::dictionary::Dictionary;
+use super::marker::Fields;
+use super::numbering::{self, Read, Said};
+use super::{fields, markers_in};
+use crate::imaging::board::{Board, Kind, Squares};
+use crate::imaging::image::Picture;
+use crate::imaging::lattice::Places;
+
+/// Markers that are no chance find.
+const FEWEST: usize = 2;
+/// Sizes of markers that are tried, as shares of a square.
+const SHARES: [f64; 8] = [0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85];
+/// Most columns of a board.
+const MOST_COLUMNS: usize = 40;
+
+/// Why none of these grids is a part of the board.
+pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> String {
+    let (Some(own), Kind::Charuco { dictionary, marker_mm, .. }) = (fields(board), board.kind) else {
+        return "no board found".to_owned();
+    };
+    let largest = grids.iter().max_by_key(|grid| grid.count());
+    let Some(grid) = largest.filter(|grid| grid.count() >= 4) else { return "no board found".to_owned() };
+    let size = (grid.columns, grid.rows);
+    let reads = markers_in(picture, grid, own);
+    if let Some(squares) = other_counts(board, size, &reads) {
+        return format!(
+            "shows the markers of a board of {} columns; --board says {} (columns first, as printed)",
+            squares.columns, board.squares
+        );
+    }
+    let mirrored = grid.flip_rows();
+    if numbering::place(board, size, &markers_in(picture, &mirrored, own)) != Said::Nothing {
+        return "shows the board mirrored: the print or the picture is".to_owned();
+    }
+    let mut best: Option<(usize, Dictionary, f64)> = None;
+    for share in std::iter::once(own.share).chain(SHARES) {
+        for bits in 4..=7 {
+            let reads = markers_in(picture, grid, Fields { share, bits });
+            for other in Dictionary::all().filter(|other| other.bits() == bits) {
+                let known = known_in(other, &reads);
+                if known >= FEWEST && 2 * known > reads.len() && best.is_none_or(|(most, ..)| known > most) {
+                    best = Some((known, other, share));
+                }
+            }
+        }
+    }
+    match best {
+        Some((known, other, share)) if (share - own.share).abs() > 0.03 && other == dictionary => format!(
+            "shows {known} markers of about {:.3} mm in squares of {} mm; --board says {marker_mm} mm",
+            share * board.square_mm,
+            board.square_mm
+        ),
+        Some((known, other, _)) if other != dictionary => {
+            format!("shows {known} markers of {}, the board has those of {}", other.name(), dictionary.name())
+        }
+        Some((known, ..)) => {
+            format!(
+                "shows {known} markers of {} in another order than a board of {} squares has them",
+                dictionary.name(),
+                board.squares
+            )
+        }
+        None => format!("shows {} corners of squares, and no marker among them that can be read", grid.count()),
+    }
+}
+
+/// The board with other counts whose order of markers is the one that is seen.
+fn other_counts(board: &Board, size: (usize, usize), reads: &[Read]) -> Option<Squares> {
+    let Kind::Charuco { dictionary, .. } = board.kind else { return None };
+    let mut counts = (3..=MOST_COLUMNS).filter_map(|columns| {
+        let rows = (2 * dictionary.count() / columns).min(200);
+        let squares = Squares { columns, rows };
+        let Said::Place(found) = numbering::place(&Board { squares, ..*board }, size, reads) else { return None };
+        (found.agreeing >= FEWEST).then_some((found.agreeing, columns))
+    });
+    let first = counts.next()?;
+    let (_, columns) = counts.fold(first, |best, next| if next.0 > best.0 { next } else { best });
+    (columns != board.squares.columns).then_some(Squares { columns, rows: board.squares.rows })
+}
+
+/// How many of what was read are markers of a dictionary, in one of the four directions.
+fn known_in(dictionary: Dictionary, reads: &[Read]) -> usize {
+    let known = |quarters: usize| {
+        let is_known = |read: &&Read| {
+            let seen = read.marker.turned(quarters);
+            (0..dictionary.count()).any(|id| dictionary.code(id).is_some_and(|code| seen.differs_from(code) == 0))
+        };
+        reads.iter().filter(is_known).count()
+    };
+    (0..4).map(known).max().unwrap_or(0)
+}

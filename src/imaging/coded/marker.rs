@@ -1,0 +1,134 @@
+//! What stands in one square of a board with markers.
+//!
+//! In: a picture and where the four corners of a square lie in it. Out: the bits of the marker that stands there, or none. Method: each bit is
+//! the mean of nine places in its middle, carried into the picture by the square's homography; black and white are those of the marker's
+//! border and of the paper round it, so that uneven light, and a board printed white on black, do not matter. Goes wrong: bits of less than
+//! about two pixels.
+
+use nalgebra::{Matrix3, Point2, Vector3};
+
+use super::dictionary::turned;
+use crate::imaging::image::{Grey, Image, Picture};
+
+/// Share of the border's fields, and of those of the paper beside it, that may be on the wrong side: glare, a fold, or blur.
+const MOST_BROKEN: f64 = 0.25;
+/// Where a bit is looked at, in its own sides from its middle.
+const WITHIN_BIT: [f64; 3] = [-0.2, 0.0, 0.2];
+
+/// The bits in a square, in its own order of columns and rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Marker {
+    /// Row by row from the lowest bit, one for the border's colour.
+    pub code: u64,
+    /// Bits along its side.
+    pub bits: usize,
+    /// Whether the border is brighter than the paper.
+    pub inverted: bool,
+    /// By how much paper and border differ, grey values.
+    pub contrast: f64,
+}
+
+impl Marker {
+    /// The same as seen after so many quarter turns of the grid that it was read in.
+    pub fn turned(self, quarters: usize) -> Marker {
+        Marker { code: turned(self.code, self.bits, quarters), ..self }
+    }
+
+    /// By how many bits it differs from a code.
+    pub fn differs_from(&self, code: u64) -> usize {
+        (self.code ^ code).count_ones() as usize
+    }
+}
+
+/// How markers are printed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fields {
+    /// Side of a marker, as a share of its square's.
+    pub share: f64,
+    /// Bits along its side, without the border.
+    pub bits: usize,
+}
+
+/// Where the corners of a unit square lie in a picture, in order round it from (0, 0) over (1, 0): the map from the one to the other.
+pub fn square_map(corners: &[Point2<f64>; 4]) -> Option<Matrix3<f64>> {
+    let [a, b, c, d] = corners;
+    // Heckbert 1989, section 2.2.3.
+    let (d1, d2, sum) = (b - c, d - c, a - b + (c - d));
+    let det = d1.perp(&d2);
+    let (g, h) = (sum.perp(&d2) / det, d1.perp(&sum) / det);
+    let (x, y) = (b - a + g * b.coords, d - a + h * d.coords);
+    let map = Matrix3::new(x.x, y.x, a.x, x.y, y.y, a.y, g, h, 1.0);
+    map.iter().all(|v| v.is_finite()).then_some(map)
+}
+
+/// A place of the unit square in the picture.
+pub fn mapped(map: &Matrix3<f64>, x: f64, y: f64) -> Point2<f64> {
+    let p = map * Vector3::new(x, y, 1.0);
+    Point2::new(p.x / p.z, p.y / p.z)
+}
+
+/// Grey value at a place, px, between the four pixels round it; `None` at the border.
+pub fn grey_at(picture: &Picture, at: &Point2<f64>) -> Option<f64> {
+    match &picture.grey {
+        Grey::Eight(image) => between(image, at),
+        Grey::Sixteen(image) => between(image, at),
+    }
+}
+
+fn between<T: Copy + Into<f64>>(image: &Image<T>, at: &Point2<f64>) -> Option<f64> {
+    let (x, y) = (at.x.floor(), at.y.floor());
+    if !(x >= 0.0 && y >= 0.0 && x + 1.0 < image.width as f64 && y + 1.0 < image.height as f64) {
+        return None;
+    }
+    let (u, v) = (at.x - x, at.y - y);
+    let first = y as usize * image.width + x as usize;
+    let pixel = |offset: usize| -> f64 { image.pixels[first + offset].into() };
+    let row = |offset: usize| pixel(offset) * (1.0 - u) + pixel(offset + 1) * u;
+    Some(row(0) * (1.0 - v) + row(image.width) * v)
+}
+
+/// Reads the marker in a square. `None` where there is none: border and paper are then not told apart.
+pub fn read(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Option<Marker> {
+    let map = square_map(corners)?;
+    let Fields { share, bits } = fields;
+    let margin = (1.0 - share) / 2.0;
+    let field = share / (bits + 2) as f64;
+    let place = |i: usize| margin + (i as f64 + 0.5) * field;
+    let mean = |x: f64, y: f64| {
+        let mut sum = 0.0;
+        for dx in WITHIN_BIT {
+            for dy in WITHIN_BIT {
+                sum += grey_at(picture, &mapped(&map, x + dx * field, y + dy * field))?;
+            }
+        }
+        Some(sum / (WITHIN_BIT.len() * WITHIN_BIT.len()) as f64)
+    };
+    let side = bits + 2;
+    let grid: Vec<f64> =
+        (0..side * side).map(|k| mean(place(k % side), place(k / side))).collect::<Option<Vec<f64>>>()?;
+    let is_border = |k: usize| [k % side, k / side].iter().any(|&i| i == 0 || i == side - 1);
+    let along = |i: usize, k: usize| {
+        let (near, far) = (margin / 2.0, 1.0 - margin / 2.0);
+        let at = [(place(i), near), (place(i), far), (near, place(i)), (far, place(i))][k];
+        grey_at(picture, &mapped(&map, at.0, at.1))
+    };
+    let paper: Vec<f64> = (0..4 * side).map(|k| along(k / 4, k % 4)).collect::<Option<Vec<f64>>>()?;
+    let border: Vec<f64> = (0..side * side).filter(|&k| is_border(k)).map(|k| grid[k]).collect();
+    let mean_of = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (white, black) = (mean_of(&paper), mean_of(&border));
+    let inverted = black > white;
+    let middle = 0.5 * (white + black);
+    let is_black = |grey: f64| (grey < middle) != inverted;
+    let wrong = |fields: &[f64], black: bool| {
+        fields.iter().filter(|grey| is_black(**grey) != black).count() as f64 > MOST_BROKEN * fields.len() as f64
+    };
+    if wrong(&border, true) || wrong(&paper, false) {
+        return None;
+    }
+    let mut code = 0;
+    for k in 0..bits * bits {
+        let (i, j) = (k % bits + 1, k / bits + 1);
+        code |= u64::from(is_black(grid[j * side + i])) << k;
+    }
+    Some(Marker { code, bits, inverted, contrast: (white - black).abs() })
+}

@@ -1,0 +1,321 @@
+//! Boards whose markers number their corners: found in any part of them.
+//!
+//! In: a picture and the board. Out: a reduced copy and the board's corners on it as far as they are seen, each at its place on the board. Method:
+//! grids of corners grow as on a plain board ([`super::detect::growth`]), on copies from coarse to fine until the markers are large enough to leave
+//! the corners alone; the markers in a grid's squares say which part of the board it is ([`numbering`]). Which squares hold the markers (old and new
+//! layout), and whether they are printed white on black, is what is seen. Goes wrong: no marker that can be read; another board, which is
+//! named where the markers tell ([`explain`]).
+
+pub mod dictionary;
+mod explain;
+pub mod faces;
+pub mod local_map;
+pub mod marker;
+mod numbering;
+
+use nalgebra::Point2;
+
+use self::marker::{Fields, grey_at, mapped, read, square_map};
+use self::numbering::{Placement, Read, Said};
+use super::board::{Board, Kind};
+use super::detect::{COARSE_PX, Detected, Refusal, grids, on_a_copy, right_handed};
+use super::image::{Grey8, Picture};
+use super::lattice::{Lattice, Places};
+use super::pyramid::{Level, factor_for};
+
+/// Which squares of a ChArUco board hold markers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layout {
+    /// The square in the upper left corner holds none: OpenCV's since 4.6.
+    New,
+    /// It holds one where the number of rows is even: OpenCV's before.
+    Old,
+}
+
+impl Layout {
+    /// Those that a board may have; both are the same where the number of rows is odd.
+    pub fn of(board: &Board) -> Vec<Layout> {
+        if let Kind::Charuco { layout: Some(layout), .. } = board.kind {
+            return vec![layout];
+        }
+        if board.squares.rows.is_multiple_of(2) { vec![Layout::New, Layout::Old] } else { vec![Layout::New] }
+    }
+
+    /// Whether the square in this column and row holds a marker.
+    pub fn holds_marker(self, x: isize, y: isize) -> bool {
+        (x + y).rem_euclid(2) == if self == Layout::New { 1 } else { 0 }
+    }
+
+    /// The number of the marker in a square that holds one, on a board of so many columns: they count row by row.
+    pub fn number(self, columns: usize, x: usize, y: usize) -> usize {
+        // Of two rows one holds the larger half.
+        let first = if self == Layout::New { columns / 2 } else { columns.div_ceil(2) };
+        y / 2 * columns + if y % 2 == 1 { first } else { 0 } + x / 2
+    }
+}
+
+/// How a board's markers are printed: what a corner's window must leave out, and what is to be said.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Print {
+    /// Side of a marker, as a share of its square's.
+    pub share: f64,
+    /// Which squares hold markers.
+    pub layout: Layout,
+    /// White on black.
+    pub inverted: bool,
+}
+
+/// Squares of so many px of a copy have a margin of so many px round their markers at least: on finer copies nothing more is seen.
+const ENOUGH_MARGIN_PX: f64 = 5.0;
+/// Copies with so many pixels may be enlarged.
+const MOST_DOUBLED_PX: usize = 4_000_000;
+/// How far from where its neighbours have it a corner may lie, in steps of the grid.
+const STRAY: f64 = 0.2;
+/// How far the marker's size may be from the board's, as a share of a square.
+const MOST_OFF: f64 = 0.05;
+/// What of the usual contrast a marker has at least: light falls off over a board, but not so far.
+const LEAST_CONTRAST: f64 = 0.35;
+/// Grids that are looked at on a copy, the largest first.
+const MOST_GRIDS: usize = 12;
+
+/// Why a part of a board has no number where the layout alone would give it one.
+pub const BY_LAYOUT: &str = "shows markers, but none at the board's sides: which corners they are depends on the layout, OpenCV's before or since 4.6";
+
+/// A part of the board in a picture.
+struct Part {
+    corners: Places,
+    placement: Placement,
+}
+
+/// Looks for the board; the reason where it was not found.
+pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
+    let Some(fields) = fields(&board) else { return Err("no board found".to_owned().into()) };
+    let margin = (1.0 - fields.share) / 2.0;
+    let mut best: Option<(Vec<Part>, Level, Grey8)> = None;
+    let mut unnumbered: Vec<Places> = Vec::new();
+    let mut by_layout = false;
+    for level in levels(picture) {
+        let copy = level.copy(picture);
+        let mut parts: Vec<Part> = Vec::new();
+        for grid in grids(&copy, margin).into_iter().take(MOST_GRIDS) {
+            let grid = without_strays(right_handed(grid.map(|p| level.to_picture(p))));
+            match number(picture, &board, fields, &grid) {
+                Numbered::Part(part) => add(&mut parts, part)?,
+                Numbered::ByLayout => by_layout = true,
+                Numbered::No if unnumbered.len() < MOST_GRIDS => unnumbered.push(grid),
+                Numbered::No => {}
+            }
+        }
+        let count = |parts: &[Part]| parts.iter().map(|part| part.corners.count()).sum::<usize>();
+        let step_px = parts.first().and_then(|part| part.corners.step_px()).map_or(0.0, |px| px / level.scale());
+        if !parts.is_empty() && best.as_ref().is_none_or(|(known, ..)| count(&parts) > count(known)) {
+            best = Some((parts, level, copy));
+        }
+        if step_px * margin >= ENOUGH_MARGIN_PX {
+            break;
+        }
+    }
+    let Some((parts, level, copy)) = best else {
+        if by_layout {
+            return Err(BY_LAYOUT.to_owned().into());
+        }
+        return Err(explain::unnumbered(picture, &board, &unnumbered).into());
+    };
+    let placement = parts[0].placement;
+    let merged = merged(&board, &parts);
+    if let Some(share) =
+        seen_share(picture, &merged, placement.layout, fields).filter(|s| (s - fields.share).abs() > MOST_OFF)
+    {
+        let Kind::Charuco { marker_mm, .. } = board.kind else { return Err("no board found".to_owned().into()) };
+        return Err(format!(
+            "shows markers of {:.3} mm in squares of {} mm; --board says {marker_mm} mm",
+            share * board.square_mm,
+            board.square_mm
+        )
+        .into());
+    }
+    let print = Print { share: fields.share, layout: placement.layout, inverted: placement.inverted };
+    let on_copy = merged.map(|p| level.to_copy(p));
+    Ok(Detected { print: Some(print), ..on_a_copy(picture, level, &copy, on_copy) })
+}
+
+/// How a board's markers are divided; `None` for a board without.
+fn fields(board: &Board) -> Option<Fields> {
+    match board.kind {
+        Kind::Checker => None,
+        Kind::Charuco { marker_mm, dictionary, .. } => {
+            Some(Fields { share: marker_mm / board.square_mm, bits: dictionary.bits() })
+        }
+    }
+}
+
+/// Copies in their order: from coarse to fine.
+fn levels(picture: &Picture) -> Vec<Level> {
+    let mut factor = factor_for(picture, COARSE_PX);
+    let mut levels = vec![Level::Reduced(factor)];
+    while factor > 1 {
+        factor = factor.div_ceil(2);
+        levels.push(Level::Reduced(factor));
+    }
+    if picture.width() * picture.height() <= MOST_DOUBLED_PX {
+        levels.push(Level::Doubled);
+    }
+    levels
+}
+
+/// The grid without corners that lie elsewhere than their neighbours say, the worst first.
+fn without_strays(mut grid: Places) -> Places {
+    loop {
+        let Some(step) = grid.step_px() else { return grid };
+        let off = |(col, row, p): (usize, usize, &Point2<f64>)| {
+            let at = local_map::predicted(&grid, (col as isize, row as isize))?;
+            Some(((at - p).norm() / step, row * grid.columns + col))
+        };
+        let worst = grid.iter().filter_map(off).max_by(|a, b| a.0.total_cmp(&b.0));
+        match worst {
+            Some((off, at)) if off > STRAY => grid.cells[at] = None,
+            _ => return grid,
+        }
+    }
+}
+
+/// What the markers in and round a grid are.
+fn markers_in(picture: &Picture, grid: &Places, fields: Fields) -> Vec<Read> {
+    let (columns, rows) = (grid.columns as isize, grid.rows as isize);
+    let all = (-1..rows).flat_map(|row| (-1..columns).map(move |col| (col, row)));
+    let is_near = |&(col, row): &(isize, isize)| {
+        [(0, 0), (1, 0), (1, 1), (0, 1)].iter().any(|(c, r)| grid.around(col + c, row + r).is_some())
+    };
+    let one = |(col, row)| {
+        let corners = local_map::square(grid, (col, row))?;
+        Some(Read { col, row, marker: read(picture, &corners, fields)? })
+    };
+    let mut reads: Vec<Read> = all.filter(is_near).filter_map(one).collect();
+    // A plain square whose neighbours blur into it looks like a marker of hardly any contrast.
+    let mut contrasts: Vec<f64> = reads.iter().map(|read| read.marker.contrast).collect();
+    contrasts.sort_by(f64::total_cmp);
+    let usual = contrasts.get(3 * contrasts.len() / 4).copied().unwrap_or(0.0);
+    reads.retain(|read| read.marker.contrast > LEAST_CONTRAST * usual);
+    reads
+}
+
+/// A grid with what its markers say.
+enum Numbered {
+    Part(Part),
+    ByLayout,
+    No,
+}
+
+/// A grid as a part of the board.
+fn number(picture: &Picture, board: &Board, fields: Fields, grid: &Places) -> Numbered {
+    let reads = markers_in(picture, grid, fields);
+    let placement = match numbering::place(board, (grid.columns, grid.rows), &reads) {
+        Said::Place(placement) => placement,
+        Said::ByLayout => return Numbered::ByLayout,
+        Said::Nothing => return Numbered::No,
+    };
+    let turned = grid.turned(placement.quarters);
+    let corners = Lattice::from_fn(board.columns(), board.rows(), |col, row| {
+        turned.around(col as isize - placement.col, row as isize - placement.row).copied()
+    });
+    if corners.count() > 0 { Numbered::Part(Part { corners, placement }) } else { Numbered::No }
+}
+
+/// Adds a part of the board, the largest first; an error where it is a part of another board of the same kind.
+fn add(parts: &mut Vec<Part>, part: Part) -> Result<(), Refusal> {
+    let elsewhere = |known: &Part| {
+        let step = known.corners.step_px().unwrap_or(0.0);
+        let apart = part.corners.iter().filter_map(|(c, r, p)| Some((p - known.corners.get(c, r)?).norm()));
+        let (mut same, mut other) = (0, 0);
+        apart.for_each(|px| if px < 0.5 * step { same += 1 } else { other += 1 });
+        (same, other)
+    };
+    for known in parts.iter() {
+        let (same, other) = elsewhere(known);
+        if other > same {
+            return if part.placement.agreeing >= 2 && known.placement.agreeing >= 2 {
+                Err("shows two boards with the same markers: cover one of them".to_owned().into())
+            } else {
+                Ok(())
+            };
+        }
+    }
+    if parts.iter().all(|known| known.placement.layout == part.placement.layout) {
+        parts.push(part);
+    }
+    Ok(())
+}
+
+fn merged(board: &Board, parts: &[Part]) -> Places {
+    Lattice::from_fn(board.columns(), board.rows(), |col, row| {
+        parts.iter().find_map(|part| part.corners.get(col, row).copied())
+    })
+}
+
+/// Side of the markers as they are seen, as a share of a square: where their outline has the most contrast. `None` where no whole square with a
+/// marker is seen well enough.
+fn seen_share(picture: &Picture, corners: &Places, layout: Layout, fields: Fields) -> Option<f64> {
+    /// Least side of a bit, px.
+    const LEAST_FIELD_PX: f64 = 3.0;
+    const STEPS: i32 = 20;
+    let field = fields.share / (fields.bits + 2) as f64;
+    if corners.step_px()? * field < LEAST_FIELD_PX {
+        return None;
+    }
+    let maps: Vec<_> = corners
+        .iter()
+        .filter(|(col, row, _)| layout.holds_marker(*col as isize + 1, *row as isize + 1))
+        .filter_map(|(col, row, _)| {
+            let square = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(c, r)| corners.get(col + c, row + r).copied());
+            let [Some(a), Some(b), Some(c), Some(d)] = square else { return None };
+            square_map(&[a, b, c, d])
+        })
+        .collect();
+    let contrast = |share: f64| {
+        let (outside, inside) = ((1.0 - share) / 2.0 - 0.25 * field, (1.0 - share) / 2.0 + 0.25 * field);
+        let mut sum = 0.0;
+        for map in &maps {
+            for k in 0..24 {
+                let (along, side) = (0.25 + 0.1 * f64::from(k % 6), k / 6);
+                let at = |depth: f64| {
+                    let (x, y) =
+                        [(along, depth), (along, 1.0 - depth), (depth, along), (1.0 - depth, along)][side as usize];
+                    grey_at(picture, &mapped(map, x, y))
+                };
+                sum += at(outside)? - at(inside)?;
+            }
+        }
+        Some(sum.abs())
+    };
+    if maps.is_empty() {
+        return None;
+    }
+    let shares = (-STEPS..=STEPS).map(|k| fields.share + 0.01 * f64::from(k)).filter(|s| (0.2..0.97).contains(s));
+    let seen = shares.filter_map(|share| Some((contrast(share)?, share)));
+    seen.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, share)| share)
+}
+
+#[cfg(test)]
+mod tests;
+
+#[cfg(test)]
+mod layouts {
+    use super::*;
+
+    #[test]
+    fn markers_count_row_by_row() {
+        for (columns, rows) in [(4, 5), (5, 4), (11, 8), (8, 11), (7, 7), (6, 6)] {
+            for layout in [Layout::New, Layout::Old] {
+                let mut next = 0;
+                for y in 0..rows {
+                    for x in 0..columns {
+                        if layout.holds_marker(x as isize, y as isize) {
+                            assert_eq!(layout.number(columns, x, y), next, "{columns}x{rows} {layout:?} {x} {y}");
+                            next += 1;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

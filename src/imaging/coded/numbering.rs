@@ -1,0 +1,251 @@
+//! Which corner of the board is which, by the markers between them.
+//!
+//! In: a grid of corners and the markers that were read in its squares. Out: how the grid lies on the board. Method: every marker that is one of the
+//! board's proposes a turn and a shift of the whole grid; the proposal that most of the markers agree with wins, where it has no rival and hardly a
+//! marker contradicts it. A single marker numbers a grid only where all of its bits are right. Goes wrong: a board that is not the one named; the
+//! markers then say which it could be ([`super::explain`]).
+
+use super::Layout;
+use super::marker::Marker;
+use crate::imaging::board::{Board, Kind};
+
+/// A marker in a square of a grid: the square is the one after corner `(col, row)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Read {
+    /// Column of the corner before it.
+    pub col: isize,
+    /// Row of the corner before it.
+    pub row: isize,
+    /// What was read.
+    pub marker: Marker,
+}
+
+/// How a grid lies on the board: turned by so many quarter turns, its corner (0, 0) is then the board's `(col, row)`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Placement {
+    /// Quarter turns of the grid.
+    pub quarters: usize,
+    /// Column of the turned grid's first corner.
+    pub col: isize,
+    /// Row of the turned grid's first corner.
+    pub row: isize,
+    /// Which squares hold markers.
+    pub layout: Layout,
+    /// Markers that agree with it.
+    pub agreeing: usize,
+    /// Markers that contradict it.
+    pub contradicting: usize,
+    /// Whether the markers are printed white on black.
+    pub inverted: bool,
+}
+
+/// How many markers agree for each that contradicts.
+const AGREEING: usize = 3;
+
+impl Placement {
+    /// True where it is more than chance.
+    fn holds(&self, whole: usize) -> bool {
+        self.agreeing > AGREEING * self.contradicting && (self.agreeing >= 2 || whole >= 1)
+    }
+}
+
+/// The number of bits that a marker may be misread in where others agree with it.
+fn tolerated(bits: usize) -> usize {
+    bits * bits / 8
+}
+
+/// What was read, as it would be in a grid of `columns` x `rows` that is turned by so many quarter turns.
+fn turned(read: &Read, (columns, rows): (usize, usize), quarters: usize) -> Read {
+    let (columns, rows) = (columns as isize, rows as isize);
+    let (col, row) = match quarters % 4 {
+        0 => (read.col, read.row),
+        1 => (rows - 2 - read.row, read.col),
+        2 => (columns - 2 - read.col, rows - 2 - read.row),
+        _ => (read.row, columns - 2 - read.col),
+    };
+    Read { col, row, marker: read.marker.turned(quarters) }
+}
+
+/// The number of the marker in a square of the board; `None` where there is none or no such square.
+fn marker_in(board: &Board, layout: Layout, (x, y): (isize, isize)) -> Option<usize> {
+    let (columns, rows) = (board.squares.columns as isize, board.squares.rows as isize);
+    let inside = (0..columns).contains(&x) && (0..rows).contains(&y);
+    (inside && layout.holds_marker(x, y)).then(|| layout.number(board.squares.columns, x as usize, y as usize))
+}
+
+/// What the markers of a grid say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Said {
+    /// How it lies on the board.
+    Place(Placement),
+    /// One of two places, by which squares of the board hold markers: that of the new layout or that of the old.
+    ByLayout,
+    /// Nothing.
+    Nothing,
+}
+
+/// How a grid of `size` corners lies on the board by what was read in it.
+pub fn place(board: &Board, size: (usize, usize), reads: &[Read]) -> Said {
+    let inverted = 2 * reads.iter().filter(|read| read.marker.inverted).count() > reads.len();
+    let reads: Vec<Read> = reads.iter().filter(|read| read.marker.inverted == inverted).copied().collect();
+    let found: Vec<(Placement, usize)> =
+        Layout::of(board).into_iter().filter_map(|layout| by_layout(board, layout, size, &reads, inverted)).collect();
+    match found[..] {
+        [] => Said::Nothing,
+        [(only, _)] => Said::Place(only),
+        // A layout is the other one moved by a column, but for the board's ends: only markers there tell them apart.
+        [(a, whole_a), (b, whole_b), ..] => {
+            if a.agreeing > b.agreeing && whole_a > whole_b {
+                Said::Place(a)
+            } else if b.agreeing > a.agreeing && whole_b > whole_a {
+                Said::Place(b)
+            } else {
+                Said::ByLayout
+            }
+        }
+    }
+}
+
+/// The same for one layout, with the number of markers all of whose bits are right.
+fn by_layout(
+    board: &Board,
+    layout: Layout,
+    size: (usize, usize),
+    reads: &[Read],
+    inverted: bool,
+) -> Option<(Placement, usize)> {
+    let Kind::Charuco { dictionary, .. } = board.kind else { return None };
+    let mut best: Option<(Placement, usize)> = None;
+    let mut rival = 0;
+    for quarters in 0..4 {
+        let seen: Vec<Read> = reads.iter().map(|read| turned(read, size, quarters)).collect();
+        for (col, row) in proposals(board, layout, &seen) {
+            let (mut agreeing, mut contradicting, mut whole) = (0, 0, 0);
+            for read in &seen {
+                let square = (read.col + 1 + col, read.row + 1 + row);
+                let code = marker_in(board, layout, square).and_then(|id| dictionary.code(id));
+                match code.map(|code| read.marker.differs_from(code)) {
+                    Some(wrong) if wrong <= tolerated(read.marker.bits) => {
+                        agreeing += 1;
+                        whole += usize::from(wrong == 0);
+                    }
+                    // Beyond the board's border there may be anything.
+                    None if !is_inside(board, square) => {}
+                    _ => contradicting += 1,
+                }
+            }
+            let found = Placement { quarters, col, row, layout, agreeing, contradicting, inverted };
+            if !found.holds(whole) {
+                continue;
+            }
+            let known = best.map_or(0, |(known, _)| known.agreeing);
+            rival = rival.max(known.min(agreeing));
+            if agreeing > known {
+                best = Some((found, whole));
+            }
+        }
+    }
+    // One marker in the right place and one by chance in the wrong one are not told apart.
+    best.filter(|(found, _)| 2 * rival < found.agreeing.max(2))
+}
+
+fn is_inside(board: &Board, (x, y): (isize, isize)) -> bool {
+    (0..board.squares.columns as isize).contains(&x) && (0..board.squares.rows as isize).contains(&y)
+}
+
+/// Shifts that bring some marker to where the board has it, each once.
+fn proposals(board: &Board, layout: Layout, seen: &[Read]) -> Vec<(isize, isize)> {
+    let Kind::Charuco { dictionary, .. } = board.kind else { return Vec::new() };
+    let mut shifts = Vec::new();
+    for y in 0..board.squares.rows {
+        for x in 0..board.squares.columns {
+            let Some(id) = marker_in(board, layout, (x as isize, y as isize)) else { continue };
+            let Some(code) = dictionary.code(id) else { continue };
+            let near = |read: &&Read| read.marker.differs_from(code) <= tolerated(read.marker.bits) / 2;
+            for read in seen.iter().filter(near) {
+                let shift = (x as isize - 1 - read.col, y as isize - 1 - read.row);
+                if !shifts.contains(&shift) {
+                    shifts.push(shift);
+                }
+            }
+        }
+    }
+    shifts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is read on a board in the squares of a part of it, seen in a grid that is turned.
+    fn part(
+        board: &Board,
+        layout: Layout,
+        cols: std::ops::Range<isize>,
+        rows: std::ops::Range<isize>,
+        quarters: usize,
+    ) -> ((usize, usize), Vec<Read>) {
+        let Kind::Charuco { dictionary, .. } = board.kind else { panic!("a board with markers") };
+        let size = (cols.len(), rows.len());
+        let mut reads = Vec::new();
+        for row in rows.start - 1..rows.end {
+            for col in cols.start - 1..cols.end {
+                let Some(id) = marker_in(board, layout, (col + 1, row + 1)) else { continue };
+                let code = dictionary.code(id).unwrap();
+                let marker = Marker { code, bits: dictionary.bits(), inverted: false, contrast: 100.0 };
+                let read = Read { col: col - cols.start, row: row - rows.start, marker };
+                reads.push(turned(&read, size, quarters));
+            }
+        }
+        (if quarters % 2 == 1 { (size.1, size.0) } else { size }, reads)
+    }
+
+    #[test]
+    fn every_part_of_a_board_is_known_from_every_side() {
+        for (name, layouts) in [("charuco:11x8:15:11:DICT_5X5_100", 2), ("charuco:4x5:54:40.5:DICT_4X4_1000", 1)] {
+            let board: Board = name.parse().unwrap();
+            assert_eq!(Layout::of(&board).len(), layouts);
+            for layout in Layout::of(&board) {
+                for quarters in 0..4 {
+                    for (col, row) in [(0, 0), (1, 0), (0, 2), (1, 1)] {
+                        let (size, reads) = part(&board, layout, col..col + 2, row..row + 2, quarters);
+                        let Said::Place(found) = place(&board, size, &reads) else {
+                            // On a board of odd columns only the markers at its sides tell the layouts apart.
+                            assert!(layouts == 2 && col > 0, "{board} {layout:?} {quarters} {col} {row}");
+                            continue;
+                        };
+                        assert_eq!((found.quarters, found.col, found.row), ((4 - quarters) % 4, col, row));
+                        assert_eq!((found.contradicting, found.layout), (0, layout));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn markers_of_another_board_number_nothing() {
+        let board: Board = "charuco:11x8:15:11:DICT_5X5_100".parse().unwrap();
+        for other in
+            ["charuco:8x11:15:11:DICT_5X5_100", "charuco:11x8:15:11:DICT_5X5_1000", "charuco:12x8:15:11:DICT_5X5_100"]
+        {
+            let other: Board = other.parse().unwrap();
+            let (size, reads) = part(&other, Layout::New, 1..7, 1..7, 0);
+            let found = place(&board, size, &reads) != Said::Nothing;
+            // DICT_5X5_1000 begins as DICT_5X5_100 does: the same markers.
+            let same = matches!(other.kind, Kind::Charuco { dictionary, .. } if dictionary.name() == "DICT_5X5_1000");
+            assert_eq!(found, same, "{other}");
+        }
+    }
+
+    #[test]
+    fn one_marker_numbers_only_where_all_its_bits_are_right() {
+        let board: Board = "charuco:11x8:15:11:DICT_5X5_100".parse().unwrap();
+        let (size, mut reads) = part(&board, Layout::New, 3..5, 3..5, 0);
+        reads.truncate(1);
+        // Which of the two layouts it is one marker does not tell.
+        assert_eq!(place(&board, size, &reads), Said::ByLayout);
+        reads[0].marker.code ^= 1 << 7;
+        assert_eq!(place(&board, size, &reads), Said::Nothing);
+        assert_eq!(place(&board, size, &[]), Said::Nothing);
+    }
+}

@@ -1,0 +1,111 @@
+//! Boards with markers, rendered: every corner that is found has its own number, lies where it should as surely as it says, and another board is
+//! named.
+
+use nalgebra::{Point2, Vector3};
+
+use crate::geometry::transform;
+use crate::imaging::Board;
+use crate::imaging::find::corners_in;
+use crate::imaging::image::{Image, Picture};
+use crate::simulate::draws::NormalTable;
+use crate::simulate::physical_board::{PhysicalBoard, Workmanship};
+use crate::simulate::picture::backdrop::Backdrop;
+use crate::simulate::picture::psf::Optics;
+use crate::simulate::picture::render::Renderer;
+use crate::simulate::picture::scene::{Print, Scene};
+use crate::simulate::picture::sensor::{Lighting, Sensor};
+use crate::simulate::rig::true_rig;
+
+/// Side of the pictures, px.
+const SIZE: u32 = 800;
+
+/// A board turned by `turn` (rad) at a place (mm), and where its corners really are.
+fn shot(name: &str, turn: [f64; 3], place: [f64; 3], inverted: bool) -> (Picture, Vec<Point2<f64>>) {
+    let board: Board = name.parse().unwrap();
+    let workmanship =
+        Workmanship { pitch_um: 0.0, bow_um: (0.0, 0.0), ink_spread_um: 0.0, scale_ppm: 0.0, margin_mm: 10.0 };
+    let made = PhysicalBoard::new(board, workmanship, 1, 0);
+    let backdrop = Backdrop::plain(0.3);
+    let (white, black) = if inverted { (0.08, 0.85) } else { (0.85, 0.08) };
+    let scene = Scene {
+        camera: true_rig(SIZE).left,
+        optics: Optics { gaussian_px: 0.8, defocus: None, coma_px: 0.0 },
+        board: &made,
+        camera_from_board: transform(Vector3::from(turn), Vector3::from(place)),
+        print: Print { white, black, rim: 0.3, rim_mm: 3.0 },
+        holder: &[],
+        backdrop: &backdrop,
+        lighting: Lighting { gradient: (0.05, -0.03), vignetting: 0.1, exposure: 0.75 },
+        sensor: Sensor { bits: 16, full_well_e: 10_000.0, read_noise_e: 5.0, dark: 0.0 },
+        seed: 3,
+        picture: 0,
+    };
+    let truth = scene.corners_px();
+    let rendered = Renderer::new(&scene).picture(&NormalTable::new());
+    let pixels = rendered.samples.iter().map(|&v| ((u32::from(v) + 128) / 257) as u8).collect();
+    (Image { width: rendered.width, height: rendered.height, pixels }.into(), truth)
+}
+
+/// How many corners are measured, and their mean square deviation in their own sigmas.
+fn measured(name: &str, picture: &Picture, truth: &[Point2<f64>]) -> (usize, f64) {
+    let board: Board = name.parse().unwrap();
+    let corners = corners_in(picture, board).unwrap();
+    let (mut count, mut sum) = (0, 0.0);
+    for (col, row, corner) in corners.iter() {
+        let off = corner.px - truth[board.index(col, row)];
+        assert!(off.norm() < 2.0, "{name}: corner {col},{row} is off by {off}");
+        if let Some(covariance) = corner.covariance_px2 {
+            (count, sum) = (count + 1, sum + off.dot(&(covariance.try_inverse().unwrap() * off)) / 2.0);
+        }
+    }
+    (count, sum / f64::from(count.max(1) as u32))
+}
+
+const BOARD: &str = "charuco:9x7:20:14:DICT_5X5_100";
+
+#[test]
+fn a_board_is_measured_whole_from_every_side_and_in_both_colours() {
+    for (quarter, inverted) in [(0, false), (1, true), (2, false), (3, true)] {
+        let turn = [0.3, -0.25, 0.2 + f64::from(quarter) * 1.6];
+        let (picture, truth) = shot(BOARD, turn, [3.0, -2.0, 560.0], inverted);
+        let (count, chi2) = measured(BOARD, &picture, &truth);
+        assert!(count == 48, "{quarter}: {count} of 48 corners");
+        // The mean of 96 squares: chance takes it from 0.7 to 1.3.
+        assert!((0.6..1.4).contains(&chi2), "{quarter}: {chi2}");
+    }
+}
+
+#[test]
+fn parts_of_a_board_have_their_own_numbers() {
+    let mut total = 0;
+    for (x, y) in [(-140.0, 0.0), (140.0, 60.0), (0.0, -150.0), (120.0, 120.0), (-130.0, -110.0)] {
+        let (picture, truth) = shot(BOARD, [0.4, 0.3, 0.5], [x, y, 420.0], false);
+        let (count, chi2) = measured(BOARD, &picture, &truth);
+        assert!((4..48).contains(&count) && (0.3..2.0).contains(&chi2), "{x} {y}: {count} corners, {chi2}");
+        total += count;
+    }
+    assert!(total > 60, "{total}");
+}
+
+#[test]
+fn another_board_is_named() {
+    let (picture, _) = shot(BOARD, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0], false);
+    for (said, why) in [
+        ("charuco:9x7:20:14:DICT_6X6_100", "DICT_5X5_"),
+        ("charuco:7x9:20:14:DICT_5X5_100", "board of 9 columns"),
+        ("charuco:10x7:20:14:DICT_5X5_100", "board of 9 columns"),
+        ("charuco:9x7:20:11:DICT_5X5_100", "markers of"),
+        ("charuco:9x7:20:17:DICT_5X5_100", "markers of"),
+    ] {
+        let refusal = corners_in(&picture, said.parse().unwrap()).expect_err(said);
+        assert!(refusal.reason.contains(why), "{said}: {}", refusal.reason);
+    }
+    let Picture { grey: crate::imaging::image::Grey::Eight(image), .. } = &picture else { panic!("eight bits") };
+    let pixels = image.pixels.chunks(image.width).flat_map(|row| row.iter().rev().copied()).collect();
+    let mirrored = Picture::from(Image { width: image.width, height: image.height, pixels });
+    let refusal = corners_in(&mirrored, BOARD.parse().unwrap()).unwrap_err();
+    assert!(refusal.reason.contains("mirrored"), "{}", refusal.reason);
+    let (plain, _) = shot("checker:9x7:20", [0.3, -0.25, 0.2], [3.0, -2.0, 560.0], false);
+    let refusal = corners_in(&plain, BOARD.parse().unwrap()).unwrap_err();
+    assert!(refusal.reason.contains("no marker"), "{}", refusal.reason);
+}
