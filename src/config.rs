@@ -148,7 +148,7 @@ impl Config {
     /// Reads the file of settings, where there is one, and checks all of it.
     pub fn load(path: Option<&Utf8Path>) -> Result<Config> {
         let config = match Config::file(path) {
-            Some(path) => files::read_toml(&path, "the configuration", None)?,
+            Some(path) => files::read_toml(&path, "settings file", None)?,
             None => Config::default(),
         };
         config.validate()?;

@@ -64,8 +64,13 @@ fn shown(label: &str, length: u64) -> Shown {
     let (stop, stopped) = channel();
     let seen = Arc::clone(&state);
     let ticker = std::thread::Builder::new().spawn(move || {
+        let mut last = String::new();
         while stopped.recv_timeout(BETWEEN_LINES) == Err(RecvTimeoutError::Timeout) {
-            line(&seen.line());
+            let now = seen.line();
+            if now != last {
+                line(&now);
+            }
+            last = now;
         }
     });
     Shown::Lines { state, stop: Some(stop), ticker: ticker.ok() }

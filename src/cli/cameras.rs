@@ -15,7 +15,7 @@ pub struct Pairs {
     /// Folder of the right camera's pictures, where the first one holds the left camera's alone
     #[arg(value_name = "RIGHT")]
     pub right: Option<Utf8PathBuf>,
-    /// What tells which pictures belong together [default: names, else the numbers in them]
+    /// How pictures are paired [default: names, else the numbers in them]
     #[arg(long, value_name = "HOW", conflicts_with = "side_by_side")]
     pub pair_by: Option<PairBy>,
     /// Each picture holds both views: its left half is the left camera's
@@ -77,7 +77,7 @@ pub struct CameraCheck {
     /// The board's coefficient of thermal expansion, 1e-6/K (alumina 7, glass 8, aluminium 23)
     #[arg(long, value_name = "PPM", allow_negative_numbers = true, requires = "board_temperature_c", value_parser = between(-100.0, 1000.0))]
     pub expansion_ppm_per_k: Option<f64>,
-    /// Pictures of a second, independent board: shows the scale
+    /// Pictures of a second board, which takes no part in the calibration: checks the scale
     #[arg(long, value_name = "DIR")]
     pub check_images: Option<Utf8PathBuf>,
     /// The second board by its name, as for --board [default: as the first]
@@ -168,10 +168,11 @@ pub struct Rectify {
     /// each other lose what is near from view
     #[arg(long)]
     pub zero_disparity: bool,
-    /// The board that shows how well rows agree by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
+    /// The board by which the rows are compared, by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
+    /// marker in mm, dictionary) [default: the board that calibrated, else those of the keys `check_board` and `target_board`]
     #[arg(long, value_name = "BOARD", conflicts_with_all = ["squares"])]
     pub board: Option<Board>,
-    /// Squares of the board that shows how well rows agree; keys `check_board.squares`, `target_board.squares` [default: both are tried]
+    /// Squares of the board by which the rows are compared
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,
     /// Filters of pictures that are raw colour mosaics: RGGB, BGGR, GRBG or GBRG

@@ -31,16 +31,16 @@ const BUILD: &str = if cfg!(debug_assertions) {
 #[command(name = "stereocal", version, long_version = BUILD, about, max_term_width = 100)]
 pub struct Cli {
     /// Settings file, with the keys that the flags name; `stereocal init` writes one [default: stereocal.toml in the working directory, if there]
-    #[arg(long, global = true, value_name = "FILE")]
+    #[arg(long, help_heading = "Global options", global = true, value_name = "FILE")]
     pub config: Option<Utf8PathBuf>,
     /// Warnings and errors only on stderr: no progress, no notes
-    #[arg(long, global = true)]
+    #[arg(long, help_heading = "Global options", global = true)]
     pub quiet: bool,
     /// Threads to compute with, 1 to 1024; results don't depend on it [default: one a core]
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, help_heading = "Global options", global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Leave program, date, command line and inputs out of the files that are written
-    #[arg(long, global = true)]
+    #[arg(long, help_heading = "Global options", global = true)]
     pub no_provenance: bool,
     /// What to do.
     #[command(subcommand)]
@@ -56,7 +56,7 @@ pub enum Command {
     Measure(Measure),
     /// Identify the robot's kinematic parameters from measurements and joint angles
     Identify(Identify),
-    /// Judge robots by the verify rows of measurements, without fitting any
+    /// Compare robot files with measurements, without fitting anything
     Verify(Verify),
     /// Write a board to print, in true size
     Board(PrintBoard),
@@ -64,11 +64,11 @@ pub enum Command {
     Report(Report),
     /// Undistort and rectify pairs of pictures, for eyes and for dense stereo
     Rectify(Rectify),
-    /// Make pictures and measurements whose truth is known
+    /// Simulate pictures and measurements with known true values
     Simulate(Simulate),
     /// Choose the poses that determine the robot best, and write them as poses.csv and robot programs
     Plan(Plan),
-    /// Readings that bring the real robot where targets were meant: CSV, or joint targets of a robot program
+    /// Correct targets for the real robot: those of a CSV, or the joint targets of a robot program
     Compensate(Compensate),
     /// Write a calibration or a robot for other programs
     Export(Export),

@@ -227,7 +227,7 @@ pub struct RobotImport {
 /// `stereocal robot new`
 #[derive(Debug, Args)]
 pub struct RobotNew {
-    /// One of `stereocal robot list`
+    /// One of `stereocal robot list`, or a part that only one of them has: irb120, "IRB 120"
     pub name: String,
     /// Where it goes.
     #[command(flatten)]

@@ -139,7 +139,7 @@ struct Program {
 impl Program {
     fn read(args: &Compensate, language: Language, joints: Joints) -> files::Result<Program> {
         let path = &args.targets;
-        let text = files::read_text(path, "the robot program", None)?;
+        let text = files::read_text(path, "robot program", None)?;
         let refuse = |message: String, hint: &str| {
             let place = Place { path: path.clone(), line: None };
             files::Error::Format { message, place, hint: Some(hint.to_owned()) }

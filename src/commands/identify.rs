@@ -12,8 +12,7 @@ use crate::identify::data::dataset::Dataset;
 use crate::identify::data::doctor::{self, Examined};
 use crate::identify::data::{known, shared};
 use crate::identify::judge::choose::{Identification, identify, step_count};
-use crate::identify::judge::held_out::Against;
-use crate::identify::record::{Record, quality};
+use crate::identify::record::{Advice, Findings, Record, quality};
 use crate::identify::{Error, Settings};
 use crate::measurements::{Measurement, Role, Source};
 use crate::progress;
@@ -43,21 +42,32 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     }
     shared::suppose_scale(&mut set);
     let bar = progress::bar("identifying", 2 + step_count(&settings));
-    let Examined { set, robot: nominal, along, mut findings, unexplained } =
+    let Examined { set, robot: nominal, along, findings, unexplained } =
         doctor::examine(&set, &given, &settings, &|step| bar.begin(step));
     let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.begin(step))?;
     bar.finish_and_clear();
-    findings.extend(unexplained.filter(|_| !doctor::is_explained(&found)));
-    findings.extend(doctor::findings(&set, &found, &along));
+    let of_fit = doctor::findings(&set, &found, &along);
+    let findings = Findings::new(findings, unexplained, of_fit, &found);
     let record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
-    for warning in &record.warnings {
-        progress::warn(warning);
-    }
+    said(&record, &out);
     let json = write(&out, &set, &nominal, &found, &record, &settings)?;
-    let stdout = if args.output.json { json } else { report::identify::summary(&record) };
-    // A method or model that was asked for is kept whatever it is worth; that it is worth less than nothing is no success.
-    let worse = found.against_nominal(&set, &nominal, &settings) != Against::NotWorse;
-    Ok(Outcome { stdout, status: if worse { Status::OutOfTolerance } else { Status::Done } })
+    let stdout = if args.output.json { json } else { report::identify::summary(&record, &out) };
+    let status = if record.advice == Advice::DoNotUse { Status::OutOfTolerance } else { Status::Done };
+    Ok(Outcome { stdout, status })
+}
+
+/// The gravest warnings on the terminal; the page and the JSON have all.
+fn said(record: &Record, out: &OutDir) {
+    const MOST: usize = 5;
+    for (k, warning) in record.warnings.iter().take(MOST).enumerate() {
+        match record.advice {
+            Advice::DoNotUse if k == 0 => progress::warn(format!("do not use the result: {warning}")),
+            _ => progress::warn(warning),
+        }
+    }
+    if record.warnings.len() > MOST {
+        progress::note(format!("{} more warnings in {}", record.warnings.len() - MOST, out.join("identify.html")));
+    }
 }
 
 /// What was typed beats the file.
@@ -188,10 +198,13 @@ fn write(
     let arm = center.map_or_else(Vec::new, |p| nominal.skeleton_mm(&p.joints_rad));
     let page =
         report::identify::page(set, record, &places, &arm, &errors(nominal, false), &errors(identified, is_fitted))?;
-    let holds = record.expected.as_ref().map_or_else(
+    let mut holds = record.expected.as_ref().map_or_else(
         || "The nominal robot was kept.".to_owned(),
         |expected| format!("Identified; {}; it holds within {}.", expected.sentence(), expected.poses),
     );
+    if record.advice == Advice::DoNotUse {
+        holds = format!("Do not use this robot: {}.", record.reason);
+    }
     let scale = record.scale.map_or(String::new(), |scale| format!("# Not in this: {}.\n", scale.sentence()));
     out.write_toml("identified.toml", &format!("# {holds}\n{scale}{}", robot::file::to_toml(identified)))?;
     let json = out.write_json("identification.json", record)?;

@@ -32,7 +32,7 @@ const FIRST_LOOKED_AT: usize = 4;
 pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
-    let rig = calibration::read(&rig_file)?;
+    let calibration::Calibrated { rig, board, .. } = calibration::read_with_check(&rig_file)?;
     let run = Run { force: args.output.force, ..run };
     let source = args.pairs.source("rectify", &args.images);
     let out = out.for_run(&run, &[source.places().as_slice(), &[&rig_file]].concat());
@@ -76,7 +76,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
         .iter()
         .map(|(pair, [left, right])| PairFiles { pair: pair.clone(), left: out.join(left), right: out.join(right) })
         .collect();
-    let boards = boards(args, config)?;
+    let boards = boards(args, config, board)?;
     let found = if args.undistort_only { None } else { look_for(&rectified, &boards) };
     let (file, shown) = judge(file, kept, found);
     let json = out.write_json("rectified.json", &file)?;
@@ -167,11 +167,18 @@ fn rectified(
     Ok([one(Side::Left, &files.left)?, one(Side::Right, &files.right)?])
 }
 
-/// The boards that may be in the pictures.
-fn boards(args: &Rectify, config: &Config) -> Result<Vec<Board>> {
+/// The boards that may be in the pictures: where none is named the one that calibrated first.
+fn boards(args: &Rectify, config: &Config, calibrated: Option<Board>) -> Result<Vec<Board>> {
     let check = config.check_board.board(args.board, args.squares, None)?;
     let target = config.target_board.board(args.board, args.squares, None)?;
-    Ok(if check.key() == target.key() { vec![check] } else { vec![check, target] })
+    let named = args.board.is_some() || args.squares.is_some();
+    let mut boards = Vec::new();
+    for board in calibrated.filter(|_| !named).into_iter().chain([check, target]) {
+        if boards.iter().all(|other: &Board| other.key() != board.key()) {
+            boards.push(board);
+        }
+    }
+    Ok(boards)
 }
 
 /// The first of the boards that the pictures show, and its corners in the rectified pictures.

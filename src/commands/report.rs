@@ -19,9 +19,7 @@ pub fn run(args: &Report, config: &Config, run: Run) -> Result<Outcome> {
     let [check, measured, robot] = [read(&parts[0])?, read(&parts[1])?, read(&parts[2])?];
     if check.is_none() && measured.is_none() && robot.is_none() {
         let hint = "`stereocal camera-check IMAGES`, `measure POSES` and `identify` write what is reported; `--out DIR` names their folder";
-        return Err(
-            files::Error::Missing { what: "any result", path: folder.to_owned(), hint: Some(hint.into()) }.into()
-        );
+        return Err(files::Error::Missing { what: "results", path: folder.to_owned(), hint: Some(hint.into()) }.into());
     }
     let out = OutDir::open(folder)?;
     let there: Vec<&Utf8Path> = parts.iter().filter(|path| path.is_file()).map(|path| path.as_path()).collect();
@@ -38,7 +36,7 @@ pub fn run(args: &Report, config: &Config, run: Run) -> Result<Outcome> {
 
 /// A result of an earlier command; `None` where it is not there.
 fn read(path: &Utf8Path) -> Result<Option<Value>> {
-    if path.is_file() { Ok(Some(files::read_json(path, "the result", None)?)) } else { Ok(None) }
+    if path.is_file() { Ok(Some(files::read_json(path, "result", None)?)) } else { Ok(None) }
 }
 
 /// Where a result was made of other files than those that stand in the folder now, as far as the results say what they were made of.

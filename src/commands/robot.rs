@@ -14,7 +14,7 @@ use crate::measurements::{Observed, Source};
 use crate::progress;
 use crate::report::robot as report;
 use crate::robot::catalogue::{self, Convention};
-use crate::robot::{Error, Robot, file};
+use crate::robot::{Error, Robot, file, names};
 
 /// Runs the command.
 pub fn run(args: &RobotCommand, config: &Config, run: Run) -> Result<Outcome> {
@@ -129,9 +129,17 @@ fn left_mm(robot: &Robot, source: &Source) -> Option<f64> {
 
 fn new(args: &RobotNew, config: &Config, run: Run) -> Result<String> {
     let unknown = || Error::Unknown { name: args.name.clone(), nearest: most_similar(&args.name) };
-    let robot = catalogue::robot(&args.name).ok_or_else(unknown)?;
+    let name = match names::meant(&args.name)[..] {
+        [] => return Err(unknown().into()),
+        [name] => name,
+        _ => return Err(Error::Ambiguous { name: args.name.clone(), candidates: names::meant(&args.name) }.into()),
+    };
+    let robot = catalogue::robot(name).ok_or_else(unknown)?;
+    if name != args.name {
+        progress::note(format!("`{}` is {name}", args.name));
+    }
     let text = write(&robot, &args.place, config, run, &[])?;
-    let arm = catalogue::ARMS.iter().find(|arm| arm.name.eq_ignore_ascii_case(&args.name));
+    let arm = catalogue::ARMS.iter().find(|arm| arm.name == name);
     Ok(text + &arm.map(report::provenance).unwrap_or_default())
 }
 

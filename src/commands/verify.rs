@@ -68,14 +68,16 @@ pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
+    let mut unexplained_errors = false;
     if let Some((file, robot)) = robots.first() {
         let Examined { set: examined, robot: mended, along, findings, unexplained } =
             doctor::examine(&set, robot, settings, &|_| {});
+        unexplained_errors = unexplained.is_some();
         for finding in findings.into_iter().chain(unexplained).chain(doctor::along_the_rows(&along)) {
             progress::warn(finding.sentence());
         }
         if mended != *robot {
-            progress::warn(format!("the robot of {file} is judged as its file has it"));
+            progress::warn(format!("the robot of {file} is judged without this correction"));
         }
         set = examined;
     }
@@ -91,11 +93,11 @@ pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
         false => (set.fit_rows(), set.verify_rows()),
     };
     if folded {
-        progress::note("no row is to verify: each is judged by a placement of the sensor that it takes no part in");
+        progress::note("no row has the role `verify`: each row is judged with the sensor placed by the others");
     }
     if only_verify {
         progress::warn(
-            "no row of role `sample` can be used: the verify rows place the sensor as well as judging the robot, which flatters points and wire lengths where they are few",
+            "no row of role `sample` can be used: the verify rows also place the sensor, so that errors of points and wire lengths come out too small where there are few rows",
         );
     }
     let judge = Judge::plain(&set, &fitted, settings.wire_offset);
@@ -116,5 +118,5 @@ pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
             report::identify::verified(&rows)
         }
     };
-    Ok(Outcome { stdout, status: Status::Done })
+    Ok(Outcome { stdout, status: if unexplained_errors { Status::OutOfTolerance } else { Status::Done } })
 }

@@ -8,6 +8,7 @@ use super::{checked, export};
 use crate::diagnostic::Place;
 use crate::files::{self, OutDir, Result};
 use crate::geometry::rotation_matrix;
+use crate::imaging::Board;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::model::rig::{Covariance, Rig};
@@ -38,6 +39,9 @@ pub struct CalibrationFile {
     /// The volume that the verdict was for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     volume: Option<Volume>,
+    /// The board that calibrated, by its name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    board: Option<String>,
     /// Whether the last pairs confirmed the rig; empty where they did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     unconfirmed: Vec<String>,
@@ -66,6 +70,8 @@ pub struct Calibrated {
     pub depths_mm: Option<[f64; 2]>,
     /// The volume that the verdict was for.
     pub volume: Option<Volume>,
+    /// The board that calibrated.
+    pub board: Option<Board>,
     /// The calibration's last pairs, where they contradict the rig.
     pub unconfirmed: Vec<String>,
 }
@@ -94,8 +100,8 @@ struct CameraRecord {
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct RigRecord {
-    rotation: [[f64; 3]; 3],
-    translation_mm: [f64; 3],
+    rotation: Vec<Vec<f64>>,
+    translation_mm: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -148,8 +154,8 @@ impl From<&Rig> for CalibrationFile {
             left: (&rig.left).into(),
             right: (&rig.right).into(),
             right_from_left: RigRecord {
-                rotation: [0, 1, 2].map(|i| [r[(i, 0)], r[(i, 1)], r[(i, 2)]]),
-                translation_mm: [t.x, t.y, t.z],
+                rotation: r.row_iter().map(|row| row.iter().copied().collect()).collect(),
+                translation_mm: vec![t.x, t.y, t.z],
             },
             covariance: rig.covariance.as_ref().map(|c| CovarianceRecord {
                 order: c.order.clone(),
@@ -158,6 +164,7 @@ impl From<&Rig> for CalibrationFile {
             corner_noise: None,
             boards: None,
             volume: None,
+            board: None,
             unconfirmed: Vec::new(),
             changes_since: Vec::new(),
         }
@@ -184,6 +191,16 @@ impl CalibrationFile {
         self
     }
 
+    /// The same with the board that calibrated.
+    pub fn with_board(mut self, board: &Board) -> CalibrationFile {
+        self.board = Some(board.to_string());
+        self
+    }
+
+    fn board(&self) -> Option<Board> {
+        self.board.as_ref()?.parse().ok()
+    }
+
     fn depths_mm(&self) -> Option<[f64; 2]> {
         let depths = self.boards.map(|b| [b.nearest_mm, b.farthest_mm])?;
         (depths[0] > 0.0 && depths[1] >= depths[0]).then_some(depths)
@@ -201,9 +218,19 @@ impl CalibrationFile {
         }
         let left = self.left.camera().map_err(|e| format!("left camera: {e}"))?;
         let right = self.right.camera().map_err(|e| format!("right camera: {e}"))?;
-        let rows = self.right_from_left.rotation;
-        let rotation = ("right_from_left.rotation", Matrix3::from_fn(|i, j| rows[i][j]));
-        let t = Vector3::from(self.right_from_left.translation_mm);
+        let RigRecord { rotation, translation_mm } = &self.right_from_left;
+        if rotation.len() != 3 || rotation.iter().any(|row| row.len() != 3) {
+            let found: Vec<String> = rotation.iter().map(|row| row.len().to_string()).collect();
+            return Err(format!(
+                "right_from_left.rotation has {} rows of {} numbers; three rows of three are needed",
+                rotation.len(),
+                found.join(", ")
+            ));
+        }
+        let t = <[f64; 3]>::try_from(translation_mm.as_slice()).map(Vector3::from).map_err(|_| {
+            format!("right_from_left.translation_mm has {} numbers; three are needed", translation_mm.len())
+        })?;
+        let rotation = ("right_from_left.rotation", Matrix3::from_fn(|i, j| rotation[i][j]));
         let mut covariance = self.covariance.as_ref().map(|c| c.covariance()).transpose()?;
         for change in &self.changes_since {
             let Some(covariance) = covariance.as_mut().filter(|c| c.order.len() == change.len()) else {
@@ -262,15 +289,16 @@ pub fn read(path: &Utf8Path) -> Result<Rig> {
 
 /// The same with what the calibration says beside the rig.
 pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
-    const WHAT: &str = "the stereo calibration";
+    const WHAT: &str = "calibration file";
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
     let text = files::read_text(path, WHAT, Some(hint))?;
-    let (rig, noise, pair_excess, depths_mm, volume, unconfirmed) = match export::read(path, &text) {
-        Some(rig) => (rig, None, None, None, None, Vec::new()),
+    let (rig, noise, pair_excess, depths_mm, volume, board, unconfirmed) = match export::read(path, &text) {
+        Some(rig) => (rig, None, None, None, None, None, Vec::new()),
         None => {
             let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
             let pair_excess = file.corner_noise.and_then(|n| n.pair_excess).filter(|e| *e >= 1.0);
-            (file.rig(), file.noise(), pair_excess, file.depths_mm(), file.volume, file.unconfirmed)
+            let (rig, board) = (file.rig(), file.board());
+            (rig, file.noise(), pair_excess, file.depths_mm(), file.volume, board, file.unconfirmed)
         }
     };
     let rig = rig.map_err(|message| files::Error::Format {
@@ -278,7 +306,7 @@ pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
         place: Place { path: path.to_owned(), line: None },
         hint: None,
     })?;
-    Ok(Calibrated { rig, noise, pair_excess, depths_mm, volume, unconfirmed })
+    Ok(Calibrated { rig, noise, pair_excess, depths_mm, volume, board, unconfirmed })
 }
 
 #[cfg(test)]

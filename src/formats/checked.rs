@@ -132,7 +132,8 @@ fn check_covariance(covariance: &Covariance) -> Result<(), String> {
     }
     if r.cholesky().is_none() {
         return Err(
-            "covariance.matrix is no covariance: a sum of the parameters would have a negative variance".to_owned()
+            "covariance.matrix is not positive semi-definite: a combination of the parameters has a negative variance"
+                .to_owned(),
         );
     }
     Ok(())

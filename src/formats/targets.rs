@@ -31,7 +31,7 @@ pub struct Row {
 
 /// Reads targets for a robot; says what was taken of columns that have other names than these.
 pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
-    let table = Table::read(path, "the targets", HINT);
+    let table = Table::read(path, "targets file", HINT);
     let own = |table: &Table| ["j1_deg", "j1_mm", "x_mm"].iter().any(|name| table.column(name).is_some());
     let table = match table {
         Ok(table) if own(&table) => table,

@@ -81,7 +81,7 @@ pub struct Chain<'a> {
 impl Urdf {
     /// Reads a file.
     pub fn read(path: &Utf8Path) -> Result<Urdf> {
-        let text = files::read_text(path, "the robot description", None)?;
+        let text = files::read_text(path, "robot description", None)?;
         Urdf::parse(text, path)
     }
 

@@ -101,9 +101,9 @@ pub enum Prior {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Constants {
-    /// Those of this program: velocities limited, the best particle descends as soon as the swarm slows down
+    /// Those of this program: velocities limited, local search from the best particle as soon as the swarm slows down
     Shipped,
-    /// Section 3.2 of the paper to the letter: no limit of the velocity, every particle descends once nothing moves
+    /// Section 3.2 of the paper to the letter: no limit of the velocity, local search from every particle once the swarm has come to rest
     Paper,
 }
 

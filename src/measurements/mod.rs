@@ -179,7 +179,7 @@ impl Table<'_> {
 /// Reads `poses.csv`.
 pub fn read_poses(path: &Utf8Path) -> Result<Vec<RobotPose>> {
     let hint = "a poses folder holds left/, right/ and poses.csv with the columns pose,group,role,j1_deg,...";
-    let table = Table::read(path, "the list of poses", hint)?;
+    let table = Table::read(path, "list of poses", hint)?;
     // A pose of `measure` is the stem of its pictures; its number would not do.
     table.require("pose")?;
     table.poses(None)
@@ -191,7 +191,7 @@ pub fn read_poses(path: &Utf8Path) -> Result<Vec<RobotPose>> {
 /// its targets.
 pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
     let hint = "`stereocal measure POSES` writes out/measurements.csv; `--measurements FILE` names another";
-    from_table(&Table::read(path, "the measurements", hint)?)
+    from_table(&Table::read(path, "measurements file", hint)?)
 }
 
 /// Measurements from a table.

@@ -54,7 +54,7 @@ impl Part {
     /// Reads a file; a program's targets have the robot's joints, so many.
     pub fn read(path: &Utf8Path, joints: usize) -> Result<Part> {
         let hint = "`stereocal measure POSES` writes out/measurements.csv; `--measurements FILE` names another";
-        let grid = Grid::read_with_programs(path, "the measurements", hint, joints)?;
+        let grid = Grid::read_with_programs(path, "measurements file", hint, joints)?;
         if grid.rows.is_empty() {
             return Err(grid.refuse(1, "the file is empty".to_owned(), None));
         }

@@ -24,9 +24,17 @@ pub struct Day {
 }
 
 impl Day {
-    /// True where nothing stands against the results: the rig's verdict is a pass, and each was made of the one before it.
+    /// True where nothing stands against the results: the rig's verdict is a pass, each was made of the one before it, and the robot may be
+    /// used.
     pub fn is_good(&self) -> bool {
-        self.breaks.is_empty() && self.check.as_ref().is_none_or(|check| text(check, "/verdict") == "pass")
+        self.breaks.is_empty()
+            && self.check.as_ref().is_none_or(|check| text(check, "/verdict") == "pass")
+            && !self.is_advised_against()
+    }
+
+    /// Whether `identify` advised against the robot that it found.
+    fn is_advised_against(&self) -> bool {
+        self.robot.as_ref().is_some_and(|robot| text(robot, "/advice") == "do-not-use")
     }
 }
 
@@ -84,19 +92,42 @@ fn measured_words(measured: &Value) -> String {
 }
 
 fn robot_words(robot: &Value) -> String {
+    if text(robot, "/advice") == "do-not-use" {
+        return format!("do not use the identified robot: {}", text(robot, "/reason"));
+    }
     let after = chosen(robot).map_or_else(|| "n/a".to_owned(), |m| mm(m, "/verify/mean_abs_mm"));
     format!("mean distance error {} mm before, {after} mm after", mm(robot, "/before/verify/mean_abs_mm"))
+}
+
+/// The number that matters most of each part that is there.
+fn numbers(day: &Day) -> Vec<(String, String)> {
+    let of = |part: &Option<Value>, say: &dyn Fn(&Value) -> (String, &str)| {
+        part.as_ref().map(say).map(|(value, what)| (value, what.to_owned()))
+    };
+    [
+        of(&day.check, &|c| (format!("{} mm", mm(c, "/max_abs_error_mm")), "largest length error of the rig")),
+        of(&day.measured, &|m| (format!("{} of {}", count(m, "/measured"), count(m, "/poses")), "poses measured")),
+        of(&day.robot, &|r| {
+            let after = chosen(r).map_or_else(|| "n/a".to_owned(), |m| mm(m, "/verify/mean_abs_mm"));
+            (format!("{after} mm"), "mean distance error of the robot after identification")
+        }),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// The page.
 pub fn page(day: &Day) -> String {
     let tone = match (day.is_good(), &day.check) {
         (true, Some(_)) => Tone::Good,
+        _ if day.is_advised_against() => Tone::Bad,
         _ if day.check.as_ref().is_some_and(|check| text(check, "/verdict") == "fail") => Tone::Bad,
         _ => Tone::Doubtful,
     };
     let headline = match &day.check {
         _ if !day.breaks.is_empty() => "The parts do not belong together".to_owned(),
+        _ if day.is_advised_against() => "Do not use the identified robot".to_owned(),
         Some(check) => format!("Rig: {}", text(check, "/verdict").to_uppercase()),
         None => "Without a camera check".to_owned(),
     };
@@ -109,7 +140,7 @@ pub fn page(day: &Day) -> String {
     .filter_map(|(part, say)| part.as_ref().map(say))
     .collect();
     let content = html! {
-        (page::verdict(tone, &headline, &format!("{}.", words.join("; "))))
+        (page::verdict(tone, &headline, &numbers(day), &format!("{}.", words.join("; "))))
         (page::warnings(&day.breaks))
         h2 { "1. The stereo rig" }
         @match &day.check { Some(check) => (rig(check)), None => p { "Not done: there is no camera-check.json." } }
@@ -149,7 +180,7 @@ fn rig(check: &Value) -> Markup {
             number(Some(least).filter(|v| v.is_finite()), 1), number(Some(most), 1), mm(check, "/trusted_mm"))) }
         p {
             "A test by VDI/VDE 2634 part 1 takes lengths of an artefact calibrated by others, on at least seven lines through the measuring volume. "
-            @if second { "Here a second board was measured that calibrated nothing; it stands in camera-check.html." }
+            @if second { "Here a second board was measured that took no part in the calibration; see camera-check.html." }
             @else { "Here the lengths are those of the calibrating board itself: an error of its pitch does not show. A second board (--check-images) shows it." }
         }
         (page::warnings(&warnings(check)))
@@ -184,9 +215,9 @@ fn arm(robot: &Value) -> Markup {
         row("positioning accuracy: largest error, mm", "/verify/point/max_abs_mm"),
     ];
     html! {
-        (page::table(&["on verify poses, which fitted nothing", "before", "after"], &rows))
+        (page::table(&["on verify poses, which took no part in the fit", "before", "after"], &rows))
         p { (format!(
-            "{} verify poses; {} kept; {} of {} parameters determined. To expect at other poses of the same range: {} mm in the mean, {} mm at 95 %.",
+            "{} verify poses; {} kept; {} of {} parameters determined. To expect at other poses of the same range: {} mm on average, {} mm at 95 %.",
             count(after, "/verify/count"), text(robot, "/chosen"), count(robot, "/identifiability/rank"),
             count(robot, "/identifiability/parameters"), mm(robot, "/expected/mean_mm"), mm(robot, "/expected/p95_mm"))) }
         p {

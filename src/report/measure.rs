@@ -85,6 +85,20 @@ fn quality(file: &MeasureFile) -> String {
     )
 }
 
+/// The three numbers of the page: how well the point is known, and how well boards fit.
+fn numbers(file: &MeasureFile) -> [(String, String); 3] {
+    let (fit_mm, px) = file.residuals();
+    let worst = file.sigma_mm().map(|sigma| sigma.into_iter().fold(0.0, f64::max));
+    [
+        (
+            format!("{} mm", number(worst, 4)),
+            "median standard deviation of the mark point, along its least certain axis".to_owned(),
+        ),
+        (format!("{} mm", number(fit_mm, 4)), "what is left of the corners after fitting the target (RMS)".to_owned()),
+        (format!("{} px", number(px, 3)), "reprojection residual (RMS)".to_owned()),
+    ]
+}
+
 /// Green only where every pose was measured and everything agrees with what was known before.
 fn tone(series: &Series, file: &MeasureFile) -> Tone {
     let (poses, measured) = file.counts();
@@ -107,7 +121,7 @@ pub fn page(series: &Series, file: &MeasureFile, known: &Knowledge, extras: &Ext
         })
         .collect();
     let content = html! {
-        (page::verdict(tone(series, file), &format!("{count} of {poses} poses measured"), &quality(file)))
+        (page::verdict(tone(series, file), &format!("{count} of {poses} poses measured"), &numbers(file), &format!("{}.", quality(file))))
         (page::warnings(file.warnings()))
         @if !missing.is_empty() {
             h2 { "Poses without a measurement" }
@@ -148,8 +162,8 @@ fn rig(measured: &[MeasuredPose]) -> Result<Markup> {
     Ok(html! {
         h2 { "The rig during the run" }
         div.side {
-            (page::figure(&pitch, "What each pose's height differences say of a nod of the right camera. A step is a rig that was pushed, a slope one that warms up."))
-            (page::figure(&yaw, "What the target's known size says of its yaw, which no epipolar line shows. Bars are one standard deviation."))
+            (page::figure(&pitch, "The turn of the right camera about its horizontal axis, by the differences in height at each pose. A step is a rig that was pushed, a slope one that warms up."))
+            (page::figure(&yaw, "Its turn about the vertical axis, by the target's known size; epipolar lines do not show it. Steps and slopes as in the other figure; bars are one standard deviation."))
         }
     })
 }
@@ -173,7 +187,7 @@ fn residuals(measured: &[MeasuredPose]) -> Result<Markup> {
         (worst_table(measured))
         div.side {
             (page::figure(&residual, "A pose far above the others was blurred, in motion, or partly hidden."))
-            (page::figure(&sigma, "From the corners, the calibration and the target together: most of it is the calibration's, which all poses share."))
+            (page::figure(&sigma, "From the corners, the calibration and the target together: most of it comes from the calibration, which all poses share. A pose far above the others stood far from where the boards were."))
         }
     })
 }
@@ -263,7 +277,7 @@ fn in_space(measured: &[MeasuredPose], known: &Knowledge) -> Markup {
     }
     html! {
         h2 { "The poses as the cameras saw them" }
-        (scene.figure("cameras and targets", "Both cameras and the target at each pose, the groups' centres in green, in the left camera's frame."))
+        (scene.figure("cameras and targets", "Both cameras and the target at each pose, the groups' centres in green, in the left camera's frame. A target that stands apart from the others is a wrong pose or a wrong numbering."))
     }
 }
 

@@ -41,7 +41,10 @@ main { max-width: 1040px; margin: 0 auto; padding: 28px 32px 64px; background: v
 h1 { font-size: 24px; margin: 0 0 4px; } h2 { font-size: 18px; margin: 36px 0 8px; border-bottom: 1px solid var(--rule); padding-bottom: 4px; }
 p, li, figcaption { max-width: 80ch; overflow-wrap: anywhere; } p.lead { color: var(--soft); margin: 0 0 16px; }
 .verdict { border-left: 8px solid; padding: 12px 16px; margin: 16px 0; border-radius: 4px; }
-.verdict strong { display: block; font-size: 20px; }
+.verdict strong { display: block; font-size: 44px; line-height: 1.1; } .verdict p { margin: 8px 0 0; }
+.numbers { display: flex; flex-wrap: wrap; gap: 8px 36px; margin: 10px 0 4px; } .numbers b { display: block; font-size: 38px; line-height: 1.15; white-space: nowrap; font-variant-numeric: tabular-nums; }
+.numbers span { color: var(--soft); } .numbers > div { max-width: 300px; }
+details { margin: 12px 0; } summary { cursor: pointer; font-weight: 600; color: var(--soft); }
 .good { border-color: var(--good); background: var(--good-bg); } .doubtful { border-color: var(--doubt); background: var(--doubt-bg); }
 .bad { border-color: var(--bad); background: var(--bad-bg); }
 table { border-collapse: collapse; margin: 8px 0 16px; font-variant-numeric: tabular-nums; font-size: 14px; }
@@ -63,9 +66,10 @@ footer { color: var(--soft); font-size: 13px; overflow-wrap: anywhere; }
 @media (max-width: 600px) { main { padding: 16px 12px 40px; } td, th { padding-left: 6px; padding-right: 6px; }
   table.ledger, table.ledger tbody { display: block; } table.ledger thead { display: none; } table.ledger td { border: 0; }
   table.ledger tr { display: grid; grid-template-columns: 1fr repeat(4, auto); padding: 4px 0; border-bottom: 1px solid var(--hair); }
-  table.ledger td.detail { grid-column: 1 / -1; min-width: 0; padding-left: 4px; } h1 { font-size: 21px; } }
+  table.ledger td.detail { grid-column: 1 / -1; min-width: 0; padding-left: 4px; } h1 { font-size: 21px; }
+  .verdict strong { font-size: 30px; } .numbers b { font-size: 28px; } .numbers { gap: 6px 22px; } }
 @page { margin: 14mm; }
-@media print { body { background: #fff; font-size: 12px; } main { padding: 0; max-width: none; } .scroll { max-height: none; overflow: visible; border: 0; }
+@media print { details::details-content { content-visibility: visible; height: auto; } body { background: #fff; font-size: 12px; } main { padding: 0; max-width: none; } .scroll { max-height: none; overflow: visible; border: 0; }
   .wide { overflow: visible; } table { font-size: 11px; } td, th { padding-left: 5px; padding-right: 5px; } tr { break-inside: avoid; } h2 { break-after: avoid; } }
 ";
 
@@ -136,9 +140,20 @@ fn before_the_end(page: String, more: &Markup) -> String {
     }
 }
 
-/// The box that says first what the reader came for.
-pub fn verdict(tone: Tone, headline: &str, explanation: &str) -> Markup {
-    html! { div class={ "verdict " (tone.class()) } { strong { (headline) } span { (text(explanation)) } } }
+/// The box that says first what the reader came for: a word or two, the numbers that matter most with what they are, and a sentence.
+pub fn verdict(tone: Tone, headline: &str, numbers: &[(String, String)], explanation: &str) -> Markup {
+    html! {
+        div class={ "verdict " (tone.class()) } {
+            strong { (headline) }
+            @if !numbers.is_empty() { div.numbers { @for (value, what) in numbers { div { b { (value) } span { (what) } } } } }
+            p { (text(explanation)) }
+        }
+    }
+}
+
+/// What only some readers want, folded behind one line.
+pub fn details(summary: &str, content: &Markup) -> Markup {
+    html! { details { summary { (summary) } (content) } }
 }
 
 /// A figure with what to conclude from it beneath.
@@ -159,6 +174,12 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> Markup {
 /// Warnings, where there are any.
 pub fn warnings(list: &[String]) -> Markup {
     html! { @if !list.is_empty() { ul.warnings { @for warning in list { li { (text(warning)) } } } } }
+}
+
+/// A sentence with its first letter as a capital.
+pub fn capital(sentence: &str) -> String {
+    let mut chars = sentence.chars();
+    chars.next().map_or_else(String::new, |first| first.to_uppercase().chain(chars).collect())
 }
 
 /// A sentence of the terminal: what stands there between backticks is code here.

@@ -39,7 +39,7 @@ pub fn summary(record: &PlanFile) -> String {
         text += &format!("the paper's: {}\n", of(paper));
     }
     if !record.plan.zero.is_empty() {
-        text += &format!("never seen: {}\n", record.plan.zero.join(", "));
+        text += &format!("not determined: {}\n", record.plan.zero.join(", "));
     }
     text += &format!(
         "expected error of the target over the spheres (root mean square, {:.4} mm noise a coordinate):\n{table}",
@@ -68,7 +68,7 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
         .collect();
     let others: Vec<String> = record.warnings.iter().filter(|warning| *warning != COLLISIONS).cloned().collect();
     let content = html! {
-        (page::verdict(page::Tone::Doubtful, "Collisions are not checked",
+        (page::verdict(page::Tone::Doubtful, "Collisions are not checked", &numbers(record, plan),
             "Neither the arm with itself, nor with the cameras or the cell. Run the program slowly, hand on the stop."))
         (page::warnings(&others))
         h2 { "Accuracy to expect" }
@@ -93,6 +93,20 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
     Ok(page::page("Planned poses", &lead, &content))
 }
 
+/// The three numbers of a plan.
+fn numbers(record: &PlanFile, plan: &Plan) -> [(String, String); 3] {
+    let samples = plan.poses.iter().filter(|p| p.at.role == Role::Sample).count();
+    let best = record.plan.expected.iter().filter(|e| e.poses <= samples).max_by_key(|e| e.poses);
+    [
+        (
+            format!("{} mm", number(best.map(|e| e.rms_mm), 3)),
+            format!("expected position error after {} samples", best.map_or(samples, |e| e.poses)),
+        ),
+        (plan.poses.len().to_string(), format!("poses, {samples} of them samples")),
+        (record.plan.rank.to_string(), "parameters determined".to_owned()),
+    ]
+}
+
 /// A placement as somebody would set it up: where the left camera is, where it looks, and what it looks at.
 fn standing(placement: &Placement) -> Vec<String> {
     let base_from_left = placement.left_from_base.inverse();
@@ -110,7 +124,10 @@ fn curve(record: &PlanFile) -> Result<maud::Markup> {
     if let Some(paper) = &record.paper {
         plot = plot.line("the paper's plan", &line(paper));
     }
-    Ok(page::figure(&plot.svg()?, "A plan whose line falls no more is limited by what it does not vary, not by noise."))
+    Ok(page::figure(
+        &plot.svg()?,
+        "Where the line is flat, more poses do not help: the rest comes from what the plan does not vary, not from noise.",
+    ))
 }
 
 /// Places of the spheres by thirds of the expected error.
@@ -129,7 +146,10 @@ fn map(plan: &Plan) -> Result<maud::Markup> {
         plot = plot.points(&label, &points);
         low = high;
     }
-    Ok(page::figure(&plot.svg()?, "The position error to expect at fresh poses, base frame; a third of them each."))
+    Ok(page::figure(
+        &plot.svg()?,
+        "The position error to expect at new poses, base frame; a third of them each. Work where it is small, or measure more poses where it is large.",
+    ))
 }
 
 /// Target points from three sides.

@@ -65,7 +65,7 @@ pub fn page(file: &RectifiedFile, rectified: &[PairFiles], shown: Option<&PairCo
     let content = html! {
         @if let Some(text) = agreement(file) {
             @let tone = if file.residual.is_some() { Tone::Good } else { Tone::Doubtful };
-            (page::verdict(tone, &figure_of(file), &format!("{text}.")))
+            (page::verdict(tone, if file.residual.is_some() { "Rectified" } else { "Not checked" }, &numbers(file), &format!("{text}.")))
         }
         @if let (Some(jpeg), Some(name)) = (&drawn, &name) {
             h2 { (if rectify { "Epipolar lines" } else { "A pair" }) }
@@ -85,11 +85,18 @@ pub fn page(file: &RectifiedFile, rectified: &[PairFiles], shown: Option<&PairCo
     Ok(page::page(title, &lead, &content))
 }
 
-fn figure_of(file: &RectifiedFile) -> String {
-    match &file.residual {
-        Some(r) => format!("{} px RMS", number(Some(r.rms_px), 3)),
-        None => "not measured".to_owned(),
-    }
+/// The three numbers of the page, where a board was seen.
+fn numbers(file: &RectifiedFile) -> Vec<(String, String)> {
+    let Some(r) = &file.residual else { return Vec::new() };
+    let common = file.common.unwrap_or("rows");
+    vec![
+        (
+            format!("{} px", number(Some(r.rms_px), 3)),
+            format!("difference of the {common} of corresponding corners (RMS)"),
+        ),
+        (format!("{} px", number(Some(r.max_px), 3)), "the largest".to_owned()),
+        (r.corners.to_string(), "corners compared".to_owned()),
+    ]
 }
 
 fn caption(name: &str, file: &RectifiedFile) -> String {

@@ -5,6 +5,7 @@ use nalgebra::{Point2, Point3};
 use super::drawing::scene::{Ink, Scene};
 use crate::geometry::Transform;
 use crate::imaging::Board;
+use crate::stereo::volume::Volume;
 use crate::stereo::{Camera, Rig};
 
 /// Both cameras as pyramids of this depth, mm, in the left camera's frame.
@@ -30,6 +31,22 @@ fn field(camera: &Camera) -> Vec<Point3<f64>> {
     let (right, bottom) = (f64::from(camera.width) - 0.5, f64::from(camera.height) - 0.5);
     let corners = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom)].map(|(x, y)| Point2::new(x, y));
     corners.iter().filter_map(|px| camera.undistort(px)).map(|ray| Point3::new(ray.x, ray.y, 1.0)).collect()
+}
+
+/// Where a verdict holds: the outline of the corners in the left picture at the nearest and at the farthest depth.
+pub fn volume(scene: &mut Scene, left: &Camera, volume: &Volume) {
+    /// Lines that join the two outlines.
+    const JOINING: usize = 8;
+    let outline: Vec<[f64; 2]> = volume.left_px.clone().into();
+    let rays = outline.iter().filter_map(|[x, y]| left.undistort(&Point2::new(*x, *y)));
+    let rays: Vec<Point3<f64>> = rays.map(|ray| Point3::new(ray.x, ray.y, 1.0)).collect();
+    let [near, far] = volume.depth_mm;
+    for depth in [near, far] {
+        scene.line(Ink::Frame, rays.iter().chain(rays.first()).map(|ray| ray * depth).collect());
+    }
+    for ray in rays.iter().step_by(rays.len().div_ceil(JOINING).max(1)) {
+        scene.line(Ink::Frame, vec![ray * near, ray * far]);
+    }
 }
 
 /// A board's outermost corners as a rectangle.

@@ -55,7 +55,7 @@ macro_rules! ur {
             name: $name,
             title: $title,
             source: UR_SOURCE,
-            note: "a machine of its own calibration reports other numbers; `export robot --format ur-calibration` speaks of those",
+            note: "a calibrated machine reports other numbers; `export robot --format ur-calibration` writes them",
             convention: Convention::Classic,
             rows: &[
                 [90.0, 0.0, 0.0, $d1],
@@ -68,7 +68,7 @@ macro_rules! ur {
             limits_deg: UR_LIMITS,
             flange_deg: [0.0; 3],
             coupled: &[],
-            }
+        }
     };
 }
 

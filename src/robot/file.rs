@@ -139,7 +139,7 @@ fn is_zero(value: &f64) -> bool {
 /// Reads `robot.toml`.
 pub fn read(path: &Utf8Path) -> Result<Robot> {
     let hint = "`--robot FILE` names the robot's nominal parameters; `stereocal simulate` writes an example";
-    let record: RobotRecord = files::read_toml(path, "the robot", Some(hint))?;
+    let record: RobotRecord = files::read_toml(path, "robot file", Some(hint))?;
     record.robot().map_err(|message| Error::File { message, place: Place { path: path.to_owned(), line: None } })
 }
 

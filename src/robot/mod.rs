@@ -9,6 +9,7 @@ pub mod ends;
 pub mod file;
 pub mod inverse;
 pub mod jacobian;
+pub mod names;
 pub mod parameters;
 pub mod refit;
 pub mod tool_fit;
@@ -55,6 +56,14 @@ pub enum Error {
         name: String,
         /// The name most like it.
         nearest: String,
+    },
+    /// Several arms may be meant.
+    #[error("`{name}` may be any of {}", candidates.join(", "))]
+    Ambiguous {
+        /// What was asked for.
+        name: String,
+        /// Their names.
+        candidates: Vec<&'static str>,
     },
     /// A robot file is there already.
     #[error("a robot file is there already")]
@@ -103,6 +112,9 @@ impl Explain for Error {
         match self {
             Error::Unknown { nearest, .. } => {
                 Some(format!("`stereocal robot list` shows the names; the most similar one is {nearest}"))
+            }
+            Error::Ambiguous { candidates, .. } => {
+                candidates.first().map(|name| format!("`stereocal robot new {name}` takes the first"))
             }
             Error::Occupied { .. } => Some("`--force` overwrites it, `--out DIR` puts it elsewhere".to_owned()),
             Error::AngleCount { needed, .. } => Some(format!("{needed} angles in degrees with commas between")),

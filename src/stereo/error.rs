@@ -140,7 +140,7 @@ pub enum Error {
 }
 
 /// The first names, and how many more there are.
-fn named(pairs: &[String]) -> String {
+pub fn named(pairs: &[String]) -> String {
     const MOST: usize = 8;
     let more = pairs.len().saturating_sub(MOST);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
@@ -212,7 +212,7 @@ impl Explain for Error {
                     "photograph the board tilted by 20 to 45 degrees about both of its axes, at several distances"
                 }
                 Error::LensUndetermined { .. } => {
-                    "without `--lens` the simplest lens that the corners bear out is taken; a richer one needs corners out to the pictures' corners"
+                    "without `--lens` the simplest lens that the corners support is taken; a richer one needs corners out to the pictures' corners"
                 }
                 Error::NotConverged { .. } => "`--lens radial2` has fewer unknowns; add pairs with the board tilted",
                 Error::RigChanged { hint, .. } => hint,

@@ -95,14 +95,14 @@ fn what_a_format_cannot_carry_is_said_in_mm() {
         let plain = export("plain.toml", &format!("plain-{format}"));
         assert!(plain.contains(file) && plain.contains("flange poses equal to"), "{plain}");
         let sagging = export("sagging.toml", &format!("sagging-{format}"));
-        let lost = sagging.contains("no place for gravity: refitted") && sagging.contains("mm in the mean");
+        let lost = sagging.contains("no place for gravity: refitted") && sagging.contains("mm on average");
         assert_eq!(lost, format != "toml", "{sagging}");
     }
     // The residual that is printed is that of the file.
     let back = chain(at, "sagging-urdf/robot.urdf", None);
     let off = Residual::between(&read(at, "sagging.toml"), &back);
     let said = run(at, &["export", "robot", "--robot", "sagging.toml", "--format", "urdf", "--out", "again"], 0);
-    assert!(said.contains(&format!("{:.4} mm in the mean", off.mean_mm)), "{said} {off:?}");
+    assert!(said.contains(&format!("{:.4} mm on average", off.mean_mm)), "{said} {off:?}");
     run(at, &["robot", "import", "plain-dh-csv/robot.csv", "--out", "table"], 0);
     let off = Residual::between(&read(at, "plain.toml"), &read(at, "table/robot.toml"));
     assert!(off.max_mm < 1e-9, "{off:?}");

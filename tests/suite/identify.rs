@@ -275,7 +275,7 @@ fn distances_on_one_sphere_leave_their_zero_open_and_are_verified_as_they_were_r
         };
         let record = identified(folder.path(), distances);
         let said = record["doctor"].to_string() + &record["warnings"].to_string();
-        let (off, open) = ("the zero of the readings is off", "too much alike to tell a zero");
+        let (off, open) = ("the zero of the readings is off", "too similar to separate an offset");
         // On spheres of one radius a robot of another size has such a zero, as long as no workshop gets it so wrong.
         assert!(said.contains(if zero_mm > 1.0 { off } else { open }), "{zero_mm}: {said}");
         assert_verified(folder.path(), &record);
@@ -395,4 +395,53 @@ fn targets_that_cannot_be_made_one_are_refused() {
             .stdout("")
             .stderr(contains(said).and(contains("hint:").or(contains("m.csv:3"))));
     }
+}
+
+/// The first lines say whether to use the result, and a robot of another make is not to be used.
+#[test]
+fn another_arms_file_is_advised_against() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |arguments: &[&str]| {
+        let mut command = Command::cargo_bin("stereocal").expect("the program is built");
+        command.current_dir(folder.path()).args(arguments).output().expect("it runs")
+    };
+    let said = |output: &std::process::Output| {
+        (String::from_utf8_lossy(&output.stdout).into_owned(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    run(&["simulate", "--points-only", "--samples", "40", "--verify", "12", "--out", "."]);
+    let measurements = "measurements.csv";
+    for arm in ["ur5e", "abb-irb120", "kuka-kr6-r900"] {
+        run(&["robot", "new", arm, "--out", arm]);
+        let file = format!("{arm}/robot.toml");
+        let output = run(&[
+            "identify",
+            "--method",
+            "trust-region",
+            "--measurements",
+            measurements,
+            "--robot",
+            &file,
+            "--out",
+            arm,
+        ]);
+        let (out, err) = said(&output);
+        assert_eq!(output.status.code(), Some(1), "{arm}: {out}{err}");
+        assert!(out.starts_with("do not use the identified robot: "), "{arm}: {out}");
+        let warnings: Vec<&str> = err.lines().filter(|line| line.starts_with("warning: ")).collect();
+        assert!(warnings[0].starts_with("warning: do not use the result: ") && warnings.len() <= 5, "{arm}: {err}");
+        let json = std::fs::read_to_string(folder.path().join(arm).join("identification.json")).expect("written");
+        let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        assert_eq!(json["advice"], "do-not-use");
+        let robot = std::fs::read_to_string(folder.path().join(arm).join("identified.toml")).expect("written");
+        assert!(robot.contains("# Do not use this robot"), "{robot}");
+        let page = std::fs::read_to_string(folder.path().join(arm).join("identify.html")).expect("written");
+        assert!(page.contains("Do not use"), "{arm}");
+    }
+    let output =
+        run(&["identify", "--method", "trust-region", "--measurements", measurements, "--robot", "robot.toml"]);
+    let (out, err) = said(&output);
+    assert_eq!(output.status.code(), Some(0), "{out}{err}");
+    assert!(out.starts_with("use the identified robot\nbefore: "), "{out}");
+    assert!(out.lines().nth(2).is_some_and(|line| line.starts_with("after: ")), "{out}");
+    assert!(!err.contains("do not use"), "{err}");
 }

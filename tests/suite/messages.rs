@@ -83,3 +83,54 @@ fn numbers_beyond_their_range() {
         refused(flags, &[], 2, &[range]);
     }
 }
+
+#[test]
+fn a_matrix_of_the_wrong_shape_is_named_by_its_key() {
+    let camera = r#"{"width": 64, "height": 48, "fx": 50, "fy": 50, "cx": 31, "cy": 23, "model": "brown4", "distortion": [0, 0, 0, 0]}"#;
+    let file = |rotation: &str, translation: &str, more: &str| {
+        format!(
+            r#"{{"version": 1, "left": {camera}, "right": {camera}, "right_from_left": {{"rotation": {rotation}, "translation_mm": {translation}}}{more}}}"#
+        )
+    };
+    let whole = "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]";
+    for (text, part) in [
+        (file("[[1, 0, 0], [0, 1, 0]]", "[-80, 0, 0]", ""), "right_from_left.rotation has 2 rows"),
+        (
+            file("[[1, 0], [0, 1, 0], [0, 0, 1]]", "[-80, 0, 0]", ""),
+            "right_from_left.rotation has 3 rows of 2, 3, 3 numbers",
+        ),
+        (file(whole, "[-80, 0]", ""), "right_from_left.translation_mm has 2 numbers"),
+        (
+            file(whole, "[-80, 0, 0]", r#", "covariance": {"order": ["left.fx"], "matrix": [[1, 0]]}"#),
+            "covariance.matrix is not 1 by 1",
+        ),
+    ] {
+        let files = [("c.json", text.as_str()), ("poses/poses.csv", "pose,group,role,j1_deg\np,g,sample,0\n")];
+        refused(&["measure", "poses", "--calibration", "c.json"], &files, 2, &[part, "c.json"]);
+    }
+}
+
+#[test]
+fn global_options_stand_under_their_own_heading() {
+    let folder = workplace();
+    for command in ["camera-check", "identify", "compensate", "robot"] {
+        let help = stdout(&stereocal(folder.path(), &[command, "--help"]));
+        let (own, global) = help.split_once("Global options:").unwrap();
+        assert!(
+            ["--config", "--quiet", "--threads", "--no-provenance"]
+                .iter()
+                .all(|g| global.contains(g) && !own.contains(g)),
+            "{help}"
+        );
+    }
+}
+
+#[test]
+fn an_arm_is_found_by_what_people_call_it() {
+    let folder = workplace();
+    let output = stereocal(folder.path(), &["robot", "new", "IRB 120"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(stderr(&output).contains("`IRB 120` is abb-irb120"), "{}", stderr(&output));
+    refused(&["robot", "new", "irb1200"], &[], 2, &["abb-irb1200-5-0.9, abb-irb1200-7-0.7", "hint: "]);
+    refused(&["robot", "new", "irb9"], &[], 2, &["no arm `irb9`", "robot list"]);
+}

@@ -63,6 +63,22 @@ fn corresponding_corners_stand_on_one_row() {
     let page = std::fs::read_to_string(folder.path().join("out/rectify.html")).unwrap();
     assert!(page.contains("Epipolar lines") && page.contains("data:image/jpeg;base64,"));
 
+    // The board is that of the calibration, where the file says it; the settings know other ones only.
+    let settings = "[check_board]\nsquares = \"9x7\"\nsquare_mm = 25.0\n";
+    std::fs::write(folder.path().join("other.toml"), settings).unwrap();
+    let mut known = json(&folder.path().join("truth/calibration.json"));
+    for (board, found) in [(None, false), (Some("checker:20x20:10"), true), (Some("no board"), false)] {
+        if let Some(board) = board {
+            known["board"] = board.into();
+        }
+        std::fs::write(folder.path().join("known.json"), known.to_string()).unwrap();
+        let arguments =
+            ["rectify", "check", "--calibration", "known.json", "--config", "other.toml", "--out", "known", "--force"];
+        let said = done(folder.path(), &arguments);
+        assert_eq!(said.contains("corners of the 20x20 board"), found, "{board:?}: {said}");
+        assert_eq!(said.contains("no board was seen"), !found, "{board:?}: {said}");
+    }
+
     // A rig that is not the pictures' own: its right camera is turned by 0.1 degrees about its x axis.
     let truth = folder.path().join("truth/calibration.json");
     let mut turned = json(&truth);

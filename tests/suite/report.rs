@@ -16,7 +16,7 @@ fn one_page_of_the_day() {
     let world = folder.path();
     let output = stereocal(world, &["report"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("any result not found"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("results not found"), "{}", stderr(&output));
     assert!(!world.join("out").exists());
 
     done(

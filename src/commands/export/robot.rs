@@ -67,7 +67,7 @@ fn export(args: &ExportRobot, robot: &Robot) -> Result<ExportedRobot> {
         (RobotFormat::DhCsv, _) => table(&along_axes(plain())),
         (RobotFormat::RosKinematicsYaml, _) => {
             let robot = along_axes(plain());
-            turning(&robot, "kinematics files know turning joints alone")?;
+            turning(&robot, "kinematics files hold revolute joints only")?;
             ros_kinematics::build(&robot)
         }
         (RobotFormat::UrCalibration, _) => {
@@ -108,7 +108,7 @@ fn nominal(args: &ExportRobot, robot: &Robot) -> Result<Robot> {
         None => {
             let arm = catalogue::ARMS.iter().find(|arm| arm.title == robot.name);
             arm.map(catalogue::Arm::robot).ok_or_else(|| Error::NotExportable {
-                message: format!("no common arm is called `{}`: deviations from what?", robot.name),
+                message: format!("nominal robot unknown: no common arm is called `{}`", robot.name),
                 hint: "`--nominal FILE` names the nominal robot file".to_owned(),
             })?
         }
@@ -140,7 +140,7 @@ fn fidelity(robot: &Robot, carried: &Robot) -> String {
         format!("the format has no place for {}: refitted over the joints' ranges", lost.join(" and "))
     };
     format!(
-        "{why}; what is left: {:.4} mm in the mean, {:.4} mm and {:.4} mrad at the most",
+        "{why}; remaining error: {:.4} mm on average, {:.4} mm and {:.4} mrad at most",
         off.mean_mm,
         off.max_mm,
         1e3 * off.max_rad

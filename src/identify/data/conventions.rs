@@ -146,11 +146,11 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
 pub fn unexplained(left_mm: f64) -> Finding {
     Finding {
         finding: format!(
-            "{left_mm:.2} mm a coordinate are left at best, more than any built robot's: the robot file is not of the robot that was \
+            "the best fit leaves {left_mm:.2} mm a coordinate, implausible for a real robot: the robot file is not of the robot that was \
              measured, or joints and readings do not belong together"
         ),
         rows: Vec::new(),
-        action: "nothing explains it; don't use the result".to_owned(),
+        action: "no change of units, signs or conventions explains it".to_owned(),
     }
 }
 

@@ -6,13 +6,13 @@ use super::conventions::Mended;
 use super::dataset::{Dataset, Reading};
 use super::sessions::{self, Along, Session};
 use super::still::{constant_joints, repeated};
-use super::{conventions, covariances, known, orientations};
+use super::{conventions, covariances, known, orientations, plausible};
 use crate::identify::judge::choose::Identification;
 use crate::identify::judge::scale::CommonScale;
-use crate::identify::record::{Smooth, file_unit};
+use crate::identify::record::Smooth;
 use crate::identify::residuals::weights::Extra;
 use crate::identify::settings::{Model, Settings};
-use crate::robot::{Parameter, Robot};
+use crate::robot::Robot;
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -91,93 +91,16 @@ pub fn is_explained(found: &Identification) -> bool {
 
 /// What was found along the way: gross errors, sessions, drifts, covariances that are off.
 pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Finding> {
-    [of_readings(set, found), of_sensor(found), of_rows(set, found), of_robot(set, found), along_the_rows(along)]
-        .concat()
-}
-
-/// What the readings are, and what they cannot tell.
-fn of_readings(set: &Dataset, found: &Identification) -> Vec<Finding> {
-    let mut list = Vec::new();
-    let mut add = |finding: String, rows: Vec<String>, action: &str| {
-        list.push(Finding { finding, rows, action: action.to_owned() });
-    };
-    if !set.floored.is_empty() {
-        add(
-            "covariances with a direction of no variance".to_owned(),
-            set.floored.clone(),
-            "a micrometre was added to each coordinate",
-        );
-    }
-    let oriented =
-        set.poses.iter().filter(|p| matches!(p.reading, Reading::Position { rotation_rad: Some(_), .. })).count();
-    if oriented > 0 && !set.has_rotations() {
-        let count = set.poses.len();
-        add(
-            format!("{oriented} of {count} poses have an orientation: it counts where all of them do"),
-            Vec::new(),
-            "the points alone are used; measure the orientation of all poses, or of none",
-        );
-    }
-    if let Some((names, finding)) = repeated(set) {
-        add(finding, names, "all of them are used");
-    }
-    for joint in constant_joints(set) {
-        add(
-            format!("joint {} is the same in all rows: its parameters cannot be told from its neighbours'", joint + 1),
-            Vec::new(),
-            "nothing was done; move it between poses",
-        );
-    }
-    if let Some(finding) = stated_covariances(set, found) {
-        add(finding, Vec::new(), "the fit weighs by what it found");
-    }
-    if set.groups.iter().any(|g| g.center.is_none())
-        && (0..set.poses.len()).any(|r| set.touches(r))
-        && set.known.is_empty()
-    {
-        add(
-            "touches alone leave the scale of the robot unseen (zero lengths would fit perfectly)".to_owned(),
-            Vec::new(),
-            "the scale stays nominal; `--known-distances` gives it",
-        );
-    }
+    let mut list = of_rows(set, found);
+    list.extend(plausible::of_another_robot(found));
+    list.extend(plausible::of_terms(found));
+    list.extend(of_sensor(set, found));
+    list.extend(along_the_rows(along));
+    list.extend(of_data(set, found));
     list
 }
 
-/// What all readings of a sensor share.
-fn of_sensor(found: &Identification) -> Vec<Finding> {
-    let mut list = Vec::new();
-    let mut add = |finding: String, rows: Vec<String>, action: &str| {
-        list.push(Finding { finding, rows, action: action.to_owned() });
-    };
-    if let Some((zero_mm, sigma_mm)) = zero(found) {
-        let (size, way) = (zero_mm.abs(), if zero_mm > 0.0 { "long" } else { "short" });
-        add(
-            format!(
-                "the distances are {size:.3} mm too {way} (known to {sigma_mm:.3} mm): the zero of the readings is off"
-            ),
-            Vec::new(),
-            "it was found with the robot and taken off there; the figures below, as those of `verify`, hold the distances as they were read",
-        );
-    }
-    if found.smooth.is_some_and(|told| told.evidence > SMOOTH)
-        && let Some(smooth) = Smooth::new(found)
-    {
-        add(
-            format!(
-                "the points of each placement share a smooth error of about {:.3} mm a coordinate, which changes over some {} mm: what the \
-                 sensor does to space, or the robot beyond its model",
-                smooth.left_mm,
-                rounded(smooth.error.length_mm)
-            ),
-            Vec::new(),
-            "it counts as one error of the placement, not as one of each point, and less is promised for it; more placements make it less",
-        );
-    }
-    list
-}
-
-/// Rows that are far from what the others predict.
+/// Rows that do not fit with the others.
 fn of_rows(set: &Dataset, found: &Identification) -> Vec<Finding> {
     let names = |rows: &[usize]| rows.iter().map(|&r| set.poses[r].name.clone()).collect::<Vec<_>>();
     let mut list = Vec::new();
@@ -218,34 +141,97 @@ fn of_rows(set: &Dataset, found: &Identification) -> Vec<Finding> {
     list
 }
 
-/// What no built robot is, or what another one would be as well.
-fn of_robot(set: &Dataset, found: &Identification) -> Vec<Finding> {
+/// Errors that the readings share.
+fn of_sensor(set: &Dataset, found: &Identification) -> Vec<Finding> {
     let mut list = Vec::new();
     let mut add = |finding: String, rows: Vec<String>, action: &str| {
         list.push(Finding { finding, rows, action: action.to_owned() });
     };
-    if let Some(far) = far(found, &link_limit) {
-        add(
-            format!(
-                "the links found are far from the nominal ones ({far}): more than any workshop gets wrong, so the robot file may be of another \
-                 robot"
-            ),
-            Vec::new(),
-            "the robot that was found is used; see whether the file is the right one",
-        );
-    }
-    if let Some(far) = far(found, &term_limit) {
-        add(
-            format!(
-                "terms found are larger than gears, bearings and encoders have them ({far}): they may stand in for something else that is \
-                 wrong, such as joints or conventions"
-            ),
-            Vec::new(),
-            "the robot that was found is used where it was measured; don't trust it elsewhere before the reason is known",
-        );
-    }
     if let Some(scale) = CommonScale::new(set, found).filter(CommonScale::is_told) {
         add(scale.sentence(), Vec::new(), "the robot that was found has this scale; check it on a known length");
+    }
+    if let Some((zero_mm, sigma_mm)) = zero(found) {
+        let (size, way) = (zero_mm.abs(), if zero_mm > 0.0 { "long" } else { "short" });
+        add(
+            format!(
+                "the distances are {size:.3} mm too {way} (known to {sigma_mm:.3} mm): the zero of the readings is off"
+            ),
+            Vec::new(),
+            "it was found with the robot and taken off there; the figures below, as those of `verify`, hold the distances as they were read",
+        );
+    }
+    if found.smooth.is_some_and(|told| told.evidence > SMOOTH)
+        && let Some(smooth) = Smooth::new(found)
+    {
+        add(
+            format!(
+                "the points of each placement share a smooth error of about {:.3} mm a coordinate, which changes over some {} mm: sensor distortion, or errors of the robot that the model does not describe",
+                smooth.left_mm,
+                rounded(smooth.error.length_mm)
+            ),
+            Vec::new(),
+            "it is treated as one error of each placement, and the expected accuracy allows for it; more placements reduce it",
+        );
+    }
+    list
+}
+
+/// What the rows hold, and what their covariances state.
+fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
+    let mut list = Vec::new();
+    let mut add = |finding: String, rows: Vec<String>, action: &str| {
+        list.push(Finding { finding, rows, action: action.to_owned() });
+    };
+    if !set.floored.is_empty() {
+        add(
+            "singular covariances (no variance in one direction)".to_owned(),
+            set.floored.clone(),
+            "a micrometre was added to each coordinate",
+        );
+    }
+    let oriented =
+        set.poses.iter().filter(|p| matches!(p.reading, Reading::Position { rotation_rad: Some(_), .. })).count();
+    if oriented > 0 && !set.has_rotations() {
+        let count = set.poses.len();
+        add(
+            format!(
+                "{oriented} of {count} poses have an orientation: orientations are used only where all poses have one"
+            ),
+            Vec::new(),
+            "the points alone are used; measure the orientation of all poses, or of none",
+        );
+    }
+    if let Some((names, finding)) = repeated(set) {
+        add(finding, names, "all of them are used");
+    }
+    let constant: Vec<String> = constant_joints(set).into_iter().map(|joint| (joint + 1).to_string()).collect();
+    if !constant.is_empty() {
+        add(
+            match &constant[..] {
+                [one] => {
+                    format!("joint {one} is the same in all rows: its parameters cannot be told from its neighbours'")
+                }
+                all => format!(
+                    "joints {} are the same in all rows: their parameters cannot be told from their neighbours'",
+                    all.join(", ")
+                ),
+            },
+            Vec::new(),
+            "move every joint between poses",
+        );
+    }
+    if let Some(finding) = stated_covariances(set, found) {
+        add(finding, Vec::new(), "the fit uses the scatter that it found");
+    }
+    if set.groups.iter().any(|g| g.center.is_none())
+        && (0..set.poses.len()).any(|r| set.touches(r))
+        && set.known.is_empty()
+    {
+        add(
+            "touches alone do not determine the scale of the robot (a robot of length zero would fit)".to_owned(),
+            Vec::new(),
+            "the scale stays nominal; `--known-distances` gives it",
+        );
     }
     list
 }
@@ -304,50 +290,6 @@ pub fn zero(found: &Identification) -> Option<(f64, f64)> {
     let at = formulation.base.rank() + k;
     let (value, sigma) = (found.extras[k].1, formulation.covariance()[(at, at)].max(0.0).sqrt());
     (value.abs() > ZERO_SIGMAS * sigma).then_some((value, sigma))
-}
-
-/// How many standard deviations a correction must have to be far from nominal.
-const FAR_SIGMAS: f64 = 5.0;
-
-/// The correction, mm or mrad, beyond which a link is not the one of the robot's file.
-fn link_limit(parameter: Parameter) -> Option<f64> {
-    match parameter {
-        Parameter::A(_) | Parameter::D(_) => Some(10.0),
-        Parameter::Alpha(_) | Parameter::Theta(_) => Some(60.0),
-        _ => None,
-    }
-}
-
-/// The size beyond which a term is no gear's, bearing's or encoder's any more: mrad, mrad a metre of lever, or thousandths. Those of the
-/// real robots of the README's table are less than a third of this.
-fn term_limit(parameter: Parameter) -> Option<f64> {
-    match parameter {
-        Parameter::Harmonic(..) | Parameter::Wobble(..) | Parameter::Coupling(..) => Some(10.0),
-        Parameter::Gravity(..) | Parameter::Bending(..) => Some(50.0),
-        _ => None,
-    }
-}
-
-/// The determined parameters whose correction is beyond its limit, for a sentence.
-fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>) -> Option<String> {
-    let candidate = &found.candidates[found.chosen];
-    let (formulation, _) = candidate.found.as_ref()?;
-    let (covariance, nominal) = (formulation.robot_covariance(), formulation.rows.kinematics.nominal());
-    let parameters = formulation.parameters();
-    let moved = |p: Parameter| candidate.robot.value(p) - nominal.value(p);
-    let is_far = |i: &usize| {
-        let size = moved(parameters[*i]).abs();
-        let sigma = covariance[(*i, *i)].max(0.0).sqrt();
-        limit(parameters[*i]).is_some_and(|limit| size > limit) && size > FAR_SIGMAS * sigma
-    };
-    let name = |i: &usize| {
-        let (unit, factor) = file_unit(parameters[*i]);
-        format!("{} {:+.1} {unit}", parameters[*i].name(), factor * moved(parameters[*i]))
-    };
-    // What a link shares with others may be theirs; terms are nothing else's.
-    let shared = |i: &usize| link_limit(parameters[*i]).is_some() && formulation.base.in_group(*i);
-    let list: Vec<String> = formulation.base.free.iter().filter(|i| is_far(i) && !shared(i)).map(name).collect();
-    (!list.is_empty()).then(|| list.join(", "))
 }
 
 /// Scatter over stated standard deviation beyond which it is worth a sentence.

@@ -27,7 +27,7 @@ const SIGMA_MM: f64 = 0.05;
 /// Reads the distances between groups of `set`.
 pub fn read(path: &Utf8Path, set: &Dataset) -> files::Result<Vec<KnownDistance>> {
     let hint = "a CSV with the columns group_a,group_b,distance_mm and optionally sigma_mm";
-    let table = Table::read(path, "the known distances", hint)?;
+    let table = Table::read(path, "file of known distances", hint)?;
     let (a, b) = (table.require("group_a")?, table.require("group_b")?);
     let distance = table.require("distance_mm")?;
     let sigma = table.column("sigma_mm");
@@ -79,9 +79,9 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, V
         let left = all - others.known.len();
         if set.known.len() < 3 || 2 * left >= all {
             findings.push(Finding {
-                finding: "the known distances do not go together with the touches".to_owned(),
+                finding: "the known distances contradict the touches".to_owned(),
                 rows: off.iter().map(|&k| name(&set, &set.known[k])).collect(),
-                action: "nothing tells which is wrong, and all of them are used; measure them again, or more of them"
+                action: "which of them is wrong cannot be decided: all are used; measure them again, or more of them"
                     .to_owned(),
             });
             break;

@@ -6,6 +6,7 @@ pub mod dataset;
 pub mod doctor;
 pub mod known;
 pub mod orientations;
+pub mod plausible;
 pub mod repeats;
 pub mod sessions;
 pub mod shared;

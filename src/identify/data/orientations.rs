@@ -52,7 +52,7 @@ pub fn examine(set: &Dataset, robot: &Robot, asked: bool) -> (Dataset, Option<Fi
         |finding: String, action: &str| Some(Finding { finding, rows: Vec::new(), action: action.to_owned() });
     let Some((left, name, reader)) = best.filter(|(left, ..)| left * EXPLAINS < as_read) else {
         let said = format!(
-            "the orientations do not go with the joints: between poses the target turns by {:.1} deg more or less than the flange",
+            "the orientations contradict the joint angles: between poses the target turns by {:.1} deg more or less than the flange",
             degrees(as_read)
         );
         if !asked {

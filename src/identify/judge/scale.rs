@@ -102,7 +102,7 @@ impl CommonScale {
                 100.0 * sigma
             ),
             false => format!(
-                "scale of the {of}: one that is off by up to {:.2} % looks like a robot that is as much larger, and would not be seen",
+                "a scale error of the {of} of up to {:.2} % cannot be told from a robot of another size",
                 100.0 * unseen
             ),
         }

@@ -116,7 +116,7 @@ impl Expected {
     /// What it comes to.
     pub fn sentence(&self) -> String {
         format!(
-            "position error to expect after a rigid fit: {:.4} mm in the mean, {:.4} mm at the worst pose, 95 of 100 below {:.4} mm",
+            "expected position error after a rigid fit: {:.4} mm on average, {:.4} mm at the worst pose, 95 % below {:.4} mm",
             self.mean_mm, self.max_mm, self.p95_mm
         )
     }

@@ -52,7 +52,7 @@ pub fn to_csv(corners: &Corners) -> String {
 /// corners have numbers of their own.
 pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<Corners> {
     let hint = "`stereocal camera-check IMAGES` writes corners.csv beside its report";
-    let table = Table::read(path, "the file of corners", hint)?;
+    let table = Table::read(path, "corners file", hint)?;
     let mut rows = parse(&table, board)?;
     let mut notes = Vec::new();
     if fit_to_board(&table, &mut rows, board)? {

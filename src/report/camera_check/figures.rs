@@ -53,7 +53,7 @@ pub(super) fn lengths(judged: &Judged) -> Result<Markup> {
     Ok(html! {
         div.side {
             (page::figure(&a, "Pair after pair, x before y; of very many lengths the worst of each few are drawn. Steps between pairs are calibration, the width of the band is corner noise."))
-            (page::figure(&b, "A pair far from the others was moved, blurred or hit from the side by light; a mean that grows with the range is a scale."))
+            (page::figure(&b, "A pair far from the others was moved, blurred or hit from the side by light; a mean that grows with the range is an error of scale."))
         }
         div.side {
             (page::figure(&c, "A mean that bends with the range is a lens or a board's shape that the model lacks."))
@@ -130,7 +130,7 @@ fn field_figure(field: &Field, width: u32, height: u32) -> Result<(String, Strin
         .svg()?;
     let seen = field.cells.iter().filter(|c| c.corners > 0).count();
     let caption = format!(
-        "Arrows are {magnify:.0} times too long; the longest is {longest:.4} px, the systematic part {:.4} px. Arrows that turn or point outward together \
+        "Arrows are magnified {magnify:.0} times; the longest is {longest:.4} px, the systematic part {:.4} px. Arrows that turn or point outward together \
          are a lens that the model lacks. Corners reached {seen} of {} cells; what lies in the others is extrapolated.",
         field.systematic_px,
         field.cells.len()
@@ -153,7 +153,7 @@ pub(super) fn volume(judged: &Judged) -> Result<Markup> {
     let worst = |axis: usize| lying(axis).map(|l| l.sigma_mm()).fold(0.0, f64::max);
     let caption = format!(
         "{} lengths in the volume in which the boards stood, as far as both cameras see them; corner noise at both ends and the calibration together. The worst: \
-         {:.4} mm across, {:.4} mm along the line of sight.",
+         {:.4} mm across, {:.4} mm along the line of sight. Where points rise above the tolerance, add pairs at that distance.",
         judged.volume.lengths.len(),
         worst(0).max(worst(1)),
         worst(2)

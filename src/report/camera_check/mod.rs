@@ -15,13 +15,13 @@ use crate::report::table::{number, with_sigma};
 use crate::stereo::Side;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::assessment::Judged;
-use crate::stereo::judge::evidence;
+use crate::stereo::judge::evidence::{self, Evidence};
 use crate::stereo::judge::verdict::Verdict;
 use maud::{Markup, html};
 
 use self::figures::{lengths, residuals, volume};
 pub use self::summary::summary;
-use self::summary::{advice, deciding, explanation, trusted, word};
+use self::summary::{advice, deciding, word};
 
 /// The pairs by their largest held-out error, the worst first.
 pub fn worst_first(judged: &Judged) -> Vec<usize> {
@@ -46,22 +46,24 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
         Verdict::Fail => Tone::Bad,
     };
     let content = html! {
-        (page::verdict(tone, word(judged.verdict), &format!("{}. {}", explanation(judged), advice(judged))))
+        (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), page::capital(&deciding(judged)))))
         (ledger(judged))
-        @if !judged.advice.is_empty() { p { "What to photograph next, before anything below is relied on:" } (page::warnings(&judged.advice)) }
-        @if !judged.warnings.is_empty() { p { "What else to know:" } }
+        @if !judged.advice.is_empty() { p { "What to photograph next:" } (page::warnings(&judged.advice)) }
+        @if !judged.warnings.is_empty() { p { "What to do, and what else to know:" } }
         (page::warnings(&warnings(judged)))
         (scale(judged))
-        h2 { "Lengths on pairs that the cameras had not seen" }
+        h2 { "Lengths on held-out pairs" }
         (lengths(judged)?)
         h2 { "Pairs, the worst first" }
         (pairs(calibration, judged))
         (pair_picture::section(pictures))
-        h2 { "What the model leaves of the corners" }
+        h2 { "Residuals of the corners" }
         (residuals(calibration, judged)?)
         (blur::section(corners))
-        h2 { "The cameras and the rig" }
+        h2 { "Where the boards were" }
+        p { "The verdict is " (summary::volume(judged)) "." }
         (in_space(calibration, judged))
+        h2 { "The cameras and the rig" }
         (parameters(calibration))
         (lenses(calibration))
         (disagreements(judged))
@@ -81,8 +83,40 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
     Ok(page::page("Camera check", &lead, &content))
 }
 
-/// The ledger: what was looked at, what was found, up to where it allows a pass, and what it means.
+/// The three numbers of the verdict.
+fn numbers(judged: &Judged) -> [(String, String); 3] {
+    let extremes = &judged.accuracy.extremes;
+    let mm = |value: f64| format!("{} mm", number(Some(value), 3));
+    [
+        (
+            mm(extremes.one_in_twenty_mm),
+            "95 % of lengths on pairs left out of the calibration are within this".to_owned(),
+        ),
+        (mm(extremes.max_abs_error_mm), "largest error of such a length".to_owned()),
+        (
+            judged.trusted_mm().map_or_else(|| "no limit".to_owned(), mm),
+            format!("lengths can be trusted to this; the tolerance is {} mm", judged.tolerance_mm),
+        ),
+    ]
+}
+
+/// The checks that are not passed; folded, all of them: what was looked at, what was found, up to where it allows a pass, what it means.
 fn ledger(judged: &Judged) -> Markup {
+    let below: Vec<&Evidence> = judged.evidence.iter().filter(|line| line.allows != Verdict::Pass).collect();
+    html! {
+        @if !below.is_empty() {
+            h2 { "Checks that are not passed" }
+            p { "No verdict is better than its worst check." }
+            (lines(&below))
+        }
+        (page::details(
+            &format!("All {} checks", judged.evidence.len()),
+            &html! { (lines(&judged.evidence.iter().collect::<Vec<_>>())) },
+        ))
+    }
+}
+
+fn lines(evidence: &[&Evidence]) -> Markup {
     let class = |verdict| match verdict {
         Verdict::Pass => "allows good",
         Verdict::Undecided => "allows doubtful",
@@ -90,11 +124,9 @@ fn ledger(judged: &Judged) -> Markup {
     };
     let cell = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), evidence::number);
     html! {
-        h2 { "What the verdict rests on" }
-        p { (format!("No verdict is better than its worst line; this one is {}; {}.", deciding(judged), trusted(judged))) }
         div.wide { table.ledger {
             thead { tr { th { "what" } th { "value" } th { "limit" } th { "unit" } th { "allows" } th { "detail" } } }
-            tbody { @for line in &judged.evidence { tr {
+            tbody { @for line in evidence { tr {
                 td { (line.what) }
                 td { (cell(line.value)) }
                 td { (cell(line.limit)) }
@@ -113,15 +145,14 @@ fn scale(judged: &Judged) -> Markup {
             Some(second) => p {
                 @match (second.scale_error, second.scale_error_sigma, second.max_abs_error_mm) {
                     (Some(scale), Some(sigma), Some(error)) => (format!(
-                        "The second board, which calibrated nothing, comes out too large by {:.1} +- {:.1} parts in a million (k = 2); its worst length over \
+                        "The second board, which took no part in the calibration, comes out too large by {:.1} +- {:.1} parts in a million (k = 2); its worst length over \
                          {} pairs is off by {error:.4} mm.",
                         1e6 * scale, 2e6 * sigma, second.pairs)),
                     _ => "A second board was asked for, and no length on it could be measured.",
                 }
             }
             None => p {
-                "The scale of every length is the pitch of the board that calibrated: an error of its pitch is invisible in these figures. \
-                 A second board of known pitch shows it: " code { "--check-images DIR" } "."
+                "The scale of every length is that of the board: an error of its pitch does not show in these figures. A second board of known pitch checks it: " code { "--check-images DIR" } "."
             }
         }
     }
@@ -188,9 +219,11 @@ fn in_space(calibration: &Calibration, judged: &Judged) -> Markup {
         };
         rig::board(&mut scene, ink, &calibration.board, pose);
     }
+    rig::volume(&mut scene, &calibration.rig().left, &judged.volume.volume);
     scene.figure(
-        "cameras and boards",
-        "Both cameras and the boards of all pairs; the worst pair's in red, the best one's in green. Where no board stood, nothing was checked.",
+        "cameras, boards and the volume of the verdict",
+        "Both cameras, the boards of all pairs (the worst pair's in red, the best one's in green) and, as two outlines joined by lines, the \
+         volume that the verdict is for. Nothing was checked outside of it: measure there only after pairs with the board there.",
     )
 }
 
@@ -218,7 +251,7 @@ fn lenses(calibration: &Calibration) -> Markup {
         .collect();
     html! {
         @if !rows.is_empty() {
-            p { "Lens models on pairs they had not seen. The simplest within two standard errors of the best was taken; those without a figure promise nothing beyond chance, or these pairs do not determine them." }
+            p { "Lens models on held-out pairs. The simplest within two standard errors of the best was taken; those without a figure give no significant gain, or these pairs do not determine them." }
             (page::table(&["lens", "held-out residual px"], &rows))
         }
     }
@@ -243,7 +276,7 @@ fn disagreements(judged: &Judged) -> Markup {
     html! {
         @if !rows.is_empty() {
             p {
-                "Models that the corners admit and that measure other lengths. The standard deviations above hold only if lens and board are what they were taken \
+                "Other models that fit the corners, and that give other lengths. The standard deviations above hold only if lens and board are what they were taken \
                  for; the truth may lie anywhere between these models, and lengths with it."
             }
             (page::table(&header, &rows))

@@ -6,6 +6,7 @@ use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::lengths::{Axis, Range};
 use crate::stereo::judge::verdict::Verdict;
+use crate::stereo::named;
 use crate::stereo::pairs::Cause;
 
 /// Rows of the table on stdout along each axis.
@@ -76,12 +77,12 @@ fn standing(calibration: &Calibration) -> Option<String> {
     let standing = &calibration.standing;
     if let Some(last) = standing.unconfirmed.first() {
         return Some(format!(
-            "the last pairs ({}) contradict this rig: it may no longer stand; `--since {last}` calibrates from them alone, once there are enough",
+            "the rig may have changed: the last pairs ({}) contradict it; `--since {last}` calibrates from them alone, once there are enough",
             named(&standing.unconfirmed)
         ));
     }
     let since = standing.since.as_ref()?;
-    Some(format!("the rig as it is since pair {since}: {} earlier pairs are of the one before", standing.pairs_before))
+    Some(format!("the rig since pair {since}; {} earlier pairs show it before it changed", standing.pairs_before))
 }
 
 /// How many pairs were used, and in a line a cause which were not.
@@ -101,20 +102,12 @@ fn pairs(calibration: &Calibration) -> Vec<String> {
     let others: usize = causes.iter().skip(MOST).map(|(.., names)| names.len()).sum();
     lines.extend(causes.iter().take(MOST).map(|(_, reason, names)| {
         let of = if names.len() > 1 { "first: " } else { "" };
-        format!("  without {}: {of}{reason}", self::named(names))
+        format!("  without {}: {of}{reason}", named(names))
     }));
     if others > 0 {
         lines.push(format!("  without {others} more, see the report"));
     }
     lines
-}
-
-/// At most eight names.
-fn named(names: &[String]) -> String {
-    const MOST: usize = 8;
-    let more = names.len().saturating_sub(MOST);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    format!("{}{more}", names.iter().take(MOST).cloned().collect::<Vec<_>>().join(", "))
 }
 
 fn rig(calibration: &Calibration, judged: &Judged) -> String {
@@ -150,7 +143,7 @@ pub(super) fn explanation(judged: &Judged) -> String {
     let pairs = judged.accuracy.pairs.iter().filter_map(|pair| Some((pair.max_abs_error_mm?, &pair.pair)));
     let worst = pairs.max_by(|a, b| a.0.total_cmp(&b.0));
     format!(
-        "nineteen of twenty held-out lengths within {:.4} mm, largest error {:.4} mm in pair {} (may be {:.4}), tolerance {} mm",
+        "95 % of held-out lengths within {:.4} mm, largest error {:.4} mm in pair {} ({:.4} with its uncertainty), tolerance {} mm",
         extremes.one_in_twenty_mm,
         extremes.max_abs_error_mm,
         worst.map_or("", |(_, pair)| pair.as_str()),
@@ -175,13 +168,12 @@ pub(super) fn deciding(judged: &Judged) -> String {
 pub(super) fn trusted(judged: &Judged) -> String {
     match judged.trusted_mm() {
         Some(mm) => format!("lengths can be trusted to {mm:.4} mm"),
-        None => "lengths cannot be trusted to any tolerance before that is settled".to_owned(),
+        None => "lengths cannot be trusted to any tolerance until that is resolved".to_owned(),
     }
 }
 
 /// What the verdict means for somebody who must decide.
 pub(super) fn advice(judged: &Judged) -> String {
-    let [long, _] = judged.accuracy.long_mm;
     let sure = judged.tolerance_mm;
     match judged.verdict {
         Verdict::Pass => {
@@ -189,11 +181,10 @@ pub(super) fn advice(judged: &Judged) -> String {
             format!("Lengths can be trusted to {trusted:.4} mm in the volume where the boards stood.")
         }
         Verdict::Undecided => format!(
-            "The evidence does not decide: the lines below that are not a pass say what casts doubt and what would settle it; until \
-             then do not rely on {sure} mm."
+            "Not decided: the checks below that are not passed say why and what to do; until then do not rely on {sure} mm."
         ),
         Verdict::Fail => format!(
-            "Do not rely on {sure} mm: errors of lengths of {long} mm, the pairs and the residuals below say where it is lost."
+            "Do not rely on {sure} mm: the lengths, the pairs and the residuals below show where the errors are."
         ),
     }
 }

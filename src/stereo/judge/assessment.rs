@@ -143,8 +143,7 @@ fn print_scatter(calibration: &Calibration, accuracy: &Accuracy, tolerance_mm: f
              errors"
         ),
         reason: format!(
-            "left and right picture agree on the corners {:.0} times better than the residuals let expect, so that it is not what the \
-             cameras see of them",
+            "left and right picture agree on the corners {:.0} times better than the residuals suggest, so that the error is the board's, not the cameras'",
             1.0 / accuracy.rays_chi_square.sqrt()
         ),
     })

@@ -120,11 +120,11 @@ fn findings(facts: &Facts) -> Evidence {
     let left: Vec<&Finding> = facts.findings.iter().filter(within).collect();
     let value = left.iter().filter_map(|finding| finding.effect_mm).fold(0.0, f64::max);
     let detail = if left.is_empty() {
-        "nothing happened over the pairs that were used: no step, no drift, no change of focus beyond the pairs' own scatter".to_owned()
+        "no change over the pairs that were used: no step, drift or change of focus beyond their scatter".to_owned()
     } else {
         let told: Vec<&str> = left.iter().map(|finding| finding.action.as_str()).collect();
         format!(
-            "{}. It is in the uncertainty of the rig; what moves a length by less than {:.0} % of the tolerance costs nothing",
+            "{}. It is included in the uncertainty of the rig; a change of a length of less than {:.0} % of the tolerance does not affect the verdict",
             told.join("; "),
             100.0 * MATERIAL_SHARE
         )
@@ -226,7 +226,7 @@ fn pair_scatter(facts: &Facts) -> Evidence {
             scatter.groups
         ),
         None => format!(
-            "one of {} pairs with poses of their own cannot be left out without losing the cameras: nothing checks what it says",
+            "one of {} pairs with poses of their own cannot be left out without losing the calibration: no other pair checks it",
             scatter.groups
         ),
     };
@@ -246,8 +246,7 @@ fn folds(facts: &Facts) -> Evidence {
     let changes = facts.accuracy.fold_steps.iter().flat_map(|step| facts.volume.changes_by_step_mm(layout, step));
     let value = changes.fold(0.0_f64, |most, mm| most.max(mm.abs()));
     let detail = format!(
-        "largest change of a length of {:.0} mm anywhere in the working volume when a block of similar pairs is left out; a rig \
-             that rests on one block is as wrong as that block may be",
+        "largest change of a length of {:.0} mm anywhere in the working volume when a block of similar pairs is left out; a rig that depends on one block has the errors of that block",
         facts.volume.length_mm
     );
     Evidence::of_length(
@@ -274,7 +273,7 @@ fn rays(facts: &Facts) -> Evidence {
         allows: Verdict::within(value, LIMIT_PERCENT),
         detail: format!(
             "{} of {} held-out corners have rays that miss each other by more than {CONTRADICTED} standard deviations and {} were \
-             measured far worse than usual{named}; a few are a hand, a reflection or a hot column, more are the rig",
+             measured far worse than usual{named}; a few are a hand or a reflection, more are an error of the rig",
             doubtful.contradicted, doubtful.corners, doubtful.unsure
         ),
     }
@@ -324,7 +323,7 @@ fn pairs_discarded(facts: &Facts) -> Evidence {
         unit: "%",
         allows: Verdict::within(value, LIMIT_PERCENT),
         detail: format!(
-            "{} of {judged} pairs with corners do not fit the common rig{named}; beyond the limit what was kept may be one rig of two",
+            "{} of {judged} pairs with corners do not fit the common rig{named}; beyond the limit the rig may have changed",
             contradicting.len()
         ),
     }
@@ -346,7 +345,7 @@ fn standing(facts: &Facts) -> Evidence {
         format!("{before}, and the last pair is one of them")
     } else {
         format!(
-            "{before}; {} came after them and contradict it: nobody knows whether it still stands. Add pairs",
+            "{before}; {} came after them and contradict it: whether the rig is still the same is unknown. Add pairs",
             after.join(", ")
         )
     };
@@ -447,8 +446,7 @@ fn second_board(facts: &Facts) -> Evidence {
         detail,
     };
     let Some(second) = facts.second else {
-        let detail = "not asked for: the scale of every length is the pitch of the board that calibrated, and an error of its pitch is \
-                      invisible here. `--check-images DIR` names pictures of a second board";
+        let detail = "not asked for: the scale of every length is the pitch of the board, and an error of its pitch does not show here. `--check-images DIR` names pictures of a second board";
         return Evidence { limit: None, ..line(None, Verdict::Pass, detail.to_owned()) };
     };
     let Some(extremes) = &second.extremes else {
@@ -474,8 +472,7 @@ fn second_board(facts: &Facts) -> Evidence {
     let own = extremes.verdict(facts.tolerance_mm);
     let allows = if measured { own } else { own.and(Verdict::Undecided) };
     let detail = format!(
-        "largest error plus its own expanded uncertainty ({:.4} + {:.4}) over all lengths in {} pairs of a board that calibrated \
-         nothing{scale}; {} of {} corners have rays that contradict each other",
+        "largest error plus its own expanded uncertainty ({:.4} + {:.4}) over all lengths in {} pairs of a board that took no part in the calibration{scale}; {} of {} corners have rays that contradict each other",
         worst.error_mm,
         worst.expanded_uncertainty_mm(),
         second.pairs,

@@ -70,14 +70,14 @@ impl Judgement {
                 format!("all pictures are {}: they fit this rig the other way round", flip.describe())
             }
             Judgement::Moved { since, creeps: true, turned_deg, moved_mm } => format!(
-                "the rig creeps: during the run the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the \
+                "the rig drifts: during the run the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the \
                  left; from pose {since} on that is more than the points' uncertainty allows"
             ),
             Judgement::Moved { since, creeps: false, turned_deg, moved_mm } => format!(
                 "the rig moved before pose {since}: the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the left"
             ),
             Judgement::Loose { times, sigma_mm } => format!(
-                "the rig is another from pose to pose: the poses disagree with one rig {times:.1} times as far as the pairs of the calibration \
+                "the rig changes from pose to pose: the poses disagree with one rig {times:.1} times as far as the pairs of the calibration \
                  did, and their points are known to {sigma_mm:.3} mm only; a camera is loose, or left and right are not of one moment"
             ),
             Judgement::Unexplained { misfit_px } => format!(

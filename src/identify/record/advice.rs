@@ -1,0 +1,236 @@
+//! Whether to use the robot that was found, and the warnings in the order of their weight.
+
+use serde::Serialize;
+
+use super::Record;
+use crate::identify::data::dataset::Dataset;
+use crate::identify::data::doctor::{self, Finding};
+use crate::identify::data::plausible;
+use crate::identify::judge::choose::Identification;
+use crate::identify::judge::errors::Spread;
+use crate::identify::judge::held_out::Against;
+use crate::robot::Robot;
+
+/// Orientations within this are one: a robot keeps an orientation to far less, and so small a turn shows nothing.
+const ONE_ORIENTATION_DEG: f64 = 1.0;
+
+/// Mean distance error of a nominal robot, mm, beyond which units or robots are mixed up: built robots are off by a few mm.
+const IMPLAUSIBLE_MM: f64 = 20.0;
+
+/// What to do with the robot that was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Advice {
+    /// Use it.
+    Use,
+    /// Use it once the reason was looked at.
+    Check,
+    /// Nothing better than the nominal robot was found, and that is the result.
+    KeepNominal,
+    /// Do not use it.
+    DoNotUse,
+}
+
+/// What is wrong with the data, by weight.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Findings {
+    /// What speaks against the result.
+    pub against: Vec<Finding>,
+    /// What was changed or left out before anything was fitted.
+    pub doubts: Vec<Finding>,
+    /// What was found along the way.
+    pub notes: Vec<Finding>,
+}
+
+impl Findings {
+    /// Those of the data, and those of the fit: what nothing explains, and a robot that is not the one of the file, speak against it.
+    pub fn new(
+        examined: Vec<Finding>,
+        unexplained: Option<Finding>,
+        of_fit: Vec<Finding>,
+        found: &Identification,
+    ) -> Findings {
+        let unexplained = unexplained.filter(|_| !doctor::is_explained(found));
+        let against: Vec<Finding> = unexplained.into_iter().chain(plausible::of_another_robot(found)).collect();
+        let notes = of_fit.into_iter().filter(|finding| !against.contains(finding)).collect();
+        Findings { against, doubts: examined, notes }
+    }
+
+    /// All of them, the gravest first.
+    pub fn all(&self) -> Vec<Finding> {
+        [&self.against, &self.doubts, &self.notes].into_iter().flatten().cloned().collect()
+    }
+}
+
+impl Record {
+    /// Fills in the advice, its reason and the warnings.
+    pub(super) fn advise(
+        &mut self,
+        set: &Dataset,
+        nominal: &Robot,
+        found: &Identification,
+        findings: &Findings,
+        rows: Against,
+    ) {
+        let worse = self.worse(rows);
+        let kept = found.candidates[found.chosen].found.is_none().then(|| self.kept_nominal(found));
+        let sentences = |list: &[Finding]| list.iter().map(Finding::sentence).collect::<Vec<_>>();
+        let mut doubts = sentences(&findings.doubts);
+        doubts.extend(self.implausible());
+        doubts.extend(one_orientation(set, nominal, found));
+        doubts.extend(self.at_limit(found));
+        let against = findings.against.first().map(|finding| finding.finding.clone());
+        (self.advice, self.reason) = match (against.or(worse.clone()), &kept, doubts.first()) {
+            (Some(reason), ..) => (Advice::DoNotUse, reason),
+            (None, Some(reason), _) => (Advice::KeepNominal, reason.clone()),
+            (None, None, Some(doubt)) => (Advice::Check, doubt.clone()),
+            (None, None, None) => (Advice::Use, String::new()),
+        };
+        self.warnings = sentences(&findings.against);
+        self.warnings.extend(worse);
+        self.warnings.extend(kept);
+        self.warnings.extend(doubts);
+        self.warnings.extend(sentences(&findings.notes));
+        self.warnings.extend(self.zero_of_readings(found));
+        self.warnings.extend(self.unusable_rows());
+        self.warnings.extend(self.undetermined());
+    }
+
+    /// A nominal robot that is farther off than built ones are. The tool is a free number, and usually unknown: what is left once it is
+    /// solved counts.
+    fn implausible(&self) -> Option<String> {
+        let before = match self.tool_mm {
+            Some((_, left)) => Some(left),
+            None => self.before.verify.distance.mean_abs_mm,
+        };
+        let before = before.filter(|&mean| mean > IMPLAUSIBLE_MM)?;
+        Some(format!(
+            "the nominal robot is off by {before:.0} mm on average, which is implausible for a real robot: check that the lengths are mm, \
+             the angles deg, and that the robot file is of the robot that was measured"
+        ))
+    }
+
+    /// Parameters whose search ended at its limit.
+    fn at_limit(&self, found: &Identification) -> Option<String> {
+        let reached: Vec<&str> = self
+            .chosen_method()
+            .filter(|_| found.candidates[found.chosen].found.is_some())
+            .map(|m| m.parameters.iter().filter(|p| p.at_bound).map(|p| p.name.as_str()).collect())
+            .unwrap_or_default();
+        let list = reached.join(", ");
+        (!reached.is_empty()).then(|| format!("{list} reached the search limit: the best value may lie beyond it"))
+    }
+
+    fn zero_of_readings(&self, found: &Identification) -> Option<String> {
+        let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
+        let zero_mm = formulation.zero_sigma_mm().unwrap_or(0.0);
+        let expected_mm = self.expected.as_ref().map_or(f64::INFINITY, |e| e.of_robot_mm);
+        (zero_mm > expected_mm && doctor::zero(found).is_none()).then(|| {
+            format!(
+                "the distances are too similar to separate an offset of the readings from a robot of another size: the offset is known to \
+                 {zero_mm:.2} mm only; measure at distances that differ, or set `wire_offset = false` where the offset is zero"
+            )
+        })
+    }
+
+    fn unusable_rows(&self) -> Option<String> {
+        let first = self.skipped.first()?;
+        let count = self.skipped.len();
+        let rows = if count == 1 { "1 row has".to_owned() } else { format!("{count} rows have") };
+        Some(format!("{rows} no usable reading, first {} ({})", first.pose, first.reason))
+    }
+
+    /// What the poses do not determine.
+    fn undetermined(&self) -> Vec<String> {
+        let mut list = Vec::new();
+        let i = &self.identifiability;
+        if !i.zero.is_empty() {
+            list.push(format!("these poses do not determine {}: they stay nominal", i.zero.join(", ")));
+        }
+        if !i.dependent.is_empty() {
+            list.push(format!(
+                "only these sums are determined: {}; the correction of each is split by tolerance",
+                shortened(&i.dependent)
+            ));
+        }
+        if !i.weak.is_empty() {
+            list.push(format!(
+                "the data hardly determine {}: their values come from the manufacturing tolerance",
+                i.weak.join(", ")
+            ));
+        }
+        if !self.widened.is_empty() {
+            list.push(format!(
+                "the nominal values of {} are far off: the search limits were widened for them",
+                self.widened.join(", ")
+            ));
+        }
+        list
+    }
+
+    /// Where rows that took no part in the fit find the chosen robot worse than the nominal one.
+    fn worse(&self, rows: Against) -> Option<String> {
+        let chosen = self.chosen_method()?;
+        let pair = |before: &Spread, after: &Spread| Some((before.mean_abs_mm?, after.mean_abs_mm?));
+        let of_points = || pair(self.before.verify.point.as_ref()?, chosen.verify.point.as_ref()?);
+        let figures = of_points().or_else(|| pair(&self.before.verify.distance, &chosen.verify.distance));
+        let figures =
+            figures.map_or_else(String::new, |(before, after)| format!(" ({after:.3} against {before:.3} mm)"));
+        let on = if self.folded { "rows that were left out of the fit" } else { "the verify rows" };
+        match rows {
+            Against::NotWorse => None,
+            Against::Perhaps => Some(format!(
+                "on {on} the identified robot is no better than the nominal one{figures}, by less than chance explains: measure more rows \
+                 before you use it"
+            )),
+            Against::Worse => {
+                Some(format!("on {on} the identified robot is worse than the nominal one{figures}: do not use it"))
+            }
+        }
+    }
+
+    /// Why the nominal robot was kept, with what the best of the others has on the same rows.
+    fn kept_nominal(&self, found: &Identification) -> String {
+        if found.vetoed {
+            return "on the verify rows the identified robot is worse than the nominal one by more than chance explains: the nominal robot \
+                    is kept"
+                .to_owned();
+        }
+        let nominal = self.judged.iter().find(|j| j.terms == self.terms).and_then(|j| j.held_out_mm);
+        let others = self.judged.iter().filter(|j| j.terms != self.terms);
+        let best = others.filter_map(|j| Some((j.held_out_mm?, &j.terms))).min_by(|a, b| a.0.total_cmp(&b.0));
+        match (nominal, best) {
+            (Some(nominal), Some((best, terms))) if best < nominal => format!(
+                "the nominal robot is kept: the best other model, {terms}, has {best:.4} mm on held-out samples against {nominal:.4} mm, \
+                 which is no significant gain"
+            ),
+            _ => "the nominal robot is kept: no model predicts held-out samples better".to_owned(),
+        }
+    }
+}
+
+/// A flange that hardly turns within a group.
+fn one_orientation(set: &Dataset, nominal: &Robot, found: &Identification) -> Option<String> {
+    (tilt_deg(set, nominal, &found.fitted) < ONE_ORIENTATION_DEG).then(|| {
+        "the flange keeps one orientation within each group: the tool and parts of the wrist cannot be separated from other parameters, and \
+         the identified robot is right for that orientation only; vary it by 20 deg or more between poses"
+            .to_owned()
+    })
+}
+
+/// The largest turn of the nominal flange between two poses of a group (one of them the group's first), deg.
+fn tilt_deg(set: &Dataset, nominal: &Robot, rows: &[usize]) -> f64 {
+    let rotation = |i: usize| nominal.base_from_flange(&set.poses[i].joints_rad).rotation;
+    let mut first = vec![None; set.groups.len()];
+    let turn = |&i: &usize| first[set.poses[i].group].get_or_insert_with(|| rotation(i)).angle_to(&rotation(i));
+    rows.iter().map(turn).fold(0.0, f64::max).to_degrees()
+}
+
+/// A list of which the first are said.
+fn shortened(list: &[String]) -> String {
+    const SAID: usize = 6;
+    match list.len() {
+        0..=SAID => list.join("; "),
+        n => format!("{}; and {} more", list[..SAID].join("; "), n - SAID),
+    }
+}

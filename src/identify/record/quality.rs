@@ -1,0 +1,78 @@
+//! Errors of a robot on the rows of a data set, as they go into tables, figures and files.
+
+use serde::Serialize;
+
+use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::choose::Identification;
+use crate::identify::judge::errors::{Judge, RowError, Spread};
+use crate::identify::residuals::weights::Extra;
+use crate::identify::settings::Settings;
+use crate::robot::Robot;
+
+/// Errors of a robot.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Quality {
+    /// On the rows that were fitted.
+    pub fit: PointSpread,
+    /// On the rows that were not.
+    pub verify: PointSpread,
+}
+
+/// Distance errors, and with positions point errors.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PointSpread {
+    /// Of distances.
+    #[serde(flatten)]
+    pub distance: Spread,
+    /// Of points after the groups' rigid transforms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point: Option<Spread>,
+    /// Of touches: distance of the predicted points of a group to their mean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub consistency: Option<Spread>,
+    /// Of touches: predicted less known distances between groups.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<Spread>,
+}
+
+impl PointSpread {
+    /// Whether there is no figure at all.
+    pub fn is_empty(&self) -> bool {
+        let others = [&self.point, &self.consistency, &self.distortion];
+        self.distance.count == 0 && others.into_iter().flatten().all(|spread| spread.count == 0)
+    }
+}
+
+/// Errors of rows under a robot, as they go into tables and figures.
+/// A robot that was `fitted` is judged on rows that its fit was without.
+pub fn quality(
+    set: &Dataset,
+    robot: &Robot,
+    fitted: bool,
+    found: &Identification,
+    settings: &Settings,
+) -> (Quality, Vec<RowError>) {
+    // Points and distances as they were read, as `verify` takes them, which knows nothing of the sensor's errors.
+    let of_sensor = found.extras.iter().copied().filter(|(e, _)| matches!(e, Extra::Target(_)));
+    let (extras, values): (Vec<Extra>, Vec<f64>) = of_sensor.unzip();
+    let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &found.fitted, settings.wire_offset) };
+    let (fit, verify) = (judge.errors(robot, &found.fitted), found.held_out_errors(&judge, robot, fitted));
+    let quality = Quality {
+        fit: spread(&judge, robot, &fit, &found.fitted),
+        verify: spread(&judge, robot, &verify, &found.judged_rows(set)),
+    };
+    (quality, verify)
+}
+
+/// The figures of a list of errors of these rows.
+pub fn spread(judge: &Judge, robot: &Robot, errors: &[RowError], rows: &[usize]) -> PointSpread {
+    let touches = rows.iter().any(|&r| judge.set.touches(r));
+    let points: Vec<f64> = errors.iter().filter_map(|e| e.point_mm.map(|p| p.norm())).collect();
+    let some = |errors: Vec<f64>| (!errors.is_empty()).then(|| Spread::new(errors));
+    PointSpread {
+        distance: Spread::new(errors.iter().filter_map(|e| e.distance_mm)),
+        point: some(if touches { Vec::new() } else { points.clone() }),
+        consistency: some(if touches { points } else { Vec::new() }),
+        distortion: some(judge.distortion_mm(robot, rows)),
+    }
+}

@@ -1,0 +1,108 @@
+//! The screen and the page of `identify`.
+
+mod figures;
+mod screen;
+mod tables;
+
+use maud::{Markup, html};
+use nalgebra::Point3;
+
+use super::Result;
+use super::page::{self, Tone};
+use super::table::number;
+use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::errors::RowError;
+use crate::identify::record::{Advice, PointSpread, Record};
+use crate::measurements::Role;
+
+pub use self::screen::{summary, verified};
+
+/// The page. `before` and `after` are the errors of the verify rows under the nominal and the identified robot.
+/// `places` are the target's points in the nominal base frame, row by row; `arm` is the arm's line at the first centre pose.
+pub fn page(
+    set: &Dataset,
+    record: &Record,
+    places: &[(Role, Point3<f64>)],
+    arm: &[Point3<f64>],
+    before: &[RowError],
+    after: &[RowError],
+) -> Result<String> {
+    let lead = format!(
+        "{} poses in {} {}, {}; {} kept, seed {}",
+        set.poses.len(),
+        set.groups.len(),
+        if set.groups.len() == 1 { "group" } else { "groups" },
+        match record.folded {
+            true => "all fitted, each judged by fits that it was left out of".to_owned(),
+            false => format!("{} to verify", set.verify_rows().len()),
+        },
+        record.chosen,
+        record.seed
+    );
+    let content = html! {
+        (verdict(record))
+        (page::warnings(&record.warnings))
+        h2 { "Verification" }
+        (figures::verification_figure(before, after)?)
+        (tables::verification_table(record))
+        @if let Some(targets) = &record.targets {
+            p { "Several targets: " (targets.sentence()) "." }
+        }
+        (tables::worst_table(set, before, after))
+        @if let Some(expected) = &record.expected {
+            h2 { "How far to trust it" }
+            (tables::expected_table(expected))
+            @if let Some(scale) = record.scale.filter(|scale| !scale.is_told()) {
+                p { "Not in these figures: " (scale.sentence()) "." }
+            }
+            (figures::expected_map(expected, places)?)
+        }
+        h2 { "Parameters" }
+        p { "Table 2 of the paper: the corrected parameters of each link and joint; alpha and a of link j - 1, theta and d of joint j." }
+        (tables::joint_table(record))
+        (tables::parameter_table(record))
+        h2 { "What the poses determine" }
+        (tables::rank_table(record))
+        h2 { "Convergence" }
+        (figures::convergence_figure(record)?)
+        h2 { "How it was chosen" }
+        (tables::judged_table(record))
+        h2 { "Where was measured" }
+        (figures::in_space(places, arm))
+        (figures::layout_figures(places)?)
+        h2 { "How the swarms start" }
+        (figures::start_figures(record.seed)?)
+    };
+    Ok(page::page("Identification", &lead, &content))
+}
+
+/// Whether to use the robot, with the errors before and after and what to expect.
+fn verdict(record: &Record) -> Markup {
+    let (tone, word) = match record.advice {
+        Advice::Use => (Tone::Good, "Use the identified robot"),
+        Advice::Check => (Tone::Doubtful, "Check before use"),
+        Advice::KeepNominal => (Tone::Doubtful, "Keep the nominal robot"),
+        Advice::DoNotUse => (Tone::Bad, "Do not use"),
+    };
+    let mean = |spread: Option<&PointSpread>| {
+        let of = |s: &PointSpread| s.point.and_then(|p| p.mean_abs_mm).or(s.distance.mean_abs_mm);
+        number(spread.and_then(of), 3)
+    };
+    let what = if record.before.verify.point.is_some() { "position" } else { "distance" };
+    let numbers = [
+        (format!("{} mm", mean(Some(&record.before.verify))), format!("mean {what} error before")),
+        (format!("{} mm", mean(record.chosen_method().map(|m| &m.verify))), format!("mean {what} error after")),
+        (
+            format!("{} mm", number(record.expected.as_ref().map(|e| e.p95_mm), 3)),
+            "95 of 100 positions are better than this".to_owned(),
+        ),
+    ];
+    let after = record.chosen_method().map_or_else(|| "n/a".to_owned(), |m| screen::errors(&m.verify));
+    let reason = if record.reason.is_empty() { String::new() } else { format!("{}. ", page::capital(&record.reason)) };
+    let detail = format!(
+        "{reason}Before: {}. After: {after}; {}.",
+        screen::errors(&record.before.verify),
+        screen::judged_on(record)
+    );
+    page::verdict(tone, word, &numbers, &detail)
+}
