@@ -53,7 +53,9 @@ fn measured(name: &str, picture: &Picture, truth: &[Point2<f64>]) -> (usize, f64
     let (mut count, mut sum) = (0, 0.0);
     for (col, row, corner) in corners.iter() {
         let off = corner.px - truth[board.index(col, row)];
-        assert!(off.norm() < 2.0, "{name}: corner {col},{row} is off by {off}");
+        // What was seen roughly only is off by less than a tenth of a square, and says so; what was measured by far less.
+        let limit_px = if corner.covariance_px2.is_some() { 1.0 } else { 7.0 };
+        assert!(off.norm() < limit_px, "{name}: corner {col},{row} is off by {off}");
         if let Some(covariance) = corner.covariance_px2 {
             (count, sum) = (count + 1, sum + off.dot(&(covariance.try_inverse().unwrap() * off)) / 2.0);
         }
