@@ -159,8 +159,10 @@ impl Program {
             return Err(refuse(message, CSV_HINT));
         }
         if read.motions.is_empty() && !args.joint_targets_only {
-            let message =
-                format!("{} joint targets, but no instruction that moves to them, in this file", moved_by.len());
+            let message = match moved_by.len() {
+                1 => "1 joint target, but no instruction that moves to it, in this file".to_owned(),
+                count => format!("{count} joint targets, but no instruction that moves to them, in this file"),
+            };
             return Err(refuse(
                 message,
                 "`--joint-targets-only` corrects them, where everything that uses them is a motion",

@@ -147,6 +147,9 @@ pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, force
             let (first, second) = apart(&best, &others).unwrap_or((best.clone(), (*other).clone()));
             return Verdict::Open(first, second);
         }
+        if let Some((computed, measured)) = computed_beside_measured(parts, &best, robot) {
+            return Verdict::Open(computed, measured);
+        }
         if !ways.iter().any(|way| rival(&way)) {
             if is_stated(&best) {
                 return Verdict::Taken(best, Basis::Robot);
@@ -160,6 +163,19 @@ pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, force
         return Verdict::None;
     }
     by_sizes(parts, &candidates[0], forced)
+}
+
+/// Of a way with several targets two, one that the nominal robot computed and one that it did not: these are no two targets of a body.
+fn computed_beside_measured(parts: &[Part], best: &Way, robot: &Robot) -> Option<(Way, Way)> {
+    let alone = |target: &(String, [At; 3])| {
+        let picked = Picked { points: vec![target.clone()], ..best.picked.clone() };
+        let (left, left_mm) = left(parts, &picked, robot, best.joints, best.lengths)?;
+        Some(Way { picked, left: Some(left), left_mm, ..best.clone() })
+    };
+    let ways: Vec<Way> = best.picked.points.iter().filter(|_| best.picked.points.len() > 1).filter_map(alone).collect();
+    let computed = ways.iter().find(|way| way.is_computed())?;
+    let measured = ways.iter().find(|way| !way.is_computed())?;
+    Some((computed.clone(), measured.clone()))
 }
 
 /// The way in the units that are stated, of the best one's columns: that which differs from it in one unit, where there is one.

@@ -52,7 +52,9 @@ pub(super) fn candidates(parts: &[Part], picked: &Picked, count: usize) -> Vec<P
             let kept = all.windows(2).all(|two| keeps_distance(parts, &two[0], &two[1]));
             let whole = 3 * all.len() == total;
             let several = of_points(all.into_iter().enumerate().map(|(i, at)| ((i + 1).to_string(), at)).collect());
-            if whole && (kept || are_readings(parts, &several)) {
+            // Two that are nearly one may be what was commanded and what was measured: without names only three or more are readings of one point.
+            let readings = several.points.len() > 2 && are_readings(parts, &several);
+            if whole && (kept || readings) {
                 list.push(several);
                 continue;
             }

@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn of_two_that_disagree_neither_is_left_out() {
         let (left, findings) = examined(2, 5.0);
-        assert!(left == 2 && findings[0].finding.contains("do not go together"), "{findings:?}");
+        assert!(left == 2 && findings[0].finding.contains("contradict the touches"), "{findings:?}");
     }
 
     #[test]
@@ -178,7 +178,7 @@ mod tests {
             set.known[1].distance_mm += 2.0;
             let (_, findings) = examine(&set, &world.nominal, &Settings::default());
             assert!(
-                findings.len() == 1 && findings[0].finding.contains("do not go together"),
+                findings.len() == 1 && findings[0].finding.contains("contradict the touches"),
                 "{by_deg}: {findings:?}"
             );
         }

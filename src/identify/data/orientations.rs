@@ -206,6 +206,6 @@ mod tests {
             counter.set(counter.get() + 1.3);
             Vector3::new(counter.get() % 3.0, 0.7, 0.1)
         });
-        assert!(said.is_some_and(|s| s.contains("do not go with the joints")));
+        assert!(said.is_some_and(|s| s.contains("contradict the joint angles")));
     }
 }

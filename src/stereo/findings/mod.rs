@@ -117,12 +117,14 @@ impl Along {
 pub fn not_simultaneous(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
     /// A lens or a rig that lacks something leaves no more than about this many times what single pictures do.
     const TIMES: f64 = 3.0;
+    /// A change that was told and leaves less than this share of the misfit explains three quarters of its squares: what is left is no cause of its own.
+    const LEFT: f64 = 0.5;
     let told = |finding: &Finding| finding.along.clone().filter(|along| along.by_pair.len() == calibration.views.len());
-    let misfit = &match changes.iter().find_map(told) {
-        Some(along) => misfit_without(calibration, &along),
-        None => calibration.misfit.clone(),
+    let (misfit, left_px) = &match changes.iter().find_map(told) {
+        Some(along) => (misfit_without(calibration, &along), LEFT * calibration.misfit.usual_px),
+        None => (calibration.misfit.clone(), 0.0),
     };
-    (misfit.usual_px > TIMES * misfit.alone_px).then(|| Finding {
+    (misfit.usual_px > (TIMES * misfit.alone_px).max(*left_px)).then(|| Finding {
         cause: Cause::NotSimultaneous.word().to_owned(),
         kind: Kind::Pair,
         pairs: misfit.worst_first.clone(),
