@@ -108,6 +108,7 @@ impl Source {
     }
 
     /// The readings of the first file alone, whatever else stands beside them: line, name and readings in deg (mm); and what was taken.
+    #[allow(clippy::type_complexity, reason = "one use")]
     pub fn readings(&self, robot: &Robot) -> Result<(Vec<(u64, String, Vec<f64>)>, String)> {
         let count = robot.joints.len();
         let parts: Vec<Part> = self.files.iter().take(1).map(|file| Part::read(file, count)).collect::<Result<_>>()?;
