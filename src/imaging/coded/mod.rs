@@ -1,10 +1,10 @@
 //! Boards whose markers number their corners: found in any part of them.
 //!
 //! In: a picture and the board. Out: a reduced copy and the board's corners on it as far as they are seen, each at its place on the board. Method:
-//! grids of corners grow as on a plain board ([`super::detect::growth`]), on copies from coarse to fine until the markers are large enough to leave
-//! the corners alone; the markers in a grid's squares say which part of the board it is ([`numbering`]). Which squares hold the markers (old and new
+//! grids of corners grow as on a plain board (`super::detect::growth`), on copies from coarse to fine until the markers are large enough to leave
+//! the corners alone; the markers in a grid's squares say which part of the board it is (`numbering`). Which squares hold the markers (old and new
 //! layout), and whether they are printed white on black, is what is seen. Goes wrong: no marker that can be read; another board, which is
-//! named where the markers tell ([`explain`]).
+//! named where the markers tell (`explain`).
 
 pub mod dictionary;
 mod explain;
