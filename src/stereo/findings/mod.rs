@@ -87,7 +87,7 @@ pub struct Finding {
 pub struct Along {
     /// From the rig without any of the change to the one with all of it.
     whole: DVector<f64>,
-    /// From the rig without any of it to the common one.
+    /// From the rig without any of it to the one that is taken.
     common: DVector<f64>,
     /// Which share of it each pair has.
     by_pair: DVector<f64>,
@@ -96,17 +96,22 @@ pub struct Along {
 }
 
 impl Along {
-    /// From the common rig to the one with a share of the change.
+    /// The same where the rig with a share of the change is the one that is taken.
+    pub fn seen_from(&self, share: f64) -> Along {
+        Along { common: &self.whole * share, ..self.clone() }
+    }
+
+    /// From the rig that is taken to the one with a share of the change.
     pub fn to(&self, share: f64) -> DVector<f64> {
         &self.whole * share - &self.common
     }
 
-    /// From the common rig to the one at the last pair.
+    /// From the rig that is taken to the one at the last pair.
     pub fn to_last(&self) -> DVector<f64> {
         self.to(1.0)
     }
 
-    /// Standard deviation of the step from the common rig to the one with a share of the change, along that step.
+    /// Standard deviation of the step from the rig that is taken to the one with a share of the change, along that step.
     pub fn sigma_of(&self, share: f64) -> DVector<f64> {
         self.to(share) * self.relative_variance.sqrt()
     }
@@ -117,14 +122,12 @@ impl Along {
 pub fn not_simultaneous(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
     /// A lens or a rig that lacks something leaves no more than about this many times what single pictures do.
     const TIMES: f64 = 3.0;
-    /// A change that was told and leaves less than this share of the misfit explains three quarters of its squares: what is left is no cause of its own.
-    const LEFT: f64 = 0.5;
     let told = |finding: &Finding| finding.along.clone().filter(|along| along.by_pair.len() == calibration.views.len());
-    let (misfit, left_px) = &match changes.iter().find_map(told) {
-        Some(along) => (misfit_without(calibration, &along), LEFT * calibration.misfit.usual_px),
-        None => (calibration.misfit.clone(), 0.0),
+    let misfit = match changes.iter().find_map(told) {
+        Some(along) => misfit_without(calibration, &along),
+        None => calibration.misfit.clone(),
     };
-    (misfit.usual_px > (TIMES * misfit.alone_px).max(*left_px)).then(|| Finding {
+    (misfit.usual_px > TIMES * misfit.alone_px).then(|| Finding {
         cause: Cause::NotSimultaneous.word().to_owned(),
         kind: Kind::Pair,
         pairs: misfit.worst_first.clone(),
@@ -274,6 +277,43 @@ impl Candidate<'_> {
     }
 }
 
+/// The candidates that are not told apart from the one that explains most, that one first.
+fn likeliest<'a, 'b>(candidates: &'b [Candidate<'a>], pairs: usize) -> Vec<&'b Candidate<'a>> {
+    // The scatter of the one that explains most is what the others are judged by.
+    let scatter = candidates.iter().map(|c| c.change.scatter).fold(f64::INFINITY, f64::min).max(1.0);
+    let evidence = |c: &Candidate| c.evidence(scatter, pairs);
+    let top = candidates.iter().map(&evidence).fold(f64::NEG_INFINITY, f64::max);
+    let mut equals: Vec<&Candidate> = candidates.iter().filter(|c| top - evidence(c) < TOLD_APART).collect();
+    equals.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
+    // A single number that does as well as all six of another place is what happened.
+    if equals.iter().any(|c| c.hypothesis.is_some()) {
+        equals.retain(|c| c.hypothesis.is_some());
+    }
+    equals
+}
+
+/// The causes of candidates that are not told apart, each once, with `|` between them.
+fn causes(equals: &[&Candidate]) -> String {
+    let mut causes: Vec<Cause> = Vec::new();
+    for candidate in equals {
+        let cause = candidate.hypothesis.map_or(Cause::CameraMoved, |h| h.cause);
+        if !causes.contains(&cause) {
+            causes.push(cause);
+        }
+    }
+    causes.iter().map(|cause| cause.word()).collect::<Vec<_>>().join("|")
+}
+
+/// What happened, in words.
+fn described(equals: &[&Candidate]) -> String {
+    let words: Vec<String> = equals.iter().filter_map(|c| Some(c.hypothesis?.words.clone())).collect();
+    match words.split_first() {
+        None => "the right camera stands and looks otherwise".to_owned(),
+        Some((first, [])) => first.clone(),
+        Some((first, others)) => format!("{first} (or {})", others.join(", or ")),
+    }
+}
+
 fn finding(
     calibration: &Calibration,
     lengths: &VolumeLengths,
@@ -282,55 +322,32 @@ fn finding(
     any: &[DVector<f64>],
 ) -> Option<Finding> {
     let count = calibration.views.len();
-    // Of all, the one that explains most; its scatter is what the others are judged by.
-    let scatter = candidates.iter().map(|c| c.change.scatter).fold(f64::INFINITY, f64::min).max(1.0);
-    let evidence = |c: &Candidate| c.evidence(scatter, count);
-    let top = candidates.iter().map(&evidence).fold(f64::NEG_INFINITY, f64::max);
-    let mut equals: Vec<&Candidate> = candidates.iter().filter(|c| top - evidence(c) < TOLD_APART).collect();
-    equals.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
-    // A single number that does as well as all six of another place is what happened.
-    if equals.iter().any(|c| c.hypothesis.is_some()) {
-        equals.retain(|c| c.hypothesis.is_some());
-    }
+    let equals = likeliest(candidates, count);
     let shown = *equals.first()?;
-    let mut causes: Vec<Cause> = Vec::new();
-    for candidate in &equals {
-        let cause = candidate.hypothesis.map_or(Cause::CameraMoved, |h| h.cause);
-        if !causes.contains(&cause) {
-            causes.push(cause);
-        }
-    }
+    let amounts = &shown.change.amounts;
     let whole = match shown.hypothesis {
-        Some(h) => &h.direction * shown.change.amounts[0],
-        None => {
-            any.iter().zip(shown.change.amounts.iter()).fold(DVector::zeros(any[0].len()), |sum, (d, a)| sum + d * *a)
-        }
+        Some(h) => &h.direction * amounts[0],
+        None => any.iter().zip(amounts.iter()).fold(DVector::zeros(any[0].len()), |sum, (d, a)| sum + d * *a),
+    };
+    let (size, unit) = match shown.hypothesis {
+        Some(h) => (amounts[0], h.unit),
+        None => (whole.rows(calibration.layout.transform_start(), 3).norm().to_degrees(), "deg"),
     };
     let changes = lengths.changes_by_step_mm(&calibration.layout, &whole);
     let effect_mm = changes.into_iter().fold(0.0, |most: f64, mm| most.max(mm.abs()));
-    let at = calibration.layout.transform_start();
-    let (size, unit) = match shown.hypothesis {
-        Some(h) => (shown.change.amounts[0], h.unit),
-        None => (whole.rows(at, 3).norm().to_degrees(), "deg"),
-    };
     let name = |i: usize| calibration.views[i].pair.clone();
     let which = match best.kind {
         Kind::Step => format!("from pair {} on", name(best.first)),
         _ => format!("from pair {} to pair {}", name(0), name(count - 1)),
     };
-    let words: Vec<String> = equals.iter().filter_map(|c| Some(c.hypothesis?.words.clone())).collect();
-    let what = match words.split_first() {
-        None => "the right camera stands and looks otherwise".to_owned(),
-        Some((first, [])) => first.clone(),
-        Some((first, others)) => format!("{first} (or {})", others.join(", or ")),
-    };
-    let mut action = format!("{what} by {size:.3} {unit} {which}, which moves a length by up to {effect_mm:.4} mm");
+    let mut action =
+        format!("{} by {size:.3} {unit} {which}, which moves a length by up to {effect_mm:.4} mm", described(&equals));
     if best.kind == Kind::Drift {
         let [before, after] = calibration.moment();
         action += &format!("; the rig is that of the middle of the series, at pairs {before} and {after}");
     }
     Some(Finding {
-        cause: causes.iter().map(|cause| cause.word()).collect::<Vec<_>>().join("|"),
+        cause: causes(&equals),
         kind: best.kind,
         pairs: (best.first..count).map(name).collect(),
         size: Some(size),

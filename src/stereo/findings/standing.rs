@@ -55,7 +55,7 @@ fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Findin
     match with_runs {
         Ok(mut found) if found.runs == 0 => {
             trailing(&mut found, corners);
-            told.iter().for_each(|change| stays(&mut found, change, asked));
+            told.iter_mut().for_each(|change| stays(&mut found, change, asked));
             Ok((found, Vec::from_iter(told)))
         }
         // What contradicts the others is no rig of its own, or too few pairs of one: it is left out.
@@ -72,8 +72,8 @@ fn stands_since(corners: &Corners, asked: &Asked, later: Later, change: Finding)
     trailing(&mut found, corners);
     leave_out(&mut found, before);
     let mut told = vec![change];
-    if let Some(further) = later.change {
-        stays(&mut found, &further, asked);
+    if let Some(mut further) = later.change {
+        stays(&mut found, &mut further, asked);
         told.push(further);
     }
     (found, told)
@@ -217,13 +217,14 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
 
 /// A change that stays in the rig: of one that drifts the rig is that of the middle of the series, and what it drifted since then is told beside
 /// it; a step is part of the uncertainty. Where the last pairs are those of another rig, that is said.
-fn stays(found: &mut Calibration, change: &Finding, asked: &Asked) {
-    if let Some(along) = &change.along {
+fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked) {
+    if let Some(along) = &mut change.along {
         let within = if change.kind == Kind::Drift { along.sigma_of(MIDDLE) } else { along.to_last() };
         found.uncertainty.shared += &within * within.transpose();
         if change.kind == Kind::Drift {
             found.move_rig(&along.to(MIDDLE));
-            found.since_moment.push(along.to_last() - along.to(MIDDLE));
+            *along = along.seen_from(MIDDLE);
+            found.since_moment.push(along.to_last());
         }
         let matrix = found.uncertainty.shared.clone();
         found.values.shared.rig.covariance = Some(Covariance { order: found.layout.names(), matrix });
