@@ -3,6 +3,7 @@
 //! Measurements are examined as `identify` examines them, with the first robot, so that both judge by the same rows: units are mended and
 //! sessions get placements of their own. The robots are those of their files.
 
+use camino::Utf8Path;
 use serde::Serialize;
 
 use super::Outcome;
@@ -21,7 +22,7 @@ use crate::identify::record::{PointSpread, spread};
 use crate::measurements::{Measurement, Observed, Role};
 use crate::progress;
 use crate::report;
-use crate::robot;
+use crate::robot::{self, Robot};
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
@@ -48,6 +49,19 @@ fn place_by_verify_rows(rows: &mut [Measurement]) -> bool {
     true
 }
 
+/// The set as the examination mends it, its findings said; and whether something explains the errors.
+fn examined(set: &Dataset, file: &Utf8Path, robot: &Robot, settings: &identify::Settings) -> (Dataset, bool) {
+    let Examined { set, robot: mended, along, findings, unexplained } = doctor::examine(set, robot, settings, &|_| {});
+    let explained = unexplained.is_none();
+    for finding in findings.into_iter().chain(unexplained).chain(doctor::along_the_rows(&along)) {
+        progress::warn(finding.sentence());
+    }
+    if mended != *robot {
+        progress::warn(format!("the robot of {file} is judged without this correction"));
+    }
+    (set, explained)
+}
+
 /// Runs the command.
 pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
     let settings = &config.identify;
@@ -68,18 +82,9 @@ pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
-    let mut unexplained_errors = false;
+    let mut explained = true;
     if let Some((file, robot)) = robots.first() {
-        let Examined { set: examined, robot: mended, along, findings, unexplained } =
-            doctor::examine(&set, robot, settings, &|_| {});
-        unexplained_errors = unexplained.is_some();
-        for finding in findings.into_iter().chain(unexplained).chain(doctor::along_the_rows(&along)) {
-            progress::warn(finding.sentence());
-        }
-        if mended != *robot {
-            progress::warn(format!("the robot of {file} is judged without this correction"));
-        }
-        set = examined;
+        (set, explained) = examined(&set, file, robot, settings);
     }
     if let Some(targets) = &set.targets {
         progress::note(targets.sentence());
@@ -118,5 +123,5 @@ pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
             report::identify::verified(&rows)
         }
     };
-    Ok(Outcome { stdout, status: if unexplained_errors { Status::OutOfTolerance } else { Status::Done } })
+    Ok(Outcome { stdout, status: if explained { Status::Done } else { Status::OutOfTolerance } })
 }

@@ -136,6 +136,31 @@ struct Placed {
     squares: f64,
 }
 
+/// The normal matrix of the shared numbers, by what all other blocks know of them, and of one block's placement.
+fn with_placement(others: DMatrix<f64>, linear: &Linear) -> DMatrix<f64> {
+    let (count, unknowns) = (others.nrows(), linear.design.ncols());
+    let mut whole = DMatrix::zeros(count + unknowns, count + unknowns);
+    whole.view_mut((0, 0), (count, count)).copy_from(&(others + product(&linear.jacobian, &linear.jacobian)));
+    let cross = product(&linear.jacobian, &linear.design);
+    whole.view_mut((0, count), (count, unknowns)).copy_from(&cross);
+    whole.view_mut((count, 0), (unknowns, count)).copy_from(&cross.transpose());
+    whole.view_mut((count, count), (unknowns, unknowns)).copy_from(&product(&linear.design, &linear.design));
+    whole
+}
+
+/// Where each row's numbers stand, of the rows that the numbers belong to one after the other.
+fn ranges(rows: impl Iterator<Item = Option<usize>>) -> Vec<(usize, std::ops::Range<usize>)> {
+    let mut ranges: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
+    for (i, row) in rows.enumerate() {
+        let Some(row) = row else { continue };
+        match ranges.last_mut() {
+            Some((last, range)) if *last == row => range.end = i + 1,
+            _ => ranges.push((row, i..i + 1)),
+        }
+    }
+    ranges
+}
+
 struct Search<'a> {
     set: &'a Dataset,
     placed: Vec<Placed>,
@@ -174,23 +199,8 @@ impl<'a> Search<'a> {
             if matches!(block, Block::Pairwise(_)) {
                 continue;
             }
-            let unknowns = linear.design.ncols();
-            let mut whole = DMatrix::zeros(count + unknowns, count + unknowns);
-            let others = &normal - own + product(&linear.jacobian, &linear.jacobian);
-            whole.view_mut((0, 0), (count, count)).copy_from(&others);
-            let cross = product(&linear.jacobian, &linear.design);
-            whole.view_mut((0, count), (count, unknowns)).copy_from(&cross);
-            whole.view_mut((count, 0), (unknowns, count)).copy_from(&cross.transpose());
-            whole.view_mut((count, count), (unknowns, unknowns)).copy_from(&product(&linear.design, &linear.design));
-            let mut of_rows: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
-            for (i, pose) in block.row_poses().into_iter().enumerate() {
-                let Some(pose) = pose else { continue };
-                let row = rows.rows[pose];
-                match of_rows.last_mut() {
-                    Some((last, range)) if *last == row => range.end = i + 1,
-                    _ => of_rows.push((row, i..i + 1)),
-                }
-            }
+            let whole = with_placement(&normal - own, &linear);
+            let of_rows = ranges(block.row_poses().into_iter().map(|pose| Some(rows.rows[pose?])));
             let (linear, inverse) = (Rc::new(linear), Rc::new(pseudo_inverse(whole)));
             let place = |rows, fresh, center, rivalled| {
                 let (linear, inverse) = (linear.clone(), inverse.clone());

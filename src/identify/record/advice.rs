@@ -180,12 +180,12 @@ impl Record {
         match rows {
             Against::NotWorse => None,
             Against::Perhaps => Some(format!(
-                "on {on} the identified robot is no better than the nominal one{figures}, by less than chance explains: measure more rows \
-                 before you use it"
+                "on {on} the identified robot is no better than the nominal one{figures}, by less than chance explains: measure \
+                 more rows before you use it"
             )),
-            Against::Worse => {
-                Some(format!("on {on} the identified robot is worse than the nominal one{figures}: do not use it"))
-            }
+            Against::Worse => Some(format!(
+                "on {on} the identified robot is worse than the nominal one{figures}, by more than chance explains"
+            )),
         }
     }
 

@@ -55,6 +55,14 @@ pub struct Deleted {
 }
 
 impl Deleted {
+    /// Sets what it is judged by, from the white sum of squares of all rows and its degrees of freedom: where the row is in the fit its own share
+    /// comes off.
+    fn judged_by(&mut self, squares: f64, freedom: f64, is_fitted: bool) {
+        let own = if is_fitted { (self.square, self.numbers as f64) } else { (0.0, 0.0) };
+        self.freedom = (freedom - own.1).max(1.0);
+        self.variance = (squares - own.0).max(0.0) / self.freedom;
+    }
+
     /// In standard deviations of the others, as of one normal number.
     fn size(&self) -> f64 {
         let square = self.square / self.variance.max(f64::MIN_POSITIVE);
@@ -189,14 +197,8 @@ impl Robust<'_> {
                     squares += residual.norm_squared();
                     numbers += at.len();
                 }
-                // Where hardly anything but the row itself says what it should be, rounding decides what the others say.
-                let by_others = (DMatrix::identity(at.len(), at.len()) - &leverage).symmetric_eigenvalues().min();
-                if by_others < LEAST_OTHERS {
-                    continue;
-                }
-                let (square, odds) = square_of_deleted(&residual, leverage, weight(row)).unwrap_or((0.0, 1.0));
-                let square = square / odds.clamp(1.0, most);
-                if square > deleted[row].square {
+                let square = square_by_others(&residual, leverage, weight(row), most);
+                if let Some(square) = square.filter(|square| *square > deleted[row].square) {
                     deleted[row] = Deleted { square, numbers: at.len(), ..deleted[row] };
                 }
             }
@@ -206,13 +208,21 @@ impl Robust<'_> {
         let freedom =
             (numbers as f64 - unknowns as f64 - determined).max(numbers.div_ceil(LEAST_FREEDOM).max(1) as f64);
         for (row, d) in deleted.iter_mut().enumerate() {
-            // Where the row is in the fit its own share comes off.
-            let own = if weight(row) > UNHEARD { (d.square, d.numbers as f64) } else { (0.0, 0.0) };
-            d.freedom = (freedom - own.1).max(1.0);
-            d.variance = (squares - own.0).max(0.0) / d.freedom;
+            d.judged_by(squares, freedom, weight(row) > UNHEARD);
         }
         (deleted, of_known)
     }
+}
+
+/// White square of a row's residual against what the others predict, extrapolation counted up to `most` times; `None` where hardly anything but
+/// the row itself says what it should be: rounding then decides what the others say.
+fn square_by_others(fitted: &DVector<f64>, leverage: DMatrix<f64>, weight: f64, most: f64) -> Option<f64> {
+    let by_others = DMatrix::identity(fitted.len(), fitted.len()) - &leverage;
+    if by_others.symmetric_eigenvalues().min() < LEAST_OTHERS {
+        return None;
+    }
+    let (square, odds) = square_of_deleted(fitted, leverage, weight).unwrap_or((0.0, 1.0));
+    Some(square / odds.clamp(1.0, most))
 }
 
 /// White square of a residual that was fitted with this leverage and root of a weight, held against the fit without it, and the largest variance

@@ -66,38 +66,9 @@ pub fn solve(problem: &dyn Problem, start: &[f64], settings: &Settings) -> Solut
             run.stop = Stop::SmallGradient;
             break;
         }
-        let stop = loop {
-            let step = step_in_box(&jacobian, &residuals, &gradient, &x, lower, upper, &scale, radius);
-            let candidate: Vec<f64> = (0..n).map(|i| (x[i] + step[i]).clamp(lower[i], upper[i])).collect();
-            let taken = DVector::from_fn(n, |i, _| candidate[i] - x[i]);
-            let predicted = cost - 0.5 * (&residuals + &jacobian * &taken).norm_squared();
-            let length = scaled_norm(taken.as_slice(), &scale);
-            // Not `cost`: a faster way to it may round differently, and reductions near rounding decide the end.
-            let new_cost = 0.5 * problem.residuals(&candidate).norm_squared();
-            run.evaluations += 1;
-            let actual = cost - new_cost;
-            let ratio = if predicted > 0.0 && new_cost.is_finite() { actual / predicted } else { -1.0 };
-            if ratio < 0.25 {
-                radius = 0.25 * length.min(radius);
-            } else if ratio > 0.75 {
-                radius = radius.max(2.0 * length);
-            }
-            if ratio >= ACCEPT && actual > 0.0 {
-                x = candidate;
-                break if actual <= settings.reduction * cost && predicted <= settings.reduction * cost {
-                    Some(Stop::SmallReduction)
-                } else {
-                    None
-                };
-            }
-            // A step cut at a wall may predict a rise; that asks for a smaller radius, not for the end.
-            if predicted >= 0.0 && predicted <= settings.reduction * cost {
-                break Some(Stop::SmallReduction);
-            }
-            if radius <= settings.step * scaled_norm(&x, &scale).max(1e-3) {
-                break Some(Stop::SmallStep);
-            }
-        };
+        let local =
+            Local { problem, residuals: &residuals, jacobian: &jacobian, gradient: &gradient, scale: &scale, cost };
+        let stop = local.step(&mut x, &mut radius, &mut run.evaluations, settings);
         (residuals, jacobian) = problem.linearised(&x);
         run.evaluations += 1 + n;
         cost = 0.5 * residuals.norm_squared();
@@ -114,6 +85,53 @@ pub fn solve(problem: &dyn Problem, start: &[f64], settings: &Settings) -> Solut
     run.x = x;
     run.cost = cost;
     run
+}
+
+/// The problem as it is linearised at a place.
+struct Local<'a> {
+    problem: &'a dyn Problem,
+    residuals: &'a DVector<f64>,
+    jacobian: &'a DMatrix<f64>,
+    gradient: &'a DVector<f64>,
+    scale: &'a [f64],
+    cost: f64,
+}
+
+impl Local<'_> {
+    /// Takes the first step that lowers the cost as predicted, from ever smaller radii; why the search ends there, where it does.
+    fn step(&self, x: &mut Vec<f64>, radius: &mut f64, evaluations: &mut usize, settings: &Settings) -> Option<Stop> {
+        let Local { problem, residuals, jacobian, gradient, scale, cost } = *self;
+        let (lower, upper) = (problem.lower(), problem.upper());
+        loop {
+            let step = step_in_box(jacobian, residuals, gradient, x, lower, upper, scale, *radius);
+            let candidate: Vec<f64> = (0..x.len()).map(|i| (x[i] + step[i]).clamp(lower[i], upper[i])).collect();
+            let taken = DVector::from_fn(x.len(), |i, _| candidate[i] - x[i]);
+            let predicted = cost - 0.5 * (residuals + jacobian * &taken).norm_squared();
+            let length = scaled_norm(taken.as_slice(), scale);
+            // Not `linearised`: a faster way to the cost may round differently, and reductions near rounding decide the end.
+            let new_cost = 0.5 * problem.residuals(&candidate).norm_squared();
+            *evaluations += 1;
+            let actual = cost - new_cost;
+            let ratio = if predicted > 0.0 && new_cost.is_finite() { actual / predicted } else { -1.0 };
+            if ratio < 0.25 {
+                *radius = 0.25 * length.min(*radius);
+            } else if ratio > 0.75 {
+                *radius = radius.max(2.0 * length);
+            }
+            if ratio >= ACCEPT && actual > 0.0 {
+                *x = candidate;
+                let ends = actual <= settings.reduction * cost && predicted <= settings.reduction * cost;
+                return ends.then_some(Stop::SmallReduction);
+            }
+            // A step cut at a wall may predict a rise; that asks for a smaller radius, not for the end.
+            if predicted >= 0.0 && predicted <= settings.reduction * cost {
+                return Some(Stop::SmallReduction);
+            }
+            if *radius <= settings.step * scaled_norm(x, scale).max(1e-3) {
+                return Some(Stop::SmallStep);
+            }
+        }
+    }
 }
 
 fn column_norms(jacobian: &DMatrix<f64>) -> Vec<f64> {

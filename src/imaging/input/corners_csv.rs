@@ -1,16 +1,19 @@
 //! `corners.csv`: corners of all pairs as text, from this program or from any other detector.
 //!
 //! In: a CSV file with the columns `pair,side,col,row,x_px,y_px` and optionally
-//! `sxx_px2,sxy_px2,syy_px2,used,blur_px,width_px,height_px`, rows in any order; where the board has markers `id` may stand for `col` and `row`. Out: [`Corners`], and back. Raw (distorted)
-//! pixels, pixel (0, 0) is the centre of the top-left pixel. Width and height are those of the picture, one size for each side; a
-//! file without them needs them said.
+//! `sxx_px2,sxy_px2,syy_px2,used,blur_px,width_px,height_px`, rows in any order; where the board has markers `id` may stand for `col`
+//! and `row`. Out: [`Corners`], and back. Raw (distorted) pixels, pixel (0, 0) is the centre of the top-left pixel. Width and height
+//! are those of the picture, one size for each side; a file without them needs them said.
+
+mod line;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use camino::Utf8Path;
-use nalgebra::{Matrix2, Point2};
+use nalgebra::Point2;
 
+use self::line::{Columns, Line, Row};
 use super::pairs::natural_order;
 use crate::csv_table::{Table, quoted};
 use crate::diagnostic::Place;
@@ -64,15 +67,6 @@ pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<C
     Ok(Corners { board, left_size, right_size, pairs, skipped, notes })
 }
 
-struct Row {
-    line: u64,
-    pair: String,
-    side: Side,
-    corner: Corner,
-    /// Width and height of the picture, px, where the file holds them.
-    size: Option<(u32, u32)>,
-}
-
 /// The size of one side's pictures: what the file holds, or else what was said. All of its corners lie inside.
 fn size_of(table: &Table, rows: &[Row], side: Side, said: Option<(u32, u32)>) -> Result<(u32, u32)> {
     let of_side = || rows.iter().filter(|row| row.side == side);
@@ -105,85 +99,20 @@ fn inside(px: &Point2<f64>, (w, h): (u32, u32)) -> bool {
 }
 
 fn parse(table: &Table, board: Board) -> Result<Vec<Row>> {
-    let (pair, side) = (table.require("pair")?, table.require("side")?);
-    let id = table.column("id").filter(|_| board.is_coded());
-    let place = match (id, table.column("col"), table.column("row")) {
-        (Some(_), Some(col), Some(row)) => Some((col, row)),
-        (Some(_), ..) => None,
-        (None, ..) => Some((table.require("col")?, table.require("row")?)),
-    };
-    let (x, y) = (table.require("x_px")?, table.require("y_px")?);
-    let covariance = ["sxx_px2", "sxy_px2", "syy_px2"].map(|name| table.column(name));
-    let used = table.column("used");
-    let blur = table.column("blur_px");
-    let size = ["width_px", "height_px"].map(|name| table.column(name));
+    let columns = Columns::of(table, board)?;
     let mut rows = Vec::with_capacity(table.rows.len());
     let mut seen = BTreeMap::new();
-    for (line, fields) in &table.rows {
-        let line = *line;
-        let name = fields[pair].to_owned();
-        if name.is_empty() {
-            return Err(table.refuse(line, "the pair has no name".to_owned()));
+    for (number, fields) in &table.rows {
+        let line = Line { table, columns: &columns, number: *number, fields };
+        let Some(row) = line.row(board)? else { continue };
+        let Corner { col, row: at, .. } = row.corner;
+        if let Some(first) = seen.insert((row.pair.clone(), row.side, col, at), row.line) {
+            let (side, name) = (row.side.name(), &row.pair);
+            return Err(
+                line.refuse(format!("corner {col},{at} of the {side} picture of {name} stands in line {first}"))
+            );
         }
-        let side = match fields[side].to_ascii_lowercase().as_str() {
-            "left" => Side::Left,
-            "right" => Side::Right,
-            other => return Err(table.refuse(line, format!("side is `{other}`; it is left or right"))),
-        };
-        let count = |column: usize| {
-            fields[column].parse::<usize>().map_err(|_| {
-                table.refuse(line, format!("`{}` is not a count: `{}`", table.header[column], &fields[column]))
-            })
-        };
-        let by_place = match place {
-            Some((col, row)) => Some((count(col)?, count(row)?)),
-            None => None,
-        };
-        let by_id = match id {
-            Some(id) => Some(board.place(count(id)?)),
-            None => None,
-        };
-        if let (Some((col, row)), Some((c, r))) = (by_place, by_id)
-            && by_place != by_id
-        {
-            let message = format!("corner {col},{row} has the id of {c},{r} on a board of {} squares", board.squares);
-            return Err(table.refuse(line, message));
-        }
-        let Some((col, row)) = by_place.or(by_id) else { continue };
-        if let Some(first) = seen.insert((name.clone(), side, col, row), line) {
-            let message = format!("corner {col},{row} of the {} picture of {name} stands in line {first}", side.name());
-            return Err(table.refuse(line, message));
-        }
-        let covariance_px2 = match covariance {
-            [Some(xx), Some(xy), Some(yy)] if [xx, xy, yy].iter().any(|&c| !fields[c].is_empty()) => {
-                let number = |c| table.number(line, fields, c);
-                Some(Matrix2::new(number(xx)?, number(xy)?, number(xy)?, number(yy)?))
-            }
-            _ => None,
-        };
-        if covariance_px2.is_some_and(|s| s.cholesky().is_none()) {
-            let message = "the covariance sxx, sxy, syy is not positive definite".to_owned();
-            return Err(table.refuse(line, message));
-        }
-        let used = match used.map_or("", |c| &fields[c]).to_ascii_lowercase().as_str() {
-            "" | "1" | "true" | "yes" => true,
-            "0" | "false" | "no" => false,
-            other => return Err(table.refuse(line, format!("used is `{other}`; it is 1 or 0"))),
-        };
-        let px = Point2::new(table.number(line, fields, x)?, table.number(line, fields, y)?);
-        let blur_px = match blur.filter(|&c| !fields[c].is_empty()) {
-            Some(column) => Some(table.number(line, fields, column)?),
-            None => None,
-        };
-        let size = match size {
-            [Some(width), Some(height)] if !fields[width].is_empty() || !fields[height].is_empty() => {
-                let side_px = |column| count(column).map(|n| n.clamp(1, 1 << 24) as u32);
-                Some((side_px(width)?, side_px(height)?))
-            }
-            _ => None,
-        };
-        let corner = Corner { col, row, px, covariance_px2, blur_px, reach: None, used };
-        rows.push(Row { line, pair: name, side, corner, size });
+        rows.push(row);
     }
     Ok(rows)
 }
@@ -256,6 +185,8 @@ fn gather(rows: Vec<Row>, board: Board) -> (Vec<PairCorners>, Vec<Skipped>) {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Matrix2;
+
     use super::*;
 
     fn read_str(text: &str, squares: &str, size: Option<(u32, u32)>) -> Result<Corners> {

@@ -1,0 +1,136 @@
+use super::*;
+
+fn ramp() -> Image<u8> {
+    let pixels = (0..100 * 100).map(|k| (k % 100 + k / 100) as u8).collect();
+    Image { width: 100, height: 100, pixels }
+}
+
+/// Sums of all products of `(1, x, y, grey)` over the whole window.
+fn total(window: &Window) -> Matrix4<f64> {
+    let near = window.arms.iter().flatten().chain([&window.crossing]);
+    let mut sum = window.flat[0] + window.flat[1];
+    for group in near.flat_map(|groups| &groups.groups) {
+        for l in 0..LANES {
+            let v = Vector4::new(1.0, group.x[l], group.y[l], group.grey[l]).cast::<f64>();
+            sum += v * v.transpose() * f64::from(group.weight[l]);
+        }
+    }
+    sum
+}
+
+#[test]
+fn every_pixel_inside_is_counted_once() {
+    let (picture, mut window) = (ramp(), Window::default());
+    for halves in [
+        [Vector2::new(30.0, 8.0), Vector2::new(-8.0, 30.0)],
+        [Vector2::new(30.0, 0.0), Vector2::new(0.0, 30.0)],
+        [Vector2::new(-20.0, 20.0), Vector2::new(25.0, 14.0)],
+    ] {
+        let start = Point2::new(49.3, 50.2);
+        let inverse = Matrix2::from_columns(&halves).try_inverse().unwrap();
+        let mut expected = Matrix4::zeros();
+        for (x, y) in (0..100 * 100).map(|k| (k % 100, k / 100)) {
+            let d = Vector2::new(f64::from(x), f64::from(y)) - start.coords;
+            if (inverse * d).amax() <= 1.0 {
+                let v = Vector4::new(1.0, d.x, d.y, f64::from(x + y));
+                expected += v * v.transpose();
+            }
+        }
+        for band_px in [f64::MAX, 6.0, 0.4] {
+            window.collect(&picture, 0.0, &Below(256.0), &Frame { start, halves, band_px, hidden: [None; 2] });
+            // Sums of a few thousand products of numbers with seven digits.
+            assert!((total(&window) - expected).amax() < 1e-7 * expected.amax(), "{halves:?} {band_px}");
+            assert_eq!(window.count(), expected[(0, 0)] as usize);
+        }
+        assert!(window.near() < window.count() / 4);
+    }
+}
+
+#[test]
+fn what_is_hidden_is_left_out_and_nothing_else() {
+    let (picture, mut window) = (ramp(), Window::default());
+    let start = Point2::new(49.3, 50.2);
+    let halves = [Vector2::new(30.0, 8.0), Vector2::new(-8.0, 30.0)];
+    let corners = [(6.0, 9.0), (28.0, 12.0), (21.0, 33.0), (4.0, 27.0)].map(|(x, y)| Vector2::new(x, y));
+    let inside = |d: Vector2<f64>| (0..4).all(|k| (corners[(k + 1) % 4] - corners[k]).perp(&(d - corners[k])) >= 0.0);
+    let inverse = Matrix2::from_columns(&halves).try_inverse().unwrap();
+    let mut expected = Matrix4::zeros();
+    for (x, y) in (0..100 * 100).map(|k| (k % 100, k / 100)) {
+        let d = Vector2::new(f64::from(x), f64::from(y)) - start.coords;
+        if (inverse * d).amax() <= 1.0 && !inside(d) {
+            let v = Vector4::new(1.0, d.x, d.y, f64::from(x + y));
+            expected += v * v.transpose();
+        }
+    }
+    for band_px in [f64::MAX, 6.0] {
+        let frame = Frame { start, halves, band_px, hidden: [None, Some(Quad(corners))] };
+        window.collect(&picture, 0.0, &Below(256.0), &frame);
+        assert!((total(&window) - expected).amax() < 1e-7 * expected.amax(), "{band_px}");
+        assert_eq!((window.count(), window.left_out), (expected[(0, 0)] as usize, 0));
+    }
+}
+
+#[test]
+fn pixels_are_sorted_by_the_edges_they_see() {
+    let (picture, mut window) = (ramp(), Window::default());
+    let halves = [Vector2::new(30.0, 3.0), Vector2::new(-9.0, 28.0)];
+    window.collect(
+        &picture,
+        0.0,
+        &Below(256.0),
+        &Frame { start: Point2::new(50.0, 50.0), halves, band_px: 5.0, hidden: [None; 2] },
+    );
+    let normals = halves.map(|v| Vector2::new(-v.y, v.x).normalize());
+    let across = |group: &Group, l: usize| normals.map(|n| n.dot(&Vector2::new(group.x[l], group.y[l]).cast()));
+    let each = |groups: &Groups, holds: &dyn Fn([f64; 2]) -> bool| {
+        assert!(groups.count > 50);
+        groups.groups.iter().all(|g| (0..LANES).all(|l| g.weight[l] == 0.0 || holds(across(g, l))))
+    };
+    assert!(each(&window.crossing, &|u| u.iter().all(|u| u.abs() <= 5.0)));
+    for (k, arms) in window.arms.iter().enumerate() {
+        assert!(each(&arms[0], &|u| u[k].abs() <= 5.0 && u[1 - k] < -5.0));
+        assert!(each(&arms[1], &|u| u[k].abs() <= 5.0 && u[1 - k] > 5.0));
+    }
+    let middle = |sums: &Matrix4<f64>| Vector2::new(sums[(0, 1)], sums[(0, 2)]) / sums[(0, 0)];
+    assert!(window.flat.iter().all(|sums| middle(sums).norm() < 1.0 && sums[(0, 0)] > 100.0));
+}
+
+#[test]
+fn a_large_window_takes_all_of_its_edges_and_a_third_of_its_rows_elsewhere() {
+    let (side, half) = (401, 180.0);
+    let picture = Image { width: side, height: side, pixels: vec![100u8; side * side] };
+    let halves = [Vector2::new(half, 0.0), Vector2::new(0.0, half)];
+    let mut window = Window::default();
+    window.collect(
+        &picture,
+        0.0,
+        &Below(256.0),
+        &Frame { start: Point2::new(200.0, 200.0), halves, band_px: 5.0, hidden: [None; 2] },
+    );
+    // Bands of 11 px along 361; of the 350 rows outside the band across, those that 3 divides.
+    assert_eq!(window.near(), 2 * 11 * 361 - 11 * 11);
+    let rows = (20..=380).filter(|y: &usize| y.abs_diff(200) > 5 && y.is_multiple_of(3)).count();
+    assert_eq!(window.count() - window.near(), rows * 350);
+}
+
+#[test]
+fn a_window_over_the_border_keeps_what_is_there() {
+    let picture = Image { width: 10, height: 10, pixels: vec![255u8; 100] };
+    let frame = Frame {
+        start: Point2::new(0.0, 0.0),
+        halves: [Vector2::new(5.0, 0.0), Vector2::new(0.0, 5.0)],
+        band_px: f64::MAX,
+        hidden: [None; 2],
+    };
+    let mut window = Window::default();
+    window.collect(&picture, 0.0, &Below(256.0), &frame);
+    assert_eq!((window.count(), window.left_out), (36, 0));
+    window.collect(&picture, 0.0, &Below(255.0), &frame);
+    assert_eq!((window.count(), window.left_out), (0, 36));
+    window.collect(&picture, 0.0, &Below(255.0), &Frame { band_px: 1.5, ..frame });
+    assert_eq!((window.count(), window.left_out), (0, 36));
+    for start in [Point2::new(-50.0, 1e6), Point2::new(f64::NAN, f64::NAN), Point2::new(f64::INFINITY, 0.0)] {
+        window.collect(&picture, 0.0, &Below(256.0), &Frame { start, ..frame });
+        assert_eq!(window.count(), 0);
+    }
+}
