@@ -4,6 +4,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::{ExportRobot, Output, between};
+use crate::formats::lenses::LensFile;
 use crate::imaging::input::pairs::{PairBy, Source};
 use crate::imaging::{Board, Mosaic, Squares};
 use crate::stereo::Lens;
@@ -61,6 +62,10 @@ pub struct CameraCheck {
     /// Lens model: radial2, brown4, brown5, rational8, thin-prism12 or tilted14 [default: chosen by held-out pairs]
     #[arg(long, value_name = "NAME", value_parser = lens)]
     pub lens: Option<Lens>,
+    /// Lenses that are known: a calibration of this program, OpenCV, ROS, Kalibr or mrcal, and `,left` or `,right` behind it where it is for one
+    /// camera; only the rig is looked for, and three pairs are enough
+    #[arg(long, value_name = "FILE[,SIDE]")]
+    pub intrinsics: Vec<LensFile>,
     /// Only the pairs from this one on, by name: the rig as it is since then
     #[arg(long, value_name = "PAIR")]
     pub since: Option<String>,

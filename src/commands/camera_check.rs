@@ -10,12 +10,13 @@ use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::CalibrationFile;
 use crate::formats::camera_check::CameraCheckFile;
+use crate::formats::lenses;
 use crate::imaging::board::SQUARES_MM;
 use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
 use crate::imaging::input::pairs::{Pairing, Source};
 use crate::imaging::overlay::SideBySide;
-use crate::imaging::{Board, Corners, Wanted, find_corners};
+use crate::imaging::{Board, Corners, Side, Wanted, find_corners};
 use crate::report::drawing::pair_picture::PairPicture;
 use crate::report::drawing::picture::PairJpeg;
 use crate::stereo::board_pose::pair_excess::pair_excess;
@@ -26,7 +27,8 @@ use crate::stereo::judge::assessment::{Demand, Judged};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::lengths::second_board::{self, SecondBoard};
 use crate::stereo::judge::verdict::Verdict;
-use crate::stereo::pairs::FEWEST_PAIRS;
+use crate::stereo::model::known_lenses::{KnownLenses, TOLERANCE};
+use crate::stereo::pairs::fewest_pairs;
 use crate::stereo::select::lens_ladder::Options;
 use crate::{progress, report};
 
@@ -45,9 +47,11 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let out = open(args, config, run)?;
 
     let pairing = pairing(args, &out)?;
-    let corners = corners(args, board, pairing.as_ref(), &out)?;
+    let known = known_lenses(args)?;
+    let corners = corners(args, board, pairing.as_ref(), known.as_ref(), &out)?;
     corners.notes.iter().for_each(progress::note);
-    let asked = Asked { options: options(args), tolerance_mm, extent };
+    known.as_ref().map_or(Ok(()), |known| known.check_size(&corners))?;
+    let asked = Asked { options: options(args, known), tolerance_mm, extent };
     let (calibration, findings) = match &args.since {
         Some(pair) => standing::calibrate_since(&corners, pair, &asked)?,
         None => standing::calibrate_standing(&corners, &asked)?,
@@ -112,10 +116,12 @@ fn pictures(
 /// The results folder, once nothing is in the way of what will be written.
 fn open(args: &CameraCheck, config: &Config, run: Run) -> Result<OutDir> {
     let run = Run { force: args.output.force, ..run };
+    let lenses = args.intrinsics.iter().map(|lens| lens.path.as_path());
     let inputs: Vec<&Utf8Path> = [&args.images, &args.pairs.right, &args.corners, &args.check_images]
         .into_iter()
         .flatten()
         .map(|p| p.as_path())
+        .chain(lenses)
         .collect();
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &inputs);
     out.check_free(&["calibration.json", "camera-check.json", "camera-check.html"])?;
@@ -140,8 +146,29 @@ fn board(args: &CameraCheck, config: &Config) -> Result<Board> {
     Ok(board.scaled(growth))
 }
 
-fn options(args: &CameraCheck) -> Options {
-    Options { lens: args.lens, shape: args.board_shape.map(|shape| shape == BoardShape::Bowed) }
+fn options(args: &CameraCheck, known: Option<KnownLenses>) -> Options {
+    Options { lens: args.lens, shape: args.board_shape.map(|shape| shape == BoardShape::Bowed), known }
+}
+
+/// The lenses that are known.
+fn known_lenses(args: &CameraCheck) -> Result<Option<KnownLenses>> {
+    let known = lenses::read(&args.intrinsics)?;
+    if known.as_ref().is_some_and(KnownLenses::both) && args.lens.is_some() {
+        let problem = "--lens asks for a lens, and --intrinsics gives those of both cameras: leave one out";
+        config::reject(vec![problem.to_owned()])?;
+    }
+    for side in Side::BOTH {
+        let camera = known.as_ref().filter(|known| !known.states_covariance(side)).and_then(|known| known.camera(side));
+        if let Some(camera) = camera {
+            progress::note(format!(
+                "the {} lens ({}) comes without a covariance: it is taken to {} % of its focal length",
+                side.name(),
+                camera.lens.name(),
+                100.0 * TOLERANCE
+            ));
+        }
+    }
+    Ok(known)
 }
 
 /// The pairs of pictures, where there are pictures.
@@ -152,12 +179,19 @@ fn pairing(args: &CameraCheck, out: &OutDir) -> Result<Option<Pairing>> {
     Ok(Some(pairing))
 }
 
-fn corners(args: &CameraCheck, board: Board, pairing: Option<&Pairing>, out: &OutDir) -> Result<Corners> {
+fn corners(
+    args: &CameraCheck,
+    board: Board,
+    pairing: Option<&Pairing>,
+    known: Option<&KnownLenses>,
+    out: &OutDir,
+) -> Result<Corners> {
+    let needed = fewest_pairs(known);
     match (&args.corners, pairing) {
         (Some(file), _) => Ok(corners_csv::read(file, board, args.picture_size)?),
         (None, Some(pairing)) => {
             let (cache, overlays) = (Some(Cache { out, thumbnails: false }), args.draw.then_some(out));
-            Ok(find_corners(pairing, &Wanted { board, needed: FEWEST_PAIRS, mosaic: args.bayer, cache, overlays })?)
+            Ok(find_corners(pairing, &Wanted { board, needed, mosaic: args.bayer, cache, overlays })?)
         }
         // The command line asks for one of the two.
         (None, None) => {

@@ -107,7 +107,13 @@ impl CameraCheckFile {
             within_95_mm: accuracy.extremes.one_in_twenty_mm,
             volume: judged.volume.volume.clone(),
             moment: calibration.moment(),
-            findings: judged.findings.iter().cloned().chain(findings::of_pairs(&calibration.discarded.pairs)).collect(),
+            findings: judged
+                .findings
+                .iter()
+                .cloned()
+                .chain(findings::of_lenses(calibration, &judged.volume))
+                .chain(findings::of_pairs(&calibration.discarded.pairs))
+                .collect(),
             expanded_uncertainty_mm: worst.expanded_uncertainty_mm(),
             uncertainty_shares_mm: [
                 Some(worst.corners_mm),

@@ -6,6 +6,7 @@ pub mod camera_check;
 mod checked;
 pub mod dh_csv;
 pub mod export;
+pub mod lenses;
 pub mod measure;
 pub mod plan;
 pub mod rectified;

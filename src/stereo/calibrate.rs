@@ -16,6 +16,7 @@ use crate::stereo::model::rig::Covariance;
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::series::{self, PairMisfit, Series};
 use crate::stereo::pairs::{Discarded, DiscardedPair, Standing};
+use crate::stereo::select::known_lenses::{self, LensCheck};
 use crate::stereo::select::lens_ladder;
 use crate::stereo::select::lens_ladder::Options;
 use crate::stereo::select::model_comparison::LensScore;
@@ -67,11 +68,20 @@ pub struct Calibration {
     pub standing: Standing,
     /// How the rig has changed since the moment that it is that of, each change as a step of the shared numbers.
     pub since_moment: Vec<DVector<f64>>,
+    /// Whose lens was known, left and right.
+    pub known_sides: [bool; 2],
+    /// Whether the pictures agree with the lenses that were known; `None` where none were, or the pictures say nothing of them.
+    pub lens_check: Option<LensCheck>,
     /// How the lenses that were tried predict held-out pairs; empty where the lens was forced.
     pub lens_scores: Vec<LensScore>,
 }
 
 impl Calibration {
+    /// True where the lenses of both cameras were known before the pictures.
+    pub fn lenses_are_known(&self) -> bool {
+        self.known_sides.iter().all(|known| *known)
+    }
+
     /// The rig with its covariance.
     pub fn rig(&self) -> &Rig {
         &self.values.shared.rig
@@ -133,11 +143,13 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
 /// The same; with `runs`, the first or the last pairs of the series stay in where they contradict the others, so that a change of the rig
 /// can be found over the series.
 pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Result<Calibration, Error> {
-    let candidates = Candidates::new(corners)?;
+    let candidates = Candidates::new(corners, options.known.as_ref())?;
     let Series { problem: start, discarded, runs, misfit } = series::find(&candidates, runs)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
     let lens_ladder::Choice { layout, near, priors, scores: lens_scores } =
         lens_ladder::choose(&start, &corners.board, options).map_err(|e| e.without(&skipped))?;
+    let known = options.known.as_ref();
+    let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout, &corners.board));
     let solved = Problem { values: near.unwrap_or(start.values), priors, views: start.views }
         .solve(&layout)
         .map_err(|e| e.without(&skipped).of_lens(options.lens))?;
@@ -148,7 +160,7 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
     let print = PrintShare::of(&solved, &corners.board, &layout);
     let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
     let Stated { mut uncertainty, pair_scatter, witnesses } =
-        stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, print_excess);
+        stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, known.is_some(), print_excess);
     let Problem { views, mut values, priors } = solved.problem;
     let mut own_noise = solved.noise;
     if let Some(print) = print {
@@ -173,6 +185,8 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
         discarded: Discarded::new(&views, discarded),
         standing: Standing::default(),
         since_moment: Vec::new(),
+        known_sides: Side::BOTH.map(|side| known.is_some_and(|known| known.camera(side).is_some())),
+        lens_check,
         lens_scores,
         views,
         values,

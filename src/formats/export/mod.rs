@@ -56,6 +56,20 @@ pub fn read(path: &Utf8Path, text: &str) -> Option<Result<Rig, String>> {
     text.contains("!!opencv-matrix").then(|| file_storage::read(text))
 }
 
+/// Reads a file that holds one camera: ROS, mrcal, OpenCV's example, a Kalibr chain of one. `None` where the text is none of them.
+pub fn read_camera(text: &str) -> Option<Result<Camera, String>> {
+    if text.contains("'lensmodel'") {
+        return Some(mrcal::read_camera(text));
+    }
+    if text.contains("distortion_model:") && text.contains("camera_matrix:") {
+        return Some(ros::read_camera(text));
+    }
+    if text.contains("cam0:") && !text.contains("cam1:") {
+        return Some(kalibr::read_camera(text));
+    }
+    file_storage::read_camera(text)
+}
+
 /// Numbers as text that reads back to the same bits.
 fn numbers(values: impl IntoIterator<Item = f64>) -> String {
     let all: Vec<String> = values.into_iter().map(|v| format!("{v:?}")).collect();

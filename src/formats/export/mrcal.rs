@@ -44,6 +44,11 @@ pub fn read(left: &str, right: &str) -> Result<Rig, String> {
     checked::rig((left, right), rotation, right_from_left.translation.vector, None)
 }
 
+/// The camera of one file.
+pub fn read_camera(text: &str) -> Result<Camera, String> {
+    Ok(one(text)?.0)
+}
+
 fn one(text: &str) -> Result<(Camera, Transform), String> {
     let model = word(text, "lensmodel")?;
     let count = match model {

@@ -82,18 +82,20 @@ fn text(name: &str, camera: &Camera, rectification: &Matrix3<f64>, f: f64, middl
     text
 }
 
+/// The camera of one file.
+pub fn read_camera(text: &str) -> Result<Camera, String> {
+    let m = list(text, "camera_matrix", Some(9))?;
+    let size = (number(text, "image_width")?, number(text, "image_height")?);
+    let count = match word(text, "distortion_model")? {
+        "plumb_bob" => 5,
+        "rational_polynomial" => 8,
+        other => return Err(format!("distortion_model is `{other}`; plumb_bob and rational_polynomial are read")),
+    };
+    camera(size, &[m[0], m[4], m[2], m[5]], &list(text, "distortion_coefficients", Some(count))?)
+}
+
 /// Reads the same back: the rig from both rectifications and the right projection.
 pub fn read(left: &str, right: &str) -> Result<Rig, String> {
-    let one = |text: &str| {
-        let m = list(text, "camera_matrix", Some(9))?;
-        let size = (number(text, "image_width")?, number(text, "image_height")?);
-        let count = match word(text, "distortion_model")? {
-            "plumb_bob" => 5,
-            "rational_polynomial" => 8,
-            other => return Err(format!("distortion_model is `{other}`; plumb_bob and rational_polynomial are read")),
-        };
-        camera(size, &[m[0], m[4], m[2], m[5]], &list(text, "distortion_coefficients", Some(count))?)
-    };
     let rectification = |text: &str| {
         let rows = list(text, "rectification_matrix", Some(9))?;
         checked::rotation("rectification_matrix", Matrix3::from_row_slice(&rows))
@@ -106,5 +108,10 @@ pub fn read(left: &str, right: &str) -> Result<Rig, String> {
     let shift_mm = p[3] / p[0] / METRE;
     let rotation = right_turn.transpose() * left_turn;
     let translation = right_turn.transpose() * Vector3::new(shift_mm, 0.0, 0.0);
-    checked::rig((one(left)?, one(right)?), ("the product of the rectifications", rotation), translation, None)
+    checked::rig(
+        (read_camera(left)?, read_camera(right)?),
+        ("the product of the rectifications", rotation),
+        translation,
+        None,
+    )
 }

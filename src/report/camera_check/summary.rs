@@ -33,6 +33,7 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
         trusted(judged),
     ];
     lines.extend(standing(calibration));
+    lines.extend(lenses(calibration));
     lines.extend(judged.findings.iter().map(|finding| format!("over the pairs: {}", finding.action)));
     lines.extend(pairs(calibration));
     lines.push(rig(calibration, judged));
@@ -83,6 +84,16 @@ fn standing(calibration: &Calibration) -> Option<String> {
     }
     let since = standing.since.as_ref()?;
     Some(format!("the rig since pair {since}; {} earlier pairs show it before it changed", standing.pairs_before))
+}
+
+/// Whether the pictures agree with lenses that were known, and what they would have shown.
+fn lenses(calibration: &Calibration) -> Option<String> {
+    let check = calibration.lens_check.as_ref()?;
+    if check.contradicts() {
+        return Some(check.statement.clone());
+    }
+    let seen = check.focus_seen.iter().flatten().copied().fold(0.0, f64::max);
+    Some(format!("{}; they would show a focal length that differs by {:.2} %", check.statement, 100.0 * seen))
 }
 
 /// How many pairs were used, and in a line a cause which were not.

@@ -161,6 +161,23 @@ fn misfit_without(calibration: &Calibration, along: &Along) -> PairMisfit {
     }
 }
 
+/// Lenses that were known and that the pictures contradict: all pairs are of other ones.
+pub fn of_lenses(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Finding> {
+    let check = calibration.lens_check.as_ref().filter(|check| check.contradicts())?;
+    let causes: Vec<&str> = check.causes.iter().map(|cause| cause.word()).collect();
+    let otherwise = lengths.measured_by(&check.rig_without).into_iter().flatten();
+    Some(Finding {
+        cause: if causes.is_empty() { Cause::Unknown.word().to_owned() } else { causes.join("|") },
+        kind: Kind::Step,
+        pairs: calibration.views.iter().map(|view| view.pair.clone()).collect(),
+        size: check.focus_change,
+        unit: if check.focus_change.is_some() { "%" } else { "" },
+        effect_mm: otherwise.map(|mm| (mm - lengths.length_mm).abs()).reduce(f64::max),
+        action: check.statement.clone(),
+        along: None,
+    })
+}
+
 /// What happened to single pairs that are not used, a finding a cause; pairs without a board or shown twice are none.
 pub fn of_pairs(discarded: &[DiscardedPair]) -> Vec<Finding> {
     let mut found: Vec<Finding> = Vec::new();

@@ -11,7 +11,7 @@ use crate::stereo::Error;
 use crate::stereo::calibrate::{Calibration, calibrate, calibrate_with};
 use crate::stereo::findings::{self, Finding, Kind};
 use crate::stereo::model::rig::Covariance;
-use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, FEWEST_PAIRS, Standing};
+use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
 use crate::stereo::select::lens_ladder::Options;
 use crate::stereo::volume::Extent;
 use crate::stereo::volume::lengths::VolumeLengths;
@@ -26,7 +26,7 @@ const MIDDLE: f64 = 0.5;
 const LONG_SQUARES: usize = 7;
 
 /// What is asked of a calibration.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Asked {
     /// Lens and board.
     pub options: Options,
@@ -92,7 +92,7 @@ fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Resu
     let first = names(&mut corners.pairs.iter());
     let mut last = names(&mut corners.pairs.iter().rev());
     last.reverse();
-    if last.len() >= FEWEST_PAIRS
+    if last.len() >= fewest_pairs(asked.options.known.as_ref())
         && let Some(kept) = since(corners, &last[0])
         && let Ok(calibration) = calibrate(&kept, &asked.options)
     {
@@ -194,7 +194,10 @@ struct Later {
 /// The rig of the pairs since a step, where these are enough, it is surer than the one of all, and it stands: of a rig that goes on changing (a
 /// focus that hunts) no part is the one that stands, and all pairs together say best what it does.
 fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Finding) -> Option<Later> {
-    if change.kind != Kind::Step || !change.material(asked) || change.pairs.len() < FEWEST_PAIRS {
+    if change.kind != Kind::Step
+        || !change.material(asked)
+        || change.pairs.len() < fewest_pairs(asked.options.known.as_ref())
+    {
         return None;
     }
     let corners = since(corners, change.pairs.first()?)?;

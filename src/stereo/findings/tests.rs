@@ -13,7 +13,7 @@ use crate::stereo::select::lens_ladder::Options;
 use crate::stereo::synthetic::World;
 use crate::stereo::volume::Extent;
 
-const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: Some(false) };
+const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: Some(false), known: None };
 
 /// The paper's rig, and the same at a fifth of its pixels.
 fn worlds(pairs: usize, seed: u64) -> [World; 2] {

@@ -66,6 +66,19 @@ pub fn one_camera(views: &[View], side: Side, size: (u32, u32), diagonal_mm: f64
         .map(|(_, one)| one)
 }
 
+/// A camera whose lens is known, with the boards' poses in its pictures.
+pub fn known_camera(views: &[View], side: Side, camera: Camera) -> OneCamera {
+    let rig = Rig { left: camera, right: camera, right_from_left: Transform::identity(), covariance: None };
+    let shared = Shared { rig, shape_mm: FLAT };
+    let pictures = views.iter().map(|view| as_left(view, side));
+    let poses_and_px = pictures.map(|picture| {
+        let pose = board_pose::fit(&shared, &picture, Loss::Cauchy(CAUCHY_WIDTH))?.left_from_board;
+        Some((pose, median_px(&shared, &pose, &picture, Side::Left)))
+    });
+    let (poses, median_px) = poses_and_px.map(|found| (found.map(|f| f.0), found.and_then(|f| f.1))).unzip();
+    OneCamera { camera, poses, median_px }
+}
+
 /// The corners of one picture as those of a left one: seen by itself, either camera is the left one of a rig without a right one.
 pub fn as_left(view: &View, side: Side) -> View {
     let mut picture = view.only(side);

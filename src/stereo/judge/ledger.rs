@@ -3,6 +3,7 @@
 //! In: what was asked of a calibration. Out: one line a fact. Wherever it can be computed a fact is what it could do to a length, in mm,
 //! and its limit is the tolerance. No verdict is better than its worst line.
 
+use crate::imaging::Side;
 use crate::statistics::median;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
@@ -59,6 +60,7 @@ pub fn ledger(facts: &Facts) -> Vec<Evidence> {
         tilts(facts),
     ];
     lines.extend(reach(facts));
+    lines.extend(known_lenses(facts));
     lines.push(second_board(facts));
     lines
 }
@@ -363,17 +365,20 @@ fn standing(facts: &Facts) -> Evidence {
 fn poses(facts: &Facts) -> Evidence {
     /// With fewer, leaving out one loses a fifth or more of all that is known, and one wrong pair cannot be told from the others.
     const FEWEST: f64 = 6.0;
+    /// Where the lenses are known, only where the cameras stand is left to be found.
+    const FEWEST_OF_KNOWN: f64 = 3.0;
+    let fewest = if facts.calibration.lenses_are_known() { FEWEST_OF_KNOWN } else { FEWEST };
     let groups = facts.calibration.pair_scatter.groups as f64;
     Evidence {
         what: "pairs with poses of their own",
         remedy: "add pairs with the board elsewhere and tilted otherwise",
         value: Some(groups),
-        limit: Some(FEWEST),
+        limit: Some(fewest),
         unit: "",
-        allows: if groups >= FEWEST { Verdict::Pass } else { Verdict::Undecided },
+        allows: if groups >= fewest { Verdict::Pass } else { Verdict::Undecided },
         detail: format!(
             "{} pairs were used. Few pairs cannot show one that is wrong by a little, a rig that drifts, or a lens that differs at the \
-             border: with fewer than {FEWEST:.0} different poses each held-out pair is judged by too few others",
+             border: with fewer than {fewest:.0} different poses each held-out pair is judged by too few others",
             facts.coverage.pairs
         ),
     }
@@ -390,13 +395,41 @@ fn tilts(facts: &Facts) -> Evidence {
         value: Some(value),
         limit: Some(LEAST_DEG),
         unit: "deg",
-        allows: if value >= LEAST_DEG { Verdict::Pass } else { Verdict::Undecided },
+        allows: if value >= LEAST_DEG || facts.calibration.lenses_are_known() {
+            Verdict::Pass
+        } else {
+            Verdict::Undecided
+        },
         detail: format!(
             "range of the boards' tilts, {horizontal:.0} degrees about the horizontal and {vertical:.0} about the vertical axis; boards \
              that are all parallel do not tell the focal length from the distance, and lengths on them come out right even where tilted \
              ones are wrong"
         ),
     }
+}
+
+/// Whether the pictures agree with lenses that were known.
+fn known_lenses(facts: &Facts) -> Option<Evidence> {
+    let check = facts.calibration.lens_check.as_ref()?;
+    let seen: Vec<String> = Side::BOTH
+        .into_iter()
+        .filter_map(|side| Some(format!("{} {:.3} %", side.name(), 100.0 * check.focus_seen[side as usize]?)))
+        .collect();
+    Some(Evidence {
+        what: "known lenses",
+        remedy: "give the lenses as they are now, or leave `--intrinsics` out and photograph more pairs",
+        value: Some(check.chi_square),
+        limit: Some(check.limit),
+        unit: "",
+        allows: if check.contradicts() { Verdict::Undecided } else { Verdict::Pass },
+        detail: format!(
+            "{}: squared difference of {} known numbers from what the pictures give by themselves, in units of its covariance. Nineteen of \
+             twenty such tests see a focal length that differs by {}",
+            check.statement,
+            check.numbers,
+            seen.join(", ")
+        ),
+    })
 }
 
 /// Depth and field: what lies beyond is extrapolated; within, the uncertainty of lengths says what it costs.

@@ -2,6 +2,7 @@
 
 pub mod board_shape;
 pub mod camera;
+pub mod known_lenses;
 pub mod parameters;
 pub mod projection;
 pub mod rectification;

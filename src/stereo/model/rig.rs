@@ -19,6 +19,17 @@ pub struct Rig {
     pub covariance: Option<Covariance>,
 }
 
+impl Camera {
+    /// Pictures of this side that have another size (px) than the camera's.
+    pub fn check_picture_size(&self, side: Side, (found_width, found_height): (u32, u32)) -> Result<(), Error> {
+        let Camera { width, height, .. } = *self;
+        if (found_width, found_height) == (width, height) {
+            return Ok(());
+        }
+        Err(Error::PictureSize { side, found_width, found_height, width, height })
+    }
+}
+
 /// A covariance matrix with names: `left.fx`, `right.k1`, `right_from_left.rx_rad`, ...
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance {
@@ -74,11 +85,7 @@ impl Rig {
 
     /// The same for one picture's width and height, px.
     pub fn check_picture_size(&self, side: Side, (found_width, found_height): (u32, u32)) -> Result<(), Error> {
-        let Camera { width, height, .. } = *self.camera(side);
-        if (found_width, found_height) == (width, height) {
-            return Ok(());
-        }
-        Err(Error::PictureSize { side, found_width, found_height, width, height })
+        self.camera(side).check_picture_size(side, (found_width, found_height))
     }
 
     /// Raw picture points, left and right, of a point in the left camera's frame, px.

@@ -8,8 +8,9 @@ use crate::stereo::Error;
 use crate::stereo::data::view::View;
 use crate::stereo::init::homography::{FEWEST_CORNERS, homography, pixel_pairs};
 use crate::stereo::init::single_camera::{self, OneCamera};
+use crate::stereo::model::known_lenses::KnownLenses;
 use crate::stereo::pairs::discarded::too_few_pairs;
-use crate::stereo::pairs::{Cause, DiscardedPair, FEWEST_PAIRS};
+use crate::stereo::pairs::{Cause, DiscardedPair, fewest_pairs};
 
 /// Pairs to choose from, in the order in which they were taken, with each camera on its own pictures.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,11 +25,13 @@ pub struct Candidates {
     pub width_px: u32,
     /// Pairs that are none.
     pub discarded: Vec<DiscardedPair>,
+    /// Fewest pairs for a rig.
+    pub fewest_pairs: usize,
 }
 
 impl Candidates {
-    /// Gathers them.
-    pub fn new(corners: &Corners) -> Result<Candidates, Error> {
+    /// Gathers them; a camera whose lens is known is not looked for in its pictures.
+    pub fn new(corners: &Corners, known: Option<&KnownLenses>) -> Result<Candidates, Error> {
         let not_found = |s: &crate::imaging::Skipped| DiscardedPair::new(&s.pair, Cause::NoBoard, s.reason.clone());
         let mut discarded: Vec<DiscardedPair> = corners.skipped.iter().map(not_found).collect();
         let mut views = Vec::new();
@@ -49,8 +52,9 @@ impl Candidates {
                 views.push(view);
             }
         }
-        if views.len() < FEWEST_PAIRS {
-            return Err(too_few_pairs(views.len(), &discarded));
+        let fewest_pairs = fewest_pairs(known);
+        if views.len() < fewest_pairs {
+            return Err(too_few_pairs(views.len(), fewest_pairs, &discarded));
         }
         let both = |view: &&View| Side::BOTH.into_iter().all(|side| view.active(side).next().is_some());
         if views.iter().filter(both).count() == 0 {
@@ -59,11 +63,21 @@ impl Candidates {
         let sizes = [corners.left_size, corners.right_size];
         let cameras: Vec<Option<OneCamera>> = Side::BOTH
             .into_par_iter()
-            .map(|side| single_camera::one_camera(&views, side, sizes[side as usize], corners.board.diagonal_mm()))
+            .map(|side| match known.and_then(|known| known.camera(side)) {
+                Some(camera) => Some(single_camera::known_camera(&views, side, *camera)),
+                None => single_camera::one_camera(&views, side, sizes[side as usize], corners.board.diagonal_mm()),
+            })
             .collect();
         let of = |side: Side| cameras[side as usize].clone().ok_or(Error::NoCamera { side });
         let cameras = [of(Side::Left)?, of(Side::Right)?];
-        Ok(Candidates { board: corners.board, views, cameras, width_px: sizes[0].0.max(sizes[1].0), discarded })
+        Ok(Candidates {
+            board: corners.board,
+            views,
+            cameras,
+            width_px: sizes[0].0.max(sizes[1].0),
+            discarded,
+            fewest_pairs,
+        })
     }
 }
 

@@ -5,7 +5,6 @@ use serde::Serialize;
 use crate::imaging::{Side, Skipped};
 use crate::stereo::Error;
 use crate::stereo::data::view::View;
-use crate::stereo::pairs::FEWEST_PAIRS;
 
 /// What happened to a pair, or to the rig over the pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -42,6 +41,8 @@ pub enum Cause {
     Baseline,
     /// A focal length changed.
     Focus,
+    /// A camera is not the one whose lens was given.
+    OtherCamera,
     /// The right camera stands and looks otherwise, in more than one way.
     CameraMoved,
     /// It belongs to what was photographed before the pair that was asked for.
@@ -69,6 +70,7 @@ impl Cause {
             Cause::Roll => "roll",
             Cause::Baseline => "baseline",
             Cause::Focus => "focus",
+            Cause::OtherCamera => "other-camera",
             Cause::CameraMoved => "camera-moved",
             Cause::Before => "before",
             Cause::Unknown => "unknown",
@@ -173,7 +175,7 @@ pub struct Standing {
 }
 
 /// Too few pairs, with what happened to the others.
-pub fn too_few_pairs(found: usize, discarded: &[DiscardedPair]) -> Error {
+pub fn too_few_pairs(found: usize, needed: usize, discarded: &[DiscardedPair]) -> Error {
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
-    Error::TooFewPairs { found, needed: FEWEST_PAIRS, total: found + skipped.len(), skipped }
+    Error::TooFewPairs { found, needed, total: found + skipped.len(), skipped }
 }

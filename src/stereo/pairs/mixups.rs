@@ -277,7 +277,8 @@ mod tests {
         let mut corners = world.corners(6);
         mix(&world, &mut corners);
         let found =
-            calibrate(&corners, &Options { lens: Some(crate::stereo::Lens::Brown4), shape: Some(false) }).unwrap();
+            calibrate(&corners, &Options { lens: Some(crate::stereo::Lens::Brown4), shape: Some(false), known: None })
+                .unwrap();
         found.skipped.into_iter().map(|s| (s.pair, s.reason)).collect()
     }
 

@@ -7,7 +7,17 @@ mod mixups;
 pub mod numbering;
 pub mod series;
 
+use crate::stereo::model::known_lenses::KnownLenses;
+
 pub use discarded::{Cause, Discarded, DiscardedPair, PictureCorners, Standing};
 
 /// Fewest pairs for a calibration whose accuracy can be held out: three calibrate, the fourth judges.
 pub const FEWEST_PAIRS: usize = 4;
+
+/// The same where the lenses of both cameras are known: two calibrate, the third judges.
+const FEWEST_OF_KNOWN: usize = 3;
+
+/// Fewest pairs for a calibration with what is known of the lenses.
+pub fn fewest_pairs(known: Option<&KnownLenses>) -> usize {
+    if known.is_some_and(KnownLenses::both) { FEWEST_OF_KNOWN } else { FEWEST_PAIRS }
+}

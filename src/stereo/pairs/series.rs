@@ -20,7 +20,7 @@ use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::discarded::too_few_pairs;
 use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::pairs::{DiscardedPair, FEWEST_PAIRS, mixups, numbering};
+use crate::stereo::pairs::{DiscardedPair, mixups, numbering};
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
@@ -217,9 +217,9 @@ fn check(
         }
         return Err(Error::Contradiction { agreeing, total, usual_px, alone_px, bad });
     }
-    if members.len() < FEWEST_PAIRS {
+    if members.len() < candidates.fewest_pairs {
         let all: Vec<DiscardedPair> = discarded.iter().chain(&candidates.discarded).cloned().collect();
-        return Err(too_few_pairs(members.len(), &all));
+        return Err(too_few_pairs(members.len(), candidates.fewest_pairs, &all));
     }
     Ok(())
 }

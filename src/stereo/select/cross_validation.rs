@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_step_without_a_fold_ends_where_its_own_search_does() {
-        let options = Options { lens: Some(Lens::Brown5), shape: Some(true) };
+        let options = Options { lens: Some(Lens::Brown5), shape: Some(true), known: None };
         // With five pairs a fifth of all that is known goes with each.
         for pairs in [5, 9] {
             let found = calibrate(&World::new(pairs, 2).corners(3), &options).unwrap();

@@ -10,8 +10,10 @@
 
 use crate::imaging::Board;
 use crate::stereo::board_pose::print_share::PrintShare;
+use crate::stereo::model::known_lenses::KnownLenses;
 use crate::stereo::model::parameters::{Layout, Values};
-use crate::stereo::select::model_comparison::{Chance, LensScore, Trial, score, simplest};
+use crate::stereo::select::known_lenses;
+use crate::stereo::select::model_comparison::{Chance, LensScore, Trial, gain_of_terms, score, simplest};
 use crate::stereo::select::stated_uncertainty;
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
@@ -20,15 +22,17 @@ use crate::stereo::{Error, Lens};
 
 /// The lens of all cameras whose pictures do not ask for more. What hand-held pictures leave open of its terms is held by what is expected of
 /// lenses, so that nothing simpler is needed.
-const SIMPLEST: Lens = Lens::Brown5;
+pub(super) const SIMPLEST: Lens = Lens::Brown5;
 
 /// What may be forced.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Options {
     /// The lens; chosen by held-out pairs where `None`.
     pub lens: Option<Lens>,
     /// Whether the board's shape is free; decided by held-out pairs where `None`.
     pub shape: Option<bool>,
+    /// Lenses that are known before the pictures.
+    pub known: Option<KnownLenses>,
 }
 
 /// What was chosen.
@@ -46,6 +50,9 @@ pub struct Choice {
 
 /// Chooses what is free, where it is not forced.
 pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choice, Error> {
+    if let Some(known) = &options.known {
+        return known_lenses::choose(start, board, known, options);
+    }
     let forced_shape = options.shape.or(options.lens.map(|_| false));
     if let (Some(lens), Some(shape)) = (options.lens, forced_shape) {
         let priors = start.priors.clone();
@@ -93,16 +100,11 @@ fn fewer_terms(problem: &Problem, five: &Trial, chance: &Chance) -> Option<Trial
     if five.layout.left != Some(SIMPLEST) {
         return None;
     }
-    let evidence = |trial: &Trial| {
-        let added = (five.layout.count() - trial.layout.count()) as f64;
-        let wider = 0.5 * (five.log_volume()? - trial.log_volume()? + added * chance.scatter.ln());
-        let fall = 0.5 * (trial.chi_square() - five.chi_square()) / chance.scatter;
-        Some(problem.priors.log_width(&five.layout, &trial.layout) - wider - fall)
-    };
+    let loss = |trial: &Trial| gain_of_terms(&problem.priors, five, trial, chance.scatter);
     let fewer = Lens::LADDER.into_iter().filter(|lens| *lens < SIMPLEST);
     let trials = fewer.filter_map(|lens| Trial::new(problem, Layout::rig(lens, five.layout.shape)));
-    let best = trials.filter_map(|trial| Some((evidence(&trial)?, trial))).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (best.0 > 0.0).then_some(best.1)
+    let best = trials.filter_map(|trial| Some((loss(&trial)?, trial))).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (best.0 < 0.0).then_some(best.1)
 }
 
 /// The simplest lens and those that are richer, each from where the one before it that has a minimum ended: a richer lens begins as a

@@ -171,6 +171,15 @@ impl Trial {
     }
 }
 
+/// Logarithm of the evidence for a richer model over a simpler one that it contains (Laplace's approximation; what is expected of the
+/// added terms is part of it). `scatter`: see [`Chance`]. `None` where a covariance has no volume.
+pub fn gain_of_terms(priors: &Priors, richer: &Trial, simpler: &Trial, scatter: f64) -> Option<f64> {
+    let added = (richer.layout.count() - simpler.layout.count()) as f64;
+    let wider = 0.5 * (richer.log_volume()? - simpler.log_volume()? + added * scatter.ln());
+    let fall = 0.5 * (simpler.chi_square() - richer.chi_square()) / scatter;
+    Some(fall + wider - priors.log_width(&richer.layout, &simpler.layout))
+}
+
 /// A lens calibrated with all pairs, and how it predicts pairs that it has not seen.
 pub fn score(problem: &Problem, lens: Lens, shape: bool) -> LensScore {
     hold_out(problem, Layout::rig(lens, shape)).map_or(LensScore::untried(lens), |(trial, rms_px)| LensScore {

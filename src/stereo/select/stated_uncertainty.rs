@@ -57,6 +57,7 @@ pub fn state(
     by_noise: Uncertainty,
     inflation: f64,
     scores: &[LensScore],
+    lenses_known: bool,
     print_excess: f64,
 ) -> Stated {
     let Some((equations, mut shared, pair_scatter)) = scattered(&solved.problem, layout, &by_noise.shared, inflation)
@@ -65,7 +66,8 @@ pub fn state(
         return Stated { uncertainty: by_noise, pair_scatter, witnesses: Vec::new() };
     };
     let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(1.0);
-    let witnesses = witnesses(&solved.problem, layout, scores, factor * print_excess);
+    let richer = richer(layout, scores, lenses_known);
+    let witnesses = witnesses(&solved.problem, layout, richer, factor * print_excess);
     // Lenses contain each other: the steps to two of them are not two biases, and Akaike's criterion names the likeliest. The board's is another.
     let gain = |w: &&Witness| w.chi_square_fall - 2.0 * w.added as f64;
     let lenses = witnesses.iter().filter(|w| w.layout.left != layout.left);
@@ -101,9 +103,9 @@ fn scattered(
     Some((equations, shared, pair_scatter))
 }
 
-fn witnesses(problem: &Problem, layout: &Layout, scores: &[LensScore], factor: f64) -> Vec<Witness> {
+fn witnesses(problem: &Problem, layout: &Layout, richer: Vec<Layout>, factor: f64) -> Vec<Witness> {
     let Some(chosen) = Trial::new(problem, *layout) else { return Vec::new() };
-    richer(layout, scores)
+    richer
         .into_iter()
         .filter_map(|richer| {
             let trial = Trial::new(problem, richer)?;
@@ -123,15 +125,15 @@ fn witnesses(problem: &Problem, layout: &Layout, scores: &[LensScore], factor: f
 }
 
 /// The richer models that are asked: lenses that the pairs determine and that do not predict held-out pairs worse, or, where the lens was
-/// forced, the ladder up to eight terms; and a board that is not flat.
-fn richer(layout: &Layout, scores: &[LensScore]) -> Vec<Layout> {
+/// forced, the ladder up to eight terms, and none where it is known; and a board that is not flat.
+fn richer(layout: &Layout, scores: &[LensScore], lenses_known: bool) -> Vec<Layout> {
     let Some(own) = layout.left else { return Vec::new() };
     let trial = |lens: Lens| scores.iter().filter_map(|s| s.trial.as_ref()).find(|t| t.layout.left == Some(lens));
     let asked = |lens: Lens| match (trial(lens), trial(own)) {
         (Some(other), Some(own)) => other.excess_over(own).partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater),
         _ => scores.is_empty() && lens <= Lens::Rational8,
     };
-    let lenses = Lens::LADDER.into_iter().filter(|lens| *lens > own && asked(*lens));
+    let lenses = Lens::LADDER.into_iter().filter(|lens| !lenses_known && *lens > own && asked(*lens));
     let lenses = lenses.map(|lens| Layout { left: Some(lens), right: Some(lens), ..*layout });
     lenses.chain((!layout.shape).then_some(Layout { shape: true, ..*layout })).collect()
 }
@@ -156,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_bow_that_was_ruled_out_is_a_witness_and_widens_the_covariance() {
-        let flat = Options { lens: Some(Lens::Brown4), shape: Some(false) };
+        let flat = Options { lens: Some(Lens::Brown4), shape: Some(false), known: None };
         let mut world = World::new(12, 3);
         let clean = calibrate(&world.corners(4), &flat).unwrap();
         assert!(clean.witnesses.iter().all(|w| !w.layout.shape), "{:?}", clean.witnesses);

@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::Side;
 use crate::stereo::model::board_shape;
+use crate::stereo::model::known_lenses::KnownLenses;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::{Camera, Lens, Rig};
 
@@ -39,6 +40,8 @@ struct Expectation {
     terms: Vec<(Number, f64)>,
     value: f64,
     sigma: f64,
+    /// Whether it counts beside the rational terms, too: what is known of a lens, not what lenses usually are.
+    known: bool,
 }
 
 /// One of the shared numbers.
@@ -79,7 +82,7 @@ impl Priors {
         let [left, right] = [&start.left, &start.right].map(|camera| (camera.fx * camera.fy).sqrt());
         if (left / right).ln().abs() < TWO_MAKES {
             let terms = vec![(Number::Camera(Side::Left, 0), 1.0), (Number::Camera(Side::Right, 0), -1.0)];
-            priors.all.push(Expectation { terms, value: 0.0, sigma: ALIKE * (left * right).sqrt() });
+            priors.all.push(Expectation { terms, value: 0.0, sigma: ALIKE * (left * right).sqrt(), known: false });
         }
         priors.of_board(diagonal_mm);
         priors
@@ -99,10 +102,29 @@ impl Priors {
         Priors { rational_held: true, ..self.clone() }
     }
 
+    /// The same with what is known of some lenses in place of what lenses usually are.
+    pub fn knowing(&self, known: &KnownLenses) -> Priors {
+        let is_known = |(number, _): &(Number, f64)| match number {
+            Number::Camera(side, _) => known.camera(*side).is_some(),
+            Number::Shape(_) => false,
+        };
+        let mut priors = self.clone();
+        priors.all.retain(|expectation| !expectation.terms.iter().all(is_known));
+        let (numbers, whitener) = (known.numbers(), known.whitener());
+        let values = &whitener * known.values();
+        priors.all.extend((0..numbers.len()).map(|row| {
+            let term =
+                |(column, (side, at)): (usize, &(Side, usize))| (Number::Camera(*side, *at), whitener[(row, column)]);
+            let terms = numbers.iter().enumerate().map(term).filter(|(_, by)| *by != 0.0).collect();
+            Expectation { terms, value: values[row], sigma: 1.0, known: true }
+        }));
+        priors
+    }
+
     /// Sum of the logarithms of the standard deviations of those numbers that a richer layout has and a simpler one has not.
     pub fn log_width(&self, richer: &Layout, simpler: &Layout) -> f64 {
         let free = |layout: &Layout, expectation: &&Expectation| {
-            expectation.terms.iter().all(|(number, _)| self.place(layout, *number).is_some())
+            expectation.terms.iter().all(|(number, _)| self.place(layout, *number, expectation.known).is_some())
         };
         let added = self.all.iter().filter(|e| free(richer, e) && !free(simpler, e));
         added.map(|expectation| expectation.sigma.ln()).sum()
@@ -113,7 +135,7 @@ impl Priors {
         let focal = (camera.fx * camera.fy).sqrt();
         let corner = (0.5 * width / camera.fx).hypot(0.5 * height / camera.fy);
         let mut one = |at: usize, value: f64, sigma: f64| {
-            self.all.push(Expectation { terms: vec![(Number::Camera(side, at), 1.0)], value, sigma });
+            self.all.push(Expectation { terms: vec![(Number::Camera(side, at), 1.0)], value, sigma, known: false });
         };
         one(2, 0.5 * (width - 1.0), CENTRE_SHARE * width);
         one(3, 0.5 * (height - 1.0), CENTRE_SHARE * width);
@@ -133,7 +155,7 @@ impl Priors {
         (16..18).for_each(|at| one(at, 0.0, TILT_RAD));
         if (camera.fx / camera.fy).ln().abs() < NOT_SQUARE {
             let terms = vec![(Number::Camera(side, 0), 1.0), (Number::Camera(side, 1), -1.0)];
-            self.all.push(Expectation { terms, value: 0.0, sigma: ASPECT * focal });
+            self.all.push(Expectation { terms, value: 0.0, sigma: ASPECT * focal, known: false });
         }
     }
 
@@ -142,6 +164,7 @@ impl Priors {
             terms: vec![(Number::Shape(k), 1.0)],
             value: 0.0,
             sigma: BOW_SHARE * diagonal_mm,
+            known: false,
         }));
     }
 
@@ -160,13 +183,15 @@ impl Priors {
             let Some(terms) = expectation
                 .terms
                 .iter()
-                .map(|(n, by)| Some((self.place(layout, *n)?, *by)))
+                .map(|(n, by)| Some((self.place(layout, *n, expectation.known)?, *by)))
                 .collect::<Option<Vec<_>>>()
             else {
                 continue;
             };
             let off = terms.iter().map(|(at, by)| by * numbers[*at]).sum::<f64>() - expectation.value;
-            let held = self.rational_held && expectation.terms.iter().any(|(number, _)| number.is_rational());
+            let held = self.rational_held
+                && !expectation.known
+                && expectation.terms.iter().any(|(number, _)| number.is_rational());
             let sigma = if held { HELD * expectation.sigma } else { expectation.sigma };
             let weight = 1.0 / (sigma * sigma);
             sum.cost += 0.5 * weight * off * off;
@@ -181,11 +206,11 @@ impl Priors {
     }
 
     /// Where a number stands among those that are free and of which something is expected.
-    fn place(&self, layout: &Layout, number: Number) -> Option<usize> {
+    fn place(&self, layout: &Layout, number: Number, known: bool) -> Option<usize> {
         match number {
             Number::Camera(side, at) => {
                 let lens = if side == Side::Left { layout.left } else { layout.right }?;
-                let told = !(4..9).contains(&at) || lens <= Lens::Brown5 || self.rational_held;
+                let told = known || !(4..9).contains(&at) || lens <= Lens::Brown5 || self.rational_held;
                 (told && at < layout.camera_count(side)).then(|| layout.camera_start(side) + at)
             }
             Number::Shape(k) => layout.shape.then(|| layout.shape_start() + k),

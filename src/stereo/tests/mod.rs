@@ -1,5 +1,6 @@
 //! The calibration as a whole against known truth: recovery, predicted scatter, symmetry, and what must be refused.
 
+mod known_lenses;
 mod models;
 mod partial;
 mod recovery;
@@ -17,7 +18,7 @@ use crate::stereo::select::lens_ladder::Options;
 use crate::stereo::synthetic::World;
 use crate::stereo::volume::Extent;
 
-const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: Some(false) };
+const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: Some(false), known: None };
 
 fn judged(corners: &Corners, options: &Options, tolerance_mm: f64) -> Judged {
     let found = calibrate(corners, options).unwrap();

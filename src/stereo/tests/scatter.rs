@@ -165,7 +165,7 @@ fn monte_carlo_runs() -> u64 {
 fn predicted_sigmas_are_the_true_ones() {
     let runs = monte_carlo_runs();
     for shape in [false, true] {
-        let spread = monte_carlo(runs, &Options { lens: Some(Lens::Brown4), shape: Some(shape) });
+        let spread = monte_carlo(runs, &Options { lens: Some(Lens::Brown4), shape: Some(shape), known: None });
         let Spread { names, ratios, inside, lengths, lengths_by_calibration } = &spread;
         // So many runs know a standard deviation to 1 / sqrt(2 runs); the numbers are correlated, so their median is hardly better.
         let known_to = 1.0 / (2.0 * runs as f64).sqrt();

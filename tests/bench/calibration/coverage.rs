@@ -132,7 +132,7 @@ fn lengths(found: &Calibration, seed: u64) -> Tally {
 }
 
 pub fn run() {
-    let told = |lens, shape| Options { lens, shape };
+    let told = |lens, shape| Options { lens, shape, known: None };
     let cases = [
         Case { name: "model true (brown4, flat)", bow_um: 0.0, options: told(Some(Lens::Brown4), Some(false)) },
         Case { name: "shape free", bow_um: 50.0, options: told(Some(Lens::Brown4), Some(true)) },

@@ -21,7 +21,7 @@ pub fn run() {
     let world = World::new(settings, None).expect("the preset is possible");
     let corners = noisy(world.check_corners());
     let truth = world.rig.baseline_mm();
-    let forced = Options { lens: Some(Lens::Brown4), shape: Some(false) };
+    let forced = Options { lens: Some(Lens::Brown4), shape: Some(false), known: None };
     let found = calibrate(&corners, &forced).expect("a calibration");
 
     let (solve, solved) = median_s(|| found.problem().solve(&found.layout).expect("a solution"));

@@ -35,7 +35,7 @@ pub fn knowledge(world: &World) -> Knowledge {
 }
 
 fn known_from(world: &World, corners: &Corners) -> Option<Knowledge> {
-    let forced = Options { lens: Some(Lens::Brown4), shape: Some(false) };
+    let forced = Options { lens: Some(Lens::Brown4), shape: Some(false), known: None };
     let found = calibrate(corners, &forced).ok()?;
     Some(Knowledge {
         rig: found.rig().clone(),

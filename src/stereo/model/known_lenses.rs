@@ -1,0 +1,220 @@
+//! Lenses that are known before the pictures: those of another calibration, with the covariance that it states or with a tolerance.
+//!
+//! In: a camera of each side whose lens is known, and their joint covariance where the calibration has one. Out: the numbers that are known,
+//! what they are expected to be, and how surely. Goes wrong: a covariance that is singular; then the cameras' own tolerance is taken.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::imaging::{Corners, Side};
+use crate::stereo::model::parameters::{CAMERA_NAMES, Layout};
+use crate::stereo::{Camera, Error, Lens, Rig};
+
+/// What a lens is known to where its calibration states no covariance, as a share of the focal length, anywhere in the picture: careful
+/// calibrations of one camera repeat to about this.
+pub const TOLERANCE: f64 = 5e-4;
+
+/// Cameras whose lenses are known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnownLenses {
+    cameras: [Option<Camera>; 2],
+    /// Of the known numbers, in the order of [`KnownLenses::numbers`].
+    covariance: DMatrix<f64>,
+    /// Whether the calibration states it.
+    stated: [bool; 2],
+    /// How far pairs scattered about the rig of that calibration beyond their corners' noise, as a variance; one where it does not say.
+    pub pair_excess: f64,
+}
+
+impl KnownLenses {
+    /// The lenses of these sides of a rig, with its covariance where it has one of them.
+    pub fn of_rig(rig: &Rig, sides: &[Side]) -> KnownLenses {
+        let camera = |side: Side| sides.contains(&side).then(|| *rig.camera(side));
+        let mut known = KnownLenses::of_cameras(Side::BOTH.map(camera));
+        let Some(stated) = &rig.covariance else { return known };
+        let numbers = known.numbers();
+        let places: Option<Vec<usize>> = numbers
+            .iter()
+            .map(|(side, at)| {
+                let name = format!("{}.{}", side.name(), CAMERA_NAMES[*at]);
+                stated.order.iter().position(|stated| *stated == name)
+            })
+            .collect();
+        let Some(places) = places else { return known };
+        let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| stated.matrix[(places[i], places[j])]);
+        if root(&covariance).is_some() {
+            known.covariance = covariance;
+            known.stated = Side::BOTH.map(|side| sides.contains(&side));
+        }
+        known
+    }
+
+    /// Cameras without a covariance: each number is known to what moves a point by [`TOLERANCE`] at the corner of the picture.
+    pub fn of_cameras(cameras: [Option<Camera>; 2]) -> KnownLenses {
+        let mut known = KnownLenses { cameras, covariance: DMatrix::zeros(0, 0), stated: [false; 2], pair_excess: 1.0 };
+        let sigmas = known.numbers().into_iter().map(|(side, at)| {
+            let camera = known.cameras[side as usize].as_ref();
+            camera.map_or(1.0, |camera| tolerance(camera, at))
+        });
+        let variances: Vec<f64> = sigmas.map(|sigma| sigma * sigma).collect();
+        known.covariance = DMatrix::from_diagonal(&DVector::from_vec(variances));
+        known
+    }
+
+    /// Both sides' together; where both know a side, the other's.
+    pub fn and(self, other: KnownLenses) -> KnownLenses {
+        let takes_other = |side: Side| other.camera(side).is_some();
+        let cameras = Side::BOTH.map(|side| if takes_other(side) { other.camera(side) } else { self.camera(side) });
+        let stated = Side::BOTH.map(|side| if takes_other(side) { &other } else { &self }.stated[side as usize]);
+        let mut both = KnownLenses { stated, ..KnownLenses::of_cameras(cameras.map(|camera| camera.copied())) };
+        let numbers = both.numbers();
+        let place = |of: &KnownLenses, number: &(Side, usize)| of.numbers().iter().position(|n| n == number);
+        let from = |number: &(Side, usize)| if takes_other(number.0) { &other } else { &self };
+        for (i, a) in numbers.iter().enumerate() {
+            for (j, b) in numbers.iter().enumerate() {
+                // What two calibrations say is independent.
+                let same = std::ptr::eq(from(a), from(b));
+                let at = place(from(a), a).zip(place(from(a), b)).filter(|_| same);
+                both.covariance[(i, j)] = at.map_or(0.0, |at| from(a).covariance[at]);
+            }
+        }
+        both.pair_excess = self.pair_excess.max(other.pair_excess);
+        both
+    }
+
+    /// The camera of a side, where its lens is known.
+    pub fn camera(&self, side: Side) -> Option<&Camera> {
+        self.cameras[side as usize].as_ref()
+    }
+
+    /// Pictures of another size than the lens's were binned, cut or taken by another camera.
+    pub fn check_size(&self, corners: &Corners) -> Result<(), Error> {
+        let sizes = [corners.left_size, corners.right_size];
+        Side::BOTH.into_iter().try_for_each(|side| {
+            self.camera(side).map_or(Ok(()), |camera| camera.check_picture_size(side, sizes[side as usize]))
+        })
+    }
+
+    /// True where both are.
+    pub fn both(&self) -> bool {
+        self.cameras.iter().all(Option::is_some)
+    }
+
+    /// Whether the calibration of a side states a covariance.
+    pub fn states_covariance(&self, side: Side) -> bool {
+        self.stated[side as usize]
+    }
+
+    /// The known numbers: side, and place in [`CAMERA_NAMES`].
+    pub fn numbers(&self) -> Vec<(Side, usize)> {
+        let of = |side: Side| {
+            let count = self.camera(side).map_or(0, |camera| 4 + camera.lens.free_count());
+            (0..count).map(move |at| (side, at))
+        };
+        Side::BOTH.into_iter().flat_map(of).collect()
+    }
+
+    /// Their values.
+    pub fn values(&self) -> DVector<f64> {
+        let value = |(side, at): (Side, usize)| self.camera(side).map_or(0.0, |camera| number(camera, at));
+        DVector::from_iterator(self.covariance.nrows(), self.numbers().into_iter().map(value))
+    }
+
+    /// Inverse of a square root of their covariance: what it makes of the deviations is independent with unit variance.
+    pub fn whitener(&self) -> DMatrix<f64> {
+        root(&self.covariance).unwrap_or_else(|| {
+            DMatrix::from_diagonal(&self.covariance.diagonal().map(|variance| 1.0 / variance.sqrt()))
+        })
+    }
+
+    /// Their covariance.
+    pub fn covariance(&self) -> &DMatrix<f64> {
+        &self.covariance
+    }
+
+    /// How the known numbers change where a side's focal length changes by its whole. `None` where it is not known.
+    pub fn focal_direction(&self, side: Side) -> Option<DVector<f64>> {
+        let camera = self.camera(side)?;
+        let numbers = self.numbers();
+        let of = |(of, at): (Side, usize)| if of == side && at < 2 { number(camera, at) } else { 0.0 };
+        Some(DVector::from_iterator(numbers.len(), numbers.into_iter().map(of)))
+    }
+
+    /// The same cameras, known so badly that pictures decide: a search that starts there does not run away where they say nothing.
+    pub fn loosened(&self) -> KnownLenses {
+        /// To a tenth of the focal length anywhere in the picture.
+        const LOOSE: f64 = 0.1 / TOLERANCE;
+        let loose = KnownLenses::of_cameras(self.cameras);
+        KnownLenses { covariance: loose.covariance * (LOOSE * LOOSE), ..loose }
+    }
+
+    /// What is free of a rig: the lenses that are known as they are, another one as it is asked for.
+    pub fn layout(&self, lens: Lens, shape: bool) -> Layout {
+        let of = |side: Side| self.camera(side).map_or(lens, |camera| camera.lens);
+        Layout { left: Some(of(Side::Left)), right: Some(of(Side::Right)), ..Layout::rig(lens, shape) }
+    }
+
+    /// The same with the lenses of left and right exchanged.
+    pub fn exchanged(&self) -> KnownLenses {
+        let [left, right] = self.cameras;
+        let swapped = KnownLenses::of_cameras([right, left]);
+        let own = self.numbers();
+        let places: Vec<Option<usize>> =
+            swapped.numbers().iter().map(|(side, at)| own.iter().position(|n| *n == (side.other(), *at))).collect();
+        let n = places.len();
+        let covariance = DMatrix::from_fn(n, n, |i, j| places[i].zip(places[j]).map_or(0.0, |at| self.covariance[at]));
+        KnownLenses { covariance, stated: [self.stated[1], self.stated[0]], pair_excess: self.pair_excess, ..swapped }
+    }
+
+    /// The same with the focal length of these sides open: known to a tenth, in one factor a side.
+    pub fn with_open_focus(&self, sides: &[Side]) -> KnownLenses {
+        /// By how much focusing changes a focal length at most, as a share.
+        const FOCUSING: f64 = 0.1;
+        let mut open = self.clone();
+        for focus in sides.iter().filter_map(|side| self.focal_direction(*side)) {
+            open.covariance += FOCUSING * FOCUSING * &focus * focus.transpose();
+        }
+        open
+    }
+
+    /// The same without what is known of a side's lens.
+    pub fn without(&self, side: Side) -> KnownLenses {
+        let keeps = |of: Side| of != side;
+        let numbers = self.numbers();
+        let kept: Vec<usize> = (0..numbers.len()).filter(|i| keeps(numbers[*i].0)).collect();
+        KnownLenses {
+            cameras: Side::BOTH.map(|of| self.cameras[of as usize].filter(|_| keeps(of))),
+            covariance: DMatrix::from_fn(kept.len(), kept.len(), |i, j| self.covariance[(kept[i], kept[j])]),
+            stated: Side::BOTH.map(|of| keeps(of) && self.stated[of as usize]),
+            pair_excess: self.pair_excess,
+        }
+    }
+}
+
+fn number(camera: &Camera, at: usize) -> f64 {
+    let Camera { fx, fy, cx, cy, distortion, .. } = camera;
+    [*fx, *fy, *cx, *cy].into_iter().chain(*distortion).nth(at).unwrap_or(0.0)
+}
+
+/// What moves a point at the corner of the picture by [`TOLERANCE`] times the focal length.
+fn tolerance(camera: &Camera, at: usize) -> f64 {
+    let corner = (0.5 * f64::from(camera.width) / camera.fx).hypot(0.5 * f64::from(camera.height) / camera.fy);
+    // k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tauX, tauY: powers of the corner's distance from the middle.
+    const POWERS: [i32; 14] = [3, 5, 2, 2, 7, 3, 5, 7, 2, 4, 2, 4, 2, 2];
+    match at {
+        0..4 => TOLERANCE * (camera.fx * camera.fy).sqrt(),
+        _ => TOLERANCE / corner.powi(POWERS[(at - 4).min(13)]),
+    }
+}
+
+/// Inverse of the lower Cholesky factor of a covariance with rows of different units.
+fn root(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = covariance.diagonal().map(|v| 1.0 / v.sqrt());
+    if !scale.iter().all(|s| s.is_finite()) {
+        return None;
+    }
+    let n = covariance.nrows();
+    let unit = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] * scale[i] * scale[j]);
+    let lower = unit.cholesky()?.l();
+    let inverse = lower.solve_lower_triangular(&DMatrix::identity(n, n))?;
+    Some(inverse * DMatrix::from_diagonal(&scale))
+}

@@ -1,0 +1,89 @@
+//! Lenses from another calibration: three pairs are enough for the rig, and lenses that are not those of the pictures are found and named.
+
+use super::*;
+use crate::stereo::model::known_lenses::KnownLenses;
+use crate::stereo::pairs::Cause;
+use crate::stereo::select::known_lenses::LensCheck;
+use crate::stereo::{Error, Side};
+
+/// Another day's pictures of the same rig.
+fn known(seed: u64) -> KnownLenses {
+    let calibration = calibrate(&World::new(12, seed).corners(seed), &BROWN4).unwrap();
+    KnownLenses::of_rig(calibration.rig(), &Side::BOTH)
+}
+
+fn knowing(known: KnownLenses) -> Options {
+    Options { known: Some(known), ..Options::default() }
+}
+
+fn check(world: &World, known: KnownLenses) -> LensCheck {
+    calibrate(&world.corners(71), &knowing(known)).unwrap().lens_check.unwrap()
+}
+
+#[test]
+fn three_pairs_find_the_rig_where_the_lenses_are_known() {
+    for seed in 80..84 {
+        let world = World::new(3, seed);
+        let found = calibrate(&world.corners(seed), &knowing(known(seed + 100))).unwrap();
+        let check = found.lens_check.as_ref().unwrap();
+        assert!(!check.contradicts() && check.causes.is_empty(), "{seed}: {check:?}");
+        let covariance = found.rig().covariance.as_ref().unwrap();
+        let at = covariance.order.iter().position(|name| name == "right_from_left.tx_mm").unwrap();
+        let off = (found.rig().right_from_left.translation.x - world.rig.right_from_left.translation.x).abs();
+        let sigma = covariance.matrix[(at, at)].sqrt();
+        assert!(off < 4.0 * sigma && sigma < 1.0, "{seed}: {off} +- {sigma} mm");
+    }
+}
+
+#[test]
+fn a_focus_that_changed_is_named_with_its_size() {
+    for (seed, share) in [(85, 1.004), (86, 0.99), (87, 1.05)] {
+        let mut world = World::new(5, seed);
+        world.rig.right.fx *= share;
+        world.rig.right.fy *= share;
+        let check = check(&world, known(seed + 100));
+        assert_eq!(check.causes, [Cause::Focus], "{share}: {}", check.statement);
+        let percent = check.focus_change.unwrap();
+        assert!((percent - 100.0 * (share - 1.0)).abs() < 0.25, "{share}: {percent} %");
+        assert!(check.statement.contains("the right lens was focused otherwise"), "{}", check.statement);
+    }
+}
+
+#[test]
+fn exchanged_lenses_and_another_camera_are_told_from_a_focus() {
+    let mut world = World::new(5, 88);
+    assert_eq!(check(&world, known(188).exchanged()).causes, [Cause::Exchanged]);
+    world.rig.left.cx += 12.0;
+    world.rig.left.distortion[0] += 0.04;
+    let other = check(&world, known(188));
+    assert_eq!(other.causes, [Cause::OtherCamera], "{}", other.statement);
+    assert!(other.statement.contains("the left camera"), "{}", other.statement);
+}
+
+#[test]
+fn a_lens_without_covariance_is_known_to_a_tolerance_and_one_side_may_be_open() {
+    let world = World::new(8, 89);
+    let camera = world.rig.left;
+    let one_side = KnownLenses::of_cameras([Some(camera), None]);
+    let found = calibrate(&world.corners(72), &knowing(one_side)).unwrap();
+    assert!(!found.lens_check.as_ref().unwrap().contradicts());
+    assert_eq!(found.layout.left, Some(camera.lens));
+    assert!((found.rig().left.fx / camera.fx - 1.0).abs() < 1e-3);
+    // The size of the pictures belongs to the lens.
+    let mut corners = world.corners(72);
+    corners.left_size.0 += 1;
+    let known = KnownLenses::of_cameras([Some(camera), None]);
+    assert!(matches!(known.check_size(&corners), Err(Error::PictureSize { side: Side::Left, .. })));
+}
+
+#[test]
+fn of_two_calibrations_each_gives_its_side() {
+    let (first, second) = (known(91), known(92));
+    let both = first.clone().and(second.clone().without(Side::Left));
+    assert_eq!(both.camera(Side::Left), first.camera(Side::Left));
+    assert_eq!(both.camera(Side::Right), second.camera(Side::Right));
+    let left = first.numbers().iter().filter(|(side, _)| *side == Side::Left).count();
+    assert_eq!(both.covariance()[(0, 1)], first.covariance()[(0, 1)]);
+    assert_eq!(both.covariance()[(left, left + 1)], second.covariance()[(left, left + 1)]);
+    assert_eq!(both.covariance()[(0, left)], 0.0);
+}
