@@ -66,6 +66,9 @@ pub struct CameraCheck {
     /// camera; only the rig is looked for, and three pairs are enough
     #[arg(long, value_name = "FILE[,SIDE]")]
     pub intrinsics: Vec<LensFile>,
+    /// Whether this calibration still holds, by two or more new pairs: what changed, by how much a length, and what the pairs would have shown
+    #[arg(long, value_name = "CALIBRATION", conflicts_with_all = ["lens", "intrinsics", "since", "volume", "board_shape", "board_uncertainty_mm", "check_images", "draw"])]
+    pub against: Option<Utf8PathBuf>,
     /// Only the pairs from this one on, by name: the rig as it is since then
     #[arg(long, value_name = "PAIR")]
     pub since: Option<String>,

@@ -34,6 +34,9 @@ use crate::{progress, report};
 
 /// Runs the command.
 pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
+    if let Some(against) = &args.against {
+        return super::recheck::run(args, against, config, run);
+    }
     let board = board(args, config)?;
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
     let mut problems = Vec::new();

@@ -8,6 +8,7 @@ pub mod export;
 pub mod identify;
 pub mod measure;
 pub mod plan;
+mod recheck;
 pub mod rectify;
 pub mod report;
 pub mod robot;

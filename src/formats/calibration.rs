@@ -66,6 +66,8 @@ pub struct Calibrated {
     pub noise: Option<Noise>,
     /// How far pairs scattered about the rig beyond that, as a variance.
     pub pair_excess: Option<f64>,
+    /// How many pairs with poses of their own made the rig.
+    pub pairs: Option<usize>,
     /// Nearest and farthest corner of a board, along the left camera's axis, mm.
     pub depths_mm: Option<[f64; 2]>,
     /// The volume that the verdict was for.
@@ -76,6 +78,22 @@ pub struct Calibrated {
     pub unconfirmed: Vec<String>,
 }
 
+impl Calibrated {
+    /// A rig of which nothing else is known.
+    fn of_rig(rig: Rig) -> Calibrated {
+        Calibrated {
+            rig,
+            noise: None,
+            pair_excess: None,
+            pairs: None,
+            depths_mm: None,
+            volume: None,
+            board: None,
+            unconfirmed: Vec::new(),
+        }
+    }
+}
+
 /// `factor` times the covariance that the refinement gives a corner, plus the square of `added_px` on both axes.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct NoiseRecord {
@@ -84,6 +102,9 @@ struct NoiseRecord {
     /// How far pairs scattered about the rig beyond that, as a variance; one where they did not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pair_excess: Option<f64>,
+    /// How many pairs with poses of their own say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pairs: Option<usize>,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -185,8 +206,12 @@ impl CalibrationFile {
         self.volume = Some(volume.clone());
         self.unconfirmed = calibration.standing.unconfirmed.clone();
         self.changes_since = calibration.since_moment.iter().map(|step| step.as_slice().to_vec()).collect();
-        self.corner_noise =
-            Some(NoiseRecord { factor: noise.factor, added_px: noise.added_px, pair_excess: Some(pair_excess) });
+        self.corner_noise = Some(NoiseRecord {
+            factor: noise.factor,
+            added_px: noise.added_px,
+            pair_excess: Some(pair_excess),
+            pairs: Some(calibration.pair_scatter.groups),
+        });
         self.boards = Some(BoardsRecord { nearest_mm, farthest_mm });
         self
     }
@@ -292,21 +317,22 @@ pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
     const WHAT: &str = "calibration file";
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
     let text = files::read_text(path, WHAT, Some(hint))?;
-    let (rig, noise, pair_excess, depths_mm, volume, board, unconfirmed) = match export::read(path, &text) {
-        Some(rig) => (rig, None, None, None, None, None, Vec::new()),
-        None => {
-            let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
-            let pair_excess = file.corner_noise.and_then(|n| n.pair_excess).filter(|e| *e >= 1.0);
-            let (rig, board) = (file.rig(), file.board());
-            (rig, file.noise(), pair_excess, file.depths_mm(), file.volume, board, file.unconfirmed)
-        }
-    };
-    let rig = rig.map_err(|message| files::Error::Format {
-        message,
-        place: Place { path: path.to_owned(), line: None },
-        hint: None,
-    })?;
-    Ok(Calibrated { rig, noise, pair_excess, depths_mm, volume, board, unconfirmed })
+    let refused =
+        |message| files::Error::Format { message, place: Place { path: path.to_owned(), line: None }, hint: None };
+    if let Some(rig) = export::read(path, &text) {
+        return Ok(Calibrated::of_rig(rig.map_err(refused)?));
+    }
+    let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
+    Ok(Calibrated {
+        rig: file.rig().map_err(refused)?,
+        noise: file.noise(),
+        pair_excess: file.corner_noise.and_then(|n| n.pair_excess).filter(|e| *e >= 1.0),
+        pairs: file.corner_noise.and_then(|n| n.pairs),
+        depths_mm: file.depths_mm(),
+        board: file.board(),
+        volume: file.volume,
+        unconfirmed: file.unconfirmed,
+    })
 }
 
 #[cfg(test)]

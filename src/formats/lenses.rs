@@ -64,6 +64,8 @@ fn read_one(file: &LensFile) -> Result<KnownLenses> {
     })?;
     let sides = side.map_or(Side::BOTH.to_vec(), |side| vec![side]);
     let mut known = KnownLenses::of_rig(&read.rig, &sides);
+    known.pairs = read.pairs;
+    known.noise = read.noise;
     known.pair_excess = read.pair_excess.unwrap_or(1.0);
     Ok(known)
 }

@@ -9,6 +9,7 @@ pub mod export;
 pub mod lenses;
 pub mod measure;
 pub mod plan;
+pub mod recheck;
 pub mod rectified;
 pub mod robots;
 pub mod targets;

@@ -9,6 +9,7 @@ pub mod identify;
 pub mod measure;
 pub mod page;
 pub mod plan;
+pub mod recheck;
 pub mod rectify;
 pub mod rig;
 pub mod robot;

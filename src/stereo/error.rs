@@ -96,6 +96,9 @@ pub enum Error {
         /// Poses in the list.
         poses: usize,
     },
+    /// A calibration without a covariance, which says nothing of how far its rig is known.
+    #[error("the calibration has no covariance of its rig: a change is not told from what was not known before")]
+    NoCovariance,
     /// The rig is not the one that was calibrated, or the target not the one described.
     #[error("{statement}")]
     RigChanged {
@@ -188,6 +191,7 @@ impl Explain for Error {
             Error::TooFewPairs { .. }
             | Error::NoSuchPair { .. }
             | Error::PictureSize { .. }
+            | Error::NoCovariance
             | Error::LensNotExportable { .. } => Status::BadInput,
             _ => Status::Undetermined,
         }
@@ -216,6 +220,7 @@ impl Explain for Error {
                 }
                 Error::NotConverged { .. } => "`--lens radial2` has fewer unknowns; add pairs with the board tilted",
                 Error::RigChanged { hint, .. } => hint,
+                Error::NoCovariance => "`stereocal camera-check IMAGES` writes a calibration.json with it",
                 Error::NothingMeasured { .. } => {
                     "`--squares CxR` and `--square-mm MM` describe the target on the robot"
                 }

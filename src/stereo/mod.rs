@@ -3,7 +3,8 @@
 //! Rooms in the order of the data; imports point up this list only: `model` and `data` say what is looked for and what was seen,
 //! `solve` finds the most likely rig, `init` where to start, `pairs` which pairs belong to it, `select` which lens;
 //! `calibrate()` is all of that in turn. `volume` is where the boards were, `findings` what happened while they were photographed, `judge`
-//! measures boards with the rig and says what it is worth, `triangulate` and `board_pose` measure points and a board's pose with it.
+//! measures boards with the rig and says what it is worth, `triangulate` and `board_pose` measure points and a board's pose with it, `recheck`
+//! says later whether it still stands.
 
 mod error;
 
@@ -30,6 +31,8 @@ pub mod findings;
 pub mod judge;
 
 pub mod board_pose;
+
+pub mod recheck;
 
 #[cfg(test)]
 pub(crate) mod synthetic;

@@ -21,6 +21,7 @@ mod tables;
 mod worlds;
 
 mod compensate;
+mod daily;
 mod export_robot;
 mod faults;
 mod folders;

@@ -6,6 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::{Corners, Side};
+use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::model::parameters::{CAMERA_NAMES, Layout};
 use crate::stereo::{Camera, Error, Lens, Rig};
 
@@ -23,6 +24,10 @@ pub struct KnownLenses {
     stated: [bool; 2],
     /// How far pairs scattered about the rig of that calibration beyond their corners' noise, as a variance; one where it does not say.
     pub pair_excess: f64,
+    /// How many pairs with poses of their own say so; `None` where it does not say.
+    pub pairs: Option<usize>,
+    /// How corners scattered there, where it says so.
+    pub noise: Option<Noise>,
 }
 
 impl KnownLenses {
@@ -50,7 +55,14 @@ impl KnownLenses {
 
     /// Cameras without a covariance: each number is known to what moves a point by [`TOLERANCE`] at the corner of the picture.
     pub fn of_cameras(cameras: [Option<Camera>; 2]) -> KnownLenses {
-        let mut known = KnownLenses { cameras, covariance: DMatrix::zeros(0, 0), stated: [false; 2], pair_excess: 1.0 };
+        let mut known = KnownLenses {
+            cameras,
+            covariance: DMatrix::zeros(0, 0),
+            stated: [false; 2],
+            pair_excess: 1.0,
+            pairs: None,
+            noise: None,
+        };
         let sigmas = known.numbers().into_iter().map(|(side, at)| {
             let camera = known.cameras[side as usize].as_ref();
             camera.map_or(1.0, |camera| tolerance(camera, at))
@@ -78,6 +90,8 @@ impl KnownLenses {
             }
         }
         both.pair_excess = self.pair_excess.max(other.pair_excess);
+        both.pairs = other.pairs.or(self.pairs);
+        both.noise = other.noise.or(self.noise);
         both
     }
 
@@ -162,18 +176,14 @@ impl KnownLenses {
             swapped.numbers().iter().map(|(side, at)| own.iter().position(|n| *n == (side.other(), *at))).collect();
         let n = places.len();
         let covariance = DMatrix::from_fn(n, n, |i, j| places[i].zip(places[j]).map_or(0.0, |at| self.covariance[at]));
-        KnownLenses { covariance, stated: [self.stated[1], self.stated[0]], pair_excess: self.pair_excess, ..swapped }
-    }
-
-    /// The same with the focal length of these sides open: known to a tenth, in one factor a side.
-    pub fn with_open_focus(&self, sides: &[Side]) -> KnownLenses {
-        /// By how much focusing changes a focal length at most, as a share.
-        const FOCUSING: f64 = 0.1;
-        let mut open = self.clone();
-        for focus in sides.iter().filter_map(|side| self.focal_direction(*side)) {
-            open.covariance += FOCUSING * FOCUSING * &focus * focus.transpose();
+        KnownLenses {
+            covariance,
+            stated: [self.stated[1], self.stated[0]],
+            pair_excess: self.pair_excess,
+            pairs: self.pairs,
+            noise: self.noise,
+            ..swapped
         }
-        open
     }
 
     /// The same without what is known of a side's lens.
@@ -186,6 +196,8 @@ impl KnownLenses {
             covariance: DMatrix::from_fn(kept.len(), kept.len(), |i, j| self.covariance[(kept[i], kept[j])]),
             stated: Side::BOTH.map(|of| keeps(of) && self.stated[of as usize]),
             pair_excess: self.pair_excess,
+            pairs: self.pairs,
+            noise: self.noise,
         }
     }
 }

@@ -2,27 +2,27 @@
 //!
 //! In: the pairs at their start, and lenses from another calibration. Out: the layout with what is expected, and the test. Method: the
 //! lenses are expectations with their covariance; the board is bent where the evidence for that is larger. The test compares the known numbers
-//! with those that the pictures give by themselves: their difference against both covariances (Hotelling), the pictures' one
-//! enlarged by what pairs scatter. A focus alone is asked for, too: it is what changes, and a test of one number sees smaller changes of it. Causes are other lenses that might be known instead: another focus, left and right exchanged, another
+//! with those that the pictures give by themselves: their difference against both covariances, the pictures' one enlarged by what pairs scatter
+//! ([`crate::stereo::solve::difference`]). A focus alone is asked for, too: it is what changes, and a test of one number sees smaller changes of it. Causes are other lenses that might be known instead: another focus, left and right exchanged, another
 //! camera. One is named where what it leaves is chance, and beside it those that do nearly as well.
 //! Goes wrong: pictures that say little of a lens; then the test says how large a change of focus it would have seen.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::{Board, Side};
-use crate::statistics::chi_square_quantile;
 use crate::stereo::model::known_lenses::KnownLenses;
 use crate::stereo::model::parameters::Layout;
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::lens_ladder::{Choice, Options, SIMPLEST};
 use crate::stereo::select::model_comparison::{Trial, gain_of_terms};
 use crate::stereo::select::stated_uncertainty;
+use crate::stereo::solve::difference::Difference;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::{Error, Rig};
 
-/// Quantile of the normal distribution beyond which pictures contradict a lens: one set of pairs in a thousand by chance, in the four tests
-/// together (all numbers, the focus of either side and of both).
-const CONTRADICTED: f64 = 3.48;
+/// Chance that one of the four tests (all numbers, the focus of either side and of both) contradicts a lens that is right: one set of pairs in a
+/// thousand is contradicted by one of them.
+const CHANCE: f64 = 2.5e-4;
 
 /// Quantile for the share of changes that the test sees at the size that is stated: nineteen in twenty.
 const SEEN: f64 = 1.645;
@@ -105,33 +105,35 @@ fn is_bent(problem: &Problem, board: &Board, bent: &Layout, flat: &Layout) -> Re
 pub fn check(start: &Problem, known: &KnownLenses, layout: &Layout, board: &Board) -> Option<LensCheck> {
     let own = Problem { priors: start.priors.knowing(&known.loosened()), ..start_of(start, known) };
     let solved = own.solve(layout).ok()?;
-    let scatter = stated_uncertainty::excess_scatter(&solved, layout, board);
+    let by_corners = solved.neighbours(board).inflation() * solved.loss_factor;
+    let scatter = stated_uncertainty::excess_scatter(&solved, layout, board).max(known.pair_excess);
+    let scatter = scatter * solved.noise_of(known.noise.as_ref());
     let trial = Trial::new(&solved.problem, *layout)?;
     let places: Vec<usize> = known.numbers().iter().map(|(side, at)| layout.camera_start(*side) + at).collect();
     let all = layout.numbers(&trial.values.shared);
     let n = places.len();
     let pictures = Pictures {
         values: DVector::from_iterator(n, places.iter().map(|at| all[*at])),
-        covariance: DMatrix::from_fn(n, n, |i, j| trial.covariance[(places[i], places[j])])
-            * scatter.max(known.pair_excess),
+        covariance: DMatrix::from_fn(n, n, |i, j| scatter * trial.covariance[(places[i], places[j])]),
+        pairs: known.pairs.unwrap_or(0).max(solved.problem.views.len()),
+        scatter: scatter / by_corners,
         corners: solved.problem.views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count(),
     };
-    let (chi_square, limit) = pictures.contradiction(known)?;
-    let causes = if chi_square > limit { causes(known, &pictures) } else { Vec::new() };
-    let focus_seen = Side::BOTH.map(|side| pictures.focus_seen(known, side));
-    let statement = statement(known, &pictures, &causes);
+    let difference = pictures.difference(known)?;
+    let (chi_square, limit) = contradiction(known, &difference);
+    let causes = if chi_square > limit { causes(known, &pictures, &difference) } else { Vec::new() };
+    let seen = |side| Some((difference.level(CHANCE) + SEEN) * difference.along(&known.focal_direction(side)?)?.1);
     let focused = causes.first().filter(|likeliest| likeliest.cause == Cause::Focus);
     let focus_change = focused.and_then(|likeliest| Some(pictures.focus_change(known, *likeliest.sides.first()?)));
-    let rig_without = trial.values.shared.rig;
     Some(LensCheck {
         chi_square,
         limit,
         numbers: n,
+        statement: statement(known, &pictures, &causes),
         causes: causes.into_iter().map(|explanation| explanation.cause).collect(),
-        statement,
         focus_change,
-        focus_seen,
-        rig_without,
+        focus_seen: Side::BOTH.map(seen),
+        rig_without: trial.values.shared.rig,
     })
 }
 
@@ -139,25 +141,18 @@ pub fn check(start: &Problem, known: &KnownLenses, layout: &Layout, board: &Boar
 struct Pictures {
     values: DVector<f64>,
     covariance: DMatrix<f64>,
+    /// How many pairs say how the numbers scatter.
+    pairs: usize,
+    /// Variance over that by the corners' noise.
+    scatter: f64,
     corners: usize,
 }
 
 impl Pictures {
-    /// Both covariances together, those of some of the numbers.
-    fn joint(&self, known: &KnownLenses, numbers: &[usize]) -> Option<Cholesky<f64, Dyn>> {
-        let own = DMatrix::from_fn(numbers.len(), numbers.len(), |i, j| self.covariance[(numbers[i], numbers[j])]);
-        (own + known.covariance()).cholesky()
-    }
-
-    /// Squared difference from lenses that might be known; only the numbers that are known in them count.
-    fn misfit(&self, known: &KnownLenses) -> Option<f64> {
-        self.misfit_of(known, &(0..self.values.len()).collect::<Vec<_>>())
-    }
-
-    fn misfit_of(&self, known: &KnownLenses, numbers: &[usize]) -> Option<f64> {
-        let own = DVector::from_iterator(numbers.len(), numbers.iter().map(|i| self.values[*i]));
-        let off = own - known.values();
-        Some(off.dot(&self.joint(known, numbers)?.solve(&off)))
+    /// Their difference from lenses that might be known.
+    fn difference(&self, known: &KnownLenses) -> Option<Difference> {
+        let joint = &self.covariance + known.covariance();
+        Difference::new(&self.values - known.values(), &joint, self.pairs, self.scatter)
     }
 
     /// By how much a side's focal length differs from the known one, %: the mean of fx and fy.
@@ -166,24 +161,21 @@ impl Pictures {
         let focal = (0..numbers.len()).filter(|i| numbers[*i].0 == side && numbers[*i].1 < 2);
         focal.map(|i| 50.0 * (self.values[i] / values[i] - 1.0)).sum()
     }
+}
 
-    /// The test that comes nearest to its limit, or is farthest beyond: its chi-squared and that limit.
-    fn contradiction(&self, known: &KnownLenses) -> Option<(f64, f64)> {
-        let all = self.misfit(known)?;
-        let focused = subsets(known).into_iter().filter_map(|sides| {
-            let left = self.misfit(&known.with_open_focus(&sides))?;
-            Some((all - left, chi_square_quantile(sides.len() as f64, CONTRADICTED)))
-        });
-        let every = (all, chi_square_quantile(self.values.len() as f64, CONTRADICTED));
-        focused.chain([every]).max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)))
-    }
+/// The test that comes nearest to its limit, or is farthest beyond: its chi-squared and that limit.
+fn contradiction(known: &KnownLenses, difference: &Difference) -> (f64, f64) {
+    let all = difference.chi_square();
+    let focused = subsets(known).into_iter().filter_map(|sides| {
+        let left = difference.left_by(&focal_directions(known, &sides))?;
+        Some((all - left, difference.limit(sides.len(), CHANCE)))
+    });
+    let every = (all, difference.limit(difference.off.len(), CHANCE));
+    focused.fold(every, |a, b| if b.0 / b.1 > a.0 / a.1 { b } else { a })
+}
 
-    /// The change of a focal length, as a share, that nineteen of twenty tests see. `None` where it is not known.
-    fn focus_seen(&self, known: &KnownLenses, side: Side) -> Option<f64> {
-        let focus = known.focal_direction(side)?;
-        let joint = self.joint(known, &(0..self.values.len()).collect::<Vec<_>>())?;
-        Some((CONTRADICTED + SEEN) / focus.dot(&joint.solve(&focus)).sqrt())
-    }
+fn focal_directions(known: &KnownLenses, sides: &[Side]) -> Vec<DVector<f64>> {
+    sides.iter().filter_map(|side| known.focal_direction(*side)).collect()
 }
 
 /// The known sides: each, and both together.
@@ -202,42 +194,37 @@ struct Explanation {
 }
 
 /// The causes that explain the difference and are not told apart, the likeliest first.
-fn causes(known: &KnownLenses, pictures: &Pictures) -> Vec<Explanation> {
-    let subsets = subsets(known);
+fn causes(known: &KnownLenses, pictures: &Pictures, difference: &Difference) -> Vec<Explanation> {
     let numbers = known.numbers();
     let penalty = 0.5 * (pictures.corners.max(2) as f64).ln();
-    let explains = |cause, sides: &[Side], misfit: Option<f64>, left: usize, freed: usize| {
-        let misfit = misfit?;
-        let chance = left == 0 || misfit <= chi_square_quantile(left as f64, CONTRADICTED);
-        let evidence = -0.5 * misfit - penalty * freed as f64;
+    let explains = |cause, sides: &[Side], difference: &Difference, freed: &[DVector<f64>]| {
+        let left = if freed.is_empty() { difference.chi_square() } else { difference.left_by(freed)? };
+        let numbers_left = numbers.len() - freed.len();
+        let chance = numbers_left == 0 || left <= difference.limit(numbers_left, CHANCE);
+        let evidence = difference.log_likelihood(left) - penalty * freed.len() as f64;
         chance.then(|| Explanation { cause, sides: sides.to_vec(), evidence })
     };
-    let focused = subsets.iter().filter_map(|sides| {
-        let misfit = pictures.misfit(&known.with_open_focus(sides));
-        explains(Cause::Focus, sides, misfit, numbers.len() - sides.len(), sides.len())
-    });
-    let replaced = subsets.iter().filter_map(|sides| {
-        let kept: Vec<usize> = (0..numbers.len()).filter(|i| !sides.contains(&numbers[*i].0)).collect();
-        let left = sides.iter().fold(known.clone(), |known, side| known.without(*side));
-        let misfit = if kept.is_empty() { Some(0.0) } else { pictures.misfit_of(&left, &kept) };
-        explains(Cause::OtherCamera, sides, misfit, kept.len(), numbers.len() - kept.len())
-    });
-    let exchanged = known.exchanged();
-    let exchanged = (exchanged.numbers() == numbers)
-        .then(|| explains(Cause::Exchanged, &Side::BOTH, pictures.misfit(&exchanged), numbers.len(), 0))
-        .flatten();
-    let mut all: Vec<Explanation> = focused.chain(replaced).chain(exchanged).collect();
-    let best = all.iter().map(|e| e.evidence).fold(f64::NEG_INFINITY, f64::max);
-    all.retain(|e| best - e.evidence < TOLD_APART);
+    let own = |sides: &[Side]| -> Vec<DVector<f64>> {
+        let of_sides = (0..numbers.len()).filter(|i| sides.contains(&numbers[*i].0));
+        of_sides.map(|at| DVector::from_fn(numbers.len(), |i, _| f64::from(i == at))).collect()
+    };
+    let mut all = Vec::new();
+    for sides in subsets(known) {
+        all.extend(explains(Cause::Focus, &sides, difference, &focal_directions(known, &sides)));
+        all.extend(explains(Cause::OtherCamera, &sides, difference, &own(&sides)));
+    }
+    let exchanged = Some(known.exchanged()).filter(|exchanged| exchanged.numbers() == numbers);
+    let exchanged = exchanged.and_then(|exchanged| pictures.difference(&exchanged));
+    all.extend(exchanged.and_then(|difference| explains(Cause::Exchanged, &Side::BOTH, &difference, &[])));
     all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-    let mut seen: Vec<Cause> = Vec::new();
-    all.retain(|e| {
-        !seen.contains(&e.cause) && {
-            seen.push(e.cause);
-            true
+    let best = all.first().map_or(0.0, |likeliest| likeliest.evidence);
+    let mut likeliest: Vec<Explanation> = Vec::new();
+    for explanation in all.into_iter().filter(|explanation| best - explanation.evidence < TOLD_APART) {
+        if likeliest.iter().all(|named| named.cause != explanation.cause) {
+            likeliest.push(explanation);
         }
-    });
-    all
+    }
+    likeliest
 }
 
 /// What the difference is and what explains it, in words.

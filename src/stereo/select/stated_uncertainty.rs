@@ -139,7 +139,7 @@ fn richer(layout: &Layout, scores: &[LensScore], lenses_known: bool) -> Vec<Layo
 }
 
 /// From one model's shared numbers to those of a richer one, in the coordinates of the covariance.
-fn step(layout: &Layout, from: &Shared, to: &Shared) -> DVector<f64> {
+pub fn step(layout: &Layout, from: &Shared, to: &Shared) -> DVector<f64> {
     let (from_numbers, to_numbers) = (layout.numbers(from), layout.numbers(to));
     let mut step =
         DVector::from_iterator(layout.count(), to_numbers.iter().zip(&from_numbers).map(|(to, from)| to - from));

@@ -162,6 +162,13 @@ impl Solved {
         if known { Ok(uncertainty) } else { Err(Error::Undetermined { focal_sigma: Some(worst), skipped: Vec::new() }) }
     }
 
+    /// Variance of the corners about an earlier calibration over that of these pairs; at least one. A few pairs of a board that is held by hand
+    /// take up much of what pictures of the rig miss it by, and seem to scatter less than they do.
+    pub fn noise_of(&self, earlier: Option<&Noise>) -> f64 {
+        let px = |noise: &Noise| noise.typical_px(&self.problem.views);
+        earlier.map_or(1.0, |earlier| (px(earlier) / px(&self.noise)).powi(2).max(1.0))
+    }
+
     /// The shared values.
     pub fn shared(&self) -> &Shared {
         &self.problem.values.shared

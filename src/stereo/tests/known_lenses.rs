@@ -9,7 +9,9 @@ use crate::stereo::{Error, Side};
 /// Another day's pictures of the same rig.
 fn known(seed: u64) -> KnownLenses {
     let calibration = calibrate(&World::new(12, seed).corners(seed), &BROWN4).unwrap();
-    KnownLenses::of_rig(calibration.rig(), &Side::BOTH)
+    let mut known = KnownLenses::of_rig(calibration.rig(), &Side::BOTH);
+    known.pairs = Some(calibration.pair_scatter.groups);
+    known
 }
 
 fn knowing(known: KnownLenses) -> Options {

@@ -113,15 +113,37 @@ impl VolumeLengths {
             _ => DIRECTIONS.iter().map(|d| Vector3::from(*d).normalize()).collect(),
         };
         let places = places(calibration, extent);
+        VolumeLengths::through(rig, &covariance, volume, &places, &directions, length_mm, sigma_px)
+    }
+
+    /// The same through a volume that a file describes, in the directions of boards with its tilts; corners scatter by one px.
+    pub fn of_volume(rig: &Rig, volume: &Volume, length_mm: f64) -> VolumeLengths {
+        let Some(covariance) = rig.covariance.as_ref().map(RigCovariance::new) else {
+            return VolumeLengths { volume: volume.clone(), length_mm, ..VolumeLengths::default() };
+        };
+        let box_mm = volume.bounding_box_mm(rig);
+        let directions = directions_of_tilts(volume.tilt_deg);
+        VolumeLengths::through(rig, &covariance, volume.clone(), &lattice(box_mm), &directions, length_mm, 1.0)
+    }
+
+    fn through(
+        rig: &Rig,
+        covariance: &RigCovariance,
+        volume: Volume,
+        places: &[Point3<f64>],
+        directions: &[Vector3<f64>],
+        length_mm: f64,
+        sigma_px: f64,
+    ) -> VolumeLengths {
         let of_place = |at: &Point3<f64>, directions: &[Vector3<f64>]| -> Vec<VolumeLength> {
             let length =
-                |direction: &Vector3<f64>| length(rig, &covariance, at, direction * length_mm, sigma_px, &volume);
+                |direction: &Vector3<f64>| length(rig, covariance, at, direction * length_mm, sigma_px, &volume);
             directions.iter().filter_map(length).collect()
         };
         let through = |directions: &[Vector3<f64>]| -> Vec<VolumeLength> {
             places.par_iter().flat_map_iter(|at| of_place(at, directions)).collect()
         };
-        let (lengths, along_sight) = (through(&directions), through(&[Vector3::z()]));
+        let (lengths, along_sight) = (through(directions), through(&[Vector3::z()]));
         VolumeLengths { length_mm, lengths, along_sight, volume }
     }
 
@@ -158,6 +180,19 @@ fn directions_of_boards(calibration: &Calibration) -> Vec<Vector3<f64>> {
     taken.iter().flat_map(|&i| [Vector3::x(), Vector3::y()].map(|axis| poses[i].rotation * axis)).collect()
 }
 
+/// The rows' and the columns' directions of boards with the least and the most of these tilts, deg: about x, then about y.
+fn directions_of_tilts([x_least, x_most, y_least, y_most]: [f64; 4]) -> Vec<Vector3<f64>> {
+    let tilts = [(x_least, y_least), (x_least, y_most), (x_most, y_least), (x_most, y_most)];
+    tilts
+        .into_iter()
+        .flat_map(|(x, y)| {
+            let normal = Vector3::new(y.to_radians().tan(), x.to_radians().tan(), 1.0).normalize();
+            let row = (Vector3::x() - normal * normal.x).normalize();
+            [row, normal.cross(&row)]
+        })
+        .collect()
+}
+
 /// A lattice through the box in the left camera's frame that the boards' corners filled, or that is asked for.
 fn places(calibration: &Calibration, extent: Extent) -> Vec<Point3<f64>> {
     let points = calibration
@@ -171,6 +206,11 @@ fn places(calibration: &Calibration, extent: Extent) -> Vec<Point3<f64>> {
             (low.inf(&p.coords), high.sup(&p.coords))
         }),
     };
+    lattice([low, high])
+}
+
+/// Places through a box, from its lowest to its highest corner.
+fn lattice([low, high]: [Vector3<f64>; 2]) -> Vec<Point3<f64>> {
     let share = |i: usize, of: usize| i as f64 / (of - 1) as f64;
     let mut places = Vec::new();
     for iz in 0..PLACES[2] {

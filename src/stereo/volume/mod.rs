@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 use crate::imaging::Side;
 use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::data::view::View;
+use crate::stereo::model::parameters::Values;
 use crate::stereo::volume::outline::Hull;
 
 /// What a verdict is asked for.
@@ -60,36 +62,48 @@ pub struct Volume {
 }
 
 impl Volume {
+    /// Where boards were, by their poses.
+    pub fn of_boards(values: &Values, views: &[View]) -> Volume {
+        let seen = |side: Side| Hull::of(views.iter().flat_map(|view| view.active(side).map(|o| o.px)));
+        Volume {
+            left_px: seen(Side::Left),
+            right_px: seen(Side::Right),
+            depth_mm: depths_mm(values, views),
+            tilt_deg: tilts_deg(values),
+        }
+    }
+
     /// Where the boards of a calibration were, or what was asked for instead.
     pub fn of(calibration: &Calibration, extent: Extent) -> Volume {
         let Calibration { views, values, .. } = calibration;
         let rig = calibration.rig();
-        let seen = |side: Side| Hull::of(views.iter().flat_map(|view| view.active(side).map(|o| o.px)));
+        let boards = Volume::of_boards(values, views);
         let whole = |side: Side| {
             let camera = rig.camera(side);
             let (right, below) = (f64::from(camera.width) - 1.0, f64::from(camera.height) - 1.0);
             Hull::of([(0.0, 0.0), (right, 0.0), (right, below), (0.0, below)].map(|(x, y)| nalgebra::Point2::new(x, y)))
         };
-        let hull = |side: Side| if extent == Extent::Boards { seen(side) } else { whole(side) };
-        let corners = views.iter().zip(&values.poses).flat_map(|(view, pose)| {
-            view.active(Side::Left).map(move |o| (pose * o.board_point(&values.shared.shape_mm)).z)
-        });
-        let depth_mm = match extent {
-            Extent::Box(sides) => [sides[2], sides[5]],
-            _ => range(corners),
-        };
-        let normals: Vec<Vector3<f64>> = values.poses.iter().map(|pose| pose.rotation * Vector3::z()).collect();
-        let about = |axis: usize| range(normals.iter().map(|n| n[axis].atan2(n.z).to_degrees()));
-        let ([about_x, about_y], [about_x_most, about_y_most]) = {
-            let (x, y) = (about(1), about(0));
-            ([x[0], y[0]], [x[1], y[1]])
-        };
-        Volume {
-            left_px: hull(Side::Left),
-            right_px: hull(Side::Right),
-            depth_mm,
-            tilt_deg: [about_x, about_x_most, about_y, about_y_most],
+        match extent {
+            Extent::Boards => boards,
+            Extent::All => Volume { left_px: whole(Side::Left), right_px: whole(Side::Right), ..boards },
+            Extent::Box(sides) => Volume {
+                left_px: whole(Side::Left),
+                right_px: whole(Side::Right),
+                depth_mm: [sides[2], sides[5]],
+                ..boards
+            },
         }
+    }
+
+    /// The box in the left camera's frame that holds its left outline at its depths, mm: lowest and highest corner.
+    pub fn bounding_box_mm(&self, rig: &Rig) -> [Vector3<f64>; 2] {
+        let rays = self.left_px.corners().iter().filter_map(|px| rig.left.undistort(px));
+        let points = rays.flat_map(|ray| self.depth_mm.map(|z| Vector3::new(ray.x * z, ray.y * z, z)));
+        points
+            .fold((Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)), |(low, high), p| {
+                (low.inf(&p), high.sup(&p))
+            })
+            .into()
     }
 
     /// Whether a point in the left camera's frame lies in it.
@@ -102,6 +116,21 @@ impl Volume {
         let (left, right) = rig.project(at);
         self.left_px.contains(&left) && self.right_px.contains(&right)
     }
+}
+
+/// Nearest and farthest corner of the boards along the left camera's axis, mm.
+fn depths_mm(values: &Values, views: &[View]) -> [f64; 2] {
+    range(views.iter().zip(&values.poses).flat_map(|(view, pose)| {
+        view.active(Side::Left).map(move |o| (pose * o.board_point(&values.shared.shape_mm)).z)
+    }))
+}
+
+/// Tilts of the boards in the left camera's frame, deg: about x the least and the most, about y the same.
+fn tilts_deg(values: &Values) -> [f64; 4] {
+    let normals: Vec<Vector3<f64>> = values.poses.iter().map(|pose| pose.rotation * Vector3::z()).collect();
+    let about = |axis: usize| range(normals.iter().map(|n| n[axis].atan2(n.z).to_degrees()));
+    let ([x_least, x_most], [y_least, y_most]) = (about(1), about(0));
+    [x_least, x_most, y_least, y_most]
 }
 
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {

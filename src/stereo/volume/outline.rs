@@ -33,6 +33,11 @@ impl Hull {
         Hull { points: lower }
     }
 
+    /// Its points in order.
+    pub fn corners(&self) -> &[Point2<f64>] {
+        &self.points
+    }
+
     /// Whether a point lies inside or on the border.
     pub fn contains(&self, at: &Point2<f64>) -> bool {
         let count = self.points.len();

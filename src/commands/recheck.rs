@@ -1,0 +1,76 @@
+//! `stereocal camera-check --against`: whether a calibration still holds, by a few new pairs.
+
+use camino::Utf8Path;
+
+use super::{Outcome, Result};
+use crate::cli::CameraCheck;
+use crate::config::{self, Config};
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::Run;
+use crate::formats::calibration::{self, Calibrated};
+use crate::formats::recheck::{self as formats, Check, HISTORY, RecheckFile, Standing};
+use crate::imaging::input::cache::Cache;
+use crate::imaging::input::corners_csv;
+use crate::imaging::{Corners, Wanted, find_corners};
+use crate::stereo::recheck::{self, Before, FEWEST_PAIRS};
+use crate::{progress, report};
+
+/// Runs the command.
+pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
+    let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
+    let mut problems = Vec::new();
+    config::within(&mut problems, "tolerance_mm", tolerance_mm, config::TOLERANCES_MM);
+    config::reject(problems)?;
+    let run = Run { force: args.output.force, ..run };
+    let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
+    let file = calibration::file(Some(against), &out)?;
+    let calibrated = calibration::read_with_check(&file)?;
+    let places = [&args.images, &args.pairs.right, &args.corners];
+    let inputs: Vec<&Utf8Path> =
+        places.into_iter().flatten().map(|path| path.as_path()).chain([file.as_path()]).collect();
+    let out = out.for_run(&run, &inputs);
+    out.check_free(&["recheck.json", HISTORY, "recheck.html"])?;
+    let mut checks = formats::history(&out)?;
+
+    let corners = corners(args, &calibrated, config, &out)?;
+    corners.notes.iter().for_each(progress::note);
+    let Calibrated { rig, noise, pair_excess, pairs, volume, .. } = calibrated;
+    let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), pairs, volume };
+    let found = recheck::recheck(&before, &corners)?;
+
+    let standing = Standing::of(&found, tolerance_mm);
+    let content = RecheckFile::new(&found, &file, tolerance_mm);
+    let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
+    checks.push(Check::new(&content, date));
+    let page = report::recheck::page(&found, standing, tolerance_mm, &checks)?;
+    let json = out.write_json("recheck.json", &content)?;
+    out.write(HISTORY, formats::to_csv(&checks).as_bytes())?;
+    out.write("recheck.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
+    let summary = || report::recheck::summary(&found, standing, tolerance_mm, checks.len(), &out);
+    let status = match standing {
+        Standing::StillValid => Status::Done,
+        Standing::ChangedWithin | Standing::Undecided => Status::OutOfTolerance,
+        Standing::Changed => Status::Undetermined,
+    };
+    Ok(Outcome { stdout: if args.output.json { json } else { summary() }, status })
+}
+
+/// The corners of the new pairs, on the board that calibrated unless another one is named.
+fn corners(args: &CameraCheck, calibrated: &Calibrated, config: &Config, out: &OutDir) -> Result<Corners> {
+    let named = args.board.is_some() || args.squares.is_some() || args.square_mm.is_some();
+    let board = match calibrated.board.filter(|_| !named) {
+        Some(board) => board,
+        None => config.check_board.board(args.board, args.squares, args.square_mm)?,
+    };
+    if let Some(file) = &args.corners {
+        return Ok(corners_csv::read(file, board, args.picture_size)?);
+    }
+    // The command line asks for one of the two.
+    let nothing = || config::Error::Invalid { problems: vec!["neither pictures nor --corners given".into()] };
+    let images = args.images.as_ref().ok_or_else(nothing)?;
+    let pairing = args.pairs.source("camera-check", images).pairs(out)?;
+    progress::note(&pairing.taken);
+    let cache = Some(Cache { out, thumbnails: false });
+    Ok(find_corners(&pairing, &Wanted { board, needed: FEWEST_PAIRS, mosaic: args.bayer, cache, overlays: None })?)
+}

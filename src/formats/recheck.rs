@@ -1,0 +1,208 @@
+//! `recheck.json` and `recheck.csv`: whether a rig still stands, and how it stood at every check before.
+
+use camino::Utf8Path;
+use serde::{Deserialize, Serialize};
+
+use crate::diagnostic::Place;
+use crate::files::{self, OutDir, Result};
+use crate::imaging::Skipped;
+use crate::stereo::findings::standing::MATERIAL_SHARE;
+use crate::stereo::recheck::{CauseSeen, Recheck};
+
+/// The history's name in a results folder.
+pub const HISTORY: &str = "recheck.csv";
+
+/// What is said of the rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Standing {
+    /// No change was seen that moves a length by more than a tenth of the tolerance, and one that moves it by the tolerance would have been.
+    StillValid,
+    /// It changed, by less than the tolerance.
+    ChangedWithin,
+    /// No change was seen, but the pairs would not have shown one that moves a length by the tolerance.
+    Undecided,
+    /// It changed by more than the tolerance.
+    Changed,
+}
+
+impl Standing {
+    /// Of a comparison, by a tolerance of a length, mm.
+    pub fn of(recheck: &Recheck, tolerance_mm: f64) -> Standing {
+        let harmless = recheck.change.is_none() || recheck.effect_mm <= MATERIAL_SHARE * tolerance_mm;
+        match (harmless, recheck.seen_mm <= tolerance_mm) {
+            (true, true) => Standing::StillValid,
+            (true, false) => Standing::Undecided,
+            (false, _) if recheck.effect_mm <= tolerance_mm => Standing::ChangedWithin,
+            (false, _) => Standing::Changed,
+        }
+    }
+}
+
+/// The content of `recheck.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RecheckFile {
+    standing: Standing,
+    tolerance_mm: f64,
+    /// The calibration that was compared with.
+    against: String,
+    pairs: Vec<String>,
+    pairs_skipped: Vec<Skipped>,
+    /// The length that changes are given for.
+    length_mm: f64,
+    /// One or, not told apart, several with `|`; empty where nothing changed.
+    cause: String,
+    statement: String,
+    /// By how much the change moves a length, mm.
+    effect_mm: f64,
+    /// The largest change of a length that a single cause could make without being seen in nineteen of twenty checks, mm.
+    seen_mm: f64,
+    causes: Vec<CauseRecord>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct CauseRecord {
+    cause: &'static str,
+    what: String,
+    amount: f64,
+    sigma: f64,
+    unit: &'static str,
+    effect_mm: f64,
+    /// The smallest change that nineteen of twenty checks see, and by how much it moves a length.
+    seen: f64,
+    seen_mm: f64,
+}
+
+impl From<&CauseSeen> for CauseRecord {
+    fn from(seen: &CauseSeen) -> CauseRecord {
+        CauseRecord {
+            cause: seen.cause.word(),
+            what: seen.words.clone(),
+            amount: seen.amount,
+            sigma: seen.sigma,
+            unit: seen.unit,
+            effect_mm: seen.effect_mm,
+            seen: seen.seen,
+            seen_mm: seen.seen_mm,
+        }
+    }
+}
+
+impl RecheckFile {
+    /// Gathers the figures.
+    pub fn new(recheck: &Recheck, against: &Utf8Path, tolerance_mm: f64) -> RecheckFile {
+        RecheckFile {
+            standing: Standing::of(recheck, tolerance_mm),
+            tolerance_mm,
+            against: against.to_string(),
+            pairs: recheck.pairs.clone(),
+            pairs_skipped: recheck.skipped.clone(),
+            length_mm: recheck.length_mm,
+            cause: recheck.cause(),
+            statement: recheck.statement(),
+            effect_mm: recheck.effect_mm,
+            seen_mm: recheck.seen_mm,
+            causes: recheck.causes.iter().map(CauseRecord::from).collect(),
+        }
+    }
+}
+
+/// One check in the history.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Check {
+    /// UTC; empty without provenance.
+    pub date: String,
+    /// The calibration that was compared with.
+    pub against: String,
+    /// How many pairs.
+    pub pairs: usize,
+    /// What was said.
+    pub standing: Standing,
+    /// The cause; empty where nothing changed.
+    pub cause: String,
+    /// By how much the change moves a length, mm.
+    pub effect_mm: f64,
+    /// What would have been seen, mm.
+    pub seen_mm: f64,
+    /// The length that both are for, mm.
+    pub length_mm: f64,
+}
+
+impl Check {
+    /// This check.
+    pub fn new(file: &RecheckFile, date: String) -> Check {
+        Check {
+            date,
+            against: file.against.clone(),
+            pairs: file.pairs.len(),
+            standing: file.standing,
+            cause: file.cause.clone(),
+            effect_mm: file.effect_mm,
+            seen_mm: file.seen_mm,
+            length_mm: file.length_mm,
+        }
+    }
+}
+
+/// The checks before this one in a results folder; none where there is no history.
+pub fn history(out: &OutDir) -> Result<Vec<Check>> {
+    let path = out.join(HISTORY);
+    if !path.is_file() {
+        return Ok(Vec::new());
+    }
+    let text = files::read_text(&path, "history of checks", None)?;
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    reader.deserialize().collect::<Result<Vec<Check>, csv::Error>>().map_err(|error| files::Error::Format {
+        message: format!("not a history of checks: {error}"),
+        place: Place { path, line: error.position().map(|position| position.line()) },
+        hint: Some("move it away, or name another `--out`".to_owned()),
+    })
+}
+
+/// The history as a file.
+pub fn to_csv(checks: &[Check]) -> String {
+    let mut text = String::from("date,against,pairs,standing,cause,effect_mm,seen_mm,length_mm\n");
+    for check in checks {
+        let standing = serde_json::to_value(check.standing).ok();
+        let standing = standing.as_ref().and_then(|value| value.as_str()).unwrap_or_default();
+        let fields = [
+            crate::csv_table::quoted(&check.date),
+            crate::csv_table::quoted(&check.against),
+            check.pairs.to_string(),
+            standing.to_owned(),
+            check.cause.clone(),
+            format!("{:.6}", check.effect_mm),
+            format!("{:.6}", check.seen_mm),
+            check.length_mm.to_string(),
+        ];
+        text.push_str(&format!("{}\n", fields.join(",")));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_history_survives_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = OutDir::open(&Utf8Path::from_path(folder.path()).unwrap().join("out")).unwrap();
+        assert_eq!(history(&out).unwrap(), []);
+        let check = |date: &str, standing| Check {
+            date: date.to_owned(),
+            against: "a, b/calibration.json".to_owned(),
+            pairs: 3,
+            standing,
+            cause: "baseline|other-board".to_owned(),
+            effect_mm: 0.0125,
+            seen_mm: 0.004,
+            length_mm: 70.0,
+        };
+        let checks = [check("2026-01-02T03:04:05Z", Standing::StillValid), check("", Standing::ChangedWithin)];
+        out.write(HISTORY, to_csv(&checks).as_bytes()).unwrap();
+        assert_eq!(history(&out).unwrap(), checks);
+        std::fs::write(out.join(HISTORY), "a,b\n1,2\n").unwrap();
+        assert!(history(&out).unwrap_err().to_string().contains("not a history of checks"));
+    }
+}

@@ -1,0 +1,309 @@
+//! Whether a rig that was calibrated earlier is still the one that takes these pictures.
+//!
+//! In: a rig with its covariance, and the corners of two or more new pairs. Out: whether it changed, by what, how far that moves a
+//! length, and the smallest change of each kind that the pairs would have shown. Method: the new pairs give a rig by themselves, from the old
+//! one on; the difference of its numbers against both covariances, all of them together and each cause as a direction of its own
+//! ([`crate::stereo::solve::difference`]), all looks together at one level. A change of a cause is seen in nineteen of twenty such tests from
+//! the level plus 1.645 of its standard deviations on, which is what the pairs are said to see. Goes wrong: pairs that are all alike hardly
+//! see a focus; that is what the stated figures say.
+
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::imaging::{Corners, Skipped};
+use crate::stereo::Error;
+use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::data::view::View;
+use crate::stereo::findings::hypothesis::{self, Hypothesis};
+use crate::stereo::init::homography::FEWEST_CORNERS;
+use crate::stereo::model::board_shape::FLAT;
+use crate::stereo::model::known_lenses::KnownLenses;
+use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::model::rig::Rig;
+use crate::stereo::pairs::misfit::misfit_px;
+use crate::stereo::pairs::{Cause, numbering};
+use crate::stereo::select::model_comparison::Trial;
+use crate::stereo::select::stated_uncertainty::{excess_scatter, step};
+use crate::stereo::solve::difference::Difference;
+use crate::stereo::solve::priors::Priors;
+use crate::stereo::solve::problem::Problem;
+use crate::stereo::volume::Volume;
+use crate::stereo::volume::lengths::VolumeLengths;
+
+/// Chance that a rig that did not change is said to have changed.
+const FALSE_ALARM: f64 = 0.01;
+
+/// Quantile of the normal distribution for the share of changes that are seen at the size that is stated: nineteen in twenty.
+const SEEN: f64 = 1.645;
+
+/// Causes are told apart where the logarithm of one's likelihood is larger by this: 150 to 1.
+const TOLD_APART: f64 = 5.0;
+
+/// Fewest pairs: one alone has nothing that confirms it.
+pub const FEWEST_PAIRS: usize = 2;
+
+/// Squares of the lengths that a change is judged by: 70 mm on the paper's board.
+const LONG_SQUARES: usize = 7;
+
+/// The rig as it was, and what its calibration says beside it.
+#[derive(Debug, Clone)]
+pub struct Before {
+    /// The rig with its covariance.
+    pub rig: Rig,
+    /// How corners scattered.
+    pub noise: Option<Noise>,
+    /// How far pairs scattered about the rig beyond that, as a variance.
+    pub pair_excess: f64,
+    /// How many pairs with poses of their own made it, where its file says so.
+    pub pairs: Option<usize>,
+    /// The volume that it was checked for.
+    pub volume: Option<Volume>,
+}
+
+/// What the pairs say of one cause.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CauseSeen {
+    /// The cause.
+    pub cause: Cause,
+    /// For a person: what would have changed.
+    pub words: String,
+    /// By how much it changed, if it alone did, with its standard deviation.
+    pub amount: f64,
+    /// In the unit of both.
+    pub sigma: f64,
+    /// The unit.
+    pub unit: &'static str,
+    /// By how much that moves a length, mm.
+    pub effect_mm: f64,
+    /// The smallest change that nineteen of twenty such tests see.
+    pub seen: f64,
+    /// By how much that one moves a length, mm.
+    pub seen_mm: f64,
+}
+
+/// What explains a change.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Explained {
+    /// Causes of one number each that are not told apart, the likeliest first, as places in the list of all.
+    Causes(Vec<usize>),
+    /// The right camera stands and looks otherwise, in more than one way.
+    Moved,
+    /// None of them.
+    Nothing,
+}
+
+/// What is said of the rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recheck {
+    /// Pairs that were compared.
+    pub pairs: Vec<String>,
+    /// Pairs that were not, and why.
+    pub skipped: Vec<Skipped>,
+    /// Length that changes are given for, mm.
+    pub length_mm: f64,
+    /// Every cause.
+    pub causes: Vec<CauseSeen>,
+    /// What explains the change; `None` where nothing changed.
+    pub change: Option<Explained>,
+    /// By how much the change moves a length, mm: that of the likeliest cause, or of all numbers together.
+    pub effect_mm: f64,
+    /// The largest change of a length that a single cause could make without being seen, mm.
+    pub seen_mm: f64,
+}
+
+/// Compares.
+pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
+    before.rig.check_size(corners)?;
+    let (problem, mut skipped) = start(before, corners);
+    if problem.views.len() < FEWEST_PAIRS {
+        let total = corners.pairs.len() + corners.skipped.len();
+        return Err(Error::TooFewPairs { found: problem.views.len(), needed: FEWEST_PAIRS, total, skipped });
+    }
+    skipped.sort_by(|a, b| a.pair.cmp(&b.pair));
+    let layout =
+        Layout { left: Some(before.rig.left.lens), right: Some(before.rig.right.lens), transform: true, shape: true };
+    let solved = problem.solve(&layout)?;
+    let by_corners = solved.neighbours(&corners.board).inflation() * solved.loss_factor;
+    let scatter = excess_scatter(&solved, &layout, &corners.board).max(before.pair_excess);
+    let scatter = scatter * solved.noise_of(before.noise.as_ref());
+    let trial = Trial::new(&solved.problem, layout).ok_or_else(Error::undetermined)?;
+    let numbers = layout.shape_start();
+    let old = before.covariance(&layout).ok_or(Error::NoCovariance)?;
+    let joint = old + trial.covariance.view((0, 0), (numbers, numbers)) * scatter;
+    let off = step(&layout, &problem.values.shared, &trial.values.shared).rows(0, numbers).into_owned();
+    let pairs = before.pairs.unwrap_or(0).max(problem.views.len());
+    let difference = Difference::new(off, &joint, pairs, scatter / by_corners).ok_or_else(Error::undetermined)?;
+
+    let squares = LONG_SQUARES.min(corners.board.columns() - 1);
+    let length_mm = squares as f64 * corners.board.square_mm;
+    let lengths = VolumeLengths::of_volume(&before.rig, &before.volume_of(&trial, &solved.problem.views), length_mm);
+    let moves = |step: &DVector<f64>| {
+        let whole = step.clone().resize_vertically(layout.count(), 0.0);
+        lengths.changes_by_step_mm(&layout, &whole).into_iter().fold(0.0, |most: f64, mm| most.max(mm.abs()))
+    };
+    let hypotheses = hypothesis::all(&Layout { shape: false, ..layout }, &before.rig);
+    let views = &solved.problem.views;
+    let corner_count = views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count();
+    let looks = Looks { difference: &difference, hypotheses: &hypotheses, corners: corner_count };
+    let of_cause = |h| looks.of_cause(h, &moves);
+    let causes = hypotheses.iter().map(of_cause).collect::<Option<Vec<_>>>().ok_or_else(Error::undetermined)?;
+    let change = looks.is_change().then(|| looks.explained());
+    let effect_mm = match &change {
+        Some(Explained::Causes(likeliest)) => likeliest.first().map_or(0.0, |&first| causes[first].effect_mm),
+        _ => moves(&difference.off),
+    };
+    let seen_mm = causes.iter().map(|cause| cause.seen_mm).fold(0.0, f64::max);
+    let pairs = solved.problem.views.iter().map(|view| view.pair.clone()).collect();
+    Ok(Recheck { pairs, skipped, length_mm, causes, change, effect_mm, seen_mm })
+}
+
+/// The pairs with the poses that the old rig gives them, from where a rig of their own is looked for.
+fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>) {
+    let shared = Shared { rig: before.rig.clone(), shape_mm: FLAT };
+    let mut skipped = corners.skipped.clone();
+    let (mut views, mut poses) = (Vec::new(), Vec::new());
+    for pair in &corners.pairs {
+        let mut seen = [View::new(&corners.board, pair, FEWEST_CORNERS)];
+        if let Some(noise) = &before.noise {
+            noise.apply(&mut seen);
+        }
+        let [mut view] = seen;
+        view.turn_right(&corners.board, numbering::on_rig(&shared, &corners.board, &view).unwrap_or(0));
+        match misfit_px(&shared, &view) {
+            Some((_, pose)) => {
+                views.push(view);
+                poses.push(pose);
+            }
+            None => {
+                let reason = "its corners give no pose of the board on this rig".to_owned();
+                skipped.push(Skipped { pair: pair.pair.clone(), reason });
+            }
+        }
+    }
+    let known = KnownLenses::of_cameras([Some(before.rig.left), Some(before.rig.right)]).loosened();
+    let priors = Priors::of_rig(&before.rig, corners.board.diagonal_mm()).knowing(&known);
+    (Problem { views, values: Values { shared, poses }, priors }, skipped)
+}
+
+impl Before {
+    /// The covariance of cameras and transform in the layout's order. `None` where the calibration has none of one of its numbers.
+    fn covariance(&self, layout: &Layout) -> Option<DMatrix<f64>> {
+        let stated = self.rig.covariance.as_ref()?;
+        let names = layout.names();
+        let place = |name: &String| stated.order.iter().position(|stated| stated == name);
+        let places = names[..layout.shape_start()].iter().map(place).collect::<Option<Vec<usize>>>()?;
+        Some(DMatrix::from_fn(places.len(), places.len(), |i, j| stated.matrix[(places[i], places[j])]))
+    }
+
+    /// The volume of the calibration; where its file does not say, that of the new boards.
+    fn volume_of(&self, trial: &Trial, views: &[View]) -> Volume {
+        self.volume.clone().unwrap_or_else(|| Volume::of_boards(&trial.values, views))
+    }
+}
+
+/// All looks at a difference: whether something changed, and what.
+struct Looks<'a> {
+    difference: &'a Difference,
+    hypotheses: &'a [Hypothesis],
+    corners: usize,
+}
+
+impl Looks<'_> {
+    /// Chance of a false alarm in one of all looks: every cause, and all numbers together.
+    fn chance(&self) -> f64 {
+        FALSE_ALARM / (self.hypotheses.len() + 1) as f64
+    }
+
+    fn of_cause(&self, h: &Hypothesis, moves: &impl Fn(&DVector<f64>) -> f64) -> Option<CauseSeen> {
+        let (amount, sigma) = self.difference.along(&h.direction)?;
+        let unit_mm = moves(&h.direction);
+        let seen = (self.difference.level(self.chance()) + SEEN) * sigma;
+        Some(CauseSeen {
+            cause: h.cause,
+            words: h.words.clone(),
+            amount,
+            sigma,
+            unit: h.unit,
+            effect_mm: unit_mm * amount.abs(),
+            seen,
+            seen_mm: unit_mm * seen,
+        })
+    }
+
+    fn is_change(&self) -> bool {
+        let (difference, chance) = (self.difference, self.chance());
+        let level = difference.level(chance);
+        let alone = |h: &Hypothesis| difference.along(&h.direction).is_some_and(|(a, sigma)| a.abs() > level * sigma);
+        difference.chi_square() > difference.limit(difference.off.len(), chance) || self.hypotheses.iter().any(alone)
+    }
+
+    /// What explains the change: causes that leave no more than chance and are not told apart, the likeliest first; or another place of the
+    /// right camera in all six numbers, where that alone leaves no more than chance or does better by more than its numbers cost.
+    fn explained(&self) -> Explained {
+        let (difference, hypotheses) = (self.difference, self.hypotheses);
+        let count = difference.off.len();
+        let within = |left: f64, freed: usize| left <= difference.limit(count - freed, self.chance());
+        let left = |i: usize| Some((difference.left_by(std::slice::from_ref(&hypotheses[i].direction))?, i));
+        let mut explain: Vec<(f64, usize)> = (0..hypotheses.len()).filter_map(left).collect();
+        explain.retain(|(left, _)| within(*left, 1));
+        explain.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let place: Vec<DVector<f64>> =
+            (0..6).map(|k| DVector::from_fn(count, |i, _| f64::from(i + 6 == count + k))).collect();
+        let by_place = difference.left_by(&place).filter(|left| within(*left, place.len()));
+        let Some(best) = explain.first().map(|(left, _)| *left) else {
+            return by_place.map_or(Explained::Nothing, |_| Explained::Moved);
+        };
+        let cost = 0.5 * (place.len() - 1) as f64 * (self.corners.max(2) as f64).ln();
+        if by_place
+            .is_some_and(|left| difference.log_likelihood(left) - difference.log_likelihood(best) - cost > TOLD_APART)
+        {
+            return Explained::Moved;
+        }
+        let less_likely = |left: f64| difference.log_likelihood(best) - difference.log_likelihood(left);
+        let near = explain.into_iter().filter(|(left, _)| less_likely(*left) < TOLD_APART);
+        Explained::Causes(near.map(|(_, i)| i).collect())
+    }
+}
+
+impl Recheck {
+    /// The causes that explain the change, the likeliest first.
+    pub fn likeliest(&self) -> Vec<&CauseSeen> {
+        match &self.change {
+            Some(Explained::Causes(likeliest)) => likeliest.iter().map(|&at| &self.causes[at]).collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The causes' words for files, with `|` between those that are not told apart; empty where nothing changed.
+    pub fn cause(&self) -> String {
+        match &self.change {
+            None => String::new(),
+            Some(Explained::Moved) => Cause::CameraMoved.word().to_owned(),
+            Some(Explained::Nothing) => Cause::Unknown.word().to_owned(),
+            Some(Explained::Causes(_)) => {
+                let mut words: Vec<&str> = self.likeliest().iter().map(|cause| cause.cause.word()).collect();
+                let mut seen = Vec::new();
+                words.retain(|word| {
+                    !seen.contains(word) && {
+                        seen.push(*word);
+                        true
+                    }
+                });
+                words.join("|")
+            }
+        }
+    }
+
+    /// What changed, for a person.
+    pub fn statement(&self) -> String {
+        let of = |c: &CauseSeen| format!("{} by {:.4} {} (+- {:.4})", c.words, c.amount, c.unit, 2.0 * c.sigma);
+        match &self.change {
+            None => "no change beyond chance".to_owned(),
+            Some(Explained::Moved) => "the right camera stands and looks otherwise, in more than one way".to_owned(),
+            Some(Explained::Nothing) => "the rig changed, and no single cause explains how".to_owned(),
+            Some(Explained::Causes(_)) => self.likeliest().into_iter().map(of).collect::<Vec<String>>().join(", or "),
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Rigs that stand and rigs that changed, with the changes planted at the size that the pairs are said to see.
+
+use super::*;
+use crate::geometry::transform;
+use crate::stereo::calibrate::{Calibration, calibrate};
+use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::synthetic::World;
+use crate::stereo::volume::Extent;
+use nalgebra::Vector3;
+
+/// A calibration as its file has it.
+fn calibrated(seed: u64) -> Before {
+    let found: Calibration = calibrate(&World::new(12, seed).corners(seed), &Options::default()).unwrap();
+    Before {
+        rig: found.rig().clone(),
+        noise: Some(found.own_noise),
+        pair_excess: 1.0,
+        pairs: Some(12),
+        volume: Some(Volume::of(&found, Extent::Boards)),
+    }
+}
+
+/// Other pairs of the same rig after a change.
+fn after(seed: u64, change: impl Fn(&mut Rig)) -> Corners {
+    let mut world = World::new(3, seed + 1000);
+    change(&mut world.rig);
+    world.corners(seed + 1000)
+}
+
+fn turned(rig: &mut Rig, deg: f64) {
+    let turn = transform(Vector3::y() * deg.to_radians(), Vector3::zeros());
+    rig.right_from_left = turn * rig.right_from_left;
+}
+
+#[test]
+fn a_rig_that_stands_is_said_to_stand() {
+    let alarms =
+        (0..12).filter(|seed| recheck(&calibrated(*seed), &after(*seed, |_| {})).unwrap().change.is_some()).count();
+    assert_eq!(alarms, 0);
+}
+
+#[test]
+fn a_yaw_is_seen_as_often_as_is_stated_and_never_under_another_name() {
+    let (mut seen, mut half) = (0, 0);
+    for seed in 0..12 {
+        let before = calibrated(seed);
+        let stands = recheck(&before, &after(seed, |_| {})).unwrap();
+        let yaw = stands.causes.iter().find(|c| c.cause == Cause::Yaw).unwrap();
+        for (share, count) in [(1.0, &mut seen), (0.25, &mut half)] {
+            let found = recheck(&before, &after(seed, |rig| turned(rig, share * yaw.seen))).unwrap();
+            *count += usize::from(found.change.is_some());
+            let causes: Vec<Cause> = found.likeliest().iter().map(|seen| seen.cause).collect();
+            assert!(causes.is_empty() || causes.contains(&Cause::Yaw), "{seed}: {}", found.statement());
+        }
+    }
+    // Of twelve 11.4 are expected, and of those a quarter as large 0.2.
+    assert!(seen >= 9 && half <= 3, "{seen} of 12 at the stated size, {half} at a quarter of it");
+}
+
+#[test]
+fn a_focus_and_a_baseline_are_named_with_their_sizes() {
+    let before = calibrated(40);
+    let focused = recheck(
+        &before,
+        &after(40, |rig| {
+            rig.left.fx *= 1.004;
+            rig.left.fy *= 1.004;
+        }),
+    )
+    .unwrap();
+    assert!(focused.cause().contains("focus"), "{}", focused.statement());
+    let left = focused.causes.iter().find(|c| c.words.starts_with("the left camera's focal")).unwrap();
+    assert!((left.amount - 0.4).abs() < 4.0 * left.sigma, "{left:?}");
+    let longer = recheck(&before, &after(40, |rig| rig.right_from_left.translation.vector *= 1.002)).unwrap();
+    // One number moves both: the pairs do not tell a longer baseline from smaller squares.
+    assert!(
+        ["baseline|other-board", "other-board|baseline"].contains(&longer.cause().as_str()),
+        "{}",
+        longer.statement()
+    );
+    let off = 0.002 * before.rig.baseline_mm();
+    let baseline = longer.causes.iter().find(|c| c.cause == Cause::Baseline).unwrap();
+    assert!((baseline.amount - off).abs() < 4.0 * baseline.sigma, "{baseline:?} for {off}");
+}
+
+#[test]
+fn a_knock_in_all_six_numbers_has_no_name_of_one() {
+    let before = calibrated(41);
+    let knocked = recheck(
+        &before,
+        &after(41, |rig| {
+            rig.right_from_left =
+                transform(Vector3::new(0.002, -0.003, 0.002), Vector3::new(0.3, -0.4, 0.5)) * rig.right_from_left;
+        }),
+    )
+    .unwrap();
+    assert!(knocked.effect_mm > 0.05, "{knocked:?}");
+    assert_eq!(knocked.cause(), "camera-moved", "{}", knocked.statement());
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let mut before = calibrated(42);
+    let one = after(42, |_| {});
+    let one = Corners { pairs: one.pairs[..1].to_vec(), ..one };
+    assert!(matches!(recheck(&before, &one), Err(Error::TooFewPairs { found: 1, needed: 2, .. })));
+    before.rig.covariance = None;
+    assert!(matches!(recheck(&before, &after(42, |_| {})), Err(Error::NoCovariance)));
+}

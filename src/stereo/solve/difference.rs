@@ -1,0 +1,102 @@
+//! Numbers that are known twice: do both agree, and which change explains where they do not.
+//!
+//! In: the difference of two estimates of the same numbers with its covariance, and from how many pairs that is known. Out: tests of all numbers
+//! together (Hotelling) and of a change along one direction (Student), and what is left where some directions may take what they like.
+//! Goes wrong: a covariance that follows from fewer pairs than there are numbers; then all numbers together are not tested.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
+
+/// Degrees of freedom from which on a covariance is as good as known.
+const KNOWN: f64 = 1e4;
+
+/// Two standard deviations of a variance that one pair tells, as a share; of many it is that over the root of their number.
+const HIDDEN: f64 = 1.5;
+
+/// The difference of two estimates.
+pub struct Difference {
+    /// Second minus first.
+    pub off: DVector<f64>,
+    joint: Cholesky<f64, Dyn>,
+    freedom: f64,
+}
+
+impl Difference {
+    /// `scatter` is the variance in the covariance over that by the corners' noise, as so many pairs tell: of the part beyond one they know as
+    /// little as they are few, and of the rest much (Welch and Satterthwaite). Where no scatter was seen, as much as chance hides may be
+    /// there. `None` where the covariance is singular.
+    pub fn new(off: DVector<f64>, joint: &DMatrix<f64>, pairs: usize, scatter: f64) -> Option<Difference> {
+        let joint = (0.5 * (joint + joint.transpose())).cholesky()?;
+        let hidden = 1.0 + HIDDEN / (pairs.max(1) as f64).sqrt();
+        let share = 1.0 - 1.0 / scatter.max(hidden);
+        let freedom = (pairs.saturating_sub(1).max(1) as f64 / (share * share)).min(KNOWN);
+        Some(Difference { off, joint, freedom })
+    }
+
+    /// Squared difference in units of its covariance.
+    pub fn chi_square(&self) -> f64 {
+        self.off.dot(&self.joint.solve(&self.off))
+    }
+
+    /// What it stays within but for this chance, where so many numbers are free to differ; infinite where too few pairs tell.
+    pub fn limit(&self, numbers: usize, chance: f64) -> f64 {
+        let (p, n) = (numbers as f64, self.freedom);
+        let inner = n - p + 1.0;
+        if inner <= 1.0 {
+            return f64::INFINITY;
+        }
+        FisherSnedecor::new(p, inner).map_or(f64::INFINITY, |f| f.inverse_cdf(1.0 - chance) * n * p / inner)
+    }
+
+    /// Standard deviations that a single number stays within but for this chance, on both sides.
+    pub fn level(&self, chance: f64) -> f64 {
+        StudentsT::new(0.0, 1.0, self.freedom).map_or(f64::INFINITY, |t| t.inverse_cdf(1.0 - chance / 2.0))
+    }
+
+    /// Amount of a direction and its standard deviation, if it alone changed. `None` where nothing is known of it.
+    pub fn along(&self, direction: &DVector<f64>) -> Option<(f64, f64)> {
+        let weighted = self.joint.solve(direction);
+        let information = direction.dot(&weighted);
+        (information > 0.0).then(|| (weighted.dot(&self.off) / information, 1.0 / information.sqrt()))
+    }
+
+    /// The squared difference that is left where these directions may take what they like.
+    pub fn left_by(&self, directions: &[DVector<f64>]) -> Option<f64> {
+        let weighted: Vec<DVector<f64>> = directions.iter().map(|d| self.joint.solve(d)).collect();
+        let n = directions.len();
+        let matrix = DMatrix::from_fn(n, n, |i, j| directions[i].dot(&weighted[j]));
+        let right = DVector::from_fn(n, |i, _| weighted[i].dot(&self.off));
+        Some((self.chi_square() - right.dot(&matrix.cholesky()?.solve(&right))).max(0.0))
+    }
+
+    /// Logarithm of the likelihood, but for a constant, of a change that leaves so much (the multivariate distribution of Student).
+    pub fn log_likelihood(&self, left: f64) -> f64 {
+        -0.5 * (self.freedom + self.off.len() as f64) * (left / self.freedom).ln_1p()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_those_of_the_tables() {
+        let known = Difference::new(DVector::zeros(2), &DMatrix::identity(2, 2), 1000, 1.0).unwrap();
+        // Chi-square of two and the normal distribution at one in a hundred; Student's of five and Fisher's of 2 and 4.
+        assert!((known.limit(2, 0.01) / 9.21 - 1.0).abs() < 5e-3 && (known.level(0.01) - 2.576).abs() < 5e-3);
+        let six = Difference::new(DVector::zeros(2), &DMatrix::identity(2, 2), 6, 1e12).unwrap();
+        assert!((six.level(0.01) - 4.032).abs() < 5e-3);
+        assert!((six.limit(2, 0.01) / (18.0 * 5.0 * 2.0 / 4.0) - 1.0).abs() < 5e-3);
+        assert_eq!(six.limit(6, 0.01), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_direction_takes_what_lies_along_it() {
+        let joint = DMatrix::from_row_slice(2, 2, &[2.0, 1.0, 1.0, 2.0]);
+        let along = DVector::from_column_slice(&[1.0, 3.0]);
+        let difference = Difference::new(&along * 0.7, &joint, 12, 1.0).unwrap();
+        let (amount, _) = difference.along(&along).unwrap();
+        assert!((amount - 0.7).abs() < 1e-12 && difference.left_by(&[along]).unwrap() < 1e-12);
+        assert!(difference.log_likelihood(0.0) > difference.log_likelihood(difference.chi_square()));
+    }
+}

@@ -1,0 +1,152 @@
+//! Daily use: lenses that are known from another day or program, and whether a calibration still holds.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::run::{stderr, stdout, stereocal, workplace};
+
+/// Shifts the right pictures' corners of a `corners.csv` along x by what a turn of the right camera by so many rad does to them, to first order.
+fn turned(folder: &Path, from: &str, to: &str, focal_px: f64, rad: f64) {
+    let text = std::fs::read_to_string(folder.join(from)).unwrap();
+    let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let at = |name: &str| header.iter().position(|h| *h == name).unwrap();
+    let (side, x, width) = (at("side"), at("x_px"), at("width_px"));
+    let mut out = format!("{}\n", header.join(","));
+    for line in text.lines().skip(1) {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if fields[side] == "right" {
+            let middle = 0.5 * fields[width].parse::<f64>().unwrap();
+            let off = (fields[x].parse::<f64>().unwrap() - middle) / focal_px;
+            fields[x] = format!("{:.6}", middle + focal_px * (off + rad * (1.0 + off * off)));
+        }
+        out.push_str(&fields.join(","));
+        out.push('\n');
+    }
+    std::fs::write(folder.join(to), out).unwrap();
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// Eight pairs, calibrated into `out`, and the corners of some of them in files of their own.
+fn calibrated() -> tempfile::TempDir {
+    let folder = workplace();
+    let at = folder.path();
+    let few = ["--check-pairs", "8", "--samples", "0", "--verify", "0", "--seed", "3"];
+    let made = stereocal(at, &[&["simulate", "--preset", "small", "--out", "."], &few[..]].concat());
+    assert_eq!(made.status.code(), Some(0), "{}", stderr(&made));
+    let checked = stereocal(at, &["camera-check", "check"]);
+    assert!(checked.status.code().unwrap() <= 1, "{}", stderr(&checked));
+    let corners = std::fs::read_to_string(at.join("out/corners.csv")).unwrap();
+    let mut names: Vec<&str> = corners.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
+    names.dedup();
+    names.sort_unstable();
+    names.dedup();
+    let some = |file: &str, keep: &dyn Fn(usize) -> bool| {
+        let kept: Vec<&str> = names.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, name)| *name).collect();
+        let lines =
+            corners.lines().enumerate().filter(|(i, line)| *i == 0 || kept.contains(&line.split(',').next().unwrap()));
+        let text: String = lines.map(|(_, line)| format!("{line}\n")).collect();
+        std::fs::write(at.join(file), text).unwrap();
+    };
+    some("three.csv", &|i| i < 3);
+    some("five.csv", &|i| i >= 3);
+    folder
+}
+
+#[test]
+fn three_pairs_and_the_lenses_of_any_program_make_a_rig() {
+    let folder = calibrated();
+    let at = folder.path();
+    let own = ["camera-check", "--corners", "five.csv", "--lens", "brown4", "--out", "lens"];
+    assert!(stereocal(at, &own).status.code().unwrap() <= 1);
+    for format in ["opencv", "ros", "kalibr", "mrcal"] {
+        let told = stereocal(
+            at,
+            &["export", "calibration", "--format", format, "--calibration", "lens/calibration.json", "--out", format],
+        );
+        assert_eq!(told.status.code(), Some(0), "{format}: {}", stderr(&told));
+    }
+    let without = stereocal(at, &["camera-check", "--corners", "three.csv", "--out", "none"]);
+    assert!(stderr(&without).contains("calibration needs 4"), "{}", stderr(&without));
+    let truth = json(&at.join("truth/calibration.json"))["right_from_left"]["translation_mm"][0].as_f64().unwrap();
+    let named: [&[&str]; 6] = [
+        &["lens/calibration.json"],
+        &["opencv/stereo_opencv.yml"],
+        &["ros/left.yaml,left", "ros/right.yaml,right"],
+        &["kalibr/camchain.yaml"],
+        &["mrcal/left.cameramodel,left", "mrcal/right.cameramodel,right"],
+        &["lens/calibration.json,left", "opencv/stereo_opencv.yml,right"],
+    ];
+    for files in named {
+        let lenses: Vec<&str> = files.iter().flat_map(|file| ["--intrinsics", file]).collect();
+        let found = stereocal(
+            at,
+            &[&["camera-check", "--corners", "three.csv", "--out", "known", "--force"], &lenses[..]].concat(),
+        );
+        assert!(found.status.code().unwrap() <= 1, "{files:?}: {}", stderr(&found));
+        let said = stdout(&found);
+        assert!(
+            said.contains("3 of 3 pairs used") && said.contains("agree with the known lenses"),
+            "{files:?}: {said}"
+        );
+        let x = json(&at.join("known/calibration.json"))["right_from_left"]["translation_mm"][0].as_f64().unwrap();
+        assert!((x - truth).abs() < 0.5, "{files:?}: {x} mm, the truth is {truth}");
+        let states = files[0] == "lens/calibration.json" && files.len() == 1;
+        assert_eq!(stderr(&found).contains("comes without a covariance"), !states, "{files:?}");
+    }
+}
+
+#[test]
+fn lenses_that_are_not_there_not_read_or_of_other_pictures_are_refused() {
+    let folder = calibrated();
+    let at = folder.path();
+    let refused = |lens: &str, more: &[&str]| {
+        let arguments = ["camera-check", "--corners", "three.csv", "--out", "known", "--intrinsics", lens];
+        let output = stereocal(at, &[&arguments[..], more].concat());
+        assert_eq!(output.status.code(), Some(2), "{lens}: {}{}", stdout(&output), stderr(&output));
+        assert!(!at.join("known/calibration.json").exists());
+        stderr(&output)
+    };
+    assert!(refused("nowhere.json", &[]).contains("nowhere.json"));
+    assert!(refused("out/calibration.json", &["--lens", "brown4"]).contains("leave one out"));
+    std::fs::write(at.join("one.yml"), "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 800., 0., 320., 0., 800., 240., 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ 0., 0., 0., 0., 0. ]\n").unwrap();
+    let other = refused("one.yml,left", &[]);
+    assert!(other.contains("the left pictures are") && other.contains("640x480"), "{other}");
+    assert!(refused("one.yml", &[]).contains("--intrinsics one.yml,left"));
+}
+
+#[test]
+fn a_rig_that_stands_is_valid_and_one_that_turned_is_named_with_a_history() {
+    let folder = calibrated();
+    let at = folder.path();
+    let own = ["camera-check", "--corners", "five.csv", "--out", "before"];
+    assert!(stereocal(at, &own).status.code().unwrap() <= 1);
+    let check = |corners: &str| {
+        let arguments =
+            ["camera-check", "--corners", corners, "--against", "before/calibration.json", "--tolerance-mm", "1"];
+        let output = stereocal(at, &arguments);
+        (output.status.code(), stdout(&output), stderr(&output))
+    };
+    let (status, said, messages) = check("three.csv");
+    assert_eq!(status, Some(0), "{said}{messages}");
+    assert!(said.starts_with("STILL VALID: no change beyond chance; 3 pairs would have shown"), "{said}");
+    let focal = json(&at.join("before/calibration.json"))["right"]["fx"].as_f64().unwrap();
+    turned(at, "three.csv", "turned.csv", focal, 0.01);
+    let (status, said, messages) = check("turned.csv");
+    assert_eq!(status, Some(3), "{said}{messages}");
+    assert!(said.starts_with("CHANGED: "), "{said}");
+    let file = json(&at.join("out/recheck.json"));
+    assert!(file["cause"].as_str().unwrap().split('|').any(|cause| cause == "yaw"), "{file}");
+    let history = std::fs::read_to_string(at.join("out/recheck.csv")).unwrap();
+    assert_eq!(history.lines().count(), 3, "{history}");
+    assert!(
+        history.lines().nth(1).unwrap().contains(",still-valid,")
+            && history.lines().nth(2).unwrap().contains(",changed,")
+    );
+    assert!(std::fs::read_to_string(at.join("out/recheck.html")).unwrap().contains("Over time"));
+    std::fs::write(at.join("one.csv"), "pair,side\n").unwrap();
+    assert_eq!(check("one.csv").0, Some(2));
+}
