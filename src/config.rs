@@ -1,14 +1,12 @@
 //! `stereocal.toml`: every default in one place. A flag beats the file, the file beats the default.
 
-use std::fmt::Display;
-use std::ops::RangeInclusive;
-
 use camino::{Utf8Path, Utf8PathBuf};
 use serde::Deserialize;
 
 use crate::diagnostic::Explain;
 use crate::files;
 use crate::imaging::board::{Board, SQUARES_MM, Squares};
+use crate::ranges::{TOLERANCES_MM, positive, within};
 
 /// The file that is read when none is named.
 pub const DEFAULT_FILE: &str = "stereocal.toml";
@@ -164,29 +162,6 @@ impl Config {
         self.measurements.validate(&mut problems);
         self.identify.validate(&mut problems);
         reject(problems)
-    }
-}
-
-/// Tolerances and uncertainties of lengths, mm.
-pub const TOLERANCES_MM: RangeInclusive<f64> = 1e-6..=1e4;
-
-/// Notes a problem unless the value is in its range.
-pub fn within<T: PartialOrd + Display>(problems: &mut Vec<String>, name: &str, value: T, range: RangeInclusive<T>) {
-    if !range.contains(&value) {
-        let (least, most) = range.into_inner();
-        problems.push(format!("{name} is {value}; it must be from {least} to {most}"));
-    }
-}
-
-/// Notes a problem unless the value is above zero, and not beyond all use.
-pub fn positive(problems: &mut Vec<String>, name: &str, value: f64) {
-    const RANGE: RangeInclusive<f64> = 1e-9..=1e9;
-    if !RANGE.contains(&value) {
-        problems.push(format!(
-            "{name} is {value}; it must be above zero, from {:e} to {:e}",
-            RANGE.start(),
-            RANGE.end()
-        ));
     }
 }
 

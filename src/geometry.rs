@@ -1,6 +1,6 @@
-//! Rigid transforms as the rest of the program writes them, on top of nalgebra.
+//! Rigid transforms as the rest of the program writes them, on top of nalgebra; the one that brings points onto others best.
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// A rigid transform, named `a_from_b` where it is bound.
 pub type Transform = Isometry3<f64>;
@@ -52,6 +52,41 @@ pub fn perturb(a_from_b: &Transform, delta_r_rad: Vector3<f64>, delta_t_mm: Vect
 /// The matrix of the cross product: `skew(a) * b = a x b`.
 pub fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
+}
+
+/// Unit vector and length; the zero vector where the length is zero.
+pub fn direction(v: &Vector3<f64>) -> (Vector3<f64>, f64) {
+    let length = v.norm();
+    if length > 0.0 { (v / length, length) } else { (Vector3::zeros(), 0.0) }
+}
+
+/// The rigid transform `b_from_a` that brings pairs (a, b, weight) of points together best (Kabsch, 1976).
+pub fn fitted_frame(pairs: impl Iterator<Item = (Point3<f64>, Point3<f64>, f64)>) -> Transform {
+    let (mean_a, mean_b, covariance) = cross_covariance(pairs);
+    let rotation = nearest_rotation(&covariance);
+    transform_from_matrix(rotation, mean_b - rotation * mean_a)
+}
+
+/// Means of pairs (a, b, weight) of points, and the sum of the weighted products `(b - mean b) (a - mean a)'`.
+pub fn cross_covariance(
+    pairs: impl Iterator<Item = (Point3<f64>, Point3<f64>, f64)>,
+) -> (Vector3<f64>, Vector3<f64>, Matrix3<f64>) {
+    let pairs: Vec<_> = pairs.collect();
+    let n = pairs.iter().map(|(_, _, w)| w).sum::<f64>().max(f64::MIN_POSITIVE);
+    let mean_a = pairs.iter().map(|(a, _, w)| a.coords * *w).sum::<Vector3<f64>>() / n;
+    let mean_b = pairs.iter().map(|(_, b, w)| b.coords * *w).sum::<Vector3<f64>>() / n;
+    let products = pairs.iter().map(|(a, b, w)| (b.coords - mean_b) * (a.coords - mean_a).transpose() * *w);
+    (mean_a, mean_b, products.sum())
+}
+
+/// The rotation R with the largest trace of R' M.
+pub fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
+    let svd = matrix.svd(true, true);
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Matrix3::identity() };
+    let mut sign = Matrix3::identity();
+    let smallest = svd.singular_values.imin();
+    sign[(smallest, smallest)] = (u * v_t).determinant().signum();
+    u * sign * v_t
 }
 
 #[cfg(test)]

@@ -25,7 +25,9 @@ pub mod csv_table;
 pub mod diagnostic;
 pub mod files;
 pub mod geometry;
+pub mod linear_algebra;
 pub mod progress;
+pub mod ranges;
 pub mod statistics;
 pub mod tables;
 

@@ -30,7 +30,7 @@ use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::model::known_lenses::{KnownLenses, TOLERANCE};
 use crate::stereo::pairs::fewest_pairs;
 use crate::stereo::select::lens_ladder::Options;
-use crate::{progress, report};
+use crate::{progress, ranges, report};
 
 /// Runs the command.
 pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
@@ -40,9 +40,9 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let board = board(args, config)?;
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
     let mut problems = Vec::new();
-    config::within(&mut problems, "tolerance_mm", tolerance_mm, config::TOLERANCES_MM);
+    ranges::within(&mut problems, "tolerance_mm", tolerance_mm, ranges::TOLERANCES_MM);
     if let Some(mm) = args.board_uncertainty_mm {
-        config::within(&mut problems, "board_uncertainty_mm", mm, config::TOLERANCES_MM);
+        ranges::within(&mut problems, "board_uncertainty_mm", mm, ranges::TOLERANCES_MM);
     }
     let extent = args.volume.unwrap_or_default();
     let demand = Demand { tolerance_mm, board_uncertainty_mm: args.board_uncertainty_mm, extent };
@@ -144,7 +144,7 @@ fn board(args: &CameraCheck, config: &Config) -> Result<Board> {
     let (Some(celsius), Some(ppm)) = (args.board_temperature_c, args.expansion_ppm_per_k) else { return Ok(board) };
     let growth = 1.0 + 1e-6 * ppm * (celsius - REFERENCE_C);
     let mut problems = Vec::new();
-    config::positive(&mut problems, "the board's thermal growth", growth);
+    ranges::positive(&mut problems, "the board's thermal growth", growth);
     config::reject(problems)?;
     Ok(board.scaled(growth))
 }
@@ -216,7 +216,7 @@ fn second_board(
         (squares, mm) => Board::checker(squares.unwrap_or(board.squares), mm.unwrap_or(board.square_mm)),
     });
     let mut problems = Vec::new();
-    config::within(&mut problems, "check_square_mm", board.square_mm, SQUARES_MM);
+    ranges::within(&mut problems, "check_square_mm", board.square_mm, SQUARES_MM);
     config::reject(problems)?;
     let (mosaic, cache) = (args.bayer, Some(Cache { out, thumbnails: false }));
     let pairing = Source::folder("camera-check", images).pairs(out)?;

@@ -10,10 +10,13 @@
 //! ```
 
 pub mod data;
+pub mod error;
+pub mod finding;
 pub mod judge;
 pub mod model;
 pub mod record;
 pub mod residuals;
+pub mod sensor;
 pub mod settings;
 pub mod solve;
 #[cfg(test)]
@@ -21,125 +24,5 @@ pub mod synthetic;
 #[cfg(test)]
 mod tests;
 
-use crate::diagnostic::{Explain, Status};
-
+pub use error::Error;
 pub use settings::{Method, Model, Settings};
-
-/// What can go wrong in an identification.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// No row can be fitted.
-    #[error(
-        "none of the {rows} rows can be fitted ({skipped} have no usable reading); rows of role `sample` are needed"
-    )]
-    NoSamples {
-        /// Rows in the file.
-        rows: usize,
-        /// Rows without a reading.
-        skipped: usize,
-        /// Why the first of them has none.
-        reason: Option<String>,
-    },
-    /// Robot and measurements are not about the same machine.
-    #[error("the robot has {robot} joints, the measurements have {measurements}")]
-    JointCount {
-        /// Of the robot.
-        robot: usize,
-        /// Of the measurements.
-        measurements: usize,
-        /// The measurements' file.
-        place: String,
-    },
-    /// A joint slides in one file and turns in the other.
-    #[error(
-        "joint {joint} {} in the robot's file; its readings are then in a column `j{joint}_{}`",
-        if *.slides { "slides" } else { "turns" }, if *.slides { "mm" } else { "deg" }
-    )]
-    JointKind {
-        /// The joint, from 1.
-        joint: usize,
-        /// Whether it slides in the robot's file.
-        slides: bool,
-        /// The measurements' file.
-        place: String,
-    },
-    /// Moving any parameter changes nothing that was measured.
-    #[error("the {poses} poses determine no parameter: moving any of them changes nothing that was measured")]
-    NothingDetermined {
-        /// Poses to fit.
-        poses: usize,
-    },
-    /// No more numbers than parameters.
-    #[error(
-        "{poses} poses give {numbers} independent numbers for {parameters} parameters; more numbers than parameters are needed"
-    )]
-    TooFew {
-        /// Independent numbers.
-        numbers: usize,
-        /// Base parameters.
-        parameters: usize,
-        /// Poses to fit.
-        poses: usize,
-    },
-    /// Several targets a pose that cannot be made one.
-    #[error("{message}")]
-    Targets {
-        /// What was found.
-        message: String,
-        /// What to look at.
-        hint: &'static str,
-    },
-    /// No verify row has anything to be measured from.
-    #[error(
-        "none of the {rows} rows can be judged: a row is judged by its distance to another of its group, or by a placement that takes {needed}"
-    )]
-    NothingJudged {
-        /// Rows to judge.
-        rows: usize,
-        /// Rows that a group is placed by.
-        needed: usize,
-    },
-    /// The chosen model needs what the data lack.
-    #[error("model `{model}` needs {needed}, which the measurements don't have")]
-    ModelNeeds {
-        /// The model.
-        model: &'static str,
-        /// What it needs.
-        needed: &'static str,
-    },
-    /// A solver started from numbers that are no numbers.
-    #[error("the residuals at the nominal robot are not finite")]
-    NotFinite,
-}
-
-impl Explain for Error {
-    fn status(&self) -> Status {
-        match self {
-            Error::NothingDetermined { .. } | Error::TooFew { .. } | Error::NothingJudged { .. } | Error::NotFinite => {
-                Status::Undetermined
-            }
-            _ => Status::BadInput,
-        }
-    }
-
-    fn place(&self) -> Option<String> {
-        match self {
-            Error::JointCount { place, .. } | Error::JointKind { place, .. } => Some(place.clone()),
-            _ => None,
-        }
-    }
-
-    fn hint(&self) -> Option<String> {
-        match self {
-            Error::JointCount { .. } => Some("`--robot FILE` names the robot that was measured".to_owned()),
-            Error::NothingDetermined { .. } | Error::TooFew { .. } | Error::NothingJudged { .. } => {
-                Some("measure more poses, spread over the workspace and with varied orientation".to_owned())
-            }
-            Error::NoSamples { reason: Some(reason), .. } => Some(format!("the first of those without: {reason}")),
-            Error::Targets { hint, .. } => Some((*hint).to_owned()),
-            Error::ModelNeeds { .. } => Some("leave `--model` out and the model is chosen by the data".to_owned()),
-            _ => None,
-        }
-    }
-}

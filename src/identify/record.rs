@@ -7,22 +7,22 @@ mod quality;
 use serde::Serialize;
 
 use super::data::dataset::{Dataset, Reading, Skipped};
-use super::data::doctor::Finding;
 use super::data::repeats::Repeats;
 use super::data::sessions::{Along, Session};
 use super::data::targets::Targets;
+use super::finding::Finding;
 use super::judge::choose::Identification;
 use super::judge::climb::{self, Certainty, Judged};
 use super::judge::scale::CommonScale;
+use super::judge::uncertainty::{Covariance, Expected};
 use super::model::prior::Tolerance;
-use super::model::uncertainty::{Covariance, Expected};
-use super::residuals::smooth::SmoothError;
-use super::residuals::weights::Extra;
+use super::sensor::Extra;
+use super::sensor::SmoothError;
 use super::settings::Settings;
 use crate::robot::Robot;
 
 pub use self::advice::{Advice, Findings};
-pub use self::parameters::{Identifiability, MethodRecord, ParameterRecord, file_unit};
+pub use self::parameters::{Identifiability, MethodRecord, ParameterRecord};
 pub use self::quality::{PointSpread, Quality, quality, spread};
 
 /// The file.

@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::within;
-use crate::identify::solve::trust_region;
+use crate::ranges::within;
 
 /// How the parameters are searched for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
@@ -140,7 +139,7 @@ pub struct Settings {
     /// Rows that fit worse than so many robust standard deviations are left out and named; 0 keeps all.
     pub outlier_sigmas: f64,
     /// The trust region's constants.
-    pub trust_region: trust_region::Settings,
+    pub trust_region: DescentSettings,
     /// Named constants, in place of section `swarm`.
     pub constants: Option<Constants>,
     /// The swarms' constants.
@@ -163,7 +162,7 @@ impl Default for Settings {
             examine: true,
             wire_offset: true,
             outlier_sigmas: 6.0,
-            trust_region: trust_region::Settings::default(),
+            trust_region: DescentSettings::default(),
             constants: None,
             swarm: SwarmSettings::default(),
         }
@@ -195,6 +194,29 @@ impl Settings {
             within(problems, &format!("identify.trust_region.{name}"), value, 0.0..=1.0);
         }
         self.swarm.validate(problems);
+    }
+}
+
+/// Section `[identify.trust_region]`.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DescentSettings {
+    /// Iterations at the most.
+    pub iterations: usize,
+    /// First radius as a multiple of the scaled start (MINPACK: 100).
+    pub radius: f64,
+    /// Stop when actual and predicted reduction fall below this fraction of the cost.
+    pub reduction: f64,
+    /// Stop when the radius falls below this fraction of the scaled point.
+    pub step: f64,
+    /// Stop when the largest cosine between the residuals and a column falls below this.
+    pub gradient: f64,
+}
+
+impl Default for DescentSettings {
+    /// MINPACK's `lmdif1` and `lmder` defaults, with tolerances near rounding: a fit takes milliseconds.
+    fn default() -> DescentSettings {
+        DescentSettings { iterations: 100, radius: 100.0, reduction: 1e-13, step: 1e-12, gradient: 1e-12 }
     }
 }
 
@@ -284,7 +306,7 @@ impl SwarmSettings {
             stagnation_iterations: 25,
             stagnation_improvement: 1e-4,
             trust_region_particles: 100,
-            trust_region_steps: trust_region::Settings::default().iterations,
+            trust_region_steps: DescentSettings::default().iterations,
             ..StapsoSettings::default()
         };
         SwarmSettings { velocity_limit: 1.0, stapso, ..SwarmSettings::default() }

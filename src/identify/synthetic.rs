@@ -62,7 +62,7 @@ pub fn planned(
             let origin = start + radius * towards.normalize();
             let target = Transform::from_parts(origin.into(), flange);
             let near = centers[group].clone().map_or_else(starts, |q| vec![q]);
-            let Some(q) = inverse::from_starts(&nominal, &target, &near) else { continue };
+            let Some(q) = near.iter().find_map(|start| inverse::from_start(&nominal, &target, start)) else { continue };
             centers[group].get_or_insert_with(|| q.clone());
             let q_deg: Vec<f64> = q.iter().map(|r| r.to_degrees()).collect();
             let q_rad: Vec<f64> = q_deg.iter().map(|d| d.to_radians()).collect();

@@ -269,7 +269,7 @@ fn a_zero_that_is_off_costs_next_to_nothing_and_is_said() {
 
 #[test]
 fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain() {
-    use crate::identify::model::uncertainty::Expected;
+    use crate::identify::judge::uncertainty::Expected;
     use crate::measurements::Observed;
     let world = synthetic::world(120, NOISE_MM, 3);
     let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use super::pool::Candidate;
 use super::scene::{self, Placement, PoseNoise, Scene};
 use super::{Error, Result};
-use crate::geometry::{Transform, transform, transform_from_matrix};
+use crate::geometry::{Transform, cross_covariance, fitted_frame, transform};
 use crate::measurements::{Measurement, Observed};
 use crate::robot::Robot;
 
@@ -80,21 +80,11 @@ pub fn place(
 
 /// The rigid motion that brings points onto others best; `None` for fewer than three, or all on a line.
 pub fn rigid(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Transform> {
-    let mean = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
-    let (a, b) = (mean(from), mean(to));
-    let cross: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| (q - b) * (p - a).transpose()).sum();
-    let svd = cross.svd(true, true);
-    let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
+    let pairs = || from.iter().zip(to).map(|(a, b)| (Point3::from(*a), Point3::from(*b), 1.0));
+    let mut values: Vec<f64> = cross_covariance(pairs()).2.singular_values().iter().copied().collect();
     values.sort_by(|x, y| y.total_cmp(x));
-    if from.len() < 3 || values[1] <= LINE * LINE * values[0] || values[0] == 0.0 {
-        return None;
-    }
-    let (u, v_t) = (svd.u?, svd.v_t?);
-    let order = svd.singular_values.imin();
-    let mut flip = Matrix3::identity();
-    flip[(order, order)] = (u * v_t).determinant().signum();
-    let rotation = u * flip * v_t;
-    Some(transform_from_matrix(rotation, b - rotation * a))
+    let is_line = from.len() < 3 || values[1] <= LINE * LINE * values[0] || values[0] == 0.0;
+    (!is_line).then(|| fitted_frame(pairs()))
 }
 
 #[cfg(test)]

@@ -169,11 +169,6 @@ pub fn best_posture(robot: &Robot, base_from_flange: &Transform, starts: usize) 
     judged.reduce(|best, next| if next.0 > best.0 { next } else { best }).map(|(_, q)| q)
 }
 
-/// The first solution found from any of the starts, in their order.
-pub fn from_starts(robot: &Robot, base_from_flange: &Transform, starts_rad: &[Vec<f64>]) -> Option<Vec<f64>> {
-    starts_rad.iter().find_map(|start| from_start(robot, base_from_flange, start))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -54,6 +54,17 @@ impl Unit {
 }
 
 impl Parameter {
+    /// Unit in files, and what to multiply mm or mrad by.
+    pub fn file_unit(self) -> (&'static str, f64) {
+        match (self, self.unit()) {
+            (_, Unit::Mm) => ("mm", 1.0),
+            (Parameter::Gravity(..) | Parameter::Bending(..), _) => ("mrad/m", 1.0),
+            (Parameter::Harmonic(..) | Parameter::Wobble(..), _) => ("mrad", 1.0),
+            (Parameter::Coupling(..), _) => ("1e-3", 1.0),
+            _ => ("deg", (1e-3f64).to_degrees()),
+        }
+    }
+
     /// Its name: `alpha_0..`, `a_0..`, `beta_2..`, `theta_1..`, `d_1..`, `v_x`, `k_2_elbow`, `sin_1`, ...
     pub fn name(self) -> String {
         match self {

@@ -4,10 +4,10 @@
 //! six numbers and the tool's three, from the placement that fits best with the tool of the file (Kabsch, 1976).
 //! What goes wrong: a tool that the poses do not determine (one orientation) stays where the damping leaves it, which costs nothing.
 
-use nalgebra::{Matrix3, Point3, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 
 use super::Robot;
-use crate::geometry::{Transform, perturb, skew, transform_from_matrix};
+use crate::geometry::{Transform, fitted_frame, perturb, skew};
 use crate::statistics::median;
 
 /// Poses that are enough.
@@ -35,7 +35,7 @@ impl Robot {
     pub fn left_mm(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>]) -> Option<f64> {
         let predicted: Vec<Vector3<f64>> = joints_rad.iter().map(|q| self.target_mm(q).coords).collect();
         let measured: Vec<Vector3<f64>> = points_mm.iter().map(|p| p.coords).collect();
-        let frame = placed(&predicted, &measured);
+        let frame = nearest(&predicted, &measured);
         median(predicted.iter().zip(&measured).map(|(p, m)| (frame * Point3::from(*p) - m).coords.norm()))
     }
 
@@ -51,7 +51,7 @@ impl Robot {
         let measured: Vec<Vector3<f64>> = rows.iter().map(|&i| points_mm[i].coords).collect();
         let mut tool = self.tool_mm;
         let predicted: Vec<Vector3<f64>> = flanges.iter().map(|f| (f * Point3::from(tool)).coords).collect();
-        let mut frame = placed(&predicted, &measured);
+        let mut frame = nearest(&predicted, &measured);
         let residuals = |frame: &Transform, tool: &Vector3<f64>| -> Vec<Vector3<f64>> {
             let off = |(f, m): (&Transform, &Vector3<f64>)| (frame * (f * Point3::from(*tool))).coords - m;
             flanges.iter().zip(&measured).map(off).collect()
@@ -99,20 +99,8 @@ impl Robot {
 }
 
 /// The transform that takes `from` nearest to `to`.
-fn placed(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Transform {
-    let count = from.len() as f64;
-    let mean = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / count;
-    let (a, b) = (mean(from), mean(to));
-    let cross: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| (q - b) * (p - a).transpose()).sum();
-    let svd = cross.svd(true, true);
-    let rotation = match (svd.u, svd.v_t) {
-        (Some(u), Some(v_t)) => {
-            let proper = Vector3::new(1.0, 1.0, (u * v_t).determinant().signum());
-            u * Matrix3::from_diagonal(&proper) * v_t
-        }
-        _ => UnitQuaternion::identity().to_rotation_matrix().into_inner(),
-    };
-    transform_from_matrix(rotation, b - rotation * a)
+fn nearest(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Transform {
+    fitted_frame(from.iter().zip(to).map(|(a, b)| (Point3::from(*a), Point3::from(*b), 1.0)))
 }
 
 #[cfg(test)]

@@ -12,8 +12,8 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::dataset::{Dataset, Kind, Reading};
-use super::doctor::Finding;
 use super::sessions;
+use crate::identify::finding::Finding;
 use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;
 use crate::identify::solve::task::Task;

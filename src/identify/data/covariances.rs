@@ -12,9 +12,9 @@ use std::collections::BTreeMap;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::dataset::{Dataset, Reading};
-use super::doctor::Finding;
 use super::shared;
 use crate::identify::Error;
+use crate::identify::finding::Finding;
 use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;
 use crate::identify::solve::task::Task;

@@ -9,11 +9,8 @@ use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
 use super::repeats::{self, Repeats};
 use super::targets::{self, Targets};
 use crate::identify::Error;
-use crate::identify::residuals::weights::Extra;
+use crate::identify::sensor::{Extra, FLOOR_MM2};
 use crate::measurements::{Measurement, Observed, Role};
-
-/// Variance that singular covariances get on top, mm^2: a micrometre, the resolution of a good instrument.
-pub(super) const FLOOR_MM2: f64 = 1e-6;
 
 /// What all readings of a set are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

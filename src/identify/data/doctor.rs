@@ -1,45 +1,17 @@
 //! What is wrong with the data: each finding in words, with the rows it is about and what was done.
 
-use serde::Serialize;
-
 use super::conventions::Mended;
 use super::dataset::{Dataset, Reading};
 use super::sessions::{self, Along, Session};
 use super::still::{constant_joints, repeated};
 use super::{conventions, covariances, known, orientations, plausible};
+use crate::identify::finding::Finding;
 use crate::identify::judge::choose::Identification;
 use crate::identify::judge::scale::CommonScale;
 use crate::identify::record::Smooth;
-use crate::identify::residuals::weights::Extra;
+use crate::identify::sensor::Extra;
 use crate::identify::settings::{Model, Settings};
 use crate::robot::Robot;
-
-/// One finding.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Finding {
-    /// What it is.
-    pub finding: String,
-    /// The rows it is about, by pose; empty where it is about all of them.
-    pub rows: Vec<String>,
-    /// What was done: mended, left out, or nothing but this warning, and how to have it otherwise.
-    pub action: String,
-}
-
-/// Rows that a sentence names.
-const NAMED: usize = 40;
-
-impl Finding {
-    /// As a warning.
-    pub fn sentence(&self) -> String {
-        let mut text = self.finding.clone();
-        if !self.rows.is_empty() {
-            let named = self.rows.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
-            let more = self.rows.len().saturating_sub(NAMED);
-            text.push_str(&format!(": {named}{}", if more > 0 { format!(" and {more} more") } else { String::new() }));
-        }
-        format!("{text}; {}", self.action)
-    }
-}
 
 /// A data set and a nominal robot as they are to be used.
 #[derive(Debug, Clone)]

@@ -6,10 +6,10 @@
 use camino::Utf8Path;
 
 use super::dataset::{Dataset, KnownDistance};
-use super::doctor::Finding;
 use crate::csv_table::Table;
 use crate::files;
 use crate::identify::Error;
+use crate::identify::finding::Finding;
 use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;
 use crate::identify::solve::task::Task;

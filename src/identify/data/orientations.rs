@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::dataset::{Dataset, Reading};
-use super::doctor::Finding;
+use crate::identify::finding::Finding;
 use crate::robot::Robot;
 use crate::statistics::median;
 

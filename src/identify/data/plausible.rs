@@ -1,8 +1,7 @@
 //! Whether the parameters that were found are those of a built robot.
 
-use super::doctor::Finding;
+use crate::identify::finding::Finding;
 use crate::identify::judge::choose::Identification;
-use crate::identify::record::file_unit;
 use crate::robot::Parameter;
 
 /// Links that are farther from the file's than they are built.
@@ -65,7 +64,7 @@ fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>) -> Opti
         limit(parameters[*i]).is_some_and(|limit| size > limit) && size > FAR_SIGMAS * sigma
     };
     let name = |i: &usize| {
-        let (unit, factor) = file_unit(parameters[*i]);
+        let (unit, factor) = parameters[*i].file_unit();
         format!("{} {:+.1} {unit}", parameters[*i].name(), factor * moved(parameters[*i]))
     };
     // What a link shares with others may be theirs; terms are nothing else's.

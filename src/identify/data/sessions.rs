@@ -17,10 +17,11 @@ use serde::Serialize;
 
 use crate::identify::data::dataset::{Dataset, Group};
 use crate::identify::data::shared;
-use crate::identify::residuals::eliminate::{Block, Linear, product, pseudo_inverse};
+use crate::identify::residuals::eliminate::{Block, Linear};
 use crate::identify::settings::Settings;
 use crate::identify::solve::robust::{LEAST_FREEDOM, Loss};
 use crate::identify::solve::task::Task;
+use crate::linear_algebra::{product, pseudo_inverse};
 use crate::measurements::Role;
 use crate::robot::Robot;
 

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, SymmetricEigen, Vector3};
 use serde::Deserialize;
 
 use super::dataset::{Dataset, Pose, Reading};
-use crate::identify::residuals::weights::Extra;
+use crate::identify::sensor::Extra;
 use crate::identify::settings::Settings;
 
 /// Share of the whole shared variance below which a direction stays with the rows.

@@ -15,9 +15,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use super::folds::FOLDS;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::model::prior::Tolerance;
-use crate::identify::residuals::eliminate::{Block, Linear, product, pseudo_inverse};
+use crate::identify::residuals::eliminate::{Block, Linear};
 use crate::identify::residuals::rows::Rows;
-use crate::identify::residuals::weights::Extra;
+use crate::identify::sensor::Extra;
+use crate::linear_algebra::{product, pseudo_inverse};
 use crate::robot::Parameter;
 
 /// Cells in all, about.

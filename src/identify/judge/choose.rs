@@ -17,7 +17,7 @@ use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::shared;
 use crate::identify::model::ladder::{Chain, Terms};
-use crate::identify::residuals::weights::{Extra, Scatter};
+use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::{Extensions, Method, Model, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::problem::{Problem, Solution};

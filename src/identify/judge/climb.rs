@@ -11,7 +11,7 @@ use super::choose::Session;
 use super::folds;
 use crate::identify::Error;
 use crate::identify::model::ladder::{Chain, Terms};
-use crate::identify::residuals::weights::{EVIDENCE, Extra, Scatter, WARPS};
+use crate::identify::sensor::{EVIDENCE, Extra, Scatter, WARPS};
 use crate::identify::settings::Model;
 use crate::identify::solve::formulation::Formulation;
 use crate::robot::Parameter;

@@ -11,7 +11,7 @@ use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, Reading};
 use crate::identify::residuals::eliminate::{Block, Unknowns};
 use crate::identify::residuals::rows::{Recipe, Rows};
-use crate::identify::residuals::weights::{Extra, Scatter};
+use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::Model;
 use crate::robot::Robot;
 

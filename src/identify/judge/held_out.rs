@@ -9,7 +9,7 @@ use super::choose::Identification;
 use super::errors::{Judge, RowError};
 use super::folds;
 use crate::identify::data::dataset::Dataset;
-use crate::identify::residuals::weights::Extra;
+use crate::identify::sensor::Extra;
 use crate::identify::settings::Settings;
 use crate::robot::Robot;
 

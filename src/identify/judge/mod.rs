@@ -8,3 +8,4 @@ pub mod folds;
 pub mod held_out;
 pub mod scale;
 pub mod smooth;
+pub mod uncertainty;

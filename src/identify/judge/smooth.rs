@@ -9,9 +9,11 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::identify::model::prior::evidence_of_all;
-use crate::identify::residuals::eliminate::{Block, product};
+use crate::identify::residuals::eliminate::Block;
 use crate::identify::residuals::rows::Rows;
-use crate::identify::residuals::smooth::{SmoothError, functions, white};
+use crate::identify::residuals::smooth::{functions, white};
+use crate::identify::sensor::SmoothError;
+use crate::linear_algebra::product;
 
 /// A smooth error that the points tell of, and by how much it makes them more probable.
 #[derive(Debug, Clone, Copy, PartialEq)]

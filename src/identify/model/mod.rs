@@ -4,4 +4,3 @@ pub mod base;
 pub mod kinematics;
 pub mod ladder;
 pub mod prior;
-pub mod uncertainty;

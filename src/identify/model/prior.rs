@@ -8,8 +8,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::base::Base;
-use crate::identify::residuals::eliminate::product;
-use crate::identify::residuals::weights::Extra;
+use crate::identify::sensor::Extra;
+use crate::linear_algebra::product;
 use crate::robot::Parameter;
 
 /// Standard deviations that are tried for every kind, mm, mrad or thousandths.

@@ -4,8 +4,9 @@ use serde::Serialize;
 
 use super::Record;
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::doctor::{self, Finding};
+use crate::identify::data::doctor;
 use crate::identify::data::plausible;
+use crate::identify::finding::Finding;
 use crate::identify::judge::choose::Identification;
 use crate::identify::judge::errors::Spread;
 use crate::identify::judge::held_out::Against;

@@ -8,7 +8,7 @@ use crate::identify::judge::choose::Candidate;
 use crate::identify::model::base::Observability;
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::problem::{Problem, Solution, Stop};
-use crate::robot::{Parameter, Unit};
+use crate::robot::Parameter;
 
 /// A limit of the search counts as reached within this fraction of its width.
 const AT_LIMIT: f64 = 1e-3;
@@ -132,7 +132,7 @@ fn parameter_records(formulation: &Formulation, solution: &Solution) -> Vec<Para
     let covariance: DMatrix<f64> = formulation.robot_covariance();
     let offsets = fit.offsets(&solution.x);
     let record = |(i, &parameter): (usize, &Parameter)| {
-        let (unit, factor) = file_unit(parameter);
+        let (unit, factor) = parameter.file_unit();
         let free = formulation.base.free.iter().position(|&f| f == i);
         let determined = !formulation.base.zero.contains(&i);
         let at_limit = |k: usize| {
@@ -150,15 +150,4 @@ fn parameter_records(formulation: &Formulation, solution: &Solution) -> Vec<Para
         }
     };
     formulation.parameters().iter().enumerate().map(record).collect()
-}
-
-/// Unit in files, and what to multiply mm or mrad by.
-pub fn file_unit(parameter: Parameter) -> (&'static str, f64) {
-    match (parameter, parameter.unit()) {
-        (_, Unit::Mm) => ("mm", 1.0),
-        (Parameter::Gravity(..) | Parameter::Bending(..), _) => ("mrad/m", 1.0),
-        (Parameter::Harmonic(..) | Parameter::Wobble(..), _) => ("mrad", 1.0),
-        (Parameter::Coupling(..), _) => ("1e-3", 1.0),
-        _ => ("deg", (1e-3f64).to_degrees()),
-    }
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::choose::Identification;
 use crate::identify::judge::errors::{Judge, RowError, Spread};
-use crate::identify::residuals::weights::Extra;
+use crate::identify::sensor::Extra;
 use crate::identify::settings::Settings;
 use crate::robot::Robot;
 

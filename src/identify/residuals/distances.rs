@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::eliminate::{Raw, direction};
-use super::weights::{Length, Scatter};
+use crate::geometry::direction;
 use crate::identify::model::kinematics::Place;
+use crate::identify::residuals::raw::Raw;
+use crate::identify::sensor::{Length, Scatter};
 
 /// Distances to the group's centre pose.
 #[derive(Debug, Clone)]

@@ -5,24 +5,23 @@
 //! Pereyra, 1973) with Kaufman's derivative. A model without such unknowns is the special case.
 //! What goes wrong: poses on one line leave the transform's turn about it free; the pseudo-inverse leaves it where it is.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::distances::{Center, Wire};
 use super::pairwise::Pairs;
 use super::points::Points;
+use super::raw::Raw;
 use super::touch::Touch;
-use super::weights::Scatter;
 use crate::geometry::Transform;
 use crate::identify::model::kinematics::Place;
+use crate::identify::sensor::Scatter;
+use crate::linear_algebra::{product, pseudo_inverse};
 
 /// Steps of the inner problem at the most; it is nearly linear and mostly needs two or three.
 const INNER_STEPS: usize = 50;
 
 /// The inner problem is solved when its step's predicted gain falls below this fraction of its cost.
 const INNER_GAIN: f64 = 1e-14;
-
-/// Relative size below which an eigenvalue of the inner normal matrix counts as zero.
-const INNER_RANK: f64 = 1e-13;
 
 /// What one block measures.
 #[derive(Debug, Clone)]
@@ -50,17 +49,6 @@ pub enum Unknowns {
     Sockets(Vec<Vector3<f64>>),
     /// `sensor_from_base`
     Frame(Transform),
-}
-
-/// A residual before whitening, and the variance that the measurement gives it.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Raw {
-    /// A length; the scatter enters so many times.
-    Length(f64, f64, f64),
-    /// A point.
-    Point(Vector3<f64>, Matrix3<f64>),
-    /// An orientation, rad.
-    Turn(Vector3<f64>),
 }
 
 /// Residuals with the placement's unknowns at their best, and derivatives where asked.
@@ -260,37 +248,4 @@ impl Unknowns {
             Unknowns::Frame(frame) => Unknowns::Frame(crate::geometry::perturb(frame, three(0), three(3))),
         }
     }
-}
-
-/// `A' B`, by way of the blocked product: `tr_mul` takes dot products one by one, at several times the time for matrices of this size.
-pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    a.transpose() * b
-}
-
-/// Unit vector and length; the zero vector where the length is zero.
-pub fn direction(v: &Vector3<f64>) -> (Vector3<f64>, f64) {
-    let length = v.norm();
-    if length > 0.0 { (v / length, length) } else { (Vector3::zeros(), 0.0) }
-}
-
-/// Of a symmetric matrix that may lack rank. Rows and columns are brought to a common size first: radians and mm mix.
-pub fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
-    if matrix.is_empty() {
-        return matrix;
-    }
-    let n = matrix.nrows();
-    let scale = DVector::from_fn(n, |i, _| if matrix[(i, i)] > 0.0 { 1.0 / matrix[(i, i)].sqrt() } else { 0.0 });
-    let scaled = DMatrix::from_fn(n, n, |r, c| matrix[(r, c)] * scale[r] * scale[c]);
-    if scaled.iter().any(|v| !v.is_finite()) {
-        return DMatrix::zeros(n, n);
-    }
-    let eigen = SymmetricEigen::new(scaled);
-    let threshold = INNER_RANK * eigen.eigenvalues.amax();
-    let mut inverse = DMatrix::zeros(n, n);
-    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-        if *value > threshold {
-            inverse += vector * vector.transpose() / *value;
-        }
-    }
-    DMatrix::from_fn(n, n, |r, c| inverse[(r, c)] * scale[r] * scale[c])
 }

@@ -8,9 +8,10 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Matrix3xX, Vector3};
 
-use super::eliminate::{Raw, direction};
-use super::weights::{Scatter, Spot};
+use crate::geometry::direction;
 use crate::identify::model::kinematics::Place;
+use crate::identify::residuals::raw::Raw;
+use crate::identify::sensor::{Scatter, Spot};
 
 /// Poses whose distances are taken together at the most.
 pub const CHUNK: usize = 60;

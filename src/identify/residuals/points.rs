@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 
-use super::eliminate::Raw;
 use super::smooth::Field;
-use super::weights::{Extra, Scatter, Spot};
 use crate::geometry::{Transform, rotation_matrix, rotation_vector_of_matrix, skew};
 use crate::identify::model::kinematics::Place;
+use crate::identify::residuals::raw::Raw;
+use crate::identify::sensor::{Extra, Scatter, Spot};
 
 /// Extra unknowns that turn the target are per mrad.
 const RAD_PER_MRAD: f64 = 1e-3;

@@ -6,16 +6,17 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector, Vector3};
 
 use super::distances::{Center, Wire};
-use super::eliminate::{Block, Evaluated, Raw, Unknowns};
+use super::eliminate::{Block, Evaluated, Unknowns};
 use super::pairwise::{CHUNK, Pairs};
 use super::points::Points;
 use super::smooth::Field;
 use super::starts::{first_anchor, mean_target, middle, robust_frame};
 use super::touch::{Contact, Known, Touch};
-use super::weights::{Extra, Length, Scatter, Spot};
 use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, Reading};
 use crate::identify::model::kinematics::{Kinematics, Place};
+use crate::identify::residuals::raw::Raw;
+use crate::identify::sensor::{Extra, Length, Scatter, Spot};
 use crate::identify::settings::Model;
 use crate::robot::{Parameter, Robot};
 

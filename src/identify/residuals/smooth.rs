@@ -9,17 +9,9 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, SymmetricEigen, Vector3};
 
-use super::eliminate::{product, pseudo_inverse};
 use crate::geometry::skew;
-
-/// How large a smooth error is, and how smooth.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct SmoothError {
-    /// Standard deviation of a coordinate, mm.
-    pub sd_mm: f64,
-    /// Length over which it changes, mm.
-    pub length_mm: f64,
-}
+use crate::identify::sensor::SmoothError;
+use crate::linear_algebra::{product, pseudo_inverse};
 
 /// Points of a placement that the error is seen through, at the most.
 const SEEN_THROUGH: usize = 24;

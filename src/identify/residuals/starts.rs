@@ -3,12 +3,12 @@
 //! In: what was measured, and the robot's places. Out: a start that gross errors hardly move, by reweighted least squares. What goes wrong: places on
 //! a line leave a turn about it, which stays where the decomposition puts it.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Point3, Rotation3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 
-use super::eliminate::pseudo_inverse;
-use super::weights::{Length, Spot};
-use crate::geometry::{Transform, transform_from_matrix};
+use crate::geometry::{Transform, fitted_frame, nearest_rotation};
 use crate::identify::model::kinematics::Place;
+use crate::identify::sensor::{Length, Spot};
+use crate::linear_algebra::pseudo_inverse;
 
 /// Rounds of reweighting a first frame.
 const FRAME_ROUNDS: usize = 15;
@@ -29,28 +29,6 @@ pub(super) fn robust_frame(spots: &[Spot], places: &[Place]) -> Transform {
         weights = misses.iter().zip(&spots).map(|(m, s)| s.weight * s.weight / m.max(floor)).collect();
     }
     frame
-}
-
-/// The rigid transform `b_from_a` that brings pairs (a, b, weight) of points together best (Kabsch, 1976).
-pub fn fitted_frame(pairs: impl Iterator<Item = (Point3<f64>, Point3<f64>, f64)>) -> Transform {
-    let pairs: Vec<_> = pairs.collect();
-    let n = pairs.iter().map(|(_, _, w)| w).sum::<f64>().max(f64::MIN_POSITIVE);
-    let mean_a = pairs.iter().map(|(a, _, w)| a.coords * *w).sum::<Vector3<f64>>() / n;
-    let mean_b = pairs.iter().map(|(_, b, w)| b.coords * *w).sum::<Vector3<f64>>() / n;
-    let covariance: Matrix3<f64> =
-        pairs.iter().map(|(a, b, w)| (b.coords - mean_b) * (a.coords - mean_a).transpose() * *w).sum();
-    let rotation = nearest_rotation(&covariance);
-    transform_from_matrix(rotation, mean_b - rotation * mean_a)
-}
-
-/// The rotation R with the largest trace of R' M.
-pub fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
-    let svd = matrix.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Matrix3::identity() };
-    let mut sign = Matrix3::identity();
-    let smallest = svd.singular_values.imin();
-    sign[(smallest, smallest)] = (u * v_t).determinant().signum();
-    u * sign * v_t
 }
 
 /// Coordinate by coordinate the median.

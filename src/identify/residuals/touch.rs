@@ -4,9 +4,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::eliminate::{Raw, direction};
-use super::weights::Scatter;
+use crate::geometry::direction;
 use crate::identify::model::kinematics::Place;
+use crate::identify::residuals::raw::Raw;
+use crate::identify::sensor::Scatter;
 
 /// A pose at which a socket was touched.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,13 +8,13 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::kernel::{Kernel, LANES, Points as Computed};
 use super::placement::Placement;
+use crate::geometry::nearest_rotation;
 use crate::geometry::{Transform, rotation_matrix, transform_from_matrix};
 use crate::identify::residuals::eliminate::Block;
 use crate::identify::residuals::points::Points;
 use crate::identify::residuals::rows::Rows;
-use crate::identify::residuals::starts::nearest_rotation;
 use crate::identify::residuals::touch::{Known, Touch};
-use crate::identify::residuals::weights::{Scatter, Spot};
+use crate::identify::sensor::{Scatter, Spot};
 
 /// Blocks whose cost needs no matrices.
 #[derive(Debug, Clone)]

@@ -18,8 +18,9 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::robust::{LEAST_FREEDOM, Robust};
 use super::scatter::as_one_number;
 use super::task::Task;
-use crate::identify::residuals::eliminate::{Block, product, pseudo_inverse};
+use crate::identify::residuals::eliminate::Block;
 use crate::identify::residuals::touch::Known;
+use crate::linear_algebra::{product, pseudo_inverse};
 
 /// Root of the weight of a row that must not count, but has to have residuals and derivatives.
 const UNHEARD: f64 = 1e-5;

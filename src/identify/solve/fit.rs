@@ -9,8 +9,8 @@ use nalgebra::{DMatrix, DVector};
 use super::batch::BatchCost;
 use super::problem::Problem;
 use crate::identify::model::base::Base;
-use crate::identify::residuals::eliminate::product;
 use crate::identify::residuals::rows::Rows;
+use crate::linear_algebra::product;
 
 /// What the solvers minimise.
 #[derive(Debug, Clone)]

@@ -15,10 +15,10 @@ use super::trust_region;
 use crate::identify::Error;
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::{Linearised, Tolerance};
-use crate::identify::residuals::eliminate::{product, pseudo_inverse};
 use crate::identify::residuals::rows::Rows;
-use crate::identify::residuals::weights::{Extra, Scatter};
+use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::{Model, Prior, Settings};
+use crate::linear_algebra::{product, pseudo_inverse};
 use crate::robot::{Parameter, Robot, Unit};
 
 /// Rounds of fitting and of estimating scatter and prior from the residuals.

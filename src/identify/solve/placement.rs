@@ -9,11 +9,13 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Vector3, Vector4};
 
 use super::kernel::Points as Computed;
+use crate::geometry::direction;
 use crate::geometry::{Transform, rotation_matrix};
 use crate::identify::model::kinematics::Place;
-use crate::identify::residuals::eliminate::{Block, Unknowns, direction, product, pseudo_inverse};
+use crate::identify::residuals::eliminate::{Block, Unknowns};
 use crate::identify::residuals::points::turn;
-use crate::identify::residuals::weights::{Length, Scatter, Spot};
+use crate::identify::sensor::{Length, Scatter, Spot};
+use crate::linear_algebra::{product, pseudo_inverse};
 
 /// Steps at the most.
 const STEPS: usize = 50;

@@ -15,7 +15,8 @@ use crate::identify::Error;
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::Tolerance;
 use crate::identify::residuals::rows::{Recipe, Rows};
-use crate::identify::residuals::weights::Scatter;
+use crate::identify::sensor::Scatter;
+use crate::identify::settings::DescentSettings;
 use crate::robot::Robot;
 
 /// Rounds of reweighting, and how many of them only bound the influence of large residuals.
@@ -176,7 +177,7 @@ impl Robust<'_> {
         let prior = prior_rows(&LOOSE, &self.base, &task, true);
         let spread = LOOSE.spread(&self.base, task.parameters);
         let fit = Fit::new(Cow::Owned(rows), &self.base, spread, &free, prior);
-        let settings = trust_region::Settings { iterations, ..task.settings.trust_region };
+        let settings = DescentSettings { iterations, ..task.settings.trust_region };
         self.x = trust_region::solve(&fit, &self.x, &settings).x;
         self.offsets = fit.offsets(&self.x);
         self.robot = task.robot.shifted(task.parameters, &self.offsets[..task.parameters.len()]);

@@ -10,8 +10,8 @@ use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::Tolerance;
 use crate::identify::residuals::rows::{Recipe, Rows};
-use crate::identify::residuals::smooth::SmoothError;
-use crate::identify::residuals::weights::{Extra, Scatter};
+use crate::identify::sensor::SmoothError;
+use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::{Model, Prior, Redundancy, Settings};
 use crate::robot::{Parameter, Robot, Unit};
 

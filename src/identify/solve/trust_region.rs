@@ -9,36 +9,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::identify::settings::DescentSettings;
 use crate::identify::solve::problem::{Problem, Solution, Stop};
-
-/// Constants of the method.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Settings {
-    /// Iterations at the most.
-    pub iterations: usize,
-    /// First radius as a multiple of the scaled start (MINPACK: 100).
-    pub radius: f64,
-    /// Stop when actual and predicted reduction fall below this fraction of the cost.
-    pub reduction: f64,
-    /// Stop when the radius falls below this fraction of the scaled point.
-    pub step: f64,
-    /// Stop when the largest cosine between the residuals and a column falls below this.
-    pub gradient: f64,
-}
-
-impl Default for Settings {
-    /// MINPACK's `lmdif1` and `lmder` defaults, with tolerances near rounding: a fit takes milliseconds.
-    fn default() -> Settings {
-        Settings { iterations: 100, radius: 100.0, reduction: 1e-13, step: 1e-12, gradient: 1e-12 }
-    }
-}
 
 /// A step is accepted when it brings this fraction of the predicted reduction (More, 1978).
 const ACCEPT: f64 = 1e-4;
 
 /// Minimises from `start` (moved into the box where it lies outside).
-pub fn solve(problem: &dyn Problem, start: &[f64], settings: &Settings) -> Solution {
+pub fn solve(problem: &dyn Problem, start: &[f64], settings: &DescentSettings) -> Solution {
     let (lower, upper) = (problem.lower(), problem.upper());
     let n = problem.dimension();
     let mut x: Vec<f64> = (0..n).map(|i| start[i].clamp(lower[i], upper[i])).collect();
@@ -99,7 +77,13 @@ struct Local<'a> {
 
 impl Local<'_> {
     /// Takes the first step that lowers the cost as predicted, from ever smaller radii; why the search ends there, where it does.
-    fn step(&self, x: &mut Vec<f64>, radius: &mut f64, evaluations: &mut usize, settings: &Settings) -> Option<Stop> {
+    fn step(
+        &self,
+        x: &mut Vec<f64>,
+        radius: &mut f64,
+        evaluations: &mut usize,
+        settings: &DescentSettings,
+    ) -> Option<Stop> {
         let Local { problem, residuals, jacobian, gradient, scale, cost } = *self;
         let (lower, upper) = (problem.lower(), problem.upper());
         loop {
@@ -352,7 +336,7 @@ mod tests {
         ];
         for (name, residuals, start, norm, tolerance) in cases {
             // Brown and Dennis' residuals are large: MINPACK too needs hundreds of evaluations.
-            let settings = Settings { iterations: 2000, ..Settings::default() };
+            let settings = DescentSettings { iterations: 2000, ..DescentSettings::default() };
             let run = solve(&classic(residuals, start.len()), start, &settings);
             let reached = (2.0 * run.cost).sqrt();
             assert!((reached - norm).abs() < tolerance, "{name}: {reached}, {run:?}");
@@ -366,19 +350,19 @@ mod tests {
         let mut problem = classic(rosenbrock, 2);
         problem.upper = vec![0.5, 2.0];
         problem.lower = vec![-2.0, -2.0];
-        let run = solve(&problem, &[-1.2, 1.0], &Settings::default());
+        let run = solve(&problem, &[-1.2, 1.0], &DescentSettings::default());
         assert!((run.cost - 0.125).abs() < 1e-9 && run.x[0] == 0.5 && (run.x[1] - 0.25).abs() < 1e-6, "{run:?}");
     }
 
     #[test]
     fn a_column_of_zeros_leaves_its_parameter_alone() {
-        let run = solve(&classic(|x| vec![x[0] - 3.0], 2), &[0.0, 7.0], &Settings::default());
+        let run = solve(&classic(|x| vec![x[0] - 3.0], 2), &[0.0, 7.0], &DescentSettings::default());
         assert!((run.x[0] - 3.0).abs() < 1e-12 && run.x[1] == 7.0);
     }
 
     #[test]
     fn a_start_that_is_no_number_is_said() {
-        let run = solve(&classic(|x| vec![x[0].sqrt()], 1), &[-1.0], &Settings::default());
+        let run = solve(&classic(|x| vec![x[0].sqrt()], 1), &[-1.0], &DescentSettings::default());
         assert_eq!(run.stop, Stop::NotFinite);
     }
 }

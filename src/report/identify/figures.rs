@@ -4,7 +4,7 @@ use maud::{Markup, html};
 use nalgebra::Point3;
 
 use crate::identify::judge::errors::RowError;
-use crate::identify::model::uncertainty::Expected;
+use crate::identify::judge::uncertainty::Expected;
 use crate::identify::record::{MethodRecord, Record};
 use crate::identify::solve::swarm::halton;
 use crate::measurements::Role;

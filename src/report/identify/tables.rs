@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::screen::distance_row;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::{RowError, Spread};
-use crate::identify::model::uncertainty::Expected;
+use crate::identify::judge::uncertainty::Expected;
 use crate::identify::record::{ParameterRecord, PointSpread, Record};
 use crate::report::page;
 use crate::report::table::number;

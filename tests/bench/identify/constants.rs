@@ -138,7 +138,7 @@ fn cost_after(solution: &Solution, evaluations: usize) -> f64 {
 
 fn least_of_starts(problem: &dyn Problem) -> f64 {
     let mut random = Pcg64::seed_from_u64(99);
-    let settings = trust_region::Settings::default();
+    let settings = DescentSettings::default();
     let starts: Vec<Vec<f64>> = (0..STARTS)
         .map(|_| {
             problem.lower().iter().zip(problem.upper()).map(|(l, u)| l + (u - l) * random.random::<f64>()).collect()

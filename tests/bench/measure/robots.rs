@@ -10,7 +10,7 @@ use stereocal::identify::data::dataset::{Dataset, Reading};
 use stereocal::identify::data::shared;
 use stereocal::identify::judge::choose::{Identification, identify};
 use stereocal::identify::judge::errors::Judge;
-use stereocal::identify::model::uncertainty::Expected;
+use stereocal::identify::judge::uncertainty::Expected;
 use stereocal::identify::settings::{Extensions, Method, Settings};
 use stereocal::measurements::{self, Measurement, Observed};
 use stereocal::robot::Robot;

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use stereocal::identify::Settings;
 use stereocal::identify::data::dataset::Dataset;
-use stereocal::identify::residuals::weights::Scatter;
+use stereocal::identify::sensor::Scatter;
 use stereocal::identify::settings::Method;
 use stereocal::identify::solve::task::Task;
 use stereocal::measurements::{Measurement, Role};

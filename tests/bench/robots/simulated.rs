@@ -6,7 +6,7 @@ use stereocal::identify::data::dataset::{Dataset, Reading};
 use stereocal::identify::judge::choose::{Identification, identify};
 use stereocal::identify::judge::errors::Judge;
 use stereocal::identify::judge::held_out::Against;
-use stereocal::identify::model::uncertainty::Expected;
+use stereocal::identify::judge::uncertainty::Expected;
 use stereocal::identify::settings::Method;
 use stereocal::robot::Robot;
 

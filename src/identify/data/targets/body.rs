@@ -6,8 +6,8 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, SymmetricEigen, Vector3, Vector6};
 
+use crate::geometry::fitted_frame;
 use crate::geometry::{Transform, perturb, rotation_matrix, skew};
-use crate::identify::residuals::starts::fitted_frame;
 use crate::statistics::median;
 
 /// Targets that stand nearer to a line than this share of their extent tell no turn about it.

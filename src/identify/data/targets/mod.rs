@@ -16,8 +16,8 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-use super::doctor::Finding;
 use crate::identify::Error;
+use crate::identify::finding::Finding;
 use crate::measurements::{Measurement, Observed};
 use body::{Body, Sighting};
 use moved::Moved;
@@ -182,7 +182,7 @@ fn told_apart(poses: &mut [Shown], names: &mut Vec<String>) -> Vec<(Moved, usize
 /// Of a covariance that may be singular.
 fn inverse(covariance: &Matrix3<f64>) -> Matrix3<f64> {
     let eigen = covariance.symmetric_eigen();
-    let least = (LEAST_VARIANCE * eigen.eigenvalues.max()).max(super::dataset::FLOOR_MM2);
+    let least = (LEAST_VARIANCE * eigen.eigenvalues.max()).max(crate::identify::sensor::FLOOR_MM2);
     let inverse = eigen.eigenvalues.map(|v| 1.0 / v.max(least));
     eigen.eigenvectors * Matrix3::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
 }

@@ -241,7 +241,7 @@ fn single_targets_tell_as_much_of_the_robot_as_their_points() {
             let robot = &found.candidates[found.chosen].robot;
             let joints: Vec<Vec<f64>> = world.rows.iter().map(|r| r.at.joints_rad()).collect();
             let pairs = joints.iter().map(|q| (robot.target_mm(q), truth.target_mm(q), 1.0));
-            let frame = crate::identify::residuals::starts::fitted_frame(pairs);
+            let frame = crate::geometry::fitted_frame(pairs);
             let miss = |q: &Vec<f64>| (frame * robot.target_mm(q) - truth.target_mm(q)).norm();
             *off = joints.iter().map(miss).sum::<f64>() / joints.len() as f64;
         }

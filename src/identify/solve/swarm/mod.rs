@@ -224,7 +224,7 @@ fn adaptive_inertia(cost: f64, least: f64, mean: f64, [low, high]: [f64; 2]) -> 
 mod tests {
     use super::*;
     use crate::identify::data::dataset::Dataset;
-    use crate::identify::settings::{Model, Prior, Settings};
+    use crate::identify::settings::{DescentSettings, Model, Prior, Settings};
     use crate::identify::solve::formulation::Formulation;
     use crate::identify::solve::task::Task;
     use crate::identify::solve::trust_region;
@@ -260,7 +260,7 @@ mod tests {
         let start = |random: &mut Pcg64| -> Vec<f64> {
             problem.lower().iter().zip(problem.upper()).map(|(l, u)| l + (u - l) * random.random::<f64>()).collect()
         };
-        let settings = trust_region::Settings::default();
+        let settings = DescentSettings::default();
         (0..starts)
             .map(|_| trust_region::solve(problem, &start(&mut random), &settings).cost)
             .fold(f64::INFINITY, f64::min)

@@ -13,7 +13,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use super::{Swarm, halton};
-use crate::identify::settings::{Method, SwarmSettings};
+use crate::identify::settings::{DescentSettings, Method, SwarmSettings};
 use crate::identify::solve::problem::{Problem, Solution, Stop};
 use crate::identify::solve::trust_region;
 
@@ -96,10 +96,8 @@ impl Swarm<'_> {
         let mut order: Vec<usize> = (0..self.costs.len()).collect();
         order.sort_by(|&a, &b| self.own_cost[a].total_cmp(&self.own_cost[b]));
         let chosen = &order[..self.settings.stapso.trust_region_particles.min(order.len())];
-        let trust = trust_region::Settings {
-            iterations: self.settings.stapso.trust_region_steps,
-            ..trust_region::Settings::default()
-        };
+        let trust =
+            DescentSettings { iterations: self.settings.stapso.trust_region_steps, ..DescentSettings::default() };
         let step = |i: usize| trust_region::solve(self.problem, &self.own_best[i * n..(i + 1) * n], &trust);
         (0..self.costs.len())
             .into_par_iter()

@@ -3,7 +3,6 @@
 //! A measured number is `value + own noise + extra' e`, where the extra unknowns `e` are common to many poses: the calibration of a
 //! rig, its scale, the zero of a wire. The fit finds them beside the robot.
 
-use super::smooth::SmoothError;
 use nalgebra::{Matrix3, Matrix3xX, Point3, RowDVector, Vector3};
 
 /// An unknown of the sensor that all placements share.
@@ -57,6 +56,9 @@ impl Extra {
 /// Logarithm of the evidence that an unknown of the sensor, or another reading of its covariances, must bring: one in four hundred.
 pub const EVIDENCE: f64 = 6.0;
 
+/// Variance that singular covariances get on top, mm^2: a micrometre, the resolution of a good instrument.
+pub const FLOOR_MM2: f64 = 1e-6;
+
 /// A measured length, mm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Length {
@@ -89,6 +91,15 @@ pub struct Spot {
     pub weight: f64,
     /// What the residual gains with each extra unknown, mm.
     pub extra: Matrix3xX<f64>,
+}
+
+/// How large a smooth error is, and how smooth.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct SmoothError {
+    /// Standard deviation of a coordinate, mm.
+    pub sd_mm: f64,
+    /// Length over which it changes, mm.
+    pub length_mm: f64,
 }
 
 /// How widely the robot scatters beyond the measurement's own covariance.

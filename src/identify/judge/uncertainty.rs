@@ -5,10 +5,8 @@ use serde::Serialize;
 
 use crate::identify::data::dataset::Dataset;
 use crate::identify::model::kinematics::Kinematics;
-use crate::identify::record::file_unit;
-use crate::identify::residuals::eliminate::pseudo_inverse;
 use crate::identify::solve::formulation::Formulation;
-use crate::robot::{Parameter, Robot};
+use crate::linear_algebra::pseudo_inverse;
 
 /// Covariance of the identified parameters, in the units of the file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -25,7 +23,7 @@ impl Covariance {
         let covariance = formulation.robot_covariance();
         let parameters = formulation.parameters();
         let seen: Vec<usize> = (0..parameters.len()).filter(|i| !formulation.base.zero.contains(i)).collect();
-        let factor = |i: usize| file_unit(parameters[i]).1;
+        let factor = |i: usize| parameters[i].file_unit().1;
         Covariance {
             order: seen.iter().map(|&i| parameters[i].name()).collect(),
             matrix: seen
@@ -142,28 +140,4 @@ pub fn region(set: &Dataset) -> String {
         }
     };
     (0..count).map(range).collect::<Vec<_>>().join(", ")
-}
-
-/// What measuring points at poses of one placement of the sensor would tell: the information matrix (inverse covariance, 1/mm^2 and
-/// the like in mm and mrad) about these parameters of the robot, the placement's rigid transform eliminated. Nothing needs to have
-/// been measured. `covariances_mm2` are those of the points in the robot's base frame, one a pose.
-pub fn information(
-    robot: &Robot,
-    parameters: &[Parameter],
-    joints_rad: &[&[f64]],
-    covariances_mm2: &[Matrix3<f64>],
-) -> DMatrix<f64> {
-    let places = Kinematics::new(robot, robot, parameters, joints_rad).places(&vec![0.0; parameters.len()], true);
-    let count = parameters.len();
-    let mut total = DMatrix::zeros(count + 6, count + 6);
-    for (place, covariance) in places.iter().zip(covariances_mm2) {
-        let Some(weight) = covariance.try_inverse() else { continue };
-        let mut columns = DMatrix::zeros(3, count + 6);
-        columns.columns_mut(0, count).copy_from(&place.point_columns);
-        columns.columns_mut(count, 6).copy_from(&rigid(&place.point_mm.coords));
-        total += columns.transpose() * weight * &columns;
-    }
-    let inverse = pseudo_inverse(total.view((count, count), (6, 6)).into_owned());
-    let cross = total.view((0, count), (count, 6)).into_owned();
-    total.view((0, 0), (count, count)).into_owned() - &cross * inverse * cross.transpose()
 }

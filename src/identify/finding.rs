@@ -1,0 +1,30 @@
+//! What is wrong with the data, in words.
+
+use serde::Serialize;
+
+/// One finding.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// What it is.
+    pub finding: String,
+    /// The rows it is about, by pose; empty where it is about all of them.
+    pub rows: Vec<String>,
+    /// What was done: mended, left out, or nothing but this warning, and how to have it otherwise.
+    pub action: String,
+}
+
+/// Rows that a sentence names.
+const NAMED: usize = 40;
+
+impl Finding {
+    /// As a warning.
+    pub fn sentence(&self) -> String {
+        let mut text = self.finding.clone();
+        if !self.rows.is_empty() {
+            let named = self.rows.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+            let more = self.rows.len().saturating_sub(NAMED);
+            text.push_str(&format!(": {named}{}", if more > 0 { format!(" and {more} more") } else { String::new() }));
+        }
+        format!("{text}; {}", self.action)
+    }
+}
