@@ -9,10 +9,10 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::{Digested, Provenance, Run};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::doctor::{self, Examined};
 use crate::identify::data::{known, shared};
-use crate::identify::judge::choose::{Identification, identify, step_count};
-use crate::identify::record::{Advice, Findings, Record, quality};
+use crate::identify::examine::{self, Examined};
+use crate::identify::record::{self, Advice, Findings, Record, quality};
+use crate::identify::run::{Identification, identify, step_count};
 use crate::identify::{Error, Settings};
 use crate::measurements::{Measurement, Role, Source};
 use crate::progress;
@@ -43,10 +43,10 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     shared::suppose_scale(&mut set);
     let bar = progress::bar("identifying", 2 + step_count(&settings));
     let Examined { set, robot: nominal, along, findings, unexplained } =
-        doctor::examine(&set, &given, &settings, &|step| bar.begin(step));
+        examine::examine(&set, &given, &settings, &|step| bar.begin(step));
     let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.begin(step))?;
     bar.finish_and_clear();
-    let of_fit = doctor::findings(&set, &found, &along);
+    let of_fit = record::findings::findings(&set, &found, &along);
     let findings = Findings::new(findings, unexplained, of_fit, &found);
     let record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     said(&record, &out);

@@ -14,11 +14,11 @@ use crate::diagnostic::Status;
 use crate::files;
 use crate::identify;
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::doctor::{self, Examined};
 use crate::identify::data::known;
+use crate::identify::examine::{self, Examined};
 use crate::identify::judge::errors::{Judge, PLACED_BY_ITSELF};
 use crate::identify::judge::folds;
-use crate::identify::record::{PointSpread, spread};
+use crate::identify::record::{self, PointSpread, spread};
 use crate::measurements::{Measurement, Observed, Role};
 use crate::progress;
 use crate::report;
@@ -51,9 +51,9 @@ fn place_by_verify_rows(rows: &mut [Measurement]) -> bool {
 
 /// The set as the examination mends it, its findings said; and whether something explains the errors.
 fn examined(set: &Dataset, file: &Utf8Path, robot: &Robot, settings: &identify::Settings) -> (Dataset, bool) {
-    let Examined { set, robot: mended, along, findings, unexplained } = doctor::examine(set, robot, settings, &|_| {});
+    let Examined { set, robot: mended, along, findings, unexplained } = examine::examine(set, robot, settings, &|_| {});
     let explained = unexplained.is_none();
-    for finding in findings.into_iter().chain(unexplained).chain(doctor::along_the_rows(&along)) {
+    for finding in findings.into_iter().chain(unexplained).chain(record::findings::along_the_rows(&along)) {
         progress::warn(finding.sentence());
     }
     if mended != *robot {

@@ -11,11 +11,13 @@
 
 pub mod data;
 pub mod error;
+pub mod examine;
 pub mod finding;
 pub mod judge;
 pub mod model;
 pub mod record;
 pub mod residuals;
+pub mod run;
 pub mod sensor;
 pub mod settings;
 pub mod solve;

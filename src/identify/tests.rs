@@ -1,9 +1,9 @@
 //! The paper's experiment rebuilt: four spheres, 262 poses and 50 to verify, Table 2's values as truth.
 
 use crate::identify::data::dataset::{Dataset, Reading};
-use crate::identify::judge::choose::identify;
 use crate::identify::judge::errors::{Judge, Spread};
 use crate::identify::record::quality;
+use crate::identify::run::identify;
 use crate::identify::settings::{Extensions, Method, Model, Prior, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::task::Task;
@@ -250,7 +250,7 @@ fn a_zero_that_is_off_costs_next_to_nothing_and_is_said() {
         }
         let set = Dataset::new(&rows).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
-        let said = crate::identify::data::doctor::findings(&set, &found, &Default::default());
+        let said = crate::identify::record::findings::findings(&set, &found, &Default::default());
         let said = said.iter().any(|f| f.finding.contains("the zero of the readings is off"));
         let (extras, values): (Vec<_>, Vec<f64>) = found.extras.iter().copied().unzip();
         let plain = Judge::plain(&set, &found.fitted, method.wire_offset);
@@ -284,7 +284,7 @@ fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain()
         let set = Dataset::new(&rows).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
         let (formulation, _) = found.candidates[found.chosen].found.as_ref().unwrap();
-        let findings = crate::identify::data::doctor::findings(&set, &found, &Default::default());
+        let findings = crate::identify::record::findings::findings(&set, &found, &Default::default());
         let said = findings.iter().any(|f| f.finding.contains("smooth error"));
         (
             said,
@@ -340,7 +340,7 @@ fn readings_of_another_scale_are_said_to_be_so() {
         }
         let set = Dataset::new(&rows).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
-        let findings = crate::identify::data::doctor::findings(&set, &found, &Default::default());
+        let findings = crate::identify::record::findings::findings(&set, &found, &Default::default());
         assert_eq!(findings.iter().any(|f| f.finding.contains("all links are found")), said, "{scale}: {findings:?}");
     }
 }

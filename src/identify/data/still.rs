@@ -6,7 +6,7 @@ use super::dataset::Dataset;
 const SAME_JOINT: f64 = 1e-9;
 
 /// Rows of the same group at the same joints.
-pub(super) fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
+pub fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
     let mut order: Vec<usize> = (0..set.poses.len()).collect();
     let key = |i: usize| (set.poses[i].group, &set.poses[i].joints_rad);
     order.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
@@ -27,7 +27,7 @@ pub(super) fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
 }
 
 /// Joints that do not move.
-pub(super) fn constant_joints(set: &Dataset) -> Vec<usize> {
+pub fn constant_joints(set: &Dataset) -> Vec<usize> {
     let Some(first) = set.poses.first() else { return Vec::new() };
     let constant = |j: &usize| set.poses.iter().all(|p| (p.joints_rad[*j] - first.joints_rad[*j]).abs() <= SAME_JOINT);
     (0..first.joints_rad.len()).filter(constant).collect()

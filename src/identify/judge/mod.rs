@@ -1,11 +1,8 @@
-//! Errors on rows that were not fitted, and the choice of model, terms and method by them.
+//! Errors on rows that were not fitted, and how far to trust what was.
 
 pub mod cells;
-pub mod choose;
-pub mod climb;
 pub mod errors;
 pub mod folds;
-pub mod held_out;
 pub mod scale;
 pub mod smooth;
 pub mod uncertainty;

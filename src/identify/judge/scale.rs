@@ -11,9 +11,9 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::identify::data::dataset::Dataset;
-use crate::identify::judge::choose::Identification;
-use crate::identify::model::ladder::Chain;
+use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::model::prior::Tolerance;
+use crate::identify::solve::formulation::Formulation;
 use crate::robot::Parameter;
 
 /// Tolerances of the links that are weighed, mm: from the smallest, so many, each so many times the one before.
@@ -54,10 +54,9 @@ pub struct CommonScale {
 }
 
 impl CommonScale {
-    /// Of the chosen robot; `None` where its links were not fitted, or nothing that was measured has their scale.
-    pub fn new(set: &Dataset, found: &Identification) -> Option<CommonScale> {
-        let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
-        if found.terms.chain != Chain::Mdh || !formulation.scale_seen || !formulation.held {
+    /// Of a fit of a robot with these terms; `None` where its links were not fitted, or nothing that was measured has their scale.
+    pub fn new(set: &Dataset, terms: &Terms, formulation: &Formulation) -> Option<CommonScale> {
+        if terms.chain != Chain::Mdh || !formulation.scale_seen || !formulation.held {
             return None;
         }
         let (base, parameters) = (&formulation.base, formulation.parameters());

@@ -1,15 +1,12 @@
 //! Whether to use the robot that was found, and the warnings in the order of their weight.
 
-use serde::Serialize;
-
-use super::Record;
+use super::file::{Advice, Record};
+use super::findings::{self, Findings};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::doctor;
-use crate::identify::data::plausible;
 use crate::identify::finding::Finding;
-use crate::identify::judge::choose::Identification;
 use crate::identify::judge::errors::Spread;
-use crate::identify::judge::held_out::Against;
+use crate::identify::run::Against;
+use crate::identify::run::Identification;
 use crate::robot::Robot;
 
 /// Orientations within this are one: a robot keeps an orientation to far less, and so small a turn shows nothing.
@@ -17,51 +14,6 @@ const ONE_ORIENTATION_DEG: f64 = 1.0;
 
 /// Mean distance error of a nominal robot, mm, beyond which units or robots are mixed up: built robots are off by a few mm.
 const IMPLAUSIBLE_MM: f64 = 20.0;
-
-/// What to do with the robot that was found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Advice {
-    /// Use it.
-    Use,
-    /// Use it once the reason was looked at.
-    Check,
-    /// Nothing better than the nominal robot was found, and that is the result.
-    KeepNominal,
-    /// Do not use it.
-    DoNotUse,
-}
-
-/// What is wrong with the data, by weight.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Findings {
-    /// What speaks against the result.
-    pub against: Vec<Finding>,
-    /// What was changed or left out before anything was fitted.
-    pub doubts: Vec<Finding>,
-    /// What was found along the way.
-    pub notes: Vec<Finding>,
-}
-
-impl Findings {
-    /// Those of the data, and those of the fit: what nothing explains, and a robot that is not the one of the file, speak against it.
-    pub fn new(
-        examined: Vec<Finding>,
-        unexplained: Option<Finding>,
-        of_fit: Vec<Finding>,
-        found: &Identification,
-    ) -> Findings {
-        let unexplained = unexplained.filter(|_| !doctor::is_explained(found));
-        let against: Vec<Finding> = unexplained.into_iter().chain(plausible::of_another_robot(found)).collect();
-        let notes = of_fit.into_iter().filter(|finding| !against.contains(finding)).collect();
-        Findings { against, doubts: examined, notes }
-    }
-
-    /// All of them, the gravest first.
-    pub fn all(&self) -> Vec<Finding> {
-        [&self.against, &self.doubts, &self.notes].into_iter().flatten().cloned().collect()
-    }
-}
 
 impl Record {
     /// Fills in the advice, its reason and the warnings.
@@ -126,7 +78,7 @@ impl Record {
         let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
         let zero_mm = formulation.zero_sigma_mm().unwrap_or(0.0);
         let expected_mm = self.expected.as_ref().map_or(f64::INFINITY, |e| e.of_robot_mm);
-        (zero_mm > expected_mm && doctor::zero(found).is_none()).then(|| {
+        (zero_mm > expected_mm && findings::zero(found).is_none()).then(|| {
             format!(
                 "the distances are too similar to separate an offset of the readings from a robot of another size: the offset is known to \
                  {zero_mm:.2} mm only; measure at distances that differ, or set `wire_offset = false` where the offset is zero"

@@ -3,9 +3,9 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::quality::{PointSpread, Quality};
-use crate::identify::judge::choose::Candidate;
 use crate::identify::model::base::Observability;
+use crate::identify::record::quality::{PointSpread, Quality};
+use crate::identify::run::Candidate;
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::problem::{Problem, Solution, Stop};
 use crate::robot::Parameter;

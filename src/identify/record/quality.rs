@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use crate::identify::data::dataset::Dataset;
-use crate::identify::judge::choose::Identification;
 use crate::identify::judge::errors::{Judge, RowError, Spread};
+use crate::identify::run::Identification;
 use crate::identify::sensor::Extra;
 use crate::identify::settings::Settings;
 use crate::robot::Robot;

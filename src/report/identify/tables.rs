@@ -137,7 +137,7 @@ pub(super) fn joint_table(record: &Record) -> Markup {
 }
 
 pub(super) fn judged_table(record: &Record) -> Markup {
-    let row = |j: &crate::identify::judge::climb::Judged| {
+    let row = |j: &crate::identify::run::Judged| {
         let mark = if j.terms == record.terms { " (kept)" } else { "" };
         vec![j.model.to_owned(), format!("{}{mark}", j.terms), number(j.held_out_mm, 4)]
     };

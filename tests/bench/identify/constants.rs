@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use stereocal::identify::Model;
 use stereocal::identify::data::dataset::Dataset;
-use stereocal::identify::settings::{Method, Prior, Settings, SwarmSettings};
+use stereocal::identify::settings::{DescentSettings, Method, Prior, Settings, SwarmSettings};
 use stereocal::identify::solve::formulation::Formulation;
 use stereocal::identify::solve::problem::{Problem, Solution};
 use stereocal::identify::solve::task::Task;

@@ -13,7 +13,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use stereocal::geometry::{Transform, transform};
 use stereocal::identify::data::dataset::Dataset;
-use stereocal::identify::judge::choose::identify;
+use stereocal::identify::run::identify;
 use stereocal::identify::settings::Method;
 use stereocal::identify::{Model, Settings as Identify};
 use stereocal::measurements::{Measurement, Observed, RobotPose, Role};

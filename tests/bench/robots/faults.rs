@@ -4,9 +4,11 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use stereocal::identify::Settings;
 use stereocal::identify::data::dataset::Dataset;
-use stereocal::identify::data::doctor::{self, Examined, Finding};
-use stereocal::identify::judge::choose::{Identification, identify};
+use stereocal::identify::examine::{self, Examined};
+use stereocal::identify::finding::Finding;
 use stereocal::identify::judge::scale::CommonScale;
+use stereocal::identify::record;
+use stereocal::identify::run::{Identification, identify};
 use stereocal::identify::settings::Method;
 use stereocal::measurements::{Measurement, Observed, Role};
 use stereocal::robot::Robot;
@@ -319,15 +321,15 @@ fn diagnosed(sensor: Sensor, plant: Plant, size: f64, seed: u64) -> (Vec<Finding
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let set = Dataset::new(&rows).expect("rows");
     let Examined { set, robot: nominal, along, findings: mut list, unexplained } =
-        doctor::examine(&set, &nominal, &settings, &|_| {});
+        examine::examine(&set, &nominal, &settings, &|_| {});
     let Ok(found) = identify(&set, &nominal, &settings, 1, &|_| {}) else {
         list.extend(unexplained);
         return (list, f64::INFINITY, None);
     };
-    list.extend(unexplained.filter(|_| !doctor::is_explained(&found)));
-    list.extend(doctor::findings(&set, &found, &along));
+    list.extend(unexplained.filter(|_| !record::findings::is_explained(&found)));
+    list.extend(record::findings::findings(&set, &found, &along));
     let error = against_truth(&unspoilt, &truth, &found.candidates[found.chosen].robot);
-    (list, error, CommonScale::new(&set, &found))
+    (list, error, found.scale(&set))
 }
 
 fn gross(percent: usize, runs: u64) {

@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 use stereocal::identify::Settings;
 use stereocal::identify::data::dataset::{Dataset, Reading};
-use stereocal::identify::judge::choose::{Identification, identify};
 use stereocal::identify::judge::errors::Judge;
-use stereocal::identify::judge::held_out::Against;
 use stereocal::identify::judge::uncertainty::Expected;
+use stereocal::identify::run::Against;
+use stereocal::identify::run::{Identification, identify};
 use stereocal::identify::settings::Method;
 use stereocal::robot::Robot;
 

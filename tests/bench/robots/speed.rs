@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use stereocal::identify::Settings;
 use stereocal::identify::data::dataset::Dataset;
-use stereocal::identify::data::doctor::{self, Examined};
-use stereocal::identify::judge::choose::{Identification, identify};
+use stereocal::identify::examine::{self, Examined};
+use stereocal::identify::run::{Identification, identify};
 use stereocal::robot::Robot;
 
 use crate::worlds::{Beyond, Plan, arms, measured};
@@ -50,7 +50,7 @@ pub fn table() {
 
 fn whole(set: &Dataset, nominal: &Robot, seed: u64) -> Identification {
     let settings = Settings::default();
-    let Examined { set, robot: nominal, .. } = doctor::examine(set, nominal, &settings, &|_| {});
+    let Examined { set, robot: nominal, .. } = examine::examine(set, nominal, &settings, &|_| {});
     identify(&set, &nominal, &settings, seed, &|_| {}).expect("it is enough")
 }
 

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use stereocal::geometry::Transform;
 use stereocal::identify::Settings;
 use stereocal::identify::data::dataset::{Dataset, KnownDistance};
-use stereocal::identify::data::doctor;
-use stereocal::identify::judge::choose::identify;
+use stereocal::identify::examine;
 use stereocal::identify::judge::errors::Judge;
-use stereocal::identify::record::spread;
+use stereocal::identify::record::{self, spread};
+use stereocal::identify::run::identify;
 use stereocal::identify::settings::Method;
 use stereocal::measurements::{Measurement, Observed, RobotPose, Role};
 use stereocal::robot::{Robot, inverse};
@@ -151,14 +151,14 @@ fn faults(runs: u64) {
         let mut set = Dataset::new(&world.rows).expect("rows");
         set.known = world.known;
         let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
-        let examined = doctor::examine(&set, &world.nominal, &settings, &|_| {});
+        let examined = examine::examine(&set, &world.nominal, &settings, &|_| {});
         let mut list = examined.findings;
         let Ok(found) = identify(&examined.set, &examined.robot, &settings, 1, &|_| {}) else {
             list.extend(examined.unexplained);
             return (list, f64::INFINITY);
         };
-        list.extend(examined.unexplained.filter(|_| !doctor::is_explained(&found)));
-        list.extend(doctor::findings(&examined.set, &found, &examined.along));
+        list.extend(examined.unexplained.filter(|_| !record::findings::is_explained(&found)));
+        list.extend(record::findings::findings(&examined.set, &found, &examined.along));
         (list, against_truth(&exact, &world.truth, &found.candidates[found.chosen].robot))
     };
     let clean: Vec<f64> = (1..=runs).into_par_iter().map(|seed| diagnosed(|_, _| {}, 0.0, 0.0, seed).1).collect();
@@ -192,7 +192,7 @@ fn outcome(nominal: &Robot, beyond: Beyond, seed: u64) -> [f64; 7] {
         [&nominal, &found.candidates[found.chosen].robot, &least_squares(&set, &nominal)].map(judged);
     let unknown = Dataset { known: Vec::new(), ..set.clone() };
     let said = identify(&unknown, &nominal, &settings, 1, &|_| {}).is_ok_and(|found| {
-        let findings = doctor::findings(&unknown, &found, &Default::default());
+        let findings = record::findings::findings(&unknown, &found, &Default::default());
         findings.iter().any(|f| f.finding.contains("scale of the robot unseen"))
     });
     [before[0], before[1], after[0], after[1], plain[0], plain[1], f64::from(u8::from(said))]

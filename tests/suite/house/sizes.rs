@@ -10,7 +10,6 @@ use super::{modules, source_files};
 const LINES_OF_A_FILE: usize = 400;
 /// Files and functions that are longer and not mended yet: lists that only get shorter.
 const LONG_FILES: &[&str] = &[
-    "src/identify/data/conventions.rs",
     "src/identify/judge/cells.rs",
     "src/report/drawing/figure.rs",
     "src/robot/catalogue.rs",
@@ -19,9 +18,6 @@ const LONG_FILES: &[&str] = &[
 const LONG_FUNCTIONS: &[&str] = &[
     "src/commands/robot.rs: table",
     "src/commands/verify.rs: run",
-    "src/identify/data/conventions.rs: applied",
-    "src/identify/data/targets/mod.rs: findings",
-    "src/identify/judge/choose.rs: identify",
     "src/imaging/find.rs: find_corners",
     "src/measurements/judge.rs: decide",
     "src/plan/mod.rs: plan",

@@ -10,6 +10,9 @@ use crate::geometry::fitted_frame;
 use crate::geometry::{Transform, perturb, rotation_matrix, skew};
 use crate::statistics::median;
 
+/// Scatter that the numbers of a file have at the least, as a share of the targets' extent.
+pub const LEAST_SCATTER: f64 = 1e-7;
+
 /// Targets that stand nearer to a line than this share of their extent tell no turn about it.
 const LINE: f64 = 0.03;
 

@@ -5,7 +5,7 @@
 //! errors make none. The target in most of the distances that step is the one that moved. Steps of less than about three times the
 //! scatter, and within the first or last few poses, are not seen.
 
-use super::body::Sighting;
+use super::body::{LEAST_SCATTER, Sighting};
 use crate::statistics::median;
 
 /// Fewest poses before and after.
@@ -60,7 +60,7 @@ fn step(distances: &[(usize, f64)]) -> Option<(f64, usize)> {
     let count = distances.len();
     let middle = median(distances.iter().map(|d| d.1))?;
     let change = median(distances.windows(2).map(|two| (two[1].1 - two[0].1).abs()))?;
-    let scatter = (change / MEDIAN_CHANGE).max(super::LEAST_SCATTER * middle);
+    let scatter = (change / MEDIAN_CHANGE).max(LEAST_SCATTER * middle);
     let bounded = |d: f64| ((d - middle) / scatter).clamp(-BOUNDED, BOUNDED);
     let total: f64 = distances.iter().map(|d| bounded(d.1)).sum();
     let mut before = 0.0;

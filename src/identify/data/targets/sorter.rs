@@ -7,11 +7,10 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::body::{Body, Sighting};
-use super::{LEAST_SCATTER, Shown};
+use super::body::{Body, LEAST_SCATTER, Sighting};
 use crate::geometry::rotation_vector;
 use crate::identify::Error;
-use crate::measurements::Observed;
+use crate::measurements::{Measurement, Observed};
 use crate::statistics::{chi_square_quantile, median};
 
 /// Of clean sets, the share in which a pose is taken for one with a gross error.
@@ -19,6 +18,14 @@ const FALSE_ALARMS: f64 = 1e-3;
 
 /// Scatter of the targets against each other, as a share of their extent, that no rigid body has.
 const RIGID: f64 = 0.05;
+
+/// All rows of one pose.
+pub(super) struct Shown<'a> {
+    pub(super) first: &'a Measurement,
+    pub(super) sightings: Vec<Sighting>,
+    /// Why there are none.
+    pub(super) reason: Option<&'a str>,
+}
 
 /// What a pose's targets tell.
 pub(super) enum Judged {

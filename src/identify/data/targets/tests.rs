@@ -1,11 +1,11 @@
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::*;
 use crate::geometry::transform;
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::orientations;
+use crate::identify::examine::orientations;
 use crate::identify::synthetic;
-use crate::measurements::Role;
+use crate::measurements::{Measurement, Observed, Role};
 use crate::robot::Robot;
 
 const NOISE_MM: f64 = 0.02;
@@ -222,7 +222,7 @@ fn single(list: &[Measurement], count: usize, from: usize) -> Vec<Measurement> {
 
 #[test]
 fn single_targets_tell_as_much_of_the_robot_as_their_points() {
-    use crate::identify::judge::choose::identify;
+    use crate::identify::run::identify;
     let settings = crate::identify::Settings {
         method: Some(crate::identify::Method::TrustRegion),
         ..crate::identify::Settings::default()

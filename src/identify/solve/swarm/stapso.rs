@@ -12,7 +12,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use super::{Swarm, halton};
+use super::halton;
+use super::particles::Swarm;
 use crate::identify::settings::{DescentSettings, Method, SwarmSettings};
 use crate::identify::solve::problem::{Problem, Solution, Stop};
 use crate::identify::solve::trust_region;

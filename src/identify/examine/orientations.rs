@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::dataset::{Dataset, Reading};
+use crate::identify::data::dataset::{Dataset, Reading};
 use crate::identify::finding::Finding;
 use crate::robot::Robot;
 use crate::statistics::median;

@@ -1,56 +1,45 @@
-//! What is wrong with the data: each finding in words, with the rows it is about and what was done.
+//! What was found along the way, each in words with the rows it is about and what was done.
 
-use super::conventions::Mended;
-use super::dataset::{Dataset, Reading};
-use super::sessions::{self, Along, Session};
-use super::still::{constant_joints, repeated};
-use super::{conventions, covariances, known, orientations, plausible};
+use crate::identify::data::dataset::{Dataset, Reading};
+use crate::identify::data::still::{constant_joints, repeated};
+use crate::identify::examine::conventions;
+use crate::identify::examine::sessions::{Along, Session};
 use crate::identify::finding::Finding;
-use crate::identify::judge::choose::Identification;
 use crate::identify::judge::scale::CommonScale;
-use crate::identify::record::Smooth;
+use crate::identify::record::file::Smooth;
+use crate::identify::record::plausible;
+use crate::identify::run::Identification;
 use crate::identify::sensor::Extra;
-use crate::identify::settings::{Model, Settings};
-use crate::robot::Robot;
 
-/// A data set and a nominal robot as they are to be used.
-#[derive(Debug, Clone)]
-pub struct Examined {
-    /// The measurements, mended, and cut into sessions.
-    pub set: Dataset,
-    /// The robot.
-    pub robot: Robot,
-    /// Sessions and drifts.
-    pub along: Along,
-    /// What was wrong, and what was done.
-    pub findings: Vec<Finding>,
-    /// Errors that nothing explained so far.
-    pub unexplained: Option<Finding>,
+/// What is wrong with the data, by weight.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Findings {
+    /// What speaks against the result.
+    pub against: Vec<Finding>,
+    /// What was changed or left out before anything was fitted.
+    pub doubts: Vec<Finding>,
+    /// What was found along the way.
+    pub notes: Vec<Finding>,
 }
 
-/// Looks for what is wrong before anything is identified. `step` hears what is being done.
-pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(&str)) -> Examined {
-    step("units, signs and conventions");
-    let (mut set, mut robot, mut findings, mut unexplained_mm) = (set.clone(), robot.clone(), Vec::new(), None);
-    let of_targets = set.targets.as_ref().map_or_else(Vec::new, |targets| targets.findings.clone());
-    if settings.examine {
-        Mended { set, robot, findings, unexplained_mm } = conventions::examine(&set, &robot, settings);
-        let of_orientations = orientations::examine(&set, &robot, settings.model == Some(Model::Pose));
-        set = of_orientations.0;
-        findings.extend(of_orientations.1);
-        let of_known = known::examine(&set, &robot, settings);
-        set = of_known.0;
-        findings.extend(of_known.1);
+impl Findings {
+    /// Those of the data, and those of the fit: what nothing explains, and a robot that is not the one of the file, speak against it.
+    pub fn new(
+        examined: Vec<Finding>,
+        unexplained: Option<Finding>,
+        of_fit: Vec<Finding>,
+        found: &Identification,
+    ) -> Findings {
+        let unexplained = unexplained.filter(|_| !is_explained(found));
+        let against: Vec<Finding> = unexplained.into_iter().chain(plausible::of_another_robot(found)).collect();
+        let notes = of_fit.into_iter().filter(|finding| !against.contains(finding)).collect();
+        Findings { against, doubts: examined, notes }
     }
-    step("sessions along the rows");
-    let (mut set, along) = sessions::find(&set, &robot, settings);
-    if settings.examine {
-        let of_covariances = covariances::examine(&set, &robot, settings);
-        set = of_covariances.0;
-        findings.extend(of_covariances.1);
+
+    /// All of them, the gravest first.
+    pub fn all(&self) -> Vec<Finding> {
+        [&self.against, &self.doubts, &self.notes].into_iter().flatten().cloned().collect()
     }
-    findings.splice(0..0, of_targets);
-    Examined { set, robot, along, findings, unexplained: unexplained_mm.map(conventions::unexplained) }
 }
 
 /// Whether the robot that was found explains what no convention did, as where a link is so far off that only the whole search reaches it.
@@ -119,7 +108,7 @@ fn of_sensor(set: &Dataset, found: &Identification) -> Vec<Finding> {
     let mut add = |finding: String, rows: Vec<String>, action: &str| {
         list.push(Finding { finding, rows, action: action.to_owned() });
     };
-    if let Some(scale) = CommonScale::new(set, found).filter(CommonScale::is_told) {
+    if let Some(scale) = found.scale(set).filter(CommonScale::is_told) {
         add(scale.sentence(), Vec::new(), "the robot that was found has this scale; check it on a known length");
     }
     if let Some((zero_mm, sigma_mm)) = zero(found) {

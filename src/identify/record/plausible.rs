@@ -1,7 +1,7 @@
 //! Whether the parameters that were found are those of a built robot.
 
 use crate::identify::finding::Finding;
-use crate::identify::judge::choose::Identification;
+use crate::identify::run::Identification;
 use crate::robot::Parameter;
 
 /// Links that are farther from the file's than they are built.

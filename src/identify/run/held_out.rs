@@ -5,25 +5,16 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::choose::Identification;
-use super::errors::{Judge, RowError};
-use super::folds;
+use super::found::{Deletion, Identification};
 use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::errors::{Judge, RowError};
+use crate::identify::judge::folds;
 use crate::identify::sensor::Extra;
 use crate::identify::settings::Settings;
 use crate::robot::Robot;
 
 /// Chance with which rows find a robot worse that is not.
 const CHANCE: f64 = 0.05;
-
-/// A fit without some of the rows.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Deletion {
-    /// The rows that were left out.
-    pub rows: Vec<usize>,
-    /// What the parameters change by, mm and mrad.
-    pub change: Vec<f64>,
-}
 
 /// How the verify rows, or rows left out of a fit, find the chosen robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

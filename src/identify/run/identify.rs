@@ -9,94 +9,24 @@
 //! 5. Verify rows take no part in any choice but one: where the robot found is worse on them than the nominal one by more than another draw
 //!    of rows would let expect, nominal is kept. Without verify rows every row is fitted, and judged by fits that it was left out of.
 
-use super::cells::Linearised;
 use super::climb::Judged;
-use super::held_out::{Against, Deletion};
-use super::{folds, smooth};
+use super::found::{Candidate, Deletion, Identification};
+use super::gross::Gross;
+use super::held_out::Against;
+use super::session::Session;
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::shared;
+use crate::identify::judge::cells::Linearised;
+use crate::identify::judge::{folds, smooth};
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::{Extensions, Method, Model, Settings};
 use crate::identify::solve::formulation::Formulation;
-use crate::identify::solve::problem::{Problem, Solution};
-use crate::identify::solve::robust::Loss;
+use crate::identify::solve::problem::Problem;
 use crate::identify::solve::task::Task;
 use crate::identify::solve::{swarm, trust_region};
 use crate::robot::{Parameter, Robot};
-
-/// One method on one model, fitted to all rows that may be fitted.
-#[derive(Debug, Clone)]
-pub struct Candidate {
-    /// How it was found: a method's name, or `nominal`.
-    pub name: &'static str,
-    /// What was minimised.
-    pub model: Model,
-    /// What the problem looked like, and what came out; nothing of the nominal robot.
-    pub found: Option<(Formulation, Solution)>,
-    /// The robot.
-    pub robot: Robot,
-    /// Root mean square held-out error of a number, mm, of the model where this ends at its least cost; `None` where it does not, or
-    /// was not judged.
-    pub held_out_mm: Option<f64>,
-}
-
-/// Everything that was found.
-#[derive(Debug, Clone)]
-pub struct Identification {
-    /// Methods and models, fitted.
-    pub candidates: Vec<Candidate>,
-    /// Index of the one to use.
-    pub chosen: usize,
-    /// The rung that was taken.
-    pub terms: Terms,
-    /// Rungs as they were judged.
-    pub judged: Vec<Judged>,
-    /// Rows that were left out because they fit far worse than the rest.
-    pub outliers: Vec<usize>,
-    /// Rows that were fitted and are further off than chance allows.
-    pub doubtful: Vec<usize>,
-    /// Verify rows that are as far off as those left out; they are still counted.
-    pub verify_outliers: Vec<usize>,
-    /// Rows that were fitted.
-    pub fitted: Vec<usize>,
-    /// The scatter that is left of the chosen fit.
-    pub scatter: Scatter,
-    /// A smooth error that the points of each placement share.
-    pub smooth: Option<smooth::Told>,
-    /// Unknowns of the sensor, and their values.
-    pub extras: Vec<(Extra, f64)>,
-    /// Whether the nominal robot was kept because the verify rows found the other one worse.
-    pub vetoed: bool,
-    /// The fits that rows were left out of, where no row is there to verify.
-    pub deletions: Vec<Deletion>,
-    /// The parameters that they change.
-    pub(super) deleted_parameters: Vec<Parameter>,
-}
-
-/// Rows that are far from what the others predict.
-#[derive(Debug, Default, PartialEq)]
-struct Gross {
-    /// Left out of the fit.
-    outliers: Vec<usize>,
-    /// Fitted.
-    doubtful: Vec<usize>,
-    /// Verify rows.
-    of_verify: Vec<usize>,
-}
-
-/// What all steps share.
-pub(super) struct Session<'a> {
-    pub(super) set: &'a Dataset,
-    pub(super) robot: &'a Robot,
-    pub(super) settings: &'a Settings,
-    seed: u64,
-    pub(super) rows: Vec<usize>,
-    pub(super) extras: Vec<Extra>,
-    smooth: Option<smooth::Told>,
-    step: &'a (dyn Fn(&str) + Sync),
-}
 
 /// Numbers a parameter that a model needs to tell gross errors by: with fewer, a fit follows them.
 const ROWS_TELL: f64 = 2.0;
@@ -148,11 +78,7 @@ pub fn identify(
         let others = models.iter().filter(|&&m| m != model);
         candidates.extend(others.filter_map(|&m| session.run(m, fitted_terms, Method::TrustRegion).ok()));
     }
-    let (scatter, values) = match &candidates[chosen].found {
-        Some((formulation, _)) => (formulation.rows.scatter, formulation.extras().to_vec()),
-        None => (Scatter::of_point(1.0), Vec::new()),
-    };
-    let extras: Vec<(Extra, f64)> = session.extras.iter().copied().zip(values).collect();
+    let (scatter, extras) = session.sensor(&candidates[chosen]);
     let mut found = Identification {
         candidates,
         chosen,
@@ -179,15 +105,6 @@ pub fn identify(
     Ok(found)
 }
 
-impl Identification {
-    fn keep_nominal(&mut self, robot: &Robot, model: Model, held_out_mm: Option<f64>) {
-        let robot = robot.clone();
-        self.candidates.push(Candidate { name: "nominal", model, found: None, robot, held_out_mm });
-        self.chosen = self.candidates.len() - 1;
-        self.terms = Terms::NOMINAL;
-    }
-}
-
 /// The models that the data allow, or the one that was asked for.
 fn models(set: &Dataset, settings: &Settings) -> Result<Vec<Model>, Error> {
     let all = match set.kind {
@@ -209,26 +126,15 @@ fn models(set: &Dataset, settings: &Settings) -> Result<Vec<Model>, Error> {
     }
 }
 
-impl Candidate {
-    /// What its method minimised; infinite of the nominal robot.
-    fn cost(&self) -> f64 {
-        self.found.as_ref().map_or(f64::INFINITY, |(_, solution)| solution.cost)
-    }
-}
-
 impl Session<'_> {
-    pub(super) fn task<'b>(&'b self, parameters: &'b [crate::robot::Parameter], model: Model) -> Task<'b> {
-        let Session { set, robot, settings, .. } = *self;
-        let extras = if model == Model::PairwiseDistance { &[] } else { self.extras.as_slice() };
-        Task {
-            set,
-            robot,
-            parameters,
-            extras,
-            rows: &self.rows,
-            model,
-            smooth: self.smooth.map(|told| told.error),
-            settings,
+    /// The scatter that a fit left, and the values of the sensor's unknowns.
+    fn sensor(&self, of: &Candidate) -> (Scatter, Vec<(Extra, f64)>) {
+        match &of.found {
+            Some((formulation, _)) => {
+                let values = formulation.extras().iter().copied();
+                (formulation.rows.scatter, self.extras.iter().copied().zip(values).collect())
+            }
+            None => (Scatter::of_point(1.0), Vec::new()),
         }
     }
 
@@ -253,29 +159,6 @@ impl Session<'_> {
         Ok((terms, judged, gross))
     }
 
-    /// Numbers that were measured, less the unknowns of the placements.
-    fn numbers(&self) -> f64 {
-        let (a_row, a_group) = match self.set.kind {
-            Kind::Positions => (3, 6),
-            Kind::Distances if self.rows.iter().any(|&r| self.set.touches(r)) => (3, 3),
-            Kind::Distances => (1, 4),
-        };
-        let groups = (0..self.set.groups.len()).filter(|&g| self.rows.iter().any(|&r| self.set.poses[r].group == g));
-        (a_row * self.rows.len()) as f64 - (a_group * groups.count()) as f64
-    }
-
-    /// Whether there are so many times more numbers to tell by than parameters.
-    pub(super) fn tells(&self, terms: &Terms, times: f64) -> bool {
-        terms.parameters(self.robot).len() as f64 * times <= self.numbers()
-    }
-
-    /// The richest model that has so many times more numbers to tell by than parameters.
-    pub(super) fn reference(&self, times: f64) -> Terms {
-        let poorer = |chain: Chain| Terms { chain, ..Terms::NOMINAL };
-        let rich = [Terms::REFERENCE, Terms::default(), poorer(Chain::Offsets)];
-        rich.into_iter().find(|t| self.tells(t, times)).unwrap_or(poorer(Chain::Tool))
-    }
-
     /// A smooth error that the points of each placement share, where they tell of one. It comes after the terms: what the robot
     /// does wrong is as smooth, and a robot that is corrected is worth more than one about which less is certain.
     fn smooth_error(&self, model: Model, terms: &Terms) -> Result<Option<smooth::Told>, Error> {
@@ -283,21 +166,6 @@ impl Session<'_> {
         let at = Formulation::new(&self.task(&parameters, model))?;
         let sds = at.tolerance.standard_deviations(&parameters, &self.extras);
         Ok(smooth::most_probable(&at.rows, &at.offsets_of(), &sds))
-    }
-
-    /// Leaves out the rows that a robust fit gives no weight, and names them; and others that are far off.
-    fn drop_outliers(&mut self, model: Model, terms: &Terms) -> Result<Gross, Error> {
-        let sigmas = self.settings.outlier_sigmas;
-        if sigmas <= 0.0 {
-            return Ok(Gross::default());
-        }
-        let parameters = terms.parameters(self.robot);
-        let mut robust = self.task(&parameters, model).robust(Loss::Biweight)?;
-        let outliers = robust.gross_errors(sigmas);
-        let doubtful = robust.doubtful(&outliers);
-        let of_verify = robust.far_off(&self.set.verify_rows(), sigmas);
-        self.rows.retain(|r| !outliers.contains(r));
-        Ok(Gross { outliers, doubtful, of_verify })
     }
 
     fn run(&self, model: Model, terms: Terms, method: Method) -> Result<Candidate, Error> {

@@ -6,10 +6,10 @@
 
 use rayon::prelude::*;
 
-use super::cells::{Cells, HeldOut, Linearised, clearly_less, root_mean};
-use super::choose::Session;
-use super::folds;
+use super::session::Session;
 use crate::identify::Error;
+use crate::identify::judge::cells::{Cells, HeldOut, Linearised, clearly_less, root_mean};
+use crate::identify::judge::folds;
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::sensor::{EVIDENCE, Extra, Scatter, WARPS};
 use crate::identify::settings::Model;

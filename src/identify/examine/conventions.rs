@@ -8,11 +8,11 @@
 //! What goes wrong: two faults at once are found one after the other only where each alone brings an improvement. What the target's
 //! unknown place undoes (the sign of the last joint with a target on its axis) is not seen and costs nothing.
 
-use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::dataset::{Dataset, Kind, Reading};
-use super::sessions;
+use super::hypothesis::{Hypothesis, hypotheses};
+use crate::identify::data::dataset::Dataset;
+use crate::identify::examine::sessions;
 use crate::identify::finding::Finding;
 use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;
@@ -52,20 +52,6 @@ const ROWS: usize = 120;
 
 /// Rows of a placement: twice its own unknowns, below which it would take up what is wrong.
 const ROWS_A_GROUP: usize = 12;
-
-/// One thing that may be wrong.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Hypothesis {
-    Radians,
-    Lengths(f64, &'static str),
-    KnownLengths(f64, &'static str),
-    Exchanged(usize, usize),
-    Negated(usize),
-    Offset(usize, f64),
-    Lagging(Option<usize>, isize),
-    StandardDh,
-    Mirrored,
-}
 
 /// Errors of a robot against a set, mm in the units of the file.
 #[derive(Debug, Clone, Copy)]
@@ -267,140 +253,6 @@ fn in_sessions(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<f64>
     };
     let (before, after) = (scatter(&thinned)?, scatter(&cut)?);
     (after * EXPLAINS < before || after < IMPLAUSIBLE_MM).then_some(after)
-}
-
-fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
-    let joints = set.poses.first().map_or(0, |p| p.joints_rad.len());
-    let mut list = vec![Hypothesis::Radians, Hypothesis::StandardDh];
-    // A touch reads no length.
-    let touches = (0..set.poses.len()).any(|row| set.touches(row));
-    for (factor, unit) in [(1000.0, "m"), (25.4, "inches"), (10.0, "cm"), (0.001, "um")] {
-        match touches {
-            false => list.push(Hypothesis::Lengths(factor, unit)),
-            true if set.known.is_empty() => {}
-            true => list.push(Hypothesis::KnownLengths(factor, unit)),
-        }
-    }
-    if set.kind == Kind::Positions {
-        list.push(Hypothesis::Mirrored);
-    }
-    for i in 0..joints {
-        list.push(Hypothesis::Negated(i));
-        list.extend((i + 1..joints).map(|j| Hypothesis::Exchanged(i, j)));
-        list.extend([90.0, -90.0, 180.0].map(|deg| Hypothesis::Offset(i, deg)));
-        list.extend([1, -1].map(|by| Hypothesis::Lagging(Some(i), by)));
-    }
-    list.extend([1, -1].map(|by| Hypothesis::Lagging(None, by)));
-    list
-}
-
-impl Hypothesis {
-    /// What lengths are multiplied by, so that errors can be compared.
-    fn factor(self) -> f64 {
-        if let Hypothesis::Lengths(factor, _) = self { factor } else { 1.0 }
-    }
-
-    fn name(self) -> String {
-        match self {
-            Hypothesis::Radians => "the joint angles are in radians, not in degrees".to_owned(),
-            Hypothesis::Lengths(_, unit) => format!("the readings are in {unit}, not in mm"),
-            Hypothesis::KnownLengths(_, unit) => format!("the known distances are in {unit}, not in mm"),
-            Hypothesis::Exchanged(i, j) => {
-                format!("the columns of joints {} and {} are exchanged (swapped)", i + 1, j + 1)
-            }
-            Hypothesis::Negated(i) => {
-                format!("joint {} is counted the other way round: its sign is flipped (negated)", i + 1)
-            }
-            Hypothesis::Offset(i, deg) => format!("joint {} is offset by {deg:.0} deg", i + 1),
-            Hypothesis::Lagging(None, by) => format!("the joints lag {by} row against the readings"),
-            Hypothesis::Lagging(Some(i), by) => format!("joint {} lags {by} row against the others", i + 1),
-            Hypothesis::StandardDh => "the robot file holds standard DH parameters, not modified ones (MDH)".to_owned(),
-            Hypothesis::Mirrored => "the coordinates are mirrored: a left-handed frame".to_owned(),
-        }
-    }
-
-    fn applied(self, set: &Dataset, robot: &Robot) -> (Dataset, Robot) {
-        let (mut set, mut robot) = (set.clone(), robot.clone());
-        match self {
-            Hypothesis::Radians => {
-                let slides = set.slides.clone();
-                for pose in &mut set.poses {
-                    for (j, q) in pose.joints_rad.iter_mut().enumerate() {
-                        if !slides.get(j).copied().unwrap_or(false) {
-                            *q = q.to_degrees();
-                        }
-                    }
-                }
-            }
-            Hypothesis::Lengths(factor, _) => {
-                for pose in &mut set.poses {
-                    pose.on_body_mm = pose.on_body_mm.map(|part| part * factor);
-                    match &mut pose.reading {
-                        Reading::Position { point_mm, covariance_mm2, .. } => {
-                            point_mm.coords *= factor;
-                            *covariance_mm2 = covariance_mm2.map(|c| c * (factor * factor));
-                        }
-                        Reading::Distance { distance_mm, sigma_mm } => {
-                            *distance_mm *= factor;
-                            *sigma_mm = sigma_mm.map(|s| s * factor);
-                        }
-                        Reading::Reference => {}
-                    }
-                }
-            }
-            Hypothesis::KnownLengths(factor, _) => {
-                for known in &mut set.known {
-                    known.distance_mm *= factor;
-                    known.sigma_mm *= factor;
-                }
-            }
-            Hypothesis::Exchanged(i, j) => set.poses.iter_mut().for_each(|p| p.joints_rad.swap(i, j)),
-            Hypothesis::Negated(i) => robot.joints[i].sign = -robot.joints[i].sign,
-            Hypothesis::Offset(i, deg) => robot.joints[i].theta_rad += deg.to_radians(),
-            Hypothesis::Lagging(joint, by) => {
-                let before: Vec<Vec<f64>> = set.poses.iter().map(|p| p.joints_rad.clone()).collect();
-                let mut alone = Vec::new();
-                for (i, pose) in set.poses.iter_mut().enumerate() {
-                    match (i.checked_add_signed(by).and_then(|from| before.get(from)), joint) {
-                        (Some(from), Some(j)) => pose.joints_rad[j] = from[j],
-                        (Some(from), None) => pose.joints_rad.clone_from(from),
-                        (None, _) => alone.push(i),
-                    }
-                }
-                set = set.without(&alone, "its joints would stand in a row that the file does not have, for they lag");
-            }
-            Hypothesis::StandardDh => robot = from_standard(&robot),
-            Hypothesis::Mirrored => {
-                for pose in &mut set.poses {
-                    pose.on_body_mm = pose.on_body_mm.map(|part| Vector3::new(-part.x, part.y, part.z));
-                    if let Reading::Position { point_mm, covariance_mm2, .. } = &mut pose.reading {
-                        point_mm.x = -point_mm.x;
-                        if let Some(c) = covariance_mm2 {
-                            for k in [1, 2] {
-                                c[(0, k)] = -c[(0, k)];
-                                c[(k, 0)] = -c[(k, 0)];
-                            }
-                        }
-                    }
-                }
-            }
-        }
-        (set, robot)
-    }
-}
-
-/// A robot whose rows were read as modified but meant as standard DH: alpha and a belong behind their joint.
-fn from_standard(robot: &Robot) -> Robot {
-    let mut modified = robot.clone();
-    for i in 0..modified.joints.len() {
-        let before = if i == 0 { (0.0, 0.0) } else { (robot.joints[i - 1].alpha_rad, robot.joints[i - 1].a_mm) };
-        (modified.joints[i].alpha_rad, modified.joints[i].a_mm) = before;
-    }
-    if let Some(last) = robot.joints.last() {
-        let turn = nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::x_axis(), last.alpha_rad);
-        modified.tool_mm = turn * robot.tool_mm + nalgebra::Vector3::new(last.a_mm, 0.0, 0.0);
-    }
-    modified
 }
 
 #[cfg(test)]

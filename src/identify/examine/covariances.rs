@@ -11,9 +11,9 @@ use std::collections::BTreeMap;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::dataset::{Dataset, Reading};
-use super::shared;
 use crate::identify::Error;
+use crate::identify::data::dataset::{Dataset, Reading};
+use crate::identify::data::shared;
 use crate::identify::finding::Finding;
 use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;

@@ -1,0 +1,49 @@
+//! All that is asked of the data before anything is identified, in its order.
+
+use super::conventions::Mended;
+use super::sessions::{self, Along};
+use super::{conventions, covariances, known, orientations};
+use crate::identify::data::dataset::Dataset;
+use crate::identify::finding::Finding;
+use crate::identify::settings::{Model, Settings};
+use crate::robot::Robot;
+
+/// A data set and a nominal robot as they are to be used.
+#[derive(Debug, Clone)]
+pub struct Examined {
+    /// The measurements, mended, and cut into sessions.
+    pub set: Dataset,
+    /// The robot.
+    pub robot: Robot,
+    /// Sessions and drifts.
+    pub along: Along,
+    /// What was wrong, and what was done.
+    pub findings: Vec<Finding>,
+    /// Errors that nothing explained so far.
+    pub unexplained: Option<Finding>,
+}
+
+/// Looks for what is wrong before anything is identified. `step` hears what is being done.
+pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(&str)) -> Examined {
+    step("units, signs and conventions");
+    let (mut set, mut robot, mut findings, mut unexplained_mm) = (set.clone(), robot.clone(), Vec::new(), None);
+    let of_targets = set.targets.as_ref().map_or_else(Vec::new, |targets| targets.findings.clone());
+    if settings.examine {
+        Mended { set, robot, findings, unexplained_mm } = conventions::examine(&set, &robot, settings);
+        let of_orientations = orientations::examine(&set, &robot, settings.model == Some(Model::Pose));
+        set = of_orientations.0;
+        findings.extend(of_orientations.1);
+        let of_known = known::examine(&set, &robot, settings);
+        set = of_known.0;
+        findings.extend(of_known.1);
+    }
+    step("sessions along the rows");
+    let (mut set, along) = sessions::find(&set, &robot, settings);
+    if settings.examine {
+        let of_covariances = covariances::examine(&set, &robot, settings);
+        set = of_covariances.0;
+        findings.extend(of_covariances.1);
+    }
+    findings.splice(0..0, of_targets);
+    Examined { set, robot, along, findings, unexplained: unexplained_mm.map(conventions::unexplained) }
+}

@@ -1,0 +1,171 @@
+//! What may be wrong with the units and conventions of a data set or of a robot's file, one fault at a time, and how both are without it.
+
+use nalgebra::{Rotation3, Vector3};
+
+use crate::identify::data::dataset::{Dataset, Kind, Pose, Reading};
+use crate::robot::Robot;
+
+/// One thing that may be wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Hypothesis {
+    /// Joint angles are in radians.
+    Radians,
+    /// Readings are in a unit of so many mm.
+    Lengths(f64, &'static str),
+    /// Known distances are in a unit of so many mm.
+    KnownLengths(f64, &'static str),
+    /// Two columns are exchanged.
+    Exchanged(usize, usize),
+    /// A joint is counted the other way round.
+    Negated(usize),
+    /// A joint is off by so many degrees.
+    Offset(usize, f64),
+    /// Joints, or one, stand so many rows off.
+    Lagging(Option<usize>, isize),
+    /// The robot's parameters are standard DH ones.
+    StandardDh,
+    /// Points are in a left-handed frame.
+    Mirrored,
+}
+
+/// All that may be wrong with a set of this kind.
+pub fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
+    let joints = set.poses.first().map_or(0, |p| p.joints_rad.len());
+    let mut list = vec![Hypothesis::Radians, Hypothesis::StandardDh];
+    // A touch reads no length.
+    let touches = (0..set.poses.len()).any(|row| set.touches(row));
+    for (factor, unit) in [(1000.0, "m"), (25.4, "inches"), (10.0, "cm"), (0.001, "um")] {
+        match touches {
+            false => list.push(Hypothesis::Lengths(factor, unit)),
+            true if set.known.is_empty() => {}
+            true => list.push(Hypothesis::KnownLengths(factor, unit)),
+        }
+    }
+    if set.kind == Kind::Positions {
+        list.push(Hypothesis::Mirrored);
+    }
+    for i in 0..joints {
+        list.push(Hypothesis::Negated(i));
+        list.extend((i + 1..joints).map(|j| Hypothesis::Exchanged(i, j)));
+        list.extend([90.0, -90.0, 180.0].map(|deg| Hypothesis::Offset(i, deg)));
+        list.extend([1, -1].map(|by| Hypothesis::Lagging(Some(i), by)));
+    }
+    list.extend([1, -1].map(|by| Hypothesis::Lagging(None, by)));
+    list
+}
+
+impl Hypothesis {
+    /// What lengths are multiplied by, so that errors can be compared.
+    pub fn factor(self) -> f64 {
+        if let Hypothesis::Lengths(factor, _) = self { factor } else { 1.0 }
+    }
+
+    /// In words.
+    pub fn name(self) -> String {
+        match self {
+            Hypothesis::Radians => "the joint angles are in radians, not in degrees".to_owned(),
+            Hypothesis::Lengths(_, unit) => format!("the readings are in {unit}, not in mm"),
+            Hypothesis::KnownLengths(_, unit) => format!("the known distances are in {unit}, not in mm"),
+            Hypothesis::Exchanged(i, j) => {
+                format!("the columns of joints {} and {} are exchanged (swapped)", i + 1, j + 1)
+            }
+            Hypothesis::Negated(i) => {
+                format!("joint {} is counted the other way round: its sign is flipped (negated)", i + 1)
+            }
+            Hypothesis::Offset(i, deg) => format!("joint {} is offset by {deg:.0} deg", i + 1),
+            Hypothesis::Lagging(None, by) => format!("the joints lag {by} row against the readings"),
+            Hypothesis::Lagging(Some(i), by) => format!("joint {} lags {by} row against the others", i + 1),
+            Hypothesis::StandardDh => "the robot file holds standard DH parameters, not modified ones (MDH)".to_owned(),
+            Hypothesis::Mirrored => "the coordinates are mirrored: a left-handed frame".to_owned(),
+        }
+    }
+
+    /// The set and the robot as they are if it holds.
+    pub fn applied(self, set: &Dataset, robot: &Robot) -> (Dataset, Robot) {
+        let (mut set, mut robot) = (set.clone(), robot.clone());
+        match self {
+            Hypothesis::Radians => in_degrees(&mut set),
+            Hypothesis::Lengths(factor, _) => set.poses.iter_mut().for_each(|pose| scale(pose, factor)),
+            Hypothesis::KnownLengths(factor, _) => {
+                for known in &mut set.known {
+                    known.distance_mm *= factor;
+                    known.sigma_mm *= factor;
+                }
+            }
+            Hypothesis::Exchanged(i, j) => set.poses.iter_mut().for_each(|p| p.joints_rad.swap(i, j)),
+            Hypothesis::Negated(i) => robot.joints[i].sign = -robot.joints[i].sign,
+            Hypothesis::Offset(i, deg) => robot.joints[i].theta_rad += deg.to_radians(),
+            Hypothesis::Lagging(joint, by) => set = lagging(set, joint, by),
+            Hypothesis::StandardDh => robot = from_standard(&robot),
+            Hypothesis::Mirrored => set.poses.iter_mut().for_each(mirror),
+        }
+        (set, robot)
+    }
+}
+
+/// Joints that turn, their numbers taken for radians.
+fn in_degrees(set: &mut Dataset) {
+    for pose in &mut set.poses {
+        for (j, q) in pose.joints_rad.iter_mut().enumerate() {
+            if !set.slides.get(j).copied().unwrap_or(false) {
+                *q = q.to_degrees();
+            }
+        }
+    }
+}
+
+fn scale(pose: &mut Pose, factor: f64) {
+    pose.on_body_mm = pose.on_body_mm.map(|part| part * factor);
+    match &mut pose.reading {
+        Reading::Position { point_mm, covariance_mm2, .. } => {
+            point_mm.coords *= factor;
+            *covariance_mm2 = covariance_mm2.map(|c| c * (factor * factor));
+        }
+        Reading::Distance { distance_mm, sigma_mm } => {
+            *distance_mm *= factor;
+            *sigma_mm = sigma_mm.map(|s| s * factor);
+        }
+        Reading::Reference => {}
+    }
+}
+
+/// All joints, or one, from so many rows on.
+fn lagging(mut set: Dataset, joint: Option<usize>, by: isize) -> Dataset {
+    let before: Vec<Vec<f64>> = set.poses.iter().map(|p| p.joints_rad.clone()).collect();
+    let mut alone = Vec::new();
+    for (i, pose) in set.poses.iter_mut().enumerate() {
+        match (i.checked_add_signed(by).and_then(|from| before.get(from)), joint) {
+            (Some(from), Some(j)) => pose.joints_rad[j] = from[j],
+            (Some(from), None) => pose.joints_rad.clone_from(from),
+            (None, _) => alone.push(i),
+        }
+    }
+    set.without(&alone, "its joints would stand in a row that the file does not have, for they lag")
+}
+
+fn mirror(pose: &mut Pose) {
+    pose.on_body_mm = pose.on_body_mm.map(|part| Vector3::new(-part.x, part.y, part.z));
+    if let Reading::Position { point_mm, covariance_mm2, .. } = &mut pose.reading {
+        point_mm.x = -point_mm.x;
+        if let Some(c) = covariance_mm2 {
+            for k in [1, 2] {
+                c[(0, k)] = -c[(0, k)];
+                c[(k, 0)] = -c[(k, 0)];
+            }
+        }
+    }
+}
+
+/// A robot whose rows were read as modified but meant as standard DH: alpha and a belong behind their joint.
+fn from_standard(robot: &Robot) -> Robot {
+    let mut modified = robot.clone();
+    for i in 0..modified.joints.len() {
+        let before = if i == 0 { (0.0, 0.0) } else { (robot.joints[i - 1].alpha_rad, robot.joints[i - 1].a_mm) };
+        (modified.joints[i].alpha_rad, modified.joints[i].a_mm) = before;
+    }
+    if let Some(last) = robot.joints.last() {
+        let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), last.alpha_rad);
+        modified.tool_mm = turn * robot.tool_mm + Vector3::new(last.a_mm, 0.0, 0.0);
+    }
+    modified
+}

@@ -1,0 +1,11 @@
+//! What is wrong with the data, asked before anything is identified: each question is answered with the data mended and a sentence.
+
+mod all;
+pub mod conventions;
+pub mod covariances;
+mod hypothesis;
+pub mod known;
+pub mod orientations;
+pub mod sessions;
+
+pub use all::{Examined, examine};

@@ -1,0 +1,122 @@
+//! `identification.json`: what stands in it.
+
+use serde::Serialize;
+
+use super::parameters::{Identifiability, MethodRecord};
+use super::quality::Quality;
+use crate::identify::data::dataset::Skipped;
+use crate::identify::data::repeats::Repeats;
+use crate::identify::data::targets::Targets;
+use crate::identify::examine::sessions::Session;
+use crate::identify::finding::Finding;
+use crate::identify::judge::scale::CommonScale;
+use crate::identify::judge::uncertainty::{Covariance, Expected};
+use crate::identify::model::prior::Tolerance;
+use crate::identify::run::{Certainty, Identification, Judged};
+use crate::identify::sensor::SmoothError;
+
+/// What to do with the robot that was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Advice {
+    /// Use it.
+    Use,
+    /// Use it once the reason was looked at.
+    Check,
+    /// Nothing better than the nominal robot was found, and that is the result.
+    KeepNominal,
+    /// Do not use it.
+    DoNotUse,
+}
+
+/// The file.
+#[derive(Debug, Clone, Serialize)]
+pub struct Record {
+    /// Of every random draw.
+    pub seed: u64,
+    /// `name/model` of one of `methods`.
+    pub chosen: String,
+    /// Terms of the robot's model.
+    pub terms: String,
+    /// The nominal robot.
+    pub before: Quality,
+    /// All that was run.
+    pub methods: Vec<MethodRecord>,
+    /// What the poses determine.
+    pub identifiability: Identifiability,
+    /// Whether to use the robot that was found.
+    pub advice: Advice,
+    /// Why, in one sentence.
+    pub reason: String,
+    /// In plain words, the gravest first.
+    pub warnings: Vec<String>,
+    /// Poses that fit far worse than the rest and were left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outliers: Vec<String>,
+    /// Sessions found along the rows.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sessions: Vec<Session>,
+    /// Rows without a usable reading.
+    pub skipped: Vec<Skipped>,
+    /// Held-out errors of models and terms.
+    pub judged: Vec<Judged>,
+    /// What is wrong with the data, and what was done about it.
+    pub doctor: Vec<Finding>,
+    /// Of the chosen method's identified parameters; `None` where nominal was kept.
+    pub covariance: Option<Covariance>,
+    /// The position error to expect of the chosen robot; `None` where nominal was kept.
+    pub expected: Option<Expected>,
+    /// A scale of the readings, as far as the links' tolerance tells it from the robot's size; `None` where the links were not fitted.
+    pub scale: Option<CommonScale>,
+    /// The targets of each pose, where there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub targets: Option<Targets>,
+    /// Readings that were repeated at one pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeats: Option<Repeats>,
+    /// How sure the choice of terms is.
+    pub certainty: Vec<Certainty>,
+    /// Whether `verify` has all rows, each in fits that it was left out of, because the file has none to verify.
+    pub folded: bool,
+    /// The tool that the nominal chain asks for and the middle error that is left with it, mm, where that is far less than with the tool of the file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tool_mm: Option<([f64; 3], f64)>,
+    /// Unknowns of the sensor that were found beside the robot: name and value (mm, thousandths, mrad, standard deviations).
+    pub sensor: Vec<(String, f64)>,
+    /// A smooth error that the points of each placement share.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smooth: Option<Smooth>,
+    /// Scatter of a point coordinate beyond the measurement's covariance, mm.
+    pub scatter_mm: f64,
+    /// Parameters whose search limits were widened.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub widened: Vec<String>,
+    /// The prior's standard deviations, where one was used.
+    pub prior: Option<Tolerance>,
+}
+
+/// A smooth error that the points of each placement share.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Smooth {
+    /// How large and how smooth.
+    #[serde(flatten)]
+    pub error: SmoothError,
+    /// Root mean square of a coordinate that is left of it after a rigid fit to each placement, mm.
+    pub left_mm: f64,
+}
+
+impl Smooth {
+    /// Of the chosen fit.
+    pub fn new(found: &Identification) -> Option<Smooth> {
+        let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
+        let error = formulation.rows.scatter.smooth?;
+        Some(Smooth { error, left_mm: formulation.rows.left_by_smooth_mm2().sqrt() })
+    }
+}
+
+impl Record {
+    /// The method that was chosen.
+    pub fn chosen_method(&self) -> Option<&MethodRecord> {
+        self.methods.iter().find(|m| self.chosen == format!("{}/{}", m.name, m.model))
+    }
+}

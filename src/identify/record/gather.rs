@@ -1,0 +1,92 @@
+//! Gathers what stands in `identification.json`.
+
+use super::file::{Advice, Record, Smooth};
+use super::findings::Findings;
+use super::parameters::{self, Identifiability, MethodRecord};
+use super::quality::quality;
+use crate::identify::data::dataset::{Dataset, Reading};
+use crate::identify::examine::sessions::Along;
+use crate::identify::judge::uncertainty::{Covariance, Expected};
+use crate::identify::run::{Identification, certainty};
+use crate::identify::sensor::Extra;
+use crate::identify::settings::Settings;
+use crate::robot::Robot;
+
+/// Name and value of an unknown of the sensor; a supposed scale in thousandths.
+fn of_sensor(set: &Dataset, extra: Extra, value: f64) -> (String, f64) {
+    match set.supposed_scale {
+        Some(sd) if extra == Extra::Shared(0) => ("sensor_scale".to_owned(), 1000.0 * sd * value),
+        _ => (extra.name(), value),
+    }
+}
+
+impl Record {
+    /// Gathers everything.
+    pub fn new(
+        set: &Dataset,
+        nominal: &Robot,
+        found: &Identification,
+        along: &Along,
+        findings: Findings,
+        settings: &Settings,
+        seed: u64,
+    ) -> Record {
+        let chosen = &found.candidates[found.chosen];
+        // Nominal has nothing to say about what the poses determine; the fit that it was kept against has.
+        let fitted = chosen.found.as_ref().or(found.candidates.first().and_then(|c| c.found.as_ref()));
+        let identifiability = fitted.map_or_else(Identifiability::nothing, |(f, _)| parameters::identifiability(f));
+        let names = |rows: &[usize]| rows.iter().map(|&i| set.poses[i].name.clone()).collect::<Vec<_>>();
+        let methods: Vec<MethodRecord> = found
+            .candidates
+            .iter()
+            .map(|c| parameters::method_record(c, quality(set, &c.robot, c.found.is_some(), found, settings).0))
+            .collect();
+        let before = quality(set, nominal, false, found, settings).0;
+        let mut record = Record {
+            seed,
+            chosen: format!("{}/{}", chosen.name, chosen.model.name()),
+            terms: found.terms.name(),
+            before,
+            methods,
+            identifiability,
+            advice: Advice::Use,
+            reason: String::new(),
+            warnings: Vec::new(),
+            outliers: names(&found.outliers),
+            sessions: along.sessions.clone(),
+            skipped: set.skipped.clone(),
+            judged: found.judged.clone(),
+            smooth: Smooth::new(found),
+            scatter_mm: found.scatter.point_mm,
+            widened: chosen.found.as_ref().map_or_else(Vec::new, |(f, _)| f.widened.clone()),
+            prior: fitted.filter(|(f, _)| f.held).map(|(f, _)| f.tolerance),
+            doctor: findings.all(),
+            covariance: chosen.found.as_ref().map(|(f, _)| Covariance::new(f)),
+            expected: chosen.found.as_ref().map(|(f, _)| Expected::new(f, set, &found.fitted)),
+            scale: found.scale(set),
+            targets: set.targets.clone(),
+            repeats: set.repeats,
+            certainty: certainty(&found.judged, &found.terms),
+            folded: !found.deletions.is_empty(),
+            tool_mm: tool(set, nominal),
+            sensor: found.extras.iter().map(|(extra, value)| of_sensor(set, *extra, *value)).collect(),
+        };
+        record.advise(set, nominal, found, &findings, found.against_nominal(set, nominal, settings));
+        record
+    }
+}
+
+/// The tool that the nominal chain asks for, where it makes it far nearer to the points; of the placement with most rows.
+fn tool(set: &Dataset, nominal: &Robot) -> Option<([f64; 3], f64)> {
+    /// Times that the chain must come nearer by a tool of its own.
+    const FAR_NEARER: f64 = 3.0;
+    let of_group = |g: usize| set.rows(|p| p.group == g && p.on_body_mm.is_none());
+    let rows = (0..set.groups.len()).map(of_group).max_by_key(Vec::len)?;
+    let point = |&r: &usize| match set.poses[r].reading {
+        Reading::Position { point_mm, .. } => Some((set.poses[r].joints_rad.clone(), point_mm)),
+        _ => None,
+    };
+    let (joints, points): (Vec<_>, Vec<_>) = rows.iter().filter_map(point).unzip();
+    let (before, after) = (nominal.left_mm(&joints, &points)?, nominal.fit_tool(&joints, &points)?);
+    (after.left_mm * FAR_NEARER < before).then(|| (after.tool_mm.into(), after.left_mm))
+}

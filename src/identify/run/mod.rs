@@ -1,0 +1,13 @@
+//! The order of it all: gross errors, models, methods, the choice among them.
+
+mod climb;
+mod found;
+mod gross;
+mod held_out;
+mod identify;
+mod session;
+
+pub use climb::{Certainty, Judged, certainty};
+pub use found::{Candidate, Deletion, Identification};
+pub use held_out::Against;
+pub use identify::{identify, step_count};

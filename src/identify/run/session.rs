@@ -1,0 +1,61 @@
+//! What the steps of an identification share, and how much the rows tell.
+
+use crate::identify::data::dataset::{Dataset, Kind};
+use crate::identify::judge::smooth;
+use crate::identify::model::ladder::{Chain, Terms};
+use crate::identify::sensor::Extra;
+use crate::identify::settings::{Model, Settings};
+use crate::identify::solve::task::Task;
+use crate::robot::{Parameter, Robot};
+
+/// What all steps share.
+pub(super) struct Session<'a> {
+    pub(super) set: &'a Dataset,
+    pub(super) robot: &'a Robot,
+    pub(super) settings: &'a Settings,
+    pub(super) seed: u64,
+    pub(super) rows: Vec<usize>,
+    pub(super) extras: Vec<Extra>,
+    pub(super) smooth: Option<smooth::Told>,
+    pub(super) step: &'a (dyn Fn(&str) + Sync),
+}
+
+impl Session<'_> {
+    pub(super) fn task<'b>(&'b self, parameters: &'b [Parameter], model: Model) -> Task<'b> {
+        let Session { set, robot, settings, .. } = *self;
+        let extras = if model == Model::PairwiseDistance { &[] } else { self.extras.as_slice() };
+        Task {
+            set,
+            robot,
+            parameters,
+            extras,
+            rows: &self.rows,
+            model,
+            smooth: self.smooth.map(|told| told.error),
+            settings,
+        }
+    }
+
+    /// Numbers that were measured, less the unknowns of the placements.
+    fn numbers(&self) -> f64 {
+        let (a_row, a_group) = match self.set.kind {
+            Kind::Positions => (3, 6),
+            Kind::Distances if self.rows.iter().any(|&r| self.set.touches(r)) => (3, 3),
+            Kind::Distances => (1, 4),
+        };
+        let groups = (0..self.set.groups.len()).filter(|&g| self.rows.iter().any(|&r| self.set.poses[r].group == g));
+        (a_row * self.rows.len()) as f64 - (a_group * groups.count()) as f64
+    }
+
+    /// Whether there are so many times more numbers to tell by than parameters.
+    pub(super) fn tells(&self, terms: &Terms, times: f64) -> bool {
+        terms.parameters(self.robot).len() as f64 * times <= self.numbers()
+    }
+
+    /// The richest model that has so many times more numbers to tell by than parameters.
+    pub(super) fn reference(&self, times: f64) -> Terms {
+        let poorer = |chain: Chain| Terms { chain, ..Terms::NOMINAL };
+        let rich = [Terms::REFERENCE, Terms::default(), poorer(Chain::Offsets)];
+        rich.into_iter().find(|t| self.tells(t, times)).unwrap_or(poorer(Chain::Tool))
+    }
+}
