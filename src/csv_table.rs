@@ -10,9 +10,10 @@ use camino::Utf8Path;
 
 use crate::diagnostic::Place;
 use crate::files::{self, Result};
+pub use crate::tables::Fields;
 use crate::tables::Grid;
 use crate::tables::grid::is_formula;
-pub use crate::tables::grid::{Fields, MOST_COLUMNS, MOST_ROWS};
+pub use crate::tables::grid::{MOST_COLUMNS, MOST_ROWS};
 
 /// A table with its header understood: fields by name, complaints with the line.
 pub struct Table<'a> {

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::Output;
+use super::output::Output;
 use crate::imaging::Board;
 
 /// `stereocal board`

@@ -3,7 +3,9 @@
 use camino::{Utf8Path, Utf8PathBuf};
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::{ExportRobot, Output, between};
+use super::output::Output;
+use super::robot::ExportRobot;
+use super::values::between;
 use crate::formats::lenses::LensFile;
 use crate::imaging::input::pairs::{PairBy, Source};
 use crate::imaging::{Board, Mosaic, Squares};

@@ -2,9 +2,11 @@
 
 mod board;
 mod cameras;
+mod output;
 mod robot;
 mod simulate;
 pub mod unexpected;
+mod values;
 
 use camino::Utf8PathBuf;
 use clap::{Args, Parser, Subcommand};
@@ -13,6 +15,7 @@ pub use self::board::PrintBoard;
 pub use self::cameras::{
     BoardShape, CalibrationFormat, CameraCheck, Export, ExportCalibration, ExportWhat, Measure, Rectify,
 };
+pub use self::output::Output;
 pub use self::robot::{
     Compensate, DhConvention, ExportRobot, Identify, Plan, PlanKind, RobotCommand, RobotFormat, RobotImport, RobotNew,
     RobotPlace, RobotShow, RobotWhat, TableFlags, Verify,
@@ -127,20 +130,6 @@ pub struct Man {
     pub force: bool,
 }
 
-/// Where results go and how they are shown.
-#[derive(Debug, Args)]
-pub struct Output {
-    /// Folder for results; key `out` [default: out]
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<Utf8PathBuf>,
-    /// Print the result as JSON
-    #[arg(long)]
-    pub json: bool,
-    /// Replace files in the results folder that stereocal did not write, or that were changed since
-    #[arg(long)]
-    pub force: bool,
-}
-
 /// `stereocal report`
 #[derive(Debug, Args)]
 pub struct Report {
@@ -150,20 +139,4 @@ pub struct Report {
     /// Replace a report.html that stereocal did not write, or that was changed since
     #[arg(long)]
     pub force: bool,
-}
-
-/// Reads a number of a range.
-fn between(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
-    move |text| match text.parse::<f64>() {
-        Ok(value) if (least..=most).contains(&value) => Ok(value),
-        _ => Err(format!("a number from {least} to {most} is needed")),
-    }
-}
-
-/// Reads a count of a range.
-fn count(least: usize, most: usize) -> impl Fn(&str) -> Result<usize, String> + Clone {
-    move |text| match text.parse::<usize>() {
-        Ok(value) if (least..=most).contains(&value) => Ok(value),
-        _ => Err(format!("a whole number from {least} to {most} is needed")),
-    }
 }

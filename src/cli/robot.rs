@@ -3,7 +3,8 @@
 use camino::Utf8PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::{Output, between, count};
+use super::output::Output;
+use super::values::{between, count};
 use crate::imaging::{Board, Squares};
 
 /// `stereocal identify`

@@ -3,7 +3,7 @@
 use camino::Utf8PathBuf;
 use clap::{Args, ValueEnum};
 
-use super::{between, count};
+use super::values::{between, count};
 use crate::simulate::settings::Orientation;
 
 /// `stereocal simulate`

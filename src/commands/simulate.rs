@@ -46,7 +46,7 @@ pub fn run(args: &Simulate, config: &Config, run: Run) -> Result<Outcome> {
         truth_files::write_points_only(&world, &out)?;
     } else {
         world.check_unoccupied(&out)?;
-        world.write_truth(&out)?;
+        truth_files::write(&world, &out)?;
         world.write_pictures(&out)?;
     }
     Ok(Outcome { stdout: summary(args, &world, &out), status: Status::Done })

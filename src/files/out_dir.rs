@@ -13,8 +13,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use camino::{Utf8Path, Utf8PathBuf};
 use serde::Serialize;
 
+use super::io::{Durability, Error, Result, is_temporary, to_json, write_atomically};
 use super::provenance::{Digested, KEY, Provenance, Run, pictures, sha256};
-use super::{Durability, Error, Result, is_temporary, to_json, write_atomically};
 use crate::progress;
 
 /// The program's own folder in a results folder.

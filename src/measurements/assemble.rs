@@ -4,19 +4,15 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::judge::{Basis, Way};
-use super::layout::is_kept;
+use super::layout::{ONE_POINT, are_readings, is_kept};
 use super::part::{At, Kind, Part};
-use super::pick::{Picked, listed};
-use super::{Measurement, from_table};
+use super::pick::listed;
+use super::rows::{Measurement, from_table};
 use crate::csv_table::Table;
 use crate::files::Result;
 use crate::tables::Fields;
-use crate::tables::grid::Form;
+use crate::tables::Form;
 use crate::tables::names::{Name, What};
-
-/// Readings within this share of what the rows are apart are of one point: an instrument repeats to hundredths of a millimetre, rows are a hundred
-/// and more apart, and what was commanded differs from what was measured by tenths at the least.
-const ONE_POINT: f64 = 1e-3;
 
 /// Makes files with a multiple of the others' rows, so many readings a pose, as long as these: one row a pose, the readings side by side.
 pub(super) fn widen(parts: &mut [Part]) -> Result<()> {
@@ -79,17 +75,6 @@ fn coordinates(part: &Part) -> Option<[usize; 3]> {
         (Some(x), Some(y), Some(z)) => Some([x, y, z]),
         _ => part.free().first_chunk::<3>().copied(),
     }
-}
-
-/// Whether what looks like several targets is one that was read several times.
-pub(super) fn are_readings(parts: &[Part], picked: &Picked) -> bool {
-    let [(_, first), (_, second), ..] = &picked.points[..] else { return false };
-    let rows = parts[first[0].part].rows.len().min(parts[second[0].part].rows.len());
-    let point = |row: usize, at: &[At; 3]| super::layout::point(parts, row, at);
-    let apart = |a: Option<nalgebra::Point3<f64>>, b: Option<nalgebra::Point3<f64>>| Some((a? - b?).norm());
-    let mean = |v: Vec<f64>| v.iter().sum::<f64>() / v.len().max(1) as f64;
-    let within = mean((0..rows).filter_map(|row| apart(point(row, first), point(row, second))).collect());
-    within < ONE_POINT * mean((1..rows).filter_map(|row| apart(point(row - 1, first), point(row, first))).collect())
 }
 
 /// What was taken of a set of files.

@@ -7,7 +7,6 @@
 
 use nalgebra::Point3;
 
-use super::assemble::are_readings;
 use super::part::{At, Part};
 use super::pick::Picked;
 use crate::statistics::median;
@@ -22,6 +21,10 @@ const RIGID: f64 = 0.05;
 
 /// Rows that tell whether a distance is kept.
 const ROWS: usize = 200;
+
+/// Readings within this share of what the rows are apart are of one point: an instrument repeats to hundredths of a millimetre, rows are a hundred
+/// and more apart, and what was commanded differs from what was measured by tenths at the least.
+pub(super) const ONE_POINT: f64 = 1e-3;
 
 /// All ways to complete what the names say.
 pub(super) fn candidates(parts: &[Part], picked: &Picked, count: usize) -> Vec<Picked> {
@@ -112,4 +115,15 @@ pub(super) fn is_kept(apart: Vec<f64>) -> bool {
 pub(super) fn point(parts: &[Part], row: usize, at: &[At; 3]) -> Option<Point3<f64>> {
     let number = |at: &At| parts[at.part].optional(row, at.column).ok().flatten();
     Some(Point3::new(number(&at[0])?, number(&at[1])?, number(&at[2])?))
+}
+
+/// Whether what looks like several targets is one that was read several times.
+pub(super) fn are_readings(parts: &[Part], picked: &Picked) -> bool {
+    let [(_, first), (_, second), ..] = &picked.points[..] else { return false };
+    let rows = parts[first[0].part].rows.len().min(parts[second[0].part].rows.len());
+    let at = |row: usize, columns: &[At; 3]| point(parts, row, columns);
+    let apart = |a: Option<Point3<f64>>, b: Option<Point3<f64>>| Some((a? - b?).norm());
+    let mean = |v: Vec<f64>| v.iter().sum::<f64>() / v.len().max(1) as f64;
+    let within = mean((0..rows).filter_map(|row| apart(at(row, first), at(row, second))).collect());
+    within < ONE_POINT * mean((1..rows).filter_map(|row| apart(at(row - 1, first), at(row, first))).collect())
 }

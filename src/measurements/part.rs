@@ -3,7 +3,7 @@
 use camino::Utf8Path;
 
 use crate::files::{Error, Result};
-use crate::tables::grid::Form;
+use crate::tables::Form;
 use crate::tables::header;
 use crate::tables::names::{Name, Unit, What};
 use crate::tables::{Fields, Grid};

@@ -155,7 +155,7 @@ impl Source {
         let count = robot.joints.len();
         let picked = pick::by_names(parts, count)?;
         if let [(_, first), .., (_, second)] = &picked.points[..]
-            && !assemble::are_readings(parts, &picked)
+            && !layout::are_readings(parts, &picked)
             && layout::changes_distance(parts, first, second)
         {
             return Err(pick::asked(parts, first, second));

@@ -5,9 +5,9 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use super::error::{Error, Result};
 use super::pool::Candidate;
 use super::scene::{self, Placement, PoseNoise, Scene};
-use super::{Error, Result};
 use crate::geometry::{Transform, cross_covariance, fitted_frame, transform};
 use crate::measurements::{Measurement, Observed};
 use crate::robot::Robot;

@@ -8,9 +8,9 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::COUNTS;
 use super::pool::Candidate;
 use super::predict::{FRAME, Problem, Rows};
+use super::settings::COUNTS;
 
 /// Poses that every placement gets before the others are shared out: its own transform needs three.
 const LEAST_A_GROUP: usize = 4;

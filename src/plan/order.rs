@@ -2,9 +2,20 @@
 
 use super::pool::Candidate;
 use super::scene::Placement;
-use super::{Planned, robot_pose};
-use crate::measurements::{Measurement, Role};
+use crate::geometry::Transform;
+use crate::measurements::{Measurement, RobotPose, Role};
 use crate::robot::Robot;
+
+/// A planned pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Planned {
+    /// As poses.csv has it.
+    pub at: RobotPose,
+    /// Index of its group.
+    pub group: usize,
+    /// Where the target should be seen.
+    pub left_from_target: Transform,
+}
 
 /// A way's length: the largest turn of a joint, which is what it takes time for, and a little of all others. A sliding joint's mm count
 /// as milliradians.
@@ -83,4 +94,18 @@ pub fn poses(
         }
     }
     planned
+}
+
+/// A row of poses.csv: readings rounded as a controller takes them.
+fn robot_pose(robot: &Robot, name: String, group: &str, role: Role, joints_rad: &[f64]) -> RobotPose {
+    let slides: Vec<bool> = robot.joints.iter().map(|j| j.slides).collect();
+    let reading = |(q, slides): (&f64, &bool)| rounded(if *slides { *q } else { q.to_degrees() });
+    let joints_deg = joints_rad.iter().zip(&slides).map(reading).collect();
+    let slides = if slides.contains(&true) { slides } else { Vec::new() };
+    RobotPose { pose: name, group: group.to_owned(), role, joints_deg, slides }
+}
+
+/// Four digits behind the point, and no minus before a zero.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.4}").parse().unwrap_or(value) + 0.0
 }

@@ -6,16 +6,11 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use super::scene::{self, Placement, PoseNoise, Scene};
-use super::{Error, Result, Settings};
+use super::error::{Error, Result};
+use super::scene::{self, Placement, PoseNoise, Scene, safe};
+use super::settings::Settings;
 use crate::geometry::{Transform, transform};
 use crate::robot::{Robot, inverse};
-
-/// Flange poses with less freedom are too near a singular posture, mm a rad.
-const LEAST_FREEDOM_MM: f64 = 15.0;
-
-/// Way that every joint keeps to its limits, rad.
-const ROOM_RAD: f64 = 0.035;
 
 /// Draws a candidate that is wanted, at the most.
 const DRAWS: usize = 12;
@@ -64,11 +59,6 @@ pub enum Kind {
     Verify(usize),
     /// The same, other ones, for judging.
     Fresh,
-}
-
-/// Whether a posture is one to plan: away from singular ones and from the joints' limits.
-pub fn safe(robot: &Robot, joints_rad: &[f64]) -> bool {
-    inverse::freedom_mm(robot, joints_rad) > LEAST_FREEDOM_MM && inverse::room_rad(robot, joints_rad) > ROOM_RAD
 }
 
 /// What candidates are drawn from.

@@ -9,7 +9,7 @@ use super::pool::Candidate;
 use super::scene::Placement;
 use crate::geometry::skew;
 use crate::identify::model::base::{Base, Observability};
-use crate::robot::corrections::Torques;
+use crate::robot::bent::Torques;
 use crate::robot::jacobian::{Screws, feature};
 use crate::robot::{Parameter, Robot, Unit};
 

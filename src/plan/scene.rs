@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 
-use super::{Error, Result, Settings};
+use super::error::{Error, Result};
+use super::settings::Settings;
 use crate::geometry::{Transform, rotation_matrix, transform, transform_from_matrix};
 use crate::imaging::Board;
 use crate::robot::{Robot, inverse};
@@ -206,8 +207,7 @@ pub fn placements(robot: &Robot, scene: &Scene, settings: &Settings) -> Result<V
         transform(rotation.scaled_axis(), *center)
     };
     let reached = |base_from_field: &Transform, starts| {
-        inverse::best_posture(robot, &base_from_flange(robot, base_from_field), starts)
-            .filter(|q| super::pool::safe(robot, q))
+        inverse::best_posture(robot, &base_from_flange(robot, base_from_field), starts).filter(|q| safe(robot, q))
     };
     let directions = directions();
     let all = |d: &&Vector3<f64>| centers.iter().all(|c| reached(&field(c, d), STARTS / 4).is_some());
@@ -241,4 +241,15 @@ impl Placement {
         let base_from_left = rotation_matrix(&self.left_from_base).transpose();
         base_from_left * covariance_mm2 * base_from_left.transpose()
     }
+}
+
+/// Flange poses with less freedom are too near a singular posture, mm a rad.
+const LEAST_FREEDOM_MM: f64 = 15.0;
+
+/// Way that every joint keeps to its limits, rad.
+const ROOM_RAD: f64 = 0.035;
+
+/// Whether a posture is one to plan: away from singular ones and from the joints' limits.
+pub fn safe(robot: &Robot, joints_rad: &[f64]) -> bool {
+    inverse::freedom_mm(robot, joints_rad) > LEAST_FREEDOM_MM && inverse::room_rad(robot, joints_rad) > ROOM_RAD
 }

@@ -3,10 +3,12 @@
 use nalgebra::{DVector, Vector3};
 
 use super::choose::{Information, choose};
-use super::pool::{Candidate, Kind, Pool, safe};
+use super::pool::{Candidate, Kind, Pool};
 use super::predict::Problem;
-use super::scene::{PoseNoise, Scene, flange_from_target, placements};
+use super::scene::{PoseNoise, Scene, flange_from_target, placements, safe};
 use super::*;
+use crate::measurements::{Measurement, RobotPose, Role};
+use crate::robot::Robot;
 use crate::robot::catalogue;
 use crate::simulate::rig::{RigDrawing, true_rig};
 

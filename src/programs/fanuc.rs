@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::ops::Range;
 
 use super::instruction::{Cause, Instruction};
+use super::language::{Motion, Target, Written};
 use super::scan;
-use super::{Motion, Target, Written};
 
 /// Words that begin a motion: joint, linear, circular, circular arc, spline.
 const MOTIONS: [char; 5] = ['J', 'L', 'C', 'A', 'S'];

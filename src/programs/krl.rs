@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use super::instruction::{Cause, Instruction};
+use super::language::{Motion, Target, Written};
 use super::scan;
 use super::variables::{Syntax, Variables};
-use super::{Motion, Target, Written};
 
 /// Motions to axis values or poses.
 const EITHER: [&str; 2] = ["PTP", "SPTP"];

@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use std::ops::Range;
 
 use super::instruction::{Cause, Instruction};
+use super::language::{Motion, Target, Written};
 use super::scan;
 use super::variables::{Syntax, Variables};
-use super::{Motion, Target, Written};
 
 /// Robot axes of a jointtarget; more are external ones.
 const AXES: usize = 6;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::Target;
+use super::language::Target;
 
 /// A value and where it stands.
 pub type Number = (f64, Range<usize>);

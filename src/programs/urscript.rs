@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use super::instruction::{Cause, Instruction};
+use super::language::{Motion, Target, Written};
 use super::scan;
 use super::variables::{Syntax, Variables};
-use super::{Motion, Target, Written};
 
 /// Calls that move to their first arguments, lists of joint angles or poses, and how many of these they have.
 const MOVES: [(&str, usize); 7] =

@@ -8,7 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::instruction::Cause;
-use super::{Target, scan};
+use super::language::Target;
+use super::scan;
 
 /// How a language writes values into variables.
 #[derive(Debug, Clone, Copy)]

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::instruction::{Cause, Instruction};
+use super::language::{Motion, Target, Written};
 use super::scan;
-use super::{Motion, Target, Written};
 
 /// Positions in pulses or angles; Cartesian ones are left out.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {

@@ -1,6 +1,6 @@
 //! The frame of every HTML report: one file, no network, readable on paper, on a phone and in the dark; a script only to turn a view in space.
 
-use super::drawing::scene;
+use super::drawing::script::SCRIPT;
 use crate::files::provenance::{Digested, Provenance};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -91,7 +91,7 @@ pub fn page(title: &str, lead: &str, content: &Markup) -> String {
                 p.lead { (lead) }
                 (PreEscaped(content.as_str()))
             }
-            @if content.contains("<svg class=\"scene\"") { script { (PreEscaped(scene::SCRIPT)) } } }
+            @if content.contains("<svg class=\"scene\"") { script { (PreEscaped(SCRIPT)) } } }
         }
     }
     .into_string()

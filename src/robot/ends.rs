@@ -6,7 +6,6 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::Robot;
 use crate::geometry::{Transform, rotation_vector, transform};
 
 /// The constant transforms at both ends of a chain; the identity by default.
@@ -21,13 +20,6 @@ pub struct Ends {
 impl Default for Ends {
     fn default() -> Ends {
         Ends { root_from_frame0: Transform::identity(), last_frame_from_flange: Transform::identity() }
-    }
-}
-
-impl Robot {
-    /// The flange in the root frame, both constant transforms included. One commanded reading a joint.
-    pub fn root_from_flange(&self, joints: &[f64]) -> Transform {
-        self.ends.root_from_frame0 * self.base_from_flange(joints) * self.ends.last_frame_from_flange
     }
 }
 

@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::Parameter;
-use super::corrections::{Bent, Torques};
+use super::bent::{Bent, Torques};
 
 /// Columns of angles are per mrad.
 const RAD_PER_MRAD: f64 = 1e-3;

@@ -2,6 +2,7 @@
 
 mod anatomy;
 pub mod axes;
+pub mod bent;
 pub mod catalogue;
 pub mod chain;
 pub mod corrections;

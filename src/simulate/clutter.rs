@@ -4,7 +4,7 @@ use nalgebra::{Point2, Vector3};
 
 use super::draws::{Draws, Purpose};
 use super::physical_board::PhysicalBoard;
-use super::picture::scene::{Patch, Tone};
+use super::picture::patch::{Patch, Tone};
 use super::rig::left_from_field;
 use crate::geometry::transform;
 

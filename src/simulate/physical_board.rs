@@ -7,7 +7,7 @@
 use nalgebra::{Point2, Point3};
 
 use super::draws::{Draws, Purpose};
-use super::picture::scene::Patch;
+use super::picture::patch::Patch;
 use crate::imaging::Board;
 use crate::imaging::coded::faces::Face;
 

@@ -10,13 +10,14 @@ use super::clutter;
 use super::draws::{Draws, NormalTable, Purpose};
 use super::physical_board::PhysicalBoard;
 use super::picture::backdrop::Backdrop;
+use super::picture::patch::Patch;
 use super::picture::render::{Picture, Renderer};
-use super::picture::scene::{Patch, Scene};
+use super::picture::scene::Scene;
 use super::picture::sensor::Lighting;
 use super::rig::true_rig;
 use super::robot_poses::{self, Arm, TruePose};
 use super::settings::Settings;
-use super::{Error, Result, true_robot, truth_files};
+use super::{Error, Result, true_robot};
 use crate::files::{OutDir, is_temporary};
 use crate::geometry::Transform;
 use crate::imaging::{Corner, Corners, PairCorners, corners::Side};
@@ -181,11 +182,6 @@ impl World {
             skipped: Vec::new(),
             notes: Vec::new(),
         }
-    }
-
-    /// Writes everything but pictures.
-    pub fn write_truth(&self, out: &OutDir) -> Result<()> {
-        Ok(truth_files::write(self, out)?)
     }
 
     /// Refuses a folder that holds other pictures where this world's will stand: the commands would read them as well.

@@ -7,6 +7,7 @@
 
 use camino::{Utf8Path, Utf8PathBuf};
 
+use super::fields::{Fields, Form};
 use super::numbers::Style;
 use super::program_lines;
 use super::source::{self, Source};
@@ -21,66 +22,6 @@ pub const MOST_ROWS: usize = 3_000_000;
 
 /// Rows that tell the delimiter.
 const SEEN_ROWS: usize = 60;
-
-/// The fields of a row, in one piece.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Fields {
-    text: Box<str>,
-    ends: Box<[u32]>,
-}
-
-impl Fields {
-    /// From cells in their order.
-    pub fn new<'a>(cells: impl Iterator<Item = &'a str>) -> Fields {
-        let (mut text, mut ends) = (String::new(), Vec::new());
-        for cell in cells {
-            text.push_str(cell);
-            // A row has less than 2^32 bytes.
-            ends.push(text.len() as u32);
-        }
-        Fields { text: text.into(), ends: ends.into() }
-    }
-
-    /// Number of fields.
-    pub fn len(&self) -> usize {
-        self.ends.len()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.ends.is_empty()
-    }
-
-    /// One after the other.
-    pub fn iter(&self) -> impl Iterator<Item = &str> {
-        (0..self.len()).map(|column| &self[column])
-    }
-}
-
-impl std::ops::Index<usize> for Fields {
-    type Output = str;
-
-    fn index(&self, column: usize) -> &str {
-        let start = if column == 0 { 0 } else { self.ends[column - 1] };
-        &self.text[start as usize..self.ends[column] as usize]
-    }
-}
-
-/// How the cells of a file were told apart.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Form {
-    /// Text with this between the cells; a blank stands for any number of them.
-    Delimited(char),
-    /// A sheet of a spreadsheet, and how many others there are.
-    Sheet(String, usize),
-    /// Lines of a program, each with one joint target.
-    Program {
-        /// Lines without a target.
-        others: usize,
-        /// Whether the language says that the numbers are degrees.
-        degrees: bool,
-    },
-}
 
 /// A file as rows of cells; rows without anything in them are left out.
 #[derive(Debug, Clone)]

@@ -5,7 +5,8 @@
 //! 0, 1, 2, ..., are none.
 //! What goes wrong: rows of other lengths than the others, and names of another count than the columns; both are refused with the line.
 
-use super::grid::{Fields, Grid};
+use super::fields::Fields;
+use super::grid::Grid;
 use super::names::Unit;
 use crate::files::Result;
 

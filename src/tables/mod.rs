@@ -8,6 +8,7 @@
 //!  names    a name -> a joint, a coordinate, a distance, its unit, and whether it was commanded
 //! ```
 
+mod fields;
 pub mod grid;
 pub mod header;
 pub mod names;
@@ -15,4 +16,5 @@ mod numbers;
 mod program_lines;
 mod source;
 
-pub use grid::{Fields, Grid};
+pub use fields::{Fields, Form};
+pub use grid::Grid;

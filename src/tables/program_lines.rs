@@ -6,7 +6,7 @@
 
 use camino::Utf8Path;
 
-use super::grid::{Fields, Form};
+use super::fields::{Fields, Form};
 use crate::programs::{self, Joints, Language};
 
 /// Lines in which words tell a program from a table.

@@ -8,8 +8,8 @@ use stereocal::imaging::Board;
 use stereocal::imaging::find::corners_in;
 use stereocal::imaging::image::{Image, Picture, decode};
 use stereocal::simulate::draws::{Draws, Purpose};
+use stereocal::simulate::picture::patch::{Patch, Tone};
 use stereocal::simulate::picture::picture_faults::{PictureFault, Shares};
-use stereocal::simulate::picture::scene::{Patch, Tone};
 
 use crate::shot::{Deviations, Setup, Shot};
 

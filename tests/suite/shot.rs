@@ -9,9 +9,10 @@ use stereocal::imaging::{Board, Corner};
 use stereocal::simulate::draws::NormalTable;
 use stereocal::simulate::physical_board::{PhysicalBoard, Workmanship};
 use stereocal::simulate::picture::backdrop::Backdrop;
+use stereocal::simulate::picture::patch::Patch;
 use stereocal::simulate::picture::psf::Optics;
 use stereocal::simulate::picture::render::Renderer;
-use stereocal::simulate::picture::scene::{Patch, Print, Scene};
+use stereocal::simulate::picture::scene::{Print, Scene};
 use stereocal::simulate::picture::sensor::{Lighting, Sensor};
 use stereocal::simulate::rig::true_rig;
 

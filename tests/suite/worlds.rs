@@ -36,7 +36,7 @@ fn written(settings: Settings, threads: usize) -> (tempfile::TempDir, Vec<(Strin
     let path = Utf8Path::from_path(folder.path()).unwrap().to_owned();
     let world = World::new(settings, None).unwrap();
     let out = OutDir::open(&path).unwrap();
-    world.write_truth(&out).unwrap();
+    truth_files::write(&world, &out).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| world.write_pictures(&out)).unwrap();
     // The list of what was written is in order once the folder is closed.

@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::scan::{behind, list, number};
-use super::{ExportedFile, camera, numbers};
+use super::written::{ExportedFile, camera, numbers};
 use crate::formats::checked;
 use crate::geometry::rotation_matrix;
 use crate::stereo::model::rectification::{Matrices, Scaling, essential, fundamental};

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::scan::{list, word};
-use super::{ExportedFile, METRE, camera, numbers, refuse};
+use super::written::{ExportedFile, METRE, camera, numbers, refuse};
 use crate::formats::checked;
 use crate::geometry::rotation_matrix;
 use crate::stereo::{Camera, Error, Lens, Rig};

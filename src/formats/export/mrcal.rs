@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::scan::{list, word};
-use super::{ExportedFile, METRE, camera, numbers, refuse};
+use super::written::{ExportedFile, METRE, camera, numbers, refuse};
 use crate::formats::checked;
 use crate::geometry::{Transform, rotation_matrix, rotation_vector, transform};
 use crate::stereo::{Camera, Error, Lens, Rig};

@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::scan::{list, number, word};
-use super::{ExportedFile, METRE, camera, numbers, refuse};
+use super::written::{ExportedFile, METRE, camera, numbers, refuse};
 use crate::formats::checked;
 use crate::stereo::{Camera, Error, Lens, Rig};
 

@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix3, Matrix3xX, Point3};
 
-use crate::robot::corrections::{Bent, Torques};
+use crate::robot::bent::{Bent, Torques};
 use crate::robot::jacobian::{Feature, Screws, feature};
 use crate::robot::{Joint, Parameter, Robot};
 

@@ -4,3 +4,4 @@ pub mod figure;
 pub mod pair_picture;
 pub mod picture;
 pub mod scene;
+pub mod script;

@@ -7,7 +7,7 @@ use nalgebra::Point2;
 
 use super::coverage::Coverage;
 use super::outline;
-use super::scene::Patch;
+use super::patch::Patch;
 use crate::geometry::Transform;
 use crate::simulate::draws::{Draws, Purpose};
 use crate::stereo::Camera;

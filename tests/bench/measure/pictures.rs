@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, Isometry3, Vector3};
 use stereocal::files::OutDir;
 use stereocal::measurements::{Observed, Role, read};
 use stereocal::simulate::settings::Settings;
+use stereocal::simulate::truth_files;
 use stereocal::simulate::world::World;
 
 use crate::coverage::Tally;
@@ -71,7 +72,7 @@ fn one(size_px: u32, target_um: f64, samples: usize, seed: u64) -> ([Tally; 3], 
     let world = World::new(settings, None).expect("the preset is possible");
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
     let out = OutDir::open(camino::Utf8Path::from_path(folder.path()).expect("a name")).expect("a folder");
-    world.write_truth(&out).expect("the truth");
+    truth_files::write(&world, &out).expect("the truth");
     world.write_pictures(&out).expect("the pictures");
     run(folder.path(), &["camera-check", "check"]);
     run(folder.path(), &["measure", "poses"]);

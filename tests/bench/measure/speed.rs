@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use stereocal::files::OutDir;
 use stereocal::imaging::image;
 use stereocal::simulate::settings::Settings;
+use stereocal::simulate::truth_files;
 use stereocal::simulate::world::World;
 
 /// Robot poses besides the four centres.
@@ -30,7 +31,7 @@ fn pictures() -> PathBuf {
         let settings = Settings { check_pairs: 8, samples: SAMPLES, verify: 0, ..Settings::paper() };
         let world = World::new(settings, None).expect("the preset is possible");
         let out = OutDir::open(camino::Utf8Path::from_path(&folder).unwrap()).expect("a folder");
-        world.write_truth(&out).expect("the truth");
+        truth_files::write(&world, &out).expect("the truth");
         world.write_pictures(&out).expect("the pictures");
         run(&folder, &["camera-check", "check", "--out", "rig"]);
         std::fs::write(folder.join("done"), b"").expect("a file");

@@ -12,6 +12,7 @@ use stereocal::plan::{Planned, Settings, plan};
 use stereocal::robot::Robot;
 use stereocal::simulate::robot_poses::{Arm, TruePose};
 use stereocal::simulate::settings::Settings as Simulated;
+use stereocal::simulate::truth_files;
 use stereocal::simulate::world::World;
 
 use crate::arms;
@@ -114,7 +115,7 @@ impl Machine {
         let folder = tempfile::tempdir().expect("a folder");
         let path = Utf8Path::from_path(folder.path()).expect("a path");
         let out = OutDir::open(path).expect("a folder to write into");
-        world.write_truth(&out).expect("files");
+        truth_files::write(&world, &out).expect("files");
         world.write_pictures(&out).expect("pictures");
         drop(out);
         Command::new(env!("CARGO_BIN_EXE_stereocal"))

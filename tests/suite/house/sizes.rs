@@ -20,7 +20,7 @@ const LONG_FUNCTIONS: &[&str] = &[
     "src/commands/verify.rs: run",
     "src/imaging/find.rs: find_corners",
     "src/measurements/judge.rs: decide",
-    "src/plan/mod.rs: plan",
+    "src/plan/steps.rs: plan",
     "src/robot/file.rs: robot",
     "src/stereo/solve/levenberg_marquardt.rs: solve_with",
 ];

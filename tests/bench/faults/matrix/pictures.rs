@@ -2,8 +2,8 @@
 
 use nalgebra::{Point2, Vector3};
 use stereocal::geometry::transform;
+use stereocal::simulate::picture::patch::{Patch, Tone};
 use stereocal::simulate::picture::picture_faults::{FileForm, PictureFault};
-use stereocal::simulate::picture::scene::{Patch, Tone};
 
 use super::set::{Plan, Set};
 use super::{Case, Right, case};

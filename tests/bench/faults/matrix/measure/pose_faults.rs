@@ -4,8 +4,8 @@ use std::path::Path;
 
 use nalgebra::{Point2, Vector3};
 use stereocal::geometry::transform;
+use stereocal::simulate::picture::patch::{Patch, Tone};
 use stereocal::simulate::picture::picture_faults::{FileForm, PictureFault};
-use stereocal::simulate::picture::scene::{Patch, Tone};
 
 use super::session::{Session, Spoil};
 use super::{Expected, MeasureCase, case};

@@ -1,0 +1,18 @@
+//! Flags of every command that writes results.
+
+use camino::Utf8PathBuf;
+use clap::Args;
+
+/// Where results go and how they are shown.
+#[derive(Debug, Args)]
+pub struct Output {
+    /// Folder for results; key `out` [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Replace files in the results folder that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
+}

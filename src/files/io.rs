@@ -1,0 +1,200 @@
+//! Files as the program reads and writes them: whole, atomically, with the path in every complaint.
+
+use std::io::{Read, Write};
+
+use camino::{Utf8Path, Utf8PathBuf};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::diagnostic::{Explain, Place};
+
+/// Result of reading or writing a file.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Reading or writing a file failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// It is not there.
+    #[error("{what} not found")]
+    Missing {
+        /// What was looked for.
+        what: &'static str,
+        /// Where.
+        path: Utf8PathBuf,
+        /// What makes it.
+        hint: Option<String>,
+    },
+    /// The operating system refused.
+    #[error("cannot {action} {path}: {source}")]
+    Io {
+        /// "read", "write", "create", ...
+        action: &'static str,
+        /// The file or folder.
+        path: Utf8PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// It would take the place of a file that the run reads.
+    #[error("{path} is read by this run and would be overwritten by it")]
+    OverInput {
+        /// The file.
+        path: Utf8PathBuf,
+    },
+    /// It would take the place of a file that is not, as it stands, this program's.
+    #[error("{path} is there already, and was not written by stereocal or was changed since")]
+    OverForeign {
+        /// The file.
+        path: Utf8PathBuf,
+    },
+    /// The content is not what the format asks for.
+    #[error("{message}")]
+    Format {
+        /// What was found and what was needed.
+        message: String,
+        /// Where.
+        place: Place,
+        /// What to change.
+        hint: Option<String>,
+    },
+}
+
+impl Explain for Error {
+    fn place(&self) -> Option<String> {
+        match self {
+            Error::Missing { path, .. } => Some(path.to_string()),
+            Error::Io { .. } | Error::OverInput { .. } | Error::OverForeign { .. } => None,
+            Error::Format { place, .. } => Some(place.to_string()),
+        }
+    }
+    fn hint(&self) -> Option<String> {
+        match self {
+            Error::Missing { hint, .. } | Error::Format { hint, .. } => hint.clone(),
+            Error::Io { .. } => None,
+            Error::OverInput { .. } => Some("`--out DIR` names another folder".to_owned()),
+            Error::OverForeign { .. } => Some(
+                "`--out DIR` names another folder; `--force`, where the command has it, replaces the file".to_owned(),
+            ),
+        }
+    }
+}
+
+/// The largest settings, robot or calibration file, bytes. A calibration of 40 pairs with its covariance has 2 MB.
+const MOST_TEXT_BYTES: u64 = 64 << 20;
+
+/// Reads a text file; `what` names it in the message when it is not there, `hint` says what makes it.
+pub fn read_text(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<String> {
+    read_text_up_to(path, what, hint, MOST_TEXT_BYTES)
+}
+
+/// Reads a text file of a size that the caller thinks possible; a longer one is refused, and never read to its end.
+pub fn read_text_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, most_bytes: u64) -> Result<String> {
+    let mut bytes = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(most_bytes + 1).read_to_end(&mut bytes));
+    let refuse =
+        |message: String| Error::Format { message, place: Place { path: path.to_owned(), line: None }, hint: None };
+    match read {
+        Ok(_) if bytes.len() as u64 > most_bytes => {
+            Err(refuse(format!("{what}: more than {} MB of text; no such file is that long", most_bytes >> 20)))
+        }
+        Ok(_) => String::from_utf8(bytes).map_err(|_| refuse(format!("{what}: not UTF-8 text"))),
+        Err(source) if source.kind() == std::io::ErrorKind::NotFound => {
+            Err(Error::Missing { what, path: path.to_owned(), hint: hint.map(str::to_owned) })
+        }
+        Err(source) => Err(Error::Io { action: "read", path: path.to_owned(), source }),
+    }
+}
+
+/// Reads a JSON file.
+pub fn read_json<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<T> {
+    let text = read_text(path, what, hint)?;
+    serde_json::from_str(&text).map_err(|e| Error::Format {
+        message: format!("{what}: {e}"),
+        place: Place { path: path.to_owned(), line: Some(e.line() as u64) },
+        hint: None,
+    })
+}
+
+/// Reads a TOML file.
+pub fn read_toml<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<T> {
+    let text = read_text(path, what, hint)?;
+    toml::from_str(&text).map_err(|e| {
+        let line = e.span().map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count() as u64);
+        Error::Format {
+            message: format!("{what}: {}", e.message()),
+            place: Place { path: path.to_owned(), line },
+            hint: None,
+        }
+    })
+}
+
+/// Indented JSON with a final newline. Numbers that are not finite become `null`.
+pub fn to_json<T: Serialize>(value: &T) -> String {
+    // Serialisation of this crate's plain structs (string keys, no I/O) has no way to fail.
+    let mut text = serde_json::to_string_pretty(value).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"));
+    text.push('\n');
+    text
+}
+
+/// Whether a file must survive a power cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Durability {
+    /// It must: file and folder are flushed to the disk before the call returns.
+    Synced,
+    /// It can be made again.
+    Unsynced,
+}
+
+/// How the names of files begin that are being written.
+const TEMPORARY: &str = ".stereocal-";
+
+/// Whether a file of this name was being written.
+pub fn is_temporary(name: &str) -> bool {
+    name.starts_with(TEMPORARY)
+}
+
+/// Writes a file whole or not at all, making its folder where needed: to a temporary name beside it, then renamed.
+pub fn write_atomically(path: &Utf8Path, bytes: &[u8], durability: Durability) -> Result<()> {
+    let io = |source| Error::Io { action: "write", path: path.to_owned(), source };
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_str().is_empty() => folder,
+        _ => Utf8Path::new("."),
+    };
+    std::fs::create_dir_all(folder).map_err(io)?;
+    let mut file =
+        tempfile::Builder::new().prefix(TEMPORARY).permissions_like_others().tempfile_in(folder).map_err(io)?;
+    file.write_all(bytes).map_err(io)?;
+    if durability == Durability::Synced {
+        file.as_file().sync_all().map_err(io)?;
+    }
+    file.persist(path).map_err(|e| io(e.error))?;
+    if durability == Durability::Synced {
+        sync_folder(folder).map_err(io)?;
+    }
+    Ok(())
+}
+
+/// Flushes the renaming itself. Not every file system has an operation for that, and not every folder may be opened.
+fn sync_folder(folder: &Utf8Path) -> std::io::Result<()> {
+    use std::io::ErrorKind::{InvalidInput, PermissionDenied, Unsupported};
+    match std::fs::File::open(folder).and_then(|folder| folder.sync_all()) {
+        Err(e) if matches!(e.kind(), InvalidInput | PermissionDenied | Unsupported) => Ok(()),
+        done => done,
+    }
+}
+
+trait PermissionsLikeOthers {
+    fn permissions_like_others(&mut self) -> &mut Self;
+}
+
+impl PermissionsLikeOthers for tempfile::Builder<'_, '_> {
+    /// Temporary files are private by default; results are meant to be read by colleagues (the umask still applies).
+    fn permissions_like_others(&mut self) -> &mut Self {
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            self.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        self
+    }
+}

@@ -1,0 +1,31 @@
+//! What the formats share: files to be written, numbers and cameras in them.
+
+use crate::formats::checked;
+use crate::stereo::{Camera, Error, Lens};
+
+/// Metres in a millimetre.
+pub(super) const METRE: f64 = 1e-3;
+
+/// A file to be written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExportedFile {
+    /// Its name in the results folder.
+    pub name: &'static str,
+    /// Its content.
+    pub text: String,
+}
+
+/// Numbers as text that reads back to the same bits.
+pub(super) fn numbers(values: impl IntoIterator<Item = f64>) -> String {
+    let all: Vec<String> = values.into_iter().map(|v| format!("{v:?}")).collect();
+    all.join(", ")
+}
+
+/// A camera whose format tells the lens by the number of its coefficients.
+pub(super) fn camera(size: (f64, f64), pinhole: &[f64], distortion: &[f64]) -> Result<Camera, String> {
+    checked::camera(size, pinhole, checked::lens_of_length(distortion.len())?, distortion)
+}
+
+pub(super) fn refuse(format: &'static str, lens: Lens, most: Lens) -> Error {
+    Error::LensNotExportable { format, lens: lens.name(), most: most.name() }
+}

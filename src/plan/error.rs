@@ -1,0 +1,96 @@
+//! What can go wrong in planning.
+
+use crate::diagnostic::{Explain, Status};
+
+/// Result of planning.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// What can go wrong in planning.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The middle of a sphere.
+    #[error(
+        "group {group}: the robot does not reach ({:.0}, {:.0}, {:.0}) mm with its flange level or pointing down, within its limits",
+        point_mm[0], point_mm[1], point_mm[2]
+    )]
+    Unreachable {
+        /// The group.
+        group: String,
+        /// The point, mm.
+        point_mm: [f64; 3],
+        /// The nearest point of that line from the base that it reaches, mm.
+        nearest_mm: Option<[f64; 3]>,
+    },
+    /// The rig's field is too small for the target.
+    #[error(
+        "the rig never sees a target of {width_mm:.0} x {height_mm:.0} mm wholly in both pictures; its field is about {field_mm:.0} mm at {distance_mm:.0} mm"
+    )]
+    NeverSeen {
+        /// The target's plate.
+        width_mm: f64,
+        /// The target's plate.
+        height_mm: f64,
+        /// Width that both cameras see.
+        field_mm: f64,
+        /// Distance of the field's middle.
+        distance_mm: f64,
+    },
+    /// Too few candidates.
+    #[error(
+        "group {group}: {found} of {tried} places in view can be reached within the joints' limits; {needed} poses are needed"
+    )]
+    TooFew {
+        /// The group.
+        group: String,
+        /// Candidates found.
+        found: usize,
+        /// Tried.
+        tried: usize,
+        /// Asked for.
+        needed: usize,
+    },
+    /// The measurements are of other groups, or of nothing.
+    #[error("{message}")]
+    Measured {
+        /// What is wrong.
+        message: String,
+        /// The file.
+        place: String,
+    },
+}
+
+impl Explain for Error {
+    fn status(&self) -> Status {
+        match self {
+            Error::TooFew { .. } => Status::Undetermined,
+            _ => Status::BadInput,
+        }
+    }
+    fn place(&self) -> Option<String> {
+        match self {
+            Error::Measured { place, .. } => Some(place.clone()),
+            _ => None,
+        }
+    }
+    fn hint(&self) -> Option<String> {
+        Some(match self {
+            Error::Unreachable { nearest_mm: Some([x, y, z]), .. } => {
+                format!("`--center {x:.0},{y:.0},{z:.0}` is reached; repeat --center for more spheres")
+            }
+            Error::Unreachable { .. } => {
+                "`stereocal robot show` gives the pose at joint angles: is the robot file right?".to_owned()
+            }
+            Error::NeverSeen { .. } => {
+                "a smaller target (`--squares`, `--square-mm`), or cameras that look at one place".to_owned()
+            }
+            Error::TooFew { .. } => {
+                "fewer poses (`--poses`), another place (`--center X,Y,Z`), or wider limits_deg in the robot file"
+                    .to_owned()
+            }
+            Error::Measured { .. } => {
+                "`--after` takes the measurements.csv of poses that `stereocal plan --first` made".to_owned()
+            }
+        })
+    }
+}

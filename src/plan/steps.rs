@@ -1,0 +1,106 @@
+//! A plan, step by step.
+
+use nalgebra::Vector3;
+
+use super::after;
+use super::choose::{self, Information};
+use super::error::Result;
+use super::order::{self, Planned};
+use super::pool::{self, Candidate, Pool};
+use super::predict::{Accuracy, Problem};
+use super::scene::{self, Placement, Scene};
+use super::settings::{COUNTS, PAPER_SAMPLES, Settings};
+use crate::measurements::Measurement;
+use crate::robot::Robot;
+
+/// A plan.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The placements that it is made for.
+    pub placements: Vec<Placement>,
+    /// Poses in the order of the run.
+    pub poses: Vec<Planned>,
+    /// What they determine, and how well.
+    pub accuracy: Accuracy,
+    /// Accuracy by the number of samples, and of this plan.
+    pub expected: Vec<(usize, f64)>,
+    /// The paper's plan: what it determines, and its accuracy by the number of samples.
+    pub paper: Option<(Accuracy, Vec<(usize, f64)>)>,
+    /// Standard deviation of a coordinate that was reckoned with, mm.
+    pub noise_mm: f64,
+    /// Expected error at places of the spheres, base frame: place, mm.
+    pub map: Vec<(Vector3<f64>, f64)>,
+    /// Candidates that were to choose from.
+    pub pool: usize,
+    /// What the user must know.
+    pub warnings: Vec<String>,
+}
+
+/// What every plan's user must know.
+pub const COLLISIONS: &str = "collisions of the arm with itself, the cameras and the cell are not checked: run the program slowly, hand on the stop";
+
+/// Plans. `measured` are rows of earlier poses, and the file they come from.
+pub fn plan(
+    robot: &Robot,
+    scene: &Scene,
+    settings: &Settings,
+    measured: Option<(&[Measurement], &str)>,
+) -> Result<Plan> {
+    let mut placements = scene::placements(robot, scene, settings)?;
+    let mut warnings = vec![COLLISIONS.to_owned()];
+    let earlier = match measured {
+        Some((rows, place)) => after::place(robot, scene, &mut placements, rows, place)?,
+        None => Vec::new(),
+    };
+    let noise = scene::PoseNoise { given_mm: settings.noise_mm, repeatability_mm: settings.repeatability_mm };
+    let candidates = |kind| Pool { robot, scene, settings, placements: &placements, noise }.candidates(kind);
+    let problem = Problem::new(robot, &placements, candidates(pool::Kind::Fresh)?);
+    let centers = candidates(pool::Kind::Center)?;
+    let mut information = Information::new(&problem);
+    earlier.iter().chain(&centers).for_each(|c| information.add(&problem.rows(c)));
+    let (chosen, expected, pool_size) = if let Some(count) = settings.first {
+        (candidates(pool::Kind::First(count))?, Vec::new(), 0)
+    } else if settings.paper {
+        let all = candidates(pool::Kind::Paper(settings.samples))?;
+        let expected = information.clone().curve(&problem, &all, &[&COUNTS[..], &[settings.samples]].concat());
+        (all, expected, 0)
+    } else {
+        let pool = candidates(pool::Kind::Pool(settings.pool))?;
+        let (chosen, expected) = choose::choose(&problem, &information, &pool, settings.samples);
+        (chosen.iter().map(|&k| pool[k].clone()).collect(), expected, pool.len())
+    };
+    let paper = if settings.first.is_none() {
+        let of_paper = candidates(pool::Kind::Paper(PAPER_SAMPLES)).ok();
+        of_paper.map(|all| {
+            let counts = [&COUNTS[..], &[PAPER_SAMPLES]].concat();
+            let mut start = Information::new(&problem);
+            centers.iter().for_each(|c| start.add(&problem.rows(c)));
+            let curve = start.curve(&problem, &all, &counts);
+            let used: Vec<Candidate> = centers.iter().chain(&all).cloned().collect();
+            (problem.accuracy(&used), curve)
+        })
+    } else {
+        None
+    };
+    chosen.iter().for_each(|c| information.add(&problem.rows(c)));
+    let used: Vec<Candidate> = earlier.iter().chain(&centers).chain(&chosen).cloned().collect();
+    let verify = if settings.first.is_some() { 0 } else { settings.verify };
+    let held_out = candidates(pool::Kind::Verify(verify))?;
+    if measured.is_none() && settings.first.is_none() {
+        warnings.push(
+            "where the cameras stand is only assumed: place them as plan.json says, or `--first` and then `--after` find out".to_owned(),
+        );
+    }
+    let poses = order::poses(robot, &placements, &centers, &chosen, &held_out, measured.map(|m| m.0));
+    Ok(Plan {
+        accuracy: problem.accuracy(&used),
+        expected,
+        paper,
+        noise_mm: problem.noise_mm(&used),
+        map: information.map(&problem),
+        pool: pool_size,
+        warnings,
+        poses,
+        placements,
+    })
+}

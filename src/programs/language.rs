@@ -1,0 +1,137 @@
+//! The makers' languages, and what stands in their programs: joint targets, stops, numbers.
+
+use std::ops::Range;
+
+use camino::Utf8Path;
+
+/// A maker's language.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Language {
+    /// Universal Robots, `.script`.
+    UrScript,
+    /// ABB, `.mod`.
+    Rapid,
+    /// KUKA, `.src` and `.dat`.
+    Krl,
+    /// Fanuc, `.ls`.
+    FanucLs,
+    /// Yaskawa, `.jbi`.
+    Jbi,
+}
+
+impl Language {
+    /// All of them.
+    pub const ALL: [Language; 5] =
+        [Language::UrScript, Language::Rapid, Language::Krl, Language::FanucLs, Language::Jbi];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Language::UrScript => "URScript",
+            Language::Rapid => "ABB RAPID",
+            Language::Krl => "KUKA KRL",
+            Language::FanucLs => "Fanuc LS",
+            Language::Jbi => "Yaskawa JBI",
+        }
+    }
+
+    /// Endings of its files, small letters.
+    fn endings(self) -> &'static [&'static str] {
+        match self {
+            Language::UrScript => &["script", "urscript"],
+            Language::Rapid => &["mod", "modx", "prg"],
+            Language::Krl => &["src", "dat"],
+            Language::FanucLs => &["ls"],
+            Language::Jbi => &["jbi"],
+        }
+    }
+
+    /// The language of a file, by its ending.
+    pub fn of(path: &Utf8Path) -> Option<Language> {
+        let ending = path.extension()?.to_ascii_lowercase();
+        Language::ALL.into_iter().find(|language| language.endings().contains(&ending.as_str()))
+    }
+
+    /// What a number of a target is times degrees.
+    fn per_degree(self, pulses: bool, pulses_per_deg: &[f64], joint: usize) -> f64 {
+        match self {
+            Language::UrScript => 1f64.to_radians(),
+            Language::Jbi if pulses => pulses_per_deg.get(joint).copied().unwrap_or(1.0),
+            _ => 1.0,
+        }
+    }
+}
+
+/// A joint target of a program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Target {
+    /// What the program calls it, or its number.
+    pub name: String,
+    /// Its line, from 1.
+    pub line: u64,
+    /// Readings, deg (mm where the joint slides).
+    pub readings: Vec<f64>,
+    /// Where each of its numbers stands in the text.
+    pub(super) places: Vec<Range<usize>>,
+    /// Where it stands as a whole, with its brackets.
+    pub(super) whole: Range<usize>,
+    /// Whether they are pulses.
+    pub(super) pulses: bool,
+}
+
+/// How the joints of a program's numbers are to be understood.
+#[derive(Debug, Clone, Copy)]
+pub struct Joints<'a> {
+    /// Which slide, one a joint: their numbers are lengths and never converted.
+    pub slides: &'a [bool],
+    /// Yaskawa's pulses a degree, one a joint; may be empty.
+    pub pulses_per_deg: &'a [f64],
+}
+
+impl Joints<'_> {
+    pub(super) fn count(&self) -> usize {
+        self.slides.len()
+    }
+
+    /// Metres of UR's language are the exception among the lengths; no UR slides.
+    pub(super) fn factor(&self, language: Language, pulses: bool, joint: usize) -> f64 {
+        if self.slides[joint] && !pulses { 1.0 } else { language.per_degree(pulses, self.pulses_per_deg, joint) }
+    }
+}
+
+/// A number as the language takes it: a hundredth of a microradian or finer; whole pulses.
+pub(super) fn number(language: Language, pulses: bool, value: f64) -> String {
+    let value = value + 0.0;
+    match language {
+        Language::UrScript => format!("{value:.9}"),
+        Language::Jbi if pulses => format!("{value:.0}"),
+        _ => format!("{value:.6}"),
+    }
+}
+
+/// A pose to stop at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stop {
+    /// Its name: that of its pictures.
+    pub name: String,
+    /// Readings, deg (mm where a joint slides).
+    pub readings: Vec<f64>,
+    /// Readings of the point that it is approached from, always from the same side of every joint (backlash).
+    pub approach: Vec<f64>,
+}
+
+/// How the robot moves between stops.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Share of the joints' full speed, per cent.
+    pub speed_percent: f64,
+    /// Time to rest before the pictures, s.
+    pub dwell_s: f64,
+}
+
+/// A stop with its numbers as text.
+pub(super) struct Written {
+    pub(super) name: String,
+    pub(super) readings: Vec<String>,
+    pub(super) approach: Vec<String>,
+}

@@ -1,0 +1,2 @@
+mod motions;
+mod written;
