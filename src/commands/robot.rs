@@ -42,6 +42,21 @@ fn import(args: &RobotImport, config: &Config, run: Run) -> Result<String> {
 /// How many times nearer to the measurements one way to read a table must come than the others.
 const CLEAR: f64 = 4.0;
 
+/// A way to read a table.
+type Way<'a> = (&'a dh_csv::Reading, Convention);
+
+fn convention_name(convention: Convention) -> &'static str {
+    if convention == Convention::Classic { "classic" } else { "modified" }
+}
+
+fn refuse(args: &RobotImport, message: String, hint: &str) -> Error {
+    Error::Table { message, place: args.file.to_string(), hint: hint.to_owned() }
+}
+
+fn tell(args: &RobotImport, reading: &dh_csv::Reading, convention: Convention) {
+    progress::note(format!("{}: {}, {} convention", args.file, reading.said, convention_name(convention)));
+}
+
 /// The robot of a table: of several ways to read it the one that fits the measurements.
 fn table(args: &RobotImport, name: &str) -> Result<Robot> {
     let readings = dh_csv::readings(&args.file, args.columns.as_deref())?;
@@ -50,37 +65,37 @@ fn table(args: &RobotImport, name: &str) -> Result<Robot> {
         (None, true) => vec![Convention::Modified],
         (None, false) => vec![Convention::Modified, Convention::Classic],
     };
-    let refuse =
-        |message: String, hint: &str| Error::Table { message, place: args.file.to_string(), hint: hint.to_owned() };
-    let of = |convention: Convention| if convention == Convention::Classic { "classic" } else { "modified" };
-    let ways: Vec<(&dh_csv::Reading, Convention)> = readings
+    let ways: Vec<Way> = readings
         .iter()
         .flat_map(|r| conventions.iter().map(move |&c| (r, c)))
         .filter(|(r, c)| !(r.is_modified() && *c == Convention::Classic))
         .collect();
-    let said = |reading: &dh_csv::Reading, convention: Convention| {
-        progress::note(format!("{}: {}, {} convention", args.file, reading.said, of(convention)));
-    };
     match &ways[..] {
         [] => {
             return Err(refuse(
+                args,
                 "beta_deg stands beside alpha and a of a modified table".to_owned(),
                 "`--dh modified` reads it",
             )
             .into());
         }
         [(reading, convention)] => {
-            said(reading, *convention);
+            tell(args, reading, *convention);
             return Ok(reading.robot(name, *convention));
         }
         _ if args.measurements.is_empty() => {
             let orders: Vec<String> = ways.iter().map(|(r, _)| format!("`--columns {}`", r.columns)).collect();
             let message = "the columns have no names, and more than one order could be".to_owned();
             let hint = format!("{} says which; `--measurements FILE` lets the readings decide", orders.join(" or "));
-            return Err(refuse(message, &hint).into());
+            return Err(refuse(args, message, &hint).into());
         }
         _ => {}
     }
+    by_readings(args, name, &ways)
+}
+
+/// The way to read a table that measurements of the robot decide for.
+fn by_readings(args: &RobotImport, name: &str, ways: &[Way]) -> Result<Robot> {
     let source = Source { files: args.measurements.clone(), ..Source::default() };
     let mut left: Vec<(f64, &dh_csv::Reading, Convention)> = ways
         .iter()
@@ -91,19 +106,20 @@ fn table(args: &RobotImport, name: &str) -> Result<Robot> {
     left.sort_by(|a, b| a.0.total_cmp(&b.0));
     match &left[..] {
         [] => Err(refuse(
+            args,
             "no way to read the table comes near to the measurements".to_owned(),
             "see whether they are of one robot; `--dh` and `--columns` read the table without them",
         )
         .into()),
         [best, next, ..] if next.0 < CLEAR * best.0 => {
             let way = |(left, r, c): &(f64, &dh_csv::Reading, Convention)| {
-                format!("`--dh {} --columns {}` ({left:.2} mm)", of(*c), r.columns)
+                format!("`--dh {} --columns {}` ({left:.2} mm)", convention_name(*c), r.columns)
             };
             let message = "more than one way to read the table fits the measurements".to_owned();
-            Err(refuse(message, &format!("{} or {} says which", way(best), way(next))).into())
+            Err(refuse(args, message, &format!("{} or {} says which", way(best), way(next))).into())
         }
         [best, ..] => {
-            said(best.1, best.2);
+            tell(args, best.1, best.2);
             Ok(best.1.robot(name, best.2))
         }
     }

@@ -62,6 +62,24 @@ fn examined(set: &Dataset, file: &Utf8Path, robot: &Robot, settings: &identify::
     (set, explained)
 }
 
+/// What the user must know of the rows.
+fn tell(set: &Dataset, folded: bool, only_verify: bool) {
+    if let Some(targets) = &set.targets {
+        progress::note(targets.sentence());
+    }
+    if let Some(repeats) = &set.repeats {
+        progress::note(repeats.sentence());
+    }
+    if folded {
+        progress::note("no row has the role `verify`: each row is judged with the sensor placed by the others");
+    }
+    if only_verify {
+        progress::warn(
+            "no row of role `sample` can be used: the verify rows also place the sensor, so that errors of points and wire lengths come out too small where there are few rows",
+        );
+    }
+}
+
 /// Runs the command.
 pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
     let settings = &config.identify;
@@ -86,25 +104,12 @@ pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
     if let Some((file, robot)) = robots.first() {
         (set, explained) = examined(&set, file, robot, settings);
     }
-    if let Some(targets) = &set.targets {
-        progress::note(targets.sentence());
-    }
-    if let Some(repeats) = &set.repeats {
-        progress::note(repeats.sentence());
-    }
     let folded = !only_verify && set.verify_rows().is_empty();
     let (fitted, judged) = match only_verify || folded {
         true => (set.rows(|_| true), set.rows(|pose| pose.role != Role::Center)),
         false => (set.fit_rows(), set.verify_rows()),
     };
-    if folded {
-        progress::note("no row has the role `verify`: each row is judged with the sensor placed by the others");
-    }
-    if only_verify {
-        progress::warn(
-            "no row of role `sample` can be used: the verify rows also place the sensor, so that errors of points and wire lengths come out too small where there are few rows",
-        );
-    }
+    tell(&set, folded, only_verify);
     let judge = Judge::plain(&set, &fitted, settings.wire_offset);
     let robots: Vec<RobotVerified> = robots
         .iter()

@@ -96,10 +96,8 @@ pub(super) struct Forced {
     pub lengths: Option<Unit>,
 }
 
-/// Judges all ways.
-pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Forced) -> Verdict {
-    let unknown = |at: &At| parts[at.part].spare().contains(&at.column);
-    let guessed = |p: &Picked| p.joints.iter().any(unknown) || p.points.iter().flat_map(|(_, at)| at).any(unknown);
+/// The candidates in all units that may be, the one nearest to the robot first.
+fn in_all_units(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Forced) -> Vec<Way> {
     let mut ways: Vec<Way> = Vec::new();
     for picked in candidates {
         for joints in [Unit::Deg, Unit::Rad].into_iter().filter(|u| forced.joints.is_none_or(|f| f == *u)) {
@@ -117,6 +115,14 @@ pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, force
         }
     }
     ways.sort_by(|a, b| a.left.unwrap_or(f64::INFINITY).total_cmp(&b.left.unwrap_or(f64::INFINITY)));
+    ways
+}
+
+/// Judges all ways.
+pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Forced) -> Verdict {
+    let unknown = |at: &At| parts[at.part].spare().contains(&at.column);
+    let guessed = |p: &Picked| p.joints.iter().any(unknown) || p.points.iter().flat_map(|(_, at)| at).any(unknown);
+    let ways = in_all_units(parts, candidates, robot, forced);
     let Some(best) = ways.first().cloned() else { return Verdict::None };
     let near = |way: &Way| way.left.is_some_and(|left| left < NEAR);
     // Of the same columns in other units.

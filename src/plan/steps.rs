@@ -69,19 +69,8 @@ pub fn plan(
         let (chosen, expected) = choose::choose(&problem, &information, &pool, settings.samples);
         (chosen.iter().map(|&k| pool[k].clone()).collect(), expected, pool.len())
     };
-    let paper = if settings.first.is_none() {
-        let of_paper = candidates(pool::Kind::Paper(PAPER_SAMPLES)).ok();
-        of_paper.map(|all| {
-            let counts = [&COUNTS[..], &[PAPER_SAMPLES]].concat();
-            let mut start = Information::new(&problem);
-            centers.iter().for_each(|c| start.add(&problem.rows(c)));
-            let curve = start.curve(&problem, &all, &counts);
-            let used: Vec<Candidate> = centers.iter().chain(&all).cloned().collect();
-            (problem.accuracy(&used), curve)
-        })
-    } else {
-        None
-    };
+    let of_paper = settings.first.is_none().then(|| candidates(pool::Kind::Paper(PAPER_SAMPLES)).ok()).flatten();
+    let paper = of_paper.map(|all| of_paper_plan(&problem, &centers, &all));
     chosen.iter().for_each(|c| information.add(&problem.rows(c)));
     let used: Vec<Candidate> = earlier.iter().chain(&centers).chain(&chosen).cloned().collect();
     let verify = if settings.first.is_some() { 0 } else { settings.verify };
@@ -103,4 +92,14 @@ pub fn plan(
         poses,
         placements,
     })
+}
+
+/// What the paper's poses determine, and their accuracy by the number of samples.
+fn of_paper_plan(problem: &Problem, centers: &[Candidate], all: &[Candidate]) -> (Accuracy, Vec<(usize, f64)>) {
+    let counts = [&COUNTS[..], &[PAPER_SAMPLES]].concat();
+    let mut start = Information::new(problem);
+    centers.iter().for_each(|c| start.add(&problem.rows(c)));
+    let curve = start.curve(problem, all, &counts);
+    let used: Vec<Candidate> = centers.iter().chain(all).cloned().collect();
+    (problem.accuracy(&used), curve)
 }

@@ -149,6 +149,48 @@ pub fn to_toml(robot: &Robot) -> String {
     toml::to_string(&RobotRecord::from(robot)).unwrap_or_default()
 }
 
+impl JointRecord {
+    /// The joint, or what is wrong with it.
+    fn joint(&self) -> Result<Joint, String> {
+        let slides = match self.kind.as_deref() {
+            None | Some("revolute") => false,
+            Some("prismatic") => true,
+            Some(kind) => {
+                return Err(format!("type is \"{kind}\"; it is \"revolute\" or \"prismatic\""));
+            }
+        };
+        if self.sign.abs() != 1.0 {
+            return Err(format!("sign is {}; it is 1 or -1", self.sign));
+        }
+        let (unit, given, other) = match slides {
+            true => ("limits_mm", self.limits_mm, self.limits_deg),
+            false => ("limits_deg", self.limits_deg, self.limits_mm),
+        };
+        if other.is_some() {
+            return Err(format!("the limits of this joint are {unit}"));
+        }
+        let limits = given.unwrap_or([-1.0, 1.0]);
+        let numbers = [self.alpha_deg, self.a_mm, self.beta_deg, self.theta_deg, self.d_mm, limits[0], limits[1]];
+        if numbers.iter().any(|v| !v.is_finite()) {
+            return Err("every number must be finite".to_owned());
+        }
+        if limits[0] >= limits[1] {
+            return Err(format!("{unit} runs from {} to {}", limits[0], limits[1]));
+        }
+        Ok(Joint {
+            alpha_rad: self.alpha_deg.to_radians(),
+            a_mm: self.a_mm,
+            beta_rad: self.beta_deg.to_radians(),
+            theta_rad: self.theta_deg.to_radians(),
+            d_mm: self.d_mm,
+            limits_rad: given
+                .map(|[low, high]| if slides { (low, high) } else { (low.to_radians(), high.to_radians()) }),
+            slides,
+            sign: self.sign,
+        })
+    }
+}
+
 impl RobotRecord {
     fn robot(&self) -> Result<Robot, String> {
         if self.convention != "mdh" {
@@ -163,42 +205,7 @@ impl RobotRecord {
         let tool_mm = Vector3::new(self.tool.x_mm, self.tool.y_mm, self.tool.z_mm);
         let mut joints = Vec::with_capacity(self.joint.len());
         for (i, j) in self.joint.iter().enumerate() {
-            let slides = match j.kind.as_deref() {
-                None | Some("revolute") => false,
-                Some("prismatic") => true,
-                Some(kind) => {
-                    return Err(format!("joint {}: type is \"{kind}\"; it is \"revolute\" or \"prismatic\"", i + 1));
-                }
-            };
-            if j.sign.abs() != 1.0 {
-                return Err(format!("joint {}: sign is {}; it is 1 or -1", i + 1, j.sign));
-            }
-            let (unit, given, other) = match slides {
-                true => ("limits_mm", j.limits_mm, j.limits_deg),
-                false => ("limits_deg", j.limits_deg, j.limits_mm),
-            };
-            if other.is_some() {
-                return Err(format!("joint {}: the limits of this joint are {unit}", i + 1));
-            }
-            let limits = given.unwrap_or([-1.0, 1.0]);
-            let numbers = [j.alpha_deg, j.a_mm, j.beta_deg, j.theta_deg, j.d_mm, limits[0], limits[1]];
-            if numbers.iter().any(|v| !v.is_finite()) {
-                return Err(format!("joint {}: every number must be finite", i + 1));
-            }
-            if limits[0] >= limits[1] {
-                return Err(format!("joint {}: {unit} runs from {} to {}", i + 1, limits[0], limits[1]));
-            }
-            joints.push(Joint {
-                alpha_rad: j.alpha_deg.to_radians(),
-                a_mm: j.a_mm,
-                beta_rad: j.beta_deg.to_radians(),
-                theta_rad: j.theta_deg.to_radians(),
-                d_mm: j.d_mm,
-                limits_rad: given
-                    .map(|[low, high]| if slides { (low, high) } else { (low.to_radians(), high.to_radians()) }),
-                slides,
-                sign: j.sign,
-            });
+            joints.push(j.joint().map_err(|said| format!("joint {}: {said}", i + 1))?);
         }
         if tool_mm.iter().any(|v| !v.is_finite()) {
             return Err("[tool]: every number must be finite".to_owned());
