@@ -1,6 +1,6 @@
 //! Rigid transforms as the rest of the program writes them, on top of nalgebra; the one that brings points onto others best.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix3x6, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// A rigid transform, named `a_from_b` where it is bound.
 pub type Transform = Isometry3<f64>;
@@ -52,6 +52,14 @@ pub fn perturb(a_from_b: &Transform, delta_r_rad: Vector3<f64>, delta_t_mm: Vect
 /// The matrix of the cross product: `skew(a) * b = a x b`.
 pub fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
+}
+
+/// How a small rigid motion (turn about the origin, then shift) moves a point: `[-skew(point), I]`.
+pub fn rigid_columns(point: &Vector3<f64>) -> Matrix3x6<f64> {
+    let mut columns = Matrix3x6::zeros();
+    columns.fixed_view_mut::<3, 3>(0, 0).copy_from(&-skew(point));
+    columns.fixed_view_mut::<3, 3>(0, 3).copy_from(&Matrix3::identity());
+    columns
 }
 
 /// Unit vector and length; the zero vector where the length is zero.

@@ -34,3 +34,58 @@ pub fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     }
     DMatrix::from_fn(n, n, |r, c| inverse[(r, c)] * scale[r] * scale[c])
 }
+
+/// Unknowns eliminated from a normal matrix: they are at their best for any values of those that are kept.
+#[derive(Debug, Clone)]
+pub struct Eliminated {
+    /// Normal matrix of what is kept.
+    pub normal: DMatrix<f64>,
+    /// `unknowns = -follow * kept`.
+    pub follow: DMatrix<f64>,
+    /// Inverse normal matrix of the unknowns, what is kept held.
+    pub inverse: DMatrix<f64>,
+}
+
+impl Eliminated {
+    /// All rows and columns beyond the first `kept`.
+    pub fn new(normal: &DMatrix<f64>, kept: usize) -> Eliminated {
+        let own = normal.nrows() - kept;
+        let inverse = pseudo_inverse(normal.view((kept, kept), (own, own)).into_owned());
+        let cross = normal.view((kept, 0), (own, kept)).into_owned();
+        let follow = &inverse * &cross;
+        let normal = normal.view((0, 0), (kept, kept)) - product(&cross, &follow);
+        Eliminated { normal, follow, inverse }
+    }
+}
+
+/// Columns less their projection on others.
+pub fn without(columns: &DMatrix<f64>, others: &DMatrix<f64>) -> DMatrix<f64> {
+    // The inner product is of few columns and may be taken one by one.
+    columns - others * (pseudo_inverse(others.tr_mul(others)) * product(others, columns))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn columns(count: usize, from: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(9, count, |r, c| ((3 * r + 7 * (from + c)) as f64).sin())
+    }
+
+    #[test]
+    fn what_is_eliminated_is_at_its_best() {
+        let (kept, own) = (columns(2, 0), columns(3, 2));
+        let all = DMatrix::from_fn(9, 5, |r, c| if c < 2 { kept[(r, c)] } else { own[(r, c - 2)] });
+        let eliminated = Eliminated::new(&product(&all, &all), 2);
+        let left = without(&kept, &own);
+        assert!((&eliminated.normal - product(&left, &left)).amax() < 1e-12);
+        assert!((left - (&kept - &own * &eliminated.follow)).amax() < 1e-12);
+    }
+
+    #[test]
+    fn a_column_that_is_there_twice_counts_once() {
+        let twice = DMatrix::from_fn(9, 2, |r, _| (r as f64).cos() * 1e6);
+        let left = without(&columns(2, 0), &twice);
+        assert!((left - without(&columns(2, 0), &twice.columns(0, 1).into_owned())).amax() < 1e-9);
+    }
+}

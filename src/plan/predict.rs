@@ -7,8 +7,9 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 
 use super::pool::Candidate;
 use super::scene::Placement;
-use crate::geometry::skew;
+use crate::geometry::rigid_columns;
 use crate::identify::model::base::{Base, Observability};
+use crate::linear_algebra::without;
 use crate::robot::bent::Torques;
 use crate::robot::jacobian::{Screws, feature};
 use crate::robot::{Parameter, Robot, Unit};
@@ -116,8 +117,9 @@ impl Problem {
             columns.fixed_view_mut::<3, 1>(0, k).copy_from(&column);
         }
         let place = screws.target_mm.coords;
-        columns.fixed_view_mut::<3, 3>(0, count).copy_from(&(skew(&(place - about_mm)) * -PER_MRAD));
-        columns.fixed_view_mut::<3, 3>(0, count + 3).copy_from(&Matrix3::identity());
+        let mut motion = rigid_columns(&(place - about_mm));
+        motion.fixed_columns_mut::<3>(0).scale_mut(PER_MRAD);
+        columns.fixed_view_mut::<3, 6>(0, count).copy_from(&motion);
         (place, columns)
     }
 
@@ -200,23 +202,4 @@ impl Problem {
         let sum: f64 = poses.iter().map(|c| c.covariance_mm2.trace() / 3.0).sum();
         (sum / poses.len().max(1) as f64).sqrt()
     }
-}
-
-/// Columns less their projection on others.
-fn without(columns: &DMatrix<f64>, others: &DMatrix<f64>) -> DMatrix<f64> {
-    if others.nrows() == 0 {
-        return columns.clone();
-    }
-    // Orthonormal columns that span the others; those of no length (too few poses) fall out.
-    let svd = others.clone().svd(true, false);
-    let most = svd.singular_values.iter().copied().fold(0.0, f64::max);
-    let Some(u) = svd.u else { return columns.clone() };
-    let mut left = columns.clone();
-    for (k, s) in svd.singular_values.iter().enumerate().filter(|(_, s)| **s > 1e-10 * most) {
-        debug_assert!(*s > 0.0);
-        let axis = u.column(k);
-        let along = axis.tr_mul(&left);
-        left -= axis * along;
-    }
-    left
 }

@@ -4,10 +4,10 @@
 //! six numbers and the tool's three, from the placement that fits best with the tool of the file (Kabsch, 1976).
 //! What goes wrong: a tool that the poses do not determine (one orientation) stays where the damping leaves it, which costs nothing.
 
-use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
+use nalgebra::{Point3, SMatrix, SVector, Vector3};
 
 use super::Robot;
-use crate::geometry::{Transform, fitted_frame, perturb, skew};
+use crate::geometry::{Transform, fitted_frame, perturb, rigid_columns};
 use crate::statistics::median;
 
 /// Poses that are enough.
@@ -63,8 +63,7 @@ impl Robot {
             for (flange, residual) in flanges.iter().zip(&now) {
                 let turned = frame.rotation * (flange * Point3::from(tool)).coords;
                 let mut jacobian = SMatrix::<f64, 3, 9>::zeros();
-                jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&-skew(&turned));
-                jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&Matrix3::identity());
+                jacobian.fixed_view_mut::<3, 6>(0, 0).copy_from(&rigid_columns(&turned));
                 let of_tool = (frame.rotation * flange.rotation).to_rotation_matrix().into_inner();
                 jacobian.fixed_view_mut::<3, 3>(0, 6).copy_from(&of_tool);
                 normal += jacobian.transpose() * jacobian;

@@ -12,16 +12,17 @@
 
 use std::rc::Rc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::identify::data::dataset::{Dataset, Group};
 use crate::identify::data::shared;
-use crate::identify::residuals::eliminate::{Block, Linear};
+use crate::identify::residuals::eliminate::Block;
 use crate::identify::settings::Settings;
+use crate::identify::solve::linearised::{Fresh, Placement};
 use crate::identify::solve::robust::{LEAST_FREEDOM, Loss};
 use crate::identify::solve::task::Task;
-use crate::linear_algebra::{product, pseudo_inverse};
+use crate::linear_algebra::pseudo_inverse;
 use crate::measurements::Role;
 use crate::robot::Robot;
 
@@ -122,31 +123,16 @@ fn gross_errors(task: &Task) -> Vec<usize> {
 struct Placed {
     /// Rows of the data set in their order, each with where its residuals start and end.
     rows: Vec<(usize, std::ops::Range<usize>)>,
-    linear: Rc<Linear>,
     /// A column an unknown of a new placement, where only some rows belong to it.
-    fresh: DMatrix<f64>,
+    fresh: Fresh,
     /// Row of the centre that was measured, from which on things move.
     center: Option<usize>,
-    /// Inverse normal matrix of the robot's parameters and this placement's unknowns, the others' eliminated.
-    inverse: Rc<DMatrix<f64>>,
     /// Fewest rows of a session.
     shortest: usize,
     /// Whether a new placement must explain more than what is smooth along a joint.
     rivalled: bool,
     /// The sum of squares of which it must then explain a share.
     squares: f64,
-}
-
-/// The normal matrix of the shared numbers, by what all other blocks know of them, and of one block's placement.
-fn with_placement(others: DMatrix<f64>, linear: &Linear) -> DMatrix<f64> {
-    let (count, unknowns) = (others.nrows(), linear.design.ncols());
-    let mut whole = DMatrix::zeros(count + unknowns, count + unknowns);
-    whole.view_mut((0, 0), (count, count)).copy_from(&(others + product(&linear.jacobian, &linear.jacobian)));
-    let cross = product(&linear.jacobian, &linear.design);
-    whole.view_mut((0, count), (count, unknowns)).copy_from(&cross);
-    whole.view_mut((count, 0), (unknowns, count)).copy_from(&cross.transpose());
-    whole.view_mut((count, count), (unknowns, unknowns)).copy_from(&product(&linear.design, &linear.design));
-    whole
 }
 
 /// Where each row's numbers stand, of the rows that the numbers belong to one after the other.
@@ -177,42 +163,37 @@ impl<'a> Search<'a> {
     fn new(task: &Task<'a>, look: Look) -> Option<Search<'a>> {
         let robust = task.robust(Loss::Absolute).ok()?.capped(if look == Look::Capped { GROSS } else { f64::INFINITY });
         let is_doubtful = task.rows.iter().any(|&row| robust.scores[row] > task.settings.outlier_sigmas);
-        let (rows, x, prior) = robust.linearised();
-        let (of_robot, extras) = rows.split(&x);
-        let places = rows.kinematics.places(of_robot, true);
-        let count = x.len();
-        let (mut normal, mut parts) = (prior, Vec::new());
-        for block in &rows.blocks {
-            let linear = block.linear(&places, extras, &rows.scatter);
-            let along = product(&linear.design, &linear.jacobian);
-            let inverse = pseudo_inverse(product(&linear.design, &linear.design));
-            let own = product(&linear.jacobian, &linear.jacobian) - along.transpose() * inverse * &along;
-            normal += &own;
-            parts.push((block, linear, own));
-        }
+        let (rows, problem, prior) = robust.linearised();
+        let parts: Vec<(&Block, &Placement, DMatrix<f64>)> = rows
+            .blocks
+            .iter()
+            .zip(&problem.placements)
+            .map(|(block, placement)| (block, placement, placement.eliminated().normal))
+            .collect();
+        let normal = parts.iter().fold(prior, |sum, (.., own)| sum + own);
         let numbers: usize = parts.iter().map(|(b, ..)| b.row_count()).sum();
         // What is left of chance after the fit: the share that the unknowns took explains nothing any more.
-        let unknowns = count + parts.iter().map(|(_, l, _)| l.design.ncols()).sum::<usize>();
+        let unknowns = problem.shared + parts.iter().map(|(_, p, _)| p.linear.design.ncols()).sum::<usize>();
         let freedom = numbers.saturating_sub(unknowns).max(numbers.div_ceil(LEAST_FREEDOM));
-        let squares: f64 = parts.iter().map(|(_, l, _)| l.residuals.norm_squared()).sum();
+        let squares: f64 = parts.iter().map(|(_, p, _)| p.linear.residuals.norm_squared()).sum();
         let mut placed = Vec::new();
-        for (block, linear, own) in parts {
+        for (block, placement, own) in parts {
             if matches!(block, Block::Pairwise(_)) {
                 continue;
             }
-            let whole = with_placement(&normal - own, &linear);
-            let of_rows = ranges(block.row_poses().into_iter().map(|pose| Some(rows.rows[pose?])));
-            let (linear, inverse) = (Rc::new(linear), Rc::new(pseudo_inverse(whole)));
-            let place = |rows, fresh, center, rivalled| {
-                let (linear, inverse) = (linear.clone(), inverse.clone());
-                Placed { rows, linear, fresh, center, inverse, shortest: SHORTEST, rivalled, squares }
+            let of_rows = ranges(placement.poses.iter().map(|pose| Some(rows.rows[(*pose)?])));
+            let (linear, inverse) =
+                (&placement.linear, Rc::new(pseudo_inverse(placement.with_others(&(&normal - own)))));
+            let place = |rows, columns, center, rivalled| {
+                let fresh = Fresh { linear: linear.clone(), columns, inverse: inverse.clone() };
+                Placed { rows, fresh, center, shortest: SHORTEST, rivalled, squares }
             };
             match block {
                 Block::Wire(_) => placed.push(place(of_rows, linear.design.clone(), None, false)),
                 Block::Points(_) => placed.push(place(of_rows, linear.design.clone(), None, true)),
                 Block::Center(c) => {
                     let center = Some(rows.rows[c.center]);
-                    placed.push(place(of_rows, c.of_center(&places, &rows.scatter), center, true));
+                    placed.push(place(of_rows, c.of_center(&problem.places, &rows.scatter), center, true));
                 }
                 // Each socket by itself: it touches few of the rows.
                 Block::Touch(touch) => {
@@ -250,7 +231,7 @@ impl<'a> Search<'a> {
             }
         }
         let (gain, row, placed) = best?;
-        if !self.pays(gain, placed.fresh.ncols()) {
+        if !self.pays(gain, placed.fresh.columns.ncols()) {
             return None;
         }
         if placed.rivalled {
@@ -285,7 +266,7 @@ impl<'a> Search<'a> {
             }
             let rival = self.orders(placed).iter().map(|o| placed.ramp(o)).fold(0.0, f64::max);
             placed.rows.len() >= 2 * placed.shortest
-                && self.pays(gain, placed.fresh.ncols())
+                && self.pays(gain, placed.fresh.columns.ncols())
                 && gain > SHARE * placed.squares
                 && gain > BEATS * rival
         };
@@ -299,39 +280,15 @@ impl<'a> Search<'a> {
 }
 
 impl Placed {
-    /// Of one row: the columns of a new placement times residuals, times themselves, times all columns there are.
-    fn products(&self, k: usize) -> (DVector<f64>, DMatrix<f64>, DMatrix<f64>) {
-        let range = self.rows[k].1.clone();
-        let fresh = self.fresh.rows(range.start, range.len());
-        let design = self.linear.design.rows(range.start, range.len());
-        let jacobian = self.linear.jacobian.rows(range.start, range.len());
-        let residuals = self.linear.residuals.rows(range.start, range.len());
-        let of_robot = fresh.tr_mul(&jacobian);
-        let count = of_robot.ncols();
-        let mut all = of_robot.resize_horizontally(count + design.ncols(), 0.0);
-        all.columns_mut(count, design.ncols()).copy_from(&fresh.tr_mul(&design));
-        (fresh.tr_mul(&residuals), fresh.tr_mul(&fresh), all)
-    }
-
-    fn gain(&self, pull: &DVector<f64>, own: &DMatrix<f64>, all: &DMatrix<f64>) -> f64 {
-        let left = own - all * &*self.inverse * all.transpose();
-        pull.dot(&(pseudo_inverse(left) * pull))
-    }
-
     /// The place in `order` from which on a new placement gains most, with what it gains.
     fn best_step(&self, order: &[usize]) -> Option<(f64, usize)> {
-        let (unknowns, columns) = (self.fresh.ncols(), self.inverse.nrows());
-        let mut pull = DVector::zeros(unknowns);
-        let (mut own, mut all) = (DMatrix::zeros(unknowns, unknowns), DMatrix::zeros(unknowns, columns));
+        let mut products = self.fresh.nothing();
         let mut best: Option<(f64, usize)> = None;
         for (late, &k) in order.iter().rev().enumerate() {
-            let (p, o, a) = self.products(k);
-            pull += p;
-            own += o;
-            all += a;
+            self.fresh.add(&mut products, &self.rows[k].1, 1.0);
             let early = order.len() - late - 1;
             if late + 1 >= self.shortest && early >= self.shortest {
-                let gain = self.gain(&pull, &own, &all);
+                let gain = self.fresh.gain(&products);
                 if best.is_none_or(|(g, _)| gain > g) {
                     best = Some((gain, k));
                 }
@@ -342,21 +299,16 @@ impl Placed {
 
     /// What a placement that moves evenly along `order` gains.
     fn ramp(&self, order: &[usize]) -> f64 {
-        let (unknowns, columns) = (self.fresh.ncols(), self.inverse.nrows());
-        let mut pull = DVector::zeros(unknowns);
-        let (mut own, mut all) = (DMatrix::zeros(unknowns, unknowns), DMatrix::zeros(unknowns, columns));
+        let mut products = self.fresh.nothing();
         // A placement that is unknown moves from its middle on, one whose centre was measured from there on.
         let start = self.center.map_or(0.5 * order.len() as f64, |center| {
             order.iter().filter(|&&k| self.rows[k].0 < center).count() as f64
         });
         for (i, &k) in order.iter().enumerate() {
             let t = (i as f64 - start) / order.len() as f64;
-            let (p, o, a) = self.products(k);
-            pull += t * p;
-            own += t * t * o;
-            all += t * a;
+            self.fresh.add(&mut products, &self.rows[k].1, t);
         }
-        self.gain(&pull, &own, &all)
+        self.fresh.gain(&products)
     }
 }
 

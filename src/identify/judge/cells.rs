@@ -10,15 +10,16 @@
 //! metre leave some hundredths.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::folds::FOLDS;
+use super::held_out::{CHANCE, HeldOut};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::model::prior::Tolerance;
-use crate::identify::residuals::eliminate::{Block, Linear};
 use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::Extra;
-use crate::linear_algebra::{product, pseudo_inverse};
+use crate::identify::solve::linearised::Linearised;
+use crate::linear_algebra::{Eliminated, pseudo_inverse};
 use crate::robot::Parameter;
 
 /// Cells in all, about.
@@ -36,23 +37,16 @@ struct Cell {
     block: usize,
     fold: usize,
     numbers: f64,
-    /// Product of [parameters and extras, placement, residual at offset zero] with itself.
+    /// Product of [parameters and extras, residual at offset zero, placement] with itself.
     normal: DMatrix<f64>,
-}
-
-/// A placement when a fold is held out: how its unknowns follow the parameters, from what is fitted of it.
-#[derive(Debug, Clone)]
-struct Follow {
-    /// `unknowns = - (by * parameters + constant)`
-    by: DMatrix<f64>,
-    constant: DVector<f64>,
 }
 
 #[derive(Debug, Clone)]
 struct Fold {
     normal: DMatrix<f64>,
     gradient: DVector<f64>,
-    follows: Vec<Option<Follow>>,
+    /// How the unknowns of each placement follow the parameters and the constant one behind them, from what is fitted of it.
+    follows: Vec<Option<DMatrix<f64>>>,
 }
 
 /// The cells of a set of rows.
@@ -69,43 +63,26 @@ pub struct Cells {
     unit_mm: f64,
 }
 
-/// Held-out errors of one model: of each cell the mean square of its numbers, mm^2, and how many there are.
-pub type HeldOut = Vec<(f64, f64)>;
-
-/// Rows linearised once, to be cut into cells in several ways.
-pub struct Linearised<'a> {
-    rows: &'a Rows,
-    /// Of each placement its derivatives, its residuals at offset zero, and the place of each of them.
-    blocks: Vec<(Linear, DVector<f64>, Vec<Option<usize>>)>,
-    columns: usize,
-}
-
 /// A label for each row of a placement by the poses that its rows are of; `None` for a row that is left aside.
 type LabelsOfPoses<'a> = dyn Fn(&[Option<usize>]) -> Vec<Option<usize>> + 'a;
 
-impl<'a> Linearised<'a> {
-    /// Where the rows are at these offsets.
-    pub fn new(rows: &'a Rows, offsets: &[f64]) -> Linearised<'a> {
-        let (of_robot, extras) = rows.split(offsets);
-        let places = rows.kinematics.places(of_robot, true);
-        let of_block = |block: &Block| {
-            let linear = block.linear(&places, extras, &rows.scatter);
-            let at_zero = &linear.residuals - &linear.jacobian * DVector::from_column_slice(offsets);
-            (linear, at_zero, block.row_poses())
-        };
-        Linearised { rows, blocks: rows.blocks.iter().map(of_block).collect(), columns: offsets.len() }
-    }
-
+impl Cells {
     /// Cells of these labels, one a residual of each placement; `fold` is that of a placement's label.
-    fn cells(&self, labels: &LabelsOfPoses<'_>, fold: &dyn Fn(usize, usize) -> usize, whole_placements: bool) -> Cells {
+    fn new(
+        problem: &Linearised,
+        rows: &Rows,
+        labels: &LabelsOfPoses<'_>,
+        fold: &dyn Fn(usize, usize) -> usize,
+        whole_placements: bool,
+    ) -> Cells {
         let mut cells = Vec::new();
-        for (b, (linear, at_zero, poses)) in self.blocks.iter().enumerate() {
-            let labels = labels(poses);
+        for (b, placement) in problem.placements.iter().enumerate() {
+            let labels = labels(&placement.poses);
             let used = labels.iter().flatten().max().map_or(0, |m| m + 1);
             for region in 0..used {
                 let of_region: Vec<usize> =
-                    (0..poses.len()).filter(|&i| labels[i].map_or(region == 0, |l| l == region)).collect();
-                let normal = normal(linear, at_zero, &of_region);
+                    (0..labels.len()).filter(|&i| labels[i].map_or(region == 0, |l| l == region)).collect();
+                let normal = placement.normal(&of_region, None);
                 cells.push(Cell { block: b, fold: fold(b, region), numbers: of_region.len() as f64, normal });
             }
         }
@@ -119,41 +96,39 @@ impl<'a> Linearised<'a> {
             }
         }
         let folds = cells.iter().map(|c| c.fold + 1).filter(|f| *f < SKIPPED).max().unwrap_or(0);
-        let make = |f: Option<usize>| Fold::new(&cells, self.blocks.len(), self.columns, f);
+        let make = |f: Option<usize>| Fold::new(&cells, problem.placements.len(), problem.shared, f);
         Cells {
-            parameters: self.rows.kinematics.parameters().to_vec(),
-            extras: self.rows.extras.clone(),
+            parameters: rows.kinematics.parameters().to_vec(),
+            extras: rows.extras.clone(),
             folds: (0..folds).map(|f| make(Some(f))).collect(),
             whole: make(None),
             whole_placements,
             cells,
-            unit_mm: self.rows.unit_variance_mm2().sqrt(),
+            unit_mm: rows.unit_variance_mm2().sqrt(),
         }
     }
 
     /// Regions of joint space, or whole placements where there are three; `most` is the largest number of folds.
-    pub fn by_regions(&self, set: &Dataset, most: usize) -> Cells {
-        let count = self.blocks.len();
+    pub fn by_regions(problem: &Linearised, rows: &Rows, set: &Dataset, most: usize) -> Cells {
+        let count = problem.placements.len();
         let (regions, whole) =
             (if count >= WHOLE { CELLS.div_ceil(count).min(3) } else { most / count.max(1) }, count >= WHOLE);
-        let labels = |poses: &[Option<usize>]| labels(set, self.rows, poses, regions);
+        let labels = |poses: &[Option<usize>]| labels(set, rows, poses, regions);
         match whole {
-            true => self.cells(&labels, &|block, _| block % most, true),
-            false => self.cells(&labels, &|block, region| block * regions + region, false),
+            true => Cells::new(problem, rows, &labels, &|block, _| block % most, true),
+            false => Cells::new(problem, rows, &labels, &|block, region| block * regions + region, false),
         }
     }
 
     /// Rows here and there: `of_row` is the fold of each row of the data set.
-    pub fn by_folds(&self, of_row: &[Option<usize>]) -> Cells {
+    pub fn by_folds(problem: &Linearised, rows: &Rows, of_row: &[Option<usize>]) -> Cells {
         let label = |poses: &[Option<usize>]| {
             // What is in no fold is always fitted: its label is one more than the last fold.
-            poses.iter().map(|p| p.map(|p| of_row[self.rows.rows[p]].unwrap_or(FOLDS))).collect()
+            poses.iter().map(|p| p.map(|p| of_row[rows.rows[p]].unwrap_or(FOLDS))).collect()
         };
-        self.cells(&label, &|_, region| if region < FOLDS { region } else { SKIPPED }, false)
+        Cells::new(problem, rows, &label, &|_, region| if region < FOLDS { region } else { SKIPPED }, false)
     }
-}
 
-impl Cells {
     /// What the most probable values of these parameters change by where each fold is left out, beside those of all; mm and mrad, one a
     /// parameter.
     pub fn deletions(&self, parameters: &[Parameter], tolerance: &Tolerance) -> Vec<Option<Vec<f64>>> {
@@ -204,15 +179,16 @@ impl Cells {
         for cell in &self.cells {
             let Some(follow) = &self.whole.follows[cell.block] else { continue };
             // The parameters' columns with the placement following them, and the residuals at the solution.
-            let (all, own) = (x.len(), follow.constant.len());
-            let mut moves = DMatrix::zeros(cell.normal.nrows(), n + 1);
+            let all = x.len();
+            let mut kept = DMatrix::zeros(all + 1, n + 1);
             for (k, &c) in columns.iter().enumerate() {
-                moves[(c, k)] = sds[k];
-                moves.view_mut((all, k), (own, 1)).copy_from(&(-sds[k] * follow.by.column(c)));
+                kept[(c, k)] = sds[k];
             }
-            moves.view_mut((0, n), (all, 1)).copy_from(&x);
-            moves.view_mut((all, n), (own, 1)).copy_from(&-(&follow.by * &x + &follow.constant));
-            moves[(all + own, n)] = 1.0;
+            kept.view_mut((0, n), (all, 1)).copy_from(&x);
+            kept[(all, n)] = 1.0;
+            let mut moves = DMatrix::zeros(cell.normal.nrows(), n + 1);
+            moves.rows_mut(0, all + 1).copy_from(&kept);
+            moves.rows_mut(all + 1, follow.nrows()).copy_from(&-(follow * kept));
             let products = moves.transpose() * &cell.normal * &moves;
             if cell.fold >= SKIPPED {
                 continue;
@@ -248,11 +224,9 @@ impl Cells {
             let x = fold.solve(&columns, &sds)?;
             for (slot, cell) in list.iter_mut().zip(&self.cells).filter(|(_, c)| c.fold == f) {
                 let Some(follow) = &fold.follows[cell.block] else { continue };
-                let unknowns = -(&follow.by * &x + &follow.constant);
-                let z = DVector::from_iterator(
-                    cell.normal.nrows(),
-                    x.iter().chain(unknowns.iter()).copied().chain(std::iter::once(1.0)),
-                );
+                let kept = x.push(1.0);
+                let unknowns = -(follow * &kept);
+                let z = DVector::from_iterator(cell.normal.nrows(), kept.iter().chain(&unknowns).copied());
                 let square = z.dot(&(&cell.normal * &z)).max(0.0);
                 *slot = (self.unit_mm * self.unit_mm * square / cell.numbers.max(1.0), cell.numbers);
             }
@@ -278,17 +252,12 @@ impl Fold {
                 fold.follows.push(None);
                 continue;
             };
-            let last = placing.nrows() - 1;
-            let unknowns = last - columns;
-            let inverse = pseudo_inverse(placing.view((columns, columns), (unknowns, unknowns)).into_owned());
-            let by = &inverse * placing.view((columns, 0), (unknowns, columns));
-            let constant: DVector<f64> = (&inverse * placing.view((columns, last), (unknowns, 1))).column(0).into();
-            if let Some(fitted) = &fitted {
-                let cross = fitted.view((0, columns), (columns, unknowns)).into_owned();
-                fold.normal += fitted.view((0, 0), (columns, columns)) - &cross * &by;
-                fold.gradient += fitted.view((0, last), (columns, 1)) - &cross * &constant;
+            let Eliminated { normal, follow, .. } = Eliminated::new(&placing, columns + 1);
+            if fitted.is_some() {
+                fold.normal += normal.view((0, 0), (columns, columns));
+                fold.gradient += normal.view((0, columns), (columns, 1));
             }
-            fold.follows.push(Some(Follow { by, constant }));
+            fold.follows.push(Some(follow));
         }
         fold
     }
@@ -328,16 +297,6 @@ fn picked(matrix: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(columns.len(), columns.len(), |r, c| matrix[(columns[r], columns[c])])
 }
 
-fn normal(linear: &Linear, at_zero: &DVector<f64>, rows: &[usize]) -> DMatrix<f64> {
-    let (robot, own) = (linear.jacobian.ncols(), linear.design.ncols());
-    let all = DMatrix::from_fn(rows.len(), robot + own + 1, |r, c| match c {
-        _ if c < robot => linear.jacobian[(rows[r], c)],
-        _ if c < robot + own => linear.design[(rows[r], c - robot)],
-        _ => at_zero[rows[r]],
-    });
-    product(&all, &all)
-}
-
 /// The region of each residual; `None` for what belongs to no pose.
 fn labels(set: &Dataset, rows: &Rows, poses: &[Option<usize>], regions: usize) -> Vec<Option<usize>> {
     let mut present: Vec<usize> = poses.iter().flatten().copied().collect();
@@ -368,38 +327,6 @@ fn divide(set: &Dataset, rows: &Rows, mut poses: Vec<usize>, regions: usize, nex
     let right = poses.split_off((poses.len() * first).div_ceil(regions));
     divide(set, rows, poses, first, next, label);
     divide(set, rows, right, regions - first, next, label);
-}
-
-/// Chance with which a model that is no better may seem so: several are tried on every rung.
-const CHANCE: f64 = 0.01;
-
-/// Whether `new` is clearly below `old`: its mean square is less, and by Student's test of the paired cells either the squares fall or
-/// their logarithms do. Squares say what a few bad regions gain; logarithms see that all regions gain where the old errors are of very
-/// different size.
-pub fn clearly_less(new: &HeldOut, old: &HeldOut) -> bool {
-    let pairs: Vec<(f64, f64)> = new.iter().zip(old).filter(|((_, n), _)| *n > 0.0).map(|(n, o)| (n.0, o.0)).collect();
-    if pairs.len() < 2 || new.len() != old.len() || root_mean(new) >= root_mean(old) {
-        return false;
-    }
-    let squares = pairs.iter().map(|(n, o)| o - n).collect();
-    let logarithms = pairs.iter().map(|(n, o)| (o.max(f64::MIN_POSITIVE) / n.max(f64::MIN_POSITIVE)).ln()).collect();
-    clearly_positive(squares) || clearly_positive(logarithms)
-}
-
-/// Whether the mean of these gains is more than chance.
-fn clearly_positive(gains: Vec<f64>) -> bool {
-    let gains = DVector::from_vec(gains);
-    let freedom = (gains.len() - 1) as f64;
-    let standard_error = (gains.variance() / freedom).sqrt();
-    let Ok(student) = StudentsT::new(0.0, 1.0, freedom) else { return false };
-    gains.mean() > student.inverse_cdf(1.0 - CHANCE) * standard_error
-}
-
-/// Root mean square of held-out errors, mm a number.
-pub fn root_mean(held_out: &HeldOut) -> Option<f64> {
-    let numbers: f64 = held_out.iter().map(|(_, n)| n).sum();
-    let squares: f64 = held_out.iter().map(|(s, n)| s * n).sum();
-    (numbers > 0.0).then(|| (squares / numbers).sqrt())
 }
 
 #[cfg(test)]

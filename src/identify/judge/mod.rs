@@ -3,6 +3,7 @@
 pub mod cells;
 pub mod errors;
 pub mod folds;
+pub mod held_out;
 pub mod scale;
 pub mod smooth;
 pub mod uncertainty;

@@ -6,14 +6,14 @@
 //! The transforms are integrated out (restricted likelihood: Patterson and Thompson, Biometrika 58, 1971), the parameters have their prior.
 //! What goes wrong: an error that the robot's parameters can follow, or that is small beside the noise, is not seen.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix};
 
 use crate::identify::model::prior::evidence_of_all;
 use crate::identify::residuals::eliminate::Block;
 use crate::identify::residuals::rows::Rows;
 use crate::identify::residuals::smooth::{functions, white};
 use crate::identify::sensor::SmoothError;
-use crate::linear_algebra::product;
+use crate::identify::solve::linearised::{Linearised, Placement};
 
 /// A smooth error that the points tell of, and by how much it makes them more probable.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,11 +62,12 @@ pub fn most_probable(rows: &Rows, offsets: &[f64], sds: &[f64]) -> Option<Told> 
             .map(|&noise| (evidence(products, sds, ratio * unit_mm, noise), noise))
             .max_by(|a, b| a.0.total_cmp(&b.0))
     };
+    let problem = Linearised::new(rows, offsets);
     let mut found: Option<(f64, SmoothError)> = None;
     let mut without = f64::INFINITY;
     for length in LENGTHS {
         let length_mm = length * size_mm;
-        let products = products(rows, offsets, length_mm);
+        let products = products(rows, &problem, length_mm);
         without = best(&products, 0.0)?.0;
         for ratio in SIZES {
             let (evidence, noise) = best(&products, ratio)?;
@@ -97,26 +98,18 @@ fn size_mm(rows: &Rows) -> Option<f64> {
     (placements >= PLACEMENTS && square > 0.0).then(|| (square / count as f64).sqrt())
 }
 
-fn products(rows: &Rows, offsets: &[f64], length_mm: f64) -> Vec<Products> {
-    let (of_robot, extras) = rows.split(offsets);
-    let places = rows.kinematics.places(of_robot, true);
-    let of_block = |block: &Block| {
+fn products(rows: &Rows, problem: &Linearised, length_mm: f64) -> Vec<Products> {
+    let of_block = |(block, placement): (&Block, &Placement)| {
         let Block::Points(points) = block else { return None };
-        let linear = block.linear(&places, extras, &rows.scatter);
-        let at_zero = &linear.residuals - &linear.jacobian * DVector::from_column_slice(offsets);
         let spots: Vec<_> = points.spots.iter().map(|s| s.point_mm).collect();
         let whiteners: Vec<_> =
             points.spots.iter().map(|s| rows.scatter.whitener(&s.covariance_mm2) * s.weight).collect();
         let functions = white(&functions(&spots, length_mm), &whiteners, points.rows_a_spot());
-        let (robot, own) = (offsets.len(), linear.design.ncols());
-        let mut all = DMatrix::zeros(at_zero.len(), robot + 1 + own + functions.ncols());
-        all.columns_mut(0, robot).copy_from(&linear.jacobian);
-        all.set_column(robot, &at_zero);
-        all.columns_mut(robot + 1, own).copy_from(&linear.design);
-        all.columns_mut(robot + 1 + own, functions.ncols()).copy_from(&functions);
-        Some(Products { normal: product(&all, &all), functions: functions.ncols(), numbers: at_zero.len() as f64 })
+        let all: Vec<usize> = (0..placement.poses.len()).collect();
+        let normal = placement.normal(&all, Some(&functions));
+        Some(Products { normal, functions: functions.ncols(), numbers: all.len() as f64 })
     };
-    rows.blocks.iter().filter_map(of_block).collect()
+    rows.blocks.iter().zip(&problem.placements).filter_map(of_block).collect()
 }
 
 /// Logarithm of the data's probability with an error of so many mm a unit of noise, and noise of so many times that of the rows.

@@ -1,12 +1,13 @@
 //! How far to trust the result: covariance of the parameters, the position error to expect, and what poses would tell.
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::DMatrix;
 use serde::Serialize;
 
+use crate::geometry::rigid_columns;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::model::kinematics::Kinematics;
 use crate::identify::solve::formulation::Formulation;
-use crate::linear_algebra::pseudo_inverse;
+use crate::linear_algebra::Eliminated;
 
 /// Covariance of the identified parameters, in the units of the file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -77,15 +78,14 @@ impl Expected {
         let (mut squares, mut of_robots) = (vec![0.0; places.len()], vec![0.0; places.len()]);
         for group in 0..set.groups.len() {
             let placing: Vec<usize> = fitted.iter().copied().filter(|&i| set.poses[i].group == group).collect();
-            let motion = |i: usize| rigid(&places[i].point_mm.coords);
-            let mut normal = DMatrix::zeros(6, 6);
-            let mut cross = DMatrix::zeros(6, count);
+            let motion = |i: usize| rigid_columns(&places[i].point_mm.coords);
+            let mut normal = DMatrix::zeros(count + 6, count + 6);
             for &i in &placing {
-                normal += motion(i).tr_mul(&motion(i));
-                cross += motion(i).tr_mul(&places[i].point_columns);
+                let mut columns = places[i].point_columns.clone().resize_horizontally(count + 6, 0.0);
+                columns.fixed_columns_mut::<6>(count).copy_from(&motion(i));
+                normal += columns.tr_mul(&columns);
             }
-            let inverse = pseudo_inverse(normal);
-            let follow = &inverse * cross;
+            let Eliminated { follow, inverse, .. } = Eliminated::new(&normal, count);
             for i in (0..places.len()).filter(|&i| set.poses[i].group == group) {
                 let columns = &places[i].point_columns - motion(i) * &follow;
                 let of_robot = (&columns * &covariance * columns.transpose()).trace();
@@ -118,14 +118,6 @@ impl Expected {
             self.mean_mm, self.max_mm, self.p95_mm
         )
     }
-}
-
-/// How a small rigid motion (turn, shift) moves a point.
-fn rigid(point: &Vector3<f64>) -> DMatrix<f64> {
-    let mut motion = DMatrix::zeros(3, 6);
-    motion.fixed_view_mut::<3, 3>(0, 0).copy_from(&-crate::geometry::skew(point));
-    motion.fixed_view_mut::<3, 3>(0, 3).copy_from(&Matrix3::identity());
-    motion
 }
 
 /// The ranges of the joints that were measured.

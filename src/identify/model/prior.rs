@@ -186,7 +186,7 @@ impl Tolerance {
     }
 
     /// The tolerance of greatest evidence for all parameters as they are, whether or not the data tell them apart; with the evidence.
-    /// `normal` and `gradient` as in [`Linearised`].
+    /// `normal` and `gradient` as in [`Likelihood`].
     pub fn from_evidence_of_all(
         parameters: &[Parameter],
         extras: &[Extra],
@@ -205,7 +205,7 @@ impl Tolerance {
 
 /// Data that are linear in the base parameters and extras.
 #[derive(Debug, Clone, Copy)]
-pub struct Linearised<'a> {
+pub struct Likelihood<'a> {
     /// The base parameters.
     pub base: &'a Base,
     /// All parameters.
@@ -218,7 +218,7 @@ pub struct Linearised<'a> {
     pub gradient: &'a DVector<f64>,
 }
 
-impl Linearised<'_> {
+impl Likelihood<'_> {
     fn evidence(&self, tolerance: &Tolerance) -> f64 {
         evidence(&tolerance.covariance(self.base, self.parameters, self.extras), self.normal, self.gradient)
     }
@@ -286,7 +286,7 @@ fn best_of_grid(parameters: &[Parameter], extras: &[Extra], score: &dyn Fn(&Tole
 }
 
 /// Logarithm of the data's probability up to what the prior does not touch, for unknowns that are independent before the data: of these
-/// standard deviations. `normal` and `gradient` as in [`Linearised`].
+/// standard deviations. `normal` and `gradient` as in [`Likelihood`].
 pub fn evidence_of_all(sds: &[f64], normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
     let n = sds.len();
     let inner = DMatrix::from_fn(n, n, |r, c| sds[r] * sds[c] * normal[(r, c)] + if r == c { 1.0 } else { 0.0 });
@@ -332,7 +332,7 @@ mod tests {
         let residuals = DVector::from_fn(n, |i, _| if i % 2 == 0 { 30.0 } else { -30.0 });
         let (normal, gradient) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&residuals));
         let data =
-            Linearised { base: &base, parameters: &parameters, extras: &[], normal: &normal, gradient: &gradient };
+            Likelihood { base: &base, parameters: &parameters, extras: &[], normal: &normal, gradient: &gradient };
         assert_eq!(data.most_probable().lengths_mm, 3.0);
     }
 

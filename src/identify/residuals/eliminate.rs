@@ -15,7 +15,7 @@ use super::touch::Touch;
 use crate::geometry::Transform;
 use crate::identify::model::kinematics::Place;
 use crate::identify::sensor::Scatter;
-use crate::linear_algebra::{product, pseudo_inverse};
+use crate::linear_algebra::{pseudo_inverse, without};
 
 /// Steps of the inner problem at the most; it is nearly linear and mostly needs two or three.
 const INNER_STEPS: usize = 50;
@@ -207,8 +207,7 @@ impl Block {
         if derivatives {
             jacobian = self.outer(places, extras, scatter, &unknowns);
             if self.unknown_count() > 0 {
-                let along = pseudo_inverse(design.tr_mul(&design)) * product(&design, &jacobian);
-                jacobian -= design * along;
+                jacobian = without(&jacobian, &design);
             }
         }
         Evaluated { residuals, jacobian, unknowns }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 
 use super::smooth::Field;
-use crate::geometry::{Transform, rotation_matrix, rotation_vector_of_matrix, skew};
+use crate::geometry::{Transform, rigid_columns, rotation_matrix, rotation_vector_of_matrix, skew};
 use crate::identify::model::kinematics::Place;
 use crate::identify::residuals::raw::Raw;
 use crate::identify::sensor::{Extra, Scatter, Spot};
@@ -93,8 +93,7 @@ impl Points {
             let whiten = scatter.whitener(&spot.covariance_mm2) * spot.weight;
             let residual = Points::point_residual(place, extras, frame, &flange_from_target, spot);
             residuals.fixed_rows_mut::<3>(row).copy_from(&(whiten * residual));
-            design.fixed_view_mut::<3, 3>(row, 0).copy_from(&(-whiten * skew(&turned)));
-            design.fixed_view_mut::<3, 3>(row, 3).copy_from(&whiten);
+            design.fixed_view_mut::<3, 6>(row, 0).copy_from(&(whiten * rigid_columns(&turned)));
             if let (true, Some(measured)) = (self.oriented, &spot.rotation) {
                 let weight = spot.weight / scatter.rotation_rad;
                 let turn = turn(&(rotation_matrix(frame) * place.rotation), &flange_from_target, measured);

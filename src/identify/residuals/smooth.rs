@@ -9,9 +9,9 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, SymmetricEigen, Vector3};
 
-use crate::geometry::skew;
+use crate::geometry::rigid_columns;
 use crate::identify::sensor::SmoothError;
-use crate::linear_algebra::{product, pseudo_inverse};
+use crate::linear_algebra::{product, pseudo_inverse, without};
 
 /// Points of a placement that the error is seen through, at the most.
 const SEEN_THROUGH: usize = 24;
@@ -127,8 +127,7 @@ pub fn white(functions: &DMatrix<f64>, whiteners: &[Matrix3<f64>], rows: usize) 
 fn left_mm2(points: &[Point3<f64>], functions: &DMatrix<f64>) -> f64 {
     let plain: Vec<(Point3<f64>, Matrix3<f64>)> = points.iter().map(|p| (*p, Matrix3::identity())).collect();
     let motions = motions(&plain, 3);
-    let mut left = white(functions, &vec![Matrix3::identity(); points.len()], 3);
-    left -= &motions * (pseudo_inverse(product(&motions, &motions)) * product(&motions, &left));
+    let left = without(&white(functions, &vec![Matrix3::identity(); points.len()], 3), &motions);
     left.norm_squared() / left.nrows().max(1) as f64
 }
 
@@ -136,8 +135,7 @@ fn left_mm2(points: &[Point3<f64>], functions: &DMatrix<f64>) -> f64 {
 fn motions(points: &[(Point3<f64>, Matrix3<f64>)], rows: usize) -> DMatrix<f64> {
     let mut motions = DMatrix::zeros(rows * points.len(), 6);
     for (i, (point, whitener)) in points.iter().enumerate() {
-        motions.fixed_view_mut::<3, 3>(rows * i, 0).copy_from(&(-whitener * skew(&point.coords)));
-        motions.fixed_view_mut::<3, 3>(rows * i, 3).copy_from(whitener);
+        motions.fixed_view_mut::<3, 6>(rows * i, 0).copy_from(&(whitener * rigid_columns(&point.coords)));
     }
     motions
 }
@@ -164,6 +162,7 @@ fn spread_out(points: &[Point3<f64>]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::skew;
 
     fn points() -> Vec<(Point3<f64>, Matrix3<f64>)> {
         let place =

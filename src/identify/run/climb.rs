@@ -8,12 +8,14 @@ use rayon::prelude::*;
 
 use super::session::Session;
 use crate::identify::Error;
-use crate::identify::judge::cells::{Cells, HeldOut, Linearised, clearly_less, root_mean};
+use crate::identify::judge::cells::Cells;
 use crate::identify::judge::folds;
+use crate::identify::judge::held_out::{HeldOut, clearly_less, root_mean};
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::sensor::{EVIDENCE, Extra, Scatter, WARPS};
 use crate::identify::settings::Model;
 use crate::identify::solve::formulation::Formulation;
+use crate::identify::solve::linearised::Linearised;
 use crate::robot::Parameter;
 
 /// A rung of the ladder, or a model, and how it did.
@@ -179,12 +181,12 @@ impl Session<'_> {
         let levers = self.robot.shifted(reference, of_robot);
         let rows = self.task(all, model).rows_at(scatter, &levers);
         let linearised = Linearised::new(&rows, &wide);
-        let regions = linearised.by_regions(self.set, self.settings.folds);
+        let regions = Cells::by_regions(&linearised, &rows, self.set, self.settings.folds);
         if regions.whole_placements() {
             return vec![regions];
         }
         let scattered = folds::folds(self.set, &self.rows);
-        let others: Vec<Cells> = scattered.iter().map(|of_row| linearised.by_folds(of_row)).collect();
+        let others: Vec<Cells> = scattered.iter().map(|of_row| Cells::by_folds(&linearised, &rows, of_row)).collect();
         std::iter::once(regions).chain(others).collect()
     }
 

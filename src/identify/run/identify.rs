@@ -17,12 +17,13 @@ use super::session::Session;
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::shared;
-use crate::identify::judge::cells::Linearised;
+use crate::identify::judge::cells::Cells;
 use crate::identify::judge::{folds, smooth};
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::{Extensions, Method, Model, Settings};
 use crate::identify::solve::formulation::Formulation;
+use crate::identify::solve::linearised::Linearised;
 use crate::identify::solve::problem::Problem;
 use crate::identify::solve::task::Task;
 use crate::identify::solve::{swarm, trust_region};
@@ -236,10 +237,10 @@ impl Session<'_> {
         let rows = task.rows_at(scatter, &levers);
         let linearised = Linearised::new(&rows, &offsets);
         let of_repeat = |of_row: &Vec<Option<usize>>| -> Vec<Deletion> {
-            let changes = linearised.by_folds(of_row).deletions(parameters, &at.tolerance);
+            let changes = Cells::by_folds(&linearised, &rows, of_row).deletions(parameters, &at.tolerance);
             let of_fold = |(fold, change): (usize, Option<Vec<f64>>)| {
-                let rows: Vec<usize> = (0..of_row.len()).filter(|&r| of_row[r] == Some(fold)).collect();
-                Some(Deletion { rows, change: change? }).filter(|d| !d.rows.is_empty())
+                let of_fold: Vec<usize> = (0..of_row.len()).filter(|&r| of_row[r] == Some(fold)).collect();
+                Some(Deletion { rows: of_fold, change: change? }).filter(|d| !d.rows.is_empty())
             };
             changes.into_iter().enumerate().filter_map(of_fold).collect()
         };

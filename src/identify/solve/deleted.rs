@@ -15,12 +15,12 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::linearised::Placement;
 use super::robust::{LEAST_FREEDOM, Robust};
 use super::scatter::as_one_number;
 use super::task::Task;
 use crate::identify::residuals::eliminate::Block;
-use crate::identify::residuals::touch::Known;
-use crate::linear_algebra::{product, pseudo_inverse};
+use crate::linear_algebra::{Eliminated, pseudo_inverse};
 
 /// Root of the weight of a row that must not count, but has to have residuals and derivatives.
 const UNHEARD: f64 = 1e-5;
@@ -155,21 +155,16 @@ impl Robust<'_> {
     }
 
     fn all_deleted(&self) -> (Vec<Deleted>, Vec<f64>) {
-        let (rows, offsets, prior) = self.linearised();
-        let mut normal = prior.clone();
-        let (of_robot, extras) = rows.split(&offsets);
-        let places = rows.kinematics.places(of_robot, true);
-        let mut parts = Vec::with_capacity(rows.blocks.len());
-        for block in &rows.blocks {
-            let linear = block.linear(&places, extras, &rows.scatter);
-            let own = pseudo_inverse(product(&linear.design, &linear.design));
-            let follow = &own * product(&linear.design, &linear.jacobian);
-            let jacobian = &linear.jacobian - &linear.design * follow;
-            normal += product(&jacobian, &jacobian);
-            let known: &[Known] = if let Block::Touch(touch) = block { &touch.known } else { &[] };
-            parts.push((block.row_poses(), linear, own, jacobian, known));
-        }
-        let covariance = pseudo_inverse(normal);
+        let (rows, problem, prior) = self.linearised();
+        let of_block = |(block, placement): (&'_ Block, &'_ Placement)| {
+            let Eliminated { normal, follow, inverse } = placement.eliminated();
+            let jacobian = &placement.linear.jacobian - &placement.linear.design * follow;
+            let known = if let Block::Touch(touch) = block { touch.known.clone() } else { Vec::new() };
+            (normal, (placement.poses.clone(), placement.linear.clone(), inverse, jacobian, known))
+        };
+        let (normals, parts): (Vec<DMatrix<f64>>, Vec<_>) =
+            rows.blocks.iter().zip(&problem.placements).map(of_block).unzip();
+        let covariance = pseudo_inverse(normals.iter().fold(prior.clone(), |sum, normal| sum + normal));
         let weight = |row: usize| self.weights.get(row).copied().unwrap_or(1.0);
         let predicting = parts.iter().flat_map(|(poses, ..)| poses.iter().flatten());
         let most = predicting.filter(|&&pose| weight(rows.rows[pose]) > UNHEARD).count().max(1) as f64;
@@ -185,7 +180,7 @@ impl Robust<'_> {
                 (residual, leverage)
             };
             // The known distances stand behind the touches.
-            for (at, known) in (poses.len() - known.len()..poses.len()).zip(*known) {
+            for (at, known) in (poses.len() - known.len()..poses.len()).zip(known) {
                 let (residual, leverage) = held(&(at..at + 1));
                 of_known[known.index] =
                     square_of_deleted(&residual, leverage, 1.0).map_or(0.0, |(square, _)| square.sqrt());
@@ -205,7 +200,7 @@ impl Robust<'_> {
             }
         }
         // What the prior holds costs the data nothing.
-        let determined = offsets.len() as f64 - (&covariance * prior).trace();
+        let determined = problem.shared as f64 - (&covariance * prior).trace();
         let freedom =
             (numbers as f64 - unknowns as f64 - determined).max(numbers.div_ceil(LEAST_FREEDOM).max(1) as f64);
         for (row, d) in deleted.iter_mut().enumerate() {

@@ -14,7 +14,7 @@ use super::task::{FIRST_SCATTER_MM, Task, prior_rows, with_scale_held};
 use super::trust_region;
 use crate::identify::Error;
 use crate::identify::model::base::Base;
-use crate::identify::model::prior::{Linearised, Tolerance};
+use crate::identify::model::prior::{Likelihood, Tolerance};
 use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::{Model, Prior, Settings};
@@ -90,7 +90,7 @@ impl Formulation {
         let none = DMatrix::zeros(0, free_fit.x.len());
         let (normal, gradient) = Fit::new(Cow::Borrowed(&rows), &base, spread, &free, none).normal(&free_fit.x);
         let most = match held {
-            true => linearised(&base, task, &normal, &gradient).at_most(&tolerance),
+            true => likelihood(&base, task, &normal, &gradient).at_most(&tolerance),
             false => tolerance,
         };
         let (bounds, widened) = bounds(&base, task.parameters, &free_fit.x, task.settings);
@@ -259,7 +259,7 @@ impl<'a> Estimate<'a> {
             let spread = self.tolerance.spread(&self.base, task.parameters);
             let none = DMatrix::zeros(0, self.x.len());
             let (normal, gradient) = Fit::new(Cow::Borrowed(&rows), &self.base, spread, &free, none).normal(&self.x);
-            self.tolerance = linearised(&self.base, task, &normal, &gradient).most_probable();
+            self.tolerance = likelihood(&self.base, task, &normal, &gradient).most_probable();
         }
         let prior = prior_rows(&self.tolerance, &self.base, task, held || round == 0);
         let spread = self.tolerance.spread(&self.base, task.parameters);
@@ -306,13 +306,13 @@ impl<'a> Estimate<'a> {
     }
 }
 
-fn linearised<'a>(
+fn likelihood<'a>(
     base: &'a Base,
     task: &Task<'a>,
     normal: &'a DMatrix<f64>,
     gradient: &'a DVector<f64>,
-) -> Linearised<'a> {
-    Linearised { base, parameters: task.parameters, extras: task.extras, normal, gradient }
+) -> Likelihood<'a> {
+    Likelihood { base, parameters: task.parameters, extras: task.extras, normal, gradient }
 }
 
 /// Number of unknowns that the data, and not the prior, have determined.

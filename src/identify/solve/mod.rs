@@ -5,6 +5,7 @@ mod deleted;
 pub mod fit;
 pub mod formulation;
 pub mod kernel;
+pub mod linearised;
 pub mod placement;
 pub mod problem;
 pub mod robust;

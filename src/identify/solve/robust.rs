@@ -8,6 +8,7 @@ use std::borrow::Cow;
 use nalgebra::DMatrix;
 
 use super::fit::Fit;
+use super::linearised::Linearised;
 use super::scatter::{Residual, robust_scale, robust_scatter, sizes};
 use super::task::{FIRST_SCATTER_MM, Task, prior_rows};
 use super::trust_region;
@@ -217,8 +218,8 @@ impl Robust<'_> {
         (numbers as f64 / left.max(1) as f64).sqrt()
     }
 
-    /// The rows with their weights, the offsets, and the normal matrix of a loose prior on all parameters.
-    pub fn linearised(&self) -> (Rows, Vec<f64>, DMatrix<f64>) {
+    /// The rows with their weights, linearised where the fit ended, and the normal matrix of a loose prior on all parameters.
+    pub fn linearised(&self) -> (Rows, Linearised, DMatrix<f64>) {
         let recipe = self.task.recipe(self.scatter, &[], &self.robot);
         let rows = Rows::new(&Recipe { weights: &self.weights, ..recipe });
         let count = self.offsets.len();
@@ -229,7 +230,8 @@ impl Robust<'_> {
         for i in self.task.parameters.len()..count {
             prior[(i, i)] = 1.0;
         }
-        (rows, self.offsets.clone(), prior)
+        let linearised = Linearised::new(&rows, &self.offsets);
+        (rows, linearised, prior)
     }
 }
 

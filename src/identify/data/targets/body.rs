@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, SymmetricEigen, Vector3, Vector6};
 
 use crate::geometry::fitted_frame;
-use crate::geometry::{Transform, perturb, rotation_matrix, skew};
+use crate::geometry::{Transform, perturb, rigid_columns, rotation_matrix};
 use crate::statistics::median;
 
 /// Scatter that the numbers of a file have at the least, as a share of the targets' extent.
@@ -185,9 +185,7 @@ impl Body {
         for (place, sighting) in self.pairs(pose) {
             let turned = rotation * place.coords;
             let residual = sighting.point_mm - frame * place;
-            let mut design = nalgebra::Matrix3x6::zeros();
-            design.fixed_view_mut::<3, 3>(0, 0).copy_from(&-skew(&turned));
-            design.fixed_view_mut::<3, 3>(0, 3).copy_from(&Matrix3::identity());
+            let design = rigid_columns(&turned);
             let weighted = design.transpose() * sighting.precision;
             equations.normal += weighted * design;
             equations.gradient += weighted * residual;

@@ -1,4 +1,6 @@
 use super::*;
+use crate::identify::judge::held_out::{clearly_less, root_mean};
+use crate::linear_algebra::product;
 
 fn held_out(squares: &[f64]) -> HeldOut {
     squares.iter().map(|&s| (s, 3.0)).collect()
