@@ -5,46 +5,8 @@
 //! joint's row, and those of the last row to the flange. Where a maker publishes a drawing instead of a table the rows follow from it.
 //! A robot file is a start: a machine's serial number decides about limits and options, so hold `robot show` against the pendant.
 
-use nalgebra::Vector3;
-
-use super::corrections::CouplingTerm;
-use super::{Ends, Joint, Robot};
-use crate::geometry::{Transform, transform};
-
-/// How the rows of an arm are to be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Convention {
-    /// alpha and a of the link behind the joint (Denavit and Hartenberg, Paul).
-    Classic,
-    /// alpha and a of the link before the joint (Craig).
-    Modified,
-}
-
-/// A row of a table: alpha (deg), a (mm), theta (deg), d (mm).
-pub type Row = [f64; 4];
-
-/// An arm with its table.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Arm {
-    /// What `robot new` calls it.
-    pub name: &'static str,
-    /// Its maker's name for it.
-    pub title: &'static str,
-    /// Where the numbers come from.
-    pub source: &'static str,
-    /// What a user must know about its angles; may be empty.
-    pub note: &'static str,
-    /// How the rows are to be read.
-    pub convention: Convention,
-    /// One a joint.
-    pub rows: &'static [Row],
-    /// Ranges, deg; one a joint.
-    pub limits_deg: &'static [[f64; 2]],
-    /// The flange against the last frame: turns about x, y and z in this order, deg.
-    pub flange_deg: [f64; 3],
-    /// Joints (from 0) whose readings count from the level: the reading of the second must be added to the first.
-    pub coupled: &'static [(usize, usize)],
-}
+use super::Robot;
+pub use super::arm::{Arm, Convention, Row, from_rows};
 
 const UR_LIMITS: &[[f64; 2]] = &[[-360.0, 360.0]; 6];
 const UR_SOURCE: &str = "Universal Robots, \"DH parameters for calculations of kinematics and dynamics\"";
@@ -307,55 +269,11 @@ pub fn robot(name: &str) -> Option<Robot> {
     ARMS.iter().find(|arm| arm.name == name).map(Arm::robot)
 }
 
-impl Arm {
-    /// As a robot file has it.
-    pub fn robot(&self) -> Robot {
-        let mut robot = from_rows(self.title, self.convention, self.rows);
-        for (joint, [low, high]) in robot.joints.iter_mut().zip(self.limits_deg) {
-            joint.limits_rad = Some((low.to_radians(), high.to_radians()));
-        }
-        let turn = |axis: Vector3<f64>, deg: f64| transform(axis * deg.to_radians(), Vector3::zeros());
-        let [x, y, z] = self.flange_deg;
-        if self.flange_deg != [0.0; 3] {
-            let turned = turn(Vector3::x(), x) * turn(Vector3::y(), y) * turn(Vector3::z(), z);
-            robot.ends.last_frame_from_flange *= turned;
-        }
-        let coupling = |&(joint, of): &(usize, usize)| CouplingTerm { joint, of, ratio: 1.0 };
-        robot.corrections.couplings = self.coupled.iter().map(coupling).collect();
-        robot
-    }
-}
-
-/// The robot of a table, without limits.
-pub fn from_rows(name: &str, convention: Convention, rows: &[Row]) -> Robot {
-    let mut ends = Ends::default();
-    let mut before = [0.0, 0.0];
-    let mut joints = Vec::with_capacity(rows.len());
-    for &[alpha_deg, a_mm, theta_deg, d_mm] in rows {
-        let [alpha, a] = match convention {
-            Convention::Modified => [alpha_deg, a_mm],
-            Convention::Classic => std::mem::replace(&mut before, [alpha_deg, a_mm]),
-        };
-        joints.push(Joint {
-            alpha_rad: alpha.to_radians(),
-            a_mm: a,
-            theta_rad: theta_deg.to_radians(),
-            d_mm,
-            ..Joint::default()
-        });
-    }
-    if convention == Convention::Classic && before != [0.0, 0.0] {
-        let along: Transform = Transform::translation(before[1], 0.0, 0.0);
-        ends.last_frame_from_flange = along * transform(Vector3::x() * before[0].to_radians(), Vector3::zeros());
-    }
-    let tool_mm = ends.last_frame_from_flange.translation.vector;
-    Robot { name: name.to_owned(), joints, tool_mm, corrections: super::Corrections::default(), ends }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Point3;
+    use crate::geometry::Transform;
+    use nalgebra::{Point3, Vector3};
 
     fn flange(name: &str, deg: &[f64]) -> Transform {
         let joints: Vec<f64> = deg.iter().map(|d| d.to_radians()).collect();

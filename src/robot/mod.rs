@@ -1,6 +1,7 @@
 //! The robot: its kinematic parameters, where they put the target, and the file they live in.
 
 mod anatomy;
+pub mod arm;
 pub mod axes;
 pub mod bent;
 pub mod catalogue;

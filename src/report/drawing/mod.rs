@@ -1,5 +1,6 @@
 //! What is drawn on pages: plots, views in space, and photographs with what was found in them.
 
+mod axis;
 pub mod figure;
 pub mod pair_picture;
 pub mod picture;
