@@ -14,13 +14,13 @@ use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
 use crate::imaging::{Corners, Wanted, find_corners};
 use crate::stereo::recheck::{self, Before, FEWEST_PAIRS};
-use crate::{progress, report};
+use crate::{progress, ranges, report};
 
 /// Runs the command.
 pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
     let mut problems = Vec::new();
-    config::within(&mut problems, "tolerance_mm", tolerance_mm, config::TOLERANCES_MM);
+    ranges::within(&mut problems, "tolerance_mm", tolerance_mm, ranges::TOLERANCES_MM);
     config::reject(problems)?;
     let run = Run { force: args.output.force, ..run };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;

@@ -10,7 +10,7 @@ use crate::stereo::findings::{self, Finding};
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::Range;
-use crate::stereo::judge::lengths::held_out::EpipolarError;
+use crate::stereo::judge::lengths::held_out::{EpipolarError, HeldOutPair};
 use crate::stereo::judge::lengths::model_disagreement::Disagreement;
 use crate::stereo::judge::lengths::second_board::SecondBoard;
 use crate::stereo::judge::verdict::{COVERAGE, Verdict};
@@ -78,25 +78,27 @@ struct PairRecord {
     gap_rms_mm: Option<f64>,
 }
 
+impl PairRecord {
+    fn new(p: &HeldOutPair) -> PairRecord {
+        PairRecord {
+            pair: p.pair.clone(),
+            mean_error_x10_mm: p.mean_error_x_short_mm,
+            mean_error_y10_mm: p.mean_error_y_short_mm,
+            mean_error_x70_mm: p.mean_error_x_long_mm,
+            mean_error_y70_mm: p.mean_error_y_long_mm,
+            max_abs_error_mm: p.max_abs_error_mm,
+            gap_rms_mm: p.gap_rms_mm,
+        }
+    }
+}
+
 impl CameraCheckFile {
     /// Gathers the figures. `x10` and `x70` stand for one square and seven, or as many as the board has.
     pub fn new(calibration: &Calibration, judged: &Judged) -> CameraCheckFile {
         let accuracy = &judged.accuracy;
         let worst = &accuracy.extremes.largest;
         let all = || calibration.views.iter().flat_map(|view| &view.observations);
-        let pairs = accuracy
-            .pairs
-            .iter()
-            .map(|p| PairRecord {
-                pair: p.pair.clone(),
-                mean_error_x10_mm: p.mean_error_x_short_mm,
-                mean_error_y10_mm: p.mean_error_y_short_mm,
-                mean_error_x70_mm: p.mean_error_x_long_mm,
-                mean_error_y70_mm: p.mean_error_y_long_mm,
-                max_abs_error_mm: p.max_abs_error_mm,
-                gap_rms_mm: p.gap_rms_mm,
-            })
-            .collect();
+        let pairs = accuracy.pairs.iter().map(PairRecord::new).collect();
         CameraCheckFile {
             passed: judged.verdict == Verdict::Pass,
             verdict: judged.verdict,

@@ -58,8 +58,6 @@ pub struct Evaluated {
     pub residuals: DVector<f64>,
     /// White, the unknowns eliminated; no columns unless asked for.
     pub jacobian: DMatrix<f64>,
-    /// The unknowns at their best.
-    pub unknowns: Unknowns,
 }
 
 /// White residuals with derivatives as they are, nothing eliminated.
@@ -210,7 +208,7 @@ impl Block {
                 jacobian = without(&jacobian, &design);
             }
         }
-        Evaluated { residuals, jacobian, unknowns }
+        Evaluated { residuals, jacobian }
     }
 
     /// Residuals and all derivatives with the unknowns at their best, nothing eliminated.

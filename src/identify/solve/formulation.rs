@@ -61,8 +61,6 @@ pub struct Formulation {
     pub held: bool,
     /// The fit without a box, extras included.
     pub free_fit: Solution,
-    /// Number of unknowns that the data and not the prior have determined.
-    pub effective: f64,
     /// Whether the data see the robot's size.
     pub scale_seen: bool,
     /// How many times larger errors that rows share make the variances than independent ones would; one until it was looked for.
@@ -83,7 +81,7 @@ impl Formulation {
                 break;
             }
         }
-        let Estimate { tolerance, effective, .. } = estimate;
+        let tolerance = estimate.tolerance;
         let (rows, base, free_fit) = estimate.settled(held)?;
         let free = vec![f64::INFINITY; free_fit.x.len()];
         let spread = tolerance.spread(&base, task.parameters);
@@ -104,7 +102,6 @@ impl Formulation {
             most,
             held,
             free_fit,
-            effective,
             scale_seen: task.scale_is_seen(),
             common: 1.0,
         })

@@ -129,11 +129,6 @@ impl Kernel {
         Kernel { robot, parameters, pose_count, angles, shifts, corrections, tilts }
     }
 
-    /// Number of poses.
-    pub fn pose_count(&self) -> usize {
-        self.pose_count
-    }
-
     /// The target's points for these offsets (mm, mrad), written into `points`.
     pub fn points(&self, offsets: &[f64], points: &mut Points) {
         self.carry(&self.links(offsets), self.tool(offsets), offsets, points);

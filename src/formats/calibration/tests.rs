@@ -1,0 +1,75 @@
+use super::*;
+use crate::geometry::transform;
+
+#[test]
+fn a_rig_survives_the_file() {
+    let mut left = Camera::pinhole(640, 480, 500.0);
+    left.distortion[0] = -0.25;
+    let mut right = left;
+    right.lens = Lens::Brown5;
+    right.distortion[4] = 0.125;
+    let rig = Rig {
+        left,
+        right,
+        right_from_left: transform(Vector3::new(0.01, -0.3, 0.02), Vector3::new(-120.0, 1.0, 20.0)),
+        covariance: Some(Covariance { order: vec!["left.fx".into()], matrix: DMatrix::from_element(1, 1, 0.5) }),
+    };
+    let text = files::to_json(&CalibrationFile::from(&rig));
+    let back = serde_json::from_str::<CalibrationFile>(&text).unwrap().rig().unwrap();
+    assert_eq!(back.left, rig.left);
+    assert_eq!(back.right, rig.right);
+    assert_eq!(back.covariance, rig.covariance);
+    assert!((back.right_from_left.to_matrix() - rig.right_from_left.to_matrix()).amax() < 1e-15);
+}
+
+#[test]
+fn a_folder_stands_for_the_one_calibration_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = Utf8Path::from_path(folder.path()).unwrap();
+    let out = OutDir::open(&path.join("out")).unwrap();
+    let put = |name: &str| std::fs::write(path.join(name), "").unwrap();
+    let found = || file(Some(path), &out).map_err(|e| e.to_string());
+    assert_eq!(file(None, &out).unwrap(), path.join("out/calibration.json"));
+    assert_eq!(file(Some(&path.join("a.json")), &out).unwrap(), path.join("a.json"));
+    assert!(found().unwrap_err().contains("no calibration in this folder"));
+    put("left.yaml");
+    put("right.yaml");
+    assert_eq!(found(), Ok(path.join("left.yaml")));
+    put("camchain.yaml");
+    assert!(found().unwrap_err().contains("several calibrations: left.yaml, camchain.yaml"));
+    put("calibration.json");
+    assert_eq!(found(), Ok(path.join("calibration.json")));
+}
+
+#[test]
+fn what_is_no_rig_is_refused_by_name() {
+    let good = Rig {
+        left: Camera::pinhole(640, 480, 500.0),
+        right: Camera::pinhole(640, 480, 500.0),
+        right_from_left: transform(Vector3::zeros(), Vector3::new(-120.0, 0.0, 0.0)),
+        covariance: Some(Covariance { order: vec!["left.fx".into()], matrix: DMatrix::from_element(1, 1, 0.5) }),
+    };
+    let good = serde_json::to_value(CalibrationFile::from(&good)).unwrap();
+    let refused = |pointer: &str, value: serde_json::Value| {
+        let mut changed = good.clone();
+        *changed.pointer_mut(pointer).unwrap() = value;
+        serde_json::from_value::<CalibrationFile>(changed).unwrap().rig().unwrap_err()
+    };
+    for (pointer, value, part) in [
+        ("/left/model", "fisheye".into(), "model is \"fisheye\""),
+        ("/left/model", "brown5".into(), "has 4 numbers; the brown5 model has 5"),
+        ("/right/distortion/2", 0.5.into(), "right camera: radial2 has 2 coefficients"),
+        ("/left/width", 0.into(), "width is 0"),
+        ("/right_from_left/rotation/0/0", 0.9.into(), "is not a rotation"),
+        ("/right_from_left/rotation/2/2", (-1.0).into(), "is not a rotation"),
+        ("/right_from_left/translation_mm/0", 0.0.into(), "0 mm apart"),
+        ("/covariance/matrix/0/0", 1e308.into(), "covariance of `left.fx` is 1e308"),
+        ("/version", 2.into(), "version 2"),
+    ] {
+        let said = refused(pointer, value);
+        assert!(said.contains(part), "{pointer}: {said}");
+    }
+    let mut named_elsewhere = good.clone();
+    named_elsewhere["left"]["model"] = "opencv".into();
+    assert!(serde_json::from_value::<CalibrationFile>(named_elsewhere).unwrap().rig().is_ok());
+}
