@@ -29,7 +29,7 @@ use crate::stereo::judge::lengths::second_board::{self, SecondBoard};
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::model::known_lenses::{KnownLenses, TOLERANCE};
 use crate::stereo::pairs::fewest_pairs;
-use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::select::options::Options;
 use crate::{progress, ranges, report};
 
 /// Runs the command.

@@ -18,8 +18,8 @@ use crate::stereo::pairs::series::{self, PairMisfit, Series};
 use crate::stereo::pairs::{Discarded, DiscardedPair, Standing};
 use crate::stereo::select::known_lenses::{self, LensCheck};
 use crate::stereo::select::lens_ladder;
-use crate::stereo::select::lens_ladder::Options;
 use crate::stereo::select::model_comparison::LensScore;
+use crate::stereo::select::options::{Choice, Options};
 use crate::stereo::select::pair_scatter::PairScatter;
 use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
 use crate::stereo::solve::priors::Priors;
@@ -146,7 +146,7 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
     let candidates = Candidates::new(corners, options.known.as_ref())?;
     let Series { problem: start, discarded, runs, misfit } = series::find(&candidates, runs)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
-    let lens_ladder::Choice { layout, near, priors, scores: lens_scores } =
+    let Choice { layout, near, priors, scores: lens_scores } =
         lens_ladder::choose(&start, &corners.board, options).map_err(|e| e.without(&skipped))?;
     let known = options.known.as_ref();
     let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout, &corners.board));

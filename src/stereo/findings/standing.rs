@@ -12,7 +12,7 @@ use crate::stereo::calibrate::{Calibration, calibrate, calibrate_with};
 use crate::stereo::findings::{self, Finding, Kind};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
-use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::select::options::Options;
 use crate::stereo::volume::Extent;
 use crate::stereo::volume::lengths::VolumeLengths;
 

@@ -9,7 +9,7 @@ use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::pairs::Cause;
-use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::select::options::Options;
 use crate::stereo::synthetic::World;
 use crate::stereo::volume::Extent;
 

@@ -11,7 +11,7 @@ use crate::stereo::judge::assessment::{Demand, Judged};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::lengths::second_board::second_board;
 use crate::stereo::judge::verdict::Verdict;
-use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::select::options::Options;
 use crate::stereo::synthetic::World;
 use crate::stereo::triangulate::{common, triangulate};
 use crate::stereo::volume::Extent;

@@ -267,7 +267,7 @@ mod tests {
     use super::*;
     use crate::imaging::{Corner, Corners, Squares};
     use crate::stereo::calibrate::calibrate;
-    use crate::stereo::select::lens_ladder::Options;
+    use crate::stereo::select::options::Options;
     use crate::stereo::synthetic::World;
 
     /// Two cameras that see a board of so many squares; a mix-up; what is said of each pair that is left out.

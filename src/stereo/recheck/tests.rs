@@ -3,7 +3,7 @@
 use super::*;
 use crate::geometry::transform;
 use crate::stereo::calibrate::{Calibration, calibrate};
-use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::select::options::Options;
 use crate::stereo::synthetic::World;
 use crate::stereo::volume::Extent;
 use nalgebra::Vector3;

@@ -139,7 +139,7 @@ mod tests {
     use crate::geometry::transform;
     use crate::stereo::Lens;
     use crate::stereo::calibrate::calibrate;
-    use crate::stereo::select::lens_ladder::Options;
+    use crate::stereo::select::options::Options;
     use crate::stereo::synthetic::World;
 
     #[test]

@@ -10,43 +10,14 @@
 
 use crate::imaging::Board;
 use crate::stereo::board_pose::print_share::PrintShare;
-use crate::stereo::model::known_lenses::KnownLenses;
-use crate::stereo::model::parameters::{Layout, Values};
+use crate::stereo::model::parameters::Layout;
 use crate::stereo::select::known_lenses;
 use crate::stereo::select::model_comparison::{Chance, LensScore, Trial, gain_of_terms, score, simplest};
+use crate::stereo::select::options::{Choice, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
-use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::uncertainty;
 use crate::stereo::{Error, Lens};
-
-/// The lens of all cameras whose pictures do not ask for more. What hand-held pictures leave open of its terms is held by what is expected of
-/// lenses, so that nothing simpler is needed.
-pub(super) const SIMPLEST: Lens = Lens::Brown5;
-
-/// What may be forced.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Options {
-    /// The lens; chosen by held-out pairs where `None`.
-    pub lens: Option<Lens>,
-    /// Whether the board's shape is free; decided by held-out pairs where `None`.
-    pub shape: Option<bool>,
-    /// Lenses that are known before the pictures.
-    pub known: Option<KnownLenses>,
-}
-
-/// What was chosen.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Choice {
-    /// What is free.
-    pub layout: Layout,
-    /// Values near the minimum of that model, where it was tried.
-    pub near: Option<Values>,
-    /// What is expected of that model.
-    pub priors: Priors,
-    /// Every lens of the ladder; empty where the lens was forced.
-    pub scores: Vec<LensScore>,
-}
 
 /// Chooses what is free, where it is not forced.
 pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choice, Error> {

@@ -153,7 +153,7 @@ pub fn step(layout: &Layout, from: &Shared, to: &Shared) -> DVector<f64> {
 mod tests {
     use super::*;
     use crate::stereo::calibrate::calibrate;
-    use crate::stereo::select::lens_ladder::Options;
+    use crate::stereo::select::options::Options;
     use crate::stereo::synthetic::World;
 
     #[test]

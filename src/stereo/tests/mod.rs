@@ -14,7 +14,7 @@ use crate::stereo::calibrate::{Calibration, calibrate};
 use crate::stereo::judge::assessment::{Demand, Judged};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::model::parameters::Shared;
-use crate::stereo::select::lens_ladder::Options;
+use crate::stereo::select::options::Options;
 use crate::stereo::synthetic::World;
 use crate::stereo::volume::Extent;
 

@@ -10,7 +10,7 @@ use stereocal::simulate::world::World;
 use stereocal::stereo::calibrate::{Calibration, calibrate};
 use stereocal::stereo::data::view::View;
 use stereocal::stereo::model::projection::CAMERA_NUMBERS;
-use stereocal::stereo::select::lens_ladder::Options;
+use stereocal::stereo::select::options::Options;
 use stereocal::stereo::triangulate::{RIG_NUMBERS, RigCovariance, rig_number, triangulate};
 use stereocal::stereo::{Lens, Rig};
 

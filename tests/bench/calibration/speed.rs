@@ -9,7 +9,7 @@ use stereocal::simulate::world::World;
 use stereocal::stereo::Lens;
 use stereocal::stereo::calibrate::calibrate;
 use stereocal::stereo::judge::lengths::held_out;
-use stereocal::stereo::select::lens_ladder::Options;
+use stereocal::stereo::select::options::Options;
 
 const PAIRS: usize = 40;
 /// Standard deviation of a corner's coordinate, px.

@@ -9,7 +9,7 @@ use stereocal::stereo::Lens;
 use stereocal::stereo::board_pose::pair_excess::pair_excess;
 use stereocal::stereo::board_pose::series::{Knowledge, Seen};
 use stereocal::stereo::calibrate::calibrate;
-use stereocal::stereo::select::lens_ladder::Options;
+use stereocal::stereo::select::options::Options;
 
 /// Standard deviation of a corner's coordinate at 1280 px, as rendered pictures give it; at 5120 px the same corner is as sharp.
 pub const SIGMA_PX: f64 = 0.002;

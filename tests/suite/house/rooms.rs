@@ -10,7 +10,6 @@ const DEBTS: &[&str] = &[
     "imaging",
     "imaging::image",
     "stereo::pairs",
-    "stereo::select::known_lenses",
     "stereo::board_pose::finish",
     "stereo::board_pose::solve::edge_bend",
 ];

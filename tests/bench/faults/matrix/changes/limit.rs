@@ -9,7 +9,7 @@ use stereocal::statistics::chi_square_quantile;
 use stereocal::stereo::Rig;
 use stereocal::stereo::calibrate::calibrate;
 use stereocal::stereo::model::parameters::Layout;
-use stereocal::stereo::select::lens_ladder::Options;
+use stereocal::stereo::select::options::Options;
 use stereocal::stereo::solve::uncertainty::invert;
 
 use super::super::set::Set;

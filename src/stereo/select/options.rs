@@ -1,0 +1,35 @@
+//! What may be forced or known of lens and board, and what was chosen.
+
+use crate::stereo::Lens;
+use crate::stereo::model::known_lenses::KnownLenses;
+use crate::stereo::model::parameters::{Layout, Values};
+use crate::stereo::select::model_comparison::LensScore;
+use crate::stereo::solve::priors::Priors;
+
+/// The lens of all cameras whose pictures do not ask for more. What hand-held pictures leave open of its terms is held by what is expected of
+/// lenses, so that nothing simpler is needed.
+pub(super) const SIMPLEST: Lens = Lens::Brown5;
+
+/// What may be forced.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Options {
+    /// The lens; chosen by held-out pairs where `None`.
+    pub lens: Option<Lens>,
+    /// Whether the board's shape is free; decided by held-out pairs where `None`.
+    pub shape: Option<bool>,
+    /// Lenses that are known before the pictures.
+    pub known: Option<KnownLenses>,
+}
+
+/// What was chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// What is free.
+    pub layout: Layout,
+    /// Values near the minimum of that model, where it was tried.
+    pub near: Option<Values>,
+    /// What is expected of that model.
+    pub priors: Priors,
+    /// Every lens of the ladder; empty where the lens was forced.
+    pub scores: Vec<LensScore>,
+}
