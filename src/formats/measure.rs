@@ -11,9 +11,9 @@ use crate::measurements::{pose_fields, pose_header, quoted};
 use crate::statistics::median;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::TargetPose;
-use crate::stereo::board_pose::finish::{Shape, Shared};
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
-use crate::stereo::board_pose::series::{Knowledge, MeasuredPose, Series};
+use crate::stereo::board_pose::{Knowledge, MeasuredPose, Series};
+use crate::stereo::board_pose::{Shape, Shared};
 use crate::stereo::volume::Volume;
 
 /// Columns behind the joints.

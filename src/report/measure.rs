@@ -13,10 +13,10 @@ use super::table::number;
 use crate::files::OutDir;
 use crate::formats::measure::MeasureFile;
 use crate::measurements::Role;
+use crate::stereo::board_pose::Shape;
 use crate::stereo::board_pose::TargetPose;
-use crate::stereo::board_pose::finish::Shape;
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
-use crate::stereo::board_pose::series::{Knowledge, MeasuredPose, Series};
+use crate::stereo::board_pose::{Knowledge, MeasuredPose, Series};
 
 /// Poses in the table of the worst.
 const WORST: usize = 10;

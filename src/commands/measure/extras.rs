@@ -10,7 +10,7 @@ use crate::measurements::Role;
 use crate::report::drawing::picture::PairJpeg;
 use crate::report::measure::{Distance, Thumbnail};
 use crate::robot::{self, Robot};
-use crate::stereo::board_pose::series::{MeasuredPose, Series};
+use crate::stereo::board_pose::{MeasuredPose, Series};
 
 /// Failures that are shown at most, and poses that fit worst.
 const FAILURES: usize = 12;

@@ -21,7 +21,8 @@ use crate::imaging::{Corners, PairCorners, Wanted, find_corners};
 use crate::measurements::{self, RobotPose};
 use crate::report::measure::Extras;
 use crate::stereo;
-use crate::stereo::board_pose::series::{self, Knowledge, Refusal, Seen, Series};
+use crate::stereo::board_pose::series;
+use crate::stereo::board_pose::{Knowledge, Refusal, Seen, Series};
 use crate::{progress, report};
 
 /// Runs the command.

@@ -18,7 +18,8 @@ use crate::imaging::input::pairs::{PairFiles, Source};
 use crate::imaging::{PairCorners, Wanted, find};
 use crate::measurements::RobotPose;
 use crate::progress;
-use crate::stereo::board_pose::series::{self, Knowledge, Refusal, Seen};
+use crate::stereo::board_pose::series;
+use crate::stereo::board_pose::{Knowledge, Refusal, Seen};
 
 /// Time between two looks into the folder.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(300);

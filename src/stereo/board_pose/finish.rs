@@ -7,17 +7,17 @@ use rayon::prelude::*;
 
 use crate::geometry::Transform;
 use crate::imaging::Side;
+use crate::stereo::board_pose::answer::{MeasuredPose, POSE_LIMIT, Refusal, Series, Shape, Shared, TargetPose};
 use crate::stereo::board_pose::rig_change::cause::{named, stretch};
 use crate::stereo::board_pose::rig_change::consistency::{self, Change};
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
-use crate::stereo::board_pose::series::{MeasuredPose, POSE_LIMIT, Refusal, Run, Series};
+use crate::stereo::board_pose::run::Run;
 use crate::stereo::board_pose::solve::alone::{Alone, Known};
 use crate::stereo::board_pose::solve::bundle::Bundle;
 use crate::stereo::board_pose::solve::estimate::{Estimate, own_covariance};
 use crate::stereo::board_pose::solve::prior::frame_modes;
 use crate::stereo::board_pose::solve::window::Window;
-use crate::stereo::board_pose::start::{Start, enough};
-use crate::stereo::board_pose::{FEWEST_CORNERS, TargetPose};
+use crate::stereo::board_pose::start::{FEWEST_CORNERS, Start, enough};
 use crate::stereo::data::view::View;
 
 /// Standard deviations by which a pose's own chi-square may exceed one before its covariance grows.
@@ -28,32 +28,6 @@ const OUTSIDER_LIMIT: f64 = 4.0;
 
 /// Chi-square a number up to which two pictures belong together.
 const PARTNER_LIMIT: f64 = 2.0;
-
-/// The target as it was found to be.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Shape {
-    /// Each crossing against the drawing, row by row, mm; without shift, turn and tilt.
-    pub deviations_mm: Vec<Vector3<f64>>,
-    /// Standard deviation of each.
-    pub sigma_mm: Vec<Vector3<f64>>,
-    /// How far crossings scatter in the plane, a coordinate, mm.
-    pub in_plane_mm: f64,
-    /// How far they scatter out of it, mm.
-    pub out_of_plane_mm: f64,
-    /// Its size against the drawing, minus one, and the standard deviation.
-    pub stretch: [f64; 2],
-}
-
-/// What all poses share.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Shared {
-    /// Names: the rig's numbers with a covariance, then the crossings' deviations.
-    pub parameters: Vec<String>,
-    /// Their change against calibration and drawing.
-    pub change: Vec<f64>,
-    /// Their covariance.
-    pub covariance: DMatrix<f64>,
-}
 
 impl Run<'_> {
     /// Every pose on the common values.

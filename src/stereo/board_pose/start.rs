@@ -11,7 +11,6 @@ use crate::geometry::Transform;
 use crate::imaging::{Board, PairCorners, Side};
 use crate::statistics::median;
 use crate::stereo::Rig;
-use crate::stereo::board_pose::FEWEST_CORNERS;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::of_view;
@@ -21,6 +20,9 @@ use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::parameters::Shared;
 use crate::stereo::pairs::numbering;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+
+/// Fewest corners in each picture for six unknowns with something to spare.
+pub const FEWEST_CORNERS: usize = 6;
 
 /// A pose before anything is known of the others.
 #[derive(Debug, Clone)]

@@ -4,7 +4,8 @@ use nalgebra::{Vector3, Vector6};
 
 use super::*;
 use crate::geometry::transform;
-use crate::stereo::board_pose::series::{self, Knowledge, Seen};
+use crate::stereo::board_pose::series;
+use crate::stereo::board_pose::{Knowledge, Seen};
 
 /// All poses of a world as a robot's run.
 fn run_of(corners: crate::imaging::Corners) -> Vec<Seen> {

@@ -3,8 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use stereocal::measurements::Role;
+use stereocal::stereo::board_pose::Series;
 use stereocal::stereo::board_pose::TargetPose;
-use stereocal::stereo::board_pose::series::{Series, measure};
+use stereocal::stereo::board_pose::series::measure;
 
 use crate::worlds::{knowledge, run as poses_of, world};
 

@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use stereocal::simulate::world::World;
-use stereocal::stereo::board_pose::series::{Knowledge, Seen, Series, measure};
+use stereocal::stereo::board_pose::series::measure;
+use stereocal::stereo::board_pose::{Knowledge, Seen, Series};
 
 use crate::worlds::{knowledge, run as poses_of, world};
 

@@ -5,7 +5,8 @@ use nalgebra::Vector3;
 use stereocal::simulate::draws::{Draws, Purpose};
 use stereocal::simulate::world::World;
 use stereocal::stereo::board_pose::rig_change::judgement::Judgement;
-use stereocal::stereo::board_pose::series::{Knowledge, Seen, Series, measure};
+use stereocal::stereo::board_pose::series::measure;
+use stereocal::stereo::board_pose::{Knowledge, Seen, Series};
 
 use crate::faults::{degrees, worst};
 use crate::worlds::{changing_knowledge, changing_run, knowledge, world};

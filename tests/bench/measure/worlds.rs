@@ -7,7 +7,7 @@ use stereocal::simulate::settings::Settings;
 use stereocal::simulate::world::World;
 use stereocal::stereo::Lens;
 use stereocal::stereo::board_pose::pair_excess::pair_excess;
-use stereocal::stereo::board_pose::series::{Knowledge, Seen};
+use stereocal::stereo::board_pose::{Knowledge, Seen};
 use stereocal::stereo::calibrate::calibrate;
 use stereocal::stereo::select::options::Options;
 

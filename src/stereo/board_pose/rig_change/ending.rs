@@ -8,10 +8,11 @@ use nalgebra::Vector3;
 use crate::geometry::perturb;
 use crate::statistics::median;
 use crate::stereo::Rig;
+use crate::stereo::board_pose::answer::{POSE_LIMIT, Refusal};
 use crate::stereo::board_pose::rig_change::consistency::{self, Along, Change, MEDIAN_CHI_SQUARE_6};
 use crate::stereo::board_pose::rig_change::judge::ALLOWED;
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
-use crate::stereo::board_pose::series::{POSE_LIMIT, Refusal, Run};
+use crate::stereo::board_pose::run::Run;
 use crate::stereo::board_pose::solve::estimate::{Estimate, TELLING_POSES, estimate};
 
 /// The same for a change from one pose on, which is looked for at every pose.

@@ -6,8 +6,10 @@ use crate::geometry::{Transform, perturb};
 use crate::imaging::{Board, Side};
 use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::bundle::Promise;
-use crate::stereo::board_pose::solve::estimate::{Estimate, OUTLIER};
-use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, PoseSums, SeenFrom, crossings, residual};
+use crate::stereo::board_pose::solve::estimate::Estimate;
+use crate::stereo::board_pose::solve::pose_block::{
+    Eliminated, OUTLIER, PoseBlock, PoseSums, SeenFrom, crossings, residual,
+};
 use crate::stereo::board_pose::start::enough;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::root_mean_square;

@@ -15,7 +15,7 @@ use crate::statistics::median;
 use crate::stereo::board_pose::rig_change::consistency::{at_each, usual_excess};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Normal, Promise, Values};
 use crate::stereo::board_pose::solve::edge_bend::edge_bends_mm;
-use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
+use crate::stereo::board_pose::solve::pose_block::{OUTLIER, crossings, residual};
 use crate::stereo::board_pose::solve::prior::{bent_modes, stretch_mode, weights};
 use crate::stereo::board_pose::start::enough;
 use crate::stereo::data::corner_noise::{Noise, whitener};
@@ -25,9 +25,6 @@ use crate::stereo::data::view::View;
 use crate::stereo::solve::normal_equations::inverse6;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::solve::uncertainty::invert;
-
-/// Whitened residuals beyond this are outliers.
-pub(in crate::stereo::board_pose) const OUTLIER: f64 = 5.3;
 
 /// Rounds of least squares with new weights.
 const ROUNDS: usize = 6;

@@ -16,6 +16,9 @@ use crate::stereo::solve::normal_equations::inverse6;
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::triangulate::RIG_NUMBERS;
 
+/// Whitened residuals beyond this are outliers.
+pub(in crate::stereo::board_pose) const OUTLIER: f64 = 5.3;
+
 /// Where the numbers of `right_from_left` begin among the rig's.
 pub(in crate::stereo::board_pose) const TRANSFORM: usize = 2 * CAMERA_NUMBERS;
 

@@ -1,0 +1,224 @@
+//! Lines on lengths: held out, anywhere in the volume, with other models, without some pairs, on a second board; and on what residuals, rays and
+//! epipolar lines say of them.
+
+use super::facts::Facts;
+use crate::statistics::median;
+use crate::stereo::judge::doubtful_corners::CONTRADICTED;
+use crate::stereo::judge::evidence::Evidence;
+use crate::stereo::judge::lengths::model_disagreement::{self};
+use crate::stereo::judge::verdict::Verdict;
+
+pub(super) fn held_out_lengths(facts: &Facts) -> Evidence {
+    let extremes = &facts.accuracy.extremes;
+    let worst = &extremes.largest;
+    let doubtful = &facts.accuracy.doubtful;
+    let left_out = if doubtful.lengths_left_out > 0 {
+        format!("; {} lengths that end in doubtful corners are not counted, see rays", doubtful.lengths_left_out)
+    } else {
+        String::new()
+    };
+    Evidence {
+        what: "held-out lengths",
+        remedy: "look at the worst pair in camera-check.html, and at the lines below it",
+        value: Some(worst.at_most_mm()),
+        limit: Some(facts.tolerance_mm),
+        unit: "mm",
+        allows: extremes.verdict(facts.tolerance_mm),
+        detail: format!(
+            "largest error plus its own expanded uncertainty ({:.4} + {:.4}) over all lengths between corners of pairs that the rig had \
+             not seen, {} folds; the limit is the tolerance. The largest error alone is {:.4}, one length in twenty \
+             is off by more than {:.4}{left_out}",
+            worst.error_mm,
+            worst.expanded_uncertainty_mm(),
+            facts.accuracy.folds,
+            extremes.max_abs_error_mm,
+            extremes.one_in_twenty_mm
+        ),
+    }
+}
+
+pub(super) fn any_length(facts: &Facts) -> Evidence {
+    let worst = facts.volume.worst(|length| facts.expanded_mm(length));
+    let value = worst.map(|(mm, _)| mm);
+    let detail = match worst {
+        None => "the rig has no covariance over the volume in which the boards stood".to_owned(),
+        Some((_, length)) => format!(
+            "expanded uncertainty of a length of {:.0} mm where it is largest, {} {:.0} mm away (standard deviations: corners {:.4}, \
+             calibration {:.4}, the latter times {:.2} for so few pairs; what the models leave open is in it), over the volume where the \
+             boards were and in the directions that they took there{}",
+            facts.volume.length_mm,
+            length.lies(),
+            length.at_mm.z,
+            length.corners_mm,
+            length.calibration_mm,
+            facts.expansion.calibration,
+            along_sight(facts)
+        ),
+    };
+    Evidence::of_length(
+        "any length in the volume",
+        "add pairs with the board where it is least certain, and tilted",
+        value,
+        facts,
+        detail,
+    )
+}
+
+/// What lengths that no board showed would be known to.
+fn along_sight(facts: &Facts) -> String {
+    let worst = facts.volume.along_sight.iter().map(|length| facts.expanded_mm(length)).reduce(f64::max);
+    worst.map_or(String::new(), |mm| format!(". Along the line of sight, where no board lay, it would be {mm:.4} mm"))
+}
+
+pub(super) fn models(facts: &Facts) -> Evidence {
+    let value = facts.disagreements.iter().map(|d| d.length_change_mm).fold(0.0, f64::max);
+    let detail = model_disagreement::describe(facts.disagreements).unwrap_or_else(|| {
+        "no richer lens, and no board that is not flat, has additional terms that are more than chance: no admissible model measures other lengths".to_owned()
+    });
+    Evidence::of_length(
+        "spread of admissible models",
+        "add pairs with the board at the borders of both pictures",
+        Some(value),
+        facts,
+        detail,
+    )
+}
+
+pub(super) fn residuals(facts: &Facts) -> Evidence {
+    let sigma_px = facts.calibration.noise.typical_px(&facts.calibration.views);
+    let systematic_px = facts.residual_pattern.systematic_px(sigma_px);
+    // What both pictures see alike moves no point, but the rig that is fitted to it: the corners' whole scatter counts here.
+    let share = facts.accuracy.disagreement_share().sqrt();
+    let corners_mm = facts.volume.worst(|length| length.corners_mm / share).map(|(mm, _)| mm);
+    let value = corners_mm.map(|mm| mm * systematic_px / sigma_px);
+    let neighbours = &facts.residual_pattern.neighbours;
+    let detail = if systematic_px > 0.0 {
+        format!(
+            "the residuals are not noise: those of neighbouring corners correlate by {:.2} (chance: {:.2}), {:.3} px of pattern over \
+             the pictures is common to all pairs. The lens model, the board's shape or its print lacks something; {systematic_px:.3} px \
+             at both ends move a length by so much where it matters most",
+            neighbours.along,
+            neighbours.standard_error,
+            facts.residual_pattern.pattern_px()
+        )
+    } else {
+        format!(
+            "the residuals are noise: neighbouring corners correlate by {:.3} along their edge (chance: {:.3})",
+            neighbours.along, neighbours.standard_error
+        )
+    };
+    Evidence::of_length(
+        "residual correlation",
+        "look at the map of residuals in camera-check.html; it takes another `--lens`, `--board-shape bowed` or a better board",
+        value,
+        facts,
+        detail,
+    )
+}
+
+pub(super) fn folds(facts: &Facts) -> Evidence {
+    let layout = &facts.calibration.layout;
+    let changes = facts.accuracy.fold_steps.iter().flat_map(|step| facts.volume.changes_by_step_mm(layout, step));
+    let value = changes.fold(0.0_f64, |most, mm| most.max(mm.abs()));
+    let detail = format!(
+        "largest change of a length of {:.0} mm anywhere in the working volume when a block of similar pairs is left out; a rig that depends on one block has the errors of that block",
+        facts.volume.length_mm
+    );
+    Evidence::of_length(
+        "rigs without some pairs",
+        "add pairs with the board elsewhere and tilted otherwise",
+        Some(value),
+        facts,
+        detail,
+    )
+}
+
+pub(super) fn rays(facts: &Facts) -> Evidence {
+    /// Share of corners whose rays may contradict each other: a hand or a reflection, not the rig.
+    const LIMIT_PERCENT: f64 = 2.0;
+    let doubtful = &facts.accuracy.doubtful;
+    let value = 100.0 * doubtful.contradicted_share();
+    let named = if doubtful.pairs.is_empty() { String::new() } else { format!(", in {}", doubtful.named()) };
+    Evidence {
+        what: "rays that contradict each other",
+        remedy: "look at the corners of the named pairs for a hand, glare or shadow",
+        value: Some(value),
+        limit: Some(LIMIT_PERCENT),
+        unit: "%",
+        allows: Verdict::within(value, LIMIT_PERCENT),
+        detail: format!(
+            "{} of {} held-out corners have rays that miss each other by more than {CONTRADICTED} standard deviations and {} were \
+             measured far worse than usual{named}; a few are a hand or a reflection, more are an error of the rig",
+            doubtful.contradicted, doubtful.corners, doubtful.unsure
+        ),
+    }
+}
+
+pub(super) fn epipolar(facts: &Facts) -> Evidence {
+    let error = &facts.accuracy.epipolar;
+    let sigma_px = facts.calibration.noise.typical_px(&facts.calibration.views);
+    let sigma_px = sigma_px * facts.accuracy.disagreement_share().sqrt();
+    // A miss as large along the epipolar line is depth, and moves lengths as corners do.
+    let px_per_mm = median(facts.volume.lengths.iter().map(|length| sigma_px / length.corners_mm));
+    let limit = px_per_mm.map(|px| px * facts.tolerance_mm);
+    Evidence {
+        what: "epipolar error",
+        remedy: "look at the worst pair in camera-check.html",
+        value: Some(error.rms_px),
+        limit,
+        unit: "px",
+        allows: Verdict::within(error.rms_px, limit.unwrap_or(f64::NAN)),
+        detail: format!(
+            "root mean square distance of held-out corners from the epipolar lines of their partners (largest {:.3} px); as much along \
+             the line is depth and moves a length by the tolerance at the limit",
+            error.max_px
+        ),
+    }
+}
+
+pub(super) fn second_board(facts: &Facts) -> Evidence {
+    let line = |value, allows, detail| Evidence {
+        what: "second board",
+        remedy: "check `--check-squares` and `--check-square-mm`, and that the rig has not moved between the two boards",
+        value,
+        limit: Some(facts.tolerance_mm),
+        unit: "mm",
+        allows,
+        detail,
+    };
+    let Some(second) = facts.second else {
+        let detail = "not asked for: the scale of every length is the pitch of the board, and an error of its pitch does not show here. `--check-images DIR` names pictures of a second board";
+        return Evidence { limit: None, ..line(None, Verdict::Pass, detail.to_owned()) };
+    };
+    let Some(extremes) = &second.extremes else {
+        let detail = format!(
+            "a second board was asked for and no length on it could be measured in {} pairs: another board than stated, or a rig that \
+             has moved",
+            second.pairs_skipped.len()
+        );
+        return line(None, Verdict::Undecided, detail);
+    };
+    let worst = &extremes.largest;
+    let scale = match (second.scale_error, second.scale_error_sigma) {
+        (Some(scale), Some(sigma)) => format!(
+            ", its scale by {:.1} +- {:.1} parts in a million (k = 2). Either board's pitch is wrong, or the rig has moved, where this \
+             is beyond the limit",
+            1e6 * scale,
+            2e6 * sigma
+        ),
+        _ => String::new(),
+    };
+    // A board that can be measured in half of its pairs only, or with rays that contradict each other, is no witness for a pass.
+    let measured = second.pairs >= second.pairs_skipped.len() && second.doubtful.contradicted_share() <= 0.1;
+    let own = extremes.verdict(facts.tolerance_mm);
+    let allows = if measured { own } else { own.and(Verdict::Undecided) };
+    let detail = format!(
+        "largest error plus its own expanded uncertainty ({:.4} + {:.4}) over all lengths in {} pairs of a board that took no part in the calibration{scale}; {} of {} corners have rays that contradict each other",
+        worst.error_mm,
+        worst.expanded_uncertainty_mm(),
+        second.pairs,
+        second.doubtful.contradicted,
+        second.doubtful.corners
+    );
+    line(Some(worst.at_most_mm()), allows, detail)
+}

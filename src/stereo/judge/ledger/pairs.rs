@@ -1,0 +1,222 @@
+//! Lines on the pairs: what happened over them, how they scatter, which are missing, how the boards stood, and lenses that were known.
+
+use super::facts::Facts;
+use crate::imaging::Side;
+use crate::stereo::findings::Finding;
+use crate::stereo::findings::standing::MATERIAL_SHARE;
+use crate::stereo::judge::evidence::Evidence;
+use crate::stereo::judge::verdict::Verdict;
+
+/// Steps and drifts that are in the rig.
+pub(super) fn findings(facts: &Facts) -> Evidence {
+    let since = facts.calibration.standing.since.as_deref();
+    let within = |finding: &&Finding| finding.pairs.first().map(String::as_str) != since || since.is_none();
+    let left: Vec<&Finding> = facts.findings.iter().filter(within).collect();
+    let value = left.iter().filter_map(|finding| finding.effect_mm).fold(0.0, f64::max);
+    let detail = if left.is_empty() {
+        "no change over the pairs that were used: no step, drift or change of focus beyond their scatter".to_owned()
+    } else {
+        let told: Vec<&str> = left.iter().map(|finding| finding.action.as_str()).collect();
+        format!(
+            "{}. It is included in the uncertainty of the rig; a change of a length of less than {:.0} % of the tolerance does not affect the verdict",
+            told.join("; "),
+            100.0 * MATERIAL_SHARE
+        )
+    };
+    Evidence::of_length(
+        "changes over the pairs",
+        "clamp the cameras, switch autofocus off, and photograph again",
+        Some(value),
+        facts,
+        detail,
+    )
+}
+
+pub(super) fn pair_scatter(facts: &Facts) -> Evidence {
+    let scatter = &facts.calibration.pair_scatter;
+    let detail = match scatter.ratio {
+        Some(_) => format!(
+            "variance of the rig by how {} pairs with poses of their own scatter about it, over the one by the corners' noise; what \
+             exceeds one is in all uncertainties here",
+            scatter.groups
+        ),
+        None => format!(
+            "one of {} pairs with poses of their own cannot be left out without losing the calibration: no other pair checks it",
+            scatter.groups
+        ),
+    };
+    Evidence {
+        what: "scatter of pairs",
+        remedy: "add pairs with the board elsewhere and tilted otherwise",
+        value: scatter.ratio,
+        limit: None,
+        unit: "",
+        allows: if scatter.ratio.is_some() { Verdict::Pass } else { Verdict::Undecided },
+        detail,
+    }
+}
+
+/// Pairs with a board that do not fit the rig now standing: not those without a board, shown twice, or of a rig that stood before.
+fn contradicting<'a>(facts: &'a Facts) -> Vec<&'a str> {
+    let all = facts.calibration.discarded.pairs.iter();
+    all.filter(|p| p.cause.contradicts()).map(|p| p.pair.as_str()).collect()
+}
+
+pub(super) fn pairs_discarded(facts: &Facts) -> Evidence {
+    /// Up to a third single pairs are wrong; beyond it what was kept may be the wrong choice.
+    const LIMIT_PERCENT: f64 = 34.0;
+    let contradicting = contradicting(facts);
+    let judged = facts.calibration.views.len() + contradicting.len();
+    let value = 100.0 * contradicting.len() as f64 / judged.max(1) as f64;
+    let named: Vec<&str> = contradicting.iter().take(5).copied().collect();
+    let named = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
+    Evidence {
+        what: "pairs discarded",
+        remedy: "see why each is not used, and take those again",
+        value: Some(value),
+        limit: Some(LIMIT_PERCENT),
+        unit: "%",
+        allows: Verdict::within(value, LIMIT_PERCENT),
+        detail: format!(
+            "{} of {judged} pairs with corners do not fit the common rig{named}; beyond the limit the rig may have changed",
+            contradicting.len()
+        ),
+    }
+}
+
+/// Whether the rig that was calibrated is the one that stands now.
+pub(super) fn standing(facts: &Facts) -> Evidence {
+    let standing = &facts.calibration.standing;
+    let after = &standing.unconfirmed;
+    let before = match &standing.since {
+        Some(since) => format!(
+            "the rig changed while it was photographed: {} pairs are of the one before, all that is said here is of the one that stands \
+             since {since}",
+            standing.pairs_before
+        ),
+        None => "all pairs that were used are of one rig".to_owned(),
+    };
+    let detail = if after.is_empty() {
+        format!("{before}, and the last pair is one of them")
+    } else {
+        format!(
+            "{before}; {} came after them and contradict it: whether the rig is still the same is unknown. Add pairs",
+            after.join(", ")
+        )
+    };
+    Evidence {
+        what: "last pairs that contradict the rig",
+        remedy: "add pairs of the rig as it stands",
+        value: Some(after.len() as f64),
+        limit: Some(0.0),
+        unit: "",
+        allows: if after.is_empty() { Verdict::Pass } else { Verdict::Undecided },
+        detail,
+    }
+}
+
+pub(super) fn poses(facts: &Facts) -> Evidence {
+    /// With fewer, leaving out one loses a fifth or more of all that is known, and one wrong pair cannot be told from the others.
+    const FEWEST: f64 = 6.0;
+    /// Where the lenses are known, only where the cameras stand is left to be found.
+    const FEWEST_OF_KNOWN: f64 = 3.0;
+    let fewest = if facts.calibration.lenses_are_known() { FEWEST_OF_KNOWN } else { FEWEST };
+    let groups = facts.calibration.pair_scatter.groups as f64;
+    Evidence {
+        what: "pairs with poses of their own",
+        remedy: "add pairs with the board elsewhere and tilted otherwise",
+        value: Some(groups),
+        limit: Some(fewest),
+        unit: "",
+        allows: if groups >= fewest { Verdict::Pass } else { Verdict::Undecided },
+        detail: format!(
+            "{} pairs were used. Few pairs cannot show one that is wrong by a little, a rig that drifts, or a lens that differs at the \
+             border: with fewer than {fewest:.0} different poses each held-out pair is judged by too few others",
+            facts.coverage.pairs
+        ),
+    }
+}
+
+pub(super) fn tilts(facts: &Facts) -> Evidence {
+    /// Below, perspective hardly tells the focal length from the distance, and the lens model decides instead of the data.
+    const LEAST_DEG: f64 = 5.0;
+    let [horizontal, vertical] = facts.coverage.tilts_deg;
+    let value = horizontal.max(vertical);
+    Evidence {
+        what: "tilts of the boards",
+        remedy: "add pairs tilted by 20 to 45 degrees",
+        value: Some(value),
+        limit: Some(LEAST_DEG),
+        unit: "deg",
+        allows: if value >= LEAST_DEG || facts.calibration.lenses_are_known() {
+            Verdict::Pass
+        } else {
+            Verdict::Undecided
+        },
+        detail: format!(
+            "range of the boards' tilts, {horizontal:.0} degrees about the horizontal and {vertical:.0} about the vertical axis; boards \
+             that are all parallel do not tell the focal length from the distance, and lengths on them come out right even where tilted \
+             ones are wrong"
+        ),
+    }
+}
+
+/// Whether the pictures agree with lenses that were known.
+pub(super) fn known_lenses(facts: &Facts) -> Option<Evidence> {
+    let check = facts.calibration.lens_check.as_ref()?;
+    let seen: Vec<String> = Side::BOTH
+        .into_iter()
+        .filter_map(|side| Some(format!("{} {:.3} %", side.name(), 100.0 * check.focus_seen[side as usize]?)))
+        .collect();
+    Some(Evidence {
+        what: "known lenses",
+        remedy: "give the lenses as they are now, or leave `--intrinsics` out and photograph more pairs",
+        value: Some(check.chi_square),
+        limit: Some(check.limit),
+        unit: "",
+        allows: if check.contradicts() { Verdict::Undecided } else { Verdict::Pass },
+        detail: format!(
+            "{}: squared difference of {} known numbers from what the pictures give by themselves, in units of its covariance. Nineteen of \
+             twenty such tests see a focal length that differs by {}",
+            check.statement,
+            check.numbers,
+            seen.join(", ")
+        ),
+    })
+}
+
+/// Depth and field: what lies beyond is extrapolated; within, the uncertainty of lengths says what it costs.
+pub(super) fn reach(facts: &Facts) -> [Evidence; 2] {
+    let [near, far] = facts.coverage.depths_mm;
+    let [left, right] = facts.coverage.field_shares;
+    let line = |what, value, unit, detail| Evidence {
+        what,
+        value: Some(value),
+        limit: None,
+        unit,
+        allows: Verdict::Pass,
+        detail,
+        remedy: "",
+    };
+    [
+        line(
+            "depth of the working volume",
+            far - near,
+            "mm",
+            format!(
+                "the middles of the boards stood {near:.0} to {far:.0} mm away; much nearer and farther the rig was not checked"
+            ),
+        ),
+        line(
+            "field reached by corners",
+            100.0 * left.min(right),
+            "%",
+            format!(
+                "of what both cameras see corners reached {:.0} % of the left and {:.0} % of the right picture; in the rest the lens model is extrapolated and \
+                 was not checked",
+                100.0 * left,
+                100.0 * right
+            ),
+        ),
+    ]
+}
