@@ -9,7 +9,6 @@ use super::modules::Crate;
 const DEBTS: &[&str] = &[
     "imaging",
     "imaging::image",
-    "stereo::pairs",
     "stereo::select::known_lenses",
     "stereo::board_pose::finish",
     "stereo::board_pose::solve::edge_bend",
