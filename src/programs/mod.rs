@@ -5,6 +5,7 @@
 //! triggers and logs. Only targets written as numbers in joint coordinates can be changed; an instruction that moves by anything
 //! else is named with the reason. What goes wrong: pulses (Yaskawa) without their number a degree.
 
+mod dialect;
 mod fanuc;
 mod instruction;
 mod krl;

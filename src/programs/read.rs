@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
+use super::dialect;
 use super::instruction::Instruction;
 use super::language::{Joints, Language, Target, number};
-use super::{fanuc, krl, rapid, urscript, yaskawa};
 
 /// A program's motions and the joint targets that are written in it.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,13 +19,7 @@ impl Program {
     /// Reads a program. An error says what could not be understood.
     pub fn read(language: Language, text: &str, joints: Joints) -> Result<Program, String> {
         let targets = all_targets(language, text, joints)?;
-        let motions = match language {
-            Language::UrScript => urscript::motions(text, &targets),
-            Language::Rapid => rapid::motions(text, &targets),
-            Language::Krl => krl::motions(text, &targets),
-            Language::FanucLs => fanuc::motions(text, &targets),
-            Language::Jbi => yaskawa::motions(text, &targets),
-        };
+        let motions = dialect::motions(language, text, &targets);
         Ok(Program { targets, motions })
     }
 
@@ -56,13 +50,7 @@ pub fn targets(language: Language, text: &str, joints: Joints) -> Result<Vec<Tar
 
 /// Every list of joint values, in the order of the text.
 fn all_targets(language: Language, text: &str, joints: Joints) -> Result<Vec<Target>, String> {
-    let found = match language {
-        Language::UrScript => urscript::targets(text, joints.count()),
-        Language::Rapid => rapid::targets(text, joints.count()),
-        Language::Krl => krl::targets(text, joints.count()),
-        Language::FanucLs => fanuc::targets(text, joints.count()),
-        Language::Jbi => yaskawa::targets(text, joints.count()),
-    };
+    let found = dialect::targets(language, text, joints.count());
     if found.iter().any(|t| t.pulses) && joints.pulses_per_deg.len() != joints.count() {
         return Err(format!(
             "the targets are in pulses; the number of pulses a degree of each of the {} joints is needed",

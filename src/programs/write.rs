@@ -1,7 +1,7 @@
 //! Lists of stops written as programs that move, wait, trigger and log.
 
+use super::dialect;
 use super::language::{Joints, Language, Motion, Stop, Written, number};
-use super::{fanuc, krl, rapid, urscript, yaskawa};
 
 /// Files of a program that visits the stops: name and text.
 pub fn program(
@@ -20,13 +20,7 @@ pub fn program(
         .iter()
         .map(|s| Written { name: plain(&s.name), readings: list(&s.readings), approach: list(&s.approach) })
         .collect();
-    match language {
-        Language::UrScript => urscript::program(name, &stops, motion),
-        Language::Rapid => rapid::program(name, &stops, motion),
-        Language::Krl => krl::program(name, &stops, motion),
-        Language::FanucLs => fanuc::program(name, &stops, motion),
-        Language::Jbi => yaskawa::program(name, &stops, motion, pulses),
-    }
+    dialect::program(language, name, &stops, motion, pulses)
 }
 
 /// A name that stands in a comment or a string of every language.

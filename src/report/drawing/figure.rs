@@ -33,7 +33,6 @@ const COLOURS: [RGBColor; 7] = [
 enum Marks {
     Points(Vec<(f64, f64)>),
     Line(Vec<(f64, f64)>),
-    Bars(Vec<(f64, f64)>),
     /// x, y, half length of the bar.
     ErrorBars(Vec<(f64, f64, f64)>),
     /// x, y, dx, dy; the arrows' lengths are in the axes' units.
@@ -45,10 +44,6 @@ impl Marks {
     fn extent(&self) -> Vec<(f64, f64)> {
         match self {
             Marks::Points(xy) | Marks::Line(xy) => xy.clone(),
-            Marks::Bars(xy) => {
-                let half = bar_half_width(xy);
-                xy.iter().flat_map(|&(x, y)| [(x - half, y), (x + half, 0.0)]).collect()
-            }
             Marks::ErrorBars(bars) => bars.iter().flat_map(|&(x, y, h)| [(x, y - h), (x, y + h)]).collect(),
             Marks::Vectors(v) => v.iter().flat_map(|&[x, y, dx, dy]| [(x, y), (x + dx, y + dy)]).collect(),
         }
@@ -102,11 +97,6 @@ impl Plot {
     /// Adds a line through points.
     pub fn line(self, label: &str, xy: &[(f64, f64)]) -> Plot {
         self.with(label, Marks::Line(xy.to_vec()))
-    }
-
-    /// Adds upright bars from zero.
-    pub fn bars(self, label: &str, xy: &[(f64, f64)]) -> Plot {
-        self.with(label, Marks::Bars(xy.to_vec()))
     }
 
     /// Adds points with upright bars of the given half length: `(x, y, half)`.
@@ -280,15 +270,6 @@ impl Plot {
                 chart.draw_series(keep(xy).into_iter().map(|p| Circle::new(p, radius, colour.mix(0.6).filled())))
             }
             Marks::Line(xy) => chart.draw_series(LineSeries::new(keep(xy), colour.stroke_width(width))),
-            Marks::Bars(xy) => {
-                let floor = if self.log_y { self.ranges().1.0 } else { 0.0 };
-                let half = bar_half_width(xy);
-                chart.draw_series(
-                    keep(xy)
-                        .into_iter()
-                        .map(|(x, y)| Rectangle::new([(x - half, floor), (x + half, y)], colour.mix(0.7).filled())),
-                )
-            }
             Marks::ErrorBars(bars) => {
                 let bars: Vec<_> =
                     bars.iter().filter(|(x, y, h)| x.is_finite() && y.is_finite() && h.is_finite()).copied().collect();
@@ -338,14 +319,6 @@ impl Plot {
 
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-/// Half of the width of bars that stand one step apart.
-fn bar_half_width(xy: &[(f64, f64)]) -> f64 {
-    let mut x: Vec<f64> = xy.iter().map(|p| p.0).filter(|x| x.is_finite()).collect();
-    x.sort_by(f64::total_cmp);
-    let step = x.windows(2).map(|w| w[1] - w[0]).filter(|&s| s > 0.0).fold(f64::INFINITY, f64::min);
-    if step.is_finite() { 0.4 * step } else { 0.4 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -355,13 +328,12 @@ mod tests {
         let svg = Plot::new("a & b", "x, mm", "y, <px>")
             .points("p", &[(0.0, 1.0), (1.0, f64::NAN)])
             .line("l", &[(0.0, 0.0), (1.0, 1.0)])
-            .bars("b", &[(0.0, 0.5), (1.0, 0.7)])
             .error_bars("e", &[(0.5, 0.5, 0.1)])
             .vectors("v", &[[0.0, 0.0, 0.1, 0.1]])
             .hline(0.9, "limit")
             .svg()
             .unwrap();
-        for part in ["a &amp; b", "x, mm", "y, &lt;px&gt;", "limit", "<circle", "<polyline", "<rect", "viewBox"] {
+        for part in ["a &amp; b", "x, mm", "y, &lt;px&gt;", "limit", "<circle", "<polyline", "viewBox"] {
             assert!(svg.contains(part), "{part} is missing");
         }
         assert!(!svg.contains("NaN"));

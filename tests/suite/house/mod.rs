@@ -1,5 +1,6 @@
 //! What must not be in the source and clippy cannot check (see clippy.toml and `[lints]` in Cargo.toml for the rest).
 
+mod face;
 mod modules;
 mod rooms;
 mod sizes;

@@ -1,0 +1,44 @@
+//! Which module reads and writes which language.
+
+use super::instruction::Instruction;
+use super::language::{Language, Motion, Target, Written};
+use super::{fanuc, krl, rapid, urscript, yaskawa};
+
+/// Every list of joint values, in the order of the text, as it stands there.
+pub(super) fn targets(language: Language, text: &str, count: usize) -> Vec<Target> {
+    match language {
+        Language::UrScript => urscript::targets(text, count),
+        Language::Rapid => rapid::targets(text, count),
+        Language::Krl => krl::targets(text, count),
+        Language::FanucLs => fanuc::targets(text, count),
+        Language::Jbi => yaskawa::targets(text, count),
+    }
+}
+
+/// Every instruction that moves the robot, in the order of the text.
+pub(super) fn motions(language: Language, text: &str, targets: &[Target]) -> Vec<Instruction> {
+    match language {
+        Language::UrScript => urscript::motions(text, targets),
+        Language::Rapid => rapid::motions(text, targets),
+        Language::Krl => krl::motions(text, targets),
+        Language::FanucLs => fanuc::motions(text, targets),
+        Language::Jbi => yaskawa::motions(text, targets),
+    }
+}
+
+/// Files of a program that visits the stops: name and text.
+pub(super) fn program(
+    language: Language,
+    name: &str,
+    stops: &[Written],
+    motion: &Motion,
+    pulses: bool,
+) -> Vec<(String, String)> {
+    match language {
+        Language::UrScript => urscript::program(name, stops, motion),
+        Language::Rapid => rapid::program(name, stops, motion),
+        Language::Krl => krl::program(name, stops, motion),
+        Language::FanucLs => fanuc::program(name, stops, motion),
+        Language::Jbi => yaskawa::program(name, stops, motion, pulses),
+    }
+}
