@@ -103,7 +103,8 @@ pub fn solve_with(
     loss: Loss,
     search: Search,
 ) -> Solution {
-    let Some(mut equations) = equations(views, layout, priors, &start, loss) else {
+    let of = |values: &Values| equations(views, layout, priors, values, loss);
+    let Some(mut equations) = of(&start) else {
         return Solution { values: start, cost: f64::INFINITY, stop: Stop::NoStart, steps: 0 };
     };
     let mut values = start;
@@ -114,17 +115,8 @@ pub fn solve_with(
     let mut lately = VecDeque::from([cost]);
     for steps in 1..=search.most_steps {
         let mut accepted = false;
-        if let Some((trial, predicted_gain)) = try_step(layout, &values, &equations, damping) {
-            let mut trial = trial;
-            let mut next = self::equations(views, layout, priors, &trial, loss);
-            if let Some(there) = next.as_ref().filter(|there| cost - there.cost() < FORETOLD * predicted_gain) {
-                // What bends is mostly the poses' part in it: they follow the shared numbers by a step of their own.
-                let followed = with_poses_following(&trial, there);
-                let then = followed.as_ref().and_then(|values| self::equations(views, layout, priors, values, loss));
-                if let Some((values, then)) = followed.zip(then).filter(|(_, then)| then.cost() < there.cost()) {
-                    (trial, next) = (values, Some(then));
-                }
-            }
+        let at = (&values, &equations, cost);
+        if let Some(Attempt { values: trial, equations: next, predicted_gain }) = attempt(&of, layout, at, damping) {
             let gain = next.as_ref().map_or(f64::NEG_INFINITY, |next| cost - next.cost());
             if let Some(next) = next.filter(|_| gain >= 0.0) {
                 values = trial;
@@ -160,6 +152,34 @@ pub fn solve_with(
     let gained = lately.front().map_or(f64::INFINITY, |before| before - cost);
     let stop = if lately.len() > LATELY && gained < NO_MATTER { Stop::Valley } else { Stop::Steps };
     Solution { values, cost, stop, steps: search.most_steps }
+}
+
+/// Where a step leads.
+struct Attempt {
+    values: Values,
+    /// There; `None` where a corner would lie behind its camera.
+    equations: Option<Equations>,
+    predicted_gain: f64,
+}
+
+/// A step from these values with their equations and cost. `None` where the equations have no solution with this damping.
+fn attempt(
+    of: &impl Fn(&Values) -> Option<Equations>,
+    layout: &Layout,
+    (values, equations, cost): (&Values, &Equations, f64),
+    damping: f64,
+) -> Option<Attempt> {
+    let (values, predicted_gain) = try_step(layout, values, equations, damping)?;
+    let mut reached = Attempt { equations: of(&values), values, predicted_gain };
+    if let Some(there) = reached.equations.as_ref().filter(|there| cost - there.cost() < FORETOLD * predicted_gain) {
+        // What bends is mostly the poses' part in it: they follow the shared numbers by a step of their own.
+        let followed = with_poses_following(&reached.values, there);
+        let then = followed.as_ref().and_then(of);
+        if let Some((values, then)) = followed.zip(then).filter(|(_, then)| then.cost() < there.cost()) {
+            reached = Attempt { values, equations: Some(then), predicted_gain };
+        }
+    }
+    Some(reached)
 }
 
 /// How the damping changes after a step that gained this share of its prediction. Gauss-Newton overshoots along weak directions
