@@ -91,7 +91,7 @@ pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[
         Standing::Changed => Tone::Bad,
     };
     let numbers = vec![
-        (format!("{:.4} mm", recheck.effect_mm), "change of a length, as far as these pairs tell".to_owned()),
+        (format!("{:.4} mm", recheck.effect_mm), "change of a length beyond chance".to_owned()),
         (format!("{:.4} mm", recheck.seen_mm), "would have been seen".to_owned()),
         (format!("{tolerance_mm} mm"), "tolerance".to_owned()),
     ];

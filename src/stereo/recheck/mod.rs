@@ -107,7 +107,7 @@ pub struct Recheck {
     pub causes: Vec<CauseSeen>,
     /// What explains the change; `None` where nothing changed.
     pub change: Option<Explained>,
-    /// By how much the change moves a length, mm: that of the likeliest cause, or of all numbers together.
+    /// By how much the change moves a length, mm: that of the likeliest cause, or of all numbers together; zero where nothing changed.
     pub effect_mm: f64,
     /// The largest change of a length that a single cause could make without being seen, mm.
     pub seen_mm: f64,
@@ -152,7 +152,9 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let change = looks.is_change().then(|| looks.explained());
     let effect_mm = match &change {
         Some(Explained::Causes(likeliest)) => likeliest.first().map_or(0.0, |&first| causes[first].effect_mm),
-        _ => moves(&difference.off),
+        Some(_) => moves(&difference.off),
+        // What the pairs scatter is no change.
+        None => 0.0,
     };
     let seen_mm = causes.iter().map(|cause| cause.seen_mm).fold(0.0, f64::max);
     let pairs = solved.problem.views.iter().map(|view| view.pair.clone()).collect();
