@@ -22,7 +22,6 @@
 //! ```
 
 pub mod check_poses;
-pub mod check_series;
 pub mod clutter;
 pub mod draws;
 pub mod physical_board;

@@ -240,7 +240,7 @@ impl World {
 }
 
 /// The light of one side of a pair: the two cameras see it from two sides, and each pair a little differently.
-pub(super) fn lighting(settings: &Settings, pair: u64, side: Side) -> Lighting {
+pub fn lighting(settings: &Settings, pair: u64, side: Side) -> Lighting {
     let mut lighting = settings.lighting;
     let mut draws = Draws::new(settings.seed, Purpose::Lighting, 2 * pair + u64::from(side == Side::Right));
     lighting.gradient.0 += draws.uniform(-0.05, 0.05);

@@ -1,6 +1,7 @@
 //! Boards as people photograph them: sharpened, clipped, glary, compressed, cut, held by fingers. Each kind is planted in a dozen pictures whose
 //! true corners are known: the board must be read in all, nine of ten corners must have a covariance, and the covariance must be true.
 
+use crate::planted_faults::matrix::picture_faults::{PictureFault, Shares};
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::{Point2, Vector3};
 use stereocal::geometry::transform;
@@ -9,7 +10,6 @@ use stereocal::imaging::find::corners_in;
 use stereocal::imaging::image::{Image, Picture, decode};
 use stereocal::simulate::draws::{Draws, Purpose};
 use stereocal::simulate::picture::patch::{Patch, Tone};
-use stereocal::simulate::picture::picture_faults::{PictureFault, Shares};
 
 use crate::shot::{Deviations, Setup, Shot};
 

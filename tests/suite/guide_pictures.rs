@@ -3,10 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::planted_faults::matrix::picture_faults::{PictureFault, Shares};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, GrayImage, ImageEncoder};
 use stereocal::imaging::image::{Image, Picture};
-use stereocal::simulate::picture::picture_faults::{PictureFault, Shares};
 
 use crate::run::refreshes;
 use crate::shot::{Setup, Shot};

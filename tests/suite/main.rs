@@ -32,6 +32,7 @@ mod house;
 mod identify;
 mod measure;
 mod messages;
+mod picture_faults;
 mod pipeline;
 mod plan;
 mod provenance;

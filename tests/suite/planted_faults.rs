@@ -2,7 +2,7 @@
 
 #[path = "../bench/faults/matrix/mod.rs"]
 #[expect(dead_code, reason = "the benchmark uses all of it")]
-mod matrix;
+pub mod matrix;
 
 use std::path::Path;
 

@@ -6,7 +6,6 @@ pub mod backdrop;
 pub mod coverage;
 pub mod outline;
 pub mod patch;
-pub mod picture_faults;
 pub mod psf;
 pub mod render;
 pub mod scene;

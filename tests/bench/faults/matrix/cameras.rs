@@ -2,8 +2,8 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
+use super::picture_faults::PictureFault;
 use stereocal::simulate::check_poses::Holding;
-use stereocal::simulate::picture::picture_faults::PictureFault;
 use stereocal::simulate::rig::RigDrawing;
 
 use super::set::Plan;

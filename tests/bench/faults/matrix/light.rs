@@ -1,6 +1,6 @@
 //! Benign pictures: dim, noisy, blurred, with another scale of grey.
 
-use stereocal::simulate::picture::picture_faults::{FileForm, PictureFault};
+use super::picture_faults::{FileForm, PictureFault};
 use stereocal::simulate::picture::scene::Print;
 
 use super::set::Plan;

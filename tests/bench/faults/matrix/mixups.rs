@@ -1,7 +1,7 @@
 //! Pictures under the wrong name, on the wrong side, turned or mirrored.
 
+use super::picture_faults::PictureFault;
 use nalgebra::Point2;
-use stereocal::simulate::picture::picture_faults::PictureFault;
 use stereocal::stereo::Rig;
 
 use super::set::{Plan, Set};

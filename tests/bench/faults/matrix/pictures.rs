@@ -1,9 +1,9 @@
 //! Pictures with defects: sensor, light, things in the way, files.
 
+use super::picture_faults::{FileForm, PictureFault};
 use nalgebra::{Point2, Vector3};
 use stereocal::geometry::transform;
 use stereocal::simulate::picture::patch::{Patch, Tone};
-use stereocal::simulate::picture::picture_faults::{FileForm, PictureFault};
 
 use super::set::{Plan, Set};
 use super::{Case, Right, case};

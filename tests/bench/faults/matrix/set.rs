@@ -3,12 +3,12 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
+use super::series::{ExposedPair, Exposure, series};
 use nalgebra::Point2;
 use rayon::prelude::*;
 use stereocal::geometry::Transform;
 use stereocal::imaging::Board;
 use stereocal::simulate::check_poses::Holding;
-use stereocal::simulate::check_series::{ExposedPair, Exposure, series};
 use stereocal::simulate::draws::NormalTable;
 use stereocal::simulate::physical_board::PhysicalBoard;
 use stereocal::simulate::rig::RigDrawing;

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use super::super::series::Exposure;
 use nalgebra::{Matrix2, Vector2};
 use stereocal::imaging::input::corners_csv::to_csv;
 use stereocal::imaging::{Corner, Corners, PairCorners};
-use stereocal::simulate::check_series::Exposure;
 use stereocal::simulate::draws::{Draws, Purpose};
 
 use super::super::said::{self, Said};

@@ -1,10 +1,10 @@
 //! From which size on a fault can be seen: the gain of chi-squared that it brings at the minimum of the faultless set, every shared number
 //! and pose solved again, against what chance brings.
 
+use super::super::series::ExposedPair;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use stereocal::imaging::Corners;
-use stereocal::simulate::check_series::ExposedPair;
 use stereocal::statistics::chi_square_quantile;
 use stereocal::stereo::Rig;
 use stereocal::stereo::calibrate::calibrate;

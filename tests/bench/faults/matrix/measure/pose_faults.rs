@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use super::super::picture_faults::{FileForm, PictureFault};
 use nalgebra::{Point2, Vector3};
 use stereocal::geometry::transform;
 use stereocal::simulate::picture::patch::{Patch, Tone};
-use stereocal::simulate::picture::picture_faults::{FileForm, PictureFault};
 
 use super::session::{Session, Spoil};
 use super::{Expected, MeasureCase, case};

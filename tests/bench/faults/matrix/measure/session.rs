@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use super::super::series::{ExposedPair, series};
 use nalgebra::{Matrix3, Point3, Vector3};
 use serde_json::Value;
 use stereocal::simulate::check_poses::Holding;
-use stereocal::simulate::check_series::{ExposedPair, series};
 use stereocal::simulate::settings::Settings;
 
 use super::super::set::{Plan, Studio};

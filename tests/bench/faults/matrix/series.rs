@@ -6,23 +6,23 @@ use std::sync::Arc;
 
 use nalgebra::Point2;
 
-use super::check_poses::{self, Holding};
-use super::clutter;
-use super::draws::NormalTable;
-use super::physical_board::PhysicalBoard;
-use super::picture::backdrop::Backdrop;
-use super::picture::patch::Patch;
-use super::picture::picture_faults::{FileForm, PictureFault, Shares};
-use super::picture::psf::Optics;
-use super::picture::render::Renderer;
-use super::picture::scene::{Print, Scene};
-use super::picture::sensor::{Lighting, Sensor};
-use super::rig::RigDrawing;
-use super::settings::Settings;
-use super::{Error, world};
-use crate::geometry::Transform;
-use crate::imaging::corners::Side;
-use crate::stereo::Camera;
+use super::picture_faults::{FileForm, PictureFault, Shares};
+use stereocal::geometry::Transform;
+use stereocal::imaging::corners::Side;
+use stereocal::simulate::check_poses::{self, Holding};
+use stereocal::simulate::clutter;
+use stereocal::simulate::draws::NormalTable;
+use stereocal::simulate::physical_board::PhysicalBoard;
+use stereocal::simulate::picture::backdrop::Backdrop;
+use stereocal::simulate::picture::patch::Patch;
+use stereocal::simulate::picture::psf::Optics;
+use stereocal::simulate::picture::render::Renderer;
+use stereocal::simulate::picture::scene::{Print, Scene};
+use stereocal::simulate::picture::sensor::{Lighting, Sensor};
+use stereocal::simulate::rig::RigDrawing;
+use stereocal::simulate::settings::Settings;
+use stereocal::simulate::{Error, world};
+use stereocal::stereo::Camera;
 
 /// One picture to be taken and what happens to it.
 #[derive(Debug, Clone)]

@@ -5,10 +5,10 @@
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::render::Picture;
-use crate::simulate::Error;
-use crate::simulate::draws::{Draws, Purpose};
-use crate::simulate::world::png;
+use stereocal::simulate::Error;
+use stereocal::simulate::draws::{Draws, Purpose};
+use stereocal::simulate::picture::render::Picture;
+use stereocal::simulate::world::png;
 
 /// A picture of shares of the range, row by row.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,6 +63,7 @@ pub enum PictureFault {
     /// Everything above a level reads as that level.
     ClipAt(f32),
     /// An unsharp mask, as cameras sharpen: what a Gaussian blur takes away is added once more, and clipped at the ends of the range.
+    #[allow(dead_code, reason = "only the tests of corners plant it")]
     Sharpened {
         /// How much of it.
         amount: f32,
@@ -249,50 +250,5 @@ impl Shares {
                 Ok(bytes)
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn ramp() -> Shares {
-        Shares { width: 3, height: 2, values: vec![0.0, 0.1, 0.2, 0.3, 0.4, 0.5] }
-    }
-
-    #[test]
-    fn four_quarter_turns_and_two_mirrors_change_nothing() {
-        let mut turned = ramp();
-        turned.suffer(&PictureFault::QuarterTurns(1), 1, 0);
-        assert_eq!((turned.width, turned.height, &turned.values[..2]), (2, 3, &[0.3, 0.0][..]));
-        turned.suffer(&PictureFault::QuarterTurns(3), 1, 0);
-        assert_eq!(turned, ramp());
-        (0..2).for_each(|_| turned.suffer(&PictureFault::Mirrored, 1, 0));
-        assert_eq!(turned, ramp());
-    }
-
-    #[test]
-    fn a_picture_of_two_moments_has_every_second_row_of_each() {
-        let mut picture = ramp();
-        picture.interlace(&Shares { values: vec![1.0; 6], ..ramp() });
-        assert_eq!(picture.values, [0.0, 0.1, 0.2, 1.0, 1.0, 1.0]);
-    }
-
-    #[test]
-    fn sharpening_leaves_even_grey_and_overshoots_at_an_edge() {
-        let values: Vec<f32> = (0..40 * 9).map(|k| if k % 40 < 20 { 0.3 } else { 0.6 }).collect();
-        let mut picture = Shares { width: 40, height: 9, values };
-        picture.suffer(&PictureFault::Sharpened { amount: 1.0, radius_px: 1.0 }, 1, 0);
-        let row = &picture.values[160..200];
-        assert!((row[5] - 0.3).abs() < 1e-6 && (row[35] - 0.6).abs() < 1e-6);
-        // The first pixel beyond the edge keeps what a Gaussian of one px has beyond half a px of it: three tenths of the step.
-        assert!((row[20] - 0.6 - 0.09).abs() < 0.02 && (row[19] + row[20] - 0.9).abs() < 1e-6, "{row:?}");
-    }
-
-    #[test]
-    fn a_hot_column_is_one_column() {
-        let mut picture = ramp();
-        picture.suffer(&PictureFault::HotColumn { at: 0.5, add: 0.25 }, 1, 0);
-        assert_eq!(picture.values, [0.0, 0.35, 0.2, 0.3, 0.65, 0.5]);
     }
 }
