@@ -1,6 +1,6 @@
 //! A board to print: a sheet of paper with the board in true size, a ruler to check the print by, and the board's name.
 //!
-//! In: a board. Out: SVG and PDF, all lengths in mm. Goes wrong: a board that no paper up to A0 holds, and printers that scale to fit: the ruler shows it.
+//! In: a board. Out: SVG and PDF, all lengths in mm; PNG (`board_png`). Goes wrong: a board that no paper up to A0 holds, and printers that scale to fit: the ruler shows it.
 
 use std::fmt::Write as _;
 
@@ -28,12 +28,12 @@ const POINT_MM: f64 = 25.4 / 72.0;
 
 /// A rectangle on the sheet, mm from its upper left corner.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Patch {
-    x: f64,
-    y: f64,
-    width: f64,
-    height: f64,
-    is_black: bool,
+pub(super) struct Patch {
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) width: f64,
+    pub(super) height: f64,
+    pub(super) is_black: bool,
 }
 
 /// A board on a sheet of paper.
@@ -47,7 +47,7 @@ pub struct Sheet {
     pub height_mm: f64,
     /// The board's name, and what the ruler is for.
     pub foot: String,
-    patches: Vec<Patch>,
+    pub(super) patches: Vec<Patch>,
     foot_at: (f64, f64),
 }
 

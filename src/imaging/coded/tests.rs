@@ -150,6 +150,7 @@ fn another_board_is_named() {
         ("charuco:9x7:20:14:DICT_6X6_100", "DICT_5X5_"),
         ("charuco:7x9:20:14:DICT_5X5_100", "board of 9 columns"),
         ("charuco:10x7:20:14:DICT_5X5_100", "board of 9 columns"),
+        ("charuco:9x6:20:14:DICT_5X5_100", "larger than 9x6"),
         ("charuco:9x7:20:11:DICT_5X5_100", "markers of"),
         ("charuco:9x7:20:17:DICT_5X5_100", "markers of"),
     ] {
@@ -164,4 +165,83 @@ fn another_board_is_named() {
     let (plain, _) = Shot::of("checker:9x7:20", [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
     let refusal = corners_in(&plain, BOARD.parse().unwrap()).unwrap_err();
     assert!(refusal.reason.contains("no marker"), "{}", refusal.reason);
+}
+
+/// The picture with some of its pixels changed.
+fn with_pixels(picture: &Picture, change: impl Fn(&Image<u8>, usize, usize) -> u8) -> Picture {
+    let Picture { grey: crate::imaging::image::Grey::Eight(image), .. } = picture else { panic!("eight bits") };
+    let (width, height) = (image.width, image.height);
+    let pixels = (0..width * height).map(|k| change(image, k % width, k / width)).collect();
+    Image { width, height, pixels }.into()
+}
+
+#[test]
+fn the_other_layout_is_named_or_leaves_no_number() {
+    for (shown, said) in [("new", "old"), ("old", "new")] {
+        for size in ["8x6", "9x8"] {
+            let [shown, said] = [shown, said].map(|layout| format!("charuco:{size}:20:14:DICT_5X5_100:{layout}"));
+            let (picture, _) = Shot::of(shown.clone().leak(), [0.3, -0.25, 0.2], [3.0, -2.0, 620.0]).taken();
+            let refusal = corners_in(&picture, said.parse().unwrap()).map(|corners| corners.count()).expect_err(&said);
+            assert!(refusal.reason.contains("layout"), "{shown} as {said}: {}", refusal.reason);
+            let open = shown.trim_end_matches(":new").trim_end_matches(":old");
+            assert!(corners_in(&picture, open.parse().unwrap()).is_ok(), "{open}");
+        }
+    }
+}
+
+#[test]
+fn two_boards_with_the_same_markers_are_named() {
+    let of = |x: f64| Shot::of(BOARD, [0.1, 0.1, 0.1], [x, 0.0, 1100.0]).taken().0;
+    let (left, right) = (of(-140.0), of(140.0));
+    let Picture { grey: crate::imaging::image::Grey::Eight(right), .. } = &right else { panic!("eight bits") };
+    let both = with_pixels(&left, |image, x, y| {
+        if x < image.width / 2 { image.pixels[y * image.width + x] } else { right.pixels[y * image.width + x] }
+    });
+    let refusal = corners_in(&both, BOARD.parse().unwrap()).map(|corners| corners.count()).expect_err("two boards");
+    assert!(refusal.reason.contains("two boards"), "{}", refusal.reason);
+}
+
+#[test]
+fn what_is_left_of_a_torn_board_is_measured() {
+    let shot = Shot::of(BOARD, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]);
+    let (picture, truth) = shot.taken();
+    let whole: Board = BOARD.parse().unwrap();
+    // From the first corner on, so many squares.
+    for squares in [0.6, 1.6, 3.3] {
+        let (at, along) = (truth[0], truth[whole.index(1, 0)] - truth[0]);
+        let torn = with_pixels(&picture, |image, x, y| {
+            let beyond =
+                (Point2::new(x as f64, y as f64) - at).dot(&(along + Vector3::z().cross(&along.push(0.0)).xy()));
+            if beyond < squares * along.norm_squared() { 120 } else { image.pixels[y * image.width + x] }
+        });
+        let (count, chi2) = measured(BOARD, &torn, &truth);
+        assert!((20..48).contains(&count) && (0.5..1.6).contains(&chi2), "{squares}: {count} corners, {chi2}");
+    }
+}
+
+#[test]
+fn markers_that_were_moved_give_no_corner_another_number() {
+    let (picture, truth) = Shot::of(BOARD, [0.0; 3], [3.0, -2.0, 560.0]).taken();
+    let board: Board = BOARD.parse().unwrap();
+    let middle =
+        |col: usize, row: usize| nalgebra::center(&truth[board.index(col, row)], &truth[board.index(col + 1, row + 1)]);
+    let half = 0.42 * (truth[1] - truth[0]).norm();
+    // Squares after these corners hold markers; each takes the one of the next.
+    let places = [(0, 1), (2, 1), (4, 1), (1, 2), (3, 2), (5, 2), (0, 3), (2, 3), (4, 3), (1, 4), (3, 4), (5, 4)];
+    for moved in [2, 6, 12] {
+        let moved = &places[..moved];
+        let other = with_pixels(&picture, |image, x, y| {
+            let p = Point2::new(x as f64, y as f64);
+            let into = |&(c, r): &(usize, usize)| (p - middle(c, r)).amax() < half;
+            let from = moved.iter().position(into).map_or(p, |k| {
+                let next = moved[(k + 1) % moved.len()];
+                p + (middle(next.0, next.1) - middle(moved[k].0, moved[k].1))
+            });
+            image.pixels[from.y.round() as usize * image.width + from.x.round() as usize]
+        });
+        match corners_in(&other, board) {
+            Ok(_) => assert!(measured(BOARD, &other, &truth).0 > 20),
+            Err(refusal) => assert!(refusal.reason.contains("another order"), "{moved:?}: {}", refusal.reason),
+        }
+    }
 }
