@@ -190,4 +190,25 @@ mod tests {
         }
         assert!(Sheet::new(&"checker:20x20:100".parse().unwrap()).unwrap_err().contains("A0 holds"));
     }
+
+    #[test]
+    fn the_pdf_is_true_to_a_ten_thousandth() {
+        let board: Board = "charuco:8x11:20:14:DICT_5X5_100".parse().unwrap();
+        let pdf = Sheet::new(&board).unwrap().pdf();
+        let text = String::from_utf8_lossy(&pdf);
+        let numbers = |line: &str| line.split(' ').filter_map(|word| word.parse().ok()).collect::<Vec<f64>>();
+        let unit = numbers(text.lines().find(|line| line.ends_with(" cm")).unwrap());
+        let mm = |number: f64| number * unit[0] * POINT_MM;
+        let rectangles = text.lines().filter(|line| line.ends_with(" re")).map(numbers);
+        let squares: Vec<Vec<f64>> = rectangles.filter(|r| (mm(r[2]) - 20.0).abs() < 0.1).collect();
+        assert_eq!(squares.len(), 44);
+        for side in [0, 1] {
+            let places = || squares.iter().map(|square| mm(square[side]));
+            let first = places().fold(f64::INFINITY, f64::min);
+            for place in places() {
+                let count = ((place - first) / 20.0).round();
+                assert!((place - first - 20.0 * count).abs() <= 1e-4 * 20.0, "{side}: {place} {first}");
+            }
+        }
+    }
 }
