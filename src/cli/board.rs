@@ -11,12 +11,18 @@ pub struct PrintBoard {
     /// The board as `--board` names it: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
     #[arg(value_name = "NAME")]
     pub board: Board,
-    /// The PDF only [default: PDF and SVG]
+    /// Only what is named of PDF, SVG and PNG [default: PDF and SVG]
     #[arg(long)]
     pub pdf: bool,
-    /// The SVG only
-    #[arg(long, conflicts_with = "pdf")]
+    /// See --pdf
+    #[arg(long)]
     pub svg: bool,
+    /// A PNG, of --dpi dots per inch and without letters
+    #[arg(long)]
+    pub png: bool,
+    /// Dots per inch of the PNG
+    #[arg(long, default_value_t = 300.0, requires = "png", value_name = "DPI")]
+    pub dpi: f64,
     /// Results.
     #[command(flatten)]
     pub output: Output,

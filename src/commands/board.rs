@@ -10,18 +10,24 @@ use crate::formats::board_sheet::Sheet;
 
 /// Runs the command.
 pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
-    let sheet = Sheet::new(&args.board).map_err(|problem| config::Error::Invalid { problems: vec![problem] })?;
+    let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
+    let sheet = Sheet::new(&args.board).map_err(invalid)?;
     let run = Run { force: args.output.force, ..run };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &[]);
-    let names: Vec<&str> = [("board.pdf", !args.svg), ("board.svg", !args.pdf)]
-        .into_iter()
-        .filter(|(_, is)| *is)
-        .map(|(name, _)| name)
-        .collect();
+    let all = !(args.pdf || args.svg || args.png);
+    let png = if args.png { Some(sheet.png(args.dpi).map_err(invalid)?) } else { None };
+    let written: Vec<(&str, Vec<u8>)> = [
+        (args.pdf || all).then(|| ("board.pdf", sheet.pdf())),
+        (args.svg || all).then(|| ("board.svg", sheet.svg().into_bytes())),
+        png.map(|bytes| ("board.png", bytes)),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let names: Vec<&str> = written.iter().map(|(name, _)| *name).collect();
     out.check_free(&names)?;
-    for name in &names {
-        let bytes = if *name == "board.pdf" { sheet.pdf() } else { sheet.svg().into_bytes() };
-        out.write(name, &bytes)?;
+    for (name, bytes) in &written {
+        out.write(name, bytes)?;
     }
     let files: Vec<String> = names.iter().map(|name| out.join(name).to_string()).collect();
     let stdout = if args.output.json {

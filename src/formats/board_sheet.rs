@@ -1,6 +1,6 @@
 //! A board to print: a sheet of paper with the board in true size, a ruler to check the print by, and the board's name.
 //!
-//! In: a board. Out: SVG and PDF, all lengths in mm. Goes wrong: a board that no paper up to A0 holds, and printers that scale to fit: the ruler shows it.
+//! In: a board. Out: SVG and PDF, all lengths in mm; PNG (`board_png`). Goes wrong: a board that no paper up to A0 holds, and printers that scale to fit: the ruler shows it.
 
 use std::fmt::Write as _;
 
@@ -28,12 +28,12 @@ const POINT_MM: f64 = 25.4 / 72.0;
 
 /// A rectangle on the sheet, mm from its upper left corner.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Patch {
-    x: f64,
-    y: f64,
-    width: f64,
-    height: f64,
-    is_black: bool,
+pub(super) struct Patch {
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) width: f64,
+    pub(super) height: f64,
+    pub(super) is_black: bool,
 }
 
 /// A board on a sheet of paper.
@@ -47,7 +47,7 @@ pub struct Sheet {
     pub height_mm: f64,
     /// The board's name, and what the ruler is for.
     pub foot: String,
-    patches: Vec<Patch>,
+    pub(super) patches: Vec<Patch>,
     foot_at: (f64, f64),
 }
 
@@ -189,5 +189,26 @@ mod tests {
             );
         }
         assert!(Sheet::new(&"checker:20x20:100".parse().unwrap()).unwrap_err().contains("A0 holds"));
+    }
+
+    #[test]
+    fn the_pdf_is_true_to_a_ten_thousandth() {
+        let board: Board = "charuco:8x11:20:14:DICT_5X5_100".parse().unwrap();
+        let pdf = Sheet::new(&board).unwrap().pdf();
+        let text = String::from_utf8_lossy(&pdf);
+        let numbers = |line: &str| line.split(' ').filter_map(|word| word.parse().ok()).collect::<Vec<f64>>();
+        let unit = numbers(text.lines().find(|line| line.ends_with(" cm")).unwrap());
+        let mm = |number: f64| number * unit[0] * POINT_MM;
+        let rectangles = text.lines().filter(|line| line.ends_with(" re")).map(numbers);
+        let squares: Vec<Vec<f64>> = rectangles.filter(|r| (mm(r[2]) - 20.0).abs() < 0.1).collect();
+        assert_eq!(squares.len(), 44);
+        for side in [0, 1] {
+            let places = || squares.iter().map(|square| mm(square[side]));
+            let first = places().fold(f64::INFINITY, f64::min);
+            for place in places() {
+                let count = ((place - first) / 20.0).round();
+                assert!((place - first - 20.0 * count).abs() <= 1e-4 * 20.0, "{side}: {place} {first}");
+            }
+        }
     }
 }

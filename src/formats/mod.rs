@@ -1,5 +1,6 @@
 //! Files that other stages and other programs read: what is written, apart from what is judged.
 
+mod board_png;
 pub mod board_sheet;
 pub mod calibration;
 pub mod camera_check;

@@ -242,8 +242,8 @@ fn printed(board: &Board, seen: &[[Look; 2]]) -> Option<String> {
     let prints: Vec<Print> = seen.iter().flatten().filter_map(|look| look.as_ref().ok()?.print).collect();
     let most = |is: &dyn Fn(&Print) -> bool| 2 * prints.iter().filter(|print| is(print)).count() > prints.len();
     let layout = match Layout::of(board).len() {
-        2 if most(&|print| print.layout == Layout::Old) => Some("OpenCV's layout before 4.6"),
-        2 => Some("OpenCV's layout since 4.6"),
+        2 if most(&|print| print.layout == Layout::Old) => Some(Layout::Old.said()),
+        2 => Some(Layout::New.said()),
         _ => None,
     };
     let inverted = most(&|print| print.inverted).then_some("printed white on black");

@@ -9,6 +9,7 @@ use nalgebra::{Point2, Point3};
 use super::draws::{Draws, Purpose};
 use super::picture::patch::Patch;
 use crate::imaging::Board;
+use crate::imaging::coded::Layout;
 use crate::imaging::coded::faces::Face;
 
 /// How a board deviates from its drawing.
@@ -125,8 +126,13 @@ impl PhysicalBoard {
     }
 
     /// True for a black square. The square at the first corner of the first row is black.
-    pub fn is_black(i: usize, j: usize) -> bool {
-        (i + j).is_multiple_of(2)
+    pub fn is_black(&self, i: usize, j: usize) -> bool {
+        !self.layout().holds_marker(i as isize, j as isize)
+    }
+
+    /// Which squares are light, and hold the markers of a board that has any.
+    pub fn layout(&self) -> Layout {
+        Layout::of(&self.drawing).first().copied().unwrap_or(Layout::New)
     }
 
     /// The four corners of square `(i, j)` as printed, in order round it, mm.

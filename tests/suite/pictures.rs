@@ -98,7 +98,7 @@ fn is_black(board: &PhysicalBoard, x: f64, y: f64) -> bool {
     // Ink and pitch move an edge by far less than a square: only neighbours can own the place.
     (-1..=1).flat_map(|dj| (-1..=1).map(move |di| (i + di, j + dj))).any(|(i, j)| {
         let on_board = (0..squares.columns as isize).contains(&i) && (0..squares.rows as isize).contains(&j);
-        on_board && PhysicalBoard::is_black(i as usize, j as usize) && inside(board.square_mm(i as usize, j as usize))
+        on_board && board.is_black(i as usize, j as usize) && inside(board.square_mm(i as usize, j as usize))
     })
 }
 

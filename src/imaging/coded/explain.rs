@@ -6,7 +6,7 @@
 use super::dictionary::Dictionary;
 use super::marker::Fields;
 use super::numbering::{self, Read, Said};
-use super::{fields, markers_in};
+use super::{Layout, fields, markers_in};
 use crate::imaging::board::{Board, Kind, Squares};
 use crate::imaging::image::Picture;
 use crate::imaging::lattice::Places;
@@ -27,11 +27,17 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> String 
     let Some(grid) = largest.filter(|grid| grid.count() >= 4) else { return "no board found".to_owned() };
     let size = (grid.columns, grid.rows);
     let reads = markers_in(picture, grid, own);
+    if let Some(layout) = other_layout(board, size, &reads) {
+        return format!("shows the markers in {}; --board says the other", layout.said());
+    }
     if let Some(squares) = other_counts(board, size, &reads) {
         return format!(
             "shows the markers of a board of {} columns; --board says {} (columns first, as printed)",
             squares.columns, board.squares
         );
+    }
+    if let Said::Place(_) = numbering::place(board, size, &reads) {
+        return format!("shows a board larger than {} squares: its corners go on beyond those", board.squares);
     }
     let mirrored = grid.flip_rows();
     if numbering::place(board, size, &markers_in(picture, &mirrored, own)) != Said::Nothing {
@@ -67,6 +73,13 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> String 
         }
         None => format!("shows {} corners of squares, and no marker among them that can be read", grid.count()),
     }
+}
+
+/// The layout in which a board whose layout was said has the markers that are seen, if that is the other one.
+fn other_layout(board: &Board, size: (usize, usize), reads: &[Read]) -> Option<Layout> {
+    let Kind::Charuco { layout: Some(said), .. } = board.kind else { return None };
+    let other = if said == Layout::New { Layout::Old } else { Layout::New };
+    matches!(numbering::place(&board.with_layout(other), size, reads), Said::Place(_)).then_some(other)
 }
 
 /// The board with other counts whose order of markers is the one that is seen.

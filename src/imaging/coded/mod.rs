@@ -41,6 +41,14 @@ impl Layout {
         if board.squares.rows.is_multiple_of(2) { vec![Layout::New, Layout::Old] } else { vec![Layout::New] }
     }
 
+    /// Its name, for a person.
+    pub fn said(self) -> &'static str {
+        match self {
+            Layout::New => "OpenCV's layout since 4.6",
+            Layout::Old => "OpenCV's layout before 4.6",
+        }
+    }
+
     /// Whether the square in this column and row holds a marker.
     pub fn holds_marker(self, x: isize, y: isize) -> bool {
         (x + y).rem_euclid(2) == if self == Layout::New { 1 } else { 0 }
@@ -215,10 +223,29 @@ fn number(picture: &Picture, board: &Board, fields: Fields, grid: &Places) -> Nu
         Said::Nothing => return Numbered::No,
     };
     let turned = grid.turned(placement.quarters);
+    if goes_beyond(board, &turned, &placement) {
+        return Numbered::No;
+    }
     let corners = Lattice::from_fn(board.columns(), board.rows(), |col, row| {
         turned.around(col as isize - placement.col, row as isize - placement.row).copied()
     });
     if corners.count() > 0 { Numbered::Part(Part { corners, placement }) } else { Numbered::No }
+}
+
+/// True where corners of a grid go on beyond the board on some side, a line of them: it is another board, or its markers are in the other squares.
+fn goes_beyond(board: &Board, turned: &Places, placement: &Placement) -> bool {
+    let (columns, rows) = (board.columns() as isize, board.rows() as isize);
+    let (mut beyond, mut lines) = ([0; 4], [0; 4]);
+    for (col, row, _) in turned.iter() {
+        let (x, y) = (col as isize + placement.col, row as isize + placement.row);
+        let sides = [(-1 - x, y, rows), (x - columns, y, rows), (-1 - y, x, columns), (y - rows, x, columns)];
+        for (k, (past, along, count)) in sides.into_iter().enumerate() {
+            let is_along = (0..count).contains(&along);
+            beyond[k] += usize::from(past == 0 && is_along);
+            lines[k] += usize::from(past == -1 && is_along);
+        }
+    }
+    (0..4).any(|k| beyond[k] >= 2 && 2 * beyond[k] > lines[k])
 }
 
 /// Adds a part of the board, the largest first; an error where it is a part of another board of the same kind.

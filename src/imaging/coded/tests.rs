@@ -19,31 +19,53 @@ use crate::simulate::rig::true_rig;
 /// Side of the pictures, px.
 const SIZE: u32 = 800;
 
-/// A board turned by `turn` (rad) at a place (mm), and where its corners really are.
-fn shot(name: &str, turn: [f64; 3], place: [f64; 3], inverted: bool) -> (Picture, Vec<Point2<f64>>) {
-    let board: Board = name.parse().unwrap();
-    let workmanship =
-        Workmanship { pitch_um: 0.0, bow_um: (0.0, 0.0), ink_spread_um: 0.0, scale_ppm: 0.0, margin_mm: 10.0 };
-    let made = PhysicalBoard::new(board, workmanship, 1, 0);
-    let backdrop = Backdrop::plain(0.3);
-    let (white, black) = if inverted { (0.08, 0.85) } else { (0.85, 0.08) };
-    let scene = Scene {
-        camera: true_rig(SIZE).left,
-        optics: Optics { gaussian_px: 0.8, defocus: None, coma_px: 0.0 },
-        board: &made,
-        camera_from_board: transform(Vector3::from(turn), Vector3::from(place)),
-        print: Print { white, black, rim: 0.3, rim_mm: 3.0 },
-        holder: &[],
-        backdrop: &backdrop,
-        lighting: Lighting { gradient: (0.05, -0.03), vignetting: 0.1, exposure: 0.75 },
-        sensor: Sensor { bits: 16, full_well_e: 10_000.0, read_noise_e: 5.0, dark: 0.0 },
-        seed: 3,
-        picture: 0,
-    };
-    let truth = scene.corners_px();
-    let rendered = Renderer::new(&scene).picture(&NormalTable::new());
-    let pixels = rendered.samples.iter().map(|&v| ((u32::from(v) + 128) / 257) as u8).collect();
-    (Image { width: rendered.width, height: rendered.height, pixels }.into(), truth)
+/// What is in a picture of a board.
+#[derive(Clone, Copy)]
+struct Shot {
+    board: &'static str,
+    /// How it is turned, rad, and where it is, mm.
+    pose: ([f64; 3], [f64; 3]),
+    /// White on black.
+    inverted: bool,
+    /// How many times as strong the lens's distortion is as that of the paper's.
+    bent: f64,
+    seed: u64,
+}
+
+impl Shot {
+    fn of(board: &'static str, turn: [f64; 3], place: [f64; 3]) -> Shot {
+        Shot { board, pose: (turn, place), inverted: false, bent: 1.0, seed: 3 }
+    }
+
+    /// The picture, and where the board's corners really are.
+    fn taken(self) -> (Picture, Vec<Point2<f64>>) {
+        let board: Board = self.board.parse().unwrap();
+        let workmanship =
+            Workmanship { pitch_um: 0.0, bow_um: (0.0, 0.0), ink_spread_um: 0.0, scale_ppm: 0.0, margin_mm: 10.0 };
+        let made = PhysicalBoard::new(board, workmanship, 1, 0);
+        let backdrop = Backdrop::plain(0.3);
+        let (white, black) = if self.inverted { (0.08, 0.85) } else { (0.85, 0.08) };
+        let mut camera = true_rig(SIZE).left;
+        camera.distortion.iter_mut().for_each(|term| *term *= self.bent);
+        let (turn, place) = self.pose;
+        let scene = Scene {
+            camera,
+            optics: Optics { gaussian_px: 0.8, defocus: None, coma_px: 0.0 },
+            board: &made,
+            camera_from_board: transform(Vector3::from(turn), Vector3::from(place)),
+            print: Print { white, black, rim: 0.3, rim_mm: 3.0 },
+            holder: &[],
+            backdrop: &backdrop,
+            lighting: Lighting { gradient: (0.05, -0.03), vignetting: 0.1, exposure: 0.75 },
+            sensor: Sensor { bits: 16, full_well_e: 10_000.0, read_noise_e: 5.0, dark: 0.0 },
+            seed: self.seed,
+            picture: 0,
+        };
+        let truth = scene.corners_px();
+        let rendered = Renderer::new(&scene).picture(&NormalTable::new());
+        let pixels = rendered.samples.iter().map(|&v| ((u32::from(v) + 128) / 257) as u8).collect();
+        (Image { width: rendered.width, height: rendered.height, pixels }.into(), truth)
+    }
 }
 
 /// How many corners are measured, and their mean square deviation in their own sigmas.
@@ -69,7 +91,7 @@ const BOARD: &str = "charuco:9x7:20:14:DICT_5X5_100";
 fn a_board_is_measured_whole_from_every_side_and_in_both_colours() {
     for (quarter, inverted) in [(0, false), (1, true), (2, false), (3, true)] {
         let turn = [0.3, -0.25, 0.2 + f64::from(quarter) * 1.6];
-        let (picture, truth) = shot(BOARD, turn, [3.0, -2.0, 560.0], inverted);
+        let (picture, truth) = Shot { inverted, ..Shot::of(BOARD, turn, [3.0, -2.0, 560.0]) }.taken();
         let (count, chi2) = measured(BOARD, &picture, &truth);
         assert!(count == 48, "{quarter}: {count} of 48 corners");
         // The mean of 96 squares: chance takes it from 0.7 to 1.3.
@@ -80,20 +102,55 @@ fn a_board_is_measured_whole_from_every_side_and_in_both_colours() {
 #[test]
 fn parts_of_a_board_have_their_own_numbers() {
     for (x, y) in [(-140.0, 0.0), (110.0, 60.0), (-90.0, -80.0), (60.0, 90.0)] {
-        let (picture, truth) = shot(BOARD, [0.4, 0.3, 0.5], [x, y, 420.0], false);
+        let (picture, truth) = Shot::of(BOARD, [0.4, 0.3, 0.5], [x, y, 420.0]).taken();
         // Every corner that is found lies where its number says.
         let (count, _) = measured(BOARD, &picture, &truth);
         assert!((4..48).contains(&count), "{x} {y}: {count} corners");
     }
 }
 
+/// The squared deviations of a picture's measured corners from the nearest true ones, in their own variances, an axis.
+fn squares(shot: Shot) -> Vec<f64> {
+    let (picture, truth) = shot.taken();
+    let Ok(corners) = corners_in(&picture, shot.board.parse().unwrap()) else { return Vec::new() };
+    let one = |corner: &crate::imaging::Corner| {
+        let nearest = truth.iter().map(|at| corner.px - at).min_by(|a, b| a.norm().total_cmp(&b.norm()))?;
+        Some(nearest.dot(&(corner.covariance_px2?.try_inverse()? * nearest)) / 2.0)
+    };
+    corners.iter().filter_map(|(_, _, corner)| one(corner)).collect()
+}
+
+#[test]
+fn parts_cut_by_the_border_are_as_certain_as_they_say() {
+    let turns = [[0.4, 0.3, 0.5], [-0.5, 0.5, 0.2], [0.0, 0.0, 0.0], [0.7, -0.4, 1.1]];
+    let coded = [(-140.0, 0.0), (110.0, 60.0), (-90.0, -80.0), (60.0, 90.0), (70.0, 0.0), (-40.0, 45.0)];
+    // Of a plain board most has to be seen.
+    let plain = [(70.0, 0.0), (-40.0, 45.0)];
+    for (board, places) in [(BOARD, &coded[..]), ("checker:9x7:20", &plain[..])] {
+        // Squares of 125, 74 and 52 px, and lenses that bend lines not at all, as the paper's do, and more than a row of squares tells.
+        for (z, bent) in [(250.0, 0.0), (250.0, 1.0), (420.0, 1.0), (600.0, 1.0), (600.0, -4.0)] {
+            let mut all: Vec<f64> = Vec::new();
+            for (k, (turn, (x, y))) in turns.iter().flat_map(|turn| places.iter().map(|at| (*turn, at))).enumerate() {
+                let place = [x * z / 420.0, y * z / 420.0, z];
+                all.extend(squares(Shot { bent, seed: 100 + k as u64, ..Shot::of(board, turn, place) }));
+            }
+            let count = all.len() as f64;
+            let mean = all.iter().sum::<f64>() / count;
+            // By chance one of a thousand.
+            let far = all.iter().filter(|square| **square > 7.0).count() as f64;
+            assert!(count > 30.0 && mean < 1.4 && far < 0.02 * count + 2.0, "{board} {z} {bent}: {count} {mean} {far}");
+        }
+    }
+}
+
 #[test]
 fn another_board_is_named() {
-    let (picture, _) = shot(BOARD, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0], false);
+    let (picture, _) = Shot::of(BOARD, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
     for (said, why) in [
         ("charuco:9x7:20:14:DICT_6X6_100", "DICT_5X5_"),
         ("charuco:7x9:20:14:DICT_5X5_100", "board of 9 columns"),
         ("charuco:10x7:20:14:DICT_5X5_100", "board of 9 columns"),
+        ("charuco:9x6:20:14:DICT_5X5_100", "larger than 9x6"),
         ("charuco:9x7:20:11:DICT_5X5_100", "markers of"),
         ("charuco:9x7:20:17:DICT_5X5_100", "markers of"),
     ] {
@@ -105,7 +162,86 @@ fn another_board_is_named() {
     let mirrored = Picture::from(Image { width: image.width, height: image.height, pixels });
     let refusal = corners_in(&mirrored, BOARD.parse().unwrap()).unwrap_err();
     assert!(refusal.reason.contains("mirrored"), "{}", refusal.reason);
-    let (plain, _) = shot("checker:9x7:20", [0.3, -0.25, 0.2], [3.0, -2.0, 560.0], false);
+    let (plain, _) = Shot::of("checker:9x7:20", [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
     let refusal = corners_in(&plain, BOARD.parse().unwrap()).unwrap_err();
     assert!(refusal.reason.contains("no marker"), "{}", refusal.reason);
+}
+
+/// The picture with some of its pixels changed.
+fn with_pixels(picture: &Picture, change: impl Fn(&Image<u8>, usize, usize) -> u8) -> Picture {
+    let Picture { grey: crate::imaging::image::Grey::Eight(image), .. } = picture else { panic!("eight bits") };
+    let (width, height) = (image.width, image.height);
+    let pixels = (0..width * height).map(|k| change(image, k % width, k / width)).collect();
+    Image { width, height, pixels }.into()
+}
+
+#[test]
+fn the_other_layout_is_named_or_leaves_no_number() {
+    for (shown, said) in [("new", "old"), ("old", "new")] {
+        for size in ["8x6", "9x8"] {
+            let [shown, said] = [shown, said].map(|layout| format!("charuco:{size}:20:14:DICT_5X5_100:{layout}"));
+            let (picture, _) = Shot::of(shown.clone().leak(), [0.3, -0.25, 0.2], [3.0, -2.0, 620.0]).taken();
+            let refusal = corners_in(&picture, said.parse().unwrap()).map(|corners| corners.count()).expect_err(&said);
+            assert!(refusal.reason.contains("layout"), "{shown} as {said}: {}", refusal.reason);
+            let open = shown.trim_end_matches(":new").trim_end_matches(":old");
+            assert!(corners_in(&picture, open.parse().unwrap()).is_ok(), "{open}");
+        }
+    }
+}
+
+#[test]
+fn two_boards_with_the_same_markers_are_named() {
+    let of = |x: f64| Shot::of(BOARD, [0.1, 0.1, 0.1], [x, 0.0, 1100.0]).taken().0;
+    let (left, right) = (of(-140.0), of(140.0));
+    let Picture { grey: crate::imaging::image::Grey::Eight(right), .. } = &right else { panic!("eight bits") };
+    let both = with_pixels(&left, |image, x, y| {
+        if x < image.width / 2 { image.pixels[y * image.width + x] } else { right.pixels[y * image.width + x] }
+    });
+    let refusal = corners_in(&both, BOARD.parse().unwrap()).map(|corners| corners.count()).expect_err("two boards");
+    assert!(refusal.reason.contains("two boards"), "{}", refusal.reason);
+}
+
+#[test]
+fn what_is_left_of_a_torn_board_is_measured() {
+    let shot = Shot::of(BOARD, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]);
+    let (picture, truth) = shot.taken();
+    let whole: Board = BOARD.parse().unwrap();
+    // From the first corner on, so many squares.
+    for squares in [0.6, 1.6, 3.3] {
+        let (at, along) = (truth[0], truth[whole.index(1, 0)] - truth[0]);
+        let torn = with_pixels(&picture, |image, x, y| {
+            let beyond =
+                (Point2::new(x as f64, y as f64) - at).dot(&(along + Vector3::z().cross(&along.push(0.0)).xy()));
+            if beyond < squares * along.norm_squared() { 120 } else { image.pixels[y * image.width + x] }
+        });
+        let (count, chi2) = measured(BOARD, &torn, &truth);
+        assert!((20..48).contains(&count) && (0.5..1.6).contains(&chi2), "{squares}: {count} corners, {chi2}");
+    }
+}
+
+#[test]
+fn markers_that_were_moved_give_no_corner_another_number() {
+    let (picture, truth) = Shot::of(BOARD, [0.0; 3], [3.0, -2.0, 560.0]).taken();
+    let board: Board = BOARD.parse().unwrap();
+    let middle =
+        |col: usize, row: usize| nalgebra::center(&truth[board.index(col, row)], &truth[board.index(col + 1, row + 1)]);
+    let half = 0.42 * (truth[1] - truth[0]).norm();
+    // Squares after these corners hold markers; each takes the one of the next.
+    let places = [(0, 1), (2, 1), (4, 1), (1, 2), (3, 2), (5, 2), (0, 3), (2, 3), (4, 3), (1, 4), (3, 4), (5, 4)];
+    for moved in [2, 6, 12] {
+        let moved = &places[..moved];
+        let other = with_pixels(&picture, |image, x, y| {
+            let p = Point2::new(x as f64, y as f64);
+            let into = |&(c, r): &(usize, usize)| (p - middle(c, r)).amax() < half;
+            let from = moved.iter().position(into).map_or(p, |k| {
+                let next = moved[(k + 1) % moved.len()];
+                p + (middle(next.0, next.1) - middle(moved[k].0, moved[k].1))
+            });
+            image.pixels[from.y.round() as usize * image.width + from.x.round() as usize]
+        });
+        match corners_in(&other, board) {
+            Ok(_) => assert!(measured(BOARD, &other, &truth).0 > 20),
+            Err(refusal) => assert!(refusal.reason.contains("another order"), "{moved:?}: {}", refusal.reason),
+        }
+    }
 }

@@ -26,6 +26,8 @@ pub(super) struct Cell {
     pub(super) place: Point2<f64>,
     /// Along the rows and along the columns, px.
     pub(super) edges: [Vector2<f64>; 2],
+    /// Whose bend nothing but the corner's own window tells.
+    pub(super) own_bends: [bool; 2],
     /// Side of the markers, as a share of a square's.
     pub(super) share: f64,
     /// The squares that hold them.
@@ -47,7 +49,8 @@ impl Cell {
                 (one, other) => one.or(other),
             }
         };
-        let cell = Cell { place, edges: [edge(1, 0)?, edge(0, 1)?], share: 0.0, marked: [None; 2] };
+        let cell =
+            Cell { place, edges: [edge(1, 0)?, edge(0, 1)?], own_bends: [false; 2], share: 0.0, marked: [None; 2] };
         (cell.side() * cell.skew() > LEAST_HEIGHT_PX).then_some(cell)
     }
 

@@ -6,7 +6,7 @@ use super::Measured;
 use super::acceptance::{MOST_LIGHT_CHANGE, plausible};
 use super::cell::Cell;
 use super::saddle_fit::window::{Below, Frame, Window};
-use super::saddle_fit::{Fit, Model, fit};
+use super::saddle_fit::{Beside, Fit, Model, fit};
 use crate::imaging::detect::Detected;
 use crate::imaging::image::Image;
 use crate::imaging::lattice::Lattice;
@@ -47,7 +47,7 @@ fn coarse_fit(copy: &Image<u8>, cell: &Cell, window: &mut Window) -> Option<(Fit
         let hidden = cell.hidden_by(HALO_BLURS * start.blur_px[0]);
         let frame = Frame { start: cell.place, halves, band_px: f64::MAX, hidden };
         window.collect(copy, 0.0, &Below(f64::MAX), &frame);
-        if let Some(first) = fit(&start, window, None)
+        if let Some(first) = fit(&start, window, Beside::default())
             && plausible(&first, &start, cell, MOST_LIGHT_CHANGE)
             && (first.model.blur_px.iter().all(|&s| s < 0.4 * half) || half >= most)
         {

@@ -10,7 +10,7 @@ use super::acceptance::{self, plausible};
 use super::cell::Cell;
 use super::outlying_pixels::{Explained, few};
 use super::saddle_fit::window::{Below, Frame, Keep, Sample, Window};
-use super::saddle_fit::{Model, fit};
+use super::saddle_fit::{Beside, Model, fit};
 use super::veil;
 use super::windows::Windows;
 use crate::imaging::detect::Detected;
@@ -38,6 +38,11 @@ const BETWEEN: f64 = 2.8;
 const SMALLEST: f64 = 0.5;
 /// A near window that is not smaller than this share of the full one would tell nothing of its own.
 const NEAR_SHARE: f64 = 0.7;
+
+/// By how many blurs a window's own bend may take the ends of its edges from where they were thought to be, beyond which another fit starts from
+/// there, and in how many rounds: within it the edges' profiles are as good as straight lines.
+const MOST_BENT_BLURS: f64 = 0.3;
+const MOST_ROUNDS: usize = 6;
 
 /// The picture at full size.
 pub(super) struct Full<'a, T> {
@@ -75,7 +80,7 @@ impl<T: Sample> Full<'_, T> {
         let near_px = near_half_px(&start);
         let alone = near_px > NEAR_SHARE * full_px;
         let near = if alone { coarse } else { self.fit_within(near_px, &cell, &start, window) };
-        Windows { cell, start, alone, most_half_px: MOST_HALF_PX, near, full: None }
+        Windows { cell, start, bends: [None; 2], alone, most_half_px: MOST_HALF_PX, near, full: None }
     }
 
     /// A fit in the full window or in a share of it, started where the one in the near window ended: most steps are taken where they are
@@ -178,7 +183,8 @@ impl<T: Sample> Full<'_, T> {
         window: &mut Window,
     ) -> Option<Measured> {
         // A window in the middle of which the corner is: what the light's gradient adds on one side it takes on the other.
-        let start = Model { corner: Vector2::zeros(), bend: seen.start.bend, ..near.fit.model };
+        let bend = [0, 1].map(|k| if seen.cell.own_bends[k] { near.fit.model.bend[k] } else { seen.start.bend[k] });
+        let start = Model { corner: Vector2::zeros(), bend, ..near.fit.model };
         self.fit_within(most_half_px, &Cell { place: near.px, ..seen.cell }, &start, window)
     }
 
@@ -216,7 +222,8 @@ impl<T: Sample> Full<'_, T> {
         window: &mut Window,
     ) -> Option<Measured> {
         let mut start = *start;
-        loop {
+        let beside = Beside { stray: self.stray, bends: cell.own_bends };
+        for round in 1.. {
             let blur = start.blur_px[0].max(start.blur_px[1]);
             let margin = margin_px(&start, cell);
             let halves = cell.edges.map(|e| e.normalize() * half_px(e.norm(), margin).min(most_half_px));
@@ -224,10 +231,16 @@ impl<T: Sample> Full<'_, T> {
             let band_px = BAND_BLURS * blur + 1.0;
             let hidden = cell.hidden(blur)?;
             window.collect(self.image, self.veil, keep, &Frame { start: cell.place, halves, band_px, hidden });
-            let found = fit(&start, window, self.stray)?;
+            let found = fit(&start, window, beside)?;
             let wider = found.model.blur_px[0].max(found.model.blur_px[1]);
             // The copy may have hidden how wide the blur is; the band must hold the whole edge.
-            if BAND_BLURS * wider <= 1.2 * band_px {
+            let in_band = BAND_BLURS * wider <= 1.2 * band_px;
+            let bent_px = |k: usize| (found.model.bend[k] - start.bend[k]).abs() * halves[k].norm_squared() / 2.0;
+            if in_band && round < MOST_ROUNDS && bent_px(0).max(bent_px(1)) > MOST_BENT_BLURS * blur {
+                start = Model { bend: found.model.bend, ..start };
+                continue;
+            }
+            if in_band {
                 let fits = plausible(&found, &start, cell, self.most_light_change);
                 return fits.then(|| Measured { px: found.place(&cell.place), fit: found, reach: cell.reach(&halves) });
             }
@@ -236,6 +249,7 @@ impl<T: Sample> Full<'_, T> {
             }
             start = Model { blur_px: found.model.blur_px, ..start };
         }
+        None
     }
 }
 

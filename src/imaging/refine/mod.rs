@@ -28,7 +28,7 @@ use nalgebra::{Matrix2, Point2, Vector2};
 
 use self::cell::Cell;
 use self::coarse::{coarse, enlarged};
-use self::curvature::{Point, bends};
+use self::curvature::{Bend, Point, Rule, bends};
 use self::full_size::Full;
 use self::saddle_fit::window::{Sample, Window};
 use self::saddle_fit::{Fit, Model};
@@ -108,8 +108,9 @@ impl<T: Sample> Full<'_, T> {
         Lattice::from_fn(measured.columns, measured.rows, |col, row| {
             let well = measured.get(col, row).copied();
             well.or_else(|| {
-                let known = self.windows_left(windows.get(col, row)?, &board, &mut window);
-                let known = known.into_iter().map(|corner| scatter.alone(corner));
+                let seen = windows.get(col, row)?;
+                let known = self.windows_left(seen, &board, &mut window);
+                let known = known.into_iter().map(|corner| scatter.alone(seen.with_lines(corner)));
                 known.filter(|corner| acceptance::is_of_use(corner, usual_px2)).min_by(by_variance)
             })
         })
@@ -131,9 +132,9 @@ impl<T: Sample> Full<'_, T> {
     fn look(&self, detected: &Detected, window: &mut Window) -> Seen {
         let coarse = coarse(detected, window);
         let columns = coarse.columns;
-        let at = |bends: &[[f64; 2]], col: usize, row: usize| bends[row * columns + col];
+        let at = |bends: &[[Option<Bend>; 2]], col: usize, row: usize| bends[row * columns + col];
         let on_copy = |m: &Measured| Point { px: detected.level.to_picture(&m.px), counts: true };
-        let coarse_bends = bends(&coarse.map(on_copy), GOOD_PX);
+        let coarse_bends = bends(&coarse.map(on_copy), Rule { good_px: GOOD_PX, in_part: detected.print.is_some() });
         // A neighbour that could not be measured still says how far the squares reach.
         let places: Places = Lattice::from_fn(columns, coarse.rows, |col, row| {
             let px = coarse.get(col, row).map_or(detected.corners.get(col, row), |m| Some(&m.px))?;
@@ -142,16 +143,19 @@ impl<T: Sample> Full<'_, T> {
         let scale = detected.level.scale();
         let near: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
             let from = coarse.get(col, row)?;
-            let cell = Cell::of(&places, col, row)?.with_markers(&places, (col, row), detected.print);
+            let bends = at(&coarse_bends, col, row);
+            let cell = Cell { own_bends: bends.map(|bend| bend.is_none()), ..Cell::of(&places, col, row)? };
+            let cell = cell.with_markers(&places, (col, row), detected.print);
             let start = Model {
                 corner: Vector2::zeros(),
-                bend: at(&coarse_bends, col, row),
+                bend: bends.map(|bend| bend.map_or(0.0, |bend| bend.per_px)),
                 // The copy's grey values are not those above the veil: without contrast the fit finds levels of its own.
                 half_contrast: 0.0,
                 ..enlarged(&from.fit.model, scale)
             };
             // On a copy of full size the first fit is a measurement already.
-            Some(self.near(cell, start, (scale == 1.0).then_some(*from), window))
+            let near = self.near(cell, start, (scale == 1.0).then_some(*from), window);
+            Some(Windows { bends, ..near })
         });
         // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large ones from.
         let near_only: Vec<Measured> = near.iter().filter_map(|(_, _, windows)| windows.near).collect();
@@ -162,7 +166,9 @@ impl<T: Sample> Full<'_, T> {
         });
         let (windows, board) = self.large(&near, &places, window);
         let measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            self.largest_free(windows.get(col, row)?, &board, window)
+            let seen = windows.get(col, row)?;
+            let corner = self.largest_free(seen, &board, window)?;
+            Some(seen.with_lines(corner))
         });
         Seen { windows, board, measured }
     }

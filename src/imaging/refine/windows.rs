@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, RowVector2, Vector2};
 use super::Measured;
 use super::acceptance;
 use super::cell::Cell;
-use super::curvature::{Point, bends};
+use super::curvature::{Bend, Point, Rule, bends};
 use super::saddle_fit::{Fit, Model};
 use crate::imaging::lattice::{Lattice, Places};
 
@@ -19,6 +19,8 @@ pub(super) struct Windows {
     pub(super) cell: Cell,
     /// What the fits start from, with the edges' bends.
     pub(super) start: Model,
+    /// How the board's corners show the edges to bend.
+    pub(super) bends: [Option<Bend>; 2],
     /// Whether the full window is hardly larger than the near one.
     pub(super) alone: bool,
     /// Half of the full window at the most, px.
@@ -36,10 +38,28 @@ impl Windows {
         (self.near.as_ref().is_none_or(|near| board.agrees(near, full)) && board.accepts(full)).then_some(full)
     }
 
-    /// The same with other bends of the edges.
-    pub(super) fn rebent(self, bend: [f64; 2]) -> Windows {
+    /// The same with other bends of the edges, where these are known.
+    pub(super) fn rebent(self, bends: [Option<Bend>; 2]) -> Windows {
+        let bends = [0, 1].map(|k| bends[k].or(self.bends[k]));
+        let bend = [0, 1].map(|k| bends[k].map_or(self.start.bend[k], |bend| bend.per_px));
         let start = Model { bend, ..self.start };
-        Windows { start, full: self.full.map(|full| full.rebent(bend, &self.cell)), ..self }
+        Windows { start, bends, full: self.full.map(|full| full.rebent(bend, &self.cell)), ..self }
+    }
+
+    /// A corner with what the bends of its edges, as the board's lines show them, make of its covariance. Whole boards have lines so long that it is
+    /// hardly anything.
+    pub(super) fn with_lines(&self, corner: Measured) -> Measured {
+        if !self.cell.has_markers() {
+            return corner;
+        }
+        let [a, b] = [0, 1].map(|k| {
+            let half_px = corner.reach[k] * self.cell.edges[k].norm();
+            self.bends[k].map_or(1.0, |bend| bend.scatter(half_px)).max(0.0).sqrt()
+        });
+        let Some(back) = corner.normals().try_inverse() else { return corner };
+        let scale = back * Matrix2::new(a, 0.0, 0.0, b) * corner.normals();
+        let covariance_px2 = scale * corner.fit.covariance_px2 * scale.transpose();
+        Measured { fit: Fit { covariance_px2, ..corner.fit }, ..corner }
     }
 }
 
@@ -47,12 +67,16 @@ impl Measured {
     /// What the fit would be with other bends: a straight edge through a window is off by a sixth of bend times half the window squared.
     fn rebent(self, bend: [f64; 2], cell: &Cell) -> Measured {
         let Measured { px, fit, reach } = self;
+        let bend = [0, 1].map(|k| if cell.own_bends[k] { fit.model.bend[k] } else { bend[k] });
         let off = |k: usize| (bend[k] - fit.model.bend[k]) * (reach[k] * cell.edges[k].norm()).powi(2) / 6.0;
-        let normals = fit.model.angles_rad.map(|angle| RowVector2::new(-angle.sin(), angle.cos()));
-        let step =
-            Matrix2::from_rows(&normals).try_inverse().map_or(Vector2::zeros(), |m| m * Vector2::new(off(0), off(1)));
+        let step = self.normals().try_inverse().map_or(Vector2::zeros(), |m| m * Vector2::new(off(0), off(1)));
         let model = Model { corner: fit.model.corner + step, bend, ..fit.model };
         Measured { px: px + step, fit: Fit { model, ..fit }, reach }
+    }
+
+    /// The normals of the edges, a row each.
+    fn normals(&self) -> Matrix2<f64> {
+        Matrix2::from_rows(&self.fit.model.angles_rad.map(|angle| RowVector2::new(-angle.sin(), angle.cos())))
     }
 }
 
@@ -68,10 +92,11 @@ pub(super) fn bends_by(
     seen: &Lattice<Windows>,
     places: &Places,
     which: impl Fn(&Windows) -> Option<Measured>,
-) -> Vec<[f64; 2]> {
+) -> Vec<[Option<Bend>; 2]> {
     let grid = Lattice::from_fn(seen.columns, seen.rows, |col, row| {
         let measured = seen.get(col, row).and_then(&which).map(|m| Point { px: m.px, counts: true });
         measured.or_else(|| Some(Point { px: *places.get(col, row)?, counts: false }))
     });
-    bends(&grid, GOOD_PX)
+    let in_part = seen.iter().any(|(_, _, windows)| windows.cell.has_markers());
+    bends(&grid, Rule { good_px: GOOD_PX, in_part })
 }

@@ -8,7 +8,6 @@ use super::patch::Patch;
 use super::psf::Optics;
 use super::sensor::{Lighting, Sensor};
 use crate::geometry::Transform;
-use crate::imaging::coded::Layout;
 use crate::imaging::coded::faces::{Face, faces};
 use crate::simulate::physical_board::PhysicalBoard;
 use crate::stereo::Camera;
@@ -93,7 +92,7 @@ impl Scene<'_> {
         let mut outlines = Vec::new();
         for j in 0..squares.rows {
             for i in 0..squares.columns {
-                if PhysicalBoard::is_black(i, j) {
+                if self.board.is_black(i, j) {
                     outlines.extend(self.board_outline(&self.board.square_mm(i, j)));
                 }
             }
@@ -111,7 +110,7 @@ impl Scene<'_> {
 
     /// The markers in the board's light squares, then what is white on them; none for a plain board.
     fn marker_layers(&self) -> Vec<Layer> {
-        let faces = faces(&self.board.drawing, Layout::New);
+        let faces = faces(&self.board.drawing, self.board.layout());
         let layer = |faces: &[Face], value: f64| Layer {
             outlines: faces.iter().filter_map(|face| self.board_outline(&self.board.face_mm(face))).collect(),
             tone: (value, 0.0, 0.0),

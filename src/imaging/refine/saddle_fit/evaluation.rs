@@ -20,6 +20,8 @@ const STRAY_ARM: usize = ARM + 2;
 pub struct Evaluation<const C: usize> {
     /// Sums of the columns' products over all pixels.
     pub sums: SMatrix<f64, C, C>,
+    /// Sum of squared residuals over the pixels that see an edge.
+    pub near_cost: f64,
     /// For each edge, on either side of the crossing.
     pub arms: [[Arm<C>; 2]; 2],
 }
@@ -37,11 +39,11 @@ pub struct Misfit {
 #[derive(Debug, Clone, Copy)]
 pub struct Arm<const C: usize> {
     /// Normal matrix of step and turn.
-    normal: Matrix2<f64>,
+    pub(super) normal: Matrix2<f64>,
     /// Its inverse; zero where the arm does not determine them.
     inverse: Matrix2<f64>,
     /// Sums of the products of the derivatives by step and turn with all columns.
-    by_columns: SMatrix<f64, 2, C>,
+    pub(super) by_columns: SMatrix<f64, 2, C>,
 }
 
 impl<const C: usize> Arm<C> {
@@ -51,7 +53,8 @@ impl<const C: usize> Arm<C> {
         gradient.dot(&(self.inverse * gradient))
     }
 
-    fn gradient(&self, parameters: &[usize], step: &[f64]) -> Vector2<f64> {
+    /// Its gradient by step and turn then.
+    pub(super) fn gradient(&self, parameters: &[usize], step: &[f64]) -> Vector2<f64> {
         let taken = parameters.iter().zip(step).map(|(&at, by)| self.by_columns.column(at) * *by);
         taken.fold(self.by_columns.column(N).into_owned(), |left, taken| left - taken)
     }
@@ -131,11 +134,12 @@ impl Model {
             }
             add_mapped(&mut total, map, &sum);
         }
+        let near_cost = total[(N, N)];
         for (sums, alike) in window.flat.iter().zip([-1.0, 1.0]) {
             let map = self.flat_to_parameters(alike);
             add_mapped(&mut total, &map[..map.len() + C - STRAY_COLUMNS], sums);
         }
-        Evaluation { sums: total, arms }
+        Evaluation { sums: total, near_cost, arms }
     }
 
     #[inline(always)]

@@ -3,11 +3,13 @@
 //! In: pixels and a start good to a few blurs. Out: place, covariance (residual variance times inverse normal matrix), blur,
 //! contrast, residual. Method: [`model`]'s ten parameters by Levenberg-Marquardt (Marquardt 1963), analytic derivatives.
 //! Two blurs, the edges' directions, both grey levels and the gradient of the light are fitted with the corner; the edges' bend
-//! (lens distortion) is given. Goes wrong: too few pixels, no contrast, an edge that is not there; all end in `None`.
+//! (lens distortion) is given, or the window's own where nothing else tells it ([`own_bends`]). Goes wrong: too few pixels, no contrast, an edge that is not there; all end in `None`.
 
 mod crossing;
+mod end;
 mod evaluation;
 pub mod model;
+mod own_bends;
 mod products;
 mod special;
 pub mod window;
@@ -15,7 +17,7 @@ pub mod window;
 use nalgebra::{Matrix2, Point2, SMatrix, SVector, Vector2};
 
 pub use evaluation::Misfit;
-use evaluation::{Arm, Evaluation, misfits};
+use evaluation::{Arm, Evaluation};
 pub use model::Model;
 use model::{COLUMNS, N};
 use window::Window;
@@ -31,6 +33,8 @@ const SMOOTH_BLUR_PX: f64 = 0.5;
 /// Sum of squared residuals at a model, with its normal matrix and gradient.
 struct Equations {
     cost: f64,
+    /// The same of pixels that see an edge.
+    near_cost: f64,
     matrix: Normal,
     gradient: Column,
     arms: [[Arm<COLUMNS>; 2]; 2],
@@ -94,9 +98,10 @@ impl Model {
 
     /// The equations of a least-squares step.
     fn equations(&self, window: &Window) -> Equations {
-        let Evaluation { sums, arms } = self.evaluate(window);
+        let Evaluation { sums, near_cost, arms } = self.evaluate(window);
         Equations {
             cost: sums[(N, N)],
+            near_cost,
             matrix: sums.fixed_view::<N, N>(0, 0).into_owned(),
             gradient: sums.fixed_view::<N, 1>(0, N).into_owned(),
             arms,
@@ -115,9 +120,17 @@ fn with_levels(start: &Model, window: &Window) -> Option<Model> {
     Some(Model { level: d[0], half_contrast: d[1], ..even })
 }
 
-/// Fits the model to the window's pixels. `None` where the pixels don't determine it or the fit does not settle. `stray` is the variance of the
-/// slope of stray light that the board's pictures have, (grey values per px)^2, where they have any.
-pub fn fit(start: &Model, window: &Window, stray: Option<f64>) -> Option<Fit> {
+/// What a window is to tell beside the model's parameters.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Beside {
+    /// The slope of stray light, which has this variance, (grey values per px)^2.
+    pub stray: Option<f64>,
+    /// The bend of either edge.
+    pub bends: [bool; 2],
+}
+
+/// Fits the model to the window's pixels. `None` where the pixels don't determine it or the fit does not settle.
+pub fn fit(start: &Model, window: &Window, beside: Beside) -> Option<Fit> {
     let count = window.count();
     if window.near() < 3 * N {
         return None;
@@ -126,63 +139,12 @@ pub fn fit(start: &Model, window: &Window, stray: Option<f64>) -> Option<Fit> {
     let start = with_levels(start, window)?;
     let (model, last, steps) = settled(start, window, freedom, LEAST_BLUR_PX)
         .or_else(|| settled(start.add(&Column::zeros(), SMOOTH_BLUR_PX), window, freedom, SMOOTH_BLUR_PX))?;
-    let fit = match stray {
-        Some(variance) => with_stray(&model, window, freedom, variance)?,
-        None => plain(&model, &last, freedom)?,
+    let fit = match beside.stray {
+        Some(variance) => end::with_stray(&model, window, (variance, beside.bends))?,
+        None => end::plain(&model, &last, window, beside.bends)?,
     };
     let fit = Fit { pixels: count, left_out: window.left_out, steps, ..fit };
     (fit.covariance_px2.iter().all(|v| v.is_finite()) && last.cost.is_finite()).then_some(fit)
-}
-
-/// Rounding to whole grey values alone leaves this variance.
-const LEAST_VARIANCE: f64 = 1.0 / 12.0;
-
-/// What the equations at the end of a fit tell of it.
-fn plain(model: &Model, last: &Equations, freedom: f64) -> Option<Fit> {
-    const PARAMETERS: [usize; N] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9];
-    let variance = (last.cost / freedom).max(LEAST_VARIANCE);
-    // A blur at its bound is not known the better for it.
-    let inverse = last.matrix.cholesky()?.inverse();
-    let arms = last.arms.map(|sides| sides.map(|arm| arm.gain(&[], &[]) / variance));
-    let misfits = of_both_edges(&last.arms, (&PARAMETERS, &[]), &inverse, variance);
-    Some(Fit::of(*model, &inverse, variance, arms, misfits))
-}
-
-/// Parameters of a fit that holds stray light, too: light that does not come from the board but from a reflection on it, and adds to dark and
-/// bright alike. Taken as light on the board its slope would move the edges. A fit is linear near its end: one step takes it there.
-fn with_stray(model: &Model, window: &Window, freedom: f64, slope_variance: f64) -> Option<Fit> {
-    const PARAMETERS: [usize; N + 2] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, COLUMNS, COLUMNS + 1];
-    let Evaluation { sums, arms } = model.evaluate_with_stray(window);
-    let mut matrix = SMatrix::<f64, { N + 2 }, { N + 2 }>::from_fn(|i, k| sums[(PARAMETERS[i], PARAMETERS[k])]);
-    let gradient = SVector::<f64, { N + 2 }>::from_fn(|i, _| sums[(PARAMETERS[i], N)]);
-    let mut variance = (sums[(N, N)] / freedom).max(LEAST_VARIANCE);
-    let weight = variance / slope_variance;
-    (matrix[(N, N)], matrix[(N + 1, N + 1)]) = (matrix[(N, N)] + weight, matrix[(N + 1, N + 1)] + weight);
-    let cholesky = matrix.cholesky()?;
-    let (step, inverse) = (cholesky.solve(&gradient), cholesky.inverse());
-    variance = ((sums[(N, N)] - step.dot(&gradient)) / freedom).max(LEAST_VARIANCE);
-    let misfit = arms.map(|sides| sides.map(|arm| arm.gain(&PARAMETERS, step.as_slice()) / variance));
-    let misfits = of_both_edges(&arms, (&PARAMETERS, step.as_slice()), &inverse, variance);
-    let model = model.add(&step.fixed_rows::<N>(0).into_owned(), LEAST_BLUR_PX);
-    let slope = (Vector2::new(step[N], step[N + 1]), inverse.fixed_view::<2, 2>(N, N) * variance);
-    Some(Fit { stray: Some(slope), ..Fit::of(model, &inverse, variance, misfit, misfits) })
-}
-
-/// The misfits of both edges together, in units of the residuals' variance.
-fn of_both_edges<const C: usize, const P: usize>(
-    arms: &[[Arm<C>; 2]; 2],
-    taken: (&[usize; P], &[f64]),
-    inverse: &SMatrix<f64, P, P>,
-    variance: f64,
-) -> [Misfit; 2] {
-    let mut sum = [Misfit::default(); 2];
-    for edge in arms.iter().filter_map(|sides| misfits(sides, taken, inverse)) {
-        for (sum, edge) in sum.iter_mut().zip(edge) {
-            sum.chi_square += edge.chi_square / variance;
-            sum.freedom += edge.freedom;
-        }
-    }
-    sum
 }
 
 /// The model at the end of all steps, the equations one short step before it, and the number of steps.
@@ -232,29 +194,6 @@ fn settled(start: Model, window: &Window, freedom: f64, least_blur_px: f64) -> O
 }
 
 impl Fit {
-    fn of<const P: usize>(
-        model: Model,
-        inverse: &SMatrix<f64, P, P>,
-        variance: f64,
-        arm_misfit: [[f64; 2]; 2],
-        misfits: [Misfit; 2],
-    ) -> Fit {
-        let part = |row: usize, column: usize| inverse.fixed_view::<2, 2>(row, column) * variance;
-        Fit {
-            model,
-            covariance_px2: part(0, 0),
-            residual: variance.sqrt(),
-            place_by_light: part(0, 8),
-            light_covariance: part(8, 8),
-            arm_misfit,
-            misfits,
-            stray: None,
-            pixels: 0,
-            left_out: 0,
-            steps: 0,
-        }
-    }
-
     /// The fit with all its covariances `factor` times as large.
     pub fn scattering(self, factor: f64) -> Fit {
         Fit {
@@ -303,7 +242,7 @@ mod tests {
                 half_contrast: 0.0,
                 ..truth
             };
-            let fit = fit(&start, &window, None).unwrap();
+            let fit = fit(&start, &window, Beside::default()).unwrap();
             // Limited by the stop rule, not by the pixels.
             assert!((fit.model.corner - truth.corner).norm() < 1e-4, "{:?}", fit.model);
             assert!((fit.model.blur_px[1] - 1.3).abs() < 1e-3 && (fit.model.angles_rad[0] - 0.1).abs() < 1e-3);
@@ -314,8 +253,8 @@ mod tests {
     #[test]
     fn a_flat_or_empty_window_has_no_corner() {
         let start = Model::example();
-        assert_eq!(fit(&start, &Window::default(), None), None);
+        assert_eq!(fit(&start, &Window::default(), Beside::default()), None);
         let flat = window(&Model { half_contrast: 0.0, light_slope: Vector2::zeros(), ..start }, 10, f64::MAX);
-        assert!(fit(&start, &flat, None).is_none_or(|f| f.covariance_px2[(0, 0)] > 1.0));
+        assert!(fit(&start, &flat, Beside::default()).is_none_or(|f| f.covariance_px2[(0, 0)] > 1.0));
     }
 }

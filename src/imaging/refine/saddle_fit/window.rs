@@ -63,6 +63,8 @@ pub struct Window {
     pub flat: [Matrix4<f64>; 2],
     /// Number of pixels that were not kept.
     pub left_out: usize,
+    /// Whether something is hidden in it.
+    pub hides: bool,
 }
 
 /// Where a window lies and what is near.
@@ -169,6 +171,7 @@ impl Window {
         self.crossing.clear();
         self.arms.iter_mut().flatten().for_each(Groups::clear);
         (self.flat, self.left_out) = ([Matrix4::zeros(); 2], 0);
+        self.hides = frame.hidden != [None; 2];
         let Some(cut) = Cut::new(frame) else { return };
         let Image { width, height, pixels } = image;
         let (width, height) = (*width, *height);
