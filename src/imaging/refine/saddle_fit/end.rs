@@ -5,10 +5,10 @@
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
+use super::equations::{Column, Equations, Fit, LEAST_BLUR_PX};
 use super::evaluation::{Arm, Evaluation, Misfit, STRAY_COLUMNS, misfits};
 use super::model::{COLUMNS, Model, N};
 use super::window::Window;
-use super::{Column, Equations, Fit, LEAST_BLUR_PX};
 
 /// Rounding to whole grey values alone leaves this variance.
 const LEAST_VARIANCE: f64 = 1.0 / 12.0;

@@ -7,6 +7,7 @@
 
 mod crossing;
 mod end;
+mod equations;
 mod evaluation;
 pub mod model;
 mod own_bends;
@@ -14,61 +15,21 @@ mod products;
 mod special;
 pub mod window;
 
-use nalgebra::{Matrix2, Point2, SMatrix, SVector, Vector2};
+use nalgebra::{Point2, Vector2};
 
+pub use equations::Fit;
+use equations::{Column, Equations, LEAST_BLUR_PX, Normal};
+use evaluation::Evaluation;
 pub use evaluation::Misfit;
-use evaluation::{Arm, Evaluation};
 pub use model::Model;
-use model::{COLUMNS, N};
+use model::N;
 use window::Window;
 
 /// Steps after which a fit that still moves is given up; a good start needs three to six.
 const MAX_STEPS: usize = 40;
-/// Least blur, px: that of the box of a pixel alone, 1/sqrt(12). Sharpened pictures would fit less, with a slope that no pixel sees.
-const LEAST_BLUR_PX: f64 = 0.3;
-/// The same for fits that do not settle with the former: an edge so steep between two rows of pixels may lie anywhere there, one that is as wide as
+/// Least blur, px, for fits that do not settle with [`LEAST_BLUR_PX`]: an edge so steep between two rows of pixels may lie anywhere there, one that is as wide as
 /// the pixels are apart lies in one place. What the profile then misses is alike on both sides.
 const SMOOTH_BLUR_PX: f64 = 0.5;
-
-/// Sum of squared residuals at a model, with its normal matrix and gradient.
-struct Equations {
-    cost: f64,
-    /// The same of pixels that see an edge.
-    near_cost: f64,
-    matrix: Normal,
-    gradient: Column,
-    arms: [[Arm<COLUMNS>; 2]; 2],
-}
-
-type Normal = SMatrix<f64, N, N>;
-type Column = SVector<f64, N>;
-
-/// What a fit found.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fit {
-    /// The parameters.
-    pub model: Model,
-    /// Covariance of the corner's place, px^2.
-    pub covariance_px2: Matrix2<f64>,
-    /// Standard deviation of the residuals, grey values.
-    pub residual: f64,
-    /// Covariance of the corner's place (rows, px) with the light's slope (columns, 1/px).
-    pub place_by_light: Matrix2<f64>,
-    /// Covariance of the light's slope, 1/px^2.
-    pub light_covariance: Matrix2<f64>,
-    /// For each edge, on either side of the crossing: chi-squared (two degrees of freedom) of that arm's edge against the common model.
-    pub arm_misfit: [[f64; 2]; 2],
-    /// By how much both edges bend at the crossing, and by how much their arms are apart there, beyond the common model.
-    pub misfits: [Misfit; 2],
-    /// Slope of stray light, grey values per px, and its covariance, where it was looked for.
-    pub stray: Option<(Vector2<f64>, Matrix2<f64>)>,
-    /// Number of pixels.
-    pub pixels: usize,
-    /// Number of pixels in the window that were left out: saturated, or not explained by a first fit.
-    pub left_out: usize,
-    /// Number of steps to the end.
-    pub steps: usize,
-}
 
 impl Model {
     /// The model after a step, with blurs of `least` px at the least.
