@@ -1,7 +1,7 @@
 //! Products and inverses of dense matrices as least squares need them.
 //!
 //! Rank is treated in one way: a symmetric matrix is brought to a unit diagonal, so that radians and mm are comparable, and what it says along
-//! eigenvectors below [`RANK`] is nothing. Such directions stay where they are.
+//! eigenvectors below `RANK` is nothing. Such directions stay where they are.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 

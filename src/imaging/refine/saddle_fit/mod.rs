@@ -3,7 +3,7 @@
 //! In: pixels and a start good to a few blurs. Out: place, covariance (residual variance times inverse normal matrix), blur,
 //! contrast, residual. Method: [`model`]'s ten parameters by Levenberg-Marquardt (Marquardt 1963), analytic derivatives.
 //! Two blurs, the edges' directions, both grey levels and the gradient of the light are fitted with the corner; the edges' bend
-//! (lens distortion) is given, or the window's own where nothing else tells it ([`own_bends`]). Goes wrong: too few pixels, no contrast, an edge that is not there; all end in `None`.
+//! (lens distortion) is given, or the window's own where nothing else tells it (`own_bends`). Goes wrong: too few pixels, no contrast, an edge that is not there; all end in `None`.
 
 mod crossing;
 mod end;
