@@ -45,40 +45,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     let headers: Vec<[Announced; 2]> =
         pairing.pairs.par_iter().map(|files| [&files.left, &files.right].map(|path| image::header(path))).collect();
     let sizes = majority_sizes(&headers);
-    let bar = progress::bar("looking for the board", 2 * pairing.pairs.len() as u64);
-    let seen: Vec<[Look; 2]> = pairing
-        .pairs
-        .par_iter()
-        .zip(&headers)
-        .map(|(files, [left, right])| {
-            let (left, right) = rayon::join(
-                || look(&files.left, left, wanted, sizes, &bar),
-                || look(&files.right, right, wanted, [sizes[1], sizes[0]], &bar),
-            );
-            [left, right]
-        })
-        .collect();
-    let again = |side: Look, path: &Utf8Path, header: &Announced, sizes: [(u32, u32); 2], board: Board| match side {
-        Err(refusal) if refusal.reason == coded::BY_LAYOUT => {
-            look(path, header, &Wanted { board, ..*wanted }, sizes, &bar)
-        }
-        known => known,
-    };
-    let seen = match common_layout(&seen) {
-        None => seen,
-        Some(layout) => {
-            let board = wanted.board.with_layout(layout);
-            let all = seen.into_par_iter().zip(&pairing.pairs).zip(&headers);
-            all.map(|(([one, other], files), [left, right])| {
-                [
-                    again(one, &files.left, left, sizes, board),
-                    again(other, &files.right, right, [sizes[1], sizes[0]], board),
-                ]
-            })
-            .collect()
-        }
-    };
-    bar.finish_and_clear();
+    let seen = look_at_all(pairing, &headers, sizes, wanted);
     let other = other_size(&seen);
     printed(&wanted.board, &seen).iter().for_each(progress::note);
     let (found, skipped) = sort_out(&pairing.pairs, seen, wanted.board);
@@ -102,6 +69,50 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
         notes.push(format!("the board was found in {} of {total} pairs", pairs.len()));
     }
     Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, notes })
+}
+
+/// Every picture from file to corners; of a board whose layout the pictures tell, those that did not tell it once more.
+fn look_at_all(
+    pairing: &Pairing,
+    headers: &[[Announced; 2]],
+    sizes: [(u32, u32); 2],
+    wanted: &Wanted<'_>,
+) -> Vec<[Look; 2]> {
+    let bar = progress::bar("looking for the board", 2 * pairing.pairs.len() as u64);
+    let seen: Vec<[Look; 2]> = pairing
+        .pairs
+        .par_iter()
+        .zip(headers)
+        .map(|(files, [left, right])| {
+            let (left, right) = rayon::join(
+                || look(&files.left, left, wanted, sizes, &bar),
+                || look(&files.right, right, wanted, [sizes[1], sizes[0]], &bar),
+            );
+            [left, right]
+        })
+        .collect();
+    let again = |side: Look, path: &Utf8Path, header: &Announced, sizes: [(u32, u32); 2], board: Board| match side {
+        Err(refusal) if refusal.reason == coded::BY_LAYOUT => {
+            look(path, header, &Wanted { board, ..*wanted }, sizes, &bar)
+        }
+        known => known,
+    };
+    let seen = match common_layout(&seen) {
+        None => seen,
+        Some(layout) => {
+            let board = wanted.board.with_layout(layout);
+            let all = seen.into_par_iter().zip(&pairing.pairs).zip(headers);
+            all.map(|(([one, other], files), [left, right])| {
+                [
+                    again(one, &files.left, left, sizes, board),
+                    again(other, &files.right, right, [sizes[1], sizes[0]], board),
+                ]
+            })
+            .collect()
+        }
+    };
+    bar.finish_and_clear();
+    seen
 }
 
 /// What a file's header says, or why it says nothing.
