@@ -25,7 +25,7 @@ use crate::stereo::model::rig::Rig;
 use crate::stereo::pairs::misfit::misfit_px;
 use crate::stereo::pairs::{Cause, numbering};
 use crate::stereo::select::model_comparison::Trial;
-use crate::stereo::select::stated_uncertainty::{excess_scatter, step};
+use crate::stereo::select::stated_uncertainty::{scatter_beside, step};
 use crate::stereo::solve::difference::Difference;
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
@@ -125,16 +125,14 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let layout =
         Layout { left: Some(before.rig.left.lens), right: Some(before.rig.right.lens), transform: true, shape: true };
     let solved = problem.solve(&layout)?;
-    let by_corners = solved.neighbours(&corners.board).inflation() * solved.loss_factor;
-    let scatter = excess_scatter(&solved, &layout, &corners.board).max(before.pair_excess);
-    let scatter = scatter * solved.noise_of(before.noise.as_ref());
+    let [scatter, beyond] = scatter_beside(&solved, &layout, &corners.board, before.pair_excess, before.noise.as_ref());
     let trial = Trial::new(&solved.problem, layout).ok_or_else(Error::undetermined)?;
     let numbers = layout.shape_start();
     let old = before.covariance(&layout).ok_or(Error::NoCovariance)?;
     let joint = old + trial.covariance.view((0, 0), (numbers, numbers)) * scatter;
     let off = step(&layout, &problem.values.shared, &trial.values.shared).rows(0, numbers).into_owned();
     let pairs = before.pairs.unwrap_or(0).max(problem.views.len());
-    let difference = Difference::new(off, &joint, pairs, scatter / by_corners).ok_or_else(Error::undetermined)?;
+    let difference = Difference::new(off, &joint, pairs, beyond).ok_or_else(Error::undetermined)?;
 
     let squares = LONG_SQUARES.min(corners.board.columns() - 1);
     let length_mm = squares as f64 * corners.board.square_mm;

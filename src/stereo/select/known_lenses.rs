@@ -105,9 +105,8 @@ fn is_bent(problem: &Problem, board: &Board, bent: &Layout, flat: &Layout) -> Re
 pub fn check(start: &Problem, known: &KnownLenses, layout: &Layout, board: &Board) -> Option<LensCheck> {
     let own = Problem { priors: start.priors.knowing(&known.loosened()), ..start_of(start, known) };
     let solved = own.solve(layout).ok()?;
-    let by_corners = solved.neighbours(board).inflation() * solved.loss_factor;
-    let scatter = stated_uncertainty::excess_scatter(&solved, layout, board).max(known.pair_excess);
-    let scatter = scatter * solved.noise_of(known.noise.as_ref());
+    let [scatter, beyond] =
+        stated_uncertainty::scatter_beside(&solved, layout, board, known.pair_excess, known.noise.as_ref());
     let trial = Trial::new(&solved.problem, *layout)?;
     let places: Vec<usize> = known.numbers().iter().map(|(side, at)| layout.camera_start(*side) + at).collect();
     let all = layout.numbers(&trial.values.shared);
@@ -116,7 +115,7 @@ pub fn check(start: &Problem, known: &KnownLenses, layout: &Layout, board: &Boar
         values: DVector::from_iterator(n, places.iter().map(|at| all[*at])),
         covariance: DMatrix::from_fn(n, n, |i, j| scatter * trial.covariance[(places[i], places[j])]),
         pairs: known.pairs.unwrap_or(0).max(solved.problem.views.len()),
-        scatter: scatter / by_corners,
+        scatter: beyond,
         corners: solved.problem.views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count(),
     };
     let difference = pictures.difference(known)?;

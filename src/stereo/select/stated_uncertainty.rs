@@ -12,6 +12,7 @@ use crate::imaging::Board;
 use crate::statistics::chi_square_quantile;
 use crate::stereo::Lens;
 use crate::stereo::Rig;
+use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::select::cross_validation;
 use crate::stereo::select::model_comparison::{LensScore, Trial};
@@ -86,6 +87,20 @@ pub fn excess_scatter(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
         scattered(&solved.problem, layout, &by_noise.shared, inflation)?.2.ratio
     };
     inflation * ratio().unwrap_or(1.0).max(1.0)
+}
+
+/// Variance of the numbers over that of the weighted normal equations, by these pairs or as an earlier calibration of the rig knows it, whichever is
+/// larger, and the same over what their corners' noise lets expect.
+pub fn scatter_beside(
+    solved: &Solved,
+    layout: &Layout,
+    board: &Board,
+    pair_excess: f64,
+    noise: Option<&Noise>,
+) -> [f64; 2] {
+    let by_corners = solved.neighbours(board).inflation() * solved.loss_factor;
+    let scatter = excess_scatter(solved, layout, board).max(pair_excess) * solved.noise_of(noise);
+    [scatter, scatter / by_corners]
 }
 
 /// The normal equations, the covariance of the shared numbers that allows for the pairs' scatter, and that scatter.
