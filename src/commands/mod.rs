@@ -10,7 +10,6 @@ pub mod identify;
 pub mod measure;
 mod outcome;
 pub mod plan;
-mod recheck;
 pub mod rectify;
 pub mod report;
 pub mod robot;

@@ -2,7 +2,7 @@
 
 use camino::Utf8Path;
 
-use super::{Outcome, Result};
+use super::super::{Outcome, Result};
 use crate::cli::CameraCheck;
 use crate::config::{self, Config};
 use crate::diagnostic::Status;
