@@ -11,6 +11,7 @@ pub mod series;
 pub mod standing;
 #[cfg(test)]
 mod tests;
+mod without_drift;
 
 use nalgebra::DVector;
 use rand::{RngExt, SeedableRng};
@@ -24,6 +25,7 @@ use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::view::View;
 use crate::stereo::findings::hypothesis::{Hypothesis, any_place};
 use crate::stereo::findings::series::{Change, Line, Linear};
+use crate::stereo::model::parameters::Layout;
 use crate::stereo::pairs::misfit::misfit_px;
 use crate::stereo::pairs::series::PairMisfit;
 use crate::stereo::pairs::{Cause, DiscardedPair};
@@ -96,6 +98,14 @@ pub struct Along {
 }
 
 impl Along {
+    /// The same for another layout: the numbers that it has.
+    pub fn in_layout(&self, own: &Layout, other: &Layout) -> Along {
+        let (from, to) = (own.names(), other.names());
+        let at: Vec<Option<usize>> = to.iter().map(|name| from.iter().position(|own| own == name)).collect();
+        let taken = |step: &DVector<f64>| DVector::from_fn(to.len(), |i, _| at[i].map_or(0.0, |k| step[k]));
+        Along { whole: taken(&self.whole), common: taken(&self.common), ..self.clone() }
+    }
+
     /// The same where the rig with a share of the change is the one that is taken.
     pub fn seen_from(&self, share: f64) -> Along {
         Along { common: &self.whole * share, ..self.clone() }

@@ -9,7 +9,7 @@
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
 use crate::stereo::calibrate::{Calibration, calibrate, calibrate_with};
-use crate::stereo::findings::{self, Finding, Kind};
+use crate::stereo::findings::{self, Finding, Kind, without_drift};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
 use crate::stereo::select::options::Options;
@@ -55,7 +55,7 @@ fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Findin
     match with_runs {
         Ok(mut found) if found.runs == 0 => {
             trailing(&mut found, corners);
-            told.iter_mut().for_each(|change| stays(&mut found, change, asked));
+            told.iter_mut().for_each(|change| stays(&mut found, change, asked, corners));
             Ok((found, Vec::from_iter(told)))
         }
         // What contradicts the others is no rig of its own, or too few pairs of one: it is left out.
@@ -73,7 +73,7 @@ fn stands_since(corners: &Corners, asked: &Asked, later: Later, change: Finding)
     leave_out(&mut found, before);
     let mut told = vec![change];
     if let Some(mut further) = later.change {
-        stays(&mut found, &mut further, asked);
+        stays(&mut found, &mut further, asked, &later.corners);
         told.push(further);
     }
     (found, told)
@@ -84,7 +84,7 @@ fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Resu
     let mut found = calibrate(corners, &asked.options)?;
     let contradicts = |pair: &PairCorners| {
         let of_pair = found.discarded.pairs.iter().find(|d| d.pair == pair.pair);
-        of_pair.is_some_and(|d| matches!(d.cause, Cause::Unknown | Cause::NotSimultaneous | Cause::OtherBoard))
+        of_pair.is_some_and(|d| d.cause.may_be_the_rig())
     };
     let names = |pairs: &mut dyn Iterator<Item = &PairCorners>| -> Vec<String> {
         pairs.take_while(|pair| contradicts(pair)).map(|pair| pair.pair.clone()).collect()
@@ -177,6 +177,11 @@ fn change(calibration: &Calibration, asked: &Asked) -> Option<Finding> {
 }
 
 impl Finding {
+    /// Whether this cause is the one found, or not told apart from it.
+    fn may_be(&self, cause: Cause) -> bool {
+        self.cause.split('|').any(|word| word == cause.word())
+    }
+
     /// Whether it moves a length by more than the share of the tolerance up to which a change is harmless.
     pub fn material(&self, asked: &Asked) -> bool {
         self.effect_mm.is_some_and(|mm| mm > MATERIAL_SHARE * asked.tolerance_mm)
@@ -220,15 +225,28 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
 
 /// A change that stays in the rig: of one that drifts the rig is that of the middle of the series, and what it drifted since then is told beside
 /// it; a step is part of the uncertainty. Where the last pairs are those of another rig, that is said.
-fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked) {
+fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked, corners: &Corners) {
+    let board_may_grow = change.may_be(Cause::OtherBoard);
     if let Some(along) = &mut change.along {
-        let within = if change.kind == Kind::Drift { along.sigma_of(MIDDLE) } else { along.to_last() };
-        found.uncertainty.shared += &within * within.transpose();
         if change.kind == Kind::Drift {
-            found.move_rig(&along.to(MIDDLE));
+            match without_drift::at_share(found, corners, &asked.options, along, MIDDLE) {
+                Some(still) => {
+                    *along = along.in_layout(&found.layout, &still.layout);
+                    *found = still;
+                }
+                None => found.move_rig(&along.to(MIDDLE)),
+            }
+        }
+        let mut within = vec![if change.kind == Kind::Drift { along.sigma_of(MIDDLE) } else { along.to_last() }];
+        if change.kind == Kind::Drift {
             *along = along.seen_from(MIDDLE);
             found.since_moment.push(along.to_last());
+            // Of a board that grows nobody knows at which pair it had its size.
+            if board_may_grow {
+                within.push(along.to_last());
+            }
         }
+        within.iter().for_each(|step| found.uncertainty.shared += step * step.transpose());
         let matrix = found.uncertainty.shared.clone();
         found.values.shared.rig.covariance = Some(Covariance { order: found.layout.names(), matrix });
     }
@@ -242,13 +260,8 @@ fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked) {
 fn trailing(found: &mut Calibration, corners: &Corners) {
     let used = |pair: &PairCorners| found.views.iter().any(|view| view.pair == pair.pair);
     let Some(last) = corners.pairs.iter().rposition(used) else { return };
-    let contradicts = |pair: &&PairCorners| {
-        found
-            .discarded
-            .pairs
-            .iter()
-            .any(|d| d.pair == pair.pair && matches!(d.cause, Cause::Unknown | Cause::NotSimultaneous))
-    };
+    let contradicts =
+        |pair: &&PairCorners| found.discarded.pairs.iter().any(|d| d.pair == pair.pair && d.cause.may_be_the_rig());
     let after: Vec<String> =
         corners.pairs[last + 1..].iter().filter(contradicts).map(|pair| pair.pair.clone()).collect();
     found.standing =

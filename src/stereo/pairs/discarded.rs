@@ -77,6 +77,11 @@ impl Cause {
         }
     }
 
+    /// True where the rig may have changed instead: what happened is unknown, or a rig that changed looks the same.
+    pub fn may_be_the_rig(self) -> bool {
+        matches!(self, Cause::Unknown | Cause::NotSimultaneous | Cause::OtherBoard)
+    }
+
     /// True where the pair is one of the series and contradicts the others: not one without a board, shown twice, or of a rig that stood before.
     pub fn contradicts(self) -> bool {
         use Cause::{Before, CameraMoved, Duplicate, Focus, NoBoard};

@@ -77,9 +77,10 @@ pub fn moved_between(series: &Series, i: usize, missed_px: Option<f64>, usual_px
     let (larger, share) = of_best_size(series.shared, view, share);
     if missed_px.is_some() && misfit_px(series.shared, &larger).is_some_and(|(px, _)| px <= series.limit_px) {
         let percent = 100.0 * share.abs();
-        let which = if share > 0.0 { "larger" } else { "smaller" };
+        let [which, length] = if share > 0.0 { ["larger", "shorter"] } else { ["smaller", "longer"] };
         let reason = format!(
-            "it shows another board: its squares are {percent:.2} % {which} than those in the other pairs{missed}"
+            "it shows another board, its squares {percent:.2} % {which} than those in the other pairs, or the baseline was {:.2} mm {length}{missed}",
+            share.abs() * centre.norm()
         );
         return (Cause::OtherBoard, reason);
     }

@@ -121,10 +121,13 @@ impl Written {
         Some(Written { eyes: [Eye::read(&json["left"])?, Eye::read(&json["right"])?], rotation, translation })
     }
 
-    /// The same with one parameter of the covariance's names changed. `None` for a name that is none of the rig's.
+    /// The same with one parameter of the covariance's names changed; the board's own move no ray. `None` for a name that is neither.
     fn changed(&self, name: &str, by: f64) -> Option<Written> {
         let mut rig = self.clone();
         let (group, parameter) = name.split_once('.')?;
+        if group == "board" {
+            return Some(rig);
+        }
         if group == "right_from_left" {
             let axis = |c: Option<char>| ['x', 'y', 'z'].iter().position(|&a| Some(a) == c);
             let mut letters = parameter.chars();
