@@ -102,8 +102,21 @@ pub struct Without {
 
 /// The calibration without each fold. `None` for a fold without which the others do not determine the cameras.
 pub fn leave_out(equations: &Equations, layout: &Layout, shared: &Shared, fold_of: &[usize]) -> Vec<Option<Without>> {
-    let blocks = &equations.blocks;
-    let reduced: Option<Vec<(DMatrix<f64>, DVector<f64>)>> = blocks.iter().map(|block| block.reduced(0.0)).collect();
+    leave_out_with(equations, equations, layout, shared, fold_of)
+}
+
+/// The same where the gradients change by another `curvature` than the weighted squares': the one of a loss whose weights change with the
+/// residuals.
+pub fn leave_out_with(
+    curvature: &Equations,
+    equations: &Equations,
+    layout: &Layout,
+    shared: &Shared,
+    fold_of: &[usize],
+) -> Vec<Option<Without>> {
+    let pairs = curvature.blocks.iter().zip(&equations.blocks);
+    let reduced: Option<Vec<(DMatrix<f64>, DVector<f64>)>> =
+        pairs.map(|(curved, block)| Some((curved.reduced(0.0)?.0, block.reduced(0.0)?.1))).collect();
     let Some(reduced) = reduced else { return vec![None; count(fold_of)] };
     (0..count(fold_of))
         .map(|fold| without(&equations.prior, &reduced, layout, shared, |i| fold_of[i] != fold))

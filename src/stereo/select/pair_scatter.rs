@@ -3,7 +3,8 @@
 //! In: the normal equations of all pairs at their minimum, the groups of pairs with nearly the same pose, and the covariance by the corners'
 //! noise. Out: the ratio of the scatter found to the one expected, and the covariance. Method: the jackknife over groups (the
 //! group-clustered sandwich with its small-sample correction, CR3 of Bell and McCaffrey 2002) holds whatever hangs together within
-//! a pair: a lens, a board or light that the model lacks. Some ten groups know a scatter in some twenty directions badly, so that it is
+//! a pair: a lens, a board or light that the model lacks. With heavy tails a group that goes also changes what the others' corners weigh; the
+//! curvature of the loss has that in it (the M-estimator's sandwich, Huber 1981, section 7.6). Some ten groups know a scatter in some twenty directions badly, so that it is
 //! shrunk towards its mean (Ledoit and Wolf 2004), and taken only where it is larger than what the corners' noise gives.
 //! Goes wrong: groups without which the others do not determine the cameras; then there is no ratio, and nothing is enlarged.
 
@@ -11,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use crate::stereo::select::cross_validation::Without;
-use crate::stereo::solve::normal_equations::Block;
+use crate::stereo::solve::normal_equations::Equations;
 
 /// How the pairs scatter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -23,60 +24,68 @@ pub struct PairScatter {
     pub ratio: Option<f64>,
 }
 
-/// The covariance of the shared numbers that allows for how the groups scatter; `by_noise` is the one by the corners' noise, `inflation` the
-/// factor in it over the normal equations' own.
-pub fn covariance(
-    by_noise: &DMatrix<f64>,
-    inflation: f64,
-    blocks: &[Block],
-    group_of: &[usize],
-    without: &[Option<Without>],
-) -> (DMatrix<f64>, PairScatter) {
-    let unknown = PairScatter { groups: without.len(), ratio: None };
-    let all: Option<Vec<&Without>> = without.iter().map(Option::as_ref).collect();
-    match all.and_then(|all| enlarge(by_noise, inflation, blocks, group_of, &all)) {
-        Some((covariance, ratio)) => (covariance, PairScatter { groups: without.len(), ratio: Some(ratio) }),
-        None => (by_noise.clone(), unknown),
+/// The groups of pairs, and the rig without each of them.
+pub struct Jackknife<'a> {
+    /// The normal equations at the minimum, with the corners' weights.
+    pub equations: &'a Equations,
+    /// The same with the loss's own curvature.
+    pub curvature: &'a Equations,
+    /// The group of every pair.
+    pub group_of: &'a [usize],
+    /// The rig without each group, by the curvature.
+    pub without: &'a [Option<Without>],
+}
+
+impl Jackknife<'_> {
+    /// The covariance of the shared numbers that allows for how the groups scatter; `by_noise` is the one by the corners' noise, `inflation` the
+    /// factor in it over the normal equations' own.
+    pub fn covariance(&self, by_noise: &DMatrix<f64>, inflation: f64) -> (DMatrix<f64>, PairScatter) {
+        let groups = self.without.len();
+        let all: Option<Vec<&Without>> = self.without.iter().map(Option::as_ref).collect();
+        match all.and_then(|all| self.enlarge(by_noise, inflation, &all)) {
+            Some((covariance, ratio)) => (covariance, PairScatter { groups, ratio: Some(ratio) }),
+            None => (by_noise.clone(), PairScatter { groups, ratio: None }),
+        }
+    }
+
+    fn enlarge(&self, by_noise: &DMatrix<f64>, inflation: f64, without: &[&Without]) -> Option<(DMatrix<f64>, f64)> {
+        let (n, groups) = (by_noise.nrows(), without.len());
+        if groups < 2 || n == 0 {
+            return None;
+        }
+        let (root, inverse_root) = roots(by_noise)?;
+        let correction = (groups - 1) as f64 / groups as f64;
+        let steps: Vec<DVector<f64>> =
+            without.iter().map(|w| &inverse_root * &w.step * (groups as f64 * correction).sqrt()).collect();
+        // What the noise alone makes of the jackknife: groups that weigh much in a direction stretch it.
+        let own = by_noise / inflation;
+        let (weighted, curved) = (reduced(self.equations)?, reduced(self.curvature)?);
+        let sum = |all: &[DMatrix<f64>]| all.iter().fold(DMatrix::zeros(n, n), |sum, m| sum + m);
+        let slope = (&own * sum(&curved)).trace() / (&own * sum(&weighted)).trace();
+        let mut expected = 0.0;
+        for (group, without) in without.iter().enumerate() {
+            let in_group = weighted.iter().zip(self.group_of).filter(|(_, of)| **of == group);
+            let information = in_group.fold(DMatrix::zeros(n, n), |sum, (m, _)| sum + m);
+            let gradient = &information - &information * &own * &information;
+            let step = &inverse_root * &without.covariance * slope;
+            expected += inflation * correction * (&step * gradient * step.transpose()).trace();
+        }
+        let scatter = steps.iter().fold(DMatrix::zeros(n, n), |sum, x| sum + x * x.transpose()) / groups as f64;
+        let stretch = (expected / n as f64).max(1.0);
+        let ratio = scatter.trace() / n as f64 / stretch;
+        let shrunk = shrunk(&scatter, &steps) / stretch;
+        let eigen = shrunk.symmetric_eigen();
+        let larger = eigen.eigenvalues.map(|v| v.max(1.0));
+        let factor = &eigen.eigenvectors * DMatrix::from_diagonal(&larger) * eigen.eigenvectors.transpose();
+        let covariance = &root * factor * root.transpose();
+        (ratio.is_finite() && covariance.iter().all(|v| v.is_finite()))
+            .then(|| (0.5 * (&covariance + covariance.transpose()), ratio))
     }
 }
 
-fn enlarge(
-    by_noise: &DMatrix<f64>,
-    inflation: f64,
-    blocks: &[Block],
-    group_of: &[usize],
-    without: &[&Without],
-) -> Option<(DMatrix<f64>, f64)> {
-    let (n, groups) = (by_noise.nrows(), without.len());
-    if groups < 2 || n == 0 {
-        return None;
-    }
-    let (root, inverse_root) = roots(by_noise)?;
-    let correction = (groups - 1) as f64 / groups as f64;
-    // What the noise alone makes of the jackknife: groups that weigh much in a direction stretch it.
-    let mut expected = 0.0;
-    let own = by_noise / inflation;
-    let steps: Vec<DVector<f64>> =
-        without.iter().map(|w| &inverse_root * &w.step * (groups as f64 * correction).sqrt()).collect();
-    for (group, without) in without.iter().enumerate() {
-        let mut information = DMatrix::zeros(n, n);
-        for (block, _) in blocks.iter().zip(group_of).filter(|(_, of)| **of == group) {
-            information += block.reduced(0.0)?.0;
-        }
-        let gradient = &information - &information * &own * &information;
-        let step = &inverse_root * &without.covariance;
-        expected += inflation * correction * (&step * gradient * step.transpose()).trace();
-    }
-    let scatter = steps.iter().fold(DMatrix::zeros(n, n), |sum, x| sum + x * x.transpose()) / groups as f64;
-    let stretch = (expected / n as f64).max(1.0);
-    let ratio = scatter.trace() / n as f64 / stretch;
-    let shrunk = shrunk(&scatter, &steps) / stretch;
-    let eigen = shrunk.symmetric_eigen();
-    let larger = eigen.eigenvalues.map(|v| v.max(1.0));
-    let factor = &eigen.eigenvectors * DMatrix::from_diagonal(&larger) * eigen.eigenvectors.transpose();
-    let covariance = &root * factor * root.transpose();
-    (ratio.is_finite() && covariance.iter().all(|v| v.is_finite()))
-        .then(|| (0.5 * (&covariance + covariance.transpose()), ratio))
+/// Each pair's share of the normal equations of the shared numbers.
+fn reduced(equations: &Equations) -> Option<Vec<DMatrix<f64>>> {
+    equations.blocks.iter().map(|block| Some(block.reduced(0.0)?.0)).collect()
 }
 
 /// The scatter matrix of some samples shrunk towards the multiple of the identity with the same trace, by as much as its own scatter says.

@@ -16,7 +16,7 @@ use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::select::cross_validation;
 use crate::stereo::select::model_comparison::{LensScore, Trial};
-use crate::stereo::select::pair_scatter::{self, PairScatter};
+use crate::stereo::select::pair_scatter::{Jackknife, PairScatter};
 use crate::stereo::solve::normal_equations::Equations;
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::uncertainty::Uncertainty;
@@ -61,8 +61,7 @@ pub fn state(
     lenses_known: bool,
     print_excess: f64,
 ) -> Stated {
-    let Some((equations, mut shared, pair_scatter)) = scattered(&solved.problem, layout, &by_noise.shared, inflation)
-    else {
+    let Some((equations, mut shared, pair_scatter)) = scattered(solved, layout, &by_noise.shared, inflation) else {
         let pair_scatter = PairScatter { groups: solved.problem.views.len(), ratio: None };
         return Stated { uncertainty: by_noise, pair_scatter, witnesses: Vec::new() };
     };
@@ -84,7 +83,7 @@ pub fn excess_scatter(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
     let inflation = solved.neighbours(board).inflation() * solved.loss_factor;
     let ratio = || {
         let by_noise = solved.uncertainty(layout).ok()?.scaled(inflation);
-        scattered(&solved.problem, layout, &by_noise.shared, inflation)?.2.ratio
+        scattered(solved, layout, &by_noise.shared, inflation)?.2.ratio
     };
     inflation * ratio().unwrap_or(1.0).max(1.0)
 }
@@ -105,16 +104,17 @@ pub fn scatter_beside(
 
 /// The normal equations, the covariance of the shared numbers that allows for the pairs' scatter, and that scatter.
 fn scattered(
-    problem: &Problem,
+    solved: &Solved,
     layout: &Layout,
     by_noise: &DMatrix<f64>,
     inflation: f64,
 ) -> Option<(Equations, DMatrix<f64>, PairScatter)> {
-    let Problem { views, values, .. } = problem;
+    let Problem { views, values, .. } = &solved.problem;
     let groups = cross_validation::groups(views, &values.poses);
-    let equations = problem.equations(layout)?;
-    let without = cross_validation::leave_out(&equations, layout, &values.shared, &groups);
-    let (shared, pair_scatter) = pair_scatter::covariance(by_noise, inflation, &equations.blocks, &groups, &without);
+    let (equations, curvature) = (solved.problem.equations(layout)?, solved.curvature(layout)?);
+    let without = cross_validation::leave_out_with(&curvature, &equations, layout, &values.shared, &groups);
+    let jackknife = Jackknife { equations: &equations, curvature: &curvature, group_of: &groups, without: &without };
+    let (shared, pair_scatter) = jackknife.covariance(by_noise, inflation);
     Some((equations, shared, pair_scatter))
 }
 

@@ -3,7 +3,7 @@
 //! In: views that agree and values near their minimum. Out: the values at the minimum, how corners scatter, and what each weighs. Method: a robust search, then the likeliest scatter of the corners, whose tails follow from the data, together with weak
 //! expectations of what lenses and boards are like ([`crate::stereo::solve::priors`]).
 
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Vector2};
 
 use crate::imaging::Board;
 use crate::stereo::Error;
@@ -160,6 +160,23 @@ impl Solved {
         let worst = worst_focal_sigma(&uncertainty.shared, layout, &self.shared().rig);
         let known = worst <= WORST_FOCAL_SIGMA;
         if known { Ok(uncertainty) } else { Err(Error::Undetermined { focal_sigma: Some(worst), skipped: Vec::new() }) }
+    }
+
+    /// The normal equations with the loss's own curvature: along its residual a corner's gradient changes by less than its weight.
+    pub fn curvature(&self, layout: &Layout) -> Option<Equations> {
+        let mut curved = self.problem.clone();
+        for (view, pose) in curved.views.iter_mut().zip(&curved.values.poses) {
+            for o in view.observations.iter_mut().filter(|o| o.active) {
+                // The whitener has the weight in it.
+                let residual = o.whiten(residuals::residual_px(&curved.values.shared, pose, o)?);
+                let slope = self.loss.slope_along(residual.norm_squared());
+                if slope < 1.0 {
+                    let along = residual * residual.transpose() / residual.norm_squared();
+                    o.whitener = (Matrix2::identity() + along * (slope.sqrt() - 1.0)) * o.whitener;
+                }
+            }
+        }
+        curved.equations(layout)
     }
 
     /// Variance of the corners about an earlier calibration over that of these pairs; at least one. A few pairs of a board that is held by hand

@@ -29,6 +29,16 @@ impl Loss {
         }
     }
 
+    /// Slope of the gradient along a residual over its weight, at least zero; `weighed` is the squared residual times the weight. Far off a
+    /// corner counts less the farther off it is.
+    pub fn slope_along(self, weighed: f64) -> f64 {
+        match self {
+            Loss::Squared => 1.0,
+            Loss::Cauchy(width) => (1.0 - 2.0 * weighed / (width * width)).max(0.0),
+            Loss::Student(freedom) => (1.0 - 2.0 * weighed / (freedom + 2.0)).max(0.0),
+        }
+    }
+
     /// Variance of an estimate over the inverse of the weighted normal equations, `J' W J` with the weights that these squared residuals
     /// have: the sandwich of an M-estimator with two-dimensional residuals (Huber 1981, section 7.6). One for least squares.
     pub fn variance_factor(self, squares: impl Iterator<Item = f64>) -> f64 {
@@ -57,6 +67,19 @@ mod tests {
                 let h = 1e-5 * s;
                 let slope = (loss.cost_and_weight(s + h).0 - loss.cost_and_weight(s - h).0) / (2.0 * h);
                 assert!((2.0 * slope - loss.cost_and_weight(s).1).abs() < 1e-7, "{loss:?} at {s}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_slope_along_a_residual_is_that_of_its_gradient() {
+        for loss in [Loss::Squared, Loss::Cauchy(2.5), Loss::Student(8.0)] {
+            let gradient = |r: f64| loss.cost_and_weight(r * r).1 * r;
+            for r in [0.1, 0.7, 1.5, 6.0] {
+                let h = 1e-6 * r;
+                let weight = loss.cost_and_weight(r * r).1;
+                let slope = ((gradient(r + h) - gradient(r - h)) / (2.0 * h) / weight).max(0.0);
+                assert!((slope - loss.slope_along(weight * r * r)).abs() < 1e-6, "{loss:?} at {r}: {slope}");
             }
         }
     }
