@@ -60,6 +60,8 @@ pub mod csv_table;
 #[doc(hidden)]
 pub mod diagnostic;
 #[doc(hidden)]
+pub mod difference;
+#[doc(hidden)]
 pub mod files;
 #[doc(hidden)]
 pub mod geometry;

@@ -4,6 +4,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::output::Output;
+use super::placement::ExportPlacement;
 use super::robot::ExportRobot;
 use super::values::between;
 use crate::formats::lenses::LensFile;
@@ -208,6 +209,8 @@ pub enum ExportWhat {
     Calibration(ExportCalibration),
     /// The robot
     Robot(ExportRobot),
+    /// Where the cameras stand, and the target on the flange
+    Placement(ExportPlacement),
 }
 
 /// `stereocal export calibration`

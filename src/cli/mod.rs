@@ -3,6 +3,7 @@
 mod board;
 mod cameras;
 mod output;
+mod placement;
 mod robot;
 mod simulate;
 pub mod unexpected;
@@ -16,6 +17,7 @@ pub use self::cameras::{
     BoardShape, CalibrationFormat, CameraCheck, Export, ExportCalibration, ExportWhat, Measure, Rectify,
 };
 pub use self::output::Output;
+pub use self::placement::{ExportPlacement, Locate, PlacementFormat};
 pub use self::robot::{
     Compensate, DhConvention, ExportRobot, Identify, Plan, PlanKind, RobotCommand, RobotFormat, RobotImport, RobotNew,
     RobotPlace, RobotShow, RobotWhat, TableFlags, Verify,
@@ -61,6 +63,8 @@ pub enum Command {
     Identify(Identify),
     /// Compare robot files with measurements, without fitting anything
     Verify(Verify),
+    /// Find where the cameras stand and the target sits, with a robot that is trusted
+    Locate(Locate),
     /// Write a board to print, in true size
     Board(PrintBoard),
     /// Join camera check, measurements and robot into one file to sign

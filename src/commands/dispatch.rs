@@ -3,7 +3,8 @@
 use super::error::Result;
 use super::outcome::Outcome;
 use super::{
-    board, camera_check, compensate, export, identify, measure, plan, rectify, report, robot, simulate, start, verify,
+    board, camera_check, compensate, export, identify, locate, measure, plan, rectify, report, robot, simulate, start,
+    verify,
 };
 use crate::cli::{Cli, Command};
 use crate::config::{self, Config};
@@ -29,6 +30,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Measure(args) => measure::run(&args, &config, run),
         Command::Identify(args) => identify::run(&args, &config, run),
         Command::Verify(args) => verify::run(&args, &config),
+        Command::Locate(args) => locate::run(&args, &config, run),
         Command::Board(args) => board::run(&args, &config, run),
         Command::Rectify(args) => rectify::run(&args, &config, run),
         Command::Report(args) => report::run(&args, &config, run),

@@ -8,9 +8,11 @@ use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::{Digested, Provenance, Run};
+use crate::formats::placement::{PLACEMENT, PlacementFile};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::{known, shared};
 use crate::identify::examine::{self, Examined};
+use crate::identify::judge::placement::Placed;
 use crate::identify::record::{self, Advice, Findings, Record, quality};
 use crate::identify::run::{Identification, identify, step_count};
 use crate::identify::{Error, Settings};
@@ -21,6 +23,9 @@ use crate::robot::{self, Robot};
 
 /// What `simulate` writes into the working directory.
 const DEFAULT_ROBOT: &str = "robot.toml";
+
+/// The robot that is written.
+const IDENTIFIED: &str = "identified.toml";
 
 /// Runs the command.
 pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
@@ -50,7 +55,8 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let findings = Findings::new(findings, unexplained, of_fit, &found);
     let record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     said(&record, &out);
-    let json = write(&out, &set, &nominal, &found, &record, &settings)?;
+    let placed = found.placed(&set, &nominal, &settings)?;
+    let json = write(&out, &set, &nominal, &found, &record, placed.as_ref(), &settings)?;
     let stdout = if args.output.json { json } else { report::identify::summary(&record, &out) };
     let status = if record.advice == Advice::DoNotUse { Status::OutOfTolerance } else { Status::Done };
     Ok(Outcome { stdout, status })
@@ -115,7 +121,7 @@ fn open(
     let run = Run { force: args.output.force, ..run };
     let inputs: Vec<&Utf8Path> = measurements.iter().map(Utf8PathBuf::as_path).chain(robot).collect();
     let out = OutDir::open(out)?.for_run(&run, &inputs);
-    out.check_free(&["identification.json", "identified.toml", "identify.html"])?;
+    out.check_free(&["identification.json", IDENTIFIED, PLACEMENT, "identify.html"])?;
     let measured = match measurements {
         [only] => check_calibration(&out, only),
         _ => None,
@@ -188,6 +194,7 @@ fn write(
     nominal: &Robot,
     found: &Identification,
     record: &Record,
+    placed: Option<&Placed>,
     settings: &Settings,
 ) -> Result<String> {
     let identified = &found.candidates[found.chosen].robot;
@@ -196,8 +203,9 @@ fn write(
     let places: Vec<_> = set.poses.iter().map(|p| (p.role, nominal.target_mm(&p.joints_rad))).collect();
     let center = set.poses.iter().find(|p| p.role == Role::Center).or(set.poses.first());
     let arm = center.map_or_else(Vec::new, |p| nominal.skeleton_mm(&p.joints_rad));
-    let page =
-        report::identify::page(set, record, &places, &arm, &errors(nominal, false), &errors(identified, is_fitted))?;
+    let after = errors(identified, is_fitted);
+    let placement = PlacementFile::new(IDENTIFIED, set, placed, &after);
+    let page = report::identify::page(set, record, &placement, &places, &arm, &errors(nominal, false), &after)?;
     let mut holds = record.expected.as_ref().map_or_else(
         || "The nominal robot was kept.".to_owned(),
         |expected| format!("Identified; {}; it holds within {}.", expected.sentence(), expected.poses),
@@ -206,8 +214,9 @@ fn write(
         holds = format!("Do not use this robot: {}.", record.reason);
     }
     let scale = record.scale.map_or(String::new(), |scale| format!("# Not in this: {}.\n", scale.sentence()));
-    out.write_toml("identified.toml", &format!("# {holds}\n{scale}{}", robot::file::to_toml(identified)))?;
+    out.write_toml(IDENTIFIED, &format!("# {holds}\n{scale}{}", robot::file::to_toml(identified)))?;
     let json = out.write_json("identification.json", record)?;
+    out.write_json(PLACEMENT, &placement)?;
     out.write("identify.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
     Ok(json)
 }

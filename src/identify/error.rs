@@ -85,6 +85,22 @@ pub enum Error {
         /// What it needs.
         needed: &'static str,
     },
+    /// Too few poses to place the sensor by.
+    #[error("group `{group}` has {found} poses with a point; a placement takes {needed}")]
+    TooFewToPlace {
+        /// The group.
+        group: String,
+        /// Poses with a point.
+        found: usize,
+        /// Poses that are needed.
+        needed: usize,
+    },
+    /// The poses leave a direction open.
+    #[error("these poses do not tell {direction}: they leave it open")]
+    Open {
+        /// What moves along it.
+        direction: String,
+    },
     /// A solver started from numbers that are no numbers.
     #[error("the residuals at the nominal robot are not finite")]
     NotFinite,
@@ -93,9 +109,12 @@ pub enum Error {
 impl Explain for Error {
     fn status(&self) -> Status {
         match self {
-            Error::NothingDetermined { .. } | Error::TooFew { .. } | Error::NothingJudged { .. } | Error::NotFinite => {
-                Status::Undetermined
-            }
+            Error::NothingDetermined { .. }
+            | Error::TooFew { .. }
+            | Error::NothingJudged { .. }
+            | Error::TooFewToPlace { .. }
+            | Error::Open { .. }
+            | Error::NotFinite => Status::Undetermined,
             _ => Status::BadInput,
         }
     }
@@ -113,6 +132,9 @@ impl Explain for Error {
             Error::NothingDetermined { .. } | Error::TooFew { .. } | Error::NothingJudged { .. } => {
                 Some("measure more poses, spread over the workspace and with varied orientation".to_owned())
             }
+            Error::TooFewToPlace { .. } | Error::Open { .. } => Some(
+                "turn the flange about two axes that are not parallel, by 20 deg or more, over three poses or more of each group".to_owned(),
+            ),
             Error::NoSamples { reason: Some(reason), .. } => Some(format!("the first of those without: {reason}")),
             Error::Targets { hint, .. } => Some((*hint).to_owned()),
             Error::ModelNeeds { .. } => Some("leave `--model` out and the model is chosen by the data".to_owned()),

@@ -103,14 +103,14 @@ pub fn of_targets(world: &World, targets: &[(&str, Vector3<f64>)], noise_mm: f64
     rows
 }
 
-/// A camera frame somewhere.
-fn sensor(group: usize) -> Transform {
+/// Where the camera of a group is.
+pub fn sensor(group: usize) -> Transform {
     let turn = Vector3::new(0.3 + group as f64, -0.7, 1.1);
     Transform::from_parts(Vector3::new(50.0, 80.0, 500.0).into(), UnitQuaternion::from_scaled_axis(turn))
 }
 
 /// Three normal numbers (Box and Muller).
-fn normal(random: &mut Pcg64Mcg) -> Vector3<f64> {
+pub fn normal(random: &mut Pcg64Mcg) -> Vector3<f64> {
     let mut one = || {
         let (u, v): (f64, f64) = (random.random(), random.random());
         (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()

@@ -6,6 +6,7 @@ pub mod camera_check;
 pub mod day;
 pub mod drawing;
 pub mod identify;
+pub mod located;
 pub mod measure;
 pub mod page;
 pub mod plan;

@@ -1,5 +1,6 @@
-//! `stereocal export`: a calibration or a robot in other programs' words.
+//! `stereocal export`: a calibration, a robot or a placement in other programs' words.
 
+mod placement;
 mod robot;
 
 use super::{Outcome, Result};
@@ -16,6 +17,7 @@ pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
     match &args.what {
         ExportWhat::Calibration(args) => calibration(args, config, run),
         ExportWhat::Robot(args) => robot::run(args, config, run),
+        ExportWhat::Placement(args) => placement::run(args, config, run),
     }
 }
 

@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::scan::{behind, list, number};
-use super::written::{ExportedFile, camera, numbers};
+use super::written::{ExportedFile, camera, matrix};
 use crate::formats::checked;
 use crate::geometry::rotation_matrix;
 use crate::stereo::model::rectification::{Matrices, Scaling, essential, fundamental};
@@ -15,13 +15,6 @@ use crate::stereo::{Camera, Error, Rig};
 
 /// One file for the rig. An error where OpenCV cannot rectify it.
 pub fn files(rig: &Rig) -> Result<Vec<ExportedFile>, Error> {
-    // By rows, as OpenCV stores matrices; nalgebra's are transposed for that.
-    let matrix = |name: &str, rows: usize, columns: usize, data: &[f64]| {
-        format!(
-            "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {} ]\n",
-            numbers(data.iter().copied())
-        )
-    };
     let mut text = String::from("%YAML:1.0\n---\n");
     text.push_str(&format!("image_width: {}\nimage_height: {}\n", rig.left.width, rig.left.height));
     text.push_str(&format!("right_image_width: {}\nright_image_height: {}\n", rig.right.width, rig.right.height));

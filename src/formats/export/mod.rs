@@ -9,4 +9,4 @@ mod scan;
 mod written;
 
 pub use read::{NAMES, read, read_camera};
-pub use written::ExportedFile;
+pub use written::{ExportedFile, matrix};

@@ -21,6 +21,12 @@ pub(super) fn numbers(values: impl IntoIterator<Item = f64>) -> String {
     all.join(", ")
 }
 
+/// A matrix as OpenCV's FileStorage has it in YAML, row by row: nalgebra's are transposed for that.
+pub fn matrix(name: &str, rows: usize, columns: usize, data: &[f64]) -> String {
+    let data = numbers(data.iter().copied());
+    format!("{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {data} ]\n")
+}
+
 /// A camera whose format tells the lens by the number of its coefficients.
 pub(super) fn camera(size: (f64, f64), pinhole: &[f64], distortion: &[f64]) -> Result<Camera, String> {
     checked::camera(size, pinhole, checked::lens_of_length(distortion.len())?, distortion)

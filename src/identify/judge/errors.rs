@@ -5,7 +5,7 @@
 //! distance of each predicted point to their mean. A group without fitted rows is placed by the rows that are judged.
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, Reading};
@@ -19,7 +19,7 @@ use crate::robot::Robot;
 pub const PLACED_BY_ITSELF: usize = 4;
 
 /// Figures of absolute errors, as in Table 3 of the paper.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// Number of errors.
     pub count: usize,

@@ -4,6 +4,8 @@ pub mod cells;
 pub mod errors;
 pub mod folds;
 pub mod held_out;
+pub mod locate;
+pub mod placement;
 pub mod scale;
 pub mod smooth;
 pub mod uncertainty;

@@ -1,7 +1,7 @@
 //! How far to trust the result: covariance of the parameters, the position error to expect, and what poses would tell.
 
 use nalgebra::DMatrix;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::rigid_columns;
 use crate::identify::data::dataset::Dataset;
@@ -55,6 +55,30 @@ pub struct Expected {
     pub map: Vec<(String, f64)>,
 }
 
+/// Lengths of errors to expect over some poses.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Lengths {
+    /// Mean over the poses of the expected length, mm.
+    pub mean_mm: f64,
+    /// 95 % are below, mm.
+    pub p95_mm: f64,
+    /// Expected length at the worst pose, mm.
+    pub max_mm: f64,
+}
+
+impl Lengths {
+    /// Of the mean square of the error at each pose, mm^2.
+    pub fn of_squares(squares_mm2: &[f64]) -> Lengths {
+        let count = squares_mm2.len().max(1) as f64;
+        let lengths: Vec<f64> = squares_mm2.iter().map(|s| MEAN_OVER_RMS * s.sqrt()).collect();
+        Lengths {
+            mean_mm: lengths.iter().sum::<f64>() / count,
+            p95_mm: P95_OVER_RMS * (squares_mm2.iter().sum::<f64>() / count).sqrt(),
+            max_mm: lengths.iter().copied().fold(0.0, f64::max),
+        }
+    }
+}
+
 /// Mean length of a vector of three normal numbers over the root of the mean of its square.
 const MEAN_OVER_RMS: f64 = 0.921_317_731_923_561_3;
 
@@ -95,14 +119,13 @@ impl Expected {
                 squares[i] = of_robot + of_frame + 3.0 * (scatter * scatter + smooth_mm2);
             }
         }
-        let lengths: Vec<f64> = squares.iter().map(|s| MEAN_OVER_RMS * s.sqrt()).collect();
-        let mean_square = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+        let Lengths { mean_mm, p95_mm, max_mm } = Lengths::of_squares(&squares);
+        let lengths = squares.iter().map(|s| MEAN_OVER_RMS * s.sqrt());
         Expected {
-            mean_mm: lengths.iter().sum::<f64>() / lengths.len().max(1) as f64,
-            p95_mm: P95_OVER_RMS * mean_square.sqrt(),
-            max_mm: lengths.iter().copied().fold(0.0, f64::max),
-            of_robot_mm: of_robots.iter().map(|s: &f64| MEAN_OVER_RMS * s.sqrt()).sum::<f64>()
-                / of_robots.len().max(1) as f64,
+            mean_mm,
+            p95_mm,
+            max_mm,
+            of_robot_mm: Lengths::of_squares(&of_robots).mean_mm,
             scatter_mm: MEAN_OVER_RMS * (3.0 * (scatter * scatter + smooth_mm2)).sqrt(),
             poses: region(set),
             map: set.poses.iter().map(|p| p.name.clone()).zip(lengths).collect(),

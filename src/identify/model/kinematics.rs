@@ -113,7 +113,7 @@ impl Kinematics {
         }
         let screws = Screws::new(&bent, &robot.tool_mm);
         let (mut point_columns, mut rotation_columns) = (Matrix3xX::zeros(0), Matrix3xX::zeros(0));
-        if derivatives {
+        if derivatives && !self.parameters.is_empty() {
             let columns = || self.parameters.iter().zip(&pose.features);
             point_columns =
                 Matrix3xX::from_columns(&columns().map(|(&p, &f)| screws.point_column(p, f)).collect::<Vec<_>>());

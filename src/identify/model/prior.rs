@@ -305,6 +305,9 @@ pub fn evidence_of_all(sds: &[f64], normal: &DMatrix<f64>, gradient: &DVector<f6
 
 /// Logarithm of the data's probability up to what the prior does not touch.
 fn evidence(covariance: &DMatrix<f64>, normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
+    if normal.is_empty() {
+        return 0.0;
+    }
     // log N = (g' C (I + N C)^-1 g - log det(I + N C)) / 2
     let mut inner = normal * covariance;
     for i in 0..inner.nrows() {

@@ -5,6 +5,7 @@ mod found;
 mod gross;
 mod held_out;
 mod identify;
+mod placed;
 mod session;
 
 pub use climb::{Certainty, Judged, certainty};

@@ -114,9 +114,13 @@ impl Formulation {
 
     /// Offsets of all parameters and extras where the free fit ended.
     pub fn offsets_of(&self) -> Vec<f64> {
-        let (of_base, extras) = self.free_fit.x.split_at(self.base.rank());
+        self.offsets_at(&self.free_fit.x[..self.base.rank()])
+    }
+
+    /// Offsets of all parameters with these base parameters, and of the extras where the free fit ended.
+    pub fn offsets_at(&self, of_base: &[f64]) -> Vec<f64> {
         let of_robot = self.spread() * nalgebra::DVector::from_column_slice(of_base);
-        of_robot.iter().chain(extras).copied().collect()
+        of_robot.iter().chain(self.extras()).copied().collect()
     }
 
     /// All parameters of the robot from the base parameters.
@@ -195,17 +199,29 @@ impl Formulation {
     /// The same with what the poses tell next to nothing of: parameters that only act together, or that nothing saw, as uncertain as they were
     /// before. At the poses that were fitted it makes no difference, at others it may.
     pub fn whole_covariance(&self) -> DMatrix<f64> {
+        let count = self.parameters().len();
+        self.offsets_covariance(&|_| false).view((0, 0), (count, count)).into_owned()
+    }
+
+    /// That of all parameters and extras, parameters that are `held` taken as they are.
+    pub fn offsets_covariance(&self, held: &dyn Fn(Parameter) -> bool) -> DMatrix<f64> {
         if !self.held || !self.scale_seen {
-            return self.robot_covariance();
+            let spread = whole_spread(self.spread(), self.rows.extras.len());
+            return &spread * self.covariance() * spread.transpose();
         }
         let (_, jacobian) = self.rows.evaluate(&self.offsets_of(), true);
+        let mut sds = self.most.standard_deviations(self.parameters(), &self.rows.extras);
+        for (sd, &parameter) in sds.iter_mut().zip(self.parameters()) {
+            if held(parameter) {
+                *sd = 0.0;
+            }
+        }
         let data = product(&jacobian, &jacobian);
-        let sds = self.most.standard_deviations(self.parameters(), &self.rows.extras);
-        let before = DVector::from_iterator(sds.len(), sds.iter().map(|sd| sd.powi(-2)));
-        let covariance = pseudo_inverse(&data + DMatrix::from_diagonal(&before));
+        let sds = DMatrix::from_diagonal(&DVector::from_vec(sds));
+        let before = DMatrix::identity(sds.nrows(), sds.nrows());
+        let covariance = &sds * pseudo_inverse(before + &sds * &data * &sds) * &sds;
         let more = &covariance * data * &covariance * (self.common - 1.0);
-        let count = self.parameters().len();
-        (covariance + more).view((0, 0), (count, count)).into_owned()
+        covariance + more
     }
 
     /// Base parameters about which the data say next to nothing: as uncertain as before.
@@ -301,6 +317,14 @@ impl<'a> Estimate<'a> {
         }
         Ok((rows, base, free_fit.ok_or(Error::NotFinite)?))
     }
+}
+
+/// All offsets from base parameters and extras.
+fn whole_spread(spread: DMatrix<f64>, extras: usize) -> DMatrix<f64> {
+    let (rows, columns) = spread.shape();
+    let mut whole = spread.resize(rows + extras, columns + extras, 0.0);
+    whole.view_mut((rows, columns), (extras, extras)).fill_with_identity();
+    whole
 }
 
 fn likelihood<'a>(

@@ -1,6 +1,7 @@
 //! The screen and the page of `identify`.
 
 mod figures;
+pub mod placement;
 mod screen;
 mod tables;
 
@@ -10,6 +11,7 @@ use nalgebra::Point3;
 use super::Result;
 use super::page::{self, Tone};
 use super::table::number;
+use crate::formats::placement::PlacementFile;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::RowError;
 use crate::identify::record::{Advice, PointSpread, Record};
@@ -22,6 +24,7 @@ pub use self::screen::{summary, verified};
 pub fn page(
     set: &Dataset,
     record: &Record,
+    placement: &PlacementFile,
     places: &[(Role, Point3<f64>)],
     arm: &[Point3<f64>],
     before: &[RowError],
@@ -56,6 +59,10 @@ pub fn page(
                 p { "Not in these figures: " (scale.sentence()) "." }
             }
             (figures::expected_map(expected, places)?)
+        }
+        @if !placement.groups.is_empty() {
+            h2 { "Where the cameras stand" }
+            (placement::tables(placement))
         }
         h2 { "Parameters" }
         p { "Table 2 of the paper: the corrected parameters of each link and joint; alpha and a of link j - 1, theta and d of joint j." }

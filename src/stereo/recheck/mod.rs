@@ -3,7 +3,7 @@
 //! In: a rig with its covariance, and the corners of two or more new pairs. Out: whether it changed, by what, how far that moves a
 //! length, and the smallest change of each kind that the pairs would have shown. Method: the new pairs give a rig by themselves, from the old
 //! one on; the difference of its numbers against both covariances, all of them together and each cause as a direction of its own
-//! ([`crate::stereo::solve::difference`]), all looks together at one level. A change of a cause is seen in nineteen of twenty such tests from
+//! ([`crate::difference`]), all looks together at one level. A change of a cause is seen in nineteen of twenty such tests from
 //! the level plus 1.645 of its standard deviations on, which is what the pairs are said to see. Goes wrong: pairs that are all alike hardly
 //! see a focus; that is what the stated figures say.
 
@@ -12,6 +12,7 @@ mod tests;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::difference::Difference;
 use crate::imaging::{Corners, Skipped};
 use crate::stereo::Error;
 use crate::stereo::data::corner_noise::Noise;
@@ -26,7 +27,6 @@ use crate::stereo::pairs::misfit::misfit_px;
 use crate::stereo::pairs::{Cause, numbering};
 use crate::stereo::select::model_comparison::Trial;
 use crate::stereo::select::stated_uncertainty::{scatter_beside, step};
-use crate::stereo::solve::difference::Difference;
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::volume::Volume;

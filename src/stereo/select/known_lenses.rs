@@ -3,12 +3,13 @@
 //! In: the pairs at their start, and lenses from another calibration. Out: the layout with what is expected, and the test. Method: the
 //! lenses are expectations with their covariance; the board is bent where the evidence for that is larger. The test compares the known numbers
 //! with those that the pictures give by themselves: their difference against both covariances, the pictures' one enlarged by what pairs scatter
-//! ([`crate::stereo::solve::difference`]). A focus alone is asked for, too: it is what changes, and a test of one number sees smaller changes of it. Causes are other lenses that might be known instead: another focus, left and right exchanged, another
+//! ([`crate::difference`]). A focus alone is asked for, too: it is what changes, and a test of one number sees smaller changes of it. Causes are other lenses that might be known instead: another focus, left and right exchanged, another
 //! camera. One is named where what it leaves is chance, and beside it those that do nearly as well.
 //! Goes wrong: pictures that say little of a lens; then the test says how large a change of focus it would have seen.
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::difference::Difference;
 use crate::imaging::{Board, Side};
 use crate::stereo::model::known_lenses::KnownLenses;
 use crate::stereo::model::parameters::Layout;
@@ -16,7 +17,6 @@ use crate::stereo::pairs::Cause;
 use crate::stereo::select::model_comparison::{Trial, gain_of_terms};
 use crate::stereo::select::options::{Choice, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
-use crate::stereo::solve::difference::Difference;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::{Error, Rig};
 

@@ -22,7 +22,7 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// `scatter` is the variance in the covariance over that by the corners' noise, as so many pairs tell: of the part beyond one they know as
+    /// `scatter` is the variance in the covariance over that by the readings' noise, as so many units (pairs, poses) tell: of the part beyond one they know as
     /// little as they are few, and of the rest much (Welch and Satterthwaite). Where no scatter was seen, as much as chance hides may be
     /// there. `None` where the covariance is singular.
     pub fn new(off: DVector<f64>, joint: &DMatrix<f64>, pairs: usize, scatter: f64) -> Option<Difference> {
@@ -36,6 +36,11 @@ impl Difference {
     /// Squared difference in units of its covariance.
     pub fn chi_square(&self) -> f64 {
         self.off.dot(&self.joint.solve(&self.off))
+    }
+
+    /// Product of two vectors in units of the covariance.
+    pub fn product(&self, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
+        a.dot(&self.joint.solve(b))
     }
 
     /// What it stays within but for this chance, where so many numbers are free to differ; infinite where too few pairs tell.

@@ -1,0 +1,64 @@
+//! Commands about where the cameras stand and the target sits.
+
+use camino::Utf8PathBuf;
+use clap::{Args, ValueEnum};
+
+use super::cameras::Measure;
+use super::robot::TableFlags;
+
+/// `stereocal locate`
+#[derive(Debug, Args)]
+pub struct Locate {
+    /// Poses: a folder with pictures and poses.csv, which is measured first, or a table of measurements as `identify` reads it.
+    #[command(flatten)]
+    pub measure: Measure,
+    /// The robot, taken as it is: identified.toml, or a nominal one that is trusted
+    #[arg(long, value_name = "FILE")]
+    pub robot: Utf8PathBuf,
+    /// How a table is read.
+    #[command(flatten)]
+    pub table: TableFlags,
+}
+
+/// `stereocal export placement`
+#[derive(Debug, Args)]
+pub struct ExportPlacement {
+    /// For which program
+    #[arg(long)]
+    pub format: PlacementFormat,
+    /// The placement, as `identify` or `locate` wrote it [default: placement.json in the results folder]
+    #[arg(long, value_name = "FILE")]
+    pub placement: Option<Utf8PathBuf>,
+    /// Which group of several [default: each, in a file of its own]
+    #[arg(long, value_name = "NAME")]
+    pub group: Option<String>,
+    /// Name of the robot's base frame
+    #[arg(long, value_name = "NAME", default_value = "base_link")]
+    pub base_frame: String,
+    /// Name of the flange's frame
+    #[arg(long, value_name = "NAME", default_value = "tool0")]
+    pub flange_frame: String,
+    /// Name of the left camera's optical frame
+    #[arg(long, value_name = "NAME", default_value = "left_camera_optical_frame")]
+    pub camera_frame: String,
+    /// Name of the target's frame
+    #[arg(long, value_name = "NAME", default_value = "target")]
+    pub target_frame: String,
+    /// Folder for results; key `out` [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+    /// Replace files that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Programs that a placement can be written for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PlacementFormat {
+    /// A ROS 2 launch file with static_transform_publisher, in m
+    RosStaticTf,
+    /// OpenCV's FileStorage (YAML) with calibrateHandEye's names, in mm
+    Opencv,
+    /// easy_handeye's calibration file (ROS 1), in m
+    EasyHandeye,
+}

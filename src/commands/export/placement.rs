@@ -1,0 +1,72 @@
+//! `stereocal export placement`: where the cameras stand, for other programs.
+
+use super::super::{Outcome, Result};
+use crate::cli::{ExportPlacement, PlacementFormat};
+use crate::config::{self, Config};
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::Run;
+use crate::formats::placement::{GroupRecord, PLACEMENT, PlacementFile};
+use crate::formats::placements::{Frames, Placement, easy_handeye, opencv, ros_static_tf};
+
+/// Runs the command.
+pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome> {
+    let out = OutDir::open(args.out.as_deref().unwrap_or(&config.out))?;
+    let path = args.placement.clone().unwrap_or_else(|| out.join(PLACEMENT));
+    let file = PlacementFile::read(&path)?;
+    let groups = groups(args, &file)?;
+    let out = out.for_run(&Run { force: args.force, ..run }, &[&path]);
+    let flange_from_target = file.flange_from_target.as_ref().and_then(|record| record.transform());
+    let mut stdout = String::new();
+    for group in &groups {
+        let Some(base_from_camera) = group.base_from_rig.transform() else { continue };
+        // A camera that stood in several places is several frames.
+        let suffix = if file.groups.len() > 1 { format!("_{}", plain(&group.group)) } else { String::new() };
+        let frames = Frames {
+            base: args.base_frame.clone(),
+            flange: args.flange_frame.clone(),
+            camera: format!("{}{suffix}", args.camera_frame),
+            target: args.target_frame.clone(),
+        };
+        let placement = Placement { frames: &frames, base_from_camera, flange_from_target };
+        let (name, text) = match args.format {
+            PlacementFormat::RosStaticTf => ("static_tf", ros_static_tf::text(&placement)),
+            PlacementFormat::Opencv => ("placement_opencv", opencv::text(&placement)),
+            PlacementFormat::EasyHandeye => {
+                ("easy_handeye", easy_handeye::text(&placement, &format!("easy_handeye{suffix}")))
+            }
+        };
+        let end = match args.format {
+            PlacementFormat::RosStaticTf => ".launch.yaml",
+            PlacementFormat::Opencv => ".yml",
+            PlacementFormat::EasyHandeye => ".yaml",
+        };
+        let name = format!("{name}{suffix}{end}");
+        out.write(&name, text.as_bytes())?;
+        stdout.push_str(&format!("{}\n", out.join(&name)));
+    }
+    if flange_from_target.is_none() {
+        stdout.push_str("note: the target's turn on the flange is not known: only the camera's place is in the file\n");
+    }
+    Ok(Outcome { stdout, status: Status::Done })
+}
+
+/// The groups that are asked for.
+fn groups<'a>(args: &ExportPlacement, file: &'a PlacementFile) -> Result<Vec<&'a GroupRecord>> {
+    let asked = |group: &&GroupRecord| args.group.as_ref().is_none_or(|name| *name == group.group);
+    let groups: Vec<&GroupRecord> = file.groups.iter().filter(asked).collect();
+    if !groups.is_empty() {
+        return Ok(groups);
+    }
+    let names: Vec<&str> = file.groups.iter().map(|group| group.group.as_str()).collect();
+    let problem = match (&args.group, names.is_empty()) {
+        (Some(name), false) => format!("--group {name}: the placement has {}", names.join(", ")),
+        _ => "the placement holds no group: distances do not tell where the sensor stands".to_owned(),
+    };
+    Err(config::Error::Invalid { problems: vec![problem] }.into())
+}
+
+/// A name that files and ROS frames may have.
+fn plain(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+}

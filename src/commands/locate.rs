@@ -1,0 +1,91 @@
+//! `stereocal locate`: where the cameras stand and the target sits, with a robot that is taken as it is.
+
+use camino::{Utf8Path, Utf8PathBuf};
+use serde::Serialize;
+
+use super::identify::{check_joints, read, source};
+use super::{Outcome, Result, measure};
+use crate::cli::Locate;
+use crate::config::Config;
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::Run;
+use crate::formats::known_robot;
+use crate::formats::placement::{PLACEMENT, PlacementFile};
+use crate::identify::data::dataset::Dataset;
+use crate::identify::data::shared;
+use crate::identify::examine::{self, Examined};
+use crate::identify::judge::errors::Judge;
+use crate::identify::judge::folds;
+use crate::identify::judge::locate::{Located, locate};
+use crate::{progress, report, robot};
+
+/// `placement.json` with the fit that it is from.
+#[derive(Debug, Serialize)]
+struct LocatedFile {
+    #[serde(flatten)]
+    placement: PlacementFile,
+    fit: Fit,
+}
+
+/// How the points agree with the robot.
+#[derive(Debug, Serialize)]
+struct Fit {
+    poses: usize,
+    rms_mm: f64,
+    chi_square: f64,
+    freedom: usize,
+    contradicted: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
+    let out = args.measure.output.out.clone().unwrap_or_else(|| config.out.clone());
+    let robot = robot::file::read(&args.robot)?;
+    let file = measured(args, config, &run, &out)?;
+    let source = source(vec![file], &args.table, config);
+    let rows = read(&source, &robot)?;
+    check_joints(&robot, &rows, &source.files[0])?;
+    let run = Run { force: args.measure.output.force, ..run };
+    let paths = source.paths();
+    let inputs: Vec<&Utf8Path> = paths.iter().map(Utf8PathBuf::as_path).chain([args.robot.as_path()]).collect();
+    let out = OutDir::open(&out)?.for_run(&run, &inputs);
+    out.check_free(&[PLACEMENT])?;
+
+    let mut set = Dataset::new(&rows)?;
+    if let [only] = paths.as_slice() {
+        shared::take(&only.with_file_name("measure.json"), &mut set);
+    }
+    let Examined { set, findings, unexplained, .. } = examine::examine(&set, &robot, &config.identify, &|_| {});
+    findings.iter().chain(&unexplained).for_each(|finding| progress::warn(finding.sentence()));
+    let trust = known_robot::trust(&args.robot);
+    let located = locate(&set, &robot, trust, &config.identify)?;
+    let all = set.rows(|_| true);
+    let held_out = folds::judged(&Judge::plain(&set, &all, false), located.placed.robot(), &all);
+    let placement = PlacementFile::new(args.robot.as_str(), &set, Some(&located.placed), &held_out);
+    let content = LocatedFile { fit: fit(&set, &located), placement };
+    let json = out.write_json(PLACEMENT, &content)?;
+    let summary = || report::located::summary(&content.placement, &located, set.poses.len(), &out);
+    let stdout = if args.measure.output.json { json } else { summary() };
+    let status = if located.contradicted { Status::OutOfTolerance } else { Status::Done };
+    Ok(Outcome { stdout, status })
+}
+
+fn fit(set: &Dataset, located: &Located) -> Fit {
+    Fit {
+        poses: set.poses.len(),
+        rms_mm: located.rms_mm,
+        chi_square: located.chi_square,
+        freedom: located.freedom,
+        contradicted: located.contradicted,
+    }
+}
+
+/// The measurements: those of a folder of pictures are made first, as `measure` makes them.
+fn measured(args: &Locate, config: &Config, run: &Run, out: &Utf8Path) -> Result<Utf8PathBuf> {
+    if !args.measure.poses.is_dir() {
+        return Ok(args.measure.poses.clone());
+    }
+    measure::run(&args.measure, config, run.clone())?;
+    Ok(out.join("measurements.csv"))
+}

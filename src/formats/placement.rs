@@ -1,0 +1,158 @@
+//! `placement.json`: where the cameras stand and the target sits on the flange, with covariances.
+
+use camino::Utf8Path;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::checked;
+use crate::diagnostic::Place;
+use crate::files::{self, Result};
+use crate::geometry::{Transform, rotation_matrix};
+use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::errors::{RowError, Spread};
+use crate::identify::judge::placement::{Placed, Uncertain, is_held};
+use crate::identify::judge::uncertainty::{Lengths, region};
+use crate::robot::Parameter;
+
+/// The file's name in a results folder.
+pub const PLACEMENT: &str = "placement.json";
+
+/// The file. Transforms are between the robot's root (before `[base]`), its flange (behind `[flange]`), the sensor and the target.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlacementFile {
+    /// The robot file that it belongs to: held numbers are its own.
+    pub robot: String,
+    /// Placements of the sensor; none where distances were read.
+    pub groups: Vec<GroupRecord>,
+    /// Where the target sits; `null` where there are no placements.
+    pub flange_from_target: Option<TransformRecord>,
+    /// What the rows and columns of a covariance are of.
+    pub covariance_order: [String; 6],
+    /// Joint ranges for which errors are said.
+    pub poses: String,
+    /// What cannot be told from a placement and stands as the robot's file has it.
+    pub held: Vec<Held>,
+}
+
+/// One placement.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GroupRecord {
+    /// Its name.
+    pub group: String,
+    /// Where the sensor stands.
+    pub base_from_rig: TransformRecord,
+    /// How far the predicted target is to be expected from the true one, at the poses of the group.
+    pub error_mm: Lengths,
+    /// Errors of points that did not help to place it.
+    pub held_out: Spread,
+}
+
+/// A rigid transform.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TransformRecord {
+    /// Row by row; `null` where nothing told it.
+    pub rotation: Option<[[f64; 3]; 3]>,
+    /// mm
+    pub translation_mm: [f64; 3],
+    /// Of `exp(w)` on the left of the rotation, rad, and of the translation, mm; `null` for what was not found.
+    pub covariance: [[Option<f64>; 6]; 6],
+}
+
+/// Numbers that are held, and why.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Held {
+    /// Their names.
+    pub parameters: Vec<String>,
+    /// Why.
+    pub because: String,
+}
+
+impl TransformRecord {
+    fn new(of: &Uncertain, turn_found: bool, shift_found: bool) -> TransformRecord {
+        let known = |k: usize| if k < 3 { turn_found } else { shift_found };
+        let entry = |r: usize, c: usize| (known(r) && known(c)).then(|| of.covariance[(r, c)]);
+        let rotation = rotation_matrix(&of.transform);
+        TransformRecord {
+            rotation: turn_found.then(|| std::array::from_fn(|r| std::array::from_fn(|c| rotation[(r, c)]))),
+            translation_mm: of.transform.translation.vector.into(),
+            covariance: std::array::from_fn(|r| std::array::from_fn(|c| entry(r, c))),
+        }
+    }
+
+    /// The transform; `None` without a rotation.
+    pub fn transform(&self) -> Option<Transform> {
+        let rotation = self.rotation?;
+        let rotation = Matrix3::from_fn(|r, c| rotation[r][c]);
+        Some(crate::geometry::transform_from_matrix(rotation, Vector3::from(self.translation_mm)))
+    }
+
+    /// Standard deviations of the turn, rad, and of the shift, mm, each as the root of the mean square of its three; `None` for what was not found.
+    pub fn sigmas(&self) -> [Option<f64>; 2] {
+        [0, 3].map(|first| {
+            let variances = (first..first + 3).map(|k| self.covariance[k][k]).collect::<Option<Vec<f64>>>()?;
+            Some((variances.iter().sum::<f64>() / 3.0).sqrt())
+        })
+    }
+}
+
+impl PlacementFile {
+    /// Of what was placed; `held_out` are errors of rows that took no part in it.
+    pub fn new(robot: &str, set: &Dataset, placed: Option<&Placed>, held_out: &[RowError]) -> PlacementFile {
+        let group = |placed: &Placed, index: usize| {
+            let group = placed.groups[index].0;
+            let of_group = held_out.iter().filter(|e| set.poses[e.row].group == group);
+            let sensor = placed.sensor_from_base(index).inverse().after(&placed.robot().ends.root_from_frame0);
+            GroupRecord {
+                group: set.groups[group].name.clone(),
+                base_from_rig: TransformRecord::new(&sensor, true, true),
+                error_mm: placed.expected(set, index),
+                held_out: Spread::new(of_group.filter_map(|e| e.point_mm.map(|p| p.norm()))),
+            }
+        };
+        let target = |placed: &Placed| {
+            let target = placed.target().after(&placed.robot().ends.last_frame_from_flange.inverse());
+            TransformRecord::new(&target, placed.oriented, placed.target_found)
+        };
+        PlacementFile {
+            robot: robot.to_owned(),
+            groups: placed.map_or_else(Vec::new, |p| (0..p.groups.len()).map(|index| group(p, index)).collect()),
+            flange_from_target: placed.map(target),
+            covariance_order: ["rx", "ry", "rz", "tx", "ty", "tz"].map(str::to_owned),
+            poses: region(set),
+            held: placed.map_or_else(Vec::new, held),
+        }
+    }
+
+    /// Reads one.
+    pub fn read(path: &Utf8Path) -> Result<PlacementFile> {
+        let hint = "`stereocal identify` and `stereocal locate` write it";
+        let file: PlacementFile = files::read_json(path, "placement", Some(hint))?;
+        let all = file.groups.iter().map(|group| &group.base_from_rig).chain(&file.flange_from_target);
+        for record in all {
+            let Some(rotation) = record.rotation else { continue };
+            let matrix = Matrix3::from_fn(|r, c| rotation[r][c]);
+            checked::rotation("a rotation", matrix).map_err(|message| files::Error::Format {
+                message,
+                place: Place { path: path.to_owned(), line: None },
+                hint: Some(hint.to_owned()),
+            })?;
+        }
+        Ok(file)
+    }
+}
+
+/// What stands as the robot's file has it.
+fn held(placed: &Placed) -> Vec<Held> {
+    let robot = placed.robot();
+    let joints = robot.joints.len();
+    let held = robot.mdh_parameters().into_iter().filter(|p| is_held(*p, joints));
+    let (of_base, of_flange): (Vec<Parameter>, Vec<Parameter>) = held.partition(|p| is_held(*p, usize::MAX));
+    let record = |list: Vec<Parameter>, because: &str| Held {
+        parameters: list.into_iter().map(Parameter::name).collect(),
+        because: because.to_owned(),
+    };
+    vec![
+        record(of_base, "they move the whole robot, as the place of the cameras does"),
+        record(of_flange, "they move the target on the flange, as its own place does"),
+    ]
+}

@@ -1,0 +1,200 @@
+//! Where the sensor stands and the target sits, with a robot that is taken as it is.
+//!
+//! In: points, orientations where there are any, a robot, and what is known of how it scatters. Out: the placements, the chi-squared of the fit
+//! against what is stated of readings and robot, and covariances that hold for few poses: a scatter that these poses themselves had to tell is
+//! made larger by Student's quantile over the normal one. Without orientations, and where the points leave the target's place open, it is held
+//! as the robot's file has it. Goes wrong: poses that leave a direction open are refused with that direction; a robot that is wrong in a
+//! way that a placement can take up is not seen.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+
+use super::placement::Placed;
+use crate::identify::Error;
+use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::residuals::raw::Raw;
+use crate::identify::residuals::rows::Rows;
+use crate::identify::sensor::{Extra, Scatter};
+use crate::identify::settings::{Model, Settings};
+use crate::identify::solve::formulation::Formulation;
+use crate::identify::solve::linearised::Linearised;
+use crate::identify::solve::task::Task;
+use crate::linear_algebra::{product, pseudo_inverse};
+use crate::robot::{Parameter, Robot};
+
+/// Fewest poses of a placement.
+pub const FEWEST_POSES: usize = 3;
+
+/// A robot's repeatability where nothing says more of it, mm: that of a common arm's data sheet.
+pub const REPEATABILITY_MM: f64 = 0.02;
+
+/// What is not known to this, mm or mrad, is not determined: a tenth of a small arm's reach.
+const OPEN: f64 = 100.0;
+
+/// Chance that a robot that agrees is said to contradict the points.
+const FALSE_ALARM: f64 = 0.01;
+
+/// Quantile of the normal distribution for intervals of 95 %.
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+
+/// How a robot scatters, as far as it is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trust {
+    /// How far a coordinate of the robot's points is off, mm.
+    pub point_mm: f64,
+    /// How far a component of an orientation's turn is off, rad; `None` where nothing says so.
+    pub rotation_rad: Option<f64>,
+}
+
+/// Where everything is.
+#[derive(Debug, Clone)]
+pub struct Located {
+    /// The placements.
+    pub placed: Placed,
+    /// Squared residuals of points over what is stated of them.
+    pub chi_square: f64,
+    /// Degrees of freedom of it.
+    pub freedom: usize,
+    /// Root mean square of a point's residual, mm.
+    pub rms_mm: f64,
+    /// Whether the points contradict the robot.
+    pub contradicted: bool,
+}
+
+/// Finds it.
+pub fn locate(set: &Dataset, robot: &Robot, trust: Trust, settings: &Settings) -> Result<Located, Error> {
+    let rows = set.rows(|pose| matches!(pose.reading, Reading::Position { .. }));
+    if set.kind != Kind::Positions {
+        return Err(Error::ModelNeeds { model: "position", needed: "positions (x_mm, y_mm, z_mm)" });
+    }
+    for (index, group) in set.groups.iter().enumerate() {
+        let found = rows.iter().filter(|&&r| set.poses[r].group == index).count();
+        if found < FEWEST_POSES {
+            return Err(Error::TooFewToPlace { group: group.name.clone(), found, needed: FEWEST_POSES });
+        }
+    }
+    let oriented = set.has_rotations();
+    let tool = [Parameter::V(0), Parameter::V(1), Parameter::V(2)];
+    let of_target = [Extra::Target(0), Extra::Target(1), Extra::Target(2)];
+    let extras: &[Extra] = if oriented { &of_target } else { set.body_unknowns() };
+    let model = if oriented { Model::Pose } else { Model::Position };
+    let with = |parameters| Task { set, robot, parameters, extras, rows: &rows, model, smooth: None, settings };
+    match fitted(&with(&tool), trust) {
+        // Points alone may leave open what the file says.
+        Err(Error::Open { .. } | Error::TooFew { .. } | Error::NothingDetermined { .. }) if !oriented => {
+            fitted(&with(&[]), trust)
+        }
+        located => located,
+    }
+}
+
+fn fitted(task: &Task, trust: Trust) -> Result<Located, Error> {
+    let mut formulation = Formulation::new(task)?;
+    let offsets = formulation.offsets_of();
+    let found = formulation.rows.scatter;
+    // What the rows themselves tell of the scatter is never taken for less than what is known of it.
+    let told = found.point_mm > trust.point_mm;
+    let scatter = Scatter {
+        point_mm: found.point_mm.max(trust.point_mm),
+        rotation_rad: trust.rotation_rad.map_or(found.rotation_rad, |known| found.rotation_rad.max(known)),
+        stated: found.stated.max(1.0),
+        smooth: None,
+    };
+    let levers = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
+    formulation.rows = task.rows_at(scatter, &levers);
+    if let Some(direction) = open_direction(&formulation.rows, &offsets, task.parameters.len()) {
+        return Err(Error::Open { direction });
+    }
+    let unknowns = offsets.len() + 6 * formulation.rows.blocks.len();
+    let numbers: usize = formulation.rows.blocks.iter().map(|b| b.row_count()).sum();
+    let whole_freedom = numbers.saturating_sub(unknowns);
+    let turns_told = task.model == Model::Pose && scatter.rotation_rad > trust.rotation_rad.unwrap_or(0.0);
+    let student = if told || turns_told { student(whole_freedom) } else { 1.0 };
+    let shared = formulation.offsets_covariance(&|_| false) * student;
+    let placed = Placed::new(task.set, &formulation.rows, &offsets, &shared, student);
+    let placed = placed.ok_or(Error::NothingDetermined { poses: task.rows.len() })?;
+    let (chi_square, freedom, rms_mm) = misfit(task, trust, &offsets);
+    let contradicted =
+        ChiSquared::new(freedom as f64).is_ok_and(|law| law.cdf(chi_square) > 1.0 - FALSE_ALARM && freedom > 0);
+    Ok(Located { placed, chi_square, freedom, rms_mm, contradicted })
+}
+
+/// By how much variances that so many degrees of freedom told are to be larger, that intervals of 1.96 standard deviations hold.
+fn student(freedom: usize) -> f64 {
+    let quantile = StudentsT::new(0.0, 1.0, freedom.max(1) as f64).map_or(NORMAL_95, |t| t.inverse_cdf(0.975));
+    (quantile / NORMAL_95).powi(2)
+}
+
+/// Squared residuals of points over what is stated of them and of the robot, with the target's place and the frames fitted to them alone; the
+/// degrees of freedom, and the root mean square of a residual.
+fn misfit(task: &Task, trust: Trust, offsets: &[f64]) -> (f64, usize, f64) {
+    let scatter = Scatter { rotation_rad: 1e3, ..Scatter::of_point(trust.point_mm) };
+    let rows = task.rows_at(scatter, task.robot);
+    let unknowns = task.parameters.len() + 6 * rows.blocks.len();
+    let (mut at, mut chi_square) = (offsets.to_vec(), f64::INFINITY);
+    for _ in 0..20 {
+        let (residuals, jacobian) = rows.evaluate(&at, true);
+        let cost = residuals.norm_squared();
+        if cost > chi_square * (1.0 - 1e-9) {
+            break;
+        }
+        chi_square = cost;
+        let step = pseudo_inverse(product(&jacobian, &jacobian)) * jacobian.tr_mul(&residuals);
+        at.iter_mut().zip(step.iter()).for_each(|(x, s)| *x -= s);
+    }
+    let raw = rows.raw(&at);
+    let squares: Vec<f64> = raw
+        .iter()
+        .filter_map(|(_, _, raw)| match raw {
+            Raw::Point(off, _) => Some(off.norm_squared()),
+            _ => None,
+        })
+        .collect();
+    let rms = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+    (chi_square, (3 * squares.len()).saturating_sub(unknowns), rms)
+}
+
+/// The direction of all unknowns together that is known least, in words, where it is as good as not known at all.
+fn open_direction(rows: &Rows, offsets: &[f64], parameters: usize) -> Option<String> {
+    let linear = Linearised::new(rows, offsets);
+    let shared = offsets.len();
+    let count = shared + 6 * linear.placements.len();
+    let mut normal = DMatrix::zeros(count, count);
+    for (k, placement) in linear.placements.iter().enumerate() {
+        let of_all = &placement.linear.jacobian;
+        let mut columns = DMatrix::zeros(of_all.nrows(), count);
+        columns.view_mut((0, 0), of_all.shape()).copy_from(of_all);
+        // Turns in mrad about the middle of the points, as the other angles are.
+        columns.view_mut((0, shared + 6 * k), (of_all.nrows(), 6)).copy_from(&placement.linear.design);
+        columns.columns_mut(shared + 6 * k, 3).scale_mut(1e-3);
+        normal += product(&columns, &columns);
+    }
+    let eigen = normal.symmetric_eigen();
+    let least = (0..count).min_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]))?;
+    if eigen.eigenvalues[least] > OPEN.powi(-2) {
+        return None;
+    }
+    Some(in_words(&eigen.eigenvectors.column(least).into_owned(), parameters, shared))
+}
+
+/// What moves along a direction of all unknowns.
+fn in_words(direction: &DVector<f64>, parameters: usize, shared: usize) -> String {
+    let part = |at: usize| Vector3::new(direction[at], direction[at + 1], direction[at + 2]);
+    let mut parts = vec![(part(shared), "the cameras' turn about"), (part(shared + 3), "the cameras' shift along")];
+    if parameters >= 3 {
+        parts.push((part(0), "the target's shift along"));
+    }
+    if shared >= parameters + 3 {
+        parts.push((part(parameters), "the target's turn about"));
+    }
+    const SHARE: f64 = 0.3;
+    let largest = parts.iter().map(|(v, _)| v.norm()).fold(0.0, f64::max);
+    let words = parts.iter().filter(|(v, _)| v.norm() > SHARE * largest).map(|(v, what)| {
+        let unit = v.normalize();
+        format!("{what} ({:.2}, {:.2}, {:.2})", unit.x, unit.y, unit.z)
+    });
+    words.collect::<Vec<String>>().join(" together with ")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,97 @@
+use nalgebra::Matrix3;
+
+use super::*;
+use crate::identify::synthetic;
+use crate::measurements::{Measurement, Observed};
+
+/// Poses of one group with noise of a coordinate that is stated, and turns where asked.
+fn rows(count: usize, noise_mm: f64, oriented: bool, seed: u64) -> (Robot, Vec<Measurement>) {
+    let mut world = synthetic::planned(4 * count, 0, 25.0, noise_mm, seed, &|_| {});
+    world.rows.retain(|row| row.at.group == "g1");
+    world.rows.truncate(count);
+    let mut random = rand_pcg::Pcg64Mcg::new(u128::from(seed) + 77);
+    for row in &mut world.rows {
+        let noise = nalgebra::UnitQuaternion::from_scaled_axis(NOISE_RAD * synthetic::normal(&mut random));
+        let flange = synthetic::sensor(1).rotation * world.truth.base_from_flange(&row.at.joints_rad()).rotation;
+        if let Observed::Position { covariance_mm2, rotation_rad, .. } = &mut row.observed {
+            *covariance_mm2 = Some(Matrix3::identity() * noise_mm * noise_mm);
+            *rotation_rad = oriented.then(|| (noise * flange).scaled_axis());
+        }
+    }
+    (world.truth, world.rows)
+}
+
+const NOISE_RAD: f64 = 3e-4;
+
+/// A robot that is known to scatter by no more than a micrometre.
+const EXACT: Trust = Trust { point_mm: 1e-3, rotation_rad: None };
+
+#[test]
+fn intervals_of_few_poses_hold() {
+    for count in [3, 5, 10] {
+        let (mut within, mut all, mut alarms) = (0, 0, 0);
+        for seed in 0..60 {
+            let (truth, rows) = rows(count, 0.05, true, seed);
+            // The target is looked for from where another robot's file has it.
+            let robot = Robot { tool_mm: truth.tool_mm + Vector3::new(30.0, -20.0, 40.0), ..truth.clone() };
+            let located = locate(&Dataset::new(&rows).unwrap(), &robot, EXACT, &Settings::default()).unwrap();
+            alarms += usize::from(located.contradicted);
+            let fresh = synthetic::planned(24, 0, 25.0, 0.0, 900 + seed, &|_| {});
+            let joints: Vec<Vec<f64>> =
+                fresh.rows.iter().filter(|r| r.at.group == "g1").map(|r| r.at.joints_rad()).collect();
+            let joints: Vec<&[f64]> = joints.iter().map(Vec::as_slice).collect();
+            for (q, (point, covariance)) in joints.iter().zip(located.placed.points(0, &joints)) {
+                let off = point - (synthetic::sensor(1) * truth.target_mm(q)).coords;
+                all += 3;
+                within += (0..3).filter(|&k| off[k].abs() < 1.96 * covariance[(k, k)].sqrt()).count();
+            }
+        }
+        let share = within as f64 / all as f64;
+        assert!((0.90..=1.0).contains(&share), "{count} poses: {share}");
+        assert!(alarms <= 3, "{count} poses: {alarms} of 60");
+    }
+}
+
+#[test]
+fn three_points_alone_place_the_cameras_with_the_target_of_the_file() {
+    let (truth, rows) = rows(3, 0.01, false, 5);
+    let located = locate(&Dataset::new(&rows).unwrap(), &truth, EXACT, &Settings::default()).unwrap();
+    assert!(!located.placed.target_found && !located.placed.oriented && !located.contradicted);
+    let off = located.placed.groups[0].1.translation.vector - synthetic::sensor(1).translation.vector;
+    assert!(off.norm() < 0.5, "{off}");
+}
+
+#[test]
+fn a_robot_that_contradicts_the_points_is_said() {
+    for oriented in [true, false] {
+        let (truth, rows) = rows(10, 0.02, oriented, 6);
+        let nominal = Robot { tool_mm: truth.tool_mm, ..Robot::paper() };
+        let trust = Trust { point_mm: REPEATABILITY_MM, rotation_rad: None };
+        let set = Dataset::new(&rows).unwrap();
+        assert!(locate(&set, &nominal, trust, &Settings::default()).unwrap().contradicted);
+        assert!(!locate(&set, &truth, trust, &Settings::default()).unwrap().contradicted);
+    }
+}
+
+#[test]
+fn poses_that_tell_too_little_are_refused_with_what_is_open() {
+    let (truth, all) = rows(6, 0.01, true, 7);
+    let refused = |rows: &[Measurement]| {
+        let set = Dataset::new(rows).unwrap();
+        locate(&set, &truth, EXACT, &Settings::default()).unwrap_err().to_string()
+    };
+    assert!(refused(&all[..2]).contains("has 2 poses with a point; a placement takes 3"));
+    // One axis turns: along it the cameras and the target may move together.
+    let mut one_axis = all[..4].to_vec();
+    for (k, row) in one_axis.iter_mut().enumerate() {
+        row.at.joints_deg = all[0].at.joints_deg.clone();
+        row.at.joints_deg[5] += 20.0 * k as f64;
+        let there = synthetic::sensor(1) * truth.base_from_flange(&row.at.joints_rad());
+        if let Observed::Position { point_mm, rotation_rad, .. } = &mut row.observed {
+            *point_mm = synthetic::sensor(1) * truth.target_mm(&row.at.joints_rad());
+            *rotation_rad = Some(there.rotation.scaled_axis());
+        }
+    }
+    let said = refused(&one_axis);
+    assert!(said.contains("the cameras' shift along") && said.contains("the target's shift along"), "{said}");
+}

@@ -1,0 +1,197 @@
+//! Where the sensor stands in each placement and where the target sits on the flange, with the covariance of all of it together.
+//!
+//! In: the rows of a fit with positions, the offsets of the robot that was found, and their covariance. Out: `sensor_from_base` of each group,
+//! the target's place, and for any joints the point that the robot shows there in the sensor's frame, with its covariance. Method: the
+//! placements' own unknowns follow the shared ones (robot, sensor, target) as the linearised problem says, so that what is uncertain of the
+//! robot is uncertain of the placement with it. What only moves the whole robot, or only the target on the flange, is what a placement is: it
+//! is held as the robot's file has it ([`is_held`]). Goes wrong: errors that the rows share and nobody stated are in none of it.
+
+use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
+
+use crate::geometry::{Transform, rigid_columns, rotation_matrix, skew, transform_from_matrix};
+use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::uncertainty::Lengths;
+use crate::identify::model::kinematics::{Kinematics, Place};
+use crate::identify::residuals::eliminate::{Block, Unknowns};
+use crate::identify::residuals::rows::Rows;
+use crate::identify::sensor::Extra;
+use crate::identify::solve::linearised::Linearised;
+use crate::linear_algebra::{product, pseudo_inverse};
+use crate::robot::{Parameter, Robot};
+
+/// Offsets of parameters are mm and mrad.
+const RAD_PER_MRAD: f64 = 1e-3;
+
+/// Whether a parameter of a robot with so many joints does nothing but move the whole robot, or the target on its flange.
+pub fn is_held(parameter: Parameter, joints: usize) -> bool {
+    use Parameter::{A, Alpha, D, Theta};
+    match parameter {
+        Alpha(0) | A(0) | Theta(0) | D(0) => true,
+        Theta(joint) | D(joint) => joint + 1 == joints,
+        _ => false,
+    }
+}
+
+/// A rigid transform and the covariance of `exp(w)` on the left of its rotation and of its translation, rad and mm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Uncertain {
+    /// The transform.
+    pub transform: Transform,
+    /// Turn first, then shift.
+    pub covariance: Matrix6<f64>,
+}
+
+impl Uncertain {
+    /// The transform back.
+    pub fn inverse(&self) -> Uncertain {
+        let transform = self.transform.inverse();
+        let turn = -rotation_matrix(&transform);
+        let mut moves = Matrix6::zeros();
+        moves.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+        moves.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+        moves.fixed_view_mut::<3, 3>(3, 0).copy_from(&(turn * skew(&self.transform.translation.vector)));
+        Uncertain { transform, covariance: moves * self.covariance * moves.transpose() }
+    }
+
+    /// Behind a transform that is certain.
+    pub fn after(&self, first: &Transform) -> Uncertain {
+        let turn = rotation_matrix(first);
+        let mut moves = Matrix6::zeros();
+        moves.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+        moves.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+        Uncertain { transform: first * self.transform, covariance: moves * self.covariance * moves.transpose() }
+    }
+}
+
+/// All placements of a set.
+#[derive(Debug, Clone)]
+pub struct Placed {
+    /// Index of the group and `sensor_from_base`, group by group; base and sensor frames as the readings and the chain have them.
+    pub groups: Vec<(usize, Transform)>,
+    /// `last_frame_from_target`; without a turn that was found its rotation is the identity.
+    pub flange_from_target: Transform,
+    /// Whether the target's turn was found.
+    pub oriented: bool,
+    /// Whether the target's point was found, and not taken from the robot's file.
+    pub target_found: bool,
+    /// Mean square of what a fresh pose is off by beside all this, mm^2: its scatter, and what placements share of smooth errors.
+    pub fresh_mm2: f64,
+    kinematics: Kinematics,
+    robot: Robot,
+    offsets: Vec<f64>,
+    extras: Vec<Extra>,
+    /// Of the shared offsets, then six numbers a group.
+    covariance: DMatrix<f64>,
+}
+
+impl Placed {
+    /// `rows` have points, `shared` is the covariance of the offsets, and `common` how many times larger than of independent errors variances
+    /// are. `None` where no group has a frame.
+    pub fn new(set: &Dataset, rows: &Rows, offsets: &[f64], shared: &DMatrix<f64>, common: f64) -> Option<Placed> {
+        let linear = Linearised::new(rows, offsets);
+        let (of_robot, of_extras) = rows.split(offsets);
+        let parameters = rows.kinematics.parameters();
+        let robot = rows.kinematics.nominal().shifted(parameters, of_robot);
+        let (mut groups, mut follows, mut own) = (Vec::new(), Vec::new(), Vec::new());
+        let mut turn = None;
+        for ((block, unknowns), placement) in rows.blocks.iter().zip(rows.unknowns(offsets)).zip(&linear.placements) {
+            let (Block::Points(points), Unknowns::Frame(frame)) = (block, unknowns) else { continue };
+            let group = set.poses[rows.rows[points.spots.first()?.pose]].group;
+            groups.push((group, frame));
+            let inverse = pseudo_inverse(product(&placement.linear.design, &placement.linear.design));
+            follows.push(-(&inverse * product(&placement.linear.design, &placement.linear.jacobian)));
+            own.push(inverse * common);
+            if !points.target.is_empty() {
+                turn = Some(points.turned_target(of_extras));
+            }
+        }
+        if groups.is_empty() {
+            return None;
+        }
+        Some(Placed {
+            flange_from_target: transform_from_matrix(turn.unwrap_or_else(Matrix3::identity), robot.tool_mm),
+            oriented: turn.is_some(),
+            target_found: parameters.iter().any(|p| matches!(p, Parameter::V(_))),
+            covariance: together(shared, &follows, &own),
+            fresh_mm2: 3.0 * (rows.scatter.point_mm.powi(2) + rows.left_by_smooth_mm2()),
+            kinematics: rows.kinematics.clone(),
+            robot,
+            offsets: of_robot.to_vec(),
+            extras: rows.extras.clone(),
+            groups,
+        })
+    }
+
+    /// The robot that was found.
+    pub fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
+    /// `sensor_from_base` of one of the groups, in their order here.
+    pub fn sensor_from_base(&self, index: usize) -> Uncertain {
+        let at = self.offsets.len() + self.extras.len() + 6 * index;
+        let covariance = self.covariance.fixed_view::<6, 6>(at, at).into_owned();
+        Uncertain { transform: self.groups[index].1, covariance }
+    }
+
+    /// `last_frame_from_target`; numbers that were not found have no variance.
+    pub fn target(&self) -> Uncertain {
+        let count = self.offsets.len();
+        let parameter = |p| self.kinematics.parameters().iter().position(|q| *q == p);
+        let extra = |e| self.extras.iter().position(|q| *q == e).map(|k| k + count);
+        let place = |k: usize| if k < 3 { extra(Extra::Target(k)) } else { parameter(Parameter::V(k - 3)) };
+        let unit = |k: usize| if k < 3 { RAD_PER_MRAD } else { 1.0 };
+        let covariance = Matrix6::from_fn(|r, c| match (place(r), place(c)) {
+            (Some(i), Some(j)) => self.covariance[(i, j)] * unit(r) * unit(c),
+            _ => 0.0,
+        });
+        Uncertain { transform: self.flange_from_target, covariance }
+    }
+
+    /// The target's point in the frame of a group's sensor at each of these joints (rad), and its covariance, mm^2: what the next reading there
+    /// is without its own noise and scatter.
+    pub fn points(&self, index: usize, joints: &[&[f64]]) -> Vec<(Vector3<f64>, Matrix3<f64>)> {
+        let nominal = self.kinematics.nominal();
+        let kinematics = Kinematics::new(nominal, &self.robot, self.kinematics.parameters(), joints);
+        let frame = &self.groups[index].1;
+        let of_place = |place: Place| {
+            let turned = frame.rotation * place.point_mm.coords;
+            let mut columns = DMatrix::zeros(3, self.covariance.ncols());
+            let robot = place.point_columns.ncols();
+            columns.view_mut((0, 0), (3, robot)).copy_from(&(rotation_matrix(frame) * place.point_columns));
+            let at = self.offsets.len() + self.extras.len() + 6 * index;
+            columns.fixed_view_mut::<3, 6>(0, at).copy_from(&rigid_columns(&turned));
+            let covariance = &columns * &self.covariance * columns.transpose();
+            (turned + frame.translation.vector, covariance.fixed_view::<3, 3>(0, 0).into_owned())
+        };
+        kinematics.places(&self.offsets, true).into_iter().map(of_place).collect()
+    }
+}
+
+impl Placed {
+    /// How far off the target is to be expected at the poses of one of the groups: against where it truly is at such a pose.
+    pub fn expected(&self, set: &Dataset, index: usize) -> Lengths {
+        let poses = set.poses.iter().filter(|pose| pose.group == self.groups[index].0);
+        let joints: Vec<&[f64]> = poses.map(|pose| pose.joints_rad.as_slice()).collect();
+        let squares =
+            self.points(index, &joints).into_iter().map(|(_, covariance)| covariance.trace() + self.fresh_mm2);
+        Lengths::of_squares(&squares.collect::<Vec<f64>>())
+    }
+}
+
+/// The covariance of shared offsets and of all placements' own unknowns, which follow them and have errors of their own.
+fn together(shared: &DMatrix<f64>, follows: &[DMatrix<f64>], own: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let count = shared.ncols();
+    let all = count + 6 * follows.len();
+    let mut follow = DMatrix::zeros(all, count);
+    follow.view_mut((0, 0), (count, count)).fill_with_identity();
+    for (k, of_group) in follows.iter().enumerate() {
+        follow.view_mut((count + 6 * k, 0), (6, count)).copy_from(of_group);
+    }
+    let mut covariance = &follow * shared * follow.transpose();
+    for (k, own) in own.iter().enumerate() {
+        let mut part = covariance.view_mut((count + 6 * k, count + 6 * k), (6, 6));
+        part += own;
+    }
+    covariance
+}

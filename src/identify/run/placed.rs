@@ -1,0 +1,59 @@
+//! Where the sensor stands, of an identification that has ended.
+
+use super::found::Identification;
+use crate::identify::Error;
+use crate::identify::data::dataset::{Dataset, Kind};
+use crate::identify::judge::placement::{Placed, is_held};
+use crate::identify::sensor::Extra;
+use crate::identify::settings::{Model, Settings};
+use crate::identify::solve::formulation::Formulation;
+use crate::identify::solve::task::Task;
+use crate::robot::Robot;
+
+impl Identification {
+    /// The placements of the chosen robot. A robot that was found by distances, or kept nominal, is placed by a fit of points to it; `None` of
+    /// readings that are no points.
+    pub fn placed(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> Result<Option<Placed>, Error> {
+        if set.kind != Kind::Positions {
+            return Ok(None);
+        }
+        let found = self.candidates[self.chosen].found.as_ref();
+        let of_points = found.filter(|(f, _)| matches!(f.model, Model::Position | Model::Pose));
+        let anew;
+        let (formulation, of_robot) = match (of_points, found) {
+            (Some((f, solution)), _) => (f, f.offsets_at(&solution.x)),
+            (None, found) => {
+                anew = self.by_points(set, nominal, settings)?;
+                (&anew, found.map_or(Vec::new(), |(f, solution)| f.offsets_at(&solution.x)))
+            }
+        };
+        let count = formulation.parameters().len();
+        let offsets: Vec<f64> = of_robot[..count].iter().chain(formulation.extras()).copied().collect();
+        let joints = nominal.joints.len();
+        let shared = formulation.offsets_covariance(&|parameter| is_held(parameter, joints));
+        Ok(Placed::new(set, &formulation.rows, &offsets, &shared, formulation.common))
+    }
+
+    /// The chosen terms with the points of all groups in frames of their own.
+    fn by_points(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> Result<Formulation, Error> {
+        let oriented = set.has_rotations() && settings.model.is_none();
+        let turned =
+            if oriented { &[Extra::Target(0), Extra::Target(1), Extra::Target(2)] } else { set.body_unknowns() };
+        let mut extras: Vec<Extra> = self.extras.iter().map(|(extra, _)| *extra).collect();
+        extras.extend(turned.iter().filter(|t| !self.extras.iter().any(|(e, _)| e == *t)));
+        let parameters = self.terms.parameters(nominal);
+        Formulation::new(&Task {
+            set,
+            robot: nominal,
+            parameters: &parameters,
+            extras: &extras,
+            rows: &self.fitted,
+            model: if oriented { Model::Pose } else { Model::Position },
+            smooth: self.smooth.map(|told| told.error),
+            settings,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

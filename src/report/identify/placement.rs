@@ -1,0 +1,50 @@
+//! Where the cameras stand and the target sits, in tables.
+
+use maud::{Markup, html};
+
+use super::page;
+use crate::formats::placement::{PlacementFile, TransformRecord};
+use crate::geometry::rotation_vector;
+use crate::report::table::number;
+
+/// Turn in degrees and shift in mm, three numbers each, and their standard deviations.
+fn cells(record: &TransformRecord) -> Vec<String> {
+    let three = |v: [f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(", ");
+    let turn = record.transform().map(|t| three(rotation_vector(&t).map(f64::to_degrees).into(), 4));
+    let [turn_rad, shift_mm] = record.sigmas();
+    vec![
+        three(record.translation_mm, 3),
+        number(shift_mm, 4),
+        turn.unwrap_or_else(|| "not in the readings".to_owned()),
+        number(turn_rad.map(f64::to_degrees), 5),
+    ]
+}
+
+/// The section of a page.
+pub fn tables(placement: &PlacementFile) -> Markup {
+    let groups = placement.groups.iter().map(|group| {
+        let mut row = vec![format!("base from rig, {}", group.group)];
+        row.extend(cells(&group.base_from_rig));
+        row.extend([
+            number(Some(group.error_mm.mean_mm), 4),
+            number(Some(group.error_mm.p95_mm), 4),
+            number(group.held_out.mean_abs_mm, 4),
+        ]);
+        row
+    });
+    let target = placement.flange_from_target.iter().map(|target| {
+        let mut row = vec!["flange from target".to_owned()];
+        row.extend(cells(target));
+        row.extend([String::new(), String::new(), String::new()]);
+        row
+    });
+    let rows: Vec<Vec<String>> = groups.chain(target).collect();
+    html! {
+        p { "The left camera in the robot's base frame, and the target on its flange; shift, and turn as axis times angle. The error is that of the \
+            predicted target, robot, placement and scatter together, at poses like these (" (placement.poses) ")." }
+        div.wide { (page::table(&["transform", "x, y, z in mm", "sigma", "turn in deg", "sigma", "error to expect, mm", "95 of 100 below", "held out"], &rows)) }
+        @for held in placement.held.iter().filter(|held| !held.parameters.is_empty()) {
+            p { "Held as " (placement.robot) " has them: " (held.parameters.join(", ")) " (" (held.because) ")." }
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! The lines of `locate`.
+
+use crate::files::OutDir;
+use crate::formats::placement::{PLACEMENT, PlacementFile, TransformRecord};
+use crate::geometry::rotation_vector;
+use crate::identify::judge::locate::Located;
+use crate::report::table::number;
+
+fn line(what: &str, record: &TransformRecord) -> String {
+    let three = |v: [f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(", ");
+    let [turn_rad, shift_mm] = record.sigmas();
+    let shift = match shift_mm {
+        Some(sigma) => format!("{} mm +- {:.4}", three(record.translation_mm, 3), 2.0 * sigma),
+        None => format!("{} mm (as in the robot's file)", three(record.translation_mm, 3)),
+    };
+    let turn = record.transform().map(|t| three(rotation_vector(&t).map(f64::to_degrees).into(), 4));
+    let turn = match (turn, turn_rad) {
+        (Some(turn), Some(sigma)) => format!("; turned by {turn} deg +- {:.5}", 2.0 * sigma.to_degrees()),
+        _ => "; its turn is not in the readings".to_owned(),
+    };
+    format!("{what}: {shift}{turn}")
+}
+
+/// The placement, the error to expect, and whether the robot agrees with the points.
+pub fn summary(placement: &PlacementFile, located: &Located, poses: usize, out: &OutDir) -> String {
+    let mut lines = Vec::new();
+    for group in &placement.groups {
+        lines.push(line(&format!("base from rig, {}", group.group), &group.base_from_rig));
+        lines.push(format!(
+            "  error to expect of the target: {:.4} mm on average, 95 % below {:.4}; held out {}",
+            group.error_mm.mean_mm,
+            group.error_mm.p95_mm,
+            number(group.held_out.mean_abs_mm, 4)
+        ));
+    }
+    lines.extend(placement.flange_from_target.as_ref().map(|target| line("flange from target", target)));
+    lines.push(format!(
+        "{poses} poses fit to {:.4} mm; chi-squared {:.1} over {} degrees of freedom",
+        located.rms_mm, located.chi_square, located.freedom
+    ));
+    if located.contradicted {
+        lines.push(
+            "the points contradict this robot by more than is stated of both: identify the robot, or look whether cameras, target and joint angles are those of these rows"
+                .to_owned(),
+        );
+    }
+    lines.push(format!("95 % intervals; covariances: {}", out.join(PLACEMENT)));
+    lines.join("\n") + "\n"
+}
