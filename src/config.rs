@@ -5,6 +5,7 @@ use serde::Deserialize;
 
 use crate::diagnostic::Explain;
 use crate::files;
+use crate::formats::board_files::NamedBoard;
 use crate::imaging::board::{Board, SQUARES_MM, Squares};
 use crate::ranges::{TOLERANCES_MM, positive, within};
 
@@ -73,7 +74,7 @@ pub struct BoardSettings(Board);
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct BoardFields {
-    board: Option<Board>,
+    board: Option<NamedBoard>,
     squares: Option<Squares>,
     square_mm: Option<f64>,
 }
@@ -83,7 +84,7 @@ impl TryFrom<BoardFields> for BoardSettings {
 
     fn try_from(fields: BoardFields) -> Result<BoardSettings, &'static str> {
         match fields {
-            BoardFields { board: Some(board), squares: None, square_mm: None } => Ok(BoardSettings(board)),
+            BoardFields { board: Some(NamedBoard(board)), squares: None, square_mm: None } => Ok(BoardSettings(board)),
             BoardFields { board: Some(_), .. } => Err("`board` says squares and size already: it stands alone"),
             BoardFields { board: None, squares: None, .. } => Err("missing field `squares`, or `board`"),
             BoardFields { board: None, square_mm: None, .. } => Err("missing field `square_mm`"),

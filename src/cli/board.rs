@@ -3,13 +3,14 @@
 use clap::Args;
 
 use super::output::Output;
+use crate::formats::board_files::named;
 use crate::imaging::Board;
 
 /// `stereocal board`
 #[derive(Debug, Args)]
 pub struct PrintBoard {
     /// The board as `--board` names it: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
-    #[arg(value_name = "NAME")]
+    #[arg(value_name = "NAME", value_parser = named)]
     pub board: Board,
     /// Only what is named of PDF, SVG and PNG [default: PDF and SVG]
     #[arg(long)]

@@ -6,9 +6,11 @@ use clap::{Args, Subcommand, ValueEnum};
 use super::output::Output;
 use super::placement::ExportPlacement;
 use super::robot::ExportRobot;
-use super::values::between;
+use super::values::{AskedSquares, between};
+use crate::formats::board_files::named;
 use crate::formats::lenses::LensFile;
 use crate::imaging::input::pairs::{PairBy, Source};
+use crate::imaging::printed::PrintedExtent;
 use crate::imaging::{Board, Mosaic, Squares};
 use crate::stereo::Lens;
 use crate::stereo::volume::Extent;
@@ -47,15 +49,21 @@ pub struct CameraCheck {
     /// Corners from a CSV file instead of pictures
     #[arg(long, value_name = "FILE")]
     pub corners: Option<Utf8PathBuf>,
-    /// The check board by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
-    #[arg(long, value_name = "BOARD", conflicts_with_all = ["squares", "square_mm"])]
+    /// The check board by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary); or a
+    /// file: Kalibr's target.yaml, a project of calib.io's Calibrator (.json), calib.io_charuco_200x150_8x11_15_11_DICT_5X5.pdf (by its name)
+    #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
     pub board: Option<Board>,
-    /// Squares of the check board, not inner corners; key `check_board.squares` [default: 20x20]
+    /// Squares of the check board, not inner corners, or `auto`: counted where pictures show all of a checkerboard; key `check_board.squares`
+    /// [default: 20x20]
     #[arg(long, value_name = "CxR")]
-    pub squares: Option<Squares>,
+    pub squares: Option<AskedSquares>,
     /// Side of a square, mm; key `check_board.square_mm` [default: 10]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub square_mm: Option<f64>,
+    /// The print by a caliper, mm: its width along the columns and its height, from the outer edge of the first square to that of the last
+    /// (149.7x99.8). Both are scales of their own; the caliper's uncertainty counts in the verdict, where --board-uncertainty-mm says no other
+    #[arg(long, value_name = "WxH")]
+    pub measured_mm: Option<PrintedExtent>,
     /// Largest length error that passes, mm; key `tolerance_mm` [default: 0.05]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub tolerance_mm: Option<f64>,
@@ -70,7 +78,7 @@ pub struct CameraCheck {
     #[arg(long, value_name = "FILE[,SIDE]")]
     pub intrinsics: Vec<LensFile>,
     /// Whether this calibration still holds, by two or more new pairs: what changed, by how much a length, and what the pairs would have shown
-    #[arg(long, value_name = "CALIBRATION", conflicts_with_all = ["lens", "intrinsics", "since", "volume", "board_shape", "board_uncertainty_mm", "check_images", "draw"])]
+    #[arg(long, value_name = "CALIBRATION", conflicts_with_all = ["lens", "intrinsics", "since", "volume", "board_shape", "board_uncertainty_mm", "measured_mm", "check_images", "draw"])]
     pub against: Option<Utf8PathBuf>,
     /// Only the pairs from this one on, by name: the rig as it is since then
     #[arg(long, value_name = "PAIR")]
@@ -92,7 +100,7 @@ pub struct CameraCheck {
     #[arg(long, value_name = "DIR")]
     pub check_images: Option<Utf8PathBuf>,
     /// The second board by its name, as for --board [default: as the first]
-    #[arg(long, value_name = "BOARD", requires = "check_images", conflicts_with_all = ["check_squares", "check_square_mm"])]
+    #[arg(long, value_name = "BOARD", value_parser = named, requires = "check_images", conflicts_with_all = ["check_squares", "check_square_mm"])]
     pub check_board: Option<Board>,
     /// Squares of the second board [default: as the first]
     #[arg(long, value_name = "CxR", requires = "check_images")]
@@ -136,7 +144,7 @@ pub struct Measure {
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
     /// The target by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
-    #[arg(long, value_name = "BOARD", conflicts_with_all = ["squares", "square_mm"])]
+    #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
     pub board: Option<Board>,
     /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
     #[arg(long, value_name = "CxR")]
@@ -181,7 +189,7 @@ pub struct Rectify {
     pub zero_disparity: bool,
     /// The board by which the rows are compared, by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
     /// marker in mm, dictionary) [default: the board that calibrated, else those of the keys `check_board` and `target_board`]
-    #[arg(long, value_name = "BOARD", conflicts_with_all = ["squares"])]
+    #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares"])]
     pub board: Option<Board>,
     /// Squares of the board by which the rows are compared
     #[arg(long, value_name = "CxR")]

@@ -23,6 +23,7 @@ pub use self::robot::{
     RobotPlace, RobotShow, RobotWhat, TableFlags, Verify,
 };
 pub use self::simulate::{LensBlur, Preset, Simulate};
+pub use self::values::AskedSquares;
 
 /// What `--version` says of the build; `-V` says the version alone.
 const BUILD: &str = if cfg!(debug_assertions) {
@@ -56,7 +57,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Calibrate both cameras from pictures of the check board, and judge the rig's accuracy
-    CameraCheck(CameraCheck),
+    CameraCheck(Box<CameraCheck>),
     /// Measure the target's point and orientation for each robot pose
     Measure(Measure),
     /// Identify the robot's kinematic parameters from measurements and joint angles

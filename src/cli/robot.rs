@@ -5,6 +5,7 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use super::output::Output;
 use super::values::{between, count};
+use crate::formats::board_files::named;
 use crate::imaging::{Board, Squares};
 
 /// `stereocal identify`
@@ -125,7 +126,7 @@ pub struct Plan {
     #[arg(long, value_name = "MM", default_value_t = 0.02, value_parser = between(0.0, 100.0))]
     pub repeatability_mm: f64,
     /// The target by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
-    #[arg(long, value_name = "BOARD", conflicts_with_all = ["squares", "square_mm"])]
+    #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
     pub board: Option<Board>,
     /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
     #[arg(long, value_name = "CxR")]

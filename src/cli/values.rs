@@ -1,5 +1,26 @@
 //! Numbers as flags take them.
 
+use std::str::FromStr;
+
+use crate::imaging::{Error, Squares};
+
+/// Squares that are said, or to be counted in the pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AskedSquares {
+    /// `auto`.
+    Counted,
+    /// So many.
+    Said(Squares),
+}
+
+impl FromStr for AskedSquares {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<AskedSquares, Error> {
+        if text.eq_ignore_ascii_case("auto") { Ok(AskedSquares::Counted) } else { text.parse().map(AskedSquares::Said) }
+    }
+}
+
 /// Reads a number of a range.
 pub(super) fn between(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
     move |text| match text.parse::<f64>() {

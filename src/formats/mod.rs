@@ -1,5 +1,6 @@
 //! Files that other stages and other programs read: what is written, apart from what is judged.
 
+pub mod board_files;
 mod board_png;
 pub mod board_sheet;
 pub mod calibration;

@@ -68,6 +68,9 @@ impl fmt::Display for Squares {
 /// Sides of squares, mm: from a wafer's to a car park's.
 pub const SQUARES_MM: RangeInclusive<f64> = 1e-3..=1e5;
 
+/// How much higher or lower than wide a square may be, as a share: printers stretch by less, and what is off by more is another board.
+pub const MOST_STRETCH: f64 = 0.03;
+
 /// What tells a board's corners apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
@@ -90,8 +93,10 @@ pub enum Kind {
 pub struct Board {
     /// Number of squares.
     pub squares: Squares,
-    /// Side of a square, mm.
+    /// Width of a square, mm.
     pub square_mm: f64,
+    /// Height of a square over its width: one as drawn, hardly another as printed.
+    pub stretch: f64,
     /// What tells its corners apart.
     pub kind: Kind,
 }
@@ -99,7 +104,7 @@ pub struct Board {
 impl Board {
     /// A plain checkerboard.
     pub fn checker(squares: Squares, square_mm: f64) -> Board {
-        Board { squares, square_mm, kind: Kind::Checker }
+        Board { squares, square_mm, stretch: 1.0, kind: Kind::Checker }
     }
 
     /// True for a board whose markers number its corners: any of them may be seen, in both pictures of a pair or in one.
@@ -139,6 +144,19 @@ impl Board {
         }
     }
 
+    /// Width and height of a square, mm.
+    pub fn sides_mm(&self) -> [f64; 2] {
+        [self.square_mm, self.square_mm * self.stretch]
+    }
+
+    /// The side of a square for a person, mm: a width and a height where they differ.
+    pub fn side_said(&self) -> String {
+        match self.sides_mm() {
+            [width, _] if self.stretch == 1.0 => width.to_string(),
+            [width, height] => format!("{width}x{height}"),
+        }
+    }
+
     /// Number of inner corners along x.
     pub fn columns(&self) -> usize {
         self.squares.columns - 1
@@ -151,8 +169,8 @@ impl Board {
 
     /// Distance between two opposite outermost inner corners, mm.
     pub fn diagonal_mm(&self) -> f64 {
-        let sides = [self.columns() - 1, self.rows() - 1].map(|squares| squares as f64 * self.square_mm);
-        sides[0].hypot(sides[1])
+        let [width, height] = self.sides_mm();
+        ((self.columns() - 1) as f64 * width).hypot((self.rows() - 1) as f64 * height)
     }
 
     /// Number of inner corners.
@@ -179,7 +197,7 @@ impl Board {
     pub fn corner_mm(&self, col: usize, row: usize) -> Point3<f64> {
         Point3::new(
             (col as f64 - (self.columns() - 1) as f64 / 2.0) * self.square_mm,
-            (row as f64 - (self.rows() - 1) as f64 / 2.0) * self.square_mm,
+            (row as f64 - (self.rows() - 1) as f64 / 2.0) * self.square_mm * self.stretch,
             0.0,
         )
     }
@@ -217,84 +235,12 @@ impl Board {
     }
 }
 
-impl fmt::Display for Board {
-    /// As it is named on the command line.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (squares, square_mm) = (self.squares, self.square_mm);
-        match self.kind {
-            Kind::Checker => write!(f, "checker:{squares}:{square_mm}"),
-            Kind::Charuco { marker_mm, dictionary, layout } => {
-                write!(f, "charuco:{squares}:{square_mm}:{marker_mm}:{}{}", dictionary.name(), of_layout(layout))
-            }
-        }
-    }
-}
-
 /// The end of a board's name that says its layout.
-fn of_layout(layout: Option<Layout>) -> &'static str {
+pub(super) fn of_layout(layout: Option<Layout>) -> &'static str {
     match layout {
         None => "",
         Some(Layout::New) => ":new",
         Some(Layout::Old) => ":old",
-    }
-}
-
-impl FromStr for Board {
-    type Err = Error;
-
-    /// Reads `checker:20x20:10` or `charuco:11x8:15:11:DICT_5X5_100`. Squares of a board with markers are counted as printed: columns first.
-    fn from_str(text: &str) -> Result<Board, Error> {
-        let refuse = |why: String| Error::BoardName { found: text.to_owned(), why };
-        let (kind, rest) = text.split_once(':').ok_or_else(|| refuse("it has no `:`".to_owned()))?;
-        let fields: Vec<&str> = rest.split(':').map(str::trim).collect();
-        let length = |text: &str| match text.parse::<f64>() {
-            Ok(mm) if SQUARES_MM.contains(&mm) => Ok(mm),
-            _ => {
-                let (least, most) = SQUARES_MM.into_inner();
-                Err(refuse(format!("`{text}` is no length from {least} to {most} mm")))
-            }
-        };
-        match (kind.trim().to_ascii_lowercase().as_str(), fields.as_slice()) {
-            ("checker", [squares, square_mm]) => Ok(Board::checker(squares.parse()?, length(square_mm)?)),
-            ("charuco", [squares, square_mm, marker_mm, dictionary, layout @ ..]) if layout.len() <= 1 => {
-                let layout = match layout.first().map(|word| word.to_ascii_lowercase()).as_deref() {
-                    None => None,
-                    Some("new") => Some(Layout::New),
-                    Some("old" | "legacy") => Some(Layout::Old),
-                    Some(other) => return Err(refuse(format!("`{other}` is no layout; there are `old` and `new`"))),
-                };
-                let (square_mm, marker_mm) = (length(square_mm)?, length(marker_mm)?);
-                let dictionary = Dictionary::named(dictionary).map_err(&refuse)?;
-                let board = Board {
-                    squares: Squares::as_printed(squares)?,
-                    square_mm,
-                    kind: Kind::Charuco { marker_mm, dictionary, layout },
-                };
-                board.check_markers().map(|()| board).map_err(refuse)
-            }
-            ("checker", _) => Err(refuse("a checkerboard is `checker:COLSxROWS:SQUARE_MM`".to_owned())),
-            ("charuco", _) => {
-                Err(refuse("a ChArUco board is `charuco:COLSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY`".to_owned()))
-            }
-            (other, _) => Err(refuse(format!("there is no kind of board named `{other}`"))),
-        }
-    }
-}
-
-impl Board {
-    /// Why there can be no such board, where there can be none.
-    fn check_markers(&self) -> Result<(), String> {
-        let Kind::Charuco { marker_mm, dictionary, .. } = self.kind else { return Ok(()) };
-        if marker_mm >= self.square_mm {
-            return Err(format!("a marker of {marker_mm} mm does not fit into a square of {} mm", self.square_mm));
-        }
-        // The old layout of an even number of rows has markers in the other squares, and as many.
-        let markers = self.squares.columns * self.squares.rows / 2;
-        if markers > dictionary.count() {
-            let (name, count) = (dictionary.name(), dictionary.count());
-            return Err(format!("{} squares hold {markers} markers, {name} has {count}", self.squares));
-        }
-        Ok(())
     }
 }
 
@@ -319,34 +265,6 @@ mod tests {
     fn nonsense_is_refused() {
         for text in ["", "7", "7x", "x6", "7x2", "-7x6", "7.5x6", "7x6x5", "1000x6"] {
             assert!(text.parse::<Squares>().is_err(), "{text}");
-        }
-    }
-
-    #[test]
-    fn boards_read_back_as_they_are_named() {
-        for text in
-            ["checker:20x20:10", "charuco:4x5:54:40.5:DICT_4X4_1000", "charuco:11x8:15:11:DICT_ARUCO_ORIGINAL:old"]
-        {
-            let board: Board = text.parse().unwrap();
-            assert_eq!(board.to_string(), text);
-        }
-        let short: Board = "CharUco:4x5:54:40.5:4x4_50".parse().unwrap();
-        assert_eq!(short.to_string(), "charuco:4x5:54:40.5:DICT_4X4_50");
-    }
-
-    #[test]
-    fn boards_that_cannot_be_are_refused_with_the_reason() {
-        for (text, why) in [
-            ("20x20", "no `:`"),
-            ("checker:20x20", "checker:COLSxROWS:SQUARE_MM"),
-            ("dots:20x20:10", "no kind of board"),
-            ("charuco:4x5:54:60:DICT_4X4_50", "does not fit"),
-            ("charuco:4x5:54:40:DICT_4X4_51", "DICT_4X4_50"),
-            ("charuco:20x20:54:40:DICT_4X4_50", "200 markers"),
-            ("charuco:4x5:0:40:DICT_4X4_50", "no length"),
-        ] {
-            let error = text.parse::<Board>().unwrap_err().to_string();
-            assert!(error.contains(why), "{text}: {error}");
         }
     }
 

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Point2};
 
 use super::Board;
+use super::open::OpenPair;
 
 /// Left or right picture of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -87,6 +88,8 @@ pub struct Corners {
     pub pairs: Vec<PairCorners>,
     /// Pairs that were not used.
     pub skipped: Vec<Skipped>,
+    /// Those of them that could be if it were known which of the board's corners they show.
+    pub open: Vec<OpenPair>,
     /// What a person should know beside that: files left out, a size that was guessed, another board that was seen.
     pub notes: Vec<String>,
 }

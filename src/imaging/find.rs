@@ -15,6 +15,7 @@ use super::image::{self, Claim, Header, Mosaic, Picture};
 use super::input::cache::{Cache, Look, Sighting};
 use super::input::pairs::{PairFiles, Pairing};
 use super::lattice::{Lattice, Places};
+use super::open::{OpenPair, listed, open_pair};
 use super::pyramid::Small;
 use super::refine::fields;
 use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, Squares, order, overlay, refine};
@@ -48,7 +49,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     let seen = look_at_all(pairing, &headers, sizes, wanted);
     let other = other_size(&seen);
     printed(&wanted.board, &seen).iter().for_each(progress::note);
-    let (found, skipped) = sort_out(&pairing.pairs, seen, wanted.board);
+    let Sorted { found, skipped, open } = sort_out(&pairing.pairs, seen, wanted.board);
     let total = pairing.pairs.len();
     if found.len() < wanted.needed {
         return Err(Error::TooFewPairs {
@@ -68,7 +69,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     if !skipped.is_empty() {
         notes.push(format!("the board was found in {} of {total} pairs", pairs.len()));
     }
-    Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, notes })
+    Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, open, notes })
 }
 
 /// Every picture from file to corners; of a board whose layout the pictures tell, those that did not tell it once more.
@@ -146,7 +147,7 @@ fn look(
 pub fn find_pair(files: &PairFiles, wanted: &Wanted<'_>) -> Result<PairCorners, String> {
     let alone = |path: &Utf8Path| read_and_look(path, &image::header(path)?, wanted);
     let looks = rayon::join(|| alone(&files.left), || alone(&files.right));
-    let (found, skipped) = sort_out(std::slice::from_ref(files), vec![[looks.0, looks.1]], wanted.board);
+    let Sorted { found, skipped, .. } = sort_out(std::slice::from_ref(files), vec![[looks.0, looks.1]], wanted.board);
     let reason = || skipped.into_iter().next().map_or_else(|| "no board".to_owned(), |s| s.reason);
     number_alike(found, wanted.board).into_iter().next().ok_or_else(reason)
 }
@@ -206,7 +207,13 @@ fn thumbnail_of(picture: &Picture, detected: Option<&Detected>) -> Small {
 
 /// The board's corners in a picture; the reason where there are none.
 pub fn corners_in(picture: &Picture, board: Board) -> Result<Lattice<Corner>, Refusal> {
-    Ok(corners_of(picture, &detect::detect(picture, board)?, board)?.corners)
+    let seen = seen_in(picture, board)?;
+    seen.open.map_or(Ok(seen.corners), |open| Err(open.refusal))
+}
+
+/// The board's corners in a picture, whose numbers may be open; the reason where there are none.
+pub fn seen_in(picture: &Picture, board: Board) -> Look {
+    corners_of(picture, &detect::detect(picture, board)?, board)
 }
 
 /// The corners of a board that was found.
@@ -233,12 +240,28 @@ fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
         });
     }
     let mut corners = refine::refine(picture, detected);
+    if let Some(open) = detected.open.as_ref().filter(|_| !is_measured(&corners)) {
+        return Err(open.refusal.clone());
+    }
     if shift_px > 0.0 {
         for covariance_px2 in corners.cells.iter_mut().flatten().filter_map(|corner| corner.covariance_px2.as_mut()) {
             *covariance_px2 += Matrix2::identity() * (shift_px / 2.0).powi(2);
         }
     }
-    Ok(Sighting { corners, print: detected.print })
+    Ok(Sighting { corners, print: detected.print, open: detected.open.clone() })
+}
+
+/// True where a grid is more than noise makes of nothing: most of its corners are measured, and far better than a square is long.
+fn is_measured(corners: &Lattice<Corner>) -> bool {
+    /// Largest standard deviation, as a share of a square's side.
+    const WELL: f64 = 0.05;
+    let step_px = corners.map(|corner| corner.px).step_px().unwrap_or(0.0);
+    let is_well = |corner: &Corner| {
+        let variance_px2 = corner.covariance_px2.map_or(f64::INFINITY, |covariance| covariance.trace());
+        corner.used && variance_px2 < (WELL * step_px).powi(2)
+    };
+    let measured = corners.iter().filter(|(_, _, corner)| is_well(corner)).count();
+    measured >= detect::LEAST_SEEN && 2 * measured > corners.count()
 }
 
 /// Which squares hold the markers in all pictures that tell it; `None` where they contradict each other, or none tells.
@@ -289,7 +312,11 @@ type Found = (String, Lattice<Corner>, Lattice<Corner>);
 
 /// The size of board that most of the refused pictures show instead.
 fn other_size(seen: &[[Look; 2]]) -> Option<Squares> {
-    let refused: Vec<&Refusal> = seen.iter().flatten().filter_map(|look| look.as_ref().err()).collect();
+    let refusal = |look: &'_ Look| match look {
+        Ok(seen) => seen.open.as_ref().map(|open| open.refusal.clone()),
+        Err(refusal) => Some(refusal.clone()),
+    };
+    let refused: Vec<Refusal> = seen.iter().flatten().filter_map(refusal).collect();
     let mut counts: BTreeMap<(usize, usize), usize> = BTreeMap::new();
     for squares in refused.iter().filter_map(|refusal| refusal.seen) {
         *counts.entry((squares.columns, squares.rows)).or_default() += 1;
@@ -298,15 +325,29 @@ fn other_size(seen: &[[Look; 2]]) -> Option<Squares> {
     (2 * count > refused.len()).then_some(Squares { columns, rows })
 }
 
+/// Pairs by what they show.
+struct Sorted {
+    found: Vec<Found>,
+    skipped: Vec<Skipped>,
+    /// Those of the skipped ones whose corners could be numbered in several ways.
+    open: Vec<OpenPair>,
+}
+
 /// What was found in both pictures of a pair, or of a board with markers in one of them.
-fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>, board: Board) -> (Vec<Found>, Vec<Skipped>) {
+fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>, board: Board) -> Sorted {
     let nothing = || Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
-    let (mut found, mut skipped) = (Vec::new(), Vec::new());
+    let (mut found, mut skipped, mut open) = (Vec::new(), Vec::new(), Vec::new());
     for (files, sides) in files.iter().zip(seen) {
         let pair = files.pair.clone();
         let reason = match sides.map(|look| look.map_err(|refusal| refusal.reason)) {
             [Ok(left), Ok(right)] => {
-                found.push((pair, left.corners, right.corners));
+                match open_pair(&pair, &[&left, &right], found.len()) {
+                    None => found.push((pair, left.corners, right.corners)),
+                    Some((pair, reason)) => {
+                        open.push(pair);
+                        skipped.push(reason);
+                    }
+                }
                 continue;
             }
             [Ok(left), Err(_)] if board.is_coded() => {
@@ -324,7 +365,7 @@ fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>, board: Board) -> (Vec<Fou
         };
         skipped.push(Skipped { pair, reason });
     }
-    (found, skipped)
+    Sorted { found, skipped, open }
 }
 
 fn number_alike(found: Vec<Found>, board: Board) -> Vec<PairCorners> {
@@ -336,14 +377,8 @@ fn number_alike(found: Vec<Found>, board: Board) -> Vec<PairCorners> {
         .zip(turns)
         .map(|((pair, left, right), (turn_left, turn_right))| PairCorners {
             pair,
-            left: turned(&left, turn_left),
-            right: turned(&right, turn_right),
+            left: listed(&left.turned(turn_left), turn_left),
+            right: listed(&right.turned(turn_right), turn_right),
         })
         .collect()
-}
-
-fn turned(grid: &Lattice<Corner>, quarters: usize) -> Vec<Corner> {
-    let reach =
-        |c: &Corner| c.reach.map(|[rows, columns]| if quarters % 2 == 1 { [columns, rows] } else { [rows, columns] });
-    grid.turned(quarters).iter().map(|(col, row, c)| Corner { col, row, reach: reach(c), ..*c }).collect()
 }

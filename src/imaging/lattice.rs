@@ -116,6 +116,58 @@ impl<T: Clone> Lattice<T> {
     }
 }
 
+/// Another numbering of the same corners: turned about corner (0, 0) by so many quarter turns, then moved by columns and rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Renumbering {
+    /// Quarter turns, from the columns' direction to the rows'.
+    pub quarters: usize,
+    /// Columns that the turned numbers are moved by.
+    pub columns: isize,
+    /// Rows that they are moved by.
+    pub rows: isize,
+}
+
+impl Renumbering {
+    /// The numbering that leads from one lattice to another of the same corners; `None` where none does.
+    pub fn between<T: PartialEq + Clone>(from: &Lattice<T>, to: &Lattice<T>) -> Option<Renumbering> {
+        let (col, row, first) = from.iter().next()?;
+        let (to_col, to_row, _) = to.iter().find(|(_, _, value)| *value == first)?;
+        (0..4).find_map(|quarters| {
+            let (x, y) = Renumbering { quarters, columns: 0, rows: 0 }.of(col, row);
+            let found = Renumbering { quarters, columns: to_col as isize - x, rows: to_row as isize - y };
+            from.renumbered(&found, (to.columns, to.rows)).filter(|renumbered| renumbered == to).map(|_| found)
+        })
+    }
+
+    /// The numbers of what had these.
+    pub fn of(&self, col: usize, row: usize) -> (isize, isize) {
+        let (col, row) = (col as isize, row as isize);
+        let (x, y) = match self.quarters % 4 {
+            0 => (col, row),
+            1 => (-row, col),
+            2 => (-col, -row),
+            _ => (row, -col),
+        };
+        (x + self.columns, y + self.rows)
+    }
+}
+
+impl<T: Clone> Lattice<T> {
+    /// The same corners with other numbers, in a lattice of this many columns and rows; `None` where one would lie outside of it.
+    pub fn renumbered(&self, numbering: &Renumbering, (columns, rows): (usize, usize)) -> Option<Lattice<T>> {
+        let mut lattice = Lattice { columns, rows, cells: vec![None; columns * rows] };
+        for (col, row, value) in self.iter() {
+            let (x, y) = numbering.of(col, row);
+            let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
+            if x >= columns || y >= rows {
+                return None;
+            }
+            lattice.cells[y * columns + x] = Some(value.clone());
+        }
+        Some(lattice)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,6 +182,20 @@ mod tests {
         assert_eq!(grid.quarter_turn().quarter_turn(), grid.half_turn());
         assert_eq!(grid.turned(3).turned(1), grid);
         assert_eq!(grid.flip_rows().flip_rows(), grid);
+    }
+
+    #[test]
+    fn every_other_numbering_is_known_from_its_lattice() {
+        let grid = numbered();
+        for quarters in 0..4 {
+            let turned = grid.turned(quarters);
+            let moved = Lattice::from_fn(7, 6, |c, r| turned.get(c.checked_sub(1)?, r.checked_sub(2)?).copied());
+            let found = Renumbering::between(&grid, &moved).unwrap();
+            // A quarter turn of the lattice takes its columns along the former rows.
+            assert_eq!(found.quarters, quarters);
+            assert_eq!(grid.renumbered(&found, (7, 6)), Some(moved));
+            assert_eq!(grid.renumbered(&found, (3, 2)), None);
+        }
     }
 
     #[test]

@@ -1,17 +1,23 @@
 //! From a folder of pictures to the corners of the board in each, in an order both cameras agree on.
 
 pub mod board;
+mod board_name;
 pub mod coded;
 pub mod corners;
+pub mod count;
 pub mod detect;
 pub mod find;
 pub mod image;
 pub mod input;
 pub mod lattice;
+pub mod open;
 pub mod order;
 pub mod overlay;
+pub mod printed;
 pub mod pyramid;
 pub mod refine;
+#[cfg(test)]
+pub mod shot;
 mod wide;
 
 use camino::Utf8PathBuf;
@@ -103,6 +109,16 @@ pub enum Error {
         /// The pairs, and why.
         skipped: Vec<Skipped>,
     },
+    /// The pictures do not tell how many squares the board has.
+    #[error("the board's squares cannot be counted: {}", tally(.counts, *.of))]
+    NotCounted {
+        /// The folder.
+        path: Utf8PathBuf,
+        /// Columns and rows of whole boards that were seen, and in how many pictures.
+        counts: Vec<((usize, usize), usize)>,
+        /// Pictures in all.
+        of: usize,
+    },
     /// The board was not found often enough.
     #[error("only {found} of {total} pairs show {}; {needed} are needed{}", shown(.board), reasons(.skipped))]
     TooFewPairs {
@@ -136,6 +152,15 @@ fn shown(board: &Board) -> String {
     }
 }
 
+/// Which whole boards were seen, and how often.
+fn tally(counts: &[((usize, usize), usize)], of: usize) -> String {
+    let each: Vec<String> = counts.iter().map(|((c, r), pictures)| format!("{c}x{r} squares in {pictures}")).collect();
+    match each.as_slice() {
+        [] => format!("none of {of} pictures shows a whole checkerboard with a margin all round"),
+        each => format!("of {of} pictures of whole checkerboards, {}", each.join(", ")),
+    }
+}
+
 /// The first few pairs that were skipped, a line each.
 fn reasons(skipped: &[Skipped]) -> String {
     /// More would push the message itself off the screen.
@@ -158,6 +183,7 @@ impl Explain for Error {
             | Error::Unpaired { path, .. }
             | Error::OddWidth { path, .. }
             | Error::NoneReadable { path, .. }
+            | Error::NotCounted { path, .. }
             | Error::TooFewPairs { path, .. } => Some(path.to_string()),
         }
     }
@@ -181,6 +207,9 @@ impl Explain for Error {
             Error::OddWidth { .. } => Some("`--side-by-side` is for pictures that hold both views, each as wide as the other".to_owned()),
             Error::SameName { .. } => Some("remove or rename one of them".to_owned()),
             Error::NoneReadable { .. } => Some(SAVED_AS.to_owned()),
+            Error::NotCounted { .. } => {
+                Some("count them: `--squares 20x20` is a board with 19x19 inner corners; one with markers needs `--board`".to_owned())
+            }
             Error::TooFewPairs { skipped, .. }
                 if 2 * skipped.iter().filter(|s| s.reason.contains(self::image::UNDECODABLE)).count() > skipped.len() =>
             {

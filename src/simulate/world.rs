@@ -180,6 +180,7 @@ impl World {
             right_size: size,
             pairs: pairs.collect(),
             skipped: Vec::new(),
+            open: Vec::new(),
             notes: Vec::new(),
         }
     }

@@ -65,6 +65,92 @@ fn broken_pictures_are_skipped_with_their_reasons() {
     assert!((200..361).contains(&left), "{left}");
 }
 
+/// Corners of a list like corners.csv: pair, side, column, row, place.
+fn corners_of(path: &Path) -> Vec<(String, [f64; 4])> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let fields = text.lines().skip(1).map(|line| line.split(',').collect::<Vec<_>>());
+    fields.map(|f| (format!("{} {}", f[0], f[1]), [2, 3, 4, 5].map(|k| f[k].parse().unwrap()))).collect()
+}
+
+#[test]
+fn columns_behind_a_hand_are_numbered_by_the_other_pictures() {
+    let folder = workplace();
+    let pictures = copied(folder.path());
+    // From some place on, in one picture of a pair, in the other, and in both alike.
+    for (file, from, grey) in
+        [("left/02.png", 0.62, 90), ("right/05.png", 0.55, 200), ("left/07.png", 0.66, 60), ("right/07.png", 0.66, 60)]
+    {
+        let mut picture = image::open(pictures.join(file)).unwrap().to_luma8();
+        let width = f64::from(picture.width());
+        for (x, _, pixel) in picture.enumerate_pixels_mut() {
+            if f64::from(x) > from * width {
+                pixel.0[0] = grey;
+            }
+        }
+        picture.save(pictures.join(file)).unwrap();
+    }
+    let (status, said) = check(folder.path(), &[]);
+    assert!(matches!(status, Some(0 | 1)), "{said}");
+    assert!(said.contains("02, 05 only a part of the board is seen"), "{said}");
+    assert!(said_of(&said, "07").contains("cannot be told"), "{said}");
+    let truth = corners_of(&Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_images/truth/corners.csv"));
+    let found = corners_of(&folder.path().join("out/corners.csv"));
+    for picture in ["02 left", "02 right", "05 left", "05 right"] {
+        let here: Vec<[f64; 4]> = found.iter().filter(|(of, _)| of == picture).map(|(_, corner)| *corner).collect();
+        assert!(here.len() > 100, "{picture}: {} corners", here.len());
+        // The board looks the same after a half turn.
+        let right = |turned: bool| {
+            here.iter().all(|[col, row, x, y]| {
+                let (col, row) = if turned { (18.0 - col, 18.0 - row) } else { (*col, *row) };
+                truth.iter().any(|(of, t)| of == picture && t[..2] == [col, row] && (t[2] - x).hypot(t[3] - y) < 2.0)
+            })
+        };
+        assert!(right(false) || right(true), "{picture}: wrong numbers");
+    }
+}
+
+#[test]
+fn a_board_is_counted_measured_and_read_from_files() {
+    let folder = workplace();
+    copied(folder.path());
+    let corners = || std::fs::read_to_string(folder.path().join("out/corners.csv")).unwrap();
+    let (status, said) = check(folder.path(), &[]);
+    assert!(matches!(status, Some(0 | 1)), "{said}");
+    let known = corners();
+    let target = "target_type: 'checkerboard' #gridtype\ntargetCols: 19\ntargetRows: 19\nrowSpacingMeters: 0.01\ncolSpacingMeters: 0.01\n";
+    std::fs::write(folder.path().join("target.yaml"), target).unwrap();
+    for (more, words) in [
+        (["--squares", "auto"], "the board has 20x20 squares: "),
+        (["--board", "target.yaml"], "20x20 squares of 10 mm"),
+    ] {
+        let (again, said) = check(folder.path(), &more);
+        assert!(again == status && said.contains(words), "{words}: {said}");
+        assert_eq!(corners(), known);
+    }
+    // A print that is half a percent large: lengths follow, and the caliper's uncertainty is in the verdict.
+    let (_, said) = check(folder.path(), &["--measured-mm", "201.0x201.0"]);
+    assert!(
+        said.contains("squares of 10.0500 x 10.0500 mm, not 10 mm") && said.contains("20x20 squares of 10.05"),
+        "{said}"
+    );
+    let text = std::fs::read_to_string(folder.path().join("out/camera-check.json")).unwrap();
+    assert!(text.contains("10.05"), "{text}");
+    for (extent, why) in [("180x180", "inner corners"), ("210x210", "+5.0 %")] {
+        let (status, said) = check(folder.path(), &["--measured-mm", extent]);
+        assert!(status == Some(2) && said.contains(why), "{extent}: {said}");
+    }
+    // Boards of two sizes, and none that is whole.
+    std::fs::create_dir(folder.path().join("none")).unwrap();
+    for side in ["left", "right"] {
+        std::fs::create_dir(folder.path().join("none").join(side)).unwrap();
+        image::GrayImage::from_pixel(64, 64, image::Luma([90]))
+            .save(folder.path().join("none").join(side).join("1.png"))
+            .unwrap();
+    }
+    let output = stereocal(folder.path(), &["camera-check", "none", "--squares", "auto"]);
+    assert!(output.status.code() == Some(2) && stderr(&output).contains("cannot be counted"), "{}", stderr(&output));
+}
+
 #[test]
 fn a_second_run_reads_what_the_first_found_and_survives_a_torn_file() {
     let folder = workplace();

@@ -16,6 +16,7 @@ use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
 use crate::imaging::input::pairs::{Pairing, Source};
 use crate::imaging::overlay::SideBySide;
+use crate::imaging::printed::Printed;
 use crate::imaging::{Board, Corners, Side, Wanted, find_corners};
 use crate::report::drawing::pair_picture::PairPicture;
 use crate::report::drawing::picture::PairJpeg;
@@ -28,7 +29,7 @@ use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::lengths::second_board::{self, SecondBoard};
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::model::known_lenses::{KnownLenses, TOLERANCE};
-use crate::stereo::pairs::fewest_pairs;
+use crate::stereo::pairs::{fewest_pairs, open_numbers};
 use crate::stereo::select::options::Options;
 use crate::{progress, ranges, report};
 
@@ -37,7 +38,6 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(against) = &args.against {
         return super::recheck::run(args, against, config, run);
     }
-    let board = board(args, config)?;
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
     let mut problems = Vec::new();
     ranges::within(&mut problems, "tolerance_mm", tolerance_mm, ranges::TOLERANCES_MM);
@@ -45,22 +45,24 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
         ranges::within(&mut problems, "board_uncertainty_mm", mm, ranges::TOLERANCES_MM);
     }
     let extent = args.volume.unwrap_or_default();
-    let demand = Demand { tolerance_mm, board_uncertainty_mm: args.board_uncertainty_mm, extent };
     config::reject(problems)?;
     let out = open(args, config, run)?;
 
     let pairing = pairing(args, &out)?;
+    let (board, by_caliper_mm) = board(args, config, pairing.as_ref())?;
+    let demand = Demand { tolerance_mm, board_uncertainty_mm: args.board_uncertainty_mm.or(by_caliper_mm), extent };
     let known = known_lenses(args)?;
     let corners = corners(args, board, pairing.as_ref(), known.as_ref(), &out)?;
-    corners.notes.iter().for_each(progress::note);
     known.as_ref().map_or(Ok(()), |known| known.check_size(&corners))?;
     let asked = Asked { options: options(args, known), tolerance_mm, extent };
+    let corners = open_numbers::by_other_pairs(corners, &asked.options);
+    corners.notes.iter().for_each(progress::note);
     let (calibration, findings) = match &args.since {
         Some(pair) => standing::calibrate_since(&corners, pair, &asked)?,
         None => standing::calibrate_standing(&corners, &asked)?,
     };
     let accuracy = held_out::hold_out(&calibration, demand.board_uncertainty_mm)?;
-    let second = second_board(args, board, &calibration, &out)?;
+    let second = second_board(args, board, &calibration, demand.board_uncertainty_mm, &out)?;
     let judged = Judged::new(&calibration, findings, accuracy, second, &demand);
     calibration.rig().unusual().into_iter().for_each(progress::warn);
 
@@ -136,11 +138,26 @@ fn open(args: &CameraCheck, config: &Config, run: Run) -> Result<OutDir> {
     Ok(out)
 }
 
-/// The check board, as large as its temperature makes it.
-fn board(args: &CameraCheck, config: &Config) -> Result<Board> {
+/// The check board, as it was printed and as large as its temperature makes it; what a caliper leaves uncertain of it, mm.
+fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Result<(Board, Option<f64>)> {
+    let squares = super::squares(args, pairing)?;
+    let drawn = config.check_board.board(args.board, squares, args.square_mm)?;
+    let Some(extent) = args.measured_mm else { return Ok((warm(args, drawn)?, None)) };
+    let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
+    let Printed { board, uncertainty_mm } = extent.of(&drawn).map_err(invalid)?;
+    progress::note(format!(
+        "by its measured extent the board has squares of {:.4} x {:.4} mm, not {} mm; by a caliper, to {uncertainty_mm} mm in all",
+        board.sides_mm()[0],
+        board.sides_mm()[1],
+        drawn.side_said()
+    ));
+    Ok((warm(args, board)?, Some(uncertainty_mm)))
+}
+
+/// The board, as large as its temperature makes it.
+fn warm(args: &CameraCheck, board: Board) -> Result<Board> {
     /// Temperature at which lengths are certified (ISO 1), deg C.
     const REFERENCE_C: f64 = 20.0;
-    let board = config.check_board.board(args.board, args.squares, args.square_mm)?;
     let (Some(celsius), Some(ppm)) = (args.board_temperature_c, args.expansion_ppm_per_k) else { return Ok(board) };
     let growth = 1.0 + 1e-6 * ppm * (celsius - REFERENCE_C);
     let mut problems = Vec::new();
@@ -208,6 +225,7 @@ fn second_board(
     args: &CameraCheck,
     board: Board,
     calibration: &Calibration,
+    board_uncertainty_mm: Option<f64>,
     out: &OutDir,
 ) -> Result<Option<SecondBoard>> {
     let Some(images) = &args.check_images else { return Ok(None) };
@@ -222,5 +240,6 @@ fn second_board(
     let pairing = Source::folder("camera-check", images).pairs(out)?;
     let corners = find_corners(&pairing, &Wanted { board, needed: 1, mosaic, cache, overlays: None })?;
     calibration.rig().check_size(&corners)?;
-    Ok(Some(second_board::second_board(calibration, &corners, args.board_uncertainty_mm)))
+    let corners = open_numbers::by_rig(corners, calibration.rig());
+    Ok(Some(second_board::second_board(calibration, &corners, board_uncertainty_mm)))
 }

@@ -12,7 +12,9 @@ use crate::formats::calibration::{self, Calibrated};
 use crate::formats::recheck::{self as formats, Check, HISTORY, RecheckFile, Standing};
 use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
+use crate::imaging::input::pairs::Pairing;
 use crate::imaging::{Corners, Wanted, find_corners};
+use crate::stereo::pairs::open_numbers;
 use crate::stereo::recheck::{self, Before, FEWEST_PAIRS};
 use crate::{progress, ranges, report};
 
@@ -33,7 +35,7 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     out.check_free(&["recheck.json", HISTORY, "recheck.html"])?;
     let mut checks = formats::history(&out)?;
 
-    let corners = corners(args, &calibrated, config, &out)?;
+    let corners = open_numbers::by_rig(corners(args, &calibrated, config, &out)?, &calibrated.rig);
     corners.notes.iter().for_each(progress::note);
     let Calibrated { rig, noise, pair_excess, pairs, volume, .. } = calibrated;
     let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), pairs, volume };
@@ -59,18 +61,20 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
 /// The corners of the new pairs, on the board that calibrated unless another one is named.
 fn corners(args: &CameraCheck, calibrated: &Calibrated, config: &Config, out: &OutDir) -> Result<Corners> {
     let named = args.board.is_some() || args.squares.is_some() || args.square_mm.is_some();
-    let board = match calibrated.board.filter(|_| !named) {
-        Some(board) => board,
-        None => config.check_board.board(args.board, args.squares, args.square_mm)?,
+    let board = |pairing: Option<&Pairing>| match calibrated.board.filter(|_| !named) {
+        Some(board) => Ok(board),
+        None => super::squares(args, pairing)
+            .and_then(|squares| Ok(config.check_board.board(args.board, squares, args.square_mm)?)),
     };
     if let Some(file) = &args.corners {
-        return Ok(corners_csv::read(file, board, args.picture_size)?);
+        return Ok(corners_csv::read(file, board(None)?, args.picture_size)?);
     }
     // The command line asks for one of the two.
     let nothing = || config::Error::Invalid { problems: vec!["neither pictures nor --corners given".into()] };
     let images = args.images.as_ref().ok_or_else(nothing)?;
     let pairing = args.pairs.source("camera-check", images).pairs(out)?;
     progress::note(&pairing.taken);
+    let board = board(Some(&pairing))?;
     let cache = Some(Cache { out, thumbnails: false });
     Ok(find_corners(&pairing, &Wanted { board, needed: FEWEST_PAIRS, mosaic: args.bayer, cache, overlays: None })?)
 }

@@ -23,6 +23,7 @@ use crate::report::measure::Extras;
 use crate::stereo;
 use crate::stereo::board_pose::series;
 use crate::stereo::board_pose::{Knowledge, Refusal, Seen, Series};
+use crate::stereo::pairs::open_numbers;
 use crate::{progress, report};
 
 /// Runs the command.
@@ -52,8 +53,9 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let pairing = source.pairs(&out)?;
     progress::note(&pairing.taken);
     let corners = find_corners(&pairing, &wanted)?;
-    corners.notes.iter().for_each(progress::note);
     known.rig.check_size(&corners)?;
+    let corners = open_numbers::by_rig(corners, &known.rig);
+    corners.notes.iter().for_each(progress::note);
     let series = series::measure(&known, seen(poses, &corners));
     let file = MeasureFile::new(&series, &corners, &known);
     say(&series, &file);

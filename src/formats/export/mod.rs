@@ -5,7 +5,7 @@ pub mod kalibr;
 pub mod mrcal;
 mod read;
 pub mod ros;
-mod scan;
+pub mod scan;
 mod written;
 
 pub use read::{NAMES, read, read_camera};

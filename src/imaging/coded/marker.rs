@@ -10,7 +10,8 @@ use nalgebra::{Matrix3, Point2, Vector3};
 use super::dictionary::turned;
 use crate::imaging::image::{Grey, Image, Picture};
 
-/// Share of the border's fields, and of those of the paper beside it, that may be on the wrong side: glare, a fold, or blur.
+/// Share of the border's fields, and of those of the paper beside it, that may be on the wrong side: glare, a fold, or blur. By the binomial sum,
+/// fields without any order pass for the border and paper of 4x4 bits once in 4 300 times, of 6x6 in 46 000.
 const MOST_BROKEN: f64 = 0.25;
 /// Where a bit is looked at, in its own sides from its middle.
 const WITHIN_BIT: [f64; 3] = [-0.2, 0.0, 0.2];

@@ -49,7 +49,8 @@ impl Placement {
     }
 }
 
-/// The number of bits that a marker may be misread in where others agree with it.
+/// The number of bits that a marker may be misread in where others agree with it. By the binomial sum, bits without any order then pass for a
+/// given marker once in 480 times for 4x4 bits, in 13 000 for 5x5, in a million for 6x6; a placement needs two that do, or one without a wrong bit.
 fn tolerated(bits: usize) -> usize {
     bits * bits / 8
 }

@@ -183,7 +183,7 @@ mod tests {
             let (x, y) = ((cols.start + col + 2) * 12, (rows.start + row + 2) * 12);
             Some(Point2::new(x as f64 - 0.5, y as f64 - 0.5))
         });
-        Detected { corners, copy, level: Level::Reduced(1), print: None }
+        Detected { corners, copy, level: Level::Reduced(1), print: None, open: None }
     }
 
     #[test]
@@ -241,8 +241,13 @@ mod tests {
             // Which of two lines that are alike is not the board's cannot be told; and there are no more of them.
             assert_eq!(without_cut_lines(&copy, &grid, board("8x7")), None);
             assert_eq!(without_cut_lines(&copy, &grid, board("6x5")), None);
-            let detected =
-                |corners: Places| Detected { corners, copy: copy.clone(), level: Level::Reduced(1), print: None };
+            let detected = |corners: Places| Detected {
+                corners,
+                copy: copy.clone(),
+                level: Level::Reduced(1),
+                print: None,
+                open: None,
+            };
             let inner = Lattice::from_fn(6, 5, |col, row| grid.get(col + 1, row + 1).copied());
             assert_eq!(lines_beyond(&detected(inner)), (0, 0));
             let part = Lattice::from_fn(7, 7, |col, row| grid.get(col, row).copied());

@@ -1,9 +1,9 @@
 //! Boards that reach beyond the picture's border.
 //!
-//! In: a grid of corners and the board. Out: the grid with the board's size, the lines that are out of view empty; `None` where it
-//! is not known where the missing lines are. Method: outer lines with few corners are chance, unless the others are out of view.
-//! Missing lines lie on the side where the next line of corners would be out of view, if the
-//! board is seen to end on the other side: a line of squares, then the margin. Something that hides part of the board looks otherwise.
+//! In: a grid of corners and the board. Out: all ways in which the grid may lie on the board, the lines that are out of view empty. Method: outer
+//! lines with few corners are chance, unless the others are out of view. Missing lines lie on the side where the next line of corners would be out
+//! of view, if the board is seen to end on the other side: a line of squares, then the margin. Something that hides part of the board looks
+//! otherwise; then they may lie on either side. A grid that is as long as the board's shorter side is not known to be the whole of that side.
 
 use nalgebra::{Point2, Vector2};
 
@@ -13,14 +13,18 @@ use crate::imaging::lattice::{Lattice, Places};
 
 /// A corner nearer to the picture's border is not seen, px of the copy: the ring that is looked at has a radius of 5.
 const CLOSE_PX: f64 = 8.0;
-/// Where the margin is looked at, steps beyond the last corners.
-const IN_MARGIN: f64 = 1.3;
+/// Where the last squares and the margin are looked at, steps beyond the last corners. Something bright that hides a board's squares from some
+/// place on looks like a margin, but hardly begins just where they end.
+const BEFORE: f64 = -0.5;
+const IN_SQUARE: [f64; 2] = [0.5, 0.85];
+const IN_MARGIN: [f64; 2] = [1.15, 1.3];
 /// How far the margin's grey may be from that of the squares of its colour, as a share of their contrast.
 const UNEVEN: f64 = 0.35;
 /// Share of the margin in view that must look as it should.
 const MOST: f64 = 0.8;
-/// Share of the margin that must be in view.
+/// Share of the margin that must be in view, and on how many squares at least: on two of them anything may look as it should.
 const LEAST_MARGIN: f64 = 0.3;
+const LEAST_SQUARES: usize = 3;
 /// A line with fewer of its corners is a chance find beside the board.
 const FEW: f64 = 0.5;
 
@@ -38,28 +42,36 @@ enum End {
     Unknown,
 }
 
-/// The grid as the whole board's. Columns stay columns.
-pub fn completed(small: &Grey8, grid: &Places, board: Board) -> Option<Places> {
-    let columns = board.columns().checked_sub(grid.columns)?;
-    let rows = board.rows().checked_sub(grid.rows)?;
+/// All ways in which the grid may lie on the board, columns along columns; as lattices of the board's size.
+pub fn placings(small: &Grey8, grid: &Places, board: Board) -> Vec<Places> {
+    let missing = |of_board: usize, of_grid: usize| of_board.checked_sub(of_grid);
+    let (Some(columns), Some(rows)) = (missing(board.columns(), grid.columns), missing(board.rows(), grid.rows)) else {
+        return Vec::new();
+    };
     let turned = grid.quarter_turn();
-    let left = missing_before(columns, || [end(small, grid), end(small, &grid.half_turn())])?;
+    let left = missing_before(columns, || [end(small, grid), end(small, &grid.half_turn())]);
     // A quarter turn brings the last row to the left.
-    let top = missing_before(rows, || [end(small, &turned.half_turn()), end(small, &turned)])?;
-    Some(Lattice::from_fn(board.columns(), board.rows(), |col, row| {
-        grid.get(col.checked_sub(left)?, row.checked_sub(top)?).copied()
-    }))
+    let top = missing_before(rows, || [end(small, &turned.half_turn()), end(small, &turned)]);
+    let placed = |(left, top): (usize, usize)| {
+        Lattice::from_fn(board.columns(), board.rows(), |col, row| {
+            grid.get(col.checked_sub(left)?, row.checked_sub(top)?).copied()
+        })
+    };
+    left.into_iter().flat_map(|left| top.iter().map(move |&top| (left, top))).map(placed).collect()
 }
 
-/// How many of the missing lines lie before the first one seen, by both ends; `None` where they do not tell.
-fn missing_before(missing: usize, ends: impl Fn() -> [End; 2]) -> Option<usize> {
+/// How many of the missing lines may lie before the first one seen, by both ends: none where both ends are the board's, for then there are none
+/// missing, and it is another board or lies otherwise.
+fn missing_before(missing: usize, ends: impl Fn() -> [End; 2]) -> Vec<usize> {
     if missing == 0 {
-        return Some(0);
+        return vec![0];
     }
     match ends() {
-        [End::OutOfView, End::Board] => Some(missing),
-        [End::Board, End::OutOfView] => Some(0),
-        _ => None,
+        [End::OutOfView, End::Board] => vec![missing],
+        [End::Board, End::OutOfView] => vec![0],
+        [End::Board, End::Board] => Vec::new(),
+        // What hides a board may look like its end.
+        _ => (0..=missing).collect(),
     }
 }
 
@@ -82,6 +94,19 @@ pub fn without_chance_lines(small: &Grey8, grid: Places) -> Places {
         let Some(sparsest) = sides.min_by(|a, b| filled(a).total_cmp(&filled(b))) else { return grid };
         grid = Lattice::from_fn(sparsest.columns - 1, sparsest.rows, |col, row| sparsest.get(col + 1, row).copied());
     }
+}
+
+/// The grid without outer lines that are no corners but the board's own outline: without such a line the grid is seen to end there as a board does.
+pub fn without_outline(small: &Grey8, grid: Places) -> Places {
+    let mut grid = grid;
+    for _ in 0..4 {
+        grid = grid.quarter_turn();
+        let inner = Lattice::from_fn(grid.columns - 1, grid.rows, |col, row| grid.get(col + 1, row).copied());
+        if inner.columns > 1 && end(small, &inner) == End::Board {
+            grid = inner;
+        }
+    }
+    grid
 }
 
 /// Where the corners of the line before a column are, as far as the grid goes on evenly; each with the step that leads there.
@@ -109,34 +134,46 @@ fn end(small: &Grey8, grid: &Places) -> End {
     if outside > 0 && 2 * outside >= known.len() && known.iter().all(|place| is_near_border(small, place)) {
         return End::OutOfView;
     }
-    // Beyond the middle between two corners: the square's grey and the margin's.
-    let greys: Vec<Option<[f64; 2]>> = next
-        .windows(2)
-        .map(|two| {
+    // At the middle between two corners: the grey of the square before them, of the one beyond, and of the margin.
+    let greys = |in_square: f64, in_margin: f64| -> Vec<Option<[f64; 3]>> {
+        let of = |two: &[Option<(Point2<f64>, Vector2<f64>)>]| {
             let [Some((a, step_a)), Some((b, step_b))] = *two else { return None };
             let (middle, step) = (nalgebra::center(&a, &b), (step_a + step_b) / 2.0);
-            Some([small.mean_at(middle - step * 0.5)?, small.mean_at(middle + step * (IN_MARGIN - 1.0))?])
-        })
-        .collect();
-    if is_board_end(&greys) { End::Board } else { End::Unknown }
+            let at = |steps: f64| small.mean_at(middle + step * (steps - 1.0));
+            Some([at(BEFORE)?, at(in_square)?, at(in_margin)?])
+        };
+        next.windows(2).map(of).collect()
+    };
+    let both = IN_SQUARE.into_iter().zip(IN_MARGIN).all(|(square, margin)| is_board_end(&greys(square, margin)));
+    if both { End::Board } else { End::Unknown }
 }
 
-/// True for squares that alternate, with a margin that is all of one of their colours.
-fn is_board_end(greys: &[Option<[f64; 2]>]) -> bool {
-    let colour = |parity: usize| {
+/// True where the board is seen to end on all four sides of the grid.
+pub fn ends_on_all_sides(small: &Grey8, grid: &Places) -> bool {
+    (0..4).all(|quarters| end(small, &grid.turned(quarters)) == End::Board)
+}
+
+/// True for squares that go on alternating as those before them do, with a margin that is all of one of their colours.
+fn is_board_end(greys: &[Option<[f64; 3]>]) -> bool {
+    let before = |parity: usize| {
         let squares: Vec<f64> = greys.iter().skip(parity).step_by(2).flatten().map(|g| g[0]).collect();
         (!squares.is_empty()).then(|| squares.iter().sum::<f64>() / squares.len() as f64)
     };
-    let (Some(even), Some(odd)) = (colour(0), colour(1)) else { return false };
+    let (Some(odd), Some(even)) = (before(0), before(1)) else { return false };
     let near = |grey: f64, colour: f64| (grey - colour).abs() < UNEVEN * (even - odd).abs();
     let fitting = |margin: f64| {
-        let fits = |(k, g): (usize, &Option<[f64; 2]>)| {
-            g.is_some_and(|[square, beyond]| near(square, if k % 2 == 0 { even } else { odd }) && near(beyond, margin))
+        let fits = |(k, g): (usize, &Option<[f64; 3]>)| {
+            g.is_some_and(|[_, square, beyond]| {
+                near(square, if k % 2 == 0 { even } else { odd }) && near(beyond, margin)
+            })
         };
         greys.iter().enumerate().filter(|&at| fits(at)).count() as f64
     };
-    let in_view = greys.iter().flatten().count() as f64;
-    in_view >= LEAST_MARGIN * greys.len() as f64 && fitting(even).max(fitting(odd)) >= MOST * in_view
+    let count = greys.iter().flatten().count();
+    let (in_view, all) = (count as f64, greys.len());
+    count >= LEAST_SQUARES.min(all)
+        && in_view >= LEAST_MARGIN * all as f64
+        && fitting(even).max(fitting(odd)) >= MOST * in_view
 }
 
 #[cfg(test)]
@@ -184,9 +221,10 @@ mod tests {
         let grid = (0..4)
             .map(|quarters| grid.turned(quarters))
             .find(|turned| turned.get(0, 0).zip(turned.get(1, 0)).is_some_and(|(a, b)| b.x > a.x))?;
-        let completed = completed(&small, &grid, board)?;
-        assert!(completed.iter().all(|(col, row, p)| *p == place(col, row)), "{completed:?}");
-        Some(completed.count())
+        let ways = placings(&small, &grid, board);
+        let is_right = |way: &Places| way.iter().all(|(col, row, p)| *p == place(col, row));
+        assert!(ways.iter().any(is_right), "{ways:?}");
+        (ways.len() == 1).then(|| ways[0].count())
     }
 
     #[test]
@@ -205,6 +243,37 @@ mod tests {
         // Cut off on the left and hidden on the right, wherever what hides it begins.
         for from in 50..70 {
             assert_eq!(seen("10x6", (-5.0, 25.0), |x, _| x > f64::from(from)), None, "{from}");
+        }
+    }
+
+    #[test]
+    fn the_outline_is_no_line_of_corners() {
+        let small = |hidden: bool| {
+            let colour = |x: usize, y: usize| {
+                let (i, j) = (x / 10, y / 10);
+                let black = (2..10).contains(&i) && (2..8).contains(&j) && (i + j) % 2 == 0;
+                if hidden && x > 92 {
+                    120
+                } else if black {
+                    30
+                } else {
+                    220
+                }
+            };
+            Grey8 { width: 120, height: 100, pixels: (0..120 * 100).map(|k| colour(k % 120, k / 120)).collect() }
+        };
+        // From the first column on, of which 2 is the outline.
+        let grid = |first: usize, last: usize| {
+            Lattice::from_fn(last - first + 1, 5, |col, row| {
+                Some(Point2::new((10 * (first + col)) as f64 - 0.5, (10 * (3 + row)) as f64 - 0.5))
+            })
+        };
+        for hidden in [false, true] {
+            for (first, last, kept) in [(2, 8, 6), (3, 9, 7), (4, 8, 5)] {
+                let found = without_outline(&small(hidden), grid(first, last));
+                assert_eq!((found.columns, found.rows), (kept, 5), "{hidden} {first}");
+                assert_eq!(found.get(0, 0), Some(&Point2::new((10 * first.max(3)) as f64 - 0.5, 29.5)));
+            }
         }
     }
 

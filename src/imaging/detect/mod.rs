@@ -10,6 +10,7 @@
 
 mod colour;
 pub mod continuation;
+pub mod count;
 mod extent;
 mod growth;
 mod saddles;
@@ -22,7 +23,8 @@ pub use self::growth::grids;
 use self::growth::largest_grid;
 use super::coded::{self, Print};
 use super::image::{Grey8, Picture};
-use super::lattice::{Lattice, Places};
+use super::lattice::{Lattice, Places, Renumbering};
+use super::open::Open;
 use super::pyramid::{Level, factor_for};
 use super::{Board, Squares};
 use crate::opencv::find_board;
@@ -31,7 +33,7 @@ use crate::opencv::find_board;
 pub const COARSE_PX: usize = 1_000_000;
 
 /// Grids of fewer corners than this are chance.
-const LEAST_SEEN: usize = 12;
+pub const LEAST_SEEN: usize = 12;
 /// How many times more of the board another copy must show to be worth more than the copy before it.
 const WORTH: f64 = 1.03;
 
@@ -46,6 +48,8 @@ pub struct Detected {
     pub level: Level,
     /// How its markers are printed, where it has any.
     pub print: Option<Print>,
+    /// What else the numbers of its corners could be, where that is open.
+    pub open: Option<Open>,
 }
 
 /// Why a picture gave no corners.
@@ -154,9 +158,25 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
         last = Some((attempt.level, small));
     }
     // A part of a larger grid is not the board with corners missing.
-    let seen = search.seen.map(|(grid, _)| grid);
-    let larger = seen.as_ref().map_or(0, Lattice::count);
-    search.partial.filter(|p| p.corners.count() > larger).ok_or_else(|| refusal(seen, board))
+    let larger = search.seen.as_ref().map_or(0, |(grid, _)| grid.count());
+    let partial = search.partial.filter(|p| p.corners.count() > larger);
+    partial.map_or_else(|| with_open_numbers(picture, search.seen, board), Ok)
+}
+
+/// A grid that may be several parts of the board as one of them; the reason where it is none, or shows too little.
+fn with_open_numbers(picture: &Picture, seen: Option<(Places, Level)>, board: Board) -> Result<Detected, Refusal> {
+    /// Share of the board's corners, and count of them, that are worth asking the other pictures about.
+    const LEAST: f64 = 0.25;
+    let refusal = refusal(seen.as_ref().map(|(grid, _)| grid), board);
+    let is_enough =
+        |grid: &Places| grid.count() >= LEAST_SEEN && grid.count() as f64 >= LEAST * board.corner_count() as f64;
+    let Some((grid, level)) = seen.filter(|(grid, _)| is_enough(grid)) else { return Err(refusal) };
+    let small = level.copy(picture);
+    let mut ways = ways_to_lie(&small, &grid, board).into_iter();
+    let mut ways = ways.by_ref().map(|way| turn_by_colours(&small, right_handed(way), board));
+    let Some(first) = ways.next() else { return Err(refusal) };
+    let others = ways.filter_map(|way| Renumbering::between(&first, &way)).collect();
+    Ok(Detected { open: Some(Open { others, refusal }), ..on_a_copy(picture, level, &small, first) })
 }
 
 /// The copy on which whole boards with large squares are seen: half as long and wide as that of about [`COARSE_PX`] and made of a few of the
@@ -180,7 +200,7 @@ fn at_a_glance(picture: &Picture, board: Board) -> Option<Detected> {
         return None;
     }
     let corners = turn_by_colours(&copy, right_handed(grid), board);
-    Some(Detected { corners, copy, level, print: None })
+    Some(Detected { corners, copy, level, print: None, open: None })
 }
 
 /// The board, or a part of it, by one attempt; another grid is kept as seen.
@@ -188,7 +208,9 @@ fn found(small: &Grey8, attempt: Attempt, board: Board, search: &mut Search) -> 
     if attempt.way == Way::Sectors {
         // Where OpenCV cannot work at all, it has found nothing.
         let corners = find_board(small, board.columns(), board.rows()).ok().flatten()?;
-        return Some(whole(board, corners));
+        // Where a line is hidden it takes the board's outline for one.
+        let grid = whole(board, corners);
+        return Some(grid.clone()).filter(|_| extent::without_outline(small, grid).count() == board.corner_count());
     }
     let grid = grown(small, board.corner_count())?;
     let fitting = fitting(small, &grid, board);
@@ -230,7 +252,8 @@ fn ladder(picture: &Picture) -> Vec<Attempt> {
 }
 
 fn grown(small: &Grey8, enough: usize) -> Option<Places> {
-    Some(extent::without_chance_lines(small, continuation::without_ends(small, largest_grid(small, enough)?)))
+    let grid = extent::without_chance_lines(small, continuation::without_ends(small, largest_grid(small, enough)?));
+    Some(extent::without_outline(small, grid))
 }
 
 fn whole(board: Board, corners: Vec<Point2<f64>>) -> Places {
@@ -242,34 +265,39 @@ fn fitting(small: &Grey8, grid: &Places, board: Board) -> Option<Places> {
     of_size(small, grid, board).or_else(|| of_size(small, &continuation::without_cut_lines(small, grid, board)?, board))
 }
 
-/// A grid as the board's, where it is known which of the board's corners are missing: it is as long and as wide as the board, or
-/// what it lacks can only lie beyond the picture's border.
+/// A grid as the board's, where it is known which of the board's corners are missing: it can lie on the board in one way only.
 fn of_size(small: &Grey8, grid: &Places, board: Board) -> Option<Places> {
     /// Share of the board's corners that makes a grid the board.
     const LEAST: f64 = 0.5;
     if (grid.count() as f64) < LEAST * board.corner_count() as f64 {
         return None;
     }
+    let mut ways = ways_to_lie(small, grid, board).into_iter();
+    ways.next().filter(|_| ways.next().is_none())
+}
+
+/// All ways in which a grid may lie on the board, but for turns after which the board looks the same.
+fn ways_to_lie(small: &Grey8, grid: &Places, board: Board) -> Vec<Places> {
     let quarter = grid.quarter_turn();
-    let ways = [Some(grid), (board.columns() != board.rows()).then_some(&quarter)];
-    let mut fitting = ways.into_iter().flatten().filter_map(|grid| extent::completed(small, grid, board));
-    let first = fitting.next()?;
-    fitting.next().is_none().then_some(first)
+    let turned = [Some(grid), (board.columns() != board.rows()).then_some(&quarter)];
+    turned.into_iter().flatten().flat_map(|grid| extent::placings(small, grid, board)).collect()
 }
 
 /// What was found on a copy, on one that is no finer than the picture.
 pub fn on_a_copy(picture: &Picture, level: Level, small: &Grey8, corners: Places) -> Detected {
     match level {
-        Level::Reduced(_) | Level::Skimmed(_) => Detected { corners, copy: small.clone(), level, print: None },
+        Level::Reduced(_) | Level::Skimmed(_) => {
+            Detected { corners, copy: small.clone(), level, print: None, open: None }
+        }
         Level::Doubled => {
             let level = Level::Reduced(1);
             let corners = corners.map(|p| level.to_copy(&Level::Doubled.to_picture(p)));
-            Detected { corners, copy: level.copy(picture), level, print: None }
+            Detected { corners, copy: level.copy(picture), level, print: None, open: None }
         }
     }
 }
 
-fn refusal(seen: Option<Places>, board: Board) -> Refusal {
+fn refusal(seen: Option<&Places>, board: Board) -> Refusal {
     let Some(grid) = seen.filter(|grid| grid.count() >= LEAST_SEEN) else { return "no board found".to_owned().into() };
     let (long, short) = (grid.columns.max(grid.rows), grid.columns.min(grid.rows));
     let (columns, rows) = (board.columns(), board.rows());
@@ -292,6 +320,8 @@ pub fn size_seen(detected: &Detected) -> Option<Squares> {
     (grid.count() == grid.columns * grid.rows).then_some(Squares { columns, rows })
 }
 
+#[cfg(test)]
+mod cut_boards;
 #[cfg(test)]
 mod tests {
     use super::*;

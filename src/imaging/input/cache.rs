@@ -12,13 +12,14 @@ use crate::files::OutDir;
 use crate::imaging::coded::{Layout, Print};
 use crate::imaging::detect::Refusal;
 use crate::imaging::image::Grey8;
-use crate::imaging::lattice::Lattice;
+use crate::imaging::lattice::{Lattice, Renumbering};
+use crate::imaging::open::Open;
 use crate::imaging::pyramid::{Level, Small};
 use crate::imaging::{Board, Corner, Mosaic};
 
 /// Names the algorithm by what it finds: a hash of the corners of the golden pictures below. A change that moves a corner fails the test
 /// `the_algorithm_is_named_by_what_it_finds`, which says the new name.
-const ALGORITHM: &str = "corners 137b2dac1f53389a";
+const ALGORITHM: &str = "corners 5f769288f6e6cfb7";
 
 /// A board in a picture.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +28,8 @@ pub struct Sighting {
     pub corners: Lattice<Corner>,
     /// How its markers are printed, where it has any.
     pub print: Option<Print>,
+    /// What else the numbers of its corners could be, where that is open.
+    pub open: Option<Open>,
 }
 
 /// What was found in a picture, or why nothing.
@@ -109,7 +112,13 @@ fn text(look: &Look) -> String {
             let seen = seen.map_or("-".to_owned(), |squares| squares.to_string());
             body.push_str(&format!("none {seen} {}\n", reason.replace('\n', " ")));
         }
-        Ok(Sighting { corners, print }) => {
+        Ok(Sighting { corners, print, open }) => {
+            if let Some(Open { others, refusal: Refusal { reason, seen } }) = open {
+                let seen = seen.map_or("-".to_owned(), |squares| squares.to_string());
+                let others: Vec<String> =
+                    others.iter().map(|o| format!("{},{},{}", o.quarters, o.columns, o.rows)).collect();
+                body.push_str(&format!("open {};{seen};{}\n", others.join(" "), reason.replace('\n', " ")));
+            }
             if let Some(Print { share, layout, inverted }) = print {
                 let old = u8::from(*layout == Layout::Old);
                 body.push_str(&format!("print {share} {old} {}\n", u8::from(*inverted)));
@@ -137,6 +146,13 @@ fn parse(text: &str, board: Board) -> Option<Look> {
         let seen = if seen == "-" { None } else { Some(seen.parse().ok()?) };
         return Some(Err(Refusal { reason: reason.strip_suffix('\n')?.to_owned(), seen }));
     }
+    let (open, body) = match body.strip_prefix("open ") {
+        None => (None, body),
+        Some(rest) => {
+            let (line, rest) = rest.split_once('\n')?;
+            (Some(parse_open(line)?), rest)
+        }
+    };
     let (print, body) = match body.strip_prefix("print ") {
         None => (None, body),
         Some(rest) => {
@@ -161,7 +177,19 @@ fn parse(text: &str, board: Board) -> Option<Look> {
         let corner = Corner { col, row, px, covariance_px2, blur_px, reach, used: used != 0.0 };
         *grid.cells.get_mut(row * board.columns() + col)? = Some(corner);
     }
-    Some(Ok(Sighting { corners: grid, print }))
+    Some(Ok(Sighting { corners: grid, print, open }))
+}
+
+/// From a line of the entry.
+fn parse_open(line: &str) -> Option<Open> {
+    let [others, seen, reason] = line.splitn(3, ';').collect::<Vec<_>>().try_into().ok()?;
+    let other = |text: &str| {
+        let [quarters, columns, rows] = text.split(',').collect::<Vec<_>>().try_into().ok()?;
+        Some(Renumbering { quarters: quarters.parse().ok()?, columns: columns.parse().ok()?, rows: rows.parse().ok()? })
+    };
+    let seen = if seen == "-" { None } else { Some(seen.parse().ok()?) };
+    let others = others.split_whitespace().map(other).collect::<Option<_>>()?;
+    Some(Open { others, refusal: Refusal { reason: reason.to_owned(), seen } })
 }
 
 #[cfg(test)]
@@ -184,9 +212,16 @@ mod tests {
             (row + col < 3).then_some(Corner { col, row, px, covariance_px2, blur_px, reach, used: col > 0 })
         });
         let print = Some(Print { share: 0.7, layout: Layout::Old, inverted: true });
-        let coded: Look = Ok(Sighting { corners: corners.clone(), print });
+        let coded: Look = Ok(Sighting { corners: corners.clone(), print, open: None });
         assert_eq!(parse(&text(&coded), board()), Some(coded));
-        let look: Look = Ok(Sighting { corners, print: None });
+        for (others, seen) in [(vec![(0, 1, 0), (3, -2, 4)], None), (Vec::new(), Some("4x4".parse().unwrap()))] {
+            let renumbering = |(quarters, columns, rows)| Renumbering { quarters, columns, rows };
+            let refusal = Refusal { reason: "shows 5 corners; which they are".to_owned(), seen };
+            let open = Some(Open { others: others.into_iter().map(renumbering).collect(), refusal });
+            let look: Look = Ok(Sighting { corners: corners.clone(), print: None, open });
+            assert_eq!(parse(&text(&look), board()), Some(look));
+        }
+        let look: Look = Ok(Sighting { corners, print: None, open: None });
         let written = text(&look);
         assert_eq!(parse(&written, board()), Some(look));
         for cut in 0..written.len() {
@@ -275,9 +310,18 @@ mod tests {
         };
         let clipped = damaged(&|_, v| v.min(170.0));
         let glary = damaged(&|x, v| v + 60.0 * (x as f64 / 400.0).powi(2));
+        // And what the border cuts, on one side and on two.
+        let cut = |left: usize, top: usize| {
+            let pixels = golden_picture(640, 52.0, 255.0, 0.0);
+            let (width, height) = (640 - left, 640 - top);
+            let pixels =
+                (0..width * height).map(|k| pixels[(k / width + top) * 640 + k % width + left] as u8).collect();
+            Picture::from(Image { width, height, pixels })
+        };
         // Full size, reduced by two, the same with bent edges, squares that are seen on a finer copy only, and 16 bits.
-        for picture in eights.into_iter().chain([sixteen, clipped, glary]) {
+        for picture in eights.into_iter().chain([sixteen, clipped, glary, cut(160, 0), cut(160, 140)]) {
             let detected = detect::detect(&picture, board).unwrap();
+            hash.update(&detected.open.as_ref().map_or(0, |open| open.others.len() + 1).to_le_bytes());
             for (col, row, c) in refine::refine(&picture, &detected).iter() {
                 let s =
                     c.covariance_px2.map_or([0.0; 3], |s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]].map(|v| v.abs().sqrt()));

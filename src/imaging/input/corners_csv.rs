@@ -64,7 +64,7 @@ pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<C
     let [left_size, right_size] =
         [size_of(&table, &rows, Side::Left, size)?, size_of(&table, &rows, Side::Right, size)?];
     let (pairs, skipped) = gather(rows, board);
-    Ok(Corners { board, left_size, right_size, pairs, skipped, notes })
+    Ok(Corners { board, left_size, right_size, pairs, skipped, open: Vec::new(), notes })
 }
 
 /// The size of one side's pictures: what the file holds, or else what was said. All of its corners lie inside.
@@ -214,6 +214,7 @@ mod tests {
                 right: vec![plain(corner(1, 1, 3.0))],
             }],
             skipped: Vec::new(),
+            open: Vec::new(),
             notes: Vec::new(),
         };
         let back = read_str(&to_csv(&corners), "4x3", None).unwrap();

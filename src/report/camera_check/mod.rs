@@ -76,7 +76,7 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
         "{} of {total} pairs of a board of {} squares of {} mm; {} lens, board {}",
         calibration.views.len(),
         board.squares,
-        board.square_mm,
+        board.side_said(),
         calibration.rig().left.lens.name(),
         if calibration.layout.shape { "free to be bowed" } else { "flat" }
     );

@@ -139,7 +139,7 @@ fn board(calibration: &Calibration) -> String {
     } else {
         ", taken as flat".to_owned()
     };
-    format!("board of {} squares of {} mm{bow}", calibration.board.squares, calibration.board.square_mm)
+    format!("board of {} squares of {} mm{bow}", calibration.board.squares, calibration.board.side_said())
 }
 
 /// What to do next: what the deciding line asks for, then what the views lack.

@@ -5,6 +5,7 @@ pub mod discarded;
 pub mod misfit;
 mod mixups;
 pub mod numbering;
+pub mod open_numbers;
 pub mod series;
 
 use crate::stereo::model::known_lenses::KnownLenses;

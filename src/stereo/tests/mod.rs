@@ -2,6 +2,7 @@
 
 mod known_lenses;
 mod models;
+mod open_numbers;
 mod partial;
 mod recovery;
 mod refusals;

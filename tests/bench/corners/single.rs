@@ -119,8 +119,10 @@ fn measure(angle: f64, spread: Spread, noise: f64) -> Spot {
                 rows: 2,
                 cells: vec![Some(start), Some(start + along[0]), Some(start + along[1]), None],
             };
-            let fits =
-                refine::measure(&picture, &Detected { corners, copy: grey, level: Level::Reduced(1), print: None });
+            let fits = refine::measure(
+                &picture,
+                &Detected { corners, copy: grey, level: Level::Reduced(1), print: None, open: None },
+            );
             let place = Vector2::new((board.len() % NOISES) as f64, (board.len() / NOISES) as f64) * f64::from(PATCH);
             board.push(fits.get(0, 0).map(|m| Measured { px: m.px + place, ..*m }));
             truths.push(truth + place);

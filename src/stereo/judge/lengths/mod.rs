@@ -79,7 +79,7 @@ pub(super) fn measure(rig: &Rig, board: &Board, view: &View) -> Measured {
     let mut add = |axis, squares: usize, a: usize, b: usize| {
         if let (Some(a), Some(b)) = (at[a], at[b]) {
             let length_mm = (points[b].point_mm - points[a].point_mm).norm();
-            let error_mm = length_mm - squares as f64 * board.square_mm;
+            let error_mm = length_mm - squares as f64 * board.sides_mm()[axis as usize];
             lengths.push(Length { axis, squares, error_mm, ends: (a, b) });
         }
     };
@@ -141,7 +141,7 @@ fn range(board: &Board, measured: &[Measured], axis: Axis, squares: usize) -> Op
     Some(Range {
         axis,
         // As a person writes it: 38.1 for three squares of 12.7.
-        nominal_mm: (squares as f64 * board.square_mm * 1e9).round() / 1e9,
+        nominal_mm: (squares as f64 * board.sides_mm()[axis as usize] * 1e9).round() / 1e9,
         count: errors.len(),
         mean_error_mm: mean,
         std_mm: (spread / (errors.len() as f64 - 1.0).max(1.0)).sqrt(),
@@ -156,7 +156,7 @@ impl Measured {
 
     /// Sum of the measured over the sum of the nominal lengths, minus one.
     pub(super) fn scale_error(&self, board: &Board) -> f64 {
-        let nominal: f64 = self.lengths.iter().map(|l| l.squares as f64 * board.square_mm).sum();
+        let nominal: f64 = self.lengths.iter().map(|l| l.squares as f64 * board.sides_mm()[l.axis as usize]).sum();
         self.lengths.iter().map(|l| l.error_mm).sum::<f64>() / nominal
     }
 

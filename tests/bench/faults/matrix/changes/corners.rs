@@ -64,7 +64,15 @@ impl World {
         });
         let pairs = pairs.collect();
         let size = (self.px, self.px);
-        Corners { board: set.typed, left_size: size, right_size: size, pairs, skipped: Vec::new(), notes: Vec::new() }
+        Corners {
+            board: set.typed,
+            left_size: size,
+            right_size: size,
+            pairs,
+            skipped: Vec::new(),
+            open: Vec::new(),
+            notes: Vec::new(),
+        }
     }
 
     /// What the program says of them.

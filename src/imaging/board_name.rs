@@ -1,0 +1,139 @@
+//! Boards by their names: `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100`.
+//!
+//! In: what was typed, or a board. Out: the board, or the reason why there is none; its name.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::Error;
+use super::board::{Board, Kind, MOST_STRETCH, SQUARES_MM, Squares, of_layout};
+use super::coded::Layout;
+use super::coded::dictionary::Dictionary;
+
+impl fmt::Display for Board {
+    /// As it is named on the command line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (squares, side) = (self.squares, self.side_said());
+        match self.kind {
+            Kind::Checker => write!(f, "checker:{squares}:{side}"),
+            Kind::Charuco { marker_mm, dictionary, layout } => {
+                write!(f, "charuco:{squares}:{side}:{marker_mm}:{}{}", dictionary.name(), of_layout(layout))
+            }
+        }
+    }
+}
+
+impl FromStr for Board {
+    type Err = Error;
+
+    /// Reads `checker:20x20:10` or `charuco:11x8:15:11:DICT_5X5_100`. Squares of a board with markers are counted as printed: columns first. A square
+    /// that is not quite one has a width and a height: `checker:20x20:10x10.01`.
+    fn from_str(text: &str) -> Result<Board, Error> {
+        let refuse = |why: String| Error::BoardName { found: text.to_owned(), why };
+        let (kind, rest) = text.split_once(':').ok_or_else(|| refuse("it has no `:`".to_owned()))?;
+        let fields: Vec<&str> = rest.split(':').map(str::trim).collect();
+        let length = |text: &str| match text.parse::<f64>() {
+            Ok(mm) if SQUARES_MM.contains(&mm) => Ok(mm),
+            _ => {
+                let (least, most) = SQUARES_MM.into_inner();
+                Err(refuse(format!("`{text}` is no length from {least} to {most} mm")))
+            }
+        };
+        let sides = |text: &str| match text.split_once('x') {
+            None => Ok((length(text)?, 1.0)),
+            Some((width, height)) => {
+                let (width, height) = (length(width)?, length(height)?);
+                let stretch = height / width;
+                // Printers stretch paper by less; other counts or another board are off by more.
+                let is_square = (1.0 - MOST_STRETCH..=1.0 + MOST_STRETCH).contains(&stretch);
+                if is_square { Ok((width, stretch)) } else { Err(refuse(format!("`{text}` is no square"))) }
+            }
+        };
+        match (kind.trim().to_ascii_lowercase().as_str(), fields.as_slice()) {
+            ("checker", [squares, square_mm]) => {
+                let (square_mm, stretch) = sides(square_mm)?;
+                Ok(Board { stretch, ..Board::checker(squares.parse()?, square_mm) })
+            }
+            ("charuco", [squares, square_mm, marker_mm, dictionary, layout @ ..]) if layout.len() <= 1 => {
+                let layout = match layout.first().map(|word| word.to_ascii_lowercase()).as_deref() {
+                    None => None,
+                    Some("new") => Some(Layout::New),
+                    Some("old" | "legacy") => Some(Layout::Old),
+                    Some(other) => return Err(refuse(format!("`{other}` is no layout; there are `old` and `new`"))),
+                };
+                let ((square_mm, stretch), marker_mm) = (sides(square_mm)?, length(marker_mm)?);
+                let dictionary = Dictionary::named(dictionary).map_err(&refuse)?;
+                let board = Board {
+                    squares: Squares::as_printed(squares)?,
+                    square_mm,
+                    stretch,
+                    kind: Kind::Charuco { marker_mm, dictionary, layout },
+                };
+                board.check_markers().map(|()| board).map_err(refuse)
+            }
+            ("checker", _) => Err(refuse("a checkerboard is `checker:COLSxROWS:SQUARE_MM`".to_owned())),
+            ("charuco", _) => {
+                Err(refuse("a ChArUco board is `charuco:COLSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY`".to_owned()))
+            }
+            ("apriltag", _) => Err(refuse(
+                "grids of AprilTags are not read; a ChArUco board may have them as markers: `charuco:11x8:15:11:DICT_APRILTAG_36h11`".to_owned(),
+            )),
+            (other, _) => Err(refuse(format!("there is no kind of board named `{other}`"))),
+        }
+    }
+}
+
+impl Board {
+    /// Why there can be no such board, where there can be none.
+    fn check_markers(&self) -> Result<(), String> {
+        let Kind::Charuco { marker_mm, dictionary, .. } = self.kind else { return Ok(()) };
+        if marker_mm >= self.square_mm {
+            return Err(format!("a marker of {marker_mm} mm does not fit into a square of {} mm", self.square_mm));
+        }
+        // The old layout of an even number of rows has markers in the other squares, and as many.
+        let markers = self.squares.columns * self.squares.rows / 2;
+        if markers > dictionary.count() {
+            let (name, count) = (dictionary.name(), dictionary.count());
+            return Err(format!("{} squares hold {markers} markers, {name} has {count}", self.squares));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boards_read_back_as_they_are_named() {
+        for text in [
+            "checker:20x20:10",
+            "checker:9x7:20x20.25",
+            "charuco:4x5:54:40.5:DICT_4X4_1000",
+            "charuco:11x8:15:11:DICT_ARUCO_ORIGINAL:old",
+        ] {
+            let board: Board = text.parse().unwrap();
+            assert_eq!(board.to_string(), text);
+        }
+        let short: Board = "CharUco:4x5:54:40.5:4x4_50".parse().unwrap();
+        assert_eq!(short.to_string(), "charuco:4x5:54:40.5:DICT_4X4_50");
+    }
+
+    #[test]
+    fn boards_that_cannot_be_are_refused_with_the_reason() {
+        for (text, why) in [
+            ("20x20", "no `:`"),
+            ("checker:20x20", "checker:COLSxROWS:SQUARE_MM"),
+            ("dots:20x20:10", "no kind of board"),
+            ("checker:20x20:10x12", "no square"),
+            ("apriltag:6x6:tag36h11:35.2:10.56", "AprilTags are not read"),
+            ("charuco:4x5:54:60:DICT_4X4_50", "does not fit"),
+            ("charuco:4x5:54:40:DICT_4X4_51", "DICT_4X4_50"),
+            ("charuco:20x20:54:40:DICT_4X4_50", "200 markers"),
+            ("charuco:4x5:0:40:DICT_4X4_50", "no length"),
+        ] {
+            let error = text.parse::<Board>().unwrap_err().to_string();
+            assert!(error.contains(why), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! What a caliper says of a printed board.
+//!
+//! In: the printed extent from the outer edge of the first to that of the last square, across and along, and the board as drawn. Out: the board as
+//! printed (width and height have scales of their own), and how well its lengths are known. Goes wrong: an extent that is not this board's, which is
+//! named: another extent of it, exchanged sides, a print not in true size, other counts.
+
+use std::str::FromStr;
+
+use super::board::{Board, MOST_STRETCH};
+
+/// Largest error of a caliper over up to 300 mm, mm (DIN 862).
+const CALIPER_MM: f64 = 0.03;
+
+/// A printed extent as it was read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PrintedExtent {
+    /// Width and height, mm.
+    pub mm: [f64; 2],
+    /// The last digit that was read, mm.
+    pub digit_mm: f64,
+}
+
+impl FromStr for PrintedExtent {
+    type Err = String;
+
+    /// Reads `149.7x99.8`.
+    fn from_str(text: &str) -> Result<PrintedExtent, String> {
+        let refuse = || "an extent is WIDTHxHEIGHT in mm, as `149.7x99.8`".to_owned();
+        let (width, height) = text.split_once(['x', 'X']).ok_or_else(refuse)?;
+        let number = |word: &str| {
+            let word = word.trim();
+            let value = word.parse::<f64>().ok().filter(|mm| mm.is_finite() && *mm > 0.0).ok_or_else(refuse)?;
+            let digits = word.split_once('.').map_or(0, |(_, digits)| digits.len() as i32);
+            Ok::<_, String>((value, 10f64.powi(-digits)))
+        };
+        let ((width, a), (height, b)) = (number(width)?, number(height)?);
+        Ok(PrintedExtent { mm: [width, height], digit_mm: a.max(b) })
+    }
+}
+
+/// A board as it was printed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Printed {
+    /// The board.
+    pub board: Board,
+    /// Expanded uncertainty (k = 2) of its whole extent, mm; that of a shorter length is less.
+    pub uncertainty_mm: f64,
+}
+
+impl PrintedExtent {
+    /// The board with this extent; the reason where it is not the extent of it.
+    pub fn of(&self, board: &Board) -> Result<Printed, String> {
+        let counts = [board.squares.columns, board.squares.rows];
+        let sides = board.sides_mm();
+        let scales = |mm: [f64; 2], squares: [usize; 2]| [0, 1].map(|k| mm[k] / (squares[k] as f64 * sides[k]));
+        let fits = |scales: [f64; 2]| scales.iter().all(|scale| (scale - 1.0).abs() <= MOST_STRETCH);
+        let exchanged = [self.mm[1], self.mm[0]];
+        let (mut mm, is_plain) = (self.mm, !board.is_coded());
+        // Of a plain board the larger count comes first, however it lies.
+        if is_plain && !fits(scales(mm, counts)) && fits(scales(exchanged, counts)) {
+            mm = exchanged;
+        }
+        let [across, along] = scales(mm, counts);
+        if !fits([across, along]) {
+            let inner = counts.map(|squares| squares - 2);
+            let is_inner = fits(scales(mm, inner)) || is_plain && fits(scales(exchanged, inner));
+            return Err(self.another(board, fits(scales(exchanged, counts)), is_inner));
+        }
+        let mut uncertainty_mm = CALIPER_MM + self.digit_mm / 2.0;
+        let (width, height) = if is_plain && counts[0] == counts[1] {
+            // Which side was called the width the pictures do not tell.
+            uncertainty_mm += (mm[0] - mm[1]).abs() / 2.0;
+            let mean = (across + along) / 2.0;
+            (mean, mean)
+        } else {
+            (across, along)
+        };
+        let scaled = board.scaled(width);
+        Ok(Printed { board: Board { stretch: board.stretch * height / width, ..scaled }, uncertainty_mm })
+    }
+
+    /// Why the extent is not the board's.
+    fn another(&self, board: &Board, is_exchanged: bool, is_inner: bool) -> String {
+        let ([width, height], squares) = (self.mm, board.squares);
+        let [across, along] = board.sides_mm();
+        let nominal = [squares.columns as f64 * across, squares.rows as f64 * along];
+        let why = if is_exchanged {
+            "width and height are exchanged".to_owned()
+        } else if is_inner {
+            "that is the extent of its inner corners: measure from the outer edge of the first square to that of the last".to_owned()
+        } else {
+            let percent = [width / nominal[0], height / nominal[1]].map(|scale| 100.0 * (scale - 1.0));
+            format!(
+                "{:+.1} % and {:+.1} %: other counts, another side of the squares, or a print that was not in true size",
+                percent[0], percent[1]
+            )
+        };
+        format!(
+            "a printed extent of {width} x {height} mm is not that of {squares} squares of {across} mm, {} x {} mm: {why}",
+            nominal[0], nominal[1]
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn measured(board: &str, extent: &str) -> Result<Printed, String> {
+        extent.parse::<PrintedExtent>()?.of(&board.parse().unwrap())
+    }
+
+    #[test]
+    fn width_and_height_have_scales_of_their_own() {
+        let Printed { board, uncertainty_mm } = measured("charuco:10x8:15:11:DICT_5X5_100", "149.7x120.6").unwrap();
+        let [width, height] = board.sides_mm();
+        assert!((width - 14.97).abs() < 1e-12 && (height - 15.075).abs() < 1e-12, "{width} {height}");
+        assert!((uncertainty_mm - 0.08).abs() < 1e-12);
+        let (a, b) = (board.corner_mm(0, 0), board.corner_mm(8, 6));
+        assert!((b.x - a.x - 8.0 * 14.97).abs() < 1e-9 && (b.y - a.y - 6.0 * 15.075).abs() < 1e-9);
+        // As it was drawn nothing changes, to the bit.
+        assert_eq!(measured("checker:10x8:15", "150x120").unwrap().board, "checker:10x8:15".parse().unwrap());
+        // A plain board may lie on either side.
+        let lying = measured("checker:10x8:15", "120.6x149.7").unwrap();
+        assert_eq!(lying.board, measured("checker:10x8:15", "149.7x120.6").unwrap().board);
+        // And of a square one the sides are not told apart.
+        let square = measured("checker:10x10:15", "149.7x150.1").unwrap();
+        assert!(square.board.stretch == 1.0 && (square.board.square_mm - 14.99).abs() < 1e-12);
+        assert!((square.uncertainty_mm - 0.28).abs() < 1e-9, "{}", square.uncertainty_mm);
+    }
+
+    #[test]
+    fn another_extent_is_named() {
+        let coded = "charuco:10x8:15:11:DICT_5X5_100";
+        for (board, extent, why) in [
+            (coded, "120.1x150.2", "exchanged"),
+            (coded, "120.1x90.2", "inner corners"),
+            ("checker:10x8:15", "90.2x120.1", "inner corners"),
+            (coded, "142.5x114", "-5.0 % and -5.0 %"),
+            (coded, "150x112", "+0.0 % and -6.7 %"),
+        ] {
+            let said = measured(board, extent).unwrap_err();
+            assert!(said.contains(why), "{board} {extent}: {said}");
+        }
+        for extent in ["150", "150x", "x120", "150x-3", "axb", "150x120x3"] {
+            assert!(extent.parse::<PrintedExtent>().is_err(), "{extent}");
+        }
+    }
+}
