@@ -72,7 +72,7 @@ mod tests {
     fn the_settings_file_has_every_key() {
         let shown = format!("{:#?}", Config::default());
         let keys = shown.lines().filter_map(|line| line.trim().split_once(": ")).map(|(key, _)| key);
-        for key in keys.filter(|key| !["columns", "rows", "kind"].contains(key)) {
+        for key in keys.filter(|key| !["columns", "rows", "stretch", "kind"].contains(key)) {
             assert!(SETTINGS.contains(&format!(" {key} = ")) || SETTINGS.contains(&format!("{key}]")), "{key}");
         }
     }
