@@ -63,8 +63,10 @@ pub enum Command {
     /// Identify the robot's kinematic parameters from measurements and joint angles
     Identify(Identify),
     /// Compare robot files with measurements, without fitting anything
+    #[command(after_help = "Example: stereocal verify --measurements today.csv --against out/identified.toml")]
     Verify(Verify),
     /// Find where the cameras stand and the target sits, with a robot that is trusted
+    #[command(after_help = "Example: stereocal locate poses/ --robot out/identified.toml")]
     Locate(Locate),
     /// Write a board to print, in true size
     Board(PrintBoard),
