@@ -2,6 +2,7 @@
 
 mod board;
 mod cameras;
+mod locate;
 mod output;
 mod placement;
 mod robot;
@@ -16,8 +17,9 @@ pub use self::board::PrintBoard;
 pub use self::cameras::{
     BoardShape, CalibrationFormat, CameraCheck, Export, ExportCalibration, ExportWhat, Measure, Rectify,
 };
+pub use self::locate::Locate;
 pub use self::output::Output;
-pub use self::placement::{ExportPlacement, Locate, PlacementFormat};
+pub use self::placement::{ExportPlacement, PlacementFormat};
 pub use self::robot::{
     Compensate, DhConvention, ExportRobot, Identify, Plan, PlanKind, RobotCommand, RobotFormat, RobotImport, RobotNew,
     RobotPlace, RobotShow, RobotWhat, TableFlags, Verify,

@@ -42,6 +42,26 @@ fn python(program: &str, file: &std::path::Path) -> Option<Value> {
     serde_json::from_slice(&output.stdout).ok()
 }
 
+/// The matrix of a quaternion `x, y, z, w`, row by row.
+fn matrix(q: &[f64]) -> [f64; 9] {
+    let (x, y, z, w) = (q[0], q[1], q[2], q[3]);
+    [
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - z * w),
+        2.0 * (x * z + y * w),
+        2.0 * (x * y + z * w),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - x * w),
+        2.0 * (x * z - y * w),
+        2.0 * (y * z + x * w),
+        1.0 - 2.0 * (x * x + y * y),
+    ]
+}
+
+fn near(a: &[f64], b: &[f64]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9 * b.abs().max(1.0))
+}
+
 #[test]
 fn a_placement_and_its_exports_are_one() {
     let folder = identified();
@@ -78,30 +98,12 @@ fn a_placement_and_its_exports_are_one() {
     }
     let (rotation, shift) =
         (numbers(&groups[0]["base_from_rig"]["rotation"]), numbers(&groups[0]["base_from_rig"]["translation_mm"]));
-    let near = |a: &[f64], b: &[f64]| {
-        a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9 * b.abs().max(1.0))
-    };
     let file = |name: String| at.join(name);
     let read = "import cv2,sys,json; f=cv2.FileStorage(sys.argv[1],cv2.FILE_STORAGE_READ); \
         print(json.dumps([f.getNode(k).mat().ravel().tolist() for k in ('R_cam2base','t_cam2base')]))";
     if let Some(found) = python(read, &file(format!("opencv/placement_opencv_{name}.yml"))) {
         assert!(near(&numbers(&found[0]), &rotation) && near(&numbers(&found[1]), &shift), "{found}");
     }
-    // The quaternion's matrix, from the numbers that another reader finds.
-    let matrix = |q: &[f64]| {
-        let (x, y, z, w) = (q[0], q[1], q[2], q[3]);
-        [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y - z * w),
-            2.0 * (x * z + y * w),
-            2.0 * (x * y + z * w),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z - x * w),
-            2.0 * (x * z - y * w),
-            2.0 * (y * z + x * w),
-            1.0 - 2.0 * (x * x + y * y),
-        ]
-    };
     let metres: Vec<f64> = shift.iter().map(|mm| mm / 1000.0).collect();
     let read = "import yaml,sys,json; d=yaml.safe_load(open(sys.argv[1])); p=d['parameters']; t=d['transformation']; \
         assert p['eye_on_hand'] is False and sorted(p)==sorted(['eye_on_hand','move_group','move_group_namespace','namespace',\

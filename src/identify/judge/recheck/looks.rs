@@ -3,104 +3,19 @@
 //! In: the residuals with their covariance, and the columns of what may have changed. Out: each cause by itself, and those that explain a change.
 //! Goes wrong: causes with the same columns are not told apart, and named together.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
-use super::CauseSeen;
+use super::compared::Look;
+use super::found::{CauseSeen, FALSE_ALARM, SEEN};
 use super::moves::Moves;
+use super::suspects::Suspect;
 use crate::difference::Difference;
-use crate::linear_algebra::pseudo_inverse;
-use crate::robot::{Parameter, Robot};
-
-/// Chance that a robot that did not change is said to have changed.
-pub(super) const FALSE_ALARM: f64 = 0.01;
-
-/// Quantile of the normal distribution for the share of changes that are seen at the size that is stated: nineteen in twenty.
-pub(super) const SEEN: f64 = 1.645;
 
 /// Causes are told apart where the logarithm of one's likelihood is larger by this: 150 to 1.
 const TOLD_APART: f64 = 5.0;
 
 /// White size of a cause, a mrad or mm, below which the poses see nothing of it.
 const UNSEEN: f64 = 1e-4;
-
-/// One thing that may have changed: columns of the offsets, in units of the file.
-pub(super) struct Suspect {
-    pub(super) word: String,
-    pub(super) words: String,
-    pub(super) unit: &'static str,
-    /// Index of the column, and what one unit of the file is in it.
-    pub(super) columns: Vec<(usize, f64)>,
-}
-
-/// The zero of a joint.
-pub(super) fn zero(robot: &Robot) -> impl Fn(usize) -> Parameter + '_ {
-    |joint| if robot.joints[joint].slides { Parameter::D(joint) } else { Parameter::Theta(joint) }
-}
-
-/// The zeros of the joints, the tool along each axis, the scale of the readings, and the tool as a whole.
-pub(super) fn suspects(robot: &Robot, parameters: &[Parameter]) -> Vec<Suspect> {
-    let at = |p: Parameter| parameters.iter().position(|q| *q == p).unwrap_or(0);
-    let of_joint = |joint: usize| {
-        let parameter = zero(robot)(joint);
-        let (unit, factor) = parameter.file_unit();
-        let words = format!("the zero of joint {}", joint + 1);
-        Suspect { word: format!("joint-{}", joint + 1), words, unit, columns: vec![(at(parameter), 1.0 / factor)] }
-    };
-    let tool = |axis: usize| (at(Parameter::V(axis)), 1.0);
-    let of_tool = |axis: usize| {
-        let name = ["x", "y", "z"][axis];
-        Suspect {
-            word: format!("tool-{name}"),
-            words: format!("the tool along {name}"),
-            unit: "mm",
-            columns: vec![tool(axis)],
-        }
-    };
-    let scale = Suspect {
-        word: "scale".to_owned(),
-        words: "the scale of the readings".to_owned(),
-        unit: "per mille",
-        // Its offset takes off what the readings have too much.
-        columns: vec![(parameters.len(), -1.0)],
-    };
-    let whole = Suspect {
-        word: "tool".to_owned(),
-        words: "the tool".to_owned(),
-        unit: "mm",
-        columns: (0..3).map(tool).collect(),
-    };
-    (0..robot.joints.len()).map(of_joint).chain((0..3).map(of_tool)).chain([scale, whole]).collect()
-}
-
-impl Suspect {
-    /// What changed, for a person.
-    pub(super) fn by(&self, amounts: &[f64]) -> String {
-        let amounts: Vec<String> = amounts.iter().map(|a| format!("{a:.4}")).collect();
-        format!("{} by {} {}", self.words, amounts.join(", "), self.unit)
-    }
-}
-
-/// Residuals somewhere, with what they are known to, and the columns of all offsets there, white.
-pub(super) struct Look {
-    pub(super) difference: Difference,
-    pub(super) columns: DMatrix<f64>,
-}
-
-impl Look {
-    /// What a unit of each of a suspect's numbers does. Residuals are predicted less measured: a joint that stands further makes them smaller.
-    fn directions(&self, suspect: &Suspect) -> Vec<DVector<f64>> {
-        suspect.columns.iter().map(|&(at, unit)| -unit * self.columns.column(at)).collect()
-    }
-
-    /// The numbers of a suspect at their best.
-    fn amounts(&self, directions: &[DVector<f64>]) -> DVector<f64> {
-        let n = directions.len();
-        let weighted = |a: &DVector<f64>, b: &DVector<f64>| self.difference.product(a, b);
-        let normal = DMatrix::from_fn(n, n, |r, c| weighted(&directions[r], &directions[c]));
-        let pull = DVector::from_fn(n, |r, _| weighted(&directions[r], &self.difference.off));
-        pseudo_inverse(normal) * pull
-    }
-}
 
 /// Rounds of looking anew where a suspect says that the robot is: a large turn is not linear.
 const ROUNDS: usize = 3;

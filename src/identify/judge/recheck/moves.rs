@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::looks::{FALSE_ALARM, SEEN};
-use super::{Before, Compared, Moved};
+use super::compared::Compared;
+use super::found::{Before, FALSE_ALARM, Moved, SEEN};
 use crate::difference::Difference;
 use crate::geometry::{rigid_columns, rotation_vector};
 use crate::identify::data::dataset::Dataset;
