@@ -218,6 +218,7 @@ pub enum ExportWhat {
     /// The robot
     Robot(ExportRobot),
     /// Where the cameras stand, and the target on the flange
+    #[command(after_help = "Example: stereocal export placement --format ros-static-tf --camera-frame left_optical")]
     Placement(ExportPlacement),
 }
 

@@ -2,6 +2,7 @@
 
 mod board;
 mod cameras;
+mod locate;
 mod output;
 mod placement;
 mod robot;
@@ -16,8 +17,9 @@ pub use self::board::PrintBoard;
 pub use self::cameras::{
     BoardShape, CalibrationFormat, CameraCheck, Export, ExportCalibration, ExportWhat, Measure, Rectify,
 };
+pub use self::locate::Locate;
 pub use self::output::Output;
-pub use self::placement::{ExportPlacement, Locate, PlacementFormat};
+pub use self::placement::{ExportPlacement, PlacementFormat};
 pub use self::robot::{
     Compensate, DhConvention, ExportRobot, Identify, Plan, PlanKind, RobotCommand, RobotFormat, RobotImport, RobotNew,
     RobotPlace, RobotShow, RobotWhat, TableFlags, Verify,
@@ -63,8 +65,10 @@ pub enum Command {
     /// Identify the robot's kinematic parameters from measurements and joint angles
     Identify(Identify),
     /// Compare robot files with measurements, without fitting anything
+    #[command(after_help = "Example: stereocal verify --measurements today.csv --against out/identified.toml")]
     Verify(Verify),
     /// Find where the cameras stand and the target sits, with a robot that is trusted
+    #[command(after_help = "Example: stereocal locate poses/ --robot out/identified.toml")]
     Locate(Locate),
     /// Write a board to print, in true size
     Board(PrintBoard),

@@ -1,24 +1,7 @@
-//! Commands about where the cameras stand and the target sits.
+//! `stereocal export placement`: where the cameras stand, for other programs.
 
 use camino::Utf8PathBuf;
 use clap::{Args, ValueEnum};
-
-use super::cameras::Measure;
-use super::robot::TableFlags;
-
-/// `stereocal locate`
-#[derive(Debug, Args)]
-pub struct Locate {
-    /// Poses: a folder with pictures and poses.csv, which is measured first, or a table of measurements as `identify` reads it.
-    #[command(flatten)]
-    pub measure: Measure,
-    /// The robot, taken as it is: identified.toml, or a nominal one that is trusted
-    #[arg(long, value_name = "FILE")]
-    pub robot: Utf8PathBuf,
-    /// How a table is read.
-    #[command(flatten)]
-    pub table: TableFlags,
-}
 
 /// `stereocal export placement`
 #[derive(Debug, Args)]

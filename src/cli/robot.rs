@@ -64,8 +64,20 @@ pub struct Verify {
     #[command(flatten)]
     pub table: TableFlags,
     /// A robot to judge; repeat for more
-    #[arg(long, value_name = "FILE", required = true)]
+    #[arg(long, value_name = "FILE", required_unless_present = "against")]
     pub robot: Vec<Utf8PathBuf>,
+    /// Is this robot, with its identification.json beside it, still the one of some ten new poses? Nothing else is judged
+    #[arg(long, value_name = "IDENTIFIED", conflicts_with_all = ["robot", "known_distances"])]
+    pub against: Option<Utf8PathBuf>,
+    /// With --against: how far the target may move, mm [default: what 95 % of errors were stated to be below at the identification]
+    #[arg(long, value_name = "MM", requires = "against", value_parser = between(1e-4, 1e3))]
+    pub tolerance_mm: Option<f64>,
+    /// With --against: folder for results; key `out` [default: out]
+    #[arg(long, value_name = "DIR", requires = "against")]
+    pub out: Option<Utf8PathBuf>,
+    /// With --against: replace files that stereocal did not write, or that were changed since
+    #[arg(long, requires = "against")]
+    pub force: bool,
     /// Distances between touched points: group_a,group_b,distance_mm and optionally sigma_mm
     #[arg(long, value_name = "FILE")]
     pub known_distances: Option<Utf8PathBuf>,

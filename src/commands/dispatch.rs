@@ -29,7 +29,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::CameraCheck(args) => camera_check::run(&args, &config, run),
         Command::Measure(args) => measure::run(&args, &config, run),
         Command::Identify(args) => identify::run(&args, &config, run),
-        Command::Verify(args) => verify::run(&args, &config),
+        Command::Verify(args) => verify::run(&args, &config, run),
         Command::Locate(args) => locate::run(&args, &config, run),
         Command::Board(args) => board::run(&args, &config, run),
         Command::Rectify(args) => rectify::run(&args, &config, run),

@@ -49,6 +49,9 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let bar = progress::bar("identifying", 2 + step_count(&settings));
     let Examined { set, robot: nominal, along, findings, unexplained } =
         examine::examine(&set, &given, &settings, &|step| bar.begin(step));
+    if unexplained.is_some() {
+        examine::in_hand::refuse(&set, &nominal)?;
+    }
     let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.begin(step))?;
     bar.finish_and_clear();
     let of_fit = record::findings::findings(&set, &found, &along);

@@ -13,7 +13,6 @@ use crate::files::provenance::Run;
 use crate::formats::known_robot;
 use crate::formats::placement::{PLACEMENT, PlacementFile};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::shared;
 use crate::identify::examine::{self, Examined};
 use crate::identify::judge::errors::Judge;
 use crate::identify::judge::folds;
@@ -52,12 +51,12 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(&out)?.for_run(&run, &inputs);
     out.check_free(&[PLACEMENT])?;
 
-    let mut set = Dataset::new(&rows)?;
-    if let [only] = paths.as_slice() {
-        shared::take(&only.with_file_name("measure.json"), &mut set);
-    }
+    let set = Dataset::new(&rows)?;
     let Examined { set, findings, unexplained, .. } = examine::examine(&set, &robot, &config.identify, &|_| {});
     findings.iter().chain(&unexplained).for_each(|finding| progress::warn(finding.sentence()));
+    if unexplained.is_some() {
+        examine::in_hand::refuse(&set, &robot)?;
+    }
     let trust = known_robot::trust(&args.robot);
     let located = locate(&set, &robot, trust, &config.identify)?;
     let all = set.rows(|_| true);

@@ -1,31 +1,39 @@
 //! What `identification.json` says of the robot file beside it: how far to trust the robot, and the covariance of what was identified.
 
 use camino::Utf8Path;
+use nalgebra::DMatrix;
 use serde::Deserialize;
 
 use crate::files::provenance::{Digested, Provenance};
 use crate::identify::judge::locate::{REPEATABILITY_MM, Trust};
+use crate::identify::judge::recheck::Before;
+use crate::identify::judge::uncertainty::Covariance;
+use crate::identify::model::ladder::Terms;
+use crate::robot::{Parameter, Robot};
 
 #[derive(Debug, Deserialize)]
 struct Identified {
     expected: Option<Expected>,
     #[serde(default)]
+    scatter_mm: f64,
+    #[serde(default)]
     scatter_rad: Option<f64>,
-    covariance: Option<Covariance>,
+    #[serde(default)]
+    smooth: Option<Smooth>,
+    #[serde(default)]
+    whole_covariance: Option<Covariance>,
 }
 
 #[derive(Debug, Deserialize)]
 struct Expected {
     mean_mm: f64,
+    p95_mm: f64,
+    map: Vec<(String, f64)>,
 }
 
-/// As [`crate::identify::judge::uncertainty::Covariance`] writes it: names, and the units of the file.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct Covariance {
-    /// Names of parameters.
-    pub order: Vec<String>,
-    /// Row by row.
-    pub matrix: Vec<Vec<f64>>,
+#[derive(Debug, Deserialize)]
+struct Smooth {
+    left_mm: f64,
 }
 
 /// The record beside a robot's file, where it is about that file.
@@ -49,7 +57,20 @@ pub fn trust(robot: &Utf8Path) -> Trust {
     }
 }
 
-/// The covariance of the identified parameters, where the robot's file has its record beside it.
-pub fn covariance(robot: &Utf8Path) -> Option<Covariance> {
-    beside(robot)?.covariance
+/// What is known of an identified robot. `None` where its file has no record beside it, or one of another program's version.
+pub fn before(file: &Utf8Path, robot: &Robot) -> Option<Before> {
+    let identified = beside(file)?;
+    let (Covariance { order, matrix }, expected) = (identified.whole_covariance?, identified.expected?);
+    let all = Terms::ALL.parameters(robot);
+    let named = |name: &String| all.iter().copied().find(|p| p.name() == *name);
+    let parameters = order.iter().map(named).collect::<Option<Vec<Parameter>>>()?;
+    let count = parameters.len();
+    if matrix.len() != count || matrix.iter().any(|row| row.len() != count) {
+        return None;
+    }
+    let factor = |i: usize| parameters[i].file_unit().1;
+    let covariance = DMatrix::from_fn(count, count, |r, c| matrix[r][c] / (factor(r) * factor(c)));
+    let point_mm = identified.scatter_mm.hypot(identified.smooth.map_or(0.0, |smooth| smooth.left_mm));
+    let trust = Trust { point_mm, rotation_rad: identified.scatter_rad };
+    Some(Before { parameters, covariance, trust, poses: expected.map.len(), p95_mm: expected.p95_mm })
 }

@@ -16,6 +16,7 @@ pub mod placements;
 pub mod plan;
 pub mod recheck;
 pub mod rectified;
+pub mod robot_recheck;
 pub mod robots;
 pub mod targets;
 pub mod urdf;

@@ -1,7 +1,7 @@
 //! `placement.json`: where the cameras stand and the target sits on the flange, with covariances.
 
 use camino::Utf8Path;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::checked;
@@ -121,6 +121,15 @@ impl PlacementFile {
             poses: region(set),
             held: placed.map_or_else(Vec::new, held),
         }
+    }
+
+    /// Where a group's sensor stood, as the chain has it; `None` of a group that is not there.
+    pub fn sensor_from_base(&self, group: &str, root_from_frame0: &Transform) -> Option<Uncertain> {
+        let record = &self.groups.iter().find(|g| g.group == group)?.base_from_rig;
+        let entries: Option<Vec<f64>> = record.covariance.iter().flatten().copied().collect();
+        let root_from_rig =
+            Uncertain { transform: record.transform()?, covariance: Matrix6::from_row_slice(&entries?) };
+        Some(root_from_rig.after(&root_from_frame0.inverse()).inverse())
     }
 
     /// Reads one.

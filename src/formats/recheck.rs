@@ -27,13 +27,13 @@ pub enum Standing {
 }
 
 impl Standing {
-    /// Of a comparison, by a tolerance of a length, mm.
-    pub fn of(recheck: &Recheck, tolerance_mm: f64) -> Standing {
-        let harmless = recheck.change.is_none() || recheck.effect_mm <= MATERIAL_SHARE * tolerance_mm;
-        match (harmless, recheck.seen_mm <= tolerance_mm) {
+    /// Of a comparison: whether anything changed, by how much that moves a length or the target, and what would have been seen, mm.
+    pub fn of(changed: bool, effect_mm: f64, seen_mm: f64, tolerance_mm: f64) -> Standing {
+        let harmless = !changed || effect_mm <= MATERIAL_SHARE * tolerance_mm;
+        match (harmless, seen_mm <= tolerance_mm) {
             (true, true) => Standing::StillValid,
             (true, false) => Standing::Undecided,
-            (false, _) if recheck.effect_mm <= tolerance_mm => Standing::ChangedWithin,
+            (false, _) if effect_mm <= tolerance_mm => Standing::ChangedWithin,
             (false, _) => Standing::Changed,
         }
     }
@@ -92,7 +92,7 @@ impl RecheckFile {
     /// Gathers the figures.
     pub fn new(recheck: &Recheck, against: &Utf8Path, tolerance_mm: f64) -> RecheckFile {
         RecheckFile {
-            standing: Standing::of(recheck, tolerance_mm),
+            standing: Standing::of(recheck.change.is_some(), recheck.effect_mm, recheck.seen_mm, tolerance_mm),
             tolerance_mm,
             against: against.to_string(),
             pairs: recheck.pairs.clone(),
@@ -114,18 +114,20 @@ pub struct Check {
     pub date: String,
     /// The calibration that was compared with.
     pub against: String,
-    /// How many pairs.
+    /// How many pairs, or poses.
+    #[serde(alias = "poses")]
     pub pairs: usize,
     /// What was said.
     pub standing: Standing,
     /// The cause; empty where nothing changed.
     pub cause: String,
-    /// By how much the change moves a length, mm.
+    /// By how much the change moves a length, or the target of a robot, mm.
     pub effect_mm: f64,
     /// What would have been seen, mm.
     pub seen_mm: f64,
-    /// The length that both are for, mm.
-    pub length_mm: f64,
+    /// The length that both are for, mm; none of a robot.
+    #[serde(default)]
+    pub length_mm: Option<f64>,
 }
 
 impl Check {
@@ -139,14 +141,14 @@ impl Check {
             cause: file.cause.clone(),
             effect_mm: file.effect_mm,
             seen_mm: file.seen_mm,
-            length_mm: file.length_mm,
+            length_mm: Some(file.length_mm),
         }
     }
 }
 
 /// The checks before this one in a results folder; none where there is no history.
-pub fn history(out: &OutDir) -> Result<Vec<Check>> {
-    let path = out.join(HISTORY);
+pub fn history(out: &OutDir, name: &str) -> Result<Vec<Check>> {
+    let path = out.join(name);
     if !path.is_file() {
         return Ok(Vec::new());
     }
@@ -159,9 +161,9 @@ pub fn history(out: &OutDir) -> Result<Vec<Check>> {
     })
 }
 
-/// The history as a file.
-pub fn to_csv(checks: &[Check]) -> String {
-    let mut text = String::from("date,against,pairs,standing,cause,effect_mm,seen_mm,length_mm\n");
+/// The history as a file, of checks by so many `counted`: pairs, or poses.
+pub fn to_csv(checks: &[Check], counted: &str) -> String {
+    let mut text = format!("date,against,{counted},standing,cause,effect_mm,seen_mm,length_mm\n");
     for check in checks {
         let standing = serde_json::to_value(check.standing).ok();
         let standing = standing.as_ref().and_then(|value| value.as_str()).unwrap_or_default();
@@ -173,7 +175,7 @@ pub fn to_csv(checks: &[Check]) -> String {
             check.cause.clone(),
             format!("{:.6}", check.effect_mm),
             format!("{:.6}", check.seen_mm),
-            check.length_mm.to_string(),
+            check.length_mm.map_or_else(String::new, |mm| mm.to_string()),
         ];
         text.push_str(&format!("{}\n", fields.join(",")));
     }
@@ -188,7 +190,7 @@ mod tests {
     fn a_history_survives_the_file() {
         let folder = tempfile::tempdir().unwrap();
         let out = OutDir::open(&Utf8Path::from_path(folder.path()).unwrap().join("out")).unwrap();
-        assert_eq!(history(&out).unwrap(), []);
+        assert_eq!(history(&out, HISTORY).unwrap(), []);
         let check = |date: &str, standing| Check {
             date: date.to_owned(),
             against: "a, b/calibration.json".to_owned(),
@@ -197,12 +199,14 @@ mod tests {
             cause: "baseline|other-board".to_owned(),
             effect_mm: 0.0125,
             seen_mm: 0.004,
-            length_mm: 70.0,
+            length_mm: (!date.is_empty()).then_some(70.0),
         };
         let checks = [check("2026-01-02T03:04:05Z", Standing::StillValid), check("", Standing::ChangedWithin)];
-        out.write(HISTORY, to_csv(&checks).as_bytes()).unwrap();
-        assert_eq!(history(&out).unwrap(), checks);
+        for counted in ["pairs", "poses"] {
+            out.write(HISTORY, to_csv(&checks, counted).as_bytes()).unwrap();
+            assert_eq!(history(&out, HISTORY).unwrap(), checks);
+        }
         std::fs::write(out.join(HISTORY), "a,b\n1,2\n").unwrap();
-        assert!(history(&out).unwrap_err().to_string().contains("not a history of checks"));
+        assert!(history(&out, HISTORY).unwrap_err().to_string().contains("not a history of checks"));
     }
 }

@@ -13,13 +13,14 @@ pub struct Page {
 }
 
 /// All pages: first those that are needed in the cell, in that order, then those that are looked up.
-pub const PAGES: [Page; 14] = [
+pub const PAGES: [Page; 15] = [
     Page { topic: "day", text: include_str!("day.md") },
     Page { topic: "boards", text: include_str!("boards.md") },
     Page { topic: "cameras", text: include_str!("cameras.md") },
     Page { topic: "pictures", text: include_str!("pictures.md") },
     Page { topic: "poses", text: include_str!("poses.md") },
     Page { topic: "again", text: include_str!("again.md") },
+    Page { topic: "placement", text: include_str!("placement.md") },
     Page { topic: "robot", text: include_str!("robot.md") },
     Page { topic: "tables", text: include_str!("tables.md") },
     Page { topic: "warnings", text: include_str!("warnings.md") },

@@ -95,6 +95,23 @@ pub enum Error {
         /// Poses that are needed.
         needed: usize,
     },
+    /// The sensor is on the flange.
+    #[error(
+        "the points move as those of cameras on the flange before a target that stands still ({backwards_mm:.2} mm off the nominal robot that way \
+         round, {as_is_mm:.1} mm as they are read); cameras that stand still, with the target on the flange, are what is identified"
+    )]
+    CamerasOnHand {
+        /// Median error as the readings are meant, mm.
+        as_is_mm: f64,
+        /// The other way round, mm.
+        backwards_mm: f64,
+    },
+    /// Nothing says how well the robot is known.
+    #[error("{path} says nothing of how well it is known")]
+    NotKnown {
+        /// The robot's file.
+        path: String,
+    },
     /// The poses leave a direction open.
     #[error("these poses do not tell {direction}: they leave it open")]
     Open {
@@ -135,6 +152,14 @@ impl Explain for Error {
             Error::TooFewToPlace { .. } | Error::Open { .. } => Some(
                 "turn the flange about two axes that are not parallel, by 20 deg or more, over three poses or more of each group".to_owned(),
             ),
+            Error::CamerasOnHand { .. } => Some(
+                "with orientations, give each row the inverse of its pose (point -R'p, rotation vector -r): the board is then the sensor, and \
+                 flange_from_target is where the camera sits on the hand"
+                    .to_owned(),
+            ),
+            Error::NotKnown { .. } => {
+                Some("`identify` writes identification.json beside identified.toml: keep both together".to_owned())
+            }
             Error::NoSamples { reason: Some(reason), .. } => Some(format!("the first of those without: {reason}")),
             Error::Targets { hint, .. } => Some((*hint).to_owned()),
             Error::ModelNeeds { .. } => Some("leave `--model` out and the model is chosen by the data".to_owned()),

@@ -14,6 +14,7 @@ pub mod recheck;
 pub mod rectify;
 pub mod rig;
 pub mod robot;
+pub mod robot_recheck;
 pub mod table;
 
 use crate::diagnostic::Explain;

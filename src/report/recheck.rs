@@ -11,12 +11,21 @@ use crate::formats::recheck::{Check, Standing};
 use crate::stereo::recheck::Recheck;
 
 /// The verdict in words.
-fn word(standing: Standing) -> &'static str {
+pub(super) fn word(standing: Standing) -> &'static str {
     match standing {
         Standing::StillValid => "STILL VALID",
         Standing::ChangedWithin => "CHANGED, WITHIN TOLERANCE",
         Standing::Undecided => "UNDECIDED",
         Standing::Changed => "CHANGED",
+    }
+}
+
+/// How grave it is.
+pub(super) fn tone(standing: Standing) -> Tone {
+    match standing {
+        Standing::StillValid => Tone::Good,
+        Standing::ChangedWithin | Standing::Undecided => Tone::Doubtful,
+        Standing::Changed => Tone::Bad,
     }
 }
 
@@ -85,11 +94,6 @@ pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks:
 
 /// The report.
 pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[Check]) -> Result<String> {
-    let tone = match standing {
-        Standing::StillValid => Tone::Good,
-        Standing::ChangedWithin | Standing::Undecided => Tone::Doubtful,
-        Standing::Changed => Tone::Bad,
-    };
     let numbers = vec![
         (format!("{:.4} mm", recheck.effect_mm), "change of a length beyond chance".to_owned()),
         (format!("{:.4} mm", recheck.seen_mm), "would have been seen".to_owned()),
@@ -113,13 +117,13 @@ pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[
     let header =
         ["cause", "changed by, if it alone did", "+- (95 %)", "mm of a length", "would be seen", "mm of a length"];
     let content = html! {
-        (page::verdict(tone, word(standing), &numbers, &text))
+        (page::verdict(tone(standing), word(standing), &numbers, &text))
         h2 { "What may have changed" }
         p { "Each cause by itself, and the smallest change of it that nineteen of twenty such checks see. Of causes that move the same corners the same way \
              all show a change where one did." }
         div.wide { (page::table(&header, &rows)) }
         h2 { "Over time" }
-        (page::figure(&history(checks, tolerance_mm)?, "Each check in this folder's history: a dot above what would have been seen is a change; \
+        (page::figure(&history(checks, tolerance_mm, "Change of a length")?, "Each check in this folder's history: a dot above what would have been seen is a change; \
             above the tolerance the calibration no longer holds."))
     };
     let lead = format!("{} new pairs against the calibration", recheck.pairs.len());
@@ -127,11 +131,11 @@ pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[
 }
 
 /// The changes of all checks over their number.
-fn history(checks: &[Check], tolerance_mm: f64) -> Result<String> {
+pub(super) fn history(checks: &[Check], tolerance_mm: f64, title: &str) -> Result<String> {
     let over = |of: fn(&Check) -> f64| -> Vec<(f64, f64)> {
         checks.iter().enumerate().map(|(i, check)| ((i + 1) as f64, of(check))).collect()
     };
-    Plot::new("Change of a length", "check", "mm")
+    Plot::new(title, "check", "mm")
         .points("changed by", &over(|check| check.effect_mm))
         .line("would have been seen", &over(|check| check.seen_mm))
         .hline(tolerance_mm, "tolerance")

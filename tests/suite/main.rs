@@ -34,6 +34,7 @@ mod measure;
 mod messages;
 mod picture_faults;
 mod pipeline;
+mod placement;
 mod plan;
 mod provenance;
 mod published;

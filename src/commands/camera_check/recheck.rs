@@ -33,7 +33,7 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
         places.into_iter().flatten().map(|path| path.as_path()).chain([file.as_path()]).collect();
     let out = out.for_run(&run, &inputs);
     out.check_free(&["recheck.json", HISTORY, "recheck.html"])?;
-    let mut checks = formats::history(&out)?;
+    let mut checks = formats::history(&out, HISTORY)?;
 
     let corners = open_numbers::by_rig(corners(args, &calibrated, config, &out)?, &calibrated.rig);
     corners.notes.iter().for_each(progress::note);
@@ -41,13 +41,13 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), pairs, volume };
     let found = recheck::recheck(&before, &corners)?;
 
-    let standing = Standing::of(&found, tolerance_mm);
+    let standing = Standing::of(found.change.is_some(), found.effect_mm, found.seen_mm, tolerance_mm);
     let content = RecheckFile::new(&found, &file, tolerance_mm);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check::new(&content, date));
     let page = report::recheck::page(&found, standing, tolerance_mm, &checks)?;
     let json = out.write_json("recheck.json", &content)?;
-    out.write(HISTORY, formats::to_csv(&checks).as_bytes())?;
+    out.write(HISTORY, formats::to_csv(&checks, "pairs").as_bytes())?;
     out.write("recheck.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
     let summary = || report::recheck::summary(&found, standing, tolerance_mm, checks.len(), &out);
     let status = match standing {

@@ -7,7 +7,7 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::placement::{GroupRecord, PLACEMENT, PlacementFile};
-use crate::formats::placements::{Frames, Placement, easy_handeye, opencv, ros_static_tf};
+use crate::formats::placements::{Frames, Placement, easy_handeye, file_storage, ros_static_tf};
 
 /// Runs the command.
 pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome> {
@@ -31,7 +31,7 @@ pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome>
         let placement = Placement { frames: &frames, base_from_camera, flange_from_target };
         let (name, text) = match args.format {
             PlacementFormat::RosStaticTf => ("static_tf", ros_static_tf::text(&placement)),
-            PlacementFormat::Opencv => ("placement_opencv", opencv::text(&placement)),
+            PlacementFormat::Opencv => ("placement_opencv", file_storage::text(&placement)),
             PlacementFormat::EasyHandeye => {
                 ("easy_handeye", easy_handeye::text(&placement, &format!("easy_handeye{suffix}")))
             }

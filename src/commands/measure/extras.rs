@@ -4,9 +4,11 @@ use camino::Utf8Path;
 use rayon::prelude::*;
 
 use super::super::Result;
+use crate::identify::data::dataset::Dataset;
+use crate::identify::examine::shifted::{self, Shift};
 use crate::imaging::input::pairs::PairFiles;
 use crate::imaging::{Corners, PairCorners, Wanted, find, overlay};
-use crate::measurements::Role;
+use crate::measurements::{Measurement, Observed, Role};
 use crate::report::drawing::picture::PairJpeg;
 use crate::report::measure::{Distance, Thumbnail};
 use crate::robot::{self, Robot};
@@ -54,10 +56,37 @@ pub(super) fn thumbnails(
     chosen.par_iter().map(draw).collect()
 }
 
+fn sent() -> Result<Robot> {
+    let file = Utf8Path::new(ROBOT);
+    if file.is_file() { Ok(robot::file::read(file)?) } else { Ok(Robot::paper()) }
+}
+
+/// Where pictures and joint angles do not belong together, by the robot that was sent.
+pub(super) fn shifted(series: &Series) -> Result<Option<String>> {
+    let robot = sent()?;
+    let measured = |m: &MeasuredPose| {
+        let target = m.target.as_ref().ok()?;
+        let point_mm = target.cam_from_board.translation.vector.into();
+        let observed = Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None };
+        Some(Measurement { at: m.at.clone(), target: String::new(), observed })
+    };
+    let rows: Vec<Measurement> = series.poses.iter().filter_map(measured).collect();
+    let Ok(set) = Dataset::new(&rows) else { return Ok(None) };
+    if rows.iter().any(|row| row.at.joints_deg.len() != robot.joints.len()) {
+        return Ok(None);
+    }
+    let said = |shift: Shift| {
+        format!(
+            "{}; look for a picture that failed or was taken twice there, and mend poses.csv or the pictures' names",
+            shift.statement(&set)
+        )
+    };
+    Ok(shifted::find(&set, &robot).map(said))
+}
+
 /// Distances to each group's centre, where a robot of so many joints is known.
 pub(super) fn distances(series: &Series) -> Result<Vec<Distance>> {
-    let file = Utf8Path::new(ROBOT);
-    let robot = if file.is_file() { robot::file::read(file)? } else { Robot::paper() };
+    let robot = sent()?;
     if series.poses.iter().any(|m| m.at.joints_deg.len() != robot.joints.len()) {
         return Ok(Vec::new());
     }

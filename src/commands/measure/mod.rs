@@ -56,7 +56,8 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     known.rig.check_size(&corners)?;
     let corners = open_numbers::by_rig(corners, &known.rig);
     corners.notes.iter().for_each(progress::note);
-    let series = series::measure(&known, seen(poses, &corners));
+    let mut series = series::measure(&known, seen(poses, &corners));
+    series.notes.extend(extras::shifted(&series)?);
     let file = MeasureFile::new(&series, &corners, &known);
     say(&series, &file);
     let distances = extras::distances(&series)?;

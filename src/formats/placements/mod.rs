@@ -4,7 +4,7 @@
 //! ROS's optical frame (REP 103: x right, y down, z forward) is the camera's frame here.
 
 pub mod easy_handeye;
-pub mod opencv;
+pub mod file_storage;
 pub mod ros_static_tf;
 
 use crate::geometry::Transform;

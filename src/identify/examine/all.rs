@@ -2,7 +2,7 @@
 
 use super::conventions::Mended;
 use super::sessions::{self, Along};
-use super::{conventions, covariances, known, orientations};
+use super::{conventions, covariances, known, orientations, shifted};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::finding::Finding;
 use crate::identify::settings::{Model, Settings};
@@ -29,7 +29,9 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     let (mut set, mut robot, mut findings, mut unexplained_mm) = (set.clone(), robot.clone(), Vec::new(), None);
     let of_targets = set.targets.as_ref().map_or_else(Vec::new, |targets| targets.findings.clone());
     if settings.examine {
-        Mended { set, robot, findings, unexplained_mm } = conventions::examine(&set, &robot, settings);
+        let of_rows = shifted::examine(&set, &robot);
+        Mended { set, robot, findings, unexplained_mm } = conventions::examine(&of_rows.0, &robot, settings);
+        findings.splice(0..0, of_rows.1);
         let of_orientations = orientations::examine(&set, &robot, settings.model == Some(Model::Pose));
         set = of_orientations.0;
         findings.extend(of_orientations.1);

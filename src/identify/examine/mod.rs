@@ -4,8 +4,10 @@ mod all;
 pub mod conventions;
 pub mod covariances;
 mod hypothesis;
+pub mod in_hand;
 pub mod known;
 pub mod orientations;
 pub mod sessions;
+pub mod shifted;
 
 pub use all::{Examined, examine};

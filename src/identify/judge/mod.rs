@@ -6,6 +6,7 @@ pub mod folds;
 pub mod held_out;
 pub mod locate;
 pub mod placement;
+pub mod recheck;
 pub mod scale;
 pub mod smooth;
 pub mod uncertainty;

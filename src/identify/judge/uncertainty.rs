@@ -10,7 +10,7 @@ use crate::identify::solve::formulation::Formulation;
 use crate::linear_algebra::Eliminated;
 
 /// Covariance of the identified parameters, in the units of the file.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Covariance {
     /// Names of the parameters.
     pub order: Vec<String>,
@@ -19,9 +19,8 @@ pub struct Covariance {
 }
 
 impl Covariance {
-    /// Of a fit: all parameters that were seen, those that act together included.
-    pub fn new(formulation: &Formulation) -> Covariance {
-        let covariance = formulation.robot_covariance();
+    /// Of a fit, with the covariance of all its parameters: those that were seen, those that act together included.
+    pub fn new(formulation: &Formulation, covariance: &DMatrix<f64>) -> Covariance {
         let parameters = formulation.parameters();
         let seen: Vec<usize> = (0..parameters.len()).filter(|i| !formulation.base.zero.contains(i)).collect();
         let factor = |i: usize| parameters[i].file_unit().1;

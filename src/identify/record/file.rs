@@ -64,6 +64,8 @@ pub struct Record {
     pub doctor: Vec<Finding>,
     /// Of the chosen method's identified parameters; `None` where nominal was kept.
     pub covariance: Option<Covariance>,
+    /// The same with what the poses tell next to nothing of as uncertain as before them: for poses elsewhere.
+    pub whole_covariance: Option<Covariance>,
     /// The position error to expect of the chosen robot; `None` where nominal was kept.
     pub expected: Option<Expected>,
     /// A scale of the readings, as far as the links' tolerance tells it from the robot's size; `None` where the links were not fitted.
@@ -88,6 +90,8 @@ pub struct Record {
     pub smooth: Option<Smooth>,
     /// Scatter of a point coordinate beyond the measurement's covariance, mm.
     pub scatter_mm: f64,
+    /// Scatter of a component of the orientation, rad, where orientations were used.
+    pub scatter_rad: Option<f64>,
     /// Parameters whose search limits were widened.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub widened: Vec<String>,

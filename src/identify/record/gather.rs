@@ -9,7 +9,7 @@ use crate::identify::examine::sessions::Along;
 use crate::identify::judge::uncertainty::{Covariance, Expected};
 use crate::identify::run::{Identification, certainty};
 use crate::identify::sensor::Extra;
-use crate::identify::settings::Settings;
+use crate::identify::settings::{Model, Settings};
 use crate::robot::Robot;
 
 /// Name and value of an unknown of the sensor; a supposed scale in thousandths.
@@ -58,10 +58,12 @@ impl Record {
             judged: found.judged.clone(),
             smooth: Smooth::new(found),
             scatter_mm: found.scatter.point_mm,
+            scatter_rad: (chosen.model == Model::Pose && chosen.found.is_some()).then_some(found.scatter.rotation_rad),
             widened: chosen.found.as_ref().map_or_else(Vec::new, |(f, _)| f.widened.clone()),
             prior: fitted.filter(|(f, _)| f.held).map(|(f, _)| f.tolerance),
             doctor: findings.all(),
-            covariance: chosen.found.as_ref().map(|(f, _)| Covariance::new(f)),
+            covariance: chosen.found.as_ref().map(|(f, _)| Covariance::new(f, &f.robot_covariance())),
+            whole_covariance: chosen.found.as_ref().map(|(f, _)| Covariance::new(f, &f.whole_covariance())),
             expected: chosen.found.as_ref().map(|(f, _)| Expected::new(f, set, &found.fitted)),
             scale: found.scale(set),
             targets: set.targets.clone(),

@@ -28,10 +28,30 @@ impl Identification {
             }
         };
         let count = formulation.parameters().len();
-        let offsets: Vec<f64> = of_robot[..count].iter().chain(formulation.extras()).copied().collect();
+        let whole: Vec<f64> = of_robot[..count].iter().chain(formulation.extras()).copied().collect();
         let joints = nominal.joints.len();
         let shared = formulation.offsets_covariance(&|parameter| is_held(parameter, joints));
-        Ok(Placed::new(set, &formulation.rows, &offsets, &shared, formulation.common))
+        // A placement is for readings as they are read: the sensor's own errors stay in them.
+        let of_target = |k: &usize| matches!(formulation.rows.extras[*k], Extra::Target(_));
+        let turns: Vec<usize> = (0..formulation.rows.extras.len()).filter(of_target).collect();
+        let extras: Vec<Extra> = turns.iter().map(|&k| formulation.rows.extras[k]).collect();
+        let kept: Vec<usize> = (0..count).chain(turns.iter().map(|k| count + k)).collect();
+        let offsets: Vec<f64> = kept.iter().map(|&k| whole[k]).collect();
+        let shared = shared.select_rows(&kept).select_columns(&kept);
+        let parameters = formulation.parameters();
+        let levers = nominal.shifted(parameters, &whole[..count]);
+        let task = Task {
+            set,
+            robot: nominal,
+            parameters,
+            extras: &extras,
+            rows: &self.fitted,
+            model: formulation.model,
+            smooth: None,
+            settings,
+        };
+        let rows = task.rows_at(formulation.rows.scatter, &levers);
+        Ok(Placed::new(set, &rows, &offsets, &shared, formulation.common))
     }
 
     /// The chosen terms with the points of all groups in frames of their own.

@@ -1,7 +1,7 @@
 //! The screen and the page of `identify`.
 
 mod figures;
-pub mod placement;
+mod placement;
 mod screen;
 mod tables;
 
@@ -60,10 +60,7 @@ pub fn page(
             }
             (figures::expected_map(expected, places)?)
         }
-        @if !placement.groups.is_empty() {
-            h2 { "Where the cameras stand" }
-            (placement::tables(placement))
-        }
+        (placement::section(placement))
         h2 { "Parameters" }
         p { "Table 2 of the paper: the corrected parameters of each link and joint; alpha and a of link j - 1, theta and d of joint j." }
         (tables::joint_table(record))

@@ -2,9 +2,9 @@
 
 use maud::{Markup, html};
 
-use super::page;
 use crate::formats::placement::{PlacementFile, TransformRecord};
 use crate::geometry::rotation_vector;
+use crate::report::page;
 use crate::report::table::number;
 
 /// Turn in degrees and shift in mm, three numbers each, and their standard deviations.
@@ -20,8 +20,11 @@ fn cells(record: &TransformRecord) -> Vec<String> {
     ]
 }
 
-/// The section of a page.
-pub fn tables(placement: &PlacementFile) -> Markup {
+/// The section of a page; nothing without placements.
+pub(super) fn section(placement: &PlacementFile) -> Markup {
+    if placement.groups.is_empty() {
+        return html! {};
+    }
     let groups = placement.groups.iter().map(|group| {
         let mut row = vec![format!("base from rig, {}", group.group)];
         row.extend(cells(&group.base_from_rig));
@@ -40,6 +43,7 @@ pub fn tables(placement: &PlacementFile) -> Markup {
     });
     let rows: Vec<Vec<String>> = groups.chain(target).collect();
     html! {
+        h2 { "Where the cameras stand" }
         p { "The left camera in the robot's base frame, and the target on its flange; shift, and turn as axis times angle. The error is that of the \
             predicted target, robot, placement and scatter together, at poses like these (" (placement.poses) ")." }
         div.wide { (page::table(&["transform", "x, y, z in mm", "sigma", "turn in deg", "sigma", "error to expect, mm", "95 of 100 below", "held out"], &rows)) }

@@ -3,15 +3,17 @@
 //! Measurements are examined as `identify` examines them, with the first robot, so that both judge by the same rows: units are mended and
 //! sessions get placements of their own. The robots are those of their files.
 
+mod recheck;
+
 use camino::Utf8Path;
 use serde::Serialize;
 
-use super::Outcome;
-use super::error::Result;
+use super::{Outcome, Result};
 use crate::cli::Verify;
 use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files;
+use crate::files::provenance::Run;
 use crate::identify;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::known;
@@ -81,7 +83,10 @@ fn tell(set: &Dataset, folded: bool, only_verify: bool) {
 }
 
 /// Runs the command.
-pub fn run(args: &Verify, config: &Config) -> Result<Outcome> {
+pub fn run(args: &Verify, config: &Config, run: Run) -> Result<Outcome> {
+    if let Some(against) = &args.against {
+        return recheck::run(args, against, config, run);
+    }
     let settings = &config.identify;
     let mut robots = Vec::new();
     for file in &args.robot {

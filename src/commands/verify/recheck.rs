@@ -1,0 +1,68 @@
+//! `stereocal verify --against`: whether an identified robot still is that robot, by some ten new poses.
+
+use camino::{Utf8Path, Utf8PathBuf};
+
+use super::super::identify::{check_joints, read, source};
+use super::super::{Outcome, Result};
+use crate::cli::Verify;
+use crate::config::Config;
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::Run;
+use crate::formats::known_robot;
+use crate::formats::placement::{PLACEMENT, PlacementFile};
+use crate::formats::recheck::{self as formats, Check, Standing};
+use crate::formats::robot_recheck::{HISTORY, RobotRecheckFile};
+use crate::identify::Error;
+use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::recheck::recheck;
+use crate::progress;
+use crate::{report, robot};
+
+/// Runs it.
+pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
+    let robot = robot::file::read(against)?;
+    let before = known_robot::before(against, &robot).ok_or_else(|| Error::NotKnown { path: against.to_string() })?;
+    let source = source(args.measurements.clone(), &args.table, config);
+    let rows = read(&source, &robot)?;
+    check_joints(&robot, &rows, &args.measurements[0])?;
+    let set = Dataset::new(&rows)?;
+    let stood = PlacementFile::read(&against.with_file_name(PLACEMENT)).ok();
+    let ends = robot.ends;
+    let placed = |group: &str| stood.as_ref()?.sensor_from_base(group, &ends.root_from_frame0);
+    let paths = source.paths();
+    let inputs: Vec<&Utf8Path> = paths.iter().map(Utf8PathBuf::as_path).chain([against]).collect();
+    let run = Run { force: args.force, ..run };
+    let out = OutDir::open(args.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &inputs);
+    out.check_free(&["verify.json", HISTORY, "verify.html"])?;
+    let mut checks = formats::history(&out, HISTORY)?;
+
+    let found = recheck(&set, &robot, &before, &placed)?;
+    for skipped in &set.skipped {
+        progress::warn(format!("pose {} is not compared: {}", skipped.pose, skipped.reason));
+    }
+    let tolerance_mm = args.tolerance_mm.unwrap_or(before.p95_mm);
+    let content = RobotRecheckFile::new(&found, against, tolerance_mm);
+    let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
+    checks.push(Check {
+        date,
+        against: against.to_string(),
+        pairs: found.poses.len(),
+        standing: content.standing,
+        cause: found.cause(),
+        effect_mm: found.effect_mm,
+        seen_mm: found.seen_mm,
+        length_mm: None,
+    });
+    let page = report::robot_recheck::page(&found, content.standing, tolerance_mm, &checks)?;
+    let json = out.write_json("verify.json", &content)?;
+    out.write(HISTORY, formats::to_csv(&checks, "poses").as_bytes())?;
+    out.write("verify.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
+    let summary = || report::robot_recheck::summary(&found, content.standing, tolerance_mm, checks.len(), &out);
+    let status = match content.standing {
+        Standing::StillValid => Status::Done,
+        Standing::ChangedWithin | Standing::Undecided => Status::OutOfTolerance,
+        Standing::Changed => Status::Undetermined,
+    };
+    Ok(Outcome { stdout: if args.json { json } else { summary() }, status })
+}

@@ -1,0 +1,142 @@
+//! The new rows at the old robot: residuals that no placement reaches, what they are known to, and the columns of what may have changed.
+
+use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
+
+use super::found::Before;
+use super::suspects::Suspect;
+use crate::difference::Difference;
+use crate::identify::data::dataset::{Dataset, Reading};
+use crate::identify::judge::locate::Trust;
+use crate::identify::residuals::raw::Raw;
+use crate::identify::residuals::rows::{Recipe, Rows};
+use crate::identify::sensor::{Extra, Scatter};
+use crate::identify::settings::Model;
+use crate::identify::solve::linearised::Linearised;
+use crate::linear_algebra::{product, pseudo_inverse};
+use crate::robot::{Parameter, Robot};
+
+/// What no orientation is known better than, rad: a micrometre at 100 mm.
+const LEAST_TURN_RAD: f64 = 1e-5;
+
+/// The new rows beside the old robot.
+pub(super) struct Compared<'a> {
+    pub(super) rows: &'a Rows,
+    pub(super) before: &'a Before,
+    /// Parameters of the robot, and the scale.
+    pub(super) count: usize,
+}
+
+/// Rounds in which the target's turn is found: it is nearly linear.
+const TURNS: usize = 4;
+
+impl Compared<'_> {
+    /// All offsets, the target's turn at its best, where the robot is off by these.
+    pub(super) fn offsets(&self, of_robot: &[f64]) -> Vec<f64> {
+        let mut offsets = vec![0.0; self.rows.offset_count()];
+        offsets[..self.count].copy_from_slice(of_robot);
+        let turns = offsets.len() - self.count;
+        for _ in 0..if turns > 0 { TURNS } else { 0 } {
+            let (residuals, jacobian) = self.rows.evaluate(&offsets, true);
+            let jacobian = jacobian.columns(self.count, turns).into_owned();
+            let step = pseudo_inverse(product(&jacobian, &jacobian)) * jacobian.tr_mul(&residuals);
+            offsets[self.count..].iter_mut().zip(step.iter()).for_each(|(x, s)| *x -= s);
+        }
+        offsets
+    }
+
+    /// The rows linearised there, and what is to be looked at.
+    pub(super) fn at(&self, of_robot: &[f64]) -> Option<(Linearised, Look)> {
+        let linear = Linearised::new(self.rows, &self.offsets(of_robot));
+        let (off, columns) = left_over(&linear, self.count);
+        let known: Vec<usize> = (0..self.before.parameters.len()).collect();
+        let of_old = columns.select_columns(&known);
+        let joint = DMatrix::identity(off.len(), off.len()) + &of_old * &self.before.covariance * of_old.transpose();
+        let difference = Difference::new(off, &joint, self.before.poses, 1.0)?;
+        Some((linear, Look { difference, columns }))
+    }
+
+    /// The largest residual of a point at the old robot, mm.
+    pub(super) fn misfit_mm(&self) -> f64 {
+        let raw = self.rows.raw(&self.offsets(&vec![0.0; self.count]));
+        let of_point = |raw: &Raw| if let Raw::Point(off, _) = raw { off.norm() } else { 0.0 };
+        raw.iter().map(|(_, _, raw)| of_point(raw)).fold(0.0, f64::max)
+    }
+}
+
+/// The rows with a scale of the sensor as an unknown, and the target's turn where orientations are used.
+pub(super) fn rows(
+    set: &Dataset,
+    robot: &Robot,
+    parameters: &[Parameter],
+    used: &[usize],
+    oriented: bool,
+    trust: Trust,
+) -> Rows {
+    let mut set = set.clone();
+    let point = |reading: &Reading| match reading {
+        Reading::Position { point_mm, .. } => point_mm.coords,
+        _ => Vector3::zeros(),
+    };
+    // A thousandth of scale.
+    set.shared = set.poses.iter().map(|p| Matrix3xX::from_columns(&[-1e-3 * point(&p.reading)])).collect();
+    let turns = [Extra::Target(0), Extra::Target(1), Extra::Target(2)];
+    let turned: &[Extra] = if oriented { &turns } else { set.body_unknowns() };
+    let extras: Vec<Extra> = std::iter::once(Extra::Shared(0)).chain(turned.iter().copied()).collect();
+    let rotation_rad = trust.rotation_rad.unwrap_or(1e-4).max(LEAST_TURN_RAD);
+    Rows::new(&Recipe {
+        set: &set,
+        robot,
+        levers: robot,
+        parameters,
+        extras: &extras,
+        rows: used,
+        weights: &[],
+        model: if oriented { Model::Pose } else { Model::Position },
+        scatter: Scatter { rotation_rad, ..Scatter::of_point(trust.point_mm) },
+        wire_offset: false,
+    })
+}
+
+/// White residuals and the columns of the first so many offsets, in coordinates that the placements and the target's turn do not reach.
+fn left_over(linear: &Linearised, count: usize) -> (DVector<f64>, DMatrix<f64>) {
+    let total: usize = linear.placements.iter().map(|p| p.linear.residuals.len()).sum();
+    let turns = linear.shared - count;
+    let mut nuisance = DMatrix::zeros(total, turns + 6 * linear.placements.len());
+    let mut all = DMatrix::zeros(total, 1 + count);
+    let mut row = 0;
+    for (k, placement) in linear.placements.iter().enumerate() {
+        let part = &placement.linear;
+        let rows = part.residuals.len();
+        nuisance.view_mut((row, turns + 6 * k), (rows, 6)).copy_from(&part.design);
+        nuisance.view_mut((row, 0), (rows, turns)).copy_from(&part.jacobian.columns(count, turns));
+        all.view_mut((row, 0), (rows, 1)).copy_from(&part.residuals);
+        all.view_mut((row, 1), (rows, count)).copy_from(&part.jacobian.columns(0, count));
+        row += rows;
+    }
+    let taken = nuisance.ncols();
+    nuisance.qr().q_tr_mul(&mut all);
+    let rest = all.rows(taken, total.saturating_sub(taken)).into_owned();
+    (rest.column(0).into_owned(), rest.columns(1, count).into_owned())
+}
+
+/// Residuals somewhere, with what they are known to, and the columns of all offsets there, white.
+pub(super) struct Look {
+    pub(super) difference: Difference,
+    pub(super) columns: DMatrix<f64>,
+}
+
+impl Look {
+    /// What a unit of each of a suspect's numbers does. Residuals are predicted less measured: a joint that stands further makes them smaller.
+    pub(super) fn directions(&self, suspect: &Suspect) -> Vec<DVector<f64>> {
+        suspect.columns.iter().map(|&(at, unit)| -unit * self.columns.column(at)).collect()
+    }
+
+    /// The numbers of a suspect at their best.
+    pub(super) fn amounts(&self, directions: &[DVector<f64>]) -> DVector<f64> {
+        let n = directions.len();
+        let weighted = |a: &DVector<f64>, b: &DVector<f64>| self.difference.product(a, b);
+        let normal = DMatrix::from_fn(n, n, |r, c| weighted(&directions[r], &directions[c]));
+        let pull = DVector::from_fn(n, |r, _| weighted(&directions[r], &self.difference.off));
+        pseudo_inverse(normal) * pull
+    }
+}

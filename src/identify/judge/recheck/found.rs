@@ -1,0 +1,113 @@
+//! What is compared with, and what is said of a robot.
+
+use nalgebra::DMatrix;
+
+use crate::identify::judge::locate::Trust;
+use crate::robot::Parameter;
+
+/// Chance that a robot that did not change is said to have changed.
+pub(super) const FALSE_ALARM: f64 = 0.01;
+
+/// Quantile of the normal distribution for the share of changes that are seen at the size that is stated: nineteen in twenty.
+pub(super) const SEEN: f64 = 1.645;
+
+/// The robot as it was.
+#[derive(Debug, Clone)]
+pub struct Before {
+    /// Identified parameters.
+    pub parameters: Vec<Parameter>,
+    /// Their covariance, mm and mrad.
+    pub covariance: DMatrix<f64>,
+    /// How it scattered.
+    pub trust: Trust,
+    /// Poses that this was found from.
+    pub poses: usize,
+    /// What 95 % of its position errors were stated to be below, mm.
+    pub p95_mm: f64,
+}
+
+/// What the poses say of one cause.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CauseSeen {
+    /// For files: `joint-3`, `tool-x`, `scale`.
+    pub word: String,
+    /// For a person: what would have changed.
+    pub words: String,
+    /// The unit.
+    pub unit: &'static str,
+    /// By how much it changed, if it alone did, with its standard deviation; `None` where the poses see nothing of it.
+    pub amount: Option<(f64, f64)>,
+    /// By how much that moves the target after the placement was found anew, mm.
+    pub effect_mm: f64,
+    /// The smallest change that nineteen of twenty such checks see.
+    pub seen: f64,
+    /// By how much that one moves the target, mm.
+    pub seen_mm: f64,
+}
+
+/// How one placement stands against the old one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Moved {
+    /// The group.
+    pub group: String,
+    /// By how much the points moved with it, mm, and how much that is by chance.
+    pub shift_mm: f64,
+    /// What nineteen of twenty checks see, mm.
+    pub seen_mm: f64,
+    /// Its turn, rad.
+    pub turn_rad: f64,
+    /// Whether it is more than chance.
+    pub moved: bool,
+}
+
+/// What is said of the robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recheck {
+    /// Poses that were compared.
+    pub poses: Vec<String>,
+    /// Every cause.
+    pub causes: Vec<CauseSeen>,
+    /// Whether the robot changed.
+    pub changed: bool,
+    /// What explains it, the likeliest first, as words for files and for people; empty where nothing single does.
+    pub likeliest: Vec<(String, String)>,
+    /// Placements that are in the old file.
+    pub placements: Vec<Moved>,
+    /// By how much the change moves the target, mm.
+    pub effect_mm: f64,
+    /// The largest movement of the target that a single cause could make without being seen, mm.
+    pub seen_mm: f64,
+}
+
+impl Recheck {
+    /// The causes' words for files, with `|` between those that are not told apart; empty where nothing changed.
+    pub fn cause(&self) -> String {
+        match (self.changed, self.likeliest.is_empty()) {
+            (true, true) => "unknown".to_owned(),
+            (true, false) => self.likeliest.iter().map(|(word, _)| word.as_str()).collect::<Vec<_>>().join("|"),
+            (false, _) if self.placements.iter().any(|p| p.moved) => "camera-moved|joint-1".to_owned(),
+            (false, _) => String::new(),
+        }
+    }
+
+    /// What changed, for a person.
+    pub fn statement(&self) -> String {
+        let moved: Vec<String> = self
+            .placements
+            .iter()
+            .filter(|p| p.moved)
+            .map(|p| format!("group {} by {:.4} mm and {:.4} deg", p.group, p.shift_mm, p.turn_rad.to_degrees()))
+            .collect();
+        match (self.changed, self.likeliest.is_empty()) {
+            (true, true) => "the robot changed, and no single cause explains how".to_owned(),
+            (true, false) => self.likeliest.iter().map(|(_, words)| words.as_str()).collect::<Vec<_>>().join(", or "),
+            (false, _) if !moved.is_empty() => {
+                format!(
+                    "the robot is the same; the cameras stand elsewhere, or the zero of joint 1 moved: {}",
+                    moved.join(", ")
+                )
+            }
+            (false, _) => "no change beyond chance".to_owned(),
+        }
+    }
+}

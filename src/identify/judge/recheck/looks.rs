@@ -1,0 +1,100 @@
+//! All looks at the residuals of an old robot: whether something changed, what explains it, and what would have been seen.
+//!
+//! In: the residuals with their covariance, and the columns of what may have changed. Out: each cause by itself, and those that explain a change.
+//! Goes wrong: causes with the same columns are not told apart, and named together.
+
+use nalgebra::DVector;
+
+use super::compared::Look;
+use super::found::{CauseSeen, FALSE_ALARM, SEEN};
+use super::moves::Moves;
+use super::suspects::Suspect;
+use crate::difference::Difference;
+
+/// Causes are told apart where the logarithm of one's likelihood is larger by this: 150 to 1.
+const TOLD_APART: f64 = 5.0;
+
+/// White size of a cause, a mrad or mm, below which the poses see nothing of it.
+const UNSEEN: f64 = 1e-4;
+
+/// Rounds of looking anew where a suspect says that the robot is: a large turn is not linear.
+const ROUNDS: usize = 3;
+
+/// All looks at the residuals.
+pub(super) struct Looks<'a> {
+    /// At the old robot.
+    pub(super) look: Look,
+    /// At a robot that is off by these.
+    pub(super) again: &'a dyn Fn(&[f64]) -> Option<Look>,
+    pub(super) suspects: &'a [Suspect],
+}
+
+impl<'a> Looks<'a> {
+    /// Chance of a false alarm in one of all looks: every cause, and all numbers together.
+    fn chance(&self) -> f64 {
+        FALSE_ALARM / (self.suspects.len() + 1) as f64
+    }
+
+    fn is_seen(&self, suspect: &Suspect) -> bool {
+        suspect.columns.iter().all(|&(at, _)| self.look.columns.column(at).norm() > UNSEEN)
+    }
+
+    pub(super) fn of(&self, suspect: &Suspect, moves: &Moves) -> CauseSeen {
+        let difference = &self.look.difference;
+        let along = self.look.directions(suspect).first().and_then(|d| difference.along(d));
+        let amount = along.filter(|_| self.is_seen(suspect));
+        let unit_mm = moves.most_mm(&suspect.columns, &[1.0]);
+        let seen = amount.map_or(f64::INFINITY, |(_, sigma)| (difference.level(self.chance()) + SEEN) * sigma);
+        CauseSeen {
+            word: suspect.word.clone(),
+            words: suspect.words.clone(),
+            unit: suspect.unit,
+            amount,
+            effect_mm: amount.map_or(0.0, |(amount, _)| unit_mm * amount.abs()),
+            seen,
+            seen_mm: if amount.is_some() { unit_mm * seen } else { 0.0 },
+        }
+    }
+
+    pub(super) fn is_change(&self) -> bool {
+        let (difference, chance) = (&self.look.difference, self.chance());
+        let over = |suspect: &Suspect| {
+            let directions = self.look.directions(suspect);
+            let gained = difference.left_by(&directions).map(|left| difference.chi_square() - left);
+            self.is_seen(suspect) && gained.is_some_and(|g| g > difference.limit(directions.len(), chance))
+        };
+        difference.chi_square() > difference.limit(difference.off.len(), chance) || self.suspects.iter().any(over)
+    }
+
+    /// Suspects that leave no more than chance and are not told apart, the likeliest first, with their numbers.
+    pub(super) fn explained(&self) -> Vec<(&'a Suspect, Vec<f64>)> {
+        let count = self.look.difference.off.len();
+        let price = 0.5 * (count.max(2) as f64).ln();
+        let mut explain: Vec<(f64, &Suspect, Vec<f64>)> = Vec::new();
+        for suspect in self.suspects.iter().filter(|s| self.is_seen(s)) {
+            let numbers = suspect.columns.len();
+            let Some((left, difference, amounts)) = self.left_by(suspect) else { continue };
+            if left <= difference.limit(count - numbers, self.chance()) {
+                explain.push((difference.log_likelihood(left) - price * numbers as f64, suspect, amounts));
+            }
+        }
+        explain.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = explain.first().map_or(0.0, |(likely, ..)| *likely);
+        let near = explain.into_iter().filter(|(likely, ..)| best - likely < TOLD_APART);
+        near.map(|(_, suspect, amounts)| (suspect, amounts)).collect()
+    }
+
+    /// What is left of the residuals where a suspect may take what it likes, and what it takes.
+    fn left_by(&self, suspect: &Suspect) -> Option<(f64, Difference, Vec<f64>)> {
+        let mut offsets = vec![0.0; self.look.columns.ncols()];
+        let mut total = DVector::zeros(suspect.columns.len());
+        let mut look = (self.again)(&offsets)?;
+        for _ in 0..ROUNDS {
+            total += look.amounts(&look.directions(suspect));
+            suspect.columns.iter().zip(total.iter()).for_each(|(&(at, unit), amount)| offsets[at] = unit * amount);
+            look = (self.again)(&offsets)?;
+        }
+        let left = look.difference.left_by(&look.directions(suspect))?;
+        Some((left, look.difference, total.iter().copied().collect()))
+    }
+}

@@ -1,0 +1,105 @@
+//! How far a change of the robot moves the target, once the placements were found anew; and each placement against where it stood.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::compared::Compared;
+use super::found::{Before, FALSE_ALARM, Moved, SEEN};
+use crate::difference::Difference;
+use crate::geometry::{rigid_columns, rotation_vector};
+use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::placement::Uncertain;
+use crate::identify::residuals::eliminate::{Block, Linear, Unknowns};
+use crate::identify::solve::linearised::{Linearised, Placement};
+use crate::linear_algebra::{product, pseudo_inverse, without};
+
+/// How far offsets move the target at each pose in mm, after the placement was found anew.
+pub(super) struct Moves {
+    columns: DMatrix<f64>,
+}
+
+impl Moves {
+    pub(super) fn new(linear: &Linearised, count: usize) -> Moves {
+        let robot = count - 1;
+        let mut parts = Vec::new();
+        for placement in &linear.placements {
+            let mut of_group: Vec<usize> = placement.poses.iter().flatten().copied().collect();
+            of_group.dedup();
+            let mut columns = DMatrix::zeros(3 * of_group.len(), count);
+            let mut rigid = DMatrix::zeros(3 * of_group.len(), 6);
+            for (k, &pose) in of_group.iter().enumerate() {
+                let place = &linear.places[pose];
+                columns.view_mut((3 * k, 0), (3, robot)).copy_from(&place.point_columns);
+                columns.view_mut((3 * k, robot), (3, 1)).copy_from(&(1e-3 * place.point_mm.coords));
+                rigid.view_mut((3 * k, 0), (3, 6)).copy_from(&rigid_columns(&place.point_mm.coords));
+            }
+            parts.push(without(&columns, &rigid));
+        }
+        let rows = parts.iter().map(|p| p.nrows()).sum();
+        let mut columns = DMatrix::zeros(rows, count);
+        let mut row = 0;
+        for part in parts {
+            columns.rows_mut(row, part.nrows()).copy_from(&part);
+            row += part.nrows();
+        }
+        Moves { columns }
+    }
+
+    /// The largest of all poses, mm.
+    pub(super) fn most_mm(&self, columns: &[(usize, f64)], amounts: &[f64]) -> f64 {
+        let mut moved = DVector::zeros(self.columns.nrows());
+        for ((at, unit), amount) in columns.iter().zip(amounts) {
+            moved += self.columns.column(*at) * (unit * amount);
+        }
+        (0..moved.len() / 3).map(|k| moved.rows(3 * k, 3).norm()).fold(0.0, f64::max)
+    }
+}
+
+/// Each placement against where it stood.
+pub(super) fn placements(
+    set: &Dataset,
+    compared: &Compared,
+    linear: &Linearised,
+    stood: &dyn Fn(&str) -> Option<Uncertain>,
+) -> Vec<Moved> {
+    let Compared { rows, before, count } = *compared;
+    let offsets = compared.offsets(&vec![0.0; count]);
+    let mut list = Vec::new();
+    for ((block, unknowns), placement) in rows.blocks.iter().zip(rows.unknowns(&offsets)).zip(&linear.placements) {
+        let (Block::Points(points), Unknowns::Frame(frame)) = (block, unknowns) else { continue };
+        let Some(spot) = points.spots.first() else { continue };
+        let name = &set.groups[set.poses[rows.rows[spot.pose]].group].name;
+        let Some(old) = stood(name) else { continue };
+        let covariance =
+            of_frame(placement, count, before) + DMatrix::from_iterator(6, 6, old.covariance.iter().copied());
+        let turn = rotation_vector(&(frame * old.transform.inverse()));
+        let shift = frame.translation.vector - old.transform.translation.vector;
+        let off = DVector::from_iterator(6, turn.iter().chain(shift.iter()).copied());
+        let Some(difference) = Difference::new(off, &covariance, before.poses, 1.0) else { continue };
+        // What the move does to the points in the middle of them.
+        let middle = points.spots.iter().map(|s| s.point_mm.coords).sum::<Vector3<f64>>() / points.spots.len() as f64;
+        let at_middle = rigid_columns(&(middle - old.transform.translation.vector));
+        let spread = at_middle * &covariance * at_middle.transpose();
+        let level = difference.limit(6, FALSE_ALARM).sqrt();
+        list.push(Moved {
+            group: name.clone(),
+            shift_mm: (at_middle * &difference.off).norm(),
+            seen_mm: (level + SEEN) * spread.diagonal().max().sqrt(),
+            turn_rad: turn.norm(),
+            moved: difference.chi_square() > difference.limit(6, FALSE_ALARM),
+        });
+    }
+    list
+}
+
+/// Covariance of a frame, the target's turn found with it, and what is uncertain of the old robot in it.
+fn of_frame(placement: &Placement, count: usize, before: &Before) -> DMatrix<f64> {
+    let Linear { jacobian, design, .. } = &*placement.linear;
+    let turns = jacobian.ncols() - count;
+    let mut own = design.clone().resize_horizontally(6 + turns, 0.0);
+    own.columns_mut(6, turns).copy_from(&jacobian.columns(count, turns));
+    let inverse = pseudo_inverse(product(&own, &own));
+    let known = jacobian.columns(0, before.parameters.len()).into_owned();
+    let follow = -(&inverse * product(&own, &known));
+    let covariance = inverse + &follow * &before.covariance * follow.transpose();
+    covariance.view((0, 0), (6, 6)).into_owned()
+}

@@ -1,0 +1,114 @@
+//! `verify.html` and the lines on stdout: whether a robot still is the identified one, and what the poses would have shown.
+
+use maud::html;
+
+use super::Result;
+use super::page;
+use super::recheck::{history, tone, word};
+use super::table::{Table, number};
+use crate::files::OutDir;
+use crate::formats::recheck::{Check, Standing};
+use crate::formats::robot_recheck::HISTORY;
+use crate::identify::judge::recheck::Recheck;
+
+fn sentence(recheck: &Recheck, tolerance_mm: f64) -> String {
+    let statement = recheck.statement();
+    match recheck.cause().is_empty() {
+        true => format!(
+            "{statement}; {} poses would have shown a single cause that moves the target by {:.4} mm, tolerance {tolerance_mm:.4} mm",
+            recheck.poses.len(),
+            recheck.seen_mm
+        ),
+        false => format!(
+            "{statement}, which moves the target by up to {:.4} mm, tolerance {tolerance_mm:.4} mm",
+            recheck.effect_mm
+        ),
+    }
+}
+
+fn next(standing: Standing, recheck: &Recheck) -> &'static str {
+    match standing {
+        Standing::StillValid => "go on with this robot",
+        Standing::Undecided => {
+            "add poses that bend every joint and turn the wrist: these would not have shown a change as large as the tolerance"
+        }
+        _ if !recheck.changed => "`stereocal locate` finds the cameras anew; the robot stays",
+        Standing::ChangedWithin => {
+            "targets are within the tolerance still; look at what is named, and identify anew before it grows"
+        }
+        Standing::Changed => "look at what is named, then identify anew: targets are off by so much since",
+    }
+}
+
+/// Cause, change, its interval, its effect, what would be seen and its effect.
+fn cells(recheck: &Recheck) -> Vec<[String; 6]> {
+    let of = |cause: &crate::identify::judge::recheck::CauseSeen| match cause.amount {
+        None => [
+            cause.words.clone(),
+            "not seen: the placement takes it up".to_owned(),
+            String::new(),
+            String::new(),
+            String::new(),
+            String::new(),
+        ],
+        Some((amount, sigma)) => [
+            cause.words.clone(),
+            format!("{amount:.4} {}", cause.unit),
+            format!("{:.4}", 2.0 * sigma),
+            number(Some(cause.effect_mm), 4),
+            format!("{:.4} {}", cause.seen, cause.unit),
+            number(Some(cause.seen_mm), 4),
+        ],
+    };
+    let placements = recheck.placements.iter().map(|moved| {
+        [
+            format!("the cameras of group {}", moved.group),
+            format!("{:.4} mm", moved.shift_mm),
+            String::new(),
+            number(Some(moved.shift_mm), 4),
+            format!("{:.4} mm", moved.seen_mm),
+            number(Some(moved.seen_mm), 4),
+        ]
+    });
+    recheck.causes.iter().map(of).chain(placements).collect()
+}
+
+const HEADER: [&str; 6] =
+    ["cause", "changed by, if it alone did", "+- (95 %)", "mm at the target", "would be seen", "mm at the target"];
+
+/// The lines on stdout.
+pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: usize, out: &OutDir) -> String {
+    let mut table = Table::new(HEADER);
+    cells(recheck).into_iter().for_each(|row| table.row(row));
+    format!(
+        "{}: {}\nnext: {}\n\n{table}\n{checks} checks in {}\nreport: {}\n",
+        word(standing),
+        sentence(recheck, tolerance_mm),
+        next(standing, recheck),
+        out.join(HISTORY),
+        out.join("verify.html")
+    )
+}
+
+/// The report.
+pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[Check]) -> Result<String> {
+    let numbers = vec![
+        (format!("{:.4} mm", recheck.effect_mm), "movement of the target beyond chance".to_owned()),
+        (format!("{:.4} mm", recheck.seen_mm), "would have been seen".to_owned()),
+        (format!("{tolerance_mm:.4} mm"), "tolerance".to_owned()),
+    ];
+    let text = format!("{}. Next: {}.", page::capital(&sentence(recheck, tolerance_mm)), next(standing, recheck));
+    let rows: Vec<Vec<String>> = cells(recheck).into_iter().map(|row| row.to_vec()).collect();
+    let content = html! {
+        (page::verdict(tone(standing), word(standing), &numbers, &text))
+        h2 { "What may have changed" }
+        p { "Each cause by itself, and the smallest change of it that nineteen of twenty such checks see; mm at the pose where it moves the target most, \
+             once the cameras' place was found anew. The zero of joint 1 is seen as cameras that moved." }
+        div.wide { (page::table(&HEADER, &rows)) }
+        h2 { "Over time" }
+        (page::figure(&history(checks, tolerance_mm, "Movement of the target")?, "Each check in this folder's history: a dot above what would have been seen \
+            is a change; above the tolerance the robot is no longer the identified one."))
+    };
+    let lead = format!("{} new poses against the identified robot", recheck.poses.len());
+    Ok(page::page("Is it still the identified robot?", &lead, &content))
+}

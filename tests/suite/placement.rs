@@ -1,0 +1,198 @@
+//! Where the cameras stand: what `identify` and `locate` write of it, and what readers of other programs make of the exports.
+
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::run::{stderr, stdout, stereocal, workplace};
+
+/// A robot with points of 30 poses in two groups, identified into `out`.
+fn identified() -> tempfile::TempDir {
+    let folder = workplace();
+    let at = folder.path();
+    let made = ["simulate", "--points-only", "--samples", "40", "--verify", "12", "--seed", "4", "--out", "."];
+    let made = stereocal(at, &made);
+    assert_eq!(made.status.code(), Some(0), "{}", stderr(&made));
+    let found = stereocal(
+        at,
+        &["identify", "--measurements", "truth/measurements.csv", "--method", "trust-region", "--extensions", "none"],
+    );
+    assert_eq!(found.status.code(), Some(0), "{}", stderr(&found));
+    folder
+}
+
+fn json(path: &std::path::Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    match value {
+        Value::Array(list) => list.iter().flat_map(numbers).collect(),
+        value => value.as_f64().into_iter().collect(),
+    }
+}
+
+/// Runs a line of Python; `None` where its modules are absent.
+fn python(program: &str, file: &std::path::Path) -> Option<Value> {
+    let output = Command::new("python3").arg("-c").arg(program).arg(file).output().ok()?;
+    if !output.status.success() {
+        eprintln!("skipped: {}", String::from_utf8_lossy(&output.stderr));
+        return None;
+    }
+    serde_json::from_slice(&output.stdout).ok()
+}
+
+/// The matrix of a quaternion `x, y, z, w`, row by row.
+fn matrix(q: &[f64]) -> [f64; 9] {
+    let (x, y, z, w) = (q[0], q[1], q[2], q[3]);
+    [
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - z * w),
+        2.0 * (x * z + y * w),
+        2.0 * (x * y + z * w),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - x * w),
+        2.0 * (x * z - y * w),
+        2.0 * (y * z + x * w),
+        1.0 - 2.0 * (x * x + y * y),
+    ]
+}
+
+fn near(a: &[f64], b: &[f64]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9 * b.abs().max(1.0))
+}
+
+#[test]
+fn a_placement_and_its_exports_are_one() {
+    let folder = identified();
+    let at = folder.path();
+    let placement = json(&at.join("out/placement.json"));
+    let groups = placement["groups"].as_array().unwrap();
+    assert!(groups.len() > 1 && groups.iter().all(|g| g["held_out"]["count"].as_u64().unwrap() > 0));
+    let held: Vec<&str> = placement["held"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .flat_map(|held| held["parameters"].as_array().unwrap())
+        .filter_map(Value::as_str)
+        .collect();
+    assert_eq!(held, ["alpha_0", "a_0", "theta_1", "d_1", "theta_6", "d_6"]);
+    let name = groups[0]["group"].as_str().unwrap();
+    for format in ["opencv", "ros-static-tf", "easy-handeye"] {
+        let told = stereocal(
+            at,
+            &[
+                "export",
+                "placement",
+                "--format",
+                format,
+                "--group",
+                name,
+                "--out",
+                format,
+                "--placement",
+                "out/placement.json",
+            ],
+        );
+        assert_eq!(told.status.code(), Some(0), "{}", stderr(&told));
+    }
+    let (rotation, shift) =
+        (numbers(&groups[0]["base_from_rig"]["rotation"]), numbers(&groups[0]["base_from_rig"]["translation_mm"]));
+    let file = |name: String| at.join(name);
+    let read = "import cv2,sys,json; f=cv2.FileStorage(sys.argv[1],cv2.FILE_STORAGE_READ); \
+        print(json.dumps([f.getNode(k).mat().ravel().tolist() for k in ('R_cam2base','t_cam2base')]))";
+    if let Some(found) = python(read, &file(format!("opencv/placement_opencv_{name}.yml"))) {
+        assert!(near(&numbers(&found[0]), &rotation) && near(&numbers(&found[1]), &shift), "{found}");
+    }
+    let metres: Vec<f64> = shift.iter().map(|mm| mm / 1000.0).collect();
+    let read = "import yaml,sys,json; d=yaml.safe_load(open(sys.argv[1])); p=d['parameters']; t=d['transformation']; \
+        assert p['eye_on_hand'] is False and sorted(p)==sorted(['eye_on_hand','move_group','move_group_namespace','namespace',\
+        'robot_base_frame','robot_effector_frame','tracking_base_frame','tracking_marker_frame']); \
+        print(json.dumps([t[k] for k in ('x','y','z','qx','qy','qz','qw')]))";
+    if let Some(found) = python(read, &file(format!("easy-handeye/easy_handeye_{name}.yaml"))) {
+        let found = numbers(&found);
+        assert!(near(&found[..3], &metres) && near(&matrix(&found[3..]), &rotation), "{found:?}");
+    }
+    let read = "import yaml,sys,json,shlex; n=yaml.safe_load(open(sys.argv[1]))['launch'][0]['node']; a=shlex.split(n['args']); \
+        o=dict(zip(a[::2],a[1::2])); assert (n['pkg'],n['exec'])==('tf2_ros','static_transform_publisher'); \
+        assert o['--frame-id']=='base_link'; print(json.dumps([float(o['--'+k]) for k in ('x','y','z','qx','qy','qz','qw')]))";
+    if let Some(found) = python(read, &file(format!("ros-static-tf/static_tf_{name}.launch.yaml"))) {
+        let found = numbers(&found);
+        assert!(near(&found[..3], &metres) && near(&matrix(&found[3..]), &rotation), "{found:?}");
+    }
+    let other = stereocal(at, &["export", "placement", "--format", "opencv", "--group", "nowhere"]);
+    assert_eq!(other.status.code(), Some(2));
+    assert!(stderr(&other).contains("--group nowhere: the placement has"), "{}", stderr(&other));
+}
+
+#[test]
+fn locate_finds_what_identify_found_and_names_a_robot_that_is_wrong() {
+    let folder = identified();
+    let at = folder.path();
+    let text = std::fs::read_to_string(at.join("truth/measurements.csv")).unwrap();
+    let group = text.lines().nth(1).unwrap().split(',').nth(1).unwrap();
+    let rows = |count: usize| -> String {
+        let of_group = text.lines().skip(1).filter(|line| line.split(',').nth(1) == Some(group)).take(count);
+        std::iter::once(text.lines().next().unwrap()).chain(of_group).map(|line| format!("{line}\n")).collect()
+    };
+    std::fs::write(at.join("three.csv"), rows(3)).unwrap();
+    std::fs::write(at.join("two.csv"), rows(2)).unwrap();
+    let located = stereocal(at, &["locate", "three.csv", "--robot", "out/identified.toml", "--out", "there"]);
+    assert_eq!(located.status.code(), Some(0), "{}{}", stdout(&located), stderr(&located));
+    assert!(stdout(&located).starts_with("base from rig"), "{}", stdout(&located));
+    let shift = |file: &str| numbers(&json(&at.join(file))["groups"][0]["base_from_rig"]["translation_mm"]);
+    for (a, b) in shift("out/placement.json").iter().zip(shift("there/placement.json")) {
+        assert!((a - b).abs() < 1.0, "{a} {b}");
+    }
+    let nominal = stereocal(at, &["locate", "truth/measurements.csv", "--robot", "robot.toml", "--out", "there"]);
+    assert_eq!(nominal.status.code(), Some(1), "{}", stderr(&nominal));
+    assert!(stdout(&nominal).contains("the points contradict this robot"), "{}", stdout(&nominal));
+    let two = stereocal(at, &["locate", "two.csv", "--robot", "out/identified.toml", "--out", "there"]);
+    assert_eq!(two.status.code(), Some(3));
+    assert!(stderr(&two).contains("a placement takes 3"), "{}", stderr(&two));
+}
+
+#[test]
+fn ten_poses_say_whether_the_robot_is_still_the_same() {
+    let folder = identified();
+    let at = folder.path();
+    let text = std::fs::read_to_string(at.join("truth/measurements.csv")).unwrap();
+    let header = text.lines().next().unwrap();
+    let lines: Vec<&str> = text.lines().skip(1).collect();
+    let group = lines[0].split(',').nth(1).unwrap();
+    // The reading of the third joint is off by so much.
+    let ten = |off_deg: f64| -> String {
+        let third = header.split(',').position(|name| name == "j3_deg").unwrap();
+        let turned = |line: &&str| {
+            let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+            fields[third] = (fields[third].parse::<f64>().unwrap() - off_deg).to_string();
+            fields.join(",")
+        };
+        let of_group = lines.iter().filter(|line| line.split(',').nth(1) == Some(group)).take(10).map(turned);
+        std::iter::once(header.to_owned()).chain(of_group).map(|line| format!("{line}\n")).collect()
+    };
+    std::fs::write(at.join("same.csv"), ten(0.0)).unwrap();
+    std::fs::write(at.join("turned.csv"), ten(0.5)).unwrap();
+    let check = |file: &str, tolerance: &str| {
+        stereocal(
+            at,
+            &["verify", "--against", "out/identified.toml", "--measurements", file, "--tolerance-mm", tolerance],
+        )
+    };
+    let same = check("same.csv", "5");
+    assert_eq!(same.status.code(), Some(0), "{}{}", stdout(&same), stderr(&same));
+    assert!(stdout(&same).starts_with("STILL VALID"), "{}", stdout(&same));
+    // What the poses would not have shown is not taken for proof.
+    assert_eq!(check("same.csv", "0.0001").status.code(), Some(1));
+    let turned = check("turned.csv", "0.1");
+    assert_eq!(turned.status.code(), Some(3), "{}{}", stdout(&turned), stderr(&turned));
+    assert!(stdout(&turned).contains("the zero of joint 3"), "{}", stdout(&turned));
+    let history = std::fs::read_to_string(at.join("out/verify.csv")).unwrap();
+    assert!(history.starts_with("date,against,poses,standing,cause,"), "{history}");
+    assert_eq!(history.lines().count(), 4, "{history}");
+    assert!(history.lines().last().unwrap().contains("joint-3"), "{history}");
+    std::fs::remove_file(at.join("out/identification.json")).unwrap();
+    let unknown = check("same.csv", "5");
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(stderr(&unknown).contains("says nothing of how well it is known"), "{}", stderr(&unknown));
+}
