@@ -153,7 +153,7 @@ impl Board {
     pub fn side_said(&self) -> String {
         match self.sides_mm() {
             [width, _] if self.stretch == 1.0 => width.to_string(),
-            [width, height] => format!("{width}x{height}"),
+            [width, height] => format!("{width}x{}", (height * 1e9).round() / 1e9),
         }
     }
 

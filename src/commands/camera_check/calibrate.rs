@@ -3,6 +3,7 @@
 use camino::Utf8Path;
 
 use super::super::{Outcome, Result};
+use super::squares::squares;
 use crate::cli::{BoardShape, CameraCheck};
 use crate::config::{self, Config};
 use crate::diagnostic::Status;
@@ -38,6 +39,8 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(against) = &args.against {
         return super::recheck::run(args, against, config, run);
     }
+    // What can be refused without pictures.
+    config.check_board.board(args.board, None, args.square_mm)?;
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
     let mut problems = Vec::new();
     ranges::within(&mut problems, "tolerance_mm", tolerance_mm, ranges::TOLERANCES_MM);
@@ -140,7 +143,7 @@ fn open(args: &CameraCheck, config: &Config, run: Run) -> Result<OutDir> {
 
 /// The check board, as it was printed and as large as its temperature makes it; what a caliper leaves uncertain of it, mm.
 fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Result<(Board, Option<f64>)> {
-    let squares = super::squares(args, pairing)?;
+    let squares = squares(args, pairing)?;
     let drawn = config.check_board.board(args.board, squares, args.square_mm)?;
     let Some(extent) = args.measured_mm else { return Ok((warm(args, drawn)?, None)) };
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };

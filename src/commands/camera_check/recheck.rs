@@ -3,6 +3,7 @@
 use camino::Utf8Path;
 
 use super::super::{Outcome, Result};
+use super::squares::squares;
 use crate::cli::CameraCheck;
 use crate::config::{self, Config};
 use crate::diagnostic::Status;
@@ -63,7 +64,7 @@ fn corners(args: &CameraCheck, calibrated: &Calibrated, config: &Config, out: &O
     let named = args.board.is_some() || args.squares.is_some() || args.square_mm.is_some();
     let board = |pairing: Option<&Pairing>| match calibrated.board.filter(|_| !named) {
         Some(board) => Ok(board),
-        None => super::squares(args, pairing)
+        None => squares(args, pairing)
             .and_then(|squares| Ok(config.check_board.board(args.board, squares, args.square_mm)?)),
     };
     if let Some(file) = &args.corners {

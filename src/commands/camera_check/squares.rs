@@ -1,0 +1,26 @@
+//! How many squares the check board has: as was said, or as the pictures show.
+
+use super::super::Result;
+use crate::cli::{AskedSquares, CameraCheck};
+use crate::config;
+use crate::imaging::Squares;
+use crate::imaging::count::{Counted, count_squares};
+use crate::imaging::input::pairs::Pairing;
+use crate::progress;
+
+/// The squares that were said, or that the pictures show where they are to be counted.
+pub fn squares(args: &CameraCheck, pairing: Option<&Pairing>) -> Result<Option<Squares>> {
+    match (args.squares, pairing) {
+        (None, _) => Ok(None),
+        (Some(AskedSquares::Said(squares)), _) => Ok(Some(squares)),
+        (Some(AskedSquares::Counted), Some(pairing)) => {
+            let Counted { squares, pictures, of } = count_squares(pairing, args.bayer)?;
+            progress::note(format!("the board has {squares} squares: {pictures} of {of} pictures show all of it"));
+            Ok(Some(squares))
+        }
+        (Some(AskedSquares::Counted), None) => {
+            let problem = "`--squares auto` counts in pictures, and --corners gives none".to_owned();
+            Err(config::Error::Invalid { problems: vec![problem] }.into())
+        }
+    }
+}
