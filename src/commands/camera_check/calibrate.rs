@@ -39,25 +39,16 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(against) = &args.against {
         return super::recheck::run(args, against, config, run);
     }
-    // What can be refused without pictures.
-    config.check_board.board(args.board, None, args.square_mm)?;
-    let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
-    let mut problems = Vec::new();
-    ranges::within(&mut problems, "tolerance_mm", tolerance_mm, ranges::TOLERANCES_MM);
-    if let Some(mm) = args.board_uncertainty_mm {
-        ranges::within(&mut problems, "board_uncertainty_mm", mm, ranges::TOLERANCES_MM);
-    }
-    let extent = args.volume.unwrap_or_default();
-    config::reject(problems)?;
+    let mut demand = demand(args, config)?;
     let out = open(args, config, run)?;
 
     let pairing = pairing(args, &out)?;
     let (board, by_caliper_mm) = board(args, config, pairing.as_ref())?;
-    let demand = Demand { tolerance_mm, board_uncertainty_mm: args.board_uncertainty_mm.or(by_caliper_mm), extent };
+    demand.board_uncertainty_mm = demand.board_uncertainty_mm.or(by_caliper_mm);
     let known = known_lenses(args)?;
     let corners = corners(args, board, pairing.as_ref(), known.as_ref(), &out)?;
     known.as_ref().map_or(Ok(()), |known| known.check_size(&corners))?;
-    let asked = Asked { options: options(args, known), tolerance_mm, extent };
+    let asked = Asked { options: options(args, known), tolerance_mm: demand.tolerance_mm, extent: demand.extent };
     let corners = open_numbers::by_other_pairs(corners, &asked.options);
     corners.notes.iter().for_each(progress::note);
     let (calibration, findings) = match &args.since {
@@ -96,6 +87,23 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let stdout = if args.output.json { json } else { report::camera_check::summary(&calibration, &judged, &out) };
     let status = if judged.verdict == Verdict::Pass { Status::Done } else { Status::OutOfTolerance };
     Ok(Outcome { stdout, status })
+}
+
+/// What lengths are judged by; refuses what can be refused without pictures.
+fn demand(args: &CameraCheck, config: &Config) -> Result<Demand> {
+    config.check_board.board(args.board, None, args.square_mm)?;
+    let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
+    let mut problems = Vec::new();
+    ranges::within(&mut problems, "tolerance_mm", tolerance_mm, ranges::TOLERANCES_MM);
+    if let Some(mm) = args.board_uncertainty_mm {
+        ranges::within(&mut problems, "board_uncertainty_mm", mm, ranges::TOLERANCES_MM);
+    }
+    config::reject(problems)?;
+    Ok(Demand {
+        tolerance_mm,
+        board_uncertainty_mm: args.board_uncertainty_mm,
+        extent: args.volume.unwrap_or_default(),
+    })
 }
 
 /// The worst and the best pair for the page; none where corners came without pictures.
