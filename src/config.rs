@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use crate::diagnostic::Explain;
 use crate::files;
-use crate::formats::board_files::NamedBoard;
+use crate::formats::boards::files::NamedBoard;
 use crate::imaging::board::{Board, SQUARES_MM, Squares};
 use crate::ranges::{TOLERANCES_MM, positive, within};
 

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::output::Output;
-use crate::formats::board_files::named;
+use crate::formats::boards::files::named;
 use crate::imaging::Board;
 
 /// `stereocal board`

@@ -7,7 +7,7 @@ use super::output::Output;
 use super::placement::ExportPlacement;
 use super::robot::ExportRobot;
 use super::values::{AskedSquares, between};
-use crate::formats::board_files::named;
+use crate::formats::boards::files::named;
 use crate::formats::lenses::LensFile;
 use crate::imaging::input::pairs::{PairBy, Source};
 use crate::imaging::printed::PrintedExtent;

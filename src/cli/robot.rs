@@ -5,7 +5,7 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use super::output::Output;
 use super::values::{between, count};
-use crate::formats::board_files::named;
+use crate::formats::boards::files::named;
 use crate::imaging::{Board, Squares};
 
 /// `stereocal identify`

@@ -6,7 +6,7 @@ use crate::config::{self, Config};
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::board_sheet::Sheet;
+use crate::formats::boards::sheet::Sheet;
 
 /// Runs the command.
 pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {

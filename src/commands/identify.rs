@@ -8,7 +8,7 @@ use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::{Digested, Provenance, Run};
-use crate::formats::placement::{PLACEMENT, PlacementFile};
+use crate::formats::placements::record::{PLACEMENT, PlacementFile};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::{known, shared};
 use crate::identify::examine::{self, Examined};

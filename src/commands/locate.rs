@@ -10,8 +10,8 @@ use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::known_robot;
-use crate::formats::placement::{PLACEMENT, PlacementFile};
+use crate::formats::placements::record::{PLACEMENT, PlacementFile};
+use crate::formats::robots::known;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::{self, Examined};
 use crate::identify::judge::errors::Judge;
@@ -57,7 +57,7 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     if unexplained.is_some() {
         examine::in_hand::refuse(&set, &robot)?;
     }
-    let trust = known_robot::trust(&args.robot);
+    let trust = known::trust(&args.robot);
     let located = locate(&set, &robot, trust, &config.identify)?;
     let all = set.rows(|_| true);
     let held_out = folds::judged(&Judge::plain(&set, &all, false), located.placed.robot(), &all);

@@ -9,12 +9,13 @@ use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::{dh_csv, urdf};
+use crate::formats::robots::{dh_csv, urdf};
 use crate::measurements::{Observed, Source};
 use crate::progress;
 use crate::report::robot as report;
+use crate::robot::catalogue::names;
 use crate::robot::catalogue::{self, Convention};
-use crate::robot::{Error, Robot, file, names};
+use crate::robot::{Error, Robot, file};
 
 /// Runs the command.
 pub fn run(args: &RobotCommand, config: &Config, run: Run) -> Result<Outcome> {

@@ -1,7 +1,7 @@
 //! The lines of `locate`.
 
 use crate::files::OutDir;
-use crate::formats::placement::{PLACEMENT, PlacementFile, TransformRecord};
+use crate::formats::placements::record::{PLACEMENT, PlacementFile, TransformRecord};
 use crate::geometry::rotation_vector;
 use crate::identify::judge::locate::Located;
 use crate::report::table::number;

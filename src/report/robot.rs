@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use nalgebra::Vector3;
 
 use super::table::Table;
-use crate::formats::urdf::roll_pitch_yaw;
+use crate::formats::robots::urdf::roll_pitch_yaw;
 use crate::geometry::{Transform, rotation_vector};
 use crate::robot::catalogue::{ARMS, Arm, PAPER};
 use crate::robot::corrections::{LoadPoint, Wave};

@@ -1,7 +1,6 @@
 //! The robot: its kinematic parameters, where they put the target, and the file they live in.
 
 mod anatomy;
-pub mod arm;
 pub mod axes;
 pub mod bent;
 pub mod catalogue;
@@ -11,7 +10,6 @@ pub mod ends;
 pub mod file;
 pub mod inverse;
 pub mod jacobian;
-pub mod names;
 pub mod parameters;
 pub mod refit;
 pub mod tool_fit;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use camino::Utf8Path;
-use stereocal::formats::urdf::Urdf;
+use stereocal::formats::robots::urdf::Urdf;
 use stereocal::robot::refit::Residual;
 use stereocal::robot::{Robot, file};
 

@@ -6,7 +6,7 @@ use crate::config::{self, Config};
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::placement::{GroupRecord, PLACEMENT, PlacementFile};
+use crate::formats::placements::record::{GroupRecord, PLACEMENT, PlacementFile};
 use crate::formats::placements::{Frames, Placement, easy_handeye, file_storage, ros_static_tf};
 
 /// Runs the command.

@@ -9,10 +9,10 @@ use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::known_robot;
-use crate::formats::placement::{PLACEMENT, PlacementFile};
+use crate::formats::placements::record::{PLACEMENT, PlacementFile};
 use crate::formats::recheck::{self as formats, Check, Standing};
 use crate::formats::robot_recheck::{HISTORY, RobotRecheckFile};
+use crate::formats::robots::known;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::recheck::recheck;
@@ -22,7 +22,7 @@ use crate::{report, robot};
 /// Runs it.
 pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
     let robot = robot::file::read(against)?;
-    let before = known_robot::before(against, &robot).ok_or_else(|| Error::NotKnown { path: against.to_string() })?;
+    let before = known::before(against, &robot).ok_or_else(|| Error::NotKnown { path: against.to_string() })?;
     let source = source(args.measurements.clone(), &args.table, config);
     let rows = read(&source, &robot)?;
     check_joints(&robot, &rows, &args.measurements[0])?;

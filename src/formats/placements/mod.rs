@@ -5,6 +5,7 @@
 
 pub mod easy_handeye;
 pub mod file_storage;
+pub mod record;
 pub mod ros_static_tf;
 
 use crate::geometry::Transform;

@@ -2,8 +2,11 @@
 //!
 //! Each format carries the robot as far as it can; what it can carry is a [`Robot`] again, so that the rest is measured and said.
 
+pub mod dh_csv;
+pub mod known;
 pub mod ros_kinematics;
 pub mod ur_calibration;
+pub mod urdf;
 pub mod urdf_corrected;
 pub mod urdf_plain;
 

@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use super::ExportedRobot;
-use crate::formats::urdf::roll_pitch_yaw;
+use crate::formats::robots::urdf::roll_pitch_yaw;
 use crate::geometry::Transform;
 use crate::robot::Robot;
 

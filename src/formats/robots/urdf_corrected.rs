@@ -7,7 +7,7 @@
 use nalgebra::UnitQuaternion;
 
 use super::ExportedRobot;
-use crate::formats::urdf::{Chain, Kind, Urdf};
+use crate::formats::robots::urdf::{Chain, Kind, Urdf};
 use crate::geometry::Transform;
 use crate::robot::Robot;
 

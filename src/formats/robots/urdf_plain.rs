@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::ExportedRobot;
-use crate::formats::urdf::origin_element;
+use crate::formats::robots::urdf::origin_element;
 use crate::geometry::Transform;
 use crate::robot::{Joint, Robot};
 
@@ -70,7 +70,7 @@ fn escaped(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::urdf::Urdf;
+    use crate::formats::robots::urdf::Urdf;
     use crate::robot::refit::Residual;
     use crate::robot::{Corrections, catalogue};
     use camino::Utf8Path;

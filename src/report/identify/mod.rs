@@ -11,7 +11,7 @@ use nalgebra::Point3;
 use super::Result;
 use super::page::{self, Tone};
 use super::table::number;
-use crate::formats::placement::PlacementFile;
+use crate::formats::placements::record::PlacementFile;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::RowError;
 use crate::identify::record::{Advice, PointSpread, Record};

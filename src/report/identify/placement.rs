@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::formats::placement::{PlacementFile, TransformRecord};
+use crate::formats::placements::record::{PlacementFile, TransformRecord};
 use crate::geometry::rotation_vector;
 use crate::report::page;
 use crate::report::table::number;

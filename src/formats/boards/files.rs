@@ -8,8 +8,8 @@
 use camino::Utf8Path;
 use serde::Deserialize;
 
-use super::export::scan;
 use crate::files;
+use crate::formats::export::scan;
 use crate::imaging::{Board, Squares};
 
 /// A board as the settings file or the command line names it.

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::corrections::CouplingTerm;
-use super::{Ends, Joint, Robot};
 use crate::geometry::{Transform, transform};
+use crate::robot::corrections::{Corrections, CouplingTerm};
+use crate::robot::{Ends, Joint, Robot};
 
 /// How the rows of an arm are to be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,5 +83,5 @@ pub fn from_rows(name: &str, convention: Convention, rows: &[Row]) -> Robot {
         ends.last_frame_from_flange = along * transform(Vector3::x() * before[0].to_radians(), Vector3::zeros());
     }
     let tool_mm = ends.last_frame_from_flange.translation.vector;
-    Robot { name: name.to_owned(), joints, tool_mm, corrections: super::Corrections::default(), ends }
+    Robot { name: name.to_owned(), joints, tool_mm, corrections: Corrections::default(), ends }
 }

@@ -4,9 +4,9 @@ use camino::Utf8Path;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::checked;
 use crate::diagnostic::Place;
 use crate::files::{self, Result};
+use crate::formats::checked;
 use crate::geometry::{Transform, rotation_matrix};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::{RowError, Spread};

@@ -1,6 +1,6 @@
 //! Which of the catalogue's arms a person means.
 
-use super::catalogue::{ARMS, PAPER};
+use super::arms::{ARMS, PAPER};
 
 /// Names of the arms that may be meant: the one of exactly this name, or all whose name or title holds what was written, in any case,
 /// with any signs between letters and digits. A number is a whole one: 120 is not in 1200.

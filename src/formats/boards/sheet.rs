@@ -1,6 +1,6 @@
 //! A board to print: a sheet of paper with the board in true size, a ruler to check the print by, and the board's name.
 //!
-//! In: a board. Out: SVG and PDF, all lengths in mm; PNG (`board_png`). Goes wrong: a board that no paper up to A0 holds, and printers that scale to fit: the ruler shows it.
+//! In: a board. Out: SVG and PDF, all lengths in mm; PNG (`png`). Goes wrong: a board that no paper up to A0 holds, and printers that scale to fit: the ruler shows it.
 
 use std::fmt::Write as _;
 

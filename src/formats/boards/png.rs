@@ -5,7 +5,7 @@
 
 use png::{BitDepth, ColorType, Encoder, PixelDimensions, Unit};
 
-use super::board_sheet::Sheet;
+use super::sheet::Sheet;
 
 /// Millimetres of an inch.
 const INCH_MM: f64 = 25.4;

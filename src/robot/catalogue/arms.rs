@@ -5,8 +5,8 @@
 //! joint's row, and those of the last row to the flange. Where a maker publishes a drawing instead of a table the rows follow from it.
 //! A robot file is a start: a machine's serial number decides about limits and options, so hold `robot show` against the pendant.
 
-use super::Robot;
-pub use super::arm::{Arm, Convention, Row, from_rows};
+use super::arm::{Arm, Convention};
+use crate::robot::Robot;
 
 const UR_LIMITS: &[[f64; 2]] = &[[-360.0, 360.0]; 6];
 const UR_SOURCE: &str = "Universal Robots, \"DH parameters for calculations of kinematics and dynamics\"";
