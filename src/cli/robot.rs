@@ -69,7 +69,7 @@ pub struct Verify {
     /// Is this robot, with its identification.json beside it, still the one of some ten new poses? Nothing else is judged
     #[arg(long, value_name = "IDENTIFIED", conflicts_with_all = ["robot", "known_distances"])]
     pub against: Option<Utf8PathBuf>,
-    /// With --against: how far the target may move, mm [default: what 95 % of errors were stated to be below at the identification]
+    /// With --against: how far the target may move, mm [default: key `tolerance_mm`, or what 95 % of the errors were stated to be below, where that is more]
     #[arg(long, value_name = "MM", requires = "against", value_parser = between(1e-4, 1e3))]
     pub tolerance_mm: Option<f64>,
     /// With --against: folder for results; key `out` [default: out]

@@ -3,7 +3,7 @@
 use camino::Utf8Path;
 use serde::{Deserialize, Serialize};
 
-use crate::diagnostic::Place;
+use crate::diagnostic::{Place, Status};
 use crate::files::{self, OutDir, Result};
 use crate::imaging::Skipped;
 use crate::stereo::findings::standing::MATERIAL_SHARE;
@@ -35,6 +35,15 @@ impl Standing {
             (true, false) => Standing::Undecided,
             (false, _) if effect_mm <= tolerance_mm => Standing::ChangedWithin,
             (false, _) => Standing::Changed,
+        }
+    }
+
+    /// With which status a check ends.
+    pub fn status(self) -> Status {
+        match self {
+            Standing::StillValid => Status::Done,
+            Standing::ChangedWithin | Standing::Undecided => Status::OutOfTolerance,
+            Standing::Changed => Status::Undetermined,
         }
     }
 }

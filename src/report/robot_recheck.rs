@@ -30,7 +30,7 @@ fn next(standing: Standing, recheck: &Recheck) -> &'static str {
     match standing {
         Standing::StillValid => "go on with this robot",
         Standing::Undecided => {
-            "add poses that bend every joint and turn the wrist: these would not have shown a change as large as the tolerance"
+            "add poses that bend every joint and turn the wrist, or say with --tolerance-mm what matters: these would not have shown a change as large as the tolerance"
         }
         _ if !recheck.changed => "`stereocal locate` finds the cameras anew; the robot stays",
         Standing::ChangedWithin => {

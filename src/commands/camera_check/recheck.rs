@@ -6,7 +6,6 @@ use super::super::{Outcome, Result};
 use super::squares::squares;
 use crate::cli::CameraCheck;
 use crate::config::{self, Config};
-use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
@@ -51,12 +50,7 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     out.write(HISTORY, formats::to_csv(&checks, "pairs").as_bytes())?;
     out.write("recheck.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
     let summary = || report::recheck::summary(&found, standing, tolerance_mm, checks.len(), &out);
-    let status = match standing {
-        Standing::StillValid => Status::Done,
-        Standing::ChangedWithin | Standing::Undecided => Status::OutOfTolerance,
-        Standing::Changed => Status::Undetermined,
-    };
-    Ok(Outcome { stdout: if args.output.json { json } else { summary() }, status })
+    Ok(Outcome { stdout: if args.output.json { json } else { summary() }, status: standing.status() })
 }
 
 /// The corners of the new pairs, on the board that calibrated unless another one is named.

@@ -6,11 +6,10 @@ use super::super::identify::{check_joints, read, source};
 use super::super::{Outcome, Result};
 use crate::cli::Verify;
 use crate::config::Config;
-use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::placements::record::{PLACEMENT, PlacementFile};
-use crate::formats::recheck::{self as formats, Check, Standing};
+use crate::formats::recheck::{self as formats, Check};
 use crate::formats::robot_recheck::{HISTORY, RobotRecheckFile};
 use crate::formats::robots::known;
 use crate::identify::Error;
@@ -41,7 +40,8 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     for skipped in &set.skipped {
         progress::warn(format!("pose {} is not compared: {}", skipped.pose, skipped.reason));
     }
-    let tolerance_mm = args.tolerance_mm.unwrap_or(before.p95_mm);
+    // A change that is smaller than what the robot was off by anyway is none to act on.
+    let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm.max(before.p95_mm));
     let content = RobotRecheckFile::new(&found, against, tolerance_mm);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check {
@@ -59,10 +59,5 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     out.write(HISTORY, formats::to_csv(&checks, "poses").as_bytes())?;
     out.write("verify.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
     let summary = || report::robot_recheck::summary(&found, content.standing, tolerance_mm, checks.len(), &out);
-    let status = match content.standing {
-        Standing::StillValid => Status::Done,
-        Standing::ChangedWithin | Standing::Undecided => Status::OutOfTolerance,
-        Standing::Changed => Status::Undetermined,
-    };
-    Ok(Outcome { stdout: if args.json { json } else { summary() }, status })
+    Ok(Outcome { stdout: if args.json { json } else { summary() }, status: content.standing.status() })
 }

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use crate::files::provenance::{Digested, Provenance};
 use crate::identify::judge::locate::{REPEATABILITY_MM, Trust};
 use crate::identify::judge::recheck::Before;
-use crate::identify::judge::uncertainty::Covariance;
+use crate::identify::judge::uncertainty::{Covariance, MEAN_OVER_RMS};
 use crate::identify::model::ladder::Terms;
 use crate::robot::{Parameter, Robot};
 
@@ -50,7 +50,7 @@ fn beside(robot: &Utf8Path) -> Option<Identified> {
 pub fn trust(robot: &Utf8Path) -> Trust {
     let identified = beside(robot);
     // Over the root of three, and of a mean length over that of its square.
-    let of_coordinate = |e: &Expected| e.mean_mm / (0.921_317_731_923_561_3 * 3f64.sqrt());
+    let of_coordinate = |e: &Expected| e.mean_mm / (MEAN_OVER_RMS * 3f64.sqrt());
     Trust {
         point_mm: identified.as_ref().and_then(|i| i.expected.as_ref()).map_or(REPEATABILITY_MM, of_coordinate),
         rotation_rad: identified.and_then(|i| i.scatter_rad),

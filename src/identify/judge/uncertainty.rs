@@ -79,7 +79,7 @@ impl Lengths {
 }
 
 /// Mean length of a vector of three normal numbers over the root of the mean of its square.
-const MEAN_OVER_RMS: f64 = 0.921_317_731_923_561_3;
+pub const MEAN_OVER_RMS: f64 = 0.921_317_731_923_561_3;
 
 /// 95 % quantile of the length of three equal normal numbers over the root of the mean of its square.
 const P95_OVER_RMS: f64 = 1.613_973;
