@@ -34,10 +34,15 @@ pub fn summary(placement: &PlacementFile, located: &Located, poses: usize, out: 
         ));
     }
     lines.extend(placement.flange_from_target.as_ref().map(|target| line("flange from target", target)));
-    lines.push(format!(
-        "{poses} poses fit to {:.4} mm; chi-squared {:.1} over {} degrees of freedom",
-        located.rms_mm, located.chi_square, located.freedom
-    ));
+    lines.push(match located.freedom {
+        0 => format!(
+            "{poses} poses are as many as the placement takes: none is left to check the robot by; add two or more"
+        ),
+        freedom => format!(
+            "{poses} poses fit to {:.4} mm; chi-squared {:.1} over {freedom} degrees of freedom",
+            located.rms_mm, located.chi_square
+        ),
+    });
     if located.contradicted {
         lines.push(
             "the points contradict this robot by more than is stated of both: identify the robot, or look whether cameras, target and joint angles are those of these rows"

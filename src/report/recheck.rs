@@ -137,7 +137,7 @@ pub(super) fn history(checks: &[Check], tolerance_mm: f64, title: &str) -> Resul
     };
     Plot::new(title, "check", "mm")
         .points("changed by", &over(|check| check.effect_mm))
-        .line("would have been seen", &over(|check| check.seen_mm))
+        .points("would have been seen", &over(|check| check.seen_mm))
         .hline(tolerance_mm, "tolerance")
         .svg()
 }

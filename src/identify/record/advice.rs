@@ -108,7 +108,7 @@ impl Record {
         }
         if !i.weak.is_empty() {
             list.push(format!(
-                "the data hardly determine {}: their values come from the manufacturing tolerance",
+                "the data hardly determine {}: what they are corrected by comes from the manufacturing tolerance",
                 i.weak.join(", ")
             ));
         }
