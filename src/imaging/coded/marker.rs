@@ -2,8 +2,8 @@
 //!
 //! In: a picture and where the four corners of a square lie in it. Out: the bits of the marker that stands there, or none. Method: each bit is
 //! the mean of nine places in its middle, carried into the picture by the square's homography; black and white are those of the marker's
-//! border and of the paper round it, so that uneven light, and a board printed white on black, do not matter. Goes wrong: bits of less than
-//! about two pixels.
+//! border and of the paper round it, so that uneven light, and a board printed white on black, do not matter; blur that mixes neighbouring bits is
+//! undone to the second order. Goes wrong: bits of less than about two pixels, and blur of more than one of them.
 
 use nalgebra::{Matrix3, Point2, Vector3};
 
@@ -48,6 +48,24 @@ pub struct Fields {
     pub share: f64,
     /// Bits along its side, without the border.
     pub bits: usize,
+}
+
+/// The fields of a marker with the blur between them undone as far as four neighbours tell, `paper` round it. To the second order a Gaussian blur of
+/// a standard deviation of `s` fields is undone by `s^2 / 2` of the differences from the neighbours. Fields that are black and white stay
+/// what they are however sharp the picture is, so that one amount does for all.
+fn sharpened(fields: &[f64], side: usize, paper: f64) -> Vec<f64> {
+    /// Of a blur of 0.7 fields: beyond it fields mix with more than their neighbours.
+    const UNDONE: f64 = 0.25;
+    let at = |i: isize, j: isize| {
+        let inside = |k: isize| (0..side as isize).contains(&k);
+        if inside(i) && inside(j) { fields[j as usize * side + i as usize] } else { paper }
+    };
+    let one = |k: usize| {
+        let (i, j) = ((k % side) as isize, (k / side) as isize);
+        let neighbours = at(i - 1, j) + at(i + 1, j) + at(i, j - 1) + at(i, j + 1);
+        fields[k] + UNDONE * (4.0 * fields[k] - neighbours)
+    };
+    (0..side * side).map(one).collect()
 }
 
 /// Where the corners of a unit square lie in a picture, in order round it from (0, 0) over (1, 0): the map from the one to the other.
@@ -105,7 +123,7 @@ pub fn read(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Op
         Some(sum / (WITHIN_BIT.len() * WITHIN_BIT.len()) as f64)
     };
     let side = bits + 2;
-    let grid: Vec<f64> =
+    let blurred: Vec<f64> =
         (0..side * side).map(|k| mean(place(k % side), place(k / side))).collect::<Option<Vec<f64>>>()?;
     let is_border = |k: usize| [k % side, k / side].iter().any(|&i| i == 0 || i == side - 1);
     let along = |i: usize, k: usize| {
@@ -114,9 +132,11 @@ pub fn read(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Op
         grey_at(picture, &mapped(&map, at.0, at.1))
     };
     let paper: Vec<f64> = (0..4 * side).map(|k| along(k / 4, k % 4)).collect::<Option<Vec<f64>>>()?;
-    let border: Vec<f64> = (0..side * side).filter(|&k| is_border(k)).map(|k| grid[k]).collect();
     let mean_of = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let (white, black) = (mean_of(&paper), mean_of(&border));
+    let white = mean_of(&paper);
+    let grid = sharpened(&blurred, side, white);
+    let border: Vec<f64> = (0..side * side).filter(|&k| is_border(k)).map(|k| grid[k]).collect();
+    let black = mean_of(&border);
     let inverted = black > white;
     let middle = 0.5 * (white + black);
     let is_black = |grey: f64| (grey < middle) != inverted;
