@@ -1,4 +1,4 @@
-//! The board as its certificate describes it: a plain checkerboard, or one whose light squares hold markers that number its corners.
+//! The board as its certificate describes it: a plain checkerboard, one whose light squares hold markers that number its corners, or a grid of tags.
 
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::Error;
 use super::coded::Layout;
 use super::coded::dictionary::Dictionary;
+use super::pitch::Pitch;
 
 /// Number of squares of a board; of a plain one the larger number first, of one with markers as printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -32,6 +33,14 @@ impl FromStr for Squares {
 }
 
 impl Squares {
+    /// Reads `6x6` as six columns of six tags.
+    pub fn of_tags(text: &str) -> Result<Squares, Error> {
+        let refuse = || Error::TagCounts { found: text.to_owned() };
+        let (a, b) = text.split_once(['x', 'X']).ok_or_else(refuse)?;
+        let count = |text: &str| text.trim().parse().ok().filter(|count| (1..100).contains(count)).ok_or_else(refuse);
+        Ok(Squares { columns: count(a)?, rows: count(b)? })
+    }
+
     /// Reads `8x11` as eight columns of eleven squares.
     pub fn as_printed(text: &str) -> Result<Squares, Error> {
         let refuse = || Error::BoardSize { found: text.to_owned() };
@@ -85,6 +94,14 @@ pub enum Kind {
         /// Which squares hold the markers, where that is said; else it is what is seen.
         layout: Option<Layout>,
     },
+    /// Kalibr's AprilGrid: tags with black squares in the corners between them. Where dark and light meet it is a checkerboard whose squares are a tag and
+    /// a gap wide in turn; the outermost are gaps.
+    Tags {
+        /// Width of a gap, mm.
+        gap_mm: f64,
+        /// The tags' codes.
+        family: Dictionary,
+    },
 }
 
 /// A board of squares: so many, of such a size.
@@ -93,7 +110,7 @@ pub enum Kind {
 pub struct Board {
     /// Number of squares.
     pub squares: Squares,
-    /// Width of a square, mm.
+    /// Width of a square, of a grid of tags that of a tag, mm.
     pub square_mm: f64,
     /// Height of a square over its width: one as drawn, hardly another as printed.
     pub stretch: f64,
@@ -119,6 +136,7 @@ impl Board {
             Kind::Charuco { marker_mm, dictionary, layout } => {
                 Kind::Charuco { marker_mm: marker_mm * factor, dictionary, layout }
             }
+            Kind::Tags { gap_mm, family } => Kind::Tags { gap_mm: gap_mm * factor, family },
         };
         Board { square_mm: self.square_mm * factor, kind, ..self }
     }
@@ -126,7 +144,7 @@ impl Board {
     /// The board with markers in these squares.
     pub fn with_layout(self, layout: Layout) -> Board {
         match self.kind {
-            Kind::Checker => self,
+            Kind::Checker | Kind::Tags { .. } => self,
             Kind::Charuco { marker_mm, dictionary, .. } => {
                 Board { kind: Kind::Charuco { marker_mm, dictionary, layout: Some(layout) }, ..self }
             }
@@ -140,6 +158,9 @@ impl Board {
             Kind::Charuco { marker_mm, dictionary, layout } => {
                 let (share, name) = (marker_mm / self.square_mm, dictionary.name());
                 format!("charuco {} {share} {name}{}", self.squares, of_layout(layout))
+            }
+            Kind::Tags { gap_mm, family } => {
+                format!("tags {} {} {}", self.squares, gap_mm / self.square_mm, family.name())
             }
         }
     }
@@ -167,10 +188,36 @@ impl Board {
         self.squares.rows - 1
     }
 
+    /// How far apart the lines of its corners are, in sides of a square.
+    pub fn pitch(&self) -> Pitch {
+        match self.kind {
+            Kind::Checker | Kind::Charuco { .. } => Pitch::Even,
+            Kind::Tags { gap_mm, .. } => Pitch::Tags { gap: gap_mm / self.square_mm },
+        }
+    }
+
+    /// How many columns and rows of tags a grid of tags has.
+    pub fn tags(&self) -> [usize; 2] {
+        [self.columns() / 2, self.rows() / 2]
+    }
+
+    /// Distance of two lines of corners that are so many lines apart, the first of them the first of the board, mm: along x, along y.
+    pub fn spans_mm(&self, lines: usize) -> [f64; 2] {
+        self.sides_mm().map(|side| self.pitch().at(lines as isize) * side)
+    }
+
+    /// Width and height of all its squares together, mm.
+    pub fn extent_mm(&self) -> [f64; 2] {
+        let [width, height] = self.sides_mm();
+        let pitch = self.pitch();
+        let of = |corners: usize, side: f64| (pitch.at(corners as isize) - pitch.at(-1)) * side;
+        [of(self.columns(), width), of(self.rows(), height)]
+    }
+
     /// Distance between two opposite outermost inner corners, mm.
     pub fn diagonal_mm(&self) -> f64 {
-        let [width, height] = self.sides_mm();
-        ((self.columns() - 1) as f64 * width).hypot((self.rows() - 1) as f64 * height)
+        let [[width, _], [_, height]] = [self.columns() - 1, self.rows() - 1].map(|lines| self.spans_mm(lines));
+        width.hypot(height)
     }
 
     /// Number of inner corners.
@@ -188,6 +235,38 @@ impl Board {
         (index % self.columns(), index / self.columns())
     }
 
+    /// A corner's number as the programs count whose boards they are: ChArUco's row by row, Kalibr's four to a tag, counter-clockwise from its lower left.
+    pub fn id(&self, col: usize, row: usize) -> usize {
+        match self.kind {
+            Kind::Checker | Kind::Charuco { .. } => self.index(col, row),
+            Kind::Tags { .. } => {
+                let corner = match (col % 2, row % 2) {
+                    (0, 1) => 0,
+                    (1, 1) => 1,
+                    (1, 0) => 2,
+                    _ => 3,
+                };
+                4 * Layout::Tags.number(self.squares, col / 2 * 2 + 1, row / 2 * 2 + 1) + corner
+            }
+        }
+    }
+
+    /// Column and row of the corner of this number; a number that the board has not gives a place that it has not.
+    pub fn by_id(&self, id: usize) -> (usize, usize) {
+        match self.kind {
+            Kind::Checker | Kind::Charuco { .. } => self.place(id),
+            Kind::Tags { .. } => {
+                let ([columns, rows], (tag, corner)) = (self.tags(), (id / 4, id % 4));
+                let (col, row) = (2 * (tag % columns), tag / columns);
+                if row >= rows {
+                    return (col, 2 * row);
+                }
+                let top = 2 * (rows - 1 - row);
+                [(col, top + 1), (col + 1, top + 1), (col + 1, top), (col, top)][corner]
+            }
+        }
+    }
+
     /// Nominal places of all inner corners in the board's frame, mm, row by row.
     pub fn corners_mm(&self) -> impl Iterator<Item = Point3<f64>> + '_ {
         (0..self.corner_count()).map(|k| self.place(k)).map(|(col, row)| self.corner_mm(col, row))
@@ -195,11 +274,10 @@ impl Board {
 
     /// Nominal place of inner corner `(col, row)` in the board's frame (origin in the centre), mm.
     pub fn corner_mm(&self, col: usize, row: usize) -> Point3<f64> {
-        Point3::new(
-            (col as f64 - (self.columns() - 1) as f64 / 2.0) * self.square_mm,
-            (row as f64 - (self.rows() - 1) as f64 / 2.0) * self.square_mm * self.stretch,
-            0.0,
-        )
+        let pitch = self.pitch();
+        // Half of the width of a plain board is exact in steps of half a square; so is where its corners lie.
+        let of = |line: usize, lines: usize| pitch.at(line as isize) - pitch.at(lines as isize - 1) / 2.0;
+        Point3::new(of(col, self.columns()) * self.square_mm, of(row, self.rows()) * self.square_mm * self.stretch, 0.0)
     }
 
     /// True where turning the board by 180 degrees in its plane leaves the same picture: both counts of squares odd, or both even.
@@ -238,7 +316,7 @@ impl Board {
 /// The end of a board's name that says its layout.
 pub(super) fn of_layout(layout: Option<Layout>) -> &'static str {
     match layout {
-        None => "",
+        None | Some(Layout::Tags) => "",
         Some(Layout::New) => ":new",
         Some(Layout::Old) => ":old",
     }
@@ -285,5 +363,21 @@ mod tests {
             .sum();
         assert_eq!(sum.norm(), 0.0);
         assert_eq!(board.corner_mm(1, 0).x - board.corner_mm(0, 0).x, 10.0);
+    }
+
+    #[test]
+    fn tags_count_as_kalibr_counts() {
+        let board: Board = "apriltag:3x2:tag36h11:40:10".parse().unwrap();
+        assert_eq!((board.columns(), board.rows(), board.tags()), (6, 4, [3, 2]));
+        // The lowest row's tags are 0, 1 and 2; each has its lower left corner first.
+        for (place, id) in [((0, 3), 0), ((1, 3), 1), ((1, 2), 2), ((0, 2), 3), ((2, 3), 4), ((0, 1), 12), ((5, 0), 22)]
+        {
+            assert_eq!((board.id(place.0, place.1), board.by_id(id)), (id, place));
+        }
+        assert!(board.by_id(24).1 >= board.rows());
+        // Two tags and the gap between them either way.
+        let across = board.corner_mm(3, 0) - board.corner_mm(0, 0);
+        assert_eq!((across.x, board.spans_mm(3), board.extent_mm()), (90.0, [90.0, 90.0], [160.0, 110.0]));
+        assert!((board.corner_mm(0, 0) + board.corner_mm(5, 3).coords).coords.norm() < 1e-12);
     }
 }

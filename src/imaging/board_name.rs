@@ -19,6 +19,10 @@ impl fmt::Display for Board {
             Kind::Charuco { marker_mm, dictionary, layout } => {
                 write!(f, "charuco:{squares}:{side}:{marker_mm}:{}{}", dictionary.name(), of_layout(layout))
             }
+            Kind::Tags { gap_mm, family } => {
+                let [columns, rows] = self.tags();
+                write!(f, "apriltag:{columns}x{rows}:{}:{side}:{gap_mm}", family.tag_name())
+            }
         }
     }
 }
@@ -75,18 +79,59 @@ impl FromStr for Board {
             ("charuco", _) => {
                 Err(refuse("a ChArUco board is `charuco:COLSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY`".to_owned()))
             }
-            ("apriltag", _) => Err(refuse(
-                "grids of AprilTags are not read; a ChArUco board may have them as markers: `charuco:11x8:15:11:DICT_APRILTAG_36h11`".to_owned(),
+            ("apriltag", [_, _, _, _, "opencv"]) => Err(refuse(
+                "OpenCV's grid of tags has corners of one square only, which move with the ink: only Kalibr's with black squares between its tags is read"
+                    .to_owned(),
             )),
+            ("apriltag", [tags, family, tag_mm, gap_mm, made_by @ ..]) if matches!(made_by, [] | ["kalibr"]) => {
+                let ((square_mm, stretch), gap_mm) = (sides(tag_mm)?, length(gap_mm)?);
+                let family = Dictionary::of_tags(family).map_err(&refuse)?;
+                let Squares { columns, rows } = Squares::of_tags(tags)?;
+                let squares = Squares { columns: 2 * columns + 1, rows: 2 * rows + 1 };
+                let board = Board { squares, square_mm, stretch, kind: Kind::Tags { gap_mm, family } };
+                board.check_markers().map(|()| board).map_err(refuse)
+            }
+            ("apriltag", _) => {
+                Err(refuse("a grid of AprilTags is `apriltag:COLSxROWS:FAMILY:TAG_MM:GAP_MM`, counted in tags".to_owned()))
+            }
             (other, _) => Err(refuse(format!("there is no kind of board named `{other}`"))),
         }
     }
 }
 
+/// Widths of gaps, in sides of a tag: black squares that are wider than the tags between them, or narrower than their bits, are no grid of tags.
+const GAPS: std::ops::RangeInclusive<f64> = 0.1..=1.0;
+
 impl Board {
+    /// Its counts and sizes, for a person.
+    pub fn said(&self) -> String {
+        let side = self.side_said();
+        match self.kind {
+            Kind::Checker | Kind::Charuco { .. } => format!("{} squares of {side} mm", self.squares),
+            Kind::Tags { gap_mm, .. } => {
+                let [columns, rows] = self.tags();
+                format!("{columns}x{rows} tags of {side} mm, {gap_mm} mm apart")
+            }
+        }
+    }
+
     /// Why there can be no such board, where there can be none.
     fn check_markers(&self) -> Result<(), String> {
-        let Kind::Charuco { marker_mm, dictionary, .. } = self.kind else { return Ok(()) };
+        let (marker_mm, dictionary) = match self.kind {
+            Kind::Checker => return Ok(()),
+            Kind::Charuco { marker_mm, dictionary, .. } => (marker_mm, dictionary),
+            Kind::Tags { gap_mm, .. } if !GAPS.contains(&(gap_mm / self.square_mm)) => {
+                return Err(format!("gaps of {gap_mm} mm between tags of {} mm are no grid's", self.square_mm));
+            }
+            Kind::Tags { family, .. } => {
+                let ([columns, rows], name, count) = (self.tags(), family.tag_name(), family.count());
+                return if columns * rows <= count {
+                    Ok(())
+                } else {
+                    Err(format!("{columns}x{rows} tags are {}, {name} has {count}", columns * rows))
+                };
+            }
+        };
         if marker_mm >= self.square_mm {
             return Err(format!("a marker of {marker_mm} mm does not fit into a square of {} mm", self.square_mm));
         }
@@ -111,6 +156,8 @@ mod tests {
             "checker:9x7:20x20.25",
             "charuco:4x5:54:40.5:DICT_4X4_1000",
             "charuco:11x8:15:11:DICT_ARUCO_ORIGINAL:old",
+            "apriltag:6x6:tag36h11:35.2:10.56",
+            "apriltag:7x4:tag25h9:40x40.1:8",
         ] {
             let board: Board = text.parse().unwrap();
             assert_eq!(board.to_string(), text);
@@ -126,7 +173,12 @@ mod tests {
             ("checker:20x20", "checker:COLSxROWS:SQUARE_MM"),
             ("dots:20x20:10", "no kind of board"),
             ("checker:20x20:10x12", "no square"),
-            ("apriltag:6x6:tag36h11:35.2:10.56", "AprilTags are not read"),
+            ("apriltag:6x6:tag36h11:35.2:10.56:opencv", "only Kalibr's"),
+            ("apriltag:6x6:tag36h11:35.2", "apriltag:COLSxROWS:FAMILY:TAG_MM:GAP_MM"),
+            ("apriltag:6x6:tag36h12:35.2:10.56", "no family of tags"),
+            ("apriltag:6:tag36h11:35.2:10.56", "COLUMNSxROWS tags"),
+            ("apriltag:6x6:tag36h11:35.2:40", "no grid's"),
+            ("apriltag:6x6:tag16h5:35.2:10", "tag16h5 has 30"),
             ("charuco:4x5:54:60:DICT_4X4_50", "does not fit"),
             ("charuco:4x5:54:40:DICT_4X4_51", "DICT_4X4_50"),
             ("charuco:20x20:54:40:DICT_4X4_50", "200 markers"),

@@ -2,6 +2,7 @@
 
 use nalgebra::{Point2, Vector2};
 
+use super::pitch::Pitch;
 use crate::statistics::median;
 
 /// Corners (or anything that belongs to one) by column and row.
@@ -22,6 +23,17 @@ impl Places {
     /// The median distance of neighbours along the rows and the columns, px; `None` without neighbours.
     pub fn step_px(&self) -> Option<f64> {
         median(self.steps_px())
+    }
+
+    /// The median side of a square, px, by the distances of neighbours on a board whose lines follow one another like this; `None` without neighbours.
+    pub fn side_px(&self, pitch: Pitch) -> Option<f64> {
+        let to = |line: usize, p: &Point2<f64>, next: Option<&Point2<f64>>| {
+            next.map(|next| (next - p).norm() / pitch.after(line as isize))
+        };
+        let both = |(col, row, p): (usize, usize, &Point2<f64>)| {
+            [to(col, p, self.get(col + 1, row)), to(row, p, self.get(col, row + 1))]
+        };
+        median(self.iter().flat_map(both).flatten())
     }
 
     /// The least distance of neighbours, px; `None` without neighbours.

@@ -13,6 +13,7 @@ pub mod lattice;
 pub mod open;
 pub mod order;
 pub mod overlay;
+pub mod pitch;
 pub mod printed;
 pub mod pyramid;
 pub mod refine;
@@ -22,6 +23,7 @@ mod wide;
 
 use camino::Utf8PathBuf;
 
+use self::board::Kind;
 use crate::diagnostic::Explain;
 
 pub use self::image::Mosaic;
@@ -42,6 +44,12 @@ pub enum Error {
     /// A board's size was not understood.
     #[error("a board is given as COLUMNSxROWS squares, at least 3x3, got `{found}`")]
     BoardSize {
+        /// What was typed.
+        found: String,
+    },
+    /// The counts of a grid of tags were not understood.
+    #[error("a grid of tags is given as COLUMNSxROWS tags, at least 1x1, got `{found}`")]
+    TagCounts {
         /// What was typed.
         found: String,
     },
@@ -146,7 +154,7 @@ const SAVED_AS: &str = "save the pictures as the camera gives them: PNG, TIFF, B
 /// What pictures have to show of a board.
 fn shown(board: &Board) -> String {
     if board.is_coded() {
-        format!("a part of the {} board with a marker", board.squares)
+        format!("a part of the board of {} with a marker", board.said())
     } else {
         format!("the whole {} board", board.squares)
     }
@@ -176,7 +184,9 @@ impl Explain for Error {
     fn place(&self) -> Option<String> {
         match self {
             Error::Files(e) => e.place(),
-            Error::BoardSize { .. } | Error::BoardName { .. } | Error::SameName { .. } => None,
+            Error::BoardSize { .. } | Error::TagCounts { .. } | Error::BoardName { .. } | Error::SameName { .. } => {
+                None
+            }
             Error::NoFolder { path }
             | Error::NotAFolder { path }
             | Error::NotRight { path, .. }
@@ -191,6 +201,7 @@ impl Explain for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Error::Files(e) => e.hint(),
+            Error::TagCounts { .. } => Some("`6x6` are six columns of six tags".to_owned()),
             Error::BoardSize { .. } => Some("`--squares 20x20` is a board with 19x19 inner corners".to_owned()),
             Error::BoardName { .. } => Some(
                 "`--board checker:20x20:10`, or `--board charuco:11x8:15:11:DICT_5X5_100` (columns, rows, square and marker in mm as printed)"
@@ -219,9 +230,13 @@ impl Explain for Error {
                 let (columns, rows) = (squares.columns - 1, squares.rows - 1);
                 Some(format!("`--squares {squares}`: the pictures show a board with {columns}x{rows} inner corners"))
             }
-            Error::TooFewPairs { board, .. } if board.is_coded() => Some(format!(
-                "`--board {board}` must be the board as printed: columns x rows, square and marker in mm, dictionary"
-            )),
+            Error::TooFewPairs { board, .. } if board.is_coded() => {
+                let named = match board.kind {
+                    Kind::Tags { .. } => "columns x rows of tags, family, tag and gap in mm",
+                    _ => "columns x rows, square and marker in mm, dictionary",
+                };
+                Some(format!("`--board {board}` must be the board as printed: {named}"))
+            }
             Error::TooFewPairs { board, .. } => {
                 let (columns, rows) = (board.columns(), board.rows());
                 Some(format!(

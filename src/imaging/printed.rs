@@ -50,24 +50,23 @@ pub struct Printed {
 impl PrintedExtent {
     /// The board with this extent; the reason where it is not the extent of it.
     pub fn of(&self, board: &Board) -> Result<Printed, String> {
-        let counts = [board.squares.columns, board.squares.rows];
-        let sides = board.sides_mm();
-        let scales = |mm: [f64; 2], squares: [usize; 2]| [0, 1].map(|k| mm[k] / (squares[k] as f64 * sides[k]));
+        let whole = board.extent_mm();
+        let scales = |mm: [f64; 2], extent: [f64; 2]| [0, 1].map(|k| mm[k] / extent[k]);
         let fits = |scales: [f64; 2]| scales.iter().all(|scale| (scale - 1.0).abs() <= MOST_STRETCH);
         let exchanged = [self.mm[1], self.mm[0]];
         let (mut mm, is_plain) = (self.mm, !board.is_coded());
         // Of a plain board the larger count comes first, however it lies.
-        if is_plain && !fits(scales(mm, counts)) && fits(scales(exchanged, counts)) {
+        if is_plain && !fits(scales(mm, whole)) && fits(scales(exchanged, whole)) {
             mm = exchanged;
         }
-        let [across, along] = scales(mm, counts);
+        let [across, along] = scales(mm, whole);
         if !fits([across, along]) {
-            let inner = counts.map(|squares| squares - 2);
+            let inner = [board.spans_mm(board.columns() - 1)[0], board.spans_mm(board.rows() - 1)[1]];
             let is_inner = fits(scales(mm, inner)) || is_plain && fits(scales(exchanged, inner));
-            return Err(self.another(board, fits(scales(exchanged, counts)), is_inner));
+            return Err(self.another(board, fits(scales(exchanged, whole)), is_inner));
         }
         let mut uncertainty_mm = CALIPER_MM + self.digit_mm / 2.0;
-        let (width, height) = if is_plain && counts[0] == counts[1] {
+        let (width, height) = if is_plain && board.squares.columns == board.squares.rows {
             // Which side was called the width the pictures do not tell.
             uncertainty_mm += (mm[0] - mm[1]).abs() / 2.0;
             let mean = (across + along) / 2.0;
@@ -83,9 +82,7 @@ impl PrintedExtent {
 
     /// Why the extent is not the board's.
     fn another(&self, board: &Board, is_exchanged: bool, is_inner: bool) -> String {
-        let ([width, height], squares) = (self.mm, board.squares);
-        let [across, along] = board.sides_mm();
-        let nominal = [squares.columns as f64 * across, squares.rows as f64 * along];
+        let ([width, height], nominal) = (self.mm, board.extent_mm());
         let why = if is_exchanged {
             "width and height are exchanged".to_owned()
         } else if is_inner {
@@ -98,8 +95,10 @@ impl PrintedExtent {
             )
         };
         format!(
-            "a printed extent of {width} x {height} mm is not that of {squares} squares of {across} mm, {} x {} mm: {why}",
-            nominal[0], nominal[1]
+            "a printed extent of {width} x {height} mm is not that of {}, {} x {} mm: {why}",
+            board.said(),
+            nominal[0],
+            nominal[1]
         )
     }
 }

@@ -157,8 +157,8 @@ impl Scene {
 
 /// Half the plate, mm: the squares and one more half square all round.
 fn half_plate(board: &Board) -> (f64, f64) {
-    let half = |squares: usize| (squares as f64 + 1.2) * board.square_mm / 2.0;
-    (half(board.squares.columns), half(board.squares.rows))
+    let [width, height] = board.extent_mm().map(|mm| (mm + 1.2 * board.square_mm) / 2.0);
+    (width, height)
 }
 
 /// Length of the stretched arm, mm: what the paper's spheres are scaled by.

@@ -177,8 +177,7 @@ fn sides(robot: &Robot, plan: &Plan) -> Result<Vec<maud::Markup>> {
 /// Outlines of the target's squares in both pictures.
 fn pictures(scene: &Scene, plan: &Plan) -> Result<Vec<maud::Markup>> {
     let board = scene.board;
-    let half = |squares: usize| squares as f64 * board.square_mm / 2.0;
-    let (w, h) = (half(board.squares.columns), half(board.squares.rows));
+    let [w, h] = board.extent_mm().map(|mm| mm / 2.0);
     let corners = [(-w, -h), (w, -h), (w, h), (-w, h), (-w, -h)];
     let figure = |left: bool| {
         let camera = if left { scene.rig.left } else { scene.rig.right };

@@ -56,13 +56,17 @@ impl PhysicalBoard {
     pub fn new(drawing: Board, workmanship: Workmanship, seed: u64, index: u64) -> PhysicalBoard {
         let mut draws = Draws::new(seed, Purpose::BoardPitch, index);
         let (columns, rows) = (drawing.squares.columns, drawing.squares.rows);
-        let scale = drawing.square_mm * (1.0 + workmanship.scale_ppm * 1e-6);
+        let (scale, pitch) = (drawing.square_mm * (1.0 + workmanship.scale_ppm * 1e-6), drawing.pitch());
+        let line = |k: usize, lines: usize| {
+            let of = |k: usize| pitch.at(k as isize - 1);
+            of(k) - (of(0) + of(lines)) / 2.0
+        };
         let sigma_mm = workmanship.pitch_um * 1e-3;
         let mut lattice_mm = Vec::with_capacity((columns + 1) * (rows + 1));
         for j in 0..=rows {
             for i in 0..=columns {
-                let x = (i as f64 - columns as f64 / 2.0) * scale + sigma_mm * draws.normal();
-                let y = (j as f64 - rows as f64 / 2.0) * scale + sigma_mm * draws.normal();
+                let x = line(i, columns) * scale + sigma_mm * draws.normal();
+                let y = line(j, rows) * scale + sigma_mm * draws.normal();
                 lattice_mm.push(Point2::new(x, y));
             }
         }
@@ -100,9 +104,8 @@ impl PhysicalBoard {
     /// The surface's height at a place, mm. Its mean over the squares is zero, so a plane fitted to the board is z = 0.
     pub fn height_mm(&self, x_mm: f64, y_mm: f64) -> f64 {
         let (bow_x, bow_y) = self.workmanship.bow_um;
-        let half = |squares: usize| squares as f64 * self.drawing.square_mm / 2.0;
-        let u = x_mm / half(self.drawing.squares.columns);
-        let v = y_mm / half(self.drawing.squares.rows);
+        let [width, height] = self.drawing.extent_mm();
+        let (u, v) = (x_mm / (width / 2.0), y_mm / (height / 2.0));
         // The middle stands out toward the viewer, who is on the side of negative z.
         let bow = bow_x * (1.0 / 3.0 - u * u) + bow_y * (1.0 / 3.0 - v * v);
         -1e-3 * (bow + self.warp.twist_um * u * v + self.warp.s_um * (std::f64::consts::PI * u).sin())
@@ -121,13 +124,13 @@ impl PhysicalBoard {
 
     /// Half the plate's width and height, mm.
     pub fn plate_half_mm(&self) -> (f64, f64) {
-        let half = |squares: usize| squares as f64 * self.drawing.square_mm / 2.0 + self.workmanship.margin_mm;
-        (half(self.drawing.squares.columns), half(self.drawing.squares.rows))
+        let [width, height] = self.drawing.extent_mm().map(|mm| mm / 2.0 + self.workmanship.margin_mm);
+        (width, height)
     }
 
     /// True for a black square. The square at the first corner of the first row is black.
     pub fn is_black(&self, i: usize, j: usize) -> bool {
-        !self.layout().holds_marker(i as isize, j as isize)
+        self.layout().is_dark(i as isize, j as isize)
     }
 
     /// Which squares are light, and hold the markers of a board that has any.

@@ -77,10 +77,14 @@ fn by_kalibr(text: &str) -> Result<Board, String> {
             checker(number("targetCols")?, number("targetRows")?, mm(across))
         }
         "aprilgrid" => {
-            Err("an AprilGrid; boards of tags are not read, checkerboards and ChArUco boards are".to_owned())
+            let (columns, rows, tag_mm) = (number("tagCols")?, number("tagRows")?, mm(number("tagSize")?));
+            let gap_mm = (tag_mm * number("tagSpacing")? * 1e9).round() / 1e9;
+            // The file names no family: Kalibr knows but this one.
+            let name = format!("apriltag:{columns}x{rows}:tag36h11:{tag_mm}:{gap_mm}");
+            name.parse().map_err(|error: crate::imaging::Error| error.to_string())
         }
         "circlegrid" => Err("a grid of circles; only boards of squares are read: checkerboards and ChArUco".to_owned()),
-        other => Err(format!("a target of type `{other}`, which is not known; `checkerboard` is")),
+        other => Err(format!("a target of type `{other}`, which is not known; `checkerboard` and `aprilgrid` are")),
     }
 }
 
@@ -177,7 +181,11 @@ mod tests {
             (checker.replace("targetCols", "tagCols"), "no `targetCols`"),
             (checker.replace("targetRows: 7", "targetRows: seven"), "not a number"),
             ("target_type: 'circlegrid'\ntargetCols: 6\n".to_owned(), "grid of circles"),
-            ("target_type: 'aprilgrid'\ntagCols: 6\n".to_owned(), "AprilGrid"),
+            ("target_type: 'aprilgrid'\ntagCols: 6\n".to_owned(), "tagRows"),
+            (
+                "target_type: 'aprilgrid'\ntagCols: 6.5\ntagRows: 6\ntagSize: 0.088\ntagSpacing: 0.3\n".to_owned(),
+                "6.5x6",
+            ),
             ("target_type: 'dots'\n".to_owned(), "`dots`"),
             ("cam0:\n".to_owned(), "no target file"),
         ] {

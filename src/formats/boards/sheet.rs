@@ -54,7 +54,7 @@ pub struct Sheet {
 impl Sheet {
     /// The board on the smallest paper that holds it; why there is none otherwise.
     pub fn new(board: &Board) -> Result<Sheet, String> {
-        let [width, height] = [board.squares.columns, board.squares.rows].map(|n| n as f64 * board.square_mm);
+        let [width, height] = board.extent_mm();
         let (wide, high) = (width + 2.0 * MARGIN_MM, height + 2.0 * MARGIN_MM + FOOT_MM);
         let sheets = PAPER.into_iter().flat_map(|(name, a, b)| [(name, a, b), (name, b, a)]);
         let Some((paper, width_mm, height_mm)) = sheets.into_iter().find(|(_, w, h)| *w >= wide && *h >= high) else {
@@ -62,17 +62,20 @@ impl Sheet {
         };
         let (left, top) = ((width_mm - width) / 2.0, (height_mm - FOOT_MM - height) / 2.0);
         let mut patches: Vec<Patch> = Vec::new();
-        let of = |face: &Face, is_black: bool| Patch {
-            x: left + (face.square.0 as f64 + face.from[0]) * board.square_mm,
-            y: top + (face.square.1 as f64 + face.from[1]) * board.square_mm,
-            width: (face.to[0] - face.from[0]) * board.square_mm,
-            height: (face.to[1] - face.from[1]) * board.square_mm,
-            is_black,
+        let (pitch, sides) = (board.pitch(), board.sides_mm());
+        let of = |face: &Face, is_black: bool| {
+            let squares = [face.square.0, face.square.1].map(|k| k as isize - 1);
+            let at = |axis: usize, share: f64| {
+                let (from, wide) = (pitch.at(squares[axis]) - pitch.at(-1), pitch.after(squares[axis]));
+                (from + share * wide) * sides[axis]
+            };
+            let ([x, y], [right, below]) = ([0, 1].map(|k| at(k, face.from[k])), [0, 1].map(|k| at(k, face.to[k])));
+            Patch { x: left + x, y: top + y, width: right - x, height: below - y, is_black }
         };
         let layout = Layout::of(board).first().copied().unwrap_or(Layout::New);
         let whole = |square| Face { square, from: [0.0; 2], to: [1.0; 2] };
         let squares = (0..board.squares.rows).flat_map(|y| (0..board.squares.columns).map(move |x| (x, y)));
-        let black = squares.filter(|(x, y)| !layout.holds_marker(*x as isize, *y as isize));
+        let black = squares.filter(|(x, y)| layout.is_dark(*x as isize, *y as isize));
         patches.extend(black.map(|square| of(&whole(square), true)));
         let markers = faces(board, layout);
         patches.extend(markers.markers.iter().map(|face| of(face, true)));

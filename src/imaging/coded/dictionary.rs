@@ -7,6 +7,9 @@ use std::fmt;
 use calib_targets_aruco::builtins::{BUILTIN_DICTIONARY_NAMES, builtin_dictionary};
 use calib_targets_aruco::{resolve_dictionary, rotate_code_u64};
 
+/// What OpenCV's names of families of AprilTags begin with.
+const TAGS: &str = "DICT_APRILTAG_";
+
 /// A set of markers, all of equally many bits.
 #[derive(Clone, Copy)]
 pub struct Dictionary(calib_targets_aruco::Dictionary);
@@ -35,6 +38,28 @@ impl Dictionary {
         found.map(Dictionary).ok_or_else(|| {
             format!("there is no dictionary `{text}`; there are {}", BUILTIN_DICTIONARY_NAMES.join(", "))
         })
+    }
+
+    /// The family of AprilTags of this name: `tag36h11`, as its makers write it, `t36h11` as Kalibr does, or OpenCV's name.
+    pub fn of_tags(text: &str) -> Result<Dictionary, String> {
+        let lower = text.to_ascii_lowercase();
+        let size = lower.strip_prefix("tag").or_else(|| lower.strip_prefix('t')).unwrap_or(&lower);
+        let known = |name: &&&str| {
+            let family = name.strip_prefix(TAGS);
+            family.is_some_and(|family| family.eq_ignore_ascii_case(size)) || text.eq_ignore_ascii_case(name)
+        };
+        let families = || BUILTIN_DICTIONARY_NAMES.iter().filter(|name| name.starts_with(TAGS));
+        let found = families().find(known).and_then(|name| builtin_dictionary(name)).map(Dictionary);
+        found.ok_or_else(|| {
+            let names: Vec<String> =
+                families().filter_map(|name| builtin_dictionary(name)).map(|d| Dictionary(d).tag_name()).collect();
+            format!("there is no family of tags `{text}`; there are {}", names.join(", "))
+        })
+    }
+
+    /// A family of AprilTags as its makers write it.
+    pub fn tag_name(self) -> String {
+        format!("tag{}", self.name().strip_prefix(TAGS).unwrap_or(self.name()).to_ascii_lowercase())
     }
 
     /// All that there are.
@@ -66,4 +91,18 @@ impl Dictionary {
 /// The bits of a marker that is turned by so many quarter turns.
 pub fn turned(code: u64, bits: usize, quarters: usize) -> u64 {
     rotate_code_u64(code, bits, (quarters % 4) as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn families_of_tags_have_the_names_of_their_makers() {
+        for name in ["tag36h11", "t36h11", "36h11", "TAG36H11", "DICT_APRILTAG_36h11"] {
+            assert_eq!(Dictionary::of_tags(name).map(Dictionary::tag_name), Ok("tag36h11".to_owned()), "{name}");
+        }
+        let why = Dictionary::of_tags("tag36h12").unwrap_err();
+        assert!(["tag16h5", "tag25h9", "tag36h11"].iter().all(|name| why.contains(name)), "{why}");
+    }
 }

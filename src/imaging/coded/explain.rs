@@ -6,10 +6,11 @@
 use super::dictionary::Dictionary;
 use super::marker::Fields;
 use super::numbering::{self, Read, Said};
-use super::{Layout, fields, markers_in};
+use super::{Layout, TAG_BORDERS, fields, markers_in};
 use crate::imaging::board::{Board, Kind, Squares};
 use crate::imaging::image::Picture;
 use crate::imaging::lattice::Places;
+use crate::imaging::pitch::Pitch;
 
 /// Markers that are no chance find.
 const FEWEST: usize = 2;
@@ -20,58 +21,80 @@ const MOST_COLUMNS: usize = 40;
 
 /// Why none of these grids is a part of the board.
 pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> String {
-    let (Some(own), Kind::Charuco { dictionary, marker_mm, .. }) = (fields(board), board.kind) else {
-        return "no board found".to_owned();
+    let dictionary = match board.kind {
+        Kind::Checker => return "no board found".to_owned(),
+        Kind::Charuco { dictionary, .. } | Kind::Tags { family: dictionary, .. } => dictionary,
     };
     let largest = grids.iter().max_by_key(|grid| grid.count());
     let Some(grid) = largest.filter(|grid| grid.count() >= 4) else { return "no board found".to_owned() };
     let size = (grid.columns, grid.rows);
-    let reads = markers_in(picture, grid, own);
+    let markers_in = |grid: &Places, fields: Fields| markers_in(picture, grid, board.pitch(), fields);
+    let all: Vec<(Fields, Vec<Read>)> = fields(board).into_iter().map(|own| (own, markers_in(grid, own))).collect();
+    let by_known = |(_, reads): &(Fields, Vec<Read>)| (known_in(dictionary, reads), reads.len());
+    let Some((own, reads)) = all.into_iter().max_by_key(by_known) else {
+        return "no board found".to_owned();
+    };
     if let Some(layout) = other_layout(board, size, &reads) {
         return format!("shows the markers in {}; --board says the other", layout.said());
     }
     if let Some(squares) = other_counts(board, size, &reads) {
+        let (columns, said) = match board.kind {
+            Kind::Tags { .. } => (squares.columns / 2, format!("{0}x{1} tags", board.tags()[0], board.tags()[1])),
+            _ => (squares.columns, board.squares.to_string()),
+        };
         return format!(
-            "shows the markers of a board of {} columns; --board says {} (columns first, as printed)",
-            squares.columns, board.squares
+            "shows the markers of a board of {columns} columns; --board says {said} (columns first, as printed)"
         );
     }
     if let Said::Place(_) = numbering::place(board, size, &reads) {
-        return format!("shows a board larger than {} squares: its corners go on beyond those", board.squares);
+        return format!("shows a board larger than {}: its corners go on beyond those", board.said());
     }
     let mirrored = grid.flip_rows();
-    if numbering::place(board, size, &markers_in(picture, &mirrored, own)) != Said::Nothing {
+    let is_mirrored = |own| numbering::place(board, size, &markers_in(&mirrored, own)) != Said::Nothing;
+    if fields(board).into_iter().any(is_mirrored) {
         return "shows the board mirrored: the print or the picture is".to_owned();
     }
     let mut best: Option<(usize, Dictionary, f64)> = None;
-    for share in std::iter::once(own.share).chain(SHARES) {
-        for bits in 4..=7 {
-            let reads = markers_in(picture, grid, Fields { share, bits });
-            for other in Dictionary::all().filter(|other| other.bits() == bits) {
-                let known = known_in(other, &reads);
-                if known >= FEWEST && 2 * known > reads.len() && best.is_none_or(|(most, ..)| known > most) {
-                    best = Some((known, other, share));
-                }
+    for fields in other_fields(board, own) {
+        let reads = markers_in(grid, fields);
+        for other in Dictionary::all().filter(|other| other.bits() == fields.bits) {
+            let known = known_in(other, &reads);
+            if known >= FEWEST && 2 * known > reads.len() && best.is_none_or(|(most, ..)| known > most) {
+                best = Some((known, other, fields.share));
             }
         }
     }
-    match best {
-        Some((known, other, share)) if (share - own.share).abs() > 0.03 && other == dictionary => format!(
-            "shows {known} markers of about {:.3} mm in squares of {} mm; --board says {marker_mm} mm",
-            share * board.square_mm,
-            board.square_mm
-        ),
-        Some((known, other, _)) if other != dictionary => {
-            format!("shows {known} markers of {}, the board has those of {}", other.name(), dictionary.name())
-        }
-        Some((known, ..)) => {
+    match (best, board.kind) {
+        (Some((known, other, share)), Kind::Charuco { marker_mm, .. })
+            if (share - own.share).abs() > 0.03 && other == dictionary =>
+        {
             format!(
-                "shows {known} markers of {} in another order than a board of {} squares has them",
-                dictionary.name(),
-                board.squares
+                "shows {known} markers of about {:.3} mm in squares of {} mm; --board says {marker_mm} mm",
+                share * board.square_mm,
+                board.square_mm
             )
         }
-        None => format!("shows {} corners of squares, and no marker among them that can be read", grid.count()),
+        (Some((known, other, _)), _) if other != dictionary => {
+            format!("shows {known} markers of {}, the board has those of {}", other.name(), dictionary.name())
+        }
+        (Some((known, ..)), _) => {
+            format!("shows {known} markers of {} in another order than {board} has them", dictionary.name())
+        }
+        (None, _) => format!("shows {} corners of squares, and no marker among them that can be read", grid.count()),
+    }
+}
+
+/// How the markers of other boards may be divided.
+fn other_fields(board: &Board, own: Fields) -> Vec<Fields> {
+    match board.pitch() {
+        Pitch::Even => {
+            let shares = std::iter::once(own.share).chain(SHARES);
+            shares.flat_map(|share| (4..=7).map(move |bits| Fields::of_marker(share, bits))).collect()
+        }
+        Pitch::Tags { gap } => {
+            let borders = TAG_BORDERS.into_iter();
+            borders.flat_map(|border| (4..=7).map(move |bits| Fields::of_tag(gap, bits, border))).collect()
+        }
     }
 }
 
@@ -84,9 +107,14 @@ fn other_layout(board: &Board, size: (usize, usize), reads: &[Read]) -> Option<L
 
 /// The board with other counts whose order of markers is the one that is seen.
 fn other_counts(board: &Board, size: (usize, usize), reads: &[Read]) -> Option<Squares> {
-    let Kind::Charuco { dictionary, .. } = board.kind else { return None };
     let mut counts = (3..=MOST_COLUMNS).filter_map(|columns| {
-        let rows = (2 * dictionary.count() / columns).min(200);
+        let rows = match board.kind {
+            Kind::Checker => return None,
+            Kind::Charuco { dictionary, .. } => (2 * dictionary.count() / columns).min(200),
+            Kind::Tags { .. } if columns % 2 == 0 => return None,
+            // Tags count from the lowest row up: only the board's own number of rows has them where they are.
+            Kind::Tags { .. } => board.squares.rows,
+        };
         let squares = Squares { columns, rows };
         let Said::Place(found) = numbering::place(&Board { squares, ..*board }, size, reads) else { return None };
         (found.agreeing >= FEWEST).then_some((found.agreeing, columns))

@@ -1,7 +1,9 @@
 //! What is printed in the squares of a board with markers: for the renderer and for paper.
 
-use super::Layout;
-use crate::imaging::board::{Board, Kind};
+use super::marker::Fields;
+use super::numbering::code_in;
+use super::{Layout, fields};
+use crate::imaging::board::Board;
 
 /// A rectangle in one square of the board.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,16 +28,19 @@ pub struct Faces {
 /// The faces of a board's markers; none of a plain board.
 pub fn faces(board: &Board, layout: Layout) -> Faces {
     let mut faces = Faces::default();
-    let Kind::Charuco { marker_mm, dictionary, .. } = board.kind else { return faces };
-    let (share, bits) = (marker_mm / board.square_mm, dictionary.bits());
-    let (margin, side) = ((1.0 - share) / 2.0, share / (bits + 2) as f64);
+    let Some(fields) = fields(board).first().copied() else { return faces };
+    let Fields { share, bits, border, .. } = fields;
+    let (margin, side) = ((1.0 - share) / 2.0, share / (bits + 2 * border) as f64);
     let squares = (0..board.squares.rows).flat_map(|y| (0..board.squares.columns).map(move |x| (x, y)));
     for square in squares.filter(|(x, y)| layout.holds_marker(*x as isize, *y as isize)) {
-        let Some(code) = dictionary.code(layout.number(board.squares.columns, square.0, square.1)) else { continue };
-        faces.markers.push(Face { square, from: [margin; 2], to: [1.0 - margin; 2] });
+        let Some(code) = code_in(board, layout, (square.0 as isize, square.1 as isize)) else { continue };
+        // A tag is a dark square itself.
+        if layout != Layout::Tags {
+            faces.markers.push(Face { square, from: [margin; 2], to: [1.0 - margin; 2] });
+        }
         for row in 0..bits {
             let is_white = |col: usize| code >> (row * bits + col) & 1 == 0;
-            let place = |at: usize| margin + (at + 1) as f64 * side;
+            let place = |at: usize| margin + (at + border) as f64 * side;
             // White neighbours are one face.
             let mut col = 0;
             while col < bits {
@@ -54,6 +59,7 @@ pub fn faces(board: &Board, layout: Layout) -> Faces {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imaging::board::Kind;
 
     #[test]
     fn a_marker_has_the_white_of_its_code() {

@@ -4,41 +4,45 @@ use nalgebra::{Matrix3, Point2, SMatrix, SVector};
 
 use super::marker::mapped;
 use crate::imaging::lattice::Places;
+use crate::imaging::pitch::Pitch;
 
 /// Corners up to so many columns and rows away count.
 const REACH: isize = 2;
 
-/// The homography from column and row, relative to a place of the grid, to the picture: by the corners near it, but for that place itself where
+/// The homography from the board's plane, in sides of a square from a place of the grid, to the picture: by the corners near it, but for that place itself where
 /// `without_it`. `None` where fewer than four are there, or all on a line.
-fn near(grid: &Places, (col, row): (isize, isize), without_it: bool) -> Option<Matrix3<f64>> {
+fn near(grid: &Places, pitch: Pitch, (col, row): (isize, isize), without_it: bool) -> Option<Matrix3<f64>> {
     let mut points = Vec::new();
     for r in -REACH..=REACH {
         for c in -REACH..=REACH {
             if without_it && (c, r) == (0, 0) {
                 continue;
             }
-            points.extend(grid.around(col + c, row + r).map(|p| (c as f64, r as f64, *p)));
+            let (x, y) = (pitch.at(col + c) - pitch.at(col), pitch.at(row + r) - pitch.at(row));
+            points.extend(grid.around(col + c, row + r).map(|p| (x, y, *p)));
         }
     }
     least_squares(&points)
 }
 
 /// Where a corner should be by those near it, which need not hold it.
-pub fn predicted(grid: &Places, (col, row): (isize, isize)) -> Option<Point2<f64>> {
-    let place = mapped(&near(grid, (col, row), true)?, 0.0, 0.0);
+pub fn predicted(grid: &Places, pitch: Pitch, (col, row): (isize, isize)) -> Option<Point2<f64>> {
+    let place = mapped(&near(grid, pitch, (col, row), true)?, 0.0, 0.0);
     place.iter().all(|v| v.is_finite()).then_some(place)
 }
 
 /// The four corners of the square between corner `(col, row)` and the one after it both ways, in order round it; those that the grid lacks as
 /// its neighbours tell.
-pub fn square(grid: &Places, (col, row): (isize, isize)) -> Option<[Point2<f64>; 4]> {
+pub fn square(grid: &Places, pitch: Pitch, (col, row): (isize, isize)) -> Option<[Point2<f64>; 4]> {
     let places = [(0, 0), (1, 0), (1, 1), (0, 1)];
     let known = places.map(|(c, r)| grid.around(col + c, row + r).copied());
     if let [Some(a), Some(b), Some(c), Some(d)] = known {
         return Some([a, b, c, d]);
     }
-    let map = near(grid, (col, row), false)?;
-    let filled = [0, 1, 2, 3].map(|k| known[k].unwrap_or_else(|| mapped(&map, places[k].0 as f64, places[k].1 as f64)));
+    let map = near(grid, pitch, (col, row), false)?;
+    let (width, height) = (pitch.after(col), pitch.after(row));
+    let filled = |k: usize| mapped(&map, places[k].0 as f64 * width, places[k].1 as f64 * height);
+    let filled = [0, 1, 2, 3].map(|k| known[k].unwrap_or_else(|| filled(k)));
     filled.iter().flat_map(|p| p.iter()).all(|v| v.is_finite()).then_some(filled)
 }
 
@@ -84,12 +88,12 @@ mod tests {
         let full = Lattice::from_fn(5, 5, |c, r| Some(mapped(&map, c as f64, r as f64)));
         let part = Lattice::from_fn(4, 4, |c, r| full.get(c, r).filter(|_| (c, r) != (1, 2)).copied());
         for at in [(1, 2), (4, 1), (2, 4), (4, 4)] {
-            let found = predicted(&part, at).unwrap();
+            let found = predicted(&part, Pitch::Even, at).unwrap();
             assert!((found - full.get(at.0 as usize, at.1 as usize).unwrap()).norm() < 1e-6, "{at:?} {found}");
         }
-        let square = square(&part, (3, 3)).unwrap();
+        let square = square(&part, Pitch::Even, (3, 3)).unwrap();
         assert!((square[2] - full.get(4, 4).unwrap()).norm() < 1e-6);
         let line = Lattice::from_fn(6, 1, |c, _| full.get(c, 0).copied());
-        assert_eq!(predicted(&line, (2, 0)), None);
+        assert_eq!(predicted(&line, Pitch::Even, (2, 0)), None);
     }
 }

@@ -48,6 +48,33 @@ pub struct Fields {
     pub share: f64,
     /// Bits along its side, without the border.
     pub bits: usize,
+    /// Width of the border, in bits.
+    pub border: usize,
+    /// How deep in the square its paper is looked at, as a share of its side; negative outside of it.
+    paper: f64,
+}
+
+impl Fields {
+    /// A marker in a square of paper.
+    pub fn of_marker(share: f64, bits: usize) -> Fields {
+        Fields { share, bits, border: 1, paper: (1.0 - share) / 4.0 }
+    }
+
+    /// A tag that fills its square, with paper in the gaps round it.
+    pub fn of_tag(gap: f64, bits: usize, border: usize) -> Fields {
+        Fields { share: 1.0, bits, border, paper: -gap / 2.0 }
+    }
+
+    /// Side of what a square holds beside its own colour, as a share of its side: a marker, or the bits of a tag that fills it.
+    pub fn marked(self) -> f64 {
+        let Fields { share, bits, border, .. } = self;
+        if share < 1.0 { share } else { bits as f64 / (bits + 2 * border) as f64 }
+    }
+
+    /// How wide the square's own colour is round that.
+    pub fn margin(self) -> f64 {
+        (1.0 - self.marked()) / 2.0
+    }
 }
 
 /// The fields of a marker with the blur between them undone as far as four neighbours tell, `paper` round it. To the second order a Gaussian blur of
@@ -109,9 +136,10 @@ fn between<T: Copy + Into<f64>>(image: &Image<T>, at: &Point2<f64>) -> Option<f6
 /// Reads the marker in a square. `None` where there is none: border and paper are then not told apart.
 pub fn read(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Option<Marker> {
     let map = square_map(corners)?;
-    let Fields { share, bits } = fields;
+    let Fields { share, bits, border, paper: near } = fields;
     let margin = (1.0 - share) / 2.0;
-    let field = share / (bits + 2) as f64;
+    let side = bits + 2 * border;
+    let field = share / side as f64;
     let place = |i: usize| margin + (i as f64 + 0.5) * field;
     let mean = |x: f64, y: f64| {
         let mut sum = 0.0;
@@ -122,12 +150,11 @@ pub fn read(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Op
         }
         Some(sum / (WITHIN_BIT.len() * WITHIN_BIT.len()) as f64)
     };
-    let side = bits + 2;
     let blurred: Vec<f64> =
         (0..side * side).map(|k| mean(place(k % side), place(k / side))).collect::<Option<Vec<f64>>>()?;
-    let is_border = |k: usize| [k % side, k / side].iter().any(|&i| i == 0 || i == side - 1);
+    let is_border = |k: usize| [k % side, k / side].iter().any(|&i| i < border || i >= side - border);
     let along = |i: usize, k: usize| {
-        let (near, far) = (margin / 2.0, 1.0 - margin / 2.0);
+        let far = 1.0 - near;
         let at = [(place(i), near), (place(i), far), (near, place(i)), (far, place(i))][k];
         grey_at(picture, &mapped(&map, at.0, at.1))
     };
@@ -135,20 +162,20 @@ pub fn read(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Op
     let mean_of = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let white = mean_of(&paper);
     let grid = sharpened(&blurred, side, white);
-    let border: Vec<f64> = (0..side * side).filter(|&k| is_border(k)).map(|k| grid[k]).collect();
-    let black = mean_of(&border);
+    let outline: Vec<f64> = (0..side * side).filter(|&k| is_border(k)).map(|k| grid[k]).collect();
+    let black = mean_of(&outline);
     let inverted = black > white;
     let middle = 0.5 * (white + black);
     let is_black = |grey: f64| (grey < middle) != inverted;
     let wrong = |fields: &[f64], black: bool| {
         fields.iter().filter(|grey| is_black(**grey) != black).count() as f64 > MOST_BROKEN * fields.len() as f64
     };
-    if wrong(&border, true) || wrong(&paper, false) {
+    if wrong(&outline, true) || wrong(&paper, false) {
         return None;
     }
     let mut code = 0;
     for k in 0..bits * bits {
-        let (i, j) = (k % bits + 1, k / bits + 1);
+        let (i, j) = (k % bits + border, k / bits + border);
         code |= u64::from(is_black(grid[j * side + i])) << k;
     }
     Some(Marker { code, bits, inverted, contrast: (white - black).abs() })

@@ -17,11 +17,13 @@ use nalgebra::Point2;
 
 use self::marker::{Fields, grey_at, mapped, read, square_map};
 use self::numbering::{Placement, Read, Said};
-use super::board::{Board, Kind};
+use super::board::{Board, Kind, Squares};
 use super::detect::{COARSE_PX, Detected, Refusal, grids, on_a_copy, right_handed};
 use super::image::{Grey8, Picture};
 use super::lattice::{Lattice, Places};
+use super::pitch::Pitch;
 use super::pyramid::{Level, factor_for};
+use crate::statistics::median;
 
 /// Which squares of a ChArUco board hold markers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +32,8 @@ pub enum Layout {
     New,
     /// It holds one where the number of rows is even: OpenCV's before.
     Old,
+    /// Every other one of every other row, the outermost are gaps: Kalibr's grid of tags.
+    Tags,
 }
 
 impl Layout {
@@ -37,6 +41,9 @@ impl Layout {
     pub fn of(board: &Board) -> Vec<Layout> {
         if let Kind::Charuco { layout: Some(layout), .. } = board.kind {
             return vec![layout];
+        }
+        if let Kind::Tags { .. } = board.kind {
+            return vec![Layout::Tags];
         }
         if board.squares.rows.is_multiple_of(2) { vec![Layout::New, Layout::Old] } else { vec![Layout::New] }
     }
@@ -46,18 +53,35 @@ impl Layout {
         match self {
             Layout::New => "OpenCV's layout since 4.6",
             Layout::Old => "OpenCV's layout before 4.6",
+            Layout::Tags => "Kalibr's layout",
         }
     }
 
     /// Whether the square in this column and row holds a marker.
     pub fn holds_marker(self, x: isize, y: isize) -> bool {
-        (x + y).rem_euclid(2) == if self == Layout::New { 1 } else { 0 }
+        match self {
+            Layout::New => (x + y).rem_euclid(2) == 1,
+            Layout::Old => (x + y).rem_euclid(2) == 0,
+            Layout::Tags => x.rem_euclid(2) == 1 && y.rem_euclid(2) == 1,
+        }
     }
 
-    /// The number of the marker in a square that holds one, on a board of so many columns: they count row by row.
-    pub fn number(self, columns: usize, x: usize, y: usize) -> usize {
+    /// Whether the square in this column and row is dark: markers stand in light ones, and tags are dark themselves.
+    pub fn is_dark(self, x: isize, y: isize) -> bool {
+        match self {
+            Layout::New | Layout::Old => !self.holds_marker(x, y),
+            Layout::Tags => (x + y).rem_euclid(2) == 0,
+        }
+    }
+
+    /// The number of the marker in a square that holds one, on a board of so many squares: they count row by row, Kalibr's tags from the lowest row up.
+    pub fn number(self, Squares { columns, rows }: Squares, x: usize, y: usize) -> usize {
         // Of two rows one holds the larger half.
-        let first = if self == Layout::New { columns / 2 } else { columns.div_ceil(2) };
+        let first = match self {
+            Layout::New => columns / 2,
+            Layout::Old => columns.div_ceil(2),
+            Layout::Tags => return (rows - 2 - y) / 2 * (columns / 2) + x / 2,
+        };
         y / 2 * columns + if y % 2 == 1 { first } else { 0 } + x / 2
     }
 }
@@ -65,8 +89,10 @@ impl Layout {
 /// How a board's markers are printed: what a corner's window must leave out, and what is to be said.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Print {
-    /// Side of a marker, as a share of its square's.
+    /// Side of what a square holds beside its own colour, as a share of the square's: of a marker, of a tag's bits without its border.
     pub share: f64,
+    /// How far apart the lines of corners are.
+    pub pitch: Pitch,
     /// Which squares hold markers.
     pub layout: Layout,
     /// White on black.
@@ -77,10 +103,14 @@ pub struct Print {
 const ENOUGH_MARGIN_PX: f64 = 5.0;
 /// Copies with so many pixels may be enlarged.
 const MOST_DOUBLED_PX: usize = 4_000_000;
-/// How far from where its neighbours have it a corner may lie, in steps of the grid.
+/// How far from where its neighbours have it a corner may lie, in sides of a square.
 const STRAY: f64 = 0.2;
 /// How far the marker's size may be from the board's, as a share of a square.
 const MOST_OFF: f64 = 0.05;
+/// How far the gaps between tags may be from the board's, in sides of a tag: coarse corners of tags of twenty pixels show them so well.
+const MOST_GAP_OFF: f64 = 0.04;
+/// Widths of a tag's black border, in its bits: Kalibr's, and that of most others who print tags.
+const TAG_BORDERS: [usize; 2] = [2, 1];
 /// What of the usual contrast a marker has at least: light falls off over a board, but not so far.
 const LEAST_CONTRAST: f64 = 0.35;
 /// Grids that are looked at on a copy, the largest first.
@@ -93,21 +123,26 @@ pub const BY_LAYOUT: &str = "shows markers, but none at the board's sides: which
 struct Part {
     corners: Places,
     placement: Placement,
+    /// How its markers are divided.
+    fields: Fields,
 }
 
 /// Looks for the board; the reason where it was not found.
 pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
-    let Some(fields) = fields(&board) else { return Err("no board found".to_owned().into()) };
-    let margin = (1.0 - fields.share) / 2.0;
+    let fields = fields(&board);
+    let pitch = board.pitch();
+    let Some(margin) = fields.iter().map(|fields| fields.margin()).min_by(f64::total_cmp) else {
+        return Err("no board found".to_owned().into());
+    };
     let mut best: Option<(Vec<Part>, Level, Grey8)> = None;
     let mut unnumbered: Vec<Places> = Vec::new();
     let mut by_layout = false;
     for level in levels(picture) {
         let copy = level.copy(picture);
         let mut parts: Vec<Part> = Vec::new();
-        for grid in grids(&copy, margin).into_iter().take(MOST_GRIDS) {
-            let grid = without_strays(right_handed(grid.map(|p| level.to_picture(p))));
-            match number(picture, &board, fields, &grid) {
+        for grid in grids(&copy, pitch, margin).into_iter().take(MOST_GRIDS) {
+            let grid = without_strays(right_handed(grid.map(|p| level.to_picture(p))), pitch);
+            match number(picture, &board, &fields, &grid) {
                 Numbered::Part(part) => add(&mut parts, part)?,
                 Numbered::ByLayout => by_layout = true,
                 Numbered::No if unnumbered.len() < MOST_GRIDS => unnumbered.push(grid),
@@ -115,11 +150,11 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
             }
         }
         let count = |parts: &[Part]| parts.iter().map(|part| part.corners.count()).sum::<usize>();
-        let step_px = parts.first().and_then(|part| part.corners.step_px()).map_or(0.0, |px| px / level.scale());
+        let step_px = parts.first().and_then(|part| part.corners.side_px(pitch)).map_or(0.0, |px| px / level.scale());
         if !parts.is_empty() && best.as_ref().is_none_or(|(known, ..)| count(&parts) > count(known)) {
             best = Some((parts, level, copy));
         }
-        if step_px * margin >= ENOUGH_MARGIN_PX {
+        if step_px * margin.min(pitch.least()) >= ENOUGH_MARGIN_PX {
             break;
         }
     }
@@ -129,32 +164,67 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
         }
         return Err(explain::unnumbered(picture, &board, &unnumbered).into());
     };
-    let placement = parts[0].placement;
+    let Part { placement, fields, .. } = parts[0];
     let merged = merged(&board, &parts);
-    if let Some(share) =
-        seen_share(picture, &merged, placement.layout, fields).filter(|s| (s - fields.share).abs() > MOST_OFF)
-    {
-        let Kind::Charuco { marker_mm, .. } = board.kind else { return Err("no board found".to_owned().into()) };
-        return Err(format!(
-            "shows markers of {:.3} mm in squares of {} mm; --board says {marker_mm} mm",
-            share * board.square_mm,
-            board.square_mm
-        )
-        .into());
+    if let Some(why) = other_measures(picture, &board, &merged, placement.layout, fields) {
+        return Err(why.into());
     }
-    let print = Print { share: fields.share, layout: placement.layout, inverted: placement.inverted };
+    let print = Print { share: fields.marked(), pitch, layout: placement.layout, inverted: placement.inverted };
     let on_copy = merged.map(|p| level.to_copy(p));
     Ok(Detected { print: Some(print), ..on_a_copy(picture, level, &copy, on_copy) })
 }
 
-/// How a board's markers are divided; `None` for a board without.
-fn fields(board: &Board) -> Option<Fields> {
+/// How a board's markers may be divided; none for a board without.
+fn fields(board: &Board) -> Vec<Fields> {
     match board.kind {
-        Kind::Checker => None,
+        Kind::Checker => Vec::new(),
         Kind::Charuco { marker_mm, dictionary, .. } => {
-            Some(Fields { share: marker_mm / board.square_mm, bits: dictionary.bits() })
+            vec![Fields::of_marker(marker_mm / board.square_mm, dictionary.bits())]
+        }
+        Kind::Tags { gap_mm, family } => {
+            TAG_BORDERS.iter().map(|border| Fields::of_tag(gap_mm / board.square_mm, family.bits(), *border)).collect()
         }
     }
+}
+
+/// What is seen to be of another size than the board's name says: the markers, or the gaps between tags.
+fn other_measures(picture: &Picture, board: &Board, merged: &Places, layout: Layout, fields: Fields) -> Option<String> {
+    match board.kind {
+        Kind::Checker => None,
+        Kind::Charuco { marker_mm, .. } => {
+            let share = seen_share(picture, merged, layout, fields).filter(|s| (s - fields.share).abs() > MOST_OFF)?;
+            Some(format!(
+                "shows markers of {:.3} mm in squares of {} mm; --board says {marker_mm} mm",
+                share * board.square_mm,
+                board.square_mm
+            ))
+        }
+        Kind::Tags { gap_mm, .. } => {
+            let gap = seen_gap(merged).filter(|gap| (gap - gap_mm / board.square_mm).abs() > MOST_GAP_OFF)?;
+            Some(format!(
+                "shows gaps of {:.2} mm between tags of {} mm; --board says {gap_mm} mm",
+                gap * board.square_mm,
+                board.square_mm
+            ))
+        }
+    }
+}
+
+/// Width of the gaps between tags as they are seen, in sides of a tag: from the cross-ratio of two tags' four corners on a line, which perspective
+/// leaves as it is. `None` where no two neighbouring tags are seen.
+fn seen_gap(corners: &Places) -> Option<f64> {
+    let one = |line: [Option<&Point2<f64>>; 4]| {
+        let [Some(a), Some(b), Some(c), Some(d)] = line else { return None };
+        let cross = ((c - a).norm() * (d - b).norm()) / ((c - b).norm() * (d - a).norm());
+        // (1 + g)^2 / (g (2 + g)) with g for the gap.
+        (cross > 1.0).then(|| (cross / (cross - 1.0)).sqrt() - 1.0)
+    };
+    let lines = corners.iter().flat_map(|(col, row, _)| {
+        let across = (col % 2 == 0).then(|| one([0, 1, 2, 3].map(|k| corners.get(col + k, row)))).flatten();
+        let along = (row % 2 == 0).then(|| one([0, 1, 2, 3].map(|k| corners.get(col, row + k)))).flatten();
+        [across, along]
+    });
+    median(lines.flatten())
 }
 
 /// Copies in their order: from coarse to fine.
@@ -172,11 +242,11 @@ fn levels(picture: &Picture) -> Vec<Level> {
 }
 
 /// The grid without corners that lie elsewhere than their neighbours say, the worst first.
-fn without_strays(mut grid: Places) -> Places {
+fn without_strays(mut grid: Places, pitch: Pitch) -> Places {
     loop {
-        let Some(step) = grid.step_px() else { return grid };
+        let Some(step) = grid.side_px(pitch) else { return grid };
         let off = |(col, row, p): (usize, usize, &Point2<f64>)| {
-            let at = local_map::predicted(&grid, (col as isize, row as isize))?;
+            let at = local_map::predicted(&grid, pitch, (col as isize, row as isize))?;
             Some(((at - p).norm() / step, row * grid.columns + col))
         };
         let worst = grid.iter().filter_map(off).max_by(|a, b| a.0.total_cmp(&b.0));
@@ -188,17 +258,19 @@ fn without_strays(mut grid: Places) -> Places {
 }
 
 /// What the markers in and round a grid are.
-fn markers_in(picture: &Picture, grid: &Places, fields: Fields) -> Vec<Read> {
+fn markers_in(picture: &Picture, grid: &Places, pitch: Pitch, fields: Fields) -> Vec<Read> {
     let (columns, rows) = (grid.columns as isize, grid.rows as isize);
     let all = (-1..rows).flat_map(|row| (-1..columns).map(move |col| (col, row)));
+    // A lattice of tags begins with one.
+    let may_hold = |at: &(isize, isize)| pitch == Pitch::Even || Layout::Tags.holds_marker(at.0 + 1, at.1 + 1);
     let is_near = |&(col, row): &(isize, isize)| {
         [(0, 0), (1, 0), (1, 1), (0, 1)].iter().any(|(c, r)| grid.around(col + c, row + r).is_some())
     };
     let one = |(col, row)| {
-        let corners = local_map::square(grid, (col, row))?;
+        let corners = local_map::square(grid, pitch, (col, row))?;
         Some(Read { col, row, marker: read(picture, &corners, fields)? })
     };
-    let mut reads: Vec<Read> = all.filter(is_near).filter_map(one).collect();
+    let mut reads: Vec<Read> = all.filter(may_hold).filter(is_near).filter_map(one).collect();
     // A plain square whose neighbours blur into it looks like a marker of hardly any contrast.
     let mut contrasts: Vec<f64> = reads.iter().map(|read| read.marker.contrast).collect();
     contrasts.sort_by(f64::total_cmp);
@@ -215,12 +287,15 @@ enum Numbered {
 }
 
 /// A grid as a part of the board.
-fn number(picture: &Picture, board: &Board, fields: Fields, grid: &Places) -> Numbered {
-    let reads = markers_in(picture, grid, fields);
-    let placement = match numbering::place(board, (grid.columns, grid.rows), &reads) {
-        Said::Place(placement) => placement,
-        Said::ByLayout => return Numbered::ByLayout,
-        Said::Nothing => return Numbered::No,
+fn number(picture: &Picture, board: &Board, fields: &[Fields], grid: &Places) -> Numbered {
+    let said = fields.iter().map(|fields| {
+        let reads = markers_in(picture, grid, board.pitch(), *fields);
+        (*fields, numbering::place(board, (grid.columns, grid.rows), &reads))
+    });
+    let (fields, placement) = match said.into_iter().find(|(_, said)| *said != Said::Nothing) {
+        Some((fields, Said::Place(placement))) => (fields, placement),
+        Some((_, Said::ByLayout)) => return Numbered::ByLayout,
+        Some((_, Said::Nothing)) | None => return Numbered::No,
     };
     let turned = grid.turned(placement.quarters);
     if goes_beyond(board, &turned, &placement) {
@@ -229,7 +304,7 @@ fn number(picture: &Picture, board: &Board, fields: Fields, grid: &Places) -> Nu
     let corners = Lattice::from_fn(board.columns(), board.rows(), |col, row| {
         turned.around(col as isize - placement.col, row as isize - placement.row).copied()
     });
-    if corners.count() > 0 { Numbered::Part(Part { corners, placement }) } else { Numbered::No }
+    if corners.count() > 0 { Numbered::Part(Part { corners, placement, fields }) } else { Numbered::No }
 }
 
 /// True where corners of a grid go on beyond the board on some side, a line of them: it is another board, or its markers are in the other squares.
@@ -337,7 +412,11 @@ mod layouts {
                 for y in 0..rows {
                     for x in 0..columns {
                         if layout.holds_marker(x as isize, y as isize) {
-                            assert_eq!(layout.number(columns, x, y), next, "{columns}x{rows} {layout:?} {x} {y}");
+                            assert_eq!(
+                                layout.number(Squares { columns, rows }, x, y),
+                                next,
+                                "{columns}x{rows} {layout:?} {x} {y}"
+                            );
                             next += 1;
                         }
                     }

@@ -6,6 +6,7 @@
 //! markers then say which it could be ([`super::explain`]).
 
 use super::Layout;
+use super::dictionary::turned as quarter_turned;
 use super::marker::Marker;
 use crate::imaging::board::{Board, Kind};
 
@@ -71,7 +72,18 @@ fn turned(read: &Read, (columns, rows): (usize, usize), quarters: usize) -> Read
 fn marker_in(board: &Board, layout: Layout, (x, y): (isize, isize)) -> Option<usize> {
     let (columns, rows) = (board.squares.columns as isize, board.squares.rows as isize);
     let inside = (0..columns).contains(&x) && (0..rows).contains(&y);
-    (inside && layout.holds_marker(x, y)).then(|| layout.number(board.squares.columns, x as usize, y as usize))
+    (inside && layout.holds_marker(x, y)).then(|| layout.number(board.squares, x as usize, y as usize))
+}
+
+/// The bits of the marker in a square of the board, row by row as they are printed; `None` where there is none.
+pub fn code_in(board: &Board, layout: Layout, square: (isize, isize)) -> Option<u64> {
+    let id = marker_in(board, layout, square)?;
+    match board.kind {
+        Kind::Checker => None,
+        Kind::Charuco { dictionary, .. } => dictionary.code(id),
+        // Kalibr prints tags as their makers do, OpenCV upside down.
+        Kind::Tags { family, .. } => Some(quarter_turned(family.code(id)?, family.bits(), 2)),
+    }
 }
 
 /// What the markers of a grid say.
@@ -115,7 +127,6 @@ fn by_layout(
     reads: &[Read],
     inverted: bool,
 ) -> Option<(Placement, usize)> {
-    let Kind::Charuco { dictionary, .. } = board.kind else { return None };
     let mut best: Option<(Placement, usize)> = None;
     let mut rival = 0;
     for quarters in 0..4 {
@@ -124,8 +135,7 @@ fn by_layout(
             let (mut agreeing, mut contradicting, mut whole) = (0, 0, 0);
             for read in &seen {
                 let square = (read.col + 1 + col, read.row + 1 + row);
-                let code = marker_in(board, layout, square).and_then(|id| dictionary.code(id));
-                match code.map(|code| read.marker.differs_from(code)) {
+                match code_in(board, layout, square).map(|code| read.marker.differs_from(code)) {
                     Some(wrong) if wrong <= tolerated(read.marker.bits) => {
                         agreeing += 1;
                         whole += usize::from(wrong == 0);
@@ -156,12 +166,10 @@ fn is_inside(board: &Board, (x, y): (isize, isize)) -> bool {
 
 /// Shifts that bring some marker to where the board has it, each once.
 fn proposals(board: &Board, layout: Layout, seen: &[Read]) -> Vec<(isize, isize)> {
-    let Kind::Charuco { dictionary, .. } = board.kind else { return Vec::new() };
     let mut shifts = Vec::new();
     for y in 0..board.squares.rows {
         for x in 0..board.squares.columns {
-            let Some(id) = marker_in(board, layout, (x as isize, y as isize)) else { continue };
-            let Some(code) = dictionary.code(id) else { continue };
+            let Some(code) = code_in(board, layout, (x as isize, y as isize)) else { continue };
             let near = |read: &&Read| read.marker.differs_from(code) <= tolerated(read.marker.bits) / 2;
             for read in seen.iter().filter(near) {
                 let shift = (x as isize - 1 - read.col, y as isize - 1 - read.row);

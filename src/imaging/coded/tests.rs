@@ -181,3 +181,50 @@ fn markers_that_were_moved_give_no_corner_another_number() {
         }
     }
 }
+
+const TAGS: &str = "apriltag:5x4:tag36h11:24:7.2";
+
+#[test]
+fn a_grid_of_tags_is_measured_whole_from_every_side_and_in_both_colours() {
+    let mut sum = 0.0;
+    for (quarter, inverted) in [(0, false), (1, true), (2, false), (3, false)] {
+        let turn = [0.3, -0.25, 0.2 + f64::from(quarter) * 1.6];
+        let (picture, truth) = Shot { inverted, ..Shot::of(TAGS, turn, [3.0, -2.0, 560.0]) }.taken();
+        let (count, chi2) = measured(TAGS, &picture, &truth);
+        assert!(count == 80, "{quarter}: {count} of 80 corners");
+        sum += chi2 / 4.0;
+    }
+    // The mean of 640 squares: chance takes it from 0.8 to 1.2.
+    assert!((0.8..1.2).contains(&sum), "{sum}");
+}
+
+#[test]
+fn parts_of_a_grid_of_tags_have_their_own_numbers() {
+    for (x, y) in [(-140.0, 0.0), (110.0, 60.0), (-90.0, -80.0), (60.0, 90.0)] {
+        let (picture, truth) = Shot::of(TAGS, [0.4, 0.3, 0.5], [x, y, 420.0]).taken();
+        let (count, _) = measured(TAGS, &picture, &truth);
+        assert!((8..80).contains(&count), "{x} {y}: {count} corners");
+    }
+}
+
+#[test]
+fn another_grid_of_tags_is_named() {
+    let (picture, _) = Shot::of(TAGS, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
+    for (said, why) in [
+        ("apriltag:5x4:tag25h9:24:7.2", "DICT_APRILTAG_36h11"),
+        ("apriltag:4x4:tag36h11:24:7.2", "board of 5 columns"),
+        ("apriltag:6x4:tag36h11:24:7.2", "board of 5 columns"),
+        ("apriltag:5x3:tag36h11:24:7.2", "larger than 5x3"),
+        ("apriltag:5x4:tag36h11:24:6", "gaps of 7."),
+        ("apriltag:5x4:tag36h11:24:8.4", "gaps of 7."),
+        (BOARD, "no marker"),
+    ] {
+        let refusal = corners_in(&picture, said.parse().unwrap()).map(|corners| corners.count()).expect_err(said);
+        assert!(refusal.reason.contains(why), "{said}: {}", refusal.reason);
+    }
+    let Picture { grey: crate::imaging::image::Grey::Eight(image), .. } = &picture else { panic!("eight bits") };
+    let pixels = image.pixels.chunks(image.width).flat_map(|row| row.iter().rev().copied()).collect();
+    let mirrored = Picture::from(Image { width: image.width, height: image.height, pixels });
+    let refusal = corners_in(&mirrored, TAGS.parse().unwrap()).unwrap_err();
+    assert!(refusal.reason.contains("mirrored"), "{}", refusal.reason);
+}

@@ -13,6 +13,7 @@ use nalgebra::{Point2, Vector2};
 use super::saddles::{Candidate, candidates, tiles};
 use crate::imaging::image::Grey8;
 use crate::imaging::lattice::{Lattice, Places};
+use crate::imaging::pitch::Pitch;
 
 /// Seeds from which a grid is tried, and where one of enough corners is known, altogether and for two tiles: each tile gives its strongest
 /// first, and a grid that is larger still has corners in several of them.
@@ -49,7 +50,7 @@ pub fn largest_grid(picture: &Grey8, enough: usize) -> Option<Places> {
             break;
         }
         seeds += 1;
-        let grown = grow(&candidates, &near, first, longest_step(picture, best.len()));
+        let grown = grow(&candidates, &near, Pitch::Even, first, longest_step(picture, best.len()));
         if grown.len() >= 9 {
             grown.iter().for_each(|&(_, i)| taken[i] = true);
         }
@@ -61,12 +62,12 @@ pub fn largest_grid(picture: &Grey8, enough: usize) -> Option<Places> {
             break;
         }
     }
-    as_grid(&best, &candidates).filter(|grid| grid.columns >= 3 && grid.rows >= 3)
+    as_grid(&best, &candidates, Pitch::Even).filter(|grid| grid.columns >= 3 && grid.rows >= 3)
 }
 
 /// All grids of four corners and more in a picture of a board with markers, the largest first: parts of a board that something divides. Edges are
-/// looked at within the `margin` round a marker, a share of a square.
-pub fn grids(picture: &Grey8, margin: f64) -> Vec<Places> {
+/// looked at within the `margin` round a marker, a share of a square. A grid of tags begins with one both ways and ends with one.
+pub fn grids(picture: &Grey8, pitch: Pitch, margin: f64) -> Vec<Places> {
     /// A square with a marker in it.
     const FEWEST: usize = 4;
     let candidates = candidates(picture);
@@ -82,7 +83,7 @@ pub fn grids(picture: &Grey8, margin: f64) -> Vec<Places> {
             break;
         }
         seeds += 1;
-        let grown = grow(&candidates, &near, first, longest_step(picture, 1));
+        let grown = grow(&candidates, &near, pitch, first, longest_step(picture, 1));
         if grown.len() >= FEWEST {
             let is_new = grown.iter().any(|&(_, i)| !taken[i]);
             grown.iter().for_each(|&(_, i)| taken[i] = true);
@@ -93,7 +94,7 @@ pub fn grids(picture: &Grey8, margin: f64) -> Vec<Places> {
     }
     // Stable: equal ones stay in the order of their seeds.
     found.sort_by_key(|grown| std::cmp::Reverse(grown.len()));
-    let grids = found.iter().filter_map(|grown| as_grid(grown, &candidates));
+    let grids = found.iter().filter_map(|grown| as_grid(grown, &candidates, pitch));
     grids.filter(|grid| grid.columns >= 2 && grid.rows >= 2).collect()
 }
 
@@ -222,8 +223,9 @@ fn longest_step(picture: &Grey8, corners: usize) -> f64 {
     (LONGER * share.sqrt()).min(LONGEST)
 }
 
-/// A grid from one candidate on: places with the candidate there. No neighbour of the first one is farther than `longest`, px.
-fn grow(candidates: &[Candidate], near: &Near, first: usize, longest: f64) -> Vec<(Place, usize)> {
+/// A grid from one candidate on: places with the candidate there. No neighbour of the first one is farther than `longest`, px. The nearest neighbours
+/// of a tag's corner are those beyond the gap: lines are numbered so that one before the first begins a tag.
+fn grow(candidates: &[Candidate], near: &Near, pitch: Pitch, first: usize, longest: f64) -> Vec<(Place, usize)> {
     let Some(seed_steps) = seed_steps(candidates, near, first, longest) else { return Vec::new() };
     let mut placed: BTreeMap<Place, usize> = BTreeMap::from([((0, 0), first)]);
     let mut used = vec![false; candidates.len()];
@@ -237,7 +239,7 @@ fn grow(candidates: &[Candidate], near: &Near, first: usize, longest: f64) -> Ve
             }
             let at = |place: Place| placed.get(&place).map(|&k| candidates[k].at);
             let Some(here) = placed.get(&(i, j)).map(|&k| candidates[k]) else { continue };
-            let step = step_at(&at, (i, j), (di, dj))
+            let step = step_at(&at, pitch, (i, j), (di, dj))
                 .unwrap_or_else(|| if di != 0 { seed_steps[0] * di as f64 } else { seed_steps[1] * dj as f64 });
             let stray = STRAY * step.norm();
             let around = [(1, 0), (0, 1), (-1, 0), (0, -1)].map(|(di, dj)| placed.get(&(next.0 + di, next.1 + dj)));
@@ -256,10 +258,17 @@ fn grow(candidates: &[Candidate], near: &Near, first: usize, longest: f64) -> Ve
 }
 
 /// The step from a place in a direction, from the steps before it or beside it.
-fn step_at(at: &dyn Fn(Place) -> Option<Point2<f64>>, (i, j): Place, (di, dj): Place) -> Option<Vector2<f64>> {
+fn step_at(
+    at: &dyn Fn(Place) -> Option<Point2<f64>>,
+    pitch: Pitch,
+    (i, j): Place,
+    (di, dj): Place,
+) -> Option<Vector2<f64>> {
     let here = at((i, j))?;
     if let Some(back) = at((i - di, j - dj)) {
-        return Some(here - back);
+        let width = |from: isize, way: isize| pitch.after(from + 1 + way.min(0));
+        let (line, way) = if di != 0 { (i, di) } else { (j, dj) };
+        return Some((here - back) * (width(line, way) / width(line, -way)));
     }
     [1, -1].into_iter().find_map(|side| {
         let (i, j) = (i + side * dj, j + side * di);
@@ -295,12 +304,17 @@ fn seed_steps(candidates: &[Candidate], near: &Near, first: usize, longest: f64)
     None
 }
 
-fn as_grid(grown: &[(Place, usize)], candidates: &[Candidate]) -> Option<Places> {
+fn as_grid(grown: &[(Place, usize)], candidates: &[Candidate], pitch: Pitch) -> Option<Places> {
     let range = |of: &dyn Fn(&Place) -> isize| {
         let values = grown.iter().map(|(place, _)| of(place));
         Some((values.clone().min()?, values.max()?))
     };
-    let ((left, right), (top, bottom)) = (range(&|p| p.0)?, range(&|p| p.1)?);
+    // Whole tags: the line of a grid's seed ends one.
+    let whole = |(first, last): (isize, isize)| match pitch {
+        Pitch::Even => (first, last),
+        Pitch::Tags { .. } => (first - (first + 1).rem_euclid(2), last + last.rem_euclid(2)),
+    };
+    let ((left, right), (top, bottom)) = (whole(range(&|p| p.0)?), whole(range(&|p| p.1)?));
     let (columns, rows) = ((right - left + 1) as usize, (bottom - top + 1) as usize);
     let mut grid: Places = Lattice::from_fn(columns, rows, |_, _| None);
     for &((i, j), k) in grown {

@@ -119,7 +119,7 @@ fn text(look: &Look) -> String {
                     others.iter().map(|o| format!("{},{},{}", o.quarters, o.columns, o.rows)).collect();
                 body.push_str(&format!("open {};{seen};{}\n", others.join(" "), reason.replace('\n', " ")));
             }
-            if let Some(Print { share, layout, inverted }) = print {
+            if let Some(Print { share, layout, inverted, .. }) = print {
                 let old = u8::from(*layout == Layout::Old);
                 body.push_str(&format!("print {share} {old} {}\n", u8::from(*inverted)));
             }
@@ -158,8 +158,12 @@ fn parse(text: &str, board: Board) -> Option<Look> {
         Some(rest) => {
             let (line, rest) = rest.split_once('\n')?;
             let [share, old, inverted] = line.split(' ').collect::<Vec<_>>().try_into().ok()?;
-            let layout = if old == "1" { Layout::Old } else { Layout::New };
-            (Some(Print { share: share.parse().ok()?, layout, inverted: inverted == "1" }), rest)
+            let layout = match Layout::of(&board)[..] {
+                [only] if old == "0" => only,
+                _ if old == "1" => Layout::Old,
+                _ => Layout::New,
+            };
+            (Some(Print { share: share.parse().ok()?, pitch: board.pitch(), layout, inverted: inverted == "1" }), rest)
         }
     };
     let mut grid: Lattice<Corner> = Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
@@ -196,6 +200,7 @@ fn parse_open(line: &str) -> Option<Open> {
 mod tests {
     use super::*;
     use crate::imaging::image::{Image, Picture};
+    use crate::imaging::pitch::Pitch;
     use crate::imaging::{detect, refine};
 
     fn board() -> Board {
@@ -211,7 +216,7 @@ mod tests {
             let reach = (col > 0).then_some([0.1, 2.0 / 3.0]);
             (row + col < 3).then_some(Corner { col, row, px, covariance_px2, blur_px, reach, used: col > 0 })
         });
-        let print = Some(Print { share: 0.7, layout: Layout::Old, inverted: true });
+        let print = Some(Print { share: 0.7, pitch: Pitch::Even, layout: Layout::Old, inverted: true });
         let coded: Look = Ok(Sighting { corners: corners.clone(), print, open: None });
         assert_eq!(parse(&text(&coded), board()), Some(coded));
         for (others, seen) in [(vec![(0, 1, 0), (3, -2, 4)], None), (Vec::new(), Some("4x4".parse().unwrap()))] {

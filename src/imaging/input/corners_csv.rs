@@ -38,7 +38,7 @@ pub fn to_csv(corners: &Corners) -> String {
                 let (col, row, x, y) = (c.col, c.row, c.px.x, c.px.y);
                 let _ = write!(text, "{name},{side},{col},{row},{x},{y},{s},{used},{blur},{w},{h}");
                 if board.is_coded() {
-                    let _ = write!(text, ",{}", board.index(col, row));
+                    let _ = write!(text, ",{}", board.id(col, row));
                 }
                 text.push('\n');
             }

@@ -30,6 +30,8 @@ pub(super) struct Cell {
     pub(super) own_bends: [bool; 2],
     /// Side of the markers, as a share of a square's.
     pub(super) share: f64,
+    /// Side of such a square, as a share of the shorter edge.
+    pub(super) square: f64,
     /// The squares that hold them.
     pub(super) marked: [Option<Marked>; 2],
 }
@@ -49,27 +51,37 @@ impl Cell {
                 (one, other) => one.or(other),
             }
         };
-        let cell =
-            Cell { place, edges: [edge(1, 0)?, edge(0, 1)?], own_bends: [false; 2], share: 0.0, marked: [None; 2] };
+        let cell = Cell {
+            place,
+            edges: [edge(1, 0)?, edge(0, 1)?],
+            own_bends: [false; 2],
+            share: 0.0,
+            square: 1.0,
+            marked: [None; 2],
+        };
         (cell.side() * cell.skew() > LEAST_HEIGHT_PX).then_some(cell)
     }
 
     /// The same on a board with markers.
     pub(super) fn with_markers(self, places: &Places, (col, row): (usize, usize), print: Option<Print>) -> Cell {
-        let Some(Print { share, layout, .. }) = print else { return self };
+        let Some(Print { share, layout, pitch, .. }) = print else { return self };
         let (col, row) = (col as isize, row as isize);
-        // The square after the corner both ways or one of its neighbours: markers stand in two that lie opposite.
-        let after = if layout.holds_marker(col + 1, row + 1) { [(0, 0), (-1, -1)] } else { [(-1, 0), (0, -1)] };
-        let marked = after.map(|(c, r)| {
-            let known = local_map::square(places, (col + c, row + r)).map(|corners| corners.map(|p| p - self.place));
-            let [a, b] = self.edges;
+        // Of the four squares round a corner two that lie opposite hold markers, or one is a tag.
+        let round = [(0, 0), (-1, -1), (-1, 0), (0, -1)];
+        let mut holding = round.into_iter().filter(|(c, r)| layout.holds_marker(col + 1 + c, row + 1 + r));
+        // The cell's own edges reach to the nearest neighbours.
+        let side = 1.0 / pitch.least();
+        let marked = [holding.next(), holding.next()].map(|square| {
+            let (c, r) = square?;
+            let known = local_map::square(places, pitch, (col + c, row + r));
+            let [a, b] = self.edges.map(|edge| edge * side);
             let edges_only = || {
                 let first = a * c as f64 + b * r as f64;
                 [first, first + a, first + a + b, first + b]
             };
-            Some(Marked(known.unwrap_or_else(edges_only)))
+            Some(Marked(known.map_or_else(edges_only, |corners| corners.map(|p| p - self.place))))
         });
-        Cell { share, marked, ..self }
+        Cell { share, marked, square: side, ..self }
     }
 
     /// Whether it lies on a board with markers.
@@ -82,7 +94,7 @@ impl Cell {
         if !self.has_markers() {
             return f64::INFINITY;
         }
-        (1.0 - self.share) / 2.0 * self.side() * self.skew()
+        (1.0 - self.share) / 2.0 * self.square * self.side() * self.skew()
     }
 
     /// What a window of such a blur leaves out; `None` where markers stand too near for the edges to be seen by themselves.
@@ -94,7 +106,7 @@ impl Cell {
     /// The markers beside the corner, larger by a halo, px.
     pub(super) fn hidden_by(&self, halo_px: f64) -> [Option<Quad>; 2] {
         // What an edge's own blur shows of a marker is nothing where it begins within the halo.
-        let near = ((1.0 - self.share) / 2.0 - halo_px / (self.side() * self.skew())).max(0.0);
+        let near = ((1.0 - self.share) / 2.0 - halo_px / (self.square * self.side() * self.skew())).max(0.0);
         self.marked.map(|marked| {
             let corners = marked?.0.map(Point2::from);
             let map = square_map(&corners)?;

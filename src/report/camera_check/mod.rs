@@ -73,10 +73,9 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
     let total = calibration.views.len() + calibration.skipped.len();
     let board = &calibration.board;
     let lead = format!(
-        "{} of {total} pairs of a board of {} squares of {} mm; {} lens, board {}",
+        "{} of {total} pairs of a board of {}; {} lens, board {}",
         calibration.views.len(),
-        board.squares,
-        board.side_said(),
+        board.said(),
         calibration.rig().left.lens.name(),
         if calibration.layout.shape { "free to be bowed" } else { "flat" }
     );

@@ -139,7 +139,7 @@ fn board(calibration: &Calibration) -> String {
     } else {
         ", taken as flat".to_owned()
     };
-    format!("board of {} squares of {} mm{bow}", calibration.board.squares, calibration.board.side_said())
+    format!("board of {}{bow}", calibration.board.said())
 }
 
 /// What to do next: what the deciding line asks for, then what the views lack.

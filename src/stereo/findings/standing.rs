@@ -169,7 +169,7 @@ pub fn since(corners: &Corners, pair: &str) -> Option<Corners> {
 fn lengths(calibration: &Calibration, extent: Extent) -> VolumeLengths {
     let board = &calibration.board;
     let squares = LONG_SQUARES.min(board.columns() - 1);
-    VolumeLengths::new(calibration, extent, squares as f64 * board.square_mm, 1.0)
+    VolumeLengths::new(calibration, extent, board.spans_mm(squares)[0], 1.0)
 }
 
 fn change(calibration: &Calibration, asked: &Asked) -> Option<Finding> {

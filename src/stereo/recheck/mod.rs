@@ -135,7 +135,7 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let difference = Difference::new(off, &joint, pairs, beyond).ok_or_else(Error::undetermined)?;
 
     let squares = LONG_SQUARES.min(corners.board.columns() - 1);
-    let length_mm = squares as f64 * corners.board.square_mm;
+    let [length_mm, _] = corners.board.spans_mm(squares);
     let lengths = VolumeLengths::of_volume(&before.rig, &before.volume_of(&trial, &solved.problem.views), length_mm);
     let moves = |step: &DVector<f64>| {
         let whole = step.clone().resize_vertically(layout.count(), 0.0);

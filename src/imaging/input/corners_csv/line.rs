@@ -98,10 +98,11 @@ impl Line<'_> {
     /// The corner's column and row on the board, by its place or its number.
     fn place(&self, board: Board) -> Result<Option<(usize, usize)>> {
         let by_place = self.columns.place.map(|(col, row)| Ok((self.count(col)?, self.count(row)?))).transpose()?;
-        let by_id = self.columns.id.map(|id| Ok(board.place(self.count(id)?))).transpose()?;
+        let by_id = self.columns.id.map(|id| Ok(board.by_id(self.count(id)?))).transpose()?;
         match (by_place, by_id) {
-            (Some((col, row)), Some((c, r))) if (col, row) != (c, r) => Err(self
-                .refuse(format!("corner {col},{row} has the id of {c},{r} on a board of {} squares", board.squares))),
+            (Some((col, row)), Some((c, r))) if (col, row) != (c, r) => {
+                Err(self.refuse(format!("corner {col},{row} has the id of {c},{r} on a board of {}", board.said())))
+            }
             _ => Ok(by_place.or(by_id)),
         }
     }

@@ -165,8 +165,8 @@ fn summarise(
         doubtful,
         folds: folds.rigs.len(),
         fold_steps: folds.steps,
-        short_mm: short.map(|s| s as f64 * board.square_mm),
-        long_mm: long.map(|s| s as f64 * board.square_mm),
+        short_mm: short.map(|s| board.spans_mm(s)[0]),
+        long_mm: long.map(|s| board.spans_mm(s)[0]),
         ranges: all_ranges(board, measured),
         pairs,
     })

@@ -42,7 +42,8 @@ pub struct Range {
     pub max_abs_error_mm: f64,
 }
 
-/// A length between two corners in a row or column.
+/// A length between two corners in a row or column. On a grid of tags lengths of an odd number of lines begin with a tag: each number of lines is one
+/// length.
 pub(super) struct Length {
     axis: Axis,
     squares: usize,
@@ -76,19 +77,20 @@ pub(super) fn measure(rig: &Rig, board: &Board, view: &View) -> Measured {
     }
     let mut lengths = Vec::new();
     let (columns, rows) = (board.columns(), board.rows());
+    let pitch = board.pitch();
     let mut add = |axis, squares: usize, a: usize, b: usize| {
         if let (Some(a), Some(b)) = (at[a], at[b]) {
             let length_mm = (points[b].point_mm - points[a].point_mm).norm();
-            let error_mm = length_mm - squares as f64 * board.sides_mm()[axis as usize];
+            let error_mm = length_mm - board.spans_mm(squares)[axis as usize];
             lengths.push(Length { axis, squares, error_mm, ends: (a, b) });
         }
     };
     for row in 0..rows {
         for col in 0..columns {
-            for squares in 1..columns - col {
+            for squares in (1..columns - col).filter(|squares| pitch.is_as_from_first(col, *squares)) {
                 add(Axis::X, squares, board.index(col, row), board.index(col + squares, row));
             }
-            for squares in 1..rows - row {
+            for squares in (1..rows - row).filter(|squares| pitch.is_as_from_first(row, *squares)) {
                 add(Axis::Y, squares, board.index(col, row), board.index(col, row + squares));
             }
         }
@@ -141,7 +143,7 @@ fn range(board: &Board, measured: &[Measured], axis: Axis, squares: usize) -> Op
     Some(Range {
         axis,
         // As a person writes it: 38.1 for three squares of 12.7.
-        nominal_mm: (squares as f64 * board.sides_mm()[axis as usize] * 1e9).round() / 1e9,
+        nominal_mm: (board.spans_mm(squares)[axis as usize] * 1e9).round() / 1e9,
         count: errors.len(),
         mean_error_mm: mean,
         std_mm: (spread / (errors.len() as f64 - 1.0).max(1.0)).sqrt(),
@@ -156,7 +158,7 @@ impl Measured {
 
     /// Sum of the measured over the sum of the nominal lengths, minus one.
     pub(super) fn scale_error(&self, board: &Board) -> f64 {
-        let nominal: f64 = self.lengths.iter().map(|l| l.squares as f64 * board.sides_mm()[l.axis as usize]).sum();
+        let nominal: f64 = self.lengths.iter().map(|l| board.spans_mm(l.squares)[l.axis as usize]).sum();
         self.lengths.iter().map(|l| l.error_mm).sum::<f64>() / nominal
     }
 
