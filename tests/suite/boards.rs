@@ -152,6 +152,43 @@ fn a_board_is_counted_measured_and_read_from_files() {
 }
 
 #[test]
+fn a_grid_of_tags_is_calibrated_and_its_corners_have_kalibrs_numbers() {
+    let folder = workplace();
+    std::fs::write(
+        folder.path().join("target.yaml"),
+        "target_type: 'aprilgrid'\ntagCols: 5\ntagRows: 4\ntagSize: 0.024 #m\ntagSpacing: 0.3\n",
+    )
+    .unwrap();
+    std::fs::write(folder.path().join("stereocal.toml"), "[check_board]\nboard = \"target.yaml\"\n").unwrap();
+    let simulate =
+        ["simulate", "--size", "900", "--check-pairs", "8", "--samples", "1", "--verify", "1", "--out", "world"];
+    assert_eq!(stereocal(folder.path(), &simulate).status.code(), Some(0));
+    let output = stereocal(folder.path(), &["camera-check", "world/check"]);
+    let said = stderr(&output) + &stdout(&output);
+    assert!(matches!(output.status.code(), Some(0 | 1)) && said.contains("5x4 tags of 24 mm, 7.2 mm apart"), "{said}");
+    assert!(said.contains("8 of 8 pairs used"), "{said}");
+    let truth = corners_of(&folder.path().join("world/truth/corners.csv"));
+    let found = corners_of(&folder.path().join("out/corners.csv"));
+    assert!(found.len() > 1100, "{} corners", found.len());
+    for (picture, [col, row, x, y]) in &found {
+        let (_, [_, _, a, b]) = truth.iter().find(|(of, t)| of == picture && t[..2] == [*col, *row]).unwrap();
+        assert!((a - x).hypot(b - y) < 0.3, "{picture} {col},{row} is off by {} {}", x - a, y - b);
+    }
+    // By their numbers alone: the lower left corner of the lower left tag is 0.
+    let text = std::fs::read_to_string(folder.path().join("out/corners.csv")).unwrap();
+    assert!(text.lines().any(|line| line.contains(",0,7,") && line.ends_with(",0")), "{text}");
+    let without = |line: &str| {
+        let fields: Vec<&str> = line.split(',').collect();
+        [&fields[..2], &fields[4..]].concat().join(",") + "\n"
+    };
+    std::fs::write(folder.path().join("by-id.csv"), text.lines().map(without).collect::<String>()).unwrap();
+    let again = ["camera-check", "--corners", "by-id.csv", "--out", "again"];
+    let output = stereocal(folder.path(), &again);
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{}", stderr(&output));
+    assert_eq!(corners_of(&folder.path().join("again/corners.csv")), found);
+}
+
+#[test]
 fn a_second_run_reads_what_the_first_found_and_survives_a_torn_file() {
     let folder = workplace();
     copied(folder.path());

@@ -1,7 +1,7 @@
-//! Boards with markers, seen in part: whether any corner has another's number, and how well and how surely the corners lie.
+//! Boards with markers and grids of tags, seen in part: whether any corner has another's number, and how well and how surely the corners lie.
 //!
-//! Every dictionary, markers of 0.6 to 0.8 of a square, tilts to 60 degrees, blur to 2.5 px, noise to 5 grey levels, squares of 12 to 70 px, from the
-//! whole board down to a tenth of it. `-- coded FIRST COUNT` takes the pictures from one number on, so that parts of a long run add up; with a
+//! Every dictionary, markers of 0.6 to 0.8 of a square, or every family of tags, gaps of 0.2 to 0.4 of a tag; tilts to 60 degrees, blur to 2.5 px, noise to 5 grey levels, squares of 12 to 70 px, from the
+//! whole board down to a tenth of it. `-- coded FIRST COUNT` (of grids of tags `-- tags FIRST COUNT`) takes the pictures from one number on, so that parts of a long run add up; with a
 //! folder behind that the pictures are written there with truth and findings, for `scripts/peers_coded.py`.
 
 use std::f64::consts::TAU;
@@ -29,6 +29,15 @@ use stereocal::simulate::rig::true_rig;
 
 /// Side of the pictures, px.
 const SIZE: u32 = 1000;
+/// Which boards are looked at.
+#[derive(Clone, Copy)]
+pub enum Coded {
+    /// ChArUco.
+    Markers,
+    /// Kalibr's grids of AprilTags.
+    Tags,
+}
+
 /// A corner farther from its truth than this share of the least step of the board has another's number.
 const WRONG: f64 = 0.4;
 
@@ -68,13 +77,23 @@ fn uniform(seed: u64) -> impl FnMut() -> f64 {
 
 impl Case {
     /// The picture of this number.
-    fn drawn(number: usize) -> Case {
+    fn drawn(kind: Coded, number: usize) -> Case {
         let mut uniform = uniform(1000 + number as u64);
-        let dictionaries: Vec<Dictionary> = Dictionary::all().collect();
-        let dictionary = dictionaries[number % dictionaries.len()];
-        let (columns, rows) = if dictionary.count() >= 40 { (10, 7) } else { (7, 5) };
-        let share = [0.6, 0.7, 0.8][number / dictionaries.len() % 3];
-        let name = format!("charuco:{columns}x{rows}:20:{}:{}:new", 20.0 * share, dictionary.name());
+        let name = match kind {
+            Coded::Markers => {
+                let dictionaries: Vec<Dictionary> = Dictionary::all().collect();
+                let dictionary = dictionaries[number % dictionaries.len()];
+                let (columns, rows) = if dictionary.count() >= 40 { (10, 7) } else { (7, 5) };
+                let share = [0.6, 0.7, 0.8][number / dictionaries.len() % 3];
+                format!("charuco:{columns}x{rows}:20:{}:{}:new", 20.0 * share, dictionary.name())
+            }
+            Coded::Tags => {
+                let families: Vec<Dictionary> = Dictionary::all().filter(|d| d.name().contains("APRILTAG")).collect();
+                let family = families[number % families.len()];
+                let gap = [0.2, 0.3, 0.4][number / families.len() % 3];
+                format!("apriltag:6x4:{}:40:{}", family.tag_name(), 40.0 * gap)
+            }
+        };
         let (tilt, about, roll) = (uniform() * 60f64.to_radians(), uniform() * TAU, uniform() * TAU);
         let turn = nalgebra::Rotation3::new(Vector3::new(about.cos(), about.sin(), 0.0) * tilt)
             * nalgebra::Rotation3::new(Vector3::new(0.0, 0.0, roll));
@@ -129,10 +148,15 @@ fn step_px(board: &Board, truth: &[Point2<f64>], (col, row): (usize, usize)) -> 
 }
 
 fn judge(case: &Case, corner: &Corner, truth: &[Point2<f64>]) -> Found {
-    let Kind::Charuco { marker_mm, .. } = case.board.kind else { panic!("a board with markers") };
+    // How far what is printed in a square stays from its edges, as a share of the least step.
+    let margin = match case.board.kind {
+        Kind::Checker => panic!("a board with markers"),
+        Kind::Charuco { marker_mm, .. } => (1.0 - marker_mm / case.board.square_mm) / 2.0,
+        Kind::Tags { gap_mm, family } => (2.0 / (family.bits() + 4) as f64 * case.board.square_mm / gap_mm).min(1.0),
+    };
     let off = corner.px - truth[case.board.index(corner.col, corner.row)];
     let step = step_px(&case.board, truth, (corner.col, corner.row));
-    let margin_px = (1.0 - marker_mm / case.board.square_mm) / 2.0 * step;
+    let margin_px = margin * step;
     let chi2 = corner.covariance_px2.and_then(|s| Some(off.dot(&(s.try_inverse()? * off)) / 2.0));
     Found {
         off_px: off.norm(),
@@ -142,8 +166,8 @@ fn judge(case: &Case, corner: &Corner, truth: &[Point2<f64>]) -> Found {
     }
 }
 
-fn look(number: usize, folder: Option<&Path>) -> Outcome {
-    let case = Case::drawn(number);
+fn look(kind: Coded, number: usize, folder: Option<&Path>) -> Outcome {
+    let case = Case::drawn(kind, number);
     let (image, truth) = case.taken(number);
     let inside = |p: &&Point2<f64>| p.iter().all(|v| (0.0..f64::from(SIZE) - 1.0).contains(v));
     let visible = truth.iter().filter(inside).count();
@@ -176,8 +200,9 @@ fn write(
     pgm.extend_from_slice(&image.pixels);
     std::fs::write(folder.join(format!("{name}.pgm")), pgm).expect("a picture is written");
     let mut table = format!("{}\n", case.board);
-    for (id, at) in truth.iter().enumerate() {
-        let (col, row) = case.board.place(id);
+    for id in 0..truth.len() {
+        let (col, row) = case.board.by_id(id);
+        let at = truth[case.board.index(col, row)];
         let corner = found.and_then(|grid| grid.get(col, row)).filter(|corner| corner.used);
         let place = corner.map_or(",".to_owned(), |corner| format!("{},{}", corner.px.x, corner.px.y));
         let margin = corner.is_some_and(|corner| judge(case, corner, truth).has_margin);
@@ -187,13 +212,18 @@ fn write(
 }
 
 /// Looks at so many pictures from one number on, and prints what came of it.
-pub fn table(first: usize, count: usize, folder: Option<&Path>) {
-    let outcomes: Vec<Outcome> = (first..first + count).into_par_iter().map(|number| look(number, folder)).collect();
-    println!("ChArUco boards in part, {SIZE} px, pictures {first} to {}: corners by the markers' share", first + count);
+pub fn table(kind: Coded, first: usize, count: usize, folder: Option<&Path>) {
+    let outcomes: Vec<Outcome> =
+        (first..first + count).into_par_iter().map(|number| look(kind, number, folder)).collect();
+    let (boards, field) = match kind {
+        Coded::Markers => ("ChArUco boards", 4),
+        Coded::Tags => ("grids of AprilTags", 2),
+    };
+    println!("{boards} in part, {SIZE} px, pictures {first} to {}: corners by the markers' codes", first + count);
     println!(
         "markers     pictures  found   corners  wrong | margin of 3 blurs and 2 px: corners  chi2  rms px | less: corners  chi2  rms px"
     );
-    let group = |outcome: &&Outcome| outcome.board.split(':').nth(4).unwrap_or_default().replace("DICT_", "");
+    let group = |outcome: &&Outcome| outcome.board.split(':').nth(field).unwrap_or_default().replace("DICT_", "");
     let family = |name: String| name.split('_').take(2).collect::<Vec<_>>().join("_");
     let mut families: Vec<String> = outcomes.iter().map(|o| family(group(&o))).collect();
     families.sort();
