@@ -9,7 +9,8 @@ use crate::imaging::Board;
 /// `stereocal board`
 #[derive(Debug, Args)]
 pub struct PrintBoard {
-    /// The board as `--board` names it: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
+    /// The board as `--board` names it: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
+    /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm)
     #[arg(value_name = "NAME", value_parser = named)]
     pub board: Board,
     /// Only what is named of PDF, SVG and PNG [default: PDF and SVG]

@@ -49,7 +49,8 @@ pub struct CameraCheck {
     /// Corners from a CSV file instead of pictures
     #[arg(long, value_name = "FILE")]
     pub corners: Option<Utf8PathBuf>,
-    /// The check board by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary); or a
+    /// The check board by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
+    /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm); or a
     /// file: Kalibr's target.yaml, a project of calib.io's Calibrator (.json), calib.io_charuco_200x150_8x11_15_11_DICT_5X5.pdf (by its name)
     #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
     pub board: Option<Board>,
@@ -143,7 +144,8 @@ pub struct Measure {
     /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
-    /// The target by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
+    /// The target by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
+    /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm)
     #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
     pub board: Option<Board>,
     /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
@@ -187,8 +189,9 @@ pub struct Rectify {
     /// each other lose what is near from view
     #[arg(long)]
     pub zero_disparity: bool,
-    /// The board by which the rows are compared, by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
-    /// marker in mm, dictionary) [default: the board that calibrated, else those of the keys `check_board` and `target_board`]
+    /// The board by which the rows are compared, by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
+    /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm) [default: the board
+    /// that calibrated, else those of the keys `check_board` and `target_board`]
     #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares"])]
     pub board: Option<Board>,
     /// Squares of the board by which the rows are compared

@@ -137,7 +137,8 @@ pub struct Plan {
     /// Pose repeatability (ISO 9283 RP), mm
     #[arg(long, value_name = "MM", default_value_t = 0.02, value_parser = between(0.0, 100.0))]
     pub repeatability_mm: f64,
-    /// The target by its name: checker:20x20:10, or charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in mm, dictionary)
+    /// The target by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
+    /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm)
     #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
     pub board: Option<Board>,
     /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]

@@ -89,12 +89,12 @@ impl Cell {
         self.marked != [None; 2]
     }
 
-    /// Distance from an edge to the markers beside it, px; infinite without markers.
+    /// Distance from an edge to the markers beside it, px, no farther than the next edge; infinite without markers.
     fn margin_px(&self) -> f64 {
         if !self.has_markers() {
             return f64::INFINITY;
         }
-        (1.0 - self.share) / 2.0 * self.square * self.side() * self.skew()
+        ((1.0 - self.share) / 2.0 * self.square).min(1.0) * self.side() * self.skew()
     }
 
     /// What a window of such a blur leaves out; `None` where markers stand too near for the edges to be seen by themselves.
