@@ -133,8 +133,16 @@ fn between<T: Copy + Into<f64>>(image: &Image<T>, at: &Point2<f64>) -> Option<f6
     Some(row(0) * (1.0 - v) + row(image.width) * v)
 }
 
-/// Reads the marker in a square. `None` where there is none: border and paper are then not told apart.
-pub fn read(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Option<Marker> {
+/// A square's fields, border and bits, and the paper round them, grey values; `None` at the picture's border.
+struct Sampled {
+    /// Row by row, the blur between them undone.
+    fields: Vec<f64>,
+    /// Fields along a side.
+    side: usize,
+    paper: Vec<f64>,
+}
+
+fn sampled(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Option<Sampled> {
     let map = square_map(corners)?;
     let Fields { share, bits, border, paper: near } = fields;
     let margin = (1.0 - share) / 2.0;
@@ -152,18 +160,36 @@ pub fn read(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Op
     };
     let blurred: Vec<f64> =
         (0..side * side).map(|k| mean(place(k % side), place(k / side))).collect::<Option<Vec<f64>>>()?;
-    let is_border = |k: usize| [k % side, k / side].iter().any(|&i| i < border || i >= side - border);
     let along = |i: usize, k: usize| {
         let far = 1.0 - near;
         let at = [(place(i), near), (place(i), far), (near, place(i)), (far, place(i))][k];
         grey_at(picture, &mapped(&map, at.0, at.1))
     };
     let paper: Vec<f64> = (0..4 * side).map(|k| along(k / 4, k % 4)).collect::<Option<Vec<f64>>>()?;
-    let mean_of = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let white = mean_of(&paper);
-    let grid = sharpened(&blurred, side, white);
+    Some(Sampled { fields: sharpened(&blurred, side, mean_of(&paper)), side, paper })
+}
+
+fn mean_of(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// How dark the bits in a square are, row by row, grey values from their mean, whatever stands round them: for markers that are too faint to be read one
+/// by one. `None` at the picture's border.
+pub fn darkness(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Option<Vec<f64>> {
+    let Sampled { fields: greys, side, .. } = sampled(picture, corners, fields)?;
+    let Fields { bits, border, .. } = fields;
+    let greys: Vec<f64> = (0..bits * bits).map(|k| greys[(k / bits + border) * side + k % bits + border]).collect();
+    let mean = mean_of(&greys);
+    Some(greys.into_iter().map(|grey| mean - grey).collect())
+}
+
+/// Reads the marker in a square. `None` where there is none: border and paper are then not told apart.
+pub fn read(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Option<Marker> {
+    let Sampled { fields: grid, side, paper } = sampled(picture, corners, fields)?;
+    let Fields { bits, border, .. } = fields;
+    let is_border = |k: usize| [k % side, k / side].iter().any(|&i| i < border || i >= side - border);
     let outline: Vec<f64> = (0..side * side).filter(|&k| is_border(k)).map(|k| grid[k]).collect();
-    let black = mean_of(&outline);
+    let (white, black) = (mean_of(&paper), mean_of(&outline));
     let inverted = black > white;
     let middle = 0.5 * (white + black);
     let is_black = |grey: f64| (grey < middle) != inverted;

@@ -9,12 +9,14 @@
 pub mod dictionary;
 mod explain;
 pub mod faces;
+mod faint;
 pub mod local_map;
 pub mod marker;
 mod numbering;
 
 use nalgebra::Point2;
 
+use self::faint::Faint;
 use self::marker::{Fields, grey_at, mapped, read, square_map};
 use self::numbering::{Placement, Read, Said};
 use super::board::{Board, Kind, Squares};
@@ -257,26 +259,40 @@ fn without_strays(mut grid: Places, pitch: Pitch) -> Places {
     }
 }
 
-/// What the markers in and round a grid are.
-fn markers_in(picture: &Picture, grid: &Places, pitch: Pitch, fields: Fields) -> Vec<Read> {
+/// The squares in and round a grid that may hold markers, by the corner before each.
+fn squares_of(grid: &Places, pitch: Pitch) -> impl Iterator<Item = (isize, isize)> {
     let (columns, rows) = (grid.columns as isize, grid.rows as isize);
-    let all = (-1..rows).flat_map(|row| (-1..columns).map(move |col| (col, row)));
+    let all = (-1..rows).flat_map(move |row| (-1..columns).map(move |col| (col, row)));
     // A lattice of tags begins with one.
-    let may_hold = |at: &(isize, isize)| pitch == Pitch::Even || Layout::Tags.holds_marker(at.0 + 1, at.1 + 1);
+    let may_hold = move |at: &(isize, isize)| pitch == Pitch::Even || Layout::Tags.holds_marker(at.0 + 1, at.1 + 1);
     let is_near = |&(col, row): &(isize, isize)| {
         [(0, 0), (1, 0), (1, 1), (0, 1)].iter().any(|(c, r)| grid.around(col + c, row + r).is_some())
     };
+    all.filter(may_hold).filter(is_near)
+}
+
+/// What the markers in and round a grid are.
+fn markers_in(picture: &Picture, grid: &Places, pitch: Pitch, fields: Fields) -> Vec<Read> {
     let one = |(col, row)| {
         let corners = local_map::square(grid, pitch, (col, row))?;
         Some(Read { col, row, marker: read(picture, &corners, fields)? })
     };
-    let mut reads: Vec<Read> = all.filter(may_hold).filter(is_near).filter_map(one).collect();
+    let mut reads: Vec<Read> = squares_of(grid, pitch).filter_map(one).collect();
     // A plain square whose neighbours blur into it looks like a marker of hardly any contrast.
     let mut contrasts: Vec<f64> = reads.iter().map(|read| read.marker.contrast).collect();
     contrasts.sort_by(f64::total_cmp);
     let usual = contrasts.get(3 * contrasts.len() / 4).copied().unwrap_or(0.0);
     reads.retain(|read| read.marker.contrast > LEAST_CONTRAST * usual);
     reads
+}
+
+/// How dark the bits are in the squares in and round a grid.
+fn faint_in(picture: &Picture, grid: &Places, board: &Board, fields: Fields) -> Vec<Faint> {
+    let one = |square| {
+        let corners = local_map::square(grid, board.pitch(), square)?;
+        Some(Faint { square, darkness: marker::darkness(picture, &corners, fields)? })
+    };
+    squares_of(grid, board.pitch()).filter_map(one).collect()
 }
 
 /// A grid with what its markers say.
@@ -288,11 +304,14 @@ enum Numbered {
 
 /// A grid as a part of the board.
 fn number(picture: &Picture, board: &Board, fields: &[Fields], grid: &Places) -> Numbered {
-    let said = fields.iter().map(|fields| {
+    let size = (grid.columns, grid.rows);
+    let one_by_one = fields.iter().map(|fields| {
         let reads = markers_in(picture, grid, board.pitch(), *fields);
-        (*fields, numbering::place(board, (grid.columns, grid.rows), &reads))
+        (*fields, numbering::place(board, size, &reads))
     });
-    let (fields, placement) = match said.into_iter().find(|(_, said)| *said != Said::Nothing) {
+    let together =
+        fields.iter().map(|fields| (*fields, faint::place(board, size, &faint_in(picture, grid, board, *fields))));
+    let (fields, placement) = match one_by_one.chain(together).find(|(_, said)| *said != Said::Nothing) {
         Some((fields, Said::Place(placement))) => (fields, placement),
         Some((_, Said::ByLayout)) => return Numbered::ByLayout,
         Some((_, Said::Nothing)) | None => return Numbered::No,

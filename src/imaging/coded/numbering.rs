@@ -41,7 +41,7 @@ pub struct Placement {
 }
 
 /// How many markers agree for each that contradicts.
-const AGREEING: usize = 3;
+pub const AGREEING: usize = 3;
 
 impl Placement {
     /// True where it is more than chance.
@@ -56,15 +56,20 @@ fn tolerated(bits: usize) -> usize {
     bits * bits / 8
 }
 
-/// What was read, as it would be in a grid of `columns` x `rows` that is turned by so many quarter turns.
-fn turned(read: &Read, (columns, rows): (usize, usize), quarters: usize) -> Read {
+/// A square, as it would be in a grid of `columns` x `rows` corners that is turned by so many quarter turns.
+pub fn turned_square((col, row): (isize, isize), (columns, rows): (usize, usize), quarters: usize) -> (isize, isize) {
     let (columns, rows) = (columns as isize, rows as isize);
-    let (col, row) = match quarters % 4 {
-        0 => (read.col, read.row),
-        1 => (rows - 2 - read.row, read.col),
-        2 => (columns - 2 - read.col, rows - 2 - read.row),
-        _ => (read.row, columns - 2 - read.col),
-    };
+    match quarters % 4 {
+        0 => (col, row),
+        1 => (rows - 2 - row, col),
+        2 => (columns - 2 - col, rows - 2 - row),
+        _ => (row, columns - 2 - col),
+    }
+}
+
+/// What was read, as it would be in such a grid.
+fn turned(read: &Read, size: (usize, usize), quarters: usize) -> Read {
+    let (col, row) = turned_square((read.col, read.row), size, quarters);
     Read { col, row, marker: read.marker.turned(quarters) }
 }
 

@@ -97,6 +97,12 @@ impl Cell {
         ((1.0 - self.share) / 2.0 * self.square).min(1.0) * self.side() * self.skew()
     }
 
+    /// Whether a first fit, whose window leaves out what a sharp picture shows of the markers, is more than a start. Two markers that lie opposite each
+    /// other pull a corner hardly; a tag has none opposite, and the next corner is but a gap away.
+    pub(super) fn stands_alone(&self, blur_px: f64) -> bool {
+        self.square <= 1.0 || self.hidden(blur_px).is_some()
+    }
+
     /// What a window of such a blur leaves out; `None` where markers stand too near for the edges to be seen by themselves.
     pub(super) fn hidden(&self, blur_px: f64) -> Option<[Option<Quad>; 2]> {
         let is_clear = self.margin_px() >= LEAST_MARGIN_PX.max(LEAST_MARGIN_BLURS * blur_px);

@@ -154,7 +154,10 @@ impl<T: Sample> Full<'_, T> {
                 ..enlarged(&from.fit.model, scale)
             };
             // On a copy of full size the first fit is a measurement already.
-            let near = self.near(cell, start, (scale == 1.0).then_some(*from), window);
+            let first = (scale == 1.0)
+                .then_some(*from)
+                .filter(|from| from.fit.model.blur_px.iter().all(|blur_px| cell.stands_alone(*blur_px)));
+            let near = self.near(cell, start, first, window);
             Some(Windows { bends, ..near })
         });
         // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large ones from.

@@ -187,7 +187,7 @@ fn look(kind: Coded, number: usize, folder: Option<&Path>) -> Outcome {
     }
 }
 
-/// The picture, and a table of id, true place and place found (empty where it was not).
+/// The picture, and a table of id, true place, place found (empty where it was not), whether it has a margin, and its squared deviation in sigmas.
 fn write(
     folder: &Path,
     name: &str,
@@ -205,8 +205,10 @@ fn write(
         let at = truth[case.board.index(col, row)];
         let corner = found.and_then(|grid| grid.get(col, row)).filter(|corner| corner.used);
         let place = corner.map_or(",".to_owned(), |corner| format!("{},{}", corner.px.x, corner.px.y));
-        let margin = corner.is_some_and(|corner| judge(case, corner, truth).has_margin);
-        writeln!(table, "{id},{},{},{place},{}", at.x, at.y, u8::from(margin)).expect("a line");
+        let judged = corner.map(|corner| judge(case, corner, truth));
+        let margin = judged.as_ref().is_some_and(|judged| judged.has_margin);
+        let chi2 = judged.map_or(String::new(), |judged| judged.chi2.to_string());
+        writeln!(table, "{id},{},{},{place},{},{chi2}", at.x, at.y, u8::from(margin)).expect("a line");
     }
     std::fs::write(folder.join(format!("{name}.csv")), table).expect("a table is written");
 }
