@@ -1,10 +1,9 @@
-//! The least-squares problem and its solvers; kernel, batch and placement are the swarms' hot loop.
+//! The least-squares problem and its solvers; batch and placement are the swarms' hot loop.
 
 pub mod batch;
 mod deleted;
 pub mod fit;
 pub mod formulation;
-pub mod kernel;
 pub mod linearised;
 pub mod placement;
 pub mod problem;
