@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use crate::geometry::rotation_matrix;
-use crate::identify::model::base::Observability;
 use crate::measurements::pose_fields;
 use crate::plan::predict::Accuracy;
 use crate::plan::{Plan, Planned};
@@ -21,16 +20,9 @@ pub struct Expected {
 /// What poses determine.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Determined {
-    /// Independent parameters.
-    pub rank: usize,
-    /// Largest over smallest singular value.
-    pub condition: Option<f64>,
-    /// O1 to O5.
-    pub observability: Option<Observability>,
-    /// Parameters that nothing shows.
-    pub zero: Vec<String>,
-    /// Parameters that act together.
-    pub dependent: Vec<String>,
+    /// Of the parameters.
+    #[serde(flatten)]
+    pub accuracy: Accuracy,
     /// Accuracy to expect.
     pub expected: Vec<Expected>,
 }
@@ -102,14 +94,8 @@ impl PlanFile {
 }
 
 fn determined(accuracy: &Accuracy, expected: &[(usize, f64)]) -> Determined {
-    Determined {
-        rank: accuracy.rank,
-        condition: accuracy.condition,
-        observability: accuracy.observability.clone(),
-        zero: accuracy.zero.clone(),
-        dependent: accuracy.groups.clone(),
-        expected: expected.iter().map(|&(poses, rms_mm)| Expected { poses, rms_mm }).collect(),
-    }
+    let expected = expected.iter().map(|&(poses, rms_mm)| Expected { poses, rms_mm }).collect();
+    Determined { accuracy: accuracy.clone(), expected }
 }
 
 /// `poses.csv` as `measure` reads it.

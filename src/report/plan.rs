@@ -22,11 +22,11 @@ pub fn summary(record: &PlanFile) -> String {
         table.row([poses.to_string(), number(at(&record.plan, poses), 4), number(paper, 4)]);
     }
     let of = |d: &Determined| {
-        let o = d.observability.as_ref();
+        let o = d.accuracy.observability.as_ref();
         format!(
             "rank {}, condition {}, O1 {}, O2 {}, O3 {}, O4 {}, O5 {}",
-            d.rank,
-            number(d.condition, 0),
+            d.accuracy.rank,
+            number(d.accuracy.condition, 0),
             number(o.map(|o| o.o1), 2),
             number(o.map(|o| o.o2), 5),
             number(o.map(|o| o.o3), 3),
@@ -38,8 +38,8 @@ pub fn summary(record: &PlanFile) -> String {
     if let Some(paper) = &record.paper {
         text += &format!("the paper's: {}\n", of(paper));
     }
-    if !record.plan.zero.is_empty() {
-        text += &format!("not determined: {}\n", record.plan.zero.join(", "));
+    if !record.plan.accuracy.zero.is_empty() {
+        text += &format!("not determined: {}\n", record.plan.accuracy.zero.join(", "));
     }
     text += &format!(
         "expected error of the target over the spheres (root mean square, {:.4} mm noise a coordinate):\n{table}",
@@ -74,7 +74,7 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
         h2 { "Accuracy to expect" }
         (page::table(&["samples", "this plan, mm", "the paper's plan, mm"], &rows))
         p { "Root mean square of the target's position error over the spheres, tilts to 25 degrees, after one rigid fit; "
-            (format!("{:.4}", record.noise_mm)) " mm noise a coordinate. Rank " (record.plan.rank) ", condition " (number(record.plan.condition, 0)) "." }
+            (format!("{:.4}", record.noise_mm)) " mm noise a coordinate. Rank " (record.plan.accuracy.rank) ", condition " (number(record.plan.accuracy.condition, 0)) "." }
         (curve(record)?)
         (map(plan)?)
         h2 { "Where the cameras stand" }
@@ -103,7 +103,7 @@ fn numbers(record: &PlanFile, plan: &Plan) -> [(String, String); 3] {
             format!("expected position error after {} samples", best.map_or(samples, |e| e.poses)),
         ),
         (plan.poses.len().to_string(), format!("poses, {samples} of them samples")),
-        (record.plan.rank.to_string(), "parameters determined".to_owned()),
+        (record.plan.accuracy.rank.to_string(), "parameters determined".to_owned()),
     ]
 }
 
