@@ -206,7 +206,7 @@ fn findings(
     let mut list = moved_targets(poses, moved, names, sorter);
     let mut add = |finding: String, rows: Vec<String>, action: &str| {
         if !rows.is_empty() {
-            list.push(Finding { finding, rows, action: action.to_owned() });
+            list.push(Finding::new(finding, action).about(rows));
         }
     };
     let rows = |holds: &dyn Fn(&Judged) -> bool| -> Vec<String> {
