@@ -132,22 +132,10 @@ fn curve(record: &PlanFile) -> Result<maud::Markup> {
 
 /// Places of the spheres by thirds of the expected error.
 fn map(plan: &Plan) -> Result<maud::Markup> {
-    let mut errors: Vec<f64> = plan.map.iter().map(|m| m.1).collect();
-    errors.sort_by(f64::total_cmp);
-    let third = |k: usize| errors.get(k * errors.len() / 3).copied().unwrap_or(0.0);
-    let limits = [third(1), third(2), f64::INFINITY];
-    let mut plot = Plot::new("Expected error over the workspace, from above", "x, mm", "y, mm").equal_axes();
-    let mut low = 0.0;
-    for high in limits {
-        let within = plan.map.iter().filter(|m| m.1 >= low && m.1 < high);
-        let points: Vec<(f64, f64)> = within.map(|m| (m.0.x, m.0.y)).collect();
-        let label =
-            if high.is_finite() { format!("{low:.4} to {high:.4} mm") } else { format!("{low:.4} mm and more") };
-        plot = plot.points(&label, &points);
-        low = high;
-    }
+    let points: Vec<(f64, f64, f64)> = plan.map.iter().map(|m| (m.0.x, m.0.y, m.1)).collect();
+    let plot = Plot::new("Expected error over the workspace, from above", "x, mm", "y, mm").equal_axes();
     Ok(page::figure(
-        &plot.svg()?,
+        &plot.points_by_thirds(&points).svg()?,
         "The position error to expect at new poses, base frame; a third of them each. Work where it is small, or measure more poses where it is large.",
     ))
 }
