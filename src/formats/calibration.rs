@@ -60,7 +60,6 @@ struct BoardsRecord {
 /// A rig and what its calibration says beside it; files made elsewhere do not say that.
 #[derive(Debug, Clone)]
 pub struct Calibrated {
-    /// The rig.
     pub rig: Rig,
     /// How corners scattered.
     pub noise: Option<Noise>,

@@ -36,7 +36,6 @@ pub struct Group {
     pub center_mm: [f64; 3],
     /// Where the left camera was assumed.
     pub cam_from_base: CamFromBase,
-    /// Poses.
     pub poses: usize,
 }
 
@@ -45,14 +44,12 @@ pub struct Group {
 pub struct CamFromBase {
     /// Three rows of three.
     pub rotation: [[f64; 3]; 3],
-    /// mm
     pub translation_mm: [f64; 3],
 }
 
 /// `plan.json`
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlanFile {
-    /// This plan.
     #[serde(flatten)]
     pub plan: Determined,
     /// Standard deviation of a coordinate that was reckoned with, mm.
@@ -68,7 +65,6 @@ pub struct PlanFile {
 }
 
 impl PlanFile {
-    /// Of a plan.
     pub fn new(plan: &Plan) -> PlanFile {
         let group = |(k, placement): (usize, &crate::plan::scene::Placement)| {
             let r = rotation_matrix(&placement.left_from_base);

@@ -9,7 +9,6 @@ use crate::identify::judge::recheck::{CauseSeen, Moved, Recheck};
 /// The history's name in a results folder.
 pub const HISTORY: &str = "verify.csv";
 
-/// The file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RobotRecheckFile {
     /// What is said of the robot.

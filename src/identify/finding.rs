@@ -2,10 +2,8 @@
 
 use serde::Serialize;
 
-/// One finding.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// What it is.
     pub finding: String,
     /// The rows it is about, by pose; empty where it is about all of them.
     pub rows: Vec<String>,

@@ -27,7 +27,6 @@ const LIMIT_SIGMAS: f64 = 5.0;
 /// A small picture of a pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Thumbnail {
-    /// The pose.
     pub pose: String,
     /// What is to be seen.
     pub caption: String,
@@ -40,7 +39,6 @@ pub struct Thumbnail {
 pub struct Distance {
     /// As the nominal robot was sent, mm.
     pub commanded_mm: f64,
-    /// As measured, mm.
     pub measured_mm: f64,
 }
 

@@ -57,7 +57,6 @@ fn counts(record: &PlanFile) -> Vec<usize> {
     all
 }
 
-/// The page.
 pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Result<String> {
     let rows: Vec<Vec<String>> = counts(record)
         .into_iter()

@@ -42,10 +42,8 @@ const GROSS: f64 = 8.0;
 /// Most cuts; data that want more are no sessions.
 const MOST_CUTS: usize = 30;
 
-/// One session.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Session {
-    /// Its group in the file.
     pub group: String,
     /// First fitted pose.
     pub first: String,

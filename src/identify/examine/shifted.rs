@@ -54,7 +54,6 @@ pub struct Shift {
 struct Left {
     /// Distance of each reading from where the robot is, mm; `None` where it belongs to no row.
     errors: Vec<Option<f64>>,
-    /// Their mean.
     mean: f64,
     tool_mm: Vector3<f64>,
 }

@@ -53,7 +53,6 @@ impl Spread {
     }
 }
 
-/// The error of one row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RowError {
     /// Row of the data set.
@@ -93,7 +92,6 @@ pub struct Judge<'a> {
     pub wire_offset: bool,
     /// Unknowns of the sensor.
     pub extras: &'a [Extra],
-    /// Their values.
     pub values: &'a [f64],
 }
 

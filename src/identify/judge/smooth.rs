@@ -18,7 +18,6 @@ use crate::identify::solve::linearised::{Linearised, Placement};
 /// A smooth error that the points tell of, and by how much it makes them more probable.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Told {
-    /// The error.
     pub error: SmoothError,
     /// Logarithm of the evidence for it.
     pub evidence: f64,

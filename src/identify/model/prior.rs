@@ -27,7 +27,6 @@ const ROUNDS: usize = 2;
 /// A turn of the target that was mounted by hand, mrad: no information.
 const TARGET_TURN_MRAD: f64 = 3000.0;
 
-/// Number of kinds.
 const KINDS: usize = 8;
 
 /// Index of the kind of zeros, and standard deviations that the search starts from, mm.
@@ -197,7 +196,6 @@ impl Tolerance {
 pub struct Likelihood<'a> {
     /// The base parameters.
     pub base: &'a Base,
-    /// All parameters.
     pub parameters: &'a [Parameter],
     /// Unknowns of the sensor.
     pub extras: &'a [Extra],
@@ -238,7 +236,6 @@ impl Likelihood<'_> {
     }
 }
 
-/// Which kinds there are.
 fn presence(parameters: &[Parameter], extras: &[Extra]) -> [bool; KINDS] {
     let mut present = [false; KINDS];
     for kind in parameters.iter().map(|&p| kind(p)).chain(extras.iter().filter_map(|&e| extra_kind(e))) {

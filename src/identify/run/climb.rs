@@ -25,7 +25,6 @@ pub struct Judged {
     pub model: &'static str,
     /// The terms in words.
     pub terms: String,
-    /// The terms.
     #[serde(skip)]
     pub of: Terms,
     /// Root mean square held-out error of a number, mm; `None` where it could not be judged.

@@ -35,7 +35,6 @@ pub struct Task<'a> {
     pub model: Model,
     /// A smooth error that the points of a placement share.
     pub smooth: Option<SmoothError>,
-    /// Settings.
     pub settings: &'a Settings,
 }
 

@@ -34,7 +34,6 @@ pub struct CauseSeen {
     pub cause: String,
     /// For a person: what would have changed.
     pub what: String,
-    /// The unit.
     pub unit: &'static str,
     /// By how much it changed, if it alone did, and the standard deviation; `None` where the poses see nothing of it.
     pub amount: Option<f64>,
@@ -51,13 +50,11 @@ pub struct CauseSeen {
 /// How one placement stands against the old one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Moved {
-    /// The group.
     pub group: String,
     /// Whether it is more than chance.
     pub moved: bool,
     /// By how much the points moved with it, mm, and how much that is by chance.
     pub shift_mm: f64,
-    /// Its turn, rad.
     pub turn_rad: f64,
     /// What nineteen of twenty checks see, mm.
     pub seen_mm: f64,
