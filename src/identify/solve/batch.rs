@@ -124,7 +124,7 @@ impl Sockets {
 mod tests {
     use super::*;
     use crate::identify::data::dataset::Dataset;
-    use crate::identify::residuals::rows::Recipe;
+    use crate::identify::residuals::rows::RowSpec;
     use crate::identify::settings::Model;
     use crate::identify::synthetic;
     use crate::measurements::{Measurement, Observed, Role};
@@ -138,7 +138,7 @@ mod tests {
         let offsets: Vec<f64> = (0..parameters.len()).map(|i| (i as f64).sin()).collect();
         let scatter = Scatter { point_mm: 0.1, rotation_rad: 1e-3, stated: 1.0, smooth: None };
         let weights: Vec<f64> = (0..set.poses.len()).map(|i| 1.0 - 0.1 * (i % 4) as f64).collect();
-        let rows = Rows::new(&Recipe {
+        let rows = Rows::new(&RowSpec {
             set: &set,
             robot: &world.nominal,
             levers: &world.nominal,

@@ -256,7 +256,7 @@ impl<'a> Estimate<'a> {
     fn new(task: &'a Task<'a>) -> Result<Estimate<'a>, Error> {
         let levers = task.robot.clone();
         let scatter = Scatter { smooth: task.smooth, ..Scatter::of_point(FIRST_SCATTER_MM) };
-        let rows = Rows::new(&task.recipe(scatter, &[], &levers));
+        let rows = Rows::new(&task.spec(scatter, &[], &levers));
         let base = task.base(&rows)?;
         task.check_count(&rows, &base)?;
         let x = vec![0.0; base.rank() + task.extras.len()];
@@ -266,7 +266,7 @@ impl<'a> Estimate<'a> {
 
     fn round(&mut self, round: usize, held: bool) {
         let task = self.task;
-        let rows = Rows::new(&task.recipe(self.scatter, &[], &self.levers));
+        let rows = Rows::new(&task.spec(self.scatter, &[], &self.levers));
         let free = vec![f64::INFINITY; self.x.len()];
         if held {
             let spread = self.tolerance.spread(&self.base, task.parameters);
@@ -295,7 +295,7 @@ impl<'a> Estimate<'a> {
     /// The fit with scatter and prior as they are, on rows whose levers are on the robot that it ends at.
     fn settled(self, held: bool) -> Result<(Rows, Base, Solution), Error> {
         let Estimate { task, base, scatter, tolerance, mut x, levers, .. } = self;
-        let mut rows = Rows::new(&task.recipe(scatter, &[], &levers));
+        let mut rows = Rows::new(&task.spec(scatter, &[], &levers));
         let prior = prior_rows(&tolerance, &base, task, held);
         let spread = tolerance.spread(&base, task.parameters);
         let free = vec![f64::INFINITY; x.len()];
@@ -310,7 +310,7 @@ impl<'a> Estimate<'a> {
             free_fit = Some(solved);
             let settled = moved < SAME_CHAIN
                 || !task.parameters.iter().any(|p| matches!(p, Parameter::Gravity(..) | Parameter::Bending(..)));
-            rows = Rows::new(&task.recipe(scatter, &[], &levers));
+            rows = Rows::new(&task.spec(scatter, &[], &levers));
             if settled {
                 break;
             }
