@@ -140,7 +140,7 @@ impl Judge<'_> {
         let rows = Rows::new(&RowSpec {
             set: self.set,
             robot,
-            levers: robot,
+            load_chain: robot,
             parameters: &[],
             extras: &extras,
             rows,

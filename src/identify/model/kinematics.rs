@@ -47,10 +47,10 @@ pub struct Place {
 
 impl Kinematics {
     /// `joints_rad`: one vector of commanded angles a pose, of the robot's joint count.
-    /// Weights have their levers on the chain of `levers`.
-    pub fn new(nominal: &Robot, levers: &Robot, parameters: &[Parameter], joints_rad: &[&[f64]]) -> Kinematics {
+    /// Weights have their levers on the chain of `load_chain`.
+    pub fn new(nominal: &Robot, load_chain: &Robot, parameters: &[Parameter], joints_rad: &[&[f64]]) -> Kinematics {
         let constants = |q: &&[f64]| {
-            let torques = Torques::new(levers, q);
+            let torques = Torques::new(load_chain, q);
             let bent = nominal.bent_with(q, &torques);
             let tilt = |(b, n): (&Joint, &Joint)| [b.alpha_rad - n.alpha_rad, b.beta_rad - n.beta_rad];
             let tilts_rad = match (0..nominal.joints.len()).any(|joint| nominal.corrections.tilts(joint)) {

@@ -28,7 +28,7 @@ pub struct RowSpec<'a> {
     /// The robot whose parameters are offset.
     pub robot: &'a Robot,
     /// The robot on whose chain weights have their levers: where `robot` is going.
-    pub levers: &'a Robot,
+    pub load_chain: &'a Robot,
     /// The parameters that may move.
     pub parameters: &'a [Parameter],
     /// Unknowns of the sensor that may move.
@@ -63,13 +63,13 @@ pub struct Rows {
 impl Rows {
     /// Builds the blocks. Rows whose group has nothing to measure from are left out.
     pub fn new(spec: &RowSpec) -> Rows {
-        let RowSpec { set, robot, levers, parameters, rows, .. } = *spec;
+        let RowSpec { set, robot, load_chain, parameters, rows, .. } = *spec;
         let mut used: Vec<usize> = rows.to_vec();
         // A centre is a place that distances need, wherever its row went.
         used.extend(set.groups.iter().filter_map(|g| g.center).filter(|c| !rows.contains(c)));
         used.sort_unstable();
         let joints: Vec<&[f64]> = used.iter().map(|&i| set.poses[i].joints_rad.as_slice()).collect();
-        let kinematics = Kinematics::new(robot, levers, parameters, &joints);
+        let kinematics = Kinematics::new(robot, load_chain, parameters, &joints);
         let places = kinematics.places(&vec![0.0; parameters.len()], false);
         let blocks = Inputs { spec, used: &used, places: &places, by_group: by_group(set, rows) }.blocks();
         Rows { kinematics, rows: used, blocks, scatter: spec.scatter, extras: spec.extras.to_vec() }

@@ -177,8 +177,8 @@ impl Session<'_> {
         let mut wide: Vec<f64> =
             all.iter().map(|p| reference.iter().position(|q| q == p).map_or(0.0, |i| of_robot[i])).collect();
         wide.extend_from_slice(extras);
-        let levers = self.robot.shifted(reference, of_robot);
-        let rows = self.task(all, model).rows_at(scatter, &levers);
+        let load_chain = self.robot.shifted(reference, of_robot);
+        let rows = self.task(all, model).rows_at(scatter, &load_chain);
         let linearised = Linearised::new(&rows, &wide);
         let regions = Cells::by_regions(&linearised, &rows, self.set, self.settings.folds);
         if regions.whole_placements() {

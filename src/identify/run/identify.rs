@@ -230,11 +230,11 @@ impl Session<'_> {
     /// What the fit becomes without each fold of the rows, each time that they are cut into folds.
     fn deletions(&self, model: Model, parameters: &[Parameter], at: &Formulation) -> Vec<Deletion> {
         let offsets = at.offsets_of();
-        let levers = self.robot.shifted(parameters, &offsets[..parameters.len()]);
+        let load_chain = self.robot.shifted(parameters, &offsets[..parameters.len()]);
         // What is smooth over a placement makes one of all its rows; without it rows can be left out.
         let scatter = Scatter { smooth: None, ..at.rows.scatter };
         let task = Task { smooth: None, ..self.task(parameters, model) };
-        let rows = task.rows_at(scatter, &levers);
+        let rows = task.rows_at(scatter, &load_chain);
         let linearised = Linearised::new(&rows, &offsets);
         let of_repeat = |of_row: &Vec<Option<usize>>| -> Vec<Deletion> {
             let changes = Cells::by_folds(&linearised, &rows, of_row).deletions(parameters, &at.tolerance);

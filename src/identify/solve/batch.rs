@@ -141,7 +141,7 @@ mod tests {
         let rows = Rows::new(&RowSpec {
             set: &set,
             robot: &world.nominal,
-            levers: &world.nominal,
+            load_chain: &world.nominal,
             parameters: &parameters,
             extras: &[],
             rows: &set.fit_rows(),

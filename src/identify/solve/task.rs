@@ -54,11 +54,11 @@ impl<'a> Task<'a> {
         Task { set, robot, parameters, extras: set.body_unknowns(), rows, model, smooth: None, settings }
     }
 
-    pub(super) fn spec(&self, scatter: Scatter, weights: &'a [f64], levers: &'a Robot) -> RowSpec<'a> {
+    pub(super) fn spec(&self, scatter: Scatter, weights: &'a [f64], load_chain: &'a Robot) -> RowSpec<'a> {
         RowSpec {
             set: self.set,
             robot: self.robot,
-            levers,
+            load_chain,
             parameters: self.parameters,
             extras: self.extras,
             rows: self.rows,
@@ -77,8 +77,8 @@ impl<'a> Task<'a> {
     }
 
     /// The rows with a scatter that is known.
-    pub fn rows_at(&self, scatter: Scatter, levers: &Robot) -> Rows {
-        Rows::new(&self.spec(scatter, &[], levers))
+    pub fn rows_at(&self, scatter: Scatter, load_chain: &Robot) -> Rows {
+        Rows::new(&self.spec(scatter, &[], load_chain))
     }
 
     /// What the poses determine, seen from the nominal robot.

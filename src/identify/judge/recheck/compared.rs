@@ -86,7 +86,7 @@ pub(super) fn rows(
     Rows::new(&RowSpec {
         set: &set,
         robot,
-        levers: robot,
+        load_chain: robot,
         parameters,
         extras: &extras,
         rows: used,
