@@ -1,6 +1,6 @@
 //! What an identification ends with.
 
-use super::climb::Judged;
+use super::forward_selection::Judged;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::scale::CommonScale;
 use crate::identify::judge::smooth;

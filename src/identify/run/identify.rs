@@ -9,7 +9,7 @@
 //! 5. Verify rows take no part in any choice but one: where the robot found is worse on them than the nominal one by more than another draw
 //!    of rows would let expect, nominal is kept. Without verify rows every row is fitted, and judged by fits that it was left out of.
 
-use super::climb::Judged;
+use super::forward_selection::Judged;
 use super::found::{Candidate, Deletion, Identification};
 use super::gross::Gross;
 use super::held_out::Against;
@@ -150,7 +150,7 @@ impl Session<'_> {
         (self.step)("models of the robot");
         let (terms, judged) = match self.settings.extensions {
             Extensions::None => (Terms::default(), Vec::new()),
-            Extensions::Auto => self.climb(by_points)?,
+            Extensions::Auto => self.select_terms(by_points)?,
         };
         if terms.chain == Chain::Mdh && terms != first && self.tells(&terms, ROWS_TELL) {
             // A row that a poorer model could not follow is no gross error, and a richer one follows too much.

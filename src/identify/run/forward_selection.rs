@@ -2,7 +2,7 @@
 //!
 //! In: the rows that may be fitted. Out: the terms that are worth taking, with the held-out error of all that were tried. From the
 //! nominal robot on the successor of least held-out error is taken that is worth its terms; the cells that say so are linearised anew
-//! where the model that was taken fits, and the climb goes on from there.
+//! where the model that was taken fits, and the selection goes on from there.
 
 use rayon::prelude::*;
 
@@ -77,7 +77,7 @@ const MOST_CLIMBS: usize = 4;
 
 impl Session<'_> {
     /// From the nominal robot up as far as it is worth it, with all that was judged.
-    pub(super) fn climb(&mut self, model: Model) -> Result<(Terms, Vec<Judged>), Error> {
+    pub(super) fn select_terms(&mut self, model: Model) -> Result<(Terms, Vec<Judged>), Error> {
         let all = Terms::ALL.parameters(self.robot);
         let reference = self.reference(MOST_PARAMETERS);
         let mut at = Terms { chain: Chain::Mdh, ..reference };
@@ -89,7 +89,7 @@ impl Session<'_> {
         let mut judged = Vec::new();
         let mut best = Terms::NOMINAL;
         for _ in 0..MOST_CLIMBS {
-            let Some(next) = self.climb_from(best, &cells, model, &mut judged) else {
+            let Some(next) = self.select_from(best, &cells, model, &mut judged) else {
                 return Ok((Terms::default(), judged));
             };
             if next == best {
@@ -109,7 +109,7 @@ impl Session<'_> {
     }
 
     /// Up the ladder from `best` by what these cells say; `None` where nothing can be held out.
-    fn climb_from(&self, mut best: Terms, cells: &[Cells], model: Model, judged: &mut Vec<Judged>) -> Option<Terms> {
+    fn select_from(&self, mut best: Terms, cells: &[Cells], model: Model, judged: &mut Vec<Judged>) -> Option<Terms> {
         let regions = cells.first()?;
         let judge = |terms: Terms, judged: &mut Vec<Judged>| -> Option<Ways> {
             let parameters = terms.parameters(self.robot);
