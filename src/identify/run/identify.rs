@@ -17,7 +17,7 @@ use super::session::Session;
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::shared;
-use crate::identify::judge::cells::Cells;
+use crate::identify::judge::cross_validation::CrossValidation;
 use crate::identify::judge::{folds, smooth};
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::sensor::{Extra, Scatter};
@@ -211,8 +211,8 @@ impl Session<'_> {
         let parameters = terms.parameters(self.robot);
         let mut formulation = Formulation::new(&self.task(&parameters, model))?;
         if model != Model::PairwiseDistance {
-            let cells = self.cells(&parameters, &parameters, &formulation, formulation.rows.scatter, model);
-            formulation.common = cells[0].common_factor(&parameters);
+            let validations = self.validations(&parameters, &parameters, &formulation, formulation.rows.scatter, model);
+            formulation.common = validations[0].common_factor(&parameters);
         }
         let deletions = if self.set.verify_rows().is_empty() {
             self.deletions(model, &parameters, &formulation)
@@ -237,7 +237,7 @@ impl Session<'_> {
         let rows = task.rows_at(scatter, &load_chain);
         let linearised = Linearised::new(&rows, &offsets);
         let of_repeat = |of_row: &Vec<Option<usize>>| -> Vec<Deletion> {
-            let changes = Cells::by_folds(&linearised, &rows, of_row).deletions(parameters, &at.tolerance);
+            let changes = CrossValidation::by_folds(&linearised, &rows, of_row).deletions(parameters, &at.tolerance);
             let of_fold = |(fold, change): (usize, Option<Vec<f64>>)| {
                 let of_fold: Vec<usize> = (0..of_row.len()).filter(|&r| of_row[r] == Some(fold)).collect();
                 Some(Deletion { rows: of_fold, change: change? }).filter(|d| !d.rows.is_empty())
