@@ -1,6 +1,5 @@
-//! The least-squares problem and its solvers; batch and placement are the swarms' hot loop.
+//! The least-squares problem and its solvers; swarm_cost and placement are the swarms' hot loop.
 
-pub mod batch;
 mod deleted;
 pub mod fit;
 pub mod formulation;
@@ -10,5 +9,6 @@ pub mod problem;
 pub mod robust;
 pub mod scatter;
 pub mod swarm;
+pub mod swarm_cost;
 pub mod task;
 pub mod trust_region;

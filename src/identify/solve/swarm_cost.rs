@@ -16,13 +16,13 @@ use crate::identify::sensor::Scatter;
 
 /// Blocks whose cost needs no matrices.
 #[derive(Debug, Clone)]
-pub struct BatchCost {
+pub struct SwarmCost {
     kinematics: Kinematics,
-    blocks: Vec<BatchBlock>,
+    blocks: Vec<BlockCost>,
 }
 
 #[derive(Debug, Clone)]
-enum BatchBlock {
+enum BlockCost {
     /// The centre's pose; pose, length and weight of each distance.
     Center(usize, Vec<(usize, f64, f64)>),
     Touch(Sockets),
@@ -36,9 +36,9 @@ struct Sockets {
     known: Option<Known>,
 }
 
-impl BatchCost {
+impl SwarmCost {
     /// `None` where a block is of another kind.
-    pub fn new(rows: &Rows) -> Option<BatchCost> {
+    pub fn new(rows: &Rows) -> Option<SwarmCost> {
         let scatter = &rows.scatter;
         let kinematics = &rows.kinematics;
         let mut places = None;
@@ -50,39 +50,39 @@ impl BatchCost {
                 Block::Center(c) => {
                     let weighted =
                         c.lengths.iter().map(|l| (l.pose, l.length_mm, (l.weight / scatter.sd(l, 2.0)).powi(2)));
-                    BatchBlock::Center(c.center, weighted.collect())
+                    BlockCost::Center(c.center, weighted.collect())
                 }
-                Block::Touch(touch) => BatchBlock::Touch(Sockets::new(touch, scatter)?),
+                Block::Touch(touch) => BlockCost::Touch(Sockets::new(touch, scatter)?),
                 _ => {
                     let places = places
                         .get_or_insert_with(|| kinematics.places(&vec![0.0; kinematics.parameters().len()], true));
-                    BatchBlock::Placement(Placement::new(block, places, scatter)?)
+                    BlockCost::Placement(Placement::new(block, places, scatter)?)
                 }
             });
         }
-        Some(BatchCost { kinematics: kinematics.clone(), blocks })
+        Some(SwarmCost { kinematics: kinematics.clone(), blocks })
     }
 
     /// The sum of the squared white residuals at these offsets (mm, mrad).
     pub fn sum_of_squares(&self, offsets: &[f64]) -> f64 {
         let points = self.kinematics.points(offsets);
-        let oriented = self.blocks.iter().any(|b| matches!(b, BatchBlock::Placement(p) if p.is_oriented()));
+        let oriented = self.blocks.iter().any(|b| matches!(b, BlockCost::Placement(p) if p.is_oriented()));
         let rotations = if oriented { self.kinematics.rotations(offsets) } else { Vec::new() };
         self.blocks.iter().map(|b| b.sum_of_squares(offsets, &points, &rotations)).sum()
     }
 }
 
-impl BatchBlock {
+impl BlockCost {
     fn sum_of_squares(&self, offsets: &[f64], points: &Computed, rotations: &[Matrix3<f64>]) -> f64 {
         match self {
-            BatchBlock::Center(center, lengths) => {
+            BlockCost::Center(center, lengths) => {
                 let square = |&(pose, length_mm, weight): &(usize, f64, f64)| {
                     weight * ((points.at(pose) - points.at(*center)).norm() - length_mm).powi(2)
                 };
                 lengths.iter().map(square).sum()
             }
-            BatchBlock::Touch(sockets) => sockets.sum_of_squares(points),
-            BatchBlock::Placement(placement) => placement.sum_of_squares(offsets, points, rotations),
+            BlockCost::Touch(sockets) => sockets.sum_of_squares(points),
+            BlockCost::Placement(placement) => placement.sum_of_squares(offsets, points, rotations),
         }
     }
 }
@@ -151,7 +151,7 @@ mod tests {
             wire_offset: true,
         });
         let long = rows.evaluate(&offsets, false).0.norm_squared();
-        let fast = BatchCost::new(&rows).unwrap().sum_of_squares(&offsets);
+        let fast = SwarmCost::new(&rows).unwrap().sum_of_squares(&offsets);
         assert!((fast / long - 1.0).abs() < 1e-9, "{model:?}: {fast} {long}");
     }
 
