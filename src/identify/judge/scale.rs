@@ -33,7 +33,7 @@ const GIVE_OR_TAKE: f64 = 4.0;
 const SCALES: [f64; 4] = [0.003, 0.01, 0.03, 0.1];
 
 /// Logarithm of the odds from which on a scale is told of, twelve to one: none of 600 clean simulated sets has as much.
-const TOLD: f64 = 2.5;
+const SIGNIFICANT: f64 = 2.5;
 
 /// Chance that the scale is larger than is said of one that would not be seen.
 const LARGER: f64 = 0.01;
@@ -87,15 +87,15 @@ impl CommonScale {
     }
 
     /// Whether it is more than the links' own errors make by chance.
-    pub fn is_told(&self) -> bool {
-        self.log_odds > TOLD
+    pub fn is_significant(&self) -> bool {
+        self.log_odds > SIGNIFICANT
     }
 
     /// The scale that was found, or how large a one would not be.
     pub fn sentence(&self) -> String {
         let CommonScale { share, sigma, unseen, of, .. } = *self;
         let (percent, way) = (100.0 * share.abs(), if share > 0.0 { "longer" } else { "shorter" });
-        match self.is_told() {
+        match self.is_significant() {
             true => format!(
                 "all links are found {percent:.2} % (+- {:.2}) {way} than the nominal ones: the {of} are scaled, or the lengths of the robot file",
                 100.0 * sigma
@@ -226,7 +226,7 @@ mod tests {
                 unseen > found.abs() + 2.0 * sigma && unseen < found.abs() + 5.0 * sigma,
                 "{found} {sigma} {unseen}"
             );
-            assert_eq!(log_odds > TOLD, told, "{error_mm} {share}: {log_odds} {found}");
+            assert_eq!(log_odds > SIGNIFICANT, told, "{error_mm} {share}: {log_odds} {found}");
             assert!((found - share).abs() < 0.005 * error_mm.max(0.1), "{error_mm} {share}: {found}");
         }
     }

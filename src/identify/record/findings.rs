@@ -104,7 +104,7 @@ fn of_rows(set: &Dataset, found: &Identification) -> Vec<Finding> {
 fn of_sensor(set: &Dataset, found: &Identification) -> Vec<Finding> {
     let mut list = Vec::new();
     let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
-    if let Some(scale) = found.scale(set).filter(CommonScale::is_told) {
+    if let Some(scale) = found.scale(set).filter(CommonScale::is_significant) {
         add(scale.sentence(), Vec::new(), "the robot that was found has this scale; check it on a known length");
     }
     if let Some((zero_mm, sigma_mm)) = zero(found) {

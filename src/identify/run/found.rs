@@ -49,7 +49,7 @@ pub struct Identification {
     /// The scatter that is left of the chosen fit.
     pub scatter: Scatter,
     /// A smooth error that the points of each placement share.
-    pub smooth: Option<smooth::Told>,
+    pub smooth: Option<smooth::Detected>,
     /// Unknowns of the sensor, and their values.
     pub extras: Vec<(Extra, f64)>,
     /// Whether the nominal robot was kept because the verify rows found the other one worse.

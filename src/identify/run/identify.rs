@@ -162,7 +162,7 @@ impl Session<'_> {
 
     /// A smooth error that the points of each placement share, where they tell of one. It comes after the terms: what the robot
     /// does wrong is as smooth, and a robot that is corrected is worth more than one about which less is certain.
-    fn smooth_error(&self, model: Model, terms: &Terms) -> Result<Option<smooth::Told>, Error> {
+    fn smooth_error(&self, model: Model, terms: &Terms) -> Result<Option<smooth::Detected>, Error> {
         let parameters = terms.parameters(self.robot);
         let at = Formulation::new(&self.task(&parameters, model))?;
         let sds = at.tolerance.standard_deviations(&parameters, &self.extras);
