@@ -134,7 +134,7 @@ fn map(plan: &Plan) -> Result<maud::Markup> {
     let points: Vec<(f64, f64, f64)> = plan.map.iter().map(|m| (m.0.x, m.0.y, m.1)).collect();
     let plot = Plot::new("Expected error over the workspace, from above", "x, mm", "y, mm").equal_axes();
     Ok(page::figure(
-        &plot.points_by_thirds(&points).svg()?,
+        &plot.points_by_thirds(&points, 0.0).svg()?,
         "The position error to expect at new poses, base frame; a third of them each. Work where it is small, or measure more poses where it is large.",
     ))
 }

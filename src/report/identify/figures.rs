@@ -33,9 +33,10 @@ pub(super) fn verification_figure(before: &[RowError], after: &[RowError]) -> Re
 
 /// The poses by thirds of the error to expect, from above and from the side.
 pub(super) fn expected_map(expected: &Expected, places: &[(Role, Point3<f64>)]) -> Result<Markup> {
+    let least_mm = expected.map.iter().map(|(_, mm)| *mm).fold(f64::INFINITY, f64::min);
     let view = |title: &str, vertical: &str, axes: (usize, usize)| {
         let points = expected.map.iter().zip(places).map(|((_, mm), (_, p))| (p[axes.0], p[axes.1], *mm));
-        Plot::new(title, "x, mm", vertical).equal_axes().points_by_thirds(&points.collect::<Vec<_>>()).svg()
+        Plot::new(title, "x, mm", vertical).equal_axes().points_by_thirds(&points.collect::<Vec<_>>(), least_mm).svg()
     };
     let caption = "The error to expect at the poses of the file, base frame, a third of them each. More poses help most where it is largest.";
     Ok(html! { div.side {
