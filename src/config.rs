@@ -65,7 +65,6 @@ pub struct Config {
     pub identify: crate::identify::Settings,
 }
 
-/// A board in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(try_from = "BoardFields")]
 pub struct BoardSettings(Board);

@@ -15,7 +15,6 @@ pub fn rotation_vector(a_from_b: &Transform) -> Vector3<f64> {
     a_from_b.rotation.scaled_axis()
 }
 
-/// The rotation matrix of a transform.
 pub fn rotation_matrix(a_from_b: &Transform) -> Matrix3<f64> {
     a_from_b.rotation.to_rotation_matrix().into_inner()
 }

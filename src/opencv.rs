@@ -5,7 +5,7 @@
 use std::sync::Once;
 
 use nalgebra::{Matrix3, Matrix3x4, Matrix4, Point2};
-use opencv::core::{Mat, Point2f, Size, TermCriteria, Vector};
+use opencv::core::{Mat, Point2f, Size, Vector};
 use opencv::prelude::{MatTraitConst, MatTraitConstManual};
 use opencv::{calib3d, core, imgproc};
 
@@ -42,16 +42,6 @@ pub fn find_board(picture: &Grey8, columns: usize, rows: usize) -> Result<Option
         return Ok(None);
     }
     Ok(Some(corners.iter().map(|p| Point2::new(f64::from(p.x), f64::from(p.y))).collect()))
-}
-
-/// OpenCV's `cornerSubPix` with a window of `2 half + 1` px: the yardstick of the corner benchmark, not used to measure.
-pub fn corner_sub_pix(picture: &Grey8, start: &[Point2<f64>], half: i32) -> Result<Vec<Point2<f64>>, Failure> {
-    hold_to_one_thread();
-    let image = Mat::new_rows_cols_with_data(picture.height as i32, picture.width as i32, &picture.pixels)?;
-    let mut corners: Vector<Point2f> = start.iter().map(|p| Point2f::new(p.x as f32, p.y as f32)).collect();
-    let stop = TermCriteria::new(core::TermCriteria_COUNT + core::TermCriteria_EPS, 100, 1e-4)?;
-    imgproc::corner_sub_pix(&image, &mut corners, Size::new(half, half), Size::new(-1, -1), stop)?;
-    Ok(corners.iter().map(|p| Point2::new(f64::from(p.x), f64::from(p.y))).collect())
 }
 
 /// OpenCV's number for "both principal points are the same".
@@ -202,48 +192,4 @@ pub fn read_matrix(text: &str, name: &str) -> opencv::Result<Vec<f64>> {
     use opencv::prelude::{FileNodeTraitConst, FileStorageTraitConst};
     let storage = FileStorage::new(text, FileStorage_READ | FileStorage_MEMORY, "")?;
     storage.get(name)?.mat()?.data_typed::<f64>().map(<[f64]>::to_vec)
-}
-
-/// OpenCV's `calibrateCamera` and `stereoCalibrate` on complete boards, four distortion terms: RMS, px, and baseline, mm.
-/// The yardstick of the calibration benchmark, not used to calibrate.
-pub fn stereo_calibrate(corners: &crate::imaging::Corners) -> Result<(f64, f64), Failure> {
-    use opencv::core::{Mat, Point2f, Point3f, Size, TermCriteria, Vector};
-    let (mut objects, mut images) =
-        (Vector::<Vector<Point3f>>::new(), [(); 2].map(|()| Vector::<Vector<Point2f>>::new()));
-    let all = corners.board.corner_count();
-    for pair in corners.pairs.iter().filter(|p| p.left.len() == all && p.right.len() == all) {
-        let place = |c: &crate::imaging::Corner| corners.board.corner_mm(c.col, c.row).cast::<f32>();
-        objects.push(pair.left.iter().map(place).map(|p| Point3f::new(p.x, p.y, p.z)).collect());
-        for (image, list) in images.iter_mut().zip([&pair.left, &pair.right]) {
-            image.push(list.iter().map(|c| c.px.cast::<f32>()).map(|p| Point2f::new(p.x, p.y)).collect());
-        }
-    }
-    let size = Size::new(corners.left_size.0 as i32, corners.left_size.1 as i32);
-    let criteria = TermCriteria::new(3, 100, 1e-9)?;
-    let flags = calib3d::CALIB_FIX_K3;
-    let mut cameras = [(); 2].map(|()| (Mat::default(), Mat::default()));
-    for ((matrix, distortion), image) in cameras.iter_mut().zip(&images) {
-        let (mut r, mut t) = (Mat::default(), Mat::default());
-        calib3d::calibrate_camera(&objects, image, size, matrix, distortion, &mut r, &mut t, flags, criteria)?;
-    }
-    let [(m1, d1), (m2, d2)] = &mut cameras;
-    let [mut r, mut t, mut e, mut f] = [(); 4].map(|()| Mat::default());
-    let rms = calib3d::stereo_calibrate(
-        &objects,
-        &images[0],
-        &images[1],
-        m1,
-        d1,
-        m2,
-        d2,
-        size,
-        &mut r,
-        &mut t,
-        &mut e,
-        &mut f,
-        flags | calib3d::CALIB_USE_INTRINSIC_GUESS,
-        criteria,
-    )?;
-    let baseline = t.data_typed::<f64>()?.iter().map(|v| v * v).sum::<f64>().sqrt();
-    Ok((rms, baseline))
 }

@@ -22,7 +22,6 @@ const MOST_SAID: usize = 20;
 /// What `compensate.json` says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Summary {
-    /// Targets in the file.
     targets: usize,
     /// Those with readings.
     compensated: usize,

@@ -17,7 +17,6 @@ use crate::robot::catalogue::names;
 use crate::robot::catalogue::{self, Convention};
 use crate::robot::{Error, Robot, file};
 
-/// Runs the command.
 pub fn run(args: &RobotCommand, config: &Config, run: Run) -> Result<Outcome> {
     let stdout = match &args.what {
         RobotWhat::Import(args) => import(args, config, run)?,

@@ -15,12 +15,10 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// It is not there.
     #[error("{what} not found")]
     Missing {
         /// What was looked for.
         what: &'static str,
-        /// Where.
         path: Utf8PathBuf,
         /// What makes it.
         hint: Option<String>,
@@ -37,22 +35,15 @@ pub enum Error {
     },
     /// It would take the place of a file that the run reads.
     #[error("{path} is read by this run and would be overwritten by it")]
-    OverInput {
-        /// The file.
-        path: Utf8PathBuf,
-    },
+    OverInput { path: Utf8PathBuf },
     /// It would take the place of a file that is not, as it stands, this program's.
     #[error("{path} is there already, and was not written by stereocal or was changed since")]
-    OverForeign {
-        /// The file.
-        path: Utf8PathBuf,
-    },
+    OverForeign { path: Utf8PathBuf },
     /// The content is not what the format asks for.
     #[error("{message}")]
     Format {
         /// What was found and what was needed.
         message: String,
-        /// Where.
         place: Place,
         /// What to change.
         hint: Option<String>,
@@ -105,7 +96,6 @@ pub fn read_text_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, 
     }
 }
 
-/// Reads a JSON file.
 pub fn read_json<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<T> {
     let text = read_text(path, what, hint)?;
     serde_json::from_str(&text).map_err(|e| Error::Format {
@@ -115,7 +105,6 @@ pub fn read_json<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint:
     })
 }
 
-/// Reads a TOML file.
 pub fn read_toml<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<T> {
     let text = read_text(path, what, hint)?;
     toml::from_str(&text).map_err(|e| {

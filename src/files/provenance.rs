@@ -100,7 +100,6 @@ pub struct Digested {
 }
 
 impl Digested {
-    /// A file that was written.
     pub fn written(name: &str, bytes: &[u8]) -> Digested {
         let (sha256, content_sha256) = rayon::join(|| sha256(bytes), || content_sha256(name, bytes));
         Digested { file: name.to_owned(), sha256, pictures: None, content_sha256 }

@@ -60,7 +60,6 @@ struct BoardsRecord {
 /// A rig and what its calibration says beside it; files made elsewhere do not say that.
 #[derive(Debug, Clone)]
 pub struct Calibrated {
-    /// The rig.
     pub rig: Rig,
     /// How corners scattered.
     pub noise: Option<Noise>,
@@ -68,8 +67,6 @@ pub struct Calibrated {
     pub pair_excess: Option<f64>,
     /// How many pairs with poses of their own made the rig.
     pub pairs: Option<usize>,
-    /// Nearest and farthest corner of a board, along the left camera's axis, mm.
-    pub depths_mm: Option<[f64; 2]>,
     /// The volume that the verdict was for.
     pub volume: Option<Volume>,
     /// The board that calibrated.
@@ -86,7 +83,6 @@ impl Calibrated {
             noise: None,
             pair_excess: None,
             pairs: None,
-            depths_mm: None,
             volume: None,
             board: None,
             unconfirmed: Vec::new(),
@@ -226,11 +222,6 @@ impl CalibrationFile {
         self.board.as_ref()?.parse().ok()
     }
 
-    fn depths_mm(&self) -> Option<[f64; 2]> {
-        let depths = self.boards.map(|b| [b.nearest_mm, b.farthest_mm])?;
-        (depths[0] > 0.0 && depths[1] >= depths[0]).then_some(depths)
-    }
-
     fn noise(&self) -> Option<Noise> {
         let noise =
             self.corner_noise.filter(|n| n.factor >= 0.0 && n.added_px >= 0.0 && n.factor + n.added_px > 0.0)?;
@@ -328,7 +319,6 @@ pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
         noise: file.noise(),
         pair_excess: file.corner_noise.and_then(|n| n.pair_excess).filter(|e| *e >= 1.0),
         pairs: file.corner_noise.and_then(|n| n.pairs),
-        depths_mm: file.depths_mm(),
         board: file.board(),
         volume: file.volume,
         unconfirmed: file.unconfirmed,

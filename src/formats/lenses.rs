@@ -16,7 +16,6 @@ use crate::stereo::model::known_lenses::KnownLenses;
 /// A file with lenses, and the side that it is for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LensFile {
-    /// The file.
     pub path: Utf8PathBuf,
     /// The side; both where `None`.
     pub side: Option<Side>,

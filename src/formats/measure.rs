@@ -35,28 +35,33 @@ const UNUSUAL_EXCESS: f64 = 2.25;
 /// The content of `measure.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeasureFile {
+    /// Crossings of the target in a row.
     #[serde(skip)]
-    columns: usize,
+    pub columns: usize,
     board: String,
     square_mm: f64,
-    poses: usize,
-    measured: usize,
+    /// Poses in the list, and poses measured.
+    pub poses: usize,
+    /// See `poses`.
+    pub measured: usize,
     /// "agrees", "allowed", "contradicts", "exchanged", "moved", "unexplained".
     rig: RigRecord,
     /// Chi-square a number over all poses, against the calibration's noise where that is known.
     chi_square: Option<f64>,
-    /// Standard deviation of a corner's coordinate, here and at the calibration, px.
-    corner_noise_px: Option<f64>,
-    calibration_noise_px: Option<f64>,
+    /// Standard deviation of a corner's coordinate, px.
+    pub corner_noise_px: Option<f64>,
+    /// Up to how far the calibration and the target's print let expect, px.
+    pub calibration_noise_px: Option<f64>,
     /// Root mean square over the poses of the corners' distance from the fitted board, mm.
-    fit_rms_mm: Option<f64>,
+    pub fit_rms_mm: Option<f64>,
     /// Root mean square over the poses of the 2-D residuals, px.
-    reprojection_rms_px: Option<f64>,
+    pub reprojection_rms_px: Option<f64>,
     /// Median standard deviation of the mark point along x, y, z, mm.
-    sigma_mm: Option<[f64; 3]>,
+    pub sigma_mm: Option<[f64; 3]>,
     results: Vec<Row>,
     missing: Vec<Missing>,
-    warnings: Vec<String>,
+    /// What a person should look at.
+    pub warnings: Vec<String>,
     target_shape: Option<ShapeRecord>,
     shared: Option<SharedRecord>,
 }
@@ -183,40 +188,10 @@ impl MeasureFile {
         }
     }
 
-    /// What a person should look at.
-    pub fn warnings(&self) -> &[String] {
-        &self.warnings
-    }
-
-    /// How far corners scatter, and up to how far the calibration and the target's print let expect, px.
-    pub fn scatter_px(&self) -> (Option<f64>, Option<f64>) {
-        (self.corner_noise_px, self.calibration_noise_px)
-    }
-
     /// True where neither the corners' scatter nor the poses' disagreement is beyond what was known before.
     pub fn chi_square_is_usual(&self) -> bool {
         self.chi_square.is_some_and(|chi| chi <= UNUSUAL_NOISE * UNUSUAL_NOISE)
             && self.rig.excess <= UNUSUAL_EXCESS * self.rig.usual_excess
-    }
-
-    /// Crossings of the target in a row.
-    pub fn columns(&self) -> usize {
-        self.columns
-    }
-
-    /// Poses in the list, and poses measured.
-    pub fn counts(&self) -> (usize, usize) {
-        (self.poses, self.measured)
-    }
-
-    /// Residuals: mm on the board, px in the pictures.
-    pub fn residuals(&self) -> (Option<f64>, Option<f64>) {
-        (self.fit_rms_mm, self.reprojection_rms_px)
-    }
-
-    /// Median standard deviation of the mark point, mm.
-    pub fn sigma_mm(&self) -> Option<[f64; 3]> {
-        self.sigma_mm
     }
 }
 

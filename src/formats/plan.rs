@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use crate::geometry::rotation_matrix;
-use crate::identify::model::base::Observability;
 use crate::measurements::pose_fields;
 use crate::plan::predict::Accuracy;
 use crate::plan::{Plan, Planned};
@@ -21,16 +20,9 @@ pub struct Expected {
 /// What poses determine.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Determined {
-    /// Independent parameters.
-    pub rank: usize,
-    /// Largest over smallest singular value.
-    pub condition: Option<f64>,
-    /// O1 to O5.
-    pub observability: Option<Observability>,
-    /// Parameters that nothing shows.
-    pub zero: Vec<String>,
-    /// Parameters that act together.
-    pub dependent: Vec<String>,
+    /// Of the parameters.
+    #[serde(flatten)]
+    pub accuracy: Accuracy,
     /// Accuracy to expect.
     pub expected: Vec<Expected>,
 }
@@ -44,7 +36,6 @@ pub struct Group {
     pub center_mm: [f64; 3],
     /// Where the left camera was assumed.
     pub cam_from_base: CamFromBase,
-    /// Poses.
     pub poses: usize,
 }
 
@@ -53,14 +44,12 @@ pub struct Group {
 pub struct CamFromBase {
     /// Three rows of three.
     pub rotation: [[f64; 3]; 3],
-    /// mm
     pub translation_mm: [f64; 3],
 }
 
 /// `plan.json`
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlanFile {
-    /// This plan.
     #[serde(flatten)]
     pub plan: Determined,
     /// Standard deviation of a coordinate that was reckoned with, mm.
@@ -76,7 +65,6 @@ pub struct PlanFile {
 }
 
 impl PlanFile {
-    /// Of a plan.
     pub fn new(plan: &Plan) -> PlanFile {
         let group = |(k, placement): (usize, &crate::plan::scene::Placement)| {
             let r = rotation_matrix(&placement.left_from_base);
@@ -102,14 +90,8 @@ impl PlanFile {
 }
 
 fn determined(accuracy: &Accuracy, expected: &[(usize, f64)]) -> Determined {
-    Determined {
-        rank: accuracy.rank,
-        condition: accuracy.condition,
-        observability: accuracy.observability.clone(),
-        zero: accuracy.zero.clone(),
-        dependent: accuracy.groups.clone(),
-        expected: expected.iter().map(|&(poses, rms_mm)| Expected { poses, rms_mm }).collect(),
-    }
+    let expected = expected.iter().map(|&(poses, rms_mm)| Expected { poses, rms_mm }).collect();
+    Determined { accuracy: accuracy.clone(), expected }
 }
 
 /// `poses.csv` as `measure` reads it.

@@ -140,7 +140,6 @@ pub struct Check {
 }
 
 impl Check {
-    /// This check.
     pub fn new(file: &RecheckFile, date: String) -> Check {
         Check {
             date,

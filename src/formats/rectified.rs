@@ -36,7 +36,6 @@ pub struct RectifiedFile {
     pub common: Option<&'static str>,
     /// How far the rows differ over all corners of the board that was found; null without a board.
     pub residual: Option<RowResidual>,
-    /// That board.
     pub board: Option<String>,
     /// The pairs written.
     pub pairs: Vec<RectifiedPair>,
@@ -47,13 +46,10 @@ pub struct RectifiedFile {
 /// Share of each picture that shows something.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Coverage {
-    /// Of the left one.
     pub left: f64,
-    /// Of the right one.
     pub right: f64,
 }
 
-/// A pair in the file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RectifiedPair {
     /// Its name.

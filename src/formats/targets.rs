@@ -16,12 +16,9 @@ use crate::robot::Robot;
 const HINT: &str =
     "a row a target: name,j1_deg,...,jN_deg, or name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad (optionally j1_deg,...)";
 
-/// A row of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Its name.
     pub name: String,
-    /// Its line in the file.
     pub line: u64,
     /// What it asks for.
     pub target: Target,

@@ -6,12 +6,10 @@ use crate::diagnostic::{Explain, Status};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// No row can be fitted.
     #[error(
         "none of the {rows} rows can be fitted ({skipped} have no usable reading); rows of role `sample` are needed"
     )]
     NoSamples {
-        /// Rows in the file.
         rows: usize,
         /// Rows without a reading.
         skipped: usize,
@@ -21,9 +19,7 @@ pub enum Error {
     /// Robot and measurements are not about the same machine.
     #[error("the robot has {robot} joints, the measurements have {measurements}")]
     JointCount {
-        /// Of the robot.
         robot: usize,
-        /// Of the measurements.
         measurements: usize,
         /// The measurements' file.
         place: String,
@@ -47,7 +43,6 @@ pub enum Error {
         /// Poses to fit.
         poses: usize,
     },
-    /// No more numbers than parameters.
     #[error(
         "{poses} poses give {numbers} independent numbers for {parameters} parameters; more numbers than parameters are needed"
     )]
@@ -79,16 +74,10 @@ pub enum Error {
     },
     /// The chosen model needs what the data lack.
     #[error("model `{model}` needs {needed}, which the measurements don't have")]
-    ModelNeeds {
-        /// The model.
-        model: &'static str,
-        /// What it needs.
-        needed: &'static str,
-    },
+    ModelNeeds { model: &'static str, needed: &'static str },
     /// Too few poses to place the sensor by.
     #[error("group `{group}` has {found} poses with a point; a placement takes {needed}")]
     TooFewToPlace {
-        /// The group.
         group: String,
         /// Poses with a point.
         found: usize,

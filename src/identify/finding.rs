@@ -2,10 +2,8 @@
 
 use serde::Serialize;
 
-/// One finding.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// What it is.
     pub finding: String,
     /// The rows it is about, by pose; empty where it is about all of them.
     pub rows: Vec<String>,
@@ -17,6 +15,16 @@ pub struct Finding {
 const NAMED: usize = 40;
 
 impl Finding {
+    /// About all rows.
+    pub fn new(finding: impl Into<String>, action: impl Into<String>) -> Finding {
+        Finding { finding: finding.into(), rows: Vec::new(), action: action.into() }
+    }
+
+    /// The same about these rows.
+    pub fn about(self, rows: Vec<String>) -> Finding {
+        Finding { rows, ..self }
+    }
+
     /// As a warning.
     pub fn sentence(&self) -> String {
         let mut text = self.finding.clone();

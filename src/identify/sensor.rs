@@ -64,7 +64,6 @@ pub const FLOOR_MM2: f64 = 1e-6;
 pub struct Length {
     /// Index of the pose among the places.
     pub pose: usize,
-    /// mm
     pub length_mm: f64,
     /// Its own variance, mm^2.
     pub variance_mm2: f64,
@@ -79,7 +78,6 @@ pub struct Length {
 pub struct Spot {
     /// Index of the pose among the places.
     pub pose: usize,
-    /// mm
     pub point_mm: Point3<f64>,
     /// Its own covariance, mm^2.
     pub covariance_mm2: Matrix3<f64>,

@@ -12,7 +12,6 @@ use crate::robot::{Robot, inverse};
 pub struct World {
     /// As its maker delivers it.
     pub nominal: Robot,
-    /// As it is.
     pub truth: Robot,
     /// What was measured.
     pub rows: Vec<Measurement>,

@@ -92,7 +92,6 @@ pub(super) struct Taken<'a> {
 }
 
 impl Taken<'_> {
-    /// The rows.
     pub fn rows(&self) -> Result<Vec<Measurement>> {
         let picked = &self.way.picked;
         let joints_in = &self.parts[picked.joints[0].part];

@@ -111,7 +111,6 @@ pub(super) fn is_kept(apart: Vec<f64>) -> bool {
     apart.len() > 1 && middle > 0.0 && off < RIGID * middle
 }
 
-/// A point as the file has it.
 pub(super) fn point(parts: &[Part], row: usize, at: &[At; 3]) -> Option<Point3<f64>> {
     let number = |at: &At| parts[at.part].optional(row, at.column).ok().flatten();
     Some(Point3::new(number(&at[0])?, number(&at[1])?, number(&at[2])?))

@@ -11,7 +11,6 @@ use crate::tables::{Fields, Grid};
 /// A column of one of several files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct At {
-    /// The file.
     pub part: usize,
     /// Its column, from 0.
     pub column: usize,
@@ -26,13 +25,11 @@ pub(super) enum Kind {
     Counts,
     /// Nothing but zeros.
     Zeros,
-    /// No number at all.
     Words,
     /// Numbers and, in this row, a word.
     Mixed(usize),
 }
 
-/// A file.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     /// Where it was read, and how.

@@ -15,7 +15,6 @@ pub(super) struct Picked {
     pub joints: Vec<At>,
     /// x, y and z of each target, with its name.
     pub points: Vec<(String, [At; 3])>,
-    /// A distance.
     pub distance: Option<At>,
     /// The unit of the joints that names state.
     pub joint_unit: Option<Unit>,

@@ -15,9 +15,7 @@ pub enum Error {
         point_mm[0], point_mm[1], point_mm[2]
     )]
     Unreachable {
-        /// The group.
         group: String,
-        /// The point, mm.
         point_mm: [f64; 3],
         /// The nearest point of that line from the base that it reaches, mm.
         nearest_mm: Option<[f64; 3]>,
@@ -41,11 +39,9 @@ pub enum Error {
         "group {group}: {found} of {tried} places in view can be reached within the joints' limits; {needed} poses are needed"
     )]
     TooFew {
-        /// The group.
         group: String,
         /// Candidates found.
         found: usize,
-        /// Tried.
         tried: usize,
         /// Asked for.
         needed: usize,
@@ -55,7 +51,6 @@ pub enum Error {
     Measured {
         /// What is wrong.
         message: String,
-        /// The file.
         place: String,
     },
 }

@@ -38,7 +38,6 @@ pub struct Candidate {
     pub group: usize,
     /// Readings, rad (mm).
     pub joints_rad: Vec<f64>,
-    /// Where the target is.
     pub left_from_target: Transform,
     /// Covariance of the measured point, base frame, mm^2.
     pub covariance_mm2: Matrix3<f64>,
@@ -69,9 +68,7 @@ pub struct Pool<'a> {
     pub scene: &'a Scene,
     /// What to plan.
     pub settings: &'a Settings,
-    /// The placements.
     pub placements: &'a [Placement],
-    /// Noise.
     pub noise: PoseNoise,
 }
 

@@ -4,6 +4,7 @@
 //! transform, whitened by the point's covariance. Accuracy is that of fresh poses on all spheres after one rigid fit.
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
+use serde::Serialize;
 
 use super::pool::Candidate;
 use super::scene::Placement;
@@ -42,7 +43,7 @@ pub struct Rows {
 }
 
 /// How well a set of poses determines the robot.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Accuracy {
     /// Number of independent parameters that are determined.
     pub rank: usize,
@@ -53,7 +54,7 @@ pub struct Accuracy {
     /// Parameters that no pose sees.
     pub zero: Vec<String>,
     /// Parameters that act together.
-    pub groups: Vec<String>,
+    pub dependent: Vec<String>,
 }
 
 /// The robot to be determined, and the places where it is to be accurate.
@@ -193,7 +194,7 @@ impl Problem {
             condition: base.condition(),
             observability: base.observability(poses.len()),
             zero: base.zero.iter().map(|&i| names[i].clone()).collect(),
-            groups: base.groups(&names),
+            dependent: base.groups(&names),
         }
     }
 

@@ -13,7 +13,6 @@ pub enum Language {
     Rapid,
     /// KUKA, `.src` and `.dat`.
     Krl,
-    /// Fanuc, `.ls`.
     FanucLs,
     /// Yaskawa, `.jbi`.
     Jbi,
@@ -24,7 +23,6 @@ impl Language {
     pub const ALL: [Language; 5] =
         [Language::UrScript, Language::Rapid, Language::Krl, Language::FanucLs, Language::Jbi];
 
-    /// Its name.
     pub fn name(self) -> &'static str {
         match self {
             Language::UrScript => "URScript",

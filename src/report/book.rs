@@ -21,7 +21,6 @@ section td img { min-width: 200px; width: 320px; } p.top { font-size: 13px; }
   section td[data-label]:not(:first-child)::before { content: attr(data-label) ': '; color: var(--soft); } }
 ";
 
-/// All pages as one.
 pub fn book(pages: &[Page], pictures: &[Picture]) -> String {
     let content = html! {
         style { (PreEscaped(STYLE)) }

@@ -117,7 +117,6 @@ fn numbers(day: &Day) -> Vec<(String, String)> {
     .collect()
 }
 
-/// The page.
 pub fn page(day: &Day) -> String {
     let tone = match (day.is_good(), &day.check) {
         (true, Some(_)) => Tone::Good,

@@ -27,7 +27,6 @@ const LIMIT_SIGMAS: f64 = 5.0;
 /// A small picture of a pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Thumbnail {
-    /// The pose.
     pub pose: String,
     /// What is to be seen.
     pub caption: String,
@@ -40,7 +39,6 @@ pub struct Thumbnail {
 pub struct Distance {
     /// As the nominal robot was sent, mm.
     pub commanded_mm: f64,
-    /// As measured, mm.
     pub measured_mm: f64,
 }
 
@@ -64,21 +62,17 @@ pub fn summary(file: &MeasureFile, out: &OutDir) -> String {
 }
 
 fn headline(file: &MeasureFile) -> String {
-    let (poses, measured) = file.counts();
-    format!("{measured} of {poses} poses measured; {}", quality(file))
+    format!("{} of {} poses measured; {}", file.measured, file.poses, quality(file))
 }
 
 fn quality(file: &MeasureFile) -> String {
-    let (fit_mm, px) = file.residuals();
-    let sigma = file.sigma_mm();
-    let along = |i: usize| number(sigma.map(|s| s[i]), 4);
-    let (scatter_px, usual_px) = file.scatter_px();
-    let usual = usual_px.map_or(String::new(), |px| format!(" (the calibration allows {px:.4})"));
+    let along = |i: usize| number(file.sigma_mm.map(|s| s[i]), 4);
+    let usual = file.calibration_noise_px.map_or(String::new(), |px| format!(" (the calibration allows {px:.4})"));
     format!(
         "board fit {} mm, reprojection {} px RMS, corners scatter by {} px{usual}; median sigma of the mark point x {} y {} z {} mm",
-        number(fit_mm, 4),
-        number(px, 3),
-        number(scatter_px, 4),
+        number(file.fit_rms_mm, 4),
+        number(file.reprojection_rms_px, 3),
+        number(file.corner_noise_px, 4),
         along(0),
         along(1),
         along(2),
@@ -87,31 +81,32 @@ fn quality(file: &MeasureFile) -> String {
 
 /// The three numbers of the page: how well the point is known, and how well boards fit.
 fn numbers(file: &MeasureFile) -> [(String, String); 3] {
-    let (fit_mm, px) = file.residuals();
-    let worst = file.sigma_mm().map(|sigma| sigma.into_iter().fold(0.0, f64::max));
+    let worst = file.sigma_mm.map(|sigma| sigma.into_iter().fold(0.0, f64::max));
     [
         (
             format!("{} mm", number(worst, 4)),
             "median standard deviation of the mark point, along its least certain axis".to_owned(),
         ),
-        (format!("{} mm", number(fit_mm, 4)), "what is left of the corners after fitting the target (RMS)".to_owned()),
-        (format!("{} px", number(px, 3)), "reprojection residual (RMS)".to_owned()),
+        (
+            format!("{} mm", number(file.fit_rms_mm, 4)),
+            "what is left of the corners after fitting the target (RMS)".to_owned(),
+        ),
+        (format!("{} px", number(file.reprojection_rms_px, 3)), "reprojection residual (RMS)".to_owned()),
     ]
 }
 
 /// Green only where every pose was measured and everything agrees with what was known before.
 fn tone(series: &Series, file: &MeasureFile) -> Tone {
-    let (poses, measured) = file.counts();
     match &series.judgement {
         judgement if judgement.ends_the_run() => Tone::Bad,
-        Judgement::Agrees if poses == measured && file.chi_square_is_usual() => Tone::Good,
+        Judgement::Agrees if file.poses == file.measured && file.chi_square_is_usual() => Tone::Good,
         _ => Tone::Doubtful,
     }
 }
 
 /// The report.
 pub fn page(series: &Series, file: &MeasureFile, known: &Knowledge, extras: &Extras) -> Result<String> {
-    let (poses, count) = file.counts();
+    let (poses, count) = (file.poses, file.measured);
     let measured = &series.poses;
     let missing: Vec<Vec<String>> = measured
         .iter()
@@ -122,7 +117,7 @@ pub fn page(series: &Series, file: &MeasureFile, known: &Knowledge, extras: &Ext
         .collect();
     let content = html! {
         (page::verdict(tone(series, file), &format!("{count} of {poses} poses measured"), &numbers(file), &format!("{}.", quality(file))))
-        (page::warnings(file.warnings()))
+        (page::warnings(&file.warnings))
         @if !missing.is_empty() {
             h2 { "Poses without a measurement" }
             (page::table(&["pose", "status", "why"], &missing))
@@ -131,7 +126,7 @@ pub fn page(series: &Series, file: &MeasureFile, known: &Knowledge, extras: &Ext
         @if count > 0 {
             (rig(measured)?)
             (residuals(measured)?)
-            @if let Some(shape) = &series.shape { (target(shape, file.columns())?) }
+            @if let Some(shape) = &series.shape { (target(shape, file.columns)?) }
             (in_space(measured, known))
             (places(measured)?)
             (distances(&extras.distances)?)

@@ -22,11 +22,11 @@ pub fn summary(record: &PlanFile) -> String {
         table.row([poses.to_string(), number(at(&record.plan, poses), 4), number(paper, 4)]);
     }
     let of = |d: &Determined| {
-        let o = d.observability.as_ref();
+        let o = d.accuracy.observability.as_ref();
         format!(
             "rank {}, condition {}, O1 {}, O2 {}, O3 {}, O4 {}, O5 {}",
-            d.rank,
-            number(d.condition, 0),
+            d.accuracy.rank,
+            number(d.accuracy.condition, 0),
             number(o.map(|o| o.o1), 2),
             number(o.map(|o| o.o2), 5),
             number(o.map(|o| o.o3), 3),
@@ -38,8 +38,8 @@ pub fn summary(record: &PlanFile) -> String {
     if let Some(paper) = &record.paper {
         text += &format!("the paper's: {}\n", of(paper));
     }
-    if !record.plan.zero.is_empty() {
-        text += &format!("not determined: {}\n", record.plan.zero.join(", "));
+    if !record.plan.accuracy.zero.is_empty() {
+        text += &format!("not determined: {}\n", record.plan.accuracy.zero.join(", "));
     }
     text += &format!(
         "expected error of the target over the spheres (root mean square, {:.4} mm noise a coordinate):\n{table}",
@@ -57,7 +57,6 @@ fn counts(record: &PlanFile) -> Vec<usize> {
     all
 }
 
-/// The page.
 pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Result<String> {
     let rows: Vec<Vec<String>> = counts(record)
         .into_iter()
@@ -74,7 +73,7 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
         h2 { "Accuracy to expect" }
         (page::table(&["samples", "this plan, mm", "the paper's plan, mm"], &rows))
         p { "Root mean square of the target's position error over the spheres, tilts to 25 degrees, after one rigid fit; "
-            (format!("{:.4}", record.noise_mm)) " mm noise a coordinate. Rank " (record.plan.rank) ", condition " (number(record.plan.condition, 0)) "." }
+            (format!("{:.4}", record.noise_mm)) " mm noise a coordinate. Rank " (record.plan.accuracy.rank) ", condition " (number(record.plan.accuracy.condition, 0)) "." }
         (curve(record)?)
         (map(plan)?)
         h2 { "Where the cameras stand" }
@@ -103,7 +102,7 @@ fn numbers(record: &PlanFile, plan: &Plan) -> [(String, String); 3] {
             format!("expected position error after {} samples", best.map_or(samples, |e| e.poses)),
         ),
         (plan.poses.len().to_string(), format!("poses, {samples} of them samples")),
-        (record.plan.rank.to_string(), "parameters determined".to_owned()),
+        (record.plan.accuracy.rank.to_string(), "parameters determined".to_owned()),
     ]
 }
 
@@ -132,22 +131,10 @@ fn curve(record: &PlanFile) -> Result<maud::Markup> {
 
 /// Places of the spheres by thirds of the expected error.
 fn map(plan: &Plan) -> Result<maud::Markup> {
-    let mut errors: Vec<f64> = plan.map.iter().map(|m| m.1).collect();
-    errors.sort_by(f64::total_cmp);
-    let third = |k: usize| errors.get(k * errors.len() / 3).copied().unwrap_or(0.0);
-    let limits = [third(1), third(2), f64::INFINITY];
-    let mut plot = Plot::new("Expected error over the workspace, from above", "x, mm", "y, mm").equal_axes();
-    let mut low = 0.0;
-    for high in limits {
-        let within = plan.map.iter().filter(|m| m.1 >= low && m.1 < high);
-        let points: Vec<(f64, f64)> = within.map(|m| (m.0.x, m.0.y)).collect();
-        let label =
-            if high.is_finite() { format!("{low:.4} to {high:.4} mm") } else { format!("{low:.4} mm and more") };
-        plot = plot.points(&label, &points);
-        low = high;
-    }
+    let points: Vec<(f64, f64, f64)> = plan.map.iter().map(|m| (m.0.x, m.0.y, m.1)).collect();
+    let plot = Plot::new("Expected error over the workspace, from above", "x, mm", "y, mm").equal_axes();
     Ok(page::figure(
-        &plot.svg()?,
+        &plot.points_by_thirds(&points, 0.0).svg()?,
         "The position error to expect at new poses, base frame; a third of them each. Work where it is small, or measure more poses where it is large.",
     ))
 }

@@ -9,7 +9,7 @@ use super::table::{Table, number};
 use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
 use crate::formats::robot_recheck::HISTORY;
-use crate::identify::judge::recheck::Recheck;
+use crate::identify::judge::recheck::{CauseSeen, Recheck};
 
 fn sentence(recheck: &Recheck, tolerance_mm: f64) -> String {
     let statement = recheck.statement();
@@ -42,23 +42,17 @@ fn next(standing: Standing, recheck: &Recheck) -> &'static str {
 
 /// Cause, change, its interval, its effect, what would be seen and its effect.
 fn cells(recheck: &Recheck) -> Vec<[String; 6]> {
-    let of = |cause: &crate::identify::judge::recheck::CauseSeen| match cause.amount {
-        None => [
-            cause.words.clone(),
-            "not seen: the placement takes it up".to_owned(),
-            String::new(),
-            String::new(),
-            String::new(),
-            String::new(),
-        ],
-        Some((amount, sigma)) => [
-            cause.words.clone(),
-            format!("{amount:.4} {}", cause.unit),
-            format!("{:.4}", 2.0 * sigma),
-            number(Some(cause.effect_mm), 4),
-            format!("{:.4} {}", cause.seen, cause.unit),
-            number(Some(cause.seen_mm), 4),
-        ],
+    let of = |cause: &CauseSeen| {
+        let with_unit = |value: f64| format!("{value:.4} {}", cause.unit);
+        let told = |text: String| if cause.amount.is_some() { text } else { String::new() };
+        [
+            cause.what.clone(),
+            cause.amount.map_or_else(|| "not seen: the placement takes it up".to_owned(), with_unit),
+            cause.sigma.map_or_else(String::new, |sigma| format!("{:.4}", 2.0 * sigma)),
+            told(number(Some(cause.effect_mm), 4)),
+            cause.seen.map_or_else(String::new, with_unit),
+            told(number(cause.seen_mm, 4)),
+        ]
     };
     let placements = recheck.placements.iter().map(|moved| {
         [

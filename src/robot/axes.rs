@@ -21,7 +21,6 @@ const ALIGNED: f64 = 1e-12;
 /// A joint's axis at reading zero, root frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis {
-    /// A point on it, mm.
     pub point_mm: Point3<f64>,
     /// Its direction, of unit length; the joint turns right-handed about it.
     pub direction: Vector3<f64>,

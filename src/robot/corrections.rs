@@ -116,9 +116,7 @@ impl Wave {
 pub struct HarmonicTerm {
     /// The joint, from 0.
     pub joint: usize,
-    /// Which wave.
     pub wave: Wave,
-    /// Its amplitude, rad.
     pub amplitude_rad: f64,
 }
 
@@ -144,7 +142,6 @@ pub struct Corrections {
     pub bending: Vec<GravityTerm>,
     /// Periodic errors.
     pub harmonics: Vec<HarmonicTerm>,
-    /// Wobble.
     pub wobble: Vec<HarmonicTerm>,
     /// Scale and coupling.
     pub couplings: Vec<CouplingTerm>,

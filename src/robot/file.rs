@@ -24,13 +24,13 @@ struct RobotRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     gravity: Option<GravityRecord>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    bending: Option<BendingRecord>,
+    bending: Option<Terms<GravityTermRecord>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    harmonics: Option<HarmonicsRecord>,
+    harmonics: Option<Terms<HarmonicTermRecord>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    wobble: Option<HarmonicsRecord>,
+    wobble: Option<Terms<HarmonicTermRecord>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    couplings: Option<CouplingsRecord>,
+    couplings: Option<Terms<CouplingTermRecord>>,
     /// `root_from_frame0`
     #[serde(default, skip_serializing_if = "Option::is_none")]
     base: Option<PoseRecord>,
@@ -87,18 +87,12 @@ struct GravityTermRecord {
     k_mrad_per_m: f64,
 }
 
-/// What bearings and links yield across the joints' axes: `k_mrad_per_m` times the levers of a unit weight at `point`.
+/// A table with terms: what bearings and links yield across the joints' axes (`[bending]`, in the form of `[gravity]`), waves in the commanded
+/// angle (periodic errors of the drives, or the tilt of their axes), couplings.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct BendingRecord {
-    terms: Vec<GravityTermRecord>,
-}
-
-/// Waves in the commanded angle: periodic errors of the drives, or the tilt of their axes.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct HarmonicsRecord {
-    terms: Vec<HarmonicTermRecord>,
+struct Terms<T> {
+    terms: Vec<T>,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -110,12 +104,6 @@ struct HarmonicTermRecord {
 }
 
 /// What a joint does by itself as another one moves, or as it moves itself (an error of its scale).
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CouplingsRecord {
-    terms: Vec<CouplingTermRecord>,
-}
-
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CouplingTermRecord {
@@ -242,7 +230,7 @@ impl RobotRecord {
             };
             terms.iter().map(term).collect()
         };
-        let waves = |table: &str, record: &Option<HarmonicsRecord>| -> Result<Vec<HarmonicTerm>, String> {
+        let waves = |table: &str, record: &Option<Terms<HarmonicTermRecord>>| -> Result<Vec<HarmonicTerm>, String> {
             let term = |t: &HarmonicTermRecord| {
                 let known = Wave::ALL.into_iter().find(|w| w.name() == t.wave);
                 let wave =
@@ -272,35 +260,26 @@ impl RobotRecord {
     }
 }
 
-fn weights_record(terms: &[GravityTerm]) -> Vec<GravityTermRecord> {
-    let term = |t: &GravityTerm| GravityTermRecord {
-        joint: t.joint + 1,
-        point: t.point.name(),
-        k_mrad_per_m: 1000.0 * t.k_rad_per_m,
-    };
-    terms.iter().map(term).collect()
+/// Terms as a table has them; `None` where there is none.
+fn table<T, R>(terms: &[T], record: impl Fn(&T) -> R) -> Option<Terms<R>> {
+    (!terms.is_empty()).then(|| Terms { terms: terms.iter().map(record).collect() })
 }
 
-fn waves_record(terms: &[HarmonicTerm]) -> Option<HarmonicsRecord> {
-    let term = |t: &HarmonicTerm| HarmonicTermRecord {
-        joint: t.joint + 1,
-        wave: t.wave.name().to_owned(),
-        amplitude_mrad: 1000.0 * t.amplitude_rad,
-    };
-    let terms: Vec<_> = terms.iter().map(term).collect();
-    if terms.is_empty() { None } else { Some(HarmonicsRecord { terms }) }
+fn weight(t: &GravityTerm) -> GravityTermRecord {
+    GravityTermRecord { joint: t.joint + 1, point: t.point.name(), k_mrad_per_m: 1000.0 * t.k_rad_per_m }
 }
 
-fn couplings_record(corrections: &Corrections) -> Option<CouplingsRecord> {
-    let term = |t: &CouplingTerm| CouplingTermRecord { joint: t.joint + 1, of: t.of + 1, per_mille: 1000.0 * t.ratio };
-    let terms: Vec<_> = corrections.couplings.iter().map(term).collect();
-    if terms.is_empty() { None } else { Some(CouplingsRecord { terms }) }
+fn wave(t: &HarmonicTerm) -> HarmonicTermRecord {
+    HarmonicTermRecord { joint: t.joint + 1, wave: t.wave.name().to_owned(), amplitude_mrad: 1000.0 * t.amplitude_rad }
+}
+
+fn coupling(t: &CouplingTerm) -> CouplingTermRecord {
+    CouplingTermRecord { joint: t.joint + 1, of: t.of + 1, per_mille: 1000.0 * t.ratio }
 }
 
 impl From<&Robot> for RobotRecord {
     fn from(robot: &Robot) -> RobotRecord {
         let direction = robot.corrections.gravity_direction;
-        let some = |terms: Vec<GravityTermRecord>| (!terms.is_empty()).then_some(terms);
         let degrees = |limits: Option<(f64, f64)>| limits.map(|(low, high)| [low.to_degrees(), high.to_degrees()]);
         RobotRecord {
             name: robot.name.clone(),
@@ -322,12 +301,12 @@ impl From<&Robot> for RobotRecord {
                 })
                 .collect(),
             tool: ToolRecord { x_mm: robot.tool_mm.x, y_mm: robot.tool_mm.y, z_mm: robot.tool_mm.z },
-            gravity: some(weights_record(&robot.corrections.gravity))
-                .map(|terms| GravityRecord { direction: None, terms }),
-            bending: some(weights_record(&robot.corrections.bending)).map(|terms| BendingRecord { terms }),
-            harmonics: waves_record(&robot.corrections.harmonics),
-            wobble: waves_record(&robot.corrections.wobble),
-            couplings: couplings_record(&robot.corrections),
+            gravity: table(&robot.corrections.gravity, weight)
+                .map(|gravity| GravityRecord { direction: None, terms: gravity.terms }),
+            bending: table(&robot.corrections.bending, weight),
+            harmonics: table(&robot.corrections.harmonics, wave),
+            wobble: table(&robot.corrections.wobble, wave),
+            couplings: table(&robot.corrections.couplings, coupling),
             base: PoseRecord::of(&robot.ends.root_from_frame0),
             flange: PoseRecord::of(&robot.ends.last_frame_from_flange),
         }

@@ -36,7 +36,6 @@ pub enum Error {
     File {
         /// What was found and what was needed.
         message: String,
-        /// Where.
         place: Place,
     },
     /// A table that could be read in several ways, or in none.
@@ -44,7 +43,6 @@ pub enum Error {
     Table {
         /// What was found.
         message: String,
-        /// The file.
         place: String,
         /// What settles it.
         hint: String,
@@ -67,10 +65,7 @@ pub enum Error {
     },
     /// A robot file is there already.
     #[error("a robot file is there already")]
-    Occupied {
-        /// Where.
-        path: String,
-    },
+    Occupied { path: String },
     /// Two robots of different joints.
     #[error("the identified robot has {identified} joints, the nominal one {nominal}")]
     Different {
@@ -82,7 +77,6 @@ pub enum Error {
     /// A format that does not fit this robot.
     #[error("{message}")]
     NotExportable {
-        /// Why.
         message: String,
         /// What would do.
         hint: String,

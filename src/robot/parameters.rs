@@ -240,7 +240,6 @@ fn compliance(terms: &[GravityTerm], joint: usize, point: LoadPoint) -> f64 {
     terms.iter().filter(|t| t.joint == joint && t.point == point).map(|t| t.k_rad_per_m).sum()
 }
 
-/// Adds to it.
 fn add_compliance(terms: &mut Vec<GravityTerm>, joint: usize, point: LoadPoint, k_rad_per_m: f64) {
     match terms.iter_mut().find(|t| t.joint == joint && t.point == point) {
         Some(term) => term.k_rad_per_m += k_rad_per_m,
@@ -253,7 +252,6 @@ fn amplitude(terms: &[HarmonicTerm], joint: usize, wave: Wave) -> f64 {
     terms.iter().filter(|t| t.joint == joint && t.wave == wave).map(|t| t.amplitude_rad).sum()
 }
 
-/// Adds to it.
 fn add_amplitude(terms: &mut Vec<HarmonicTerm>, joint: usize, wave: Wave, amplitude_rad: f64) {
     match terms.iter_mut().find(|t| t.joint == joint && t.wave == wave) {
         Some(term) => term.amplitude_rad += amplitude_rad,

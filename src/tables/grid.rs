@@ -28,7 +28,6 @@ const SEEN_ROWS: usize = 60;
 pub struct Grid {
     /// Where it was read.
     pub path: Utf8PathBuf,
-    /// How.
     pub form: Form,
     /// The encoding, where it is not UTF-8.
     pub encoding: Option<&'static str>,

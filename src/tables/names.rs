@@ -78,7 +78,6 @@ pub enum What {
     Coordinate(usize),
     /// An entry of a 4x4 matrix, row and column as they are counted.
     Matrix(usize, usize),
-    /// A distance.
     Distance,
     /// A column of the measurements' own format, by its name.
     Own(&'static str),

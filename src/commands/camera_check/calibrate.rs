@@ -181,7 +181,6 @@ fn options(args: &CameraCheck, known: Option<KnownLenses>) -> Options {
     Options { lens: args.lens, shape: args.board_shape.map(|shape| shape == BoardShape::Bowed), known }
 }
 
-/// The lenses that are known.
 fn known_lenses(args: &CameraCheck) -> Result<Option<KnownLenses>> {
     let known = lenses::read(&args.intrinsics)?;
     if known.as_ref().is_some_and(KnownLenses::both) && args.lens.is_some() {

@@ -139,7 +139,7 @@ fn say(series: &Series, file: &MeasureFile) {
                 progress::warn(format!("pose {} is not measured: {}", pose.at.pose, refusal.reason));
             }
         }
-        file.warnings().iter().for_each(progress::warn);
+        file.warnings.iter().for_each(progress::warn);
     }
 }
 

@@ -18,7 +18,6 @@ use crate::identify::judge::recheck::recheck;
 use crate::progress;
 use crate::{report, robot};
 
-/// Runs it.
 pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
     let robot = robot::file::read(against)?;
     let before = known::before(against, &robot).ok_or_else(|| Error::NotKnown { path: against.to_string() })?;

@@ -44,7 +44,6 @@ pub fn read(left: &str, right: &str) -> Result<Rig, String> {
     checked::rig((left, right), rotation, right_from_left.translation.vector, None)
 }
 
-/// The camera of one file.
 pub fn read_camera(text: &str) -> Result<Camera, String> {
     Ok(one(text)?.0)
 }

@@ -82,7 +82,6 @@ fn text(name: &str, camera: &Camera, rectification: &Matrix3<f64>, f: f64, middl
     text
 }
 
-/// The camera of one file.
 pub fn read_camera(text: &str) -> Result<Camera, String> {
     let m = list(text, "camera_matrix", Some(9))?;
     let size = (number(text, "image_width")?, number(text, "image_height")?);

@@ -6,7 +6,6 @@
 
 use super::{Placement, metres_and_quaternion, quoted};
 
-/// The file.
 pub fn text(placement: &Placement, name: &str) -> String {
     let frames = placement.frames;
     let parameters = [

@@ -9,7 +9,6 @@ use super::Placement;
 use crate::formats::export::matrix;
 use crate::geometry::{Transform, rotation_matrix};
 
-/// The file.
 pub fn text(placement: &Placement) -> String {
     let mut text = String::from("%YAML:1.0\n---\n");
     let mut add = |name: &str, transform: &Transform| {

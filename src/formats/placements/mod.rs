@@ -18,11 +18,9 @@ const METRE: f64 = 1e-3;
 pub struct Frames {
     /// The robot's base.
     pub base: String,
-    /// Its flange.
     pub flange: String,
     /// The left camera's optical frame.
     pub camera: String,
-    /// The target.
     pub target: String,
 }
 

@@ -52,18 +52,15 @@ pub struct GroupRecord {
 pub struct TransformRecord {
     /// Row by row; `null` where nothing told it.
     pub rotation: Option<[[f64; 3]; 3]>,
-    /// mm
     pub translation_mm: [f64; 3],
     /// Of `exp(w)` on the left of the rotation, rad, and of the translation, mm; `null` for what was not found.
     pub covariance: [[Option<f64>; 6]; 6],
 }
 
-/// Numbers that are held, and why.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Held {
     /// Their names.
     pub parameters: Vec<String>,
-    /// Why.
     pub because: String,
 }
 
@@ -132,7 +129,6 @@ impl PlacementFile {
         Some(root_from_rig.after(&root_from_frame0.inverse()).inverse())
     }
 
-    /// Reads one.
     pub fn read(path: &Utf8Path) -> Result<PlacementFile> {
         let hint = "`stereocal identify` and `stereocal locate` write it";
         let file: PlacementFile = files::read_json(path, "placement", Some(hint))?;

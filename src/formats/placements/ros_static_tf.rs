@@ -6,7 +6,6 @@
 use super::{Placement, metres_and_quaternion, quoted};
 use crate::geometry::Transform;
 
-/// The file.
 pub fn text(placement: &Placement) -> String {
     let frames = placement.frames;
     let node = |parent: &str, child: &str, transform: &Transform| {

@@ -15,9 +15,7 @@ use crate::robot::Robot;
 /// A robot in some format.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExportedRobot {
-    /// Name of the file.
     pub name: &'static str,
-    /// Its text.
     pub text: String,
     /// The robot that a reader of the file has, constant transforms added that the notes ask for.
     pub carried: Robot,

@@ -32,11 +32,9 @@ pub enum Kind {
 /// A joint as the file has it; lengths in mm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UrdfJoint {
-    /// Its name.
     pub name: String,
     /// What it does.
     pub kind: Kind,
-    /// The word in the file.
     pub word: String,
     /// The joint that it follows, where it does.
     pub mimics: Option<String>,
@@ -50,7 +48,6 @@ pub struct UrdfJoint {
     pub axis: Vector3<f64>,
     /// Range: rad, of a sliding joint mm.
     pub limits_rad: Option<(f64, f64)>,
-    /// Its line in the file.
     pub line: u64,
     /// Where its `<joint>` element's `<origin>` stands in the text, or where one would be put.
     origin_at: Result<std::ops::Range<usize>, usize>,
@@ -61,7 +58,6 @@ pub struct UrdfJoint {
 pub struct Urdf {
     /// The robot's name.
     pub name: String,
-    /// All joints.
     pub joints: Vec<UrdfJoint>,
     /// The link that is no joint's child.
     pub root: String,
@@ -79,7 +75,6 @@ pub struct Chain<'a> {
 }
 
 impl Urdf {
-    /// Reads a file.
     pub fn read(path: &Utf8Path) -> Result<Urdf> {
         let text = files::read_text(path, "robot description", None)?;
         Urdf::parse(text, path)

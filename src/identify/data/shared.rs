@@ -14,6 +14,7 @@ use serde::Deserialize;
 use super::dataset::{Dataset, Pose, Reading};
 use crate::identify::sensor::Extra;
 use crate::identify::settings::Settings;
+use crate::statistics::median;
 
 /// Share of the whole shared variance below which a direction stays with the rows.
 const LEAST_SHARE: f64 = 1e-8;
@@ -87,12 +88,8 @@ pub fn suppose_scale(set: &mut Dataset) {
         let distance = point.norm();
         (distance > 0.0).then(|| covariance.symmetric_eigenvalues().max().max(0.0).sqrt() / distance)
     };
-    let mut noise: Vec<f64> = set.poses.iter().filter_map(|p| relative(point(p)?)).collect();
-    if noise.is_empty() {
-        return;
-    }
-    noise.sort_by(f64::total_cmp);
-    let scale = SCALE_OVER_POINT * noise[noise.len() / 2];
+    let Some(noise) = median(set.poses.iter().filter_map(|p| relative(point(p)?))) else { return };
+    let scale = SCALE_OVER_POINT * noise;
     set.shared = set
         .poses
         .iter()

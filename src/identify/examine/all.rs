@@ -13,7 +13,6 @@ use crate::robot::Robot;
 pub struct Examined {
     /// The measurements, mended, and cut into sessions.
     pub set: Dataset,
-    /// The robot.
     pub robot: Robot,
     /// Sessions and drifts.
     pub along: Along,

@@ -117,11 +117,10 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
             }
             false => ("the nominal links' errors", now.target, there.target),
         };
-        findings.push(Finding {
-            finding: format!("{}{} ({whose} fall from {from:.2} to {to:.3} mm)", hypothesis.name(), same.concat()),
-            rows: Vec::new(),
-            action: "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)".to_owned(),
-        });
+        findings.push(Finding::new(
+            format!("{}{} ({whose} fall from {from:.2} to {to:.3} mm)", hypothesis.name(), same.concat()),
+            "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)",
+        ));
         left = there.scaled(1.0 / hypothesis.factor());
     }
     let unexplained_mm = (left.fitted >= IMPLAUSIBLE_MM && cut.is_none()).then_some(left.fitted);
@@ -130,14 +129,13 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
 
 /// What is said of errors that no hypothesis explains.
 pub fn unexplained(left_mm: f64) -> Finding {
-    Finding {
-        finding: format!(
+    Finding::new(
+        format!(
             "the best fit leaves {left_mm:.2} mm a coordinate, implausible for a real robot: the robot file is not of the robot that was \
              measured, or joints and readings do not belong together"
         ),
-        rows: Vec::new(),
-        action: "no change of units, signs or conventions explains it".to_owned(),
-    }
+        "no change of units, signs or conventions explains it",
+    )
 }
 
 /// The hypotheses that explain what is left, of those that bring the file's robot `nearer` or of all.

@@ -71,15 +71,10 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, V
         groups.retain(|g| g.name != off.name);
         let (times, sizes, way) =
             if off.times > 1.0 { (off.times, "larger", "small") } else { (1.0 / off.times, "smaller", "large") };
-        findings.push(Finding {
-            finding: format!(
+        findings.push(Finding::new(format!(
                 "the covariances of group {} are too {way} beside those of the other groups: its residuals are {times:.1} times {sizes}",
                 off.name
-            ),
-            rows: Vec::new(),
-            action: "its rows count for what they are in this run; mend the file (`examine = false` in [identify] takes it as it is)"
-                .to_owned(),
-        });
+            ), "its rows count for what they are in this run; mend the file (`examine = false` in [identify] takes it as it is)"));
     }
     (set, findings)
 }

@@ -38,22 +38,19 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, V
         let Some((_, k, others)) = best else { break };
         let left = all - others.known.len();
         if set.known.len() < 3 || 2 * left >= all {
-            findings.push(Finding {
-                finding: "the known distances contradict the touches".to_owned(),
-                rows: off.iter().map(|&k| name(&set, &set.known[k])).collect(),
-                action: "which of them is wrong cannot be decided: all are used; measure them again, or more of them"
-                    .to_owned(),
-            });
+            findings.push(
+                Finding::new(
+                    "the known distances contradict the touches",
+                    "which of them is wrong cannot be decided: all are used; measure them again, or more of them",
+                )
+                .about(off.iter().map(|&k| name(&set, &set.known[k])).collect()),
+            );
             break;
         }
-        findings.push(Finding {
-            finding: format!(
+        findings.push(Finding::new(format!(
                 "the known distance of {:.3} mm is {:.0} standard deviations off what the touches and the other known distances say",
                 set.known[k].distance_mm, sizes[k]
-            ),
-            rows: vec![name(&set, &set.known[k])],
-            action: "left out in this run; measure it again (`examine = false` in [identify] takes it as it is)".to_owned(),
-        });
+            ), "left out in this run; measure it again (`examine = false` in [identify] takes it as it is)").about(vec![name(&set, &set.known[k])]));
         set = others;
     }
     (set, findings)

@@ -48,8 +48,7 @@ pub fn examine(set: &Dataset, robot: &Robot, asked: bool) -> (Dataset, Option<Fi
         HYPOTHESES.iter().filter_map(|(name, reader)| Some((difference_rad(&set, robot, *reader)?, name, reader)));
     let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
     let degrees = |rad: f64| rad.to_degrees();
-    let finding =
-        |finding: String, action: &str| Some(Finding { finding, rows: Vec::new(), action: action.to_owned() });
+    let finding = |finding: String, action: &str| Some(Finding::new(finding, action));
     let Some((left, name, reader)) = best.filter(|(left, ..)| left * EXPLAINS < as_read) else {
         let said = format!(
             "the orientations contradict the joint angles: between poses the target turns by {:.1} deg more or less than the flange",
@@ -110,11 +109,11 @@ fn without_turned(set: Dataset, robot: &Robot, usual_rad: f64) -> (Dataset, Opti
     if turned.is_empty() {
         return (set, None);
     }
-    let finding = Finding {
-        finding: "the targets are turned otherwise than the flange, as where the names of two are exchanged".to_owned(),
-        rows: turned.iter().map(|&row| set.poses[row].name.clone()).collect(),
-        action: "left out; look at their names in `target`".to_owned(),
-    };
+    let finding = Finding::new(
+        "the targets are turned otherwise than the flange, as where the names of two are exchanged",
+        "left out; look at their names in `target`",
+    )
+    .about(turned.iter().map(|&row| set.poses[row].name.clone()).collect());
     (set.without(&turned, "the targets are turned otherwise than the flange"), Some(finding))
 }
 

@@ -42,10 +42,8 @@ const GROSS: f64 = 8.0;
 /// Most cuts; data that want more are no sessions.
 const MOST_CUTS: usize = 30;
 
-/// One session.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Session {
-    /// Its group in the file.
     pub group: String,
     /// First fitted pose.
     pub first: String,
@@ -71,7 +69,7 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     let parameters = robot.mdh_parameters();
     // A zero that is off is no step, and what the calibration leaves open no drift.
     let extras = shared::unknowns(set, settings);
-    let (mut look, mut gross) = (Look::AsTheyAre, Vec::new());
+    let (mut look, mut gross) = (Look::Uncapped, Vec::new());
     for _ in 0..MOST_CUTS {
         let rows: Vec<usize> = cut.fit_rows().into_iter().filter(|row| !gross.contains(row)).collect();
         let task = Task { extras: &extras, ..Task::plain(&cut, robot, &parameters, &rows, settings) };
@@ -84,7 +82,7 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
                 split(&mut cut, row);
                 look
             }
-            (None, Look::AsTheyAre) if search.is_doubtful => Look::Capped,
+            (None, Look::Uncapped) if search.is_doubtful => Look::Capped,
             (None, Look::Capped) => {
                 gross = gross_errors(&task);
                 if gross.is_empty() {
@@ -105,7 +103,7 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
 /// nothing is found any more are they held down, and at last left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Look {
-    AsTheyAre,
+    Uncapped,
     Capped,
     WithoutGross,
 }

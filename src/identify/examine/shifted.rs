@@ -54,7 +54,6 @@ pub struct Shift {
 struct Left {
     /// Distance of each reading from where the robot is, mm; `None` where it belongs to no row.
     errors: Vec<Option<f64>>,
-    /// Their mean.
     mean: f64,
     tool_mm: Vector3<f64>,
 }
@@ -87,13 +86,11 @@ impl Shift {
 
     /// For the terminal and the page.
     pub fn finding(&self, set: &Dataset) -> Finding {
-        Finding {
-            finding: self.statement(set),
-            rows: Vec::new(),
-            action: "mended for this run: look for a picture that failed or was taken twice there, and mend the file (`examine = false` in \
-                     [identify] takes it as it is)"
-                .to_owned(),
-        }
+        Finding::new(
+            self.statement(set),
+            "mended for this run: look for a picture that failed or was taken twice there, and mend the file (`examine = false` in \
+                     [identify] takes it as it is)",
+        )
     }
 }
 

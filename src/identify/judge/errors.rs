@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, Reading};
 use crate::identify::residuals::eliminate::{Block, Unknowns};
-use crate::identify::residuals::rows::{Recipe, Rows};
+use crate::identify::residuals::rows::{RowSpec, Rows};
 use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::Model;
 use crate::robot::Robot;
@@ -53,7 +53,6 @@ impl Spread {
     }
 }
 
-/// The error of one row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RowError {
     /// Row of the data set.
@@ -93,7 +92,6 @@ pub struct Judge<'a> {
     pub wire_offset: bool,
     /// Unknowns of the sensor.
     pub extras: &'a [Extra],
-    /// Their values.
     pub values: &'a [f64],
 }
 
@@ -139,10 +137,10 @@ impl Judge<'_> {
         // How a body is turned on this robot's flange its rows say anew.
         let of_sensor = |(extra, _): &(&Extra, &f64)| !matches!(extra, Extra::Target(_));
         let (extras, values): (Vec<Extra>, Vec<f64>) = self.extras.iter().zip(self.values).filter(of_sensor).unzip();
-        let rows = Rows::new(&Recipe {
+        let rows = Rows::new(&RowSpec {
             set: self.set,
             robot,
-            levers: robot,
+            load_chain: robot,
             parameters: &[],
             extras: &extras,
             rows,

@@ -100,8 +100,8 @@ fn fitted(task: &Task, trust: Trust) -> Result<Located, Error> {
         stated: found.stated.max(1.0),
         smooth: None,
     };
-    let levers = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
-    formulation.rows = task.rows_at(scatter, &levers);
+    let load_chain = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
+    formulation.rows = task.rows_at(scatter, &load_chain);
     if let Some(direction) = open_direction(&formulation.rows, &offsets, task.parameters.len()) {
         return Err(Error::Open { direction });
     }

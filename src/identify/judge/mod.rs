@@ -1,6 +1,6 @@
 //! Errors on rows that were not fitted, and how far to trust what was.
 
-pub mod cells;
+pub mod cross_validation;
 pub mod errors;
 pub mod folds;
 pub mod held_out;

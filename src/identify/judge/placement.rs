@@ -35,7 +35,6 @@ pub fn is_held(parameter: Parameter, joints: usize) -> bool {
 /// A rigid transform and the covariance of `exp(w)` on the left of its rotation and of its translation, rad and mm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uncertain {
-    /// The transform.
     pub transform: Transform,
     /// Turn first, then shift.
     pub covariance: Matrix6<f64>,

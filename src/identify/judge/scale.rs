@@ -12,7 +12,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::identify::data::dataset::Dataset;
 use crate::identify::model::ladder::{Chain, Terms};
-use crate::identify::model::prior::Tolerance;
+use crate::identify::model::prior::{Tolerance, weighed};
 use crate::identify::solve::formulation::Formulation;
 use crate::robot::Parameter;
 
@@ -33,7 +33,7 @@ const GIVE_OR_TAKE: f64 = 4.0;
 const SCALES: [f64; 4] = [0.003, 0.01, 0.03, 0.1];
 
 /// Logarithm of the odds from which on a scale is told of, twelve to one: none of 600 clean simulated sets has as much.
-const TOLD: f64 = 2.5;
+const SIGNIFICANT: f64 = 2.5;
 
 /// Chance that the scale is larger than is said of one that would not be seen.
 const LARGER: f64 = 0.01;
@@ -72,7 +72,7 @@ impl CommonScale {
             longer[k] = length(base.free[k]) + of_others.sum::<f64>();
         }
         let (normal, gradient) = formulation.normal();
-        let weighed: Vec<Weighed> = (0..TOLERANCES)
+        let all: Vec<Weighed> = (0..TOLERANCES)
             .filter_map(|step| {
                 let lengths_mm = SMALLEST_MM * STEP.powi(step as i32);
                 let tolerance = Tolerance { lengths_mm, target_mm: MOUNTED_MM, ..formulation.tolerance };
@@ -81,21 +81,21 @@ impl CommonScale {
                 Weighed::new(&covariance, &normal, &gradient, &longer, before)
             })
             .collect();
-        let Summary { log_odds, share, sigma, unseen } = summed_up(&weighed);
+        let Summary { log_odds, share, sigma, unseen } = summed_up(&all);
         let of = if set.known.is_empty() { "readings" } else { "known distances" };
         (sigma.is_finite() && log_odds.is_finite()).then_some(CommonScale { share, sigma, log_odds, unseen, of })
     }
 
     /// Whether it is more than the links' own errors make by chance.
-    pub fn is_told(&self) -> bool {
-        self.log_odds > TOLD
+    pub fn is_significant(&self) -> bool {
+        self.log_odds > SIGNIFICANT
     }
 
     /// The scale that was found, or how large a one would not be.
     pub fn sentence(&self) -> String {
         let CommonScale { share, sigma, unseen, of, .. } = *self;
         let (percent, way) = (100.0 * share.abs(), if share > 0.0 { "longer" } else { "shorter" });
-        match self.is_told() {
+        match self.is_significant() {
             true => format!(
                 "all links are found {percent:.2} % (+- {:.2}) {way} than the nominal ones: the {of} are scaled, or the lengths of the robot file",
                 100.0 * sigma
@@ -125,12 +125,7 @@ impl Weighed {
     ) -> Option<Weighed> {
         // What is measured of the links scatters by the tolerance and the noise: with N = J'J and C the tolerance, its weight is
         // (C + N^-1)^-1 = (I + N C)^-1 N.
-        let mut inner = normal * covariance;
-        for i in 0..inner.nrows() {
-            inner[(i, i)] += 1.0;
-        }
-        let lu = inner.lu();
-        let log_determinant: f64 = lu.u().diagonal().iter().map(|d| d.abs().ln()).sum();
+        let (lu, log_determinant) = weighed(normal, covariance);
         let seen = lu.solve(gradient)?;
         let of_longer = lu.solve(&(normal * longer))?;
         Some(Weighed {
@@ -204,7 +199,7 @@ mod tests {
     use super::*;
 
     /// Links of 50 to 400 mm, found exactly, off by errors of about `error_mm` and by a share.
-    fn weighed(error_mm: f64, share: f64) -> Summary {
+    fn of_links(error_mm: f64, share: f64) -> Summary {
         let lengths = [400.0, -300.0, 250.0, 100.0, 50.0];
         let errors = [0.9, 1.2, -0.7, -1.1, 0.8].map(|e| e * error_mm);
         let longer = DVector::from_row_slice(&lengths);
@@ -226,12 +221,12 @@ mod tests {
         for (error_mm, share, told) in
             [(0.5, 0.0, false), (0.5, 0.001, false), (0.5, 0.01, true), (5.0, 0.01, false), (0.02, -0.001, true)]
         {
-            let Summary { log_odds, share: found, sigma, unseen } = weighed(error_mm, share);
+            let Summary { log_odds, share: found, sigma, unseen } = of_links(error_mm, share);
             assert!(
                 unseen > found.abs() + 2.0 * sigma && unseen < found.abs() + 5.0 * sigma,
                 "{found} {sigma} {unseen}"
             );
-            assert_eq!(log_odds > TOLD, told, "{error_mm} {share}: {log_odds} {found}");
+            assert_eq!(log_odds > SIGNIFICANT, told, "{error_mm} {share}: {log_odds} {found}");
             assert!((found - share).abs() < 0.005 * error_mm.max(0.1), "{error_mm} {share}: {found}");
         }
     }

@@ -17,8 +17,7 @@ use crate::identify::solve::linearised::{Linearised, Placement};
 
 /// A smooth error that the points tell of, and by how much it makes them more probable.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Told {
-    /// The error.
+pub struct Detected {
     pub error: SmoothError,
     /// Logarithm of the evidence for it.
     pub evidence: f64,
@@ -53,7 +52,7 @@ struct Products {
 
 /// The smooth error; `None` where nothing tells of one. `offsets` are where the rows are linearised, `sds` the standard deviations of
 /// parameters and extras before the data.
-pub fn most_probable(rows: &Rows, offsets: &[f64], sds: &[f64]) -> Option<Told> {
+pub fn most_probable(rows: &Rows, offsets: &[f64], sds: &[f64]) -> Option<Detected> {
     let size_mm = size_mm(rows)?;
     let unit_mm = rows.unit_variance_mm2().sqrt();
     let best = |products: &[Products], ratio: f64| {
@@ -77,8 +76,8 @@ pub fn most_probable(rows: &Rows, offsets: &[f64], sds: &[f64]) -> Option<Told> 
         }
     }
     found
-        .map(|(evidence, error)| Told { error, evidence: evidence - without })
-        .filter(|told| told.evidence > ENOUGH && told.error.sd_mm > SMALLEST_MM)
+        .map(|(evidence, error)| Detected { error, evidence: evidence - without })
+        .filter(|detected| detected.evidence > ENOUGH && detected.error.sd_mm > SMALLEST_MM)
 }
 
 /// Root mean square distance of points from the middle of their placement, mm; `None` where there are too few points or placements.

@@ -4,6 +4,8 @@
 //! derivatives. Features of the corrections (levers, waves) are constants of the pose; the chain that levers are taken on is given,
 //! so that a fit can end on its own.
 
+pub mod points;
+
 use nalgebra::{Matrix3, Matrix3xX, Point3};
 
 use crate::robot::bent::{Bent, Torques};
@@ -16,6 +18,8 @@ pub struct Kinematics {
     nominal: Robot,
     parameters: Vec<Parameter>,
     poses: Vec<PoseConstants>,
+    /// Sine and cosine of each joint's turn at every pose.
+    turns: Vec<Vec<(f64, f64)>>,
 }
 
 #[derive(Debug, Clone)]
@@ -43,10 +47,10 @@ pub struct Place {
 
 impl Kinematics {
     /// `joints_rad`: one vector of commanded angles a pose, of the robot's joint count.
-    /// Weights have their levers on the chain of `levers`.
-    pub fn new(nominal: &Robot, levers: &Robot, parameters: &[Parameter], joints_rad: &[&[f64]]) -> Kinematics {
+    /// Weights have their levers on the chain of `load_chain`.
+    pub fn new(nominal: &Robot, load_chain: &Robot, parameters: &[Parameter], joints_rad: &[&[f64]]) -> Kinematics {
         let constants = |q: &&[f64]| {
-            let torques = Torques::new(levers, q);
+            let torques = Torques::new(load_chain, q);
             let bent = nominal.bent_with(q, &torques);
             let tilt = |(b, n): (&Joint, &Joint)| [b.alpha_rad - n.alpha_rad, b.beta_rad - n.beta_rad];
             let tilts_rad = match (0..nominal.joints.len()).any(|joint| nominal.corrections.tilts(joint)) {
@@ -59,10 +63,14 @@ impl Kinematics {
                 features: parameters.iter().map(|&p| feature(p, &torques, q)).collect(),
             }
         };
+        let poses: Vec<PoseConstants> = joints_rad.iter().map(constants).collect();
+        let turns =
+            |(k, joint): (usize, &Joint)| poses.iter().map(|p| joint.turn_rad(p.angles_rad[k]).sin_cos()).collect();
         Kinematics {
             nominal: nominal.clone(),
             parameters: parameters.to_vec(),
-            poses: joints_rad.iter().map(constants).collect(),
+            turns: nominal.joints.iter().enumerate().map(turns).collect(),
+            poses,
         }
     }
 
@@ -74,21 +82,6 @@ impl Kinematics {
     /// The robot whose parameters are offset.
     pub fn nominal(&self) -> &Robot {
         &self.nominal
-    }
-
-    /// Number of poses.
-    pub fn pose_count(&self) -> usize {
-        self.poses.len()
-    }
-
-    /// Of a pose: its angles with the nominal robot's own corrections, rad, and the features of the parameters.
-    pub fn constants(&self, pose: usize) -> (&[f64], &[Feature]) {
-        (&self.poses[pose].angles_rad, &self.poses[pose].features)
-    }
-
-    /// Of a pose: what the nominal robot's own bending and wobble add to alpha and beta, one a joint, rad; empty without.
-    pub fn tilts_rad(&self, pose: usize) -> &[[f64; 2]] {
-        &self.poses[pose].tilts_rad
     }
 
     /// Every pose, with derivatives where asked.

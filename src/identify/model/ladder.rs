@@ -39,7 +39,6 @@ impl Terms {
     pub const NOMINAL: Terms =
         Terms { chain: Chain::Nominal, beta: false, gravity: 0, couplings: 0, harmonics: 0, wobble: false };
 
-    /// All that there is.
     pub const ALL: Terms =
         Terms { chain: Chain::Mdh, beta: true, gravity: 3, couplings: 2, harmonics: 2, wobble: true };
 

@@ -5,7 +5,7 @@
 //! has the variance of their combination, and its correction is spread over them as their tolerances say. The factors maximise the probability of the data (type II maximum likelihood:
 //! MacKay, "Bayesian interpolation", 1992) over a grid, one kind after the other.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, LU};
 
 use super::base::Base;
 use crate::identify::sensor::Extra;
@@ -27,7 +27,6 @@ const ROUNDS: usize = 2;
 /// A turn of the target that was mounted by hand, mrad: no information.
 const TARGET_TURN_MRAD: f64 = 3000.0;
 
-/// Number of kinds.
 const KINDS: usize = 8;
 
 /// Index of the kind of zeros, and standard deviations that the search starts from, mm.
@@ -91,17 +90,26 @@ fn extra_kind(extra: Extra) -> Option<usize> {
 }
 
 impl Tolerance {
-    fn values(&self) -> [f64; KINDS] {
+    fn kinds(&mut self) -> [&mut f64; KINDS] {
         [
-            self.lengths_mm,
-            self.angles_mrad,
-            self.target_mm,
-            self.gravity_mrad_per_m,
-            self.harmonics_mrad,
-            self.couplings_per_mille,
-            self.zero_mm,
-            self.warps_per_mille,
+            &mut self.lengths_mm,
+            &mut self.angles_mrad,
+            &mut self.target_mm,
+            &mut self.gravity_mrad_per_m,
+            &mut self.harmonics_mrad,
+            &mut self.couplings_per_mille,
+            &mut self.zero_mm,
+            &mut self.warps_per_mille,
         ]
+    }
+
+    fn values(mut self) -> [f64; KINDS] {
+        self.kinds().map(|value| *value)
+    }
+
+    fn with(mut self, kind: usize, value: f64) -> Tolerance {
+        *self.kinds()[kind] = value;
+        self
     }
 
     /// Standard deviation of a parameter, mm or mrad.
@@ -115,26 +123,6 @@ impl Tolerance {
             (Extra::Target(_), _) => TARGET_TURN_MRAD,
             _ => 1.0,
         }
-    }
-
-    fn with(&self, kind: usize, value: f64) -> Tolerance {
-        let mut t = *self;
-        let slots = [
-            &mut t.lengths_mm,
-            &mut t.angles_mrad,
-            &mut t.target_mm,
-            &mut t.gravity_mrad_per_m,
-            &mut t.harmonics_mrad,
-            &mut t.couplings_per_mille,
-            &mut t.zero_mm,
-            &mut t.warps_per_mille,
-        ];
-        for (k, slot) in slots.into_iter().enumerate() {
-            if k == kind {
-                *slot = value;
-            }
-        }
-        t
     }
 
     /// Covariance of the base parameters, their own and what they stand for, and of the extra unknowns after them.
@@ -208,7 +196,6 @@ impl Tolerance {
 pub struct Likelihood<'a> {
     /// The base parameters.
     pub base: &'a Base,
-    /// All parameters.
     pub parameters: &'a [Parameter],
     /// Unknowns of the sensor.
     pub extras: &'a [Extra],
@@ -249,7 +236,6 @@ impl Likelihood<'_> {
     }
 }
 
-/// Which kinds there are.
 fn presence(parameters: &[Parameter], extras: &[Extra]) -> [bool; KINDS] {
     let mut present = [false; KINDS];
     for kind in parameters.iter().map(|&p| kind(p)).chain(extras.iter().filter_map(|&e| extra_kind(e))) {
@@ -303,18 +289,24 @@ pub fn evidence_of_all(sds: &[f64], normal: &DMatrix<f64>, gradient: &DVector<f6
     0.5 * of_each.sum::<f64>()
 }
 
+/// I + N C of a product N of the white Jacobian with itself and a covariance C before the data, and the logarithm of its determinant.
+pub fn weighed(normal: &DMatrix<f64>, covariance: &DMatrix<f64>) -> (LU<f64, Dyn, Dyn>, f64) {
+    let mut inner = normal * covariance;
+    for i in 0..inner.nrows() {
+        inner[(i, i)] += 1.0;
+    }
+    let lu = inner.lu();
+    let log_determinant = lu.u().diagonal().iter().map(|d| d.abs().ln()).sum();
+    (lu, log_determinant)
+}
+
 /// Logarithm of the data's probability up to what the prior does not touch.
 fn evidence(covariance: &DMatrix<f64>, normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
     if normal.is_empty() {
         return 0.0;
     }
     // log N = (g' C (I + N C)^-1 g - log det(I + N C)) / 2
-    let mut inner = normal * covariance;
-    for i in 0..inner.nrows() {
-        inner[(i, i)] += 1.0;
-    }
-    let lu = inner.lu();
-    let log_determinant: f64 = lu.u().diagonal().iter().map(|d| d.abs().ln()).sum();
+    let (lu, log_determinant) = weighed(normal, covariance);
     match lu.solve(gradient) {
         Some(solved) => 0.5 * (gradient.dot(&(covariance * solved)) - log_determinant),
         None => f64::NEG_INFINITY,

@@ -19,17 +19,14 @@ use crate::identify::sensor::SmoothError;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Advice {
-    /// Use it.
     Use,
     /// Use it once the reason was looked at.
     Check,
     /// Nothing better than the nominal robot was found, and that is the result.
     KeepNominal,
-    /// Do not use it.
     DoNotUse,
 }
 
-/// The file.
 #[derive(Debug, Clone, Serialize)]
 pub struct Record {
     /// Of every random draw.
@@ -119,7 +116,6 @@ impl Smooth {
 }
 
 impl Record {
-    /// The method that was chosen.
     pub fn chosen_method(&self) -> Option<&MethodRecord> {
         self.methods.iter().find(|m| self.chosen == format!("{}/{}", m.name, m.model))
     }

@@ -65,9 +65,7 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
 fn of_rows(set: &Dataset, found: &Identification) -> Vec<Finding> {
     let names = |rows: &[usize]| rows.iter().map(|&r| set.poses[r].name.clone()).collect::<Vec<_>>();
     let mut list = Vec::new();
-    let mut add = |finding: String, rows: Vec<String>, action: &str| {
-        list.push(Finding { finding, rows, action: action.to_owned() });
-    };
+    let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
     if !found.outliers.is_empty() {
         let share = 100.0 * found.outliers.len() as f64 / (found.fitted.len() + found.outliers.len()) as f64;
         add(
@@ -105,10 +103,8 @@ fn of_rows(set: &Dataset, found: &Identification) -> Vec<Finding> {
 /// Errors that the readings share.
 fn of_sensor(set: &Dataset, found: &Identification) -> Vec<Finding> {
     let mut list = Vec::new();
-    let mut add = |finding: String, rows: Vec<String>, action: &str| {
-        list.push(Finding { finding, rows, action: action.to_owned() });
-    };
-    if let Some(scale) = found.scale(set).filter(CommonScale::is_told) {
+    let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
+    if let Some(scale) = found.scale(set).filter(CommonScale::is_significant) {
         add(scale.sentence(), Vec::new(), "the robot that was found has this scale; check it on a known length");
     }
     if let Some((zero_mm, sigma_mm)) = zero(found) {
@@ -140,9 +136,7 @@ fn of_sensor(set: &Dataset, found: &Identification) -> Vec<Finding> {
 /// What the rows hold, and what their covariances state.
 fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
     let mut list = Vec::new();
-    let mut add = |finding: String, rows: Vec<String>, action: &str| {
-        list.push(Finding { finding, rows, action: action.to_owned() });
-    };
+    let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
     if !set.floored.is_empty() {
         add(
             "singular covariances (no variance in one direction)".to_owned(),
@@ -200,9 +194,7 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
 /// Sessions and drifts.
 pub fn along_the_rows(along: &Along) -> Vec<Finding> {
     let mut list = Vec::new();
-    let mut add = |finding: String, rows: Vec<String>, action: &str| {
-        list.push(Finding { finding, rows, action: action.to_owned() });
-    };
+    let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
     let drifts = |s: &Session| along.drifting.contains(&s.group);
     let ranges = |of: &dyn Fn(&&Session) -> bool| -> Vec<String> {
         along.sessions.iter().filter(of).map(|s| format!("{}..{}", s.first, s.last)).collect()

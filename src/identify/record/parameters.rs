@@ -18,9 +18,7 @@ const AT_LIMIT: f64 = 1e-3;
 pub struct MethodRecord {
     /// Method.
     pub name: &'static str,
-    /// Model.
     pub model: &'static str,
-    /// All parameters.
     pub parameters: Vec<ParameterRecord>,
     /// On the rows that were fitted.
     pub fit: PointSpread,
@@ -30,9 +28,7 @@ pub struct MethodRecord {
     pub held_out_mm: Option<f64>,
     /// Least cost, mm^2.
     pub cost_mm2: Option<f64>,
-    /// Iterations.
     pub iterations: usize,
-    /// Evaluations.
     pub evaluations: usize,
     /// Why it stopped.
     pub stop: Option<Stop>,
@@ -42,10 +38,8 @@ pub struct MethodRecord {
     pub history_evaluations: Vec<usize>,
 }
 
-/// One parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParameterRecord {
-    /// Its name.
     pub name: String,
     /// `mm`, `deg`, `mrad` (harmonics) or `mrad/m` (gravity).
     pub unit: &'static str,
@@ -66,7 +60,6 @@ pub struct ParameterRecord {
 pub struct Identifiability {
     /// Number of base parameters.
     pub rank: usize,
-    /// Number of parameters.
     pub parameters: usize,
     /// Parameters that move nothing that was measured.
     pub zero: Vec<String>,

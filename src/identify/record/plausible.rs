@@ -7,26 +7,24 @@ use crate::robot::Parameter;
 /// Links that are farther from the file's than they are built.
 pub fn of_another_robot(found: &Identification) -> Option<Finding> {
     let far = far(found, &link_limit)?;
-    Some(Finding {
-        finding: format!(
+    Some(Finding::new(
+        format!(
             "the links found are far from the nominal ones ({far}), farther than robots are built: the robot file may be of another robot"
         ),
-        rows: Vec::new(),
-        action: "check that the robot file is the right one".to_owned(),
-    })
+        "check that the robot file is the right one",
+    ))
 }
 
 /// Terms that are larger than those of built robots.
 pub fn of_terms(found: &Identification) -> Option<Finding> {
     let far = far(found, &term_limit)?;
-    Some(Finding {
-        finding: format!(
+    Some(Finding::new(
+        format!(
             "terms found are implausibly large for gears, bearings and encoders ({far}): they may compensate another error, such as wrong \
              joints or conventions"
         ),
-        rows: Vec::new(),
-        action: "the robot that was found holds where it was measured only, until the reason is known".to_owned(),
-    })
+        "the robot that was found holds where it was measured only, until the reason is known",
+    ))
 }
 
 /// How many standard deviations a correction must have to be far from nominal.

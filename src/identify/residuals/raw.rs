@@ -7,7 +7,6 @@ use nalgebra::{Matrix3, Vector3};
 pub enum Raw {
     /// A length; the scatter enters so many times.
     Length(f64, f64, f64),
-    /// A point.
     Point(Vector3<f64>, Matrix3<f64>),
     /// An orientation, rad.
     Turn(Vector3<f64>),

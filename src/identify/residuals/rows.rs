@@ -22,13 +22,13 @@ use crate::robot::{Parameter, Robot};
 
 /// What to build residuals from.
 #[derive(Debug, Clone, Copy)]
-pub struct Recipe<'a> {
+pub struct RowSpec<'a> {
     /// The measurements.
     pub set: &'a Dataset,
     /// The robot whose parameters are offset.
     pub robot: &'a Robot,
     /// The robot on whose chain weights have their levers: where `robot` is going.
-    pub levers: &'a Robot,
+    pub load_chain: &'a Robot,
     /// The parameters that may move.
     pub parameters: &'a [Parameter],
     /// Unknowns of the sensor that may move.
@@ -62,17 +62,17 @@ pub struct Rows {
 
 impl Rows {
     /// Builds the blocks. Rows whose group has nothing to measure from are left out.
-    pub fn new(recipe: &Recipe) -> Rows {
-        let Recipe { set, robot, levers, parameters, rows, .. } = *recipe;
+    pub fn new(spec: &RowSpec) -> Rows {
+        let RowSpec { set, robot, load_chain, parameters, rows, .. } = *spec;
         let mut used: Vec<usize> = rows.to_vec();
         // A centre is a place that distances need, wherever its row went.
         used.extend(set.groups.iter().filter_map(|g| g.center).filter(|c| !rows.contains(c)));
         used.sort_unstable();
         let joints: Vec<&[f64]> = used.iter().map(|&i| set.poses[i].joints_rad.as_slice()).collect();
-        let kinematics = Kinematics::new(robot, levers, parameters, &joints);
+        let kinematics = Kinematics::new(robot, load_chain, parameters, &joints);
         let places = kinematics.places(&vec![0.0; parameters.len()], false);
-        let blocks = Inputs { recipe, used: &used, places: &places, by_group: by_group(set, rows) }.blocks();
-        Rows { kinematics, rows: used, blocks, scatter: recipe.scatter, extras: recipe.extras.to_vec() }
+        let blocks = Inputs { spec, used: &used, places: &places, by_group: by_group(set, rows) }.blocks();
+        Rows { kinematics, rows: used, blocks, scatter: spec.scatter, extras: spec.extras.to_vec() }
     }
 
     /// Number of offsets: the robot's parameters, then the extra unknowns.
@@ -220,7 +220,7 @@ fn point_extra(set: &Dataset, row: usize, point_mm: &Point3<f64>, extras: &[Extr
 }
 
 struct Inputs<'a> {
-    recipe: &'a Recipe<'a>,
+    spec: &'a RowSpec<'a>,
     used: &'a [usize],
     places: &'a [Place],
     by_group: Vec<Vec<usize>>,
@@ -232,23 +232,23 @@ impl Inputs<'_> {
     }
 
     fn weight(&self, row: usize) -> f64 {
-        self.recipe.weights.get(row).copied().unwrap_or(1.0)
+        self.spec.weights.get(row).copied().unwrap_or(1.0)
     }
 
     fn blocks(&self) -> Vec<Block> {
-        let groups = 0..self.recipe.set.groups.len();
-        match (self.recipe.set.kind, self.recipe.model) {
+        let groups = 0..self.spec.set.groups.len();
+        match (self.spec.set.kind, self.spec.model) {
             (Kind::Distances, _) => groups.filter_map(|g| self.measured_distances(g)).chain(self.touches()).collect(),
             (Kind::Positions, Model::CenterDistance) => groups.filter_map(|g| self.center_distances(g)).collect(),
             (Kind::Positions, Model::PairwiseDistance) => groups.flat_map(|g| self.pairs(g)).collect(),
-            (Kind::Positions, Model::Position | Model::Pose) => self.points(self.recipe.model == Model::Pose),
+            (Kind::Positions, Model::Position | Model::Pose) => self.points(self.spec.model == Model::Pose),
         }
     }
 
     fn measured_distances(&self, group: usize) -> Option<Block> {
-        let extras = self.recipe.extras;
+        let extras = self.spec.extras;
         let zero = |e: &Extra| if *e == Extra::Zero { 1.0 } else { 0.0 };
-        let length = |&i: &usize| match self.recipe.set.poses[i].reading {
+        let length = |&i: &usize| match self.spec.set.poses[i].reading {
             Reading::Distance { distance_mm, sigma_mm } if distance_mm > 0.0 => Some(Length {
                 pose: self.place_of(i)?,
                 length_mm: distance_mm,
@@ -262,18 +262,18 @@ impl Inputs<'_> {
         if lengths.is_empty() {
             return None;
         }
-        match self.recipe.set.groups[group].center.and_then(|c| self.place_of(c)) {
+        match self.spec.set.groups[group].center.and_then(|c| self.place_of(c)) {
             Some(center) => Some(Block::Center(Center { center, lengths })),
             None => {
                 let anchor_mm = first_anchor(self.places, &lengths);
-                Some(Block::Wire(Wire { lengths, anchor_mm, offset: self.recipe.wire_offset }))
+                Some(Block::Wire(Wire { lengths, anchor_mm, offset: self.spec.wire_offset }))
             }
         }
     }
 
     /// One block for all sockets that known distances tie together.
     fn touches(&self) -> Vec<Block> {
-        let set = self.recipe.set;
+        let set = self.spec.set;
         let touched: Vec<(usize, Vec<(usize, f64)>)> = (0..set.groups.len())
             .filter_map(|g| {
                 let contact = |&i: &usize| match set.poses[i].reading {
@@ -319,22 +319,22 @@ impl Inputs<'_> {
 
     fn spot(&self, row: usize) -> Option<Spot> {
         let pose = self.place_of(row)?;
-        match &self.recipe.set.poses[row].reading {
+        match &self.spec.set.poses[row].reading {
             Reading::Position { point_mm, covariance_mm2, rotation_rad } => Some(Spot {
                 pose,
                 point_mm: *point_mm,
-                on_body_mm: self.recipe.set.poses[row].on_body_mm,
+                on_body_mm: self.spec.set.poses[row].on_body_mm,
                 covariance_mm2: covariance_mm2.unwrap_or_else(Matrix3::zeros),
                 rotation: rotation_rad.map(|r| Rotation3::new(r).into_inner()),
                 weight: self.weight(row),
-                extra: point_extra(self.recipe.set, row, point_mm, self.recipe.extras),
+                extra: point_extra(self.spec.set, row, point_mm, self.spec.extras),
             }),
             _ => None,
         }
     }
 
     fn center_distances(&self, group: usize) -> Option<Block> {
-        let reference = self.recipe.set.reference(group, self.recipe.rows)?;
+        let reference = self.spec.set.reference(group, self.spec.rows)?;
         let center = self.spot(reference)?;
         let length = |&i: &usize| {
             let spot = self.spot(i).filter(|spot| spot.on_body_mm.is_none())?;
@@ -363,7 +363,7 @@ impl Inputs<'_> {
         (0..chunks)
             .map(chunk)
             .filter(|c| c.len() > 2)
-            .filter_map(|c| Pairs::new(c, &self.recipe.scatter))
+            .filter_map(|c| Pairs::new(c, &self.spec.scatter))
             .map(Block::Pairwise)
             .collect()
     }
@@ -378,8 +378,8 @@ impl Inputs<'_> {
         let frames: Vec<Transform> = lists.iter().map(|spots| robust_frame(spots, self.places)).collect();
         let turned = oriented || lists.iter().flatten().any(|spot| spot.on_body_mm.is_some());
         let flange_from_target = if turned { mean_target(&lists, &frames, self.places) } else { Matrix3::identity() };
-        let target = if turned { Points::target_extras(self.recipe.extras) } else { Vec::new() };
-        let scatter = &self.recipe.scatter;
+        let target = if turned { Points::target_extras(self.spec.extras) } else { Vec::new() };
+        let scatter = &self.spec.scatter;
         let block = |(spots, sensor_from_base): (Vec<Spot>, Transform)| {
             let target = target.clone();
             let mut points = Points { spots, sensor_from_base, flange_from_target, oriented, target, field: None };

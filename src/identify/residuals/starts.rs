@@ -9,9 +9,15 @@ use crate::geometry::{Transform, fitted_frame, nearest_rotation};
 use crate::identify::model::kinematics::Place;
 use crate::identify::sensor::{Length, Spot};
 use crate::linear_algebra::pseudo_inverse;
+use crate::statistics::median;
 
 /// Rounds of reweighting a first frame.
 const FRAME_ROUNDS: usize = 15;
+
+/// The distance below which rows count as if they were as far off: a tenth of the middle one.
+fn least_weighed(misses: &[f64]) -> f64 {
+    (0.1 * median(misses.iter().copied()).unwrap_or(0.0)).max(1e-9)
+}
 
 /// A frame that gross errors hardly move: least sum of distances, by reweighting (Weiszfeld's way).
 pub(super) fn robust_frame(spots: &[Spot], places: &[Place]) -> Transform {
@@ -23,9 +29,7 @@ pub(super) fn robust_frame(spots: &[Spot], places: &[Place]) -> Transform {
     for _ in 0..FRAME_ROUNDS {
         frame = fitted_frame(spots.iter().zip(&weights).map(|(s, w)| (places[s.pose].point_mm, s.point_mm, *w)));
         let misses: Vec<f64> = spots.iter().map(|s| (frame * places[s.pose].point_mm - s.point_mm).norm()).collect();
-        let mut sorted = misses.clone();
-        sorted.sort_by(f64::total_cmp);
-        let floor = (0.1 * sorted[sorted.len() / 2]).max(1e-9);
+        let floor = least_weighed(&misses);
         weights = misses.iter().zip(&spots).map(|(m, s)| s.weight * s.weight / m.max(floor)).collect();
     }
     frame
@@ -33,11 +37,7 @@ pub(super) fn robust_frame(spots: &[Spot], places: &[Place]) -> Transform {
 
 /// Coordinate by coordinate the median.
 pub(super) fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
-    Vector3::from_fn(|axis, _| {
-        let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied().unwrap_or(0.0)
-    })
+    Vector3::from_fn(|axis, _| median(points.iter().map(|p| p[axis])).unwrap_or(0.0))
 }
 
 /// Mean of `flange_from_target` over all poses: of those with an orientation, and of those that show a part of the body, which stands in some
@@ -79,9 +79,7 @@ pub(super) fn first_anchor(places: &[Place], lengths: &[Length]) -> Vector3<f64>
         anchor = mean + solution.fixed_rows::<3>(0);
         let misses: Vec<f64> =
             lengths.iter().map(|l| ((places[l.pose].point_mm.coords - anchor).norm() - l.length_mm).abs()).collect();
-        let mut sorted = misses.clone();
-        sorted.sort_by(f64::total_cmp);
-        let floor = (0.1 * sorted[n / 2]).max(1e-9);
+        let floor = least_weighed(&misses);
         weights = misses.iter().zip(lengths).map(|(m, l)| l.weight / m.max(floor).sqrt()).collect();
     }
     anchor

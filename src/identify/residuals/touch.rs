@@ -29,9 +29,7 @@ pub struct Known {
     pub a: usize,
     /// Index of the other.
     pub b: usize,
-    /// mm
     pub distance_mm: f64,
-    /// mm
     pub sigma_mm: f64,
     /// Which of the data set's known distances it is.
     pub index: usize,

@@ -1,6 +1,6 @@
 //! What an identification ends with.
 
-use super::climb::Judged;
+use super::forward_selection::Judged;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::scale::CommonScale;
 use crate::identify::judge::smooth;
@@ -49,7 +49,7 @@ pub struct Identification {
     /// The scatter that is left of the chosen fit.
     pub scatter: Scatter,
     /// A smooth error that the points of each placement share.
-    pub smooth: Option<smooth::Told>,
+    pub smooth: Option<smooth::Detected>,
     /// Unknowns of the sensor, and their values.
     pub extras: Vec<(Extra, f64)>,
     /// Whether the nominal robot was kept because the verify rows found the other one worse.

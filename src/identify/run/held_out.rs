@@ -23,7 +23,6 @@ pub enum Against {
     NotWorse,
     /// Worse, by no more than another draw of rows might.
     Perhaps,
-    /// Worse.
     Worse,
 }
 

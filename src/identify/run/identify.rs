@@ -9,7 +9,7 @@
 //! 5. Verify rows take no part in any choice but one: where the robot found is worse on them than the nominal one by more than another draw
 //!    of rows would let expect, nominal is kept. Without verify rows every row is fitted, and judged by fits that it was left out of.
 
-use super::climb::Judged;
+use super::forward_selection::Judged;
 use super::found::{Candidate, Deletion, Identification};
 use super::gross::Gross;
 use super::held_out::Against;
@@ -17,7 +17,7 @@ use super::session::Session;
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::shared;
-use crate::identify::judge::cells::Cells;
+use crate::identify::judge::cross_validation::CrossValidation;
 use crate::identify::judge::{folds, smooth};
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::sensor::{Extra, Scatter};
@@ -150,7 +150,7 @@ impl Session<'_> {
         (self.step)("models of the robot");
         let (terms, judged) = match self.settings.extensions {
             Extensions::None => (Terms::default(), Vec::new()),
-            Extensions::Auto => self.climb(by_points)?,
+            Extensions::Auto => self.select_terms(by_points)?,
         };
         if terms.chain == Chain::Mdh && terms != first && self.tells(&terms, ROWS_TELL) {
             // A row that a poorer model could not follow is no gross error, and a richer one follows too much.
@@ -162,7 +162,7 @@ impl Session<'_> {
 
     /// A smooth error that the points of each placement share, where they tell of one. It comes after the terms: what the robot
     /// does wrong is as smooth, and a robot that is corrected is worth more than one about which less is certain.
-    fn smooth_error(&self, model: Model, terms: &Terms) -> Result<Option<smooth::Told>, Error> {
+    fn smooth_error(&self, model: Model, terms: &Terms) -> Result<Option<smooth::Detected>, Error> {
         let parameters = terms.parameters(self.robot);
         let at = Formulation::new(&self.task(&parameters, model))?;
         let sds = at.tolerance.standard_deviations(&parameters, &self.extras);
@@ -211,8 +211,8 @@ impl Session<'_> {
         let parameters = terms.parameters(self.robot);
         let mut formulation = Formulation::new(&self.task(&parameters, model))?;
         if model != Model::PairwiseDistance {
-            let cells = self.cells(&parameters, &parameters, &formulation, formulation.rows.scatter, model);
-            formulation.common = cells[0].common_factor(&parameters);
+            let validations = self.validations(&parameters, &parameters, &formulation, formulation.rows.scatter, model);
+            formulation.common = validations[0].common_factor(&parameters);
         }
         let deletions = if self.set.verify_rows().is_empty() {
             self.deletions(model, &parameters, &formulation)
@@ -230,14 +230,14 @@ impl Session<'_> {
     /// What the fit becomes without each fold of the rows, each time that they are cut into folds.
     fn deletions(&self, model: Model, parameters: &[Parameter], at: &Formulation) -> Vec<Deletion> {
         let offsets = at.offsets_of();
-        let levers = self.robot.shifted(parameters, &offsets[..parameters.len()]);
+        let load_chain = self.robot.shifted(parameters, &offsets[..parameters.len()]);
         // What is smooth over a placement makes one of all its rows; without it rows can be left out.
         let scatter = Scatter { smooth: None, ..at.rows.scatter };
         let task = Task { smooth: None, ..self.task(parameters, model) };
-        let rows = task.rows_at(scatter, &levers);
+        let rows = task.rows_at(scatter, &load_chain);
         let linearised = Linearised::new(&rows, &offsets);
         let of_repeat = |of_row: &Vec<Option<usize>>| -> Vec<Deletion> {
-            let changes = Cells::by_folds(&linearised, &rows, of_row).deletions(parameters, &at.tolerance);
+            let changes = CrossValidation::by_folds(&linearised, &rows, of_row).deletions(parameters, &at.tolerance);
             let of_fold = |(fold, change): (usize, Option<Vec<f64>>)| {
                 let of_fold: Vec<usize> = (0..of_row.len()).filter(|&r| of_row[r] == Some(fold)).collect();
                 Some(Deletion { rows: of_fold, change: change? }).filter(|d| !d.rows.is_empty())

@@ -1,6 +1,6 @@
 //! The order of it all: gross errors, models, methods, the choice among them.
 
-mod climb;
+mod forward_selection;
 mod found;
 mod gross;
 mod held_out;
@@ -8,7 +8,7 @@ mod identify;
 mod placed;
 mod session;
 
-pub use climb::{Certainty, Judged, certainty};
+pub use forward_selection::{Certainty, Judged, certainty};
 pub use found::{Candidate, Deletion, Identification};
 pub use held_out::Against;
 pub use identify::{identify, step_count};

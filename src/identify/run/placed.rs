@@ -39,7 +39,7 @@ impl Identification {
         let offsets: Vec<f64> = kept.iter().map(|&k| whole[k]).collect();
         let shared = shared.select_rows(&kept).select_columns(&kept);
         let parameters = formulation.parameters();
-        let levers = nominal.shifted(parameters, &whole[..count]);
+        let load_chain = nominal.shifted(parameters, &whole[..count]);
         let task = Task {
             set,
             robot: nominal,
@@ -50,7 +50,7 @@ impl Identification {
             smooth: None,
             settings,
         };
-        let rows = task.rows_at(formulation.rows.scatter, &levers);
+        let rows = task.rows_at(formulation.rows.scatter, &load_chain);
         Ok(Placed::new(set, &rows, &offsets, &shared, formulation.common))
     }
 

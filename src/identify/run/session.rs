@@ -16,7 +16,7 @@ pub(super) struct Session<'a> {
     pub(super) seed: u64,
     pub(super) rows: Vec<usize>,
     pub(super) extras: Vec<Extra>,
-    pub(super) smooth: Option<smooth::Told>,
+    pub(super) smooth: Option<smooth::Detected>,
     pub(super) step: &'a (dyn Fn(&str) + Sync),
 }
 

@@ -23,10 +23,10 @@ use crate::identify::residuals::eliminate::Block;
 use crate::linear_algebra::{Eliminated, pseudo_inverse};
 
 /// Root of the weight of a row that must not count, but has to have residuals and derivatives.
-const UNHEARD: f64 = 1e-5;
+const NEGLIGIBLE: f64 = 1e-5;
 
 /// Share of the standard deviations that a row is left out for, within which it goes back.
-const GOES_BACK: f64 = 2.0 / 3.0;
+const READMITTED_WITHIN: f64 = 2.0 / 3.0;
 
 /// Times that rows may go back.
 const ROUNDS: usize = 4;
@@ -83,14 +83,15 @@ impl Robust<'_> {
         }
         for _ in 0..ROUNDS {
             for &row in self.task.rows {
-                self.weights[row] = if out.contains(&row) { UNHEARD } else { 1.0 };
+                self.weights[row] = if out.contains(&row) { NEGLIGIBLE } else { 1.0 };
             }
             self.step(STEPS);
             if out.is_empty() {
                 break;
             }
             let deleted = self.deleted();
-            let still: Vec<usize> = out.iter().copied().filter(|&r| deleted[r].size() > GOES_BACK * sigmas).collect();
+            let still: Vec<usize> =
+                out.iter().copied().filter(|&r| deleted[r].size() > READMITTED_WITHIN * sigmas).collect();
             if still.len() == out.len() {
                 break;
             }
@@ -117,7 +118,7 @@ impl Robust<'_> {
         rows.sort_unstable();
         rows.dedup();
         let mut weights = self.weights.clone();
-        others.iter().for_each(|&row| weights[row] = UNHEARD);
+        others.iter().for_each(|&row| weights[row] = NEGLIGIBLE);
         let with = Robust { task: Task { rows: &rows, ..self.task }, weights, ..self.clone() };
         let deleted = with.deleted();
         let mut far: Vec<usize> = others.iter().copied().filter(|&r| deleted[r].size() > sigmas).collect();
@@ -167,7 +168,7 @@ impl Robust<'_> {
         let covariance = pseudo_inverse(normals.iter().fold(prior.clone(), |sum, normal| sum + normal));
         let weight = |row: usize| self.weights.get(row).copied().unwrap_or(1.0);
         let predicting = parts.iter().flat_map(|(poses, ..)| poses.iter().flatten());
-        let most = predicting.filter(|&&pose| weight(rows.rows[pose]) > UNHEARD).count().max(1) as f64;
+        let most = predicting.filter(|&&pose| weight(rows.rows[pose]) > NEGLIGIBLE).count().max(1) as f64;
         let (mut squares, mut numbers, mut unknowns) = (0.0, 0usize, 0);
         let mut deleted = vec![Deleted::default(); self.task.set.poses.len()];
         let mut of_known = vec![0.0; self.task.set.known.len()];
@@ -189,7 +190,7 @@ impl Robust<'_> {
                 let Some(pose) = poses[at.start] else { continue };
                 let row = rows.rows[pose];
                 let (residual, leverage) = held(&at);
-                if weight(row) > UNHEARD {
+                if weight(row) > NEGLIGIBLE {
                     squares += residual.norm_squared();
                     numbers += at.len();
                 }
@@ -204,7 +205,7 @@ impl Robust<'_> {
         let freedom =
             (numbers as f64 - unknowns as f64 - determined).max(numbers.div_ceil(LEAST_FREEDOM).max(1) as f64);
         for (row, d) in deleted.iter_mut().enumerate() {
-            d.judged_by(squares, freedom, weight(row) > UNHEARD);
+            d.judged_by(squares, freedom, weight(row) > NEGLIGIBLE);
         }
         (deleted, of_known)
     }

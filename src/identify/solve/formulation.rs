@@ -245,7 +245,7 @@ struct Estimate<'a> {
     /// Base parameters and extras.
     x: Vec<f64>,
     /// The robot on whose chain weights have their levers.
-    levers: Robot,
+    load_chain: Robot,
     /// Number of unknowns that the data have determined.
     effective: f64,
 }
@@ -254,19 +254,19 @@ impl<'a> Estimate<'a> {
     /// From the side of noise: what the parameters have not explained yet counts as scatter, so that a few rows are not followed to the last
     /// digit by a prior that makes room for it.
     fn new(task: &'a Task<'a>) -> Result<Estimate<'a>, Error> {
-        let levers = task.robot.clone();
+        let load_chain = task.robot.clone();
         let scatter = Scatter { smooth: task.smooth, ..Scatter::of_point(FIRST_SCATTER_MM) };
-        let rows = Rows::new(&task.recipe(scatter, &[], &levers));
+        let rows = Rows::new(&task.spec(scatter, &[], &load_chain));
         let base = task.base(&rows)?;
         task.check_count(&rows, &base)?;
         let x = vec![0.0; base.rank() + task.extras.len()];
         let scatter = estimate_scatter(&rows, &vec![0.0; rows.offset_count()], 0.0, scatter);
-        Ok(Estimate { task, base, scatter, tolerance: Tolerance::default(), x, levers, effective: 0.0 })
+        Ok(Estimate { task, base, scatter, tolerance: Tolerance::default(), x, load_chain, effective: 0.0 })
     }
 
     fn round(&mut self, round: usize, held: bool) {
         let task = self.task;
-        let rows = Rows::new(&task.recipe(self.scatter, &[], &self.levers));
+        let rows = Rows::new(&task.spec(self.scatter, &[], &self.load_chain));
         let free = vec![f64::INFINITY; self.x.len()];
         if held {
             let spread = self.tolerance.spread(&self.base, task.parameters);
@@ -281,7 +281,7 @@ impl<'a> Estimate<'a> {
         let offsets = fit.offsets(&x);
         self.effective = determined(&fit, &x, &prior);
         self.scatter = estimate_scatter(&rows, &offsets, self.effective, self.scatter);
-        self.levers = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
+        self.load_chain = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
         self.x = x;
         if round < BASES
             && let Some(richer) = task.richer(&rows, &offsets, &self.base)
@@ -294,8 +294,8 @@ impl<'a> Estimate<'a> {
 
     /// The fit with scatter and prior as they are, on rows whose levers are on the robot that it ends at.
     fn settled(self, held: bool) -> Result<(Rows, Base, Solution), Error> {
-        let Estimate { task, base, scatter, tolerance, mut x, levers, .. } = self;
-        let mut rows = Rows::new(&task.recipe(scatter, &[], &levers));
+        let Estimate { task, base, scatter, tolerance, mut x, load_chain, .. } = self;
+        let mut rows = Rows::new(&task.spec(scatter, &[], &load_chain));
         let prior = prior_rows(&tolerance, &base, task, held);
         let spread = tolerance.spread(&base, task.parameters);
         let free = vec![f64::INFINITY; x.len()];
@@ -306,11 +306,11 @@ impl<'a> Estimate<'a> {
             let moved = solved.x.iter().zip(&x).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             x.clone_from(&solved.x);
             let offsets = fit.offsets(&x);
-            let levers = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
+            let load_chain = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
             free_fit = Some(solved);
             let settled = moved < SAME_CHAIN
                 || !task.parameters.iter().any(|p| matches!(p, Parameter::Gravity(..) | Parameter::Bending(..)));
-            rows = Rows::new(&task.recipe(scatter, &[], &levers));
+            rows = Rows::new(&task.spec(scatter, &[], &load_chain));
             if settled {
                 break;
             }

@@ -1,15 +1,14 @@
-//! The least-squares problem and its solvers; kernel, batch and placement are the swarms' hot loop.
+//! The least-squares problem and its solvers; swarm_cost and placement are the swarms' hot loop.
 
-pub mod batch;
 mod deleted;
 pub mod fit;
 pub mod formulation;
-pub mod kernel;
 pub mod linearised;
 pub mod placement;
 pub mod problem;
 pub mod robust;
 pub mod scatter;
 pub mod swarm;
+pub mod swarm_cost;
 pub mod task;
 pub mod trust_region;

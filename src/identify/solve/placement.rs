@@ -1,6 +1,6 @@
 //! The cost of a placement whose own unknowns are solved for, without building matrices: for the swarms.
 //!
-//! In: points and rotations from the [`Kernel`](crate::identify::solve::kernel::Kernel). Out: the sum of the squared whitened residuals with the
+//! In: points and rotations of the robot's poses. Out: the sum of the squared whitened residuals with the
 //! unknowns (rigid transforms, the wire's anchor and zero) at their best. The unknowns start where they follow the parameters to
 //! first order and go on by Newton's method; rigid transforms with the normal matrix of the nominal robot, which hardly changes
 //! within the box, so that two or three gradients are enough.
@@ -8,10 +8,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Vector3, Vector4};
 
-use super::kernel::Points as Computed;
 use crate::geometry::direction;
 use crate::geometry::{Transform, rotation_matrix};
 use crate::identify::model::kinematics::Place;
+use crate::identify::model::kinematics::points::Points as Computed;
 use crate::identify::residuals::eliminate::{Block, Unknowns};
 use crate::identify::residuals::points::turn;
 use crate::identify::sensor::{Length, Scatter, Spot};

@@ -11,7 +11,6 @@ pub trait Problem: Sync {
     /// Upper bounds.
     fn upper(&self) -> &[f64];
 
-    /// The residuals at `x`.
     fn residuals(&self, x: &[f64]) -> DVector<f64>;
 
     /// The residuals at `x` and their derivatives, a column a parameter.
@@ -56,7 +55,6 @@ pub enum Stop {
 pub struct Solution {
     /// The best point.
     pub x: Vec<f64>,
-    /// Its cost.
     pub cost: f64,
     /// Iterations made.
     pub iterations: usize,

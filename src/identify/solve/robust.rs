@@ -15,7 +15,7 @@ use super::trust_region;
 use crate::identify::Error;
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::Tolerance;
-use crate::identify::residuals::rows::{Recipe, Rows};
+use crate::identify::residuals::rows::{RowSpec, Rows};
 use crate::identify::sensor::Scatter;
 use crate::identify::settings::DescentSettings;
 use crate::robot::Robot;
@@ -46,7 +46,7 @@ impl<'a> Task<'a> {
     pub fn robust(&self, loss: Loss) -> Result<Robust<'a>, Error> {
         let mut scatter = Scatter::of_point(FIRST_SCATTER_MM);
         let mut weights = vec![1.0; self.set.poses.len()];
-        let rows = Rows::new(&self.recipe(scatter, &[], self.robot));
+        let rows = Rows::new(&self.spec(scatter, &[], self.robot));
         let base = self.base(&rows)?;
         self.check_count(&rows, &base)?;
         let mut robust = Robust {
@@ -62,7 +62,7 @@ impl<'a> Task<'a> {
         let bounded = if loss == Loss::Biweight { BOUNDED_ROUNDS } else { ROBUST_ROUNDS };
         let mut scale = 1.0;
         for round in 0..ROBUST_ROUNDS {
-            let probe = self.recipe(scatter, &weights, &robust.robot);
+            let probe = self.spec(scatter, &weights, &robust.robot);
             let residuals = Residual::all(&Rows::new(&probe).raw(&robust.offsets));
             let count = self.set.poses.len();
             if round <= bounded {
@@ -100,7 +100,7 @@ impl Task<'_> {
         let mut weights = vec![1.0; self.set.poses.len()];
         let mut residuals = Vec::new();
         for _ in 0..PLACING_ROUNDS {
-            let rows = Rows::new(&self.recipe(Scatter::of_point(FIRST_SCATTER_MM), &weights, self.robot));
+            let rows = Rows::new(&self.spec(Scatter::of_point(FIRST_SCATTER_MM), &weights, self.robot));
             residuals = Residual::all(&rows.raw(&vec![0.0; rows.offset_count()]));
             let typical = typical_mm(&residuals);
             if typical > hopeless_mm {
@@ -173,7 +173,7 @@ impl Robust<'_> {
     /// Some steps of the trust region with the weights as they are.
     pub(super) fn step(&mut self, iterations: usize) {
         let task = self.task;
-        let rows = Rows::new(&Recipe { weights: &self.weights, ..task.recipe(self.scatter, &[], &self.robot) });
+        let rows = Rows::new(&RowSpec { weights: &self.weights, ..task.spec(self.scatter, &[], &self.robot) });
         let free = vec![f64::INFINITY; self.x.len()];
         let prior = prior_rows(&LOOSE, &self.base, &task, true);
         let spread = LOOSE.spread(&self.base, task.parameters);
@@ -199,7 +199,7 @@ impl Robust<'_> {
 
     /// Mean size of the fitted rows' residuals a coordinate, mm, without the largest tenth of them.
     pub fn typical_mm(&self) -> f64 {
-        let probe = self.task.recipe(self.scatter, &self.weights, &self.robot);
+        let probe = self.task.spec(self.scatter, &self.weights, &self.robot);
         typical_mm(&Residual::all(&Rows::new(&probe).raw(&self.offsets)))
     }
 
@@ -220,8 +220,8 @@ impl Robust<'_> {
 
     /// The rows with their weights, linearised where the fit ended, and the normal matrix of a loose prior on all parameters.
     pub fn linearised(&self) -> (Rows, Linearised, DMatrix<f64>) {
-        let recipe = self.task.recipe(self.scatter, &[], &self.robot);
-        let rows = Rows::new(&Recipe { weights: &self.weights, ..recipe });
+        let spec = self.task.spec(self.scatter, &[], &self.robot);
+        let rows = Rows::new(&RowSpec { weights: &self.weights, ..spec });
         let count = self.offsets.len();
         let mut prior = DMatrix::zeros(count, count);
         for (i, &parameter) in self.task.parameters.iter().enumerate() {

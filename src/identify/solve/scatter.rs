@@ -87,7 +87,6 @@ impl Residual {
         (self.numbers().iter().map(|n| n.square).sum::<f64>() / self.count as f64).sqrt()
     }
 
-    /// Numbers that it has.
     pub(super) fn count(&self) -> usize {
         self.count
     }

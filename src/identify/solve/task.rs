@@ -9,7 +9,7 @@ use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::Tolerance;
-use crate::identify::residuals::rows::{Recipe, Rows};
+use crate::identify::residuals::rows::{RowSpec, Rows};
 use crate::identify::sensor::SmoothError;
 use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::{Model, Prior, Redundancy, Settings};
@@ -35,7 +35,6 @@ pub struct Task<'a> {
     pub model: Model,
     /// A smooth error that the points of a placement share.
     pub smooth: Option<SmoothError>,
-    /// Settings.
     pub settings: &'a Settings,
 }
 
@@ -55,11 +54,11 @@ impl<'a> Task<'a> {
         Task { set, robot, parameters, extras: set.body_unknowns(), rows, model, smooth: None, settings }
     }
 
-    pub(super) fn recipe(&self, scatter: Scatter, weights: &'a [f64], levers: &'a Robot) -> Recipe<'a> {
-        Recipe {
+    pub(super) fn spec(&self, scatter: Scatter, weights: &'a [f64], load_chain: &'a Robot) -> RowSpec<'a> {
+        RowSpec {
             set: self.set,
             robot: self.robot,
-            levers,
+            load_chain,
             parameters: self.parameters,
             extras: self.extras,
             rows: self.rows,
@@ -78,8 +77,8 @@ impl<'a> Task<'a> {
     }
 
     /// The rows with a scatter that is known.
-    pub fn rows_at(&self, scatter: Scatter, levers: &Robot) -> Rows {
-        Rows::new(&self.recipe(scatter, &[], levers))
+    pub fn rows_at(&self, scatter: Scatter, load_chain: &Robot) -> Rows {
+        Rows::new(&self.spec(scatter, &[], load_chain))
     }
 
     /// What the poses determine, seen from the nominal robot.

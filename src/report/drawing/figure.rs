@@ -94,6 +94,22 @@ impl Plot {
         self.with(label, Marks::Points(xy.to_vec()))
     }
 
+    /// Adds points by thirds of a length that each carries, none of them below `least_mm`: `(x, y, mm)`.
+    pub fn points_by_thirds(mut self, points: &[(f64, f64, f64)], least_mm: f64) -> Plot {
+        let mut lengths: Vec<f64> = points.iter().map(|(.., mm)| *mm).collect();
+        lengths.sort_by(f64::total_cmp);
+        let third = |k: usize| lengths.get(k * lengths.len() / 3).copied().unwrap_or(0.0);
+        for (low, high) in [(least_mm, third(1)), (third(1), third(2)), (third(2), f64::INFINITY)] {
+            let within = points.iter().filter(|(.., mm)| *mm >= low && *mm < high);
+            let label = match high.is_finite() {
+                true => format!("{low:.4} to {high:.4} mm"),
+                false => format!("{low:.4} mm and more"),
+            };
+            self = self.points(&label, &within.map(|&(x, y, _)| (x, y)).collect::<Vec<_>>());
+        }
+        self
+    }
+
     /// Adds a line through points.
     pub fn line(self, label: &str, xy: &[(f64, f64)]) -> Plot {
         self.with(label, Marks::Line(xy.to_vec()))

@@ -33,20 +33,10 @@ pub(super) fn verification_figure(before: &[RowError], after: &[RowError]) -> Re
 
 /// The poses by thirds of the error to expect, from above and from the side.
 pub(super) fn expected_map(expected: &Expected, places: &[(Role, Point3<f64>)]) -> Result<Markup> {
-    let mut errors: Vec<f64> = expected.map.iter().map(|(_, mm)| *mm).collect();
-    errors.sort_by(f64::total_cmp);
-    let third = |k: usize| errors.get(k * errors.len() / 3).copied().unwrap_or(0.0);
-    let limits = [(third(0), third(1)), (third(1), third(2)), (third(2), f64::INFINITY)];
+    let least_mm = expected.map.iter().map(|(_, mm)| *mm).fold(f64::INFINITY, f64::min);
     let view = |title: &str, vertical: &str, axes: (usize, usize)| {
-        let mut plot = Plot::new(title, "x, mm", vertical).equal_axes();
-        for (low, high) in limits {
-            let within = expected.map.iter().zip(places).filter(|((_, mm), _)| *mm >= low && *mm < high);
-            let points: Vec<(f64, f64)> = within.map(|(_, (_, p))| (p[axes.0], p[axes.1])).collect();
-            let label =
-                if high.is_finite() { format!("{low:.4} to {high:.4} mm") } else { format!("{low:.4} mm and more") };
-            plot = plot.points(&label, &points);
-        }
-        plot.svg()
+        let points = expected.map.iter().zip(places).map(|((_, mm), (_, p))| (p[axes.0], p[axes.1], *mm));
+        Plot::new(title, "x, mm", vertical).equal_axes().points_by_thirds(&points.collect::<Vec<_>>(), least_mm).svg()
     };
     let caption = "The error to expect at the poses of the file, base frame, a third of them each. More poses help most where it is largest.";
     Ok(html! { div.side {

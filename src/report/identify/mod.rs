@@ -55,7 +55,7 @@ pub fn page(
         @if let Some(expected) = &record.expected {
             h2 { "How far to trust it" }
             (tables::expected_table(expected))
-            @if let Some(scale) = record.scale.filter(|scale| !scale.is_told()) {
+            @if let Some(scale) = record.scale.filter(|scale| !scale.is_significant()) {
                 p { "Not in these figures: " (scale.sentence()) "." }
             }
             (figures::expected_map(expected, places)?)

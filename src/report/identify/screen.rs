@@ -27,7 +27,7 @@ pub fn summary(record: &Record, out: &OutDir) -> String {
     }
     lines.extend(record.repeats.as_ref().map(|repeats| repeats.sentence()));
     lines.extend(record.targets.as_ref().map(|targets| targets.sentence()));
-    lines.extend(record.scale.filter(|scale| !scale.is_told()).map(|scale| scale.sentence()));
+    lines.extend(record.scale.filter(|scale| !scale.is_significant()).map(|scale| scale.sentence()));
     lines.push(format!("all methods and warnings: {}", out.join("identify.html")));
     lines.join("\n") + "\n"
 }

@@ -42,7 +42,6 @@ pub struct Arm {
 }
 
 impl Arm {
-    /// As a robot file has it.
     pub fn robot(&self) -> Robot {
         let mut robot = from_rows(self.title, self.convention, self.rows);
         for (joint, [low, high]) in robot.joints.iter_mut().zip(self.limits_deg) {

@@ -11,6 +11,7 @@
 )]
 
 mod coverage;
+mod peer;
 mod speed;
 
 fn main() {

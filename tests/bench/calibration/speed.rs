@@ -37,7 +37,7 @@ pub fn run() {
     let (held_out, accuracy) = median_s(|| held_out::hold_out(&found, None).expect("an accuracy"));
     println!("held-out accuracy         {held_out:.3} s, worst {:.5} mm", accuracy.extremes.max_abs_error_mm);
     let start = Instant::now();
-    let (rms, baseline) = stereocal::opencv::stereo_calibrate(&corners).expect("OpenCV works");
+    let (rms, baseline) = super::peer::stereo_calibrate(&corners).expect("OpenCV works");
     let peer = start.elapsed().as_secs_f64();
     println!("OpenCV, three functions   {peer:.3} s, RMS {rms:.4} px, baseline {baseline:.4} mm");
     println!("OpenCV / stereocal        {:.1} (start, screening, bundle)", peer / whole);

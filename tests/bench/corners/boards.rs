@@ -80,7 +80,7 @@ fn row(size: u32, sectors_too: bool) {
     println!("   fit {} predicted {:.5}", rms(&found, &truth), predicted.sqrt());
     let start: Vec<Point2<f64>> = detected.corners.iter().map(|(_, _, p)| detected.level.to_picture(p)).collect();
     let clock = core_s();
-    let sub_pix = opencv::corner_sub_pix(&grey, &start, 5).expect("OpenCV works");
+    let sub_pix = super::sub_pix::corner_sub_pix(&grey, &start, 5).expect("OpenCV works");
     println!("   cornerSubPix(11) {} in {:.3} s", rms(&sub_pix, &truth), core_s() - clock);
     peer(&grey, &truth);
     if sectors_too {

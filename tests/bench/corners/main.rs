@@ -18,6 +18,7 @@ mod coded;
 mod corner_patch;
 mod poses;
 mod single;
+mod sub_pix;
 
 fn main() {
     // One table alone where it is named; `poses N` draws N pairs.

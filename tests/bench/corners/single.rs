@@ -9,9 +9,9 @@ use stereocal::imaging::lattice::Lattice;
 use stereocal::imaging::pyramid::Level;
 use stereocal::imaging::refine::illumination;
 use stereocal::imaging::refine::{self, Measured};
-use stereocal::opencv;
 
 use super::corner_patch::{Spread, draw};
+use super::sub_pix::corner_sub_pix;
 
 /// Light and dark, grey values.
 const LEVEL: f64 = 120.0;
@@ -110,7 +110,7 @@ fn measure(angle: f64, spread: Spread, noise: f64) -> Spot {
             let start = truth + Vector2::new(uniform() - 0.5, uniform() - 0.5);
             let side = PATCH as usize;
             let grey = Grey8 { width: side, height: side, pixels };
-            let sub_pix = opencv::corner_sub_pix(&grey, &[start], 5).expect("OpenCV works");
+            let sub_pix = corner_sub_pix(&grey, &[start], 5).expect("OpenCV works");
             spot.sub_pix.push(sub_pix[0] - truth);
             let picture = Picture::from(grey.clone());
             let along = angles.map(|a| Vector2::new(a.cos(), a.sin()) * SQUARE_PX);

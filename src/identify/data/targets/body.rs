@@ -25,7 +25,6 @@ const STEPS: usize = 10;
 /// One target as a pose showed it.
 #[derive(Debug, Clone, Copy)]
 pub struct Sighting {
-    /// Which target.
     pub target: usize,
     /// Sensor's frame, mm.
     pub point_mm: Point3<f64>,
@@ -43,7 +42,6 @@ pub struct Body {
 /// A body at a pose.
 #[derive(Debug, Clone, Copy)]
 pub struct Placed {
-    /// `sensor_from_body`.
     pub sensor_from_body: Transform,
     /// Covariance of the body's origin, mm^2, where the precisions are those of the readings.
     pub covariance_mm2: Matrix3<f64>,

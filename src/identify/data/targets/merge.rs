@@ -45,7 +45,6 @@ pub struct Targets {
 pub struct Part {
     /// From the mark point, in the frame of the targets' places, mm.
     pub place_mm: [f64; 3],
-    /// Poses.
     pub poses: usize,
 }
 
@@ -172,7 +171,6 @@ fn inverse(covariance: &Matrix3<f64>) -> Matrix3<f64> {
     eigen.eigenvectors * Matrix3::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
 }
 
-/// Targets that were moved.
 fn moved_targets(poses: &[Shown], moved: &[(Moved, usize)], names: &[String], sorter: &Sorter) -> Vec<Finding> {
     let mut list = Vec::new();
     for (Moved { target, from }, new) in moved {
@@ -206,7 +204,7 @@ fn findings(
     let mut list = moved_targets(poses, moved, names, sorter);
     let mut add = |finding: String, rows: Vec<String>, action: &str| {
         if !rows.is_empty() {
-            list.push(Finding { finding, rows, action: action.to_owned() });
+            list.push(Finding::new(finding, action).about(rows));
         }
     };
     let rows = |holds: &dyn Fn(&Judged) -> bool| -> Vec<String> {

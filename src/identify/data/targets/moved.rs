@@ -23,7 +23,6 @@ const MEDIAN_CHANGE: f64 = 0.954;
 /// A target and the pose from which on it stands elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Moved {
-    /// Which target.
     pub target: usize,
     /// Index of the pose.
     pub from: usize,

@@ -43,7 +43,7 @@ pub fn recheck(
     let named = |(suspect, amounts): &(&Suspect, Vec<f64>)| (suspect.word.clone(), suspect.by(amounts));
     let likeliest = explained.iter().map(named).collect();
     let placements = if changed { Vec::new() } else { placements(set, &compared, &linear, stood) };
-    let seen_mm = causes.iter().filter(|c| c.amount.is_some()).map(|c| c.seen_mm).fold(0.0, f64::max);
+    let seen_mm = causes.iter().filter_map(|c| c.seen_mm).fold(0.0, f64::max);
     let effect_mm = match (changed, explained.first()) {
         (true, Some((suspect, amounts))) => moves.most_mm(&suspect.columns, amounts),
         (true, None) => compared.misfit_mm(),

@@ -8,7 +8,7 @@ use crate::difference::Difference;
 use crate::identify::data::dataset::{Dataset, Reading};
 use crate::identify::judge::locate::Trust;
 use crate::identify::residuals::raw::Raw;
-use crate::identify::residuals::rows::{Recipe, Rows};
+use crate::identify::residuals::rows::{RowSpec, Rows};
 use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::Model;
 use crate::identify::solve::linearised::Linearised;
@@ -83,10 +83,10 @@ pub(super) fn rows(
     let turned: &[Extra] = if oriented { &turns } else { set.body_unknowns() };
     let extras: Vec<Extra> = std::iter::once(Extra::Shared(0)).chain(turned.iter().copied()).collect();
     let rotation_rad = trust.rotation_rad.unwrap_or(1e-4).max(LEAST_TURN_RAD);
-    Rows::new(&Recipe {
+    Rows::new(&RowSpec {
         set: &set,
         robot,
-        levers: robot,
+        load_chain: robot,
         parameters,
         extras: &extras,
         rows: used,

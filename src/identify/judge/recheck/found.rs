@@ -1,6 +1,7 @@
 //! What is compared with, and what is said of a robot.
 
 use nalgebra::DMatrix;
+use serde::Serialize;
 
 use crate::identify::judge::locate::Trust;
 use crate::robot::Parameter;
@@ -27,37 +28,36 @@ pub struct Before {
 }
 
 /// What the poses say of one cause.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CauseSeen {
     /// For files: `joint-3`, `tool-x`, `scale`.
-    pub word: String,
+    pub cause: String,
     /// For a person: what would have changed.
-    pub words: String,
-    /// The unit.
+    pub what: String,
     pub unit: &'static str,
-    /// By how much it changed, if it alone did, with its standard deviation; `None` where the poses see nothing of it.
-    pub amount: Option<(f64, f64)>,
+    /// By how much it changed, if it alone did, and the standard deviation; `None` where the poses see nothing of it.
+    pub amount: Option<f64>,
+    /// See `amount`.
+    pub sigma: Option<f64>,
     /// By how much that moves the target after the placement was found anew, mm.
     pub effect_mm: f64,
     /// The smallest change that nineteen of twenty such checks see.
-    pub seen: f64,
+    pub seen: Option<f64>,
     /// By how much that one moves the target, mm.
-    pub seen_mm: f64,
+    pub seen_mm: Option<f64>,
 }
 
 /// How one placement stands against the old one.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Moved {
-    /// The group.
     pub group: String,
-    /// By how much the points moved with it, mm, and how much that is by chance.
-    pub shift_mm: f64,
-    /// What nineteen of twenty checks see, mm.
-    pub seen_mm: f64,
-    /// Its turn, rad.
-    pub turn_rad: f64,
     /// Whether it is more than chance.
     pub moved: bool,
+    /// By how much the points moved with it, mm, and how much that is by chance.
+    pub shift_mm: f64,
+    pub turn_rad: f64,
+    /// What nineteen of twenty checks see, mm.
+    pub seen_mm: f64,
 }
 
 /// What is said of the robot.

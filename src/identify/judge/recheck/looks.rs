@@ -44,15 +44,16 @@ impl<'a> Looks<'a> {
         let along = self.look.directions(suspect).first().and_then(|d| difference.along(d));
         let amount = along.filter(|_| self.is_seen(suspect));
         let unit_mm = moves.most_mm(&suspect.columns, &[1.0]);
-        let seen = amount.map_or(f64::INFINITY, |(_, sigma)| (difference.level(self.chance()) + SEEN) * sigma);
+        let seen = amount.map(|(_, sigma)| (difference.level(self.chance()) + SEEN) * sigma);
         CauseSeen {
-            word: suspect.word.clone(),
-            words: suspect.words.clone(),
+            cause: suspect.word.clone(),
+            what: suspect.words.clone(),
             unit: suspect.unit,
-            amount,
+            amount: amount.map(|(amount, _)| amount),
+            sigma: amount.map(|(_, sigma)| sigma),
             effect_mm: amount.map_or(0.0, |(amount, _)| unit_mm * amount.abs()),
             seen,
-            seen_mm: if amount.is_some() { unit_mm * seen } else { 0.0 },
+            seen_mm: seen.map(|seen| unit_mm * seen),
         }
     }
 

@@ -115,10 +115,10 @@ fn a_planted_change_is_seen_from_the_stated_size_on_and_named() {
         let clean = cell.check(&|_| {}, 1.0, 700 + seed);
         for (k, parameter) in parameters.into_iter().enumerate() {
             let word = format!("joint-{}", k + 2);
-            let stated = clean.causes.iter().find(|c| c.word == word).unwrap();
+            let stated = clean.causes.iter().find(|c| c.cause == word).unwrap();
             all += 1;
             for (i, times) in [0.5, 1.0, 2.0].into_iter().enumerate() {
-                let off = times * stated.seen / parameter.file_unit().1;
+                let off = times * stated.seen.unwrap() / parameter.file_unit().1;
                 let found = cell.check(&|robot| robot.add(parameter, off), 1.0, 700 + seed);
                 seen[i] += usize::from(found.changed);
                 named[i] += usize::from(found.cause().split('|').any(|cause| cause == word));
@@ -144,7 +144,7 @@ fn a_large_change_is_named_though_it_is_not_linear() {
     let cell = cell(false, 4);
     let turned = cell.check(&|robot| robot.add(Parameter::Theta(2), 20.0), 1.0, 6);
     assert_eq!(turned.cause(), "joint-3", "{}", turned.statement());
-    let (amount, _) = turned.causes.iter().find(|c| c.word == "joint-3").unwrap().amount.unwrap();
+    let amount = turned.causes.iter().find(|c| c.cause == "joint-3").unwrap().amount.unwrap();
     assert!((amount - 20.0 * 1e-3f64.to_degrees()).abs() < 0.05, "{amount}");
 }
 

@@ -22,7 +22,7 @@ use crate::identify::solve::linearised::Linearised;
 use crate::linear_algebra::{Eliminated, pseudo_inverse};
 use crate::robot::Parameter;
 
-/// Cells in all, about.
+/// CrossValidation in all, about.
 const CELLS: usize = 12;
 
 /// The fold of rows that are always fitted.
@@ -51,7 +51,7 @@ struct Fold {
 
 /// The cells of a set of rows.
 #[derive(Debug, Clone)]
-pub struct Cells {
+pub struct CrossValidation {
     parameters: Vec<Parameter>,
     extras: Vec<Extra>,
     cells: Vec<Cell>,
@@ -66,15 +66,15 @@ pub struct Cells {
 /// A label for each row of a placement by the poses that its rows are of; `None` for a row that is left aside.
 type LabelsOfPoses<'a> = dyn Fn(&[Option<usize>]) -> Vec<Option<usize>> + 'a;
 
-impl Cells {
-    /// Cells of these labels, one a residual of each placement; `fold` is that of a placement's label.
+impl CrossValidation {
+    /// CrossValidation of these labels, one a residual of each placement; `fold` is that of a placement's label.
     fn new(
         problem: &Linearised,
         rows: &Rows,
         labels: &LabelsOfPoses<'_>,
         fold: &dyn Fn(usize, usize) -> usize,
         whole_placements: bool,
-    ) -> Cells {
+    ) -> CrossValidation {
         let mut cells = Vec::new();
         for (b, placement) in problem.placements.iter().enumerate() {
             let labels = labels(&placement.poses);
@@ -97,7 +97,7 @@ impl Cells {
         }
         let folds = cells.iter().map(|c| c.fold + 1).filter(|f| *f < SKIPPED).max().unwrap_or(0);
         let make = |f: Option<usize>| Fold::new(&cells, problem.placements.len(), problem.shared, f);
-        Cells {
+        CrossValidation {
             parameters: rows.kinematics.parameters().to_vec(),
             extras: rows.extras.clone(),
             folds: (0..folds).map(|f| make(Some(f))).collect(),
@@ -109,24 +109,24 @@ impl Cells {
     }
 
     /// Regions of joint space, or whole placements where there are three; `most` is the largest number of folds.
-    pub fn by_regions(problem: &Linearised, rows: &Rows, set: &Dataset, most: usize) -> Cells {
+    pub fn by_regions(problem: &Linearised, rows: &Rows, set: &Dataset, most: usize) -> CrossValidation {
         let count = problem.placements.len();
         let (regions, whole) =
             (if count >= WHOLE { CELLS.div_ceil(count).min(3) } else { most / count.max(1) }, count >= WHOLE);
         let labels = |poses: &[Option<usize>]| labels(set, rows, poses, regions);
         match whole {
-            true => Cells::new(problem, rows, &labels, &|block, _| block % most, true),
-            false => Cells::new(problem, rows, &labels, &|block, region| block * regions + region, false),
+            true => CrossValidation::new(problem, rows, &labels, &|block, _| block % most, true),
+            false => CrossValidation::new(problem, rows, &labels, &|block, region| block * regions + region, false),
         }
     }
 
     /// Rows here and there: `of_row` is the fold of each row of the data set.
-    pub fn by_folds(problem: &Linearised, rows: &Rows, of_row: &[Option<usize>]) -> Cells {
+    pub fn by_folds(problem: &Linearised, rows: &Rows, of_row: &[Option<usize>]) -> CrossValidation {
         let label = |poses: &[Option<usize>]| {
             // What is in no fold is always fitted: its label is one more than the last fold.
             poses.iter().map(|p| p.map(|p| of_row[rows.rows[p]].unwrap_or(FOLDS))).collect()
         };
-        Cells::new(problem, rows, &label, &|_, region| if region < FOLDS { region } else { SKIPPED }, false)
+        CrossValidation::new(problem, rows, &label, &|_, region| if region < FOLDS { region } else { SKIPPED }, false)
     }
 
     /// What the most probable values of these parameters change by where each fold is left out, beside those of all; mm and mrad, one a

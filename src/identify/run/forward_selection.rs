@@ -2,13 +2,13 @@
 //!
 //! In: the rows that may be fitted. Out: the terms that are worth taking, with the held-out error of all that were tried. From the
 //! nominal robot on the successor of least held-out error is taken that is worth its terms; the cells that say so are linearised anew
-//! where the model that was taken fits, and the climb goes on from there.
+//! where the model that was taken fits, and the selection goes on from there.
 
 use rayon::prelude::*;
 
 use super::session::Session;
 use crate::identify::Error;
-use crate::identify::judge::cells::Cells;
+use crate::identify::judge::cross_validation::CrossValidation;
 use crate::identify::judge::folds;
 use crate::identify::judge::held_out::{HeldOut, clearly_less, root_mean};
 use crate::identify::model::ladder::{Chain, Terms};
@@ -25,7 +25,6 @@ pub struct Judged {
     pub model: &'static str,
     /// The terms in words.
     pub terms: String,
-    /// The terms.
     #[serde(skip)]
     pub of: Terms,
     /// Root mean square held-out error of a number, mm; `None` where it could not be judged.
@@ -78,19 +77,19 @@ const MOST_CLIMBS: usize = 4;
 
 impl Session<'_> {
     /// From the nominal robot up as far as it is worth it, with all that was judged.
-    pub(super) fn climb(&mut self, model: Model) -> Result<(Terms, Vec<Judged>), Error> {
+    pub(super) fn select_terms(&mut self, model: Model) -> Result<(Terms, Vec<Judged>), Error> {
         let all = Terms::ALL.parameters(self.robot);
         let reference = self.reference(MOST_PARAMETERS);
         let mut at = Terms { chain: Chain::Mdh, ..reference };
         let parameters = at.parameters(self.robot);
         let formulation = Formulation::new(&self.task(&parameters, model))?;
         let scatter = formulation.rows.scatter;
-        let cells = self.cells(&all, &parameters, &formulation, scatter, model);
-        let mut cells = self.take_warps(cells, &all, &parameters, scatter, model)?;
+        let validations = self.validations(&all, &parameters, &formulation, scatter, model);
+        let mut validations = self.take_warps(validations, &all, &parameters, scatter, model)?;
         let mut judged = Vec::new();
         let mut best = Terms::NOMINAL;
         for _ in 0..MOST_CLIMBS {
-            let Some(next) = self.climb_from(best, &cells, model, &mut judged) else {
+            let Some(next) = self.select_from(best, &validations, model, &mut judged) else {
                 return Ok((Terms::default(), judged));
             };
             if next == best {
@@ -104,18 +103,24 @@ impl Session<'_> {
             at = best;
             let parameters = at.parameters(self.robot);
             let formulation = Formulation::new(&self.task(&parameters, model))?;
-            cells = self.cells(&all, &parameters, &formulation, formulation.rows.scatter, model);
+            validations = self.validations(&all, &parameters, &formulation, formulation.rows.scatter, model);
         }
         Ok((best, judged))
     }
 
     /// Up the ladder from `best` by what these cells say; `None` where nothing can be held out.
-    fn climb_from(&self, mut best: Terms, cells: &[Cells], model: Model, judged: &mut Vec<Judged>) -> Option<Terms> {
-        let regions = cells.first()?;
+    fn select_from(
+        &self,
+        mut best: Terms,
+        validations: &[CrossValidation],
+        model: Model,
+        judged: &mut Vec<Judged>,
+    ) -> Option<Terms> {
+        let regions = validations.first()?;
         let judge = |terms: Terms, judged: &mut Vec<Judged>| -> Option<Ways> {
             let parameters = terms.parameters(self.robot);
             let tolerance = regions.tolerance(&parameters).0;
-            let ways: Option<Ways> = cells.par_iter().map(|c| c.held_out(&parameters, &tolerance)).collect();
+            let ways: Option<Ways> = validations.par_iter().map(|c| c.held_out(&parameters, &tolerance)).collect();
             let held_out_mm = ways.as_ref().and_then(root_mean_of);
             let by_way_mm = ways.iter().flatten().filter_map(root_mean).collect();
             judged.retain(|j| j.of != terms);
@@ -163,30 +168,31 @@ impl Session<'_> {
         Some(best)
     }
 
-    /// Cells linearised where a formulation ended, at a scatter that need not be its own: regions or whole placements, and where it is regions
+    /// CrossValidation linearised where a formulation ended, at a scatter that need not be its own: regions or whole placements, and where it is regions
     /// rows here and there as often as they are cut anew.
-    pub(super) fn cells(
+    pub(super) fn validations(
         &self,
         all: &[Parameter],
         reference: &[Parameter],
         at: &Formulation,
         scatter: Scatter,
         model: Model,
-    ) -> Vec<Cells> {
+    ) -> Vec<CrossValidation> {
         let offsets = at.offsets_of();
         let (of_robot, extras) = offsets.split_at(reference.len());
         let mut wide: Vec<f64> =
             all.iter().map(|p| reference.iter().position(|q| q == p).map_or(0.0, |i| of_robot[i])).collect();
         wide.extend_from_slice(extras);
-        let levers = self.robot.shifted(reference, of_robot);
-        let rows = self.task(all, model).rows_at(scatter, &levers);
+        let load_chain = self.robot.shifted(reference, of_robot);
+        let rows = self.task(all, model).rows_at(scatter, &load_chain);
         let linearised = Linearised::new(&rows, &wide);
-        let regions = Cells::by_regions(&linearised, &rows, self.set, self.settings.folds);
+        let regions = CrossValidation::by_regions(&linearised, &rows, self.set, self.settings.folds);
         if regions.whole_placements() {
             return vec![regions];
         }
         let scattered = folds::folds(self.set, &self.rows);
-        let others: Vec<Cells> = scattered.iter().map(|of_row| Cells::by_folds(&linearised, &rows, of_row)).collect();
+        let others: Vec<CrossValidation> =
+            scattered.iter().map(|of_row| CrossValidation::by_folds(&linearised, &rows, of_row)).collect();
         std::iter::once(regions).chain(others).collect()
     }
 
@@ -194,23 +200,23 @@ impl Session<'_> {
     /// scatter.
     fn take_warps(
         &mut self,
-        cells: Vec<Cells>,
+        validations: Vec<CrossValidation>,
         all: &[Parameter],
         reference: &[Parameter],
         scatter: Scatter,
         model: Model,
-    ) -> Result<Vec<Cells>, Error> {
+    ) -> Result<Vec<CrossValidation>, Error> {
         if self.set.supposed_scale.is_none() {
-            return Ok(cells);
+            return Ok(validations);
         }
         let kept = self.extras.len();
         self.extras.extend((0..WARPS.len()).map(Extra::Warp));
         let with = Formulation::new(&self.task(reference, model))?;
-        let richer = self.cells(all, reference, &with, scatter, model);
-        if richer[0].tolerance(reference).1 > cells[0].tolerance(reference).1 + EVIDENCE {
+        let richer = self.validations(all, reference, &with, scatter, model);
+        if richer[0].tolerance(reference).1 > validations[0].tolerance(reference).1 + EVIDENCE {
             return Ok(richer);
         }
         self.extras.truncate(kept);
-        Ok(cells)
+        Ok(validations)
     }
 }

@@ -13,8 +13,8 @@ fn a_gain_in_every_region_counts_however_unlike_the_regions_are() {
     assert!(clearly_less(&new, &old) && !clearly_less(&old, &new));
 }
 
-/// Cells of a model with two parameters seen directly, 20 rows a fold, each fold's rows off by its own amount.
-fn direct(common: &[f64]) -> Cells {
+/// CrossValidation of a model with two parameters seen directly, 20 rows a fold, each fold's rows off by its own amount.
+fn direct(common: &[f64]) -> CrossValidation {
     let mut random = 1u32;
     let mut noise = || {
         // Twelve uniform numbers make a normal one.
@@ -36,7 +36,7 @@ fn direct(common: &[f64]) -> Cells {
         })
         .collect();
     let make = |held| Fold::new(&cells, 1, 2, held);
-    Cells {
+    CrossValidation {
         parameters: vec![Parameter::A(0), Parameter::A(1)],
         extras: Vec::new(),
         folds: (0..common.len()).map(|f| make(Some(f))).collect(),
