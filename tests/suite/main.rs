@@ -30,6 +30,7 @@ mod guide;
 mod guide_pictures;
 mod house;
 mod identify;
+mod known_move;
 mod measure;
 mod messages;
 mod picture_faults;
