@@ -43,3 +43,4 @@ mod readme;
 mod real;
 mod rectify;
 mod report;
+mod rows;
