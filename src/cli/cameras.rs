@@ -13,6 +13,7 @@ use crate::imaging::input::pairs::{PairBy, Source};
 use crate::imaging::printed::PrintedExtent;
 use crate::imaging::{Board, Mosaic, Squares};
 use crate::stereo::Lens;
+use crate::stereo::judge::moves::StatedMove;
 use crate::stereo::volume::Extent;
 
 /// How a folder of pictures is read, and the second one where each camera has its own.
@@ -65,6 +66,11 @@ pub struct CameraCheck {
     /// (149.7x99.8). Both are scales of their own; the caliper's uncertainty counts in the verdict, where --board-uncertainty-mm says no other
     #[arg(long, value_name = "WxH")]
     pub measured_mm: Option<PrintedExtent>,
+    /// A slide of the board by a known length (a gauge block, a micrometer), mm, photographed before and after: checks the scale by something that
+    /// is not the board. With its uncertainty (k = 2; 0.002 where none is said) and the names of both pairs, where not just two pairs in a row show
+    /// such a move: 5mm+-0.003:03,04. May be given again
+    #[arg(long, value_name = "MM[+-U][:FIRST,SECOND]", allow_negative_numbers = true)]
+    pub known_move: Vec<StatedMove>,
     /// Largest length error that passes, mm; key `tolerance_mm` [default: 0.05]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub tolerance_mm: Option<f64>,
@@ -79,7 +85,7 @@ pub struct CameraCheck {
     #[arg(long, value_name = "FILE[,SIDE]")]
     pub intrinsics: Vec<LensFile>,
     /// Whether this calibration still holds, by two or more new pairs: what changed, by how much a length, and what the pairs would have shown
-    #[arg(long, value_name = "CALIBRATION", conflicts_with_all = ["lens", "intrinsics", "since", "volume", "board_shape", "board_uncertainty_mm", "measured_mm", "check_images", "draw"])]
+    #[arg(long, value_name = "CALIBRATION", conflicts_with_all = ["lens", "intrinsics", "since", "volume", "board_shape", "board_uncertainty_mm", "measured_mm", "known_move", "check_images", "draw"])]
     pub against: Option<Utf8PathBuf>,
     /// Only the pairs from this one on, by name: the rig as it is since then
     #[arg(long, value_name = "PAIR")]

@@ -59,6 +59,9 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Calibrate both cameras from pictures of the check board, and judge the rig's accuracy
+    #[command(
+        after_help = "Example: stereocal camera-check check/ --squares 20x20 --square-mm 10 --known-move 5mm:03,04"
+    )]
     CameraCheck(Box<CameraCheck>),
     /// Measure the target's point and orientation for each robot pose
     Measure(Measure),

@@ -11,6 +11,7 @@ use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::model::rig::{Covariance, Rig};
 use crate::stereo::volume::Volume;
 use crate::stereo::{Camera, Lens};
@@ -48,6 +49,9 @@ pub struct CalibrationFile {
     /// How the rig had changed at the last pair since the moment for which it and its covariance are, each change in the covariance's order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     changes_since: Vec<Vec<f64>>,
+    /// Slides of the board by known lengths, and what they say of the scale.
+    #[serde(skip_deserializing, skip_serializing_if = "Vec::is_empty")]
+    known_moves: Vec<KnownMove>,
 }
 
 /// Distances of the boards' corners from the left camera along its axis.
@@ -184,6 +188,7 @@ impl From<&Rig> for CalibrationFile {
             board: None,
             unconfirmed: Vec::new(),
             changes_since: Vec::new(),
+            known_moves: Vec::new(),
         }
     }
 }
@@ -215,6 +220,12 @@ impl CalibrationFile {
     /// The same with the board that calibrated.
     pub fn with_board(mut self, board: &Board) -> CalibrationFile {
         self.board = Some(board.to_string());
+        self
+    }
+
+    /// The same with known moves.
+    pub fn with_moves(mut self, moves: &[KnownMove]) -> CalibrationFile {
+        self.known_moves = moves.to_vec();
         self
     }
 

@@ -13,6 +13,7 @@ use crate::stereo::judge::lengths::Range;
 use crate::stereo::judge::lengths::held_out::{EpipolarError, HeldOutPair};
 use crate::stereo::judge::lengths::model_disagreement::Disagreement;
 use crate::stereo::judge::lengths::second_board::SecondBoard;
+use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::judge::verdict::{COVERAGE, Verdict};
 use crate::stereo::select::model_comparison::LensScore;
 use crate::stereo::select::pair_scatter::PairScatter;
@@ -60,6 +61,7 @@ pub struct CameraCheckFile {
     ranges: Vec<Range>,
     pairs: Vec<PairRecord>,
     second_board: Option<SecondBoard>,
+    known_moves: Vec<KnownMove>,
     lens_scores: Vec<LensScore>,
     disagreements: Vec<Disagreement>,
     neighbour_correlation: NeighbourCorrelation,
@@ -114,6 +116,7 @@ impl CameraCheckFile {
                 .iter()
                 .cloned()
                 .chain(findings::of_lenses(calibration, &judged.volume))
+                .chain(judged.of_scale())
                 .chain(findings::of_pairs(&calibration.discarded.pairs))
                 .collect(),
             expanded_uncertainty_mm: worst.expanded_uncertainty_mm(),
@@ -138,7 +141,8 @@ impl CameraCheckFile {
             reduced_chi_square: calibration.noise.reduced_chi_square,
             ranges: accuracy.ranges.clone(),
             pairs,
-            second_board: judged.second.clone(),
+            second_board: judged.standards.second.clone(),
+            known_moves: judged.standards.moves.measured.clone(),
             lens_scores: calibration.lens_scores.clone(),
             disagreements: judged.disagreements.clone(),
             neighbour_correlation: judged.residual_pattern.neighbours,

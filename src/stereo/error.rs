@@ -68,6 +68,26 @@ pub enum Error {
         /// Names of those that there are.
         pairs: Vec<String>,
     },
+    /// A known move whose pairs were not named, and that no or several pairs could be.
+    #[error(
+        "between which pairs the board moved by {length_mm} mm is not settled: {}{}",
+        match .fits { 0 => "no two pairs in a row show such a move without a turn; the nearest are".to_owned(), n => format!("{n} do") },
+        moved(.candidates)
+    )]
+    MoveUnsettled {
+        /// As stated, mm.
+        length_mm: f64,
+        /// Moves that fit.
+        fits: usize,
+        /// Those, or the nearest: the pairs as `--known-move` takes them, and how the board moved.
+        candidates: Vec<(String, String)>,
+    },
+    /// One move that is stated twice.
+    #[error("the move between pairs {} and {} is stated twice", pairs[0], pairs[1])]
+    MoveTwice {
+        /// The pairs.
+        pairs: [String; 2],
+    },
     /// The views do not tell the cameras.
     #[error("the views are too similar to tell the cameras{}{}", focal(.focal_sigma), list(.skipped))]
     Undetermined {
@@ -154,6 +174,10 @@ fn list(pairs: &[Skipped]) -> String {
     pairs.iter().map(|s| format!("\n  {}: {}", s.pair, s.reason)).collect()
 }
 
+fn moved(list: &[(String, String)]) -> String {
+    list.iter().map(|(pairs, moved)| format!("\n  {pairs}: {moved}")).collect()
+}
+
 fn focal(sigma: &Option<f64>) -> String {
     sigma.map_or(String::new(), |s| format!(": a focal length is known to {:.0} % only", 100.0 * s))
 }
@@ -190,6 +214,8 @@ impl Explain for Error {
         match self {
             Error::TooFewPairs { .. }
             | Error::NoSuchPair { .. }
+            | Error::MoveUnsettled { .. }
+            | Error::MoveTwice { .. }
             | Error::PictureSize { .. }
             | Error::NoCovariance
             | Error::LensNotExportable { .. } => Status::BadInput,
@@ -211,7 +237,12 @@ impl Explain for Error {
                 Error::Contradiction { .. } => {
                     "trigger both cameras at once, clamp them and the board, and check that equal names belong together"
                 }
-                Error::NoSuchPair { .. } => "`--since` takes the name of a pair as the report lists it",
+                Error::NoSuchPair { .. } => "`--since` and `--known-move` take the names of pairs as the report lists them",
+                Error::MoveUnsettled { length_mm, candidates, .. } => {
+                    let pairs = candidates.first().map_or("FIRST,SECOND", |(pairs, _)| pairs);
+                    return Some(format!("name the pairs before and after it: `--known-move {length_mm}mm:{pairs}`"));
+                }
+                Error::MoveTwice { .. } => "give each move once",
                 Error::Undetermined { .. } => {
                     "photograph the board tilted by 20 to 45 degrees about both of its axes, at several distances"
                 }

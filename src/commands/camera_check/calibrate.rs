@@ -25,9 +25,10 @@ use crate::stereo::board_pose::pair_excess::pair_excess;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::residuals;
 use crate::stereo::findings::standing::{self, Asked};
-use crate::stereo::judge::assessment::{Demand, Judged};
+use crate::stereo::judge::assessment::{Demand, Judged, Standards};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::lengths::second_board::{self, SecondBoard};
+use crate::stereo::judge::moves;
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::model::known_lenses::{KnownLenses, TOLERANCE};
 use crate::stereo::pairs::{fewest_pairs, open_numbers};
@@ -57,7 +58,8 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     };
     let accuracy = held_out::hold_out(&calibration, demand.board_uncertainty_mm)?;
     let second = second_board(args, board, &calibration, demand.board_uncertainty_mm, &out)?;
-    let judged = Judged::new(&calibration, findings, accuracy, second, &demand);
+    let standards = Standards { second, moves: moves::measure(&calibration, &args.known_move)? };
+    let judged = Judged::new(&calibration, findings, accuracy, standards, &demand);
     calibration.rig().unusual().into_iter().for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
@@ -72,7 +74,8 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
                 judged.coverage.corner_depths_mm,
                 &judged.volume.volume,
             )
-            .with_board(&calibration.board),
+            .with_board(&calibration.board)
+            .with_moves(&judged.standards.moves.measured),
     )?;
     if !out.is_input("corners.csv") {
         out.write("corners.csv", corners_csv::to_csv(&calibration.mark(&corners)).as_bytes())?;
@@ -206,6 +209,8 @@ fn pairing(args: &CameraCheck, out: &OutDir) -> Result<Option<Pairing>> {
     let Some(images) = &args.images else { return Ok(None) };
     let pairing = args.pairs.source("camera-check", images).pairs(out)?;
     progress::note(&pairing.taken);
+    let names: Vec<String> = pairing.pairs.iter().map(|files| files.pair.clone()).collect();
+    moves::check_names(&args.known_move, &names)?;
     Ok(Some(pairing))
 }
 

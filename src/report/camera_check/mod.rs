@@ -140,7 +140,8 @@ fn lines(evidence: &[&Evidence]) -> Markup {
 /// What the figures do not show: the scale.
 fn scale(judged: &Judged) -> Markup {
     html! {
-        @match &judged.second {
+        @for known in &judged.standards.moves.measured { p { (page::capital(&known.statement())) "." } }
+        @match &judged.standards.second {
             Some(second) => p {
                 @match (second.scale_error, second.scale_error_sigma, second.max_abs_error_mm) {
                     (Some(scale), Some(sigma), Some(error)) => (format!(
@@ -150,8 +151,9 @@ fn scale(judged: &Judged) -> Markup {
                     _ => "A second board was asked for, and no length on it could be measured.",
                 }
             }
+            None if !judged.standards.moves.measured.is_empty() => {}
             None => p {
-                "The scale of every length is that of the board: an error of its pitch does not show in these figures. A second board of known pitch checks it: " code { "--check-images DIR" } "."
+                "The scale of every length is that of the board: an error of its pitch does not show in these figures. A second board of known pitch checks it: " code { "--check-images DIR" } "; or a slide of the board by a known length: " code { "--known-move MM" } "."
             }
         }
     }

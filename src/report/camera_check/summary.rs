@@ -5,6 +5,7 @@ use crate::report::table::{Table, number};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::lengths::{Axis, Range};
+use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::named;
 use crate::stereo::pairs::Cause;
@@ -34,6 +35,7 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
     ];
     lines.extend(standing(calibration));
     lines.extend(lenses(calibration));
+    lines.extend(scale(judged));
     lines.extend(judged.findings.iter().map(|finding| format!("over the pairs: {}", finding.action)));
     lines.extend(pairs(calibration));
     lines.push(rig(calibration, judged));
@@ -94,6 +96,14 @@ fn lenses(calibration: &Calibration) -> Option<String> {
     }
     let seen = check.focus_seen.iter().flatten().copied().fold(0.0, f64::max);
     Some(format!("{}; they would show a focal length that differs by {:.2} %", check.statement, 100.0 * seen))
+}
+
+/// What known moves say of the scale.
+fn scale(judged: &Judged) -> Vec<String> {
+    let moves = &judged.standards.moves;
+    let measured = moves.measured.iter().map(KnownMove::statement);
+    let why = judged.of_scale().and_then(|_| moves.why());
+    measured.chain(moves.missing.iter().cloned()).chain(why).collect()
 }
 
 /// How many pairs were used, and in a line a cause which were not.

@@ -4,10 +4,11 @@ use crate::diagnostic::Warning;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::judge::evidence::{self, Evidence};
-use crate::stereo::judge::ledger::{Facts, ledger};
+use crate::stereo::judge::ledger::{Facts, KNOWN_MOVE, ledger};
 use crate::stereo::judge::lengths::held_out::Accuracy;
 use crate::stereo::judge::lengths::model_disagreement::{self, Disagreement};
 use crate::stereo::judge::lengths::second_board::SecondBoard;
+use crate::stereo::judge::moves::KnownMoves;
 use crate::stereo::judge::residual_correlation::{self, ResidualPattern};
 use crate::stereo::judge::verdict::{Expansion, Verdict};
 use crate::stereo::judge::view_coverage::Coverage;
@@ -25,8 +26,8 @@ pub struct Judged {
     pub evidence: Vec<Evidence>,
     /// Held-out accuracy.
     pub accuracy: Accuracy,
-    /// A second board.
-    pub second: Option<SecondBoard>,
+    /// What checks the scale.
+    pub standards: Standards,
     /// Whether the residuals are noise.
     pub residual_pattern: ResidualPattern,
     /// Lens models that disagree.
@@ -41,6 +42,15 @@ pub struct Judged {
     pub advice: Vec<String>,
     /// What else a person should know.
     pub warnings: Vec<Warning>,
+}
+
+/// Lengths that are known by something else than the board that calibrated.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Standards {
+    /// A second board.
+    pub second: Option<SecondBoard>,
+    /// Slides of known lengths.
+    pub moves: KnownMoves,
 }
 
 /// What lengths are judged by.
@@ -60,7 +70,7 @@ impl Judged {
         calibration: &Calibration,
         findings: Vec<Finding>,
         accuracy: Accuracy,
-        second: Option<SecondBoard>,
+        standards: Standards,
         demand: &Demand,
     ) -> Judged {
         let tolerance_mm = demand.tolerance_mm;
@@ -72,7 +82,8 @@ impl Judged {
         let evidence = ledger(&Facts {
             calibration,
             accuracy: &accuracy,
-            second: second.as_ref(),
+            second: standards.second.as_ref(),
+            moves: &standards.moves,
             volume: &volume,
             findings: &findings,
             residual_pattern: &residual_pattern,
@@ -91,7 +102,7 @@ impl Judged {
             verdict: evidence::verdict(&evidence),
             evidence,
             accuracy,
-            second,
+            standards,
             residual_pattern,
             disagreements,
             findings,
@@ -100,6 +111,12 @@ impl Judged {
             coverage,
             warnings,
         }
+    }
+
+    /// What known moves say of the scale, where they contradict it and nothing else shows the rig itself to be wrong.
+    pub fn of_scale(&self) -> Option<Finding> {
+        let rig_fails = self.evidence.iter().any(|line| line.allows == Verdict::Fail && line.what != KNOWN_MOVE);
+        self.standards.moves.finding(self.volume.length_mm).filter(|_| !rig_fails)
     }
 
     /// The line of the ledger that decides: the worst, and of several that are equally bad the one farthest beyond its limit.

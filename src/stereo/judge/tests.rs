@@ -7,7 +7,7 @@ use crate::imaging::{Corner, Corners, PairCorners};
 use crate::stereo::Rig;
 use crate::stereo::data::view::View;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
-use crate::stereo::judge::assessment::{Demand, Judged};
+use crate::stereo::judge::assessment::{Demand, Judged, Standards};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::lengths::second_board::second_board;
 use crate::stereo::judge::verdict::Verdict;
@@ -33,9 +33,10 @@ fn calibrated_and_judged(corners: &Corners, second: Option<&Corners>) -> (Rig, J
     let (found, findings) = calibrate_standing(corners, &asked).unwrap();
     let accuracy = held_out::hold_out(&found, None).unwrap();
     let second = second.map(|corners| second_board(&found, corners, None));
+    let standards = Standards { second, ..Standards::default() };
     let demand = Demand { tolerance_mm: TOLERANCE_MM, board_uncertainty_mm: None, extent: Extent::Boards };
     let rig = found.rig().clone();
-    (rig, Judged::new(&found, findings, accuracy, second, &demand))
+    (rig, Judged::new(&found, findings, accuracy, standards, &demand))
 }
 
 /// The largest error with which a rig measures lengths between the corners of the world's boards, mm, from places without noise.

@@ -47,6 +47,8 @@ pub enum Cause {
     CameraMoved,
     /// It belongs to what was photographed before the pair that was asked for.
     Before,
+    /// A slide of the board was not as long as was said.
+    KnownMove,
     /// It contradicts the others, and nothing that is known here explains it better than the rest.
     Unknown,
 }
@@ -73,6 +75,7 @@ impl Cause {
             Cause::OtherCamera => "other-camera",
             Cause::CameraMoved => "camera-moved",
             Cause::Before => "before",
+            Cause::KnownMove => "known-move",
             Cause::Unknown => "unknown",
         }
     }

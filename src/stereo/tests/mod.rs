@@ -12,7 +12,7 @@ mod target;
 use crate::imaging::Corners;
 use crate::stereo::Lens;
 use crate::stereo::calibrate::{Calibration, calibrate};
-use crate::stereo::judge::assessment::{Demand, Judged};
+use crate::stereo::judge::assessment::{Demand, Judged, Standards};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::model::parameters::Shared;
 use crate::stereo::select::options::Options;
@@ -28,7 +28,7 @@ fn judged(corners: &Corners, options: &Options, tolerance_mm: f64) -> Judged {
         &found,
         Vec::new(),
         accuracy,
-        None,
+        Standards::default(),
         &Demand { tolerance_mm, board_uncertainty_mm: None, extent: Extent::Boards },
     )
 }

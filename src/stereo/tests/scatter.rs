@@ -225,7 +225,7 @@ fn a_board_whose_print_scatters_is_told_from_corners_that_do() {
     // 0.02 mm (root mean square) is 0.07 px here, seven times the corners' own scatter.
     assert!(accuracy.rays_chi_square < 0.1, "{}", accuracy.rays_chi_square);
     let demand = Demand { tolerance_mm: 0.05, board_uncertainty_mm: None, extent: Extent::Boards };
-    let judged = Judged::new(&found, Vec::new(), accuracy, None, &demand);
+    let judged = Judged::new(&found, Vec::new(), accuracy, Standards::default(), &demand);
     assert!(judged.warnings.iter().any(|w| w.text.contains("corners' places on the board")), "{:?}", judged.warnings);
 }
 

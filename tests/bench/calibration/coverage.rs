@@ -14,8 +14,19 @@ use stereocal::stereo::select::options::Options;
 use stereocal::stereo::triangulate::{RIG_NUMBERS, RigCovariance, rig_number, triangulate};
 use stereocal::stereo::{Lens, Rig};
 
-/// Standard deviation of a corner's coordinate at 26 Mpx, as rendered pictures give it, px.
-const SIGMA_PX: f64 = 0.002;
+/// Pictures, and how their corners scatter.
+#[derive(Clone, Copy)]
+pub struct Noise {
+    /// Width and height, px.
+    pub size_px: u32,
+    /// Standard deviation of a corner's coordinate, px.
+    pub sigma_px: f64,
+    /// And of a crossing of the board's print, um; `None` as the preset has it.
+    pub print_um: Option<f64>,
+}
+
+/// 26 Mpx, with corners as rendered pictures give them.
+const PAPER: Noise = Noise { size_px: 5120, sigma_px: 0.002, print_um: None };
 /// Rigs a line.
 const RIGS: u64 = 100;
 /// Pairs of each.
@@ -32,12 +43,15 @@ struct Case {
     options: Options,
 }
 
+/// Errors with their standard deviations.
 #[derive(Default)]
-struct Tally {
-    count: f64,
-    inside: f64,
+pub struct Tally {
+    pub count: f64,
+    pub inside: f64,
     chi: f64,
-    squares: f64,
+    pub squares: f64,
+    /// What the standard deviations let expect of the squares.
+    pub variances: f64,
     largest: f64,
 }
 
@@ -47,29 +61,33 @@ impl Tally {
         self.inside += f64::from(u8::from(off.abs() <= WIDTH * sigma));
         self.chi += (off / sigma).powi(2);
         self.squares += off * off;
+        self.variances += sigma * sigma;
         self.largest = self.largest.max(off.abs());
     }
 
-    fn merge(&mut self, other: &Tally) {
+    pub fn merge(&mut self, other: &Tally) {
         self.count += other.count;
         self.inside += other.inside;
         self.chi += other.chi;
         self.squares += other.squares;
+        self.variances += other.variances;
         self.largest = self.largest.max(other.largest);
     }
 }
 
-fn world(seed: u64, pairs: usize, bow_um: f64) -> World {
-    let mut settings = Settings { check_pairs: pairs, samples: 4, verify: 0, seed, ..Settings::paper() };
+pub fn world(seed: u64, pairs: usize, bow_um: f64, noise: Noise) -> World {
+    let size_px = noise.size_px;
+    let mut settings = Settings { size_px, check_pairs: pairs, samples: 4, verify: 0, seed, ..Settings::paper() };
     settings.check_workmanship.bow_um = (bow_um, 0.0);
+    settings.check_workmanship.pitch_um = noise.print_um.unwrap_or(settings.check_workmanship.pitch_um);
     World::new(settings, None).expect("the preset is possible")
 }
 
-fn noisy(mut corners: Corners, seed: u64) -> Corners {
+pub fn noisy(mut corners: Corners, seed: u64, sigma_px: f64) -> Corners {
     let mut draws = Draws::new(seed, Purpose::Points, 3);
     for corner in corners.pairs.iter_mut().flat_map(|p| p.left.iter_mut().chain(&mut p.right)) {
-        corner.px += Vector2::new(draws.normal(), draws.normal()) * SIGMA_PX;
-        corner.covariance_px2 = Some(Matrix2::identity() * SIGMA_PX * SIGMA_PX);
+        corner.px += Vector2::new(draws.normal(), draws.normal()) * sigma_px;
+        corner.covariance_px2 = Some(Matrix2::identity() * sigma_px * sigma_px);
     }
     corners
 }
@@ -104,11 +122,12 @@ fn parameters(truth: &Rig, found: &Rig) -> Tally {
     tally
 }
 
-/// Lengths along rows and columns of fresh boards, seen with the same noise.
-fn lengths(found: &Calibration, seed: u64) -> Tally {
+/// Lengths along rows and columns of fresh boards, seen with the same noise; or, where they are exact, the rig's share of the errors alone.
+pub fn lengths(found: &Calibration, seed: u64, noise: Noise, exact: bool) -> Tally {
+    const EXACT_PX: f64 = 1e-6;
     let mut tally = Tally::default();
-    let fresh = world(seed + 100_000, 4, 0.0);
-    let corners = noisy(fresh.check_corners(), seed + 100_000);
+    let fresh = world(seed + 100_000, 4, 0.0, noise);
+    let corners = noisy(fresh.check_corners(), seed + 100_000, if exact { EXACT_PX } else { noise.sigma_px });
     let rig = found.rig();
     let Some(covariance) = rig.covariance.as_ref().map(RigCovariance::new) else { return tally };
     let board = corners.board;
@@ -124,7 +143,8 @@ fn lengths(found: &Calibration, seed: u64) -> Tally {
             let (Some(a), Some(b)) = (point(from.0, from.1), point(to.0, to.1)) else { continue };
             let true_mm =
                 (fresh.check_board.corner_mm(to.0, to.1) - fresh.check_board.corner_mm(from.0, from.1)).norm();
-            let variance = a.corner_variance_mm2(&b) + covariance.length_variance_mm2(&a, &b);
+            let of_corners = if exact { 0.0 } else { a.corner_variance_mm2(&b) };
+            let variance = of_corners + covariance.length_variance_mm2(&a, &b);
             tally.add((b.point_mm - a.point_mm).norm() - true_mm, variance.sqrt());
         }
     }
@@ -141,7 +161,8 @@ pub fn run() {
         Case { name: "tangential terms missing", bow_um: 0.0, options: told(Some(Lens::Radial2), Some(false)) },
     ];
     println!(
-        "\n{RIGS} rigs a line, {PAIRS} pairs of 26 Mpx, corners {SIGMA_PX} px: numbers of the rig, and lengths of 70 mm on fresh boards"
+        "\n{RIGS} rigs a line, {PAIRS} pairs of 26 Mpx, corners {} px: numbers of the rig, and lengths of 70 mm on fresh boards",
+        PAPER.sigma_px
     );
     println!(
         "                           |   within 95 %  chi2 |   within 95 %  chi2  RMS um  largest um: median rig, all"
@@ -150,9 +171,9 @@ pub fn run() {
         let each: Vec<Option<(Tally, Tally)>> = (0..RIGS)
             .into_par_iter()
             .map(|seed| {
-                let world = world(1000 + seed, PAIRS, case.bow_um);
-                let found = calibrate(&noisy(world.check_corners(), seed), &case.options).ok()?;
-                Some((parameters(&world.rig, found.rig()), lengths(&found, seed)))
+                let world = world(1000 + seed, PAIRS, case.bow_um, PAPER);
+                let found = calibrate(&noisy(world.check_corners(), seed, PAPER.sigma_px), &case.options).ok()?;
+                Some((parameters(&world.rig, found.rig()), lengths(&found, seed, PAPER, false)))
             })
             .collect();
         let (mut numbers, mut lengths) = (Tally::default(), Tally::default());

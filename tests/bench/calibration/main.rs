@@ -1,6 +1,6 @@
-//! Benchmark `calibration`: what the bundle costs beside OpenCV's, and whether the intervals of its numbers hold.
+//! Benchmark `calibration`: what the bundle costs beside OpenCV's, and whether the intervals of its numbers hold, and what known lenses give.
 //!
-//! `cargo bench --bench calibration -- speed|coverage`; without a word both.
+//! `cargo bench --bench calibration -- speed|coverage|known-lenses`; without a word all.
 #![allow(
     clippy::print_stdout,
     clippy::unwrap_used,
@@ -11,6 +11,7 @@
 )]
 
 mod coverage;
+mod known_lenses;
 mod peer;
 mod speed;
 
@@ -22,5 +23,8 @@ fn main() {
     }
     if runs("coverage") {
         coverage::run();
+    }
+    if runs("known-lenses") {
+        known_lenses::run();
     }
 }

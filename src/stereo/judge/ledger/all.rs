@@ -1,7 +1,7 @@
 //! All lines of the ledger, in the order in which they are read.
 
 use super::facts::Facts;
-use super::{lengths, pairs};
+use super::{lengths, moves, pairs};
 use crate::stereo::judge::evidence::Evidence;
 
 /// The ledger.
@@ -24,5 +24,6 @@ pub fn ledger(facts: &Facts) -> Vec<Evidence> {
     lines.extend(pairs::reach(facts));
     lines.extend(pairs::known_lenses(facts));
     lines.push(lengths::second_board(facts));
+    lines.extend(moves::known_moves(facts));
     lines
 }

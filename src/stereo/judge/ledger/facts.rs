@@ -6,6 +6,7 @@ use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::held_out::Accuracy;
 use crate::stereo::judge::lengths::model_disagreement::Disagreement;
 use crate::stereo::judge::lengths::second_board::SecondBoard;
+use crate::stereo::judge::moves::KnownMoves;
 use crate::stereo::judge::residual_correlation::ResidualPattern;
 use crate::stereo::judge::verdict::{COVERAGE, Expansion, Verdict};
 use crate::stereo::judge::view_coverage::Coverage;
@@ -19,6 +20,8 @@ pub struct Facts<'a> {
     pub accuracy: &'a Accuracy,
     /// A second board, where one was asked for.
     pub second: Option<&'a SecondBoard>,
+    /// Slides of known lengths.
+    pub moves: &'a KnownMoves,
     /// Lengths through the volume that the verdict is for.
     pub volume: &'a VolumeLengths,
     /// What happened to the rig while it was photographed.

@@ -187,7 +187,7 @@ pub(super) fn second_board(facts: &Facts) -> Evidence {
         detail,
     };
     let Some(second) = facts.second else {
-        let detail = "not asked for: the scale of every length is the pitch of the board, and an error of its pitch does not show here. `--check-images DIR` names pictures of a second board";
+        let detail = "not asked for: the scale of every length is the pitch of the board, and an error of its pitch does not show here. `--check-images DIR` names pictures of a second board, `--known-move MM` a slide of a known length";
         return Evidence { limit: None, ..line(None, Verdict::Pass, detail.to_owned()) };
     };
     let Some(extremes) = &second.extremes else {

@@ -6,7 +6,9 @@
 mod all;
 mod facts;
 mod lengths;
+mod moves;
 mod pairs;
 
 pub use all::ledger;
 pub use facts::Facts;
+pub use moves::KNOWN_MOVE;
