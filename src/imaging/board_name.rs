@@ -1,4 +1,4 @@
-//! Boards by their names: `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100`.
+//! Boards by their names: `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100`, `apriltag:6x6:tag36h11:35.2:10.56`.
 //!
 //! In: what was typed, or a board. Out: the board, or the reason why there is none; its name.
 
@@ -30,29 +30,14 @@ impl fmt::Display for Board {
 impl FromStr for Board {
     type Err = Error;
 
-    /// Reads `checker:20x20:10` or `charuco:11x8:15:11:DICT_5X5_100`. Squares of a board with markers are counted as printed: columns first. A square
+    /// Reads `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100` or `apriltag:6x6:tag36h11:35.2:10.56`. Squares of a board with markers are counted as printed: columns first. A square
     /// that is not quite one has a width and a height: `checker:20x20:10x10.01`.
     fn from_str(text: &str) -> Result<Board, Error> {
         let refuse = |why: String| Error::BoardName { found: text.to_owned(), why };
         let (kind, rest) = text.split_once(':').ok_or_else(|| refuse("it has no `:`".to_owned()))?;
         let fields: Vec<&str> = rest.split(':').map(str::trim).collect();
-        let length = |text: &str| match text.parse::<f64>() {
-            Ok(mm) if SQUARES_MM.contains(&mm) => Ok(mm),
-            _ => {
-                let (least, most) = SQUARES_MM.into_inner();
-                Err(refuse(format!("`{text}` is no length from {least} to {most} mm")))
-            }
-        };
-        let sides = |text: &str| match text.split_once('x') {
-            None => Ok((length(text)?, 1.0)),
-            Some((width, height)) => {
-                let (width, height) = (length(width)?, length(height)?);
-                let stretch = height / width;
-                // Printers stretch paper by less; other counts or another board are off by more.
-                let is_square = (1.0 - MOST_STRETCH..=1.0 + MOST_STRETCH).contains(&stretch);
-                if is_square { Ok((width, stretch)) } else { Err(refuse(format!("`{text}` is no square"))) }
-            }
-        };
+        let length = |text: &str| length_mm(text).map_err(refuse);
+        let sides = |text: &str| sides_mm(text).map_err(refuse);
         match (kind.trim().to_ascii_lowercase().as_str(), fields.as_slice()) {
             ("checker", [squares, square_mm]) => {
                 let (square_mm, stretch) = sides(square_mm)?;
@@ -97,6 +82,23 @@ impl FromStr for Board {
             (other, _) => Err(refuse(format!("there is no kind of board named `{other}`"))),
         }
     }
+}
+
+/// A length, mm; the reason where it is none.
+fn length_mm(text: &str) -> Result<f64, String> {
+    let (least, most) = SQUARES_MM.into_inner();
+    let known = text.parse().ok().filter(|mm| SQUARES_MM.contains(mm));
+    known.ok_or_else(|| format!("`{text}` is no length from {least} to {most} mm"))
+}
+
+/// The width of a square, mm, and its height over that: `10`, or `10x10.01`.
+fn sides_mm(text: &str) -> Result<(f64, f64), String> {
+    let Some((width, height)) = text.split_once('x') else { return Ok((length_mm(text)?, 1.0)) };
+    let (width, height) = (length_mm(width)?, length_mm(height)?);
+    let stretch = height / width;
+    // Printers stretch paper by less; other counts or another board are off by more.
+    let is_square = (1.0 - MOST_STRETCH..=1.0 + MOST_STRETCH).contains(&stretch);
+    if is_square { Ok((width, stretch)) } else { Err(format!("`{text}` is no square")) }
 }
 
 /// Widths of gaps, in sides of a tag: black squares that are wider than the tags between them, or narrower than their bits, are no grid of tags.

@@ -9,7 +9,7 @@ use camino::Utf8Path;
 use nalgebra::Matrix2;
 use rayon::prelude::*;
 
-use super::coded::{self, Layout, Print};
+use super::coded::{self, Layout};
 use super::detect::{self, Detected, Refusal, continuation};
 use super::image::{self, Claim, Header, Mosaic, Picture};
 use super::input::cache::{Cache, Look, Sighting};
@@ -18,6 +18,7 @@ use super::lattice::{Lattice, Places};
 use super::open::{OpenPair, listed, open_pair};
 use super::pyramid::Small;
 use super::refine::fields;
+use super::shown::{printed, unseen_lines};
 use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, Squares, order, overlay, refine};
 use crate::files::OutDir;
 use crate::files::provenance::picture_hash;
@@ -69,6 +70,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     if !skipped.is_empty() {
         notes.push(format!("the board was found in {} of {total} pairs", pairs.len()));
     }
+    unseen_lines(&wanted.board, &pairs).iter().for_each(|said| progress::warn(said));
     Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, open, notes })
 }
 
@@ -240,6 +242,12 @@ fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
         });
     }
     let mut corners = refine::refine(picture, detected);
+    let measured = Lattice::from_fn(corners.columns, corners.rows, |c, r| {
+        corners.get(c, r).filter(|corner| corner.used).map(|corner| corner.px)
+    });
+    if let Some(why) = coded::measures::other_gaps(&board, &measured) {
+        return Err(why.into());
+    }
     if let Some(open) = detected.open.as_ref().filter(|_| !is_measured(&corners)) {
         return Err(open.refusal.clone());
     }
@@ -269,20 +277,6 @@ fn common_layout(seen: &[[Look; 2]]) -> Option<Layout> {
     let mut layouts = seen.iter().flatten().filter_map(|look| Some(look.as_ref().ok()?.print?.layout));
     let first = layouts.next()?;
     layouts.all(|layout| layout == first).then_some(first)
-}
-
-/// How most pictures show the board's markers, for a person.
-fn printed(board: &Board, seen: &[[Look; 2]]) -> Option<String> {
-    let prints: Vec<Print> = seen.iter().flatten().filter_map(|look| look.as_ref().ok()?.print).collect();
-    let most = |is: &dyn Fn(&Print) -> bool| 2 * prints.iter().filter(|print| is(print)).count() > prints.len();
-    let layout = match Layout::of(board).len() {
-        2 if most(&|print| print.layout == Layout::Old) => Some(Layout::Old.said()),
-        2 => Some(Layout::New.said()),
-        _ => None,
-    };
-    let inverted = most(&|print| print.inverted).then_some("printed white on black");
-    let said: Vec<&str> = layout.into_iter().chain(inverted).collect();
-    (!prints.is_empty() && !said.is_empty()).then(|| format!("the board's markers: {}", said.join(", ")))
 }
 
 fn draw(pairs: &[PairCorners], files: &[PairFiles], mosaic: Option<Mosaic>, out: &OutDir) -> Result<()> {

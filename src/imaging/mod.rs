@@ -19,6 +19,7 @@ pub mod pyramid;
 pub mod refine;
 #[cfg(test)]
 pub mod shot;
+mod shown;
 mod wide;
 
 use camino::Utf8PathBuf;

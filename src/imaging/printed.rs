@@ -97,8 +97,8 @@ impl PrintedExtent {
         format!(
             "a printed extent of {width} x {height} mm is not that of {}, {} x {} mm: {why}",
             board.said(),
-            nominal[0],
-            nominal[1]
+            (nominal[0] * 1e9).round() / 1e9,
+            (nominal[1] * 1e9).round() / 1e9
         )
     }
 }

@@ -61,6 +61,9 @@ fn mm(metres: f64) -> f64 {
     (metres * 1e9).round() / 1e6
 }
 
+/// Longest side of a tag in Kalibr's file, mm: longer ones were meant as mm.
+const MOST_TAG_MM: f64 = 3000.0;
+
 /// Kalibr's target file.
 fn by_kalibr(text: &str) -> Result<Board, String> {
     let without_comments: String =
@@ -78,12 +81,21 @@ fn by_kalibr(text: &str) -> Result<Board, String> {
         }
         "aprilgrid" => {
             let (columns, rows, tag_mm) = (number("tagCols")?, number("tagRows")?, mm(number("tagSize")?));
+            if tag_mm > MOST_TAG_MM {
+                return Err(format!("tags of {tag_mm} mm: `tagSize` is in metres, and `tagSpacing` a share of it"));
+            }
             let gap_mm = (tag_mm * number("tagSpacing")? * 1e9).round() / 1e9;
+            if number("codeOffset").is_ok_and(|first| first != 0.0) {
+                return Err("`codeOffset` is not 0: only boards whose tags begin with number 0 are read".to_owned());
+            }
             // The file names no family: Kalibr knows but this one.
             let name = format!("apriltag:{columns}x{rows}:tag36h11:{tag_mm}:{gap_mm}");
             name.parse().map_err(|error: crate::imaging::Error| error.to_string())
         }
-        "circlegrid" => Err("a grid of circles; only boards of squares are read: checkerboards and ChArUco".to_owned()),
+        "circlegrid" => {
+            Err("a grid of circles; only boards of squares are read: checkerboards, ChArUco boards and AprilGrids"
+                .to_owned())
+        }
         other => Err(format!("a target of type `{other}`, which is not known; `checkerboard` and `aprilgrid` are")),
     }
 }
@@ -185,6 +197,15 @@ mod tests {
             (
                 "target_type: 'aprilgrid'\ntagCols: 6.5\ntagRows: 6\ntagSize: 0.088\ntagSpacing: 0.3\n".to_owned(),
                 "6.5x6",
+            ),
+            (
+                "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 24\ntagSpacing: 0.3\n".to_owned(),
+                "in metres",
+            ),
+            (
+                "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.024\ntagSpacing: 0.3\ncodeOffset: 5\n"
+                    .to_owned(),
+                "codeOffset",
             ),
             ("target_type: 'dots'\n".to_owned(), "`dots`"),
             ("cam0:\n".to_owned(), "no target file"),

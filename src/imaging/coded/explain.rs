@@ -39,12 +39,12 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> String 
     }
     if let Some(squares) = other_counts(board, size, &reads) {
         let (columns, said) = match board.kind {
-            Kind::Tags { .. } => (squares.columns / 2, format!("{0}x{1} tags", board.tags()[0], board.tags()[1])),
-            _ => (squares.columns, board.squares.to_string()),
+            Kind::Tags { .. } => {
+                (format!("{} columns of tags", squares.columns / 2), format!("{}x{}", board.tags()[0], board.tags()[1]))
+            }
+            _ => (format!("{} columns", squares.columns), board.squares.to_string()),
         };
-        return format!(
-            "shows the markers of a board of {columns} columns; --board says {said} (columns first, as printed)"
-        );
+        return format!("shows the markers of a board of {columns}; --board says {said} (columns first, as printed)");
     }
     if let Said::Place(_) = numbering::place(board, size, &reads) {
         return format!("shows a board larger than {}: its corners go on beyond those", board.said());
@@ -54,9 +54,14 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> String 
     if fields(board).into_iter().any(is_mirrored) {
         return "shows the board mirrored: the print or the picture is".to_owned();
     }
+    other_markers(picture, board, (dictionary, own), grid)
+}
+
+/// What else the markers of a grid are: of another dictionary, of another size, in another order, or none.
+fn other_markers(picture: &Picture, board: &Board, (dictionary, own): (Dictionary, Fields), grid: &Places) -> String {
     let mut best: Option<(usize, Dictionary, f64)> = None;
     for fields in other_fields(board, own) {
-        let reads = markers_in(grid, fields);
+        let reads = markers_in(picture, grid, board.pitch(), fields);
         for other in Dictionary::all().filter(|other| other.bits() == fields.bits) {
             let known = known_in(other, &reads);
             if known >= FEWEST && 2 * known > reads.len() && best.is_none_or(|(most, ..)| known > most) {

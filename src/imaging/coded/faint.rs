@@ -22,7 +22,7 @@ pub struct Faint {
     pub darkness: Vec<f64>,
 }
 
-/// How many times what chance does the right place must show: among 10^5 turns and shifts a normal deviate is once in 10^7 as large.
+/// How many times what chance does the right place must show: among 10^5 turns and shifts a normal deviate is as large once in 10^8 times.
 const SURE: f64 = 7.5;
 /// The share of that which the second best may reach.
 const RIVAL: f64 = 0.5;
@@ -117,7 +117,7 @@ fn judged(board: &Board, size: (usize, usize), seen: &[Faint], best: Way) -> Sai
     let well = correlations.get(3 * correlations.len() / 4).copied().unwrap_or(0.0);
     let agreeing = correlations.iter().filter(|correlation| **correlation > well / 2.0).count();
     let contradicting = correlations.len() - agreeing;
-    if agreeing < AGREEING * contradicting {
+    if agreeing <= AGREEING * contradicting {
         return Said::Nothing;
     }
     let (col, row) = shift;

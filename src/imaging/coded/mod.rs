@@ -12,12 +12,13 @@ pub mod faces;
 mod faint;
 pub mod local_map;
 pub mod marker;
+pub mod measures;
 mod numbering;
 
 use nalgebra::Point2;
 
 use self::faint::Faint;
-use self::marker::{Fields, grey_at, mapped, read, square_map};
+use self::marker::{Fields, read};
 use self::numbering::{Placement, Read, Said};
 use super::board::{Board, Kind, Squares};
 use super::detect::{COARSE_PX, Detected, Refusal, grids, on_a_copy, right_handed};
@@ -25,7 +26,6 @@ use super::image::{Grey8, Picture};
 use super::lattice::{Lattice, Places};
 use super::pitch::Pitch;
 use super::pyramid::{Level, factor_for};
-use crate::statistics::median;
 
 /// Which squares of a ChArUco board hold markers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,10 +107,6 @@ const ENOUGH_MARGIN_PX: f64 = 5.0;
 const MOST_DOUBLED_PX: usize = 4_000_000;
 /// How far from where its neighbours have it a corner may lie, in sides of a square.
 const STRAY: f64 = 0.2;
-/// How far the marker's size may be from the board's, as a share of a square.
-const MOST_OFF: f64 = 0.05;
-/// How far the gaps between tags may be from the board's, in sides of a tag: coarse corners of tags of twenty pixels show them so well.
-const MOST_GAP_OFF: f64 = 0.04;
 /// Widths of a tag's black border, in its bits: Kalibr's, and that of most others who print tags.
 const TAG_BORDERS: [usize; 2] = [2, 1];
 /// What of the usual contrast a marker has at least: light falls off over a board, but not so far.
@@ -168,7 +164,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     };
     let Part { placement, fields, .. } = parts[0];
     let merged = merged(&board, &parts);
-    if let Some(why) = other_measures(picture, &board, &merged, placement.layout, fields) {
+    if let Some(why) = measures::other_markers(picture, &board, &merged, placement.layout, fields) {
         return Err(why.into());
     }
     let print = Print { share: fields.marked(), pitch, layout: placement.layout, inverted: placement.inverted };
@@ -187,46 +183,6 @@ fn fields(board: &Board) -> Vec<Fields> {
             TAG_BORDERS.iter().map(|border| Fields::of_tag(gap_mm / board.square_mm, family.bits(), *border)).collect()
         }
     }
-}
-
-/// What is seen to be of another size than the board's name says: the markers, or the gaps between tags.
-fn other_measures(picture: &Picture, board: &Board, merged: &Places, layout: Layout, fields: Fields) -> Option<String> {
-    match board.kind {
-        Kind::Checker => None,
-        Kind::Charuco { marker_mm, .. } => {
-            let share = seen_share(picture, merged, layout, fields).filter(|s| (s - fields.share).abs() > MOST_OFF)?;
-            Some(format!(
-                "shows markers of {:.3} mm in squares of {} mm; --board says {marker_mm} mm",
-                share * board.square_mm,
-                board.square_mm
-            ))
-        }
-        Kind::Tags { gap_mm, .. } => {
-            let gap = seen_gap(merged).filter(|gap| (gap - gap_mm / board.square_mm).abs() > MOST_GAP_OFF)?;
-            Some(format!(
-                "shows gaps of {:.2} mm between tags of {} mm; --board says {gap_mm} mm",
-                gap * board.square_mm,
-                board.square_mm
-            ))
-        }
-    }
-}
-
-/// Width of the gaps between tags as they are seen, in sides of a tag: from the cross-ratio of two tags' four corners on a line, which perspective
-/// leaves as it is. `None` where no two neighbouring tags are seen.
-fn seen_gap(corners: &Places) -> Option<f64> {
-    let one = |line: [Option<&Point2<f64>>; 4]| {
-        let [Some(a), Some(b), Some(c), Some(d)] = line else { return None };
-        let cross = ((c - a).norm() * (d - b).norm()) / ((c - b).norm() * (d - a).norm());
-        // (1 + g)^2 / (g (2 + g)) with g for the gap.
-        (cross > 1.0).then(|| (cross / (cross - 1.0)).sqrt() - 1.0)
-    };
-    let lines = corners.iter().flat_map(|(col, row, _)| {
-        let across = (col % 2 == 0).then(|| one([0, 1, 2, 3].map(|k| corners.get(col + k, row)))).flatten();
-        let along = (row % 2 == 0).then(|| one([0, 1, 2, 3].map(|k| corners.get(col, row + k)))).flatten();
-        [across, along]
-    });
-    median(lines.flatten())
 }
 
 /// Copies in their order: from coarse to fine.
@@ -371,49 +327,6 @@ fn merged(board: &Board, parts: &[Part]) -> Places {
     Lattice::from_fn(board.columns(), board.rows(), |col, row| {
         parts.iter().find_map(|part| part.corners.get(col, row).copied())
     })
-}
-
-/// Side of the markers as they are seen, as a share of a square: where their outline has the most contrast. `None` where no whole square with a
-/// marker is seen well enough.
-fn seen_share(picture: &Picture, corners: &Places, layout: Layout, fields: Fields) -> Option<f64> {
-    /// Least side of a bit, px.
-    const LEAST_FIELD_PX: f64 = 3.0;
-    const STEPS: i32 = 20;
-    let field = fields.share / (fields.bits + 2) as f64;
-    if corners.step_px()? * field < LEAST_FIELD_PX {
-        return None;
-    }
-    let maps: Vec<_> = corners
-        .iter()
-        .filter(|(col, row, _)| layout.holds_marker(*col as isize + 1, *row as isize + 1))
-        .filter_map(|(col, row, _)| {
-            let square = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(c, r)| corners.get(col + c, row + r).copied());
-            let [Some(a), Some(b), Some(c), Some(d)] = square else { return None };
-            square_map(&[a, b, c, d])
-        })
-        .collect();
-    let contrast = |share: f64| {
-        let (outside, inside) = ((1.0 - share) / 2.0 - 0.25 * field, (1.0 - share) / 2.0 + 0.25 * field);
-        let mut sum = 0.0;
-        for map in &maps {
-            for k in 0..24 {
-                let (along, side) = (0.25 + 0.1 * f64::from(k % 6), k / 6);
-                let at = |depth: f64| {
-                    let (x, y) =
-                        [(along, depth), (along, 1.0 - depth), (depth, along), (1.0 - depth, along)][side as usize];
-                    grey_at(picture, &mapped(map, x, y))
-                };
-                sum += at(outside)? - at(inside)?;
-            }
-        }
-        Some(sum.abs())
-    };
-    if maps.is_empty() {
-        return None;
-    }
-    let shares = (-STEPS..=STEPS).map(|k| fields.share + 0.01 * f64::from(k)).filter(|s| (0.2..0.97).contains(s));
-    let seen = shares.filter_map(|share| Some((contrast(share)?, share)));
-    seen.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, share)| share)
 }
 
 #[cfg(test)]

@@ -217,6 +217,8 @@ fn another_grid_of_tags_is_named() {
         ("apriltag:5x3:tag36h11:24:7.2", "larger than 5x3"),
         ("apriltag:5x4:tag36h11:24:6", "gaps of 7."),
         ("apriltag:5x4:tag36h11:24:8.4", "gaps of 7."),
+        ("apriltag:5x4:tag36h11:24:7.35", "gaps of 7.2"),
+        ("apriltag:5x4:tag36h11:24:7.05", "gaps of 7."),
         (BOARD, "no marker"),
     ] {
         let refusal = corners_in(&picture, said.parse().unwrap()).map(|corners| corners.count()).expect_err(said);

@@ -165,8 +165,8 @@ fn summarise(
         doubtful,
         folds: folds.rigs.len(),
         fold_steps: folds.steps,
-        short_mm: short.map(|s| board.spans_mm(s)[0]),
-        long_mm: long.map(|s| board.spans_mm(s)[0]),
+        short_mm: short.map(|s| lengths::as_written_mm(board.spans_mm(s)[0])),
+        long_mm: long.map(|s| lengths::as_written_mm(board.spans_mm(s)[0])),
         ranges: all_ranges(board, measured),
         pairs,
     })

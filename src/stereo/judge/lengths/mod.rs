@@ -142,8 +142,7 @@ fn range(board: &Board, measured: &[Measured], axis: Axis, squares: usize) -> Op
     let spread: f64 = errors.iter().map(|e| (e - mean) * (e - mean)).sum();
     Some(Range {
         axis,
-        // As a person writes it: 38.1 for three squares of 12.7.
-        nominal_mm: (board.spans_mm(squares)[axis as usize] * 1e9).round() / 1e9,
+        nominal_mm: as_written_mm(board.spans_mm(squares)[axis as usize]),
         count: errors.len(),
         mean_error_mm: mean,
         std_mm: (spread / (errors.len() as f64 - 1.0).max(1.0)).sqrt(),
@@ -165,6 +164,11 @@ impl Measured {
     pub(super) fn errors(&self, axis: Axis, squares: usize) -> impl Iterator<Item = f64> + '_ {
         self.lengths.iter().filter(move |l| l.axis == axis && l.squares == squares).map(|l| l.error_mm)
     }
+}
+
+/// A length as a person writes it: 38.1 for three squares of 12.7.
+pub(super) fn as_written_mm(length_mm: f64) -> f64 {
+    (length_mm * 1e9).round() / 1e9
 }
 
 pub(super) fn mean(values: &[f64]) -> Option<f64> {

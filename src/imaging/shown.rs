@@ -1,0 +1,91 @@
+//! What all pictures together show of how a board with markers is made, for a person.
+//!
+//! In: what was seen in each picture. Out: its layout and colours, and the sides of it that no picture shows.
+
+use super::board::Kind;
+use super::coded::{Layout, Print};
+use super::input::cache::Look;
+use super::{Board, Corner, PairCorners};
+
+/// How most pictures show the board's markers, for a person.
+pub fn printed(board: &Board, seen: &[[Look; 2]]) -> Option<String> {
+    let prints: Vec<Print> = seen.iter().flatten().filter_map(|look| look.as_ref().ok()?.print).collect();
+    let most = |is: &dyn Fn(&Print) -> bool| 2 * prints.iter().filter(|print| is(print)).count() > prints.len();
+    let layout = match Layout::of(board).len() {
+        2 if most(&|print| print.layout == Layout::Old) => Some(Layout::Old.said()),
+        2 => Some(Layout::New.said()),
+        _ => None,
+    };
+    let inverted = most(&|print| print.inverted).then_some("printed white on black");
+    let said: Vec<&str> = layout.into_iter().chain(inverted).collect();
+    (!prints.is_empty() && !said.is_empty()).then(|| format!("the board's markers: {}", said.join(", ")))
+}
+
+/// The sides of a board with markers whose outermost squares or tags no picture shows: the board may have fewer than its name says, and then its middle is
+/// elsewhere. Markers count from one side, so that those that are there do not tell.
+pub fn unseen_lines(board: &Board, pairs: &[PairCorners]) -> Option<String> {
+    if !board.is_coded() {
+        return None;
+    }
+    let seen = || pairs.iter().flat_map(|pair| pair.left.iter().chain(&pair.right));
+    let ends = |of: &dyn Fn(&Corner) -> usize, count: usize| {
+        let (first, last) = (seen().map(of).min()?, seen().map(of).max()?);
+        Some([first, count - 1 - last])
+    };
+    let lines = |corners: usize| match board.kind {
+        Kind::Tags { .. } => corners.div_ceil(2),
+        _ => corners,
+    };
+    let [left, right] = ends(&|corner| corner.col, board.columns())?.map(lines);
+    let [above, below] = ends(&|corner| corner.row, board.rows())?.map(lines);
+    let [columns, rows] = match board.kind {
+        Kind::Tags { .. } => board.tags(),
+        _ => [board.squares.columns, board.squares.rows],
+    };
+    let sides = [(left, "left columns"), (right, "right columns"), (above, "upper rows"), (below, "lower rows")];
+    let unseen: Vec<String> =
+        sides.iter().filter(|(count, _)| *count > 0).map(|(count, side)| format!("{count} {side}")).collect();
+    (!unseen.is_empty()).then(|| {
+        format!(
+            "no picture shows all of the board's {columns}x{rows}: its outermost {} are never seen. If it has {}x{}, say so with --board: the board's \
+             middle depends on it",
+            unseen.join(" and "),
+            columns - left - right,
+            rows - above - below
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+
+    /// A pair whose left picture shows these columns and rows of corners.
+    fn pair(cols: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> PairCorners {
+        let corner = |col, row| Corner {
+            col,
+            row,
+            px: Point2::origin(),
+            covariance_px2: None,
+            blur_px: None,
+            reach: None,
+            used: true,
+        };
+        let left = rows.flat_map(|row| cols.clone().map(move |col| corner(col, row))).collect();
+        PairCorners { left, ..PairCorners::default() }
+    }
+
+    #[test]
+    fn sides_that_no_picture_shows_are_said() {
+        let tags: Board = "apriltag:6x7:tag36h11:24:7.2".parse().unwrap();
+        let said = unseen_lines(&tags, &[pair(0..12, 2..9), pair(4..10, 3..14)]).unwrap();
+        assert!(said.contains("1 upper rows are") && said.contains("If it has 6x6"), "{said}");
+        let charuco: Board = "charuco:8x6:20:14:DICT_4X4_50".parse().unwrap();
+        let said = unseen_lines(&charuco, &[pair(0..5, 0..3), pair(1..6, 1..4)]).unwrap();
+        assert!(said.contains("1 right columns and 1 lower rows") && said.contains("If it has 7x5"), "{said}");
+        // Every side in some picture, none of which shows the board whole.
+        assert_eq!(unseen_lines(&charuco, &[pair(0..5, 0..3), pair(2..7, 2..5)]), None);
+        assert_eq!(unseen_lines(&"checker:8x6:20".parse().unwrap(), &[pair(0..2, 0..2)]), None);
+    }
+}
