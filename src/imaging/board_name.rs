@@ -68,7 +68,7 @@ impl FromStr for Board {
                 "OpenCV's grid of tags has corners of one square only, which move with the ink: only Kalibr's with black squares between its tags is read"
                     .to_owned(),
             )),
-            ("apriltag", [tags, family, tag_mm, gap_mm, made_by @ ..]) if matches!(made_by, [] | ["kalibr"]) => {
+            ("apriltag", [tags, family, tag_mm, gap_mm] | [tags, family, tag_mm, gap_mm, "kalibr"]) => {
                 let ((square_mm, stretch), gap_mm) = (sides(tag_mm)?, length(gap_mm)?);
                 let family = Dictionary::of_tags(family).map_err(&refuse)?;
                 let Squares { columns, rows } = Squares::of_tags(tags)?;

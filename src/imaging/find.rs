@@ -70,7 +70,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     if !skipped.is_empty() {
         notes.push(format!("the board was found in {} of {total} pairs", pairs.len()));
     }
-    unseen_lines(&wanted.board, &pairs).iter().for_each(|said| progress::warn(said));
+    unseen_lines(&wanted.board, &pairs).iter().for_each(progress::warn);
     Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, open, notes })
 }
 
