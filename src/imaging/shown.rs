@@ -42,12 +42,18 @@ pub fn unseen_lines(board: &Board, pairs: &[PairCorners]) -> Option<String> {
         Kind::Tags { .. } => board.tags(),
         _ => [board.squares.columns, board.squares.rows],
     };
-    let sides = [(left, "left columns"), (right, "right columns"), (above, "upper rows"), (below, "lower rows")];
-    let unseen: Vec<String> =
-        sides.iter().filter(|(count, _)| *count > 0).map(|(count, side)| format!("{count} {side}")).collect();
+    let sides = [(left, "left column"), (right, "right column"), (above, "upper row"), (below, "lower row")];
+    let unseen: Vec<String> = sides
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, side)| match count {
+            1 => format!("the {side}"),
+            _ => format!("the {count} {side}s"),
+        })
+        .collect();
     (!unseen.is_empty()).then(|| {
         format!(
-            "no picture shows all of the board's {columns}x{rows}: its outermost {} are never seen. If it has {}x{}, say so with --board: the board's \
+            "no picture shows all of the board's {columns}x{rows}: {} of it never. If it has {}x{}, say so with --board: the board's \
              middle depends on it",
             unseen.join(" and "),
             columns - left - right,
@@ -80,10 +86,13 @@ mod tests {
     fn sides_that_no_picture_shows_are_said() {
         let tags: Board = "apriltag:6x7:tag36h11:24:7.2".parse().unwrap();
         let said = unseen_lines(&tags, &[pair(0..12, 2..9), pair(4..10, 3..14)]).unwrap();
-        assert!(said.contains("1 upper rows are") && said.contains("If it has 6x6"), "{said}");
+        assert!(said.contains("7: the upper row of it never") && said.contains("If it has 6x6"), "{said}");
         let charuco: Board = "charuco:8x6:20:14:DICT_4X4_50".parse().unwrap();
         let said = unseen_lines(&charuco, &[pair(0..5, 0..3), pair(1..6, 1..4)]).unwrap();
-        assert!(said.contains("1 right columns and 1 lower rows") && said.contains("If it has 7x5"), "{said}");
+        assert!(
+            said.contains("the right column and the lower row of it never") && said.contains("If it has 7x5"),
+            "{said}"
+        );
         // Every side in some picture, none of which shows the board whole.
         assert_eq!(unseen_lines(&charuco, &[pair(0..5, 0..3), pair(2..7, 2..5)]), None);
         assert_eq!(unseen_lines(&"checker:8x6:20".parse().unwrap(), &[pair(0..2, 0..2)]), None);
