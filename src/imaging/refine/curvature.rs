@@ -28,6 +28,11 @@ impl Bend {
         let by_bend = half_px * half_px / 6.0;
         1.0 + 2.0 * by_bend * self.by_own + by_bend * by_bend * self.by_all
     }
+
+    /// How much of what moves the corner in such a window across its line does so still where the line's bend, which it takes part in, is the edge's.
+    pub fn own_share(&self, half_px: f64) -> f64 {
+        1.0 + half_px * half_px / 6.0 * self.by_own
+    }
 }
 
 /// Fewest corners that show how a line bends.
@@ -162,6 +167,22 @@ mod tests {
             // y grows away from the middle of the arc, so n.d is positive there and the bend negative.
             assert!((along_rows * r + 1.0).abs() < 2e-3, "{along_rows}");
             assert!(along_columns.abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_corner_scatters_at_least_by_its_own_share() {
+        // Corners at the ends of short lines bend them against themselves, those in the middle with themselves.
+        for count in [3, 4, 6, 9] {
+            let line = Lattice::from_fn(count, 1, |col, _| {
+                Some(Point { px: Point2::new(30.0 * col as f64 + (col % 2) as f64, 0.1), counts: true })
+            });
+            for bend in bends(&line, Rule { in_part: true, ..PLAIN }).iter().map(|both| both[0].unwrap()) {
+                for half_px in [3.0, 10.0, 25.0] {
+                    let (scatter, own) = (bend.scatter(half_px), bend.own_share(half_px));
+                    assert!(scatter >= own * own && (own - 1.0).abs() > 1e-6, "{count} {half_px}: {scatter} {own}");
+                }
+            }
         }
     }
 

@@ -52,14 +52,19 @@ impl Windows {
         if !self.cell.has_markers() {
             return corner;
         }
-        let [a, b] = [0, 1].map(|k| {
-            let half_px = corner.reach[k] * self.cell.edges[k].norm();
-            self.bends[k].map_or(1.0, |bend| bend.scatter(half_px)).max(0.0).sqrt()
-        });
         let Some(back) = corner.normals().try_inverse() else { return corner };
-        let scale = back * Matrix2::new(a, 0.0, 0.0, b) * corner.normals();
+        let across = |by: &dyn Fn(Bend, f64) -> f64| {
+            let [a, b] = [0, 1].map(|k| {
+                let half_px = corner.reach[k] * self.cell.edges[k].norm();
+                self.bends[k].map_or(1.0, |bend| by(bend, half_px))
+            });
+            back * Matrix2::new(a, 0.0, 0.0, b) * corner.normals()
+        };
+        let scale = across(&|bend, half_px| bend.scatter(half_px).max(0.0).sqrt());
         let covariance_px2 = scale * corner.fit.covariance_px2 * scale.transpose();
-        Measured { fit: Fit { covariance_px2, ..corner.fit }, ..corner }
+        // What the line's other corners do to the place has nothing to do with the light in this one's window.
+        let place_by_light = across(&|bend, half_px| bend.own_share(half_px)) * corner.fit.place_by_light;
+        Measured { fit: Fit { covariance_px2, place_by_light, ..corner.fit }, ..corner }
     }
 }
 

@@ -60,6 +60,9 @@ impl<const C: usize> Arm<C> {
     }
 }
 
+/// The least of an arm's turn that its step does not explain, as a share: a thousand times the rounding of sums of seven digits.
+const LEAST_APART: f64 = 1e-4;
+
 /// What the two arms of an edge miss the common model by, as `[bent, apart]`: the one how they run through the crossing aside of it and turn against
 /// each other, the other how far they are apart there and turn alike. Each is free of the other; chi-squared in units of the residuals' variance
 /// times it, and what that is in the mean where residuals are noise and nothing else: two, less what the common fit of `parameters` has taken, whose
@@ -255,10 +258,13 @@ fn stray_columns(group: &Group, columns: &mut [Lanes]) {
     }
 }
 
-/// An arm by the products of [`along`]'s columns, of which the first two are the derivatives by its step and its turn.
+/// An arm by the products of [`along`]'s columns, of which the first two are the derivatives by its step and its turn. One of a pixel or two, or of pixels
+/// that all lie as far from the crossing, does not tell the two apart: what is left of their products is rounding.
 fn by_itself<const C: usize, const A: usize>(map: &[Share], sums: &SMatrix<f64, A, A>) -> Arm<C> {
     let normal = sums.fixed_view::<2, 2>(0, 0).into_owned();
-    let inverse = normal.cholesky().map_or(Matrix2::zeros(), |c| c.inverse());
+    let apart = 1.0 - normal.m12 * normal.m21 / (normal.m11 * normal.m22);
+    let known = normal.cholesky().filter(|_| apart > LEAST_APART);
+    let inverse = known.map_or(Matrix2::zeros(), |c| c.inverse());
     let mut by_columns = SMatrix::zeros();
     for &(to, column, share) in map {
         for i in 0..2 {
@@ -284,6 +290,25 @@ mod tests {
 
     pub fn group(x: f64, y: f64) -> Group {
         Group { x: [x as f32; LANES], y: [y as f32; LANES], grey: [0.0; LANES], weight: [1.0; LANES] }
+    }
+
+    #[test]
+    fn an_arm_of_one_pixel_or_of_equal_ones_tells_nothing_by_itself() {
+        let of = |pixels: &[f32]| {
+            let mut sums = [0.0_f32; 3];
+            for y in pixels {
+                let (step, turn) = (0.37_f32, 0.37 * y);
+                sums = [sums[0] + step * step, sums[1] + step * turn, sums[2] + turn * turn];
+            }
+            let [a, b, c] = sums.map(f64::from);
+            by_itself::<COLUMNS, 2>(&[], &SMatrix::<f64, 2, 2>::new(a, b, b, c)).inverse
+        };
+        for k in 0..200 {
+            let y = 2.0 + 0.037 * k as f32;
+            assert_eq!((of(&[y]), of(&[y; 7])), (Matrix2::zeros(), Matrix2::zeros()), "{y}");
+            // Pixels that are one apart tell a turn as far out as windows reach.
+            assert!(of(&[y, y + 1.0]) != Matrix2::zeros(), "{y}");
+        }
     }
 
     #[test]
