@@ -2,8 +2,8 @@
 //!
 //! 1. A robust fit names the rows that have no weight; they are left out, until the model that is chosen says whether they are far off
 //!    from it too. Verify rows are looked at too, named and kept.
-//! 2. The ladder of models is climbed (see [`super::climb`]): more terms only where the held-out errors fall and the evidence asks for
-//!    them, against a model that is contained only for what the further terms bring.
+//! 2. Models are compared by forward selection (see [`super::forward_selection`]): more terms only where the held-out errors fall and the
+//!    evidence asks for them, against a model that is contained only for what the further terms bring.
 //! 3. What of the residuals is smooth over a placement of the sensor counts as one error, not as many.
 //! 4. Every method solves the same problem, so the least cost is the best; the cheapest of equals is kept.
 //! 5. Verify rows take no part in any choice but one: where the robot found is worse on them than the nominal one by more than another draw
