@@ -79,6 +79,19 @@ impl Usual {
     }
 }
 
+/// The minimum roughly, by a loss that gross corners hardly move. The size of the board is free meanwhile: a target of quite another
+/// size, held to its own, would be seen as one whose edges all bend.
+fn roughly(bundle: &mut Bundle, mut values: Values) -> Option<Values> {
+    let stretch_mm = std::mem::replace(&mut bundle.shape.stretch_mm, f64::INFINITY);
+    for _ in 0..2 {
+        let noise = Noise::from_median(&residuals(bundle, &values, |_| true));
+        bundle.weigh(&values, &noise);
+        values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?.0;
+    }
+    bundle.shape.stretch_mm = stretch_mm;
+    Some(values)
+}
+
 /// Finds the minimum. `usual` is what counts at least; `excess` is held where it is known. `None` where the
 /// corners do not determine the poses.
 pub(in crate::stereo::board_pose) fn estimate<'a>(
@@ -87,13 +100,8 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
     usual: Usual,
     known_excess: Option<f64>,
 ) -> Option<Estimate<'a>> {
-    let mut values = start;
     let certificate = bundle.shape;
-    for _ in 0..2 {
-        let noise = Noise::from_median(&residuals(&bundle, &values, |_| true));
-        bundle.weigh(&values, &noise);
-        values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?.0;
-    }
+    let mut values = roughly(&mut bundle, start)?;
     let poses = values.poses.iter().flatten().count();
     let mut noise = at_least(usual.noise, Noise::from_median(&residuals(&bundle, &values, |_| true)));
     let (mut inflation, mut excess) = (1.0, known_excess.unwrap_or(1.0));
