@@ -6,6 +6,7 @@
 //! counted. The largest finding is taken out and the rest is looked at again. What is done about a finding follows from its effect and
 //! not from how surely it is seen ([`standing`]). Goes wrong: fewer than six pairs; more than one change at one place.
 
+pub mod common_misfit;
 pub mod hypothesis;
 pub mod series;
 pub mod standing;
@@ -22,12 +23,9 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::statistics::median;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::view::View;
 use crate::stereo::findings::hypothesis::{Hypothesis, any_place};
 use crate::stereo::findings::series::{Change, Line, Linear};
 use crate::stereo::model::parameters::Layout;
-use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::pairs::series::PairMisfit;
 use crate::stereo::pairs::{Cause, DiscardedPair};
 use crate::stereo::volume::lengths::VolumeLengths;
 
@@ -43,9 +41,6 @@ const FEWEST_EACH: usize = 2;
 /// Fewest pairs whose order can be exchanged often enough, how often it is, and in how many of a hundred orders so large a change may be found.
 const PERMUTED_FROM: usize = 12;
 const PERMUTATIONS: usize = 400;
-
-/// Pairs that are named as the worst.
-const WORST: usize = 5;
 
 /// Fewest pairs in which a change is looked for.
 const FEWEST: usize = 6;
@@ -124,50 +119,6 @@ impl Along {
     /// Standard deviation of the step from the rig that is taken to the one with a share of the change, along that step.
     pub fn sigma_of(&self, share: f64) -> DVector<f64> {
         self.to(share) * self.relative_variance.sqrt()
-    }
-}
-
-/// Whether the pictures of the pairs were taken at one moment: all pairs miss their rig, with what changed over them taken out, by several
-/// times what each camera leaves of its own pictures, so that it is neither the corners nor a lens.
-pub fn not_simultaneous(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
-    /// A lens or a rig that lacks something leaves no more than about this many times what single pictures do.
-    const TIMES: f64 = 3.0;
-    let told = |finding: &Finding| finding.along.clone().filter(|along| along.by_pair.len() == calibration.views.len());
-    let misfit = match changes.iter().find_map(told) {
-        Some(along) => misfit_without(calibration, &along),
-        None => calibration.misfit.clone(),
-    };
-    (misfit.usual_px > TIMES * misfit.alone_px).then(|| Finding {
-        cause: Cause::NotSimultaneous.word().to_owned(),
-        kind: Kind::Pair,
-        pairs: misfit.worst_first.clone(),
-        size: Some(misfit.usual_px),
-        unit: "px",
-        effect_mm: None,
-        action: format!(
-            "the pictures of the pairs were not taken at one moment: half of the pairs miss the rig by {:.2} px and more, each camera alone \
-             by {:.2} px; the worst are {}. Trigger both cameras at once, or hold the board still",
-            misfit.usual_px,
-            misfit.alone_px,
-            misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ")
-        ),
-        along: None,
-    })
-}
-
-/// How far the pairs miss the rig, each its own along a change.
-fn misfit_without(calibration: &Calibration, along: &Along) -> PairMisfit {
-    let of = |(view, share): (&View, &f64)| {
-        let shared = calibration.layout.step(&calibration.values.shared, along.to(*share).as_slice());
-        misfit_px(&shared, view).map_or(f64::INFINITY, |(px, _)| px)
-    };
-    let px: Vec<f64> = calibration.views.par_iter().zip(along.by_pair.as_slice()).map(of).collect();
-    let mut worst: Vec<usize> = (0..px.len()).collect();
-    worst.sort_by(|a, b| px[*b].total_cmp(&px[*a]).then(a.cmp(b)));
-    PairMisfit {
-        usual_px: median(px.iter().copied()).unwrap_or(0.0),
-        alone_px: calibration.misfit.alone_px,
-        worst_first: worst.into_iter().map(|i| calibration.views[i].pair.clone()).collect(),
     }
 }
 

@@ -231,3 +231,19 @@ fn small_noisy_pictures_fit_one_rig() {
     assert!(told.is_empty(), "{told:?}");
     assert!(found.skipped.is_empty(), "{:?}", found.skipped);
 }
+
+#[test]
+fn a_board_whose_squares_are_not_as_wide_as_high_as_was_said_is_named_by_its_ratio() {
+    for stretch in [0.004, -0.01, 0.03] {
+        for world in worlds(12, 4) {
+            let mut corners = world.corners(4);
+            corners.board.square_mm *= 1.0 + stretch;
+            corners.board.stretch = 1.0 / (1.0 + stretch);
+            let (_, told) = calibrate_standing(&corners, &asked(Options::default())).unwrap();
+            let [finding] = told.as_slice() else { panic!("{stretch}: {told:?}") };
+            assert_eq!(finding.cause, "other-board", "{stretch}: {finding:?}");
+            let off = finding.size.unwrap() / 100.0 - (1.0 / (1.0 + stretch) - 1.0);
+            assert!(off.abs() < 1e-4, "{stretch}: {finding:?}");
+        }
+    }
+}

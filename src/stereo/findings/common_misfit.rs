@@ -1,0 +1,163 @@
+//! Why all pairs of a series miss their rig by more than their corners let expect.
+//!
+//! In: a calibration from all pairs, and what changed over them. Out: the cause that they share: a board whose squares are not as wide and high as
+//! was said, or else, where they miss their rig by several times what each camera leaves of its own pictures, pictures that were
+//! not taken at one moment. Method: one camera alone takes up much of a board that is too wide in the place that it gives it, two cameras
+//! cannot; the ratio of width and height that the pairs ask for is looked for, all poses and the rig solved again, and it is the cause where the
+//! misfit goes with it. The size of the squares itself no pictures tell. Goes wrong: both at once are told as the second.
+
+use rayon::prelude::*;
+
+use super::{Along, Finding, Kind};
+use crate::statistics::median;
+use crate::stereo::Lens;
+use crate::stereo::calibrate::Calibration;
+use crate::stereo::data::residuals;
+use crate::stereo::data::view::View;
+use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::pairs::Cause;
+use crate::stereo::pairs::misfit::misfit_px;
+use crate::stereo::pairs::series::PairMisfit;
+use crate::stereo::solve::problem::Problem;
+
+/// A lens or a rig that lacks something leaves no more than about this many times what single pictures do.
+const TIMES: f64 = 3.0;
+
+/// Pairs that are named as the worst.
+const WORST: usize = 5;
+
+/// Changes of the board's ratio of width and height at which the pairs are solved, from which the next are guessed.
+const STEPS: [f64; 3] = [1e-2, 1e-3, 1e-4];
+
+/// No printer stretches a board by more.
+const MOST_STRETCH: f64 = 0.1;
+
+/// The cause that all pairs share, where there is one.
+pub fn look(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
+    let told = |finding: &Finding| finding.along.clone().filter(|along| along.by_pair.len() == calibration.views.len());
+    let misfit = match changes.iter().find_map(told) {
+        Some(along) => misfit_without(calibration, &along),
+        None => calibration.misfit.clone(),
+    };
+    if misfit.usual_px < TIMES * corner_sigma_px(&calibration.views) {
+        return None;
+    }
+    let is_shared = misfit.usual_px > TIMES * misfit.alone_px;
+    other_sides(calibration, &misfit).or_else(|| is_shared.then(|| not_simultaneous(misfit)))
+}
+
+/// Standard deviation of most corners as their refinement states it, px; zero where it gave none.
+fn corner_sigma_px(views: &[View]) -> f64 {
+    let observations = views.iter().flat_map(|view| view.observations.iter().filter(|o| o.active));
+    median(observations.map(|o| (0.5 * o.covariance_px2.trace()).sqrt())).unwrap_or(0.0)
+}
+
+/// Pictures that were not taken at one moment: neither the corners nor a lens explain so much.
+fn not_simultaneous(misfit: PairMisfit) -> Finding {
+    Finding {
+        cause: Cause::NotSimultaneous.word().to_owned(),
+        kind: Kind::Pair,
+        size: Some(misfit.usual_px),
+        unit: "px",
+        effect_mm: None,
+        action: format!(
+            "the pictures of the pairs were not taken at one moment: half of the pairs miss the rig by {:.2} px and more, each camera alone \
+             by {:.2} px; the worst are {}. Trigger both cameras at once, or hold the board still",
+            misfit.usual_px,
+            misfit.alone_px,
+            misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ")
+        ),
+        pairs: misfit.worst_first,
+        along: None,
+    }
+}
+
+/// How far the pairs miss the rig, each its own along a change.
+fn misfit_without(calibration: &Calibration, along: &Along) -> PairMisfit {
+    let of = |(view, share): (&View, &f64)| {
+        let shared = calibration.layout.step(&calibration.values.shared, along.to(*share).as_slice());
+        misfit_px(&shared, view).map_or(f64::INFINITY, |(px, _)| px)
+    };
+    let px: Vec<f64> = calibration.views.par_iter().zip(along.by_pair.as_slice()).map(of).collect();
+    let mut worst: Vec<usize> = (0..px.len()).collect();
+    worst.sort_by(|a, b| px[*b].total_cmp(&px[*a]).then(a.cmp(b)));
+    PairMisfit {
+        usual_px: median(px.iter().copied()).unwrap_or(0.0),
+        alone_px: calibration.misfit.alone_px,
+        worst_first: worst.into_iter().map(|i| calibration.views[i].pair.clone()).collect(),
+    }
+}
+
+/// A board whose squares are not as wide and high as was said, where the pairs fit one rig with other squares.
+fn other_sides(calibration: &Calibration, misfit: &PairMisfit) -> Option<Finding> {
+    /// Most of it that may be left. One number of sixteen that a rig has takes up little of what has another cause.
+    const LEFT: f64 = 0.5;
+    let (stretch, shared, views) = likeliest_stretch(calibration)?;
+    let left = |view: &View| misfit_px(&shared, view).map_or(f64::INFINITY, |(px, _)| px);
+    let left_px = median(views.par_iter().map(left).collect::<Vec<f64>>())?;
+    if left_px > LEFT * misfit.usual_px {
+        return None;
+    }
+    let [width_mm, height_mm] = calibration.board.sides_mm();
+    let said = width_mm / height_mm;
+    Some(Finding {
+        cause: Cause::OtherBoard.word().to_owned(),
+        kind: Kind::Step,
+        pairs: calibration.views.iter().map(|view| view.pair.clone()).collect(),
+        size: Some(100.0 * stretch),
+        unit: "%",
+        effect_mm: None,
+        action: format!(
+            "the board's squares are {:.4} times as wide as high, not {said:.4} times as was said: with that half of the pairs miss the rig by \
+             {left_px:.3} px and more, instead of {:.3} px. Measure the board along and across, and say its squares as WxH",
+            said * (1.0 + stretch),
+            misfit.usual_px,
+        ),
+        along: None,
+    })
+}
+
+/// By how much wider the board is than was said, for its height, with what the pairs then make of the rig. `None` where they do not tell.
+fn likeliest_stretch(calibration: &Calibration) -> Option<(f64, Shared, Vec<View>)> {
+    let problem = calibration.problem();
+    let layout = with_usual_lens(&calibration.layout);
+    let mut stretch = 0.0;
+    for step in STEPS {
+        let at = |by: f64| cost(&stretched(&problem, by), &layout);
+        let tried = [-step, 0.0, step].par_iter().map(|by| at(stretch + by)).collect::<Option<Vec<f64>>>()?;
+        let (slope, curvature) = (0.5 * (tried[2] - tried[0]), tried[2] - 2.0 * tried[1] + tried[0]);
+        let change = -slope / curvature * step;
+        if !(curvature > 0.0 && (stretch + change).abs() < MOST_STRETCH) {
+            return None;
+        }
+        stretch += change;
+    }
+    let problem = stretched(&problem, stretch);
+    let values = problem.refit(&layout)?;
+    Some((stretch, values.shared, problem.views))
+}
+
+/// The layout with at least the terms that nearly all lenses need: misfit that the board made may have left fewer.
+fn with_usual_lens(layout: &Layout) -> Layout {
+    let richer = |lens: Option<Lens>| {
+        lens.map(|lens| if lens.free_count() < Lens::Brown5.free_count() { Lens::Brown5 } else { lens })
+    };
+    Layout { left: richer(layout.left), right: richer(layout.right), ..*layout }
+}
+
+/// The pairs of a board that is wider by this share for its height.
+fn stretched(problem: &Problem, by: f64) -> Problem {
+    let mut problem = problem.clone();
+    for o in problem.views.iter_mut().flat_map(|view| &mut view.observations) {
+        o.board_mm.x *= (1.0 + by).sqrt();
+        o.board_mm.y /= (1.0 + by).sqrt();
+    }
+    problem
+}
+
+/// What is left at the minimum: chi-squared by the weights as they are.
+fn cost(problem: &Problem, layout: &Layout) -> Option<f64> {
+    let values = problem.refit(layout)?;
+    let left = residuals::active(&problem.views, &values)?;
+    Some(left.iter().map(|(o, residual)| o.whiten(*residual).norm_squared()).sum())
+}
