@@ -2,7 +2,8 @@
 
 use std::str::FromStr;
 
-use crate::imaging::{Error, Squares};
+use crate::imaging::Squares;
+use crate::imaging::board::Error;
 
 /// Squares that are said, or to be counted in the pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

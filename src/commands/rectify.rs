@@ -13,11 +13,11 @@ use crate::files::{self, OutDir};
 use crate::formats::calibration;
 use crate::formats::rectified::{Coverage, RectifiedFile, RectifiedPair};
 use crate::imaging::find::find_pair;
-use crate::imaging::image::raster::Raster;
+use crate::imaging::image::raster::{Raster, Samples};
 use crate::imaging::image::{self, Claim, Header};
 use crate::imaging::input::pairs::PairFiles;
 use crate::imaging::{self, Board, PairCorners, Skipped, Wanted};
-use crate::opencv::{Map, remap, undistort_rectify_map};
+use crate::opencv::{Failure, Map, remap, undistort_rectify_map};
 use crate::stereo::model::rectification::{Matrices, Scaling, row_differences, row_residual};
 use crate::stereo::{self, Rig, Side};
 use crate::{progress, report};
@@ -108,11 +108,21 @@ fn names(files: &PairFiles) -> [String; 2] {
     [name(Side::Left, &files.left), name(Side::Right, &files.right)]
 }
 
+/// A picture with its colours at the places of a map.
+fn remapped(raw: &Raster, map: &Map) -> Result<Raster, Failure> {
+    let samples = match &raw.samples {
+        Samples::Eight(v) => Samples::Eight(remap(v, raw.width, raw.channels, map)?),
+        Samples::Sixteen(v) => Samples::Sixteen(remap(v, raw.width, raw.channels, map)?),
+    };
+    let (width, height) = map.size();
+    Ok(Raster { width, height, channels: raw.channels, samples })
+}
+
 /// What will be done to the pictures, and what is said of it.
 fn plan(args: &Rectify, rig: &Rig) -> Result<(RectifiedFile, [Map; 2])> {
     let (width, height) = (rig.left.width, rig.left.height);
     let map = |side: Side, r: &Matrix3<f64>, p: &Matrix3<f64>, size| {
-        undistort_rectify_map(rig.camera(side), r, p, size).map_err(stereo::Error::from)
+        undistort_rectify_map(&rig.camera(side).for_opencv(), r, p, size).map_err(stereo::Error::from)
     };
     let raw = Side::BOTH.map(|side| (rig.camera(side).width, rig.camera(side).height));
     let coverage = |maps: &[Map; 2]| Coverage { left: maps[0].coverage(raw[0]), right: maps[1].coverage(raw[1]) };
@@ -161,7 +171,7 @@ fn rectified(
         if (raw.width, raw.height) != size {
             return Err(say("is not of the size that its header announces".to_owned()));
         }
-        let rectified = remap(&raw, &maps[side as usize]).map_err(|e| say(e.to_string()))?;
+        let rectified = remapped(&raw, &maps[side as usize]).map_err(|e| say(e.to_string()))?;
         rectified.png().ok_or_else(|| say("cannot be written as PNG".to_owned()))
     };
     Ok([one(Side::Left, &files.left)?, one(Side::Right, &files.right)?])

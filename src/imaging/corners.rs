@@ -3,7 +3,6 @@
 use nalgebra::{Matrix2, Point2};
 
 use super::Board;
-use super::open::OpenPair;
 
 /// Left or right picture of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -73,6 +72,17 @@ pub struct Skipped {
     pub pair: String,
     /// Why, for a person.
     pub reason: String,
+}
+
+/// A pair at least one of whose pictures leaves its numbers open.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenPair {
+    /// Its name.
+    pub pair: String,
+    /// The corners of its left and of its right picture, once for each way of numbering them.
+    pub sides: [Vec<Vec<Corner>>; 2],
+    /// How many pairs that leave nothing open come before it.
+    pub before: usize,
 }
 
 /// The corners of all pairs of a folder.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Vector2};
 
-use super::pitch::Pitch;
+use super::board::Pitch;
 use crate::statistics::median;
 
 /// Corners (or anything that belongs to one) by column and row.

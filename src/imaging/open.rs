@@ -4,30 +4,9 @@
 //! In: what pictures show. Out: pairs with all numberings that their corners may have. How the cameras stand, which other pairs tell, decides
 //! between them later (`crate::stereo::pairs::open_numbers`); a pair for which that is not done counts as one without a board.
 
-use super::corners::{Corner, Skipped};
-use super::detect::Refusal;
+use super::corners::{Corner, OpenPair, Skipped};
 use super::input::cache::Sighting;
 use super::lattice::{Lattice, Renumbering};
-
-/// That the corners of a picture may have other numbers as well.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Open {
-    /// The others, each from the one that they have.
-    pub others: Vec<Renumbering>,
-    /// Why they are open, for a person.
-    pub refusal: Refusal,
-}
-
-/// A pair at least one of whose pictures leaves its numbers open.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OpenPair {
-    /// Its name.
-    pub pair: String,
-    /// The corners of its left and of its right picture, once for each way of numbering them.
-    pub sides: [Vec<Vec<Corner>>; 2],
-    /// How many pairs that leave nothing open come before it.
-    pub before: usize,
-}
 
 /// A pair with what its pictures leave open, and why; `None` where they leave nothing open. `before`: how many such pairs were before it.
 pub fn open_pair(pair: &str, sides: &[&Sighting; 2], before: usize) -> Option<(OpenPair, Skipped)> {

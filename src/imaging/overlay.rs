@@ -8,9 +8,9 @@ use image::{GrayImage, Luma, Rgb, RgbImage, imageops};
 use nalgebra::Point2;
 
 use super::detect::COARSE_PX;
+use super::image::pyramid::Small;
 use super::image::{Grey8, Mosaic};
 use super::input::pairs::PairFiles;
-use super::pyramid::Small;
 use super::{Corner, PairCorners, Side};
 
 /// Standard deviations up to which a corner gets a colour, px, from the best.

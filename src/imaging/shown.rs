@@ -2,8 +2,7 @@
 //!
 //! In: what was seen in each picture. Out: its layout and colours, and the sides of it that no picture shows.
 
-use super::board::Kind;
-use super::coded::{Layout, Print};
+use super::board::{Kind, Layout, Print};
 use super::input::cache::Look;
 use super::{Board, Corner, PairCorners};
 
@@ -11,7 +10,7 @@ use super::{Board, Corner, PairCorners};
 pub fn printed(board: &Board, seen: &[[Look; 2]]) -> Option<String> {
     let prints: Vec<Print> = seen.iter().flatten().filter_map(|look| look.as_ref().ok()?.print).collect();
     let most = |is: &dyn Fn(&Print) -> bool| 2 * prints.iter().filter(|print| is(print)).count() > prints.len();
-    let layout = match Layout::of(board).len() {
+    let layout = match board.layouts().len() {
         2 if most(&|print| print.layout == Layout::Old) => Some(Layout::Old.said()),
         2 => Some(Layout::New.said()),
         _ => None,

@@ -9,7 +9,7 @@ use nalgebra::{Point2, Point3};
 use super::draws::{Draws, Purpose};
 use super::picture::patch::Patch;
 use crate::imaging::Board;
-use crate::imaging::coded::Layout;
+use crate::imaging::board::Layout;
 use crate::imaging::coded::faces::Face;
 
 /// How a board deviates from its drawing.
@@ -135,7 +135,7 @@ impl PhysicalBoard {
 
     /// Which squares are light, and hold the markers of a board that has any.
     pub fn layout(&self) -> Layout {
-        Layout::of(&self.drawing).first().copied().unwrap_or(Layout::New)
+        self.drawing.layouts().first().copied().unwrap_or(Layout::New)
     }
 
     /// The four corners of square `(i, j)` as printed, in order round it, mm.

@@ -35,7 +35,7 @@ pub fn named(text: &str) -> Result<Board, String> {
     let of_file = match kind.as_deref() {
         Some("yaml" | "yml") => by_kalibr,
         Some("json") => by_calibrator,
-        _ => return text.parse().map_err(|error: crate::imaging::Error| error.to_string()),
+        _ => return text.parse().map_err(|error: crate::imaging::board::Error| error.to_string()),
     };
     let content = files::read_text(path, "file of a board", None).map_err(|error| format!("{path}: {error}"))?;
     of_file(&content).map_err(|why| format!("{path}: {why}"))
@@ -53,7 +53,7 @@ fn checker(columns: f64, rows: f64, square_mm: f64) -> Result<Board, String> {
     };
     let (columns, rows) = (count(columns, "columns")?, count(rows, "rows")?);
     let name = format!("checker:{}:{square_mm}", Squares { columns, rows });
-    name.parse().map_err(|error: crate::imaging::Error| error.to_string())
+    name.parse().map_err(|error: crate::imaging::board::Error| error.to_string())
 }
 
 /// Rounds off what a length in metres brings along as binary fraction, mm.
@@ -90,7 +90,7 @@ fn by_kalibr(text: &str) -> Result<Board, String> {
             }
             // The file names no family: Kalibr knows but this one.
             let name = format!("apriltag:{columns}x{rows}:tag36h11:{tag_mm}:{gap_mm}");
-            name.parse().map_err(|error: crate::imaging::Error| error.to_string())
+            name.parse().map_err(|error: crate::imaging::board::Error| error.to_string())
         }
         "circlegrid" => {
             Err("a grid of circles; only boards of squares are read: checkerboards, ChArUco boards and AprilGrids"

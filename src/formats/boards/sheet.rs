@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use pdf_writer::{Content, Finish, Name, Pdf, Rect, Ref, Str};
 
 use crate::imaging::Board;
-use crate::imaging::coded::Layout;
+use crate::imaging::board::Layout;
 use crate::imaging::coded::faces::{Face, faces};
 
 /// Sheets of paper, mm, the short side first.
@@ -72,7 +72,7 @@ impl Sheet {
             let ([x, y], [right, below]) = ([0, 1].map(|k| at(k, face.from[k])), [0, 1].map(|k| at(k, face.to[k])));
             Patch { x: left + x, y: top + y, width: right - x, height: below - y, is_black }
         };
-        let layout = Layout::of(board).first().copied().unwrap_or(Layout::New);
+        let layout = board.layouts().first().copied().unwrap_or(Layout::New);
         let whole = |square| Face { square, from: [0.0; 2], to: [1.0; 2] };
         let squares = (0..board.squares.rows).flat_map(|y| (0..board.squares.columns).map(move |x| (x, y)));
         let black = squares.filter(|(x, y)| layout.is_dark(*x as isize, *y as isize));

@@ -3,14 +3,13 @@
 //! In: grids of corners without a number. Out: the reason, for a person. Method: the same markers are read once more as on other boards: of another
 //! dictionary, of other counts, with markers of another size, mirrored; the first that they fit is named.
 
-use super::dictionary::Dictionary;
-use super::marker::Fields;
+use super::in_grid::markers_in;
+use super::marker::{Fields, TAG_BORDERS, fields};
 use super::numbering::{self, Read, Said};
-use super::{Layout, TAG_BORDERS, fields, markers_in};
-use crate::imaging::board::{Board, Kind, Squares};
+use crate::imaging::board::dictionary::Dictionary;
+use crate::imaging::board::{Board, Kind, Layout, Pitch, Squares};
 use crate::imaging::image::Picture;
 use crate::imaging::lattice::Places;
-use crate::imaging::pitch::Pitch;
 
 /// Markers that are no chance find.
 const FEWEST: usize = 2;

@@ -1,9 +1,8 @@
 //! What is printed in the squares of a board with markers: for the renderer and for paper.
 
-use super::marker::Fields;
+use super::marker::{Fields, fields};
 use super::numbering::code_in;
-use super::{Layout, fields};
-use crate::imaging::board::Board;
+use crate::imaging::board::{Board, Layout};
 
 /// A rectangle in one square of the board.
 #[derive(Debug, Clone, Copy, PartialEq)]

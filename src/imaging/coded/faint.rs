@@ -7,10 +7,9 @@
 
 use std::collections::BTreeMap;
 
-use super::Layout;
-use super::dictionary::turned;
 use super::numbering::{AGREEING, Placement, Said, code_in, turned_square};
-use crate::imaging::board::Board;
+use crate::imaging::board::dictionary::turned;
+use crate::imaging::board::{Board, Layout};
 use crate::statistics::median;
 
 /// What is seen in a square of a grid, the one after corner `square`.
@@ -39,7 +38,7 @@ struct Way {
 
 /// How a grid of `size` corners lies on the board by all that is seen in it together.
 pub fn place(board: &Board, size: (usize, usize), seen: &[Faint]) -> Said {
-    let mut ways: Vec<Way> = Layout::of(board).into_iter().flat_map(|layout| ways(board, layout, size, seen)).collect();
+    let mut ways: Vec<Way> = board.layouts().into_iter().flat_map(|layout| ways(board, layout, size, seen)).collect();
     ways.sort_by(|a, b| b.score.abs().total_cmp(&a.score.abs()));
     // What is usual among ways that are all wrong but for one: a normal deviate's median magnitude is 0.674.
     let chance = median(ways.iter().map(|way| way.score.abs())).map_or(1.0, |usual| (usual / 0.674).max(1.0));

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Point2, SMatrix, SVector};
 
 use super::marker::mapped;
+use crate::imaging::board::Pitch;
 use crate::imaging::lattice::Places;
-use crate::imaging::pitch::Pitch;
 
 /// Corners up to so many columns and rows away count.
 const REACH: isize = 2;

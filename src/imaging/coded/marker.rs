@@ -7,8 +7,12 @@
 
 use nalgebra::{Matrix3, Point2, Vector3};
 
-use super::dictionary::turned;
+use crate::imaging::board::dictionary::turned;
+use crate::imaging::board::{Board, Kind};
 use crate::imaging::image::{Grey, Image, Picture};
+
+/// Widths of a tag's black border, in its bits: Kalibr's, and that of most others who print tags.
+pub const TAG_BORDERS: [usize; 2] = [2, 1];
 
 /// Share of the border's fields, and of those of the paper beside it, that may be on the wrong side: glare, a fold, or blur. By the binomial sum,
 /// fields without any order pass for the border and paper of 4x4 bits once in 4 300 times, of 6x6 in 46 000.
@@ -205,4 +209,17 @@ pub fn read(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Op
         code |= u64::from(is_black(grid[j * side + i])) << k;
     }
     Some(Marker { code, bits, inverted, contrast: (white - black).abs() })
+}
+
+/// How a board's markers may be divided; none for a board without.
+pub fn fields(board: &Board) -> Vec<Fields> {
+    match board.kind {
+        Kind::Checker => Vec::new(),
+        Kind::Charuco { marker_mm, dictionary, .. } => {
+            vec![Fields::of_marker(marker_mm / board.square_mm, dictionary.bits())]
+        }
+        Kind::Tags { gap_mm, family } => {
+            TAG_BORDERS.iter().map(|border| Fields::of_tag(gap_mm / board.square_mm, family.bits(), *border)).collect()
+        }
+    }
 }

@@ -5,9 +5,8 @@
 
 use nalgebra::Point2;
 
-use super::Layout;
 use super::marker::{Fields, grey_at, mapped, square_map};
-use crate::imaging::board::{Board, Kind};
+use crate::imaging::board::{Board, Kind, Layout};
 use crate::imaging::image::Picture;
 use crate::imaging::lattice::Places;
 use crate::statistics::median;

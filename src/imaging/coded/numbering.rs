@@ -5,10 +5,9 @@
 //! marker contradicts it. A single marker numbers a grid only where all of its bits are right. Goes wrong: a board that is not the one named; the
 //! markers then say which it could be ([`super::explain`]).
 
-use super::Layout;
-use super::dictionary::turned as quarter_turned;
 use super::marker::Marker;
-use crate::imaging::board::{Board, Kind};
+use crate::imaging::board::dictionary::turned as quarter_turned;
+use crate::imaging::board::{Board, Kind, Layout};
 
 /// A marker in a square of a grid: the square is the one after corner `(col, row)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,7 +106,7 @@ pub fn place(board: &Board, size: (usize, usize), reads: &[Read]) -> Said {
     let inverted = 2 * reads.iter().filter(|read| read.marker.inverted).count() > reads.len();
     let reads: Vec<Read> = reads.iter().filter(|read| read.marker.inverted == inverted).copied().collect();
     let found: Vec<(Placement, usize)> =
-        Layout::of(board).into_iter().filter_map(|layout| by_layout(board, layout, size, &reads, inverted)).collect();
+        board.layouts().into_iter().filter_map(|layout| by_layout(board, layout, size, &reads, inverted)).collect();
     match found[..] {
         [] => Said::Nothing,
         [(only, _)] => Said::Place(only),
@@ -218,8 +217,8 @@ mod tests {
     fn every_part_of_a_board_is_known_from_every_side() {
         for (name, layouts) in [("charuco:11x8:15:11:DICT_5X5_100", 2), ("charuco:4x5:54:40.5:DICT_4X4_1000", 1)] {
             let board: Board = name.parse().unwrap();
-            assert_eq!(Layout::of(&board).len(), layouts);
-            for layout in Layout::of(&board) {
+            assert_eq!(board.layouts().len(), layouts);
+            for layout in board.layouts() {
                 for quarters in 0..4 {
                     for (col, row) in [(0, 0), (1, 0), (0, 2), (1, 1)] {
                         let (size, reads) = part(&board, layout, col..col + 2, row..row + 2, quarters);

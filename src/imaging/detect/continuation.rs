@@ -168,7 +168,7 @@ fn local(grid: &Places, col: isize, row: isize) -> Option<(Point2<f64>, Vector2<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::pyramid::Level;
+    use crate::imaging::image::pyramid::Level;
 
     /// A board of 7x6 squares of 12 px in a light margin, of which the inner corners in the given ranges were found.
     fn found(cols: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> Detected {

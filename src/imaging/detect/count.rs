@@ -3,7 +3,8 @@
 //! In: a picture. Out: the count, where all corners of a grid are there and the board is seen to end on all four sides. Goes wrong: a board that is
 //! cut, hidden, without a margin, or in glare gives none.
 
-use super::{Attempt, Way, extent, grown, ladder};
+use super::extent;
+use super::plain::{Attempt, Way, grown, ladder};
 use crate::imaging::Squares;
 use crate::imaging::image::Picture;
 

@@ -11,9 +11,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use nalgebra::{Point2, Vector2};
 
 use super::saddles::{Candidate, candidates, tiles};
+use crate::imaging::board::Pitch;
 use crate::imaging::image::Grey8;
 use crate::imaging::lattice::{Lattice, Places};
-use crate::imaging::pitch::Pitch;
 
 /// Seeds from which a grid is tried, and where one of enough corners is known, altogether and for two tiles: each tile gives its strongest
 /// first, and a grid that is larger still has corners in several of them.

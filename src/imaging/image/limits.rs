@@ -10,7 +10,8 @@ use std::sync::{Condvar, Mutex, PoisonError};
 use camino::Utf8Path;
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
 
-use super::UNDECODABLE;
+/// What every reason for a file that is no picture says.
+pub const UNDECODABLE: &str = "cannot be decoded";
 
 /// Longest side, px: what a JPEG can say, and three times the longest side of any area sensor.
 const MOST_SIDE_PX: u32 = 65_535;

@@ -7,98 +7,18 @@
 mod channels;
 mod clipping;
 mod decode;
+mod grey;
 mod integrity;
 mod jpeg_scan;
 mod limits;
 mod mosaic;
+mod picture;
+pub mod pyramid;
 pub mod raster;
-
-use nalgebra::Point2;
+pub mod wide;
 
 pub use decode::{decode, picture};
-pub use limits::{Claim, Header, header, read};
+pub use grey::{Grey, Grey8, Image};
+pub use limits::{Claim, Header, UNDECODABLE, header, read};
 pub use mosaic::Mosaic;
-
-/// What every reason for a file that is no picture says.
-pub const UNDECODABLE: &str = "cannot be decoded";
-
-/// Values row by row.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Image<T> {
-    /// Width, px.
-    pub width: usize,
-    /// Height, px.
-    pub height: usize,
-    /// Its `width * height` values.
-    pub pixels: Vec<T>,
-}
-
-/// A small 8-bit picture for looking, not for measuring.
-pub type Grey8 = Image<u8>;
-
-/// Grey values as the camera gave them.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Grey {
-    /// 8 bits a pixel.
-    Eight(Image<u8>),
-    /// 16 bits a pixel, of which a camera may use fewer.
-    Sixteen(Image<u16>),
-}
-
-/// A grey picture and the level at which it is clipped.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Picture {
-    /// Its grey values.
-    pub grey: Grey,
-    clip_level: f64,
-}
-
-impl From<Image<u8>> for Picture {
-    fn from(image: Image<u8>) -> Picture {
-        let clip_level = clipping::level(&image);
-        Picture { grey: Grey::Eight(image), clip_level }
-    }
-}
-
-impl From<Image<u16>> for Picture {
-    fn from(image: Image<u16>) -> Picture {
-        let clip_level = clipping::level(&image);
-        Picture { grey: Grey::Sixteen(image), clip_level }
-    }
-}
-
-impl Picture {
-    /// The grey value from which on a pixel tells only "too bright".
-    pub fn clip_level(&self) -> f64 {
-        self.clip_level
-    }
-
-    /// Width, px.
-    pub fn width(&self) -> usize {
-        match &self.grey {
-            Grey::Eight(image) => image.width,
-            Grey::Sixteen(image) => image.width,
-        }
-    }
-
-    /// Height, px.
-    pub fn height(&self) -> usize {
-        match &self.grey {
-            Grey::Eight(image) => image.height,
-            Grey::Sixteen(image) => image.height,
-        }
-    }
-}
-
-impl<T: Copy + Into<f64>> Image<T> {
-    /// Mean of the 3 x 3 pixels at a place; `None` at the picture's border.
-    pub fn mean_at(&self, at: Point2<f64>) -> Option<f64> {
-        let (x, y) = (at.x.round(), at.y.round());
-        if !(x >= 1.0 && y >= 1.0 && x + 1.0 < self.width as f64 && y + 1.0 < self.height as f64) {
-            return None;
-        }
-        let (x, y) = (x as usize, y as usize);
-        let row = |y: usize| self.pixels[y * self.width + x - 1..][..3].iter().map(|&v| v.into()).sum::<f64>();
-        Some((y - 1..=y + 1).map(row).sum::<f64>() / 9.0)
-    }
-}
+pub use picture::Picture;

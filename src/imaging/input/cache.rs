@@ -9,12 +9,12 @@ use nalgebra::{Matrix2, Point2};
 use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
 
 use crate::files::OutDir;
-use crate::imaging::coded::{Layout, Print};
+use crate::imaging::board::{Layout, Print};
+use crate::imaging::detect::Open;
 use crate::imaging::detect::Refusal;
 use crate::imaging::image::Grey8;
+use crate::imaging::image::pyramid::{Level, Small};
 use crate::imaging::lattice::{Lattice, Renumbering};
-use crate::imaging::open::Open;
-use crate::imaging::pyramid::{Level, Small};
 use crate::imaging::{Board, Corner, Mosaic};
 
 /// Names the algorithm by what it finds: a hash of the corners of the golden pictures below. A change that moves a corner fails the test
@@ -158,7 +158,7 @@ fn parse(text: &str, board: Board) -> Option<Look> {
         Some(rest) => {
             let (line, rest) = rest.split_once('\n')?;
             let [share, old, inverted] = line.split(' ').collect::<Vec<_>>().try_into().ok()?;
-            let layout = match Layout::of(&board)[..] {
+            let layout = match board.layouts()[..] {
                 [only] if old == "0" => only,
                 _ if old == "1" => Layout::Old,
                 _ => Layout::New,
@@ -199,8 +199,8 @@ fn parse_open(line: &str) -> Option<Open> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imaging::board::Pitch;
     use crate::imaging::image::{Image, Picture};
-    use crate::imaging::pitch::Pitch;
     use crate::imaging::{detect, refine};
 
     fn board() -> Board {

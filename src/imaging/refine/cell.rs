@@ -3,7 +3,7 @@
 use nalgebra::{Point2, Vector2};
 
 use super::saddle_fit::window::Quad;
-use crate::imaging::coded::Print;
+use crate::imaging::board::Print;
 use crate::imaging::coded::local_map;
 use crate::imaging::coded::marker::{mapped, square_map};
 use crate::imaging::lattice::Places;

@@ -145,6 +145,12 @@ impl Camera {
     pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::new(self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
     }
+
+    /// As OpenCV takes it.
+    pub fn for_opencv(&self) -> crate::opencv::Lens<'_> {
+        let distortion = &self.distortion[..self.lens.vector_length()];
+        crate::opencv::Lens { matrix: self.matrix(), distortion, size: (self.width, self.height) }
+    }
 }
 
 /// OpenCV's matrix of a tilted sensor, `[[R33, 0, -R13], [0, R33, -R23], [0, 0, 1]] R(tau_x, tau_y)`.

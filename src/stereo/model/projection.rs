@@ -211,7 +211,7 @@ pub(crate) mod tests {
             let points: Vec<Point3<f64>> = (0..40)
                 .map(|i| Point3::new(f64::from(i % 8) * 55.0 - 190.0, f64::from(i / 8) * 60.0 - 120.0, 600.0))
                 .collect();
-            let theirs = crate::opencv::project_points(&camera, &points).unwrap();
+            let theirs = crate::opencv::project_points(&camera.for_opencv(), &points).unwrap();
             for (point, px) in points.iter().zip(theirs) {
                 let off = (camera.project(point) - px).norm();
                 // Rounding of both sides, at coordinates of about 1000 px.

@@ -46,7 +46,11 @@ pub struct Matrices {
 impl Matrices {
     /// Asks OpenCV.
     pub fn new(rig: &Rig, scaling: Scaling) -> Result<Matrices, Failure> {
-        stereo_rectify(rig, scaling)
+        let cameras = [rig.left.for_opencv(), rig.right.for_opencv()];
+        let (rotation, translation) = (rotation_matrix(&rig.right_from_left), &rig.right_from_left.translation.vector);
+        let (rotations, projections, disparity_to_depth) =
+            stereo_rectify(cameras, &rotation, translation, (scaling.flags(), scaling.alpha))?;
+        Ok(Matrices { rotations, projections, disparity_to_depth })
     }
 
     /// `R1`, `P1` for the left side, `R2`, `P2` for the right one.

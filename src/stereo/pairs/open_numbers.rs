@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use crate::imaging::open::OpenPair;
+use crate::imaging::corners::OpenPair;
 use crate::imaging::{Board, Corners, PairCorners};
 use crate::stereo::Rig;
 use crate::stereo::data::view::View;

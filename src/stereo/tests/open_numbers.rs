@@ -3,7 +3,7 @@
 use super::*;
 use crate::imaging::Corner;
 use crate::imaging::Skipped;
-use crate::imaging::open::OpenPair;
+use crate::imaging::corners::OpenPair;
 use crate::stereo::pairs::open_numbers;
 
 /// A picture's corners but for the first columns and rows, in all ways in which the rest may lie on the board.

@@ -85,7 +85,7 @@ fn row(size: u32, sectors_too: bool) {
     peer(&grey, &truth);
     if sectors_too {
         let clock = core_s();
-        let found = opencv::find_board(&grey, 19, 19).expect("OpenCV works");
+        let found = opencv::find_board(&grey.pixels, grey.width, (19, 19)).expect("OpenCV works");
         let text = found.map_or("not found".to_owned(), |f| rms(&f, &truth));
         println!("   findChessboardCornersSB {text} in {:.3} s", core_s() - clock);
     }

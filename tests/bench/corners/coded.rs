@@ -14,7 +14,7 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use stereocal::geometry::transform;
 use stereocal::imaging::board::Kind;
-use stereocal::imaging::coded::dictionary::Dictionary;
+use stereocal::imaging::board::dictionary::Dictionary;
 use stereocal::imaging::find::corners_in;
 use stereocal::imaging::image::{Image, Picture};
 use stereocal::imaging::{Board, Corner};

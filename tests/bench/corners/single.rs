@@ -4,9 +4,9 @@ use nalgebra::{Matrix2, Point2, Vector2};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use stereocal::imaging::detect::Detected;
+use stereocal::imaging::image::pyramid::Level;
 use stereocal::imaging::image::{Grey8, Picture};
 use stereocal::imaging::lattice::Lattice;
-use stereocal::imaging::pyramid::Level;
 use stereocal::imaging::refine::illumination;
 use stereocal::imaging::refine::{self, Measured};
 

@@ -5,12 +5,6 @@ use std::path::Path;
 
 use super::modules::Crate;
 
-/// Modules that use each other in a circle and are not mended yet, each by the first of its names: a list that only gets shorter.
-const DEBTS: &[&str] = &["imaging", "imaging::image"];
-
-/// Modules that import against the order and are not mended yet.
-const AGAINST: &[&str] = &["opencv"];
-
 /// Who uses whom, by index, with a path as written.
 type Uses = Vec<BTreeMap<usize, String>>;
 
@@ -96,13 +90,8 @@ fn no_modules_use_each_other_in_a_circle() {
     let ours = ours();
     assert!(ours.modules.len() > 100, "the source was not found");
     let found = circles(&ours);
-    let first = |circle: &[usize]| ours.modules[circle[0]].name.clone();
-    let not_named: Vec<_> = found.iter().filter(|(circle, _)| !DEBTS.contains(&first(circle).as_str())).collect();
-    let told: Vec<String> =
-        not_named.iter().map(|(circle, imports)| format!("{}: {imports:#?}", circle.len())).collect();
+    let told: Vec<String> = found.iter().map(|(circle, imports)| format!("{}: {imports:#?}", circle.len())).collect();
     assert!(told.is_empty(), "{} circles\n{}", told.len(), told.join("\n"));
-    let paid: Vec<_> = DEBTS.iter().filter(|debt| !found.iter().any(|(circle, _)| first(circle) == **debt)).collect();
-    assert!(paid.is_empty(), "no circle any more, take it off the list: {paid:?}");
 }
 
 #[test]
@@ -111,11 +100,7 @@ fn rooms_import_from_those_before_them() {
     let order = order(&std::fs::read_to_string(conventions).unwrap());
     assert!(order.contains_key("src") && order.contains_key("identify"), "no order was read: {order:?}");
     let found = against(&ours(), &order);
-    let is_debt = |told: &String, debt: &str| told.split(' ').next() == Some(debt);
-    let new: Vec<&String> = found.iter().filter(|told| !AGAINST.iter().any(|debt| is_debt(told, debt))).collect();
-    assert!(new.is_empty(), "{new:#?}");
-    let paid: Vec<_> = AGAINST.iter().filter(|debt| !found.iter().any(|told| is_debt(told, debt))).collect();
-    assert!(paid.is_empty(), "no longer against the order, take it off the list: {paid:?}");
+    assert!(found.is_empty(), "{found:#?}");
 }
 
 /// A crate of the given files.

@@ -5,10 +5,9 @@ use std::fmt;
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::listing::Folder;
-use super::matching::PairBy;
 use super::names::{Open, Reach};
 use super::readings::{Reading, Told};
-use super::{Pairing, Source};
+use super::{PairBy, Pairing, Source};
 use crate::imaging::{Error, Side, image};
 
 /// Folders, and readings, that a message shows at most.

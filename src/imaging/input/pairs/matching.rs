@@ -7,31 +7,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use camino::{Utf8Path, Utf8PathBuf};
 
-use super::PairFiles;
 use super::names::{Open, Reach, SEPARATORS, natural_order, numbers};
+use super::{PairBy, PairFiles};
 use crate::imaging::{Error, Result, Side};
-
-/// How pictures were paired, or are to be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum PairBy {
-    /// By their names, a word for the side left away
-    Name,
-    /// By the number in their names
-    Number,
-    /// In the order of their names; as many left pictures as right ones
-    Order,
-}
-
-impl PairBy {
-    /// The word in messages.
-    pub fn word(self) -> &'static str {
-        match self {
-            PairBy::Name => "name",
-            PairBy::Number => "number",
-            PairBy::Order => "order",
-        }
-    }
-}
 
 /// Two sides paired.
 #[derive(Debug, Clone)]

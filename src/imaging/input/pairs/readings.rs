@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 
 use camino::{Utf8Path, Utf8PathBuf};
 
-use super::PairFiles;
 use super::listing::Folder;
-use super::matching::{self, Matched, PairBy, by_key};
+use super::matching::{self, Matched, by_key};
 use super::names::{Open, Reach, SEPARATORS, natural_order, tokens};
+use super::{PairBy, PairFiles};
 use crate::imaging::{Result, Side};
 
 /// Folders that are compared with each other: among more, no two are the cameras' without being named.

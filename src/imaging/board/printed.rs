@@ -6,7 +6,7 @@
 
 use std::str::FromStr;
 
-use super::board::{Board, MOST_STRETCH};
+use super::certificate::{Board, MOST_STRETCH};
 
 /// Largest error of a caliper over up to 300 mm, mm (DIN 862).
 const CALIPER_MM: f64 = 0.03;

@@ -1,78 +1,14 @@
 //! The board as its certificate describes it: a plain checkerboard, one whose light squares hold markers that number its corners, or a grid of tags.
 
-use std::fmt;
 use std::ops::RangeInclusive;
-use std::str::FromStr;
 
 use nalgebra::Point3;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
-use super::Error;
-use super::coded::Layout;
-use super::coded::dictionary::Dictionary;
+use super::dictionary::Dictionary;
+use super::layout::Layout;
 use super::pitch::Pitch;
-
-/// Number of squares of a board; of a plain one the larger number first, of one with markers as printed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
-pub struct Squares {
-    /// Squares along x, the longer side of a plain board.
-    pub columns: usize,
-    /// Squares along y.
-    pub rows: usize,
-}
-
-impl FromStr for Squares {
-    type Err = Error;
-
-    /// Reads `20x20`. `6x7` and `7x6` are the same board.
-    fn from_str(text: &str) -> Result<Squares, Error> {
-        let Squares { columns, rows } = Squares::as_printed(text)?;
-        Ok(Squares { columns: columns.max(rows), rows: columns.min(rows) })
-    }
-}
-
-impl Squares {
-    /// Reads `6x6` as six columns of six tags.
-    pub fn of_tags(text: &str) -> Result<Squares, Error> {
-        let refuse = || Error::TagCounts { found: text.to_owned() };
-        let (a, b) = text.split_once(['x', 'X']).ok_or_else(refuse)?;
-        let count = |text: &str| text.trim().parse().ok().filter(|count| (1..100).contains(count)).ok_or_else(refuse);
-        Ok(Squares { columns: count(a)?, rows: count(b)? })
-    }
-
-    /// Reads `8x11` as eight columns of eleven squares.
-    pub fn as_printed(text: &str) -> Result<Squares, Error> {
-        let refuse = || Error::BoardSize { found: text.to_owned() };
-        let (a, b) = text.split_once(['x', 'X']).ok_or_else(refuse)?;
-        let a: usize = a.trim().parse().map_err(|_| refuse())?;
-        let b: usize = b.trim().parse().map_err(|_| refuse())?;
-        // Two inner corners each way are the least that has a direction; 200 is far beyond any picture.
-        if a.min(b) < 3 || a.max(b) > 200 {
-            return Err(refuse());
-        }
-        Ok(Squares { columns: a, rows: b })
-    }
-}
-
-impl TryFrom<String> for Squares {
-    type Error = Error;
-    fn try_from(text: String) -> Result<Squares, Error> {
-        text.parse()
-    }
-}
-
-impl From<Squares> for String {
-    fn from(squares: Squares) -> String {
-        squares.to_string()
-    }
-}
-
-impl fmt::Display for Squares {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}x{}", self.columns, self.rows)
-    }
-}
+use super::squares::Squares;
 
 /// Sides of squares, mm: from a wafer's to a car park's.
 pub const SQUARES_MM: RangeInclusive<f64> = 1e-3..=1e5;
@@ -141,6 +77,16 @@ impl Board {
         Board { square_mm: self.square_mm * factor, kind, ..self }
     }
 
+    /// The layouts that it may have; both of a ChArUco board are the same where the number of rows is odd.
+    pub fn layouts(&self) -> Vec<Layout> {
+        match self.kind {
+            Kind::Charuco { layout: Some(layout), .. } => vec![layout],
+            Kind::Tags { .. } => vec![Layout::Tags],
+            _ if self.squares.rows.is_multiple_of(2) => vec![Layout::New, Layout::Old],
+            _ => vec![Layout::New],
+        }
+    }
+
     /// The board with markers in these squares.
     pub fn with_layout(self, layout: Layout) -> Board {
         match self.kind {
@@ -157,7 +103,7 @@ impl Board {
             Kind::Checker => self.squares.to_string(),
             Kind::Charuco { marker_mm, dictionary, layout } => {
                 let (share, name) = (marker_mm / self.square_mm, dictionary.name());
-                format!("charuco {} {share} {name}{}", self.squares, of_layout(layout))
+                format!("charuco {} {share} {name}{}", self.squares, layout.map_or("", Layout::of_name))
             }
             Kind::Tags { gap_mm, family } => {
                 format!("tags {} {} {}", self.squares, gap_mm / self.square_mm, family.name())
@@ -313,38 +259,9 @@ impl Board {
     }
 }
 
-/// The end of a board's name that says its layout.
-pub(super) fn of_layout(layout: Option<Layout>) -> &'static str {
-    match layout {
-        None | Some(Layout::Tags) => "",
-        Some(Layout::New) => ":new",
-        Some(Layout::Old) => ":old",
-    }
-}
-
-impl TryFrom<String> for Board {
-    type Error = Error;
-    fn try_from(text: String) -> Result<Board, Error> {
-        text.parse()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn larger_count_comes_first() {
-        let squares: Squares = "6x7".parse().unwrap();
-        assert_eq!(squares.to_string(), "7x6");
-    }
-
-    #[test]
-    fn nonsense_is_refused() {
-        for text in ["", "7", "7x", "x6", "7x2", "-7x6", "7.5x6", "7x6x5", "1000x6"] {
-            assert!(text.parse::<Squares>().is_err(), "{text}");
-        }
-    }
 
     #[test]
     fn only_boards_that_look_the_same_are_ambiguous() {

@@ -6,9 +6,10 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::Error;
-use super::board::{Board, Kind, MOST_STRETCH, SQUARES_MM, Squares, of_layout};
-use super::coded::Layout;
-use super::coded::dictionary::Dictionary;
+use super::certificate::{Board, Kind, MOST_STRETCH, SQUARES_MM};
+use super::dictionary::Dictionary;
+use super::layout::Layout;
+use super::squares::Squares;
 
 impl fmt::Display for Board {
     /// As it is named on the command line.
@@ -17,7 +18,8 @@ impl fmt::Display for Board {
         match self.kind {
             Kind::Checker => write!(f, "checker:{squares}:{side}"),
             Kind::Charuco { marker_mm, dictionary, layout } => {
-                write!(f, "charuco:{squares}:{side}:{marker_mm}:{}{}", dictionary.name(), of_layout(layout))
+                let layout = layout.map_or("", Layout::of_name);
+                write!(f, "charuco:{squares}:{side}:{marker_mm}:{}{layout}", dictionary.name())
             }
             Kind::Tags { gap_mm, family } => {
                 let [columns, rows] = self.tags();
@@ -27,13 +29,20 @@ impl fmt::Display for Board {
     }
 }
 
+impl TryFrom<String> for Board {
+    type Error = Error;
+    fn try_from(text: String) -> Result<Board, Error> {
+        text.parse()
+    }
+}
+
 impl FromStr for Board {
     type Err = Error;
 
-    /// Reads `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100` or `apriltag:6x6:tag36h11:35.2:10.56`. Squares of a board with markers are counted as printed: columns first. A square
-    /// that is not quite one has a width and a height: `checker:20x20:10x10.01`.
+    /// Reads `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100` or `apriltag:6x6:tag36h11:35.2:10.56`. Squares of a board with markers
+    /// are counted as printed: columns first. A square that is not quite one has a width and a height: `checker:20x20:10x10.01`.
     fn from_str(text: &str) -> Result<Board, Error> {
-        let refuse = |why: String| Error::BoardName { found: text.to_owned(), why };
+        let refuse = |why: String| Error::Name { found: text.to_owned(), why };
         let (kind, rest) = text.split_once(':').ok_or_else(|| refuse("it has no `:`".to_owned()))?;
         let fields: Vec<&str> = rest.split(':').map(str::trim).collect();
         let length = |text: &str| length_mm(text).map_err(refuse);

@@ -1,0 +1,195 @@
+//! Boards whose markers number their corners: found in any part of them.
+//!
+//! In: a picture and the board. Out: a reduced copy and the board's corners on it as far as they are seen, each at its place on the board. Method:
+//! grids of corners grow as on a plain board (`super::detect::growth`), on copies from coarse to fine until the markers are large enough to leave
+//! the corners alone; the markers in a grid's squares say which part of the board it is (`numbering`). Which squares hold the markers (old and new
+//! layout), and whether they are printed white on black, is what is seen. Goes wrong: no marker that can be read; another board, which is
+//! named where the markers tell (`explain`).
+
+use nalgebra::Point2;
+
+use super::in_grid::{faint_in, markers_in};
+use super::marker::{Fields, fields};
+use super::numbering::{Placement, Said};
+use super::{explain, faint, local_map, measures, numbering};
+use crate::imaging::Board;
+use crate::imaging::board::{Pitch, Print};
+use crate::imaging::detect::{COARSE_PX, Detected, Refusal, grids, on_a_copy, right_handed};
+use crate::imaging::image::pyramid::{Level, factor_for};
+use crate::imaging::image::{Grey8, Picture};
+use crate::imaging::lattice::{Lattice, Places};
+
+/// Squares of so many px of a copy have a margin of so many px round their markers at least: on finer copies nothing more is seen.
+const ENOUGH_MARGIN_PX: f64 = 5.0;
+/// Copies with so many pixels may be enlarged.
+const MOST_DOUBLED_PX: usize = 4_000_000;
+/// How far from where its neighbours have it a corner may lie, in sides of a square.
+const STRAY: f64 = 0.2;
+/// Grids that are looked at on a copy, the largest first.
+const MOST_GRIDS: usize = 12;
+
+/// Why a part of a board has no number where the layout alone would give it one.
+pub const BY_LAYOUT: &str = "shows markers, but none at the board's sides: which corners they are depends on the layout, OpenCV's before or since 4.6";
+
+/// A part of the board in a picture.
+struct Part {
+    corners: Places,
+    placement: Placement,
+    /// How its markers are divided.
+    fields: Fields,
+}
+
+/// Looks for the board; the reason where it was not found.
+pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
+    let fields = fields(&board);
+    let pitch = board.pitch();
+    let Some(margin) = fields.iter().map(|fields| fields.margin()).min_by(f64::total_cmp) else {
+        return Err("no board found".to_owned().into());
+    };
+    let mut best: Option<(Vec<Part>, Level, Grey8)> = None;
+    let mut unnumbered: Vec<Places> = Vec::new();
+    let mut by_layout = false;
+    for level in levels(picture) {
+        let copy = level.copy(picture);
+        let mut parts: Vec<Part> = Vec::new();
+        for grid in grids(&copy, pitch, margin).into_iter().take(MOST_GRIDS) {
+            let grid = without_strays(right_handed(grid.map(|p| level.to_picture(p))), pitch);
+            match number(picture, &board, &fields, &grid) {
+                Numbered::Part(part) => add(&mut parts, part)?,
+                Numbered::ByLayout => by_layout = true,
+                Numbered::No if unnumbered.len() < MOST_GRIDS => unnumbered.push(grid),
+                Numbered::No => {}
+            }
+        }
+        let count = |parts: &[Part]| parts.iter().map(|part| part.corners.count()).sum::<usize>();
+        let step_px = parts.first().and_then(|part| part.corners.side_px(pitch)).map_or(0.0, |px| px / level.scale());
+        if !parts.is_empty() && best.as_ref().is_none_or(|(known, ..)| count(&parts) > count(known)) {
+            best = Some((parts, level, copy));
+        }
+        if step_px * margin.min(pitch.least()) >= ENOUGH_MARGIN_PX {
+            break;
+        }
+    }
+    let Some((parts, level, copy)) = best else {
+        if by_layout {
+            return Err(BY_LAYOUT.to_owned().into());
+        }
+        return Err(explain::unnumbered(picture, &board, &unnumbered).into());
+    };
+    let Part { placement, fields, .. } = parts[0];
+    let merged = merged(&board, &parts);
+    if let Some(why) = measures::other_markers(picture, &board, &merged, placement.layout, fields) {
+        return Err(why.into());
+    }
+    let print = Print { share: fields.marked(), pitch, layout: placement.layout, inverted: placement.inverted };
+    let on_copy = merged.map(|p| level.to_copy(p));
+    Ok(Detected { print: Some(print), ..on_a_copy(picture, level, &copy, on_copy) })
+}
+
+/// Copies in their order: from coarse to fine.
+fn levels(picture: &Picture) -> Vec<Level> {
+    let mut factor = factor_for(picture, COARSE_PX);
+    let mut levels = vec![Level::Reduced(factor)];
+    while factor > 1 {
+        factor = factor.div_ceil(2);
+        levels.push(Level::Reduced(factor));
+    }
+    if picture.width() * picture.height() <= MOST_DOUBLED_PX {
+        levels.push(Level::Doubled);
+    }
+    levels
+}
+
+/// The grid without corners that lie elsewhere than their neighbours say, the worst first.
+fn without_strays(mut grid: Places, pitch: Pitch) -> Places {
+    loop {
+        let Some(step) = grid.side_px(pitch) else { return grid };
+        let off = |(col, row, p): (usize, usize, &Point2<f64>)| {
+            let at = local_map::predicted(&grid, pitch, (col as isize, row as isize))?;
+            Some(((at - p).norm() / step, row * grid.columns + col))
+        };
+        let worst = grid.iter().filter_map(off).max_by(|a, b| a.0.total_cmp(&b.0));
+        match worst {
+            Some((off, at)) if off > STRAY => grid.cells[at] = None,
+            _ => return grid,
+        }
+    }
+}
+
+/// A grid with what its markers say.
+enum Numbered {
+    Part(Part),
+    ByLayout,
+    No,
+}
+
+/// A grid as a part of the board.
+fn number(picture: &Picture, board: &Board, fields: &[Fields], grid: &Places) -> Numbered {
+    let size = (grid.columns, grid.rows);
+    let one_by_one = fields.iter().map(|fields| {
+        let reads = markers_in(picture, grid, board.pitch(), *fields);
+        (*fields, numbering::place(board, size, &reads))
+    });
+    let together =
+        fields.iter().map(|fields| (*fields, faint::place(board, size, &faint_in(picture, grid, board, *fields))));
+    let (fields, placement) = match one_by_one.chain(together).find(|(_, said)| *said != Said::Nothing) {
+        Some((fields, Said::Place(placement))) => (fields, placement),
+        Some((_, Said::ByLayout)) => return Numbered::ByLayout,
+        Some((_, Said::Nothing)) | None => return Numbered::No,
+    };
+    let turned = grid.turned(placement.quarters);
+    if goes_beyond(board, &turned, &placement) {
+        return Numbered::No;
+    }
+    let corners = Lattice::from_fn(board.columns(), board.rows(), |col, row| {
+        turned.around(col as isize - placement.col, row as isize - placement.row).copied()
+    });
+    if corners.count() > 0 { Numbered::Part(Part { corners, placement, fields }) } else { Numbered::No }
+}
+
+/// True where corners of a grid go on beyond the board on some side, a line of them: it is another board, or its markers are in the other squares.
+fn goes_beyond(board: &Board, turned: &Places, placement: &Placement) -> bool {
+    let (columns, rows) = (board.columns() as isize, board.rows() as isize);
+    let (mut beyond, mut lines) = ([0; 4], [0; 4]);
+    for (col, row, _) in turned.iter() {
+        let (x, y) = (col as isize + placement.col, row as isize + placement.row);
+        let sides = [(-1 - x, y, rows), (x - columns, y, rows), (-1 - y, x, columns), (y - rows, x, columns)];
+        for (k, (past, along, count)) in sides.into_iter().enumerate() {
+            let is_along = (0..count).contains(&along);
+            beyond[k] += usize::from(past == 0 && is_along);
+            lines[k] += usize::from(past == -1 && is_along);
+        }
+    }
+    (0..4).any(|k| beyond[k] >= 2 && 2 * beyond[k] > lines[k])
+}
+
+/// Adds a part of the board, the largest first; an error where it is a part of another board of the same kind.
+fn add(parts: &mut Vec<Part>, part: Part) -> Result<(), Refusal> {
+    let elsewhere = |known: &Part| {
+        let step = known.corners.step_px().unwrap_or(0.0);
+        let apart = part.corners.iter().filter_map(|(c, r, p)| Some((p - known.corners.get(c, r)?).norm()));
+        let (mut same, mut other) = (0, 0);
+        apart.for_each(|px| if px < 0.5 * step { same += 1 } else { other += 1 });
+        (same, other)
+    };
+    for known in parts.iter() {
+        let (same, other) = elsewhere(known);
+        if other > same {
+            return if part.placement.agreeing >= 2 && known.placement.agreeing >= 2 {
+                Err("shows two boards with the same markers: cover one of them".to_owned().into())
+            } else {
+                Ok(())
+            };
+        }
+    }
+    if parts.iter().all(|known| known.placement.layout == part.placement.layout) {
+        parts.push(part);
+    }
+    Ok(())
+}
+
+fn merged(board: &Board, parts: &[Part]) -> Places {
+    Lattice::from_fn(board.columns(), board.rows(), |col, row| {
+        parts.iter().find_map(|part| part.corners.get(col, row).copied())
+    })
+}

@@ -1,0 +1,74 @@
+//! What looking for a board in a picture gives.
+
+use crate::imaging::Squares;
+use crate::imaging::board::Print;
+use crate::imaging::image::pyramid::{Level, factor_for};
+use crate::imaging::image::{Grey8, Picture};
+use crate::imaging::lattice::{Places, Renumbering};
+
+/// Pixels of the copy on which boards of any kind are looked for first.
+pub const COARSE_PX: usize = 1_000_000;
+
+/// Grids of fewer corners than this are chance.
+pub const LEAST_SEEN: usize = 12;
+
+/// A board found in a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detected {
+    /// Coarse places of the inner corners on the copy, px, to about half a pixel.
+    pub corners: Places,
+    /// The reduced copy.
+    pub copy: Grey8,
+    /// Its size; never doubled.
+    pub level: Level,
+    /// How its markers are printed, where it has any.
+    pub print: Option<Print>,
+    /// What else the numbers of its corners could be, where that is open.
+    pub open: Option<Open>,
+}
+
+/// Why a picture gave no corners.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// For a person.
+    pub reason: String,
+    /// The board of another size that the picture shows instead.
+    pub seen: Option<Squares>,
+}
+
+impl From<String> for Refusal {
+    fn from(reason: String) -> Refusal {
+        // One line: a reason is kept as a line of the cache.
+        Refusal { reason: reason.replace('\n', " "), seen: None }
+    }
+}
+
+/// That the corners of a picture may have other numbers as well.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Open {
+    /// The others, each from the one that they have.
+    pub others: Vec<Renumbering>,
+    /// Why they are open, for a person.
+    pub refusal: Refusal,
+}
+
+/// The copy on which whole boards with large squares are seen: half as long and wide as that of about [`COARSE_PX`] and made of a few of the
+/// picture's lines, of a small picture the same.
+pub fn glance_level(picture: &Picture) -> Level {
+    let first = factor_for(picture, COARSE_PX);
+    if first == 1 { Level::Reduced(1) } else { Level::Skimmed(2 * first) }
+}
+
+/// What was found on a copy, on one that is no finer than the picture.
+pub fn on_a_copy(picture: &Picture, level: Level, small: &Grey8, corners: Places) -> Detected {
+    match level {
+        Level::Reduced(_) | Level::Skimmed(_) => {
+            Detected { corners, copy: small.clone(), level, print: None, open: None }
+        }
+        Level::Doubled => {
+            let level = Level::Reduced(1);
+            let corners = corners.map(|p| level.to_copy(&Level::Doubled.to_picture(p)));
+            Detected { corners, copy: level.copy(picture), level, print: None, open: None }
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! What can go wrong between a folder and its corners.
+
+use camino::Utf8PathBuf;
+
+use super::board::{self, Board, Kind, Squares};
+use super::corners::Skipped;
+use crate::diagnostic::Explain;
+
+/// Result of looking for corners.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// What can go wrong between a folder and its corners.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Reading or writing files.
+    #[error(transparent)]
+    Files(#[from] crate::files::Error),
+    /// A board that was not understood.
+    #[error(transparent)]
+    Board(#[from] board::Error),
+    /// The folder is not there.
+    #[error("folder not found")]
+    NoFolder {
+        /// The folder.
+        path: Utf8PathBuf,
+    },
+    /// A file where a folder was needed.
+    #[error("a folder of pictures is needed, this is a file")]
+    NotAFolder {
+        /// The file.
+        path: Utf8PathBuf,
+    },
+    /// A second place that is no folder of the right camera's pictures.
+    #[error("{}", if *.found { "a folder of the right camera's pictures is needed, this is a file" } else { "folder not found" })]
+    NotRight {
+        /// What was named.
+        path: Utf8PathBuf,
+        /// Whether there is something of that name.
+        found: bool,
+    },
+    /// Pictures, perhaps, but not which left one belongs to which right one.
+    #[error("{statement}")]
+    Unpaired {
+        /// The folder.
+        path: Utf8PathBuf,
+        /// What was found.
+        statement: String,
+        /// The call that would do.
+        hint: String,
+    },
+    /// A picture that cannot be cut into two equal halves.
+    #[error("the picture is {width} px wide, which are no two equal halves")]
+    OddWidth {
+        /// The picture.
+        path: Utf8PathBuf,
+        /// Its width, px.
+        width: usize,
+    },
+    /// Two files that would be the same picture of the same pair.
+    #[error("two pictures claim the same side of pair `{pair}`: {first} and {second}")]
+    SameName {
+        /// The pair.
+        pair: String,
+        /// One file.
+        first: Utf8PathBuf,
+        /// The other.
+        second: Utf8PathBuf,
+    },
+    /// Not one pair of pictures could be read.
+    #[error("not one pair of pictures can be read{}", reasons(.skipped))]
+    NoneReadable {
+        /// The folder.
+        path: Utf8PathBuf,
+        /// The pairs, and why.
+        skipped: Vec<Skipped>,
+    },
+    /// The pictures do not tell how many squares the board has.
+    #[error("the board's squares cannot be counted: {}", tally(.counts, *.of))]
+    NotCounted {
+        /// The folder.
+        path: Utf8PathBuf,
+        /// Columns and rows of whole boards that were seen, and in how many pictures.
+        counts: Vec<((usize, usize), usize)>,
+        /// Pictures in all.
+        of: usize,
+    },
+    /// The board was not found often enough.
+    #[error("only {found} of {total} pairs show {}; {needed} are needed{}", shown(.board), reasons(.skipped))]
+    TooFewPairs {
+        /// Pairs with the board in both pictures.
+        found: usize,
+        /// Pairs in the folder.
+        total: usize,
+        /// Pairs needed.
+        needed: usize,
+        /// The board that was looked for; boxed, for errors are returned everywhere.
+        board: Box<Board>,
+        /// The folder.
+        path: Utf8PathBuf,
+        /// The others, and why.
+        skipped: Vec<Skipped>,
+        /// Another board size that the pictures show.
+        other: Option<Squares>,
+    },
+}
+
+/// What pictures are read.
+const SAVED_AS: &str = "save the pictures as the camera gives them: PNG, TIFF, BMP, JPEG or PGM of 8 or 16 bits a pixel, up to 300 million \
+                        px and 1 GiB when decoded";
+
+/// What pictures have to show of a board.
+fn shown(board: &Board) -> String {
+    if board.is_coded() {
+        format!("a part of the board of {} with a marker", board.said())
+    } else {
+        format!("the whole {} board", board.squares)
+    }
+}
+
+/// Which whole boards were seen, and how often.
+fn tally(counts: &[((usize, usize), usize)], of: usize) -> String {
+    let each: Vec<String> = counts.iter().map(|((c, r), pictures)| format!("{c}x{r} squares in {pictures}")).collect();
+    match each.as_slice() {
+        [] => format!("none of {of} pictures shows a whole checkerboard with a margin all round"),
+        each => format!("of {of} pictures of whole checkerboards, {}", each.join(", ")),
+    }
+}
+
+/// The first few pairs that were skipped, a line each.
+fn reasons(skipped: &[Skipped]) -> String {
+    /// More would push the message itself off the screen.
+    const MOST: usize = 8;
+    let mut text: String = skipped.iter().take(MOST).map(|s| format!("\n  {}: {}", s.pair, s.reason)).collect();
+    if skipped.len() > MOST {
+        text.push_str(&format!("\n  and {} more", skipped.len() - MOST));
+    }
+    text
+}
+
+impl Explain for Error {
+    fn place(&self) -> Option<String> {
+        match self {
+            Error::Files(e) => e.place(),
+            Error::Board(_) | Error::SameName { .. } => None,
+            Error::NoFolder { path }
+            | Error::NotAFolder { path }
+            | Error::NotRight { path, .. }
+            | Error::Unpaired { path, .. }
+            | Error::OddWidth { path, .. }
+            | Error::NoneReadable { path, .. }
+            | Error::NotCounted { path, .. }
+            | Error::TooFewPairs { path, .. } => Some(path.to_string()),
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        match self {
+            Error::Files(e) => e.hint(),
+            Error::Board(e) => e.hint(),
+            Error::NoFolder { .. } | Error::NotAFolder { .. } => Some(
+                "a folder of pairs holds left/ and right/ with equal names, or left*/right*, *_left/*_right, *_L/*_R names"
+                    .to_owned(),
+            ),
+            Error::NotRight { path, .. } => Some(format!(
+                "a second folder is that of the right camera's pictures; other places are named by their flags, results by `--out {path}`"
+            )),
+            Error::Unpaired { hint, .. } => Some(hint.clone()),
+            Error::OddWidth { .. } => Some("`--side-by-side` is for pictures that hold both views, each as wide as the other".to_owned()),
+            Error::SameName { .. } => Some("remove or rename one of them".to_owned()),
+            Error::NoneReadable { .. } => Some(SAVED_AS.to_owned()),
+            Error::NotCounted { .. } => {
+                Some("count them: `--squares 20x20` is a board with 19x19 inner corners; one with markers needs `--board`".to_owned())
+            }
+            Error::TooFewPairs { skipped, .. }
+                if 2 * skipped.iter().filter(|s| s.reason.contains(super::image::UNDECODABLE)).count() > skipped.len() =>
+            {
+                Some(SAVED_AS.to_owned())
+            }
+            Error::TooFewPairs { other: Some(squares), .. } => {
+                let (columns, rows) = (squares.columns - 1, squares.rows - 1);
+                Some(format!("`--squares {squares}`: the pictures show a board with {columns}x{rows} inner corners"))
+            }
+            Error::TooFewPairs { board, .. } if board.is_coded() => {
+                let named = match board.kind {
+                    Kind::Tags { .. } => "columns x rows of tags, family, tag and gap in mm",
+                    _ => "columns x rows, square and marker in mm, dictionary",
+                };
+                Some(format!("`--board {board}` must be the board as printed: {named}"))
+            }
+            Error::TooFewPairs { board, .. } => {
+                let (columns, rows) = (board.columns(), board.rows());
+                Some(format!(
+                    "`--squares` counts squares, not inner corners: {} means {columns}x{rows} inner corners",
+                    board.squares
+                ))
+            }
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! Grey values row by row, as a camera gave them.
+
+use nalgebra::Point2;
+
+/// Values row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Image<T> {
+    /// Width, px.
+    pub width: usize,
+    /// Height, px.
+    pub height: usize,
+    /// Its `width * height` values.
+    pub pixels: Vec<T>,
+}
+
+/// A small 8-bit picture for looking, not for measuring.
+pub type Grey8 = Image<u8>;
+
+/// Grey values as the camera gave them.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Grey {
+    /// 8 bits a pixel.
+    Eight(Image<u8>),
+    /// 16 bits a pixel, of which a camera may use fewer.
+    Sixteen(Image<u16>),
+}
+
+impl<T: Copy + Into<f64>> Image<T> {
+    /// Mean of the 3 x 3 pixels at a place; `None` at the picture's border.
+    pub fn mean_at(&self, at: Point2<f64>) -> Option<f64> {
+        let (x, y) = (at.x.round(), at.y.round());
+        if !(x >= 1.0 && y >= 1.0 && x + 1.0 < self.width as f64 && y + 1.0 < self.height as f64) {
+            return None;
+        }
+        let (x, y) = (x as usize, y as usize);
+        let row = |y: usize| self.pixels[y * self.width + x - 1..][..3].iter().map(|&v| v.into()).sum::<f64>();
+        Some((y - 1..=y + 1).map(row).sum::<f64>() / 9.0)
+    }
+}

@@ -1,0 +1,80 @@
+//! What is asked of folders of pictures, and what they are understood as.
+
+use camino::{Utf8Path, Utf8PathBuf};
+
+/// How pictures were paired, or are to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum PairBy {
+    /// By their names, a word for the side left away
+    Name,
+    /// By the number in their names
+    Number,
+    /// In the order of their names; as many left pictures as right ones
+    Order,
+}
+
+impl PairBy {
+    /// The word in messages.
+    pub fn word(self) -> &'static str {
+        match self {
+            PairBy::Name => "name",
+            PairBy::Number => "number",
+            PairBy::Order => "order",
+        }
+    }
+}
+
+/// The two picture files of a pair.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PairFiles {
+    /// Name of the pair: the pictures' common stem, what is left of both without the word for the side, or their number.
+    pub pair: String,
+    /// The left picture.
+    pub left: Utf8PathBuf,
+    /// The right picture.
+    pub right: Utf8PathBuf,
+}
+
+/// Where pictures are, and how they are to be read.
+#[derive(Debug, Clone, Copy)]
+pub struct Source<'a> {
+    /// The command that asks, for the calls in messages.
+    pub command: &'a str,
+    /// The folder of all pictures, or of the left ones.
+    pub images: &'a Utf8Path,
+    /// The folder of the right ones.
+    pub right: Option<&'a Utf8Path>,
+    /// How they are paired; `None` is by name, else by number.
+    pub by: Option<PairBy>,
+    /// Whether each picture holds both halves.
+    pub side_by_side: bool,
+}
+
+/// A folder understood.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Pairing {
+    /// The folder, as messages name it.
+    pub place: Utf8PathBuf,
+    /// Pairs in natural order of their names.
+    pub pairs: Vec<PairFiles>,
+    /// What was taken, in a line.
+    pub taken: String,
+    /// Pictures of one side without the other.
+    pub single: Vec<Utf8PathBuf>,
+    /// Pictures whose names tell no side.
+    pub sideless: usize,
+    /// Files that are no pictures.
+    pub other: usize,
+}
+
+impl<'a> Source<'a> {
+    /// One folder, read as it is.
+    pub fn folder(command: &'a str, images: &'a Utf8Path) -> Source<'a> {
+        Source { command, images, right: None, by: None, side_by_side: false }
+    }
+
+    /// The folders that were named.
+    pub fn places(&self) -> Vec<&'a Utf8Path> {
+        std::iter::once(self.images).chain(self.right).collect()
+    }
+}

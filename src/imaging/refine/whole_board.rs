@@ -1,0 +1,259 @@
+//! Coarse corners to measured ones: a fit of the blurred corner to the raw pixels at full size, for each corner.
+//!
+//! In: the picture and the board as detected. Out: corners with covariance. First each corner is fitted on the reduced copy in a small
+//! window (`coarse`); then at full size in a small window (near), and in the largest that stays inside the four squares round
+//! it (full), along edges that bend as the lens bends the board's lines (`curvature`): as the near windows show them, and at last as the
+//! full ones do. Where some of the full windows tell that edges bend much from crossing to crossing, all are cut down. Where the larger
+//! window does not agree with the smaller one, or the four arms of a corner not with each other (`acceptance`), something hides a part of
+//! it, and the largest window that is free of it is kept. Stray light that adds to dark and bright alike is fitted where the board shows
+//! it (`stray`). Last, corners get the covariances that they have by what their arms tell (`scatter`), also those that no window shows well, and
+//! share what they know of the light (`illumination`), which counts from the picture's veil (`veil`). Goes wrong: a corner without contrast,
+//! hidden, or cut off by the border; it is dropped, the others stay.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::cell::Cell;
+use super::coarse::{coarse, enlarged};
+use super::curvature::{Bend, Point, Rule, bends};
+use super::full_size::Full;
+use super::measured::Measured;
+use super::saddle_fit::Model;
+use super::saddle_fit::window::{Sample, Window};
+use super::scatter::Scatter;
+use super::windows::{Windows, bends_by, usual};
+use super::{acceptance, full_size, illumination, scatter, stray};
+use crate::imaging::Corner;
+use crate::imaging::detect::Detected;
+use crate::imaging::image::{Grey, Picture};
+use crate::imaging::lattice::{Lattice, Places};
+
+/// How good places on the copy are at least, px.
+const GOOD_PX: f64 = 0.1;
+/// One corner of so many is tried in its full window to see how much edges bend, and so many at the least.
+const TRIED: usize = 3;
+const LEAST_TRIED: usize = 9;
+
+/// Measures all corners of a board.
+pub fn refine(picture: &Picture, detected: &Detected) -> Lattice<Corner> {
+    let measured = measure(picture, detected);
+    Lattice::from_fn(measured.columns, measured.rows, |col, row| {
+        if let Some(m) = measured.get(col, row) {
+            let [a, b] = m.fit.model.blur_px;
+            let blur_px = Some((0.5 * (a * a + b * b)).sqrt());
+            // Symmetric to the last bit, so that three numbers hold it.
+            let s = &m.fit.covariance_px2;
+            let across = 0.5 * (s[(0, 1)] + s[(1, 0)]);
+            let covariance_px2 = Some(Matrix2::new(s[(0, 0)], across, across, s[(1, 1)]));
+            return Some(Corner { col, row, px: m.px, covariance_px2, blur_px, reach: Some(m.reach), used: true });
+        }
+        // Kept where it was seen roughly, so that a picture in which nothing could be measured can still be judged.
+        let px = detected.level.to_picture(detected.corners.get(col, row)?);
+        Some(Corner { col, row, px, covariance_px2: None, blur_px: None, reach: None, used: false })
+    })
+}
+
+/// Measures all corners of a board, with what else the fits tell.
+pub fn measure(picture: &Picture, detected: &Detected) -> Lattice<Measured> {
+    match &picture.grey {
+        Grey::Eight(image) => Full::of(image, picture.clip_level(), detected).measure(detected),
+        Grey::Sixteen(image) => Full::of(image, picture.clip_level(), detected).measure(detected),
+    }
+}
+
+/// What a board's windows told, what is usual in them, and the corners that they show well.
+struct Seen {
+    windows: Lattice<Windows>,
+    board: acceptance::Board,
+    measured: Lattice<Measured>,
+}
+
+impl<T: Sample> Full<'_, T> {
+    fn measure(&self, detected: &Detected) -> Lattice<Measured> {
+        let mut window = Window::default();
+        let mut seen = self.look(detected, &mut window);
+        // Where corners are as noise makes them there is nothing to look for.
+        if scatter::miss_the_model(&seen.measured)
+            && let Some(stray) = self.stray_light(&seen.windows, &mut window)
+        {
+            seen = self.with_stray(stray).look(detected, &mut window);
+        }
+        let scatter = Scatter::of(&seen.measured);
+        scatter.carry(&mut seen.measured);
+        let Seen { windows, board, mut measured } = seen;
+        illumination::tie(&mut measured);
+        let usual_px2 = acceptance::usual_variance(measured.iter().map(|(_, _, m)| m));
+        Lattice::from_fn(measured.columns, measured.rows, |col, row| {
+            let well = measured.get(col, row).copied();
+            well.or_else(|| {
+                let seen = windows.get(col, row)?;
+                let known = self.windows_left(seen, &board, &mut window);
+                let known = known.into_iter().map(|corner| scatter.alone(seen.with_lines(corner)));
+                known.filter(|corner| acceptance::is_of_use(corner, usual_px2)).min_by(by_variance)
+            })
+        })
+    }
+
+    /// Variance of the slope of stray light by the near windows, in each of which it is fitted without a bound.
+    fn stray_light(&self, seen: &Lattice<Windows>, window: &mut Window) -> Option<f64> {
+        let unbound = self.with_stray(stray::UNBOUND);
+        let mut fits = Lattice::from_fn(seen.columns, seen.rows, |col, row| {
+            let windows = seen.get(col, row)?;
+            let near = windows.near.or(windows.full)?;
+            unbound.fit_from(&near, full_size::near_half_px(&windows.start), windows, window)
+        });
+        Scatter::of(&fits).carry(&mut fits);
+        stray::variance(&fits.iter().filter_map(|(_, _, fit)| fit.fit.stray).collect::<Vec<_>>())
+    }
+
+    /// What the board's windows tell, from the first fits on.
+    fn look(&self, detected: &Detected, window: &mut Window) -> Seen {
+        let coarse = coarse(detected, window);
+        let columns = coarse.columns;
+        let at = |bends: &[[Option<Bend>; 2]], col: usize, row: usize| bends[row * columns + col];
+        let on_copy = |m: &Measured| Point { px: detected.level.to_picture(&m.px), counts: true };
+        let coarse_bends = bends(&coarse.map(on_copy), Rule { good_px: GOOD_PX, in_part: detected.print.is_some() });
+        // A neighbour that could not be measured still says how far the squares reach.
+        let places: Places = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            let px = coarse.get(col, row).map_or(detected.corners.get(col, row), |m| Some(&m.px))?;
+            Some(detected.level.to_picture(px))
+        });
+        let scale = detected.level.scale();
+        let near: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            let from = coarse.get(col, row)?;
+            let bends = at(&coarse_bends, col, row);
+            let cell = Cell { own_bends: bends.map(|bend| bend.is_none()), ..Cell::of(&places, col, row)? };
+            let cell = cell.with_markers(&places, (col, row), detected.print);
+            let start = Model {
+                corner: Vector2::zeros(),
+                bend: bends.map(|bend| bend.map_or(0.0, |bend| bend.per_px)),
+                // The copy's grey values are not those above the veil: without contrast the fit finds levels of its own.
+                half_contrast: 0.0,
+                ..enlarged(&from.fit.model, scale)
+            };
+            // On a copy of full size the first fit is a measurement already.
+            let first = (scale == 1.0)
+                .then_some(*from)
+                .filter(|from| from.fit.model.blur_px.iter().all(|blur_px| cell.stands_alone(*blur_px)));
+            let near = self.near(cell, start, first, window);
+            Some(Windows { bends, ..near })
+        });
+        // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large ones from.
+        let near_only: Vec<Measured> = near.iter().filter_map(|(_, _, windows)| windows.near).collect();
+        let board = acceptance::Board::of(&near_only, &[]);
+        let near_bends = bends_by(&near, &places, |windows| windows.near.filter(|near| board.accepts(near)));
+        let near = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            Some(near.get(col, row)?.clone().rebent(at(&near_bends, col, row)))
+        });
+        let (windows, board) = self.large(&near, &places, window);
+        let measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
+            let seen = windows.get(col, row)?;
+            let corner = self.largest_free(seen, &board, window)?;
+            Some(seen.with_lines(corner))
+        });
+        Seen { windows, board, measured }
+    }
+
+    /// The fits in full windows, or where edges bend too much for these in smaller ones, along edges that bend as these windows show it;
+    /// with what is usual in them.
+    fn large(
+        &self,
+        near: &Lattice<Windows>,
+        places: &Places,
+        window: &mut Window,
+    ) -> (Lattice<Windows>, acceptance::Board) {
+        // How much edges bend is seen on some of the corners as well: where full windows are of no use, most need not be looked at.
+        let few = near.count() < LEAST_TRIED * TRIED;
+        let tried = Lattice::from_fn(near.columns, near.rows, |col, row| {
+            let seen = near.get(col, row).filter(|_| few || (col + row).is_multiple_of(TRIED))?;
+            Some(self.full(seen.clone(), 1.0, window))
+        });
+        let mut within = |share: f64| {
+            let seen = Lattice::from_fn(near.columns, near.rows, |col, row| {
+                let known = tried.get(col, row).filter(|_| share == 1.0).cloned();
+                known.or_else(|| Some(self.full(near.get(col, row)?.clone(), share, window)))
+            });
+            let board = usual(&seen);
+            let bends = bends_by(&seen, places, |windows| windows.free(&board).copied());
+            let seen = Lattice::from_fn(near.columns, near.rows, |col, row| {
+                Some(seen.get(col, row)?.clone().rebent(bends[row * near.columns + col]))
+            });
+            let board = usual(&seen);
+            (seen, board)
+        };
+        let share = usual(&tried).straight_share();
+        let (seen, board) = within(share);
+        let smaller = board.straight_share();
+        if share == 1.0 && smaller < 1.0 { within(smaller) } else { (seen, board) }
+    }
+}
+
+fn by_variance(a: &Measured, b: &Measured) -> std::cmp::Ordering {
+    a.fit.covariance_px2.trace().total_cmp(&b.fit.covariance_px2.trace())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::image::Image;
+    use crate::imaging::{Board, detect};
+    use statrs::function::erf::erf;
+
+    const SIDE_PX: f64 = 60.0;
+
+    /// A board of 8x7 squares whose every other row of crossings is off by `zigzag_px` along the rows, with noise of 2 grey levels.
+    fn zigzag_board(zigzag_px: f64) -> Picture {
+        const BLUR_PX: f64 = 0.9;
+        let (width, height) = (600, 540);
+        // Light minus dark across the nearest of the lines that are a square apart, in the signs of the squares.
+        let across = |px: f64, lines: f64| {
+            let nearest = (px / SIDE_PX).round().clamp(0.0, lines);
+            let sign = if nearest.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
+            sign * erf((px - nearest * SIDE_PX) / (BLUR_PX * 2f64.sqrt()))
+        };
+        let grey = |x: f64, y: f64| {
+            let y = y - 60.3;
+            let x = x - 60.7 - zigzag_px * ((y / SIDE_PX).rem_euclid(2.0) - 1.0).abs();
+            let inside = (0.0..8.0 * SIDE_PX).contains(&x) && (0.0..7.0 * SIDE_PX).contains(&y);
+            if inside { 120.0 - 80.0 * across(x, 8.0) * across(y, 7.0) } else { 200.0 }
+        };
+        let mut state = 11u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f64 / f64::from(1u32 << 24) - 0.5
+        };
+        let pixels = (0..width * height).map(|k| {
+            let noise = 2.0 * 12f64.sqrt() * uniform();
+            (grey((k % width) as f64, (k / width) as f64) + noise).round().clamp(0.0, 255.0) as u8
+        });
+        Picture::from(Image { width, height, pixels: pixels.collect() })
+    }
+
+    #[test]
+    fn bent_edges_are_seen_in_windows_that_are_alike_and_small_where_they_bend_much() {
+        let board = Board::checker("8x7".parse().unwrap(), 10.0);
+        let mean_reach = |zigzag_px: f64| {
+            let picture = zigzag_board(zigzag_px);
+            let measured = measure(&picture, &detect::detect(&picture, board).unwrap());
+            assert_eq!(measured.count(), 42);
+            let reach = measured.iter().map(|(_, _, m)| m.reach[1]).sum::<f64>() / 42.0;
+            for (_, _, m) in measured.iter() {
+                assert!((m.reach[1] - reach).abs() < 0.02, "{zigzag_px}: {:?}", m.reach);
+                // Crossings of even lines are off by the zigzag, those between are not.
+                let row = ((m.px.y - 60.3) / SIDE_PX).round();
+                let column = ((m.px.x - 60.7) / SIDE_PX).round();
+                let sign = if row.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
+                let seen = 60.7 + column * SIDE_PX + 0.5 * zigzag_px * (1.0 + sign * (1.0 - reach));
+                let sigma = m.fit.covariance_px2.m11.sqrt();
+                assert!(
+                    (m.px.x - seen).abs() < 5.0 * sigma + 0.03 * zigzag_px,
+                    "{zigzag_px}: {} {seen} {sigma}",
+                    m.px.x
+                );
+            }
+            reach
+        };
+        let (straight, bent, bent_much) = (mean_reach(0.0), mean_reach(0.1), mean_reach(0.8));
+        assert!((straight - 0.85).abs() < 0.02 && (bent - straight).abs() < 1e-3, "{straight} {bent}");
+        assert!(bent_much < 0.3, "{bent_much}");
+    }
+}
