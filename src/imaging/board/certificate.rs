@@ -116,6 +116,14 @@ impl Board {
         [self.square_mm, self.square_mm * self.stretch]
     }
 
+    /// What it is made of and counted in, for a person.
+    pub fn unit(&self) -> &'static str {
+        match self.kind {
+            Kind::Checker | Kind::Charuco { .. } => "squares",
+            Kind::Tags { .. } => "tags",
+        }
+    }
+
     /// The side of a square for a person, mm: a width and a height where they differ.
     pub fn side_said(&self) -> String {
         match self.sides_mm() {

@@ -62,6 +62,11 @@ impl Dictionary {
         format!("tag{}", self.name().strip_prefix(TAGS).unwrap_or(self.name()).to_ascii_lowercase())
     }
 
+    /// Its name for a person: AprilTags by the family's.
+    pub fn said(self) -> String {
+        if self.name().starts_with(TAGS) { self.tag_name() } else { self.name().to_owned() }
+    }
+
     /// All that there are.
     pub fn all() -> impl Iterator<Item = Dictionary> {
         BUILTIN_DICTIONARY_NAMES.iter().filter_map(|name| builtin_dictionary(name)).map(Dictionary)

@@ -48,7 +48,7 @@ impl FromStr for Board {
         let length = |text: &str| length_mm(text).map_err(refuse);
         let sides = |text: &str| sides_mm(text).map_err(refuse);
         match (kind.trim().to_ascii_lowercase().as_str(), fields.as_slice()) {
-            ("checker", [squares, square_mm]) => {
+            ("checker" | "checkerboard" | "chessboard", [squares, square_mm]) => {
                 let (square_mm, stretch) = sides(square_mm)?;
                 Ok(Board { stretch, ..Board::checker(squares.parse()?, square_mm) })
             }
@@ -69,15 +69,15 @@ impl FromStr for Board {
                 };
                 board.check_markers().map(|()| board).map_err(refuse)
             }
-            ("checker", _) => Err(refuse("a checkerboard is `checker:COLSxROWS:SQUARE_MM`".to_owned())),
+            ("checker" | "checkerboard" | "chessboard", _) => Err(refuse("a checkerboard is `checker:COLSxROWS:SQUARE_MM`".to_owned())),
             ("charuco", _) => {
                 Err(refuse("a ChArUco board is `charuco:COLSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY`".to_owned()))
             }
-            ("apriltag", [_, _, _, _, "opencv"]) => Err(refuse(
+            ("apriltag" | "aprilgrid", [_, _, _, _, "opencv"]) => Err(refuse(
                 "OpenCV's grid of tags has corners of one square only, which move with the ink: only Kalibr's with black squares between its tags is read"
                     .to_owned(),
             )),
-            ("apriltag", [tags, family, tag_mm, gap_mm] | [tags, family, tag_mm, gap_mm, "kalibr"]) => {
+            ("apriltag" | "aprilgrid", [tags, family, tag_mm, gap_mm] | [tags, family, tag_mm, gap_mm, "kalibr"]) => {
                 let ((square_mm, stretch), gap_mm) = (sides(tag_mm)?, length(gap_mm)?);
                 let family = Dictionary::of_tags(family).map_err(&refuse)?;
                 let Squares { columns, rows } = Squares::of_tags(tags)?;
@@ -85,10 +85,10 @@ impl FromStr for Board {
                 let board = Board { squares, square_mm, stretch, kind: Kind::Tags { gap_mm, family } };
                 board.check_markers().map(|()| board).map_err(refuse)
             }
-            ("apriltag", _) => {
+            ("apriltag" | "aprilgrid", _) => {
                 Err(refuse("a grid of AprilTags is `apriltag:COLSxROWS:FAMILY:TAG_MM:GAP_MM`, counted in tags".to_owned()))
             }
-            (other, _) => Err(refuse(format!("there is no kind of board named `{other}`"))),
+            (other, _) => Err(refuse(format!("there is no kind of board named `{other}`; there are checker, charuco and apriltag"))),
         }
     }
 }
@@ -175,6 +175,12 @@ mod tests {
         }
         let short: Board = "CharUco:4x5:54:40.5:4x4_50".parse().unwrap();
         assert_eq!(short.to_string(), "charuco:4x5:54:40.5:DICT_4X4_50");
+        for (other, usual) in [
+            ("chessboard:9x7:20", "checker:9x7:20"),
+            ("aprilgrid:6x6:tag36h11:35.2:10.56", "apriltag:6x6:tag36h11:35.2:10.56"),
+        ] {
+            assert_eq!(other.parse::<Board>().unwrap(), usual.parse().unwrap());
+        }
     }
 
     #[test]
@@ -182,7 +188,7 @@ mod tests {
         for (text, why) in [
             ("20x20", "no `:`"),
             ("checker:20x20", "checker:COLSxROWS:SQUARE_MM"),
-            ("dots:20x20:10", "no kind of board"),
+            ("dots:20x20:10", "there are checker, charuco and apriltag"),
             ("checker:20x20:10x12", "no square"),
             ("apriltag:6x6:tag36h11:35.2:10.56:opencv", "only Kalibr's"),
             ("apriltag:6x6:tag36h11:35.2", "apriltag:COLSxROWS:FAMILY:TAG_MM:GAP_MM"),

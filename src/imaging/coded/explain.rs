@@ -79,10 +79,10 @@ fn other_markers(picture: &Picture, board: &Board, (dictionary, own): (Dictionar
             )
         }
         (Some((known, other, _)), _) if other != dictionary => {
-            format!("shows {known} markers of {}, the board has those of {}", other.name(), dictionary.name())
+            format!("shows {known} markers of {}, the board has those of {}", other.said(), dictionary.said())
         }
         (Some((known, ..)), _) => {
-            format!("shows {known} markers of {} in another order than {board} has them", dictionary.name())
+            format!("shows {known} markers of {} in another order than {board} has them", dictionary.said())
         }
         (None, _) => format!("shows {} corners of squares, and no marker among them that can be read", grid.count()),
     }

@@ -47,6 +47,9 @@ pub fn to_csv(corners: &Corners) -> String {
     text
 }
 
+/// What is said of a file of a board with markers that is read as one of a plain board.
+const UNUSED_ID: &str = "the corners file has a column `id`, as of a board with markers: name that with --board; col and row are taken as a plain board's";
+
 /// Reads `corners.csv`. `size` is the width and height of the pictures, px, for a file that does not hold them.
 ///
 /// Refused with the line: bad numbers, an unknown side, a corner that stands there twice or does not exist on the board or in the
@@ -58,6 +61,9 @@ pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<C
     let table = Table::read(path, "corners file", hint)?;
     let mut rows = parse(&table, board)?;
     let mut notes = Vec::new();
+    if table.column("id").is_some() && !board.is_coded() {
+        notes.push(UNUSED_ID.to_owned());
+    }
     if fit_to_board(&table, &mut rows, board)? {
         notes.push("the columns of the corners file run along the shorter side: turned by 90 degrees".to_owned());
     }
@@ -140,7 +146,9 @@ fn fit_to_board(table: &Table, rows: &mut [Row], board: Board) -> Result<bool> {
             board.squares
         ),
         place: Place { path: table.path.to_owned(), line: Some(line) },
-        hint: Some(if board.is_coded() {
+        hint: Some(if table.column("id").is_some() && !board.is_coded() {
+            UNUSED_ID.to_owned()
+        } else if board.is_coded() {
             format!("a board of {}x{} squares or more, columns first as printed, has such corners", col + 2, row + 2)
         } else {
             format!("`--squares {}x{}` if the board has that many squares", col + 2, row + 2)
@@ -188,6 +196,7 @@ mod tests {
     use nalgebra::Matrix2;
 
     use super::*;
+    use crate::diagnostic::Explain;
 
     fn read_str(text: &str, squares: &str, size: Option<(u32, u32)>) -> Result<Corners> {
         let dir = tempfile::tempdir().unwrap();
@@ -304,6 +313,14 @@ mod tests {
             let message = format!("{}", read(text).unwrap_err());
             assert!(message.contains(why), "{message}");
         }
+    }
+
+    #[test]
+    fn numbers_of_a_board_with_markers_that_is_taken_for_a_plain_one_are_spoken_of() {
+        let text = "pair,side,col,row,id,x_px,y_px\na,left,1,0,1,1,2\na,right,1,0,1,5,6\n";
+        assert_eq!(read_str(text, "4x3", Some((640, 480))).unwrap().notes, [UNUSED_ID]);
+        let beyond = read_str(&text.replace(",1,0,", ",7,0,"), "4x3", Some((640, 480))).unwrap_err();
+        assert_eq!(beyond.hint().as_deref(), Some(UNUSED_ID));
     }
 
     #[test]

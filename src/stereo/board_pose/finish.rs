@@ -49,7 +49,7 @@ impl Run<'_> {
         };
         let ended = match &judgement {
             Judgement::Contradicts(_) | Judgement::Loose { .. } | Judgement::Unexplained { .. } => {
-                judgement.describe(&self.known.rig, self.known.board.square_mm)
+                judgement.describe(&self.known.rig, &self.known.board)
             }
             _ => None,
         };

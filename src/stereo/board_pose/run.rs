@@ -241,7 +241,7 @@ impl<'a> Run<'a> {
     /// No pose is measured.
     pub(super) fn nothing(self, judgement: Judgement) -> Series {
         let status = "rig changed";
-        let reason = judgement.describe(&self.known.rig, self.known.board.square_mm);
+        let reason = judgement.describe(&self.known.rig, &self.known.board);
         let too_few = |start: &Start| {
             let [left, right] = Side::BOTH.map(|side| start.view.active(side).count());
             Refusal { status: "too few corners", reason: format!("too few corners: {left} left, {right} right") }

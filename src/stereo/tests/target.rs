@@ -68,7 +68,7 @@ fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
             tolerance_mm: 0.05,
         };
         let judgement = series::measure(&known, run_of(corners.clone())).judgement;
-        judgement.describe(rig, square_mm).unwrap_or_default()
+        judgement.describe(rig, &board).unwrap_or_default()
     };
     assert_eq!(judged(&world.rig, 10.0), "");
     let pitch = judged(&world.rig, 12.0);

@@ -6,6 +6,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use crate::imaging::Board;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::estimate::Estimate;
 use crate::stereo::board_pose::solve::pose_block::TRANSFORM;
@@ -79,7 +80,7 @@ impl Cause {
     }
 
     /// In words, with its amount.
-    pub fn describe(self, amount: f64, rig: &Rig, square_mm: f64) -> String {
+    pub fn describe(self, amount: f64, rig: &Rig, board: &Board) -> String {
         const AXES: [&str; 3] = ["x", "y", "z"];
         let percent = 100.0 * amount;
         match self {
@@ -105,10 +106,9 @@ impl Cause {
             Cause::Focal(side) => format!("the {} camera's focal length changed by {percent:.3} %", side.name()),
             Cause::BothFocal => format!("both focal lengths changed by {percent:.3} %"),
             Cause::Pitch => {
-                format!(
-                    "the target's squares are {:.4} mm, not {square_mm} mm, on this rig",
-                    square_mm * (1.0 + amount)
-                )
+                let [width, height] = board.scaled(1.0 + amount).sides_mm();
+                let seen = if width == height { format!("{width:.4}") } else { format!("{width:.4}x{height:.4}") };
+                format!("the target's {} are {seen} mm, not {} mm, on this rig", board.unit(), board.side_said())
             }
         }
     }

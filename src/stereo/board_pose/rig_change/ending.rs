@@ -85,7 +85,7 @@ impl<'a> Run<'a> {
         let since = self.at[k].pose.clone();
         let [turned_deg, moved_mm] = size_of(&along.change, &self.known.rig);
         let judgement = Judgement::Moved { since, creeps: along.creeps, turned_deg, moved_mm };
-        let reason = judgement.describe(&self.known.rig, self.known.board.square_mm).unwrap_or_default();
+        let reason = judgement.describe(&self.known.rig, &self.known.board).unwrap_or_default();
         for i in k..self.at.len() {
             self.taking_part[i] = false;
             if self.refusals[i].is_none() {

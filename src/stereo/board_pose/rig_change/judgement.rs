@@ -1,5 +1,6 @@
 //! What is found of the rig as a whole, and how it is said.
 
+use crate::imaging::Board;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation};
 use crate::stereo::board_pose::rig_change::flip::Flip;
@@ -50,17 +51,17 @@ impl Judgement {
     }
 
     /// What is wrong, for a person; `None` where nothing is.
-    pub fn describe(&self, rig: &Rig, square_mm: f64) -> Option<String> {
+    pub fn describe(&self, rig: &Rig, board: &Board) -> Option<String> {
         Some(match self {
             Judgement::Agrees => return None,
             Judgement::Allowed(changed) => format!(
                 "the rig is not quite the one that was calibrated: {}; the points move by {:.4} mm with it, and their covariance allows for that",
-                causes(changed, rig, square_mm),
+                causes(changed, rig, board),
                 changed.moves_mm
             ),
             Judgement::Contradicts(changed) => format!(
                 "the calibration does not suit these pictures: {}; the points are off by {:.3} mm with it",
-                causes(changed, rig, square_mm),
+                causes(changed, rig, board),
                 changed.moves_mm
             ),
             Judgement::Exchanged => {
@@ -108,8 +109,8 @@ impl Judgement {
     }
 }
 
-fn causes(changed: &Changed, rig: &Rig, square_mm: f64) -> String {
-    let one = |e: &Explanation| unit_of(e, rig).unwrap_or_else(|| e.cause.describe(e.amount, rig, square_mm));
+fn causes(changed: &Changed, rig: &Rig, board: &Board) -> String {
+    let one = |e: &Explanation| unit_of(e, rig).unwrap_or_else(|| e.cause.describe(e.amount, rig, board));
     let all: Vec<String> = changed.explanations.iter().map(one).collect();
     all.join(", or ")
 }

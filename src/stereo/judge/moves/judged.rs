@@ -146,7 +146,7 @@ impl KnownMoves {
 
     /// What explains moves that contradict the scale, and what to do, for a person.
     pub fn why(&self) -> Option<String> {
-        let board = format!("squares of {:.4} mm would agree with it", self.surest()?.square_mm);
+        let board = format!("sides of {:.4} mm would agree with it", self.surest()?.square_mm);
         match self.causes()[..] {
             [] => None,
             [Cause::OtherBoard] => Some(format!("all moves show one scale: the board's pitch is not as said; {board}")),
