@@ -163,7 +163,7 @@ impl MeasureFile {
         };
         let mut warnings = corners.notes.clone();
         warnings.extend(series.notes.iter().cloned());
-        warnings.extend(series.judgement.describe(rig, board.square_mm));
+        warnings.extend(series.judgement.describe(rig, board));
         warnings.extend(outside(series, known));
         warnings.extend(scatter(series));
         warnings.extend(grown(series));
@@ -208,14 +208,14 @@ impl RigRecord {
             Judgement::Unexplained { .. } => ("unexplained", &[][..], None),
         };
         let change = |e: &crate::stereo::board_pose::rig_change::cause::Explanation| ChangeRecord {
-            what: e.cause.describe(e.amount, rig, board.square_mm),
+            what: e.cause.describe(e.amount, rig, board),
             amount: e.amount,
             unit: e.cause.unit(),
             sigma: e.sigma,
         };
         RigRecord {
             state,
-            statement: series.judgement.describe(rig, board.square_mm),
+            statement: series.judgement.describe(rig, board),
             chi_square: series.prior_chi_square.map(|c| c[0]),
             degrees_of_freedom: series.prior_chi_square.map(|c| c[1]),
             excess: series.excess,

@@ -146,7 +146,7 @@ fn say(series: &Series, file: &MeasureFile) {
 /// A rig that is not the calibrated one, or not one measured pose, is the end of the run; the files say so as well.
 fn end(series: &Series, known: &Knowledge) -> Result<()> {
     let judgement = &series.judgement;
-    if let (true, Some(statement)) = (judgement.ends_the_run(), judgement.describe(&known.rig, known.board.square_mm)) {
+    if let (true, Some(statement)) = (judgement.ends_the_run(), judgement.describe(&known.rig, &known.board)) {
         return Err(stereo::Error::RigChanged { statement, hint: judgement.hint().unwrap_or_default() }.into());
     }
     if series.poses.iter().all(|pose| pose.target.is_err()) {

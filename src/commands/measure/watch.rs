@@ -148,7 +148,7 @@ fn judge(poses: &[RobotPose], arrivals: &BTreeMap<&str, Arrival>, known: &Knowle
             _ => {}
         }
     }
-    if let Some(statement) = series.judgement.describe(&known.rig, known.board.square_mm) {
+    if let Some(statement) = series.judgement.describe(&known.rig, &known.board) {
         progress::warn(statement);
     }
     progress::note(format!("{count} of {} poses are there", poses.len()));

@@ -54,7 +54,7 @@ fn run_all(size_px: u32, target_um: f64, samples: usize) -> (Tallies, usize) {
         .map(|seed| {
             let world = world(size_px, target_um, samples, 100 + seed);
             let series = measure(&knowledge(&world), poses_of(&world));
-            let alarms = usize::from(series.judgement.describe(&world.rig, 10.0).is_some())
+            let alarms = usize::from(series.judgement.describe(&world.rig, &world.target.drawing).is_some())
                 + series.poses.iter().filter(|pose| pose.target.is_err()).count();
             let truth: Vec<_> = world.poses.iter().map(|pose| pose.left_from_target).collect();
             let roles: Vec<(usize, Role)> = world.poses.iter().map(|pose| (pose.group, pose.commanded.role)).collect();

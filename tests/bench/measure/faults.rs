@@ -169,7 +169,7 @@ pub fn run() {
             (fault.plant)(&world, size, &mut known, &mut seen);
             let series = measure(&known, seen);
             let (sigmas, mm) = worst(&series, &world);
-            let said = series.judgement.describe(&known.rig, known.board.square_mm);
+            let said = series.judgement.describe(&known.rig, &known.board);
             let refused: Vec<String> = series
                 .poses
                 .iter()
@@ -194,7 +194,7 @@ pub fn run() {
     for seed in 0..CLEAN {
         let world = world(1280, if seed % 2 == 0 { 10.0 } else { 0.0 }, SAMPLES, 400 + seed);
         let series = measure(&knowledge(&world), poses_of(&world));
-        let said = series.judgement.describe(&world.rig, 10.0);
+        let said = series.judgement.describe(&world.rig, &world.target.drawing);
         let refused = series.poses.iter().filter(|p| p.target.is_err()).count();
         if said.is_some() || refused > 0 {
             alarms += 1;

@@ -46,7 +46,7 @@ fn creep(judgement: &Judgement, _: &World) -> bool {
 
 /// That it creeps, or, of one so small that it costs no pose, what it is on the average of the run, among its equals.
 fn focus(judgement: &Judgement, world: &World) -> bool {
-    let said = judgement.describe(&world.rig, world.target.drawing.square_mm).unwrap_or_default();
+    let said = judgement.describe(&world.rig, &world.target.drawing).unwrap_or_default();
     creep(judgement, world) || (matches!(judgement, Judgement::Allowed(_)) && said.contains("focal length"))
 }
 
@@ -211,7 +211,7 @@ fn one_line(line: &Line, size: f64, counts: &mut Counts) {
             Judgement::Agrees | Judgement::Unexplained { .. } => unknown += 1,
             _ => wrong += 1,
         }
-        said = said.or_else(|| judgement.describe(&known.rig, known.board.square_mm));
+        said = said.or_else(|| judgement.describe(&known.rig, &known.board));
     }
     counts.wrong += wrong;
     println!(
