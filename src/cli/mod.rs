@@ -59,9 +59,10 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Calibrate both cameras from pictures of the check board, and judge the rig's accuracy
-    #[command(
-        after_help = "Example: stereocal camera-check check/ --squares 20x20 --square-mm 10 --known-move 5mm:03,04"
-    )]
+    #[command(after_help = "Examples:
+  stereocal camera-check check/ --squares 20x20 --square-mm 10 --known-move 5mm:03,04
+  stereocal camera-check remounted/ --squares 20x20 --square-mm 10 --intrinsics out/calibration.json --out new
+  stereocal camera-check today/ --against out/calibration.json")]
     CameraCheck(Box<CameraCheck>),
     /// Measure the target's point and orientation for each robot pose
     Measure(Measure),

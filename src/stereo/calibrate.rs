@@ -146,7 +146,7 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
     let candidates = Candidates::new(corners, options.known.as_ref())?;
     let Series { problem: start, discarded, runs, misfit } = series::find(&candidates, runs)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
-    let Choice { layout, near, priors, scores: lens_scores } =
+    let Choice { layout, near, priors, scatter, scores: lens_scores } =
         lens_ladder::choose(&start, &corners.board, options).map_err(|e| e.without(&skipped))?;
     let known = options.known.as_ref();
     let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout, &corners.board));
@@ -160,7 +160,7 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
     let print = PrintShare::of(&solved, &corners.board, &layout);
     let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
     let Stated { mut uncertainty, pair_scatter, witnesses } =
-        stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, known.is_some(), print_excess);
+        stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, scatter, print_excess);
     let Problem { views, mut values, priors } = solved.problem;
     let mut own_noise = solved.noise;
     if let Some(print) = print {

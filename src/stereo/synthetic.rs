@@ -86,6 +86,19 @@ impl World {
         world
     }
 
+    /// The same where the right camera turns by so much at random between pairs, as a board in a hand before cameras that nobody triggers looks.
+    pub fn corners_by_hand(&self, seed: u64, turn_deg: f64) -> Corners {
+        let mut all = self.corners(seed);
+        let mut draws = Draws::new(seed, Purpose::Points, 17);
+        for i in 0..all.pairs.len() {
+            let turn = Vector3::from_fn(|_, _| draws.normal()) * turn_deg.to_radians();
+            let mut turned = self.clone();
+            turned.rig.right_from_left = transform(turn, Vector3::zeros()) * self.rig.right_from_left;
+            all.pairs[i] = turned.corners(seed).pairs[i].clone();
+        }
+        all
+    }
+
     /// The corners as the cameras see them, with noise; corners outside of a picture are missing.
     pub fn corners(&self, seed: u64) -> Corners {
         let mut draws = Draws::new(seed, Purpose::Points, 0);

@@ -182,6 +182,11 @@ fn ten_poses_say_whether_the_robot_is_still_the_same() {
     let same = check("same.csv", "5");
     assert_eq!(same.status.code(), Some(0), "{}{}", stdout(&same), stderr(&same));
     assert!(stdout(&same).starts_with("STILL VALID"), "{}", stdout(&same));
+    // Whatever the plan called the poses.
+    std::fs::write(at.join("verify.csv"), ten(0.0).replace(",sample,", ",verify,").replace(",center,", ",verify,"))
+        .unwrap();
+    let verify = check("verify.csv", "5");
+    assert_eq!(verify.status.code(), Some(0), "{}{}", stdout(&verify), stderr(&verify));
     // What the poses would not have shown is not taken for proof.
     assert_eq!(check("same.csv", "0.0001").status.code(), Some(1));
     let turned = check("turned.csv", "0.1");
@@ -189,7 +194,7 @@ fn ten_poses_say_whether_the_robot_is_still_the_same() {
     assert!(stdout(&turned).contains("the zero of joint 3"), "{}", stdout(&turned));
     let history = std::fs::read_to_string(at.join("out/verify.csv")).unwrap();
     assert!(history.starts_with("date,against,poses,standing,cause,"), "{history}");
-    assert_eq!(history.lines().count(), 4, "{history}");
+    assert_eq!(history.lines().count(), 5, "{history}");
     assert!(history.lines().last().unwrap().contains("joint-3"), "{history}");
     std::fs::remove_file(at.join("out/identification.json")).unwrap();
     let unknown = check("same.csv", "5");

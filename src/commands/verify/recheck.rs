@@ -15,6 +15,7 @@ use crate::formats::robots::known;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::recheck::recheck;
+use crate::measurements::Role;
 use crate::progress;
 use crate::{report, robot};
 
@@ -22,7 +23,9 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let robot = robot::file::read(against)?;
     let before = known::before(against, &robot).ok_or_else(|| Error::NotKnown { path: against.to_string() })?;
     let source = source(args.measurements.clone(), &args.table, config);
-    let rows = read(&source, &robot)?;
+    let mut rows = read(&source, &robot)?;
+    // Nothing is fitted that rows could be kept from.
+    rows.iter_mut().filter(|row| row.at.role == Role::Verify).for_each(|row| row.at.role = Role::Sample);
     check_joints(&robot, &rows, &args.measurements[0])?;
     let set = Dataset::new(&rows)?;
     let stood = PlacementFile::read(&against.with_file_name(PLACEMENT)).ok();

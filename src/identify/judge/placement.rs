@@ -168,7 +168,8 @@ impl Placed {
 }
 
 impl Placed {
-    /// How far off the target is to be expected at the poses of one of the groups: against where it truly is at such a pose.
+    /// How far off the target is to be expected at the poses of one of the groups: against where it is at such a pose, beside the noise of a
+    /// reading that its covariance states.
     pub fn expected(&self, set: &Dataset, index: usize) -> Lengths {
         let poses = set.poses.iter().filter(|pose| pose.group == self.groups[index].0);
         let joints: Vec<&[f64]> = poses.map(|pose| pose.joints_rad.as_slice()).collect();

@@ -62,11 +62,16 @@ impl<'a> Fit<'a> {
     /// White residuals and Jacobian of the unknowns at `x`, without the prior.
     pub fn white(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
         let (residuals, jacobian) = self.rows.evaluate(&self.offsets(x), true);
-        let (robot, extras) = (self.spread.nrows(), x.len() - self.base.rank());
-        let of_base = jacobian.columns(0, robot) * &self.spread;
-        let mut columns = of_base.resize_horizontally(x.len(), 0.0);
-        columns.columns_mut(x.len() - extras, extras).copy_from(&jacobian.columns(robot, extras));
-        (residuals, columns)
+        (residuals, self.of_unknowns(&jacobian))
+    }
+
+    /// The columns of the unknowns from those of all offsets.
+    pub(super) fn of_unknowns(&self, jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+        let (robot, rank) = (self.spread.nrows(), self.base.rank());
+        let extras = jacobian.ncols() - robot;
+        let mut columns = (jacobian.columns(0, robot) * &self.spread).resize_horizontally(rank + extras, 0.0);
+        columns.columns_mut(rank, extras).copy_from(&jacobian.columns(robot, extras));
+        columns
     }
 
     /// Product of the white Jacobian with itself and with the residuals at offset zero, to first order from `x`.

@@ -8,6 +8,7 @@ use std::borrow::Cow;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::fit::Fit;
+use super::freedom;
 use super::problem::Solution;
 use super::scatter::estimate_scatter;
 use super::task::{FIRST_SCATTER_MM, Task, prior_rows, with_scale_held};
@@ -260,7 +261,7 @@ impl<'a> Estimate<'a> {
         let base = task.base(&rows)?;
         task.check_count(&rows, &base)?;
         let x = vec![0.0; base.rank() + task.extras.len()];
-        let scatter = estimate_scatter(&rows, &vec![0.0; rows.offset_count()], 0.0, scatter);
+        let scatter = estimate_scatter(&rows, &vec![0.0; rows.offset_count()], 0.0, None, scatter);
         Ok(Estimate { task, base, scatter, tolerance: Tolerance::default(), x, load_chain, effective: 0.0 })
     }
 
@@ -280,7 +281,8 @@ impl<'a> Estimate<'a> {
         let x = trust_region::solve(&fit, &self.x, &task.settings.trust_region).x;
         let offsets = fit.offsets(&x);
         self.effective = determined(&fit, &x, &prior);
-        self.scatter = estimate_scatter(&rows, &offsets, self.effective, self.scatter);
+        let lost = (task.model == Model::Pose).then(|| freedom::lost(&fit, &x, &prior)).flatten();
+        self.scatter = estimate_scatter(&rows, &offsets, self.effective, lost, self.scatter);
         self.load_chain = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
         self.x = x;
         if round < BASES

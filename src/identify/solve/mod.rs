@@ -3,6 +3,7 @@
 mod deleted;
 pub mod fit;
 pub mod formulation;
+mod freedom;
 pub mod linearised;
 pub mod placement;
 pub mod problem;

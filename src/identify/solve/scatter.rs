@@ -166,19 +166,30 @@ pub(super) fn robust_scatter(
     }
 }
 
-/// The scatter at which the white sum of squares equals the degrees of freedom (Pearson's equation); for points and orientations apart.
-pub(super) fn estimate_scatter(rows: &Rows, offsets: &[f64], effective: f64, before: Scatter) -> Scatter {
+/// The scatter at which the white sum of squares equals the degrees of freedom (Pearson's equation); for points and orientations apart. `lost` is
+/// what the fit took of either ([`super::freedom`]); where it is not known, each number loses the same share to parameters and placements.
+pub(super) fn estimate_scatter(
+    rows: &Rows,
+    offsets: &[f64],
+    effective: f64,
+    lost: Option<[f64; 2]>,
+    before: Scatter,
+) -> Scatter {
     let raw = rows.raw(offsets);
     let turns: Vec<f64> =
         raw.iter().filter_map(|(_, _, r)| if let Raw::Turn(t) = r { Some(t.norm_squared()) } else { None }).collect();
     let residuals = Residual::all(&raw);
     let of_points: f64 = residuals.iter().map(|r| r.count as f64).sum();
-    let total = of_points + 3.0 * turns.len() as f64;
-    // Each number loses the same share to parameters and placements.
-    let share = ((rows.count() as f64 - rows.lost_to_smooth() - effective) / total.max(1.0)).max(1.0 / total.max(1.0));
-    let turn_square = turns.iter().sum::<f64>() / (3.0 * share * turns.len().max(1) as f64);
+    let of_turns = 3.0 * turns.len() as f64;
+    let total = (of_points + of_turns).max(1.0);
+    let alike = (rows.count() as f64 - rows.lost_to_smooth() - effective) / total;
+    let [points_left, turns_left] = match lost {
+        Some([points, turns]) => [of_points - rows.lost_to_smooth() - points, of_turns - turns],
+        None => [alike * of_points, alike * of_turns],
+    };
+    let turn_square = turns.iter().sum::<f64>() / turns_left.max(of_turns / total).max(f64::MIN_POSITIVE);
     let rotation_rad = if turns.is_empty() { before.rotation_rad } else { turn_square.sqrt().max(LEAST_RAD) };
-    let wanted = share * of_points;
+    let wanted = points_left.max(of_points / total);
     let excess = |scatter: &Scatter| {
         let sum: f64 = residuals.iter().map(|r| r.weight * r.weight * r.white_square(scatter)).sum();
         sum / wanted.max(f64::MIN_POSITIVE) - 1.0

@@ -161,6 +161,11 @@ impl KnownLenses {
         KnownLenses { covariance: loose.covariance * (LOOSE * LOOSE), ..loose }
     }
 
+    /// The same as it counts beside corners whose weights leave out that the numbers scatter by so much more, as a variance.
+    pub fn weighing(&self, scatter: f64) -> KnownLenses {
+        KnownLenses { covariance: &self.covariance / scatter, ..self.clone() }
+    }
+
     /// What is free of a rig: the lenses that are known as they are, another one as it is asked for.
     pub fn layout(&self, lens: Lens, shape: bool) -> Layout {
         let of = |side: Side| self.camera(side).map_or(lens, |camera| camera.lens);

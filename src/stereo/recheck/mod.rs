@@ -3,7 +3,7 @@
 //! In: a rig with its covariance, and the corners of two or more new pairs. Out: whether it changed, by what, how far that moves a
 //! length, and the smallest change of each kind that the pairs would have shown. Method: the new pairs give a rig by themselves, from the old
 //! one on; the difference of its numbers against both covariances, all of them together and each cause as a direction of its own
-//! ([`crate::difference`]), all looks together at one level. A change of a cause is seen in nineteen of twenty such tests from
+//! ([`crate::difference`]), all looks together at one level; a change is what shows from the old rig on as well as from the new one. A change of a cause is seen in nineteen of twenty such tests from
 //! the level plus 1.645 of its standard deviations on, which is what the pairs are said to see. Goes wrong: pairs that are all alike hardly
 //! see a focus; that is what the stated figures say.
 
@@ -18,6 +18,7 @@ use crate::stereo::Error;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
 use crate::stereo::findings::hypothesis::{self, Hypothesis};
+use crate::stereo::init::board_pose;
 use crate::stereo::init::homography::FEWEST_CORNERS;
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::known_lenses::KnownLenses;
@@ -27,8 +28,10 @@ use crate::stereo::pairs::misfit::misfit_px;
 use crate::stereo::pairs::{Cause, numbering};
 use crate::stereo::select::model_comparison::Trial;
 use crate::stereo::select::stated_uncertainty::{scatter_beside, step};
+use crate::stereo::solve::normal_equations;
 use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::problem::{Problem, Solved};
+use crate::stereo::solve::uncertainty;
 use crate::stereo::volume::Volume;
 use crate::stereo::volume::lengths::VolumeLengths;
 
@@ -40,6 +43,9 @@ const SEEN: f64 = 1.645;
 
 /// Causes are told apart where the logarithm of one's likelihood is larger by this: 150 to 1.
 const TOLD_APART: f64 = 5.0;
+
+/// Causes that a line names; the table has all.
+const TOLD: usize = 3;
 
 /// Fewest pairs: one alone has nothing that confirms it.
 pub const FEWEST_PAIRS: usize = 2;
@@ -133,6 +139,10 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let off = step(&layout, &problem.values.shared, &trial.values.shared).rows(0, numbers).into_owned();
     let pairs = before.pairs.unwrap_or(0).max(problem.views.len());
     let difference = Difference::new(off, &joint, pairs, beyond).ok_or_else(Error::undetermined)?;
+    let from_old = step_from_old(&solved, &before.rig, &layout).and_then(|(off, covariance)| {
+        let joint = before.covariance(&layout)? + covariance.view((0, 0), (numbers, numbers)) * scatter;
+        Difference::new(off.rows(0, numbers).into_owned(), &joint, pairs, beyond)
+    });
 
     let squares = LONG_SQUARES.min(corners.board.columns() - 1);
     let [length_mm, _] = corners.board.spans_mm(squares);
@@ -144,7 +154,8 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let hypotheses = hypothesis::all(&Layout { shape: false, ..layout }, &before.rig);
     let views = &solved.problem.views;
     let corner_count = views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count();
-    let looks = Looks { difference: &difference, hypotheses: &hypotheses, corners: corner_count };
+    let looks =
+        Looks { difference: &difference, from_old: from_old.as_ref(), hypotheses: &hypotheses, corners: corner_count };
     let of_cause = |h| looks.of_cause(h, &moves);
     let causes = hypotheses.iter().map(of_cause).collect::<Option<Vec<_>>>().ok_or_else(Error::undetermined)?;
     let change = looks.is_change().then(|| looks.explained());
@@ -157,6 +168,18 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let seen_mm = causes.iter().map(|cause| cause.seen_mm).fold(0.0, f64::max);
     let pairs = solved.problem.views.iter().map(|view| view.pair.clone()).collect();
     Ok(Recheck { pairs, skipped, length_mm, causes, change, effect_mm, seen_mm })
+}
+
+/// From the old rig to that of the pairs as the equations at the old one foretell it, with its covariance: where the pairs leave a bent valley,
+/// its two ends lie off the straight line along which the old rig is uncertain. `None` where they say nothing.
+fn step_from_old(solved: &Solved, rig: &Rig, layout: &Layout) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let mut problem = solved.problem.clone();
+    problem.values.shared.rig = rig.clone();
+    for (pose, view) in problem.values.poses.iter_mut().zip(&problem.views) {
+        *pose = board_pose::follow(&problem.values.shared, view, *pose)?.left_from_board;
+    }
+    let (matrix, gradient) = normal_equations::eliminate(&problem.equations(layout)?, 0.0)?;
+    Some((-normal_equations::solve_scaled(&matrix, &gradient)?, uncertainty::invert(&matrix)?))
 }
 
 /// The pairs with the poses that the old rig gives them, from where a rig of their own is looked for.
@@ -206,6 +229,8 @@ impl Before {
 /// All looks at a difference: whether something changed, and what.
 struct Looks<'a> {
     difference: &'a Difference,
+    /// The same from the old rig on; see [`step_from_old`].
+    from_old: Option<&'a Difference>,
     hypotheses: &'a [Hypothesis],
     corners: usize,
 }
@@ -232,8 +257,13 @@ impl Looks<'_> {
         })
     }
 
+    /// A change is one from either rig on.
     fn is_change(&self) -> bool {
-        let (difference, chance) = (self.difference, self.chance());
+        std::iter::once(self.difference).chain(self.from_old).all(|difference| self.differs(difference))
+    }
+
+    fn differs(&self, difference: &Difference) -> bool {
+        let chance = self.chance();
         let level = difference.level(chance);
         let alone = |h: &Hypothesis| difference.along(&h.direction).is_some_and(|(a, sigma)| a.abs() > level * sigma);
         difference.chi_square() > difference.limit(difference.off.len(), chance) || self.hypotheses.iter().any(alone)
@@ -303,7 +333,12 @@ impl Recheck {
             None => "no change beyond chance".to_owned(),
             Some(Explained::Moved) => "the right camera stands and looks otherwise, in more than one way".to_owned(),
             Some(Explained::Nothing) => "the rig changed, and no single cause explains how".to_owned(),
-            Some(Explained::Causes(_)) => self.likeliest().into_iter().map(of).collect::<Vec<String>>().join(", or "),
+            Some(Explained::Causes(_)) => {
+                let likeliest = self.likeliest();
+                let more = likeliest.len().saturating_sub(TOLD);
+                let told = likeliest.into_iter().take(TOLD).map(of);
+                told.chain((more > 0).then(|| format!("{more} more"))).collect::<Vec<String>>().join(", or ")
+            }
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Lenses that are known: what is free beside them, and whether the pictures agree with them.
 //!
 //! In: the pairs at their start, and lenses from another calibration. Out: the layout with what is expected, and the test. Method: the
-//! lenses are expectations with their covariance; the board is bent where the evidence for that is larger. The test compares the known numbers
+//! lenses are expectations with their covariance, beside which the corners weigh as little as their pairs scatter, by themselves or in the earlier
+//! calibration; the board is bent where the evidence for that is larger. The test compares the known numbers
 //! with those that the pictures give by themselves: their difference against both covariances, the pictures' one enlarged by what pairs scatter
 //! ([`crate::difference`]). A focus alone is asked for, too: it is what changes, and a test of one number sees smaller changes of it. Causes are other lenses that might be known instead: another focus, left and right exchanged, another
 //! camera. One is named where what it leaves is chance, and beside it those that do nearly as well.
@@ -63,14 +64,23 @@ impl LensCheck {
 pub fn choose(start: &Problem, board: &Board, known: &KnownLenses, options: &Options) -> Result<Choice, Error> {
     let lens = options.lens.unwrap_or(SIMPLEST);
     let problem = start_of(start, known);
-    let shape = match options.shape {
-        Some(shape) => shape,
-        None => is_bent(&problem, board, &known.layout(lens, true), &known.layout(lens, false))?,
+    let fit = |shape| {
+        let layout = known.layout(lens, shape);
+        problem.solve(&layout).map(|solved| (solved, layout))
     };
+    let (mut solved, layout) = fit(options.shape.unwrap_or(true)).or_else(|_| fit(options.shape.unwrap_or(false)))?;
+    let [scatter, _] =
+        stated_uncertainty::scatter_beside(&solved, &layout, board, known.pair_excess, known.noise.as_ref());
+    // Corners weigh by their noise alone; beside them, what is known counts by as much more as the pairs scatter beyond it.
+    solved.problem.priors = start.priors.knowing(&known.weighing(scatter));
+    let shape = options
+        .shape
+        .unwrap_or_else(|| is_bent(&solved.problem, &known.layout(lens, true), &known.layout(lens, false), scatter));
     Ok(Choice {
         layout: known.layout(lens, shape),
         near: Some(problem.values),
-        priors: problem.priors,
+        priors: solved.problem.priors,
+        scatter: Some(scatter),
         scores: Vec::new(),
     })
 }
@@ -88,17 +98,9 @@ fn start_of(start: &Problem, known: &KnownLenses) -> Problem {
 }
 
 /// Whether the evidence for a board that is bent is larger than for a flat one.
-fn is_bent(problem: &Problem, board: &Board, bent: &Layout, flat: &Layout) -> Result<bool, Error> {
-    let (solved, layout) = match problem.solve(bent) {
-        Ok(solved) => (solved, bent),
-        Err(_) => (problem.solve(flat)?, flat),
-    };
-    let scatter = stated_uncertainty::excess_scatter(&solved, layout, board);
-    let solved = solved.problem;
-    let trials = Trial::new(&solved, *bent).zip(Trial::new(&solved, *flat));
-    Ok(trials.is_some_and(|(bent, flat)| {
-        gain_of_terms(&solved.priors, &bent, &flat, scatter).is_some_and(|gain| gain > 0.0)
-    }))
+fn is_bent(problem: &Problem, bent: &Layout, flat: &Layout, scatter: f64) -> bool {
+    let trials = Trial::new(problem, *bent).zip(Trial::new(problem, *flat));
+    trials.and_then(|(bent, flat)| gain_of_terms(&problem.priors, &bent, &flat, scatter)).is_some_and(|gain| gain > 0.0)
 }
 
 /// Compares the known lenses with what the pictures say by themselves. `None` where they say nothing.

@@ -27,7 +27,7 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     let forced_shape = options.shape.or(options.lens.map(|_| false));
     if let (Some(lens), Some(shape)) = (options.lens, forced_shape) {
         let priors = start.priors.clone();
-        return Ok(Choice { layout: Layout::rig(lens, shape), near: None, priors, scores: Vec::new() });
+        return Ok(Choice { layout: Layout::rig(lens, shape), near: None, priors, scatter: None, scores: Vec::new() });
     }
     // Weights from a model that is at least as rich as most need; the comparison uses the same for all.
     let fit = |shape| {
@@ -57,11 +57,11 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     let Some(chosen) = simplest(&scores, &chance) else {
         // Some pairs cannot be left out without losing the cameras: nothing can be compared.
         let priors = solved.problem.priors.clone();
-        return Ok(Choice { layout, near: Some(solved.problem.values), priors, scores: Vec::new() });
+        return Ok(Choice { layout, near: Some(solved.problem.values), priors, scatter: None, scores: Vec::new() });
     };
     let fewer = fewer_terms(&solved.problem, chosen, &chance);
     let Trial { layout, values, priors, .. } = fewer.as_ref().unwrap_or(chosen).clone();
-    Ok(Choice { layout, near: Some(values), priors, scores })
+    Ok(Choice { layout, near: Some(values), priors, scatter: None, scores })
 }
 
 /// A lens of fewer terms than the simplest of the ladder, where the pairs say so: the logarithm of its evidence (Laplace's approximation; what is

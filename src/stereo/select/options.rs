@@ -30,6 +30,8 @@ pub struct Choice {
     pub near: Option<Values>,
     /// What is expected of that model.
     pub priors: Priors,
+    /// Where lenses are known: variance of the shared numbers over what the weighted corners alone say.
+    pub scatter: Option<f64>,
     /// Every lens of the ladder; empty where the lens was forced.
     pub scores: Vec<LensScore>,
 }

@@ -34,6 +34,8 @@ pub struct Jackknife<'a> {
     pub group_of: &'a [usize],
     /// The rig without each group, by the curvature.
     pub without: &'a [Option<Without>],
+    /// What the covariance is at least, over the one by the corners' noise: pairs of an earlier calibration may say so.
+    pub least: f64,
 }
 
 impl Jackknife<'_> {
@@ -44,7 +46,7 @@ impl Jackknife<'_> {
         let all: Option<Vec<&Without>> = self.without.iter().map(Option::as_ref).collect();
         match all.and_then(|all| self.enlarge(by_noise, inflation, &all)) {
             Some((covariance, ratio)) => (covariance, PairScatter { groups, ratio: Some(ratio) }),
-            None => (by_noise.clone(), PairScatter { groups, ratio: None }),
+            None => (by_noise * self.least, PairScatter { groups, ratio: None }),
         }
     }
 
@@ -75,7 +77,7 @@ impl Jackknife<'_> {
         let ratio = scatter.trace() / n as f64 / stretch;
         let shrunk = shrunk(&scatter, &steps) / stretch;
         let eigen = shrunk.symmetric_eigen();
-        let larger = eigen.eigenvalues.map(|v| v.max(1.0));
+        let larger = eigen.eigenvalues.map(|v| v.max(self.least));
         let factor = &eigen.eigenvectors * DMatrix::from_diagonal(&larger) * eigen.eigenvectors.transpose();
         let covariance = &root * factor * root.transpose();
         (ratio.is_finite() && covariance.iter().all(|v| v.is_finite()))

@@ -50,23 +50,25 @@ pub struct Stated {
     pub witnesses: Vec<Witness>,
 }
 
-/// Enlarges the covariance `by_noise`, which is `inflation` times that of the normal equations. `print_excess`: see
-/// [`Chance::print`](crate::stereo::select::model_comparison::Chance).
+/// Enlarges the covariance `by_noise`, which is `inflation` times that of the normal equations, to `known` times these at least: what
+/// the numbers scatter by where lenses are known. `print_excess`: see [`Chance::print`](crate::stereo::select::model_comparison::Chance).
 pub fn state(
     solved: &Solved,
     layout: &Layout,
     by_noise: Uncertainty,
     inflation: f64,
     scores: &[LensScore],
-    lenses_known: bool,
+    known: Option<f64>,
     print_excess: f64,
 ) -> Stated {
-    let Some((equations, mut shared, pair_scatter)) = scattered(solved, layout, &by_noise.shared, inflation) else {
+    let least = (known.unwrap_or(1.0) / inflation).max(1.0);
+    let found = scattered(solved, layout, &by_noise.shared, inflation, least);
+    let Some((equations, mut shared, pair_scatter)) = found else {
         let pair_scatter = PairScatter { groups: solved.problem.views.len(), ratio: None };
-        return Stated { uncertainty: by_noise, pair_scatter, witnesses: Vec::new() };
+        return Stated { uncertainty: by_noise.scaled(least), pair_scatter, witnesses: Vec::new() };
     };
-    let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(1.0);
-    let richer = richer(layout, scores, lenses_known);
+    let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(least);
+    let richer = richer(layout, scores, known.is_some());
     let witnesses = witnesses(&solved.problem, layout, richer, factor * print_excess);
     // Lenses contain each other: the steps to two of them are not two biases, and Akaike's criterion names the likeliest. The board's is another.
     let gain = |w: &&Witness| w.chi_square_fall - 2.0 * w.added as f64;
@@ -83,7 +85,7 @@ pub fn excess_scatter(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
     let inflation = solved.neighbours(board).inflation() * solved.loss_factor;
     let ratio = || {
         let by_noise = solved.uncertainty(layout).ok()?.scaled(inflation);
-        scattered(solved, layout, &by_noise.shared, inflation)?.2.ratio
+        scattered(solved, layout, &by_noise.shared, inflation, 1.0)?.2.ratio
     };
     inflation * ratio().unwrap_or(1.0).max(1.0)
 }
@@ -108,12 +110,14 @@ fn scattered(
     layout: &Layout,
     by_noise: &DMatrix<f64>,
     inflation: f64,
+    least: f64,
 ) -> Option<(Equations, DMatrix<f64>, PairScatter)> {
     let Problem { views, values, .. } = &solved.problem;
     let groups = cross_validation::groups(views, &values.poses);
     let (equations, curvature) = (solved.problem.equations(layout)?, solved.curvature(layout)?);
     let without = cross_validation::leave_out_with(&curvature, &equations, layout, &values.shared, &groups);
-    let jackknife = Jackknife { equations: &equations, curvature: &curvature, group_of: &groups, without: &without };
+    let jackknife =
+        Jackknife { equations: &equations, curvature: &curvature, group_of: &groups, without: &without, least };
     let (shared, pair_scatter) = jackknife.covariance(by_noise, inflation);
     Some((equations, shared, pair_scatter))
 }

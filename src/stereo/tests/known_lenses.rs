@@ -1,6 +1,7 @@
 //! Lenses from another calibration: three pairs are enough for the rig, and lenses that are not those of the pictures are found and named.
 
 use super::*;
+use crate::stereo::board_pose::pair_excess::pair_excess;
 use crate::stereo::model::known_lenses::KnownLenses;
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::known_lenses::LensCheck;
@@ -88,4 +89,44 @@ fn of_two_calibrations_each_gives_its_side() {
     assert_eq!(both.covariance()[(0, 1)], first.covariance()[(0, 1)]);
     assert_eq!(both.covariance()[(left, left + 1)], second.covariance()[(left, left + 1)]);
     assert_eq!(both.covariance()[(0, left)], 0.0);
+}
+
+/// Deviations of three pairs' focal lengths from the known ones in their standard deviations, mean square; and of the baseline from the truth in
+/// its own.
+fn by_hand(turn_deg: f64, told: bool) -> [f64; 2] {
+    const WORLDS: u64 = 12;
+    let mut squares = [0.0; 2];
+    for seed in 300..300 + WORLDS {
+        let earlier = calibrate(&World::new(12, seed).corners_by_hand(seed, turn_deg), &BROWN4).unwrap();
+        let mut known = KnownLenses::of_rig(earlier.rig(), &Side::BOTH);
+        if told {
+            known.pair_excess = pair_excess(&earlier);
+            (known.pairs, known.noise) = (Some(earlier.pair_scatter.groups), Some(earlier.own_noise));
+        }
+        let world = World::new(3, seed + 500);
+        let found = calibrate(&world.corners_by_hand(seed + 500, turn_deg), &knowing(known.clone())).unwrap();
+        let sigma = known.covariance()[(0, 0)].sqrt();
+        squares[0] += ((found.rig().left.fx - earlier.rig().left.fx) / sigma).powi(2) / WORLDS as f64;
+        let covariance = found.rig().covariance.as_ref().unwrap();
+        let at = covariance.order.iter().position(|name| name == "right_from_left.tx_mm").unwrap();
+        let off = found.rig().right_from_left.translation.x - world.rig.right_from_left.translation.x;
+        squares[1] += off * off / covariance.matrix[(at, at)] / WORLDS as f64;
+    }
+    squares
+}
+
+#[test]
+fn three_pairs_that_scatter_do_not_pull_the_lenses_from_what_is_known_of_them() {
+    for turn_deg in [0.01, 0.03] {
+        let [told, of_baseline] = by_hand(turn_deg, true);
+        let [alone, _] = by_hand(turn_deg, false);
+        // What is known is known to one standard deviation; pairs that weigh by their corners' noise alone pull by many.
+        assert!(
+            told < 1.0 && told < 0.5 * alone,
+            "{turn_deg} deg: {told} where the scatter is told, {alone} where not"
+        );
+        assert!(of_baseline < 3.0, "{turn_deg} deg: {of_baseline}");
+    }
+    let [clean, of_baseline] = by_hand(0.0, true);
+    assert!(clean < 1.0 && of_baseline < 3.0, "{clean} {of_baseline}");
 }

@@ -11,6 +11,7 @@ use stereocal::stereo::model::known_lenses::KnownLenses;
 use stereocal::stereo::model::rig::Covariance;
 use stereocal::stereo::pairs::Cause;
 use stereocal::stereo::select::options::Options;
+use stereocal::stereo::solve::problem::Problem;
 use stereocal::stereo::solve::uncertainty;
 
 use crate::coverage::{Noise, Tally, lengths, noisy, world};
@@ -82,8 +83,10 @@ fn known(seed: u64, pairs: usize, noise: Noise) -> Option<KnownLenses> {
 }
 
 /// The same calibration with the least covariance that corners of this noise and lenses known so well allow (Cramer and Rao).
-fn at_bound(found: &Calibration, noise: Noise) -> Option<Calibration> {
-    let equations = found.problem().equations(&found.layout)?;
+fn at_bound(found: &Calibration, known: &KnownLenses, noise: Noise) -> Option<Calibration> {
+    let problem = found.problem();
+    let problem = Problem { priors: problem.priors.knowing(known), ..problem };
+    let equations = problem.equations(&found.layout)?;
     let typical = found.noise.typical_px(&found.views);
     let mut bound = found.clone();
     let matrix = uncertainty::of_equations(&equations)?.shared * (noise.sigma_px / typical).powi(2);
@@ -102,13 +105,13 @@ struct One {
 fn one(seed: u64, pairs: usize, known: &KnownLenses, lenses: Lenses, noise: Noise) -> Option<One> {
     let known = if lenses == Lenses::Swapped { known.exchanged() } else { known.clone() };
     let world = lenses.changed(world(seed, pairs, 0.0, noise), seed);
-    let options = Options { known: Some(known), ..Options::default() };
+    let options = Options { known: Some(known.clone()), ..Options::default() };
     let found = calibrate(&noisy(world.check_corners(), seed, noise.sigma_px), &options).ok()?;
     let check = found.lens_check.clone()?;
     let (mut of_lengths, mut bound) = (Tally::default(), Tally::default());
     if lenses == Lenses::Right {
         of_lengths = lengths(&found, seed, noise, true);
-        bound = lengths(&at_bound(&found, noise)?, seed, noise, true);
+        bound = lengths(&at_bound(&found, &known, noise)?, seed, noise, true);
     }
     let contradicted = check.contradicts();
     let seen = check.focus_seen[0].unwrap_or(f64::NAN);

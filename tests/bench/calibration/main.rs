@@ -1,6 +1,7 @@
-//! Benchmark `calibration`: what the bundle costs beside OpenCV's, and whether the intervals of its numbers hold, and what known lenses give.
+//! Benchmark `calibration`: what the bundle costs beside OpenCV's, whether the intervals of its numbers hold, what known lenses give, and what
+//! shows that a rig changed.
 //!
-//! `cargo bench --bench calibration -- speed|coverage|known-lenses`; without a word all.
+//! `cargo bench --bench calibration -- speed|coverage|known-lenses|against [RIGS]`; without a word all.
 #![allow(
     clippy::print_stdout,
     clippy::unwrap_used,
@@ -10,6 +11,7 @@
     reason = "a benchmark prints its tables, and ends where its input is not as it should be"
 )]
 
+mod against;
 mod coverage;
 mod known_lenses;
 mod peer;
@@ -26,5 +28,8 @@ fn main() {
     }
     if runs("known-lenses") {
         known_lenses::run();
+    }
+    if runs("against") {
+        against::run(wanted.iter().find_map(|word| word.parse().ok()).unwrap_or(60));
     }
 }

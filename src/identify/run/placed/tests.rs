@@ -80,6 +80,8 @@ struct Tally {
     target: Vec<f64>,
     /// Fresh coordinates, and those within their 95 % interval.
     coordinates: (usize, usize),
+    /// The scatter of a coordinate that was found, over the noise.
+    scatter: Vec<f64>,
 }
 
 impl Tally {
@@ -127,6 +129,7 @@ fn tally(robots: u64, samples: usize, oriented: bool, extensions: Extensions) ->
         let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
         let placed = found.placed(&set, &world.nominal, &settings).unwrap().unwrap();
         assert_eq!(placed.oriented, oriented);
+        tally.scatter.push((placed.fresh_mm2 / 3.0).sqrt() / NOISE_MM);
         tally.add(&world, &fresh, &placed);
     }
     tally
@@ -135,13 +138,15 @@ fn tally(robots: u64, samples: usize, oriented: bool, extensions: Extensions) ->
 #[test]
 fn stated_uncertainties_are_those_of_simulated_robots() {
     for oriented in [false, true] {
-        let Tally { sensor, target, coordinates } = tally(20, 60, oriented, Extensions::None);
+        let Tally { sensor, target, coordinates, scatter } = tally(20, 60, oriented, Extensions::None);
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         // Four placements of twenty robots, and what they have in common: three standard deviations of a chi-squared over its degrees of freedom.
         assert!((0.7..1.4).contains(&mean(&sensor)), "{oriented}: placements {}", mean(&sensor));
         assert!((0.6..1.5).contains(&mean(&target)), "{oriented}: target {}", mean(&target));
         let share = coordinates.1 as f64 / coordinates.0 as f64;
         assert!((0.91..0.98).contains(&share), "{oriented}: {share} of {}", coordinates.0);
+        // Orientations are worth little beside these points: what the fit took is the points' alone.
+        assert!((0.96..1.04).contains(&mean(&scatter)), "{oriented}: scatter {}", mean(&scatter));
     }
 }
 
