@@ -181,6 +181,10 @@ impl Explain for Error {
                 let (columns, rows) = (squares.columns - 1, squares.rows - 1);
                 Some(format!("`--squares {squares}`: the pictures show a board with {columns}x{rows} inner corners"))
             }
+            // The board is the right one: most pairs show it.
+            Error::TooFewPairs { found, total, needed, .. } if *found > 0 && 2 * found >= *total => {
+                Some(format!("photograph the board in more places: {needed} pairs are the least, twelve make a sure rig"))
+            }
             Error::TooFewPairs { board, .. } if board.is_coded() => {
                 let named = match board.kind {
                     Kind::Tags { .. } => "columns x rows of tags, family, tag and gap in mm",
@@ -195,6 +199,25 @@ impl Explain for Error {
                     board.squares
                 ))
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_that_is_seen_is_not_doubted() {
+        let hint = |found: usize, total: usize, board: &str| {
+            let board = Box::new(board.parse().unwrap());
+            let (path, skipped) = ("pictures".into(), Vec::new());
+            Error::TooFewPairs { found, total, needed: 3, board, path, skipped, other: None }.hint().unwrap()
+        };
+        for board in ["checker:9x7:20", "charuco:5x4:30:22:DICT_4X4_50"] {
+            assert!(hint(2, 3, board).contains("in more places"), "{}", hint(2, 3, board));
+            assert!(hint(2, 9, board).contains("--squares") || hint(2, 9, board).contains("--board"));
+            assert!(hint(0, 0, board).contains("--squares") || hint(0, 0, board).contains("--board"));
         }
     }
 }

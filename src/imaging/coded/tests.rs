@@ -211,7 +211,7 @@ fn parts_of_a_grid_of_tags_have_their_own_numbers() {
 fn another_grid_of_tags_is_named() {
     let (picture, _) = Shot::of(TAGS, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
     for (said, why) in [
-        ("apriltag:5x4:tag25h9:24:7.2", "DICT_APRILTAG_36h11"),
+        ("apriltag:5x4:tag25h9:24:7.2", "markers of tag36h11"),
         ("apriltag:4x4:tag36h11:24:7.2", "board of 5 columns"),
         ("apriltag:6x4:tag36h11:24:7.2", "board of 5 columns"),
         ("apriltag:5x3:tag36h11:24:7.2", "larger than 5x3"),
