@@ -215,8 +215,8 @@ mod tests {
             assert_eq!(names(&format!("{header}\n{rows}")).unwrap(), ["a", "b", "c"], "{header}");
         }
         let headings = "No.,nominal (mm),,measured,\n,X,Y,X,Y\n1,2.5,3,4,5\n2,3.5,4,5,6\n";
-        let read = ["No.", "nominal (mm) X", "nominal (mm) Y", "measured X", "measured Y"];
-        assert_eq!(names(headings).unwrap(), read);
+        let together = ["No.", "nominal (mm) X", "nominal (mm) Y", "measured X", "measured Y"];
+        assert_eq!(names(headings).unwrap(), together);
         // Names that stand once need nothing of what is above them.
         assert_eq!(names("robot 7,today,\na,b,c\n1,2,3\n4,5,6.5\n").unwrap(), ["a", "b", "c"]);
         assert_eq!(read("0,1,2,3\n1.5,2,3,4\n").unwrap().rows.len(), 1);
