@@ -14,7 +14,7 @@ use crate::identify::sensor::{Extra, Scatter, Spot};
 const RAD_PER_MRAD: f64 = 1e-3;
 
 /// Points are on a line where they are scattered square to it by less than this share of what they are along it.
-const LINE: f64 = 0.1;
+const LINE: f64 = 0.01;
 
 /// The points of one placement.
 #[derive(Debug, Clone)]

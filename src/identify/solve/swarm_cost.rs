@@ -162,27 +162,6 @@ mod tests {
         agree(&rows, Model::Position);
     }
 
-    /// Points on a line leave a turn about it that small steps alone do not find.
-    #[test]
-    fn of_points_on_a_line_too() {
-        for span_deg in [0.5, 2.0, 4.0] {
-            let world = synthetic::world(40, 0.05, 3);
-            let mut rows: Vec<Measurement> = world.rows.into_iter().filter(|r| r.at.role == Role::Sample).collect();
-            let first = rows[0].at.joints_deg.clone();
-            let step = span_deg / rows.len() as f64;
-            for (i, row) in rows.iter_mut().enumerate() {
-                row.at.joints_deg.clone_from(&first);
-                row.at.joints_deg[0] += step * i as f64;
-                row.at.group = "g0".to_owned();
-                let point_mm = world.truth.target_mm(&row.at.joints_rad());
-                let noise = Vector3::from_fn(|axis, _| 0.05 * (1.7 * (i + 40 * axis) as f64).sin());
-                let point_mm = nalgebra::Rotation3::new(Vector3::new(2.0, -1.0, 0.5)) * point_mm + noise;
-                row.observed = Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None };
-            }
-            agree(&rows, Model::Position);
-        }
-    }
-
     #[test]
     fn with_unequal_weights_and_orientations_too() {
         let world = synthetic::world(40, 0.05, 3);
