@@ -14,9 +14,11 @@ use crate::tables::Fields;
 use crate::tables::Form;
 use crate::tables::names::{Name, What};
 
-/// Makes files with a multiple of the others' rows, so many readings a pose, as long as these: one row a pose, the readings side by side.
-pub(super) fn widen(parts: &mut [Part]) -> Result<()> {
-    let Some(least) = parts.iter().map(|p| p.rows.len()).min() else { return Ok(()) };
+/// Makes files with a multiple of the others' rows, so many readings a pose, as long as these: one row a pose, the readings side by side. Says
+/// whether there were any.
+pub(super) fn widen(parts: &mut [Part]) -> Result<bool> {
+    let Some(least) = parts.iter().map(|p| p.rows.len()).min() else { return Ok(false) };
+    let widened = parts.iter().any(|p| p.rows.len() != least);
     let counts: Vec<String> = parts.iter().map(|p| format!("{} has {} rows", p.file_name(), p.rows.len())).collect();
     for part in parts.iter_mut().filter(|part| part.rows.len() != least) {
         let times = part.rows.len() / least;
@@ -44,7 +46,7 @@ pub(super) fn widen(parts: &mut [Part]) -> Result<()> {
         part.kinds = part.kinds.iter().cycle().take(times * part.kinds.len()).cloned().collect();
         part.rows = rows;
     }
-    Ok(())
+    Ok(widened)
 }
 
 /// Where the k-th reading of a pose stands: one after the other, or first all of the first target.

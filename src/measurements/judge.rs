@@ -101,12 +101,11 @@ fn in_all_units(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Fo
     let mut ways: Vec<Way> = Vec::new();
     for picked in candidates {
         for joints in [Unit::Deg, Unit::Rad].into_iter().filter(|u| forced.joints.is_none_or(|f| f == *u)) {
-            for lengths in [Unit::Mm, Unit::M, Unit::Um] {
+            for lengths in [Unit::Mm, Unit::M, Unit::Um, Unit::Cm, Unit::Inch] {
                 let stated = forced.lengths.or(picked.length_unit);
-                // Nobody writes micrometres without saying so.
-                let wanted = stated
-                    .map_or(lengths != Unit::Um, |s| s == lengths || forced.lengths.is_none() && lengths != Unit::Um);
-                if wanted {
+                // Nobody writes others without saying so.
+                let usual = matches!(lengths, Unit::Mm | Unit::M);
+                if stated.map_or(usual, |s| s == lengths || forced.lengths.is_none() && usual) {
                     let (left, left_mm) = left(parts, picked, robot, joints, lengths).unzip();
                     let left_mm = left_mm.unwrap_or(f64::INFINITY);
                     ways.push(Way { picked: picked.clone(), joints, lengths, left, left_mm });

@@ -19,6 +19,9 @@ const MOST_FREE: usize = 60;
 /// deviations in the middle of all rows, and half of them differ from that by more than 0.46: three tenths of it.
 const RIGID: f64 = 0.05;
 
+/// What rounding leaves of a rotation's rows that are at right angles and of length one.
+const ROUNDED: f64 = 2e-3;
+
 /// Rows that tell whether a distance is kept.
 const ROWS: usize = 200;
 
@@ -67,9 +70,31 @@ pub(super) fn candidates(parts: &[Part], picked: &Picked, count: usize) -> Vec<P
             list.extend(
                 of.windows(3).filter(|w| beside(w)).map(|w| of_points(vec![(String::new(), [w[0], w[1], w[2]])])),
             );
+            let matrices = of.iter().filter_map(|first| translation(parts, *first));
+            list.extend(matrices.map(|point| of_points(vec![(String::new(), point)])));
         }
     }
     list
+}
+
+/// The last column of a transform that is written row by row from this column on: rows of a rotation, each with a coordinate behind it.
+fn translation(parts: &[Part], first: At) -> Option<[At; 3]> {
+    let at = |entry: usize| At { column: first.column + entry, ..first };
+    let file = &parts[first.part];
+    if first.column + 12 > file.width() {
+        return None;
+    }
+    let turn = |row: usize| point(parts, row, &[at(0), at(1), at(2)]).zip(point(parts, row, &[at(4), at(5), at(6)]));
+    let rotates = |row: usize| {
+        let third = point(parts, row, &[at(8), at(9), at(10)])?;
+        let (first, second) = turn(row)?;
+        Some(
+            (first.coords.cross(&second.coords) - third.coords).norm() < ROUNDED
+                && (first.coords.norm() - 1.0).abs() < ROUNDED,
+        )
+    };
+    let told: Vec<bool> = (0..file.rows.len()).take(ROWS).filter_map(rotates).collect();
+    (!told.is_empty() && told.iter().all(|is| *is)).then(|| [at(3), at(7), at(11)])
 }
 
 fn beside(columns: &[At]) -> bool {

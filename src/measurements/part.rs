@@ -45,7 +45,7 @@ pub(super) struct Part {
 }
 
 /// Cells that say that there is no number.
-const NOTHING: [&str; 8] = ["", "nan", "na", "n/a", "-", "null", "none", "inf"];
+const NOTHING: [&str; 11] = ["", "nan", "na", "n/a", "#n/a", "-", "--", "---", "null", "none", "inf"];
 
 impl Part {
     /// Reads a file; a program's targets have the robot's joints, so many.
@@ -172,7 +172,10 @@ impl Part {
 /// Letters by which Yaskawa's controllers call the joints of six axes, and of seven.
 const LETTERED: [&str; 2] = ["slurbt", "slerubt"];
 
-/// Names as what they mean, those of a controller that calls its joints by letters included.
+/// What Universal Robots calls the joints; recorders write them in the order of the alphabet.
+const CALLED: [&str; 6] = ["shoulderpan", "shoulderlift", "elbow", "wrist1", "wrist2", "wrist3"];
+
+/// Names as what they mean, those of controllers that call their joints by letters or by words included.
 fn understood(names: &[String]) -> Vec<Name> {
     let mut meanings: Vec<Name> = names.iter().map(|name| Name::of(name)).collect();
     let words: Vec<String> = names.iter().map(|name| crate::tables::names::words(name).0.concat()).collect();
@@ -182,6 +185,17 @@ fn understood(names: &[String]) -> Vec<Name> {
             for (joint, name) in meanings[first..first + letters.len()].iter_mut().enumerate() {
                 *name = Name { what: What::Joint(joint + 1), key: vec![letters.to_owned()], ..name.clone() };
             }
+        }
+    }
+    let called = |word: &&str| -> Option<usize> {
+        let columns = (0..names.len()).filter(|&c| words[c].contains(*word) && meanings[c].measured != Some(false));
+        <[usize; 1]>::try_from(columns.collect::<Vec<_>>()).ok().map(|[only]| only)
+    };
+    let columns: Vec<usize> = CALLED.iter().filter_map(called).collect();
+    if columns.len() == CALLED.len() {
+        for (joint, column) in columns.into_iter().enumerate() {
+            let (unit, key) = (meanings[column].unit, vec!["called".to_owned()]);
+            meanings[column] = Name { what: What::Joint(joint + 1), unit, key, measured: None };
         }
     }
     meanings

@@ -122,7 +122,7 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
         // Where the robot was sent and where it says that it is: the identified robot corrects commands.
         let (first, second) = (&complete[0].0, &complete[1].0);
         let message = format!("two sets of joints would do: {} and {}", listed(parts, first), listed(parts, second));
-        let flag = |joints: &[At]| columns_flag(parts, joints, &points_for_flag(parts), None);
+        let flag = |joints: &[At]| columns_flag(parts, joints, &points_for_flag(parts));
         let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(first), flag(second));
         return Err(parts[first[0].part].refuse(message, Some(&hint)));
     }
@@ -153,8 +153,13 @@ fn points(parts: &[Part]) -> Result<Vec<(String, [At; 3], Option<bool>)>> {
     let mut commanded: Option<[At; 3]> = None;
     for group in groups(parts, |n| if let What::Coordinate(axis) = n.what { Some(axis) } else { None }) {
         let of_axis = |axis: usize| group.columns.iter().filter(move |(a, _)| *a == axis).map(|(_, at)| *at);
-        for axis in 0..3 {
-            let found: Vec<At> = of_axis(axis).collect();
+        let all = [0, 1, 2].map(|axis| of_axis(axis).collect::<Vec<At>>());
+        if let [[a, d], [b, e], [c, f]] = all.each_ref().map(Vec::as_slice)
+            && group.measured != Some(false)
+        {
+            return Err(asked(parts, &[], [&[*a, *b, *c], &[*d, *e, *f]], false));
+        }
+        for found in all {
             if found.len() > 1 && group.measured != Some(false) {
                 return Err(twice(parts, "a coordinate", &found));
             }
@@ -178,7 +183,7 @@ fn points(parts: &[Part]) -> Result<Vec<(String, [At; 3], Option<bool>)>> {
                 let taken = names.into_iter().zip(&marked);
                 return Ok(taken.map(|(name, &i)| (name, sets[i].1, sets[i].2)).collect());
             }
-            _ => return Err(asked(parts, &sets[0].1, &sets[1].1)),
+            _ => return Err(asked(parts, &[], [&sets[0].1, &sets[1].1], false)),
         }
     }
     if sets.is_empty()
@@ -249,38 +254,40 @@ fn twice(parts: &[Part], what: &str, columns: &[At]) -> Error {
         .refuse(message, Some("`--columns NAME,NAME,...` names the columns in their order; `-` skips one"))
 }
 
-/// That two sets of points would do, with the flags that take either.
-pub(super) fn asked(parts: &[Part], first: &[At; 3], second: &[At; 3]) -> Error {
+/// That two sets of points would do, with the flags that take either, or both as readings of one point.
+/// Joints that are not given are those of the names.
+pub(super) fn asked(parts: &[Part], joints: &[At], [first, second]: [&[At; 3]; 2], readings: bool) -> Error {
     let message = format!(
         "two points would do, {} and {}: which was measured, and which was commanded or computed, only you know",
         listed(parts, first),
         listed(parts, second)
     );
-    let flag = |points: &[At; 3]| columns_flag(parts, &[], points, None);
-    let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(first), flag(second));
+    let flag = |points: &[At]| columns_flag(parts, joints, points);
+    let both = if readings {
+        format!(", `--columns {}` both as readings of one point", flag(&[*first, *second].concat()))
+    } else {
+        String::new()
+    };
+    let hint = format!("`--columns {}` takes the first, `--columns {}` the second{both}", flag(first), flag(second));
     parts[first[0].part].refuse(message, Some(&hint))
 }
 
 /// What `--columns` must say to take these columns; joints or points that names say are added.
-pub(super) fn columns_flag(parts: &[Part], joints: &[At], points: &[At], known: Option<&[At]>) -> String {
-    let named_joints: Vec<At> = match (joints, known) {
-        ([], Some(known)) => known.to_vec(),
-        ([], None) => {
-            let number = |n: &Name| if let What::Joint(i) = n.what { Some(i) } else { None };
-            let mut best: Vec<(usize, At)> =
-                groups(parts, number).into_iter().map(|g| g.columns).max_by_key(Vec::len).unwrap_or_default();
-            best.sort_unstable();
-            best.into_iter().map(|(_, at)| at).collect()
-        }
-        (joints, _) => joints.to_vec(),
-    };
+pub(super) fn columns_flag(parts: &[Part], joints: &[At], points: &[At]) -> String {
+    let number = |n: &Name| if let What::Joint(i) = n.what { Some(i) } else { None };
+    let mut named: Vec<(usize, At)> =
+        groups(parts, number).into_iter().map(|g| g.columns).max_by_key(Vec::len).unwrap_or_default();
+    named.sort_unstable();
+    let named: Vec<At> = named.into_iter().map(|(_, at)| at).collect();
+    let named_joints = if joints.is_empty() { named.as_slice() } else { joints };
     let mut words = Vec::new();
     for (part, file) in parts.iter().enumerate() {
         let width = if file.is_program() { named_joints.len().max(1).min(file.width()) } else { file.width() };
         for column in 0..width {
             let at = At { part, column };
             let joint = named_joints.iter().position(|j| *j == at).map(|i| format!("j{}", i + 1));
-            let point = points.iter().position(|p| *p == at).map(|i| ["x", "y", "z"][i % 3].to_owned());
+            let number = |i: usize| if points.len() > 3 { (i / 3 + 1).to_string() } else { String::new() };
+            let point = points.iter().position(|p| *p == at).map(|i| ["x", "y", "z"][i % 3].to_owned() + &number(i));
             words.push(joint.or(point).unwrap_or_else(|| "-".to_owned()));
         }
     }

@@ -16,6 +16,7 @@ use super::pick::{self, Picked, columns_flag, listed};
 use super::{Measurement, read};
 use crate::files::Result;
 use crate::robot::Robot;
+use crate::tables::Form;
 use crate::tables::names::{Name, Unit, What};
 
 /// Section `[measurements]`: what is known of tables beside what they say.
@@ -91,8 +92,8 @@ impl Source {
         let several = sets.len() > 1;
         let (mut rows, mut said) = (Vec::new(), Vec::new());
         for (number, mut set) in sets.into_iter().enumerate() {
-            assemble::widen(&mut set)?;
-            let (way, basis) = self.way(&set, robot)?;
+            let widened = assemble::widen(&mut set)?;
+            let (way, basis) = self.way(&set, robot, widened)?;
             let (way, slides) = (way, robot.joints.iter().map(|j| j.slides).collect::<Vec<_>>());
             let taken = Taken { parts: &set, way: &way, basis, slides: &slides, number: several.then_some(number + 1) };
             rows.extend(taken.rows()?);
@@ -150,15 +151,17 @@ impl Source {
         Ok(((0..parts[0].rows.len()).map(row).collect::<Result<Vec<_>>>()?, said))
     }
 
-    /// The columns and units of a set of files.
-    fn way(&self, parts: &[Part], robot: &Robot) -> Result<(Way, Basis)> {
+    /// The columns and units of a set of files; `widened` says that several rows of one were put side by side.
+    fn way(&self, parts: &[Part], robot: &Robot, widened: bool) -> Result<(Way, Basis)> {
         let count = robot.joints.len();
         let picked = pick::by_names(parts, count)?;
-        if let [(_, first), .., (_, second)] = &picked.points[..]
-            && !layout::are_readings(parts, &picked)
-            && layout::changes_distance(parts, first, second)
-        {
-            return Err(pick::asked(parts, first, second));
+        if let [(_, first), .., (_, second)] = &picked.points[..] {
+            let readings = layout::are_readings(parts, &picked);
+            // Two that are nearly one may be where the robot was sent and what was measured there.
+            let unsaid = picked.points.len() == 2 && !widened && self.columns.is_none();
+            if readings && unsaid || !readings && layout::changes_distance(parts, first, second) {
+                return Err(pick::asked(parts, &[], [first, second], readings));
+            }
         }
         let complete = picked.joints.len() == count && picked.is_measured();
         let candidates = if complete { vec![picked.clone()] } else { layout::candidates(parts, &picked, count) };
@@ -291,15 +294,30 @@ fn lacking(parts: &[Part], picked: &Picked, count: usize) -> crate::files::Error
         (false, false) => "no columns of a measured point or a distance".to_owned(),
         _ => format!("no columns of {count} joints and of a measured point or a distance"),
     };
-    let hint = "another `--measurements FILE` joins the file that has them row by row; \
-                `--columns j1,j2,...,-,x,y,z` names the columns in their order, `-` skips one";
-    parts[0].refuse(format!("{what}: {}", found.join("; ")), Some(hint))
+    let sheets = parts.iter().find(|p| matches!(&p.grid.form, Form::Sheet(_, others) if *others > 0));
+    let sheets = sheets.map_or(String::new(), |p| format!(", `{}#SHEET` another sheet", p.file_name()));
+    let hint = format!(
+        "{}another `--measurements FILE` joins the file that has them row by row{sheets}; \
+         `--columns j1,j2,...,-,x,y,z` names the columns in their order, `-` skips one",
+        lying(parts, count)
+    );
+    parts[0].refuse(format!("{what}: {}", found.join("; ")), Some(&hint))
+}
+
+/// What to do with a table whose rows are as many as the columns that a pose has.
+fn lying(parts: &[Part], count: usize) -> &'static str {
+    let lies = |p: &Part| {
+        let rows = p.rows.len();
+        !p.is_named() && p.width() > 2 * rows && (rows == 3 || rows == count || rows >= count + 3)
+    };
+    if parts.iter().any(lies) { "if each column is a pose, exchange rows and columns; " } else { "" }
 }
 
 fn unplaced(parts: &[Part], first: &Picked) -> crate::files::Error {
     let hint = format!(
-        "`--columns {}` if these are the columns; look at `--robot`, too: its file must be of this robot",
-        columns_flag(parts, &first.joints, &first.points.first().map_or(Vec::new(), |(_, at)| at.to_vec()), None)
+        "{}`--columns {}` if these are the columns; look at `--robot`, too: its file must be of this robot",
+        lying(parts, first.joints.len()),
+        columns_flag(parts, &first.joints, &first.points.first().map_or(Vec::new(), |(_, at)| at.to_vec()))
     );
     let what = match parts.iter().any(|p| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance))) {
         true => "the joints",
@@ -316,16 +334,7 @@ fn open(parts: &[Part], a: &Way, b: &Way) -> crate::files::Error {
     match (point(a), point(b)) {
         (Some(first), Some(second)) if first != second && a.picked.joints == b.picked.joints => {
             let (first, second) = if first <= second { (first, second) } else { (second, first) };
-            let flag =
-                |points: &[super::part::At; 3]| columns_flag(parts, &a.picked.joints, points, Some(&a.picked.joints));
-            let message = format!(
-                "two points would do, {} and {}: which was measured, and which was commanded or computed, only you know",
-                listed(parts, &first),
-                listed(parts, &second)
-            );
-            let hint =
-                format!("`--columns {}` takes the first, `--columns {}` the second", flag(&first), flag(&second));
-            parts[first[0].part].refuse(message, Some(&hint))
+            pick::asked(parts, &a.picked.joints, [&first, &second], false)
         }
         _ => {
             let message = format!(
@@ -333,9 +342,8 @@ fn open(parts: &[Part], a: &Way, b: &Way) -> crate::files::Error {
                 listed(parts, &a.picked.joints),
                 listed(parts, &b.picked.joints)
             );
-            let flag = |way: &Way| {
-                columns_flag(parts, &way.picked.joints, &point(way).map_or(Vec::new(), |p| p.to_vec()), None)
-            };
+            let flag =
+                |way: &Way| columns_flag(parts, &way.picked.joints, &point(way).map_or(Vec::new(), |p| p.to_vec()));
             let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(a), flag(b));
             parts[0].refuse(message, Some(&hint))
         }

@@ -148,19 +148,31 @@ impl Grid {
 /// none of its rows.
 fn without_brackets(text: &str) -> Option<String> {
     let is_bracket = |c: char| matches!(c, '[' | ']' | '{' | '}' | '(' | ')');
-    let of_numbers = |c: char| c.is_ascii_digit() || " \t\r,;.+-eE".contains(c);
+    let of_numbers = |c: char| c.is_ascii_digit() || " \t\r,;.+-eE\"".contains(c);
     let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
-    let rows = lines.iter().filter(|line| line.chars().all(|c| is_bracket(c) || of_numbers(c)));
+    let is_row = |line: &str| line.chars().all(|c| is_bracket(c) || of_numbers(c));
+    let rows = lines.iter().filter(|line| is_row(line));
     // Names with units in brackets, `J1 [deg]`, close what they open and stand once; a list is opened on one line and closed on another, or on each.
     let closed = |line: &&&str| line.matches(['[', '{', '(']).count() == line.matches([']', '}', ')']).count();
     let bracketed = lines.iter().filter(|line| line.contains(is_bracket)).count();
     let is_list = 2 * bracketed > lines.len() || lines.iter().any(|line| !closed(&line));
-    if !is_list || 2 * rows.count() <= lines.len() {
+    if !is_list || 2 * rows.clone().count() <= lines.len() {
         return None;
     }
+    // Names of lists are none of columns.
+    let lists = rows.clone().all(|line| line.matches(['[', '{', '(']).count() > 1);
     let bare = |line: &str| {
-        let bare: String = line.chars().map(|c| if is_bracket(c) { ' ' } else { c }).collect();
-        bare.trim().trim_end_matches([',', ';']).trim_end().to_owned()
+        if lists && !is_row(line) {
+            return String::new();
+        }
+        let plain = |c: char| match c {
+            _ if is_bracket(c) || c == '"' => ' ',
+            ';' if lists && line.contains(',') => ',',
+            _ => c,
+        };
+        let bare: String = line.chars().map(plain).collect();
+        let bare = bare.trim().trim_end_matches([',', ';']).trim_end();
+        bare.strip_prefix("- ").unwrap_or(bare).trim_start().to_owned()
     };
     Some(text.lines().map(|line| bare(line) + "\n").collect())
 }

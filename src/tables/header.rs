@@ -39,6 +39,7 @@ pub fn split(grid: &Grid) -> Result<Headed> {
     }
     let rows = even(grid, first, names.as_ref().map_or(0, |(_, names)| names.len()))?;
     let width = rows.first().map_or(0, |(_, row)| row.len());
+    let names = names.and_then(|(line, names)| Some((line, without_title(names, width)?)));
     let names = names.map(|(line, names)| fitted(grid, line, names, &rows, width)).transpose()?;
     Ok(Headed { names, rows })
 }
@@ -67,28 +68,52 @@ fn is_comment(row: &Fields) -> bool {
         && !ERRORS.iter().any(|error| row[0].starts_with(error))
 }
 
-/// Whether a row counts its columns.
+/// Whether a row counts its columns, but for that of the rows' own numbers.
 fn counts(row: &Fields) -> bool {
-    let from = row[0].parse::<usize>().unwrap_or(usize::MAX);
-    from < 2 && row.len() >= COUNTED && row.iter().zip(from..).all(|(cell, i)| cell == i.to_string())
+    let skipped = usize::from(row[0].is_empty());
+    let from = row.iter().nth(skipped).and_then(|cell| cell.parse::<usize>().ok()).unwrap_or(usize::MAX);
+    from < 2
+        && row.len() >= COUNTED + skipped
+        && row.iter().skip(skipped).zip(from..).all(|(cell, i)| cell == i.to_string())
 }
 
-/// The names above a row, with the units below them, and their line.
+/// The names above a row, with the units below them and the headings above them, and their line.
 fn above(grid: &Grid, first: usize) -> (u64, Vec<String>) {
     let cells = |at: usize| -> Vec<String> { grid.rows[at].1.iter().map(|c| c.trim().to_owned()).collect() };
-    let (line, last) = (grid.rows[first - 1].0, cells(first - 1));
+    let (mut at, mut names) = (first - 1, cells(first - 1));
     let unit = |cell: &String| cell.is_empty() || Unit::of(cell.trim_matches(['[', ']', '(', ')'])).is_some();
-    if first > 1 && last.iter().all(unit) {
-        let names = cells(first - 2);
-        if names.len() == last.len() {
-            let joined = |(name, unit): (String, &String)| match unit.is_empty() {
-                true => name,
-                false => format!("{name} [{}]", unit.trim_matches(['[', ']', '(', ')'])),
-            };
-            return (grid.rows[first - 2].0, names.into_iter().zip(&last).map(joined).collect());
+    if at > 0 && names.iter().all(unit) && cells(at - 1).len() == names.len() {
+        let joined = |(name, unit): (String, &String)| match unit.is_empty() {
+            true => name,
+            false => format!("{name} [{}]", unit.trim_matches(['[', ']', '(', ')'])),
+        };
+        at -= 1;
+        names = cells(at).into_iter().zip(&names).map(joined).collect();
+    }
+    let filled = |cells: &[String]| cells.iter().filter(|cell| !cell.is_empty()).count();
+    let twice = (1..names.len()).any(|i| !names[i].is_empty() && names[..i].contains(&names[i]));
+    if at > 0 && twice && filled(&cells(at - 1)) > 1 {
+        // Names that stand twice are of what is written above them, in the first of the cells that it spans.
+        let mut heading = String::new();
+        let headings = cells(at - 1).into_iter().chain(std::iter::repeat(String::new()));
+        for (name, above) in names.iter_mut().zip(headings) {
+            heading = if above.is_empty() { heading } else { above };
+            *name = format!("{heading} {name}").trim().to_owned();
         }
     }
-    (line, last)
+    (grid.rows[at].0, names)
+}
+
+/// The names of a line in one piece, which has another delimiter than the rows; `None` where it is a title.
+fn without_title(names: Vec<String>, width: usize) -> Option<Vec<String>> {
+    let [only] = &names[..] else { return Some(names) };
+    if width == 1 {
+        return Some(names);
+    }
+    let only = only.trim_start_matches(['#', '%']);
+    let split = |by: char| -> Vec<String> { only.split(by).map(|word| word.trim().to_owned()).collect() };
+    let blanks = only.split_whitespace().map(str::to_owned).collect();
+    [split(','), split(';'), split('\t'), split('|'), blanks].into_iter().find(|words| words.len() == width)
 }
 
 /// The rows from `first` on, made equally long: cells at the end that are empty everywhere are none.
@@ -104,7 +129,8 @@ fn even(grid: &Grid, first: usize, names: usize) -> Result<Vec<(u64, Fields)>> {
     let mut even = Vec::with_capacity(rows.len());
     for (line, row) in rows {
         if row.len() < width.min(usual) || filled(row) > width {
-            let message = format!("{} cells, but most rows have {usual}", row.len());
+            let cells = if row.len() == 1 { "1 cell".to_owned() } else { format!("{} cells", row.len()) };
+            let message = format!("{cells}, but most rows have {usual}");
             return Err(grid.refuse(*line, message, Some("each row has a cell for each column; an empty one counts")));
         }
         even.push((*line, if row.len() == width { row.clone() } else { Fields::new(row.iter().take(width)) }));
@@ -181,6 +207,18 @@ mod tests {
         assert_eq!(names(&format!("1,2,x\n{rows}")).unwrap(), ["1", "2", "x"]);
         assert_eq!(read(&format!("a,b,c\n{rows}# pause; then on\n1,2,3\n% end\n")).unwrap().rows.len(), 4);
         assert_eq!(names("0,1,2,3\n1.5,2,3,4\n"), None);
+        assert_eq!(names(",0,1,2,3\n0,1.5,2,3,4\n1,2.5,3,4,5\n"), None);
+        for title in ["Units: mm", "// exported by the tracker", "# 3 columns"] {
+            assert_eq!(names(&format!("{title}\n{rows}")), None, "{title}");
+        }
+        for header in ["a b c", "# a\tb\tc", "a;b;c"] {
+            assert_eq!(names(&format!("{header}\n{rows}")).unwrap(), ["a", "b", "c"], "{header}");
+        }
+        let headings = "No.,nominal (mm),,measured,\n,X,Y,X,Y\n1,2.5,3,4,5\n2,3.5,4,5,6\n";
+        let together = ["No.", "nominal (mm) X", "nominal (mm) Y", "measured X", "measured Y"];
+        assert_eq!(names(headings).unwrap(), together);
+        // Names that stand once need nothing of what is above them.
+        assert_eq!(names("robot 7,today,\na,b,c\n1,2,3\n4,5,6.5\n").unwrap(), ["a", "b", "c"]);
         assert_eq!(read("0,1,2,3\n1.5,2,3,4\n").unwrap().rows.len(), 1);
     }
 

@@ -18,6 +18,10 @@ pub enum Unit {
     M,
     /// Micrometres.
     Um,
+    /// Centimetres.
+    Cm,
+    /// Inches.
+    Inch,
 }
 
 impl Unit {
@@ -29,6 +33,8 @@ impl Unit {
             "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some(Unit::Mm),
             "m" | "meter" | "meters" | "metre" | "metres" => Some(Unit::M),
             "um" | "µm" | "μm" | "micron" | "microns" => Some(Unit::Um),
+            "cm" => Some(Unit::Cm),
+            "in" | "inch" | "inches" => Some(Unit::Inch),
             _ => None,
         }
     }
@@ -45,6 +51,8 @@ impl Unit {
             Unit::Rad => value.to_degrees(),
             Unit::M => 1000.0 * value,
             Unit::Um => value / 1000.0,
+            Unit::Cm => 10.0 * value,
+            Unit::Inch => 25.4 * value,
         }
     }
 
@@ -56,6 +64,8 @@ impl Unit {
             Unit::Mm => "mm",
             Unit::M => "m",
             Unit::Um => "um",
+            Unit::Cm => "cm",
+            Unit::Inch => "inches",
         }
     }
 
@@ -104,22 +114,24 @@ const OWN: [&str; 15] = [
     "szz_mm2", "rx_rad", "ry_rad", "rz_rad",
 ];
 
-const JOINT: &str = "j q joint joints theta θ th axis ax a jnt jt jointangle jointpos jointposition angle";
+const JOINT: &str = "j q joint joints theta θ th axis ax a jnt jt jointangle jointpos jointposition angle gelenk achse \
+    articulation axe 关节 关节角 关节角度 轴";
 
 /// Words beside a joint's name or a coordinate's that say nothing new.
 const PLAIN: &str = "angle angles pos position positions value values coord coordinate coordinates p point state reading \
-    xyz in";
+    xyz in koordinate koordinaten 坐标 位置 角度";
 
 /// Words that say that a number is something else.
-const ELSE: &str = "tau torque torques force f current i vel velocity speed v qd dq acc temp temperature dif diff delta \
+const ELSE: &str = "tau torque torques force f current effort i vel velocity speed v qd dq acc temp temperature dif diff delta \
     err error errors e res residual residuals dev deviation std sd sigma unc uncertainty u rms var cov \
     rot rotation roll pitch yaw euler quat quaternion orientation offset normal min";
 
 const COMMANDED: &str = "cmd command commanded nominal nom n t target goal desired des d ref reference set setpoint plan \
-    planned theo theoretical ideal taught programmed fk calc calculated computed c model robot";
+    planned theo theoretical ideal taught programmed fk calc calculated computed c model robot soll theorie consigne \
+    理论 名义 指令 期望 目标 规划 理想 计算 命令";
 
 const MEASURED: &str = "m meas measure measured measurement act actual laser tracker lt leica faro smr camera vicon ndi \
-    mocap observed obs real cmm marker reflector";
+    mocap observed obs real cmm marker reflector ist gemessen mesure mesurée mesuré 实际 实测 测量 激光 跟踪仪";
 
 impl Name {
     /// Reads a name.
@@ -148,9 +160,13 @@ impl Name {
             return other;
         };
         let says = |list: &str, rest: &[String]| rest.iter().any(|word| is_in(list, word));
-        // `target 2` is a reflector, `target` alone where the robot was sent.
-        let counted = rest.windows(2).any(|two| two[0] == "target" && is_index(&two[1]));
-        rest.retain(|word| !(counted && word == "target" || is_in(PLAIN, word)));
+        // `target 2` and `N2` are reflectors, `target` and `n` alone where the robot was sent.
+        let counts = |two: &[String]| {
+            let letter = two[0].chars().count() == 1 && two[1].chars().all(|c| c.is_ascii_digit());
+            (two[0] == "target" && is_index(&two[1]) || letter).then(|| two[0].clone())
+        };
+        let counted = rest.windows(2).find_map(counts);
+        rest.retain(|word| !(counted.as_ref() == Some(word) || is_in(PLAIN, word)));
         let measured = match (says(COMMANDED, &rest), says(MEASURED, &rest)) {
             (true, _) => Some(false),
             (false, true) => Some(true),
@@ -192,10 +208,12 @@ pub fn words(name: &str) -> (Vec<String>, Option<Unit>) {
     for c in plain.chars() {
         let kind = match c {
             _ if c.is_ascii_digit() => 0,
+            // Ideographs stand beside letters without a blank.
+            _ if c.is_alphabetic() && c >= '\u{2e80}' => 3,
             _ if c.is_alphabetic() || c == '°' || c == 'µ' => 1,
             _ => 2,
         };
-        if kind < 2 {
+        if kind != 2 {
             match words.last_mut().filter(|_| before == Some(kind)) {
                 Some(word) => word.extend(c.to_lowercase()),
                 None => words.push(c.to_lowercase().collect()),
@@ -288,6 +306,9 @@ mod tests {
             "joint1_pos",
             "JointAngle1",
             "joint[1]",
+            "Gelenk 1",
+            "关节1",
+            "关节角1(°)",
         ] {
             assert_eq!(what(name).0, What::Joint(1), "{name}");
         }
@@ -307,14 +328,18 @@ mod tests {
         assert_eq!(what("X_meas"), (What::Coordinate(0), None, Some(true)));
         assert_eq!(what("pz"), (What::Coordinate(2), None, None));
         assert_eq!(what("MX Coord."), (What::Coordinate(0), None, Some(true)));
-        for name in ["x_t", "x_cmd", "Nominal X", "xc", "x_nominal [mm]", "target x"] {
+        assert_eq!(what("实测X(mm)"), (What::Coordinate(0), Some(Unit::Mm), Some(true)));
+        assert_eq!(what("x [cm]"), (What::Coordinate(0), Some(Unit::Cm), None));
+        for name in ["x_t", "x_cmd", "Nominal X", "xc", "x_nominal [mm]", "target x", "x_n", "理论X", "x soll"] {
             assert_eq!((what(name).0, what(name).2), (What::Coordinate(0), Some(false)), "{name}");
         }
         for name in ["U(95) X  [mm]", "x_dif", "Rx", "rx", "dx", "vx", "x error", "fx"] {
             assert_eq!(what(name).0, What::Other, "{name}");
         }
         assert_eq!(Name::of("x2").key, ["2"]);
-        assert_eq!(Name::of("target 2 x").key, ["2"]);
+        for name in ["target 2 x", "x_N2", "N2x", "T2.x"] {
+            assert_eq!((Name::of(name).key, what(name).2), (vec!["2".to_owned()], None), "{name}");
+        }
         assert_eq!(what("m_03").0, What::Matrix(0, 3));
         assert_eq!(what("T14").0, What::Matrix(1, 4));
         assert_eq!(what("L").0, What::Distance);

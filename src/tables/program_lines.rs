@@ -1,7 +1,8 @@
 //! Joint targets of a robot program as rows of numbers.
 //!
 //! Programs in the makers' languages are read as `compensate` reads them; of any other text each line counts that holds a list of numbers in
-//! brackets, `j:{1.0,2.0,...}`, `Angles(1.0, 2.0, ...)`, `[1.0, 2.0, ...]`, as long as most of its lines do.
+//! brackets, `j:{1.0,2.0,...}`, `Angles(1.0, 2.0, ...)`, `[1.0, 2.0, ...]`, as long as most of its lines do, or
+//! one of five where each has a word beside the list.
 //! A list is a row as it stands; numbers beyond the joints are those of axes that the robot does not have.
 
 use camino::Utf8Path;
@@ -9,8 +10,8 @@ use camino::Utf8Path;
 use super::fields::{Fields, Form};
 use crate::programs::{self, Joints, Language};
 
-/// Lines in which words tell a program from a table.
-const SEEN: usize = 60;
+/// Moves from which on a program may have more lines of other commands.
+const MOVES: usize = 5;
 
 /// The targets with their lines, and the form. `None` where the text is no program.
 pub(super) fn read(path: &Utf8Path, text: &str, joints: usize) -> Option<(Vec<(u64, Fields)>, Form)> {
@@ -30,13 +31,17 @@ pub(super) fn read(path: &Utf8Path, text: &str, joints: usize) -> Option<(Vec<(u
             return Some((rows, Form::Program { others, degrees: true }));
         }
     }
-    let rows: Vec<(u64, Fields)> =
-        text.lines().zip(1..).filter_map(|(line, number)| Some((number, list(line, joints)?))).collect();
-    // Lines of nothing but numbers in brackets, with more of them than joints and a point behind them, are a table's.
+    let found: Vec<(u64, &str, Fields)> =
+        text.lines().zip(1..).filter_map(|(line, number)| Some((number, line, list(line, joints)?))).collect();
     let is_word = |line: &str| line.chars().any(|c| c.is_alphabetic() && !matches!(c, 'e' | 'E'));
-    let table = !text.lines().take(lines.min(SEEN)).any(is_word)
-        && rows.iter().all(|(_, row)| row.len() >= joints + 3 || row.len() < joints);
-    (2 * rows.len() > lines && !table).then(|| {
+    let words = found.iter().filter(|(_, line, _)| is_word(line)).count();
+    // Lines of nothing but numbers in brackets, with a point behind the joints, are a table's.
+    let whole = |line: &str, row: &Fields| row.len() >= joints + 3 || line.matches(['[', '{', '(']).count() > 1;
+    let table = words == 0 && found.iter().all(|(_, line, row)| whole(line, row));
+    // What a program commands between its moves holds no list, and its moves are more than what a table says of itself.
+    let enough = 2 * found.len() > lines || found.len() >= MOVES && words == found.len() && 5 * found.len() > lines;
+    (enough && !table).then(|| {
+        let rows: Vec<(u64, Fields)> = found.into_iter().map(|(line, _, row)| (line, row)).collect();
         let others = lines - rows.len();
         (rows, Form::Program { others, degrees: false })
     })
@@ -68,6 +73,12 @@ mod tests {
         assert_eq!(rows("a.csv", text, 3).unwrap(), [["2.5", "-29.5", "6", "0"], ["1", "2", "3", "0"]]);
         assert_eq!(rows("a.txt", "c(0).Angles(1,2,3)\nc(1).Angles(4,5,6)\n", 3).unwrap().len(), 2);
         assert_eq!(rows("a.csv", "j1,j2,j3\n1,2,3\n", 3), None);
+        let moves: String = (0..5).map(|k| format!("MoveJoints(1, 2, {k})\nDelay(1)\nGetPose()\n")).collect();
+        assert_eq!(rows("a.txt", &moves, 3).unwrap()[4], ["1", "2", "4"]);
+        // A table says of itself where its tool is.
+        let table: String = (0..9).map(|k| format!("1,2,{k},4,5,6\n")).collect();
+        assert_eq!(rows("a.csv", &format!("# tool [1,2,3]\n{table}"), 3), None);
+        assert_eq!(rows("a.csv", &"\"[1, 2, 3]\",\"[4, 5, 6]\"\n".repeat(6), 3), None);
     }
 
     #[test]

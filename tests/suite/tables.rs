@@ -13,6 +13,8 @@ use stereocal::robot::Robot;
 
 use crate::run::{shared, stderr, stereocal, workplace};
 
+mod forms;
+
 /// Readings that were converted agree to this, deg and mm: rounding of the last digit of a double, times a thousand.
 const SAME: f64 = 1e-9;
 

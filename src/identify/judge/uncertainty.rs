@@ -87,6 +87,11 @@ const P95_OVER_RMS: f64 = 1.613_973;
 impl Expected {
     /// At the poses of the set, the placements fitted to `fitted`.
     pub fn new(formulation: &Formulation, set: &Dataset, fitted: &[usize]) -> Expected {
+        Expected::at(formulation, set, fitted, &(0..set.poses.len()).collect::<Vec<_>>())
+    }
+
+    /// At some rows of the set.
+    pub fn at(formulation: &Formulation, set: &Dataset, fitted: &[usize], rows: &[usize]) -> Expected {
         let joints: Vec<&[f64]> = set.poses.iter().map(|p| p.joints_rad.as_slice()).collect();
         let kinematics = &formulation.rows.kinematics;
         let nominal = kinematics.nominal();
@@ -118,16 +123,17 @@ impl Expected {
                 squares[i] = of_robot + of_frame + 3.0 * (scatter * scatter + smooth_mm2);
             }
         }
-        let Lengths { mean_mm, p95_mm, max_mm } = Lengths::of_squares(&squares);
-        let lengths = squares.iter().map(|s| MEAN_OVER_RMS * s.sqrt());
+        let of_rows = |all: &[f64]| rows.iter().map(|&row| all[row]).collect::<Vec<f64>>();
+        let Lengths { mean_mm, p95_mm, max_mm } = Lengths::of_squares(&of_rows(&squares));
+        let length = |row: &usize| (set.poses[*row].name.clone(), MEAN_OVER_RMS * squares[*row].sqrt());
         Expected {
             mean_mm,
             p95_mm,
             max_mm,
-            of_robot_mm: Lengths::of_squares(&of_robots).mean_mm,
+            of_robot_mm: Lengths::of_squares(&of_rows(&of_robots)).mean_mm,
             scatter_mm: MEAN_OVER_RMS * (3.0 * (scatter * scatter + smooth_mm2)).sqrt(),
             poses: region(set),
-            map: set.poses.iter().map(|p| p.name.clone()).zip(lengths).collect(),
+            map: rows.iter().map(length).collect(),
         }
     }
 }

@@ -113,9 +113,13 @@ impl Record {
             ));
         }
         if !self.widened.is_empty() {
+            // Of a sum nobody knows which of its parts is far off.
+            let sum_of = |name: &String| {
+                i.dependent.iter().find(|sum| sum.split(' ').next() == Some(name)).unwrap_or(name).clone()
+            };
             list.push(format!(
                 "the nominal values of {} are far off: the search limits were widened for them",
-                self.widened.join(", ")
+                self.widened.iter().map(sum_of).collect::<Vec<String>>().join(", ")
             ));
         }
         list

@@ -120,12 +120,12 @@ impl Block {
         }
     }
 
-    fn start(&self) -> Unknowns {
+    fn start(&self, places: &[Place]) -> Unknowns {
         match self {
             Block::Center(_) | Block::Pairwise(_) => Unknowns::Nothing,
             Block::Wire(wire) => Unknowns::Anchor(wire.anchor_mm, 0.0),
             Block::Touch(touch) => Unknowns::Sockets(touch.sockets.clone()),
-            Block::Points(points) => Unknowns::Frame(points.sensor_from_base),
+            Block::Points(points) => Unknowns::Frame(points.start(places)),
         }
     }
 
@@ -173,7 +173,7 @@ impl Block {
     }
 
     fn solve(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> (Unknowns, DVector<f64>, DMatrix<f64>) {
-        let mut at = self.start();
+        let mut at = self.start(places);
         let (mut residuals, mut design) = self.inner(places, extras, scatter, &at);
         if self.unknown_count() == 0 {
             return (at, residuals, design);

@@ -3,13 +3,18 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 
 use super::smooth::Field;
-use crate::geometry::{Transform, rigid_columns, rotation_matrix, rotation_vector_of_matrix, skew};
+use crate::geometry::{
+    Transform, cross_covariance, fitted_frame, rigid_columns, rotation_matrix, rotation_vector_of_matrix, skew,
+};
 use crate::identify::model::kinematics::Place;
 use crate::identify::residuals::raw::Raw;
 use crate::identify::sensor::{Extra, Scatter, Spot};
 
 /// Extra unknowns that turn the target are per mrad.
 const RAD_PER_MRAD: f64 = 1e-3;
+
+/// Points are on a line where they are scattered square to it by less than this share of what they are along it.
+const LINE: f64 = 0.01;
 
 /// The points of one placement.
 #[derive(Debug, Clone)]
@@ -18,6 +23,8 @@ pub struct Points {
     pub spots: Vec<Spot>,
     /// Where the search for the transform starts.
     pub sensor_from_base: Transform,
+    /// Whether the points are on a line.
+    pub on_a_line: bool,
     /// The target's orientation on the flange before the extra unknowns turn it.
     pub flange_from_target: Matrix3<f64>,
     /// Whether orientations are used.
@@ -32,6 +39,23 @@ impl Points {
     /// Three residuals a point, three more an orientation; those of an orientation that was not measured are zero.
     pub fn rows_a_spot(&self) -> usize {
         if self.oriented { 6 } else { 3 }
+    }
+
+    /// Whether points that a robot carries are on a line; parts of a body, which turn with it, never are.
+    pub fn are_on_a_line(spots: &[Spot]) -> bool {
+        let (_, _, spread) = cross_covariance(spots.iter().map(|s| (s.point_mm, s.point_mm, 1.0)));
+        let along = spread.symmetric_eigenvalues().max();
+        spots.iter().all(|s| s.on_body_mm.is_none()) && spread.trace() - along < LINE * LINE * along
+    }
+
+    /// Where the search for the transform starts. Of points on a line the turn about it has a second optimum, and small steps may end in either:
+    /// they start from the best turn for equal weights.
+    pub(super) fn start(&self, places: &[Place]) -> Transform {
+        if !self.on_a_line {
+            return self.sensor_from_base;
+        }
+        let weighted = |s: &Spot| (places[s.pose].point_mm, s.point_mm, s.weight * s.weight);
+        fitted_frame(self.spots.iter().map(weighted))
     }
 
     /// Numbers that were measured with some weight.

@@ -382,7 +382,9 @@ impl Inputs<'_> {
         let scatter = &self.spec.scatter;
         let block = |(spots, sensor_from_base): (Vec<Spot>, Transform)| {
             let target = target.clone();
-            let mut points = Points { spots, sensor_from_base, flange_from_target, oriented, target, field: None };
+            let on_a_line = Points::are_on_a_line(&spots);
+            let mut points =
+                Points { spots, sensor_from_base, on_a_line, flange_from_target, oriented, target, field: None };
             points.field = scatter.smooth.map(|error| {
                 let white = |s: &Spot| (s.point_mm, scatter.whitener(&s.covariance_mm2) * s.weight);
                 let spots: Vec<_> = points.spots.iter().map(white).collect();

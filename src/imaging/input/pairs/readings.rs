@@ -17,6 +17,9 @@ use crate::imaging::{Result, Side};
 /// Folders that are compared with each other: among more, no two are the cameras' without being named.
 const MOST_COMPARED: usize = 32;
 
+/// Folders of two pictures each from which on they are those of pairs: nobody has so many cameras and two pictures of each.
+const PAIRS_AT_LEAST: usize = 5;
+
 /// What tells left from right, the strongest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Told {
@@ -91,7 +94,7 @@ pub fn all(folders: &[Folder], by: Option<PairBy>) -> Vec<Result<Reading>> {
     readings
 }
 
-/// A folder for each pair: two pictures in each of them, called alike in all and by words for the side.
+/// A folder for each pair: two pictures in each of them, called alike in all and by words for the side; of many also by two numbers or letters.
 fn by_folders(below: &[&Folder]) -> Option<Reading> {
     let (first, rest) = below.split_first().filter(|(_, rest)| !rest.is_empty())?;
     let names = |folder: &Folder| -> Option<[String; 2]> {
@@ -103,10 +106,14 @@ fn by_folders(below: &[&Folder]) -> Option<Reading> {
     if rest.iter().filter(alike).count() < rest.len() {
         return None;
     }
-    let (told, side) = Reach::ALL.into_iter().zip([Told::Words, Told::Letters]).find_map(|(reach, told)| {
+    let by_words = Reach::ALL.into_iter().zip([Told::Words, Told::Letters]).find_map(|(reach, told)| {
         let [a, b] = [&called[0], &called[1]].map(|name| Open::new(name, reach));
         a.side_beside(&b).map(|side| (told, side))
-    })?;
+    });
+    let many = below.len() >= PAIRS_AT_LEAST && differ_in_one(&called[0], &called[1]);
+    let first_is_left = natural_order(&called[0], &called[1]).is_lt();
+    let counted = (Told::Alike, if first_is_left { Side::Left } else { Side::Right });
+    let (told, side) = by_words.or(many.then_some(counted))?;
     let (left, right) = if side == Side::Left { (0, 1) } else { (1, 0) };
     let picture = |at: usize| below.iter().map(move |folder| folder.pictures[at].clone());
     let pairs = below.iter().zip(picture(left).zip(picture(right)));
@@ -141,21 +148,21 @@ fn tell(first: &Folder, second: &Folder, alone: bool) -> Option<(Told, Side)> {
         ([Some(_), _] | [_, Some(_)], _) | (_, [Some(_), _] | [_, Some(_)]) => return None,
         _ => (),
     }
-    let (a, b) = (tokens(&first.below), tokens(&second.below));
-    let differing: Vec<(&str, &str)> = a.iter().copied().zip(b.iter().copied()).filter(|(a, b)| a != b).collect();
-    let alike = match differing.as_slice() {
-        [(a, b)] => {
-            let number = |s: &str| s.chars().all(|c| c.is_ascii_digit());
-            let letter = |s: &str| s.chars().count() == 1 && s.chars().all(char::is_alphabetic);
-            (number(a) && number(b)) || (letter(a) && letter(b))
-        }
-        _ => false,
-    };
-    match (alike && a.len() == b.len(), alone) {
+    match (differ_in_one(&first.below, &second.below), alone) {
         (true, _) => Some((Told::Alike, Side::Left)),
         (false, true) => Some((Told::Two, Side::Left)),
         (false, false) => None,
     }
+}
+
+/// Whether two names differ in one number or in one letter alone.
+fn differ_in_one(a: &str, b: &str) -> bool {
+    let (a, b) = (tokens(a), tokens(b));
+    let differing: Vec<(&str, &str)> = a.iter().copied().zip(b.iter().copied()).filter(|(a, b)| a != b).collect();
+    let [(x, y)] = differing[..] else { return false };
+    let number = |s: &str| s.chars().all(|c| c.is_ascii_digit());
+    let letter = |s: &str| s.chars().count() == 1 && s.chars().all(char::is_alphabetic);
+    a.len() == b.len() && (number(x) && number(y) || letter(x) && letter(y))
 }
 
 /// Two paths from the first folder on in which they differ.

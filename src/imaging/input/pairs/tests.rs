@@ -256,6 +256,20 @@ fn a_folder_may_hold_one_pair() {
     assert_eq!(found.pairs.iter().map(|p| p.pair.as_str()).collect::<Vec<_>>(), ["pair_2", "pair_10"]);
     assert_eq!(found.taken, "2 pairs by name: left pair_*/left.png, right pair_*/right.png");
     assert_eq!(names(&["001/cam_L.png", "001/cam_R.png", "002/cam_L.png", "002/cam_R.png"]), ["001", "002"]);
+    // Many folders with two pictures each are no cameras; a few may be.
+    for two in [["im0", "im1"], ["view_a", "view_b"], ["10", "9"]] {
+        let files: Vec<String> = (1..=5).flat_map(|k| two.map(|name| format!("scene{k}/{name}.png"))).collect();
+        let (_keep, path) = folder(&files);
+        let found = read(&path, None).unwrap_or_else(|e| panic!("{two:?}: {}", crate::diagnostic::report(&e)));
+        assert_eq!(
+            found.pairs.iter().map(|p| p.pair.as_str()).collect::<Vec<_>>(),
+            ["scene1", "scene2", "scene3", "scene4", "scene5"]
+        );
+        let left = if two[0] == "10" { "9.png" } else { &format!("{}.png", two[0]) };
+        assert!(found.pairs[0].left.as_str().ends_with(left), "{}", found.taken);
+        assert!(found.taken.ends_with("no word tells left from right: the first by name is left"), "{}", found.taken);
+        assert!(complaint(&files[..8].iter().map(String::as_str).collect::<Vec<_>>(), None).contains("ways"));
+    }
     // Two cameras with two pictures each are no two pairs of folders.
     assert_eq!(names(&["cam1/1.png", "cam1/2.png", "cam2/1.png", "cam2/2.png"]), ["1", "2"]);
     let said = complaint(&["a/left.png", "a/right.png", "b/left.png", "b/right.png", "b/top.png"], None);
