@@ -213,3 +213,63 @@ pub fn turn(
 ) -> Vector3<f64> {
     rotation_vector_of_matrix(&(sensor_from_flange * flange_from_target * measured.transpose()))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3xX, Point3};
+
+    use super::*;
+    use crate::geometry::transform;
+
+    /// Forty points of a robot along 300 mm, off the line by up to `off_mm`, and as a sensor reads them that stands turned about it.
+    fn along(off_mm: f64, sensor_from_base: Transform, start: Transform) -> (Points, Vec<Place>) {
+        let at = |k: usize| {
+            let k = k as f64;
+            Point3::new(500.0 + k * 300.0 / 39.0, off_mm * (1.3 * k).sin(), 200.0 + off_mm * (2.1 * k).cos())
+        };
+        let place = |k| Place {
+            point_mm: at(k),
+            rotation: Matrix3::identity(),
+            point_columns: Matrix3xX::zeros(0),
+            rotation_columns: Matrix3xX::zeros(0),
+        };
+        let spot = |k| Spot {
+            pose: k,
+            point_mm: sensor_from_base * at(k),
+            covariance_mm2: Matrix3::identity(),
+            on_body_mm: None,
+            rotation: None,
+            weight: 1.0,
+            extra: Matrix3xX::zeros(0),
+        };
+        let spots: Vec<Spot> = (0..40).map(spot).collect();
+        let on_a_line = Points::are_on_a_line(&spots);
+        let (flange_from_target, target) = (Matrix3::identity(), Vec::new());
+        let points = Points {
+            spots,
+            sensor_from_base: start,
+            on_a_line,
+            flange_from_target,
+            oriented: false,
+            target,
+            field: None,
+        };
+        (points, (0..40).map(place).collect())
+    }
+
+    #[test]
+    fn points_on_a_line_start_at_the_best_turn_about_it_and_others_where_they_were_told() {
+        for turn_rad in [0.3, 1.7, 3.1] {
+            let sensor_from_base = transform(Vector3::new(turn_rad, 0.0, 0.0), Vector3::new(10.0, -70.0, 900.0));
+            let elsewhere = transform(Vector3::new(turn_rad + 3.0, 0.1, 0.0), Vector3::zeros());
+            for off_mm in [0.01, 0.3, 1.0] {
+                let (points, places) = along(off_mm, sensor_from_base, elsewhere);
+                let start = points.start(&places);
+                let misses = points.spots.iter().map(|s| (start * places[s.pose].point_mm - s.point_mm).norm());
+                assert!(points.on_a_line && misses.fold(0.0, f64::max) < 1e-6, "{turn_rad} {off_mm}");
+            }
+            let (points, places) = along(30.0, sensor_from_base, elsewhere);
+            assert_eq!((points.on_a_line, points.start(&places)), (false, elsewhere));
+        }
+    }
+}
