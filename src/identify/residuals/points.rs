@@ -262,7 +262,7 @@ mod tests {
         for turn_rad in [0.3, 1.7, 3.1] {
             let sensor_from_base = transform(Vector3::new(turn_rad, 0.0, 0.0), Vector3::new(10.0, -70.0, 900.0));
             let elsewhere = transform(Vector3::new(turn_rad + 3.0, 0.1, 0.0), Vector3::zeros());
-            for off_mm in [0.01, 0.3, 1.0] {
+            for off_mm in [0.01, 0.3, 0.6] {
                 let (points, places) = along(off_mm, sensor_from_base, elsewhere);
                 let start = points.start(&places);
                 let misses = points.spots.iter().map(|s| (start * places[s.pose].point_mm - s.point_mm).norm());
