@@ -266,7 +266,8 @@ mod tests {
                 let (points, places) = along(off_mm, sensor_from_base, elsewhere);
                 let start = points.start(&places);
                 let misses = points.spots.iter().map(|s| (start * places[s.pose].point_mm - s.point_mm).norm());
-                assert!(points.on_a_line && misses.fold(0.0, f64::max) < 1e-6, "{turn_rad} {off_mm}");
+                let miss = misses.fold(0.0, f64::max);
+                assert!(points.on_a_line && miss < 1e-6, "{turn_rad} rad {off_mm} mm: {} {miss}", points.on_a_line);
             }
             let (points, places) = along(30.0, sensor_from_base, elsewhere);
             assert_eq!((points.on_a_line, points.start(&places)), (false, elsewhere));
