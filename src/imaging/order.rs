@@ -6,7 +6,7 @@
 //! numbering nearest to their common direction, and right pictures the one nearest to the direction that most of them
 //! have relative to their left pictures: cameras of a rig keep their roll against each other.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::Vector2;
 
@@ -56,18 +56,20 @@ fn turns_to(angle: f64, reference: f64, step: usize) -> usize {
     steps as usize * step % 4
 }
 
-/// The difference of two angles, in (-pi, pi].
-pub fn angle_between(a: f64, b: f64) -> f64 {
-    let d = (a - b).rem_euclid(TAU);
-    if d > PI { d - TAU } else { d }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use nalgebra::Point2;
 
     use super::super::lattice::Lattice;
     use super::*;
+
+    /// The difference of two angles, in (-pi, pi].
+    fn angle_between(a: f64, b: f64) -> f64 {
+        let d = (a - b).rem_euclid(TAU);
+        if d > PI { d - TAU } else { d }
+    }
 
     fn board(squares: &str) -> Board {
         Board::checker(squares.parse().unwrap(), 10.0)

@@ -9,7 +9,7 @@ mod pitch;
 pub mod printed;
 mod squares;
 
-pub use certificate::{Board, Kind, MOST_STRETCH, SQUARES_MM};
+pub use certificate::{Board, Kind, SQUARES_MM};
 pub use error::Error;
 pub use layout::{Layout, Print};
 pub use pitch::Pitch;

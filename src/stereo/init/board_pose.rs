@@ -3,7 +3,7 @@
 //! In: a rig and the corners of a pair. Out: `left_from_board`. Method: start from each picture's homography of undistorted rays,
 //! then a bundle of the pose alone over both pictures; the better end wins. Goes wrong: too few corners, corners on a line.
 
-use nalgebra::{Matrix6, Point2};
+use nalgebra::Point2;
 
 use crate::geometry::Transform;
 use crate::imaging::Side;
@@ -13,9 +13,7 @@ use crate::stereo::data::view::View;
 use crate::stereo::init::homography::{homography, pose};
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
-use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::Loss;
-use crate::stereo::solve::uncertainty;
 
 /// A board's pose and how well it fits.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,11 +38,6 @@ pub fn refit(shared: &Shared, view: &View, known: Transform, loss: Loss) -> Opti
     search(shared, view, known, loss, Search::ROUGH)
 }
 
-/// Fits the pose from a start that is known, to the limit of rounding.
-pub fn refine(shared: &Shared, view: &View, start: Transform, loss: Loss) -> Option<PoseFit> {
-    search(shared, view, start, loss, Search::EXACT)
-}
-
 /// The pose of a pair on a rig that hardly differs from one on which the pose is known.
 pub fn follow(shared: &Shared, view: &View, known: Transform) -> Option<PoseFit> {
     search(shared, view, known, Loss::Squared, Search::TRIAL)
@@ -55,12 +48,6 @@ fn search(shared: &Shared, view: &View, start: Transform, loss: Loss, search: Se
     let solution = levenberg_marquardt::solve(std::slice::from_ref(view), &Layout::POSES_ONLY, values, loss, search);
     let left_from_board = *solution.values.poses.first()?;
     solution.cost.is_finite().then_some(PoseFit { left_from_board, cost: solution.cost })
-}
-
-/// Covariance of a fitted pose from the corners alone, with unit variance of the whitened residuals.
-pub fn covariance(shared: &Shared, view: &View, left_from_board: &Transform) -> Option<Matrix6<f64>> {
-    let values = Values { shared: shared.clone(), poses: vec![*left_from_board] };
-    uncertainty::of_solution(std::slice::from_ref(view), &Layout::POSES_ONLY, &Priors::NONE, &values)?.poses.pop()
 }
 
 /// `left_from_board` as one picture alone shows it, from the homography of its undistorted rays. `None` where its corners give none.

@@ -64,13 +64,6 @@ pub struct PairMisfit {
     pub worst_first: Vec<String>,
 }
 
-impl Series {
-    /// The other pairs with what happened to them.
-    pub fn skipped(&self) -> Vec<Skipped> {
-        self.discarded.iter().map(DiscardedPair::skipped).collect()
-    }
-}
-
 /// What a pair leaves on a rig: px, and its pose. `None` where it has none.
 type Misfit = Option<(f64, Transform)>;
 

@@ -6,12 +6,8 @@
 use nalgebra::{DMatrix, DMatrixViewMut, Matrix6};
 use rayon::prelude::*;
 
-use crate::stereo::data::view::View;
-use crate::stereo::model::parameters::{Layout, Values};
-use crate::stereo::solve::levenberg_marquardt::equations;
+use crate::stereo::model::parameters::Layout;
 use crate::stereo::solve::normal_equations::{self, Block, Equations};
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::{Rig, Side};
 
 /// A focal length that is known no better than this share is not known.
@@ -55,12 +51,7 @@ impl Uncertainty {
     }
 }
 
-/// Covariance at a minimum. `None` where the views do not determine the unknowns.
-pub fn of_solution(views: &[View], layout: &Layout, priors: &Priors, values: &Values) -> Option<Uncertainty> {
-    of_equations(&equations(views, layout, priors, values, Loss::Squared)?)
-}
-
-/// The same from the equations at the minimum.
+/// Covariance at a minimum, from the equations there. `None` where the views do not determine the unknowns.
 pub fn of_equations(equations: &Equations) -> Option<Uncertainty> {
     let count = equations.count();
     let shared =

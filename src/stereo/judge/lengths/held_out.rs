@@ -12,7 +12,7 @@ use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::view::View;
 use crate::stereo::judge::doubtful_corners::{self, DoubtfulCorners};
 use crate::stereo::judge::lengths::{self, Axis, Measured, Range, all_ranges, mean, measure};
-use crate::stereo::judge::verdict::{Expansion, Extremes, Verdict};
+use crate::stereo::judge::verdict::{Expansion, Extremes};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::select::cross_validation::{self, FOLDS, Without};
 use crate::stereo::solve::uncertainty;
@@ -75,11 +75,6 @@ impl Accuracy {
     /// pictures), which both see alike: it moves no point.
     pub fn disagreement_share(&self) -> f64 {
         self.rays_chi_square.clamp(f64::MIN_POSITIVE, 1.0)
-    }
-
-    /// What the held-out pairs say.
-    pub fn verdict(&self, tolerance_mm: f64) -> Verdict {
-        self.extremes.verdict(tolerance_mm)
     }
 }
 
