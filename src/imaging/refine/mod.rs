@@ -6,13 +6,11 @@ mod coarse;
 mod curvature;
 pub mod fields;
 mod full_size;
-pub mod illumination;
+pub mod light;
 mod measured;
 mod outlying_pixels;
 pub mod saddle_fit;
 mod scatter;
-mod stray;
-mod veil;
 mod whole_board;
 mod windows;
 

@@ -6,8 +6,8 @@
 //! full ones do. Where some of the full windows tell that edges bend much from crossing to crossing, all are cut down. Where the larger
 //! window does not agree with the smaller one, or the four arms of a corner not with each other (`acceptance`), something hides a part of
 //! it, and the largest window that is free of it is kept. Stray light that adds to dark and bright alike is fitted where the board shows
-//! it (`stray`). Last, corners get the covariances that they have by what their arms tell (`scatter`), also those that no window shows well, and
-//! share what they know of the light (`illumination`), which counts from the picture's veil (`veil`). Goes wrong: a corner without contrast,
+//! it. Last, corners get the covariances that they have by what their arms tell (`scatter`), also those that no window shows well, and
+//! share what they know of the light, which counts from the picture's veil (`light`). Goes wrong: a corner without contrast,
 //! hidden, or cut off by the border; it is dropped, the others stay.
 
 use nalgebra::{Matrix2, Vector2};
@@ -16,12 +16,13 @@ use super::cell::Cell;
 use super::coarse::{coarse, enlarged};
 use super::curvature::{Bend, Point, Rule, bends};
 use super::full_size::Full;
+use super::light::{illumination, stray};
 use super::measured::Measured;
 use super::saddle_fit::Model;
 use super::saddle_fit::window::{Sample, Window};
 use super::scatter::Scatter;
 use super::windows::{Windows, bends_by, usual};
-use super::{acceptance, full_size, illumination, scatter, stray};
+use super::{acceptance, full_size, scatter};
 use crate::imaging::Corner;
 use crate::imaging::detect::Detected;
 use crate::imaging::image::{Grey, Picture};

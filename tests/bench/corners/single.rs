@@ -7,7 +7,7 @@ use stereocal::imaging::detect::Detected;
 use stereocal::imaging::image::pyramid::Level;
 use stereocal::imaging::image::{Grey8, Picture};
 use stereocal::imaging::lattice::Lattice;
-use stereocal::imaging::refine::illumination;
+use stereocal::imaging::refine::light::illumination;
 use stereocal::imaging::refine::{self, Measured};
 
 use super::corner_patch::{Spread, draw};

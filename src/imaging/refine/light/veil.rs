@@ -31,7 +31,7 @@ struct Pair {
 }
 
 /// The veil of a picture, a whole grey value; zero where the board does not tell.
-pub(super) fn level<T: Copy + Into<f64>>(image: &Image<T>, clip_level: f64, places: &Places) -> f64 {
+pub fn level<T: Copy + Into<f64>>(image: &Image<T>, clip_level: f64, places: &Places) -> f64 {
     let pairs = pairs(image, clip_level, places);
     let found = line(&pairs).and_then(|(veil, sigma)| {
         let contrast = median(pairs.iter().map(|p| (p.even - p.odd).abs()))?;

@@ -9,14 +9,14 @@ use nalgebra::{Matrix2, Vector2};
 use crate::statistics::median;
 
 /// A variance of slopes that bounds nothing: all of the range of 16 bits within a px.
-pub(super) const UNBOUND: f64 = 4e9;
+pub const UNBOUND: f64 = 4e9;
 /// Standard errors beyond which a variance is none by chance.
 const BEYOND_CHANCE: f64 = 3.0;
 /// A slope that is known so many times less well than the usual one tells nothing, in variances.
 const UNKNOWN: f64 = 10.0;
 
 /// Variance of the slopes along an axis beyond their own; `None` where they are none but for chance.
-pub(super) fn variance(slopes: &[(Vector2<f64>, Matrix2<f64>)]) -> Option<f64> {
+pub fn variance(slopes: &[(Vector2<f64>, Matrix2<f64>)]) -> Option<f64> {
     let usual = median(slopes.iter().map(|(_, own)| own.trace()))?;
     let known = slopes.iter().filter(|(_, own)| own.trace() < UNKNOWN * usual);
     let beyond: Vec<f64> = known.map(|(slope, own)| (slope.norm_squared() - own.trace()) / 2.0).collect();

@@ -12,8 +12,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix2xX, Point2, Vector2};
 
-use super::Measured;
 use crate::imaging::lattice::Lattice;
+use crate::imaging::refine::Measured;
 use crate::statistics::median;
 
 /// Fewest corners for a plane and for a second degree.
@@ -107,8 +107,8 @@ fn draw(corner: &mut Measured, light: Vector2<f64>, variance: f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::saddle_fit::{Fit, Misfit, Model};
     use super::*;
+    use crate::imaging::refine::saddle_fit::{Fit, Misfit, Model};
 
     /// A board of fits whose places are off by what their gradients are off by, times a blur of 2 px squared; deviations of
     /// the gradients repeat with period `prime`.
