@@ -11,6 +11,30 @@ fn done(folder: &Path, arguments: &[&str]) -> String {
 }
 
 #[test]
+fn what_happened_over_the_pairs_stands_before_the_checks() {
+    let folder = workplace();
+    let world = folder.path();
+    let simulate =
+        ["simulate", "--preset", "small", "--size", "960", "--check-pairs", "10", "--samples", "4", "--out", "."];
+    done(world, &[&simulate[..], &["--verify", "0"]].concat());
+    let page_of = |board: &str, out: &str| {
+        let output = stereocal(world, &["camera-check", "check/", "--board", board, "--out", out]);
+        let page = std::fs::read_to_string(world.join(out).join("camera-check.html")).unwrap();
+        (stdout(&output), page)
+    };
+    let (said, page) = page_of("checker:20x20:10", "as-it-is");
+    assert!(!said.contains("over the pairs") && !page.contains("What happened over the pairs"), "{said}");
+    for (side, ratio) in [("10x9.94", "not 1.0060 times"), ("10x9.8", "not 1.0204 times")] {
+        let (said, page) = page_of(&format!("checker:20x20:{side}"), side);
+        assert!(said.contains("1.0000 times as wide as high") && said.contains(ratio), "{said}");
+        let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("{side}: no `{text}`"));
+        assert!(at("What happened over the pairs") < at("Checks that are not passed"));
+        // The board is as good as it was, and nothing of it is in the rig.
+        assert!(!page.contains("a better board") && !page.contains("included in the uncertainty"), "{side}");
+    }
+}
+
+#[test]
 fn one_page_of_the_day() {
     let folder = workplace();
     let world = folder.path();

@@ -32,6 +32,11 @@ pub fn worst_first(judged: &Judged) -> Vec<usize> {
     order
 }
 
+/// What was found over the pairs.
+fn happened(judged: &Judged) -> Vec<String> {
+    judged.findings.iter().map(|finding| finding.action.clone()).collect()
+}
+
 /// Warnings with their reasons, but for those whose reason stands in the table of evidence.
 fn warnings(judged: &Judged) -> Vec<String> {
     let said = |warning: &Warning| judged.evidence.iter().any(|line| line.detail == warning.reason);
@@ -47,6 +52,7 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
     };
     let content = html! {
         (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), page::capital(&deciding(judged)))))
+        @if !judged.findings.is_empty() { p { "What happened over the pairs:" } (page::warnings(&happened(judged))) }
         (ledger(judged))
         @if !judged.advice.is_empty() { p { "What to photograph next:" } (page::warnings(&judged.advice)) }
         @if !judged.warnings.is_empty() { p { "What to do, and what else to know:" } }

@@ -12,6 +12,7 @@ use crate::stereo::judge::moves::KnownMoves;
 use crate::stereo::judge::residual_correlation::{self, ResidualPattern};
 use crate::stereo::judge::verdict::{Expansion, Verdict};
 use crate::stereo::judge::view_coverage::Coverage;
+use crate::stereo::pairs::Cause;
 use crate::stereo::volume::Extent;
 use crate::stereo::volume::lengths::VolumeLengths;
 
@@ -96,7 +97,10 @@ impl Judged {
         // The held-out lengths are the result itself and stand in its first line.
         let doubts = evidence.iter().skip(1).filter(|line| line.allows != Verdict::Pass);
         warnings.extend(doubts.map(Evidence::warning));
-        warnings.extend(print_scatter(calibration, &accuracy, tolerance_mm));
+        // A board that was said wrongly is no board that scatters.
+        if !findings.iter().any(|finding| finding.cause == Cause::OtherBoard.word()) {
+            warnings.extend(print_scatter(calibration, &accuracy, tolerance_mm));
+        }
         Judged {
             tolerance_mm,
             verdict: evidence::verdict(&evidence),

@@ -17,11 +17,15 @@ pub(super) fn findings(facts: &Facts) -> Evidence {
         "no change over the pairs that were used: no step, drift or change of focus beyond their scatter".to_owned()
     } else {
         let told: Vec<&str> = left.iter().map(|finding| finding.action.as_str()).collect();
-        format!(
-            "{}. It is included in the uncertainty of the rig; a change of a length of less than {:.0} % of the tolerance does not affect the verdict",
-            told.join("; "),
-            100.0 * MATERIAL_SHARE
-        )
+        let effect = if left.iter().any(|finding| finding.effect_mm.is_some()) {
+            format!(
+                "It is included in the uncertainty of the rig; a change of a length of less than {:.0} % of the tolerance does not affect the verdict",
+                100.0 * MATERIAL_SHARE
+            )
+        } else {
+            "What it does to a length stands in the held-out lengths".to_owned()
+        };
+        format!("{}. {effect}", told.join("; "))
     };
     Evidence::of_length(
         "changes over the pairs",
