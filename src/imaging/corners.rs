@@ -74,6 +74,35 @@ pub struct Skipped {
     pub reason: String,
 }
 
+/// The first names, and how many more there are.
+pub fn named(pairs: &[String]) -> String {
+    const MOST: usize = 8;
+    let more = pairs.len().saturating_sub(MOST);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{}{more}", pairs.iter().take(MOST).cloned().collect::<Vec<_>>().join(", "))
+}
+
+/// Why pairs were skipped, a line a reason, those of most pairs first.
+pub fn reasons(skipped: &[Skipped]) -> String {
+    /// More would push the message itself off the screen.
+    const MOST: usize = 8;
+    let mut by_reason: Vec<(&str, Vec<String>)> = Vec::new();
+    for Skipped { pair, reason } in skipped {
+        match by_reason.iter_mut().find(|(known, _)| known == reason) {
+            Some((_, pairs)) => pairs.push(pair.clone()),
+            None => by_reason.push((reason, vec![pair.clone()])),
+        }
+    }
+    by_reason.sort_by_key(|(_, pairs)| std::cmp::Reverse(pairs.len()));
+    let mut text: String =
+        by_reason.iter().take(MOST).map(|(reason, pairs)| format!("\n  {}: {reason}", named(pairs))).collect();
+    let others: usize = by_reason.iter().skip(MOST).map(|(_, pairs)| pairs.len()).sum();
+    if others > 0 {
+        text.push_str(&format!("\n  and {others} more for other reasons"));
+    }
+    text
+}
+
 /// A pair at least one of whose pictures leaves its numbers open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenPair {
@@ -102,4 +131,24 @@ pub struct Corners {
     pub open: Vec<OpenPair>,
     /// What a person should know beside that: files left out, a size that was guessed, another board that was seen.
     pub notes: Vec<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_is_said_once_with_its_pairs() {
+        let pair = |name: String, reason: &str| Skipped { pair: name, reason: reason.to_owned() };
+        let mut skipped = vec![pair("a".to_owned(), "no board found")];
+        skipped.extend((1..=12).map(|k| pair(format!("{k:02}"), "another board")));
+        skipped.extend((0..9).map(|k| pair(format!("b{k}"), &format!("reason {k}"))));
+        let said = reasons(&skipped);
+        assert!(
+            said.starts_with("\n  01, 02, 03, 04, 05, 06, 07, 08 and 4 more: another board\n  a: no board found\n"),
+            "{said}"
+        );
+        assert!(said.ends_with("\n  b5: reason 5\n  and 3 more for other reasons"), "{said}");
+        assert_eq!(reasons(&[]), "");
+    }
 }

@@ -3,7 +3,7 @@
 use camino::Utf8PathBuf;
 
 use super::board::{self, Board, Kind, Squares};
-use super::corners::Skipped;
+use super::corners::{Skipped, reasons};
 use crate::diagnostic::Explain;
 
 /// Result of looking for corners.
@@ -125,17 +125,6 @@ fn tally(counts: &[((usize, usize), usize)], of: usize) -> String {
         [] => format!("none of {of} pictures shows a whole checkerboard with a margin all round"),
         each => format!("of {of} pictures of whole checkerboards, {}", each.join(", ")),
     }
-}
-
-/// The first few pairs that were skipped, a line each.
-fn reasons(skipped: &[Skipped]) -> String {
-    /// More would push the message itself off the screen.
-    const MOST: usize = 8;
-    let mut text: String = skipped.iter().take(MOST).map(|s| format!("\n  {}: {}", s.pair, s.reason)).collect();
-    if skipped.len() > MOST {
-        text.push_str(&format!("\n  and {} more", skipped.len() - MOST));
-    }
-    text
 }
 
 impl Explain for Error {

@@ -1,6 +1,7 @@
 //! What can go wrong between corners and points.
 
 use crate::diagnostic::{Explain, Status};
+use crate::imaging::corners::{named, reasons};
 use crate::imaging::{Side, Skipped};
 use crate::stereo::Lens;
 
@@ -9,7 +10,7 @@ use crate::stereo::Lens;
 #[non_exhaustive]
 pub enum Error {
     /// Not enough pairs to calibrate and to hold one out.
-    #[error("only {found} of {total} pairs can be used; calibration needs {needed}{}", list(.skipped))]
+    #[error("only {found} of {total} pairs can be used; calibration needs {needed}{}", reasons(.skipped))]
     TooFewPairs {
         /// Usable pairs.
         found: usize,
@@ -46,7 +47,7 @@ pub enum Error {
     #[error(
         "the pairs contradict each other: only {agreeing} of {total} fit one rig; half of them miss it by {usual_px:.1} px and more, \
          each camera alone by {alone_px:.2} px{}",
-        list(.bad)
+        reasons(.bad)
     )]
     Contradiction {
         /// Pairs that fit one rig.
@@ -89,7 +90,7 @@ pub enum Error {
         pairs: [String; 2],
     },
     /// The views do not tell the cameras.
-    #[error("the views are too similar to tell the cameras{}{}", focal(.focal_sigma), list(.skipped))]
+    #[error("the views are too similar to tell the cameras{}{}", focal(.focal_sigma), reasons(.skipped))]
     Undetermined {
         /// Worst relative standard deviation of a focal length, where there is one.
         focal_sigma: Option<f64>,
@@ -160,18 +161,6 @@ pub enum Error {
         /// Needed.
         height: u32,
     },
-}
-
-/// The first names, and how many more there are.
-pub fn named(pairs: &[String]) -> String {
-    const MOST: usize = 8;
-    let more = pairs.len().saturating_sub(MOST);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    format!("{}{more}", pairs.iter().take(MOST).cloned().collect::<Vec<_>>().join(", "))
-}
-
-fn list(pairs: &[Skipped]) -> String {
-    pairs.iter().map(|s| format!("\n  {}: {}", s.pair, s.reason)).collect()
 }
 
 fn moved(list: &[(String, String)]) -> String {

@@ -40,6 +40,6 @@ pub(crate) mod synthetic;
 mod tests;
 
 pub use crate::imaging::Side;
-pub use error::{Error, named};
+pub use error::Error;
 pub use model::camera::{Camera, Lens};
 pub use model::rig::Rig;

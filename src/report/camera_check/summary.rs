@@ -1,13 +1,13 @@
 //! The verdict in words, and the table on stdout.
 
 use crate::files::OutDir;
+use crate::imaging::corners::named;
 use crate::report::table::{Table, number};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::lengths::{Axis, Range};
 use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::judge::verdict::Verdict;
-use crate::stereo::named;
 use crate::stereo::pairs::Cause;
 
 /// Rows of the table on stdout along each axis.
