@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::detect::count::squares_of;
+use super::detect::count::{Seen, squares_of};
 use super::image::{self, Claim};
 use super::input::pairs::Pairing;
 use super::{Error, Mosaic, Result, Squares};
@@ -22,6 +22,8 @@ pub struct Counted {
     pub squares: Squares,
     /// Pictures that show so many.
     pub pictures: usize,
+    /// True where these show a margin behind them; else they show no more, and hardly any other does.
+    pub ends: bool,
     /// Pictures in all.
     pub of: usize,
 }
@@ -30,7 +32,7 @@ pub struct Counted {
 pub fn count_squares(pairing: &Pairing, mosaic: Option<Mosaic>) -> Result<Counted> {
     let paths: Vec<_> = pairing.pairs.iter().flat_map(|files| [&files.left, &files.right]).collect();
     let bar = progress::bar("counting the board's squares", paths.len() as u64);
-    let seen: Vec<Option<Squares>> = paths
+    let seen: Vec<Option<Seen>> = paths
         .par_iter()
         .map(|path| {
             bar.inc(1);
@@ -40,23 +42,42 @@ pub fn count_squares(pairing: &Pairing, mosaic: Option<Mosaic>) -> Result<Counte
         })
         .collect();
     bar.finish_and_clear();
-    let mut counts: BTreeMap<(usize, usize), usize> = BTreeMap::new();
-    for squares in seen.iter().flatten() {
-        *counts.entry((squares.columns, squares.rows)).or_default() += 1;
-    }
-    decided(&counts, seen.len()).ok_or_else(|| Error::NotCounted {
-        path: pairing.place.clone(),
-        counts: counts.into_iter().collect(),
-        of: seen.len(),
+    let counts = |ends: bool| {
+        let mut counts: Counts = BTreeMap::new();
+        for squares in seen.iter().flatten().filter(|seen| seen.ends || !ends).map(|seen| seen.squares) {
+            *counts.entry((squares.columns, squares.rows)).or_default() += 1;
+        }
+        counts
+    };
+    let whole = counts(true);
+    decided(&whole, seen.len()).or_else(|| without_margin(&counts(false), seen.len())).ok_or_else(|| {
+        Error::NotCounted { path: pairing.place.clone(), counts: whole.into_iter().collect(), of: seen.len() }
     })
 }
 
+/// In how many pictures columns and rows of squares were counted.
+type Counts = BTreeMap<(usize, usize), usize>;
+
 /// The count that the pictures agree on.
-fn decided(counts: &BTreeMap<(usize, usize), usize>, of: usize) -> Option<Counted> {
-    let (&(columns, rows), &pictures) = counts.iter().max_by_key(|(_, pictures)| **pictures)?;
+fn decided(counts: &Counts, of: usize) -> Option<Counted> {
+    let ((columns, rows), pictures) = most_frequent(counts)?;
     let others = counts.values().sum::<usize>() - pictures;
     let is_clear = pictures >= FEWEST.min(of) && others * AGREEING <= pictures;
-    is_clear.then_some(Counted { squares: Squares { columns, rows }, pictures, of })
+    is_clear.then_some(Counted { squares: Squares { columns, rows }, pictures, ends: true, of })
+}
+
+/// The count of a board without a margin that is seen: what half of the pictures with a grid in full view show, and hardly any shows more. Less
+/// is shown where a hand covers a line.
+fn without_margin(counts: &Counts, of: usize) -> Option<Counted> {
+    let ((columns, rows), pictures) = most_frequent(counts)?;
+    let more: usize = counts.iter().filter(|((c, r), _)| c * r > columns * rows).map(|(_, pictures)| pictures).sum();
+    let all: usize = counts.values().sum();
+    let is_clear = pictures >= FEWEST.min(of) && 2 * pictures > all && more * AGREEING <= pictures;
+    is_clear.then_some(Counted { squares: Squares { columns, rows }, pictures, ends: false, of })
+}
+
+fn most_frequent(counts: &Counts) -> Option<((usize, usize), usize)> {
+    counts.iter().max_by_key(|(_, pictures)| **pictures).map(|(squares, pictures)| (*squares, *pictures))
 }
 
 #[cfg(test)]
@@ -75,5 +96,17 @@ mod tests {
         assert_eq!(of(&[((9, 7), 6), ((8, 7), 6)]), None);
         assert_eq!(of(&[((9, 7), 1)]), None);
         assert_eq!(of(&[]), None);
+    }
+
+    #[test]
+    fn boards_without_a_margin_are_counted_where_hardly_any_picture_shows_more() {
+        let of = |counts: &[((usize, usize), usize)]| {
+            without_margin(&counts.iter().copied().collect(), 20).map(|counted| counted.squares.to_string())
+        };
+        assert_eq!(of(&[((10, 7), 8), ((9, 7), 4), ((8, 7), 1)]), Some("10x7".to_owned()));
+        // Hidden in most: the larger count is the board's, and is not told from a chance find.
+        assert_eq!(of(&[((9, 7), 12), ((10, 7), 2)]), None);
+        assert_eq!(of(&[((9, 7), 5), ((8, 7), 5)]), None);
+        assert_eq!(of(&[((9, 7), 1)]), None);
     }
 }

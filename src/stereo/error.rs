@@ -29,6 +29,17 @@ pub enum Error {
         /// Pairs with a board in one picture at least.
         pairs: usize,
     },
+    /// Both cameras stand at one place, as far as the pictures tell: nothing can be measured by them.
+    #[error(
+        "the cameras stand at one place: their distance is {baseline_mm:.2} mm with a standard deviation of {sigma_mm:.2} mm, and rays that \
+         do not cross measure nothing"
+    )]
+    NoBaseline {
+        /// Distance of the cameras' centres, mm.
+        baseline_mm: f64,
+        /// Its standard deviation, mm.
+        sigma_mm: f64,
+    },
     /// Too few corners for so many unknowns.
     #[error("{corners} corners give {} numbers for {unknowns} unknowns", 2 * .corners)]
     TooFewCorners {
@@ -220,6 +231,9 @@ impl Explain for Error {
                 }
                 Error::NothingInCommon { .. } => {
                     "photograph the board where both cameras see it at once, and check that equal names belong together"
+                }
+                Error::NoBaseline { .. } => {
+                    "left and right pictures have to come from two cameras; are these of one, or copies of the same?"
                 }
                 Error::TooFewCorners { .. } => "photograph more pairs, or `--lens radial2` for fewer unknowns",
                 Error::NoCamera { .. } => "`--squares CxR` must be the board's squares, not its inner corners",

@@ -14,8 +14,9 @@ pub fn squares(args: &CameraCheck, pairing: Option<&Pairing>) -> Result<Option<S
         (None, _) => Ok(None),
         (Some(AskedSquares::Said(squares)), _) => Ok(Some(squares)),
         (Some(AskedSquares::Counted), Some(pairing)) => {
-            let Counted { squares, pictures, of } = count_squares(pairing, args.bayer)?;
-            progress::note(format!("the board has {squares} squares: {pictures} of {of} pictures show all of it"));
+            let Counted { squares, pictures, ends, of } = count_squares(pairing, args.bayer)?;
+            let shown = if ends { "show all of it" } else { "show so many and no more, without a margin round them" };
+            progress::note(format!("the board has {squares} squares: {pictures} of {of} pictures {shown}"));
             Ok(Some(squares))
         }
         (Some(AskedSquares::Counted), None) => {

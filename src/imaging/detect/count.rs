@@ -1,23 +1,38 @@
 //! How many squares a plain board has, by a picture that shows all of it.
 //!
-//! In: a picture. Out: the count, where all corners of a grid are there and the board is seen to end on all four sides. Goes wrong: a board that is
-//! cut, hidden, without a margin, or in glare gives none.
+//! In: a picture. Out: the count, where all corners of a grid are there and the board is seen to end on all four sides, or where at least the
+//! next line of corners would be in view. Goes wrong: a board that is cut, hidden or in glare gives none, or too few of the second kind.
 
 use super::extent;
 use super::plain::{Attempt, Way, grown, ladder};
 use crate::imaging::Squares;
 use crate::imaging::image::Picture;
 
+/// The squares that a picture shows, and whether the board is seen to end behind them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Seen {
+    /// The squares.
+    pub squares: Squares,
+    /// True where a margin follows on all four sides; else more corners would be in view, and none is found.
+    pub ends: bool,
+}
+
 /// The squares of the whole board that a picture shows.
-pub fn squares_of(picture: &Picture) -> Option<Squares> {
+pub fn squares_of(picture: &Picture) -> Option<Seen> {
     let levels = ladder(picture).into_iter().filter_map(|Attempt { level, way }| (way == Way::Grow).then_some(level));
-    levels.into_iter().find_map(|level| {
-        let small = level.copy(picture);
-        let grid = grown(&small, usize::MAX)?;
-        let is_whole = grid.count() == grid.columns * grid.rows && extent::ends_on_all_sides(&small, &grid);
-        let (columns, rows) = (grid.columns.max(grid.rows) + 1, grid.columns.min(grid.rows) + 1);
-        is_whole.then_some(Squares { columns, rows })
-    })
+    let seen: Vec<Seen> = levels
+        .into_iter()
+        .filter_map(|level| {
+            let small = level.copy(picture);
+            let grid = grown(&small, usize::MAX)?;
+            let ends = extent::ends_on_all_sides(&small, &grid);
+            let is_whole = grid.count() == grid.columns * grid.rows && (ends || extent::is_in_view(&small, &grid));
+            let (columns, rows) = (grid.columns.max(grid.rows) + 1, grid.columns.min(grid.rows) + 1);
+            is_whole.then_some(Seen { squares: Squares { columns, rows }, ends })
+        })
+        .collect();
+    let corners = |seen: &&Seen| seen.squares.columns * seen.squares.rows;
+    seen.iter().find(|seen| seen.ends).or_else(|| seen.iter().max_by_key(corners)).copied()
 }
 
 #[cfg(test)]
@@ -31,7 +46,7 @@ mod tests {
             for turn in [[0.3, -0.25, 0.2], [-0.2, 0.3, 1.7]] {
                 let (picture, truth) = Shot::of(board, turn, [3.0, -2.0, z]).taken();
                 let squares = board.split(':').nth(1).unwrap().parse().unwrap();
-                assert_eq!(squares_of(&picture), Some(squares), "{board}");
+                assert_eq!(squares_of(&picture), Some(Seen { squares, ends: true }), "{board}");
                 // From some column of corners on it is hidden.
                 let (first, second) = (truth[0], truth[1]);
                 for (columns, grey) in [(1.5, 90), (2.5, 200), (0.6, 30)] {
@@ -40,7 +55,7 @@ mod tests {
                         let along = at.dot(&(second - first)) / (second - first).norm_squared();
                         if along < columns { grey } else { image.pixels[y * image.width + x] }
                     });
-                    assert_eq!(squares_of(&hidden), None, "{board} {columns} {grey}");
+                    assert!(!squares_of(&hidden).is_some_and(|seen| seen.ends), "{board} {columns} {grey}");
                 }
                 // Cut by the border.
                 let (cut, _) = Shot::of(board, turn, [-90.0, 40.0, z - 160.0]).taken();

@@ -153,6 +153,12 @@ pub fn ends_on_all_sides(small: &Grey8, grid: &Places) -> bool {
     (0..4).all(|quarters| end(small, &grid.turned(quarters)) == End::Board)
 }
 
+/// True where more corners would be in view on all four sides of the grid.
+pub fn is_in_view(small: &Grey8, grid: &Places) -> bool {
+    (0..4)
+        .all(|quarters| next_places(&grid.turned(quarters), 0).iter().flatten().all(|place| !is_outside(small, place)))
+}
+
 /// True for squares that go on alternating as those before them do, with a margin that is all of one of their colours.
 fn is_board_end(greys: &[Option<[f64; 3]>]) -> bool {
     let before = |parity: usize| {

@@ -42,6 +42,11 @@ impl Candidates {
                 discarded.push(DiscardedPair::new(&pair.pair, Cause::Duplicate, reason));
                 continue;
             }
+            if one_picture(pair) {
+                let reason = "left and right picture are one picture: both cameras need their own".to_owned();
+                discarded.push(DiscardedPair::new(&pair.pair, Cause::Duplicate, reason));
+                continue;
+            }
             let view = View::new(&corners.board, pair, fewest);
             let [left, right] = Side::BOTH.map(|side| view.active(side).count());
             let is_enough = if corners.board.is_coded() { tells_a_pose(&view) } else { left.min(right) >= fewest };
@@ -86,10 +91,19 @@ fn tells_a_pose(view: &View) -> bool {
     Side::BOTH.into_iter().any(|side| homography(&pixel_pairs(view.active(side))).is_some())
 }
 
-/// True for corners of the same pictures: no two pictures have the same noise.
+/// True for corners of the same pictures.
 fn same_corners(a: &PairCorners, b: &PairCorners) -> bool {
-    let same = |a: &[Corner], b: &[Corner]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.px == b.px);
     same(&a.left, &b.left) && same(&a.right, &b.right)
+}
+
+/// True where both sides of a pair are one picture.
+fn one_picture(pair: &PairCorners) -> bool {
+    !pair.left.is_empty() && same(&pair.left, &pair.right)
+}
+
+/// True for corners of one picture: no two pictures have the same noise.
+fn same(a: &[Corner], b: &[Corner]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.px == b.px)
 }
 
 /// A quarter of the board tells its pose well enough.

@@ -327,6 +327,9 @@ mod tests {
             let again = corners.pairs[3].clone();
             corners.pairs[7] = crate::imaging::PairCorners { pair: "07".into(), ..again };
         });
+        one(BOARDS[0], "02", "left and right picture are one picture", |_, corners| {
+            corners.pairs[2].right = corners.pairs[2].left.clone();
+        });
         let mixed = said(BOARDS[1], |_, corners| {
             let right = corners.pairs[8].right.clone();
             corners.pairs[8].right = std::mem::replace(&mut corners.pairs[1].right, right);

@@ -23,6 +23,10 @@ const TANGENTIAL: f64 = 1e-3;
 const PRISM: f64 = 2e-3;
 /// By how much a sensor is tilted, rad: more than any that is not meant to be.
 const TILT_RAD: f64 = 0.05;
+/// Focal lengths as shares of the picture's longer side, and by what factor most differ from it: 25 degrees across to 80. So wide that it
+/// holds nothing that pictures tell; it keeps boards that all lie alike from a camera that has no focal length at all.
+const FOCAL_SHARE: f64 = 1.2;
+const FOCAL_FACTOR: f64 = 2.0;
 /// How far the picture's centre lies from its middle, as a share of the width.
 const CENTRE_SHARE: f64 = 0.015;
 /// By how much fx and fy differ; pixels whose sides differ by more than the second number are not meant to be square.
@@ -40,6 +44,8 @@ struct Expectation {
     terms: Vec<(Number, f64)>,
     value: f64,
     sigma: f64,
+    /// Whether it is the sum's logarithm that is expected, and its value and deviation are logarithms.
+    logarithm: bool,
     /// Whether it counts beside the rational terms, too: what is known of a lens, not what lenses usually are.
     known: bool,
 }
@@ -82,7 +88,13 @@ impl Priors {
         let [left, right] = [&start.left, &start.right].map(|camera| (camera.fx * camera.fy).sqrt());
         if (left / right).ln().abs() < TWO_MAKES {
             let terms = vec![(Number::Camera(Side::Left, 0), 1.0), (Number::Camera(Side::Right, 0), -1.0)];
-            priors.all.push(Expectation { terms, value: 0.0, sigma: ALIKE * (left * right).sqrt(), known: false });
+            priors.all.push(Expectation {
+                terms,
+                value: 0.0,
+                sigma: ALIKE * (left * right).sqrt(),
+                logarithm: false,
+                known: false,
+            });
         }
         priors.of_board(diagonal_mm);
         priors
@@ -116,7 +128,7 @@ impl Priors {
             let term =
                 |(column, (side, at)): (usize, &(Side, usize))| (Number::Camera(*side, *at), whitener[(row, column)]);
             let terms = numbers.iter().enumerate().map(term).filter(|(_, by)| *by != 0.0).collect();
-            Expectation { terms, value: values[row], sigma: 1.0, known: true }
+            Expectation { terms, value: values[row], sigma: 1.0, logarithm: false, known: true }
         }));
         priors
     }
@@ -135,7 +147,13 @@ impl Priors {
         let focal = (camera.fx * camera.fy).sqrt();
         let corner = (0.5 * width / camera.fx).hypot(0.5 * height / camera.fy);
         let mut one = |at: usize, value: f64, sigma: f64| {
-            self.all.push(Expectation { terms: vec![(Number::Camera(side, at), 1.0)], value, sigma, known: false });
+            self.all.push(Expectation {
+                terms: vec![(Number::Camera(side, at), 1.0)],
+                value,
+                sigma,
+                logarithm: false,
+                known: false,
+            });
         };
         one(2, 0.5 * (width - 1.0), CENTRE_SHARE * width);
         one(3, 0.5 * (height - 1.0), CENTRE_SHARE * width);
@@ -153,9 +171,16 @@ impl Priors {
         one(7, 0.0, TANGENTIAL);
         (12..16).for_each(|at| one(at, 0.0, PRISM));
         (16..18).for_each(|at| one(at, 0.0, TILT_RAD));
+        self.all.push(Expectation {
+            terms: vec![(Number::Camera(side, 0), 1.0)],
+            value: (FOCAL_SHARE * width.max(height)).ln(),
+            sigma: FOCAL_FACTOR.ln(),
+            logarithm: true,
+            known: false,
+        });
         if (camera.fx / camera.fy).ln().abs() < NOT_SQUARE {
             let terms = vec![(Number::Camera(side, 0), 1.0), (Number::Camera(side, 1), -1.0)];
-            self.all.push(Expectation { terms, value: 0.0, sigma: ASPECT * focal, known: false });
+            self.all.push(Expectation { terms, value: 0.0, sigma: ASPECT * focal, logarithm: false, known: false });
         }
     }
 
@@ -164,6 +189,7 @@ impl Priors {
             terms: vec![(Number::Shape(k), 1.0)],
             value: 0.0,
             sigma: BOW_SHARE * diagonal_mm,
+            logarithm: false,
             known: false,
         }));
     }
@@ -188,7 +214,10 @@ impl Priors {
             else {
                 continue;
             };
-            let off = terms.iter().map(|(at, by)| by * numbers[*at]).sum::<f64>() - expectation.value;
+            let sum_of_terms = terms.iter().map(|(at, by)| by * numbers[*at]).sum::<f64>();
+            let (said, slope) =
+                if expectation.logarithm { (sum_of_terms.ln(), 1.0 / sum_of_terms) } else { (sum_of_terms, 1.0) };
+            let off = said - expectation.value;
             let held = self.rational_held
                 && !expectation.known
                 && expectation.terms.iter().any(|(number, _)| number.is_rational());
@@ -196,9 +225,9 @@ impl Priors {
             let weight = 1.0 / (sigma * sigma);
             sum.cost += 0.5 * weight * off * off;
             for (i, a) in &terms {
-                sum.gradient[*i] += weight * a * off;
+                sum.gradient[*i] += weight * slope * a * off;
                 for (j, b) in &terms {
-                    sum.matrix[(*i, *j)] += weight * a * b;
+                    sum.matrix[(*i, *j)] += weight * slope * slope * a * b;
                 }
             }
         }

@@ -18,7 +18,7 @@ use crate::stereo::solve::levenberg_marquardt::{self, Search, Solution, Stop};
 use crate::stereo::solve::normal_equations::Equations;
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
-use crate::stereo::solve::uncertainty::{self, Uncertainty, WORST_FOCAL_SIGMA, worst_focal_sigma};
+use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, Uncertainty, worst_focal_sigma};
 
 /// Rounds of fitting the scatter and solving again.
 const MOST_ROUNDS: usize = 12;
@@ -158,7 +158,7 @@ impl Solved {
         let equations = self.problem.equations(layout).ok_or_else(Error::undetermined)?;
         let uncertainty = uncertainty::of_equations(&equations).ok_or_else(Error::undetermined)?;
         let worst = worst_focal_sigma(&uncertainty.shared, layout, &self.shared().rig);
-        let known = worst <= WORST_FOCAL_SIGMA;
+        let known = worst <= UNTOLD_FOCAL_SIGMA;
         if known { Ok(uncertainty) } else { Err(Error::Undetermined { focal_sigma: Some(worst), skipped: Vec::new() }) }
     }
 

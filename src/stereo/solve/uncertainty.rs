@@ -10,8 +10,10 @@ use crate::stereo::model::parameters::Layout;
 use crate::stereo::solve::normal_equations::{self, Block, Equations};
 use crate::stereo::{Rig, Side};
 
-/// A focal length that is known no better than this share is not known.
+/// A focal length that is known no better than this share tells no lens from another, and no rig passes with it.
 pub const WORST_FOCAL_SIGMA: f64 = 0.1;
+/// One that is known no better than this was told by what focal lengths usually are (a factor of two, see `priors`), not by the pictures.
+pub const UNTOLD_FOCAL_SIGMA: f64 = 0.35;
 
 /// By how much chi-square (twice the cost) would fall if the equations were straight from here to the minimum: what a richer
 /// model is expected to gain at a simpler one's minimum (Rao's score). `None` where the views do not determine the unknowns.

@@ -3,9 +3,11 @@
 use nalgebra::Vector3;
 
 use super::*;
-use crate::geometry::transform;
+use crate::geometry::{Transform, transform};
 use crate::stereo::Error;
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::judge::lengths::held_out;
+use crate::stereo::judge::verdict::Verdict;
 
 #[test]
 fn a_pair_that_was_not_taken_at_once_is_named_and_left_out() {
@@ -75,4 +77,37 @@ fn boards_that_are_never_tilted_do_not_tell_the_cameras() {
     let refused = calibrate(&world.corners(1), &Options::default());
     let told = |c: Calibration| (c.rig().left.fx, c.uncertainty.shared[(0, 0)].sqrt(), c.layout);
     assert!(matches!(refused, Err(Error::Undetermined { .. })), "{:?}", refused.map(told));
+}
+
+#[test]
+fn pictures_of_one_camera_are_no_rig() {
+    let mut world = World::new(9, 3);
+    world.rig.right = world.rig.left;
+    world.rig.right_from_left = Transform::identity();
+    // Taken twice from one place; and from 30 mm beside it, which is a rig.
+    let refused = held_out::hold_out(&calibrate(&world.corners(4), &BROWN4).unwrap(), None);
+    let told = |accuracy: held_out::Accuracy| accuracy.extremes.max_abs_error_mm;
+    assert!(
+        matches!(refused, Err(Error::NoBaseline { baseline_mm, .. }) if baseline_mm < 2.0),
+        "{:?}",
+        refused.map(told)
+    );
+    world.rig.right_from_left = transform(Vector3::zeros(), Vector3::new(-30.0, 0.0, 0.0));
+    assert!(held_out::hold_out(&calibrate(&world.corners(4), &BROWN4).unwrap(), None).is_ok());
+}
+
+#[test]
+fn a_pair_that_alone_tells_the_cameras_leaves_the_verdict_open() {
+    let mut world = World::new(9, 1);
+    world.rig.right_from_left = transform(Vector3::zeros(), Vector3::new(-40.0, 0.0, 0.0));
+    for (i, pose) in world.poses.iter_mut().enumerate().skip(1) {
+        *pose = transform(Vector3::new(0.0, 0.0, 0.1 * i as f64), Vector3::new(i as f64, -(i as f64), 550.0));
+    }
+    let tilted = judged(&world.corners(1), &BROWN4, 0.5);
+    assert_eq!(tilted.accuracy.unchecked, ["00"]);
+    assert_eq!(tilted.verdict, Verdict::Undecided);
+    let line = tilted.evidence.iter().find(|line| line.what == "rigs without some pairs").unwrap();
+    assert!(line.value.is_none() && line.detail.contains("Without 00 the others do not"), "{}", line.detail);
+    // With tilts enough nothing hangs on one pair.
+    assert!(judged(&World::new(9, 1).corners(1), &BROWN4, 0.5).accuracy.unchecked.is_empty());
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use camino::{Utf8Path, Utf8PathBuf};
 
-use super::listing::Folder;
+use super::listing::{Aside, Folder};
 use super::names::{Open, Reach};
 use super::readings::{Reading, Told};
 use super::{PairBy, Pairing, Source};
@@ -269,8 +269,12 @@ impl Pairing {
         if self.sideless > 0 {
             parts.push(format!("{} whose names tell neither left nor right", count(self.sideless, "picture")));
         }
-        if self.other > 0 {
-            parts.push(count(self.other, "other file"));
+        let Aside { other, again } = self.aside;
+        if again > 0 {
+            parts.push(format!("{} of the same names in a format that loses more", count(again, "picture")));
+        }
+        if other > 0 {
+            parts.push(count(other, "other file"));
         }
         (!parts.is_empty()).then(|| format!("left out: {}", parts.join("; ")))
     }

@@ -50,9 +50,9 @@ impl Source<'_> {
         if let Some(others) = explain::not_taken(&reading, folders) {
             taken = format!("{taken}; {others}");
         }
-        let Reading { matched, sideless, other, .. } = reading;
+        let Reading { matched, sideless, aside, .. } = reading;
         let place = self.places().iter().map(|p| p.as_str()).collect::<Vec<_>>().join(" and ").into();
-        Ok(Pairing { place, pairs: matched.pairs, taken, single: matched.single, sideless, other })
+        Ok(Pairing { place, pairs: matched.pairs, taken, single: matched.single, sideless, aside })
     }
 
     /// A second place that is no folder of pictures was perhaps meant for a flag.

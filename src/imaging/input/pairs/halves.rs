@@ -26,7 +26,7 @@ pub fn split(source: &Source<'_>, out: &OutDir) -> Result<Pairing> {
     let pairs = folder.pictures.par_iter().map(|path| one(path, out)).collect::<Result<Vec<PairFiles>>>()?;
     let taken =
         format!("{}: the left and the right half of each picture in {}", count(pairs.len(), "pair"), folder.path);
-    Ok(Pairing { place: source.images.to_owned(), pairs, taken, other: folder.other, ..Pairing::default() })
+    Ok(Pairing { place: source.images.to_owned(), pairs, taken, aside: folder.aside, ..Pairing::default() })
 }
 
 fn stem(path: &Utf8Path) -> &str {

@@ -3,14 +3,16 @@
 //! Hidden files and folders are passed over, and so are folders that this program wrote its results into: a run inside the folder of
 //! pictures must not find what it wrote the last time.
 
+use std::collections::HashMap;
+
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::names::natural_order;
 use crate::files::{self, OutDir};
 use crate::imaging::{Error, Result};
 
-/// Extensions of pictures, in small letters.
-const EXTENSIONS: [&str; 8] = ["png", "tif", "tiff", "bmp", "jpg", "jpeg", "pgm", "pnm"];
+/// Extensions of pictures, in small letters; those that lose nothing first.
+const EXTENSIONS: [&str; 8] = ["png", "tif", "tiff", "bmp", "pgm", "pnm", "jpg", "jpeg"];
 
 /// Levels below a folder, and folders there, that are looked into: enough for any set of pictures, and an end where the folder that was
 /// named is a whole disk.
@@ -30,8 +32,30 @@ pub struct Folder {
     pub pictures: Vec<Utf8PathBuf>,
     /// Its folders, sorted.
     pub folders: Vec<Utf8PathBuf>,
+    /// What else there is.
+    pub aside: Aside,
+}
+
+/// Files of a folder that are passed over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Aside {
     /// Files that are no pictures.
     pub other: usize,
+    /// Pictures that lie there once more under the same name, in a format that comes before theirs.
+    pub again: usize,
+}
+
+impl std::ops::Add for Aside {
+    type Output = Aside;
+    fn add(self, more: Aside) -> Aside {
+        Aside { other: self.other + more.other, again: self.again + more.again }
+    }
+}
+
+impl std::iter::Sum for Aside {
+    fn sum<I: Iterator<Item = Aside>>(all: I) -> Aside {
+        all.fold(Aside::default(), |sum, one| sum + one)
+    }
 }
 
 /// Lists one folder.
@@ -45,7 +69,7 @@ pub fn list(folder: &Utf8Path) -> Result<Folder> {
     for entry in folder.read_dir_utf8().map_err(failed)? {
         // A name that is not UTF-8 is a file we can't name; the system's reason says so.
         let Ok(entry) = entry else {
-            entries.other += 1;
+            entries.aside.other += 1;
             continue;
         };
         let path = entry.into_path();
@@ -58,12 +82,31 @@ pub fn list(folder: &Utf8Path) -> Result<Folder> {
         } else if extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str())) {
             entries.pictures.push(path);
         } else {
-            entries.other += 1;
+            entries.aside.other += 1;
         }
     }
     entries.pictures.sort();
     entries.folders.sort();
+    entries.aside.again = once(&mut entries.pictures);
     Ok(entries)
+}
+
+/// Keeps one picture of those of one name, the one in the format that loses least; how many went.
+fn once(pictures: &mut Vec<Utf8PathBuf>) -> usize {
+    let rank = |path: &Utf8Path| {
+        let extension = path.extension().map(str::to_ascii_lowercase);
+        EXTENSIONS.iter().position(|known| extension.as_deref() == Some(known))
+    };
+    let mut best: HashMap<Utf8PathBuf, Utf8PathBuf> = HashMap::new();
+    for path in pictures.iter() {
+        let kept = best.entry(path.with_extension("")).or_insert_with(|| path.clone());
+        if rank(path) < rank(kept) {
+            kept.clone_from(path);
+        }
+    }
+    let before = pictures.len();
+    pictures.retain(|path| best.get(&path.with_extension("")) == Some(path));
+    before - pictures.len()
 }
 
 /// The folder itself, then the folders below it that hold pictures, level by level in natural order. One that can't be read is none.

@@ -2,6 +2,8 @@
 
 use camino::{Utf8Path, Utf8PathBuf};
 
+use super::listing::Aside;
+
 /// How pictures were paired, or are to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum PairBy {
@@ -63,8 +65,8 @@ pub struct Pairing {
     pub single: Vec<Utf8PathBuf>,
     /// Pictures whose names tell no side.
     pub sideless: usize,
-    /// Files that are no pictures.
-    pub other: usize,
+    /// Files of these folders that are passed over.
+    pub aside: Aside,
 }
 
 impl<'a> Source<'a> {

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use camino::{Utf8Path, Utf8PathBuf};
 
-use super::listing::Folder;
+use super::listing::{Aside, Folder};
 use super::matching::{self, Matched, by_key};
 use super::names::{Open, Reach, SEPARATORS, natural_order, tokens};
 use super::{PairBy, PairFiles};
@@ -50,8 +50,8 @@ pub struct Reading {
     pub matched: Matched,
     /// Pictures whose names tell no side.
     pub sideless: usize,
-    /// Files that are no pictures.
-    pub other: usize,
+    /// Files of these folders that are passed over.
+    pub aside: Aside,
 }
 
 impl Reading {
@@ -70,7 +70,7 @@ pub fn two_folders(left: &Folder, right: &Folder, told: Told, by: Option<PairBy>
         sides: [left.pictures.clone(), right.pictures.clone()],
         matched: matching::pair(&left.pictures, &right.pictures, by)?,
         sideless: 0,
-        other: left.other + right.other,
+        aside: left.aside + right.aside,
     })
 }
 
@@ -125,7 +125,7 @@ fn by_folders(below: &[&Folder]) -> Option<Reading> {
         sides: [picture(left).collect(), picture(right).collect()],
         matched: Matched { by: PairBy::Name, pairs, single: Vec::new() },
         sideless: 0,
-        other: below.iter().map(|folder| folder.other).sum(),
+        aside: below.iter().map(|folder| folder.aside).sum(),
     })
 }
 
@@ -203,7 +203,7 @@ fn by_names(folder: &Folder, by: Option<PairBy>) -> Vec<Result<Reading>> {
 fn in_one(folder: &Folder, told: Told, sides: [Vec<Utf8PathBuf>; 2], matched: Matched) -> Reading {
     let sideless = folder.pictures.len() - sides[0].len() - sides[1].len();
     let places = vec![folder.path.clone()];
-    Reading { told, depth: folder.depth, places, sides, matched, sideless, other: folder.other }
+    Reading { told, depth: folder.depth, places, sides, matched, sideless, aside: folder.aside }
 }
 
 /// Pictures whose names say left, and those whose names say right.

@@ -21,6 +21,7 @@ pub fn ledger(facts: &Facts) -> Vec<Evidence> {
         pairs::poses(facts),
         pairs::tilts(facts),
     ];
+    lines.extend(pairs::focal_lengths(facts));
     lines.extend(pairs::reach(facts));
     lines.extend(pairs::known_lenses(facts));
     lines.push(lengths::second_board(facts));

@@ -120,14 +120,23 @@ pub(super) fn folds(facts: &Facts) -> Evidence {
     let layout = &facts.calibration.layout;
     let changes = facts.accuracy.fold_steps.iter().flat_map(|step| facts.volume.changes_by_step_mm(layout, step));
     let value = changes.fold(0.0_f64, |most, mm| most.max(mm.abs()));
+    let unchecked = &facts.accuracy.unchecked;
+    let alone = if unchecked.is_empty() {
+        String::new()
+    } else {
+        format!(
+            ". Without {} the others do not determine the cameras: nothing checks what it says",
+            unchecked.join(", ")
+        )
+    };
     let detail = format!(
-        "largest change of a length of {:.0} mm anywhere in the working volume when a block of similar pairs is left out; a rig that depends on one block has the errors of that block",
+        "largest change of a length of {:.0} mm anywhere in the working volume when a block of similar pairs is left out; a rig that depends on one block has the errors of that block{alone}",
         facts.volume.length_mm
     );
     Evidence::of_length(
         "rigs without some pairs",
         "add pairs with the board elsewhere and tilted otherwise",
-        Some(value),
+        unchecked.is_empty().then_some(value),
         facts,
         detail,
     )

@@ -2,10 +2,12 @@
 
 use super::facts::Facts;
 use crate::imaging::Side;
+use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::findings::standing::MATERIAL_SHARE;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::verdict::Verdict;
+use crate::stereo::solve::uncertainty::{WORST_FOCAL_SIGMA, worst_focal_sigma};
 
 /// Steps and drifts that are in the rig.
 pub(super) fn findings(facts: &Facts) -> Evidence {
@@ -163,6 +165,23 @@ pub(super) fn tilts(facts: &Facts) -> Evidence {
              ones are wrong"
         ),
     }
+}
+
+/// A focal length that the pictures hardly tell; lengths elsewhere than where the boards were are then anybody's guess.
+pub(super) fn focal_lengths(facts: &Facts) -> Option<Evidence> {
+    let Calibration { uncertainty, layout, .. } = facts.calibration;
+    let worst = worst_focal_sigma(&uncertainty.shared, layout, facts.calibration.rig());
+    (worst > WORST_FOCAL_SIGMA).then(|| Evidence {
+        what: "focal lengths",
+        remedy: "add pairs tilted by 20 to 45 degrees about both axes, at several distances",
+        value: Some(100.0 * worst),
+        limit: Some(100.0 * WORST_FOCAL_SIGMA),
+        unit: "%",
+        allows: Verdict::Undecided,
+        detail: "standard deviation of the focal length that the pictures tell least: boards that all lie alike do not tell it from \
+                 their distance"
+            .to_owned(),
+    })
 }
 
 /// Whether the pictures agree with lenses that were known.

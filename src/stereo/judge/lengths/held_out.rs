@@ -4,7 +4,7 @@
 //! fold's rig triangulates the corners of the pairs it was not calibrated with. The board's pitch sets the scale, so that a wrong
 //! pitch is invisible here: only a second board shows it.
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -58,6 +58,8 @@ pub struct Accuracy {
     pub doubtful: DoubtfulCorners,
     /// Number of folds.
     pub folds: usize,
+    /// Pairs without which the others do not determine the cameras: no other rig measures them.
+    pub unchecked: Vec<String>,
     /// What leaving out each fold does to the shared numbers.
     pub fold_steps: Vec<DVector<f64>>,
     /// Lengths of the short and the long range, mm, along x and y alike where the board allows.
@@ -87,33 +89,60 @@ pub struct EpipolarError {
     pub max_px: f64,
 }
 
-/// The rigs that measured: one a fold.
+/// The rigs that measured: one a fold, `None` where the other pairs do not determine one.
 struct Folds {
     of_pair: Vec<usize>,
-    rigs: Vec<Rig>,
-    covariances: Vec<RigCovariance>,
-    steps: Vec<DVector<f64>>,
+    rigs: Vec<Option<FoldRig>>,
+}
+
+/// A rig of all pairs but those of one fold.
+struct FoldRig {
+    rig: Rig,
+    covariance: RigCovariance,
+    step: DVector<f64>,
+}
+
+impl Folds {
+    /// The rig that has not seen this pair.
+    fn of(&self, pair: usize) -> Option<&FoldRig> {
+        self.rigs[self.of_pair[pair]].as_ref()
+    }
 }
 
 /// Holds out every pair once, together with those of similar poses, and measures it. `board_mm` is the expanded uncertainty of the board's lengths.
 ///
-/// An error where the pairs without some of them do not determine the cameras.
+/// Pairs without which the others do not determine the cameras are not measured; an error where that is all of them.
 pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accuracy, Error> {
     let undetermined = || Error::undetermined().without(&calibration.skipped);
     if calibration.views.iter().all(|view| common(view).is_empty()) {
         return Err(Error::NothingInCommon { pairs: calibration.views.len() });
     }
+    check_baseline(calibration)?;
     let folds = folds(calibration).ok_or_else(undetermined)?;
     let mut measured: Vec<Measured> = calibration
         .views
         .par_iter()
         .enumerate()
-        .map(|(i, view)| measure(&folds.rigs[folds.of_pair[i]], &calibration.board, view))
+        .map(|(i, view)| folds.of(i).map_or(Measured::NOTHING, |fold| measure(&fold.rig, &calibration.board, view)))
         .collect();
     let names: Vec<&str> = calibration.views.iter().map(|view| view.pair.as_str()).collect();
     let usual_px = calibration.noise.typical_px(&calibration.views);
     let doubtful = doubtful_corners::leave_out(&mut measured, &names, usual_px);
     summarise(calibration, folds, &measured, doubtful, board_mm).ok_or_else(undetermined)
+}
+
+/// An error where the distance of the cameras is not told from none.
+fn check_baseline(calibration: &Calibration) -> Result<(), Error> {
+    /// Standard deviations by which the distance must be more than nothing.
+    const FEWEST: f64 = 3.0;
+    let Calibration { layout, uncertainty, .. } = calibration;
+    let between_mm = calibration.rig().right_from_left.translation.vector;
+    let at = layout.transform_start() + 3;
+    let covariance = uncertainty.shared.fixed_view::<3, 3>(at, at);
+    let direction = between_mm.try_normalize(0.0).unwrap_or_else(Vector3::x);
+    let (baseline_mm, sigma_mm) =
+        (between_mm.norm(), (direction.transpose() * covariance * direction).x.max(0.0).sqrt());
+    if baseline_mm < FEWEST * sigma_mm { Err(Error::NoBaseline { baseline_mm, sigma_mm }) } else { Ok(()) }
 }
 
 /// The rigs without each fold, with covariances that allow for the same as the final one's.
@@ -122,7 +151,6 @@ fn folds(calibration: &Calibration) -> Option<Folds> {
     let equations = calibration.problem().equations(layout)?;
     let of_pair = cross_validation::folds(views, &values.poses, FOLDS);
     let without = cross_validation::leave_out(&equations, layout, &values.shared, &of_pair);
-    let without = without.into_iter().collect::<Option<Vec<Without>>>()?;
     let inflation = calibration.inflation;
     let by_noise = uncertainty::of_equations(&equations)?.shared * inflation;
     let more = &calibration.uncertainty.shared - by_noise;
@@ -130,12 +158,8 @@ fn folds(calibration: &Calibration) -> Option<Folds> {
         let matrix = &w.covariance * inflation + &more;
         RigCovariance::new(&Covariance { order: layout.names(), matrix })
     };
-    Some(Folds {
-        of_pair,
-        covariances: without.iter().map(covariance).collect(),
-        rigs: without.iter().map(|w| w.shared.rig.clone()).collect(),
-        steps: without.into_iter().map(|w| w.step).collect(),
-    })
+    let rig = |w: Without| FoldRig { covariance: covariance(&w), rig: w.shared.rig, step: w.step };
+    Some(Folds { of_pair, rigs: without.into_iter().map(|w| w.map(rig)).collect() })
 }
 
 fn summarise(
@@ -153,13 +177,15 @@ fn summarise(
     let expansion = Expansion::new(calibration.pair_scatter.groups, board_mm);
     let rays_chi_square = mean(&measured.iter().flat_map(|m| &m.points).map(|p| p.chi_square).collect::<Vec<_>>())?;
     let share = rays_chi_square.clamp(f64::MIN_POSITIVE, 1.0);
+    let names: Vec<&String> = calibration.views.iter().map(|view| &view.pair).collect();
     Some(Accuracy {
-        extremes: lengths::extremes(measured, |i| folds.covariances.get(folds.of_pair[i]), expansion, share)?,
+        extremes: lengths::extremes(measured, |i| Some(&folds.of(i)?.covariance), expansion, share)?,
         rays_chi_square,
         epipolar: epipolar(calibration.rig(), measured)?,
         doubtful,
         folds: folds.rigs.len(),
-        fold_steps: folds.steps,
+        unchecked: (0..names.len()).filter(|i| folds.of(*i).is_none()).map(|i| names[i].clone()).collect(),
+        fold_steps: folds.rigs.into_iter().flatten().map(|fold| fold.step).collect(),
         short_mm: short.map(|s| lengths::as_written_mm(board.spans_mm(s)[0])),
         long_mm: long.map(|s| lengths::as_written_mm(board.spans_mm(s)[0])),
         ranges: all_ranges(board, measured),

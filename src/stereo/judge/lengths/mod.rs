@@ -64,6 +64,12 @@ pub(super) struct Measured {
     pub(super) lengths: Vec<Length>,
 }
 
+impl Measured {
+    /// A pair that no rig has measured.
+    pub(super) const NOTHING: Measured =
+        Measured { points: Vec::new(), sigmas_px: Vec::new(), doubtful: Vec::new(), lengths: Vec::new() };
+}
+
 /// Triangulates the corners of a pair and measures all lengths along rows and columns.
 pub(super) fn measure(rig: &Rig, board: &Board, view: &View) -> Measured {
     let mut at = vec![None; board.corner_count()];
