@@ -27,6 +27,7 @@ use crate::imaging::Corner;
 use crate::imaging::detect::Detected;
 use crate::imaging::image::{Grey, Picture};
 use crate::imaging::lattice::{Lattice, Places};
+use crate::statistics::median;
 
 /// How good places on the copy are at least, px.
 const GOOD_PX: f64 = 0.1;
@@ -76,7 +77,10 @@ impl<T: Sample> Full<'_, T> {
         if scatter::miss_the_model(&seen.measured)
             && let Some(stray) = self.stray_light(&seen.windows, &mut window)
         {
-            seen = self.with_stray(stray).look(detected, &mut window);
+            let with_stray = self.with_stray(stray).look(detected, &mut window);
+            if unevenness(&with_stray.measured) <= unevenness(&seen.measured) {
+                seen = with_stray;
+            }
         }
         let scatter = Scatter::of(&seen.measured);
         scatter.carry(&mut seen.measured);
@@ -186,6 +190,21 @@ impl<T: Sample> Full<'_, T> {
         let smaller = board.straight_share();
         if share == 1.0 && smaller < 1.0 { within(smaller) } else { (seen, board) }
     }
+}
+
+/// How unevenly corners follow each other along the board's lines, px: the median of third differences, next to nothing of a board that a lens
+/// shows. Overshoot of a sharpened edge may look like stray light, with the corner beside its place; then it is large.
+fn unevenness(corners: &Lattice<Measured>) -> f64 {
+    let at = |col: usize, row: usize| corners.get(col, row).map(|m| m.px.coords);
+    let thirds =
+        (0..corners.rows).flat_map(|row| (0..corners.columns).map(move |col| (col, row))).flat_map(|(col, row)| {
+            let third = |step: [usize; 2]| {
+                let [a, b, c, d] = [0, 1, 2, 3].map(|k| at(col + k * step[0], row + k * step[1]));
+                Some((d? - a? - (c? - b?) * 3.0).norm())
+            };
+            [third([1, 0]), third([0, 1])].into_iter().flatten()
+        });
+    median(thirds).unwrap_or(0.0)
 }
 
 fn by_variance(a: &Measured, b: &Measured) -> std::cmp::Ordering {
