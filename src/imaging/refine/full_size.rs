@@ -88,7 +88,8 @@ impl<T: Sample> Full<'_, T> {
     pub(super) fn full(&self, seen: Windows, share: f64, window: &mut Window) -> Windows {
         let mut within = |half_px: f64| match &seen.near {
             _ if seen.alone => self.fit_within(half_px, &seen.cell, &seen.start, window),
-            None => None,
+            // Squares that are not alike all over show in a small window as a light that changes, and in a large one hardly.
+            None => self.fit_within(half_px, &seen.cell, &seen.start, window),
             Some(near) => self.fit_from(near, half_px, &seen, window),
         };
         // What is hardly larger than the near window is not made smaller.

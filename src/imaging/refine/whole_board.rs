@@ -276,4 +276,50 @@ mod tests {
         assert!((straight - 0.85).abs() < 0.02 && (bent - straight).abs() < 1e-3, "{straight} {bent}");
         assert!(bent_much < 0.3, "{bent_much}");
     }
+
+    /// An upright board of 9x7 squares of 25 px, its edges as sharp as pixels are, with `overshoot` (a share of the contrast) beside them as a
+    /// camera's sharpening leaves it, and stray light whose slope is up to `stray` grey values per px.
+    fn sharpened_board(overshoot: f64, stray: f64) -> Picture {
+        let (width, height, side) = (280, 230, 25.2);
+        let grey = |x: f64, y: f64| {
+            let (x, y) = (x - 26.1 - 0.012 * (y - 100.0), y - 27.4 + 0.006 * (x - 100.0));
+            let (i, j) = ((x / side).floor(), (y / side).floor());
+            let is_dark = (0.0..9.0).contains(&i) && (0.0..7.0).contains(&j) && (i + j).rem_euclid(2.0) == 0.0;
+            (if is_dark { 50.0 } else { 176.0 }) + stray * (x * 0.05).sin() / 0.05
+        };
+        const PARTS: usize = 8;
+        let pixel = |x: usize, y: usize| {
+            let part = |at: usize, k: usize| at as f64 - 0.5 + (k as f64 + 0.5) / PARTS as f64;
+            let all = (0..PARTS * PARTS).map(|k| grey(part(x, k % PARTS), part(y, k / PARTS)));
+            all.sum::<f64>() / (PARTS * PARTS) as f64
+        };
+        let plain: Vec<f64> = (0..width * height).map(|k| pixel(k % width, k / width)).collect();
+        let pixels = (0..width * height).map(|k| {
+            let (x, y) = (k % width, k / width);
+            let beside = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(dx, dy): (isize, isize)| {
+                let (x, y) = (x.saturating_add_signed(dx).min(width - 1), y.saturating_add_signed(dy).min(height - 1));
+                plain[y * width + x]
+            });
+            let sharp = plain[k] + overshoot * (4.0 * plain[k] - beside.iter().sum::<f64>());
+            (sharp + ((k * 7919) % 5) as f64 - 2.0).round().clamp(0.0, 255.0) as u8
+        });
+        Picture::from(Image { width, height, pixels: pixels.collect() })
+    }
+
+    #[test]
+    fn neither_overshoot_nor_stray_light_takes_sharp_corners_off_their_lines() {
+        let board = Board::checker("9x7".parse().unwrap(), 10.0);
+        for (overshoot, stray) in [(0.0, 0.0), (0.1, 0.0), (0.3, 0.0), (0.5, 0.3), (0.0, 0.6), (0.8, 0.6)] {
+            let picture = sharpened_board(overshoot, stray);
+            let measured = measure(&picture, &detect::detect(&picture, board).unwrap());
+            assert_eq!(measured.count(), 48);
+            for (_, _, m) in measured.iter() {
+                let on_board =
+                    Vector2::new(m.px.x - 26.1 - 0.012 * (m.px.y - 100.0), m.px.y - 27.4 + 0.006 * (m.px.x - 100.0));
+                let off = on_board.map(|at| at - (at / 25.2).round() * 25.2);
+                let sigma = m.fit.covariance_px2.trace().sqrt();
+                assert!(off.amax() < 2.0 * sigma, "{overshoot} {stray}: {off:?} {sigma}");
+            }
+        }
+    }
 }

@@ -35,7 +35,12 @@ impl Windows {
     /// The full window, if nothing reaches into it.
     pub(super) fn free(&self, board: &acceptance::Board) -> Option<&Measured> {
         let full = self.full.as_ref()?;
-        (self.near.as_ref().is_none_or(|near| board.agrees(near, full)) && board.accepts(full)).then_some(full)
+        // Where no smaller window checks it, it must look as the others do.
+        let checked = match &self.near {
+            Some(near) => board.agrees(near, full),
+            None => self.alone || board.holds_in_small_window(full),
+        };
+        (checked && board.accepts(full)).then_some(full)
     }
 
     /// The same with other bends of the edges, where these are known.
