@@ -95,7 +95,7 @@ impl Noise {
     }
 
     /// Logarithm of the likelihood of residuals, but for a constant.
-    fn log_likelihood(&self, residuals: &[(Observation, Vector2<f64>)], loss: Loss) -> f64 {
+    pub fn log_likelihood(&self, residuals: &[(Observation, Vector2<f64>)], loss: Loss) -> f64 {
         let of = |(o, r): &(Observation, Vector2<f64>)| {
             let covariance = self.covariance(o);
             let whitened = whitener(&covariance) * r;

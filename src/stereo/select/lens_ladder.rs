@@ -15,7 +15,7 @@ use crate::stereo::select::known_lenses;
 use crate::stereo::select::model_comparison::{Chance, LensScore, Trial, gain_of_terms, score, simplest};
 use crate::stereo::select::options::{Choice, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
-use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::uncertainty;
 use crate::stereo::{Error, Lens};
 
@@ -34,12 +34,15 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
         let layout = Layout::rig(SIMPLEST, shape);
         start.solve(&layout).map(|solved| (solved, layout))
     };
-    let (solved, layout) =
+    let (mut solved, layout) =
         fit(forced_shape.unwrap_or(true)).or_else(|_| fit(forced_shape.unwrap_or(false))).map_err(|e| match e {
             // Not even the simplest search ends: the pairs leave a valley, not a minimum.
             Error::NotConverged { .. } => Error::undetermined(),
             other => other,
         })?;
+    if let Some(wide) = of_wide_lens(start, &solved, &layout) {
+        solved = wide;
+    }
     let chance = Chance {
         scatter: stated_uncertainty::excess_scatter(&solved, &layout, board),
         print: PrintShare::of(&solved, board, &layout).map_or(1.0, |print| print.excess),
@@ -62,6 +65,23 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     let fewer = fewer_terms(&solved.problem, chosen, &chance);
     let Trial { layout, values, priors, .. } = fewer.as_ref().unwrap_or(chosen).clone();
     Ok(Choice { layout, near: Some(values), priors, scatter: None, scores })
+}
+
+/// The pairs as a lens with the rational terms leaves them, where many corners lie far from where the simplest one puts them and near where this
+/// one does. In wide pictures the simplest lens gives up the borders: there corners hardly count with it, and no lens would gain anything
+/// by them.
+fn of_wide_lens(start: &Problem, simplest: &Solved, layout: &Layout) -> Option<Solved> {
+    /// How many times the usual distance (root mean square of a normal distribution) marks residuals with borders given up.
+    const FAR: f64 = 2.0;
+    let usual_px = simplest.noise.typical_px(&simplest.problem.views) * 2f64.sqrt();
+    if simplest.rms_px < FAR * usual_px {
+        return None;
+    }
+    let wide = Layout::rig(Lens::Rational8, layout.shape);
+    let solved = Problem { values: simplest.problem.values.clone(), ..start.clone() }.solve(&wide).ok()?;
+    let added = (wide.count() - layout.count()) as f64;
+    let gain = solved.log_likelihood - simplest.log_likelihood;
+    (solved.rms_px < simplest.rms_px && 2.0 * gain > added + 2.0 * (2.0 * added).sqrt()).then_some(solved)
 }
 
 /// A lens of fewer terms than the simplest of the ladder, where the pairs say so: the logarithm of its evidence (Laplace's approximation; what is

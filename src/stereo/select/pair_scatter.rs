@@ -57,8 +57,16 @@ impl Jackknife<'_> {
         }
         let (root, inverse_root) = roots(by_noise)?;
         let correction = (groups - 1) as f64 / groups as f64;
-        let steps: Vec<DVector<f64>> =
-            without.iter().map(|w| &inverse_root * &w.step * (groups as f64 * correction).sqrt()).collect();
+        // Of the step without a group what the others tell.
+        let told: Vec<DMatrix<f64>> = without
+            .iter()
+            .map(|w| told_by_others(&(&inverse_root * &w.covariance * inverse_root.transpose() * inflation)))
+            .collect();
+        let steps: Vec<DVector<f64>> = without
+            .iter()
+            .zip(&told)
+            .map(|(w, told)| told * (&inverse_root * &w.step) * (groups as f64 * correction).sqrt())
+            .collect();
         // What the noise alone makes of the jackknife: groups that weigh much in a direction stretch it.
         let own = by_noise / inflation;
         let (weighted, curved) = (reduced(self.equations)?, reduced(self.curvature)?);
@@ -69,7 +77,7 @@ impl Jackknife<'_> {
             let in_group = weighted.iter().zip(self.group_of).filter(|(_, of)| **of == group);
             let information = in_group.fold(DMatrix::zeros(n, n), |sum, (m, _)| sum + m);
             let gradient = &information - &information * &own * &information;
-            let step = &inverse_root * &without.covariance * slope;
+            let step = &told[group] * &inverse_root * &without.covariance * slope;
             expected += inflation * correction * (&step * gradient * step.transpose()).trace();
         }
         let scatter = steps.iter().fold(DMatrix::zeros(n, n), |sum, x| sum + x * x.transpose()) / groups as f64;
@@ -83,6 +91,18 @@ impl Jackknife<'_> {
         (ratio.is_finite() && covariance.iter().all(|v| v.is_finite()))
             .then(|| (0.5 * (&covariance + covariance.transpose()), ratio))
     }
+}
+
+/// Projection on the directions that the rig without a group knows hardly worse than the one with it; `covariance` is its in units of the
+/// latter's. What a group alone tells (the distortion at a border that one pair reaches) no other pair checks: without it those numbers go
+/// anywhere, and a step there says nothing of how pairs scatter.
+fn told_by_others(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    /// Most by which the variance grows in a direction that the others tell, too.
+    const MOST_GROWTH: f64 = 100.0;
+    let n = covariance.nrows();
+    let eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
+    let lost = (0..n).filter(|&i| !(eigen.eigenvalues[i] <= MOST_GROWTH)).map(|i| eigen.eigenvectors.column(i));
+    lost.fold(DMatrix::identity(n, n), |kept, direction| kept - direction * direction.transpose())
 }
 
 /// Each pair's share of the normal equations of the shared numbers.

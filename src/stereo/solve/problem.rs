@@ -45,6 +45,8 @@ pub struct Solved {
     pub loss: Loss,
     /// Variance of the unknowns over what the weighted normal equations say, as the loss makes it.
     pub loss_factor: f64,
+    /// Logarithm of the corners' likelihood with this scatter, but for a constant.
+    pub log_likelihood: f64,
     /// Root mean square of the length of the 2-D residuals, px.
     pub rms_px: f64,
 }
@@ -102,6 +104,7 @@ impl Problem {
         noise.apply(&mut views);
         let left = residuals::active(&views, &values).ok_or_else(unseen)?;
         let whitened = |o: &Observation, r: &Vector2<f64>| o.whiten(*r).norm_squared();
+        let log_likelihood = noise.log_likelihood(&left, loss);
         let loss_factor = loss.variance_factor(left.iter().map(|(o, r)| whitened(o, r)));
         if loss != Loss::Squared {
             weigh(&mut views, &values, loss);
@@ -112,7 +115,7 @@ impl Problem {
         }
         let squares: Vec<f64> = left.iter().map(|(_, r)| r.norm_squared()).collect();
         let rms_px = residuals::root_mean_square(&squares).unwrap_or(0.0);
-        Ok(Solved { problem: Problem { views, values, priors }, noise, loss, loss_factor, rms_px })
+        Ok(Solved { problem: Problem { views, values, priors }, noise, loss, loss_factor, log_likelihood, rms_px })
     }
 
     /// The same without some pairs: `keep` says which stay.
