@@ -3,8 +3,9 @@
 //! In: a picture and where its corners are. Out: how far its two fields lie apart where the board moved between them; corners measured in
 //! such a picture are those of two boards. Method: at each edge a row is compared with the mean of the rows above and below; what
 //! they differ by, over the grey value's slope along the row, is a shift. Between fields it alternates from row to row. The
-//! same sums with a sign that alternates every two rows hold noise, slanted edges and blur just as well, and no fields. Goes wrong: a
-//! motion that is all along the columns shifts nothing along the rows.
+//! same sums with a sign that alternates every two rows hold noise, slanted edges and blur just as well, and no fields. Colours that were
+//! interpolated from a mosaic alternate from column to column as they do from row to row, which fields do not. Goes wrong: a motion that
+//! is all along the columns shifts nothing along the rows.
 
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 
@@ -21,6 +22,8 @@ const BEYOND_CHANCE: f64 = 4.0;
 /// Share of the shifts' squares that is a motion of the whole board. Colours that were interpolated from a mosaic leave shifts
 /// between rows too, of either sign from edge to edge.
 const COMMON: f64 = 0.5;
+/// Share of the squares of the shifts between rows that those between columns are where it is a mosaic.
+const ALIKE: f64 = 0.25;
 /// Least shift that matters, px. Sensors with two read-out paths have rows of unequal gain, which shifts nothing; colours that a camera
 /// interpolates from its mosaic leave up to 0.05 px in pictures of one moment.
 const LEAST_SHIFT_PX: f64 = 0.06;
@@ -40,19 +43,35 @@ pub fn shift_between_fields(picture: &Picture, places: &Places) -> Option<f64> {
 }
 
 fn shift<T: Copy + Into<i32>>(image: &Image<T>, places: &Places) -> Option<f64> {
+    let seen = seen(image, places)?;
+    let (fields, control) = (square(&seen, 0), square(&seen, 1));
+    let shift_px = (fields / seen.len() as f64).sqrt();
+    let moved = shift_px > LEAST_SHIFT_PX && fields > BEYOND_CHANCE.powi(2) * control;
+    let is_motion = moved && common_square(&seen) > COMMON * fields;
+    (is_motion && between_columns(image, places) < ALIKE * fields / seen.len() as f64).then_some(shift_px)
+}
+
+/// Mean square of the shifts between columns, px^2.
+fn between_columns<T: Copy + Into<i32>>(image: &Image<T>, places: &Places) -> f64 {
+    let (width, height) = (image.height, image.width);
+    let pixels = (0..width * height).map(|k| image.pixels[(k % width) * image.width + k / width]).collect();
+    let turned = seen(&Image { width, height, pixels }, &places.map(|p| Point2::new(p.y, p.x)));
+    turned.map_or(0.0, |seen| square(&seen, 0) / seen.len() as f64)
+}
+
+/// Sum of the squares of the shifts, or of the controls'.
+fn square(seen: &[(Point2<f64>, [f64; 2])], which: usize) -> f64 {
+    seen.iter().map(|(_, s)| s[which] * s[which]).sum()
+}
+
+/// Places with the shift there and its control, px; `None` where too few tell.
+fn seen<T: Copy + Into<i32>>(image: &Image<T>, places: &Places) -> Option<Vec<(Point2<f64>, [f64; 2])>> {
     let half = (HALF_SQUARES * places.step_px()?).min(HALF_PX).ceil();
     let corners: Vec<Point2<f64>> = places.iter().map(|(_, _, p)| *p).collect();
     let every = corners.len().div_ceil(CORNERS).max(1);
     let seen: Vec<(Point2<f64>, [f64; 2])> =
         corners.into_iter().step_by(every).filter_map(|p| Some((p, around(image, &p, half)?))).collect();
-    if seen.len() < FEWEST {
-        return None;
-    }
-    let square = |which: usize| seen.iter().map(|(_, s)| s[which] * s[which]).sum::<f64>();
-    let (fields, control) = (square(0), square(1));
-    let shift_px = (fields / seen.len() as f64).sqrt();
-    let moved = shift_px > LEAST_SHIFT_PX && fields > BEYOND_CHANCE.powi(2) * control;
-    (moved && common_square(&seen) > COMMON * fields).then_some(shift_px)
+    (seen.len() >= FEWEST).then_some(seen)
 }
 
 /// What a motion of the whole board, a linear function of the place, makes of the shifts' sum of squares.
@@ -150,6 +169,30 @@ mod tests {
                 let (picture, places) = picture(turn, moved);
                 assert!(shift_between_fields(&picture, &places).is_some(), "{turn} {moved}");
             }
+        }
+    }
+
+    #[test]
+    fn edges_that_alternate_along_rows_and_columns_alike_are_a_mosaics() {
+        for zigzag in [0.4, 0.8, 1.5] {
+            let (sharp, places) = picture(0.1, 0.0);
+            let Grey::Eight(image) = &sharp.grey else { unreachable!() };
+            let at = |x: f64, y: f64| {
+                let (i, j) = (x.clamp(0.0, 298.0), y.clamp(0.0, 298.0));
+                let (c, r) = (i as usize, j as usize);
+                let g = |c: usize, r: usize| f64::from(image.pixels[r * 300 + c]);
+                let (u, v) = (i - c as f64, j - r as f64);
+                (1.0 - v) * ((1.0 - u) * g(c, r) + u * g(c + 1, r))
+                    + v * ((1.0 - u) * g(c, r + 1) + u * g(c + 1, r + 1))
+            };
+            let pixel = |k: usize| {
+                let (x, y) = (k % 300, k / 300);
+                let by = |n: usize| if n % 2 == 0 { 0.5 * zigzag } else { -0.5 * zigzag };
+                at(x as f64 + by(y), y as f64 + by(x)).round() as u8
+            };
+            let pixels = (0..300 * 300).map(pixel).collect();
+            let mosaic = Picture::from(Image { width: 300, height: 300, pixels });
+            assert_eq!(shift_between_fields(&mosaic, &places), None, "{zigzag}");
         }
     }
 }

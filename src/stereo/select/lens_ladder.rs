@@ -81,7 +81,7 @@ fn of_wide_lens(start: &Problem, simplest: &Solved, layout: &Layout) -> Option<S
     let solved = Problem { values: simplest.problem.values.clone(), ..start.clone() }.solve(&wide).ok()?;
     let added = (wide.count() - layout.count()) as f64;
     let gain = solved.log_likelihood - simplest.log_likelihood;
-    (solved.rms_px < simplest.rms_px && 2.0 * gain > added + 2.0 * (2.0 * added).sqrt()).then_some(solved)
+    (2.0 * gain > added + 2.0 * (2.0 * added).sqrt()).then_some(solved)
 }
 
 /// A lens of fewer terms than the simplest of the ladder, where the pairs say so: the logarithm of its evidence (Laplace's approximation; what is

@@ -1,10 +1,14 @@
 //! Lenses and boards that are not as simple as they are drawn.
 
+use nalgebra::Vector3;
+
 use super::*;
+use crate::geometry::transform;
 use crate::stereo::Lens;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::view::View;
 use crate::stereo::triangulate::{common, triangulate};
+use crate::stereo::{Camera, Rig};
 
 #[test]
 fn a_bowed_board_is_seen_and_corrected() {
@@ -112,4 +116,29 @@ fn a_lens_term_of_half_a_pixel_is_found_by_the_ladder() {
     assert!(lens >= Lens::Brown5 && worst_point_mm(&found, &world) < 0.015, "{lens:?}");
     let forced = calibrate(&corners, &BROWN4).unwrap();
     assert!(!crate::stereo::judge::residual_correlation::check(&forced).white(), "{:?}", forced.neighbours);
+}
+
+#[test]
+fn the_borders_of_a_wide_picture_are_no_outliers() {
+    let mut camera = Camera::pinhole(1280, 960, 617.0);
+    camera.lens = Lens::Rational8;
+    camera.distortion[..8].copy_from_slice(&[0.37, -0.18, -1e-4, 2e-4, 0.003, 0.74, -0.18, -0.02]);
+    let right = Camera { fx: 615.0, cx: 645.0, ..camera };
+    let between = transform(Vector3::new(0.01, 0.02, -0.005), Vector3::new(-67.0, 0.3, 1.0));
+    let mut world = World::new(10, 5);
+    world.rig = Rig { left: camera, right, right_from_left: between, covariance: None };
+    for (i, pose) in world.poses.iter_mut().enumerate() {
+        // One pair in three reaches to a border on the left, where 200 px are missing of what a lens without distortion shows.
+        let aside = if i % 3 == 0 { -120.0 } else { 8.0 * i as f64 };
+        let turn = Vector3::new(0.3 - 0.07 * i as f64, 0.1 * (i as f64 - 4.0), 0.05 * i as f64);
+        *pose = transform(turn, Vector3::new(aside, 5.0 * i as f64 - 20.0, 170.0 + 6.0 * i as f64));
+    }
+    let found = calibrate(&world.corners(6), &Options::default()).unwrap();
+    let lens = found.layout.left.unwrap();
+    let px = |found: &Calibration| found.noise.typical_px(&found.views);
+    assert!(lens >= Lens::Rational8 && px(&found) < 1.2 * world.sigma_px, "{lens:?} {}", px(&found));
+    assert!((found.rig().left.fx - 617.0).abs() < 1.0, "{}", found.rig().left.fx);
+    // With the simplest lens they are, and nothing says so but how far off they lie.
+    let simple = calibrate(&world.corners(6), &Options { lens: Some(Lens::Brown5), ..BROWN4 }).unwrap();
+    assert!(px(&simple) > 1.5 * world.sigma_px && simple.rms_px > 10.0 * px(&simple), "{}", px(&simple));
 }
