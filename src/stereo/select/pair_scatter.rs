@@ -101,7 +101,7 @@ fn told_by_others(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     const MOST_GROWTH: f64 = 100.0;
     let n = covariance.nrows();
     let eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
-    let lost = (0..n).filter(|&i| !(eigen.eigenvalues[i] <= MOST_GROWTH)).map(|i| eigen.eigenvectors.column(i));
+    let lost = (0..n).filter(|&i| eigen.eigenvalues[i] > MOST_GROWTH).map(|i| eigen.eigenvectors.column(i));
     lost.fold(DMatrix::identity(n, n), |kept, direction| kept - direction * direction.transpose())
 }
 

@@ -3,7 +3,7 @@
 //! Hidden files and folders are passed over, and so are folders that this program wrote its results into: a run inside the folder of
 //! pictures must not find what it wrote the last time.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use camino::{Utf8Path, Utf8PathBuf};
 
@@ -97,7 +97,7 @@ fn once(pictures: &mut Vec<Utf8PathBuf>) -> usize {
         let extension = path.extension().map(str::to_ascii_lowercase);
         EXTENSIONS.iter().position(|known| extension.as_deref() == Some(known))
     };
-    let mut best: HashMap<Utf8PathBuf, Utf8PathBuf> = HashMap::new();
+    let mut best: BTreeMap<Utf8PathBuf, Utf8PathBuf> = BTreeMap::new();
     for path in pictures.iter() {
         let kept = best.entry(path.with_extension("")).or_insert_with(|| path.clone());
         if rank(path) < rank(kept) {
