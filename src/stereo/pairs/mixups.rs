@@ -28,6 +28,10 @@ const ENOUGH_CORNERS: usize = 40;
 /// Pairs that are tried as the home of a picture, those with the board nearest to where it shows it.
 const NEAREST: usize = 3;
 
+/// Share of the limit for pairs within which one fits that was turned or mirrored back: a board near the middle that is seen nearly square
+/// looks alike from behind, and half fits what it is not.
+const FITS_WELL: f64 = 0.5;
+
 /// A series of pairs, the rig that most of them agree on, and which of them do not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series<'a> {
@@ -158,9 +162,9 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// True where the view fits on a rig in one of the numberings that the board's outline allows.
-    fn fits(&self, shared: &Shared, view: &View) -> bool {
-        let limit = self.series.limit_px;
+    /// True where the view fits on a rig, within a share of the limit, in one of the numberings that the board's outline allows.
+    fn fits(&self, shared: &Shared, view: &View, share: f64) -> bool {
+        let limit = share * self.series.limit_px;
         self.series.board.turns_of_outline().into_iter().any(|quarters| {
             let mut turned = view.clone();
             turned.turn_right(self.series.board, quarters);
@@ -185,7 +189,7 @@ impl Scene<'_> {
             let reason = "the corners are numbered from another end of the board in the right picture than in the left";
             return Some((Cause::Numbering, reason.to_owned()));
         }
-        if self.fits(shared, &view.exchanged()) {
+        if self.fits(shared, &view.exchanged(), 1.0) {
             let reason = "left and right picture are exchanged: give each the other's name";
             return Some((Cause::Exchanged, reason.to_owned()));
         }
@@ -200,7 +204,7 @@ impl Scene<'_> {
                         o.renumber(self.series.board, (o.col, self.series.board.rows() - 1 - o.row));
                     }
                 }
-                if self.fits(shared, &undone) {
+                if self.fits(shared, &undone, FITS_WELL) {
                     let (side, words) = (side.name(), change.words);
                     let reason = format!("the {side} picture is {words}: use the file as the camera wrote it");
                     return Some((change.cause, reason));
@@ -250,7 +254,7 @@ impl Scene<'_> {
             let home = others.into_iter().take(NEAREST).map(|(_, j)| j).find(|&j| {
                 let mut mixed = self.views[i].only(side);
                 mixed.observations.extend(self.views[j].only(other).observations);
-                self.fits(self.series.shared, &mixed)
+                self.fits(self.series.shared, &mixed, 1.0)
             })?;
             let reason = format!(
                 "the pictures do not belong together: the {} one was taken at the same time as the {} one of pair {}",
