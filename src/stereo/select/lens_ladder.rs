@@ -68,7 +68,7 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
 }
 
 /// The pairs as a lens with the rational terms leaves them, where many corners lie far from where the simplest one puts them and near where this
-/// one does. In wide pictures the simplest lens gives up the borders: there corners hardly count with it, and no lens would gain anything
+/// one does, and the pairs determine it. In wide pictures the simplest lens gives up the borders: there corners hardly count with it, and no lens would gain anything
 /// by them.
 fn of_wide_lens(start: &Problem, simplest: &Solved, layout: &Layout) -> Option<Solved> {
     /// How many times the usual distance (root mean square of a normal distribution) marks residuals with borders given up.
@@ -79,6 +79,7 @@ fn of_wide_lens(start: &Problem, simplest: &Solved, layout: &Layout) -> Option<S
     }
     let wide = Layout::rig(Lens::Rational8, layout.shape);
     let solved = Problem { values: simplest.problem.values.clone(), ..start.clone() }.solve(&wide).ok()?;
+    solved.uncertainty(&wide).ok()?;
     let added = (wide.count() - layout.count()) as f64;
     let gain = solved.log_likelihood - simplest.log_likelihood;
     (2.0 * gain > added + 2.0 * (2.0 * added).sqrt()).then_some(solved)
