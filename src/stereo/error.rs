@@ -29,10 +29,10 @@ pub enum Error {
         /// Pairs with a board in one picture at least.
         pairs: usize,
     },
-    /// Both cameras stand at one place, as far as the pictures tell: nothing can be measured by them.
+    /// The distance of the cameras is not told from none: nothing can be measured by them.
     #[error(
-        "the cameras stand at one place: their distance is {baseline_mm:.2} mm with a standard deviation of {sigma_mm:.2} mm, and rays that \
-         do not cross measure nothing"
+        "the cameras cannot be told from one camera: their distance is {baseline_mm:.2} mm with a standard deviation of {sigma_mm:.2} mm; \
+         nothing is measured by rays that hardly cross"
     )]
     NoBaseline {
         /// Distance of the cameras' centres, mm.
@@ -233,7 +233,7 @@ impl Explain for Error {
                     "photograph the board where both cameras see it at once, and check that equal names belong together"
                 }
                 Error::NoBaseline { .. } => {
-                    "left and right pictures have to come from two cameras; are these of one, or copies of the same?"
+                    "left and right pictures come from two cameras that stand apart: are these all of one? If not, add pairs"
                 }
                 Error::TooFewCorners { .. } => "photograph more pairs, or `--lens radial2` for fewer unknowns",
                 Error::NoCamera { .. } => "`--squares CxR` must be the board's squares, not its inner corners",

@@ -20,19 +20,22 @@ pub struct Seen {
 /// The squares of the whole board that a picture shows.
 pub fn squares_of(picture: &Picture) -> Option<Seen> {
     let levels = ladder(picture).into_iter().filter_map(|Attempt { level, way }| (way == Way::Grow).then_some(level));
-    let seen: Vec<Seen> = levels
-        .into_iter()
-        .filter_map(|level| {
-            let small = level.copy(picture);
-            let grid = grown(&small, usize::MAX)?;
-            let ends = extent::ends_on_all_sides(&small, &grid);
-            let is_whole = grid.count() == grid.columns * grid.rows && (ends || extent::is_in_view(&small, &grid));
-            let (columns, rows) = (grid.columns.max(grid.rows) + 1, grid.columns.min(grid.rows) + 1);
-            is_whole.then_some(Seen { squares: Squares { columns, rows }, ends })
-        })
-        .collect();
-    let corners = |seen: &&Seen| seen.squares.columns * seen.squares.rows;
-    seen.iter().find(|seen| seen.ends).or_else(|| seen.iter().max_by_key(corners)).copied()
+    let mut most: Option<Seen> = None;
+    for level in levels {
+        let small = level.copy(picture);
+        let Some(grid) = grown(&small, usize::MAX).filter(|grid| grid.count() == grid.columns * grid.rows) else {
+            continue;
+        };
+        let squares = Squares { columns: grid.columns.max(grid.rows) + 1, rows: grid.columns.min(grid.rows) + 1 };
+        if extent::ends_on_all_sides(&small, &grid) {
+            return Some(Seen { squares, ends: true });
+        }
+        let is_more = most.is_none_or(|most| squares.columns * squares.rows > most.squares.columns * most.squares.rows);
+        if is_more && extent::is_in_view(&small, &grid) {
+            most = Some(Seen { squares, ends: false });
+        }
+    }
+    most
 }
 
 #[cfg(test)]

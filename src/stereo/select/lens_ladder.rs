@@ -67,9 +67,9 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     Ok(Choice { layout, near: Some(values), priors, scatter: None, scores })
 }
 
-/// The pairs as a lens with the rational terms leaves them, where many corners lie far from where the simplest one puts them and near where this
-/// one does, and the pairs determine it. In wide pictures the simplest lens gives up the borders: there corners hardly count with it, and no lens would gain anything
-/// by them.
+/// The pairs as a lens with the rational terms leaves them, where many corners lie far from where the simplest one puts them, this one explains
+/// them and the pairs determine it. In wide pictures the simplest lens gives up the borders: corners there hardly count with it, and no lens
+/// would gain anything by them.
 fn of_wide_lens(start: &Problem, simplest: &Solved, layout: &Layout) -> Option<Solved> {
     /// How many times the usual distance (root mean square of a normal distribution) marks residuals with borders given up.
     const FAR: f64 = 2.0;

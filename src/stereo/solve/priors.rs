@@ -50,6 +50,13 @@ struct Expectation {
     known: bool,
 }
 
+impl Expectation {
+    /// What lenses and boards usually are, of a sum itself.
+    fn usual(terms: Vec<(Number, f64)>, value: f64, sigma: f64) -> Expectation {
+        Expectation { terms, value, sigma, logarithm: false, known: false }
+    }
+}
+
 /// One of the shared numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Number {
@@ -88,13 +95,7 @@ impl Priors {
         let [left, right] = [&start.left, &start.right].map(|camera| (camera.fx * camera.fy).sqrt());
         if (left / right).ln().abs() < TWO_MAKES {
             let terms = vec![(Number::Camera(Side::Left, 0), 1.0), (Number::Camera(Side::Right, 0), -1.0)];
-            priors.all.push(Expectation {
-                terms,
-                value: 0.0,
-                sigma: ALIKE * (left * right).sqrt(),
-                logarithm: false,
-                known: false,
-            });
+            priors.all.push(Expectation::usual(terms, 0.0, ALIKE * (left * right).sqrt()));
         }
         priors.of_board(diagonal_mm);
         priors
@@ -128,7 +129,7 @@ impl Priors {
             let term =
                 |(column, (side, at)): (usize, &(Side, usize))| (Number::Camera(*side, *at), whitener[(row, column)]);
             let terms = numbers.iter().enumerate().map(term).filter(|(_, by)| *by != 0.0).collect();
-            Expectation { terms, value: values[row], sigma: 1.0, logarithm: false, known: true }
+            Expectation { known: true, ..Expectation::usual(terms, values[row], 1.0) }
         }));
         priors
     }
@@ -147,13 +148,7 @@ impl Priors {
         let focal = (camera.fx * camera.fy).sqrt();
         let corner = (0.5 * width / camera.fx).hypot(0.5 * height / camera.fy);
         let mut one = |at: usize, value: f64, sigma: f64| {
-            self.all.push(Expectation {
-                terms: vec![(Number::Camera(side, at), 1.0)],
-                value,
-                sigma,
-                logarithm: false,
-                known: false,
-            });
+            self.all.push(Expectation::usual(vec![(Number::Camera(side, at), 1.0)], value, sigma));
         };
         one(2, 0.5 * (width - 1.0), CENTRE_SHARE * width);
         one(3, 0.5 * (height - 1.0), CENTRE_SHARE * width);
@@ -171,27 +166,18 @@ impl Priors {
         one(7, 0.0, TANGENTIAL);
         (12..16).for_each(|at| one(at, 0.0, PRISM));
         (16..18).for_each(|at| one(at, 0.0, TILT_RAD));
-        self.all.push(Expectation {
-            terms: vec![(Number::Camera(side, 0), 1.0)],
-            value: (FOCAL_SHARE * width.max(height)).ln(),
-            sigma: FOCAL_FACTOR.ln(),
-            logarithm: true,
-            known: false,
-        });
+        let (usual, factor) = ((FOCAL_SHARE * width.max(height)).ln(), FOCAL_FACTOR.ln());
+        let terms = vec![(Number::Camera(side, 0), 1.0)];
+        self.all.push(Expectation { logarithm: true, ..Expectation::usual(terms, usual, factor) });
         if (camera.fx / camera.fy).ln().abs() < NOT_SQUARE {
             let terms = vec![(Number::Camera(side, 0), 1.0), (Number::Camera(side, 1), -1.0)];
-            self.all.push(Expectation { terms, value: 0.0, sigma: ASPECT * focal, logarithm: false, known: false });
+            self.all.push(Expectation::usual(terms, 0.0, ASPECT * focal));
         }
     }
 
     fn of_board(&mut self, diagonal_mm: f64) {
-        self.all.extend((0..board_shape::NUMBERS).map(|k| Expectation {
-            terms: vec![(Number::Shape(k), 1.0)],
-            value: 0.0,
-            sigma: BOW_SHARE * diagonal_mm,
-            logarithm: false,
-            known: false,
-        }));
+        let flat = |k| Expectation::usual(vec![(Number::Shape(k), 1.0)], 0.0, BOW_SHARE * diagonal_mm);
+        self.all.extend((0..board_shape::NUMBERS).map(flat));
     }
 
     /// Their share of the normal equations. Expectations of numbers that are not free say nothing; nor do those of single distortion

@@ -177,14 +177,15 @@ fn summarise(
     let expansion = Expansion::new(calibration.pair_scatter.groups, board_mm);
     let rays_chi_square = mean(&measured.iter().flat_map(|m| &m.points).map(|p| p.chi_square).collect::<Vec<_>>())?;
     let share = rays_chi_square.clamp(f64::MIN_POSITIVE, 1.0);
-    let names: Vec<&String> = calibration.views.iter().map(|view| &view.pair).collect();
+    let unchecked = calibration.views.iter().enumerate().filter(|(i, _)| folds.of(*i).is_none());
+    let unchecked = unchecked.map(|(_, view)| view.pair.clone()).collect();
     Some(Accuracy {
         extremes: lengths::extremes(measured, |i| Some(&folds.of(i)?.covariance), expansion, share)?,
         rays_chi_square,
         epipolar: epipolar(calibration.rig(), measured)?,
         doubtful,
         folds: folds.rigs.len(),
-        unchecked: (0..names.len()).filter(|i| folds.of(*i).is_none()).map(|i| names[i].clone()).collect(),
+        unchecked,
         fold_steps: folds.rigs.into_iter().flatten().map(|fold| fold.step).collect(),
         short_mm: short.map(|s| lengths::as_written_mm(board.spans_mm(s)[0])),
         long_mm: long.map(|s| lengths::as_written_mm(board.spans_mm(s)[0])),
