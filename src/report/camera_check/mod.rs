@@ -98,10 +98,18 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
             "95 % of lengths on pairs left out of the calibration are within this".to_owned(),
         ),
         (mm(extremes.max_abs_error_mm), "largest error of such a length".to_owned()),
-        (
-            judged.trusted_mm().map_or_else(|| "no limit".to_owned(), mm),
-            format!("lengths can be trusted to this; the tolerance is {} mm", judged.tolerance_mm),
-        ),
+        match judged.trusted_mm() {
+            Some(trusted_mm) => {
+                (mm(trusted_mm), format!("lengths can be trusted to this; the tolerance is {} mm", judged.tolerance_mm))
+            }
+            None => (
+                "not known".to_owned(),
+                format!(
+                    "what lengths can be trusted to, as long as a check is open; the tolerance is {} mm",
+                    judged.tolerance_mm
+                ),
+            ),
+        },
     ]
 }
 
