@@ -34,18 +34,21 @@ fn straight_part(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Vector3<f
 }
 
 impl Bundle<'_> {
-    /// Sets the crossings to what their corners, each through its own window, show on the whole; and with it what each corner sees.
-    pub(in crate::stereo::board_pose) fn unbend(&mut self, values: &mut Values) {
+    /// Sets the crossings to what their corners, each through its own window, show on the whole; and with it what each corner sees. `told` is
+    /// how much of a change of what is seen a crossing follows, between none and one: of what a window hardly sees, corners that are known
+    /// badly would else make any deviation.
+    pub(in crate::stereo::board_pose) fn unbend(&mut self, values: &mut Values, told: &[Vector3<f64>]) {
         let board = self.board;
         let windows = Window::means(board, &self.views);
         let off = crossing_means(board, &self.views, |o| o.seen_off_mm);
-        let seen: Vec<Vector3<f64>> = values.deviations_mm.iter().zip(off).map(|(d, off)| d + off).collect();
+        let seen: Vec<Vector3<f64>> = values.deviations_mm.iter().zip(&off).map(|(d, off)| d + off).collect();
         // A board that is larger, or sheared, has straight edges.
         let straight = straight_part(board, &seen);
         let bent: Vec<Vector3<f64>> = seen.iter().zip(&straight).map(|(d, s)| d - s).collect();
         let mut deviations = bent.clone();
         for _ in 0..STEPS {
-            deviations = bent.iter().zip(&windows).map(|(b, window)| b - window.seen_off(&deviations)).collect();
+            let of = |k: usize| bent[k] - off[k] + told[k].component_mul(&(off[k] - windows[k].seen_off(&deviations)));
+            deviations = (0..bent.len()).map(of).collect();
         }
         for o in self.views.iter_mut().flat_map(|view| &mut view.observations) {
             o.seen_off_mm = Window::of(board, o).seen_off(&deviations);
@@ -143,38 +146,68 @@ mod tests {
         assert!(slanted.iter().zip(&straight).all(|(a, b)| (a - b).norm() < 1e-12));
     }
 
+    /// The board with one corner a crossing, each seen through windows of this reach.
+    fn bundle(board: &Board, reach: f64) -> Bundle<'_> {
+        let observation = |k: usize| {
+            let mut o = Observation::of_point(Side::Left, nalgebra::Point2::origin(), 0.01);
+            ((o.col, o.row), o.reach) = (board.place(k), [reach; 2]);
+            o
+        };
+        let observations = (0..board.corner_count()).map(observation).collect();
+        Bundle {
+            board,
+            views: vec![View { pair: String::new(), observations }],
+            rig: RigPrior::new(&World::new(1, 1).rig),
+            shape: ShapePrior { in_plane_mm: 0.01, out_of_plane_mm: 0.01, bent_mm: 0.01, stretch_mm: 0.01 },
+            edge_bends_mm: vec![0.0; board.corner_count()],
+        }
+    }
+
+    fn values(deviations_mm: &[Vector3<f64>]) -> Values {
+        Values { rig: nalgebra::DVector::zeros(0), deviations_mm: deviations_mm.to_vec(), poses: Vec::new() }
+    }
+
+    fn length_of(d: impl Iterator<Item = Vector3<f64>>) -> f64 {
+        d.map(|d| d.norm_squared()).sum::<f64>().sqrt()
+    }
+
     #[test]
     fn crossings_are_found_through_windows_of_any_reach() {
         let (board, truth) = (board(), deviations());
         let straight = straight_part(&board, &truth);
         let bent: Vec<Vector3<f64>> = truth.iter().zip(&straight).map(|(d, s)| d - s).collect();
         for reach in [0.2, 0.6, 0.8] {
-            let observation = |k: usize| {
-                let mut o = Observation::of_point(Side::Left, nalgebra::Point2::origin(), 0.01);
-                ((o.col, o.row), o.reach) = (board.place(k), [reach; 2]);
-                o
-            };
-            let observations: Vec<Observation> = (0..truth.len()).map(observation).collect();
-            let seen_off = |k: usize| Window::of(&board, &observations[k]).seen_off(&bent);
+            let mut bundle = bundle(&board, reach);
+            let seen_off = |k: usize| Window::of(&board, &bundle.views[0].observations[k]).seen_off(&bent);
             let seen: Vec<Vector3<f64>> = (0..truth.len()).map(|k| truth[k] + seen_off(k)).collect();
-            let view = View { pair: String::new(), observations: observations.clone() };
-            let mut bundle = Bundle {
-                board: &board,
-                views: vec![view],
-                rig: RigPrior::new(&World::new(1, 1).rig),
-                shape: ShapePrior { in_plane_mm: 0.01, out_of_plane_mm: 0.01, bent_mm: 0.01, stretch_mm: 0.01 },
-                edge_bends_mm: vec![0.0; truth.len()],
-            };
-            let mut values =
-                Values { rig: nalgebra::DVector::zeros(0), deviations_mm: seen.clone(), poses: Vec::new() };
-            bundle.unbend(&mut values);
-            let left = |found: &[Vector3<f64>]| {
-                found.iter().zip(&truth).map(|(f, t)| (f - t).norm_squared()).sum::<f64>().sqrt()
-            };
-            assert!(left(&values.deviations_mm) < 0.05 * left(&vec![Vector3::zeros(); truth.len()]), "{reach}");
+            let mut values = values(&seen);
+            bundle.unbend(&mut values, &vec![Vector3::repeat(1.0); truth.len()]);
+            let left = length_of(values.deviations_mm.iter().zip(&truth).map(|(f, t)| f - t));
+            assert!(left < 0.05 * length_of(truth.iter().copied()), "{reach}");
             // Every corner is told what its window sees: crossing and offset together are what was seen.
             let o = &bundle.views[0].observations[8];
             assert!((values.deviations_mm[8] + o.seen_off_mm - seen[8]).norm() < 1e-4);
+        }
+    }
+
+    /// Of a board in few pictures that scatter, crossings keep to what was known of them, and windows as wide as the squares hardly see
+    /// that neighbours are off in turn: set to what is seen in full, the crossings would be farther off each time.
+    #[test]
+    fn crossings_that_are_known_badly_do_not_run_away() {
+        let (board, seen) = (board(), deviations());
+        for (reach, told) in [(0.8, 0.1), (0.95, 0.1), (0.95, 0.5), (0.95, 0.02)] {
+            let mut bundle = bundle(&board, reach);
+            let mut values = values(&vec![Vector3::zeros(); seen.len()]);
+            for _ in 0..30 {
+                // The least squares with what each corner sees held: a share of what is left goes into its crossing.
+                for (k, d) in values.deviations_mm.iter_mut().enumerate() {
+                    *d = told * (seen[k] - bundle.views[0].observations[k].seen_off_mm);
+                }
+                bundle.unbend(&mut values, &vec![Vector3::repeat(told); seen.len()]);
+            }
+            let most = told / (1.0 - told * reach) * length_of(seen.iter().copied());
+            let found = length_of(values.deviations_mm.iter().copied());
+            assert!(found > 0.5 * told * most && found < 1.05 * most, "{reach} {told}: {found} of {most}");
         }
     }
 }

@@ -109,7 +109,8 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
     let mut covariance = DMatrix::zeros(0, 0);
     for round in 0..ROUNDS {
         if round > 0 && poses >= TELLING_POSES {
-            bundle.unbend(&mut values);
+            let told = told_of_crossings(&normal, &covariance, values.rig.len());
+            bundle.unbend(&mut values, &told);
         }
         bundle.weigh(&values, &noise);
         bundle.mark_outliers(&mut values);
@@ -184,6 +185,16 @@ impl Estimate<'_> {
         let covariance = self.own_point_mm2(i)? + &by_shared * &known.covariance * by_shared.transpose();
         Some(shift_mm.dot(&(covariance.try_inverse()? * shift_mm)))
     }
+}
+
+/// How much of each crossing's place, which are the shared unknowns from `first` on, its corners determine rather than what was known
+/// before, from none to one.
+fn told_of_crossings(normal: &Normal, covariance: &DMatrix<f64>, first: usize) -> Vec<Vector3<f64>> {
+    let told = covariance.component_mul(&normal.data).column_sum();
+    told.as_slice()[first..]
+        .chunks_exact(3)
+        .map(|d| Vector3::new(d[0], d[1], d[2]).map(|t| t.clamp(0.0, 1.0)))
+        .collect()
 }
 
 /// Residuals in px of the corners that are wanted, where they can be predicted, in the order of the poses.
