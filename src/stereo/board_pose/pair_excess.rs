@@ -6,30 +6,47 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use crate::stereo::board_pose::rig_change::consistency::{of_outsider, usual_excess};
+use crate::stereo::board_pose::print_share::rig_basis;
+use crate::stereo::board_pose::rig_change::consistency::{Change, of_member, of_usual};
 use crate::stereo::board_pose::solve::pose_block::{PoseBlock, SeenFrom, crossings};
+use crate::stereo::board_pose::solve::totals::Totals;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::model::board_shape::lift;
 use crate::stereo::solve::robust_loss::Loss;
-use crate::stereo::triangulate::RIG_NUMBERS;
+use crate::stereo::solve::uncertainty::invert;
 
 /// Two standard deviations of the excess of one pair that chance alone makes, as the median of many has it.
 const CHANCE: f64 = 1.5;
 
 /// Finds it; one where it is not beyond chance.
 pub fn pair_excess(calibration: &Calibration) -> f64 {
-    let (board, shared) = (&calibration.board, &calibration.values.shared);
+    let each = changes(calibration).unwrap_or_default();
+    let chance = 1.0 + CHANCE / (each.iter().flatten().count().max(1) as f64).sqrt();
+    Some(of_usual(&each)).filter(|excess| *excess > chance).unwrap_or(1.0)
+}
+
+/// What a change at each pair alone would gain. The rig was fitted to the same pairs, of which few determine it no better than their own
+/// change, so that it is free beside the change; the board's shape is held.
+fn changes(calibration: &Calibration) -> Option<Vec<Option<Change>>> {
+    let (board, shared, layout) = (&calibration.board, &calibration.values.shared, &calibration.layout);
     let height = |l: &[f64]| Vector3::new(0.0, 0.0, l.iter().zip(&shared.shape_mm).map(|(l, s)| l * s).sum());
     let heights: Vec<Vector3<f64>> = board.corners_mm().map(|at| height(&lift(board, &at))).collect();
     let places = crossings(board, &heights);
-    // What pairs share is held.
-    let (basis, none) = (DMatrix::zeros(RIG_NUMBERS, 0), DMatrix::zeros(3 * places.len(), 3 * places.len()));
-    let pairs = calibration.views.iter().zip(&calibration.values.poses);
-    let each = pairs.map(|(view, pose)| {
-        let seen = SeenFrom { rig: &shared.rig, crossings: &places, board, pose, view };
-        of_outsider(&PoseBlock::of(&seen, Loss::Squared)?.eliminate(&basis)?, &none)
-    });
-    let each: Vec<_> = each.collect();
-    let chance = 1.0 + CHANCE / (each.iter().flatten().count().max(1) as f64).sqrt();
-    Some(usual_excess(&each)).filter(|excess| *excess > chance).unwrap_or(1.0)
+    let basis = rig_basis(layout);
+    let n = basis.ncols();
+    let pairs: Vec<_> = calibration.views.iter().zip(&calibration.values.poses).collect();
+    let mut parts = Vec::new();
+    let totals = Totals::of(
+        &pairs,
+        (&basis, places.len()),
+        |&(view, pose)| {
+            PoseBlock::of(&SeenFrom { rig: &shared.rig, crossings: &places, board, pose, view }, Loss::Squared)
+        },
+        |_, _, part| parts.push(part),
+    )?;
+    let known = calibration.priors.information(layout, shared).matrix;
+    let rig = invert(&(totals.matrix.view((0, 0), (n, n)) + known.view((0, 0), (n, n))))?;
+    let mut covariance = DMatrix::zeros(n + 3 * places.len(), n + 3 * places.len());
+    covariance.view_mut((0, 0), (n, n)).copy_from(&rig);
+    Some(parts.iter().map(|part| of_member(part, &covariance)).collect())
 }

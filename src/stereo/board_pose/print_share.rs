@@ -42,6 +42,12 @@ impl PrintShare {
     }
 }
 
+/// Which of the rig's numbers each shared number that comes first in the layout is.
+pub(super) fn rig_basis(layout: &Layout) -> DMatrix<f64> {
+    let numbers: Vec<usize> = layout.names().iter().filter_map(|name| rig_number(name)).collect();
+    DMatrix::from_fn(RIG_NUMBERS, numbers.len(), |number, column| f64::from(numbers[column] == number))
+}
+
 fn print_share(solved: &Solved, board: &Board, layout: &Layout, inflation: f64) -> Option<PrintShare> {
     let Problem { views, values, priors } = &solved.problem;
     let noise = &solved.noise;
@@ -51,11 +57,8 @@ fn print_share(solved: &Solved, board: &Board, layout: &Layout, inflation: f64) 
     let heights = lifts.iter().map(|l| Vector3::new(0.0, 0.0, l.iter().zip(&shape).map(|(l, s)| l * s).sum()));
     let places = crossings(board, &heights.collect::<Vec<_>>());
     let names = layout.names();
-    let rig_count = names.iter().filter(|name| rig_number(name).is_some()).count();
-    let mut basis = DMatrix::zeros(RIG_NUMBERS, rig_count);
-    for (column, number) in names.iter().filter_map(|name| rig_number(name)).enumerate() {
-        basis[(number, column)] = 1.0;
-    }
+    let basis = rig_basis(layout);
+    let rig_count = basis.ncols();
     let size = rig_count + 3 * m;
     let seen = Seen::of(board, views);
     let pairs: Vec<_> = views.iter().zip(&values.poses).collect();

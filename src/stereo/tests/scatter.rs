@@ -1,5 +1,6 @@
 //! Predicted scatter against the scatter there is.
 
+use crate::stereo::board_pose::pair_excess::pair_excess;
 use nalgebra::{Matrix2, Matrix4, Point2, Vector2, Vector4};
 
 use super::*;
@@ -261,4 +262,20 @@ fn the_rigs_covariance_holds_for_print_that_is_seen_through_windows() {
     // As if each corner were its crossing's own: what is smooth over the board is then taken for less than it is.
     let unknown = chi_square(false);
     assert!(unknown > 1.3 * known, "{known} {unknown}");
+}
+
+/// Few pairs go after the rig's own numbers; how far they scatter about it is told no smaller for that.
+#[test]
+fn four_pairs_scatter_about_their_rig_as_far_as_many_do() {
+    let excess = |pairs: usize, turn_deg: f64| {
+        const WORLDS: u64 = 9;
+        let of =
+            |seed| pair_excess(&calibrate(&World::new(pairs, seed).corners_by_hand(seed, turn_deg), &BROWN4).unwrap());
+        (700..700 + WORLDS).map(|seed| of(seed).ln()).sum::<f64>() / WORLDS as f64
+    };
+    for turn_deg in [0.01, 0.03] {
+        let (few, many) = (excess(4, turn_deg).exp(), excess(30, turn_deg).exp());
+        assert!(many > 2.0 && few > 0.95 * many && few < 2.5 * many, "{turn_deg}: {few} {many}");
+    }
+    assert!(excess(4, 0.0).exp() < 1.3);
 }

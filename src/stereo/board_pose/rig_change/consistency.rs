@@ -54,6 +54,11 @@ pub(in crate::stereo::board_pose) fn at_each(normal: &Normal, covariance: &DMatr
     left(normal, covariance, &common, &whole)
 }
 
+/// What a change at a pose alone would gain where the minimum, in which it has its part, left all shared values free.
+pub(in crate::stereo::board_pose) fn of_member(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change> {
+    score(&part.change, &part.change_shared, &part.change_gradient, covariance)
+}
+
 /// What a change would gain at a pose that had no part in the minimum.
 pub(in crate::stereo::board_pose) fn of_outsider(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change> {
     // The gradient scatters with the pose's own corners and with the shared values, which its corners did not help to find.
@@ -114,12 +119,17 @@ fn left(normal: &Normal, covariance: &DMatrix<f64>, change: &Vector6<f64>, share
     normal.poses.par_iter().zip(shares).map(of).collect()
 }
 
-/// How much larger the usual score of a pose is than chance: one where the model holds.
+/// How much larger the usual score of a pose is than chance, after [`at_each`]: one where the model holds.
 pub(in crate::stereo::board_pose) fn usual_excess(each: &[Option<Change>]) -> f64 {
     let poses = each.iter().flatten().count() as f64;
     // One change that all have was taken off.
     let freed = if poses > 1.0 { poses / (poses - 1.0) } else { 1.0 };
-    median(each.iter().flatten().map(|c| c.fall)).map_or(1.0, |m| freed * m / MEDIAN_CHI_SQUARE_6)
+    freed * of_usual(each)
+}
+
+/// The usual score over what chance makes of it.
+pub(in crate::stereo::board_pose) fn of_usual(each: &[Option<Change>]) -> f64 {
+    median(each.iter().flatten().map(|c| c.fall)).map_or(1.0, |m| m / MEDIAN_CHI_SQUARE_6)
 }
 
 /// Sums over poses of what they say of a change.
