@@ -159,27 +159,3 @@ pub fn touched(moved_mm: f64, seed: u64) -> (World, Vec<Vector3<f64>>) {
     }
     (world, sockets)
 }
-
-/// Distances alone, to the group's centre.
-pub fn as_distances(rows: &[Measurement]) -> Vec<Measurement> {
-    let center = |group: &str| {
-        rows.iter().find(|r| r.at.group == group && r.at.role == Role::Center).and_then(|r| position(&r.observed))
-    };
-    rows.iter()
-        .map(|row| {
-            let distance_mm = match (center(&row.at.group), position(&row.observed)) {
-                (Some(c), Some(p)) => (p - c).norm(),
-                _ => 0.0,
-            };
-            Measurement {
-                at: row.at.clone(),
-                target: String::new(),
-                observed: Observed::Distance { distance_mm, sigma_mm: None },
-            }
-        })
-        .collect()
-}
-
-fn position(observed: &Observed) -> Option<Point3<f64>> {
-    if let Observed::Position { point_mm, .. } = observed { Some(*point_mm) } else { None }
-}

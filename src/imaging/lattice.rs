@@ -64,12 +64,6 @@ impl<T: Clone> Lattice<T> {
         Lattice { columns, rows, cells }
     }
 
-    /// All places, with what is there.
-    pub fn iter_all(&self) -> impl Iterator<Item = (usize, usize, Option<&T>)> {
-        let columns = self.columns;
-        self.cells.iter().enumerate().map(move |(i, c)| (i % columns, i / columns, c.as_ref()))
-    }
-
     /// The corner at a place; `None` where it is missing or outside of the grid.
     pub fn get(&self, col: usize, row: usize) -> Option<&T> {
         if col < self.columns && row < self.rows { self.cells[row * self.columns + col].as_ref() } else { None }

@@ -151,24 +151,6 @@ impl Discarded {
         });
         Discarded { pairs_in_all: used.len() + pairs.len(), pictures: pictures.collect(), pairs }
     }
-
-    /// Share of the corners in the used pairs that were rejected.
-    pub fn corner_share(&self) -> f64 {
-        let (seen, rejected) = self.pictures.iter().fold((0, 0), |(s, r), p| (s + p.seen, r + p.rejected));
-        rejected as f64 / seen.max(1) as f64
-    }
-
-    /// The picture that lost the largest share of its corners, where one lost any.
-    pub fn worst_picture(&self) -> Option<&PictureCorners> {
-        let share = |p: &PictureCorners| p.rejected as f64 / p.seen.max(1) as f64;
-        self.pictures.iter().filter(|p| p.rejected > 0).max_by(|a, b| share(a).total_cmp(&share(b)))
-    }
-
-    /// Share of the pairs that were seen, with a board in both pictures, and contradict the others.
-    pub fn contradicting_share(&self) -> f64 {
-        let contradicts = |p: &&DiscardedPair| p.cause.contradicts();
-        self.pairs.iter().filter(contradicts).count() as f64 / self.pairs_in_all.max(1) as f64
-    }
 }
 
 /// Which pairs the rig is that of. A rig that changed while it was photographed is two rigs; the one that stands now is the last.
