@@ -14,7 +14,7 @@ use crate::stereo::init::board_pose;
 use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::pairs::candidates::Candidates;
-use crate::stereo::pairs::series::{self, PairMisfit, Series};
+use crate::stereo::pairs::series::{self, Series};
 use crate::stereo::pairs::{Discarded, DiscardedPair, Standing};
 use crate::stereo::select::known_lenses::{self, LensCheck};
 use crate::stereo::select::lens_ladder;
@@ -50,8 +50,8 @@ pub struct Calibration {
     pub inflation: f64,
     /// What is expected of cameras and board before any picture.
     pub priors: Priors,
-    /// How far the pairs miss the rig, beside what each camera leaves of its own pictures.
-    pub misfit: PairMisfit,
+    /// What each camera leaves of its own pictures, the median over them, px.
+    pub alone_px: f64,
     /// How many of the first or last pairs are in it although they contradict the others.
     pub runs: usize,
     /// How the pairs scatter about the common rig; the covariance allows for more than the corners' noise lets expect.
@@ -144,7 +144,7 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
 /// can be found over the series.
 pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Result<Calibration, Error> {
     let candidates = Candidates::new(corners, options.known.as_ref())?;
-    let Series { problem: start, discarded, runs, misfit } = series::find(&candidates, runs)?;
+    let Series { problem: start, discarded, runs, alone_px } = series::find(&candidates, runs)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
     let Choice { layout, near, priors, scatter, scores: lens_scores } =
         lens_ladder::choose(&start, &corners.board, options).map_err(|e| e.without(&skipped))?;
@@ -180,7 +180,7 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
         inflation,
         priors,
         runs,
-        misfit,
+        alone_px,
         skipped,
         discarded: Discarded::new(&views, discarded),
         standing: Standing::default(),

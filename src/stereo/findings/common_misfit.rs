@@ -17,7 +17,6 @@ use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::pairs::Cause;
 use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::pairs::series::PairMisfit;
 use crate::stereo::solve::problem::Problem;
 
 /// A lens or a rig that lacks something leaves no more than about this many times what single pictures do.
@@ -35,15 +34,20 @@ const MOST_STRETCH: f64 = 0.1;
 /// The cause that all pairs share, where there is one.
 pub fn look(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
     let told = |finding: &Finding| finding.along.clone().filter(|along| along.by_pair.len() == calibration.views.len());
-    let misfit = match changes.iter().find_map(told) {
-        Some(along) => misfit_without(calibration, &along),
-        None => calibration.misfit.clone(),
-    };
+    let misfit = misfit_without(calibration, changes.iter().find_map(told));
     if misfit.usual_px < TIMES * corner_sigma_px(&calibration.views) {
         return None;
     }
-    let is_shared = misfit.usual_px > TIMES * misfit.alone_px;
-    other_sides(calibration, &misfit).or_else(|| is_shared.then(|| not_simultaneous(misfit)))
+    let is_shared = misfit.usual_px > TIMES * calibration.alone_px;
+    other_sides(calibration, &misfit).or_else(|| is_shared.then(|| not_simultaneous(calibration.alone_px, misfit)))
+}
+
+/// How far pairs miss their common rig.
+struct Misfit {
+    /// Median over the pairs, px.
+    usual_px: f64,
+    /// The pairs, the worst first.
+    worst_first: Vec<String>,
 }
 
 /// Standard deviation of most corners as their refinement states it, px; zero where it gave none.
@@ -53,7 +57,7 @@ fn corner_sigma_px(views: &[View]) -> f64 {
 }
 
 /// Pictures that were not taken at one moment: neither the corners nor a lens explain so much.
-fn not_simultaneous(misfit: PairMisfit) -> Finding {
+fn not_simultaneous(alone_px: f64, misfit: Misfit) -> Finding {
     Finding {
         cause: Cause::NotSimultaneous.word().to_owned(),
         kind: Kind::Pair,
@@ -62,9 +66,8 @@ fn not_simultaneous(misfit: PairMisfit) -> Finding {
         effect_mm: None,
         action: format!(
             "the pictures of the pairs were not taken at one moment: half of the pairs miss the rig by {:.2} px and more, each camera alone \
-             by {:.2} px; the worst are {}. Trigger both cameras at once, or hold the board still",
+             by {alone_px:.2} px; the worst are {}. Trigger both cameras at once, or hold the board still",
             misfit.usual_px,
-            misfit.alone_px,
             misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ")
         ),
         pairs: misfit.worst_first,
@@ -72,30 +75,37 @@ fn not_simultaneous(misfit: PairMisfit) -> Finding {
     }
 }
 
-/// How far the pairs miss the rig, each its own along a change.
-fn misfit_without(calibration: &Calibration, along: &Along) -> PairMisfit {
-    let of = |(view, share): (&View, &f64)| {
-        let shared = calibration.layout.step(&calibration.values.shared, along.to(*share).as_slice());
-        misfit_px(&shared, view).map_or(f64::INFINITY, |(px, _)| px)
+/// How far the pairs miss the rig, each its own along a change where there is one.
+fn misfit_without(calibration: &Calibration, change: Option<Along>) -> Misfit {
+    let (layout, views, shared) = (&calibration.layout, &calibration.views, &calibration.values.shared);
+    let of = |i: usize| match &change {
+        Some(along) => left_px(&layout.step(shared, along.to(along.by_pair[i]).as_slice()), &views[i]),
+        None => left_px(shared, &views[i]),
     };
-    let px: Vec<f64> = calibration.views.par_iter().zip(along.by_pair.as_slice()).map(of).collect();
+    let px: Vec<f64> = (0..views.len()).into_par_iter().map(of).collect();
     let mut worst: Vec<usize> = (0..px.len()).collect();
     worst.sort_by(|a, b| px[*b].total_cmp(&px[*a]).then(a.cmp(b)));
-    PairMisfit {
+    Misfit {
         usual_px: median(px.iter().copied()).unwrap_or(0.0),
-        alone_px: calibration.misfit.alone_px,
-        worst_first: worst.into_iter().map(|i| calibration.views[i].pair.clone()).collect(),
+        worst_first: worst.into_iter().map(|i| views[i].pair.clone()).collect(),
     }
 }
 
+fn left_px(shared: &Shared, view: &View) -> f64 {
+    misfit_px(shared, view).map_or(f64::INFINITY, |(px, _)| px)
+}
+
 /// A board whose squares are not as wide and high as was said, where the pairs fit one rig with other squares.
-fn other_sides(calibration: &Calibration, misfit: &PairMisfit) -> Option<Finding> {
+fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
     /// Most of it that may be left. One number of sixteen that a rig has takes up little of what has another cause.
     const LEFT: f64 = 0.5;
-    let (stretch, shared, views) = likeliest_stretch(calibration)?;
-    let left = |view: &View| misfit_px(&shared, view).map_or(f64::INFINITY, |(px, _)| px);
-    let left_px = median(views.par_iter().map(left).collect::<Vec<f64>>())?;
-    if left_px > LEFT * misfit.usual_px {
+    let problem = calibration.problem();
+    let layout = with_usual_lens(&calibration.layout);
+    let stretch = likeliest_stretch(&problem, &layout)?;
+    // What a richer lens takes up is not the board's.
+    let before_px = refitted_px(&problem, &layout)?.min(misfit.usual_px);
+    let left_px = refitted_px(&stretched(&problem, stretch), &layout)?;
+    if left_px > LEFT * before_px {
         return None;
     }
     let [width_mm, height_mm] = calibration.board.sides_mm();
@@ -109,22 +119,19 @@ fn other_sides(calibration: &Calibration, misfit: &PairMisfit) -> Option<Finding
         effect_mm: None,
         action: format!(
             "the board's {} are {:.4} times as wide as high, not {said:.4} times as was said: with that half of the pairs miss the rig by \
-             {left_px:.3} px and more, instead of {:.3} px. Measure the board along and across, and say the side as WxH",
+             {left_px:.3} px and more, instead of {before_px:.3} px. Measure the board along and across, and say the side as WxH",
             calibration.board.unit(),
             said * (1.0 + stretch),
-            misfit.usual_px,
         ),
         along: None,
     })
 }
 
-/// By how much wider the board is than was said, for its height, with what the pairs then make of the rig. `None` where they do not tell.
-fn likeliest_stretch(calibration: &Calibration) -> Option<(f64, Shared, Vec<View>)> {
-    let problem = calibration.problem();
-    let layout = with_usual_lens(&calibration.layout);
+/// By how much wider the board is than was said, for its height. `None` where the pairs do not tell.
+fn likeliest_stretch(problem: &Problem, layout: &Layout) -> Option<f64> {
     let mut stretch = 0.0;
     for step in STEPS {
-        let at = |by: f64| cost(&stretched(&problem, by), &layout);
+        let at = |by: f64| cost(&stretched(problem, by), layout);
         let tried = [-step, 0.0, step].par_iter().map(|by| at(stretch + by)).collect::<Option<Vec<f64>>>()?;
         let (slope, curvature) = (0.5 * (tried[2] - tried[0]), tried[2] - 2.0 * tried[1] + tried[0]);
         let change = -slope / curvature * step;
@@ -133,9 +140,13 @@ fn likeliest_stretch(calibration: &Calibration) -> Option<(f64, Shared, Vec<View
         }
         stretch += change;
     }
-    let problem = stretched(&problem, stretch);
-    let values = problem.refit(&layout)?;
-    Some((stretch, values.shared, problem.views))
+    Some(stretch)
+}
+
+/// How far half of the pairs miss the rig that fits them best.
+fn refitted_px(problem: &Problem, layout: &Layout) -> Option<f64> {
+    let shared = problem.refit(layout)?.shared;
+    median(problem.views.par_iter().map(|view| left_px(&shared, view)).collect::<Vec<f64>>())
 }
 
 /// The layout with at least the terms that nearly all lenses need: misfit that the board made may have left fewer.

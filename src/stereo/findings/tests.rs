@@ -247,3 +247,17 @@ fn a_board_whose_squares_are_not_as_wide_as_high_as_was_said_is_named_by_its_rat
         }
     }
 }
+
+/// The pairs' first common rig is that of a flat board; what is said of all pairs is said of the rig that is stated.
+#[test]
+fn a_bowed_board_is_no_other_one() {
+    for bow_mm in [0.03, 0.1, 0.4] {
+        for mut world in worlds(12, 5) {
+            (world.bow_mm, world.sigma_px) = ([bow_mm, 0.5 * bow_mm], 0.002);
+            let corners = world.corners(5);
+            let (found, told) = calibrate_standing(&corners, &asked(Options::default())).unwrap();
+            assert!(found.values.shared.shape_mm.iter().any(|mm| mm.abs() > 0.2 * bow_mm), "{bow_mm}");
+            assert!(told.is_empty(), "{bow_mm}: {told:?}");
+        }
+    }
+}

@@ -50,8 +50,8 @@ pub fn at_share(
             o.px = shift.seen;
         }
     }
-    let Calibration { misfit, skipped, discarded, standing, .. } = found.clone();
-    Some(Calibration { misfit, skipped, discarded, standing, ..still })
+    let Calibration { alone_px, skipped, discarded, standing, .. } = found.clone();
+    Some(Calibration { alone_px, skipped, discarded, standing, ..still })
 }
 
 /// A corner where it was seen, and where it would have been seen at the moment.

@@ -49,19 +49,8 @@ pub struct Series {
     pub discarded: Vec<DiscardedPair>,
     /// How many pairs of runs that contradict the others stayed.
     pub runs: usize,
-    /// How far the pairs miss their rig.
-    pub misfit: PairMisfit,
-}
-
-/// How far pairs miss their common rig, beside what each camera leaves of its own pictures.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PairMisfit {
-    /// Median over the pairs, px.
-    pub usual_px: f64,
-    /// Median over the pictures of what their camera alone leaves, px.
+    /// What each camera leaves of its own pictures, the median over them, px.
     pub alone_px: f64,
-    /// The pairs, the worst first.
-    pub worst_first: Vec<String>,
 }
 
 /// What a pair leaves on a rig: px, and its pose. `None` where it has none.
@@ -108,16 +97,12 @@ pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
         .collect();
     check(candidates, &misfits, usual_px, &members, &discarded)?;
     let values = Values { shared, poses: members.iter().filter_map(|&i| Some(misfits[i]?.1)).collect() };
-    let px = |i: &usize| misfits[*i].map_or(0.0, |(px, _)| px);
-    let mut worst = members.clone();
-    worst.sort_by(|a, b| px(b).total_cmp(&px(a)).then(a.cmp(b)));
-    let worst_first = worst.iter().map(|&i| views[i].pair.clone()).collect();
-    let misfit = PairMisfit { usual_px, alone_px: alone_px_of(candidates), worst_first };
     let views = members.iter().map(|&i| views[i].clone()).collect();
     let mut discarded: Vec<DiscardedPair> = discarded.into_iter().chain(candidates.discarded.iter().cloned()).collect();
     discarded.sort_by(|a, b| a.pair.cmp(&b.pair));
     let runs = runs_kept.len();
-    Ok(Series { problem: Problem { views, values, priors }, discarded, runs, misfit })
+    let alone_px = alone_px_of(candidates);
+    Ok(Series { problem: Problem { views, values, priors }, discarded, runs, alone_px })
 }
 
 /// The pairs with the numbering that they agree on, and the rig in the middle of their own.
