@@ -20,6 +20,7 @@ pub(super) fn verification_figure(before: &[RowError], after: &[RowError]) -> Re
     };
     let svg =
         Plot::new("Distance errors of the verify rows", "verify row, in the order of the file", "absolute error, mm")
+            .whole_x()
             .points("before", &series(before))
             .points("after", &series(after))
             .log_y()
