@@ -68,6 +68,15 @@ impl Provenance {
     }
 }
 
+impl Provenance {
+    /// What this run read that the JSON file there was made of, too: of that it is no test.
+    pub fn shares(&self, file: &Utf8Path) -> Option<&str> {
+        let made_of = Provenance::of_json(file)?.inputs;
+        let same = |read: &&Digested| made_of.iter().any(|input| input.sha256 == read.sha256);
+        self.inputs.iter().find(same).map(|read| read.file.as_str())
+    }
+}
+
 /// Name and version.
 pub fn program() -> String {
     format!("stereocal {}", env!("CARGO_PKG_VERSION"))

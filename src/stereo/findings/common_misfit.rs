@@ -109,7 +109,7 @@ fn other_sides(calibration: &Calibration, misfit: &PairMisfit) -> Option<Finding
         effect_mm: None,
         action: format!(
             "the board's {} are {:.4} times as wide as high, not {said:.4} times as was said: with that half of the pairs miss the rig by \
-             {left_px:.3} px and more, instead of {:.3} px. Measure the board along and across, and say the side as WxH",
+             {left_px:.3} px and more, instead of {:.3} px. Measure the board along and across, and give `--measured-mm WxH`",
             calibration.board.unit(),
             said * (1.0 + stretch),
             misfit.usual_px,
