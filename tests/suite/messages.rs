@@ -46,7 +46,7 @@ fn what_a_beginner_mistypes() {
     let robot = [("x/poses.csv", ""), ("robot.toml", "name = \"r\"")];
     refused(&["measure", "x", "--calibration", "robot.toml"], &robot, 2, &["this is no JSON", "camera-check IMAGES"]);
     refused(&["identify", "--robot", "a.json"], &[("a.json", "{}")], 2, &["this is JSON", "hint: ", "robot new"]);
-    refused(&["board", "checker:9x6:194.4"], &[], 2, &["the board is 1749.6 x 1166.4 mm", "hint: ", "65 %"]);
+    refused(&["board", "checker:9x6:194.4"], &[], 2, &["the board is 1749.6 x 1166.4 mm", "hint: ", "66 %"]);
 }
 
 #[test]
