@@ -190,7 +190,7 @@ impl Explain for Error {
             Error::TooFewPairs { board, .. } => {
                 let (columns, rows) = (board.columns(), board.rows());
                 Some(format!(
-                    "`--squares` counts squares, not inner corners: {} means {columns}x{rows} inner corners",
+                    "`--squares` counts squares, not inner corners: {} means {columns}x{rows} inner corners; a board with markers is named by `--board`",
                     board.squares
                 ))
             }

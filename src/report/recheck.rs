@@ -101,7 +101,7 @@ pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[
         (format!("{:.4} mm", recheck.seen_mm), "would have been seen".to_owned()),
         (format!("{tolerance_mm} mm"), "tolerance".to_owned()),
     ];
-    let text = page::capital(&format!("{}. Next: {}.", sentence(recheck, standing, tolerance_mm), next(standing)));
+    let text = format!("{}. Next: {}.", sentence(recheck, standing, tolerance_mm), next(standing));
     let rows: Vec<Vec<String>> = recheck
         .causes
         .iter()

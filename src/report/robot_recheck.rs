@@ -93,7 +93,7 @@ pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[
         (format!("{:.4} mm", recheck.seen_mm), "would have been seen".to_owned()),
         (format!("{tolerance_mm:.4} mm"), "tolerance".to_owned()),
     ];
-    let text = format!("{}. Next: {}.", page::capital(&sentence(recheck, tolerance_mm)), next(standing, recheck));
+    let text = format!("{}. Next: {}.", sentence(recheck, tolerance_mm), next(standing, recheck));
     let rows: Vec<Vec<String>> = cells(recheck).into_iter().map(|row| row.to_vec()).collect();
     let content = html! {
         (page::verdict(tone(standing), word(standing), &numbers, &text))
