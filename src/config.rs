@@ -209,6 +209,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_size_that_nobody_said_is_said() {
+        let assumed = Config::default().check_board;
+        assert!(assumed.size_is_assumed(None, None).is_some_and(|said| said.contains("10 mm")));
+        assert_eq!(assumed.size_is_assumed(None, Some(10.0)), None);
+        assert_eq!(assumed.size_is_assumed(Some("checker:9x7:20".parse().unwrap()), None), None);
+        let config: Config = toml::from_str("[check_board]\nsquares = \"20x20\"\nsquare_mm = 10.0\n").unwrap();
+        assert_eq!(config.check_board.size_is_assumed(None, None), None);
+    }
+
+    #[test]
     fn all_problems_come_at_once() {
         let config: Config =
             toml::from_str("tolerance_mm = -1.0\n[check_board]\nsquares = \"9x7\"\nsquare_mm = 0.0\n").unwrap();

@@ -61,7 +61,10 @@ impl Explain for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Error::Missing { hint, .. } | Error::Format { hint, .. } => hint.clone(),
-            Error::Io { .. } => None,
+            Error::Io { action, source, .. } => {
+                let may_not_write = *action != "read" && source.kind() == std::io::ErrorKind::PermissionDenied;
+                may_not_write.then(|| "`--out DIR` names a folder that you may write into".to_owned())
+            }
             Error::OverInput { .. } => Some("`--out DIR` names another folder".to_owned()),
             Error::OverForeign { .. } => Some(
                 "`--out DIR` names another folder; `--force`, where the command has it, replaces the file".to_owned(),

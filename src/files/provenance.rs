@@ -217,6 +217,23 @@ mod tests {
     }
 
     #[test]
+    fn what_a_result_was_made_of_is_known_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = Utf8Path::from_path(folder.path()).unwrap();
+        let (old, new, result) = (root.join("old.csv"), root.join("new.csv"), root.join("calibration.json"));
+        std::fs::write(&old, "1").unwrap();
+        std::fs::write(&new, "2").unwrap();
+        let of = |inputs: &[&Utf8PathBuf]| Provenance {
+            inputs: inputs.iter().filter_map(|path| Digested::read(path)).collect(),
+            ..Provenance::new(String::new())
+        };
+        std::fs::write(&result, serde_json::json!({ KEY: of(&[&old]) }).to_string()).unwrap();
+        assert_eq!(of(&[&new, &old]).shares(&result), Some(old.as_str()));
+        assert_eq!(of(&[&new, &result]).shares(&result), None);
+        assert_eq!(of(&[&old]).shares(&new), None);
+    }
+
+    #[test]
     fn a_picture_has_the_hash_that_xxh128sum_prints() {
         assert_eq!(picture_hash(b""), "99aa06d3014798d86001c324468d497f");
     }

@@ -117,6 +117,15 @@ mod tests {
     }
 
     #[test]
+    fn cameras_nearer_than_they_are_wide_are_said() {
+        // 70 mm in metres and in inches; an endoscope, and a small rig.
+        for (baseline, is_said) in [(0.07, true), (70.0 / 25.4, true), (2.9, true), (4.2, false), (20.0, false)] {
+            let said = unusual(Vector3::zeros(), Vector3::new(baseline, 0.0, 0.0));
+            assert_eq!(said.is_some_and(|w| w.contains("less than cameras are wide")), is_said, "{baseline}");
+        }
+    }
+
+    #[test]
     fn exchanged_and_rolled_rigs_are_said_and_others_are_not() {
         let inward = Vector3::new(0.02, -0.6, 0.05);
         assert_eq!(unusual(inward, Vector3::new(200.0, 5.0, 60.0)), None);
