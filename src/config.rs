@@ -28,19 +28,28 @@ pub enum Error {
         /// One line a problem.
         problems: Vec<String>,
     },
+    /// Something else that was asked for and cannot be.
+    #[error("{message}")]
+    Usage {
+        /// What.
+        message: String,
+        /// What to try.
+        hint: String,
+    },
 }
 
 impl Explain for Error {
     fn place(&self) -> Option<String> {
         match self {
             Error::Files(e) => e.place(),
-            Error::Invalid { .. } => None,
+            Error::Invalid { .. } | Error::Usage { .. } => None,
         }
     }
     fn hint(&self) -> Option<String> {
         match self {
             Error::Files(e) => e.hint(),
             Error::Invalid { .. } => None,
+            Error::Usage { hint, .. } => Some(hint.clone()),
         }
     }
 }
@@ -65,9 +74,13 @@ pub struct Config {
     pub identify: crate::identify::Settings,
 }
 
+/// A board, and whether it is the paper's because none was said.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(try_from = "BoardFields")]
-pub struct BoardSettings(Board);
+pub struct BoardSettings {
+    board: Board,
+    is_assumed: bool,
+}
 
 /// A board as the file says it: by its name, or by its squares and their size.
 #[derive(Deserialize)]
@@ -83,12 +96,14 @@ impl TryFrom<BoardFields> for BoardSettings {
 
     fn try_from(fields: BoardFields) -> Result<BoardSettings, &'static str> {
         match fields {
-            BoardFields { board: Some(NamedBoard(board)), squares: None, square_mm: None } => Ok(BoardSettings(board)),
+            BoardFields { board: Some(NamedBoard(board)), squares: None, square_mm: None } => {
+                Ok(BoardSettings::said(board))
+            }
             BoardFields { board: Some(_), .. } => Err("`board` says squares and size already: it stands alone"),
             BoardFields { board: None, squares: None, .. } => Err("missing field `squares`, or `board`"),
             BoardFields { board: None, square_mm: None, .. } => Err("missing field `square_mm`"),
             BoardFields { squares: Some(squares), square_mm: Some(mm), .. } => {
-                Ok(BoardSettings(Board::checker(squares, mm)))
+                Ok(BoardSettings::said(Board::checker(squares, mm)))
             }
         }
     }
@@ -110,11 +125,30 @@ impl Default for MeasureSettings {
 }
 
 impl BoardSettings {
+    fn said(board: Board) -> BoardSettings {
+        BoardSettings { board, is_assumed: false }
+    }
+
+    fn assumed(columns: usize, rows: usize) -> BoardSettings {
+        BoardSettings { board: Board::checker(Squares { columns, rows }, 10.0), is_assumed: true }
+    }
+
+    /// That nobody said how large the squares are, where it is so: no residual shows a wrong size.
+    pub fn size_is_assumed(&self, named: Option<Board>, square_mm: Option<f64>) -> Option<String> {
+        let is_assumed = self.is_assumed && named.is_none() && square_mm.is_none();
+        is_assumed.then(|| {
+            format!(
+                "the squares are taken to be {} mm wide, because nobody said: every length comes from it; measure them and give `--square-mm`",
+                self.board.square_mm
+            )
+        })
+    }
+
     /// The board, with what was given on the command line instead of the file's values: a board, or squares and their size.
     pub fn board(&self, named: Option<Board>, squares: Option<Squares>, square_mm: Option<f64>) -> Result<Board> {
-        let (BoardSettings(own), mut problems) = (self, Vec::new());
+        let (own, mut problems) = (self.board, Vec::new());
         let board = named.unwrap_or(match (squares, square_mm) {
-            (None, None) => *own,
+            (None, None) => own,
             _ => Board::checker(squares.unwrap_or(own.squares), square_mm.unwrap_or(own.square_mm)),
         });
         within(&mut problems, "square_mm", board.square_mm, SQUARES_MM);
@@ -127,8 +161,8 @@ impl Default for Config {
     fn default() -> Config {
         Config {
             out: "out".into(),
-            check_board: BoardSettings(Board::checker(Squares { columns: 20, rows: 20 }, 10.0)),
-            target_board: BoardSettings(Board::checker(Squares { columns: 7, rows: 6 }, 10.0)),
+            check_board: BoardSettings::assumed(20, 20),
+            target_board: BoardSettings::assumed(7, 6),
             tolerance_mm: 0.05,
             measure: MeasureSettings::default(),
             measurements: crate::measurements::source::Known::default(),
@@ -156,8 +190,8 @@ impl Config {
     fn validate(&self) -> Result<()> {
         let mut problems = Vec::new();
         within(&mut problems, "tolerance_mm", self.tolerance_mm, TOLERANCES_MM);
-        within(&mut problems, "check_board.square_mm", self.check_board.0.square_mm, SQUARES_MM);
-        within(&mut problems, "target_board.square_mm", self.target_board.0.square_mm, SQUARES_MM);
+        within(&mut problems, "check_board.square_mm", self.check_board.board.square_mm, SQUARES_MM);
+        within(&mut problems, "target_board.square_mm", self.target_board.board.square_mm, SQUARES_MM);
         positive(&mut problems, "measure.crossing_mm", self.measure.crossing_mm);
         self.measurements.validate(&mut problems);
         self.identify.validate(&mut problems);
@@ -173,6 +207,16 @@ pub fn reject(problems: Vec<String>) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_size_that_nobody_said_is_said() {
+        let assumed = Config::default().check_board;
+        assert!(assumed.size_is_assumed(None, None).is_some_and(|said| said.contains("10 mm")));
+        assert_eq!(assumed.size_is_assumed(None, Some(10.0)), None);
+        assert_eq!(assumed.size_is_assumed(Some("checker:9x7:20".parse().unwrap()), None), None);
+        let config: Config = toml::from_str("[check_board]\nsquares = \"20x20\"\nsquare_mm = 10.0\n").unwrap();
+        assert_eq!(config.check_board.size_is_assumed(None, None), None);
+    }
 
     #[test]
     fn all_problems_come_at_once() {

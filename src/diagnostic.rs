@@ -67,6 +67,11 @@ pub fn report(error: &impl Explain) -> String {
     text
 }
 
+/// `1 picture`, `2 pictures`.
+pub fn count(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
 /// Something a person should know although the command ends well.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {

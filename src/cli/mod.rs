@@ -38,16 +38,16 @@ const BUILD: &str = if cfg!(debug_assertions) {
 #[derive(Debug, Parser)]
 #[command(name = "stereocal", version, long_version = BUILD, about, max_term_width = 100)]
 pub struct Cli {
-    /// Settings file, with the keys that the flags name; `stereocal init` writes one [default: stereocal.toml in the working directory, if there]
+    /// Settings file; `stereocal init` writes one [default: stereocal.toml here, if there]
     #[arg(long, help_heading = "Global options", global = true, value_name = "FILE")]
     pub config: Option<Utf8PathBuf>,
     /// Warnings and errors only on stderr: no progress, no notes
     #[arg(long, help_heading = "Global options", global = true)]
     pub quiet: bool,
-    /// Threads to compute with, 1 to 1024; results don't depend on it [default: one a core]
+    /// Threads, 1 to 1024; results don't depend on it [default: one a core]
     #[arg(long, help_heading = "Global options", global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Leave program, date, command line and inputs out of the files that are written
+    /// Leave program, date, command line and inputs out of the files
     #[arg(long, help_heading = "Global options", global = true)]
     pub no_provenance: bool,
     /// What to do.
@@ -58,7 +58,7 @@ pub struct Cli {
 /// The commands, in the order of the data.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Calibrate both cameras from pictures of the check board, and judge the rig's accuracy
+    /// Calibrate both cameras by pictures of the check board, and judge the rig
     #[command(after_help = "Examples:
   stereocal camera-check check/ --squares 20x20 --square-mm 10 --known-move 5mm:03,04
   stereocal camera-check remounted/ --squares 20x20 --square-mm 10 --intrinsics out/calibration.json --out new
@@ -82,9 +82,9 @@ pub enum Command {
     Rectify(Rectify),
     /// Simulate pictures and measurements with known true values
     Simulate(Simulate),
-    /// Choose the poses that determine the robot best, and write them as poses.csv and robot programs
+    /// Choose the poses that determine the robot best, as poses.csv and robot programs
     Plan(Plan),
-    /// Correct targets for the real robot: those of a CSV, or the joint targets of a robot program
+    /// Correct targets for the real robot: of a CSV, or the joint targets of a program
     Compensate(Compensate),
     /// Write a calibration or a robot for other programs
     Export(Export),

@@ -6,12 +6,12 @@ use crate::config::{self, Config};
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::boards::sheet::Sheet;
+use crate::formats::boards::sheet::{Sheet, TooLarge};
 
 /// Runs the command.
 pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
-    let sheet = Sheet::new(&args.board).map_err(invalid)?;
+    let sheet = Sheet::new(&args.board).map_err(|TooLarge { message, hint }| config::Error::Usage { message, hint })?;
     let run = Run { force: args.output.force, ..run };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &[]);
     let all = !(args.pdf || args.svg || args.png);
@@ -37,12 +37,13 @@ pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
         format!("{object:#}\n")
     } else {
         format!(
-            "{} on {} ({} x {} mm): {}\n",
+            "{} on {} ({} x {} mm): {}\nnext: print it at 100 %, measure it, and name it as it came out: `camera-check IMAGES --board {}`\n",
             args.board,
             sheet.paper,
             sheet.width_mm,
             sheet.height_mm,
-            files.join(", ")
+            files.join(", "),
+            args.board
         )
     };
     Ok(Outcome { stdout, status: Status::Done })

@@ -241,6 +241,9 @@ impl Moved {
     }
 }
 
+/// Targets that move by less are not corrected, mm.
+const SAME_MM: f64 = 1e-6;
+
 fn said(summary: &Summary, motions: Option<&[Instruction]>, written: &Utf8Path) -> String {
     let mut text = format!("{} of {} targets compensated: {written}\n", summary.compensated, summary.targets);
     if let Some(motions) = motions {
@@ -253,7 +256,10 @@ fn said(summary: &Summary, motions: Option<&[Instruction]>, written: &Utf8Path) 
         };
     }
     if let (Some(mean), Some(max)) = (summary.before_mean_mm, summary.before_max_mm) {
-        text += &format!("without it the real tool would be off by {mean:.3} mm on average, {max:.3} at most\n");
+        text += &match max < SAME_MM {
+            true => "both files describe the same robot, nothing was corrected: `--identified` names what `identify` wrote, identified.toml\n".to_owned(),
+            false => format!("without it the real tool would be off by {mean:.3} mm on average, {max:.3} at most\n"),
+        };
     }
     let left: Vec<String> = match motions {
         Some(motions) => motions.iter().filter(|m| m.moves_by.is_err()).map(|m| format!("left: {m}")).collect(),

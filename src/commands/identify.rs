@@ -5,7 +5,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 use super::{Outcome, Result};
 use crate::cli::{Identify, TableFlags};
 use crate::config::Config;
-use crate::diagnostic::Status;
+use crate::diagnostic::{Status, count};
 use crate::files::OutDir;
 use crate::files::provenance::{Digested, Provenance, Run};
 use crate::formats::placements::record::{PLACEMENT, PlacementFile};
@@ -57,7 +57,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let of_fit = record::findings::findings(&set, &found, &along);
     let findings = Findings::new(findings, unexplained, of_fit, &found);
     let record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
-    said(&record, &out);
+    said(&record, &out, args.output.json);
     let placed = found.placed(&set, &nominal, &settings)?;
     let json = write(&out, &set, &nominal, &found, &record, placed.as_ref(), &settings)?;
     let stdout = if args.output.json { json } else { report::identify::summary(&record, &out) };
@@ -65,17 +65,19 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     Ok(Outcome { stdout, status })
 }
 
-/// The gravest warnings on the terminal; the page and the JSON have all.
-fn said(record: &Record, out: &OutDir) {
+/// The gravest warnings on the terminal; the page and the JSON have all. What the verdict says is not said before it, unless it goes elsewhere.
+fn said(record: &Record, out: &OutDir, is_json: bool) {
     const MOST: usize = 5;
     for (k, warning) in record.warnings.iter().take(MOST).enumerate() {
         match record.advice {
+            _ if !is_json && warning == record.whole_reason() => {}
             Advice::DoNotUse if k == 0 => progress::warn(format!("do not use the result: {warning}")),
             _ => progress::warn(warning),
         }
     }
     if record.warnings.len() > MOST {
-        progress::note(format!("{} more warnings in {}", record.warnings.len() - MOST, out.join("identify.html")));
+        let more = count(record.warnings.len() - MOST, "more warning");
+        progress::note(format!("{more} in {}", out.join("identify.html")));
     }
 }
 

@@ -12,7 +12,7 @@ use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
 use crate::formats::plan::{PlanFile, poses_csv};
-use crate::measurements::{Measurement, Source};
+use crate::measurements::{Measurement, Role, Source};
 use crate::plan::scene::Scene;
 use crate::plan::{PAPER_SAMPLES, Plan, Planned, Settings, plan};
 use crate::programs::{Joints, Language, Motion, Stop, program};
@@ -146,8 +146,15 @@ fn programs(args: &Arguments, robot: &Robot, poses: &[Planned]) -> Vec<(String, 
 }
 
 fn said(args: &Arguments, found: &Plan, record: &PlanFile, out: &OutDir, earlier: Option<&[Measurement]>) -> String {
-    let mut text =
-        format!("{} poses in {} groups: {}\n", found.poses.len(), found.placements.len(), out.join("poses.csv"));
+    let of = |role: Role| found.poses.iter().filter(|p| p.at.role == role).count();
+    let mut text = format!(
+        "{} poses in {} groups ({} to identify from, {} to verify, the others centres): {}\n",
+        found.poses.len(),
+        found.placements.len(),
+        of(Role::Sample),
+        of(Role::Verify),
+        out.join("poses.csv")
+    );
     if args.first.is_some() {
         text += "measure them, then `stereocal plan --after out/measurements.csv` plans the rest where the cameras really stand\n";
         return text;

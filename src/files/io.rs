@@ -61,7 +61,10 @@ impl Explain for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Error::Missing { hint, .. } | Error::Format { hint, .. } => hint.clone(),
-            Error::Io { .. } => None,
+            Error::Io { action, source, .. } => {
+                let may_not_write = *action != "read" && source.kind() == std::io::ErrorKind::PermissionDenied;
+                may_not_write.then(|| "`--out DIR` names a folder that you may write into".to_owned())
+            }
             Error::OverInput { .. } => Some("`--out DIR` names another folder".to_owned()),
             Error::OverForeign { .. } => Some(
                 "`--out DIR` names another folder; `--force`, where the command has it, replaces the file".to_owned(),
@@ -98,15 +101,23 @@ pub fn read_text_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, 
 
 pub fn read_json<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<T> {
     let text = read_text(path, what, hint)?;
+    let of_another_kind = !text.trim_start().starts_with(['{', '[']);
     serde_json::from_str(&text).map_err(|e| Error::Format {
-        message: format!("{what}: {e}"),
-        place: Place { path: path.to_owned(), line: Some(e.line() as u64) },
-        hint: None,
+        message: if of_another_kind { format!("{what}: this is no JSON") } else { format!("{what}: {e}") },
+        place: Place { path: path.to_owned(), line: (!of_another_kind).then_some(e.line() as u64) },
+        hint: hint.filter(|_| of_another_kind).map(str::to_owned),
     })
 }
 
 pub fn read_toml<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<T> {
     let text = read_text(path, what, hint)?;
+    if text.trim_start().starts_with('{') {
+        return Err(Error::Format {
+            message: format!("{what}: this is JSON, and TOML is needed"),
+            place: Place { path: path.to_owned(), line: None },
+            hint: hint.map(str::to_owned),
+        });
+    }
     toml::from_str(&text).map_err(|e| {
         let line = e.span().map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count() as u64);
         Error::Format {

@@ -15,7 +15,12 @@ use serde::Serialize;
 
 use super::io::{Durability, Error, Result, is_temporary, to_json, write_atomically};
 use super::provenance::{Digested, KEY, Provenance, Run, pictures, sha256};
+use crate::diagnostic::Place;
 use crate::progress;
+
+/// Endings of files that are written: no folder is meant by such a name.
+const RESULTS: [&str; 12] =
+    ["toml", "json", "csv", "html", "yaml", "yml", "pdf", "svg", "png", "urdf", "cameramodel", "txt"];
 
 /// The program's own folder in a results folder.
 const OWN: &str = ".stereocal";
@@ -51,6 +56,13 @@ struct State {
 impl OutDir {
     /// Creates the folder where needed, checks that a file can be made in it, and waits for other runs that write into it.
     pub fn open(path: &Utf8Path) -> Result<OutDir> {
+        if !path.is_dir() && (path.is_file() || path.extension().is_some_and(|e| RESULTS.contains(&e))) {
+            return Err(Error::Format {
+                message: "results go into a folder, and this is the name of a file".to_owned(),
+                place: Place { path: path.to_owned(), line: None },
+                hint: Some("`--out DIR` names the folder; `--out .` is the one that you are in".to_owned()),
+            });
+        }
         let io = |action, source| Error::Io { action, path: path.to_owned(), source };
         std::fs::create_dir_all(path).map_err(|e| io("create", e))?;
         tempfile::NamedTempFile::new_in(path).map_err(|e| io("write into", e))?;

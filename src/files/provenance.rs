@@ -68,6 +68,15 @@ impl Provenance {
     }
 }
 
+impl Provenance {
+    /// What this run read that the JSON file there was made of, too: of that it is no test.
+    pub fn shares(&self, file: &Utf8Path) -> Option<&str> {
+        let made_of = Provenance::of_json(file)?.inputs;
+        let same = |read: &&Digested| made_of.iter().any(|input| input.sha256 == read.sha256);
+        self.inputs.iter().find(same).map(|read| read.file.as_str())
+    }
+}
+
 /// Name and version.
 pub fn program() -> String {
     format!("stereocal {}", env!("CARGO_PKG_VERSION"))
@@ -205,6 +214,23 @@ mod tests {
         assert!(a.same_content(&b) && a.sha256 != b.sha256 && !b.same_content(&c));
         let bare = Digested::written("d.json", br#"{"fx": 1.5}"#);
         assert!(bare.content_sha256.is_none() && !bare.same_content(&a));
+    }
+
+    #[test]
+    fn what_a_result_was_made_of_is_known_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = Utf8Path::from_path(folder.path()).unwrap();
+        let (old, new, result) = (root.join("old.csv"), root.join("new.csv"), root.join("calibration.json"));
+        std::fs::write(&old, "1").unwrap();
+        std::fs::write(&new, "2").unwrap();
+        let of = |inputs: &[&Utf8PathBuf]| Provenance {
+            inputs: inputs.iter().filter_map(|path| Digested::read(path)).collect(),
+            ..Provenance::new(String::new())
+        };
+        std::fs::write(&result, serde_json::json!({ KEY: of(&[&old]) }).to_string()).unwrap();
+        assert_eq!(of(&[&new, &old]).shares(&result), Some(old.as_str()));
+        assert_eq!(of(&[&new, &result]).shares(&result), None);
+        assert_eq!(of(&[&old]).shares(&new), None);
     }
 
     #[test]

@@ -317,7 +317,7 @@ pub fn read(path: &Utf8Path) -> Result<Rig> {
 /// The same with what the calibration says beside the rig.
 pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
     const WHAT: &str = "calibration file";
-    let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; name the file where another one is meant";
+    let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
     let text = files::read_text(path, WHAT, Some(hint))?;
     let refused =
         |message| files::Error::Format { message, place: Place { path: path.to_owned(), line: None }, hint: None };

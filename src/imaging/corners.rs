@@ -82,6 +82,11 @@ pub fn named(pairs: &[String]) -> String {
     format!("{}{more}", pairs.iter().take(MOST).cloned().collect::<Vec<_>>().join(", "))
 }
 
+/// How many of all, where they are too few.
+pub fn too_few(found: usize, total: usize) -> String {
+    if found == 0 { format!("none of {total}") } else { format!("only {found} of {total}") }
+}
+
 /// Why pairs were skipped, a line a reason, those of most pairs first.
 pub fn reasons(skipped: &[Skipped]) -> String {
     /// More would push the message itself off the screen.
@@ -98,7 +103,7 @@ pub fn reasons(skipped: &[Skipped]) -> String {
         by_reason.iter().take(MOST).map(|(reason, pairs)| format!("\n  {}: {reason}", named(pairs))).collect();
     let others: usize = by_reason.iter().skip(MOST).map(|(_, pairs)| pairs.len()).sum();
     if others > 0 {
-        text.push_str(&format!("\n  and {others} more for other reasons"));
+        text.push_str(&format!("\n  and {others} more"));
     }
     text
 }
@@ -148,7 +153,7 @@ mod tests {
             said.starts_with("\n  01, 02, 03, 04, 05, 06, 07, 08 and 4 more: another board\n  a: no board found\n"),
             "{said}"
         );
-        assert!(said.ends_with("\n  b5: reason 5\n  and 3 more for other reasons"), "{said}");
+        assert!(said.ends_with("\n  b5: reason 5\n  and 3 more"), "{said}");
         assert_eq!(reasons(&[]), "");
     }
 }

@@ -3,7 +3,7 @@
 use camino::Utf8PathBuf;
 
 use super::board::{self, Board, Kind, Squares};
-use super::corners::{Skipped, reasons};
+use super::corners::{Skipped, reasons, too_few};
 use crate::diagnostic::Explain;
 
 /// Result of looking for corners.
@@ -86,7 +86,7 @@ pub enum Error {
         of: usize,
     },
     /// The board was not found often enough.
-    #[error("only {found} of {total} pairs show {}; {needed} are needed{}", shown(.board), reasons(.skipped))]
+    #[error("{} pairs show {}; {}{}", too_few(*.found, *.total), shown(.board), at_least(*.needed), reasons(.skipped))]
     TooFewPairs {
         /// Pairs with the board in both pictures.
         found: usize,
@@ -118,6 +118,10 @@ fn shown(board: &Board) -> String {
     }
 }
 
+fn at_least(needed: usize) -> String {
+    if needed == 1 { "one is needed".to_owned() } else { format!("{needed} are needed") }
+}
+
 /// Which whole boards were seen, and how often.
 fn tally(counts: &[((usize, usize), usize)], of: usize) -> String {
     let each: Vec<String> = counts.iter().map(|((c, r), pictures)| format!("{c}x{r} squares in {pictures}")).collect();
@@ -147,6 +151,7 @@ impl Explain for Error {
         match self {
             Error::Files(e) => e.hint(),
             Error::Board(e) => e.hint(),
+            Error::NotAFolder { path } if super::video::hint(path).is_some() => super::video::hint(path),
             Error::NoFolder { .. } | Error::NotAFolder { .. } => Some(
                 "a folder of pairs holds left/ and right/ with equal names, or left*/right*, *_left/*_right, *_L/*_R names"
                     .to_owned(),
@@ -179,12 +184,13 @@ impl Explain for Error {
                     Kind::Tags { .. } => "columns x rows of tags, family, tag and gap in mm",
                     _ => "columns x rows, square and marker in mm, dictionary",
                 };
-                Some(format!("`--board {board}` must be the board as printed: {named}"))
+                let plain = "one without markers is named `--squares CxR --square-mm MM`";
+                Some(format!("`--board {board}` must be the board as printed: {named}; {plain}"))
             }
             Error::TooFewPairs { board, .. } => {
                 let (columns, rows) = (board.columns(), board.rows());
                 Some(format!(
-                    "`--squares` counts squares, not inner corners: {} means {columns}x{rows} inner corners",
+                    "`--squares` counts squares, not inner corners: {} means {columns}x{rows} inner corners; a board with markers is named by `--board`",
                     board.squares
                 ))
             }

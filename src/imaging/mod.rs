@@ -17,6 +17,7 @@ pub mod refine;
 #[cfg(test)]
 pub mod shot;
 mod shown;
+mod video;
 
 pub use board::{Board, Squares};
 pub use corners::{Corner, Corners, PairCorners, Side, Skipped};

@@ -283,6 +283,7 @@ fn lacking(parts: &[Part], picked: &Picked, count: usize) -> crate::files::Error
         let shown = p.names.as_ref().map(|n| n.iter().take(40).cloned().collect::<Vec<_>>().join(", "));
         match shown {
             Some(names) => format!("{} has {names}", p.file_name()),
+            None if p.is_program() => format!("{} has the joint targets of a program", p.file_name()),
             None => {
                 format!("{} has {} columns without names, {} of them numbers", p.file_name(), p.width(), p.free().len())
             }

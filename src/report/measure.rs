@@ -146,6 +146,7 @@ fn rig(measured: &[MeasuredPose]) -> Result<Markup> {
     };
     let plot = |title: &str, (bars, limit): (Vec<(f64, f64, f64)>, f64)| {
         Plot::new(title, "pose, in the order of the run", "turn of the right camera, mdeg")
+            .whole_x()
             .error_bars("", &bars)
             .hline(limit, "limit")
             .hline(-limit, "limit")
@@ -168,10 +169,12 @@ fn residuals(measured: &[MeasuredPose]) -> Result<Markup> {
         measured.iter().enumerate().filter_map(|(i, m)| Some((i as f64, figure(m.target.as_ref().ok()?)))).collect()
     };
     let residual = Plot::new("Residual of every pose", "pose, in the order of the run", "RMS, px")
+        .whole_x()
         .points("", &of(|t| t.rms_px))
         .size(520, 340)
         .svg()?;
     let sigma = Plot::new("Standard deviation of the mark point", "pose, in the order of the run", "mm")
+        .whole_x()
         .points("x", &of(|t| t.covariance[(3, 3)].sqrt()))
         .points("y", &of(|t| t.covariance[(4, 4)].sqrt()))
         .points("z", &of(|t| t.covariance[(5, 5)].sqrt()))

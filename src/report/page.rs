@@ -146,7 +146,7 @@ pub fn verdict(tone: Tone, headline: &str, numbers: &[(String, String)], explana
         div class={ "verdict " (tone.class()) } {
             strong { (headline) }
             @if !numbers.is_empty() { div.numbers { @for (value, what) in numbers { div { b { (value) } span { (what) } } } } }
-            p { (text(explanation)) }
+            p { (text(&capital(explanation))) }
         }
     }
 }

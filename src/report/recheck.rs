@@ -6,6 +6,7 @@ use super::Result;
 use super::drawing::figure::Plot;
 use super::page::{self, Tone};
 use super::table::{Table, number};
+use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
 use crate::stereo::recheck::Recheck;
@@ -78,15 +79,16 @@ pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks:
     for cause in &recheck.causes {
         table.row([
             cause.words.clone(),
-            format!("{:.4} {}", cause.amount, cause.unit),
+            format!("{} {}", number(Some(cause.amount), 4), cause.unit),
             format!("{:.4}", 2.0 * cause.sigma),
             format!("{:.4} {}", cause.seen, cause.unit),
             number(Some(cause.seen_mm), 4),
         ]);
     }
     format!(
-        "{}\n\n{table}\n{checks} checks in {}\nreport: {}\n",
+        "{}\n\n{table}\n{} in {}\nreport: {}\n",
         lines.join("\n"),
+        count(checks, "check"),
         out.join(crate::formats::recheck::HISTORY),
         out.join("recheck.html")
     )
@@ -106,7 +108,7 @@ pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[
         .map(|cause| {
             vec![
                 cause.words.clone(),
-                format!("{:.4} {}", cause.amount, cause.unit),
+                format!("{} {}", number(Some(cause.amount), 4), cause.unit),
                 format!("{:.4}", 2.0 * cause.sigma),
                 number(Some(cause.effect_mm), 4),
                 format!("{:.4} {}", cause.seen, cause.unit),
@@ -136,6 +138,7 @@ pub(super) fn history(checks: &[Check], tolerance_mm: f64, title: &str) -> Resul
         checks.iter().enumerate().map(|(i, check)| ((i + 1) as f64, of(check))).collect()
     };
     Plot::new(title, "check", "mm")
+        .whole_x()
         .points("changed by", &over(|check| check.effect_mm))
         .points("would have been seen", &over(|check| check.seen_mm))
         .hline(tolerance_mm, "tolerance")

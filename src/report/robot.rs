@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use nalgebra::Vector3;
 
-use super::table::Table;
+use super::table::{self, Table};
 use crate::formats::robots::urdf::roll_pitch_yaw;
 use crate::geometry::{Transform, rotation_vector};
 use crate::robot::catalogue::{ARMS, Arm, PAPER};
@@ -39,7 +39,7 @@ pub fn provenance(arm: &Arm) -> String {
 pub fn chain(robot: &Robot) -> String {
     let mut text = format!("{}: {} joints\n", robot.name, robot.joints.len());
     let mut table = Table::new(["joint", "alpha deg", "a mm", "beta deg", "theta deg", "d mm", "range deg"]);
-    let number = |v: f64| format!("{:.4}", v + 0.0);
+    let number = |v: f64| table::number(Some(v), 4);
     for (i, j) in robot.joints.iter().enumerate() {
         let range = j.limits_rad.map_or("any".to_owned(), |(low, high)| match j.slides {
             true => format!("{low:.1} to {high:.1} mm"),
@@ -148,7 +148,10 @@ pub fn pose(robot: &Robot, joints_deg: &[f64]) -> String {
     let angles: Vec<String> = joints_deg.iter().map(|d| format!("{d}")).collect();
     let mut text =
         format!("at joint readings {} (deg; mm where a joint slides), in the root frame:\n", angles.join(", "));
-    let place = |v: Vector3<f64>| format!("x {:.4}  y {:.4}  z {:.4} mm", v.x + 0.0, v.y + 0.0, v.z + 0.0);
+    let place = |v: Vector3<f64>| {
+        let [x, y, z] = [v.x, v.y, v.z].map(|mm| table::number(Some(mm), 4));
+        format!("x {x}  y {y}  z {z} mm")
+    };
     let _ = writeln!(text, "flange   {}", place(flange.translation.vector));
     let r = rotation_vector(&flange);
     let _ = writeln!(text, "  rotation vector      rx {:.6}  ry {:.6}  rz {:.6} rad", r.x + 0.0, r.y + 0.0, r.z + 0.0);

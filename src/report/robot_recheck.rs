@@ -6,6 +6,7 @@ use super::Result;
 use super::page;
 use super::recheck::{history, tone, word};
 use super::table::{Table, number};
+use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
 use crate::formats::robot_recheck::HISTORY;
@@ -20,7 +21,7 @@ fn sentence(recheck: &Recheck, tolerance_mm: f64) -> String {
             recheck.seen_mm
         ),
         false => format!(
-            "{statement}, which moves the target by up to {:.4} mm, tolerance {tolerance_mm:.4} mm",
+            "{statement}; the target is off by up to {:.4} mm, tolerance {tolerance_mm:.4} mm",
             recheck.effect_mm
         ),
     }
@@ -36,14 +37,14 @@ fn next(standing: Standing, recheck: &Recheck) -> &'static str {
         Standing::ChangedWithin => {
             "targets are within the tolerance still; look at what is named, and identify anew before it grows"
         }
-        Standing::Changed => "look at what is named, then identify anew: targets are off by so much since",
+        Standing::Changed => "look for what happened to arm, tool and cameras since, then identify anew",
     }
 }
 
 /// Cause, change, its interval, its effect, what would be seen and its effect.
 fn cells(recheck: &Recheck) -> Vec<[String; 6]> {
     let of = |cause: &CauseSeen| {
-        let with_unit = |value: f64| format!("{value:.4} {}", cause.unit);
+        let with_unit = |value: f64| format!("{} {}", number(Some(value), 4), cause.unit);
         let told = |text: String| if cause.amount.is_some() { text } else { String::new() };
         [
             cause.what.clone(),
@@ -75,10 +76,11 @@ pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks:
     let mut table = Table::new(HEADER);
     cells(recheck).into_iter().for_each(|row| table.row(row));
     format!(
-        "{}: {}\nnext: {}\n\n{table}\n{checks} checks in {}\nreport: {}\n",
+        "{}: {}\nnext: {}\n\n{table}\n{} in {}\nreport: {}\n",
         word(standing),
         sentence(recheck, tolerance_mm),
         next(standing, recheck),
+        count(checks, "check"),
         out.join(HISTORY),
         out.join("verify.html")
     )
@@ -91,7 +93,7 @@ pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[
         (format!("{:.4} mm", recheck.seen_mm), "would have been seen".to_owned()),
         (format!("{tolerance_mm:.4} mm"), "tolerance".to_owned()),
     ];
-    let text = format!("{}. Next: {}.", page::capital(&sentence(recheck, tolerance_mm)), next(standing, recheck));
+    let text = format!("{}. Next: {}.", sentence(recheck, tolerance_mm), next(standing, recheck));
     let rows: Vec<Vec<String>> = cells(recheck).into_iter().map(|row| row.to_vec()).collect();
     let content = html! {
         (page::verdict(tone(standing), word(standing), &numbers, &text))

@@ -126,7 +126,7 @@ fn is_zero(value: &f64) -> bool {
 
 /// Reads `robot.toml`.
 pub fn read(path: &Utf8Path) -> Result<Robot> {
-    let hint = "`--robot FILE` names the robot's nominal parameters; `stereocal simulate` writes an example";
+    let hint = "`--robot FILE` names the nominal robot; `stereocal robot new NAME` writes that of a common arm, `robot import` that of a URDF or table";
     let record: RobotRecord = files::read_toml(path, "robot file", Some(hint))?;
     record.robot().map_err(|message| Error::File { message, place: Place { path: path.to_owned(), line: None } })
 }

@@ -1,16 +1,19 @@
 //! What can go wrong between corners and points.
 
 use crate::diagnostic::{Explain, Status};
-use crate::imaging::corners::{named, reasons};
+use crate::imaging::corners::{named, reasons, too_few};
 use crate::imaging::{Side, Skipped};
 use crate::stereo::Lens;
+
+/// How the reason begins where both sides of a pair hold one picture.
+pub const ONE_PICTURE: &str = "left and right picture are one picture";
 
 /// What can go wrong between corners and points.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// Not enough pairs to calibrate and to hold one out.
-    #[error("only {found} of {total} pairs can be used; calibration needs {needed}{}", reasons(.skipped))]
+    #[error("{} pairs can be used; calibration needs {needed}{}", too_few(*.found, *.total), reasons(.skipped))]
     TooFewPairs {
         /// Usable pairs.
         found: usize,
@@ -56,8 +59,9 @@ pub enum Error {
     },
     /// Most pairs do not belong to one rig.
     #[error(
-        "the pairs contradict each other: only {agreeing} of {total} fit one rig; half of them miss it by {usual_px:.1} px and more, \
+        "the pairs contradict each other: {} fit one rig; half of them miss it by {usual_px:.1} px and more, \
          each camera alone by {alone_px:.2} px{}",
+        too_few(*.agreeing, *.total),
         reasons(.bad)
     )]
     Contradiction {
@@ -226,6 +230,9 @@ impl Explain for Error {
     fn hint(&self) -> Option<String> {
         Some(
             match self {
+                Error::TooFewPairs { skipped, .. } if skipped.iter().any(|s| s.reason.starts_with(ONE_PICTURE)) => {
+                    "name the folders of both cameras, each with its own pictures: `stereocal camera-check LEFT RIGHT`"
+                }
                 Error::TooFewPairs { .. } => {
                     "photograph more pairs; `--squares CxR` must be the board's squares, not its inner corners"
                 }
@@ -233,7 +240,7 @@ impl Explain for Error {
                     "photograph the board where both cameras see it at once, and check that equal names belong together"
                 }
                 Error::NoBaseline { .. } => {
-                    "left and right pictures come from two cameras that stand apart: are these all of one? If not, add pairs"
+                    "are these pictures all of one camera? Each side needs its own; of two cameras that stand apart add pairs nearer to them and tilted"
                 }
                 Error::TooFewCorners { .. } => "photograph more pairs, or `--lens radial2` for fewer unknowns",
                 Error::NoCamera { .. } => "`--squares CxR` must be the board's squares, not its inner corners",

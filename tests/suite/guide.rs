@@ -71,5 +71,5 @@ fn a_page_that_is_not_there_is_said_with_those_that_are() {
     assert!(PAGES.iter().all(|page| book.contains(page.title())));
     let output = stereocal(folder.path(), &["guide", "nothing"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("no page nothing") && stderr(&output).contains("boards"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("no page `nothing`") && stderr(&output).contains("boards"), "{}", stderr(&output));
 }

@@ -27,6 +27,28 @@ fn no_command_is_bad_usage() {
     refused(&["identify", "points.csv"], &[], 2, &["unexpected argument", "hint: ", "`--measurements points.csv`"]);
 }
 
+/// Slips of a first hour, each answered with what would do.
+#[test]
+fn what_a_beginner_mistypes() {
+    refused(&["camera-check", "x", "--square-mm", "0.75in"], &[], 2, &["hint: ", "`--square-mm 19.05`"]);
+    refused(&["camera-check", "l/1.png", "l/2.png", "l/3.png"], &[], 2, &["hint: pictures are named by their folder"]);
+    refused(&["export", "calibration"], &[], 2, &["hint: ", "opencv, ros, kalibr, mrcal"]);
+    refused(&["guide", "bord"], &[], 2, &["no page `bord`", "hint: there are day, boards"]);
+    refused(
+        &["camera-check", "x", "--squares", "10x7"],
+        &[("x/left.mp4", "")],
+        2,
+        &["left.mp4", "hint: `mkdir left; ffmpeg -i "],
+    );
+    refused(&["camera-check", "left.mp4"], &[("left.mp4", "")], 2, &["this is a file", "ffmpeg -i left.mp4 "]);
+    refused(&["robot", "new", "ur5e", "--out", "ur5e.toml"], &[], 2, &["the name of a file", "hint: `--out DIR`"]);
+    refused(&["measure", "x"], &[("x/poses.csv", "")], 2, &["calibration file not found", "`--calibration FILE`"]);
+    let robot = [("x/poses.csv", ""), ("robot.toml", "name = \"r\"")];
+    refused(&["measure", "x", "--calibration", "robot.toml"], &robot, 2, &["this is no JSON", "camera-check IMAGES"]);
+    refused(&["identify", "--robot", "a.json"], &[("a.json", "{}")], 2, &["this is JSON", "hint: ", "robot new"]);
+    refused(&["board", "checker:9x6:194.4"], &[], 2, &["the board is 1749.6 x 1166.4 mm", "hint: ", "66 %"]);
+}
+
 #[test]
 fn a_board_that_is_none() {
     refused(&["camera-check", "x", "--squares", "20"], &[], 2, &["COLUMNSxROWS", "`20`"]);

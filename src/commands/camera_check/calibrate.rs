@@ -60,7 +60,7 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let second = second_board(args, board, &calibration, demand.board_uncertainty_mm, &out)?;
     let standards = Standards { second, moves: moves::measure(&calibration, &args.known_move)? };
     let judged = Judged::new(&calibration, findings, accuracy, standards, &demand);
-    calibration.rig().unusual().into_iter().for_each(progress::warn);
+    calibration.rig().unusual().into_iter().chain(report::camera_check::blurred(&corners)).for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
     let pictures = pictures(args, pairing.as_ref(), &calibration, &judged);
@@ -156,7 +156,10 @@ fn open(args: &CameraCheck, config: &Config, run: Run) -> Result<OutDir> {
 fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Result<(Board, Option<f64>)> {
     let squares = squares(args, pairing)?;
     let drawn = config.check_board.board(args.board, squares, args.square_mm)?;
-    let Some(extent) = args.measured_mm else { return Ok((warm(args, drawn)?, None)) };
+    let Some(extent) = args.measured_mm else {
+        config.check_board.size_is_assumed(args.board, args.square_mm).into_iter().for_each(progress::warn);
+        return Ok((warm(args, drawn)?, None));
+    };
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
     let Printed { board, uncertainty_mm } = extent.of(&drawn).map_err(invalid)?;
     progress::note(format!(

@@ -37,6 +37,11 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
 
     let corners = open_numbers::by_rig(corners(args, &calibrated, config, &out)?, &calibrated.rig);
     corners.notes.iter().for_each(progress::note);
+    if let Some(same) = out.provenance().as_ref().and_then(|run| run.shares(&file)) {
+        progress::warn(format!(
+            "this calibration was made of {same}: whether it still holds is told by new pairs alone"
+        ));
+    }
     let Calibrated { rig, noise, pair_excess, pairs, volume, .. } = calibrated;
     let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), pairs, volume };
     let found = recheck::recheck(&before, &corners)?;

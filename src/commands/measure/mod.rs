@@ -10,11 +10,12 @@ use camino::{Utf8Path, Utf8PathBuf};
 use super::{Outcome, Result};
 use crate::cli::Measure;
 use crate::config::Config;
-use crate::diagnostic::Status;
+use crate::diagnostic::{Status, count};
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
 use crate::formats::measure::{self, MeasureFile};
+use crate::imaging::corners::named;
 use crate::imaging::input::cache::Cache;
 use crate::imaging::input::pairs::Source;
 use crate::imaging::{Corners, PairCorners, Wanted, find_corners};
@@ -125,8 +126,9 @@ fn seen(poses: Vec<RobotPose>, corners: &Corners) -> Vec<Seen> {
         Seen { at, corners }
     };
     let seen = poses.into_iter().map(of).collect();
-    for name in by_name.keys() {
-        progress::warn(format!("the pictures {name} belong to no pose of poses.csv"));
+    let idle: Vec<String> = by_name.keys().map(|name| (*name).to_owned()).collect();
+    if !idle.is_empty() {
+        progress::warn(format!("{} belong to no pose of poses.csv: {}", count(idle.len(), "pair"), named(&idle)));
     }
     seen
 }

@@ -36,5 +36,5 @@ fn write(folder: &Utf8Path, run: Run) -> Result<String> {
 
 fn unknown(topic: &str) -> config::Error {
     let topics = PAGES.map(|page| page.topic).join(", ");
-    config::Error::Invalid { problems: vec![format!("the guide has no page {topic}; there are {topics}")] }
+    config::Error::Usage { message: format!("the guide has no page `{topic}`"), hint: format!("there are {topics}") }
 }

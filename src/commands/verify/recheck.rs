@@ -14,6 +14,7 @@ use crate::formats::robot_recheck::{HISTORY, RobotRecheckFile};
 use crate::formats::robots::known;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
+use crate::identify::examine::shifted;
 use crate::identify::judge::recheck::recheck;
 use crate::measurements::Role;
 use crate::progress;
@@ -38,6 +39,18 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     out.check_free(&["verify.json", HISTORY, "verify.html"])?;
     let mut checks = formats::history(&out, HISTORY)?;
 
+    if let Some(shift) = shifted::find(&set, &robot) {
+        progress::warn(format!(
+            "{}; mend the file first: below, this looks like a change of the robot",
+            shift.statement(&set)
+        ));
+    }
+    let record = against.with_file_name("identification.json");
+    if let Some(same) = out.provenance().as_ref().and_then(|run| run.shares(&record)) {
+        progress::warn(format!(
+            "this robot was identified from {same}: whether it still is that robot is told by new poses alone"
+        ));
+    }
     let found = recheck(&set, &robot, &before, &placed)?;
     for skipped in &set.skipped {
         progress::warn(format!("pose {} is not compared: {}", skipped.pose, skipped.reason));

@@ -51,14 +51,38 @@ pub struct Sheet {
     foot_at: (f64, f64),
 }
 
+/// A board that no paper holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TooLarge {
+    /// Its size and that of the largest paper.
+    pub message: String,
+    /// How much smaller it must be.
+    pub hint: String,
+}
+
+impl TooLarge {
+    fn new(width: f64, height: f64) -> TooLarge {
+        let (_, short, long) = PAPER[PAPER.len() - 1];
+        let [across, along] = [[short, long], [long, short]]
+            .map(|[w, h]| ((w - 2.0 * MARGIN_MM) / width).min((h - 2.0 * MARGIN_MM - FOOT_MM) / height));
+        let percent = (100.0 * across.max(along)).floor();
+        TooLarge {
+            message: format!(
+                "the board is {width:.1} x {height:.1} mm, more than A0 holds ({short} x {long} mm with its margin)"
+            ),
+            hint: format!("make its squares {percent} % as large, or fewer"),
+        }
+    }
+}
+
 impl Sheet {
     /// The board on the smallest paper that holds it; why there is none otherwise.
-    pub fn new(board: &Board) -> Result<Sheet, String> {
+    pub fn new(board: &Board) -> Result<Sheet, TooLarge> {
         let [width, height] = board.extent_mm();
         let (wide, high) = (width + 2.0 * MARGIN_MM, height + 2.0 * MARGIN_MM + FOOT_MM);
         let sheets = PAPER.into_iter().flat_map(|(name, a, b)| [(name, a, b), (name, b, a)]);
         let Some((paper, width_mm, height_mm)) = sheets.into_iter().find(|(_, w, h)| *w >= wide && *h >= high) else {
-            return Err(format!("the board is {width} x {height} mm, A0 holds {} x {}", 841.0 - 20.0, 1189.0 - 36.0));
+            return Err(TooLarge::new(width, height));
         };
         let (left, top) = ((width_mm - width) / 2.0, (height_mm - FOOT_MM - height) / 2.0);
         let mut patches: Vec<Patch> = Vec::new();
@@ -191,7 +215,7 @@ mod tests {
                     .all(|p| p.x >= 0.0 && p.x + p.width <= sheet.width_mm && p.y + p.height <= sheet.height_mm)
             );
         }
-        assert!(Sheet::new(&"checker:20x20:100".parse().unwrap()).unwrap_err().contains("A0 holds"));
+        assert!(Sheet::new(&"checker:20x20:100".parse().unwrap()).unwrap_err().message.contains("A0 holds"));
     }
 
     #[test]

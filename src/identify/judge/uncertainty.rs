@@ -156,7 +156,9 @@ pub fn region(set: &Dataset) -> String {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         match set.slides.get(j) {
             Some(true) => format!("j{} {low:.0}..{high:.0} mm", j + 1),
-            _ => format!("j{} {:.0}..{:.0} deg", j + 1, low.to_degrees(), high.to_degrees()),
+            _ => {
+                format!("j{} {:.0}..{:.0} deg", j + 1, low.to_degrees().round() + 0.0, high.to_degrees().round() + 0.0)
+            }
         }
     };
     (0..count).map(range).collect::<Vec<_>>().join(", ")

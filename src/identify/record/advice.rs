@@ -16,6 +16,16 @@ const ONE_ORIENTATION_DEG: f64 = 1.0;
 const IMPLAUSIBLE_MM: f64 = 20.0;
 
 impl Record {
+    /// The reason with what to do about it, as the warnings have it.
+    pub fn whole_reason(&self) -> &str {
+        let reason = self.reason.as_str();
+        self.warnings
+            .iter()
+            .map(String::as_str)
+            .find(|said| !reason.is_empty() && said.starts_with(reason))
+            .unwrap_or(reason)
+    }
+
     /// Fills in the advice, its reason and the warnings.
     pub(super) fn advise(
         &mut self,
@@ -108,7 +118,7 @@ impl Record {
         }
         if !i.weak.is_empty() {
             list.push(format!(
-                "the data hardly determine {}: what they are corrected by comes from the manufacturing tolerance",
+                "the data hardly determine {}: the correction comes from the manufacturing tolerance",
                 i.weak.join(", ")
             ));
         }
@@ -118,7 +128,7 @@ impl Record {
                 i.dependent.iter().find(|sum| sum.split(' ').next() == Some(name)).unwrap_or(name).clone()
             };
             list.push(format!(
-                "the nominal values of {} are far off: the search limits were widened for them",
+                "far from nominal: {}; the search limits were widened",
                 self.widened.iter().map(sum_of).collect::<Vec<String>>().join(", ")
             ));
         }

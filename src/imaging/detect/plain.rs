@@ -198,7 +198,7 @@ pub(super) fn ladder(picture: &Picture) -> Vec<Attempt> {
 
 pub(super) fn grown(small: &Grey8, enough: usize) -> Option<Places> {
     let grid = extent::without_chance_lines(small, continuation::without_ends(small, largest_grid(small, enough)?));
-    Some(extent::without_outline(small, grid))
+    Some(extent::without_outline(small, grid)).filter(|grid| grid.columns > 1 && grid.rows > 1)
 }
 
 fn whole(board: Board, corners: Vec<Point2<f64>>) -> Places {

@@ -19,6 +19,7 @@ pub(super) fn lengths(judged: &Judged) -> Result<Markup> {
     let guard = |plot: Plot| plot.hline(judged.tolerance_mm, "tolerance").hline(-judged.tolerance_mm, "");
     let a = guard(
         Plot::new(&format!("(a) Errors of all lengths of {long} mm"), "pair used, in the order of names", "error, mm")
+            .whole_x()
             .points("", &every),
     )
     .svg()?;
@@ -26,6 +27,7 @@ pub(super) fn lengths(judged: &Judged) -> Result<Markup> {
         accuracy.pairs.iter().enumerate().filter_map(|(i, p)| Some((i as f64 + 1.0, of(p)?))).collect()
     };
     let b = Plot::new("(b) Mean error of every pair", "pair used, in the order of names", "mean error, mm")
+        .whole_x()
         .points(&format!("x {short} mm"), &mean(|p| p.mean_error_x_short_mm))
         .points(&format!("y {short} mm"), &mean(|p| p.mean_error_y_short_mm))
         .points(&format!("x {long} mm"), &mean(|p| p.mean_error_x_long_mm))

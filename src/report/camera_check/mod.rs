@@ -22,6 +22,7 @@ use maud::{Markup, html};
 use self::figures::{lengths, residuals, volume};
 pub use self::summary::summary;
 use self::summary::{advice, deciding, word};
+pub use crate::report::blur::warning as blurred;
 
 /// The pairs by their largest held-out error, the worst first.
 pub fn worst_first(judged: &Judged) -> Vec<usize> {

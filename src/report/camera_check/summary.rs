@@ -173,23 +173,32 @@ pub(super) fn explanation(judged: &Judged) -> String {
     )
 }
 
-/// The line of the ledger that decides, and how many others are below a pass.
+/// The line of the ledger that decides, and which others are below a pass.
 pub(super) fn deciding(judged: &Judged) -> String {
-    let below = judged.evidence.iter().filter(|line| line.allows != Verdict::Pass).count();
-    let others = match below.saturating_sub(1) {
-        0 if below == 0 => format!("all {} checks passed", judged.evidence.len()),
-        0 => "all other checks passed".to_owned(),
-        1 => "1 other check is not passed".to_owned(),
-        others => format!("{others} other checks are not passed"),
+    let deciding = judged.deciding();
+    let below = || judged.evidence.iter().filter(|line| line.allows != Verdict::Pass);
+    let others: Vec<&str> =
+        below().filter(|line| deciding.is_none_or(|first| first.what != line.what)).map(|line| line.what).collect();
+    let others = match (below().next(), others.is_empty()) {
+        (None, _) => format!("all {} checks passed", judged.evidence.len()),
+        (_, true) => "all other checks passed".to_owned(),
+        _ => format!("not passed either: {}", others.join(", ")),
     };
-    judged.deciding().map_or(others.clone(), |line| format!("decided by {}: {}; {others}", line.what, line.figure()))
+    deciding.map_or(others.clone(), |line| format!("decided by {}: {}; {others}", line.what, line.figure()))
 }
 
 /// What the rig can be trusted to, whatever the tolerance.
 pub(super) fn trusted(judged: &Judged) -> String {
     match judged.trusted_mm() {
         Some(mm) => format!("lengths can be trusted to {mm:.4} mm"),
-        None => "lengths cannot be trusted to any tolerance until that is resolved".to_owned(),
+        None => {
+            let open = judged.evidence.iter().filter(|line| line.unit != "mm" && line.unit != "px");
+            let open: Vec<&str> = open.filter(|line| line.allows != Verdict::Pass).map(|line| line.what).collect();
+            match open.is_empty() {
+                true => "lengths cannot be trusted to any tolerance: these pairs do not bound their errors".to_owned(),
+                false => format!("lengths cannot be trusted to any tolerance before this passes: {}", open.join(", ")),
+            }
+        }
     }
 }
 

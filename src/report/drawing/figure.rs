@@ -64,6 +64,7 @@ pub struct Plot {
     log_y: bool,
     equal_axes: bool,
     y_down: bool,
+    whole_x: bool,
 }
 
 impl Plot {
@@ -81,6 +82,7 @@ impl Plot {
             log_y: false,
             equal_axes: false,
             y_down: false,
+            whole_x: false,
         }
     }
 
@@ -167,6 +169,12 @@ impl Plot {
         self
     }
 
+    /// Ticks of x at whole numbers alone, where it counts.
+    pub fn whole_x(mut self) -> Plot {
+        self.whole_x = true;
+        self
+    }
+
     /// The figure as SVG text, ready to stand in a page.
     pub fn svg(&self) -> Result<String> {
         let mut text = String::new();
@@ -233,13 +241,16 @@ impl Plot {
             .build_cartesian_2d(x.0..x.1, y.0..y.1)
             .map_err(say)?;
         let y_text = |v: &f64| if self.log_y { power_of_ten(*v) } else { tick(*v, y) };
+        let x_text = |v: &f64| if self.whole_x { format!("{v:.0}") } else { tick(*v, x) };
+        // So few that a step is one at least.
+        let x_labels = if self.whole_x { (1.0 + (x.1 - x.0).floor()).clamp(1.0, 7.0) as usize } else { 7 };
         chart
             .configure_mesh()
             .x_desc(&self.x_label)
             .y_desc(&self.y_label)
-            .x_label_formatter(&|v| tick(*v, x))
+            .x_label_formatter(&x_text)
             .y_label_formatter(&y_text)
-            .x_labels(7)
+            .x_labels(x_labels)
             .y_labels(7)
             .label_style(font(13))
             .axis_desc_style(font(14))
@@ -353,6 +364,20 @@ mod tests {
             assert!(svg.contains(part), "{part} is missing");
         }
         assert!(!svg.contains("NaN"));
+    }
+
+    #[test]
+    fn counts_have_whole_ticks() {
+        for pairs in [1, 2, 4, 6, 13, 60] {
+            let dots: Vec<(f64, f64)> = (1..=pairs).map(|k| (f64::from(k), 0.1)).collect();
+            let svg = Plot::new("t", "pair", "y").whole_x().points("", &dots).y_range(0.0, 1.0).svg().unwrap();
+            let labels: Vec<&str> =
+                svg.split('>').filter_map(|part| part.strip_suffix("</text")).map(str::trim).collect();
+            let whole: Vec<i64> = labels.iter().filter_map(|label| label.parse().ok()).collect();
+            assert!(!whole.is_empty() && whole.len() <= 9, "{pairs}: {labels:?}");
+            let distinct: std::collections::BTreeSet<&i64> = whole.iter().collect();
+            assert_eq!(distinct.len(), whole.len(), "{pairs}: {labels:?}");
+        }
     }
 
     #[test]

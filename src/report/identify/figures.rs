@@ -20,13 +20,14 @@ pub(super) fn verification_figure(before: &[RowError], after: &[RowError]) -> Re
     };
     let svg =
         Plot::new("Distance errors of the verify rows", "verify row, in the order of the file", "absolute error, mm")
+            .whole_x()
             .points("before", &series(before))
             .points("after", &series(after))
             .log_y()
             .svg()?;
     Ok(page::figure(
         &svg,
-        "Fig. 9 of the paper: each verification distance before and after; a division of the scale is a factor of ten. A pose that is \
+        "Fig. 9 of the paper: each verification distance before and after; the scale is logarithmic. A pose that is \
          as far off after as before is one that the model cannot explain: see the table of the worst.",
     ))
 }

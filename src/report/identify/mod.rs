@@ -42,9 +42,11 @@ pub fn page(
         record.chosen,
         record.seed
     );
+    // What the verdict says is not said again.
+    let others: Vec<String> = record.warnings.iter().filter(|said| *said != record.whole_reason()).cloned().collect();
     let content = html! {
         (verdict(record))
-        (page::warnings(&record.warnings))
+        (page::warnings(&others))
         h2 { "Verification" }
         (figures::verification_figure(before, after)?)
         (tables::verification_table(record))
@@ -93,16 +95,17 @@ fn verdict(record: &Record) -> Markup {
         number(spread.and_then(of), 3)
     };
     let what = if record.before.verify.point.is_some() { "position" } else { "distance" };
-    let numbers = [
+    let mut numbers = vec![
         (format!("{} mm", mean(Some(&record.before.verify))), format!("mean {what} error before")),
         (format!("{} mm", mean(record.chosen_method().map(|m| &m.verify))), format!("mean {what} error after")),
-        (
-            format!("{} mm", number(record.expected.as_ref().map(|e| e.p95_mm), 3)),
-            "95 of 100 positions are better than this".to_owned(),
-        ),
     ];
+    if let Some(expected) = &record.expected {
+        let p95 = format!("{} mm", number(Some(expected.p95_mm), 3));
+        numbers.push((p95, "95 of 100 positions are better than this".to_owned()));
+    }
     let after = record.chosen_method().map_or_else(|| "n/a".to_owned(), |m| screen::errors(&m.verify));
-    let reason = if record.reason.is_empty() { String::new() } else { format!("{}. ", page::capital(&record.reason)) };
+    let reason = record.whole_reason();
+    let reason = if reason.is_empty() { String::new() } else { format!("{}. ", page::capital(reason)) };
     let detail = format!(
         "{reason}Before: {}. After: {after}; {}.",
         screen::errors(&record.before.verify),

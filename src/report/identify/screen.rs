@@ -37,9 +37,9 @@ pub(super) fn advice(record: &Record) -> String {
     let file = "the identified robot";
     match record.advice {
         Advice::Use => format!("use {file}"),
-        Advice::Check => format!("check before you use {file}: {}", record.reason),
-        Advice::KeepNominal => record.reason.clone(),
-        Advice::DoNotUse => format!("do not use {file}: {}", record.reason),
+        Advice::Check => format!("check before you use {file}: {}", record.whole_reason()),
+        Advice::KeepNominal => record.whole_reason().to_owned(),
+        Advice::DoNotUse => format!("do not use {file}: {}", record.whole_reason()),
     }
 }
 

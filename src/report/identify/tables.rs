@@ -120,7 +120,7 @@ pub(super) fn joint_table(record: &Record) -> Markup {
     let Some(method) = record.chosen_method() else { return html! {} };
     let find = |name: String| method.parameters.iter().find(|p| p.name == name);
     let cell = |name: String| match find(name) {
-        Some(p) if p.delta != 0.0 => format!("{:.4} {:+.4}", p.nominal, p.delta),
+        Some(p) if p.delta.abs() >= 0.00005 => format!("{:.4} {:+.4}", p.nominal, p.delta),
         Some(p) => format!("{:.4}", p.nominal),
         None => String::new(),
     };

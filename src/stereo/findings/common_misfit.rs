@@ -110,6 +110,7 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
     }
     let [width_mm, height_mm] = calibration.board.sides_mm();
     let said = width_mm / height_mm;
+    let digits = if stretch.abs() < 1e-3 { 6 } else { 4 };
     Some(Finding {
         cause: Cause::OtherBoard.word().to_owned(),
         kind: Kind::Step,
@@ -118,8 +119,9 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
         unit: "%",
         effect_mm: None,
         action: format!(
-            "the board's {} are {:.4} times as wide as high, not {said:.4} times as was said: with that half of the pairs miss the rig by \
-             {left_px:.3} px and more, instead of {before_px:.3} px. Measure the board along and across, and say the side as WxH",
+            "the board's {} are {:.digits$} times as wide as high, not {said:.digits$} times as was said: with that half of the pairs miss \
+             the rig by {left_px:.3} px and more, instead of {before_px:.3} px. Measure the board along and across, and give \
+             `--measured-mm WxH`",
             calibration.board.unit(),
             said * (1.0 + stretch),
         ),

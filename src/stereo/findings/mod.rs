@@ -321,7 +321,8 @@ fn finding(
         format!("{} by {size:.3} {unit} {which}, which moves a length by up to {effect_mm:.4} mm", described(&equals));
     if best.kind == Kind::Drift {
         let [before, after] = calibration.moment();
-        action += &format!("; the rig is that of the middle of the series, at pairs {before} and {after}");
+        let at = if before == after { format!("pair {before}") } else { format!("pairs {before} and {after}") };
+        action += &format!("; the rig is that of the middle of the series, at {at}");
     }
     Some(Finding {
         cause: causes(&equals),

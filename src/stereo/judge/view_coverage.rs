@@ -5,6 +5,7 @@
 
 use nalgebra::{Point2, Point3, Vector3};
 
+use crate::diagnostic::count;
 use crate::imaging::Side;
 use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
@@ -93,7 +94,8 @@ impl Coverage {
         for (name, tilt) in [("horizontal", self.tilts_deg[0]), ("vertical", self.tilts_deg[1])] {
             if tilt < LEAST_TILT_DEG {
                 advice.push(format!(
-                    "the boards' tilts about the {name} axis differ by {tilt:.0} degrees only: add pairs tilted by 20 to 45 degrees both ways"
+                    "the boards' tilts about the {name} axis differ by {} only: add pairs tilted by 20 to 45 degrees both ways",
+                    count(tilt.round() as usize, "degree")
                 ));
             }
         }

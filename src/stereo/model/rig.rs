@@ -53,9 +53,18 @@ impl Rig {
         self.right_from_left.translation.vector.norm()
     }
 
-    /// What is unusual in how the cameras stand, where something is: the left one on the right side, one rolled against the other. Both
-    /// may be meant, and no residual tells: a rig whose folders are exchanged, or with all pictures of one side turned, is a rig.
+    /// What is unusual in how the cameras stand, where something is: nearer to each other than cameras are wide, the left one on the right
+    /// side, one rolled against the other. All may be meant, and no residual tells: a rig whose folders are exchanged, or with all pictures
+    /// of one side turned, is a rig, and so is one of a board in other units.
     pub fn unusual(&self) -> Option<String> {
+        /// Endoscopes have 4 mm.
+        const LEAST_BASELINE_MM: f64 = 3.0;
+        if self.baseline_mm() < LEAST_BASELINE_MM {
+            return Some(format!(
+                "the cameras stand {:.3} mm apart, less than cameras are wide: is the board's size in mm? An inch is 25.4 mm",
+                self.baseline_mm()
+            ));
+        }
         let rotation = crate::geometry::rotation_matrix(&self.right_from_left);
         let roll_deg = rotation[(1, 0)].atan2(rotation[(1, 1)]).to_degrees();
         if roll_deg.abs() > 45.0 {
@@ -70,8 +79,8 @@ impl Rig {
         let exchanged = right_mm.x < -right_mm.y.abs().max(right_mm.z.abs());
         exchanged.then(|| {
             format!(
-                "the left camera stands {:.1} mm to the right of the right one: are left and right exchanged? Exchange the folders' \
-                 names; if the cameras are only named so, all is well",
+                "the left camera stands {:.1} mm to the right of the right one: are left and right exchanged? Exchange the folders; \
+                 if the cameras are only named so, all is well",
                 -right_mm.x
             )
         })
@@ -105,6 +114,15 @@ mod tests {
         let camera = Camera::pinhole(640, 480, 800.0);
         let left_from_right = transform(turn, right_mm);
         Rig { left: camera, right: camera, right_from_left: left_from_right.inverse(), covariance: None }.unusual()
+    }
+
+    #[test]
+    fn cameras_nearer_than_they_are_wide_are_said() {
+        // 70 mm in metres and in inches; an endoscope, and a small rig.
+        for (baseline, is_said) in [(0.07, true), (70.0 / 25.4, true), (2.9, true), (4.2, false), (20.0, false)] {
+            let said = unusual(Vector3::zeros(), Vector3::new(baseline, 0.0, 0.0));
+            assert_eq!(said.is_some_and(|w| w.contains("less than cameras are wide")), is_said, "{baseline}");
+        }
     }
 
     #[test]

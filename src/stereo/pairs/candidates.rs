@@ -4,8 +4,8 @@
 use rayon::prelude::*;
 
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
-use crate::stereo::Error;
 use crate::stereo::data::view::View;
+use crate::stereo::error::{Error, ONE_PICTURE};
 use crate::stereo::init::homography::{FEWEST_CORNERS, homography, pixel_pairs};
 use crate::stereo::init::single_camera::{self, OneCamera};
 use crate::stereo::model::known_lenses::KnownLenses;
@@ -43,7 +43,7 @@ impl Candidates {
                 continue;
             }
             if one_picture(pair) {
-                let reason = "left and right picture are one picture: both cameras need their own".to_owned();
+                let reason = format!("{ONE_PICTURE}: both cameras need their own");
                 discarded.push(DiscardedPair::new(&pair.pair, Cause::Duplicate, reason));
                 continue;
             }

@@ -4,19 +4,15 @@ use std::fmt;
 
 use camino::{Utf8Path, Utf8PathBuf};
 
-use super::listing::{Aside, Folder};
+use super::listing::{Aside, Folder, list};
 use super::names::{Open, Reach};
 use super::readings::{Reading, Told};
 use super::{PairBy, Pairing, Source};
-use crate::imaging::{Error, Side, image};
+use crate::diagnostic::count;
+use crate::imaging::{Error, Side, image, video};
 
 /// Folders, and readings, that a message shows at most.
 const MOST_SHOWN: usize = 8;
-
-/// `1 picture`, `2 pictures`.
-pub fn count(n: usize, noun: &str) -> String {
-    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
-}
 
 /// A command to type.
 pub struct Call<'a> {
@@ -157,7 +153,7 @@ pub fn none(source: &Source<'_>, folders: &[Folder], readings: &[Reading]) -> Er
     let pictures: usize = holding.iter().map(|folder| folder.pictures.len()).sum();
     let best = readings.iter().min_by_key(|r| (r.told, r.depth));
     let (statement, hint) = match best {
-        _ if pictures == 0 => ("there are no pictures here (PNG, TIFF, BMP, JPEG, PGM)".to_owned(), by_hand(source)),
+        _ if pictures == 0 => without_pictures(source, folders),
         Some(reading) => unmatched(source, reading),
         None => match one_side(folders) {
             Some((have, lacks)) => (
@@ -172,6 +168,28 @@ pub fn none(source: &Source<'_>, folders: &[Folder], readings: &[Reading]) -> Er
     };
     let statement = statement + &found(folders);
     Error::Unpaired { path: source.images.to_owned(), statement, hint }
+}
+
+/// No picture that can be read; perhaps a video, or pictures in another format.
+fn without_pictures(source: &Source<'_>, folders: &[Folder]) -> (String, String) {
+    const NONE: &str = "there are no pictures here (PNG, TIFF, BMP, JPEG, PGM)";
+    let below = folders.first().into_iter().flat_map(|root| &root.folders).filter_map(|path| list(path).ok());
+    let others: Vec<Utf8PathBuf> =
+        folders.iter().flat_map(|f| f.others.clone()).chain(below.flat_map(|f| f.others)).collect();
+    let Some(first) = others.first() else { return (NONE.to_owned(), by_hand(source)) };
+    let names = first.file_name().unwrap_or(first.as_str());
+    let statement = format!(
+        "{NONE}, but {} ({names}{})",
+        count(others.len(), "other file"),
+        if others.len() > 1 { ", ..." } else { "" }
+    );
+    (
+        statement,
+        others
+            .iter()
+            .find_map(|file| video::hint(file))
+            .unwrap_or_else(|| "save pictures of other formats as PNG".to_owned()),
+    )
 }
 
 /// The sides are told, but nothing says which pictures belong together.
@@ -271,7 +289,7 @@ impl Pairing {
         }
         let Aside { other, again } = self.aside;
         if again > 0 {
-            parts.push(format!("{} of the same names in a format that loses more", count(again, "picture")));
+            parts.push(format!("{} of the same names in a lossy format", count(again, "picture")));
         }
         if other > 0 {
             parts.push(count(other, "other file"));

@@ -6,10 +6,10 @@
 use camino::{Utf8Path, Utf8PathBuf};
 use rayon::prelude::*;
 
-use super::explain::count;
 use super::folders::the_pictures;
 use super::listing::list;
 use super::{PairFiles, Pairing, Source, natural_order};
+use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::imaging::image::raster::{Raster, Samples};
 use crate::imaging::image::{self, Claim};

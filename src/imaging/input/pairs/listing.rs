@@ -32,7 +32,9 @@ pub struct Folder {
     pub pictures: Vec<Utf8PathBuf>,
     /// Its folders, sorted.
     pub folders: Vec<Utf8PathBuf>,
-    /// What else there is.
+    /// Files that are no pictures, as they come.
+    pub others: Vec<Utf8PathBuf>,
+    /// How many of them, and what else there is.
     pub aside: Aside,
 }
 
@@ -83,8 +85,10 @@ pub fn list(folder: &Utf8Path) -> Result<Folder> {
             entries.pictures.push(path);
         } else {
             entries.aside.other += 1;
+            entries.others.push(path);
         }
     }
+    entries.others.sort();
     entries.pictures.sort();
     entries.folders.sort();
     entries.aside.again = once(&mut entries.pictures);

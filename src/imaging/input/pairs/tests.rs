@@ -186,12 +186,19 @@ fn of_two_formats_of_one_name_the_one_without_loss_is_read() {
     let files: Vec<[&str; 2]> =
         found.pairs.iter().map(|p| [&p.left, &p.right].map(|path| path.file_name().unwrap())).collect();
     assert_eq!(files, [["left_1.png", "right_1.PNG"], ["left_2.bmp", "right_2.jpg"]]);
-    assert_eq!(found.left_out().unwrap(), "left out: 2 pictures of the same names in a format that loses more");
+    assert_eq!(found.left_out().unwrap(), "left out: 2 pictures of the same names in a lossy format");
 }
 
 #[test]
 fn folders_without_pairs_say_what_they_hold() {
     assert!(complaint(&[] as &[&str], None).contains("there are no pictures here"));
+    let said = complaint(&["left.mp4", "right.mp4"], None);
+    assert!(said.contains("but 2 other files (left.mp4, ...)") && said.contains("ffmpeg -i "), "{said}");
+    let said = complaint(&["left/a.HEIC", "right/a.HEIC"], None);
+    assert!(
+        said.contains("but 2 other files (a.HEIC, ...)") && said.contains("save pictures of other formats"),
+        "{said}"
+    );
     let said = complaint(&["left/a.png", "rigth/a.png"], None);
     assert!(said.contains("left/ but no right/") && said.contains("camera-check IMAGES/left IMAGES/rigth`"), "{said}");
     let said = complaint(&["left/a.png", "cam2/a.png"], None);

@@ -13,13 +13,17 @@ pub(super) fn held_out_lengths(facts: &Facts) -> Evidence {
     let worst = &extremes.largest;
     let doubtful = &facts.accuracy.doubtful;
     let left_out = if doubtful.lengths_left_out > 0 {
-        format!("; {} lengths that end in doubtful corners are not counted, see rays", doubtful.lengths_left_out)
+        format!(
+            "; {} lengths that end in doubtful corners are not counted (see the check of rays)",
+            doubtful.lengths_left_out
+        )
     } else {
         String::new()
     };
     Evidence {
         what: "held-out lengths",
-        remedy: "look at the worst pair in camera-check.html, and at the lines below it",
+        remedy: "look at the worst pair in camera-check.html; where all are alike: a flat board on a stand, both cameras triggered at once, \
+                 or the `--tolerance-mm` that your robot needs",
         value: Some(worst.at_most_mm()),
         limit: Some(facts.tolerance_mm),
         unit: "mm",
@@ -109,7 +113,7 @@ pub(super) fn residuals(facts: &Facts) -> Evidence {
     };
     Evidence::of_length(
         "residual correlation",
-        "look at the map of residuals in camera-check.html; it takes another `--lens`, `--board-shape bowed` or a better board",
+        "look at the map of residuals in camera-check.html; it takes another `--lens` or a better board, or `--board-shape bowed` where it was taken as flat",
         value,
         facts,
         detail,
