@@ -267,7 +267,7 @@ fn most_alike(parts: &[Part], picked: &Picked) -> Vec<usize> {
         })
     };
     let (group, target) = (named("group"), named("target"));
-    fn cell<'a>(of: Option<(&'a Part, usize)>, row: usize) -> &'a str {
+    fn cell(of: Option<(&Part, usize)>, row: usize) -> &str {
         of.and_then(|(p, column)| p.rows.get(row).map(|(_, cells)| &cells[column])).unwrap_or("")
     }
     let mut sets: std::collections::BTreeMap<(&str, &str), Vec<usize>> = std::collections::BTreeMap::new();

@@ -26,10 +26,19 @@ const DEEPEST: usize = 20;
 
 /// Evaluates a formula; `known` says what a name stands for.
 pub fn evaluate(text: &str, known: &dyn Fn(&str) -> Option<f64>) -> Option<Value> {
-    let mut parser = Parser { rest: text.trim(), known, radians: false, variable: false };
+    let plain = plain(text);
+    let mut parser = Parser { rest: plain.trim(), known, radians: false, variable: false };
     let number = parser.sum(0)?;
     let whole = parser.rest.trim_start().is_empty() && number.is_finite();
     whole.then_some(Value { number, radians: parser.radians, variable: parser.variable })
+}
+
+/// Without the marks of HTML and LaTeX: `θ<sub>2</sub>`, `\\theta_2`.
+fn plain(text: &str) -> std::borrow::Cow<'_, str> {
+    if !text.contains(['<', '\\', '$']) {
+        return text.into();
+    }
+    ["<sub>", "</sub>", "\\", "$"].iter().fold(text.to_owned(), |text, mark| text.replace(mark, "")).into()
 }
 
 struct Parser<'a> {
@@ -182,7 +191,15 @@ mod tests {
         assert_eq!(of("135*mm"), Some((0.135, false, false)));
         assert_eq!(of("-1.5e-3 + 2"), Some((1.9985, false, false)));
         assert_eq!(of("\u{2212}90"), Some((-90.0, false, false)));
-        for (text, number) in [("q1", 0.0), ("θ2-90", -90.0), ("theta_3 + 90", 90.0), ("q_{4}", 0.0), ("th5*", 0.0)] {
+        for (text, number) in [
+            ("q1", 0.0),
+            ("θ2-90", -90.0),
+            ("theta_3 + 90", 90.0),
+            ("q_{4}", 0.0),
+            ("th5*", 0.0),
+            ("90 + \\theta_2", 90.0),
+            ("θ<sub>3</sub>", 0.0),
+        ] {
             assert_eq!(of(text), Some((number, false, true)), "{text}");
         }
         for text in ["", "a1", "pi/", "2 3", "x+1", "2**3", "(1", "1/0", "nan", "1e999"] {

@@ -7,10 +7,13 @@
 //! lengths are metres where the longest is shorter than a toy's. What goes wrong: names that say degrees or mm over radians or metres, which is
 //! refused: no arm has twists of 1.57 degrees at every elbow, and none is 0.4 mm long.
 
+mod units;
+
 use std::fmt::Write as _;
 
 use camino::Utf8Path;
 
+use self::units::units;
 use super::dh_text;
 use crate::files::{self, Result};
 use crate::robot::Robot;
@@ -22,12 +25,6 @@ use crate::tables::{Fields, Form, Grid};
 
 const HINT: &str =
     "a row a joint, from the base: alpha_deg,a_mm,theta_deg,d_mm (deg and mm), or alpha, a, d, theta in any order";
-
-/// Longest link that is taken for metres, mm: a toy's.
-const METRES: f64 = 3.0;
-
-/// How near an angle must be to a multiple of a quarter turn in radians to be taken for one.
-const QUARTER: f64 = 2e-3;
 
 /// What the columns of a row are called, in the order of [`Row`].
 const NAMES: [&str; 4] = ["alpha", "a", "theta", "d"];
@@ -42,6 +39,9 @@ const WORDS: [&[&str]; 4] = [
     &["theta", "θ", "th", "q", "angle"],
     &["d", "offset", "linkoffset"],
 ];
+
+/// Words that may stand beside a parameter's letter.
+const SAID_BESIDE: [&str; 5] = ["twist", "length", "angle", "offset", "linkoffset"];
 
 /// Orders in which tables without names are written.
 const ORDERS: [[usize; 4]; 4] = [[0, 1, 3, 2], [0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 1, 0]];
@@ -108,7 +108,17 @@ fn of_text(path: &Utf8Path) -> Result<Option<Vec<Reading>>> {
         return Ok(None);
     };
     let links = dh_text::read(&text).map_err(|(line, message)| grid(Vec::new()).refuse(line, message, Some(HINT)))?;
-    let Some(links) = links else { return Ok(None) };
+    let Some(links) = links else {
+        let Some(table) = dh_text::matrix(&text) else { return Ok(None) };
+        let grid = grid(table.rows.clone());
+        return Ok(Some(match table.names.map(|names| names.map(str::to_owned)) {
+            Some(names) => {
+                let at = NAMES.map(|name| names.iter().position(|n| n == name).unwrap_or(0));
+                vec![reading(&grid, &table.rows, at, Some(&names))?]
+            }
+            None => without_names(&grid, &table.rows)?,
+        }));
+    };
     let unit = if links.radians { " [rad]" } else { "" };
     let names = [format!("alpha{unit}"), "a".to_owned(), format!("theta{unit}"), "d".to_owned()];
     let cells = |row: &Row| Fields::new(row.map(|v| v.to_string()).iter().map(String::as_str));
@@ -138,32 +148,33 @@ fn readings_of(grid: &Grid, columns: Option<&str>) -> Result<Vec<Reading>> {
             let columns = [alpha?, a?, theta?, d?];
             Ok(vec![reading(grid, &rows, columns, Some(&names))?])
         }
-        None => {
-            // Columns of words and of the joint's number are no parameters.
-            let counts = |c: usize| {
-                rows.iter().enumerate().all(|(i, (_, r))| r[c] == i.to_string() || r[c] == (i + 1).to_string())
-            };
-            let is_number = |c: usize| rows.iter().all(|(_, r)| value(&r[c]).is_some());
-            let free: Vec<usize> =
-                (0..rows[0].1.len()).filter(|&c| is_number(c) && !(counts(c) && rows.len() > 2)).collect();
-            let [w, x, y, z] = free[..] else {
-                let message = format!("{} columns of numbers without names; four are needed", free.len());
-                return Err(grid.refuse(rows[0].0, message, Some(HINT)));
-            };
-            let columns = [w, x, y, z];
-            let in_order = |order: &[usize; 4]| {
-                let mut of_row = [0; 4];
-                order.iter().zip(columns).for_each(|(&which, column)| of_row[which] = column);
-                of_row
-            };
-            // Lengths in the place of angles are no multiples of a quarter turn.
-            let readings: Vec<Reading> =
-                ORDERS.iter().filter_map(|order| reading(grid, &rows, in_order(order), None).ok()).collect();
-            let regular = |r: &&Reading| r.rows.iter().all(|row| row[0].abs() <= 180.0 && row[2].abs() <= 360.0);
-            let likely: Vec<Reading> = readings.iter().filter(regular).cloned().collect();
-            Ok(if likely.is_empty() { readings } else { likely })
-        }
+        None => without_names(grid, &rows),
     }
+}
+
+/// Every order that the columns of a table without names may have.
+fn without_names(grid: &Grid, rows: &[(u64, Fields)]) -> Result<Vec<Reading>> {
+    // Columns of words and of the joint's number are no parameters.
+    let counts =
+        |c: usize| rows.iter().enumerate().all(|(i, (_, r))| r[c] == i.to_string() || r[c] == (i + 1).to_string());
+    let is_number = |c: usize| rows.iter().all(|(_, r)| value(&r[c]).is_some());
+    let free: Vec<usize> = (0..rows[0].1.len()).filter(|&c| is_number(c) && !(counts(c) && rows.len() > 2)).collect();
+    let [w, x, y, z] = free[..] else {
+        let message = format!("{} columns of numbers without names; four are needed", free.len());
+        return Err(grid.refuse(rows[0].0, message, Some(HINT)));
+    };
+    let columns = [w, x, y, z];
+    let in_order = |order: &[usize; 4]| {
+        let mut of_row = [0; 4];
+        order.iter().zip(columns).for_each(|(&which, column)| of_row[which] = column);
+        of_row
+    };
+    // Lengths in the place of angles are no multiples of a quarter turn.
+    let readings: Vec<Reading> =
+        ORDERS.iter().filter_map(|order| reading(grid, rows, in_order(order), None).ok()).collect();
+    let regular = |r: &&Reading| r.rows.iter().all(|row| row[0].abs() <= 180.0 && row[2].abs() <= 360.0);
+    let likely: Vec<Reading> = readings.iter().filter(regular).cloned().collect();
+    Ok(if likely.is_empty() { readings } else { likely })
 }
 
 /// The column of a parameter.
@@ -176,7 +187,10 @@ fn find(grid: &Grid, names: &[String], wanted: &str) -> Result<usize> {
     let which = NAMES.iter().position(|n| *n == wanted).unwrap_or(0);
     let says = |name: &String| {
         let words = plain(name).0;
-        words.first().is_some_and(|w| WORDS[which].contains(&w.as_str())) && words.len() == 1
+        // `Link twist (alpha)`, `theta offset`: the letter says it.
+        let letters: Vec<&String> = words.iter().filter(|w| !SAID_BESIDE.contains(&w.as_str())).collect();
+        let is_it = |w: &String| WORDS[which].contains(&w.as_str());
+        if letters.is_empty() { matches!(&words[..], [only] if is_it(only)) } else { letters.into_iter().all(is_it) }
     };
     let found: Vec<usize> = (0..names.len()).filter(|&i| says(&names[i])).collect();
     let line = grid.rows.first().map_or(1, |(line, _)| *line);
@@ -189,7 +203,8 @@ fn find(grid: &Grid, names: &[String], wanted: &str) -> Result<usize> {
 
 /// Words of a name without indices and units, and its unit.
 fn plain(name: &str) -> (Vec<String>, Option<Unit>) {
-    let (mut words, mut unit) = names::words(name);
+    let name = ["<sub>", "</sub>"].iter().fold(name.to_owned(), |name, mark| name.replace(mark, " "));
+    let (mut words, mut unit) = names::words(&name);
     if words.len() > 1
         && let Some(found) = words.last().and_then(|w| Unit::of(w))
     {
@@ -238,7 +253,28 @@ fn beside(grid: &Grid, rows: &[(u64, Fields)], names: Option<&[String]>) -> Resu
     Ok((beta_deg, limits_deg))
 }
 
+/// The rows that turn: where some have the joint's variable for theta, a row at the end without one is a fixed flange, which the tool takes in.
+fn turning<'a>(grid: &Grid, rows: &'a [(u64, Fields)], columns: [usize; 4]) -> Result<&'a [(u64, Fields)]> {
+    let theta = columns[2];
+    let turns = |row: &(u64, Fields)| value(&row.1[theta]).is_some_and(|v| v.variable);
+    // What is no number, or slides, is said of the cell.
+    let stands = |row: &&(u64, Fields)| columns.iter().all(|&c| value(&row.1[c]).is_some_and(|v| !v.variable));
+    let Some(last) = rows.iter().rposition(turns) else { return Ok(rows) };
+    match rows[..last].iter().find(stands) {
+        Some((line, row)) => {
+            let message = format!(
+                "theta is `{}`, but other rows have their joint's variable there: this one does not turn",
+                &row[theta]
+            );
+            Err(grid.refuse(*line, message, Some("a row a joint; add what stands still to the row before")))
+        }
+        None if rows[last + 1..].iter().all(|row| stands(&row)) => Ok(&rows[..=last]),
+        None => Ok(rows),
+    }
+}
+
 fn reading(grid: &Grid, rows: &[(u64, Fields)], columns: [usize; 4], names: Option<&[String]>) -> Result<Reading> {
+    let rows = turning(grid, rows, columns)?;
     let mut table: Vec<Row> = Vec::with_capacity(rows.len());
     let mut radians = false;
     for (line, row) in rows {
@@ -285,47 +321,6 @@ fn reading(grid: &Grid, rows: &[(u64, Fields)], columns: [usize; 4], names: Opti
         length.word()
     );
     Ok(Reading { rows: table, beta_deg, limits_deg, said, columns, stated, own })
-}
-
-/// The unit of two columns: what their names say, else what the numbers look like.
-fn units(
-    grid: &Grid,
-    rows: &[(u64, Fields)],
-    table: &[Row],
-    at: [usize; 2],
-    stated: [Option<Unit>; 2],
-) -> Result<Unit> {
-    let angles = at[0] == 0;
-    let all = || table.iter().enumerate().flat_map(|(i, r)| at.map(|k| (i, r[k])));
-    let largest = all().map(|(_, v)| v.abs()).fold(0.0, f64::max);
-    let quarter = |v: f64| {
-        let turns = v / std::f64::consts::FRAC_PI_2;
-        turns.round() != 0.0 && (turns - turns.round()).abs() < QUARTER
-    };
-    let odd = match angles {
-        true => all().find(|(_, v)| quarter(*v)).filter(|_| largest < 2.0 * std::f64::consts::TAU),
-        false => all().find(|(_, v)| v.abs() == largest).filter(|_| largest > 0.0 && largest < METRES),
-    };
-    let (usual, other) = if angles { (Unit::Deg, Unit::Rad) } else { (Unit::Mm, Unit::M) };
-    match (stated[0].or(stated[1]), odd) {
-        (Some(unit), Some((row, v))) if unit == usual => {
-            let (what, factor) = if angles { ("radians", "180/pi") } else { ("metres", "1000") };
-            let message = format!(
-                "the names say {}, but {v} is none and no number of these columns is above {largest:.2}: these are {what}",
-                unit.word()
-            );
-            let hint = format!(
-                "multiply the columns by {factor}, or call them {} and {} with `[{}]`",
-                NAMES[at[0]],
-                NAMES[at[1]],
-                other.word()
-            );
-            Err(grid.refuse(rows[row].0, message, Some(&hint)))
-        }
-        (Some(unit), _) => Ok(unit),
-        (None, Some(_)) => Ok(other),
-        (None, None) => Ok(usual),
-    }
 }
 
 /// The modified table of a robot: what a table can carry.

@@ -2,22 +2,24 @@
 //!
 //! In: text. Out: a row a joint, alpha, a, theta, d as they stand there, and the convention where words say it. Forms: links that are built one by one with
 //! named parameters (`RevoluteDH(d=0.1, a=0, alpha=pi/2)`, `Link('d', 0.1, 'a', 0, ...)`, `{a: 0, alpha: 1.57, ...}`, keys one below the other);
-//! `Link([theta d a alpha])` of the Robotics Toolbox for MATLAB; and a list a parameter (`a = [0, -0.4, ...]`). Parameters that a link's call
+//! `Link([theta d a alpha])` of the Robotics Toolbox for MATLAB; a list a parameter (`a = [0, -0.4, ...]`); and parameters with numbers
+//! (`alpha0: 0, a0: 0, d1: 0.3, alpha1: -pi/2`). Parameters that a link's call
 //! does not name are zero. Names that the text sets to a number stand for it.
 //! What goes wrong: a parameter that is no number, sliding joints, axes that are turned round; all refused with the line.
 
+mod link;
+mod matrix;
+mod numbered;
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 
+pub use self::matrix::{Matrix, matrix};
+
+use self::link::{KEYS, Link};
 use crate::robot::catalogue::{Convention, Row};
 use crate::tables::expression::{Value, evaluate};
-
-/// Names of the parameters, in the order of [`Row`].
-const KEYS: [&[&str]; 4] = [
-    &["alpha", "α", "twist", "link_twist"],
-    &["a", "r", "link_length"],
-    &["theta", "θ", "offset", "theta_offset", "offset_theta", "theta0"],
-    &["d", "link_offset"],
-];
 
 /// Calls that make a link.
 const CALLS: [&str; 8] =
@@ -37,16 +39,6 @@ pub struct Links {
 /// A line and what is wrong there.
 pub type Wrong = (u64, String);
 
-/// One link while it is read.
-#[derive(Debug, Clone)]
-struct Link {
-    line: u64,
-    depth: usize,
-    /// Whether a call makes it, whose parameters may be left out.
-    call: bool,
-    values: [Option<Value>; 4],
-}
-
 /// The links of a text; none where it has none.
 pub fn read(text: &str) -> Result<Option<Links>, Wrong> {
     let text = without_comments(text);
@@ -59,13 +51,26 @@ pub fn read(text: &str) -> Result<Option<Links>, Wrong> {
         links: Vec::new(),
         lists: Default::default(),
         of_calls: None,
+        numbered: Default::default(),
+        wrong: None,
     };
     scan.run()?;
     let lower = text.to_lowercase();
     if ["'prismatic'", "\"prismatic\"", ": prismatic"].iter().any(|word| lower.contains(word)) && scan.links.len() > 1 {
         return Err((1, "a joint that slides, which a table of turning joints has no place for".to_owned()));
     }
-    let Scan { mut links, lists, of_calls, .. } = scan;
+    let Scan { mut links, lists, of_calls, numbered, wrong, .. } = scan;
+    let others = || -> Result<(Vec<Link>, Option<Convention>), Wrong> {
+        let of_lists = of_lists(&lists)?;
+        Ok(if of_lists.is_empty() { numbered::links(&numbered) } else { (of_lists, None) })
+    };
+    // What a loop takes out of lists is no number where the link is made.
+    if let Some(wrong) = wrong {
+        links = Vec::new();
+        if others()?.0.len() < 2 {
+            return Err(wrong);
+        }
+    }
     // A lone key is one of something else.
     links.retain(|link| link.call || link.values.iter().flatten().count() > 1);
     if links.len() > 1 {
@@ -73,8 +78,10 @@ pub fn read(text: &str) -> Result<Option<Links>, Wrong> {
         if let Some(odd) = links.iter().find(|link| !link.call && has(link) != has(&links[0])) {
             return Err((odd.line, "this link has other parameters than the first".to_owned()));
         }
-    } else {
-        links = of_lists(&lists)?;
+    }
+    let mut shown = None;
+    if links.len() < 2 {
+        (links, shown) = others()?;
     }
     if links.len() < 2 {
         return Ok(None);
@@ -83,7 +90,7 @@ pub fn read(text: &str) -> Result<Option<Links>, Wrong> {
     Ok(Some(Links {
         radians: values().any(|v| v.radians),
         rows: links.iter().map(|link| (link.line, link.values.map(|v| v.map_or(0.0, |v| v.number)))).collect(),
-        convention: of_calls.or_else(|| convention(&lower, links.iter().any(|link| link.call))),
+        convention: of_calls.or(shown).or_else(|| convention(&lower, links.iter().any(|link| link.call))),
     }))
 }
 
@@ -140,6 +147,9 @@ struct Scan<'a> {
     lists: [Option<(u64, Vec<Value>)>; 4],
     /// The convention of the calls that make links.
     of_calls: Option<Convention>,
+    numbered: numbered::Numbered,
+    /// The first value that is no number.
+    wrong: Option<Wrong>,
 }
 
 impl Scan<'_> {
@@ -223,9 +233,15 @@ impl Scan<'_> {
                     return Err((self.line, format!("`{}`: a joint that slides", text.trim())));
                 }
                 None if self.depth > 0 && !text.trim().is_empty() => {
-                    return Err((self.line, format!("`{word}` is `{}`, which is no number", text.trim())));
+                    let wrong = (self.line, format!("`{word}` is `{}`, which is no number", text.trim()));
+                    self.wrong.get_or_insert(wrong);
                 }
                 _ => {}
+            }
+        } else if let Some((which, number)) = numbered::parameter(word) {
+            let known = |name: &str| self.known.get(name).copied();
+            if let Some(v) = evaluate(&value[..extent(value)], &known).filter(|v| !v.variable || which == 2) {
+                self.numbered[which].entry(number).or_insert((self.line, v));
             }
         }
         if word == "flip" && value.trim_start().starts_with(['T', 't']) {
@@ -235,13 +251,25 @@ impl Scan<'_> {
             ));
         }
         if separator == '=' && self.depth == 0 {
-            let text = &value[..extent(value)];
-            let known = |name: &str| self.known.get(name).copied();
-            if let Some(v) = evaluate(text, &known).filter(|v| !v.variable) {
-                self.known.insert(word.to_owned(), v.number);
-            }
+            self.assign(start, word.to_owned(), value);
         }
         Ok(())
+    }
+
+    /// Numbers that get names, `a1, a2 = 0.4, 0.3` too.
+    fn assign(&mut self, start: usize, last: String, value: &str) {
+        let before = self.text[..start].rsplit(['\n', ';']).next().unwrap_or("");
+        let mut names: Vec<String> = before.split(',').map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).collect();
+        names.push(last);
+        let mut rest = value;
+        for name in names {
+            let text = &rest[..extent(rest)];
+            let known = |name: &str| self.known.get(name).copied();
+            if let Some(v) = evaluate(text, &known).filter(|v| !v.variable) {
+                self.known.insert(name, v.number);
+            }
+            rest = rest[text.len()..].strip_prefix(',').unwrap_or("");
+        }
     }
 
     fn put(&mut self, which: usize, value: Value) {
@@ -355,6 +383,3 @@ fn of_lists(lists: &[Option<(u64, Vec<Value>)>; 4]) -> Result<Vec<Link>, Wrong> 
     };
     Ok((0..alpha.len()).map(link).collect())
 }
-
-#[cfg(test)]
-mod tests;

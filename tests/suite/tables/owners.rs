@@ -50,11 +50,12 @@ fn a_column_that_sets_rows_apart_is_asked_about() {
     let (robot, rows) = world(60);
     let file = |name: &str, size: f64, number: &dyn Fn(usize, usize) -> String| {
         let measured = in_turn(&rows, size);
-        let line = |(i, ((q, _), (k, p))): (usize, (&(Vec<f64>, [f64; 3]), &(usize, [f64; 3])))| {
+        let mut table = String::new();
+        for (i, ((q, _), (k, p))) in rows.iter().zip(&measured).enumerate() {
             let cells: Vec<String> = q.iter().map(f64::to_string).collect();
-            format!("{},{},{},{},{}\n", cells.join(","), number(i, *k), p[0], p[1], p[2])
-        };
-        folder.file(name, rows.iter().zip(&measured).enumerate().map(line).collect::<String>())
+            let _ = writeln!(table, "{},{},{},{},{}", cells.join(","), number(i, *k), p[0], p[1], p[2]);
+        }
+        folder.file(name, table)
     };
     let reflector = |_: usize, k: usize| (k + 1).to_string();
     for size in [1.0, 0.5] {
@@ -156,4 +157,45 @@ fn a_robot_of_formulas_or_of_a_program_is_the_one_of_numbers() {
     folder.file("plane.csv", "alpha,a,d,theta\n0,0,310,0\n0,225,0,0\n0,0,20,0\n");
     let open = at(&["robot", "import", "plane.csv", "--out", "plane"]);
     assert!(open.status.code() == Some(2) && stderr(&open).contains("--dh classic"), "{}", stderr(&open));
+}
+
+#[test]
+fn a_description_whose_declaration_does_not_stand_at_its_beginning_is_read() {
+    let folder = Folder(workplace());
+    let at = |arguments: &[&str]| stereocal(Path::new(folder.0.path()), arguments);
+    let joint = |n: usize| {
+        format!(
+            "<joint name=\"j{n}\" type=\"revolute\"><parent link=\"l{}\"/><child link=\"l{n}\"/><origin xyz=\"0.1 0 0.2\"/><axis xyz=\"0 {} {}\"/></joint>\n",
+            n - 1,
+            n % 2,
+            1 - n % 2
+        )
+    };
+    let links: String = (0..4).map(|n| format!("<link name=\"l{n}\"/>\n")).collect();
+    let body = format!("<robot name=\"arm\">\n{links}{}</robot>\n", (1..4).map(joint).collect::<String>());
+    let mut said = Vec::new();
+    for (name, head) in [
+        ("a", ""),
+        ("b", "<?xml version=\"1.0\" ?>\n"),
+        ("c", "\n<?xml version=\"1.0\" ?>\n"),
+        ("d", "\u{feff}\n\n<?xml version=\"1.0\"\n?>\n"),
+    ] {
+        folder.file(&format!("{name}.urdf"), format!("{head}{body}"));
+        let read = at(&["robot", "import", &format!("{name}.urdf"), "--out", name]);
+        assert!(read.status.success(), "{name}: {}", stderr(&read));
+        said.push(std::fs::read_to_string(folder.0.path().join(name).join("robot.toml")).expect("a robot"));
+    }
+    let plain =
+        |text: &String| text.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect::<Vec<_>>();
+    assert!(said.iter().all(|text| plain(text) == plain(&said[0])));
+    // A line is that of the file.
+    folder.file(
+        "bad.urdf",
+        format!(
+            "\n<?xml version=\"1.0\" ?>\n{}",
+            body.replace("</robot>", "<joint name=\"x\" type=\"revolute\"/></robot>")
+        ),
+    );
+    let bad = at(&["robot", "import", "bad.urdf", "--out", "bad"]);
+    assert!(bad.status.code() == Some(2) && stderr(&bad).contains("bad.urdf:11"), "{}", stderr(&bad));
 }

@@ -41,6 +41,14 @@ fn the_ends_of_a_table_show_its_convention_where_no_word_says_it() {
     let said = |text: &str| crate::diagnostic::report(&all(text).unwrap_err());
     assert!(said(&classic.replace("q3,0.1", "0,d3")).contains("`d3` is not a number"));
     assert!(said(&classic.replace("q3,0.1", "0,q3")).contains("slides"));
+    // Of rows that turn and rows that do not the last may be the flange.
+    let flange = all(&format!("{classic}0,0.2,0,0\n")).unwrap();
+    assert!(flange[0].rows == all(classic).unwrap()[0].rows && flange[0].said.starts_with("4 joints"));
+    assert!(said(&classic.replace("q3,0.1", "0,0.1")).contains("does not turn"));
+    assert!(said(&classic.replace("q2 - pi/2", "q2 - 90")).contains("in radians stand beside one of 90"));
+    let words = "Link Length (a<sub>i-1</sub>),Link Twist (α<sub>i-1</sub>),Joint Offset (d<sub>i</sub>),Joint Angle (θ<sub>i</sub>)\n0,0,310,θ<sub>1</sub>\n0,-90,0,\\theta_2 - 90\n520,0,0,θ<sub>3</sub>\n";
+    let found = all(words).unwrap();
+    assert_eq!((found[0].rows[1], found[0].convention()), ([-90.0, 0.0, -90.0, 0.0], Some(Convention::Modified)));
 }
 
 #[test]

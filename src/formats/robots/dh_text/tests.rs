@@ -38,6 +38,35 @@ fn links_of_programs_and_settings() {
 }
 
 #[test]
+fn links_of_loops_over_lists_of_names_and_of_numbers() {
+    let expected = [[0.0, 0.0, 0.0, 0.75], [-PI / 2.0, 0.35, -PI / 2.0, 0.0], [0.0, 1.25, 0.0, -0.05]];
+    let loops = "a = [0, 0.35, 1.25]\nd = [0.75, 0, -0.05]\nalpha = [0, -pi/2, 0]\noffset = [0, -pi / 2, 0]\nfor j in range(3):\n    links.append(RevoluteMDH(d=d[j], a=a[j], alpha=alpha[j], r=com[j]))\n";
+    let dictionary = "s = {alpha0: 0, a0: 0, d1: 0.75, q1: q1,\n alpha1: -pi/2, a1: 0.35, d2: 0, q2: q2 - pi/2,\n alpha2: 0, a2: 1.25, d3: -0.05, q3: q3}\n";
+    let assigned = "alpha_0 = 0; a_0 = 0; d_1 = 750 * mm; theta_1 = 0;\nalpha_1 = -pi/2; a_1 = 0.35; d_2 = 0; theta_2 = -pi/2;\nalpha_2 = 0; a_2 = 1.25; d_3 = -0.05; theta_3 = 0;\n";
+    for text in [loops.to_owned(), dictionary.to_owned(), format!("mm = 0.001;\n{assigned}")] {
+        assert!(close(&rows(&text).0, &expected), "{text}\n{:?}", rows(&text));
+        assert_eq!(rows(&text).1, Some(Convention::Modified), "{text}");
+    }
+    let named = "a1, a2, d1 = 0.35, 1.25, 0.75\nt = [RevoluteMDH(d=d1), RevoluteMDH(alpha=-pi/2, a=a1, offset=-pi/2), RevoluteMDH(a=a2, d=-0.05)]\n";
+    assert!(close(&rows(named).0, &expected), "{:?}", rows(named));
+}
+
+#[test]
+fn a_table_in_brackets_has_its_order_in_a_comment() {
+    let body = "dh = np.array([\n    [0, -90, 10, 0],  # joint 1\n    [50, 0, 0, -90],\n    [0, -90, 5, 0]])\n";
+    let found = matrix(&format!("# four parameters a row: [a, alpha, d, theta]\n{body}")).unwrap();
+    assert_eq!((found.rows.len(), found.rows[1].0), (3, 4));
+    assert_eq!(found.names, Some(["a", "alpha", "d", "theta"]));
+    assert_eq!(matrix(body).unwrap().names, None);
+    let matlab = "%   a(i-1)  alpha(i-1)  d(i)  theta_offset\nDH = [0, 0, 77, 0;      % 1\n      0, -pi/2, 0, -pi/2; % 2\n      128, 0, 0, pi/2];\n";
+    let found = matrix(matlab).unwrap();
+    assert_eq!((found.names, &found.rows[2].1[3]), (Some(["a", "alpha", "d", "theta"]), "pi/2"));
+    for text in ["x = [1, 2, 3, 4]\n", "[1,2,3,4]\n[1,2,3,4]\n\n[1,2,3,4]\n[1,2,3,4]\n", ""] {
+        assert_eq!(matrix(text), None, "{text}");
+    }
+}
+
+#[test]
 fn what_a_table_has_no_place_for_is_refused_with_its_line() {
     let wrong = |text: &str| read(text).unwrap_err();
     let two = "RevoluteDH(d=0.3, alpha=pi/2)\n";
