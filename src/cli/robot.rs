@@ -220,12 +220,12 @@ pub enum RobotWhat {
 /// `stereocal robot import`
 #[derive(Debug, Args)]
 pub struct RobotImport {
-    /// A URDF (.urdf, .xml) or a table of any form: columns alpha, a, theta, d in any order
+    /// A URDF (.urdf, .xml); a table of any form, columns alpha, a, theta, d in any order; or a program's or settings' text with such parameters
     pub file: Utf8PathBuf,
     /// Link of a URDF that carries the target [default: the end of the chain]
     #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
-    /// Where alpha and a of a table's row stand: behind the joint (classic) or before it [default: what fits --measurements, else modified]
+    /// Where alpha and a of a table's row stand: behind the joint (classic) or before it [default: what fits --measurements, else what the names or the first and last rows show]
     #[arg(long, value_enum)]
     pub dh: Option<DhConvention>,
     /// Measurements of the robot, which tell what a table leaves open; repeat as for `identify`

@@ -60,14 +60,15 @@ fn tell(args: &RobotImport, reading: &dh_csv::Reading, convention: Convention) {
 /// The robot of a table: of several ways to read it the one that fits the measurements.
 fn table(args: &RobotImport, name: &str) -> Result<Robot> {
     let readings = dh_csv::readings(&args.file, args.columns.as_deref())?;
-    let conventions = match (args.dh, args.measurements.is_empty()) {
+    let conventions = |reading: &dh_csv::Reading| match (args.dh, reading.convention()) {
         (Some(typed), _) => vec![typed.into()],
-        (None, true) => vec![Convention::Modified],
-        (None, false) => vec![Convention::Modified, Convention::Classic],
+        // Measurements are heard before what the table's ends show.
+        (None, Some(shown)) if args.measurements.is_empty() => vec![shown],
+        _ => vec![Convention::Modified, Convention::Classic],
     };
     let ways: Vec<Way> = readings
         .iter()
-        .flat_map(|r| conventions.iter().map(move |&c| (r, c)))
+        .flat_map(|r| conventions(r).into_iter().map(move |c| (r, c)))
         .filter(|(r, c)| !(r.is_modified() && *c == Convention::Classic))
         .collect();
     match &ways[..] {
@@ -83,15 +84,26 @@ fn table(args: &RobotImport, name: &str) -> Result<Robot> {
             tell(args, reading, *convention);
             return Ok(reading.robot(name, *convention));
         }
-        _ if args.measurements.is_empty() => {
-            let orders: Vec<String> = ways.iter().map(|(r, _)| format!("`--columns {}`", r.columns)).collect();
-            let message = "the columns have no names, and more than one order could be".to_owned();
-            let hint = format!("{} says which; `--measurements FILE` lets the readings decide", orders.join(" or "));
-            return Err(refuse(args, message, &hint).into());
-        }
+        _ if args.measurements.is_empty() => return Err(open(args, &readings, &ways).into()),
         _ => {}
     }
     by_readings(args, name, &ways)
+}
+
+/// What a table leaves open, with the flags that say it.
+fn open(args: &RobotImport, readings: &[dh_csv::Reading], ways: &[Way]) -> Error {
+    if readings.len() > 1 {
+        let orders: Vec<String> = readings.iter().map(|r| format!("`--columns {}`", r.columns)).collect();
+        let message = "the columns have no names, and more than one order could be".to_owned();
+        let hint = format!("{} says which; `--measurements FILE` lets the readings decide", orders.join(" or "));
+        return refuse(args, message, &hint);
+    }
+    let place = ways.first().map_or(String::new(), |(r, _)| format!(" ({})", r.said));
+    let message = format!(
+        "whether alpha and a of a row stand before the joint or behind it is not said, and the table could be either{place}"
+    );
+    let hint = "`--dh modified` (Craig: before) or `--dh classic` (Denavit and Hartenberg: behind) says which; `--measurements FILE` lets the readings decide";
+    refuse(args, message, hint)
 }
 
 /// The way to read a table that measurements of the robot decide for.

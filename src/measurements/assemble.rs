@@ -202,15 +202,18 @@ impl Taken<'_> {
             (Some(at), _) => format!("distances from {}", from(&[*at])),
             (None, [(_, at)]) => format!("points from {}", from(at)),
             (None, all) => {
-                let each: Vec<String> = all.iter().map(|(_, at)| listed(self.parts, at)).collect();
+                let each: Vec<String> = all.iter().map(|(_, at)| from(at)).collect();
                 let what = if self.targets_as_readings() { "readings" } else { "targets" };
-                format!("{} {what} a pose from {} and {}", all.len(), from(&all[0].1), each[1..].join(" and "))
+                format!("{} {what} a pose from {}", all.len(), each.join(" and "))
             }
         };
         let basis = match self.basis {
-            Basis::Stated => "",
-            Basis::Robot => " (which the nominal robot confirms)",
-            Basis::Sizes => " (by their size; the nominal robot does not tell)",
+            Basis::Stated => String::new(),
+            Basis::Robot => " (which the nominal robot confirms)".to_owned(),
+            Basis::Sizes if self.way.left.is_some() => {
+                format!(" (by their size; the nominal robot is {:.0} mm off with them)", self.way.left_mm)
+            }
+            Basis::Sizes => " (by their size; the nominal robot does not tell)".to_owned(),
         };
         let mut text = format!(
             "{}: {count} rows; joints from {} in {}, {measured} in {}{basis}",
@@ -245,9 +248,13 @@ impl Taken<'_> {
                 Form::Program { others, .. } => Some(format!("a program's lines ({others} lines hold no target)")),
             };
             let header = (part.names.is_none() && !part.is_program()).then(|| "no header".to_owned());
-            words.extend(form.into_iter().chain(part.grid.encoding.map(str::to_owned)).chain(header));
+            let of_part = form.into_iter().chain(part.grid.encoding.map(str::to_owned)).chain(header);
+            for word in of_part {
+                if !words.contains(&word) {
+                    words.push(word);
+                }
+            }
         }
-        words.dedup();
         words.iter().map(|word| format!(", {word}")).collect()
     }
 

@@ -14,13 +14,13 @@ use super::layout::point;
 use super::part::{At, Part};
 use super::pick::Picked;
 use crate::robot::Robot;
-use crate::tables::names::Unit;
+use crate::tables::names::{Unit, What};
 
 /// What is left as a share of the points' spread at the most where columns and units are right and the robot's file is of this robot: a robot of a
 /// metre's reach that is off by five hundredths of it is none that was built. Points that have nothing to do with the joints leave a share whose
 /// square is distributed as Beta(f / 2, 9 / 2), f = 3 n - 9 numbers of n rows being left beside placement and tool: less than this with a
 /// probability of 4e-7 for five rows, and with 1e-3 for four, which is too much where a thousand choices of columns are tried.
-const NEAR: f64 = 0.05;
+pub(super) const NEAR: f64 = 0.05;
 
 /// Rows from which on chance does not come near.
 const FEWEST: usize = 5;
@@ -54,7 +54,7 @@ pub(super) struct Way {
     /// Share of the points' spread that is left; `None` where nothing can be said.
     pub left: Option<f64>,
     /// The same in mm.
-    left_mm: f64,
+    pub left_mm: f64,
 }
 
 impl Way {
@@ -117,6 +117,21 @@ fn in_all_units(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Fo
     ways
 }
 
+/// The candidates in the units that nobody need say, or in those that are stated, unjudged.
+pub(super) fn usual(candidates: &[Picked], forced: Forced) -> Vec<Way> {
+    let mut ways = Vec::new();
+    for picked in candidates {
+        for joints in [Unit::Deg, Unit::Rad] {
+            for lengths in [Unit::Mm, Unit::M] {
+                let joints = forced.joints.or(picked.joint_unit).unwrap_or(joints);
+                let lengths = forced.lengths.or(picked.length_unit).unwrap_or(lengths);
+                ways.push(Way { picked: picked.clone(), joints, lengths, left: None, left_mm: f64::INFINITY });
+            }
+        }
+    }
+    ways
+}
+
 /// Judges all ways.
 pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Forced) -> Verdict {
     let unknown = |at: &At| parts[at.part].spare().contains(&at.column);
@@ -167,7 +182,7 @@ pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, force
     if !only {
         return Verdict::None;
     }
-    by_sizes(parts, &candidates[0], forced)
+    by_sizes(parts, &candidates[0], forced, &ways)
 }
 
 /// Of a way with several targets two, one that the nominal robot computed and one that it did not: these are no two targets of a body.
@@ -220,26 +235,60 @@ fn largest(parts: &[Part], columns: &mut dyn Iterator<Item = At>) -> f64 {
 }
 
 /// Units by the sizes of the numbers, where they leave no choice.
-fn by_sizes(parts: &[Part], picked: &Picked, forced: Forced) -> Verdict {
+fn by_sizes(parts: &[Part], picked: &Picked, forced: Forced, ways: &[Way]) -> Verdict {
     let joints = forced.joints.or(picked.joint_unit).or_else(|| angle_by_size(parts, picked));
     let mut measured = picked.points.iter().flat_map(|(_, at)| *at).chain(picked.distance);
     let lengths =
         forced.lengths.or(picked.length_unit).or_else(|| (largest(parts, &mut measured) > METRES).then_some(Unit::Mm));
     match (joints, lengths) {
         (Some(joints), Some(lengths)) => {
-            let way = Way { picked: picked.clone(), joints, lengths, left: None, left_mm: f64::INFINITY };
-            Verdict::Taken(way, Basis::Sizes)
+            let plain = Way { picked: picked.clone(), joints, lengths, left: None, left_mm: f64::INFINITY };
+            let judged = ways.iter().find(|way| way.joints == joints && way.lengths == lengths).cloned();
+            Verdict::Taken(judged.unwrap_or(plain), Basis::Sizes)
         }
         (joints, _) => Verdict::NoUnit { joints: joints.is_none() },
     }
 }
 
-/// What the nominal robot leaves of these columns in these units, as a share of the spread of the points and in mm.
+/// What the nominal robot leaves of these columns in these units, as a share of the spread of the points and in mm; of rows that name their placement
+/// or their target those of the one that has most.
 fn left(parts: &[Part], picked: &Picked, robot: &Robot, joints: Unit, lengths: Unit) -> Option<(f64, f64)> {
+    let rows = most_alike(parts, picked);
+    let some: Vec<usize> = rows.iter().copied().step_by(rows.len().div_ceil(ROWS).max(1)).collect();
+    left_of(parts, picked, robot, joints, lengths, &some)
+}
+
+/// The rows of the placement and the target, where names say them, that have most rows.
+fn most_alike(parts: &[Part], picked: &Picked) -> Vec<usize> {
+    let part = &parts[picked.joints[0].part];
+    let named = |wanted: &str| {
+        parts.iter().find_map(|p| {
+            Some((p, p.meanings.as_ref()?.iter().position(|n| matches!(n.what, What::Own(own) if own == wanted))?))
+        })
+    };
+    let (group, target) = (named("group"), named("target"));
+    fn cell(of: Option<(&Part, usize)>, row: usize) -> &str {
+        of.and_then(|(p, column)| p.rows.get(row).map(|(_, cells)| &cells[column])).unwrap_or("")
+    }
+    let mut sets: std::collections::BTreeMap<(&str, &str), Vec<usize>> = std::collections::BTreeMap::new();
+    for row in 0..part.rows.len() {
+        sets.entry((cell(group, row), cell(target, row))).or_default().push(row);
+    }
+    sets.into_values().max_by_key(Vec::len).unwrap_or_default()
+}
+
+/// The same of these rows.
+pub(super) fn left_of(
+    parts: &[Part],
+    picked: &Picked,
+    robot: &Robot,
+    joints: Unit,
+    lengths: Unit,
+    rows: &[usize],
+) -> Option<(f64, f64)> {
     let (_, at) = picked.points.first()?;
-    let rows = parts[picked.joints[0].part].rows.len();
     let (mut readings, mut points) = (Vec::new(), Vec::<Point3<f64>>::new());
-    for row in (0..rows).step_by(rows.div_ceil(ROWS).max(1)) {
+    for &row in rows {
         let angles: Option<Vec<f64>> = picked
             .joints
             .iter()

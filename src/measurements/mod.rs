@@ -1,5 +1,6 @@
 //! `poses.csv` and `measurements.csv`: where the robot was sent, and what was measured there.
 
+mod apart;
 mod assemble;
 mod judge;
 mod layout;

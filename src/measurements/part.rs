@@ -48,8 +48,9 @@ pub(super) struct Part {
 const NOTHING: [&str; 11] = ["", "nan", "na", "n/a", "#n/a", "-", "--", "---", "null", "none", "inf"];
 
 impl Part {
-    /// Reads a file; a program's targets have the robot's joints, so many.
-    pub fn read(path: &Utf8Path, joints: usize) -> Result<Part> {
+    /// Reads a file; a program's targets have the robot's joints, so many. Names that do not fit the columns are an error, unless the columns are
+    /// `named` otherwise.
+    pub fn read(path: &Utf8Path, joints: usize, named: bool) -> Result<Part> {
         let hint = "`stereocal measure POSES` writes out/measurements.csv; `--measurements FILE` names another";
         let grid = Grid::read_with_programs(path, "measurements file", hint, joints)?;
         if grid.rows.is_empty() {
@@ -57,7 +58,14 @@ impl Part {
         }
         let headed = match grid.form {
             Form::Program { .. } => header::Headed { names: None, rows: grid.rows.clone() },
-            _ => header::split(&grid)?,
+            _ => match header::split(&grid) {
+                Err(_) if named => header::rows_alone(&grid)?,
+                headed => headed?,
+            },
+        };
+        let headed = match stacked(&headed.rows).filter(|_| headed.names.is_none()) {
+            Some(rows) => header::Headed { rows, ..headed },
+            None => headed,
         };
         let width = headed.rows.first().map_or(0, |(_, row)| row.len());
         let kinds = (0..width).map(|column| kind(&headed.rows, column)).collect();
@@ -167,6 +175,18 @@ impl Part {
     pub fn refuse(&self, message: String, hint: Option<&str>) -> Error {
         self.grid.refuse(self.rows.first().map_or(1, |(line, _)| *line), message, hint)
     }
+}
+
+/// Transforms that are written one below the other, four rows of four each: a row of sixteen cells each.
+fn stacked(rows: &[(u64, Fields)]) -> Option<Vec<(u64, Fields)>> {
+    const LAST: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+    let is_last = |row: &Fields| row.iter().zip(LAST).all(|(cell, v)| cell.parse() == Ok(v));
+    let four = rows.iter().all(|(_, row)| row.len() == 4) && rows.len().is_multiple_of(4);
+    if !four || !rows.chunks_exact(4).all(|matrix| is_last(&matrix[3].1)) {
+        return None;
+    }
+    let together = |matrix: &[(u64, Fields)]| (matrix[0].0, Fields::new(matrix.iter().flat_map(|(_, row)| row.iter())));
+    Some(rows.chunks_exact(4).map(together).collect())
 }
 
 /// Letters by which Yaskawa's controllers call the joints of six axes, and of seven.

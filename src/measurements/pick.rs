@@ -274,6 +274,11 @@ pub(super) fn asked(parts: &[Part], joints: &[At], [first, second]: [&[At; 3]; 2
 
 /// What `--columns` must say to take these columns; joints or points that names say are added.
 pub(super) fn columns_flag(parts: &[Part], joints: &[At], points: &[At]) -> String {
+    columns_flag_with(parts, joints, points, None)
+}
+
+/// The same with one more column and its name.
+pub(super) fn columns_flag_with(parts: &[Part], joints: &[At], points: &[At], more: Option<(At, &str)>) -> String {
     let number = |n: &Name| if let What::Joint(i) = n.what { Some(i) } else { None };
     let mut named: Vec<(usize, At)> =
         groups(parts, number).into_iter().map(|g| g.columns).max_by_key(Vec::len).unwrap_or_default();
@@ -288,7 +293,8 @@ pub(super) fn columns_flag(parts: &[Part], joints: &[At], points: &[At]) -> Stri
             let joint = named_joints.iter().position(|j| *j == at).map(|i| format!("j{}", i + 1));
             let number = |i: usize| if points.len() > 3 { (i / 3 + 1).to_string() } else { String::new() };
             let point = points.iter().position(|p| *p == at).map(|i| ["x", "y", "z"][i % 3].to_owned() + &number(i));
-            words.push(joint.or(point).unwrap_or_else(|| "-".to_owned()));
+            let more = more.filter(|(column, _)| *column == at).map(|(_, name)| name.to_owned());
+            words.push(joint.or(point).or(more).unwrap_or_else(|| "-".to_owned()));
         }
     }
     while words.last().is_some_and(|word| word == "-") {

@@ -8,6 +8,7 @@
 use camino::Utf8PathBuf;
 use serde::Deserialize;
 
+use super::apart;
 use super::assemble::{self, Taken};
 use super::judge::{self, Basis, Forced, Verdict, Way};
 use super::layout;
@@ -78,11 +79,11 @@ impl Source {
             if let [only] = &self.files[..]
                 && self.columns.is_none()
                 && self.units.is_none()
-                && is_own(&Part::read(only, count)?)
+                && is_own(&Part::read(only, count, false)?)
             {
                 return Ok((read(only)?, Vec::new()));
             }
-            parts.push(Part::read(file, count)?);
+            parts.push(Part::read(file, count, self.columns.is_some())?);
         }
         let joined_by_columns = match &self.columns {
             Some(columns) => name_columns(&mut parts, columns, count)?,
@@ -112,7 +113,8 @@ impl Source {
     #[allow(clippy::type_complexity, reason = "one use")]
     pub fn readings(&self, robot: &Robot) -> Result<(Vec<(u64, String, Vec<f64>)>, String)> {
         let count = robot.joints.len();
-        let parts: Vec<Part> = self.files.iter().take(1).map(|file| Part::read(file, count)).collect::<Result<_>>()?;
+        let parts: Vec<Part> =
+            self.files.iter().take(1).map(|file| Part::read(file, count, false)).collect::<Result<_>>()?;
         let mut picked = pick::joints_alone(&parts, count)?;
         let free: Vec<At> = parts[0].free().into_iter().map(|column| At { part: 0, column }).collect();
         if picked.joints.is_empty() && free.len() == count {
@@ -169,7 +171,11 @@ impl Source {
             return Err(parts.iter().find_map(Part::mixed).unwrap_or_else(|| lacking(parts, &picked, count)));
         }
         match judge::decide(parts, &candidates, robot, self.forced()) {
-            Verdict::Taken(way, basis) => Ok((way, basis)),
+            Verdict::Taken(way, basis) => {
+                let apart =
+                    if self.columns.is_some() { None } else { apart::clearest(parts, vec![way.clone()], robot) };
+                apart.map_or(Ok((way, basis)), |apart| Err(apart.asked(parts)))
+            }
             Verdict::WrongUnit { stated, better } => Err(wrong_unit(parts, &stated, &better)),
             Verdict::Open(a, b) => Err(open(parts, &a, &b)),
             Verdict::NoUnit { joints } => {
@@ -182,7 +188,12 @@ impl Source {
                 );
                 Err(parts[0].refuse(message, Some(hint)))
             }
-            Verdict::None => Err(parts.iter().find_map(Part::mixed).unwrap_or_else(|| unplaced(parts, &candidates[0]))),
+            Verdict::None => {
+                let ways = || judge::usual(&candidates, self.forced());
+                let apart = if self.columns.is_some() { None } else { apart::clearest(parts, ways(), robot) };
+                let mixed = || parts.iter().find_map(Part::mixed);
+                Err(apart.map(|a| a.asked(parts)).or_else(mixed).unwrap_or_else(|| unplaced(parts, &candidates[0])))
+            }
         }
     }
 }
@@ -248,7 +259,8 @@ fn sets(parts: Vec<Part>, count: usize) -> Vec<Vec<Part>> {
     let measured = |p: &Part| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance | What::Matrix(..)));
     let lone = |p: &Part| joints(p) != measured(p);
     // A file without names may be either; beside one that lacks the other half it is what that one lacks.
-    let lacking = parts.iter().any(|p| p.is_named() && lone(p));
+    let short = |p: &Part| !p.is_named() && (count..count + 3).contains(&p.free().len());
+    let lacking = parts.iter().any(|p| p.is_named() && lone(p) || short(p));
     // Names that are not known may be those of joints.
     let alone = parts.iter().all(|p| p.is_named() && measured(p));
     let whole = |p: &Part| match p.is_named() {

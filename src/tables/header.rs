@@ -7,7 +7,7 @@
 
 use super::fields::Fields;
 use super::grid::Grid;
-use super::names::Unit;
+use super::names::{Unit, is_said_of_another};
 use crate::files::Result;
 
 /// A table's rows, and names where it has them.
@@ -42,6 +42,12 @@ pub fn split(grid: &Grid) -> Result<Headed> {
     let names = names.and_then(|(line, names)| Some((line, without_title(names, width)?)));
     let names = names.map(|(line, names)| fitted(grid, line, names, &rows, width)).transpose()?;
     Ok(Headed { names, rows })
+}
+
+/// The rows of a grid whose columns are named otherwise, whatever stands above them.
+pub fn rows_alone(grid: &Grid) -> Result<Headed> {
+    let first = grid.rows.iter().position(|(_, row)| is_data(row)).unwrap_or(0);
+    Ok(Headed { names: None, rows: even(grid, first, 0)? })
 }
 
 /// More numbers than words.
@@ -159,6 +165,19 @@ fn fitted(grid: &Grid, line: u64, mut names: Vec<String>, rows: &[(u64, Fields)]
     while names.len() > width && names.last().is_some_and(String::is_empty) {
         names.pop();
     }
+    if names.len() > width {
+        // `Nominal X Nominal Y`: blanks cut these off from what they are said of.
+        let mut joined: Vec<String> = Vec::new();
+        let mut open = false;
+        for name in &names {
+            match joined.last_mut().filter(|_| open) {
+                Some(before) => *before = format!("{before} {name}"),
+                None => joined.push(name.clone()),
+            }
+            open = is_said_of_another(name);
+        }
+        names = if joined.len() == width { joined } else { names };
+    }
     // Names of rows have no name of their own.
     let numbered = rows
         .iter()
@@ -202,6 +221,8 @@ mod tests {
         }
         assert_eq!(names(&format!("a,b,c\nmm,mm,\n{rows}")).unwrap(), ["a [mm]", "b [mm]", "c"]);
         assert_eq!(names("# a [mm] b\n1.5 2\n3.5 4\n").unwrap(), ["a [mm]", "b"]);
+        let two = "Name Nominal X Nominal Y Measured X Measured Y\nP1 1.5 2 3 4\nP2 3.5 4 5 6\n";
+        assert_eq!(names(two).unwrap(), ["Name", "Nominal X", "Nominal Y", "Measured X", "Measured Y"]);
         assert_eq!(names("a b\nr1 1.5 2\nr2 3.5 4\n").unwrap(), ["", "a", "b"]);
         assert_eq!(names(rows), None);
         assert_eq!(names(&format!("1,2,x\n{rows}")).unwrap(), ["1", "2", "x"]);

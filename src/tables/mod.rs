@@ -4,10 +4,12 @@
 //!  source   a file's bytes -> text in whatever encoding, or the cells of a spreadsheet; what is no table is refused with how to export it
 //!  grid     text -> rows of cells: which delimiter, decimal comma, lines of a program; line numbers as an editor counts them
 //!  numbers  a cell with a decimal comma, or with thousands set apart, as a number
+//!  expression   a cell with a formula, `pi/2`, `q2 - 90`, as a number
 //!  header   where the names of the columns stand, if there are any
 //!  names    a name -> a joint, a coordinate, a distance, its unit, and whether it was commanded
 //! ```
 
+pub mod expression;
 mod fields;
 pub mod grid;
 pub mod header;

@@ -176,6 +176,12 @@ impl Name {
     }
 }
 
+/// Whether a word alone names nothing, but says of the name behind it where that comes from.
+pub fn is_said_of_another(word: &str) -> bool {
+    let word = word.to_lowercase();
+    word.chars().count() > 2 && [COMMANDED, MEASURED, ELSE].iter().any(|list| is_in(list, &word))
+}
+
 /// Whether a list of words has this one.
 fn is_in(list: &str, word: &str) -> bool {
     list.split_whitespace().any(|listed| listed == word)

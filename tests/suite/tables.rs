@@ -14,6 +14,7 @@ use stereocal::robot::Robot;
 use crate::run::{shared, stderr, stereocal, workplace};
 
 mod forms;
+mod owners;
 
 /// Readings that were converted agree to this, deg and mm: rounding of the last digit of a double, times a thousand.
 const SAME: f64 = 1e-9;

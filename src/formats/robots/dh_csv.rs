@@ -1,33 +1,36 @@
 //! A Denavit-Hartenberg table: a row a joint from the base, columns alpha, a, theta and d in any order, optionally `beta_deg` and
 //! `min_deg,max_deg`.
 //!
-//! In: a table in any form, with names of its columns or without. Out: every way to read it, each with what was taken; with names of columns
+//! In: a table in any form, with names of its columns or without, or the text of a program or of settings ([`dh_text`]). Cells may be formulas (`pi/2`,
+//! `q2 - 90`). Out: every way to read it, each with what was taken; with names of columns
 //! there is one. Angles are radians where the names say so, or where none is named, none exceeds 2 pi and one is a quarter turn in radians;
 //! lengths are metres where the longest is shorter than a toy's. What goes wrong: names that say degrees or mm over radians or metres, which is
 //! refused: no arm has twists of 1.57 degrees at every elbow, and none is 0.4 mm long.
+
+mod units;
 
 use std::fmt::Write as _;
 
 use camino::Utf8Path;
 
-use crate::files::Result;
+use self::units::units;
+use super::dh_text;
+use crate::files::{self, Result};
 use crate::robot::Robot;
 use crate::robot::catalogue::{Convention, Row, from_rows};
+use crate::tables::expression::{self, Value};
 use crate::tables::header::{self, Headed};
 use crate::tables::names::{self, Unit};
-use crate::tables::{Fields, Grid};
+use crate::tables::{Fields, Form, Grid};
 
 const HINT: &str =
     "a row a joint, from the base: alpha_deg,a_mm,theta_deg,d_mm (deg and mm), or alpha, a, d, theta in any order";
 
-/// Longest link that is taken for metres, mm: a toy's.
-const METRES: f64 = 3.0;
-
-/// How near an angle must be to a multiple of a quarter turn in radians to be taken for one.
-const QUARTER: f64 = 2e-3;
-
 /// What the columns of a row are called, in the order of [`Row`].
 const NAMES: [&str; 4] = ["alpha", "a", "theta", "d"];
+
+/// The same with units, as this program writes them.
+const OWN: [&str; 4] = ["alpha_deg", "a_mm", "theta_deg", "d_mm"];
 
 /// Other words for them.
 const WORDS: [&[&str]; 4] = [
@@ -36,6 +39,9 @@ const WORDS: [&[&str]; 4] = [
     &["theta", "θ", "th", "q", "angle"],
     &["d", "offset", "linkoffset"],
 ];
+
+/// Words that may stand beside a parameter's letter.
+const SAID_BESIDE: [&str; 5] = ["twist", "length", "angle", "offset", "linkoffset"];
 
 /// Orders in which tables without names are written.
 const ORDERS: [[usize; 4]; 4] = [[0, 1, 3, 2], [0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 1, 0]];
@@ -52,6 +58,10 @@ pub struct Reading {
     pub said: String,
     /// The columns' names in their order, as `--columns` has them.
     pub columns: String,
+    /// The convention that words or names say.
+    stated: Option<Convention>,
+    /// Whether the names are this program's own, whose tables are modified ones.
+    own: bool,
 }
 
 impl Reading {
@@ -65,14 +75,66 @@ impl Reading {
         robot
     }
 
+    /// The convention: what words, names or a column `beta_deg` say, else what the table's ends show. An arm stands on its base: a first row with a twist
+    /// or a length and a last one without is a classic table's, the other way round a modified one's. `None` where neither says it.
+    pub fn convention(&self) -> Option<Convention> {
+        if self.is_modified() {
+            return Some(Convention::Modified);
+        }
+        let ends = self.rows.first().zip(self.rows.last()).filter(|_| self.rows.len() > 2);
+        let is_plain = |row: &Row| row[0] == 0.0 && row[1] == 0.0;
+        let shown = || match ends.map(|(first, last)| (is_plain(first), is_plain(last)))? {
+            (false, true) => Some(Convention::Classic),
+            (true, false) => Some(Convention::Modified),
+            _ => None,
+        };
+        self.stated.or_else(shown).or(self.own.then_some(Convention::Modified))
+    }
+
     /// Whether it has a column that stands beside alpha and a of a modified table alone.
     pub fn is_modified(&self) -> bool {
         self.beta_deg.iter().any(Option::is_some)
     }
 }
 
+/// Extensions of files that are tables whatever stands in them.
+const TABLES: [&str; 5] = ["csv", "tsv", "xlsx", "xls", "ods"];
+
+/// The links of a program's or settings' text as a table; `None` where it has none.
+fn of_text(path: &Utf8Path) -> Result<Option<Vec<Reading>>> {
+    let grid =
+        |rows: Vec<(u64, Fields)>| Grid { path: path.to_owned(), form: Form::Delimited(','), encoding: None, rows };
+    let Ok(text) = files::read_text(path, "the table of Denavit-Hartenberg parameters", Some(HINT)) else {
+        return Ok(None);
+    };
+    let links = dh_text::read(&text).map_err(|(line, message)| grid(Vec::new()).refuse(line, message, Some(HINT)))?;
+    let Some(links) = links else {
+        let Some(table) = dh_text::matrix(&text) else { return Ok(None) };
+        let grid = grid(table.rows.clone());
+        return Ok(Some(match table.names.map(|names| names.map(str::to_owned)) {
+            Some(names) => {
+                let at = NAMES.map(|name| names.iter().position(|n| n == name).unwrap_or(0));
+                vec![reading(&grid, &table.rows, at, Some(&names))?]
+            }
+            None => without_names(&grid, &table.rows)?,
+        }));
+    };
+    let unit = if links.radians { " [rad]" } else { "" };
+    let names = [format!("alpha{unit}"), "a".to_owned(), format!("theta{unit}"), "d".to_owned()];
+    let cells = |row: &Row| Fields::new(row.map(|v| v.to_string()).iter().map(String::as_str));
+    let rows: Vec<(u64, Fields)> = links.rows.iter().map(|(line, row)| (*line, cells(row))).collect();
+    let mut found = reading(&grid(rows.clone()), &rows, [0, 1, 2, 3], Some(&names))?;
+    found.stated = links.convention;
+    Ok(Some(vec![found]))
+}
+
 /// Every way to read a table; `columns` names them where it is given.
 pub fn readings(path: &Utf8Path, columns: Option<&str>) -> Result<Vec<Reading>> {
+    if !path.extension().is_some_and(|e| TABLES.iter().any(|table| e.eq_ignore_ascii_case(table)))
+        && let Some(found) = of_text(path)?
+    {
+        return Ok(found);
+    }
     readings_of(&Grid::read(path, "the table of Denavit-Hartenberg parameters", HINT)?, columns)
 }
 
@@ -86,32 +148,33 @@ fn readings_of(grid: &Grid, columns: Option<&str>) -> Result<Vec<Reading>> {
             let columns = [alpha?, a?, theta?, d?];
             Ok(vec![reading(grid, &rows, columns, Some(&names))?])
         }
-        None => {
-            // Columns of words and of the joint's number are no parameters.
-            let counts = |c: usize| {
-                rows.iter().enumerate().all(|(i, (_, r))| r[c] == i.to_string() || r[c] == (i + 1).to_string())
-            };
-            let is_number = |c: usize| rows.iter().all(|(_, r)| r[c].parse::<f64>().is_ok());
-            let free: Vec<usize> =
-                (0..rows[0].1.len()).filter(|&c| is_number(c) && !(counts(c) && rows.len() > 2)).collect();
-            let [w, x, y, z] = free[..] else {
-                let message = format!("{} columns of numbers without names; four are needed", free.len());
-                return Err(grid.refuse(rows[0].0, message, Some(HINT)));
-            };
-            let columns = [w, x, y, z];
-            let in_order = |order: &[usize; 4]| {
-                let mut of_row = [0; 4];
-                order.iter().zip(columns).for_each(|(&which, column)| of_row[which] = column);
-                of_row
-            };
-            // Lengths in the place of angles are no multiples of a quarter turn.
-            let readings: Vec<Reading> =
-                ORDERS.iter().filter_map(|order| reading(grid, &rows, in_order(order), None).ok()).collect();
-            let regular = |r: &&Reading| r.rows.iter().all(|row| row[0].abs() <= 180.0 && row[2].abs() <= 360.0);
-            let likely: Vec<Reading> = readings.iter().filter(regular).cloned().collect();
-            Ok(if likely.is_empty() { readings } else { likely })
-        }
+        None => without_names(grid, &rows),
     }
+}
+
+/// Every order that the columns of a table without names may have.
+fn without_names(grid: &Grid, rows: &[(u64, Fields)]) -> Result<Vec<Reading>> {
+    // Columns of words and of the joint's number are no parameters.
+    let counts =
+        |c: usize| rows.iter().enumerate().all(|(i, (_, r))| r[c] == i.to_string() || r[c] == (i + 1).to_string());
+    let is_number = |c: usize| rows.iter().all(|(_, r)| value(&r[c]).is_some());
+    let free: Vec<usize> = (0..rows[0].1.len()).filter(|&c| is_number(c) && !(counts(c) && rows.len() > 2)).collect();
+    let [w, x, y, z] = free[..] else {
+        let message = format!("{} columns of numbers without names; four are needed", free.len());
+        return Err(grid.refuse(rows[0].0, message, Some(HINT)));
+    };
+    let columns = [w, x, y, z];
+    let in_order = |order: &[usize; 4]| {
+        let mut of_row = [0; 4];
+        order.iter().zip(columns).for_each(|(&which, column)| of_row[which] = column);
+        of_row
+    };
+    // Lengths in the place of angles are no multiples of a quarter turn.
+    let readings: Vec<Reading> =
+        ORDERS.iter().filter_map(|order| reading(grid, rows, in_order(order), None).ok()).collect();
+    let regular = |r: &&Reading| r.rows.iter().all(|row| row[0].abs() <= 180.0 && row[2].abs() <= 360.0);
+    let likely: Vec<Reading> = readings.iter().filter(regular).cloned().collect();
+    Ok(if likely.is_empty() { readings } else { likely })
 }
 
 /// The column of a parameter.
@@ -124,7 +187,10 @@ fn find(grid: &Grid, names: &[String], wanted: &str) -> Result<usize> {
     let which = NAMES.iter().position(|n| *n == wanted).unwrap_or(0);
     let says = |name: &String| {
         let words = plain(name).0;
-        words.first().is_some_and(|w| WORDS[which].contains(&w.as_str())) && words.len() == 1
+        // `Link twist (alpha)`, `theta offset`: the letter says it.
+        let letters: Vec<&String> = words.iter().filter(|w| !SAID_BESIDE.contains(&w.as_str())).collect();
+        let is_it = |w: &String| WORDS[which].contains(&w.as_str());
+        if letters.is_empty() { matches!(&words[..], [only] if is_it(only)) } else { letters.into_iter().all(is_it) }
     };
     let found: Vec<usize> = (0..names.len()).filter(|&i| says(&names[i])).collect();
     let line = grid.rows.first().map_or(1, |(line, _)| *line);
@@ -137,7 +203,8 @@ fn find(grid: &Grid, names: &[String], wanted: &str) -> Result<usize> {
 
 /// Words of a name without indices and units, and its unit.
 fn plain(name: &str) -> (Vec<String>, Option<Unit>) {
-    let (mut words, mut unit) = names::words(name);
+    let name = ["<sub>", "</sub>"].iter().fold(name.to_owned(), |name, mark| name.replace(mark, " "));
+    let (mut words, mut unit) = names::words(&name);
     if words.len() > 1
         && let Some(found) = words.last().and_then(|w| Unit::of(w))
     {
@@ -150,31 +217,28 @@ fn plain(name: &str) -> (Vec<String>, Option<Unit>) {
     (words, unit)
 }
 
-fn reading(grid: &Grid, rows: &[(u64, Fields)], columns: [usize; 4], names: Option<&[String]>) -> Result<Reading> {
-    let number = |line: u64, row: &Fields, column: usize| match row[column].parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(grid.refuse(line, format!("`{}` is not a number", &row[column]), Some(HINT))),
-    };
-    let mut table: Vec<Row> = Vec::with_capacity(rows.len());
-    for (line, row) in rows {
-        let mut numbers = [0.0; 4];
-        for (slot, &column) in numbers.iter_mut().zip(&columns) {
-            *slot = number(*line, row, column)?;
-        }
-        table.push(numbers);
-    }
-    let stated = |at: usize| names.and_then(|n| plain(&n[columns[at]]).1);
-    let angle = units(grid, rows, &table, [0, 2], [stated(0), stated(2)])?;
-    let length = units(grid, rows, &table, [1, 3], [stated(1), stated(3)])?;
-    for row in &mut table {
-        *row = [angle.converted(row[0]), length.converted(row[1]), angle.converted(row[2]), length.converted(row[3])];
-    }
+/// What a cell says: a number, or a formula.
+fn value(cell: &str) -> Option<Value> {
+    expression::evaluate(cell, &|_| None)
+}
+
+/// The number of a cell.
+fn number(grid: &Grid, line: u64, row: &Fields, column: usize) -> Result<Value> {
+    let refuse = || grid.refuse(line, format!("`{}` is not a number", &row[column]), Some(HINT));
+    value(&row[column]).filter(|value| value.number.is_finite()).ok_or_else(refuse)
+}
+
+/// What a joint may have beside its parameters: `beta_deg`, and limits.
+type Beside = (Vec<Option<f64>>, Vec<Option<(f64, f64)>>);
+
+/// Columns beside the parameters, of a table with names.
+fn beside(grid: &Grid, rows: &[(u64, Fields)], names: Option<&[String]>) -> Result<Beside> {
     let optional = |name: &str| names.and_then(|n| n.iter().position(|c| c.eq_ignore_ascii_case(name)));
     let (beta, low, high) = (optional("beta_deg"), optional("min_deg"), optional("max_deg"));
     let (mut beta_deg, mut limits_deg) = (Vec::new(), Vec::new());
     for (line, row) in rows {
         let of = |column: Option<usize>| match column.filter(|&c| !row[c].is_empty()) {
-            Some(column) => number(*line, row, column).map(Some),
+            Some(column) => number(grid, *line, row, column).map(|v| Some(v.number)),
             None => Ok(None),
         };
         beta_deg.push(of(beta)?);
@@ -186,6 +250,66 @@ fn reading(grid: &Grid, rows: &[(u64, Fields)], columns: [usize; 4], names: Opti
             _ => None,
         });
     }
+    Ok((beta_deg, limits_deg))
+}
+
+/// The rows that turn: where some have the joint's variable for theta, a row at the end without one is a fixed flange, which the tool takes in.
+fn turning<'a>(grid: &Grid, rows: &'a [(u64, Fields)], columns: [usize; 4]) -> Result<&'a [(u64, Fields)]> {
+    let theta = columns[2];
+    let turns = |row: &(u64, Fields)| value(&row.1[theta]).is_some_and(|v| v.variable);
+    // What is no number, or slides, is said of the cell.
+    let stands = |row: &&(u64, Fields)| columns.iter().all(|&c| value(&row.1[c]).is_some_and(|v| !v.variable));
+    let Some(last) = rows.iter().rposition(turns) else { return Ok(rows) };
+    match rows[..last].iter().find(stands) {
+        Some((line, row)) => {
+            let message = format!(
+                "theta is `{}`, but other rows have their joint's variable there: this one does not turn",
+                &row[theta]
+            );
+            Err(grid.refuse(*line, message, Some("a row a joint; add what stands still to the row before")))
+        }
+        None if rows[last + 1..].iter().all(|row| stands(&row)) => Ok(&rows[..=last]),
+        None => Ok(rows),
+    }
+}
+
+fn reading(grid: &Grid, rows: &[(u64, Fields)], columns: [usize; 4], names: Option<&[String]>) -> Result<Reading> {
+    let rows = turning(grid, rows, columns)?;
+    let mut table: Vec<Row> = Vec::with_capacity(rows.len());
+    let mut radians = false;
+    for (line, row) in rows {
+        let mut numbers = [0.0; 4];
+        for (which, (slot, &column)) in numbers.iter_mut().zip(&columns).enumerate() {
+            let value = number(grid, *line, row, column)?;
+            if value.variable && which != 2 {
+                let message =
+                    format!("`{}`: the joint's variable is {}, so the joint slides", &row[column], NAMES[which]);
+                return Err(grid.refuse(
+                    *line,
+                    message,
+                    Some("a table has turning joints alone; `robot import` takes a sliding one from a URDF"),
+                ));
+            }
+            radians |= value.radians && matches!(which, 0 | 2);
+            *slot = value.number;
+        }
+        table.push(numbers);
+    }
+    let of_pi = |at: usize| (radians && matches!(at, 0 | 2)).then_some(Unit::Rad);
+    let stated = |at: usize| names.and_then(|n| plain(&n[columns[at]]).1).or_else(|| of_pi(at));
+    let angle = units(grid, rows, &table, [0, 2], [stated(0), stated(2)])?;
+    let length = units(grid, rows, &table, [1, 3], [stated(1), stated(3)])?;
+    for row in &mut table {
+        *row = [angle.converted(row[0]), length.converted(row[1]), angle.converted(row[2]), length.converted(row[3])];
+    }
+    let (beta_deg, limits_deg) = beside(grid, rows, names)?;
+    // `a(i-1)`, `alpha_{i-1}`: those of the link before.
+    let before = |name: &String| {
+        let bare: String = name.chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '\u{2212}')).collect();
+        ["i-1", "i\u{2212}1", "j-1", "n-1"].iter().any(|index| bare.contains(index))
+    };
+    let stated = names.filter(|n| before(&n[columns[0]]) || before(&n[columns[1]])).map(|_| Convention::Modified);
+    let own = names.is_some_and(|n| columns.iter().zip(OWN).all(|(&c, own)| n[c].eq_ignore_ascii_case(own)));
     let mut order: Vec<(usize, &str)> = columns.iter().copied().zip(NAMES).collect();
     order.sort_unstable();
     let columns = order.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(",");
@@ -196,48 +320,7 @@ fn reading(grid: &Grid, rows: &[(u64, Fields)], columns: [usize; 4], names: Opti
         angle.word(),
         length.word()
     );
-    Ok(Reading { rows: table, beta_deg, limits_deg, said, columns })
-}
-
-/// The unit of two columns: what their names say, else what the numbers look like.
-fn units(
-    grid: &Grid,
-    rows: &[(u64, Fields)],
-    table: &[Row],
-    at: [usize; 2],
-    stated: [Option<Unit>; 2],
-) -> Result<Unit> {
-    let angles = at[0] == 0;
-    let all = || table.iter().enumerate().flat_map(|(i, r)| at.map(|k| (i, r[k])));
-    let largest = all().map(|(_, v)| v.abs()).fold(0.0, f64::max);
-    let quarter = |v: f64| {
-        let turns = v / std::f64::consts::FRAC_PI_2;
-        turns.round() != 0.0 && (turns - turns.round()).abs() < QUARTER
-    };
-    let odd = match angles {
-        true => all().find(|(_, v)| quarter(*v)).filter(|_| largest < 2.0 * std::f64::consts::TAU),
-        false => all().find(|(_, v)| v.abs() == largest).filter(|_| largest > 0.0 && largest < METRES),
-    };
-    let (usual, other) = if angles { (Unit::Deg, Unit::Rad) } else { (Unit::Mm, Unit::M) };
-    match (stated[0].or(stated[1]), odd) {
-        (Some(unit), Some((row, v))) if unit == usual => {
-            let (what, factor) = if angles { ("radians", "180/pi") } else { ("metres", "1000") };
-            let message = format!(
-                "the names say {}, but {v} is none and no number of these columns is above {largest:.2}: these are {what}",
-                unit.word()
-            );
-            let hint = format!(
-                "multiply the columns by {factor}, or call them {} and {} with `[{}]`",
-                NAMES[at[0]],
-                NAMES[at[1]],
-                other.word()
-            );
-            Err(grid.refuse(rows[row].0, message, Some(&hint)))
-        }
-        (Some(unit), _) => Ok(unit),
-        (None, Some(_)) => Ok(other),
-        (None, None) => Ok(usual),
-    }
+    Ok(Reading { rows: table, beta_deg, limits_deg, said, columns, stated, own })
 }
 
 /// The modified table of a robot: what a table can carry.
@@ -265,40 +348,4 @@ pub fn to_csv(robot: &Robot) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn all(text: &str) -> Result<Vec<Reading>> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = camino::Utf8PathBuf::from_path_buf(folder.path().join("dh.csv")).unwrap();
-        std::fs::write(&path, text).unwrap();
-        readings(&path, None)
-    }
-
-    #[test]
-    fn one_table_in_all_its_forms() {
-        let expected = vec![[0.0, 0.0, 0.0, 487.0], [-90.0, 85.0, -90.0, 0.0], [0.0, 640.0, 0.0, 12.5]];
-        for text in [
-            "alpha, a, d, theta\n0, 0, 487, 0\n-90, 85, 0, -90\n0, 640, 12.5, 0\n",
-            "theta_deg;d_mm;a_mm;alpha_deg\n0;487;0;0\n-90;0;85;-90\n0;12,5;640;0\n",
-            "joint,alpha [rad],a [m],theta [rad],d [m]\n1,0,0,0,0.487\n2,-1.5707963267948966,0.085,-1.5707963267948966,0\n3,0,0.64,0,0.0125\n",
-            "d\ttheta\talpha\ta\n0.487\t0\t0\t0\n0\t-1.5707963267948966\t-1.5707963267948966\t0.085\n0.0125\t0\t0\t0.64\n",
-        ] {
-            let found = all(text).unwrap();
-            assert_eq!(found.len(), 1, "{text}");
-            for (row, expected) in found[0].rows.iter().zip(&expected) {
-                assert!(row.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{text}: {row:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn without_names_every_order_that_could_be_is_offered() {
-        let found = all("0, 0, 487, 0\n-90, 85, 0, -90\n0, 640, 12.5, 0\n").unwrap();
-        assert!(found.len() > 1 && found.iter().any(|r| r.columns == "alpha,a,d,theta"), "{found:?}");
-        let said = |text: &str| crate::diagnostic::report(&all(text).unwrap_err());
-        assert!(said("alpha_deg,a_mm,theta_deg,d_mm\n1.5708,85,0,0\n0,640,1.5708,12\n").contains("radians"));
-        assert!(said("alpha_deg,a_mm,theta_deg,d_mm\n90,0.085,0,0\n0,0.640,0,0\n").contains("metres"));
-        assert!(said("alpha,a,theta\n90,85,0\n0,640,0\n").contains("no column `d_mm`"));
-    }
-}
+mod tests;

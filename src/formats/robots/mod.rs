@@ -3,6 +3,7 @@
 //! Each format carries the robot as far as it can; what it can carry is a [`Robot`] again, so that the rest is measured and said.
 
 pub mod dh_csv;
+pub mod dh_text;
 pub mod known;
 pub mod ros_kinematics;
 pub mod ur_calibration;

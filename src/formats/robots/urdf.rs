@@ -74,6 +74,20 @@ pub struct Chain<'a> {
     pub tip: String,
 }
 
+/// The text with blanks for a declaration that does not stand at its beginning, where alone XML allows it; places stay what they are.
+fn without_declaration(text: String) -> String {
+    let body = text.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']);
+    let start = text.len() - body.len();
+    match body.find("?>").filter(|_| start > 0 && body.starts_with("<?xml")) {
+        Some(end) => {
+            let plain = |c: char| if c == '\n' { "\n".to_owned() } else { " ".repeat(c.len_utf8()) };
+            let head: String = text[..start + end + 2].chars().map(plain).collect();
+            head + &body[end + 2..]
+        }
+        None => text,
+    }
+}
+
 impl Urdf {
     pub fn read(path: &Utf8Path) -> Result<Urdf> {
         let text = files::read_text(path, "robot description", None)?;
@@ -86,6 +100,7 @@ impl Urdf {
         let refuse = |line, message: String, hint: Option<&str>| -> files::Error {
             files::Error::Format { message, place: place(line), hint: hint.map(str::to_owned) }
         };
+        let text = without_declaration(text);
         let document = Document::parse(&text)
             .map_err(|e| refuse(Some(u64::from(e.pos().row)), format!("not readable as XML: {e}"), None))?;
         let root = document.root_element();

@@ -10,7 +10,7 @@ use super::eliminate::{Block, Evaluated, Unknowns};
 use super::pairwise::{CHUNK, Pairs};
 use super::points::Points;
 use super::smooth::Field;
-use super::starts::{first_anchor, mean_target, middle, robust_frame};
+use super::starts::{first_anchor, frames_and_turn, middle};
 use super::touch::{Contact, Known, Touch};
 use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, Reading};
@@ -375,9 +375,8 @@ impl Inputs<'_> {
             .map(|rows| rows.iter().filter_map(|&i| self.spot(i)).collect::<Vec<_>>())
             .filter(|spots| spots.len() >= 3)
             .collect();
-        let frames: Vec<Transform> = lists.iter().map(|spots| robust_frame(spots, self.places)).collect();
         let turned = oriented || lists.iter().flatten().any(|spot| spot.on_body_mm.is_some());
-        let flange_from_target = if turned { mean_target(&lists, &frames, self.places) } else { Matrix3::identity() };
+        let (frames, flange_from_target) = frames_and_turn(&lists, self.places, turned);
         let target = if turned { Points::target_extras(self.spec.extras) } else { Vec::new() };
         let scatter = &self.spec.scatter;
         let block = |(spots, sensor_from_base): (Vec<Spot>, Transform)| {

@@ -3,7 +3,7 @@
 //! In: what was measured, and the robot's places. Out: a start that gross errors hardly move, by reweighted least squares. What goes wrong: places on
 //! a line leave a turn about it, which stays where the decomposition puts it.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, Rotation3, Vector3};
 
 use crate::geometry::{Transform, fitted_frame, nearest_rotation};
 use crate::identify::model::kinematics::Place;
@@ -19,16 +19,55 @@ fn least_weighed(misses: &[f64]) -> f64 {
     (0.1 * median(misses.iter().copied()).unwrap_or(0.0)).max(1e-9)
 }
 
-/// A frame that gross errors hardly move: least sum of distances, by reweighting (Weiszfeld's way).
-pub(super) fn robust_frame(spots: &[Spot], places: &[Place]) -> Transform {
-    // How a body of several targets is turned on the flange is not known yet: its mark points come first.
+/// Rounds in which frames and a body's turn are found from each other; they end as soon as the turn stays.
+const TURN_ROUNDS: usize = 60;
+
+/// Change of a turn that ends the rounds, rad: a ten-thousandth of a millimetre at a metre.
+const TURN_STAYS_RAD: f64 = 1e-7;
+
+/// The frame of each placement, and how a body of several targets is turned on the flange. A pose that shows a part of the body says where it is only
+/// once the turn is known, and the turn is known from the frames: they are found from each other until neither moves.
+pub(super) fn frames_and_turn(lists: &[Vec<Spot>], places: &[Place], turned: bool) -> (Vec<Transform>, Matrix3<f64>) {
+    let frames_with = |turn: Option<&Matrix3<f64>>| -> Vec<Transform> {
+        lists.iter().map(|spots| robust_frame(spots, places, turn)).collect()
+    };
+    let mut frames = frames_with(None);
+    if !turned {
+        return (frames, Matrix3::identity());
+    }
+    let mut turn = mean_target(lists, &frames, places);
+    if !lists.iter().flatten().any(|spot| spot.on_body_mm.is_some()) {
+        return (frames, turn);
+    }
+    for _ in 0..TURN_ROUNDS {
+        frames = frames_with(Some(&turn));
+        let next = mean_target(lists, &frames, places);
+        let change = Rotation3::from_matrix_unchecked(next.transpose() * turn).angle();
+        turn = next;
+        if change < TURN_STAYS_RAD {
+            break;
+        }
+    }
+    (frames, turn)
+}
+
+/// A frame that gross errors hardly move: least sum of distances, by reweighting (Weiszfeld's way). Without a body's turn its mark points come first.
+fn robust_frame(spots: &[Spot], places: &[Place], turn: Option<&Matrix3<f64>>) -> Transform {
     let whole: Vec<&Spot> = spots.iter().filter(|spot| spot.on_body_mm.is_none()).collect();
-    let spots = if whole.len() >= 3 { whole } else { spots.iter().collect() };
+    let spots = if turn.is_none() && whole.len() >= 3 { whole } else { spots.iter().collect() };
+    let point = |spot: &Spot| {
+        let place = &places[spot.pose];
+        let part = turn.zip(spot.on_body_mm).map(|(turn, part)| place.rotation * (turn * part));
+        place.point_mm + part.unwrap_or_else(Vector3::zeros)
+    };
+    let points: Vec<Point3<f64>> = spots.iter().map(|spot| point(spot)).collect();
     let mut weights: Vec<f64> = spots.iter().map(|s| s.weight * s.weight).collect();
     let mut frame = Transform::identity();
     for _ in 0..FRAME_ROUNDS {
-        frame = fitted_frame(spots.iter().zip(&weights).map(|(s, w)| (places[s.pose].point_mm, s.point_mm, *w)));
-        let misses: Vec<f64> = spots.iter().map(|s| (frame * places[s.pose].point_mm - s.point_mm).norm()).collect();
+        let seen = spots.iter().zip(&points).zip(&weights);
+        frame = fitted_frame(seen.map(|((s, point), w)| (*point, s.point_mm, *w)));
+        let misses: Vec<f64> =
+            spots.iter().zip(&points).map(|(s, point)| (frame * point - s.point_mm).norm()).collect();
         let floor = least_weighed(&misses);
         weights = misses.iter().zip(&spots).map(|(m, s)| s.weight * s.weight / m.max(floor)).collect();
     }
@@ -42,7 +81,7 @@ pub(super) fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
 
 /// Mean of `flange_from_target` over all poses: of those with an orientation, and of those that show a part of the body, which stands in some
 /// direction from the mark point.
-pub(super) fn mean_target(lists: &[Vec<Spot>], frames: &[Transform], places: &[Place]) -> Matrix3<f64> {
+fn mean_target(lists: &[Vec<Spot>], frames: &[Transform], places: &[Place]) -> Matrix3<f64> {
     let mut sum = Matrix3::zeros();
     for (spots, frame) in lists.iter().zip(frames) {
         let rotation = crate::geometry::rotation_matrix(frame);

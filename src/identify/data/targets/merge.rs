@@ -92,7 +92,7 @@ pub fn as_one(rows: &[Measurement]) -> Result<Option<(Vec<Measurement>, Targets)
     let seen: Vec<Vec<Sighting>> = poses.iter().map(|p| p.sightings.clone()).collect();
     let body = Body::new(&seen, names.len()).ok_or_else(|| Error::Targets {
         message: format!("the rows are of {} targets ({}), but no pose shows two of them", names.len(), names.join(", ")),
-        hint: "the rows of one pose have the same `pose`; targets that are never seen together are identified one at a time",
+        hint: "one pose at which all of them were measured joins them: its rows have the same `pose` and joints; without one, identify the rows of one target at a time",
     })?;
     let sorter = Sorter::new(body, &seen, stated).refined(&seen);
     let scatter_mm = sorter.scatter_mm(&seen);

@@ -253,6 +253,23 @@ fn single_targets_tell_as_much_of_the_robot_as_their_points() {
 }
 
 #[test]
+fn few_whole_poses_tell_where_the_single_targets_of_all_others_stand() {
+    use crate::identify::judge::errors::Judge;
+    for (count, from) in [(3, 1), (3, 2), (3, 14), (3, 44)] {
+        let world = synthetic::world(40, 0.0, 3);
+        let mean = TARGETS[..count].iter().map(|(_, p)| p).sum::<Vector3<f64>>() / count as f64;
+        let truth = Robot { tool_mm: mean, ..world.truth.clone() };
+        let set = Dataset::new(&single(&rows(count, 3), count, from)).unwrap();
+        let fitted: Vec<usize> = (0..set.poses.len()).collect();
+        let errors = Judge::plain(&set, &fitted, false).errors(&truth, &fitted);
+        assert_eq!(errors.len(), set.poses.len());
+        let most = errors.iter().filter_map(|e| e.point_mm).map(|e| e.norm()).fold(0.0, f64::max);
+        // The body is as its few poses show it.
+        assert!(most < 10.0 * NOISE_MM, "{count} targets, {from} whole poses: {most} mm");
+    }
+}
+
+#[test]
 fn what_is_no_body_is_refused() {
     let mut list = rows(3, 1);
     for (i, row) in list.iter_mut().enumerate() {

@@ -1,0 +1,21 @@
+//! A link while it is read, and what its parameters are called.
+
+use crate::tables::expression::Value;
+
+/// Names of the parameters, in the order of a row.
+pub(super) const KEYS: [&[&str]; 4] = [
+    &["alpha", "α", "twist", "link_twist"],
+    &["a", "r", "link_length"],
+    &["theta", "θ", "offset", "theta_offset", "offset_theta", "theta0"],
+    &["d", "link_offset"],
+];
+
+/// One link while it is read.
+#[derive(Debug, Clone)]
+pub(super) struct Link {
+    pub line: u64,
+    pub depth: usize,
+    /// Whether a call makes it, whose parameters may be left out.
+    pub call: bool,
+    pub values: [Option<Value>; 4],
+}

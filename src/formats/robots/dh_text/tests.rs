@@ -1,0 +1,87 @@
+use super::*;
+
+const PI: f64 = std::f64::consts::PI;
+
+fn rows(text: &str) -> (Vec<Row>, Option<Convention>) {
+    let links = read(text).unwrap().unwrap();
+    (links.rows.into_iter().map(|(_, row)| row).collect(), links.convention)
+}
+
+fn close(found: &[Row], expected: &[Row]) -> bool {
+    found.len() == expected.len()
+        && found.iter().zip(expected).all(|(f, e)| f.iter().zip(e).all(|(a, b)| (a - b).abs() < 1e-12))
+}
+
+#[test]
+fn links_of_programs_and_settings() {
+    let expected = [[PI / 2.0, 0.0, 0.0, 0.33], [0.0, 0.27, -PI / 2.0, 0.0], [-PI / 2.0, -0.06, 0.0, 0.0]];
+    let python = "from roboticstoolbox import RevoluteDH, PrismaticDH\n\"\"\"alpha: the twist, d = offset\"\"\"\nmm = 1e-3\nl2 = 270 * mm # a2\n\
+                  links = [\n RevoluteDH(d=330*mm, alpha=np.pi/2, qlim=np.deg2rad([-165, 165])),\n \
+                  RevoluteDH(a=l2, qlim=[-1, 1], offset=-np.pi / 2),\n RevoluteDH(alpha=-pi/2, a=-0.06)]\n";
+    let matlab = "L(1) = Link('d', 0.33, 'a', 0, 'alpha', pi/2); % base\nL(2)=Link('d',0,'a',0.27,'alpha',0,'offset',-pi/2);\nL(3)=Link('d',0,'a',-0.06,'alpha',-pi/2);\n";
+    let vectors =
+        "L(1) = Link([0 0.33 0 pi/2]);\nL(2) = Link([-pi/2 0 0.27 0 0]);\nL(3) = Link([0, 0, -0.06, -pi/2, 0, 0]);\n";
+    let flow = "links:\n - {a: 0, alpha: 1.5707963267948966, d: 0.33, theta: 0}\n - {a: 0.27, alpha: 0, d: 0, theta: -1.5707963267948966}\n - {a: -0.06, alpha: -1.5707963267948966, d: 0, theta: 0}\n";
+    let block = "j1:\n  a: 0\n  alpha: pi/2\n  d: 0.33\n  theta: 0\nj2:\n  a: 0.27\n  alpha: 0\n  d: 0\n  theta: -pi/2\nj3:\n  a: -0.06\n  alpha: -pi/2\n  d: 0\n  theta: 0\n";
+    let json = "{\"dh\": [{\"theta\": 0, \"d\": 0.33, \"a\": 0, \"alpha\": 1.5707963267948966},\n{\"theta\": -1.5707963267948966, \"d\": 0, \"a\": 0.27, \"alpha\": 0},\n{\"theta\": 0, \"d\": 0, \"a\": -0.06, \"alpha\": -1.5707963267948966}]}\n";
+    let lists = "[DH]\na = [0.0, 0.27, -0.06]\nd = [0.33, 0, 0]\nalpha = [1.5707963267948966, 0, -1.5707963267948966]\ntheta = [0, -1.5707963267948966, 0]\n";
+    let spaced =
+        "function [a,d] = dh()\nalpha = [pi/2 0 -pi/2];\na = [0 0.27 -0.06];\nd = [0.33 0 0];\ntheta = [0 -pi/2 0];\n";
+    for text in [python, matlab, vectors, flow, block, json, lists, spaced] {
+        assert!(close(&rows(text).0, &expected), "{text}\n{:?}", rows(text));
+    }
+    assert_eq!(rows(python).1, Some(Convention::Classic));
+    assert_eq!(rows(matlab).1, Some(Convention::Classic));
+    assert_eq!(rows(&matlab.replace("pi/2);", "pi/2, 'modified');")).1, Some(Convention::Modified));
+    assert_eq!(rows(&python.replace("RevoluteDH(", "RevoluteMDH(")).1, Some(Convention::Modified));
+    assert_eq!(rows(lists).1, None);
+}
+
+#[test]
+fn links_of_loops_over_lists_of_names_and_of_numbers() {
+    let expected = [[0.0, 0.0, 0.0, 0.75], [-PI / 2.0, 0.35, -PI / 2.0, 0.0], [0.0, 1.25, 0.0, -0.05]];
+    let loops = "a = [0, 0.35, 1.25]\nd = [0.75, 0, -0.05]\nalpha = [0, -pi/2, 0]\noffset = [0, -pi / 2, 0]\nfor j in range(3):\n    links.append(RevoluteMDH(d=d[j], a=a[j], alpha=alpha[j], r=com[j]))\n";
+    let dictionary = "s = {alpha0: 0, a0: 0, d1: 0.75, q1: q1,\n alpha1: -pi/2, a1: 0.35, d2: 0, q2: q2 - pi/2,\n alpha2: 0, a2: 1.25, d3: -0.05, q3: q3}\n";
+    let assigned = "alpha_0 = 0; a_0 = 0; d_1 = 750 * mm; theta_1 = 0;\nalpha_1 = -pi/2; a_1 = 0.35; d_2 = 0; theta_2 = -pi/2;\nalpha_2 = 0; a_2 = 1.25; d_3 = -0.05; theta_3 = 0;\n";
+    for text in [loops.to_owned(), dictionary.to_owned(), format!("mm = 0.001;\n{assigned}")] {
+        assert!(close(&rows(&text).0, &expected), "{text}\n{:?}", rows(&text));
+        assert_eq!(rows(&text).1, Some(Convention::Modified), "{text}");
+    }
+    let named = "a1, a2, d1 = 0.35, 1.25, 0.75\nt = [RevoluteMDH(d=d1), RevoluteMDH(alpha=-pi/2, a=a1, offset=-pi/2), RevoluteMDH(a=a2, d=-0.05)]\n";
+    assert!(close(&rows(named).0, &expected), "{:?}", rows(named));
+}
+
+#[test]
+fn a_table_in_brackets_has_its_order_in_a_comment() {
+    let body = "dh = np.array([\n    [0, -90, 10, 0],  # joint 1\n    [50, 0, 0, -90],\n    [0, -90, 5, 0]])\n";
+    let found = matrix(&format!("# four parameters a row: [a, alpha, d, theta]\n{body}")).unwrap();
+    assert_eq!((found.rows.len(), found.rows[1].0), (3, 4));
+    assert_eq!(found.names, Some(["a", "alpha", "d", "theta"]));
+    assert_eq!(matrix(body).unwrap().names, None);
+    let matlab = "%   a(i-1)  alpha(i-1)  d(i)  theta_offset\nDH = [0, 0, 77, 0;      % 1\n      0, -pi/2, 0, -pi/2; % 2\n      128, 0, 0, pi/2];\n";
+    let found = matrix(matlab).unwrap();
+    assert_eq!((found.names, &found.rows[2].1[3]), (Some(["a", "alpha", "d", "theta"]), "pi/2"));
+    for text in ["x = [1, 2, 3, 4]\n", "[1,2,3,4]\n[1,2,3,4]\n\n[1,2,3,4]\n[1,2,3,4]\n", ""] {
+        assert_eq!(matrix(text), None, "{text}");
+    }
+}
+
+#[test]
+fn what_a_table_has_no_place_for_is_refused_with_its_line() {
+    let wrong = |text: &str| read(text).unwrap_err();
+    let two = "RevoluteDH(d=0.3, alpha=pi/2)\n";
+    assert_eq!(wrong(&format!("{two}PrismaticDH(a=0.2)\n")).0, 2);
+    assert!(wrong(&format!("{two}RevoluteDH(d=d2, a=0.2)\n")).1.contains("`d2`"));
+    assert!(wrong(&format!("{two}RevoluteDH(d=0.1, flip=True)\n")).1.contains("flip"));
+    assert!(wrong(&format!("{two}RevoluteDH(0.1, 0.2, 0.3)\n")).1.contains("without names"));
+    assert!(wrong("L(1) = Link([0 0.3 0 0 1]);\n").1.contains("slides"));
+    assert!(wrong("a = [0, 1]\nd = [0, 1, 2]\nalpha = [0, 0]\n").1.contains("different lengths"));
+    assert!(wrong("x: {a: 0, d: 1}\ny: {a: 0, d: 1, alpha: 2}\n").1.contains("other parameters"));
+    // A link that names nothing is one, too.
+    assert_eq!(rows("L1 = RevoluteMDH(qlim=[0, 1])\nL2 = RevoluteMDH(a=0.2)\nL3 = RevoluteMDH()\n").0.len(), 3);
+    for text in
+        ["", "x = 3\n", "alpha_deg,a_mm,theta_deg,d_mm\n0,0,0,1\n1,2,3,4\n", "delta_a = [0, 1]\ndelta_d = [0, 1]\n"]
+    {
+        assert_eq!(read(text).unwrap(), None, "{text}");
+    }
+}
