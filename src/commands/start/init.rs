@@ -63,7 +63,9 @@ mod tests {
     #[test]
     fn the_settings_file_says_the_defaults() {
         let config: Config = toml::from_str(&uncommented()).unwrap();
-        assert_eq!(config, Config::default());
+        // A size that the file says is said, though it is the default.
+        let shown = |config: &Config| format!("{config:?}").replace("is_assumed: true", "is_assumed: false");
+        assert_eq!(shown(&config), shown(&Config::default()));
         assert_eq!(toml::from_str::<Config>(SETTINGS).unwrap(), Config::default());
     }
 
@@ -72,7 +74,7 @@ mod tests {
     fn the_settings_file_has_every_key() {
         let shown = format!("{:#?}", Config::default());
         let keys = shown.lines().filter_map(|line| line.trim().split_once(": ")).map(|(key, _)| key);
-        for key in keys.filter(|key| !["columns", "rows", "stretch", "kind"].contains(key)) {
+        for key in keys.filter(|key| !["columns", "rows", "stretch", "kind", "is_assumed"].contains(key)) {
             assert!(SETTINGS.contains(&format!(" {key} = ")) || SETTINGS.contains(&format!("{key}]")), "{key}");
         }
     }
