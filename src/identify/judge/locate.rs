@@ -177,10 +177,15 @@ fn open_direction(rows: &Rows, offsets: &[f64], parameters: usize) -> Option<Str
     Some(in_words(&eigen.eigenvectors.column(least).into_owned(), parameters, shared))
 }
 
-/// What moves along a direction of all unknowns.
+/// What moves along a direction of all unknowns; of the placements the one that moves most.
 fn in_words(direction: &DVector<f64>, parameters: usize, shared: usize) -> String {
     let part = |at: usize| Vector3::new(direction[at], direction[at + 1], direction[at + 2]);
-    let mut parts = vec![(part(shared), "the cameras' turn about"), (part(shared + 3), "the cameras' shift along")];
+    let placements = (shared..direction.len()).step_by(6);
+    let by_motion = |a: &usize, b: &usize| direction.rows(*a, 6).norm().total_cmp(&direction.rows(*b, 6).norm());
+    let mut parts = Vec::new();
+    if let Some(at) = placements.max_by(by_motion) {
+        parts.extend([(part(at), "the cameras' turn about"), (part(at + 3), "the cameras' shift along")]);
+    }
     if parameters >= 3 {
         parts.push((part(0), "the target's shift along"));
     }

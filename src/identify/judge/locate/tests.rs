@@ -95,3 +95,17 @@ fn poses_that_tell_too_little_are_refused_with_what_is_open() {
     let said = refused(&one_axis);
     assert!(said.contains("the cameras' shift along") && said.contains("the target's shift along"), "{said}");
 }
+
+#[test]
+fn what_a_later_placement_leaves_open_is_named() {
+    let (truth, mut all) = rows(8, 0.01, false, 7);
+    // Three readings at one pose: about that point the cameras may be turned at will.
+    for k in 0..3 {
+        let mut row = all[0].clone();
+        row.at.group = "g2".to_owned();
+        row.at.joints_deg[5] += 1e-6 * f64::from(k);
+        all.push(row);
+    }
+    let refused = locate(&Dataset::new(&all).unwrap(), &truth, EXACT, &Settings::default()).unwrap_err();
+    assert!(refused.to_string().contains("the cameras' turn about"), "{refused}");
+}
