@@ -41,6 +41,9 @@ const CERTIFICATE_COUNT: f64 = 0.1;
 /// Smallest deviation that is told from none, mm.
 const SMALLEST_MM: f64 = 1e-6;
 
+/// Median length of a corner's whitened residual.
+const MEDIAN_MISS: f64 = 1.177;
+
 /// Steps of the fixed point.
 const FIXED_POINT_STEPS: usize = 30;
 
@@ -104,7 +107,8 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
     let mut values = roughly(&mut bundle, start)?;
     let poses = values.poses.iter().flatten().count();
     let mut noise = at_least(usual.noise, Noise::from_median(&residuals(&bundle, &values, |_| true)));
-    let (mut inflation, mut excess) = (1.0, known_excess.unwrap_or(1.0));
+    let usual_excess_here = usual.excess_here(&noise, &bundle.views).max(1.0);
+    let (mut inflation, mut excess) = (1.0, known_excess.unwrap_or(usual_excess_here));
     let mut normal = bundle.normal(&values, Loss::Squared)?;
     let mut covariance = DMatrix::zeros(0, 0);
     for round in 0..ROUNDS {
@@ -113,7 +117,7 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
             bundle.unbend(&mut values, &told);
         }
         bundle.weigh(&values, &noise);
-        bundle.mark_outliers(&mut values);
+        bundle.mark_outliers(&mut values, excess);
         inflate(&mut bundle.views, inflation * excess);
         (values, normal) = bundle.solve(values, Loss::Squared, Promise::RESULT)?;
         covariance = normal.covariance()?;
@@ -261,14 +265,19 @@ impl Bundle<'_> {
 
     /// Corners that miss their prediction by more than chance allows are out; the whiteners hold the noise alone.
     /// A pose with too few left takes no part.
-    fn mark_outliers(&mut self, values: &mut Values) {
+    fn mark_outliers(&mut self, values: &mut Values, excess: f64) {
         let rig = self.rig_at(values);
         let crossings = crossings(self.board, &values.deviations_mm);
         let board = self.board;
         self.views.par_iter_mut().zip(&mut values.poses).for_each(|(view, place)| {
             let Some(pose) = place else { return };
-            for o in &mut view.observations {
-                o.active = residual(&rig, &crossings, board, pose, o).is_some_and(|r| o.whiten(r).norm() <= OUTLIER);
+            let miss = |o: &Observation| Some(o.whiten(residual(&rig, &crossings, board, pose, o)?).norm());
+            let misses: Vec<Option<f64>> = view.observations.iter().map(miss).collect();
+            // A pose that misses the rig as a whole, as the others do, has no more outliers for it.
+            let whole = median(misses.iter().flatten().copied()).unwrap_or(0.0) / MEDIAN_MISS;
+            let allowed = OUTLIER * whole.clamp(1.0, excess.max(1.0).sqrt());
+            for (o, miss) in view.observations.iter_mut().zip(misses) {
+                o.active = miss.is_some_and(|miss| miss <= allowed);
             }
             if !enough(view) {
                 *place = None;
