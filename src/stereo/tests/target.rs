@@ -86,3 +86,29 @@ fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
     };
     assert!(judged(&exchanged, 10.0).contains("exchanged"));
 }
+
+/// Boards held by hand before cameras that nobody triggers: what the pairs of the calibration did, poses may do; one that does much more is named.
+#[test]
+fn the_pairs_of_a_calibration_are_measured_by_it() {
+    for turn_deg in [0.01, 0.05] {
+        let world = World::new(12, 41);
+        let mut corners = world.corners_by_hand(41, turn_deg);
+        let found = calibrate(&corners, &BROWN4).unwrap();
+        let known = Knowledge {
+            rig: found.rig().clone(),
+            noise: Some(found.own_noise),
+            pair_excess: Some(crate::stereo::board_pose::pair_excess::pair_excess(&found)),
+            volume: None,
+            board: world.board,
+            crossing_mm: 0.01,
+            tolerance_mm: 5.0,
+        };
+        let refused = |corners: &crate::imaging::Corners| -> Vec<String> {
+            let poses = series::measure(&known, run_of(corners.clone())).poses.into_iter();
+            poses.filter(|pose| pose.target.is_err()).map(|pose| pose.at.pose).collect()
+        };
+        assert_eq!(refused(&corners), Vec::<String>::new(), "{turn_deg}");
+        corners.pairs[7] = world.corners_by_hand(43, 30.0 * turn_deg).pairs[7].clone();
+        assert_eq!(refused(&corners), [corners.pairs[7].pair.clone()], "{turn_deg}");
+    }
+}
