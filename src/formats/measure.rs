@@ -153,8 +153,8 @@ impl MeasureFile {
     pub fn new(series: &Series, corners: &Corners, known: &Knowledge) -> MeasureFile {
         let (board, rig) = (&known.board, &known.rig);
         let targets: Vec<&TargetPose> = series.poses.iter().filter_map(|m| m.target.as_ref().ok()).collect();
-        let rms = |of: fn(&TargetPose) -> f64| {
-            let squares: Vec<f64> = targets.iter().map(|t| of(t) * of(t)).collect();
+        let rms = |of: fn(&TargetPose) -> Option<f64>| {
+            let squares: Vec<f64> = targets.iter().filter_map(|t| of(t)).map(|value| value * value).collect();
             crate::stereo::data::residuals::root_mean_square(&squares)
         };
         let sigma = |axis: usize| median(targets.iter().map(|t| t.covariance[(3 + axis, 3 + axis)].sqrt()));
@@ -178,7 +178,7 @@ impl MeasureFile {
             corner_noise_px: series.noise_px,
             calibration_noise_px: series.usual_px,
             fit_rms_mm: rms(|t| t.fit_rms_mm),
-            reprojection_rms_px: rms(|t| t.rms_px),
+            reprojection_rms_px: rms(|t| Some(t.rms_px)),
             sigma_mm: sigma(0).zip(sigma(1)).zip(sigma(2)).map(|((x, y), z)| [x, y, z]),
             results: series.poses.iter().map(row).collect(),
             missing: series.poses.iter().filter_map(missing).collect(),
@@ -350,10 +350,11 @@ pub fn to_csv(measured: &[MeasuredPose]) -> String {
                 let p = t.cam_from_board.translation.vector;
                 let r = rotation_vector(&t.cam_from_board);
                 let point = UPPER.map(|(i, j)| t.covariance[(3 + i, 3 + j)]);
-                for number in [p.x, p.y, p.z].into_iter().chain(point).chain([r.x, r.y, r.z, t.fit_rms_mm]) {
+                for number in [p.x, p.y, p.z].into_iter().chain(point).chain([r.x, r.y, r.z]) {
                     let _ = write!(text, ",{number}");
                 }
-                let _ = write!(text, ",{},ok", t.corners);
+                let fit_rms_mm = t.fit_rms_mm.map_or_else(String::new, |mm| mm.to_string());
+                let _ = write!(text, ",{fit_rms_mm},{},ok", t.corners);
                 for (i, j) in UPPER {
                     let _ = write!(text, ",{}", t.covariance[(i, j)]);
                 }

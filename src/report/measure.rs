@@ -199,7 +199,7 @@ fn worst_table(measured: &[MeasuredPose]) -> Markup {
         let figures = [
             number(Some(t.chi_square), 2),
             number(Some(t.rms_px), 4),
-            number(Some(t.fit_rms_mm), 4),
+            number(t.fit_rms_mm, 4),
             sigma(3),
             sigma(4),
             sigma(5),

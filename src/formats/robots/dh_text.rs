@@ -25,6 +25,9 @@ use crate::tables::expression::{Value, evaluate};
 const CALLS: [&str; 8] =
     ["RevoluteDH", "RevoluteMDH", "PrismaticDH", "PrismaticMDH", "DHLink", "Link", "Revolute", "Prismatic"];
 
+/// Why a sliding joint is refused.
+const SLIDES: &str = "a joint that slides, which a table of turning joints has no place for";
+
 /// What a text holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Links {
@@ -57,7 +60,7 @@ pub fn read(text: &str) -> Result<Option<Links>, Wrong> {
     scan.run()?;
     let lower = text.to_lowercase();
     if ["'prismatic'", "\"prismatic\"", ": prismatic"].iter().any(|word| lower.contains(word)) && scan.links.len() > 1 {
-        return Err((1, "a joint that slides, which a table of turning joints has no place for".to_owned()));
+        return Err((1, SLIDES.to_owned()));
     }
     let Scan { mut links, lists, of_calls, numbered, wrong, .. } = scan;
     let others = || -> Result<(Vec<Link>, Option<Convention>), Wrong> {
@@ -292,10 +295,7 @@ impl Scan<'_> {
             return Ok(());
         }
         if word.starts_with("Prismatic") {
-            return Err((
-                self.line,
-                "a joint that slides, which a table of turning joints has no place for".to_owned(),
-            ));
+            return Err((self.line, SLIDES.to_owned()));
         }
         self.of_calls = match word {
             "RevoluteMDH" => Some(Convention::Modified),
@@ -310,10 +310,7 @@ impl Scan<'_> {
                 return Err((self.line, "`Link([...])` without the numbers theta, d, a, alpha".to_owned()));
             };
             if list.get(4).is_some_and(|sigma| sigma.number != 0.0) {
-                return Err((
-                    self.line,
-                    "a joint that slides, which a table of turning joints has no place for".to_owned(),
-                ));
+                return Err((self.line, SLIDES.to_owned()));
             }
             let mut theta = list[0];
             if let Some(offset) = list.get(5) {

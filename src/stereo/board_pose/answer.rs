@@ -20,8 +20,8 @@ pub struct TargetPose {
     pub own_covariance: Matrix6<f64>,
     /// Derivative by the shared numbers, in the order of [`Shared::parameters`]: rotation (rad), then translation (mm).
     pub sensitivity: Matrix6xX<f64>,
-    /// Root mean square distance of the triangulated corners from the fitted target, mm.
-    pub fit_rms_mm: f64,
+    /// Root mean square distance of the triangulated corners from the fitted target, mm; `None` where none is in use in both pictures.
+    pub fit_rms_mm: Option<f64>,
     /// Root mean square of the length of the 2-D residuals, px.
     pub rms_px: f64,
     /// Corners used, both pictures together.

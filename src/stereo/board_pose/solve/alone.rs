@@ -6,10 +6,8 @@ use crate::geometry::{Transform, perturb};
 use crate::imaging::{Board, Side};
 use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::bundle::Promise;
-use crate::stereo::board_pose::solve::estimate::Estimate;
-use crate::stereo::board_pose::solve::pose_block::{
-    Eliminated, OUTLIER, PoseBlock, PoseSums, SeenFrom, crossings, residual,
-};
+use crate::stereo::board_pose::solve::estimate::{Estimate, leave_outliers_out};
+use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, PoseSums, SeenFrom, crossings, residual};
 use crate::stereo::board_pose::start::enough;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::root_mean_square;
@@ -30,6 +28,8 @@ pub(in crate::stereo::board_pose) struct Known<'a> {
     board: &'a Board,
     basis: &'a DMatrix<f64>,
     inflation: f64,
+    /// See [`Estimate::excess`].
+    excess: f64,
 }
 
 /// A pose on them.
@@ -46,8 +46,8 @@ pub(in crate::stereo::board_pose) struct Alone {
     pub freedom: f64,
     /// Root mean square of the length of the 2-D residuals, px.
     pub rms_px: f64,
-    /// Root mean square distance of the triangulated corners from the target, mm.
-    pub fit_rms_mm: f64,
+    /// Root mean square distance of the triangulated corners from the target, mm; `None` where no corner is in use in both pictures.
+    pub fit_rms_mm: Option<f64>,
 }
 
 impl<'a> Known<'a> {
@@ -59,6 +59,7 @@ impl<'a> Known<'a> {
             board: found.bundle.board,
             basis: &found.bundle.rig.basis,
             inflation: found.inflation,
+            excess: found.excess,
         }
     }
 
@@ -68,10 +69,8 @@ impl<'a> Known<'a> {
         view.observations.iter_mut().for_each(|o| o.active = true);
         let mut pose = self.search(&view, *start, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?;
         for _ in 0..ROUNDS {
-            for o in &mut view.observations {
-                o.active =
-                    self.residual(&pose, o).is_some_and(|r| o.whiten(r).norm() * self.inflation.sqrt() <= OUTLIER);
-            }
+            let miss = |o: &Observation| Some(o.whiten(self.residual(&pose, o)?).norm() * self.inflation.sqrt());
+            leave_outliers_out(&mut view, miss, self.excess);
             if !enough(&view) {
                 return None;
             }
@@ -88,7 +87,7 @@ impl<'a> Known<'a> {
             chi_square: sum * self.inflation / freedom.max(1.0),
             freedom,
             rms_px: root_mean_square(&squares)?,
-            fit_rms_mm: self.fit_rms_mm(&view, &pose).unwrap_or(f64::NAN),
+            fit_rms_mm: self.fit_rms_mm(&view, &pose),
             pose,
             view,
         })

@@ -191,6 +191,21 @@ impl Estimate<'_> {
     }
 }
 
+/// Leaves out the corners of a pose that miss their prediction by more than chance allows; `miss` is in standard deviations of their noise. A pose
+/// that misses the rig as a whole, as the usual one does with this [`Estimate::excess`], has no more outliers for it.
+pub(in crate::stereo::board_pose) fn leave_outliers_out(
+    view: &mut View,
+    miss: impl Fn(&Observation) -> Option<f64>,
+    excess: f64,
+) {
+    let misses: Vec<Option<f64>> = view.observations.iter().map(miss).collect();
+    let whole = median(misses.iter().flatten().copied()).unwrap_or(0.0) / MEDIAN_MISS;
+    let allowed = OUTLIER * whole.clamp(1.0, excess.max(1.0).sqrt());
+    for (o, miss) in view.observations.iter_mut().zip(misses) {
+        o.active = miss.is_some_and(|miss| miss <= allowed);
+    }
+}
+
 /// How much of each crossing's place, which are the shared unknowns from `first` on, its corners determine rather than what was known
 /// before, from none to one.
 fn told_of_crossings(normal: &Normal, covariance: &DMatrix<f64>, first: usize) -> Vec<Vector3<f64>> {
@@ -272,13 +287,7 @@ impl Bundle<'_> {
         self.views.par_iter_mut().zip(&mut values.poses).for_each(|(view, place)| {
             let Some(pose) = place else { return };
             let miss = |o: &Observation| Some(o.whiten(residual(&rig, &crossings, board, pose, o)?).norm());
-            let misses: Vec<Option<f64>> = view.observations.iter().map(miss).collect();
-            // A pose that misses the rig as a whole, as the others do, has no more outliers for it.
-            let whole = median(misses.iter().flatten().copied()).unwrap_or(0.0) / MEDIAN_MISS;
-            let allowed = OUTLIER * whole.clamp(1.0, excess.max(1.0).sqrt());
-            for (o, miss) in view.observations.iter_mut().zip(misses) {
-                o.active = miss.is_some_and(|miss| miss <= allowed);
-            }
+            leave_outliers_out(view, miss, excess);
             if !enough(view) {
                 *place = None;
             }
