@@ -103,6 +103,12 @@ fn the_pairs_of_a_calibration_are_measured_by_it() {
             crossing_mm: 0.01,
             tolerance_mm: 5.0,
         };
+        // No pose keeps to a part of its corners that happens to agree.
+        for pose in series::measure(&known, run_of(corners.clone())).poses {
+            let (target, seen) = (pose.target.unwrap(), corners.pairs.iter().find(|pair| pair.pair == pose.at.pose));
+            let seen = seen.map_or(0, |pair| pair.left.len() + pair.right.len());
+            assert!(10 * target.corners > 9 * seen && target.fit_rms_mm.is_some(), "{turn_deg}: {}", pose.at.pose);
+        }
         let refused = |corners: &crate::imaging::Corners| -> Vec<String> {
             let poses = series::measure(&known, run_of(corners.clone())).poses.into_iter();
             poses.filter(|pose| pose.target.is_err()).map(|pose| pose.at.pose).collect()
