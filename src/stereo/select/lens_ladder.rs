@@ -15,6 +15,7 @@ use crate::stereo::select::known_lenses;
 use crate::stereo::select::model_comparison::{Chance, LensScore, Trial, gain_of_terms, score, simplest};
 use crate::stereo::select::options::{Choice, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
+use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::uncertainty;
 use crate::stereo::{Error, Lens};
@@ -26,8 +27,9 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     }
     let forced_shape = options.shape.or(options.lens.map(|_| false));
     if let (Some(lens), Some(shape)) = (options.lens, forced_shape) {
-        let priors = start.priors.clone();
-        return Ok(Choice { layout: Layout::rig(lens, shape), near: None, priors, scatter: None, scores: Vec::new() });
+        let layout = Layout::rig(lens, shape);
+        let priors = priors_of_forced(start, &layout);
+        return Ok(Choice { layout, near: None, priors, scatter: None, scores: Vec::new() });
     }
     // Weights from a model that is at least as rich as most need; the comparison uses the same for all.
     let fit = |shape| {
@@ -48,14 +50,14 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
         print: PrintShare::of(&solved, board, &layout).map_or(1.0, |print| print.excess),
     };
     // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
-    let mut scores = ladder(&solved.problem, layout.shape);
+    let mut scores = ladder(&solved.problem, layout.shape, &chance);
     let bent = simplest(&scores, &chance).filter(|_| forced_shape.is_none() && layout.shape);
     let flat = bent.and_then(|bent| score(&solved.problem, bent.layout.left?, false).trial);
     let bends = bent
         .zip(flat)
         .is_none_or(|(bent, flat)| flat.is_worse_than(bent, &chance) || flat.is_refuted_by(bent, &chance));
     if !bends {
-        scores = ladder(&solved.problem, false);
+        scores = ladder(&solved.problem, false, &chance);
     }
     let Some(chosen) = simplest(&scores, &chance) else {
         // Some pairs cannot be left out without losing the cameras: nothing can be compared.
@@ -99,32 +101,46 @@ fn fewer_terms(problem: &Problem, five: &Trial, chance: &Chance) -> Option<Trial
     (best.0 < 0.0).then_some(best.1)
 }
 
-/// The simplest lens and those that are richer, each from where the one before it that has a minimum ended: a richer lens begins as a
-/// simpler one. One that is expected to gain no more than chance cannot predict better, and is not tried.
-fn ladder(problem: &Problem, shape: bool) -> Vec<LensScore> {
+/// What is expected of a lens that was asked for. Rational terms and radial ones are exchanged for each other where a lens bends little: where all of
+/// them are free and the pairs do not tell them apart, the terms after them do not need them.
+fn priors_of_forced(start: &Problem, layout: &Layout) -> Priors {
+    let holds = layout.left > Some(Lens::Rational8)
+        && start.solve(layout).and_then(|solved| solved.uncertainty(layout)).is_err();
+    if holds { start.priors.holding_rational() } else { start.priors.clone() }
+}
+
+/// The simplest lens and those that are richer, each from where the best before it ended: a richer lens begins as a simpler one. One that is
+/// expected to gain no more than chance cannot predict better, and is not tried. Rational terms that did not prove themselves
+/// are held at zero in the lenses after them, which would only carry them on along the valley where they are exchanged for the radial ones.
+fn ladder(problem: &Problem, shape: bool, chance: &Chance) -> Vec<LensScore> {
     let mut problem = problem.clone();
-    let mut simpler = None;
+    let mut simpler: Option<Layout> = None;
     let mut scores = Vec::new();
     for lens in Lens::LADDER.into_iter().filter(|lens| *lens >= SIMPLEST) {
         let layout = Layout::rig(lens, shape);
-        let tried = simpler.is_none_or(|simpler| expects_gain(&problem, &layout, &simpler));
-        let score = if tried { score(&problem, lens, shape) } else { LensScore::untried(lens) };
-        if let Some(trial) = &score.trial {
-            problem.values = trial.values.clone();
-            simpler = Some(layout);
-        } else if lens == Lens::Rational8 {
-            problem.priors = problem.priors.holding_rational();
+        let added = |simpler: Layout| layout.count() - simpler.count();
+        let tried = simpler.is_none_or(|simpler| expects_gain(&problem, &layout, added(simpler)));
+        scores.push(if tried { score(&problem, lens, shape) } else { LensScore::untried(lens) });
+        if lens == Lens::Rational8 {
+            let best = simplest(&scores, chance);
+            if best.is_none_or(|best| best.layout != layout) {
+                problem.priors = problem.priors.holding_rational();
+            }
+            if let Some(best) = best {
+                (problem.values, simpler) = (best.values.clone(), Some(best.layout));
+            }
+        } else if let Some(trial) = scores.last().and_then(|score| score.trial.as_ref()) {
+            (problem.values, simpler) = (trial.values.clone(), Some(layout));
         }
-        scores.push(score);
     }
     scores
 }
 
 /// Whether a richer lens can be expected to explain more than noise would let it: more than two standard deviations above the mean of
 /// a chi-square with as many degrees of freedom as it adds. Of a lens that cannot be determined nothing is expected.
-fn expects_gain(problem: &Problem, layout: &Layout, simpler: &Layout) -> bool {
+fn expects_gain(problem: &Problem, layout: &Layout, added: usize) -> bool {
     let start = problem.with_layout(layout);
     let expected = start.equations(layout).and_then(|equations| uncertainty::expected_decrease(&equations));
-    let added = (layout.count() - simpler.count()) as f64;
+    let added = added as f64;
     expected.is_some_and(|expected| expected > added + 2.0 * (2.0 * added).sqrt())
 }

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::geometry::transform;
+use crate::imaging::{Board, Squares};
 use crate::stereo::Lens;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::view::View;
@@ -141,4 +142,29 @@ fn the_borders_of_a_wide_picture_are_no_outliers() {
     // With the simplest lens they are, and nothing says so but how far off they lie.
     let simple = calibrate(&world.corners(6), &Options { lens: Some(Lens::Brown5), ..BROWN4 }).unwrap();
     assert!(px(&simple) > 1.5 * world.sigma_px && simple.rms_px > 10.0 * px(&simple), "{}", px(&simple));
+}
+
+#[test]
+fn a_prism_needs_no_rational_terms() {
+    for seed in 0..6 {
+        let mut world = World::new(16, seed);
+        world.board = Board::checker(Squares { columns: 20, rows: 20 }, 10.0);
+        world.sigma_px = 0.006;
+        world.print_mm = 0.001;
+        for camera in [&mut world.rig.left, &mut world.rig.right] {
+            camera.lens = Lens::ThinPrism12;
+            // 1.5 px at the corners of the picture.
+            camera.distortion[8] = 4.5e-3;
+            camera.distortion[10] = -3e-3;
+        }
+        let corners = world.corners(seed + 50);
+        for asked in [None, Some(Lens::ThinPrism12)] {
+            let found = calibrate(&corners, &Options { lens: asked, ..Options::default() }).unwrap();
+            assert!(found.layout.left >= Some(Lens::ThinPrism12), "seed {seed}: {:?}", found.layout.left);
+            assert!(found.rms_px < 0.015, "seed {seed}, asked for {asked:?}: {} px", found.rms_px);
+            // Free ones would run along the valley where they are exchanged for the radial terms.
+            let rational = found.rig().left.distortion[5].abs();
+            assert!(asked.is_some() || rational < 1e-3, "seed {seed}: k4 {rational}");
+        }
+    }
 }
