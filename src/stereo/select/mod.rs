@@ -5,5 +5,6 @@ pub mod known_lenses;
 pub mod lens_ladder;
 pub mod model_comparison;
 pub mod options;
+pub mod pair_motion;
 pub mod pair_scatter;
 pub mod stated_uncertainty;

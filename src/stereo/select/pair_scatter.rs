@@ -5,13 +5,16 @@
 //! group-clustered sandwich with its small-sample correction, CR3 of Bell and McCaffrey 2002) holds whatever hangs together within
 //! a pair: a lens, a board or light that the model lacks. With heavy tails a group that goes also changes what the others' corners weigh; the
 //! curvature of the loss has that in it (the M-estimator's sandwich, Huber 1981, section 7.6). Some ten groups know a scatter in some twenty directions badly, so that it is
-//! shrunk towards its mean (Ledoit and Wolf 2004), and taken only where it is larger than what the corners' noise gives.
+//! shrunk towards what the corners' noise and a motion of each pair's own ([`pair_motion`]) would give, at the scatter's own size (Ledoit
+//! and Wolf 2004), and taken only where it is larger than what these two give.
 //! Goes wrong: groups without which the others do not determine the cameras; then there is no ratio, and nothing is enlarged.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+use crate::stereo::model::parameters::Layout;
 use crate::stereo::select::cross_validation::Without;
+use crate::stereo::select::pair_motion;
 use crate::stereo::solve::normal_equations::Equations;
 
 /// How the pairs scatter.
@@ -32,6 +35,8 @@ pub struct Jackknife<'a> {
     pub curvature: &'a Equations,
     /// The group of every pair.
     pub group_of: &'a [usize],
+    /// What is free.
+    pub layout: &'a Layout,
     /// The rig without each group, by the curvature.
     pub without: &'a [Option<Without>],
     /// What the covariance is at least, over the one by the corners' noise: pairs of an earlier calibration may say so.
@@ -83,10 +88,15 @@ impl Jackknife<'_> {
         let scatter = steps.iter().fold(DMatrix::zeros(n, n), |sum, x| sum + x * x.transpose()) / groups as f64;
         let stretch = (expected / n as f64).max(1.0);
         let ratio = scatter.trace() / n as f64 / stretch;
-        let shrunk = shrunk(&scatter, &steps) / stretch;
-        let eigen = shrunk.symmetric_eigen();
-        let larger = eigen.eigenvalues.map(|v| v.max(self.least));
+        let moved = pair_motion::covariance(self.equations, self.layout, &own, inflation);
+        let by_motion = moved.map_or(DMatrix::zeros(n, n), |moved| &inverse_root * moved * inverse_root.transpose());
+        let floor = DMatrix::identity(n, n) * self.least + &by_motion;
+        let shrunk = shrunk(&scatter, &steps, DMatrix::identity(n, n) + by_motion) / stretch;
+        let (floor_root, floor_inverse) = roots(&floor)?;
+        let eigen = (&floor_inverse * shrunk * floor_inverse.transpose()).symmetric_eigen();
+        let larger = eigen.eigenvalues.map(|v| v.max(1.0));
         let factor = &eigen.eigenvectors * DMatrix::from_diagonal(&larger) * eigen.eigenvectors.transpose();
+        let factor = &floor_root * factor * floor_root.transpose();
         let covariance = &root * factor * root.transpose();
         (ratio.is_finite() && covariance.iter().all(|v| v.is_finite()))
             .then(|| (0.5 * (&covariance + covariance.transpose()), ratio))
@@ -110,11 +120,9 @@ fn reduced(equations: &Equations) -> Option<Vec<DMatrix<f64>>> {
     equations.blocks.iter().map(|block| Some(block.reduced(0.0)?.0)).collect()
 }
 
-/// The scatter matrix of some samples shrunk towards the multiple of the identity with the same trace, by as much as its own scatter says.
-fn shrunk(scatter: &DMatrix<f64>, samples: &[DVector<f64>]) -> DMatrix<f64> {
-    let n = scatter.nrows();
-    let mean = scatter.trace() / n as f64;
-    let target = DMatrix::identity(n, n) * mean;
+/// The scatter matrix of some samples shrunk towards the multiple of `shape` with the same trace, by as much as its own scatter says.
+fn shrunk(scatter: &DMatrix<f64>, samples: &[DVector<f64>], shape: DMatrix<f64>) -> DMatrix<f64> {
+    let target = &shape * (scatter.trace() / shape.trace());
     let distance = (scatter - &target).norm_squared();
     let count = samples.len() as f64;
     let noise = samples.iter().map(|x| (x * x.transpose() - scatter).norm_squared()).sum::<f64>() / (count * count);

@@ -117,7 +117,7 @@ fn scattered(
     let (equations, curvature) = (solved.problem.equations(layout)?, solved.curvature(layout)?);
     let without = cross_validation::leave_out_with(&curvature, &equations, layout, &values.shared, &groups);
     let jackknife =
-        Jackknife { equations: &equations, curvature: &curvature, group_of: &groups, without: &without, least };
+        Jackknife { equations: &equations, curvature: &curvature, group_of: &groups, layout, without: &without, least };
     let (shared, pair_scatter) = jackknife.covariance(by_noise, inflation);
     Some((equations, shared, pair_scatter))
 }

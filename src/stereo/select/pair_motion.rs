@@ -1,0 +1,139 @@
+//! How far the link of the two pictures is off the common rig from pair to pair, and what that does to the shared numbers.
+//!
+//! In: the normal equations of all pairs at their minimum. Out: the covariance of the shared numbers by that motion alone. Method: of a board that
+//! is held by hand before cameras that are not triggered together, or of a right camera that is not clamped, each pair has a small motion of
+//! its own, drawn with a variance for each of the six numbers of `right_from_left`; the variances are the likeliest ones (expectation and
+//! maximisation, Dempster, Laird and Rubin 1977), and reach the shared numbers through the normal equations of the pairs. Goes wrong: pairs
+//! that do not tell the motion from their noise; its variances are then small.
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+
+use crate::stereo::model::parameters::Layout;
+use crate::stereo::solve::normal_equations::{Block, Equations};
+use crate::stereo::solve::uncertainty::invert;
+
+/// Rounds after which variances that are there have settled, and those that are not have fallen to a hundredth of what the noise hides.
+const ROUNDS: usize = 100;
+
+/// What a pair tells of the shared numbers and of its own motion, in units of the noise: the information of the shared ones and their gradient.
+struct Told {
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+/// Covariance of the shared numbers by the pairs' motions. `own` is the inverse of the normal equations, `inflation` the variance of the whitened
+/// residuals. `None` where the transform is not among the shared numbers or the pairs do not determine them.
+pub fn covariance(equations: &Equations, layout: &Layout, own: &DMatrix<f64>, inflation: f64) -> Option<DMatrix<f64>> {
+    let at = layout.transform.then(|| layout.transform_start())?;
+    let told = |block: &Block| {
+        let (matrix, gradient) = block.reduced(0.0)?;
+        Some(Told { matrix: matrix / inflation, gradient: gradient / inflation })
+    };
+    let pairs = equations.blocks.iter().map(told).collect::<Option<Vec<Told>>>()?;
+    let prior = Told { matrix: &equations.prior.matrix / inflation, gradient: &equations.prior.gradient / inflation };
+    let variances = Matrix6::from_diagonal(&variances(&pairs, &prior, at)?);
+    let own = own * inflation;
+    let by_motion = pairs.iter().fold(DMatrix::zeros(own.nrows(), own.nrows()), |sum, pair| {
+        let pull = pair.matrix.columns(at, 6);
+        sum + pull * variances * pull.transpose()
+    });
+    Some(&own * by_motion * &own)
+}
+
+/// The likeliest variances of the six numbers from pair to pair, what the shared numbers take up of the motions allowed for (restricted
+/// likelihood). The six begin with number `at` of the shared ones.
+fn variances(pairs: &[Told], prior: &Told, at: usize) -> Option<Vector6<f64>> {
+    let count = pairs.len() as f64;
+    let link = |pair: &Told| pair.matrix.fixed_view::<6, 6>(at, at).into_owned();
+    let known = pairs.iter().fold(Vector6::zeros(), |sum, pair| sum + link(pair).diagonal());
+    let mut variances = known.map(|known| count / known);
+    for _ in 0..ROUNDS {
+        let drawn = Matrix6::from_diagonal(&variances.map(|v| 1.0 / v));
+        let spreads = pairs.iter().map(|pair| (link(pair) + drawn).try_inverse()).collect::<Option<Vec<_>>>()?;
+        let (mut matrix, mut gradient) = (prior.matrix.clone(), prior.gradient.clone());
+        for (pair, spread) in pairs.iter().zip(&spreads) {
+            let through = pair.matrix.columns(at, 6) * spread;
+            matrix += &pair.matrix - &through * pair.matrix.rows(at, 6);
+            gradient += &pair.gradient - &through * pair.gradient.fixed_rows::<6>(at);
+        }
+        let shared = invert(&matrix)?;
+        let step = -&shared * gradient;
+        let mut sum = Vector6::zeros();
+        for (pair, spread) in pairs.iter().zip(&spreads) {
+            let rows = pair.matrix.rows(at, 6);
+            let motion = spread * (pair.gradient.fixed_rows::<6>(at) + rows * &step);
+            let through = spread * rows;
+            let open = spread + &through * &shared * through.transpose();
+            sum += motion.component_mul(&motion) + open.diagonal();
+        }
+        variances = sum / count;
+    }
+    Some(variances)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::draws::{Draws, Purpose};
+
+    #[test]
+    fn the_variance_of_a_motion_is_found_and_that_of_none_is_small() {
+        let mut draws = Draws::new(3, Purpose::Points, 0);
+        // A seventh shared number pulls as the second does; all but the motions is known before.
+        let told = DMatrix::from_diagonal(&DVector::from_vec(vec![4e6, 1e6, 1e6, 1.0, 4.0, 0.1, 0.0]));
+        let truth = [0.0, 5e-3, 0.0, 0.0, 0.0, 20.0, 0.0];
+        let pairs: Vec<Told> = (0..200)
+            .map(|_| {
+                let motion = DVector::from_fn(7, |k, _| truth[k] * draws.normal());
+                let noise = DVector::from_fn(7, |k, _| told[(k, k)].sqrt() * draws.normal());
+                Told { matrix: told.clone(), gradient: &told * motion + noise }
+            })
+            .collect();
+        let prior = Told { matrix: DMatrix::identity(7, 7), gradient: DVector::zeros(7) };
+        let found = variances(&pairs, &prior, 0).unwrap().map(f64::sqrt);
+        for k in 0..6 {
+            let noise = 1.0 / told[(k, k)].sqrt();
+            if truth[k] > 0.0 {
+                assert!((found[k] / truth[k] - 1.0).abs() < 0.15, "{k}: {} for {}", found[k], truth[k]);
+            } else {
+                assert!(found[k] < 0.4 * noise, "{k}: {} beside noise of {noise}", found[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_shared_numbers_take_up_is_no_smaller_motion() {
+        // Ten pairs, of whose turns four shared numbers take up their shares.
+        let (pairs_of_each, rounds) = (10, 200);
+        let mut mean = 0.0;
+        let mut draws = Draws::new(5, Purpose::Points, 0);
+        for _ in 0..rounds {
+            let mut all: Vec<Told> = (0..pairs_of_each)
+                .map(|_| {
+                    // Each pair sees the turn and the four numbers as one sum, and the rest well.
+                    let row = DVector::from_fn(10, |k, _| {
+                        if k == 0 {
+                            1.0
+                        } else if k < 6 {
+                            0.0
+                        } else {
+                            draws.normal()
+                        }
+                    });
+                    let turn = draws.normal();
+                    let mut matrix = &row * row.transpose() * 1e6;
+                    (1..6).for_each(|k| matrix[(k, k)] += 1e6);
+                    Told { matrix, gradient: row * (1e6 * turn) }
+                })
+                .collect();
+            let prior = Told { matrix: DMatrix::identity(10, 10) * 1e-6, gradient: DVector::zeros(10) };
+            // The gradient at the minimum of all.
+            let sum = all.iter().fold(prior.matrix.clone(), |sum, pair| sum + &pair.matrix);
+            let pull = all.iter().fold(DVector::zeros(10), |sum, pair| sum + &pair.gradient);
+            let step = -invert(&sum).unwrap() * pull;
+            all.iter_mut().for_each(|pair| pair.gradient += &pair.matrix * &step);
+            mean += variances(&all, &prior, 0).unwrap()[0] / f64::from(rounds);
+        }
+        assert!((mean - 1.0).abs() < 0.15, "{mean}");
+    }
+}
