@@ -4,8 +4,6 @@
 //! derivatives. Features of the corrections (levers, waves) are constants of the pose; the chain that levers are taken on is given,
 //! so that a fit can end on its own.
 
-pub mod points;
-
 use nalgebra::{Matrix3, Matrix3xX, Point3};
 
 use crate::robot::bent::{Bent, Torques};
@@ -18,8 +16,6 @@ pub struct Kinematics {
     nominal: Robot,
     parameters: Vec<Parameter>,
     poses: Vec<PoseConstants>,
-    /// Sine and cosine of each joint's turn at every pose.
-    turns: Vec<Vec<(f64, f64)>>,
 }
 
 #[derive(Debug, Clone)]
@@ -63,15 +59,8 @@ impl Kinematics {
                 features: parameters.iter().map(|&p| feature(p, &torques, q)).collect(),
             }
         };
-        let poses: Vec<PoseConstants> = joints_rad.iter().map(constants).collect();
-        let turns =
-            |(k, joint): (usize, &Joint)| poses.iter().map(|p| joint.turn_rad(p.angles_rad[k]).sin_cos()).collect();
-        Kinematics {
-            nominal: nominal.clone(),
-            parameters: parameters.to_vec(),
-            turns: nominal.joints.iter().enumerate().map(turns).collect(),
-            poses,
-        }
+        let poses = joints_rad.iter().map(constants).collect();
+        Kinematics { nominal: nominal.clone(), parameters: parameters.to_vec(), poses }
     }
 
     /// The free parameters.

@@ -7,7 +7,6 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::problem::Problem;
-use super::swarm_cost::SwarmCost;
 use crate::identify::model::base::Base;
 use crate::identify::residuals::rows::Rows;
 use crate::linear_algebra::product;
@@ -27,8 +26,6 @@ pub struct Fit<'a> {
     prior: DMatrix<f64>,
     /// Root of the unit variance: residuals come out in mm.
     unit_mm: f64,
-    /// The cost without matrices, where the blocks allow it.
-    swarm_cost: Option<SwarmCost>,
 }
 
 impl<'a> Fit<'a> {
@@ -42,8 +39,7 @@ impl<'a> Fit<'a> {
     ) -> Fit<'a> {
         let lower = bounds.iter().map(|b| -b).collect();
         let unit_mm = rows.unit_variance_mm2().sqrt();
-        let swarm_cost = if bounds.iter().all(|b| b.is_finite()) { SwarmCost::new(&rows) } else { None };
-        Fit { rows, base, spread, lower, upper: bounds.to_vec(), prior, unit_mm, swarm_cost }
+        Fit { rows, base, spread, lower, upper: bounds.to_vec(), prior, unit_mm }
     }
 
     /// Offsets of all parameters of the robot, then of the extras.
@@ -90,13 +86,6 @@ impl<'a> Fit<'a> {
 }
 
 impl Problem for Fit<'_> {
-    fn cost(&self, x: &[f64]) -> f64 {
-        let Some(swarm_cost) = &self.swarm_cost else { return 0.5 * self.residuals(x).norm_squared() };
-        let of_prior: f64 =
-            self.prior.row_iter().map(|row| row.iter().zip(x).map(|(w, x)| w * x).sum::<f64>().powi(2)).sum();
-        0.5 * self.unit_mm * self.unit_mm * (swarm_cost.sum_of_squares(&self.offsets(x)) + of_prior)
-    }
-
     fn lower(&self) -> &[f64] {
         &self.lower
     }
