@@ -79,8 +79,9 @@ pub struct Spot {
     /// Index of the pose among the places.
     pub pose: usize,
     pub point_mm: Point3<f64>,
-    /// Its own covariance, mm^2.
     pub covariance_mm2: Matrix3<f64>,
+    /// The matrix that makes white what it is off by: of its own covariance with the robot's scatter, times the weight.
+    pub whitener: Matrix3<f64>,
     /// Where it stands on a body of several targets, in the body's frame, mm; `None` for the mark point.
     pub on_body_mm: Option<Vector3<f64>>,
     /// `sensor_from_target`, where the model uses it.

@@ -5,8 +5,8 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use super::Parameter;
 use super::bent::{Bent, Torques};
+use super::{Joint, Parameter};
 
 /// Columns of angles are per mrad.
 const RAD_PER_MRAD: f64 = 1e-3;
@@ -39,15 +39,37 @@ struct JointScrews {
     slides: bool,
 }
 
-impl Screws {
-    /// Of the robot as it stands (see [`super::Robot::bent`]), with the target at `tool_mm` in the last joint's frame.
-    pub fn new(bent: &Bent, tool_mm: &Vector3<f64>) -> Screws {
+/// What joints do at any reading, where nothing tilts them.
+pub struct Links(Vec<Link>);
+
+/// Alpha and beta, and sine and cosine of both.
+struct Link {
+    angles_rad: [f64; 2],
+    turns: [(f64, f64); 2],
+}
+
+impl Links {
+    pub fn new(joints: &[Joint]) -> Links {
+        let link = |joint: &Joint| {
+            let angles_rad = [joint.alpha_rad, joint.beta_rad];
+            Link { angles_rad, turns: angles_rad.map(f64::sin_cos) }
+        };
+        Links(joints.iter().map(link).collect())
+    }
+
+    /// Goes along the chain; `see` gets every joint's screws. The flange's rotation and the target's point, base frame, mm.
+    #[inline]
+    fn along(
+        &self,
+        bent: &Bent,
+        tool_mm: &Vector3<f64>,
+        mut see: impl FnMut(JointScrews),
+    ) -> (Matrix3<f64>, Point3<f64>) {
         let mut rotation = Matrix3::identity();
         let mut origin = Point3::origin();
-        let mut joints = Vec::with_capacity(bent.joints.len());
-        for (joint, &q) in bent.joints.iter().zip(&bent.joints_rad) {
-            let (sa, ca) = joint.alpha_rad.sin_cos();
-            let (sb, cb) = joint.beta_rad.sin_cos();
+        for ((joint, &q), link) in bent.joints.iter().zip(&bent.joints_rad).zip(&self.0) {
+            let angles = [joint.alpha_rad, joint.beta_rad];
+            let [(sa, ca), (sb, cb)] = if angles == link.angles_rad { link.turns } else { angles.map(f64::sin_cos) };
             let (st, ct) = joint.turn_rad(q).sin_cos();
             let x: Vector3<f64> = rotation.column(0).into();
             let (y0, z0) = (rotation.column(1), rotation.column(2));
@@ -57,12 +79,30 @@ impl Screws {
             origin += joint.a_mm * x;
             let x1 = cb * x - sb * z1;
             let z = sb * x + cb * z1;
-            joints.push(JointScrews { x, before, y, z, origin, sign: joint.sign, slides: joint.slides });
+            see(JointScrews { x, before, y, z, origin, sign: joint.sign, slides: joint.slides });
             origin += joint.shift_mm(q) * z;
             rotation = Matrix3::from_columns(&[ct * x1 + st * y, ct * y - st * x1, z]);
         }
-        let target_mm = origin + rotation * tool_mm;
-        Screws { joints, base_from_flange: rotation, target_mm }
+        (rotation, origin + rotation * tool_mm)
+    }
+
+    /// The flange's rotation and the target's point, base frame, mm, of the robot as it stands.
+    pub fn end(&self, bent: &Bent, tool_mm: &Vector3<f64>) -> (Matrix3<f64>, Point3<f64>) {
+        self.along(bent, tool_mm, |_| {})
+    }
+}
+
+impl Screws {
+    /// Of the robot as it stands (see [`super::Robot::bent`]), with the target at `tool_mm` in the last joint's frame.
+    pub fn new(bent: &Bent, tool_mm: &Vector3<f64>) -> Screws {
+        Screws::with_links(bent, tool_mm, &Links::new(&bent.joints))
+    }
+
+    /// The same with the links of the robot as it is before anything tilts it.
+    pub fn with_links(bent: &Bent, tool_mm: &Vector3<f64>, links: &Links) -> Screws {
+        let mut joints = Vec::with_capacity(bent.joints.len());
+        let (base_from_flange, target_mm) = links.along(bent, tool_mm, |joint| joints.push(joint));
+        Screws { joints, base_from_flange, target_mm }
     }
 
     /// Rotation of the flange, base frame.

@@ -101,8 +101,7 @@ fn products(rows: &Rows, problem: &Linearised, length_mm: f64) -> Vec<Products> 
     let of_block = |(block, placement): (&Block, &Placement)| {
         let Block::Points(points) = block else { return None };
         let spots: Vec<_> = points.spots.iter().map(|s| s.point_mm).collect();
-        let whiteners: Vec<_> =
-            points.spots.iter().map(|s| rows.scatter.whitener(&s.covariance_mm2) * s.weight).collect();
+        let whiteners: Vec<_> = points.spots.iter().map(|s| s.whitener).collect();
         let functions = white(&functions(&spots, length_mm), &whiteners, points.rows_a_spot());
         let all: Vec<usize> = (0..placement.poses.len()).collect();
         let normal = placement.normal(&all, Some(&functions));

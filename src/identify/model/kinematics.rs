@@ -4,10 +4,10 @@
 //! derivatives. Features of the corrections (levers, waves) are constants of the pose; the chain that levers are taken on is given,
 //! so that a fit can end on its own.
 
-use nalgebra::{Matrix3, Matrix3xX, Point3};
+use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
 
 use crate::robot::bent::{Bent, Torques};
-use crate::robot::jacobian::{Feature, Screws, feature};
+use crate::robot::jacobian::{Feature, Links, Screws, feature};
 use crate::robot::{Joint, Parameter, Robot};
 
 /// A robot at fixed commanded poses with chosen parameters free.
@@ -76,11 +76,23 @@ impl Kinematics {
     /// Every pose, with derivatives where asked.
     pub fn places(&self, offsets: &[f64], derivatives: bool) -> Vec<Place> {
         let robot = self.nominal.shifted(&self.parameters, offsets);
-        self.poses.iter().map(|pose| self.place(&robot, pose, offsets, derivatives)).collect()
+        let links = Links::new(&robot.joints);
+        let mut bent = Bent { joints: Vec::new(), joints_rad: Vec::new() };
+        let place = |pose: &PoseConstants| {
+            self.bend(&robot, pose, offsets, &mut bent);
+            if derivatives {
+                self.with_columns(&robot, &links, pose, &bent)
+            } else {
+                without_columns(&robot, &links, &bent)
+            }
+        };
+        self.poses.iter().map(place).collect()
     }
 
-    fn place(&self, robot: &Robot, pose: &PoseConstants, offsets: &[f64], derivatives: bool) -> Place {
-        let mut bent = Bent { joints: robot.joints.clone(), joints_rad: pose.angles_rad.clone() };
+    /// The robot as it stands at a pose.
+    fn bend(&self, robot: &Robot, pose: &PoseConstants, offsets: &[f64], bent: &mut Bent) {
+        bent.joints.clone_from(&robot.joints);
+        bent.joints_rad.clone_from(&pose.angles_rad);
         for (joint, tilt) in pose.tilts_rad.iter().enumerate() {
             bent.tilt(joint, *tilt);
         }
@@ -93,15 +105,24 @@ impl Kinematics {
                 *angle += offset / 1000.0 * feature[0];
             }
         }
-        let screws = Screws::new(&bent, &robot.tool_mm);
-        let (mut point_columns, mut rotation_columns) = (Matrix3xX::zeros(0), Matrix3xX::zeros(0));
-        if derivatives && !self.parameters.is_empty() {
-            let columns = || self.parameters.iter().zip(&pose.features);
-            point_columns =
-                Matrix3xX::from_columns(&columns().map(|(&p, &f)| screws.point_column(p, f)).collect::<Vec<_>>());
-            rotation_columns =
-                Matrix3xX::from_columns(&columns().map(|(&p, &f)| screws.rotation_column(p, f)).collect::<Vec<_>>());
-        }
-        Place { point_mm: screws.target_mm, rotation: *screws.base_from_flange(), point_columns, rotation_columns }
     }
+
+    fn with_columns(&self, robot: &Robot, links: &Links, pose: &PoseConstants, bent: &Bent) -> Place {
+        let screws = Screws::with_links(bent, &robot.tool_mm, links);
+        let columns = |of: &dyn Fn(Parameter, Feature) -> Vector3<f64>| {
+            let all = self.parameters.iter().zip(&pose.features).map(|(&p, &f)| of(p, f));
+            Matrix3xX::from_iterator(self.parameters.len(), all.flat_map(<[f64; 3]>::from))
+        };
+        Place {
+            point_mm: screws.target_mm,
+            rotation: *screws.base_from_flange(),
+            point_columns: columns(&|p, f| screws.point_column(p, f)),
+            rotation_columns: columns(&|p, f| screws.rotation_column(p, f)),
+        }
+    }
+}
+
+fn without_columns(robot: &Robot, links: &Links, bent: &Bent) -> Place {
+    let (rotation, point_mm) = links.end(bent, &robot.tool_mm);
+    Place { point_mm, rotation, point_columns: Matrix3xX::zeros(0), rotation_columns: Matrix3xX::zeros(0) }
 }

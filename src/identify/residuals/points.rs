@@ -114,7 +114,7 @@ impl Points {
             let (place, row) = (&places[spot.pose], rows * i);
             let part = Points::on_body(place, &flange_from_target, spot).unwrap_or_else(Vector3::zeros);
             let turned = frame.rotation * (place.point_mm.coords + part);
-            let whiten = scatter.whitener(&spot.covariance_mm2) * spot.weight;
+            let whiten = spot.whitener;
             let residual = Points::point_residual(place, extras, frame, &flange_from_target, spot);
             residuals.fixed_rows_mut::<3>(row).copy_from(&(whiten * residual));
             design.fixed_view_mut::<3, 6>(row, 0).copy_from(&(whiten * rigid_columns(&turned)));
@@ -143,7 +143,7 @@ impl Points {
         let mut jacobian = DMatrix::zeros(rows * self.spots.len(), robot + extras.len());
         for (i, spot) in self.spots.iter().enumerate() {
             let (place, row) = (&places[spot.pose], rows * i);
-            let whiten = scatter.whitener(&spot.covariance_mm2) * spot.weight;
+            let whiten = spot.whitener;
             jacobian.view_mut((row, 0), (3, robot)).copy_from(&(whiten * rotation * &place.point_columns));
             for (k, column) in spot.extra.column_iter().enumerate() {
                 jacobian.fixed_view_mut::<3, 1>(row, robot + k).copy_from(&(whiten * column));
@@ -237,6 +237,7 @@ mod tests {
             pose: k,
             point_mm: sensor_from_base * at(k),
             covariance_mm2: Matrix3::identity(),
+            whitener: Matrix3::identity(),
             on_body_mm: None,
             rotation: None,
             weight: 1.0,

@@ -320,15 +320,19 @@ impl Inputs<'_> {
     fn spot(&self, row: usize) -> Option<Spot> {
         let pose = self.place_of(row)?;
         match &self.spec.set.poses[row].reading {
-            Reading::Position { point_mm, covariance_mm2, rotation_rad } => Some(Spot {
-                pose,
-                point_mm: *point_mm,
-                on_body_mm: self.spec.set.poses[row].on_body_mm,
-                covariance_mm2: covariance_mm2.unwrap_or_else(Matrix3::zeros),
-                rotation: rotation_rad.map(|r| Rotation3::new(r).into_inner()),
-                weight: self.weight(row),
-                extra: point_extra(self.spec.set, row, point_mm, self.spec.extras),
-            }),
+            Reading::Position { point_mm, covariance_mm2, rotation_rad } => {
+                let (weight, covariance_mm2) = (self.weight(row), covariance_mm2.unwrap_or_else(Matrix3::zeros));
+                Some(Spot {
+                    pose,
+                    point_mm: *point_mm,
+                    on_body_mm: self.spec.set.poses[row].on_body_mm,
+                    covariance_mm2,
+                    whitener: self.spec.scatter.whitener(&covariance_mm2) * weight,
+                    rotation: rotation_rad.map(|r| Rotation3::new(r).into_inner()),
+                    weight,
+                    extra: point_extra(self.spec.set, row, point_mm, self.spec.extras),
+                })
+            }
             _ => None,
         }
     }
@@ -385,8 +389,7 @@ impl Inputs<'_> {
             let mut points =
                 Points { spots, sensor_from_base, on_a_line, flange_from_target, oriented, target, field: None };
             points.field = scatter.smooth.map(|error| {
-                let white = |s: &Spot| (s.point_mm, scatter.whitener(&s.covariance_mm2) * s.weight);
-                let spots: Vec<_> = points.spots.iter().map(white).collect();
+                let spots: Vec<_> = points.spots.iter().map(|s| (s.point_mm, s.whitener)).collect();
                 Box::new(Field::new(&spots, points.rows_a_spot(), error))
             });
             Block::Points(points)
