@@ -41,22 +41,27 @@ pub fn rotation_vector_of_matrix(rotation: &Matrix3<f64>) -> Vector3<f64> {
 /// Square of the sine up to which a turn is small enough for a short series.
 const SMALL_SINE_SQUARED: f64 = 1e-3;
 
-/// Applies a small change: `exp(delta_r)` on the left of the rotation, `delta_t` added to the translation.
-pub fn perturb(a_from_b: &Transform, delta_r_rad: Vector3<f64>, delta_t_mm: Vector3<f64>) -> Transform {
+/// Applies a small change, the first six numbers of `delta`: `exp` of three (rad) on the left of the rotation, three (mm) added to the
+/// translation.
+pub fn perturb(a_from_b: &Transform, delta: &[f64]) -> Transform {
+    let [delta_r_rad, delta_t_mm] = [&delta[..3], &delta[3..6]].map(Vector3::from_column_slice);
     let mut rotation = UnitQuaternion::from_scaled_axis(delta_r_rad) * a_from_b.rotation;
     rotation.renormalize();
     Isometry3::from_parts(Translation3::from(a_from_b.translation.vector + delta_t_mm), rotation)
 }
 
-/// The matrix of the cross product: `skew(a) * b = a x b`.
-pub fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
-    Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
+/// A rotation whose z-axis points along `axis` and whose x-axis is as level as can be.
+pub fn facing(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let z = axis.normalize();
+    let level = Vector3::z().cross(&z);
+    let x = if level.norm() > 1e-6 { level.normalize() } else { Vector3::x() };
+    transform_from_matrix(Matrix3::from_columns(&[x, z.cross(&x), z]), Vector3::zeros()).rotation
 }
 
-/// How a small rigid motion (turn about the origin, then shift) moves a point: `[-skew(point), I]`.
+/// How a small rigid motion (turn about the origin, then shift) moves a point: `[-[point]x, I]`.
 pub fn rigid_columns(point: &Vector3<f64>) -> Matrix3x6<f64> {
     let mut columns = Matrix3x6::zeros();
-    columns.fixed_view_mut::<3, 3>(0, 0).copy_from(&-skew(point));
+    columns.fixed_view_mut::<3, 3>(0, 0).copy_from(&-point.cross_matrix());
     columns.fixed_view_mut::<3, 3>(0, 3).copy_from(&Matrix3::identity());
     columns
 }

@@ -1,10 +1,10 @@
 //! What the cameras see: the field of a calibrated rig, the target in it, and where the cameras are assumed to stand.
 
-use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::error::{Error, Result};
 use super::settings::Settings;
-use crate::geometry::{Transform, rotation_matrix, transform, transform_from_matrix};
+use crate::geometry::{Transform, facing, rotation_matrix, transform, transform_from_matrix};
 use crate::imaging::Board;
 use crate::robot::{Robot, inverse};
 use crate::stereo::Rig;
@@ -20,8 +20,9 @@ const BORDER: f64 = 0.02;
 /// Starts for the posture at a sphere's middle.
 const STARTS: usize = 200;
 
-/// ISO 9283's RP over the standard deviation of a coordinate, for three equal normal ones.
-const RP_OVER_SIGMA: f64 = 3.616;
+/// ISO 9283: RP is the mean distance from the barycentre plus three standard deviations. For three equal
+/// normal coordinates of standard deviation s that is (1.596 + 3 * 0.673) s.
+pub const RP_OVER_SIGMA: f64 = 3.616;
 
 /// Reach of the paper's robot, as [`reach_mm`] counts it.
 fn paper_reach_mm() -> f64 {
@@ -111,19 +112,7 @@ impl Scene {
     /// Whether the whole plate is in both pictures, the plate so much larger on all sides, mm.
     pub fn sees(&self, left_from_target: &Transform, margin_mm: f64) -> bool {
         let (w, h) = half_plate(&self.board);
-        let (w, h) = (w + margin_mm, h + margin_mm);
-        [(-w, -h), (w, -h), (w, h), (-w, h)].iter().all(|&(x, y)| {
-            let point = left_from_target * Point3::new(x, y, 0.0);
-            if point.z <= 0.0 || (self.rig.right_from_left * point).z <= 0.0 {
-                return false;
-            }
-            let (left, right) = self.rig.project(&point);
-            [(left, &self.rig.left), (right, &self.rig.right)].iter().all(|(px, camera)| {
-                let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-                let border = BORDER * width;
-                px.x > border && px.x < width - 1.0 - border && px.y > border && px.y < height - 1.0 - border
-            })
-        })
+        self.rig.sees_plate(left_from_target, (w + margin_mm, h + margin_mm), BORDER)
     }
 
     /// Whether the pose is one to plan: wholly seen, its printed side to the cameras, in the depth of field, not too oblique.
@@ -169,14 +158,6 @@ pub fn reach_mm(robot: &Robot) -> f64 {
 /// The target's printed side looks along the flange's z: its own z points back.
 pub fn flange_from_target(robot: &Robot) -> Transform {
     transform(Vector3::x() * std::f64::consts::PI, robot.tool_mm)
-}
-
-/// A rotation whose z points along `axis` and whose x is as level as can be.
-fn facing(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let z = axis.normalize();
-    let level = Vector3::z().cross(&z);
-    let x = if level.norm() > 1e-6 { level.normalize() } else { Vector3::x() };
-    transform_from_matrix(Matrix3::from_columns(&[x, z.cross(&x), z]), Vector3::zeros()).rotation
 }
 
 /// Directions of the flange, the paper's first: level, then lower and lower, all round.

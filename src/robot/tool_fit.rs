@@ -77,7 +77,7 @@ impl Robot {
                 damping *= 10.0;
                 continue;
             };
-            let next = perturb(&frame, step.fixed_rows::<3>(0).into(), step.fixed_rows::<3>(3).into());
+            let next = perturb(&frame, step.as_slice());
             let moved = tool + step.fixed_rows::<3>(6);
             let then = residuals(&next, &moved);
             let (before, after) = (cost(&now), cost(&then));

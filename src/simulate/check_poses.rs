@@ -1,6 +1,6 @@
 //! Where the check board is held: tilted every way, near and far, wholly inside both pictures.
 
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::Error;
 use super::draws::{Draws, Purpose};
@@ -44,20 +44,7 @@ const BORDER: f64 = 0.004;
 
 /// True where the whole plate is inside both pictures.
 pub fn seen_by_both(rig: &Rig, board: &PhysicalBoard, left_from_board: &Transform) -> bool {
-    let (w, h) = board.plate_half_mm();
-    [(-w, -h), (w, -h), (w, h), (-w, h)].iter().all(|&(x, y)| {
-        let point = left_from_board * Point3::new(x, y, 0.0);
-        let in_right = rig.right_from_left * point;
-        if point.z <= 0.0 || in_right.z <= 0.0 {
-            return false;
-        }
-        let (left, right) = rig.project(&point);
-        [(left, &rig.left), (right, &rig.right)].iter().all(|(px, camera)| {
-            let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-            let border = BORDER * width;
-            px.x > border && px.x < width - 1.0 - border && px.y > border && px.y < height - 1.0 - border
-        })
-    })
+    rig.sees_plate(left_from_board, board.plate_half_mm(), BORDER)
 }
 
 /// `left_from_board` of each pair of the presets' rig.

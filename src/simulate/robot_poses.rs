@@ -8,8 +8,9 @@ use super::draws::{Draws, Purpose};
 use super::physical_board::PhysicalBoard;
 use super::rig::left_from_field;
 use super::settings::{Orientation, Settings, Sphere};
-use crate::geometry::{Transform, transform};
+use crate::geometry::{Transform, facing, transform};
 use crate::measurements::{RobotPose, Role};
+use crate::plan::scene::RP_OVER_SIGMA;
 use crate::robot::{Robot, inverse};
 use crate::stereo::Rig;
 
@@ -31,10 +32,6 @@ const POSTURE_STARTS: usize = 200;
 
 /// Draws a pose before it is given up.
 const ATTEMPTS: usize = 4000;
-
-/// ISO 9283: RP is the mean distance from the barycentre plus three standard deviations. For three equal
-/// normal coordinates of standard deviation s that is (1.596 + 3 * 0.673) s.
-const RP_OVER_SIGMA: f64 = 3.616;
 
 /// A pose of the robot and what is true there.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,15 +58,6 @@ fn flange_from_target(robot: &Robot, mounting_rad: Vector3<f64>) -> Transform {
     let facing = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
     let turned = UnitQuaternion::from_scaled_axis(mounting_rad) * facing;
     transform(turned.scaled_axis(), robot.tool_mm)
-}
-
-/// A rotation whose z-axis points along `axis` and whose x-axis lies as level as can be.
-fn facing(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let z = axis.normalize();
-    let level = Vector3::z().cross(&z);
-    let x = if level.norm() > 1e-6 { level.normalize() } else { Vector3::x() };
-    let rotation = nalgebra::Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[x, z.cross(&x), z]));
-    UnitQuaternion::from_rotation_matrix(&rotation)
 }
 
 struct Group<'a> {

@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix3, Matrix4x3, Point2, Point3, Vector2, Vector3, Vector4};
 
-use crate::geometry::{rotation_matrix, skew};
+use crate::geometry::rotation_matrix;
 use crate::imaging::Side;
 use crate::stereo::Rig;
 use crate::stereo::data::observation::Observation;
@@ -133,7 +133,7 @@ impl Linear {
             by_rig[i] = upper(left.whitener * l.by_camera[i]);
             by_rig[CAMERA_NUMBERS + i] = lower(right.whitener * r.by_camera[i]);
         }
-        let turn = -(r_by_point * skew(&(rig.right_from_left.rotation * point.coords)));
+        let turn = -(r_by_point * (rig.right_from_left.rotation * point.coords).cross_matrix());
         for i in 0..3 {
             by_rig[2 * CAMERA_NUMBERS + i] = lower(turn.column(i).into());
             by_rig[2 * CAMERA_NUMBERS + 3 + i] = lower(r_by_point.column(i).into());

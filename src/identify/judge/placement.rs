@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
 
-use crate::geometry::{Transform, rigid_columns, rotation_matrix, skew, transform_from_matrix};
+use crate::geometry::{Transform, rigid_columns, rotation_matrix, transform_from_matrix};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::uncertainty::Lengths;
 use crate::identify::model::kinematics::{Kinematics, Place};

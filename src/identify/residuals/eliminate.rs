@@ -242,7 +242,7 @@ impl Unknowns {
             Unknowns::Sockets(sockets) => {
                 Unknowns::Sockets(sockets.iter().enumerate().map(|(k, c)| c + three(3 * k)).collect())
             }
-            Unknowns::Frame(frame) => Unknowns::Frame(crate::geometry::perturb(frame, three(0), three(3))),
+            Unknowns::Frame(frame) => Unknowns::Frame(crate::geometry::perturb(frame, step.as_slice())),
         }
     }
 }

@@ -152,7 +152,7 @@ fn rigid_motions(spots: &[Spot], colour: &[Matrix3<f64>]) -> DMatrix<f64> {
         let bleach = colour.try_inverse().unwrap_or_else(Matrix3::identity);
         let arm = spot.point_mm.coords - centroid;
         motions.fixed_view_mut::<3, 3>(3 * i, 0).copy_from(&bleach);
-        motions.fixed_view_mut::<3, 3>(3 * i, 3).copy_from(&(bleach * crate::geometry::skew(&arm)));
+        motions.fixed_view_mut::<3, 3>(3 * i, 3).copy_from(&(bleach * arm.cross_matrix()));
     }
     if n < 2 { motions } else { motions.qr().q() }
 }

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 
 use super::smooth::Field;
 use crate::geometry::{
-    Transform, cross_covariance, fitted_frame, rigid_columns, rotation_matrix, rotation_vector_of_matrix, skew,
+    Transform, cross_covariance, fitted_frame, rigid_columns, rotation_matrix, rotation_vector_of_matrix,
 };
 use crate::identify::model::kinematics::Place;
 use crate::identify::residuals::raw::Raw;
@@ -149,7 +149,7 @@ impl Points {
                 jacobian.fixed_view_mut::<3, 1>(row, robot + k).copy_from(&(whiten * column));
             }
             if let Some(part) = Points::on_body(place, &flange_from_target, spot) {
-                let swing = -(whiten * rotation * skew(&part));
+                let swing = -(whiten * rotation * part.cross_matrix());
                 let mut of_robot = jacobian.view_mut((row, 0), (3, robot));
                 of_robot += swing * &place.rotation_columns;
                 for &(k, axis) in &self.target {

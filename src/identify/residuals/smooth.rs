@@ -162,12 +162,11 @@ fn spread_out(points: &[Point3<f64>]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::skew;
 
     fn points() -> Vec<(Point3<f64>, Matrix3<f64>)> {
         let place =
             |i: usize| Point3::new((3.1 * i as f64).sin(), (1.7 * i as f64).cos(), (0.9 * i as f64).sin()) * 400.0;
-        let whitener = |i: usize| Matrix3::identity() * (40.0 + i as f64) + skew(&Vector3::new(3.0, -2.0, 1.0));
+        let whitener = |i: usize| Matrix3::identity() * (40.0 + i as f64) + Vector3::new(3.0, -2.0, 1.0).cross_matrix();
         (0..20).map(|i| (place(i), whitener(i))).collect()
     }
 

@@ -131,6 +131,14 @@ impl Camera {
             }
             let dx = (slope.m22 * miss.x - slope.m12 * miss.y) / det;
             let dy = (slope.m11 * miss.y - slope.m21 * miss.x) / det;
+    /// Adds a step to `fx fy cx cy k1 k2 ...`, as many of them as it has.
+    pub fn add(&mut self, step: &[f64]) {
+        let Camera { fx, fy, cx, cy, distortion, .. } = self;
+        for (number, change) in [fx, fy, cx, cy].into_iter().chain(distortion).zip(step) {
+            *number += change;
+        }
+    }
+
             n.x -= dx;
             n.y -= dy;
             if dx.abs().max(dy.abs()) < 1e-14 * (1.0 + n.coords.amax()) {

@@ -1,11 +1,9 @@
 //! Which numbers of a rig are free, where each stands in the vector of unknowns, and how a step changes them.
 
-use nalgebra::Vector3;
-
 use crate::geometry::{Transform, perturb};
 use crate::imaging::Side;
 use crate::stereo::model::board_shape;
-use crate::stereo::{Camera, Lens, Rig};
+use crate::stereo::{Lens, Rig};
 
 /// Names of a camera's numbers in the order of [`crate::stereo::model::projection::Projection::by_camera`].
 pub const CAMERA_NAMES: [&str; 18] =
@@ -128,28 +126,15 @@ impl Layout {
         let mut next = shared.clone();
         for side in Side::BOTH {
             let start = self.camera_start(side);
-            let camera = match side {
-                Side::Left => &mut next.rig.left,
-                Side::Right => &mut next.rig.right,
-            };
-            add_to_camera(camera, &step[start..start + self.camera_count(side)]);
+            next.rig.camera_mut(side).add(&step[start..start + self.camera_count(side)]);
         }
         if self.transform {
-            let s = &step[self.transform_start()..];
-            next.rig.right_from_left =
-                perturb(&next.rig.right_from_left, Vector3::new(s[0], s[1], s[2]), Vector3::new(s[3], s[4], s[5]));
+            next.rig.right_from_left = perturb(&next.rig.right_from_left, &step[self.transform_start()..]);
         }
         if self.shape {
             let s = &step[self.shape_start()..];
             next.shape_mm.iter_mut().zip(s).for_each(|(height, change)| *height += change);
         }
         next
-    }
-}
-
-fn add_to_camera(camera: &mut Camera, step: &[f64]) {
-    let Camera { fx, fy, cx, cy, distortion, .. } = camera;
-    for (number, change) in [fx, fy, cx, cy].into_iter().chain(distortion).zip(step) {
-        *number += change;
     }
 }

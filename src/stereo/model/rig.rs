@@ -48,6 +48,31 @@ impl Rig {
         }
     }
 
+    /// The same, to be changed.
+    pub fn camera_mut(&mut self, side: Side) -> &mut Camera {
+        match side {
+            Side::Left => &mut self.left,
+            Side::Right => &mut self.right,
+        }
+    }
+
+    /// Whether a plate of these half sides (mm), in its own x-y plane, is wholly inside both pictures; `border` is what stays clear at the
+    /// edge, as a share of a picture's width.
+    pub fn sees_plate(&self, left_from_plate: &Transform, (w, h): (f64, f64), border: f64) -> bool {
+        [(-w, -h), (w, -h), (w, h), (-w, h)].iter().all(|&(x, y)| {
+            let point = left_from_plate * Point3::new(x, y, 0.0);
+            if point.z <= 0.0 || (self.right_from_left * point).z <= 0.0 {
+                return false;
+            }
+            let (left, right) = self.project(&point);
+            [(left, &self.left), (right, &self.right)].iter().all(|(px, camera)| {
+                let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+                let border = border * width;
+                px.x > border && px.x < width - 1.0 - border && px.y > border && px.y < height - 1.0 - border
+            })
+        })
+    }
+
     /// Distance of the two cameras' centres, mm.
     pub fn baseline_mm(&self) -> f64 {
         self.right_from_left.translation.vector.norm()

@@ -8,7 +8,7 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{DVector, Vector3, Vector6};
+use nalgebra::{DVector, Vector6};
 use rayon::prelude::*;
 
 use crate::geometry::perturb;
@@ -206,7 +206,7 @@ pub fn equations(views: &[View], layout: &Layout, priors: &Priors, values: &Valu
 fn with_poses_following(values: &Values, there: &Equations) -> Option<Values> {
     let poses = there.blocks.iter().zip(&values.poses).map(|(block, pose)| {
         let step: Vector6<f64> = -(block.pose_inverse(0.0)? * block.pose_gradient);
-        Some(perturb(pose, Vector3::new(step[0], step[1], step[2]), Vector3::new(step[3], step[4], step[5])))
+        Some(perturb(pose, step.as_slice()))
     });
     Some(Values { shared: values.shared.clone(), poses: poses.collect::<Option<_>>()? })
 }
@@ -226,11 +226,7 @@ fn try_step(layout: &Layout, values: &Values, equations: &Equations, damping: f6
         let right = block.pose_gradient + block.mixed.tr_mul(&step);
         let pose_step: Vector6<f64> = -(block.pose_inverse(damping)? * right);
         predicted_gain -= 0.5 * block.pose_gradient.dot(&pose_step);
-        poses.push(perturb(
-            pose,
-            Vector3::new(pose_step[0], pose_step[1], pose_step[2]),
-            Vector3::new(pose_step[3], pose_step[4], pose_step[5]),
-        ));
+        poses.push(perturb(pose, pose_step.as_slice()));
         predicted_gain -= 0.5 * block.shared_gradient.dot(&step);
     }
     Some((Values { shared: layout.step(&values.shared, step.as_slice()), poses }, predicted_gain))

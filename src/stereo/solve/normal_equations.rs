@@ -287,7 +287,6 @@ mod tests {
     use crate::stereo::Lens;
     use crate::stereo::solve::priors::Priors;
     use crate::stereo::synthetic::World;
-    use nalgebra::Vector3;
 
     fn cost(shared: &Shared, layout: &Layout, pose: &Transform, view: &View) -> f64 {
         block(shared, layout, pose, view, Loss::Cauchy(2.0)).unwrap().cost
@@ -319,11 +318,9 @@ mod tests {
         }
         for i in 0..6 {
             let at = |h: f64| {
-                let mut step = Vector6::zeros();
+                let mut step = Vector6::<f64>::zeros();
                 step[i] = h;
-                let moved =
-                    perturb(pose, Vector3::new(step[0], step[1], step[2]), Vector3::new(step[3], step[4], step[5]));
-                cost(&shared, &layout, &moved, &view)
+                cost(&shared, &layout, &perturb(pose, step.as_slice()), &view)
             };
             let h = if i < 3 { 1e-6 } else { 1e-4 };
             close((at(h) - at(-h)) / (2.0 * h), analytic.pose_gradient[i], "pose");

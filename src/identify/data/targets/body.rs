@@ -160,7 +160,7 @@ impl Body {
         let mut at = self.equations(pose, &frame);
         for _ in 0..STEPS {
             let step = at.normal.cholesky()?.solve(&at.gradient);
-            let next = perturb(&frame, step.fixed_rows::<3>(0).into(), step.fixed_rows::<3>(3).into());
+            let next = perturb(&frame, step.as_slice());
             let there = self.equations(pose, &next);
             if there.cost >= at.cost {
                 break;

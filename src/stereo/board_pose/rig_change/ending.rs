@@ -99,7 +99,7 @@ impl<'a> Run<'a> {
 /// Turn of the right camera, deg, and way of its centre, mm.
 fn size_of(change: &Change, rig: &Rig) -> [f64; 2] {
     let c = &change.change;
-    let moved = perturb(&rig.right_from_left, Vector3::new(c[0], c[1], c[2]), Vector3::new(c[3], c[4], c[5]));
+    let moved = perturb(&rig.right_from_left, c.as_slice());
     let way = moved.inverse().translation.vector - rig.right_from_left.inverse().translation.vector;
     [Vector3::new(c[0], c[1], c[2]).norm().to_degrees(), way.norm()]
 }

@@ -1,6 +1,6 @@
 //! One pose with everything shared held: the poses that the bundle did without, and the figures of those that it had.
 
-use nalgebra::{DMatrix, Point3, Vector2, Vector3, Vector6};
+use nalgebra::{DMatrix, Point3, Vector2};
 
 use crate::geometry::{Transform, perturb};
 use crate::imaging::{Board, Side};
@@ -109,8 +109,7 @@ impl<'a> Known<'a> {
             let (step, promise) = at.step()?;
             let mut share = 1.0;
             let better = loop {
-                let s: Vector6<f64> = step * share;
-                let trial = perturb(&pose, Vector3::new(s[0], s[1], s[2]), Vector3::new(s[3], s[4], s[5]));
+                let trial = perturb(&pose, (step * share).as_slice());
                 match PoseSums::of(&self.seen(view, &trial), loss) {
                     Some(next) if next.cost <= at.cost => break Some((trial, next)),
                     _ if share < 1e-3 => break None,

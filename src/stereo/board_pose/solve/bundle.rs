@@ -194,8 +194,7 @@ impl Values {
                 .map(|(pose, part)| {
                     let (pose, part) = (pose.as_ref()?, part.as_ref()?);
                     let shared = &part.by_shared * step;
-                    let s = (part.step_to + shared) * share;
-                    Some(perturb(pose, Vector3::new(s[0], s[1], s[2]), Vector3::new(s[3], s[4], s[5])))
+                    Some(perturb(pose, ((part.step_to + shared) * share).as_slice()))
                 })
                 .collect(),
         }

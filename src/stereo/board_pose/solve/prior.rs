@@ -84,17 +84,9 @@ impl RigPrior {
         let step = &self.basis * unknowns;
         let mut rig = self.rig.clone();
         for (camera, start) in [(&mut rig.left, 0), (&mut rig.right, CAMERA_NUMBERS)] {
-            camera.fx += step[start];
-            camera.fy += step[start + 1];
-            camera.cx += step[start + 2];
-            camera.cy += step[start + 3];
-            for (number, change) in camera.distortion.iter_mut().zip(&step.as_slice()[start + 4..]) {
-                *number += change;
-            }
+            camera.add(&step.as_slice()[start..]);
         }
-        let t = &step.as_slice()[TRANSFORM..];
-        rig.right_from_left =
-            perturb(&rig.right_from_left, Vector3::new(t[0], t[1], t[2]), Vector3::new(t[3], t[4], t[5]));
+        rig.right_from_left = perturb(&rig.right_from_left, &step.as_slice()[TRANSFORM..]);
         rig
     }
 }
