@@ -13,6 +13,14 @@ pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     a.transpose() * b
 }
 
+/// A symmetric matrix with rows of different units brought to a unit diagonal, and the factors of its rows and columns that do it. `None` where an
+/// element of the diagonal is not above zero.
+pub fn to_unit_diagonal(matrix: &DMatrix<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());
+    let scaled = || DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    scale.iter().all(|s| s.is_finite()).then(|| (scaled(), scale.clone()))
+}
+
 /// Of a symmetric matrix that may lack rank. Rows and columns are brought to a common size first: radians and mm mix.
 pub fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     if matrix.is_empty() {

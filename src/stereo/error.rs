@@ -53,10 +53,7 @@ pub enum Error {
     },
     /// One camera's pictures fit no camera.
     #[error("the corners in the {} pictures fit no camera", side.name())]
-    NoCamera {
-        /// Whose.
-        side: Side,
-    },
+    NoCamera { side: Side },
     /// Most pairs do not belong to one rig.
     #[error(
         "the pairs contradict each other: {} fit one rig; half of them miss it by {usual_px:.1} px and more, \
@@ -100,10 +97,7 @@ pub enum Error {
     },
     /// One move that is stated twice.
     #[error("the move between pairs {} and {} is stated twice", pairs[0], pairs[1])]
-    MoveTwice {
-        /// The pairs.
-        pairs: [String; 2],
-    },
+    MoveTwice { pairs: [String; 2] },
     /// The views do not tell the cameras.
     #[error("the views are too similar to tell the cameras{}{}", focal(.focal_sigma), reasons(.skipped))]
     Undetermined {
@@ -116,10 +110,7 @@ pub enum Error {
     #[error(
         "the pairs do not determine a {lens} lens: several of its numbers can be exchanged for each other without moving any corner"
     )]
-    LensUndetermined {
-        /// The lens.
-        lens: &'static str,
-    },
+    LensUndetermined { lens: &'static str },
     /// The search did not end at a minimum.
     #[error("the calibration did not converge within {steps} steps")]
     NotConverged {

@@ -1,20 +1,25 @@
 //! What a rig and its poses leave of the corners.
 
-use nalgebra::Vector2;
+use nalgebra::{Point3, Vector2};
 
 use crate::geometry::Transform;
 use crate::imaging::Side;
 use crate::statistics::median;
+use crate::stereo::Rig;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::{Shared, Values};
 
 /// Predicted minus seen, px. `None` for a corner behind its camera.
 pub fn residual_px(shared: &Shared, left_from_board: &Transform, o: &Observation) -> Option<Vector2<f64>> {
-    let in_left = left_from_board * o.board_point(&shared.shape_mm);
+    of_point(&shared.rig, left_from_board * o.board_point(&shared.shape_mm), o)
+}
+
+/// The same of a corner at a point in the left camera's frame, mm.
+pub fn of_point(rig: &Rig, in_left: Point3<f64>, o: &Observation) -> Option<Vector2<f64>> {
     let (camera, point) = match o.side {
-        Side::Left => (&shared.rig.left, in_left),
-        Side::Right => (&shared.rig.right, shared.rig.right_from_left * in_left),
+        Side::Left => (&rig.left, in_left),
+        Side::Right => (&rig.right, rig.right_from_left * in_left),
     };
     let in_front = point.z > 0.0;
     in_front.then(|| camera.project(&point) - o.px).filter(|r| r.x.is_finite() && r.y.is_finite())
@@ -37,20 +42,17 @@ pub fn of_view(shared: &Shared, view: &View, pose: &Transform) -> Vec<(Observati
 
 /// Root mean square of the length of the 2-D residuals of one picture's active corners, px, as OpenCV defines it.
 pub fn rms_px(shared: &Shared, left_from_board: &Transform, view: &View, side: Side) -> Option<f64> {
-    let squares = view
-        .active(side)
-        .map(|o| residual_px(shared, left_from_board, o).map(|r| r.norm_squared()))
-        .collect::<Option<Vec<f64>>>()?;
+    let squares: Vec<f64> = of_picture(shared, left_from_board, view, side)?.iter().map(|r| r.norm_squared()).collect();
     root_mean_square(&squares)
 }
 
 /// Median length of one picture's residuals, px.
 pub fn median_px(shared: &Shared, left_from_board: &Transform, view: &View, side: Side) -> Option<f64> {
-    let all = view
-        .active(side)
-        .map(|o| residual_px(shared, left_from_board, o).map(|r| r.norm()))
-        .collect::<Option<Vec<f64>>>()?;
-    median(all)
+    median(of_picture(shared, left_from_board, view, side)?.iter().map(|r| r.norm()))
+}
+
+fn of_picture(shared: &Shared, left_from_board: &Transform, view: &View, side: Side) -> Option<Vec<Vector2<f64>>> {
+    view.active(side).map(|o| residual_px(shared, left_from_board, o)).collect()
 }
 
 /// Root of the mean of squares; `None` of nothing.

@@ -75,10 +75,7 @@ impl ResidualPattern {
 pub fn check(calibration: &Calibration) -> ResidualPattern {
     let shared = &calibration.values.shared;
     let mut fields = Side::BOTH.map(|side| {
-        let camera = match side {
-            Side::Left => &shared.rig.left,
-            Side::Right => &shared.rig.right,
-        };
+        let camera = shared.rig.camera(side);
         Gather::new(side, camera.width, camera.height)
     });
     for (view, pose) in calibration.views.iter().zip(&calibration.values.poses) {

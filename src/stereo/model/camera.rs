@@ -1,6 +1,6 @@
 //! One camera: a pinhole with OpenCV's distortion model.
 
-use nalgebra::{Matrix3, Point2, Point3, Vector3};
+use nalgebra::{Matrix3, Point2, Point3};
 
 /// How many numbers of OpenCV's distortion vector are free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -103,17 +103,7 @@ impl Camera {
 
     /// Normalised image coordinates (x/z, y/z) as the lens bends them (OpenCV, `calib3d` documentation).
     pub fn distort(&self, n: &Point2<f64>) -> Point2<f64> {
-        let [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y] = self.distortion;
-        let (x, y) = (n.x, n.y);
-        let r2 = x * x + y * y;
-        let radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
-        let xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x) + r2 * (s1 + r2 * s2);
-        let yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y + r2 * (s3 + r2 * s4);
-        if tau_x == 0.0 && tau_y == 0.0 {
-            return Point2::new(xd, yd);
-        }
-        let tilted = tilt_matrix(tau_x, tau_y) * Vector3::new(xd, yd, 1.0);
-        Point2::new(tilted.x / tilted.z, tilted.y / tilted.z)
+        self.distort_with_slope(n).0
     }
 
     /// The ray through a raw picture point: normalised coordinates (x/z, y/z) with `distort` undone by Newton's method.
@@ -131,14 +121,6 @@ impl Camera {
             }
             let dx = (slope.m22 * miss.x - slope.m12 * miss.y) / det;
             let dy = (slope.m11 * miss.y - slope.m21 * miss.x) / det;
-    /// Adds a step to `fx fy cx cy k1 k2 ...`, as many of them as it has.
-    pub fn add(&mut self, step: &[f64]) {
-        let Camera { fx, fy, cx, cy, distortion, .. } = self;
-        for (number, change) in [fx, fy, cx, cy].into_iter().chain(distortion).zip(step) {
-            *number += change;
-        }
-    }
-
             n.x -= dx;
             n.y -= dy;
             if dx.abs().max(dy.abs()) < 1e-14 * (1.0 + n.coords.amax()) {
@@ -147,6 +129,14 @@ impl Camera {
         }
         let miss = self.distort(&n) - target;
         (miss.amax() < 1e-10).then_some(n)
+    }
+
+    /// Adds a step to `fx fy cx cy k1 k2 ...`, as many of them as it has.
+    pub fn add(&mut self, step: &[f64]) {
+        let Camera { fx, fy, cx, cy, distortion, .. } = self;
+        for (number, change) in [fx, fy, cx, cy].into_iter().chain(distortion).zip(step) {
+            *number += change;
+        }
     }
 
     /// The pinhole matrix.

@@ -6,6 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::{Corners, Side};
+use crate::linear_algebra::to_unit_diagonal;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::model::parameters::{CAMERA_NAMES, Layout};
 use crate::stereo::{Camera, Error, Lens, Rig};
@@ -181,29 +182,7 @@ impl KnownLenses {
             swapped.numbers().iter().map(|(side, at)| own.iter().position(|n| *n == (side.other(), *at))).collect();
         let n = places.len();
         let covariance = DMatrix::from_fn(n, n, |i, j| places[i].zip(places[j]).map_or(0.0, |at| self.covariance[at]));
-        KnownLenses {
-            covariance,
-            stated: [self.stated[1], self.stated[0]],
-            pair_excess: self.pair_excess,
-            pairs: self.pairs,
-            noise: self.noise,
-            ..swapped
-        }
-    }
-
-    /// The same without what is known of a side's lens.
-    pub fn without(&self, side: Side) -> KnownLenses {
-        let keeps = |of: Side| of != side;
-        let numbers = self.numbers();
-        let kept: Vec<usize> = (0..numbers.len()).filter(|i| keeps(numbers[*i].0)).collect();
-        KnownLenses {
-            cameras: Side::BOTH.map(|of| self.cameras[of as usize].filter(|_| keeps(of))),
-            covariance: DMatrix::from_fn(kept.len(), kept.len(), |i, j| self.covariance[(kept[i], kept[j])]),
-            stated: Side::BOTH.map(|of| keeps(of) && self.stated[of as usize]),
-            pair_excess: self.pair_excess,
-            pairs: self.pairs,
-            noise: self.noise,
-        }
+        KnownLenses { covariance, cameras: swapped.cameras, stated: [self.stated[1], self.stated[0]], ..self.clone() }
     }
 }
 
@@ -225,13 +204,8 @@ fn tolerance(camera: &Camera, at: usize) -> f64 {
 
 /// Inverse of the lower Cholesky factor of a covariance with rows of different units.
 fn root(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let scale = covariance.diagonal().map(|v| 1.0 / v.sqrt());
-    if !scale.iter().all(|s| s.is_finite()) {
-        return None;
-    }
-    let n = covariance.nrows();
-    let unit = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] * scale[i] * scale[j]);
+    let (unit, scale) = to_unit_diagonal(covariance)?;
     let lower = unit.cholesky()?.l();
-    let inverse = lower.solve_lower_triangular(&DMatrix::identity(n, n))?;
+    let inverse = lower.solve_lower_triangular(&DMatrix::identity(scale.len(), scale.len()))?;
     Some(inverse * DMatrix::from_diagonal(&scale))
 }

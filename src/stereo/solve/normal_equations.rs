@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, RowVector3, Vector2, Vector3,
 
 use crate::geometry::{Transform, rotation_matrix};
 use crate::imaging::Side;
+use crate::linear_algebra::to_unit_diagonal;
 use crate::stereo::Camera;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
@@ -271,11 +272,7 @@ pub fn eliminate(equations: &Equations, damping: f64) -> Option<(DMatrix<f64>, D
 
 /// Solves a symmetric positive definite system after scaling it to a unit diagonal.
 pub fn solve_scaled(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());
-    if !scale.iter().all(|s| s.is_finite()) {
-        return None;
-    }
-    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let (scaled, scale) = to_unit_diagonal(matrix)?;
     let solution = scaled.cholesky()?.solve(&right.component_mul(&scale));
     Some(solution.component_mul(&scale))
 }

@@ -6,6 +6,7 @@
 use nalgebra::{DMatrix, DMatrixViewMut, Matrix6};
 use rayon::prelude::*;
 
+use crate::linear_algebra::to_unit_diagonal;
 use crate::stereo::model::parameters::Layout;
 use crate::stereo::solve::normal_equations::{self, Block, Equations};
 use crate::stereo::{Rig, Side};
@@ -77,12 +78,8 @@ pub fn invert(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     const COLUMNS: usize = 16;
     /// Smallest share of its scaled eigenvalues that double precision still tells from a dependence.
     const SMALLEST: f64 = 1e-13;
-    let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());
-    if !scale.iter().all(|s| s.is_finite()) {
-        return None;
-    }
-    let n = matrix.nrows();
-    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let (scaled, scale) = to_unit_diagonal(matrix)?;
+    let n = scale.len();
     let cholesky = scaled.clone().cholesky()?;
     let mut inverse = DMatrix::identity(n, n);
     inverse.as_mut_slice().par_chunks_mut((COLUMNS * n).max(1)).for_each(|columns| {

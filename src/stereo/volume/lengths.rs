@@ -8,7 +8,7 @@
 use nalgebra::{DVector, Point3, Vector3};
 use rayon::prelude::*;
 
-use crate::imaging::Side;
+use crate::imaging::{Board, Side};
 use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::observation::Observation;

@@ -10,6 +10,7 @@ use crate::geometry::{Transform, rotation_matrix};
 use crate::imaging::Board;
 use crate::stereo::Rig;
 use crate::stereo::data::observation::{Observation, Side};
+use crate::stereo::data::residuals::of_point;
 use crate::stereo::data::view::View;
 use crate::stereo::model::projection::CAMERA_NUMBERS;
 use crate::stereo::solve::normal_equations::inverse6;
@@ -38,13 +39,7 @@ pub(in crate::stereo::board_pose) fn residual(
     pose: &Transform,
     o: &Observation,
 ) -> Option<Vector2<f64>> {
-    let in_left = pose * (crossings[board.index(o.col, o.row)] + o.seen_off_mm);
-    let (camera, point) = match o.side {
-        Side::Left => (&rig.left, in_left),
-        Side::Right => (&rig.right, rig.right_from_left * in_left),
-    };
-    let in_front = point.z > 0.0;
-    in_front.then(|| camera.project(&point) - o.px).filter(|r| r.x.is_finite() && r.y.is_finite())
+    of_point(rig, pose * (crossings[board.index(o.col, o.row)] + o.seen_off_mm), o)
 }
 
 /// A target in front of the rig, and what was seen of it there.
