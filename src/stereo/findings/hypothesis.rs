@@ -21,48 +21,50 @@ pub struct Hypothesis {
 
 /// All causes of one number each.
 pub fn all(layout: &Layout, rig: &Rig) -> Vec<Hypothesis> {
-    let at = layout.transform_start();
     let translation = rig.right_from_left.translation.vector;
-    let vector = |set: &dyn Fn(&mut DVector<f64>)| {
-        let mut direction = DVector::zeros(layout.count());
-        set(&mut direction);
-        direction
-    };
-    // The right camera turns about its own centre: points in its frame turn, and with them the translation.
-    let turn = |axis: Vector3<f64>| {
-        let per_deg = axis * 1f64.to_radians();
-        vector(&|d| {
-            d.rows_mut(at, 3).copy_from(&per_deg);
-            d.rows_mut(at + 3, 3).copy_from(&per_deg.cross(&translation));
-        })
-    };
-    let focal = |sides: &[Side]| {
-        vector(&|d| {
-            for side in sides {
-                let camera = rig.camera(*side);
-                let start = layout.camera_start(*side);
-                (d[start], d[start + 1]) = (0.01 * camera.fx, 0.01 * camera.fy);
-            }
-        })
-    };
-    let along = translation / translation.norm().max(f64::MIN_POSITIVE);
-    let longer = vector(&|d| d.rows_mut(at + 3, 3).copy_from(&along));
+    let turn = |axis: Vector3<f64>| turned(layout, rig, axis * 1f64.to_radians());
+    let focal = |sides: &[Side]| refocused(layout, rig, sides, 0.01);
+    let longer = moved(layout, translation / translation.norm().max(f64::MIN_POSITIVE));
     // Larger squares make everything seem nearer, the baseline too; one unit is a per cent.
-    let larger = vector(&|d| d.rows_mut(at + 3, 3).copy_from(&(-0.01 * translation)));
-    let shifted = |axis: usize| vector(&|d| d[at + 3 + axis] = 1.0);
+    let larger = moved(layout, -0.01 * translation);
+    let shifted = |axis: Vector3<f64>| moved(layout, axis);
     let of = |cause, words: &str, direction, unit| Hypothesis { cause, words: words.to_owned(), direction, unit };
     vec![
         of(Cause::Yaw, "the right camera turned about its vertical axis", turn(Vector3::y()), "deg"),
         of(Cause::Pitch, "the right camera turned about its horizontal axis", turn(Vector3::x()), "deg"),
         of(Cause::Roll, "the right camera turned about its line of sight", turn(Vector3::z()), "deg"),
         of(Cause::Baseline, "the baseline changed", longer, "mm"),
-        of(Cause::CameraMoved, "the right camera moved along its line of sight", shifted(2), "mm"),
-        of(Cause::CameraMoved, "the right camera moved up or down", shifted(1), "mm"),
+        of(Cause::CameraMoved, "the right camera moved along its line of sight", shifted(Vector3::z()), "mm"),
+        of(Cause::CameraMoved, "the right camera moved up or down", shifted(Vector3::y()), "mm"),
         of(Cause::Focus, "the left camera's focal length changed", focal(&[Side::Left]), "%"),
         of(Cause::Focus, "the right camera's focal length changed", focal(&[Side::Right]), "%"),
         of(Cause::Focus, "both focal lengths changed", focal(&Side::BOTH), "%"),
         of(Cause::OtherBoard, "the board's squares have another size", larger, "%"),
     ]
+}
+
+/// The right camera turns about its own centre, by a rotation vector, rad: points in its frame turn, and with them the translation.
+pub fn turned(layout: &Layout, rig: &Rig, about: Vector3<f64>) -> DVector<f64> {
+    let mut direction = moved(layout, about.cross(&rig.right_from_left.translation.vector));
+    direction.rows_mut(layout.transform_start(), 3).copy_from(&about);
+    direction
+}
+
+/// The right camera is pushed by so much in its own frame, mm.
+pub fn moved(layout: &Layout, way_mm: Vector3<f64>) -> DVector<f64> {
+    let mut direction = DVector::zeros(layout.count());
+    direction.rows_mut(layout.transform_start() + 3, 3).copy_from(&way_mm);
+    direction
+}
+
+/// Focal lengths change by a share of them.
+pub fn refocused(layout: &Layout, rig: &Rig, sides: &[Side], share: f64) -> DVector<f64> {
+    let mut direction = DVector::zeros(layout.count());
+    for side in sides {
+        let (camera, start) = (rig.camera(*side), layout.camera_start(*side));
+        (direction[start], direction[start + 1]) = (share * camera.fx, share * camera.fy);
+    }
+    direction
 }
 
 /// The six directions of any other place of the right camera.

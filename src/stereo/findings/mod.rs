@@ -124,10 +124,10 @@ impl Along {
 /// Lenses that were known and that the pictures contradict: all pairs are of other ones.
 pub fn of_lenses(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Finding> {
     let check = calibration.lens_check.as_ref().filter(|check| check.contradicts())?;
-    let causes: Vec<&str> = check.causes.iter().map(|cause| cause.word()).collect();
+    let causes = Cause::words(check.causes.iter().copied());
     let otherwise = lengths.measured_by(&check.rig_without).into_iter().flatten();
     Some(Finding {
-        cause: if causes.is_empty() { Cause::Unknown.word().to_owned() } else { causes.join("|") },
+        cause: if causes.is_empty() { Cause::Unknown.word().to_owned() } else { causes },
         kind: Kind::Step,
         pairs: calibration.views.iter().map(|view| view.pair.clone()).collect(),
         size: check.focus_change,
@@ -271,14 +271,7 @@ fn likeliest<'a, 'b>(candidates: &'b [Candidate<'a>], pairs: usize) -> Vec<&'b C
 
 /// The causes of candidates that are not told apart, each once, with `|` between them.
 fn causes(equals: &[&Candidate]) -> String {
-    let mut causes: Vec<Cause> = Vec::new();
-    for candidate in equals {
-        let cause = candidate.hypothesis.map_or(Cause::CameraMoved, |h| h.cause);
-        if !causes.contains(&cause) {
-            causes.push(cause);
-        }
-    }
-    causes.iter().map(|cause| cause.word()).collect::<Vec<_>>().join("|")
+    Cause::words(equals.iter().map(|candidate| candidate.hypothesis.map_or(Cause::CameraMoved, |h| h.cause)))
 }
 
 /// What happened, in words.

@@ -80,6 +80,17 @@ impl Cause {
         }
     }
 
+    /// The words of causes that are not told apart, each once, with `|` between them.
+    pub fn words(causes: impl Iterator<Item = Cause>) -> String {
+        let mut words: Vec<&str> = Vec::new();
+        causes.map(Cause::word).for_each(|word| {
+            if !words.contains(&word) {
+                words.push(word)
+            }
+        });
+        words.join("|")
+    }
+
     /// True where the rig may have changed instead: what happened is unknown, or a rig that changed looks the same.
     pub fn may_be_the_rig(self) -> bool {
         matches!(self, Cause::Unknown | Cause::NotSimultaneous | Cause::OtherBoard)

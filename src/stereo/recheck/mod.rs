@@ -312,17 +312,7 @@ impl Recheck {
             None => String::new(),
             Some(Explained::Moved) => Cause::CameraMoved.word().to_owned(),
             Some(Explained::Nothing) => Cause::Unknown.word().to_owned(),
-            Some(Explained::Causes(_)) => {
-                let mut words: Vec<&str> = self.likeliest().iter().map(|cause| cause.cause.word()).collect();
-                let mut seen = Vec::new();
-                words.retain(|word| {
-                    !seen.contains(word) && {
-                        seen.push(*word);
-                        true
-                    }
-                });
-                words.join("|")
-            }
+            Some(Explained::Causes(_)) => Cause::words(self.likeliest().iter().map(|cause| cause.cause)),
         }
     }
 

@@ -7,13 +7,12 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::imaging::Board;
-use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::estimate::Estimate;
-use crate::stereo::board_pose::solve::pose_block::TRANSFORM;
 use crate::stereo::board_pose::solve::prior::{stretch_length_mm, stretch_mode};
 use crate::stereo::data::observation::Side;
-use crate::stereo::model::projection::CAMERA_NUMBERS;
-use crate::stereo::triangulate::RIG_NUMBERS;
+use crate::stereo::findings::hypothesis::{moved, refocused, turned};
+use crate::stereo::model::parameters::Layout;
+use crate::stereo::{Lens, Rig};
 
 /// One thing that may have changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,27 +46,16 @@ impl Cause {
 
     /// The change of the rig's numbers by one unit; `None` for the target's pitch.
     pub(in crate::stereo::board_pose) fn direction(self, rig: &Rig) -> Option<DVector<f64>> {
-        let mut direction = DVector::zeros(RIG_NUMBERS);
-        let mut focal = |side: Side| {
-            let camera = rig.camera(side);
-            let at = if side == Side::Left { 0 } else { CAMERA_NUMBERS };
-            direction[at] = camera.fx;
-            direction[at + 1] = camera.fy;
-        };
+        // All numbers of a rig, in their order.
+        let layout = &Layout::rig(Lens::Tilted14, false);
+        let along = |axis: usize| Vector3::ith(axis, 1.0);
         match self {
-            Cause::Pitch => return None,
-            Cause::Focal(side) => focal(side),
-            Cause::BothFocal => Side::BOTH.into_iter().for_each(focal),
-            Cause::Shift(axis) => direction[TRANSFORM + 3 + axis] = 1.0,
-            Cause::Turn(axis) => {
-                let mut about = Vector3::zeros();
-                about[axis] = 1.0;
-                direction[TRANSFORM + axis] = 1.0;
-                let moved = about.cross(&rig.right_from_left.translation.vector);
-                direction.rows_mut(TRANSFORM + 3, 3).copy_from(&moved);
-            }
+            Cause::Pitch => None,
+            Cause::Focal(side) => Some(refocused(layout, rig, &[side], 1.0)),
+            Cause::BothFocal => Some(refocused(layout, rig, &Side::BOTH, 1.0)),
+            Cause::Shift(axis) => Some(moved(layout, along(axis))),
+            Cause::Turn(axis) => Some(turned(layout, rig, along(axis))),
         }
-        Some(direction)
     }
 
     /// Unit of its amount; a share has none.
