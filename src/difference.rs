@@ -7,6 +7,12 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
+/// Causes are told apart where the logarithm of one's likelihood is larger by this: 150 to 1.
+pub const TOLD_APART: f64 = 5.0;
+
+/// Quantile of the normal distribution for the share of changes that a test sees at the size that is stated: nineteen in twenty.
+pub const SEEN: f64 = 1.645;
+
 /// Degrees of freedom from which on a covariance is as good as known.
 const KNOWN: f64 = 1e4;
 

@@ -69,31 +69,6 @@ pub struct CameraCheckFile {
     warnings: Vec<String>,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct PairRecord {
-    pair: String,
-    mean_error_x10_mm: Option<f64>,
-    mean_error_y10_mm: Option<f64>,
-    mean_error_x70_mm: Option<f64>,
-    mean_error_y70_mm: Option<f64>,
-    max_abs_error_mm: Option<f64>,
-    gap_rms_mm: Option<f64>,
-}
-
-impl PairRecord {
-    fn new(p: &HeldOutPair) -> PairRecord {
-        PairRecord {
-            pair: p.pair.clone(),
-            mean_error_x10_mm: p.mean_error_x_short_mm,
-            mean_error_y10_mm: p.mean_error_y_short_mm,
-            mean_error_x70_mm: p.mean_error_x_long_mm,
-            mean_error_y70_mm: p.mean_error_y_long_mm,
-            max_abs_error_mm: p.max_abs_error_mm,
-            gap_rms_mm: p.gap_rms_mm,
-        }
-    }
-}
-
 impl CameraCheckFile {
     /// Gathers the figures. `x10` and `x70` stand for one square and seven, or as many as the board has.
     pub fn new(calibration: &Calibration, judged: &Judged) -> CameraCheckFile {

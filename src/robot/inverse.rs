@@ -11,7 +11,7 @@ use super::Robot;
 use crate::geometry::{Transform, rotation_vector};
 
 /// Length by which angles are weighed against mm: a robot's wrist at about arm's length.
-const ARM_MM: f64 = 200.0;
+pub(super) const ARM_MM: f64 = 200.0;
 
 /// The pose is reached when the target is missed by less than this, mm (angles times the arm).
 const REACHED_MM: f64 = 1e-7;

@@ -9,7 +9,7 @@ use super::bent::{Bent, Torques};
 use super::{Joint, Parameter};
 
 /// Columns of angles are per mrad.
-const RAD_PER_MRAD: f64 = 1e-3;
+pub const RAD_PER_MRAD: f64 = 1e-3;
 
 /// What a parameter's joint turns by at a pose per unit of the parameter: about its axis (first number), or, where its link tilts, about x
 /// and y of its link.

@@ -7,8 +7,9 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
+use super::inverse::{self, ARM_MM};
 use super::jacobian::Screws;
-use super::{Corrections, Parameter, Robot, inverse};
+use super::{Corrections, Parameter, Robot};
 use crate::geometry::rotation_vector;
 
 /// Postures that are fitted, and those that the rest is judged at (others).
@@ -17,9 +18,6 @@ const JUDGED: usize = 1000;
 
 /// Steps; the problem is nearly linear.
 const STEPS: usize = 6;
-
-/// Turns are weighed against mm with this arm, mm.
-const ARM_MM: f64 = 200.0;
 
 /// Ridge as a share of the largest diagonal.
 const RIDGE: f64 = 1e-13;

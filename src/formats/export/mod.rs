@@ -9,4 +9,5 @@ pub mod scan;
 mod written;
 
 pub use read::{NAMES, read, read_camera};
+pub(super) use written::METRE;
 pub use written::{ExportedFile, matrix};

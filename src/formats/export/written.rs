@@ -4,7 +4,7 @@ use crate::formats::checked;
 use crate::stereo::{Camera, Error, Lens};
 
 /// Metres in a millimetre.
-pub(super) const METRE: f64 = 1e-3;
+pub(in crate::formats) const METRE: f64 = 1e-3;
 
 /// A file to be written.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -8,10 +8,8 @@ pub mod file_storage;
 pub mod record;
 pub mod ros_static_tf;
 
+use super::export::METRE;
 use crate::geometry::Transform;
-
-/// Metres in a millimetre.
-const METRE: f64 = 1e-3;
 
 /// What the frames are called.
 #[derive(Debug, Clone, PartialEq, Eq)]

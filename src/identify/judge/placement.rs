@@ -17,10 +17,8 @@ use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::Extra;
 use crate::identify::solve::linearised::Linearised;
 use crate::linear_algebra::{product, pseudo_inverse};
+use crate::robot::jacobian::RAD_PER_MRAD;
 use crate::robot::{Parameter, Robot};
-
-/// Offsets of parameters are mm and mrad.
-const RAD_PER_MRAD: f64 = 1e-3;
 
 /// Whether a parameter of a robot with so many joints does nothing but move the whole robot, or the target on its flange.
 pub fn is_held(parameter: Parameter, joints: usize) -> bool {

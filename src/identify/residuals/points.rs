@@ -9,9 +9,7 @@ use crate::geometry::{
 use crate::identify::model::kinematics::Place;
 use crate::identify::residuals::raw::Raw;
 use crate::identify::sensor::{Extra, Scatter, Spot};
-
-/// Extra unknowns that turn the target are per mrad.
-const RAD_PER_MRAD: f64 = 1e-3;
+use crate::robot::jacobian::RAD_PER_MRAD;
 
 /// Points are on a line where they are scattered square to it by less than this share of what they are along it.
 const LINE: f64 = 0.01;

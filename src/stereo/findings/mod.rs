@@ -21,6 +21,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use crate::difference::TOLD_APART;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::hypothesis::{Hypothesis, any_place};
 use crate::stereo::findings::series::{Change, Line, Linear};
@@ -30,9 +31,6 @@ use crate::stereo::volume::lengths::VolumeLengths;
 
 /// Chance that a series in which nothing happened has a finding, all looks together.
 const FALSE_ALARM: f64 = 1e-3;
-
-/// Causes are told apart where the logarithm of one's likelihood is larger by this: 150 to 1.
-const TOLD_APART: f64 = 5.0;
 
 /// Fewest pairs on either side of a step: one pair that differs is no change of the rig.
 const FEWEST_EACH: usize = 2;

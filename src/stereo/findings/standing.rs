@@ -14,16 +14,13 @@ use crate::stereo::model::rig::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
 use crate::stereo::select::options::Options;
 use crate::stereo::volume::Extent;
-use crate::stereo::volume::lengths::VolumeLengths;
+use crate::stereo::volume::lengths::{VolumeLengths, long_mm};
 
 /// A change that moves a length by less than this share of the tolerance changes nothing.
 pub const MATERIAL_SHARE: f64 = 0.1;
 
 /// Share of a drift in the middle of the series.
 const MIDDLE: f64 = 0.5;
-
-/// Squares of the lengths that a change is judged by: 70 mm on the paper's board.
-const LONG_SQUARES: usize = 7;
 
 /// What is asked of a calibration.
 #[derive(Debug, Clone, PartialEq)]
@@ -167,9 +164,7 @@ pub fn since(corners: &Corners, pair: &str) -> Option<Corners> {
 }
 
 fn lengths(calibration: &Calibration, extent: Extent) -> VolumeLengths {
-    let board = &calibration.board;
-    let squares = LONG_SQUARES.min(board.columns() - 1);
-    VolumeLengths::new(calibration, extent, board.spans_mm(squares)[0], 1.0)
+    VolumeLengths::new(calibration, extent, long_mm(&calibration.board), 1.0)
 }
 
 fn change(calibration: &Calibration, asked: &Asked) -> Option<Finding> {

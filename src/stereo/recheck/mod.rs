@@ -12,7 +12,7 @@ mod tests;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::difference::Difference;
+use crate::difference::{Difference, SEEN, TOLD_APART};
 use crate::imaging::{Corners, Skipped};
 use crate::stereo::Error;
 use crate::stereo::data::corner_noise::Noise;
@@ -33,25 +33,16 @@ use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::uncertainty;
 use crate::stereo::volume::Volume;
-use crate::stereo::volume::lengths::VolumeLengths;
+use crate::stereo::volume::lengths::{VolumeLengths, long_mm};
 
 /// Chance that a rig that did not change is said to have changed.
 const FALSE_ALARM: f64 = 0.01;
-
-/// Quantile of the normal distribution for the share of changes that are seen at the size that is stated: nineteen in twenty.
-const SEEN: f64 = 1.645;
-
-/// Causes are told apart where the logarithm of one's likelihood is larger by this: 150 to 1.
-const TOLD_APART: f64 = 5.0;
 
 /// Causes that a line names; the table has all.
 const TOLD: usize = 3;
 
 /// Fewest pairs: one alone has nothing that confirms it.
 pub const FEWEST_PAIRS: usize = 2;
-
-/// Squares of the lengths that a change is judged by: 70 mm on the paper's board.
-const LONG_SQUARES: usize = 7;
 
 /// The rig as it was, and what its calibration says beside it.
 #[derive(Debug, Clone)]
@@ -74,6 +65,7 @@ pub struct CauseSeen {
     /// The cause.
     pub cause: Cause,
     /// For a person: what would have changed.
+    #[serde(rename = "what")]
     pub words: String,
     /// By how much it changed, if it alone did, with its standard deviation.
     pub amount: f64,
@@ -144,18 +136,23 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
         Difference::new(off.rows(0, numbers).into_owned(), &joint, pairs, beyond)
     });
 
-    let squares = LONG_SQUARES.min(corners.board.columns() - 1);
-    let [length_mm, _] = corners.board.spans_mm(squares);
+    let length_mm = long_mm(&corners.board);
     let lengths = VolumeLengths::of_volume(&before.rig, &before.volume_of(&trial, &solved.problem.views), length_mm);
     let moves = |step: &DVector<f64>| {
         let whole = step.clone().resize_vertically(layout.count(), 0.0);
         lengths.changes_by_step_mm(&layout, &whole).into_iter().fold(0.0, |most: f64, mm| most.max(mm.abs()))
     };
-    let hypotheses = hypothesis::all(&Layout { shape: false, ..layout }, &before.rig);
+    let compared = Layout { shape: false, ..layout };
+    let hypotheses = hypothesis::all(&compared, &before.rig);
     let views = &solved.problem.views;
     let corner_count = views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count();
-    let looks =
-        Looks { difference: &difference, from_old: from_old.as_ref(), hypotheses: &hypotheses, corners: corner_count };
+    let looks = Looks {
+        difference: &difference,
+        from_old: from_old.as_ref(),
+        layout: &compared,
+        hypotheses: &hypotheses,
+        corners: corner_count,
+    };
     let of_cause = |h| looks.of_cause(h, &moves);
     let causes = hypotheses.iter().map(of_cause).collect::<Option<Vec<_>>>().ok_or_else(Error::undetermined)?;
     let change = looks.is_change().then(|| looks.explained());
@@ -231,6 +228,7 @@ struct Looks<'a> {
     difference: &'a Difference,
     /// The same from the old rig on; see [`step_from_old`].
     from_old: Option<&'a Difference>,
+    layout: &'a Layout,
     hypotheses: &'a [Hypothesis],
     corners: usize,
 }
@@ -279,8 +277,7 @@ impl Looks<'_> {
         let mut explain: Vec<(f64, usize)> = (0..hypotheses.len()).filter_map(left).collect();
         explain.retain(|(left, _)| within(*left, 1));
         explain.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let place: Vec<DVector<f64>> =
-            (0..6).map(|k| DVector::from_fn(count, |i, _| f64::from(i + 6 == count + k))).collect();
+        let place = hypothesis::any_place(self.layout);
         let by_place = difference.left_by(&place).filter(|left| within(*left, place.len()));
         let Some(best) = explain.first().map(|(left, _)| *left) else {
             return by_place.map_or(Explained::Nothing, |_| Explained::Moved);

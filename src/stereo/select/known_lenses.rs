@@ -10,7 +10,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::difference::Difference;
+use crate::difference::{Difference, SEEN, TOLD_APART};
 use crate::imaging::{Board, Side};
 use crate::stereo::model::known_lenses::KnownLenses;
 use crate::stereo::model::parameters::Layout;
@@ -24,12 +24,6 @@ use crate::stereo::{Error, Rig};
 /// Chance that one of the four tests (all numbers, the focus of either side and of both) contradicts a lens that is right: one set of pairs in a
 /// thousand is contradicted by one of them.
 const CHANCE: f64 = 2.5e-4;
-
-/// Quantile for the share of changes that the test sees at the size that is stated: nineteen in twenty.
-const SEEN: f64 = 1.645;
-
-/// Causes are told apart where the logarithm of one's likelihood is larger by this: 150 to 1.
-const TOLD_APART: f64 = 5.0;
 
 /// Whether the pictures agree with the lenses that were known.
 #[derive(Debug, Clone, PartialEq)]

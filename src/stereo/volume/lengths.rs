@@ -16,6 +16,14 @@ use crate::stereo::model::parameters::Layout;
 use crate::stereo::triangulate::{RigCovariance, SpacePoint, rig_number, triangulate};
 use crate::stereo::volume::{Extent, Volume};
 
+/// Squares of the lengths that a rig is judged by: 70 mm on the paper's board.
+pub const LONG_SQUARES: usize = 7;
+
+/// Such a length on a board, or the longest that it has, mm.
+pub fn long_mm(board: &Board) -> f64 {
+    board.spans_mm(LONG_SQUARES.min(board.columns() - 1))[0]
+}
+
 /// Places along x and y, and along z.
 const PLACES: [usize; 3] = [7, 7, 5];
 

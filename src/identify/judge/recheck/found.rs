@@ -9,9 +9,6 @@ use crate::robot::Parameter;
 /// Chance that a robot that did not change is said to have changed.
 pub(super) const FALSE_ALARM: f64 = 0.01;
 
-/// Quantile of the normal distribution for the share of changes that are seen at the size that is stated: nineteen in twenty.
-pub(super) const SEEN: f64 = 1.645;
-
 /// The robot as it was.
 #[derive(Debug, Clone)]
 pub struct Before {

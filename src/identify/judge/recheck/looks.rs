@@ -6,13 +6,10 @@
 use nalgebra::DVector;
 
 use super::compared::Look;
-use super::found::{CauseSeen, FALSE_ALARM, SEEN};
+use super::found::{CauseSeen, FALSE_ALARM};
 use super::moves::Moves;
 use super::suspects::Suspect;
-use crate::difference::Difference;
-
-/// Causes are told apart where the logarithm of one's likelihood is larger by this: 150 to 1.
-const TOLD_APART: f64 = 5.0;
+use crate::difference::{Difference, SEEN, TOLD_APART};
 
 /// White size of a cause, a mrad or mm, below which the poses see nothing of it.
 const UNSEEN: f64 = 1e-4;

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::compared::Compared;
-use super::found::{Before, FALSE_ALARM, Moved, SEEN};
-use crate::difference::Difference;
+use super::found::{Before, FALSE_ALARM, Moved};
+use crate::difference::{Difference, SEEN};
 use crate::geometry::{rigid_columns, rotation_vector};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::placement::Uncertain;

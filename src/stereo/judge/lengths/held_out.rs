@@ -17,11 +17,11 @@ use crate::stereo::model::rig::Covariance;
 use crate::stereo::select::cross_validation::{self, FOLDS, Without};
 use crate::stereo::solve::uncertainty;
 use crate::stereo::triangulate::{RigCovariance, common};
+use crate::stereo::volume::lengths::LONG_SQUARES;
 use crate::stereo::{Error, Rig};
 
-/// The short and the long range of Fig. 6 (b), in squares: 10 and 70 mm on the paper's board.
+/// The short range of Fig. 6 (b), in squares: 10 mm on the paper's board; the long one is [`LONG_SQUARES`].
 const SHORT_SQUARES: usize = 1;
-const LONG_SQUARES: usize = 7;
 
 /// One pair as measured by cameras that have not seen it.
 #[derive(Debug, Clone, PartialEq)]

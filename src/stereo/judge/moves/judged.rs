@@ -4,15 +4,13 @@ use serde::Serialize;
 
 use super::slide::{Places, Slide};
 use super::stated::StatedMove;
+use crate::difference::SEEN;
 use crate::stereo::findings::{Finding, Kind};
 use crate::stereo::judge::verdict::{COVERAGE, Verdict};
 use crate::stereo::pairs::Cause;
 
 /// Standard deviations beyond which a move contradicts the scale: one in a hundred that are as stated does.
 const CONTRADICTS: f64 = 2.5758;
-
-/// Quantile of the normal distribution for the share of scale errors that are seen at the size that is said: nineteen in twenty.
-const SEEN: f64 = 1.645;
 
 /// A move that was measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
