@@ -212,6 +212,26 @@ impl Dataset {
         (0..self.poses.len()).filter(|&i| keep(&self.poses[i])).collect()
     }
 
+    /// Their names.
+    pub fn names(&self, rows: &[usize]) -> Vec<String> {
+        rows.iter().map(|&row| self.poses[row].name.clone()).collect()
+    }
+
+    /// Rows with a point, so many of each group at the least; an error where distances were measured, or where a group has fewer.
+    pub fn placing_rows(&self, fewest: usize) -> Result<Vec<usize>, Error> {
+        if self.kind != Kind::Positions {
+            return Err(Error::ModelNeeds { model: "position", needed: "positions (x_mm, y_mm, z_mm)" });
+        }
+        let rows = self.rows(|pose| matches!(pose.reading, Reading::Position { .. }));
+        for (index, group) in self.groups.iter().enumerate() {
+            let found = rows.iter().filter(|&&row| self.poses[row].group == index).count();
+            if found < fewest {
+                return Err(Error::TooFewToPlace { group: group.name.clone(), found, needed: fewest });
+            }
+        }
+        Ok(rows)
+    }
+
     /// Rows that may be fitted: centres and samples.
     pub fn fit_rows(&self) -> Vec<usize> {
         self.rows(|p| p.role != Role::Verify)
@@ -271,10 +291,10 @@ impl Dataset {
         whole.peek().is_some() && whole.all(|p| matches!(p.reading, Reading::Position { rotation_rad: Some(_), .. }))
     }
 
-    /// Unknowns of the sensor without which no point can be predicted: how the body of several targets is turned on the flange, where poses
-    /// show a part of it.
-    pub fn body_unknowns(&self) -> &'static [Extra] {
-        match self.poses.iter().any(|p| p.on_body_mm.is_some()) {
+    /// How the target is turned on the flange, where orientations are used, or where a point cannot be predicted without it: where poses show a
+    /// part of a body of several targets.
+    pub fn target_unknowns(&self, oriented: bool) -> &'static [Extra] {
+        match oriented || self.poses.iter().any(|p| p.on_body_mm.is_some()) {
             true => &[Extra::Target(0), Extra::Target(1), Extra::Target(2)],
             false => &[],
         }

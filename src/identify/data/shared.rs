@@ -106,7 +106,7 @@ pub fn unknowns(set: &Dataset, settings: &Settings) -> Vec<Extra> {
         _ if set.to_centers() && settings.wire_offset => vec![Extra::Zero],
         _ => Vec::new(),
     };
-    [own, set.body_unknowns().to_vec()].concat()
+    [own, set.target_unknowns(false).to_vec()].concat()
 }
 
 /// Columns of the leading shared errors and own covariance, row by row.

@@ -17,13 +17,9 @@ pub fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
     let mut rows: Vec<usize> = order.windows(2).filter(|w| same(w[0], w[1])).flat_map(|w| [w[0], w[1]]).collect();
     rows.sort_unstable();
     rows.dedup();
-    let names: Vec<String> = rows.iter().map(|&r| set.poses[r].name.clone()).collect();
-    (!names.is_empty()).then(|| {
-        (
-            names,
-            "poses that the robot came back to: they say how well it repeats, and nothing about its links".to_owned(),
-        )
-    })
+    let found =
+        "poses that the robot came back to: they say how well it repeats, and nothing about its links".to_owned();
+    (!rows.is_empty()).then(|| (set.names(&rows), found))
 }
 
 /// Joints that do not move.

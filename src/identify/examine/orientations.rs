@@ -113,7 +113,7 @@ fn without_turned(set: Dataset, robot: &Robot, usual_rad: f64) -> (Dataset, Opti
         "the targets are turned otherwise than the flange, as where the names of two are exchanged",
         "left out; look at their names in `target`",
     )
-    .about(turned.iter().map(|&row| set.poses[row].name.clone()).collect());
+    .about(set.names(&turned));
     (set.without(&turned, "the targets are turned otherwise than the flange"), Some(finding))
 }
 

@@ -11,10 +11,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::placement::Placed;
 use crate::identify::Error;
-use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::data::dataset::Dataset;
 use crate::identify::residuals::raw::Raw;
 use crate::identify::residuals::rows::Rows;
-use crate::identify::sensor::{Extra, Scatter};
+use crate::identify::sensor::Scatter;
 use crate::identify::settings::{Model, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::linearised::Linearised;
@@ -63,20 +63,10 @@ pub struct Located {
 
 /// Finds it.
 pub fn locate(set: &Dataset, robot: &Robot, trust: Trust, settings: &Settings) -> Result<Located, Error> {
-    let rows = set.rows(|pose| matches!(pose.reading, Reading::Position { .. }));
-    if set.kind != Kind::Positions {
-        return Err(Error::ModelNeeds { model: "position", needed: "positions (x_mm, y_mm, z_mm)" });
-    }
-    for (index, group) in set.groups.iter().enumerate() {
-        let found = rows.iter().filter(|&&r| set.poses[r].group == index).count();
-        if found < FEWEST_POSES {
-            return Err(Error::TooFewToPlace { group: group.name.clone(), found, needed: FEWEST_POSES });
-        }
-    }
+    let rows = set.placing_rows(FEWEST_POSES)?;
     let oriented = set.has_rotations();
     let tool = [Parameter::V(0), Parameter::V(1), Parameter::V(2)];
-    let of_target = [Extra::Target(0), Extra::Target(1), Extra::Target(2)];
-    let extras: &[Extra] = if oriented { &of_target } else { set.body_unknowns() };
+    let extras = set.target_unknowns(oriented);
     let model = if oriented { Model::Pose } else { Model::Position };
     let with = |parameters| Task { set, robot, parameters, extras, rows: &rows, model, smooth: None, settings };
     match fitted(&with(&tool), trust) {

@@ -43,20 +43,21 @@ impl Uncertain {
     pub fn inverse(&self) -> Uncertain {
         let transform = self.transform.inverse();
         let turn = -rotation_matrix(&transform);
-        let mut moves = Matrix6::zeros();
-        moves.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
-        moves.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
-        moves.fixed_view_mut::<3, 3>(3, 0).copy_from(&(turn * skew(&self.transform.translation.vector)));
-        Uncertain { transform, covariance: moves * self.covariance * moves.transpose() }
+        self.moved(transform, &turn, turn * self.transform.translation.vector.cross_matrix())
     }
 
     /// Behind a transform that is certain.
     pub fn after(&self, first: &Transform) -> Uncertain {
-        let turn = rotation_matrix(first);
+        self.moved(first * self.transform, &rotation_matrix(first), Matrix3::zeros())
+    }
+
+    /// Another transform, whose turn and shift change by `turn` times those of this one, the shift by `swing` times the turn beside.
+    fn moved(&self, transform: Transform, turn: &Matrix3<f64>, swing: Matrix3<f64>) -> Uncertain {
         let mut moves = Matrix6::zeros();
-        moves.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
-        moves.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
-        Uncertain { transform: first * self.transform, covariance: moves * self.covariance * moves.transpose() }
+        moves.fixed_view_mut::<3, 3>(0, 0).copy_from(turn);
+        moves.fixed_view_mut::<3, 3>(3, 3).copy_from(turn);
+        moves.fixed_view_mut::<3, 3>(3, 0).copy_from(&swing);
+        Uncertain { transform, covariance: moves * self.covariance * moves.transpose() }
     }
 }
 

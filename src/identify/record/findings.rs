@@ -63,41 +63,28 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
 
 /// Rows that do not fit with the others.
 fn of_rows(set: &Dataset, found: &Identification) -> Vec<Finding> {
-    let names = |rows: &[usize]| rows.iter().map(|&r| set.poses[r].name.clone()).collect::<Vec<_>>();
-    let mut list = Vec::new();
-    let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
-    if !found.outliers.is_empty() {
-        let share = 100.0 * found.outliers.len() as f64 / (found.fitted.len() + found.outliers.len()) as f64;
-        add(
-            match found.outliers.len() {
-                1 => "1 row fits far worse than the rest".to_owned(),
-                count => format!("{count} rows ({share:.0} %) fit far worse than the rest"),
-            },
-            names(&found.outliers),
-            "left out of the fit (`outlier_sigmas = 0` in [identify] keeps them)",
-        );
-    }
-    if !found.doubtful.is_empty() {
-        add(
-            match found.doubtful.len() {
-                1 => "1 row fits worse than the rest by more than chance allows".to_owned(),
-                count => format!("{count} rows fit worse than the rest by more than chance allows"),
-            },
-            names(&found.doubtful),
+    let share = 100.0 * found.outliers.len() as f64 / (found.fitted.len() + found.outliers.len()).max(1) as f64;
+    let left_out = "left out of the fit (`outlier_sigmas = 0` in [identify] keeps them)";
+    let counted = "they are counted in the figures; measure them again";
+    let kinds = [
+        (&found.outliers, "row", format!(" ({share:.0} %)"), "far worse than the rest", left_out),
+        (
+            &found.doubtful,
+            "row",
+            String::new(),
+            "worse than the rest by more than chance allows",
             "fitted all the same; measure again",
-        );
-    }
-    if !found.verify_outliers.is_empty() {
-        add(
-            match found.verify_outliers.len() {
-                1 => "1 verify row fits far worse than the rest".to_owned(),
-                count => format!("{count} verify rows fit far worse than the rest"),
-            },
-            names(&found.verify_outliers),
-            "they are counted in the figures; measure them again",
-        );
-    }
-    list
+        ),
+        (&found.verify_outliers, "verify row", String::new(), "far worse than the rest", counted),
+    ];
+    let finding = |(rows, what, share, how, action): (&Vec<usize>, &str, String, &str, &str)| {
+        let said = match rows.len() {
+            1 => format!("1 {what} fits {how}"),
+            count => format!("{count} {what}s{share} fit {how}"),
+        };
+        Finding::new(said, action).about(set.names(rows))
+    };
+    kinds.into_iter().filter(|kind| !kind.0.is_empty()).map(finding).collect()
 }
 
 /// Errors that the readings share.

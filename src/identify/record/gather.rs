@@ -35,7 +35,6 @@ impl Record {
         // Nominal has nothing to say about what the poses determine; the fit that it was kept against has.
         let fitted = chosen.found.as_ref().or(found.candidates.first().and_then(|c| c.found.as_ref()));
         let identifiability = fitted.map_or_else(Identifiability::nothing, |(f, _)| parameters::identifiability(f));
-        let names = |rows: &[usize]| rows.iter().map(|&i| set.poses[i].name.clone()).collect::<Vec<_>>();
         let methods: Vec<MethodRecord> = found
             .candidates
             .iter()
@@ -52,7 +51,7 @@ impl Record {
             advice: Advice::Use,
             reason: String::new(),
             warnings: Vec::new(),
-            outliers: names(&found.outliers),
+            outliers: set.names(&found.outliers),
             sessions: along.sessions.clone(),
             skipped: set.skipped.clone(),
             judged: found.judged.clone(),

@@ -144,7 +144,7 @@ impl Session<'_> {
         (self.step)("gross errors");
         let first = self.reference(ROWS_TELL);
         let mut gross = self.drop_outliers(by_points, &first)?;
-        if model == Model::Pose && self.set.body_unknowns().is_empty() {
+        if model == Model::Pose && self.set.target_unknowns(false).is_empty() {
             self.extras.extend((0..3).map(Extra::Target));
         }
         (self.step)("models of the robot");

@@ -57,8 +57,7 @@ impl Identification {
     /// The chosen terms with the points of all groups in frames of their own.
     fn by_points(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> Result<Formulation, Error> {
         let oriented = set.has_rotations() && settings.model.is_none();
-        let turned =
-            if oriented { &[Extra::Target(0), Extra::Target(1), Extra::Target(2)] } else { set.body_unknowns() };
+        let turned = set.target_unknowns(oriented);
         let mut extras: Vec<Extra> = self.extras.iter().map(|(extra, _)| *extra).collect();
         extras.extend(turned.iter().filter(|t| !self.extras.iter().any(|(e, _)| e == *t)));
         let parameters = self.terms.parameters(nominal);

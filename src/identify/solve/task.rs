@@ -51,7 +51,7 @@ impl<'a> Task<'a> {
         settings: &'a Settings,
     ) -> Task<'a> {
         let model = if set.kind == Kind::Positions { Model::Position } else { Model::CenterDistance };
-        Task { set, robot, parameters, extras: set.body_unknowns(), rows, model, smooth: None, settings }
+        Task { set, robot, parameters, extras: set.target_unknowns(false), rows, model, smooth: None, settings }
     }
 
     pub(super) fn spec(&self, scatter: Scatter, weights: &'a [f64], load_chain: &'a Robot) -> RowSpec<'a> {

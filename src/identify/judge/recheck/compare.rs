@@ -6,7 +6,7 @@ use super::looks::Looks;
 use super::moves::{Moves, placements};
 use super::suspects::{Suspect, suspects, zero};
 use crate::identify::Error;
-use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::locate::FEWEST_POSES;
 use crate::identify::judge::placement::Uncertain;
 use crate::robot::{Parameter, Robot};
@@ -18,13 +18,7 @@ pub fn recheck(
     before: &Before,
     stood: &dyn Fn(&str) -> Option<Uncertain>,
 ) -> Result<Recheck, Error> {
-    let used = set.rows(|pose| matches!(pose.reading, Reading::Position { .. }));
-    if set.kind != Kind::Positions {
-        return Err(Error::ModelNeeds { model: "position", needed: "positions (x_mm, y_mm, z_mm)" });
-    }
-    if let Some((index, found)) = too_few(set, &used) {
-        return Err(Error::TooFewToPlace { group: set.groups[index].name.clone(), found, needed: FEWEST_POSES });
-    }
+    let used = set.placing_rows(FEWEST_POSES)?;
     let mut parameters = before.parameters.clone();
     let others = (0..robot.joints.len()).map(zero(robot)).chain((0..3).map(Parameter::V));
     parameters.extend(others.filter(|p| !before.parameters.contains(p)));
@@ -50,12 +44,6 @@ pub fn recheck(
         (false, _) => 0.0,
     };
     let effect_mm = placements.iter().filter(|p| p.moved).map(|p| p.shift_mm).fold(effect_mm, f64::max);
-    let poses = used.iter().map(|&r| set.poses[r].name.clone()).collect();
+    let poses = set.names(&used);
     Ok(Recheck { poses, causes, changed, likeliest, placements, effect_mm, seen_mm })
-}
-
-/// The first group that has too few poses, with how many.
-fn too_few(set: &Dataset, used: &[usize]) -> Option<(usize, usize)> {
-    let count = |group: usize| used.iter().filter(|&&r| set.poses[r].group == group).count();
-    (0..set.groups.len()).map(|group| (group, count(group))).find(|(_, found)| *found < FEWEST_POSES)
 }

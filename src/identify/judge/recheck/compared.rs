@@ -79,9 +79,8 @@ pub(super) fn rows(
     };
     // A thousandth of scale.
     set.shared = set.poses.iter().map(|p| Matrix3xX::from_columns(&[-1e-3 * point(&p.reading)])).collect();
-    let turns = [Extra::Target(0), Extra::Target(1), Extra::Target(2)];
-    let turned: &[Extra] = if oriented { &turns } else { set.body_unknowns() };
-    let extras: Vec<Extra> = std::iter::once(Extra::Shared(0)).chain(turned.iter().copied()).collect();
+    let turned = set.target_unknowns(oriented).iter().copied();
+    let extras: Vec<Extra> = std::iter::once(Extra::Shared(0)).chain(turned).collect();
     let rotation_rad = trust.rotation_rad.unwrap_or(1e-4).max(LEAST_TURN_RAD);
     Rows::new(&RowSpec {
         set: &set,
