@@ -215,7 +215,7 @@ fn look_for(pairs: &[PairFiles], boards: &[Board]) -> Option<(Board, Vec<PairCor
 
 /// The pairs with how well their rows agree, and the one that agrees worst.
 fn judge(
-    file: RectifiedFile,
+    mut file: RectifiedFile,
     kept: Vec<(String, [String; 2])>,
     found: Option<(Board, Vec<PairCorners>)>,
 ) -> (RectifiedFile, Option<PairCorners>) {
@@ -235,7 +235,7 @@ fn judge(
         .filter_map(|p| Some((p.residual?.rms_px, &p.pair)))
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .and_then(|(_, name)| found.iter().find(|p| p.pair == *name).cloned());
-    let file = file.with_pairs(pairs);
+    file.pairs = pairs;
     match board {
         Some(board) => (file.with_residual(board, row_residual(&all)), worst),
         None => (file, None),

@@ -202,6 +202,7 @@ impl CalibrationFile {
         pair_excess: f64,
         [nearest_mm, farthest_mm]: [f64; 2],
         volume: &Volume,
+        moves: &[KnownMove],
     ) -> CalibrationFile {
         let noise = &calibration.own_noise;
         self.volume = Some(volume.clone());
@@ -214,17 +215,7 @@ impl CalibrationFile {
             pairs: Some(calibration.pair_scatter.groups),
         });
         self.boards = Some(BoardsRecord { nearest_mm, farthest_mm });
-        self
-    }
-
-    /// The same with the board that calibrated.
-    pub fn with_board(mut self, board: &Board) -> CalibrationFile {
-        self.board = Some(board.to_string());
-        self
-    }
-
-    /// The same with known moves.
-    pub fn with_moves(mut self, moves: &[KnownMove]) -> CalibrationFile {
+        self.board = Some(calibration.board.to_string());
         self.known_moves = moves.to_vec();
         self
     }

@@ -59,7 +59,8 @@ pub struct CameraCheckFile {
     rays_chi_square: f64,
     reduced_chi_square: Option<f64>,
     ranges: Vec<Range>,
-    pairs: Vec<PairRecord>,
+    /// `x10` and `x70` stand for one square and seven, or as many as the board has.
+    pairs: Vec<HeldOutPair>,
     second_board: Option<SecondBoard>,
     known_moves: Vec<KnownMove>,
     lens_scores: Vec<LensScore>,
@@ -70,12 +71,11 @@ pub struct CameraCheckFile {
 }
 
 impl CameraCheckFile {
-    /// Gathers the figures. `x10` and `x70` stand for one square and seven, or as many as the board has.
+    /// Gathers the figures.
     pub fn new(calibration: &Calibration, judged: &Judged) -> CameraCheckFile {
         let accuracy = &judged.accuracy;
         let worst = &accuracy.extremes.largest;
         let all = || calibration.views.iter().flat_map(|view| &view.observations);
-        let pairs = accuracy.pairs.iter().map(PairRecord::new).collect();
         CameraCheckFile {
             passed: judged.verdict == Verdict::Pass,
             verdict: judged.verdict,
@@ -115,7 +115,7 @@ impl CameraCheckFile {
             corner_sigma_px: calibration.noise.typical_px(&calibration.views),
             reduced_chi_square: calibration.noise.reduced_chi_square,
             ranges: accuracy.ranges.clone(),
-            pairs,
+            pairs: accuracy.pairs.clone(),
             second_board: judged.standards.second.clone(),
             known_moves: judged.standards.moves.measured.clone(),
             lens_scores: calibration.lens_scores.clone(),

@@ -66,35 +66,7 @@ pub struct RecheckFile {
     effect_mm: f64,
     /// The largest change of a length that a single cause could make without being seen in nineteen of twenty checks, mm.
     seen_mm: f64,
-    causes: Vec<CauseRecord>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct CauseRecord {
-    cause: &'static str,
-    what: String,
-    amount: f64,
-    sigma: f64,
-    unit: &'static str,
-    effect_mm: f64,
-    /// The smallest change that nineteen of twenty checks see, and by how much it moves a length.
-    seen: f64,
-    seen_mm: f64,
-}
-
-impl From<&CauseSeen> for CauseRecord {
-    fn from(seen: &CauseSeen) -> CauseRecord {
-        CauseRecord {
-            cause: seen.cause.word(),
-            what: seen.words.clone(),
-            amount: seen.amount,
-            sigma: seen.sigma,
-            unit: seen.unit,
-            effect_mm: seen.effect_mm,
-            seen: seen.seen,
-            seen_mm: seen.seen_mm,
-        }
-    }
+    causes: Vec<CauseSeen>,
 }
 
 impl RecheckFile {
@@ -111,7 +83,7 @@ impl RecheckFile {
             statement: recheck.statement(),
             effect_mm: recheck.effect_mm,
             seen_mm: recheck.seen_mm,
-            causes: recheck.causes.iter().map(CauseRecord::from).collect(),
+            causes: recheck.causes.clone(),
         }
     }
 }

@@ -110,11 +110,6 @@ impl RectifiedFile {
         }
     }
 
-    /// The same with the pairs that were written.
-    pub fn with_pairs(self, pairs: Vec<RectifiedPair>) -> RectifiedFile {
-        RectifiedFile { pairs, ..self }
-    }
-
     /// The same with how well the rows of a board's corners agree.
     pub fn with_residual(mut self, board: Board, residual: Option<RowResidual>) -> RectifiedFile {
         self.board = Some(board.squares.to_string());

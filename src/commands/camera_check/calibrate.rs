@@ -67,15 +67,13 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let page = report::camera_check::page(&calibration, &judged, &corners, &pictures)?;
     out.write_json(
         "calibration.json",
-        &CalibrationFile::from(calibration.rig())
-            .with_check(
-                &calibration,
-                pair_excess(&calibration),
-                judged.coverage.corner_depths_mm,
-                &judged.volume.volume,
-            )
-            .with_board(&calibration.board)
-            .with_moves(&judged.standards.moves.measured),
+        &CalibrationFile::from(calibration.rig()).with_check(
+            &calibration,
+            pair_excess(&calibration),
+            judged.coverage.corner_depths_mm,
+            &judged.volume.volume,
+            &judged.standards.moves.measured,
+        ),
     )?;
     if !out.is_input("corners.csv") {
         out.write("corners.csv", corners_csv::to_csv(&calibration.mark(&corners)).as_bytes())?;

@@ -30,18 +30,13 @@ pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome>
         };
         let placement = Placement { frames: &frames, base_from_camera, flange_from_target };
         let (name, text) = match args.format {
-            PlacementFormat::RosStaticTf => ("static_tf", ros_static_tf::text(&placement)),
-            PlacementFormat::Opencv => ("placement_opencv", file_storage::text(&placement)),
+            PlacementFormat::RosStaticTf => (format!("static_tf{suffix}.launch.yaml"), ros_static_tf::text(&placement)),
+            PlacementFormat::Opencv => (format!("placement_opencv{suffix}.yml"), file_storage::text(&placement)),
             PlacementFormat::EasyHandeye => {
-                ("easy_handeye", easy_handeye::text(&placement, &format!("easy_handeye{suffix}")))
+                let namespace = format!("easy_handeye{suffix}");
+                (format!("{namespace}.yaml"), easy_handeye::text(&placement, &namespace))
             }
         };
-        let end = match args.format {
-            PlacementFormat::RosStaticTf => ".launch.yaml",
-            PlacementFormat::Opencv => ".yml",
-            PlacementFormat::EasyHandeye => ".yaml",
-        };
-        let name = format!("{name}{suffix}{end}");
         out.write(&name, text.as_bytes())?;
         stdout.push_str(&format!("{}\n", out.join(&name)));
     }

@@ -11,6 +11,7 @@
 mod tests;
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
 use crate::difference::{Difference, SEEN, TOLD_APART};
 use crate::imaging::{Corners, Skipped};
@@ -60,7 +61,7 @@ pub struct Before {
 }
 
 /// What the pairs say of one cause.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CauseSeen {
     /// The cause.
     pub cause: Cause,

@@ -24,23 +24,28 @@ use crate::stereo::{Error, Rig};
 const SHORT_SQUARES: usize = 1;
 
 /// One pair as measured by cameras that have not seen it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeldOutPair {
     /// Its name.
     pub pair: String,
     /// Mean error of the short range along x, mm; `None` where no such length was seen.
+    #[serde(rename = "mean_error_x10_mm")]
     pub mean_error_x_short_mm: Option<f64>,
     /// Along y.
+    #[serde(rename = "mean_error_y10_mm")]
     pub mean_error_y_short_mm: Option<f64>,
     /// Mean error of the long range along x, mm.
+    #[serde(rename = "mean_error_x70_mm")]
     pub mean_error_x_long_mm: Option<f64>,
     /// Along y.
+    #[serde(rename = "mean_error_y70_mm")]
     pub mean_error_y_long_mm: Option<f64>,
     /// Largest absolute error of any range, mm; `None` where both pictures show no length.
     pub max_abs_error_mm: Option<f64>,
     /// Root mean square of the distance between the two rays of a corner, mm; `None` where both show none.
     pub gap_rms_mm: Option<f64>,
     /// Errors of the long range, x then y, mm: Fig. 6 (a).
+    #[serde(skip)]
     pub long_errors_mm: Vec<f64>,
 }
 
