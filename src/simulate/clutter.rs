@@ -45,42 +45,25 @@ pub fn behind(seed: u64, placement: u64) -> Vec<Patch> {
 /// What holds the check board: a plate and a post behind it, in the board's frame.
 pub fn stand(board: &PhysicalBoard) -> Vec<Patch> {
     let (w, h) = board.plate_half_mm();
-    let at = |x: f64, y: f64, z: f64| transform(Vector3::zeros(), Vector3::new(x, y, z));
     vec![
-        Patch {
-            parent_from_patch: at(0.0, h + 150.0, 40.0),
-            corners_mm: rectangle(36.0, 340.0),
-            tone: Tone { value: 0.16, slope: (0.7, 0.0) },
-        },
-        Patch {
-            parent_from_patch: at(0.0, h - 4.0, 12.0),
-            corners_mm: rectangle(w * 0.6, 26.0),
-            tone: Tone { value: 0.1, slope: (0.2, 0.3) },
-        },
+        upright([0.0, h + 150.0, 40.0], rectangle(36.0, 340.0), 0.16, (0.7, 0.0)),
+        upright([0.0, h - 4.0, 12.0], rectangle(w * 0.6, 26.0), 0.1, (0.2, 0.3)),
     ]
 }
 
 /// What holds the target: the flange behind it and the arm behind that, in the target's frame.
 pub fn arm(target: &PhysicalBoard) -> Vec<Patch> {
     let (w, h) = target.plate_half_mm();
-    let at = |x: f64, y: f64, z: f64| transform(Vector3::zeros(), Vector3::new(x, y, z));
     vec![
-        Patch {
-            parent_from_patch: at(0.35 * w, h + 60.0, 95.0),
-            corners_mm: rectangle(84.0, 260.0),
-            tone: Tone { value: 0.55, slope: (-0.6, 0.1) },
-        },
-        Patch {
-            parent_from_patch: at(-12.0, 8.0, 30.0),
-            corners_mm: disc(52.0),
-            tone: Tone { value: 0.3, slope: (0.5, 0.3) },
-        },
-        Patch {
-            parent_from_patch: at(-12.0, 8.0, 22.0),
-            corners_mm: disc(44.0),
-            tone: Tone { value: 0.12, slope: (-0.4, 0.3) },
-        },
+        upright([0.35 * w, h + 60.0, 95.0], rectangle(84.0, 260.0), 0.55, (-0.6, 0.1)),
+        upright([-12.0, 8.0, 30.0], disc(52.0), 0.3, (0.5, 0.3)),
+        upright([-12.0, 8.0, 22.0], disc(44.0), 0.12, (-0.4, 0.3)),
     ]
+}
+
+/// A patch at a place, parallel to its parent's x-y plane.
+fn upright(at_mm: [f64; 3], corners_mm: Vec<Point2<f64>>, value: f64, slope: (f64, f64)) -> Patch {
+    Patch { parent_from_patch: transform(Vector3::zeros(), at_mm.into()), corners_mm, tone: Tone { value, slope } }
 }
 
 fn rectangle(width: f64, height: f64) -> Vec<Point2<f64>> {

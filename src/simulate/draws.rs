@@ -16,8 +16,6 @@ pub enum Purpose {
     CheckPoses = 3,
     /// Where the cameras stand, and where the robot goes.
     RobotPoses = 4,
-    /// How the robot misses a pose it repeats.
-    Repeatability = 5,
     /// What stands behind the board.
     Clutter = 6,
     /// Photon and read noise.

@@ -76,12 +76,7 @@ pub enum Error {
     },
     /// Pictures of something else stand where these would go.
     #[error("the folder holds pictures that are not of this world, {name} for one; they would be taken for its own")]
-    Occupied {
-        /// One of them.
-        name: String,
-        /// The folder.
-        folder: Utf8PathBuf,
-    },
+    Occupied { name: String, folder: Utf8PathBuf },
     /// A picture could not be encoded.
     #[error("cannot encode a picture: {0}")]
     Encode(#[from] image::ImageError),

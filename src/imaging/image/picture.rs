@@ -13,15 +13,13 @@ pub struct Picture {
 
 impl From<Image<u8>> for Picture {
     fn from(image: Image<u8>) -> Picture {
-        let clip_level = clipping::level(&image);
-        Picture { grey: Grey::Eight(image), clip_level }
+        Picture { clip_level: clipping::level(&image), grey: Grey::Eight(image) }
     }
 }
 
 impl From<Image<u16>> for Picture {
     fn from(image: Image<u16>) -> Picture {
-        let clip_level = clipping::level(&image);
-        Picture { grey: Grey::Sixteen(image), clip_level }
+        Picture { clip_level: clipping::level(&image), grey: Grey::Sixteen(image) }
     }
 }
 
@@ -33,17 +31,18 @@ impl Picture {
 
     /// Width, px.
     pub fn width(&self) -> usize {
-        match &self.grey {
-            Grey::Eight(image) => image.width,
-            Grey::Sixteen(image) => image.width,
-        }
+        self.size().0
     }
 
     /// Height, px.
     pub fn height(&self) -> usize {
+        self.size().1
+    }
+
+    fn size(&self) -> (usize, usize) {
         match &self.grey {
-            Grey::Eight(image) => image.height,
-            Grey::Sixteen(image) => image.height,
+            Grey::Eight(image) => (image.width, image.height),
+            Grey::Sixteen(image) => (image.width, image.height),
         }
     }
 }

@@ -42,13 +42,13 @@ const FEWEST: usize = 3;
 /// times what is usual there and by more than they are good for does not count.
 pub fn bends(grid: &Lattice<Point>, rule: Rule) -> Vec<[Option<Bend>; 2]> {
     let mut bends = vec![[None; 2]; grid.columns * grid.rows];
+    let at = |c: usize, r: usize| Some((r * grid.columns + c, *grid.get(c, r)?));
     for row in 0..grid.rows {
-        let line: Vec<_> =
-            (0..grid.columns).filter_map(|c| Some((row * grid.columns + c, *grid.get(c, row)?))).collect();
+        let line: Vec<_> = (0..grid.columns).filter_map(|c| at(c, row)).collect();
         line_bend(&line, rule, |at, bend| bends[at][0] = Some(bend));
     }
     for col in 0..grid.columns {
-        let line: Vec<_> = (0..grid.rows).filter_map(|r| Some((r * grid.columns + col, *grid.get(col, r)?))).collect();
+        let line: Vec<_> = (0..grid.rows).filter_map(|r| at(col, r)).collect();
         line_bend(&line, rule, |at, bend| bends[at][1] = Some(bend));
     }
     bends
