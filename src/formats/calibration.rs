@@ -73,7 +73,6 @@ pub struct Calibrated {
     pub pairs: Option<usize>,
     /// The volume that the verdict was for.
     pub volume: Option<Volume>,
-    /// The board that calibrated.
     pub board: Option<Board>,
     /// The calibration's last pairs, where they contradict the rig.
     pub unconfirmed: Vec<String>,

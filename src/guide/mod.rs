@@ -63,7 +63,6 @@ pub fn page(topic: &str) -> Option<&'static Page> {
 }
 
 impl Page {
-    /// Its title.
     pub fn title(&self) -> &'static str {
         self.text.lines().next().unwrap_or_default().trim_start_matches(['#', ' '])
     }

@@ -65,7 +65,6 @@ pub struct Length {
     /// Index of the pose among the places.
     pub pose: usize,
     pub length_mm: f64,
-    /// Its own variance, mm^2.
     pub variance_mm2: f64,
     /// Root of the row's weight, 0 to 1.
     pub weight: f64,

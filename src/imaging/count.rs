@@ -18,7 +18,6 @@ const AGREEING: usize = 10;
 /// Squares of a board, and how many pictures show them of how many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counted {
-    /// The squares.
     pub squares: Squares,
     /// Pictures that show so many.
     pub pictures: usize,

@@ -60,7 +60,6 @@ pub enum Error {
     /// Two files that would be the same picture of the same pair.
     #[error("two pictures claim the same side of pair `{pair}`: {first} and {second}")]
     SameName {
-        /// The pair.
         pair: String,
         /// One file.
         first: Utf8PathBuf,

@@ -11,7 +11,6 @@ use crate::tables::names::{Name, Unit, What, is_index};
 /// Columns, taken so far.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Picked {
-    /// One a joint.
     pub joints: Vec<At>,
     /// x, y and z of each target, with its name.
     pub points: Vec<(String, [At; 3])>,

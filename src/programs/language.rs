@@ -19,7 +19,6 @@ pub enum Language {
 }
 
 impl Language {
-    /// All of them.
     pub const ALL: [Language; 5] =
         [Language::UrScript, Language::Rapid, Language::Krl, Language::FanucLs, Language::Jbi];
 
@@ -73,7 +72,6 @@ pub struct Target {
     pub(super) places: Vec<Range<usize>>,
     /// Where it stands as a whole, with its brackets.
     pub(super) whole: Range<usize>,
-    /// Whether they are pulses.
     pub(super) pulses: bool,
 }
 

@@ -61,7 +61,6 @@ pub enum Error {
         point_mm[0], point_mm[1], point_mm[2]
     )]
     OutOfReach {
-        /// The group.
         group: String,
         /// Its start point, mm.
         point_mm: [f64; 3],

@@ -49,7 +49,6 @@ pub struct TruePose {
 pub struct Arm {
     /// As its maker says.
     pub nominal: Robot,
-    /// As it is.
     pub truth: Robot,
 }
 

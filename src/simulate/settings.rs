@@ -75,9 +75,7 @@ pub struct Settings {
     pub print: Print,
     /// The lenses' spread.
     pub optics: Optics,
-    /// The light.
     pub lighting: Lighting,
-    /// The sensors.
     pub sensor: Sensor,
     /// The robot's hidden deviations.
     pub robot: RobotDeviations,

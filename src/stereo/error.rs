@@ -48,7 +48,6 @@ pub enum Error {
     TooFewCorners {
         /// Corners that are no outliers.
         corners: usize,
-        /// Unknowns.
         unknowns: usize,
     },
     /// One camera's pictures fit no camera.
@@ -137,7 +136,6 @@ pub enum Error {
     /// A lens that another program has no words for.
     #[error("the {lens} lens cannot be said in {format}'s format; it goes up to {most}")]
     LensNotExportable {
-        /// The format.
         format: &'static str,
         /// The lens of the rig.
         lens: &'static str,
@@ -156,11 +154,8 @@ pub enum Error {
     /// Pictures of another size than the calibration's.
     #[error("the {} pictures are {found_width}x{found_height} px, the calibration is for {width}x{height}", side.name())]
     PictureSize {
-        /// Whose.
         side: Side,
-        /// Found.
         found_width: u32,
-        /// Found.
         found_height: u32,
         /// Needed.
         width: u32,

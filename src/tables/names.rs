@@ -20,7 +20,6 @@ pub enum Unit {
     Um,
     /// Centimetres.
     Cm,
-    /// Inches.
     Inch,
 }
 

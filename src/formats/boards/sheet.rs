@@ -41,9 +41,7 @@ pub(super) struct Patch {
 pub struct Sheet {
     /// The paper's name.
     pub paper: &'static str,
-    /// Its width, mm.
     pub width_mm: f64,
-    /// Its height, mm.
     pub height_mm: f64,
     /// The board's name, and what the ruler is for.
     pub foot: String,
@@ -112,7 +110,6 @@ impl Sheet {
         Ok(Sheet { paper, width_mm, height_mm, foot, patches, foot_at })
     }
 
-    /// As SVG.
     pub fn svg(&self) -> String {
         let (w, h) = (self.width_mm, self.height_mm);
         let mut text = format!(
@@ -134,7 +131,6 @@ impl Sheet {
         text
     }
 
-    /// As PDF.
     pub fn pdf(&self) -> Vec<u8> {
         let [catalog, pages, page, contents, font] = [1, 2, 3, 4, 5].map(Ref::new);
         let letters = Name(b"F1");

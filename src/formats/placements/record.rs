@@ -34,7 +34,6 @@ pub struct PlacementFile {
     pub held: Vec<Held>,
 }
 
-/// One placement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GroupRecord {
     /// Its name.

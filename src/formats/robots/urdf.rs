@@ -247,7 +247,6 @@ impl Urdf {
 }
 
 impl Chain<'_> {
-    /// The joints that move.
     pub fn moving(&self) -> impl Iterator<Item = &UrdfJoint> {
         self.joints.iter().copied().filter(|j| j.kind != Kind::Fixed)
     }

@@ -28,12 +28,10 @@ pub enum Reading {
     Position {
         /// In the group's frame, mm.
         point_mm: Point3<f64>,
-        /// Its covariance, mm^2.
         covariance_mm2: Option<Matrix3<f64>>,
         /// `sensor_from_target` as a rotation vector.
         rotation_rad: Option<Vector3<f64>>,
     },
-    /// A distance.
     Distance {
         /// Its value, mm.
         distance_mm: f64,
@@ -58,7 +56,6 @@ impl Reading {
 /// A pose that can be used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pose {
-    /// Its name.
     pub name: String,
     /// Index of its group.
     pub group: usize,
@@ -75,7 +72,6 @@ pub struct Pose {
 /// One placement of the sensor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Group {
-    /// Its name.
     pub name: String,
     /// Index of its centre pose, where it has a row.
     pub center: Option<usize>,
@@ -84,7 +80,6 @@ pub struct Group {
 /// A row that was left out.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Skipped {
-    /// The pose.
     pub pose: String,
     /// Why.
     pub reason: String,
@@ -97,7 +92,6 @@ pub struct Dataset {
     pub kind: Kind,
     /// Placements, in order of appearance.
     pub groups: Vec<Group>,
-    /// Poses.
     pub poses: Vec<Pose>,
     /// Rows without a usable reading.
     pub skipped: Vec<Skipped>,
@@ -124,9 +118,7 @@ pub struct KnownDistance {
     pub a: usize,
     /// Index of the other.
     pub b: usize,
-    /// mm
     pub distance_mm: f64,
-    /// mm
     pub sigma_mm: f64,
 }
 

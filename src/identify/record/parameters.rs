@@ -16,7 +16,6 @@ const AT_LIMIT: f64 = 1e-3;
 /// One method on one model.
 #[derive(Debug, Clone, Serialize)]
 pub struct MethodRecord {
-    /// Method.
     pub name: &'static str,
     pub model: &'static str,
     pub parameters: Vec<ParameterRecord>,

@@ -21,7 +21,6 @@ pub struct Quality {
 /// Distance errors, and with positions point errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PointSpread {
-    /// Of distances.
     #[serde(flatten)]
     pub distance: Spread,
     /// Of points after the groups' rigid transforms.

@@ -21,7 +21,6 @@ pub struct Points {
     pub spots: Vec<Spot>,
     /// Where the search for the transform starts.
     pub sensor_from_base: Transform,
-    /// Whether the points are on a line.
     pub on_a_line: bool,
     /// The target's orientation on the flange before the extra unknowns turn it.
     pub flange_from_target: Matrix3<f64>,

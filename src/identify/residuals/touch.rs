@@ -40,7 +40,6 @@ pub struct Known {
 pub struct Touch {
     /// Where the search for each socket starts, base frame, mm.
     pub sockets: Vec<Vector3<f64>>,
-    /// The touches.
     pub contacts: Vec<Contact>,
     /// The known distances.
     pub known: Vec<Known>,

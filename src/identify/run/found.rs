@@ -20,7 +20,6 @@ pub struct Candidate {
     pub model: Model,
     /// What the problem looked like, and what came out; nothing of the nominal robot.
     pub found: Option<(Formulation, Solution)>,
-    /// The robot.
     pub robot: Robot,
     /// Root mean square held-out error of a number, mm, of the model where this ends at its least cost; `None` where it does not, or
     /// was not judged.

@@ -153,7 +153,6 @@ pub struct Robust<'a> {
     pub offsets: Vec<f64>,
     /// The robot found.
     pub robot: Robot,
-    /// Robust scatter.
     pub scatter: Scatter,
 }
 

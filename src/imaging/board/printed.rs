@@ -41,7 +41,6 @@ impl FromStr for PrintedExtent {
 /// A board as it was printed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Printed {
-    /// The board.
     pub board: Board,
     /// Expanded uncertainty (k = 2) of its whole extent, mm; that of a shorter length is less.
     pub uncertainty_mm: f64,

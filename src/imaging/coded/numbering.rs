@@ -97,7 +97,6 @@ pub enum Said {
     Place(Placement),
     /// One of two places, by which squares of the board hold markers: that of the new layout or that of the old.
     ByLayout,
-    /// Nothing.
     Nothing,
 }
 

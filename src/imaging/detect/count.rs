@@ -11,7 +11,6 @@ use crate::imaging::image::Picture;
 /// The squares that a picture shows, and whether the board is seen to end behind them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Seen {
-    /// The squares.
     pub squares: Squares,
     /// True where a margin follows on all four sides; else more corners would be in view, and none is found.
     pub ends: bool,

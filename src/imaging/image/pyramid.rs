@@ -57,7 +57,6 @@ const THUMBNAIL_COLUMNS: usize = 360;
 /// A reduced copy, and how far it is reduced.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Small {
-    /// The copy.
     pub copy: Grey8,
     /// Its size; never doubled.
     pub level: Level,

@@ -24,7 +24,6 @@ const ALGORITHM: &str = "corners 2dc9fddd79d9dac8";
 /// A board in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {
-    /// Its corners.
     pub corners: Lattice<Corner>,
     /// How its markers are printed, where it has any.
     pub print: Option<Print>,

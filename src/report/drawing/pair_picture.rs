@@ -19,7 +19,6 @@ pub struct PairPicture {
     pub pair: String,
     /// What it is an example of.
     pub role: &'static str,
-    /// The pictures.
     pub jpeg: PairJpeg,
     /// Corners with their residuals, predicted minus seen, px.
     pub residuals: Vec<(Observation, Vector2<f64>)>,

@@ -32,19 +32,15 @@ pub struct Scene<'a> {
     pub camera: Camera,
     /// The lens's spread.
     pub optics: Optics,
-    /// The board.
     pub board: &'a PhysicalBoard,
     /// Where it is.
     pub camera_from_board: Transform,
-    /// Its print.
     pub print: Print,
     /// What carries the board, in the board's frame, from behind to before.
     pub holder: &'a [Patch],
     /// What stands behind.
     pub backdrop: &'a Backdrop,
-    /// The light.
     pub lighting: Lighting,
-    /// The sensor.
     pub sensor: Sensor,
     /// Seed of the noise.
     pub seed: u64,

@@ -41,7 +41,6 @@ impl Lighting {
     }
 }
 
-/// A sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensor {
     /// Bits a pixel: 8, or 9 to 16 (then stored in 16 bits, the high ones).

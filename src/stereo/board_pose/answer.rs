@@ -9,7 +9,6 @@ use crate::stereo::board_pose::rig_change::judgement::Judgement;
 /// A change of the rig at one pose that lowers chi-square by more than this is none of chance: one pose in twenty million.
 pub(in crate::stereo::board_pose) const POSE_LIMIT: f64 = 45.0;
 
-/// The target at one pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TargetPose {
     /// `cam_from_board`: the left camera is the camera.
@@ -76,7 +75,6 @@ pub struct Shared {
     pub parameters: Vec<String>,
     /// Their change against calibration and drawing.
     pub change: Vec<f64>,
-    /// Their covariance.
     pub covariance: DMatrix<f64>,
 }
 

@@ -9,13 +9,11 @@ use crate::stereo::{Rig, Side};
 /// A cause with its direction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hypothesis {
-    /// The cause.
     pub cause: Cause,
     /// For a person: what changed.
     pub words: String,
     /// How the shared numbers change by one unit of it, in the layout's order.
     pub direction: DVector<f64>,
-    /// The unit.
     pub unit: &'static str,
 }
 

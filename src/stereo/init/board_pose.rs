@@ -18,7 +18,6 @@ use crate::stereo::solve::robust_loss::Loss;
 /// A board's pose and how well it fits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseFit {
-    /// `left_from_board`.
     pub left_from_board: Transform,
     /// Half the robust sum of squares of the whitened residuals.
     pub cost: f64,

@@ -32,7 +32,6 @@ const USUAL_FOCAL_SHARES: [f64; 4] = [0.6, 1.0, 2.0, 4.0];
 /// One camera, calibrated by itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OneCamera {
-    /// The camera.
     pub camera: Camera,
     /// `camera_from_board` of every view; `None` where the picture's corners are no board.
     pub poses: Vec<Option<Transform>>,

@@ -19,7 +19,6 @@ use crate::stereo::volume::lengths::VolumeLengths;
 /// A calibration with everything that was asked of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
-    /// The tolerance, mm.
     pub tolerance_mm: f64,
     /// Pass, fail or undecided: the worst line of the evidence.
     pub verdict: Verdict,
@@ -48,7 +47,6 @@ pub struct Judged {
 /// Lengths that are known by something else than the board that calibrated.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Standards {
-    /// A second board.
     pub second: Option<SecondBoard>,
     /// Slides of known lengths.
     pub moves: KnownMoves,
@@ -66,7 +64,6 @@ pub struct Demand {
 }
 
 impl Judged {
-    /// Judges.
     pub fn new(
         calibration: &Calibration,
         findings: Vec<Finding>,

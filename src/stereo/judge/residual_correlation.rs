@@ -27,7 +27,6 @@ pub struct Cell {
     pub x_px: f64,
     /// Middle of the cell, px.
     pub y_px: f64,
-    /// Corners in it.
     pub corners: usize,
     /// Mean residual (predicted minus seen), px; zero where there are none.
     pub mean_px: [f64; 2],
@@ -44,7 +43,6 @@ pub struct Field {
     pub systematic_px: f64,
 }
 
-/// The residuals' pattern.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResidualPattern {
     /// Correlation of the residuals of neighbouring corners.

@@ -128,7 +128,6 @@ impl KnownLenses {
         Side::BOTH.into_iter().flat_map(of).collect()
     }
 
-    /// Their values.
     pub fn values(&self) -> DVector<f64> {
         let value = |(side, at): (Side, usize)| self.camera(side).map_or(0.0, |camera| number(camera, at));
         DVector::from_iterator(self.covariance.nrows(), self.numbers().into_iter().map(value))
@@ -141,7 +140,6 @@ impl KnownLenses {
         })
     }
 
-    /// Their covariance.
     pub fn covariance(&self) -> &DMatrix<f64> {
         &self.covariance
     }

@@ -15,7 +15,6 @@ use crate::stereo::pairs::{Cause, DiscardedPair, fewest_pairs};
 /// Pairs to choose from, in the order in which they were taken, with each camera on its own pictures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidates {
-    /// The board.
     pub board: Board,
     /// The pairs as they were read.
     pub views: Vec<View>,

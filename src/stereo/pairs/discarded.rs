@@ -129,7 +129,6 @@ impl DiscardedPair {
 /// Corners of one picture of a pair that is used.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PictureCorners {
-    /// The pair.
     pub pair: String,
     /// Which of its pictures.
     #[serde(skip)]

@@ -37,7 +37,6 @@ const FITS_WELL: f64 = 0.5;
 pub struct Series<'a> {
     /// The common rig.
     pub shared: &'a Shared,
-    /// The board.
     pub board: &'a Board,
     /// All pairs in their order.
     pub views: &'a [View],

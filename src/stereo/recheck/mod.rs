@@ -63,7 +63,6 @@ pub struct Before {
 /// What the pairs say of one cause.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CauseSeen {
-    /// The cause.
     pub cause: Cause,
     /// For a person: what would have changed.
     #[serde(rename = "what")]
@@ -72,7 +71,6 @@ pub struct CauseSeen {
     pub amount: f64,
     /// In the unit of both.
     pub sigma: f64,
-    /// The unit.
     pub unit: &'static str,
     /// By how much that moves a length, mm.
     pub effect_mm: f64,

@@ -51,7 +51,6 @@ impl Chance {
 /// How a model predicts pairs it has not seen.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct LensScore {
-    /// The lens.
     pub model: &'static str,
     /// Root mean square of the held-out 2-D residuals, px; `None` where the pairs do not determine the lens, or it promised nothing.
     pub held_out_rms_px: Option<f64>,

@@ -30,7 +30,6 @@ const MORE_THAN_CHANCE: f64 = 2.6;
 pub struct Witness {
     /// What is free in it.
     pub layout: Layout,
-    /// Its rig.
     pub rig: Rig,
     /// How many terms it adds.
     pub added: usize,

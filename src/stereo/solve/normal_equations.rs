@@ -21,15 +21,12 @@ use crate::stereo::solve::robust_loss::Loss;
 /// One pair's share of the normal equations.
 #[derive(Debug, Clone)]
 pub struct Block {
-    /// Shared by shared.
     pub shared: DMatrix<f64>,
     /// Shared by pose.
     pub mixed: DMatrix<f64>,
-    /// Pose by pose.
     pub pose: Matrix6<f64>,
     /// Gradient of the shared numbers, `J' r`.
     pub shared_gradient: DVector<f64>,
-    /// Gradient of the pose.
     pub pose_gradient: Vector6<f64>,
     /// Half the robust sum of squares.
     pub cost: f64,

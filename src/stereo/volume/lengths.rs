@@ -96,7 +96,6 @@ impl VolumeLength {
 /// Lengths through the volume.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VolumeLengths {
-    /// The volume.
     pub volume: Volume,
     /// How long they are, mm.
     pub length_mm: f64,

@@ -54,7 +54,6 @@ pub struct Open {
 enum Weight {
     /// A long word that stands alone.
     Word,
-    /// A short one.
     Short,
     /// Part of another word, which says something only against another name.
     Part,

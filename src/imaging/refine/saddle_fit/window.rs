@@ -45,7 +45,6 @@ impl Sample for u16 {}
 /// Any number of pixels in groups.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Groups {
-    /// The groups.
     pub groups: Vec<Group>,
     /// Number of pixels.
     pub count: usize,

@@ -24,7 +24,6 @@ const NUMBERS: f64 = 6.0;
 /// A change of `right_from_left`, rotation (rad) and translation (mm), and by how much it would lower chi-square.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::stereo::board_pose) struct Change {
-    /// The change.
     pub change: Vector6<f64>,
     /// Fall of chi-square.
     pub fall: f64,

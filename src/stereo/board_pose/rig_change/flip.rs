@@ -14,7 +14,6 @@ pub enum Flip {
 }
 
 impl Flip {
-    /// All.
     pub const ALL: [Flip; 3] = [Flip::Mirrored, Flip::UpsideDown, Flip::HalfTurn];
 
     /// In words.

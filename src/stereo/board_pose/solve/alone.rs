@@ -32,7 +32,6 @@ pub(in crate::stereo::board_pose) struct Known<'a> {
     excess: f64,
 }
 
-/// A pose on them.
 pub(in crate::stereo::board_pose) struct Alone {
     /// `left_from_board`.
     pub pose: Transform,

@@ -70,7 +70,6 @@ pub(in crate::stereo::board_pose) struct PosePart {
     pub change: Matrix6<f64>,
     /// The same by the shared unknowns.
     pub change_shared: DMatrix<f64>,
-    /// Its gradient.
     pub change_gradient: Vector6<f64>,
     /// Derivative of the pose by such a change that nobody knows of.
     pub by_change: Matrix6<f64>,

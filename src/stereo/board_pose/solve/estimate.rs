@@ -52,7 +52,6 @@ const FIXED_POINT_STEPS: usize = 30;
 pub(in crate::stereo::board_pose) struct Estimate<'a> {
     /// The problem with the whiteners, the outliers and the shape's prior that were found.
     pub bundle: Bundle<'a>,
-    /// The values.
     pub values: Values,
     /// The normal equations there.
     pub normal: Normal,

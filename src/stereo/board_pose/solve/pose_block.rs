@@ -44,7 +44,6 @@ pub(in crate::stereo::board_pose) fn residual(
 
 /// A target in front of the rig, and what was seen of it there.
 pub(in crate::stereo::board_pose) struct SeenFrom<'a> {
-    /// The rig.
     pub rig: &'a Rig,
     /// Where each crossing is on the target, as [`crossings`] has them.
     pub crossings: &'a [Point3<f64>],
@@ -268,13 +267,11 @@ pub(in crate::stereo::board_pose) struct Eliminated {
     pub rig_mixed: SMatrix<f64, RIG_NUMBERS, 6>,
     /// Covariance of the pose from its own corners.
     pub pose_inverse: Matrix6<f64>,
-    /// Gradient of the pose.
     pub pose_gradient: Vector6<f64>,
     /// A change of `right_from_left` at this pose alone, by itself.
     pub change: Matrix6<f64>,
     /// The same by the shared unknowns.
     pub change_shared: DMatrix<f64>,
-    /// Its gradient.
     pub change_gradient: Vector6<f64>,
 }
 

@@ -14,7 +14,6 @@ use crate::stereo::volume::lengths::{VolumeLength, VolumeLengths};
 
 /// All that was asked of a calibration.
 pub struct Facts<'a> {
-    /// The calibration.
     pub calibration: &'a Calibration,
     /// Held-out lengths.
     pub accuracy: &'a Accuracy,

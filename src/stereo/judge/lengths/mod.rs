@@ -34,7 +34,6 @@ pub struct Range {
     pub nominal_mm: f64,
     /// How many lengths.
     pub count: usize,
-    /// Mean error, mm.
     pub mean_error_mm: f64,
     /// Standard deviation of the errors, mm.
     pub std_mm: f64,
