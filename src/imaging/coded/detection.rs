@@ -46,23 +46,16 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     let Some(margin) = fields.iter().map(|fields| fields.margin()).min_by(f64::total_cmp) else {
         return Err("no board found".to_owned().into());
     };
+    let count = |parts: &[Part]| merged(&board, parts).count();
     let mut best: Option<(Vec<Part>, Level, Grey8)> = None;
-    let mut unnumbered: Vec<Places> = Vec::new();
-    let mut by_layout = false;
+    let mut missed = Missed::default();
     for level in levels(picture) {
         let copy = level.copy(picture);
-        let mut parts: Vec<Part> = Vec::new();
-        for grid in grids(&copy, pitch, margin).into_iter().take(MOST_GRIDS) {
-            let grid = without_strays(right_handed(grid.map(|p| level.to_picture(p))), pitch);
-            match number(picture, &board, &fields, &grid) {
-                Numbered::Part(part) => add(&mut parts, part)?,
-                Numbered::ByLayout => by_layout = true,
-                Numbered::No if unnumbered.len() < MOST_GRIDS => unnumbered.push(grid),
-                Numbered::No => {}
-            }
-        }
-        let count = |parts: &[Part]| parts.iter().map(|part| part.corners.count()).sum::<usize>();
-        let step_px = parts.first().and_then(|part| part.corners.side_px(pitch)).map_or(0.0, |px| px / level.scale());
+        let parts = parts_on(picture, &board, &fields, (level, &copy), &mut missed)?;
+        // Of a part of a board: the rest may be farther away.
+        let is_whole = count(&parts) == board.columns() * board.rows();
+        let side_px = |part: &Part| if is_whole { part.corners.side_px(pitch) } else { part.corners.least_step_px() };
+        let step_px = parts.first().and_then(side_px).map_or(0.0, |px| px / level.scale());
         if !parts.is_empty() && best.as_ref().is_none_or(|(known, ..)| count(&parts) > count(known)) {
             best = Some((parts, level, copy));
         }
@@ -71,10 +64,10 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
         }
     }
     let Some((parts, level, copy)) = best else {
-        if by_layout {
+        if missed.by_layout {
             return Err(BY_LAYOUT.to_owned().into());
         }
-        return Err(explain::unnumbered(picture, &board, &unnumbered).into());
+        return Err(explain::unnumbered(picture, &board, &missed.unnumbered).into());
     };
     let Part { placement, fields, .. } = parts[0];
     let merged = merged(&board, &parts);
@@ -84,6 +77,42 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     let print = Print { share: fields.marked(), pitch, layout: placement.layout, inverted: placement.inverted };
     let on_copy = merged.map(|p| level.to_copy(p));
     Ok(Detected { print: Some(print), ..on_a_copy(picture, level, &copy, on_copy) })
+}
+
+/// What was seen of a board and has no number.
+#[derive(Default)]
+struct Missed {
+    unnumbered: Vec<Places>,
+    /// Whether the layout would number some.
+    by_layout: bool,
+}
+
+/// The parts of the board on one copy. Where they are not all of it, the grids of foreshortened squares are parts too.
+fn parts_on(
+    picture: &Picture,
+    board: &Board,
+    fields: &[Fields],
+    (level, copy): (Level, &Grey8),
+    missed: &mut Missed,
+) -> Result<Vec<Part>, Refusal> {
+    let pitch = board.pitch();
+    let margin = fields.iter().map(|fields| fields.margin()).fold(f64::INFINITY, f64::min);
+    let mut parts: Vec<Part> = Vec::new();
+    for foreshortened in [false, true] {
+        if merged(board, &parts).count() == board.columns() * board.rows() {
+            break;
+        }
+        for grid in grids(copy, pitch, margin, foreshortened).into_iter().take(MOST_GRIDS) {
+            let grid = without_strays(right_handed(grid.map(|p| level.to_picture(p))), pitch);
+            match number(picture, board, fields, &grid) {
+                Numbered::Part(part) => add(&mut parts, part)?,
+                Numbered::ByLayout => missed.by_layout = true,
+                Numbered::No if missed.unnumbered.len() < MOST_GRIDS => missed.unnumbered.push(grid),
+                Numbered::No => {}
+            }
+        }
+    }
+    Ok(parts)
 }
 
 /// Copies in their order: from coarse to fine.
@@ -188,8 +217,10 @@ fn add(parts: &mut Vec<Part>, part: Part) -> Result<(), Refusal> {
     Ok(())
 }
 
+/// The corners of all parts; those of the first where several have one. A small grid has too few corners to tell by itself that one of them strays.
 fn merged(board: &Board, parts: &[Part]) -> Places {
-    Lattice::from_fn(board.columns(), board.rows(), |col, row| {
+    let corners = Lattice::from_fn(board.columns(), board.rows(), |col, row| {
         parts.iter().find_map(|part| part.corners.get(col, row).copied())
-    })
+    });
+    if parts.len() > 1 { without_strays(corners, board.pitch()) } else { corners }
 }

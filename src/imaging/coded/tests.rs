@@ -230,3 +230,40 @@ fn another_grid_of_tags_is_named() {
     let refusal = corners_in(&mirrored, TAGS.parse().unwrap()).unwrap_err();
     assert!(refusal.reason.contains("mirrored"), "{}", refusal.reason);
 }
+
+#[test]
+fn foreshortened_boards_are_measured() {
+    let wide = "charuco:9x7:20:15:DICT_4X4_100";
+    let tall = "charuco:8x11:24:18.75:DICT_4X4_1000";
+    // Squares three to four times as wide as high: their markers are nearer to the long edges than a marker of a square seen from above.
+    for (board, tilt, spin, z, least) in [
+        (wide, 1.2, 0.1, 300.0, 40),
+        (wide, 1.2, 0.5, 400.0, 44),
+        (wide, 1.25, 0.5, 300.0, 40),
+        (tall, 1.25, 0.1, 400.0, 40),
+        (tall, 1.3, 0.1, 400.0, 36),
+    ] {
+        let (picture, truth) = Shot::of(board, [tilt, 0.7 * spin, spin], [0.0, 0.0, z]).taken();
+        let (count, chi2) = measured(board, &picture, &truth);
+        assert!(count >= least, "{board} {tilt} {spin} {z}: {count} corners");
+        assert!(chi2 < 3.0, "{board} {tilt} {spin} {z}: {chi2}");
+    }
+}
+
+#[test]
+fn no_corner_of_a_small_part_strays() {
+    let wide = "charuco:9x7:20:15:DICT_4X4_100";
+    let tall = "charuco:8x11:24:18.75:DICT_4X4_1000";
+    for (board, tilt, spin, z) in [
+        (tall, 1.15, 0.5, 300.0),
+        (tall, 1.2, 0.1, 300.0),
+        (tall, 1.2, 0.1, 400.0),
+        (tall, 1.2, 0.5, 300.0),
+        (wide, 1.25, 0.1, 300.0),
+    ] {
+        let (picture, truth) = Shot::of(board, [tilt, 0.7 * spin, spin], [0.0, 0.0, z]).taken();
+        // Every corner that is found lies where its number says.
+        let (count, _) = measured(board, &picture, &truth);
+        assert!(count > 20, "{board} {tilt} {spin} {z}: {count} corners");
+    }
+}

@@ -30,6 +30,8 @@ const EDGE_CONTRAST: f64 = 0.25;
 const ALONG: f64 = 0.4;
 /// How far from an edge both squares are looked at, as a share of such a way: where they certainly are, even on an oblique board.
 const ASIDE: f64 = 0.4;
+/// How near to an edge its squares are looked at at least, px: nearer, they blur into each other.
+const NEAREST_PX: f64 = 1.0;
 /// How far the bright axes of neighbours may be from perpendicular, rad.
 const SLANT: f64 = 0.6;
 
@@ -66,12 +68,13 @@ pub fn largest_grid(picture: &Grey8, enough: usize) -> Option<Places> {
 }
 
 /// All grids of four corners and more in a picture of a board with markers, the largest first: parts of a board that something divides. Edges are
-/// looked at within the `margin` round a marker, a share of a square. A grid of tags begins with one both ways and ends with one.
-pub fn grids(picture: &Grey8, pitch: Pitch, margin: f64) -> Vec<Places> {
+/// looked at within the `margin` round a marker, a share of a square; of `foreshortened` squares nearer to the edge too, as a marker comes near to their
+/// long edges. A grid of tags begins with one both ways and ends with one.
+pub fn grids(picture: &Grey8, pitch: Pitch, margin: f64, foreshortened: bool) -> Vec<Places> {
     /// A square with a marker in it.
     const FEWEST: usize = 4;
     let candidates = candidates(picture);
-    let near = Near { aside: margin / 2.0 / ALONG, ..Near::new(picture, &candidates) };
+    let near = Near { aside: margin / 2.0 / ALONG, foreshortened, ..Near::new(picture, &candidates) };
     let mut taken = vec![false; candidates.len()];
     let mut found: Vec<Vec<(Place, usize)>> = Vec::new();
     let mut seeds = 0;
@@ -104,6 +107,8 @@ struct Near<'a> {
     candidates: &'a [Candidate],
     /// Where the squares beside an edge are looked at, as a share of the way along it.
     aside: f64,
+    /// Whether they are looked at nearer to the edge too.
+    foreshortened: bool,
     /// Cells in a row.
     columns: usize,
     /// Row by row; each candidate with its place, which is all that most questions are about.
@@ -117,7 +122,14 @@ impl<'a> Near<'a> {
     fn new(picture: &'a Grey8, candidates: &'a [Candidate]) -> Near<'a> {
         let cells_of = |size: usize| cell_of(size as f64, usize::MAX) + 1;
         let (columns, rows) = (cells_of(picture.width), cells_of(picture.height));
-        let mut near = Near { picture, candidates, aside: ASIDE, columns, cells: vec![Vec::new(); columns * rows] };
+        let mut near = Near {
+            picture,
+            candidates,
+            aside: ASIDE,
+            foreshortened: false,
+            columns,
+            cells: vec![Vec::new(); columns * rows],
+        };
         for (i, c) in candidates.iter().enumerate() {
             let [x, y] = near.cell(&c.at);
             near.cells[y * columns + x].push((c.at, i));
@@ -168,12 +180,16 @@ impl Near<'_> {
         let bright_left = (a.axis - step.y.atan2(step.x)).rem_euclid(PI) < FRAC_PI_2;
         let sign = if bright_left { 1.0 } else { -1.0 };
         let least = EDGE_CONTRAST * a.contrast.max(b.contrast);
-        [0.1, 0.5].into_iter().all(|from| sign * self.across(a.at + step * from, step * ALONG) > least)
+        let shows = |aside: f64| {
+            [0.1, 0.5].into_iter().all(|from| sign * self.across(a.at + step * from, step * ALONG, aside) > least)
+        };
+        let nearer = |aside: &f64| self.foreshortened && aside * ALONG * step.norm() > 2.0 * NEAREST_PX;
+        std::iter::successors(Some(self.aside), |aside| Some(aside / 2.0).filter(|_| nearer(aside))).any(shows)
     }
 
-    /// Mean grey on the left of a way less that on its right.
-    fn across(&self, from: Point2<f64>, way: Vector2<f64>) -> f64 {
-        let aside = Vector2::new(-way.y, way.x) * self.aside;
+    /// Mean grey on the left of a way less that on its right, so far from it.
+    fn across(&self, from: Point2<f64>, way: Vector2<f64>, aside: f64) -> f64 {
+        let aside = Vector2::new(-way.y, way.x) * aside;
         let samples = (way.norm().ceil() as usize).clamp(2, 32);
         let step = way / samples as f64;
         let sums = [from + aside, from - aside].map(|from| self.sum(from + 0.5 * step, step, samples));
