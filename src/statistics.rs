@@ -1,4 +1,4 @@
-//! The median, and quantiles of the distributions that tests compare with.
+//! The median, quantiles of the distributions that tests compare with, and what a repeatability is in standard deviations.
 
 /// The middle one of the numbers, the upper of two; `None` where there is none.
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
@@ -9,6 +9,10 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 
 /// Quantile of the normal distribution that one draw in a thousand exceeds.
 pub const NORMAL_999: f64 = 3.0902;
+
+/// ISO 9283: RP is the mean distance from the barycentre plus three standard deviations. For three equal
+/// normal coordinates of standard deviation s that is (1.596 + 3 * 0.673) s.
+pub const RP_OVER_SIGMA: f64 = 3.616;
 
 /// Quantile of chi-square at the level of a quantile of the normal distribution (Wilson and Hilferty 1931; 3 % too large at one degree of
 /// freedom and 99.9 %, less elsewhere).

@@ -7,6 +7,7 @@ use super::settings::Settings;
 use crate::geometry::{Transform, facing, rotation_matrix, transform, transform_from_matrix};
 use crate::imaging::Board;
 use crate::robot::{Robot, inverse};
+use crate::statistics::RP_OVER_SIGMA;
 use crate::stereo::Rig;
 use crate::stereo::data::observation::{Observation, Side};
 use crate::stereo::triangulate::triangulate;
@@ -19,10 +20,6 @@ const BORDER: f64 = 0.02;
 
 /// Starts for the posture at a sphere's middle.
 const STARTS: usize = 200;
-
-/// ISO 9283: RP is the mean distance from the barycentre plus three standard deviations. For three equal
-/// normal coordinates of standard deviation s that is (1.596 + 3 * 0.673) s.
-pub const RP_OVER_SIGMA: f64 = 3.616;
 
 /// Reach of the paper's robot, as [`reach_mm`] counts it.
 fn paper_reach_mm() -> f64 {

@@ -10,8 +10,8 @@ use super::rig::left_from_field;
 use super::settings::{Orientation, Settings, Sphere};
 use crate::geometry::{Transform, facing, transform};
 use crate::measurements::{RobotPose, Role};
-use crate::plan::scene::RP_OVER_SIGMA;
 use crate::robot::{Robot, inverse};
+use crate::statistics::RP_OVER_SIGMA;
 use crate::stereo::Rig;
 
 /// Largest tilt of the flange out of its group's orientation, and largest turn about its axis, deg.

@@ -118,8 +118,7 @@ fn ladder(problem: &Problem, shape: bool, chance: &Chance) -> Vec<LensScore> {
     let mut scores = Vec::new();
     for lens in Lens::LADDER.into_iter().filter(|lens| *lens >= SIMPLEST) {
         let layout = Layout::rig(lens, shape);
-        let added = |simpler: Layout| layout.count() - simpler.count();
-        let tried = simpler.is_none_or(|simpler| expects_gain(&problem, &layout, added(simpler)));
+        let tried = simpler.is_none_or(|simpler| expects_gain(&problem, &layout, &simpler));
         scores.push(if tried { score(&problem, lens, shape) } else { LensScore::untried(lens) });
         if lens == Lens::Rational8 {
             let best = simplest(&scores, chance);
@@ -138,9 +137,9 @@ fn ladder(problem: &Problem, shape: bool, chance: &Chance) -> Vec<LensScore> {
 
 /// Whether a richer lens can be expected to explain more than noise would let it: more than two standard deviations above the mean of
 /// a chi-square with as many degrees of freedom as it adds. Of a lens that cannot be determined nothing is expected.
-fn expects_gain(problem: &Problem, layout: &Layout, added: usize) -> bool {
+fn expects_gain(problem: &Problem, layout: &Layout, simpler: &Layout) -> bool {
     let start = problem.with_layout(layout);
     let expected = start.equations(layout).and_then(|equations| uncertainty::expected_decrease(&equations));
-    let added = added as f64;
+    let added = (layout.count() - simpler.count()) as f64;
     expected.is_some_and(|expected| expected > added + 2.0 * (2.0 * added).sqrt())
 }
