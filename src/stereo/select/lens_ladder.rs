@@ -4,7 +4,7 @@
 //! pairs ([`crate::stereo::select::cross_validation`]); the rig of a fold measures the pose of each pair it has not seen, and what is left counts. The simplest model whose
 //! loss is within two standard errors of the best wins (after Breiman et al. 1984), since a richer one extrapolates worse; unless the corners
 //! refute it: chi-squared falls by more than chance for a richer one that predicts no worse. What the board's print alone would let a term of no
-//! worth gain is allowed for in both.
+//! worth gain is allowed for in both. How much chance does, the richest lens tells that the pairs determine.
 //! Goes wrong: pairs too few or too alike to tell models apart; then the simplest that fits wins, and
 //! [`crate::stereo::judge::lengths::model_disagreement`] says what is at stake.
 
@@ -45,19 +45,21 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     if let Some(wide) = of_wide_lens(start, &solved, &layout) {
         solved = wide;
     }
-    let chance = Chance {
-        scatter: stated_uncertainty::excess_scatter(&solved, &layout, board),
-        print: PrintShare::of(&solved, board, &layout).map_or(1.0, |print| print.excess),
-    };
+    let mut chance = chance(&solved, &layout, board);
     // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
-    let mut scores = ladder(&solved.problem, layout.shape, &chance);
+    let mut scores = ladder(&solved.problem, layout.shape, &chance, &[]);
+    if let Some((full, full_layout)) = of_richest(&solved.problem, &scores, &chance) {
+        chance = self::chance(&full, &full_layout, board);
+        solved.problem.views = full.problem.views;
+        scores = ladder(&solved.problem, layout.shape, &chance, &scores);
+    }
     let bent = simplest(&scores, &chance).filter(|_| forced_shape.is_none() && layout.shape);
     let flat = bent.and_then(|bent| score(&solved.problem, bent.layout.left?, false).trial);
     let bends = bent
         .zip(flat)
         .is_none_or(|(bent, flat)| flat.is_worse_than(bent, &chance) || flat.is_refuted_by(bent, &chance));
     if !bends {
-        scores = ladder(&solved.problem, false, &chance);
+        scores = ladder(&solved.problem, false, &chance, &[]);
     }
     let Some(chosen) = simplest(&scores, &chance) else {
         // Some pairs cannot be left out without losing the cameras: nothing can be compared.
@@ -67,6 +69,26 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     let fewer = fewer_terms(&solved.problem, chosen, &chance);
     let Trial { layout, values, priors, .. } = fewer.as_ref().unwrap_or(chosen).clone();
     Ok(Choice { layout, near: Some(values), priors, scatter: None, scores })
+}
+
+/// By how much more than the corners' noise chance moves chi-squared, as a solution's residuals tell.
+fn chance(solved: &Solved, layout: &Layout, board: &Board) -> Chance {
+    Chance {
+        scatter: stated_uncertainty::excess_scatter(solved, layout, board),
+        print: PrintShare::of(solved, board, layout).map_or(1.0, |print| print.excess),
+    }
+}
+
+/// The richest lens that the pairs determine, with the corners weighed as it leaves them, where a simpler one was chosen. What the simpler one
+/// lacks would else pass for scatter of the pairs, before which no term seems worth anything (Mallows, Technometrics 15, 1973, takes
+/// the variance from the full model for the same reason).
+fn of_richest(problem: &Problem, scores: &[LensScore], chance: &Chance) -> Option<(Solved, Layout)> {
+    let richest = scores.iter().rev().find_map(|score| score.trial.as_ref())?;
+    if simplest(scores, chance)?.layout == richest.layout {
+        return None;
+    }
+    let Trial { layout, values, priors, .. } = richest.clone();
+    Some((Problem { values, priors, views: problem.views.clone() }.solve_near(&layout).ok()?, layout))
 }
 
 /// The pairs as a lens with the rational terms leaves them, where many corners lie far from where the simplest one puts them, this one explains
@@ -111,14 +133,19 @@ fn priors_of_forced(start: &Problem, layout: &Layout) -> Priors {
 
 /// The simplest lens and those that are richer, each from where the best before it ended: a richer lens begins as a simpler one. One that is
 /// expected to gain no more than chance cannot predict better, and is not tried. Rational terms that did not prove themselves
-/// are held at zero in the lenses after them, which would only carry them on along the valley where they are exchanged for the radial ones.
-fn ladder(problem: &Problem, shape: bool, chance: &Chance) -> Vec<LensScore> {
+/// are held at zero in the lenses after them, which would only carry them on along the valley where they are exchanged for the radial ones. `before`:
+/// the same with other weights; where lenses were tried then, they start from there.
+fn ladder(problem: &Problem, shape: bool, chance: &Chance, before: &[LensScore]) -> Vec<LensScore> {
     let mut problem = problem.clone();
     let mut simpler: Option<Layout> = None;
     let mut scores = Vec::new();
-    for lens in Lens::LADDER.into_iter().filter(|lens| *lens >= SIMPLEST) {
+    for (i, lens) in Lens::LADDER.into_iter().filter(|lens| *lens >= SIMPLEST).enumerate() {
         let layout = Layout::rig(lens, shape);
-        let tried = simpler.is_none_or(|simpler| expects_gain(&problem, &layout, &simpler));
+        let known = before.get(i).and_then(|score| score.trial.as_ref());
+        if let Some(known) = known {
+            problem.values = known.values.clone();
+        }
+        let tried = known.is_some() || simpler.is_none_or(|simpler| expects_gain(&problem, &layout, &simpler));
         scores.push(if tried { score(&problem, lens, shape) } else { LensScore::untried(lens) });
         if lens == Lens::Rational8 {
             let best = simplest(&scores, chance);

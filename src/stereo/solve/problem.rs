@@ -73,7 +73,6 @@ impl Problem {
     pub fn solve(&self, layout: &Layout) -> Result<Solved, Error> {
         let Problem { mut views, mut values, priors } = self.with_layout(layout);
         let unknowns = layout.count() + 6 * views.len();
-        let unseen = || Error::NotConverged { steps: 0 };
         let corners = views.iter().map(|view| view.observations.len()).sum::<usize>();
         if 2 * corners <= unknowns {
             return Err(Error::TooFewCorners { corners, unknowns });
@@ -84,6 +83,13 @@ impl Problem {
             let (loss, search) = (Loss::Cauchy(CAUCHY_WIDTH), Search::ROUGH);
             values = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search).values;
         }
+        Problem { views, values, priors }.solve_near(layout)
+    }
+
+    /// The same from values near the minimum: without the robust search.
+    pub fn solve_near(&self, layout: &Layout) -> Result<Solved, Error> {
+        let Problem { mut views, mut values, priors } = self.with_layout(layout);
+        let unknowns = layout.count() + 6 * views.len();
         let (mut noise, mut loss) = Noise::likeliest(&residuals::active(&views, &values).ok_or_else(unseen)?, unknowns);
         for _ in 0..MOST_ROUNDS {
             noise.apply(&mut views);
@@ -193,6 +199,11 @@ impl Solved {
     pub fn shared(&self) -> &Shared {
         &self.problem.values.shared
     }
+}
+
+/// Where values put a board behind a camera.
+fn unseen() -> Error {
+    Error::NotConverged { steps: 0 }
 }
 
 /// An error where a search did not end at a minimum. A lens that was asked for may have numbers that these views do not tell apart; the covariance

@@ -168,3 +168,21 @@ fn a_prism_needs_no_rational_terms() {
         }
     }
 }
+
+#[test]
+fn what_a_simple_lens_lacks_is_no_scatter_of_the_pairs() {
+    // Rational terms and a prism of a pixel: either alone explains little of what is left, and what the simplest lens leaves scatters the pairs.
+    for seed in 0..2 {
+        let mut world = World::paper(16, seed);
+        world.sigma_px = 0.002;
+        world.print_mm = 0.001;
+        for camera in [&mut world.rig.left, &mut world.rig.right] {
+            camera.lens = Lens::ThinPrism12;
+            camera.distortion[..8].copy_from_slice(&[0.25, 0.12, 2e-4, -3e-4, 0.02, 0.35, 0.18, 0.03]);
+            camera.distortion[8] = 1.5e-3;
+            camera.distortion[10] = -1e-3;
+        }
+        let found = calibrate(&world.corners(seed + 60), &Options::default()).unwrap();
+        assert!(found.layout.left >= Some(Lens::ThinPrism12), "seed {seed}: {:?}", found.layout.left);
+    }
+}
