@@ -12,12 +12,12 @@ use super::{Along, Finding, Kind};
 use crate::statistics::median;
 use crate::stereo::Lens;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::residuals;
 use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::pairs::Cause;
 use crate::stereo::pairs::misfit::misfit_px;
 use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::uncertainty;
 
 /// A lens or a rig that lacks something leaves no more than about this many times what single pictures do.
 const TIMES: f64 = 3.0;
@@ -25,8 +25,12 @@ const TIMES: f64 = 3.0;
 /// Pairs that are named as the worst.
 const WORST: usize = 5;
 
-/// Changes of the board's ratio of width and height at which the pairs are solved, from which the next are guessed.
-const STEPS: [f64; 3] = [1e-2, 1e-3, 1e-4];
+/// Change of the board's ratio of width and height by which the equations are asked what it would gain: far below what moves a corner by a pixel.
+const SMALL: f64 = 1e-4;
+
+/// Rounds after which the ratio stands still to [`STILL`], from a tenth of the board.
+const MOST_ROUNDS: usize = 6;
+const STILL: f64 = 1e-7;
 
 /// No printer stretches a board by more.
 const MOST_STRETCH: f64 = 0.1;
@@ -99,12 +103,12 @@ fn left_px(shared: &Shared, view: &View) -> f64 {
 fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
     /// Most of it that may be left. One number of sixteen that a rig has takes up little of what has another cause.
     const LEFT: f64 = 0.5;
-    let problem = calibration.problem();
     let layout = with_usual_lens(&calibration.layout);
-    let stretch = likeliest_stretch(&problem, &layout)?;
     // What a richer lens takes up is not the board's.
-    let before_px = refitted_px(&problem, &layout)?.min(misfit.usual_px);
-    let left_px = refitted_px(&stretched(&problem, stretch), &layout)?;
+    let problem = refitted(&calibration.problem(), &layout)?;
+    let before_px = median_px(&problem)?.min(misfit.usual_px);
+    let (stretch, fitted) = likeliest_stretch(&problem, &layout)?;
+    let left_px = median_px(&fitted)?;
     if left_px > LEFT * before_px {
         return None;
     }
@@ -129,26 +133,42 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
     })
 }
 
-/// By how much wider the board is than was said, for its height. `None` where the pairs do not tell.
-fn likeliest_stretch(problem: &Problem, layout: &Layout) -> Option<f64> {
-    let mut stretch = 0.0;
-    for step in STEPS {
-        let at = |by: f64| cost(&stretched(problem, by), layout);
-        let tried = [-step, 0.0, step].par_iter().map(|by| at(stretch + by)).collect::<Option<Vec<f64>>>()?;
-        let (slope, curvature) = (0.5 * (tried[2] - tried[0]), tried[2] - 2.0 * tried[1] + tried[0]);
-        let change = -slope / curvature * step;
-        if !(curvature > 0.0 && (stretch + change).abs() < MOST_STRETCH) {
+/// By how much wider the board is than was said, for its height, and the pairs with that board. `None` where the pairs do not tell, or where it
+/// explains too little of what they miss the rig by to be the cause. Method: Gauss-Newton with the rig and the poses eliminated.
+fn likeliest_stretch(problem: &Problem, layout: &Layout) -> Option<(f64, Problem)> {
+    /// Share of chi-squared that a cause takes away at least; the misfit falls to half of it, and chi-squared to a quarter.
+    const LEAST: f64 = 0.25;
+    let (mut stretch, mut fitted) = (0.0, problem.clone());
+    for round in 0..MOST_ROUNDS {
+        let at = |by: f64| {
+            let equations = stretched(&fitted, by).equations(layout)?;
+            Some(equations.cost() - 0.5 * uncertainty::expected_decrease(&equations)?)
+        };
+        let [below, here, above] = [at(-SMALL)?, at(0.0)?, at(SMALL)?];
+        let (slope, curvature) = (0.5 * (above - below), above - 2.0 * here + below);
+        let change = -slope / curvature * SMALL;
+        let enough = round > 0 || 0.5 * slope * slope / curvature > LEAST * here;
+        stretch = (1.0 + stretch) * (1.0 + change) - 1.0;
+        if !(curvature > 0.0 && enough && f64::abs(stretch) < MOST_STRETCH) {
             return None;
         }
-        stretch += change;
+        fitted = refitted(&stretched(&fitted, change), layout)?;
+        if change.abs() < STILL {
+            break;
+        }
     }
-    Some(stretch)
+    Some((stretch, fitted))
 }
 
-/// How far half of the pairs miss the rig that fits them best.
-fn refitted_px(problem: &Problem, layout: &Layout) -> Option<f64> {
-    let shared = problem.refit(layout)?.shared;
-    median(problem.views.par_iter().map(|view| left_px(&shared, view)).collect::<Vec<f64>>())
+/// The pairs with the rig that fits them best.
+fn refitted(problem: &Problem, layout: &Layout) -> Option<Problem> {
+    Some(Problem { values: problem.refit(layout)?, ..problem.with_layout(layout) })
+}
+
+/// How far half of the pairs miss their rig.
+fn median_px(problem: &Problem) -> Option<f64> {
+    let shared = &problem.values.shared;
+    median(problem.views.par_iter().map(|view| left_px(shared, view)).collect::<Vec<f64>>())
 }
 
 /// The layout with at least the terms that nearly all lenses need: misfit that the board made may have left fewer.
@@ -167,11 +187,4 @@ fn stretched(problem: &Problem, by: f64) -> Problem {
         o.board_mm.y /= (1.0 + by).sqrt();
     }
     problem
-}
-
-/// What is left at the minimum: chi-squared by the weights as they are.
-fn cost(problem: &Problem, layout: &Layout) -> Option<f64> {
-    let values = problem.refit(layout)?;
-    let left = residuals::active(&problem.views, &values)?;
-    Some(left.iter().map(|(o, residual)| o.whiten(*residual).norm_squared()).sum())
 }

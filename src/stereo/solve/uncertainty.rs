@@ -17,10 +17,13 @@ pub const WORST_FOCAL_SIGMA: f64 = 0.1;
 pub const UNTOLD_FOCAL_SIGMA: f64 = 0.35;
 
 /// By how much chi-square (twice the cost) would fall if the equations were straight from here to the minimum: what a richer
-/// model is expected to gain at a simpler one's minimum (Rao's score). `None` where the views do not determine the unknowns.
+/// model is expected to gain at a simpler one's minimum (Rao's score), or other data at the minimum of these. `None` where the views do not determine
+/// the unknowns.
 pub fn expected_decrease(equations: &Equations) -> Option<f64> {
     let (matrix, gradient) = normal_equations::eliminate(equations, 0.0)?;
-    Some(gradient.dot(&(invert(&matrix)? * &gradient)))
+    let of_pose = |block: &Block| Some(block.pose_gradient.dot(&(block.pose_inverse(0.0)? * block.pose_gradient)));
+    let of_poses = equations.blocks.iter().map(of_pose).sum::<Option<f64>>()?;
+    Some(of_poses + gradient.dot(&(invert(&matrix)? * &gradient)))
 }
 
 /// Covariance of the shared numbers and of each pose (its own block), with unit variance of the whitened residuals.
