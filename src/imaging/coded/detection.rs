@@ -8,6 +8,7 @@
 
 use nalgebra::Point2;
 
+use super::claim::{self, Claim};
 use super::in_grid::{faint_in, markers_in};
 use super::marker::{Fields, fields};
 use super::numbering::{Placement, Said};
@@ -105,7 +106,7 @@ fn parts_on(
         for grid in grids(copy, pitch, margin, foreshortened).into_iter().take(MOST_GRIDS) {
             let grid = without_strays(right_handed(grid.map(|p| level.to_picture(p))), pitch);
             match number(picture, board, fields, &grid) {
-                Numbered::Part(part) => add(&mut parts, part)?,
+                Numbered::Part(part) => add(board, &mut parts, part)?,
                 Numbered::ByLayout => missed.by_layout = true,
                 Numbered::No if missed.unnumbered.len() < MOST_GRIDS => missed.unnumbered.push(grid),
                 Numbered::No => {}
@@ -193,22 +194,29 @@ fn goes_beyond(board: &Board, turned: &Places, placement: &Placement) -> bool {
 }
 
 /// Adds a part of the board, the largest first; an error where it is a part of another board of the same kind.
-fn add(parts: &mut Vec<Part>, part: Part) -> Result<(), Refusal> {
-    let elsewhere = |known: &Part| {
+fn add(board: &Board, parts: &mut Vec<Part>, mut part: Part) -> Result<(), Refusal> {
+    let is_elsewhere = |known: &Part, part: &Part| {
         let step = known.corners.step_px().unwrap_or(0.0);
         let apart = part.corners.iter().filter_map(|(c, r, p)| Some((p - known.corners.get(c, r)?).norm()));
         let (mut same, mut other) = (0, 0);
         apart.for_each(|px| if px < 0.5 * step { same += 1 } else { other += 1 });
-        (same, other)
+        other > same
     };
-    for known in parts.iter() {
-        let (same, other) = elsewhere(known);
-        if other > same {
-            return if part.placement.agreeing >= 2 && known.placement.agreeing >= 2 {
-                Err("shows two boards with the same markers: cover one of them".to_owned().into())
-            } else {
-                Ok(())
-            };
+    while let Some(at) = parts.iter().position(|known| is_elsewhere(known, &part)) {
+        let known = &mut parts[at];
+        match claim::claim(board, &known.corners, &part.corners) {
+            Claim::TwoBoards if part.placement.agreeing >= 2 && known.placement.agreeing >= 2 => {
+                return Err("shows two boards with the same markers: cover one of them".to_owned().into());
+            }
+            Claim::TwoBoards => return Ok(()),
+            Claim::First(corners) => {
+                known.corners = corners;
+                return Ok(());
+            }
+            Claim::Second(corners) => {
+                part.corners = corners;
+                parts.remove(at);
+            }
         }
     }
     if parts.iter().all(|known| known.placement.layout == part.placement.layout) {

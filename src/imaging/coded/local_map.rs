@@ -48,7 +48,7 @@ pub fn square(grid: &Places, pitch: Pitch, (col, row): (isize, isize)) -> Option
 
 /// Homography through points `(column, row, place)` by least squares of its linear equations, its last element one at the place that they are
 /// relative to.
-fn least_squares(points: &[(f64, f64, Point2<f64>)]) -> Option<Matrix3<f64>> {
+pub fn least_squares(points: &[(f64, f64, Point2<f64>)]) -> Option<Matrix3<f64>> {
     if points.len() < 4 {
         return None;
     }

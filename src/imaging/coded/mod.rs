@@ -1,5 +1,6 @@
 //! Boards whose markers number their corners: found in any part of them.
 
+mod claim;
 mod detection;
 mod explain;
 pub mod faces;

@@ -138,6 +138,19 @@ fn two_boards_with_the_same_markers_are_named() {
 }
 
 #[test]
+fn a_board_before_another_one_is_named() {
+    // Half of each is seen, the second lies five and a half squares beside the first.
+    let of = |x: f64| Shot::of(BOARD, [0.1, 0.1, 0.1], [x, 0.0, 700.0]).taken().0;
+    let (left, right) = (of(-55.0), of(55.0));
+    let Picture { grey: crate::imaging::image::Grey::Eight(right), .. } = &right else { panic!("eight bits") };
+    let both = with_pixels(&left, |image, x, y| {
+        if x < image.width / 2 { image.pixels[y * image.width + x] } else { right.pixels[y * image.width + x] }
+    });
+    let refusal = corners_in(&both, BOARD.parse().unwrap()).map(|corners| corners.count()).expect_err("two boards");
+    assert!(refusal.reason.contains("two boards"), "{}", refusal.reason);
+}
+
+#[test]
 fn what_is_left_of_a_torn_board_is_measured() {
     let shot = Shot::of(BOARD, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]);
     let (picture, truth) = shot.taken();
@@ -265,5 +278,24 @@ fn no_corner_of_a_small_part_strays() {
         // Every corner that is found lies where its number says.
         let (count, _) = measured(board, &picture, &truth);
         assert!(count > 20, "{board} {tilt} {spin} {z}: {count} corners");
+    }
+}
+
+#[test]
+fn a_strongly_foreshortened_board_is_not_two() {
+    let wide = "charuco:9x7:20:15:DICT_4X4_100";
+    let tall = "charuco:8x11:24:18.75:DICT_4X4_1000";
+    // At 72 to 76 degrees parts of the board are put together wrongly: every other line, or a diagonal.
+    for (board, tilt, spin, z) in [
+        (tall, 1.25, 0.0, 250.0),
+        (wide, 1.3, 0.5, 250.0),
+        (tall, 1.27, 0.1, 400.0),
+        (tall, 1.32, 0.3, 500.0),
+        (tall, 1.29, 0.3, 300.0),
+    ] {
+        let (picture, truth) = Shot::of(board, [tilt, 0.7 * spin, spin], [0.0, 0.0, z]).taken();
+        // Every corner that is found lies where its number says.
+        let (count, _) = measured(board, &picture, &truth);
+        assert!(count > 4, "{board} {tilt} {spin} {z}: {count} corners");
     }
 }
