@@ -207,10 +207,9 @@ impl<T: Sample> Full<'_, T> {
             return halves;
         }
         let room = |at: f64, size: usize| (at + 0.5).min(size as f64 - 0.5 - at).max(0.0);
-        let (x, y) = (room(cell.place.x, self.image.width), room(cell.place.y, self.image.height));
-        let [a, b] = halves;
-        let share = (x / (a.x.abs() + b.x.abs())).min(y / (a.y.abs() + b.y.abs())).min(1.0);
-        halves.map(|half| half * share)
+        let room_px = [room(cell.place.x, self.image.width), room(cell.place.y, self.image.height)];
+        let [a, b] = shares_inside(&halves, room_px);
+        [halves[0] * a, halves[1] * b]
     }
 
     /// The same with the pixels that are to be kept.
@@ -254,6 +253,27 @@ impl<T: Sample> Full<'_, T> {
     }
 }
 
+/// The shares of both halves of a window that stays within so many px of its middle along x and y: those by which the corner is known best. How well it
+/// is known across an edge goes with the root of how long that edge is.
+fn shares_inside(halves: &[Vector2<f64>; 2], room_px: [f64; 2]) -> [f64; 2] {
+    /// Of a third less a step.
+    const STEPS: usize = 40;
+    let left = |axis: usize, first: f64| (room_px[axis] - first * halves[0][axis].abs()) / halves[1][axis].abs();
+    let second = |first: f64| left(0, first).min(left(1, first)).clamp(0.0, 1.0);
+    if second(1.0) >= 1.0 {
+        return [1.0; 2];
+    }
+    // The sum of both variances is convex.
+    let variance = |first: f64| 1.0 / first + 1.0 / second(first);
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..STEPS {
+        let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+        if variance(a) <= variance(b) { high = b } else { low = a }
+    }
+    let first = 0.5 * (low + high);
+    [first, second(first)]
+}
+
 /// Half of the largest window along an edge of this length, px.
 fn half_px(edge_px: f64, margin_px: f64) -> f64 {
     (edge_px - margin_px.max(LEAST_MARGIN * edge_px)).max(0.5 * edge_px).min(MOST_HALF_PX)
@@ -266,4 +286,23 @@ fn margin_px(start: &Model, cell: &Cell) -> f64 {
 
 pub(super) fn near_half_px(start: &Model) -> f64 {
     NEAR_HALF_PX.max(NEAR_HALF_BLURS * start.blur_px[0].max(start.blur_px[1]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_border_cuts_only_the_half_that_meets_it() {
+        let halves = [Vector2::new(40.0, 0.0), Vector2::new(0.0, 40.0)];
+        assert_eq!(shares_inside(&halves, [40.0, 50.0]), [1.0; 2]);
+        for (room, expected) in [([10.0, 50.0], [0.25, 1.0]), ([50.0, 20.0], [1.0, 0.5]), ([8.0, 12.0], [0.2, 0.3])] {
+            let shares = shares_inside(&halves, room);
+            assert!((0..2).all(|k| (shares[k] - expected[k]).abs() < 1e-6), "{room:?}: {shares:?}");
+        }
+        // Of edges that meet it alike both are cut alike.
+        let shares = shares_inside(&[Vector2::new(30.0, 30.0), Vector2::new(30.0, -30.0)], [30.0, 100.0]);
+        assert!(shares.iter().all(|share| (share - 0.5).abs() < 1e-6), "{shares:?}");
+        assert!(shares_inside(&halves, [0.0, 10.0]).iter().all(|share| share.is_finite()));
+    }
 }

@@ -115,7 +115,10 @@ impl<T: Sample> Full<'_, T> {
         let coarse = coarse(detected, window);
         let columns = coarse.columns;
         let at = |bends: &[[Option<Bend>; 2]], col: usize, row: usize| bends[row * columns + col];
-        let on_copy = |m: &Measured| Point { px: detected.level.to_picture(&m.px), counts: true };
+        let on_copy = |m: &Measured| {
+            let covariance_px2 = m.fit.covariance_px2 * detected.level.scale().powi(2);
+            Point { px: detected.level.to_picture(&m.px), counts: true, covariance_px2 }
+        };
         let coarse_bends = bends(&coarse.map(on_copy), Rule { good_px: GOOD_PX, in_part: detected.print.is_some() });
         // A neighbour that could not be measured still says how far the squares reach.
         let places: Places = Lattice::from_fn(columns, coarse.rows, |col, row| {

@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, RowVector2, Vector2};
 use super::Measured;
 use super::acceptance;
 use super::cell::Cell;
-use super::curvature::{Bend, Point, Rule, bends};
+use super::curvature::{Bend, Point, Rule, SEEN, bends};
 use super::saddle_fit::{Fit, Model};
 use crate::imaging::lattice::{Lattice, Places};
 
@@ -58,17 +58,19 @@ impl Windows {
             return corner;
         }
         let Some(back) = corner.normals().try_inverse() else { return corner };
-        let across = |by: &dyn Fn(Bend, f64) -> f64| {
+        let normals = corner.normals();
+        let known = normals * corner.fit.covariance_px2 * normals.transpose();
+        let across = |by: &dyn Fn(Bend, f64, f64) -> f64| {
             let [a, b] = [0, 1].map(|k| {
                 let half_px = corner.reach[k] * self.cell.edges[k].norm();
-                self.bends[k].map_or(1.0, |bend| by(bend, half_px))
+                self.bends[k].map_or(1.0, |bend| by(bend, half_px, known[(k, k)]))
             });
-            back * Matrix2::new(a, 0.0, 0.0, b) * corner.normals()
+            back * Matrix2::new(a, 0.0, 0.0, b) * normals
         };
-        let scale = across(&|bend, half_px| bend.scatter(half_px).max(0.0).sqrt());
+        let scale = across(&|bend, half_px, known| (bend.variance_px2(half_px, known) / known).max(0.0).sqrt());
         let covariance_px2 = scale * corner.fit.covariance_px2 * scale.transpose();
         // What the line's other corners do to the place has nothing to do with the light in this one's window.
-        let place_by_light = across(&|bend, half_px| bend.own_share(half_px)) * corner.fit.place_by_light;
+        let place_by_light = across(&|bend, half_px, _| bend.own_share(half_px)) * corner.fit.place_by_light;
         Measured { fit: Fit { covariance_px2, place_by_light, ..corner.fit }, ..corner }
     }
 }
@@ -104,8 +106,12 @@ pub(super) fn bends_by(
     which: impl Fn(&Windows) -> Option<Measured>,
 ) -> Vec<[Option<Bend>; 2]> {
     let grid = Lattice::from_fn(seen.columns, seen.rows, |col, row| {
-        let measured = seen.get(col, row).and_then(&which).map(|m| Point { px: m.px, counts: true });
-        measured.or_else(|| Some(Point { px: *places.get(col, row)?, counts: false }))
+        let measured = seen.get(col, row).and_then(&which).map(|m| Point {
+            px: m.px,
+            counts: true,
+            covariance_px2: m.fit.covariance_px2,
+        });
+        measured.or_else(|| Some(Point { px: *places.get(col, row)?, counts: false, covariance_px2: SEEN }))
     });
     let in_part = seen.iter().any(|(_, _, windows)| windows.cell.has_markers());
     bends(&grid, Rule { good_px: GOOD_PX, in_part })

@@ -1,0 +1,97 @@
+//! The bends of all lines of a board, both ways.
+
+use super::bend::{Bend, Point, Rule};
+use super::line::line_bend;
+use super::parallel;
+use crate::imaging::lattice::Lattice;
+
+/// Bends of the two edges at each place of the grid; `None` on lines with fewer than three corners that count. A place that is off its line by many
+/// times what is usual there and by more than they are good for does not count.
+pub fn bends(grid: &Lattice<Point>, rule: Rule) -> Vec<[Option<Bend>; 2]> {
+    let mut bends = vec![[None; 2]; grid.columns * grid.rows];
+    let at = |c: usize, r: usize| Some((r * grid.columns + c, *grid.get(c, r)?));
+    if rule.in_part {
+        let rows = (0..grid.rows).map(|row| (0..grid.columns).filter_map(|c| at(c, row)).collect());
+        parallel::bends(&rows.collect::<Vec<_>>(), rule.good_px, |at, bend| bends[at][0] = Some(bend));
+        let columns = (0..grid.columns).map(|col| (0..grid.rows).filter_map(|r| at(col, r)).collect());
+        parallel::bends(&columns.collect::<Vec<_>>(), rule.good_px, |at, bend| bends[at][1] = Some(bend));
+        return bends;
+    }
+    for row in 0..grid.rows {
+        let line: Vec<_> = (0..grid.columns).filter_map(|c| at(c, row)).collect();
+        line_bend(&line, rule.good_px, |at, bend| bends[at][0] = Some(bend));
+    }
+    for col in 0..grid.columns {
+        let line: Vec<_> = (0..grid.rows).filter_map(|r| at(col, r)).collect();
+        line_bend(&line, rule.good_px, |at, bend| bends[at][1] = Some(bend));
+    }
+    bends
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point2;
+
+    use super::*;
+    use crate::imaging::refine::curvature::SEEN;
+
+    const PLAIN: Rule = Rule { good_px: 0.1, in_part: false };
+
+    #[test]
+    fn circles_have_their_curvature() {
+        // Rows are arcs of radius 5000 px about a point far below the grid: curving away from the normal (0, 1).
+        let radius = 5000.0;
+        let grid = Lattice::from_fn(9, 5, |col, row| {
+            let angle = (col as f64 - 4.0) * 40.0 / radius;
+            let r = radius - row as f64 * 40.0;
+            Some(Point { px: Point2::new(r * angle.sin(), -r * angle.cos()), counts: true, covariance_px2: SEEN })
+        });
+        for (at, both) in bends(&grid, PLAIN).into_iter().enumerate() {
+            let [along_rows, along_columns] = both.map(|bend| bend.unwrap().per_px);
+            let r = radius - (at / 9) as f64 * 40.0;
+            // y grows away from the middle of the arc, so n.d is positive there and the bend negative.
+            assert!((along_rows * r + 1.0).abs() < 2e-3, "{along_rows}");
+            assert!(along_columns.abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_corner_scatters_at_least_by_its_own_share() {
+        // Corners at the ends of short lines bend them against themselves, those in the middle with themselves.
+        for (count, lines) in [(3, 1), (4, 1), (6, 1), (9, 1), (3, 3), (6, 4), (9, 6)] {
+            let line = Lattice::from_fn(count, lines, |col, row| {
+                let px = Point2::new(30.0 * col as f64 + (col % 2) as f64, 0.1 + 30.0 * row as f64);
+                Some(Point { px, counts: true, covariance_px2: SEEN * 0.01 })
+            });
+            for bend in bends(&line, Rule { in_part: true, ..PLAIN }).iter().map(|both| both[0].unwrap()) {
+                for half_px in [3.0, 10.0, 25.0] {
+                    let (scatter, own) = (bend.variance_px2(half_px, 0.01) / 0.01, bend.own_share(half_px));
+                    assert!(scatter >= own * own && (own - 1.0).abs() > 1e-7, "{count} {half_px}: {scatter} {own}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lines_of_two_corners_and_broken_ones_tell_no_bend() {
+        let point = |x: f64, y: f64| Point { px: Point2::new(x, y), counts: true, covariance_px2: SEEN };
+        let grid = Lattice::from_fn(2, 2, |col, row| Some(point(col as f64, (row * col) as f64)));
+        assert!(bends(&grid, PLAIN).iter().all(|b| *b == [None; 2]));
+        let same = Lattice::from_fn(5, 5, |_, _| Some(point(1.0, 1.0)));
+        assert!(bends(&same, PLAIN).iter().flatten().flatten().all(|bend| bend.per_px.is_finite()));
+    }
+
+    #[test]
+    fn a_corner_that_does_not_count_bends_no_line() {
+        // The first corner of a straight line, where it has the most weight, is off.
+        let line = |counts: bool| {
+            Lattice::from_fn(12, 1, |col, _| {
+                let y = if col == 0 { 0.5 } else { 0.0 };
+                Some(Point { px: Point2::new(40.0 * col as f64, y), counts: counts || col > 0, covariance_px2: SEEN })
+            })
+        };
+        let most = |bends: Vec<[Option<Bend>; 2]>| bends.iter().map(|b| b[0].unwrap().per_px.abs()).fold(0.0, f64::max);
+        assert!(most(bends(&line(true), PLAIN)) > 1e-5);
+        assert!(most(bends(&line(false), PLAIN)) < 1e-12);
+    }
+}
