@@ -6,13 +6,16 @@ use super::bound::margin;
 use super::case::Case;
 use super::{Found, Outcome};
 
+/// What pictures are told apart by: its title, and a picture's group.
+type Group<'a> = (&'a str, &'a dyn Fn(&Case) -> String);
+
 /// Prints a line a group, the wrong numbers, and the boards that were not found although twelve corners are in view.
 pub fn print(outcomes: &[Outcome]) {
     println!("                      of 12 or more | margin of 3 blurs and 2 px:  over | less:");
     println!(
         "               pictures  found   corners  wrong | corners   chi2  bound   rms px | corners   chi2   rms px"
     );
-    let groups: [(&str, &dyn Fn(&Case) -> String); 7] = [
+    let groups: [Group; 7] = [
         ("dictionary", &family),
         ("margin", &|case| format!("{:.2}", margin(case))),
         ("share seen", &|case| between(case.share_seen(), &[0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0])),
