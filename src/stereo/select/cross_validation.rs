@@ -13,7 +13,7 @@ use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::solve::normal_equations::{self, Equations};
 use crate::stereo::solve::priors::Information;
-use crate::stereo::solve::uncertainty::{self, determines_cameras};
+use crate::stereo::solve::uncertainty::{self, WORST_FOCAL_SIGMA, worst_focal_sigma};
 
 /// Folds over the pairs; with fewer pairs each is a fold of its own.
 pub const FOLDS: usize = 10;
@@ -105,9 +105,31 @@ pub fn leave_out(equations: &Equations, layout: &Layout, shared: &Shared, fold_o
     leave_out_with(equations, equations, layout, shared, fold_of)
 }
 
+/// The same, with another limit of how surely the others must determine a focal length, as a share of it.
+pub fn leave_out_within(
+    focal_sigma: f64,
+    equations: &Equations,
+    layout: &Layout,
+    shared: &Shared,
+    fold_of: &[usize],
+) -> Vec<Option<Without>> {
+    every_fold(focal_sigma, equations, equations, layout, shared, fold_of)
+}
+
 /// The same where the gradients change by another `curvature` than the weighted squares': the one of a loss whose weights change with the
 /// residuals.
 pub fn leave_out_with(
+    curvature: &Equations,
+    equations: &Equations,
+    layout: &Layout,
+    shared: &Shared,
+    fold_of: &[usize],
+) -> Vec<Option<Without>> {
+    every_fold(WORST_FOCAL_SIGMA, curvature, equations, layout, shared, fold_of)
+}
+
+fn every_fold(
+    focal_sigma: f64,
     curvature: &Equations,
     equations: &Equations,
     layout: &Layout,
@@ -120,9 +142,11 @@ pub fn leave_out_with(
     let Some(reduced) = reduced else { return vec![None; count(fold_of)] };
     (0..count(fold_of))
         .map(|fold| without(&equations.prior, &reduced, layout, shared, |i| fold_of[i] != fold))
+        .map(|without| without.filter(|w| worst_focal_sigma(&w.covariance, layout, &shared.rig) <= focal_sigma))
         .collect()
 }
 
+/// The calibration without some pairs. `None` where nothing holds the rest.
 fn without(
     prior: &Information,
     reduced: &[(DMatrix<f64>, DVector<f64>)],
@@ -136,9 +160,6 @@ fn without(
         gradient += own_gradient;
     }
     let covariance = uncertainty::invert(&matrix)?;
-    if !determines_cameras(&covariance, layout, &shared.rig) {
-        return None;
-    }
     let step = -normal_equations::solve_scaled(&matrix, &gradient)?;
     let shared = layout.step(shared, step.as_slice());
     Some(Without { step, covariance, shared })

@@ -15,7 +15,7 @@ use crate::stereo::judge::lengths::{self, Axis, Measured, Range, all_ranges, mea
 use crate::stereo::judge::verdict::{Expansion, Extremes};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::select::cross_validation::{self, FOLDS, Without};
-use crate::stereo::solve::uncertainty;
+use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, WORST_FOCAL_SIGMA};
 use crate::stereo::triangulate::{RigCovariance, common};
 use crate::stereo::volume::lengths::LONG_SQUARES;
 use crate::stereo::{Error, Rig};
@@ -63,7 +63,8 @@ pub struct Accuracy {
     pub doubtful: DoubtfulCorners,
     /// Number of folds.
     pub folds: usize,
-    /// Pairs without which the others do not determine the cameras: no other rig measures them.
+    /// Pairs without which the others do not determine the cameras: no other rig measures them, or only one that what focal lengths usually
+    /// are helped to.
     pub unchecked: Vec<String>,
     /// What leaving out each fold does to the shared numbers.
     pub fold_steps: Vec<DVector<f64>>,
@@ -98,6 +99,8 @@ pub struct EpipolarError {
 struct Folds {
     of_pair: Vec<usize>,
     rigs: Vec<Option<FoldRig>>,
+    /// False where no fold leaves pairs that determine the cameras, and what focal lengths usually are helped these.
+    determined: bool,
 }
 
 /// A rig of all pairs but those of one fold.
@@ -116,7 +119,8 @@ impl Folds {
 
 /// Holds out every pair once, together with those of similar poses, and measures it. `board_mm` is the expanded uncertainty of the board's lengths.
 ///
-/// Pairs without which the others do not determine the cameras are not measured; an error where that is all of them.
+/// Pairs without which the others do not determine the cameras are not measured. Where that is all of them (a few boards that all lie alike), rigs
+/// measure them that know their focal lengths no better than the calibration must, and all are told as unchecked; an error where there is not even one of those.
 pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accuracy, Error> {
     let undetermined = || Error::undetermined().without(&calibration.skipped);
     if calibration.views.iter().all(|view| common(view).is_empty()) {
@@ -155,7 +159,12 @@ fn folds(calibration: &Calibration) -> Option<Folds> {
     let Calibration { views, values, layout, .. } = calibration;
     let equations = calibration.problem().equations(layout)?;
     let of_pair = cross_validation::folds(views, &values.poses, FOLDS);
-    let without = cross_validation::leave_out(&equations, layout, &values.shared, &of_pair);
+    let within = |focal| cross_validation::leave_out_within(focal, &equations, layout, &values.shared, &of_pair);
+    let mut without = within(WORST_FOCAL_SIGMA);
+    let determined = without.iter().any(Option::is_some);
+    if !determined {
+        without = within(UNTOLD_FOCAL_SIGMA);
+    }
     let inflation = calibration.inflation;
     let by_noise = uncertainty::of_equations(&equations)?.shared * inflation;
     let more = &calibration.uncertainty.shared - by_noise;
@@ -164,7 +173,7 @@ fn folds(calibration: &Calibration) -> Option<Folds> {
         RigCovariance::new(&Covariance { order: layout.names(), matrix })
     };
     let rig = |w: Without| FoldRig { covariance: covariance(&w), rig: w.shared.rig, step: w.step };
-    Some(Folds { of_pair, rigs: without.into_iter().map(|w| w.map(rig)).collect() })
+    Some(Folds { of_pair, rigs: without.into_iter().map(|w| w.map(rig)).collect(), determined })
 }
 
 fn summarise(
@@ -182,7 +191,7 @@ fn summarise(
     let expansion = Expansion::new(calibration.pair_scatter.groups, board_mm);
     let rays_chi_square = mean(&measured.iter().flat_map(|m| &m.points).map(|p| p.chi_square).collect::<Vec<_>>())?;
     let share = rays_chi_square.clamp(f64::MIN_POSITIVE, 1.0);
-    let unchecked = calibration.views.iter().enumerate().filter(|(i, _)| folds.of(*i).is_none());
+    let unchecked = calibration.views.iter().enumerate().filter(|(i, _)| !folds.determined || folds.of(*i).is_none());
     let unchecked = unchecked.map(|(_, view)| view.pair.clone()).collect();
     Some(Accuracy {
         extremes: lengths::extremes(measured, |i| Some(&folds.of(i)?.covariance), expansion, share)?,
