@@ -8,7 +8,7 @@
 use nalgebra::Point2;
 use rayon::prelude::*;
 
-use crate::geometry::{Transform, rotation_vector};
+use crate::geometry::Transform;
 use crate::imaging::{Board, Side};
 use crate::stereo::Rig;
 use crate::stereo::data::residuals::median_px;
@@ -18,7 +18,6 @@ use crate::stereo::init::single_camera::as_left;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::pairs::Cause;
 use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::pairs::numbering::renumbered;
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
@@ -47,7 +46,7 @@ pub struct Series<'a> {
 }
 
 /// The poses that each of a pair's pictures gives the board alone, as `left_from_board` on the common rig.
-type Alone = [Option<Transform>; 2];
+pub type Alone = [Option<Transform>; 2];
 
 /// What was mixed up in each of these pairs, where something was: with it undone the pair fits the rig of the others.
 pub fn explain(series: &Series, strays: &[usize]) -> Vec<Option<(Cause, String)>> {
@@ -56,69 +55,8 @@ pub fn explain(series: &Series, strays: &[usize]) -> Vec<Option<(Cause, String)>
     }
     let views: Vec<View> = series.views.iter().map(|view| view.thinned(ENOUGH_CORNERS)).collect();
     let scene = Scene { series, views };
-    let alone: Vec<Alone> = scene.views.par_iter().map(|view| scene.alone(view)).collect();
+    let alone: Vec<Alone> = scene.views.par_iter().map(|view| series.alone(view)).collect();
     strays.par_iter().map(|&i| scene.files(i).or_else(|| scene.partner(i, &alone))).collect()
-}
-
-/// What happened to a pair in which nothing was mixed up: another board, where one number explains it, or something that moved between its two
-/// pictures. `missed_px` is by how much it misses the rig, `usual_px` what pairs usually do.
-pub fn moved_between(series: &Series, i: usize, missed_px: Option<f64>, usual_px: f64) -> (Cause, String) {
-    let view = &series.views[i];
-    let scene = Scene { series, views: Vec::new() };
-    let [left, right] = scene.alone(view);
-    let Some((left, right)) = left.zip(right) else {
-        return (Cause::Unknown, "its corners form no board on one of the cameras".to_owned());
-    };
-    let missed = missed_px.map_or(String::new(), |px| {
-        format!(" (its corners miss the rig by {px:.2} px, those of others by {usual_px:.2} px)")
-    });
-    let apart = right.translation.vector - left.translation.vector;
-    // A board whose squares are larger by a share is taken for nearer by each camera along its own rays: the two places are apart along the
-    // baseline, by that share of it.
-    let centre = series.shared.rig.right_from_left.inverse().translation.vector;
-    let share = apart.dot(&centre) / centre.norm_squared();
-    let (larger, share) = of_best_size(series.shared, view, share);
-    if missed_px.is_some() && misfit_px(series.shared, &larger).is_some_and(|(px, _)| px <= series.limit_px) {
-        let percent = 100.0 * share.abs();
-        let [which, length] = if share > 0.0 { ["larger", "shorter"] } else { ["smaller", "longer"] };
-        let reason = format!(
-            "it shows another board, its squares {percent:.2} % {which} than those in the other pairs, or the baseline was {:.2} mm {length}{missed}",
-            share.abs() * centre.norm()
-        );
-        return (Cause::OtherBoard, reason);
-    }
-    let turn = |quarters| rotation_vector(&(right * renumbered(quarters) * left.inverse())).norm();
-    let turned = series.board.turns_of_outline().into_iter().map(turn).fold(f64::INFINITY, f64::min);
-    let reason = format!(
-        "its pictures were not taken at one moment: between them the board (or a camera) moved by about {:.1} mm and {:.1} deg{missed}. Clamp \
-         the board and trigger both cameras at once",
-        apart.norm(),
-        turned.to_degrees()
-    );
-    (Cause::NotSimultaneous, reason)
-}
-
-/// The pair as one of a board that is larger by the share that fits best, and that share; the start is some parts of it off.
-fn of_best_size(shared: &Shared, view: &View, start: f64) -> (View, f64) {
-    let sized = |share: f64| {
-        let mut sized = view.clone();
-        sized.observations.iter_mut().for_each(|o| o.board_mm *= 1.0 + share);
-        sized
-    };
-    let cost = |share: f64| board_pose::fit(shared, &sized(share), Loss::Squared).map_or(f64::INFINITY, |fit| fit.cost);
-    let (mut share, mut width) = (start, 0.5 * start.abs());
-    // Near its minimum the cost is a parabola in the share.
-    for _ in 0..5 {
-        let [below, here, above] = [cost(share - width), cost(share), cost(share + width)];
-        let bend = below - 2.0 * here + above;
-        let step = 0.5 * width * (below - above) / bend;
-        if !(bend > 0.0 && step.is_finite()) {
-            break;
-        }
-        share += step.clamp(-2.0 * width, 2.0 * width);
-        width *= 0.2;
-    }
-    (sized(share), share)
 }
 
 /// Something that may be done to a picture on its way from the camera.
@@ -160,6 +98,14 @@ struct Scene<'a> {
     views: Vec<View>,
 }
 
+impl Series<'_> {
+    /// The poses that each of a pair's pictures gives the board alone.
+    pub fn alone(&self, view: &View) -> Alone {
+        let of = |side| board_pose::fit(self.shared, &view.only(side), Loss::Cauchy(CAUCHY_WIDTH));
+        Side::BOTH.map(|side| of(side).map(|fit| fit.left_from_board))
+    }
+}
+
 impl Scene<'_> {
     /// True where the view fits on a rig, within a share of the limit, in one of the numberings that the board's outline allows.
     fn fits(&self, shared: &Shared, view: &View, share: f64) -> bool {
@@ -169,11 +115,6 @@ impl Scene<'_> {
             turned.turn_right(self.series.board, quarters);
             misfit_px(shared, &turned).is_some_and(|(px, _)| px <= limit)
         })
-    }
-
-    fn alone(&self, view: &View) -> Alone {
-        let of = |side| board_pose::fit(self.series.shared, &view.only(side), Loss::Cauchy(CAUCHY_WIDTH));
-        Side::BOTH.map(|side| of(side).map(|fit| fit.left_from_board))
     }
 
     /// What was done to the pair's own files.

@@ -4,6 +4,7 @@ pub mod candidates;
 pub mod discarded;
 pub mod misfit;
 mod mixups;
+mod moved;
 pub mod numbering;
 pub mod open_numbers;
 pub mod series;

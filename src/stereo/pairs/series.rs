@@ -20,7 +20,7 @@ use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::discarded::too_few_pairs;
 use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::pairs::{DiscardedPair, mixups, numbering};
+use crate::stereo::pairs::{DiscardedPair, mixups, moved, numbering};
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
@@ -87,12 +87,19 @@ pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
         members.extend(&runs_kept);
         members.sort_unstable();
     }
-    let unexplained = |i: usize| mixups::moved_between(&series, i, misfits[i].map(|(px, _)| px), usual_px);
+    let is_out = |i: &usize| !runs_kept.contains(i);
+    let open: Vec<(usize, Option<f64>)> = strays
+        .iter()
+        .zip(&mixed_up)
+        .filter(|(i, why)| why.is_none() && is_out(i))
+        .map(|(&i, _)| (i, misfits[i].map(|(px, _)| px)))
+        .collect();
+    let mut moved = moved::explain(&series, &open, usual_px).into_iter();
     let discarded: Vec<DiscardedPair> = strays
         .iter()
         .zip(mixed_up)
-        .filter(|(i, _)| !runs_kept.contains(i))
-        .map(|(&i, reason)| (i, reason.unwrap_or_else(|| unexplained(i))))
+        .filter(|(i, _)| is_out(i))
+        .filter_map(|(&i, reason)| Some((i, reason.or_else(|| moved.next())?)))
         .map(|(i, (cause, reason))| DiscardedPair::new(&views[i].pair, cause, reason))
         .collect();
     check(candidates, &misfits, usual_px, &members, &discarded)?;

@@ -1,0 +1,187 @@
+//! What happened to pairs in which nothing was mixed up and that miss the rig of the others by far.
+//!
+//! In: a series with its rig, and those pairs. Out: a cause a pair, with figures. Method: a board whose squares are larger by a share is taken for
+//! nearer by each camera along its own rays: the two places that the cameras give it are apart along the baseline, by that share of
+//! it. One number explains such a pair; a board or a camera that moved between the two pictures takes six. A board that moved along the
+//! baseline looks the same, so that what the other pairs did decides: where several show one other size it is a board, where others
+//! moved this one did. Goes wrong: several boards of one other size that all moved alike.
+
+use nalgebra::Vector3;
+
+use crate::geometry::rotation_vector;
+use crate::statistics::median;
+use crate::stereo::data::view::View;
+use crate::stereo::init::board_pose;
+use crate::stereo::model::parameters::Shared;
+use crate::stereo::pairs::Cause;
+use crate::stereo::pairs::misfit::misfit_px;
+use crate::stereo::pairs::mixups::Series;
+use crate::stereo::pairs::numbering::renumbered;
+use crate::stereo::solve::robust_loss::Loss;
+
+/// Pairs that usually miss their rig by so many times what each camera leaves of its own pictures were not taken at one moment.
+const TIMES: f64 = 3.0;
+
+/// Shares that differ by no more than this part of them are of one board.
+const ONE_SIZE: f64 = 0.1;
+
+/// How the two pictures of a pair disagree.
+struct Apart {
+    /// From where the left picture has the board to where the right one has it, mm.
+    way_mm: Vector3<f64>,
+    turned_rad: f64,
+    /// By what share larger squares would explain it.
+    larger: Option<f64>,
+}
+
+/// What happened to each of these pairs; with each comes by how much it misses the rig, px, where it has a pose on it.
+pub fn explain(series: &Series, strays: &[(usize, Option<f64>)], usual_px: f64) -> Vec<(Cause, String)> {
+    let apart: Vec<Option<Apart>> = strays.iter().map(|&(i, px)| apart(series, i, px)).collect();
+    let alone = series.alone_px.iter().flat_map(|side| side.iter().flatten().copied());
+    let others_moved = median(alone).is_some_and(|alone_px| usual_px > TIMES * alone_px)
+        || apart.iter().flatten().any(|apart| apart.larger.is_none());
+    let baseline_mm = series.shared.rig.baseline_mm();
+    let explained = |(k, &(_, missed_px)): (usize, &(usize, Option<f64>))| {
+        let Some(Apart { way_mm, turned_rad, larger }) = &apart[k] else {
+            return (Cause::Unknown, "its corners form no board on one of the cameras".to_owned());
+        };
+        let missed = missed_px.map_or(String::new(), |px| {
+            format!(" (its corners miss the rig by {px:.2} px, those of others by {usual_px:.2} px)")
+        });
+        let same = |other: &Apart| {
+            larger.zip(other.larger).is_some_and(|(own, other)| (own - other).abs() <= ONE_SIZE * own.abs())
+        };
+        let shown_again = apart.iter().enumerate().any(|(other, a)| other != k && a.as_ref().is_some_and(same));
+        let turned_deg = turned_rad.to_degrees();
+        match larger {
+            Some(share) if shown_again || !others_moved => {
+                (Cause::OtherBoard, other_board(*share, baseline_mm, shown_again) + &missed)
+            }
+            Some(share) => (
+                Cause::NotSimultaneous,
+                format!(
+                    "its pictures were not taken at one moment: between them the board (or a camera) moved by about {:.1} mm along the line \
+                     between the cameras{missed}; or it shows another board, its squares {}. Clamp the board and trigger both cameras at once",
+                    share.abs() * baseline_mm,
+                    size(*share),
+                ),
+            ),
+            None => (
+                Cause::NotSimultaneous,
+                format!(
+                    "its pictures were not taken at one moment: between them the board (or a camera) moved by about {:.1} mm and \
+                     {turned_deg:.1} deg{missed}. Clamp the board and trigger both cameras at once",
+                    way_mm.norm(),
+                ),
+            ),
+        }
+    };
+    strays.iter().enumerate().map(explained).collect()
+}
+
+fn size(share: f64) -> String {
+    format!("{:.2} % {}", 100.0 * share.abs(), if share > 0.0 { "larger" } else { "smaller" })
+}
+
+/// A pair with other squares; one that is the only one of its size may have moved instead.
+fn other_board(share: f64, baseline_mm: f64, shown_again: bool) -> String {
+    let length = if share > 0.0 { "shorter" } else { "longer" };
+    let moved = if shown_again { "" } else { ", or the board moved by so much along it between the two pictures" };
+    format!(
+        "it shows another board, its squares {} than those in the other pairs, or the baseline was {:.2} mm {length}{moved}",
+        size(share),
+        share.abs() * baseline_mm
+    )
+}
+
+fn apart(series: &Series, i: usize, missed_px: Option<f64>) -> Option<Apart> {
+    let view = &series.views[i];
+    let [left, right] = series.alone(view);
+    let (left, right) = left.zip(right)?;
+    let way_mm = right.translation.vector - left.translation.vector;
+    let centre = series.shared.rig.right_from_left.inverse().translation.vector;
+    let (larger, share) = of_best_size(series.shared, view, way_mm.dot(&centre) / centre.norm_squared());
+    let fits = missed_px.is_some() && misfit_px(series.shared, &larger).is_some_and(|(px, _)| px <= series.limit_px);
+    let turn = |quarters| rotation_vector(&(right * renumbered(quarters) * left.inverse())).norm();
+    let turned_rad = series.board.turns_of_outline().into_iter().map(turn).fold(f64::INFINITY, f64::min);
+    Some(Apart { way_mm, turned_rad, larger: fits.then_some(share) })
+}
+
+/// The pair as one of a board that is larger by the share that fits best, and that share; the start is some parts of it off.
+fn of_best_size(shared: &Shared, view: &View, start: f64) -> (View, f64) {
+    let sized = |share: f64| {
+        let mut sized = view.clone();
+        sized.observations.iter_mut().for_each(|o| o.board_mm *= 1.0 + share);
+        sized
+    };
+    let cost = |share: f64| board_pose::fit(shared, &sized(share), Loss::Squared).map_or(f64::INFINITY, |fit| fit.cost);
+    let (mut share, mut width) = (start, 0.5 * start.abs());
+    // Near its minimum the cost is a parabola in the share.
+    for _ in 0..5 {
+        let [below, here, above] = [cost(share - width), cost(share), cost(share + width)];
+        let bend = below - 2.0 * here + above;
+        let step = 0.5 * width * (below - above) / bend;
+        if !(bend > 0.0 && step.is_finite()) {
+            break;
+        }
+        share += step.clamp(-2.0 * width, 2.0 * width);
+        width *= 0.2;
+    }
+    (sized(share), share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::transform;
+    use crate::imaging::Corners;
+    use crate::stereo::calibrate::calibrate;
+    use crate::stereo::select::options::Options;
+    use crate::stereo::synthetic::World;
+
+    /// What is said of the pairs that are left out.
+    fn said(corners: &Corners) -> Vec<(String, Cause, String)> {
+        let options = Options { lens: Some(crate::stereo::Lens::Brown4), shape: Some(false), known: None };
+        let pairs = calibrate(corners, &options).unwrap().discarded.pairs;
+        pairs.into_iter().map(|d| (d.pair, d.cause, d.reason)).collect()
+    }
+
+    /// The board was pushed along the baseline between the two pictures of these pairs, each by so many mm.
+    fn pushed(world: &World, corners: &mut Corners, seed: u64, pushes: &[(usize, f64)]) {
+        let baseline = world.rig.right_from_left.inverse().translation.vector.normalize();
+        for &(pair, mm) in pushes {
+            let mut moved = world.clone();
+            moved.poses[pair] = transform(Vector3::zeros(), baseline * mm) * moved.poses[pair];
+            corners.pairs[pair].right = moved.corners(seed).pairs[pair].right.clone();
+        }
+    }
+
+    #[test]
+    fn one_that_moved_along_the_baseline_among_others_that_moved_is_no_other_board() {
+        for seed in [7, 8, 9] {
+            let world = World::new(14, seed);
+            let mut corners = world.corners_by_hand(seed, 0.03);
+            pushed(&world, &mut corners, seed, &[(4, 6.0)]);
+            let [(pair, cause, reason)] = &said(&corners)[..] else { panic!("{:?}", said(&corners)) };
+            assert!(pair == "04" && *cause == Cause::NotSimultaneous, "{reason}");
+            assert!(
+                reason.contains("along the line between the cameras") && reason.contains("another board"),
+                "{reason}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_moved_alone_among_pairs_that_did_not_may_be_another_board() {
+        let world = World::new(14, 7);
+        let mut corners = world.corners(7);
+        pushed(&world, &mut corners, 7, &[(4, 6.0)]);
+        let [(pair, cause, reason)] = &said(&corners)[..] else { panic!("{:?}", said(&corners)) };
+        assert!(pair == "04" && *cause == Cause::OtherBoard && reason.contains("or the board moved"), "{reason}");
+        // Two of one size are of a board; two of two sizes may both have moved.
+        pushed(&world, &mut corners, 7, &[(9, 6.0)]);
+        let both = said(&corners);
+        assert!(both.len() == 2 && both.iter().all(|(_, cause, _)| *cause == Cause::OtherBoard), "{both:?}");
+        assert!(both.iter().all(|(_, _, reason)| !reason.contains("moved")), "{both:?}");
+    }
+}
