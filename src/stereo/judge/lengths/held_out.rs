@@ -63,8 +63,8 @@ pub struct Accuracy {
     pub doubtful: DoubtfulCorners,
     /// Number of folds.
     pub folds: usize,
-    /// Pairs without which the others do not determine the cameras: no other rig measures them, or only one that what focal lengths usually
-    /// are helped to.
+    /// Pairs without which the others do not determine the cameras: no other rig measures them, or only one that what focal lengths usually are
+    /// helped to.
     pub unchecked: Vec<String>,
     /// What leaving out each fold does to the shared numbers.
     pub fold_steps: Vec<DVector<f64>>,
@@ -120,7 +120,8 @@ impl Folds {
 /// Holds out every pair once, together with those of similar poses, and measures it. `board_mm` is the expanded uncertainty of the board's lengths.
 ///
 /// Pairs without which the others do not determine the cameras are not measured. Where that is all of them (a few boards that all lie alike), rigs
-/// measure them that know their focal lengths no better than the calibration must, and all are told as unchecked; an error where there is not even one of those.
+/// measure them whose focal lengths are known no better than a calibration's must be, and all are told as unchecked; an error where there is
+/// not even one of those.
 pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accuracy, Error> {
     let undetermined = || Error::undetermined().without(&calibration.skipped);
     if calibration.views.iter().all(|view| common(view).is_empty()) {
