@@ -12,7 +12,7 @@ use crate::imaging::Board;
 use crate::stereo::board_pose::print_share::PrintShare;
 use crate::stereo::model::parameters::Layout;
 use crate::stereo::select::known_lenses;
-use crate::stereo::select::model_comparison::{Chance, LensScore, Trial, gain_of_terms, score, simplest};
+use crate::stereo::select::model_comparison::{Chance, LensScore, OF_PAIR, Trial, gain_of_terms, score, simplest};
 use crate::stereo::select::options::{Choice, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
 use crate::stereo::solve::priors::Priors;
@@ -49,7 +49,8 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
     let mut scores = ladder(&solved.problem, layout.shape, &chance, &[]);
     if let Some((full, full_layout)) = of_richest(&solved.problem, &scores, &chance) {
-        chance = self::chance(&full, &full_layout, board);
+        chance =
+            self::chance(&full, &full_layout, board).with_taken_up(full_layout.count(), solved.problem.views.len());
         solved.problem.views = full.problem.views;
         scores = ladder(&solved.problem, layout.shape, &chance, &scores);
     }
@@ -81,10 +82,11 @@ fn chance(solved: &Solved, layout: &Layout, board: &Board) -> Chance {
 
 /// The richest lens that the pairs determine, with the corners weighed as it leaves them, where a simpler one was chosen. What the simpler one
 /// lacks would else pass for scatter of the pairs, before which no term seems worth anything (Mallows, Technometrics 15, 1973, takes
-/// the variance from the full model for the same reason).
+/// the variance from the full model for the same reason). At least half of what the pairs tell of a rig must be left to scatter.
 fn of_richest(problem: &Problem, scores: &[LensScore], chance: &Chance) -> Option<(Solved, Layout)> {
-    let richest = scores.iter().rev().find_map(|score| score.trial.as_ref())?;
-    if simplest(scores, chance)?.layout == richest.layout {
+    let told = |trial: &&Trial| 2 * trial.layout.count() <= OF_PAIR * problem.views.len();
+    let richest = scores.iter().rev().filter_map(|score| score.trial.as_ref()).find(told)?;
+    if richest.layout.count() <= simplest(scores, chance)?.layout.count() {
         return None;
     }
     let Trial { layout, values, priors, .. } = richest.clone();

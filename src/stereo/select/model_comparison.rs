@@ -36,7 +36,16 @@ pub struct Chance {
     pub print: f64,
 }
 
+/// Numbers that a pair tells of a rig beyond those that its own board takes: where its right camera seems to stand.
+pub const OF_PAIR: usize = 6;
+
 impl Chance {
+    /// With what so many numbers took up of the scatter of so few pairs. At most all of them go into where the pairs seem to see the right camera.
+    pub fn with_taken_up(self, numbers: usize, pairs: usize) -> Chance {
+        let all = (OF_PAIR * pairs) as f64;
+        Chance { scatter: self.scatter * all / (all - numbers as f64), ..self }
+    }
+
     /// By how much chi-squared may fall for so many terms of no worth.
     fn fall(&self, added: usize) -> f64 {
         self.scatter * self.print * chi_square_quantile(added as f64, REFUTED)
