@@ -52,29 +52,21 @@ pub fn explain(series: &Series, strays: &[(usize, Option<f64>)], usual_px: f64) 
             larger.zip(other.larger).is_some_and(|(own, other)| (own - other).abs() <= ONE_SIZE * own.abs())
         };
         let shown_again = apart.iter().enumerate().any(|(other, a)| other != k && a.as_ref().is_some_and(same));
-        let turned_deg = turned_rad.to_degrees();
-        match larger {
+        let (way, or_board) = match larger {
             Some(share) if shown_again || !others_moved => {
-                (Cause::OtherBoard, other_board(*share, baseline_mm, shown_again) + &missed)
+                return (Cause::OtherBoard, other_board(*share, baseline_mm, shown_again) + &missed);
             }
             Some(share) => (
-                Cause::NotSimultaneous,
-                format!(
-                    "its pictures were not taken at one moment: between them the board (or a camera) moved by about {:.1} mm along the line \
-                     between the cameras{missed}; or it shows another board, its squares {}. Clamp the board and trigger both cameras at once",
-                    share.abs() * baseline_mm,
-                    size(*share),
-                ),
+                format!("{:.1} mm along the line between the cameras", share.abs() * baseline_mm),
+                format!("; or it shows another board, its squares {}", size(*share)),
             ),
-            None => (
-                Cause::NotSimultaneous,
-                format!(
-                    "its pictures were not taken at one moment: between them the board (or a camera) moved by about {:.1} mm and \
-                     {turned_deg:.1} deg{missed}. Clamp the board and trigger both cameras at once",
-                    way_mm.norm(),
-                ),
-            ),
-        }
+            None => (format!("{:.1} mm and {:.1} deg", way_mm.norm(), turned_rad.to_degrees()), String::new()),
+        };
+        let reason = format!(
+            "its pictures were not taken at one moment: between them the board (or a camera) moved by about {way}{missed}{or_board}. Clamp \
+             the board and trigger both cameras at once"
+        );
+        (Cause::NotSimultaneous, reason)
     };
     strays.iter().enumerate().map(explained).collect()
 }

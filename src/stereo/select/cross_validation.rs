@@ -13,7 +13,7 @@ use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::solve::normal_equations::{self, Equations};
 use crate::stereo::solve::priors::Information;
-use crate::stereo::solve::uncertainty::{self, WORST_FOCAL_SIGMA, worst_focal_sigma};
+use crate::stereo::solve::uncertainty::{self, worst_focal_sigma};
 
 /// Folds over the pairs; with fewer pairs each is a fold of its own.
 pub const FOLDS: usize = 10;
@@ -100,41 +100,15 @@ pub struct Without {
     pub shared: Shared,
 }
 
-/// The calibration without each fold. `None` for a fold without which the others do not determine the cameras.
-pub fn leave_out(equations: &Equations, layout: &Layout, shared: &Shared, fold_of: &[usize]) -> Vec<Option<Without>> {
-    leave_out_with(equations, equations, layout, shared, fold_of)
-}
-
-/// The same, with another limit of how surely the others must determine a focal length, as a share of it.
-pub fn leave_out_within(
-    focal_sigma: f64,
-    equations: &Equations,
-    layout: &Layout,
-    shared: &Shared,
-    fold_of: &[usize],
-) -> Vec<Option<Without>> {
-    every_fold(focal_sigma, equations, equations, layout, shared, fold_of)
-}
-
-/// The same where the gradients change by another `curvature` than the weighted squares': the one of a loss whose weights change with the
-/// residuals.
-pub fn leave_out_with(
+/// The calibration without each fold. `None` for a fold without which the others do not determine both focal lengths to the share `focal_sigma` of
+/// them. The gradients change by `curvature`: the equations themselves, or those of a loss whose weights change with the residuals.
+pub fn leave_out(
     curvature: &Equations,
     equations: &Equations,
     layout: &Layout,
     shared: &Shared,
     fold_of: &[usize],
-) -> Vec<Option<Without>> {
-    every_fold(WORST_FOCAL_SIGMA, curvature, equations, layout, shared, fold_of)
-}
-
-fn every_fold(
     focal_sigma: f64,
-    curvature: &Equations,
-    equations: &Equations,
-    layout: &Layout,
-    shared: &Shared,
-    fold_of: &[usize],
 ) -> Vec<Option<Without>> {
     let pairs = curvature.blocks.iter().zip(&equations.blocks);
     let reduced: Option<Vec<(DMatrix<f64>, DVector<f64>)>> =
@@ -174,6 +148,7 @@ mod tests {
     use crate::stereo::Lens;
     use crate::stereo::calibrate::calibrate;
     use crate::stereo::select::options::Options;
+    use crate::stereo::solve::uncertainty::WORST_FOCAL_SIGMA;
     use crate::stereo::synthetic::World;
 
     #[test]
@@ -186,7 +161,7 @@ mod tests {
             let fold_of: Vec<usize> = (0..pairs).collect();
             let problem = found.problem();
             let equations = problem.equations(&layout).unwrap();
-            let all = leave_out(&equations, &layout, &found.values.shared, &fold_of);
+            let all = leave_out(&equations, &equations, &layout, &found.values.shared, &fold_of, WORST_FOCAL_SIGMA);
             for (fold, without) in all.iter().enumerate() {
                 let without = without.as_ref().unwrap();
                 let searched = found.problem().subset(|i| fold_of[i] != fold).refit(&layout).unwrap();

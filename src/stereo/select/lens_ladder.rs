@@ -10,6 +10,7 @@
 
 use crate::imaging::Board;
 use crate::stereo::board_pose::print_share::PrintShare;
+use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::Layout;
 use crate::stereo::select::known_lenses;
 use crate::stereo::select::model_comparison::{Chance, LensScore, OF_PAIR, Trial, gain_of_terms, score, simplest};
@@ -45,13 +46,13 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     if let Some(wide) = of_wide_lens(start, &solved, &layout) {
         solved = wide;
     }
-    let mut chance = chance(&solved, &layout, board);
+    let scatter = stated_uncertainty::excess_scatter(&solved, &layout, board);
+    let mut chance = Chance { scatter, print: print_excess(&solved, &layout, board) };
     // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
     let mut scores = ladder(&solved.problem, layout.shape, &chance, &[]);
-    if let Some((full, full_layout)) = of_richest(&solved.problem, &scores, &chance) {
-        chance =
-            self::chance(&full, &full_layout, board).with_taken_up(full_layout.count(), solved.problem.views.len());
-        solved.problem.views = full.problem.views;
+    if let Some((views, told)) = of_richest(&solved.problem, &scores, &chance, board) {
+        chance = told;
+        solved.problem.views = views;
         scores = ladder(&solved.problem, layout.shape, &chance, &scores);
     }
     let bent = simplest(&scores, &chance).filter(|_| forced_shape.is_none() && layout.shape);
@@ -72,25 +73,28 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     Ok(Choice { layout, near: Some(values), priors, scatter: None, scores })
 }
 
-/// By how much more than the corners' noise chance moves chi-squared, as a solution's residuals tell.
-fn chance(solved: &Solved, layout: &Layout, board: &Board) -> Chance {
-    Chance {
-        scatter: stated_uncertainty::excess_scatter(solved, layout, board),
-        print: PrintShare::of(solved, board, layout).map_or(1.0, |print| print.excess),
-    }
+fn print_excess(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
+    PrintShare::of(solved, board, layout).map_or(1.0, |print| print.excess)
 }
 
-/// The richest lens that the pairs determine, with the corners weighed as it leaves them, where a simpler one was chosen. What the simpler one
-/// lacks would else pass for scatter of the pairs, before which no term seems worth anything (Mallows, Technometrics 15, 1973, takes
-/// the variance from the full model for the same reason). At least half of what the pairs tell of a rig must be left to scatter.
-fn of_richest(problem: &Problem, scores: &[LensScore], chance: &Chance) -> Option<(Solved, Layout)> {
-    let told = |trial: &&Trial| 2 * trial.layout.count() <= OF_PAIR * problem.views.len();
-    let richest = scores.iter().rev().filter_map(|score| score.trial.as_ref()).find(told)?;
-    if richest.layout.count() <= simplest(scores, chance)?.layout.count() {
-        return None;
-    }
-    let Trial { layout, values, priors, .. } = richest.clone();
-    Some((Problem { values, priors, views: problem.views.clone() }.solve_near(&layout).ok()?, layout))
+/// The corners as the richest lens weighs them with which the pairs tell how they scatter, and what chance does then, where a simpler one was
+/// chosen. What the simpler one lacks would else pass for scatter of the pairs, before which no term seems worth anything (Mallows,
+/// Technometrics 15, 1973, takes the variance from the full model for the same reason). At least half of what the pairs tell of a rig must be
+/// left to scatter.
+fn of_richest(problem: &Problem, scores: &[LensScore], chance: &Chance, board: &Board) -> Option<(Vec<View>, Chance)> {
+    let chosen = simplest(scores, chance)?.layout.count();
+    let pairs = problem.views.len();
+    let richer = scores.iter().rev().filter_map(|score| score.trial.as_ref()).filter(|t| t.layout.count() > chosen);
+    richer.filter(|trial| 2 * trial.layout.count() <= OF_PAIR * pairs).find_map(
+        |Trial { layout, values, priors, .. }| {
+            let near = Problem { views: problem.views.clone(), values: values.clone(), priors: priors.clone() };
+            let full = near.solve_near(layout).ok()?;
+            let scatter = stated_uncertainty::told_scatter(&full, layout, board)?;
+            let told =
+                Chance { scatter, print: print_excess(&full, layout, board) }.with_taken_up(layout.count(), pairs);
+            Some((full.problem.views, told))
+        },
+    )
 }
 
 /// The pairs as a lens with the rational terms leaves them, where many corners lie far from where the simplest one puts them, this one explains

@@ -16,7 +16,7 @@ use crate::stereo::solve::normal_equations::Equations;
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::robust_loss::Loss;
-use crate::stereo::solve::uncertainty::{self, determines_cameras};
+use crate::stereo::solve::uncertainty::{self, WORST_FOCAL_SIGMA, determines_cameras};
 
 /// Standard errors by which a richer model must predict better: one is what half of the useless terms reach by chance when the
 /// best of several is taken.
@@ -204,7 +204,8 @@ fn hold_out(problem: &Problem, layout: Layout) -> Option<(Trial, f64)> {
     let (trial, equations) = Trial::with_equations(problem, layout)?;
     let views = &problem.views;
     let fold_of = cross_validation::folds(views, &trial.values.poses, FOLDS);
-    let rigs = cross_validation::leave_out(&equations, &layout, &trial.values.shared, &fold_of);
+    let shared = &trial.values.shared;
+    let rigs = cross_validation::leave_out(&equations, &equations, &layout, shared, &fold_of, WORST_FOCAL_SIGMA);
     let rigs = rigs.into_iter().map(|without| Some(without?.shared)).collect::<Option<Vec<Shared>>>()?;
     let misses: Vec<Option<Miss>> =
         views.par_iter().enumerate().map(|(i, view)| miss(&rigs[fold_of[i]], view, trial.values.poses[i])).collect();

@@ -19,7 +19,7 @@ use crate::stereo::select::model_comparison::{LensScore, Trial};
 use crate::stereo::select::pair_scatter::{Jackknife, PairScatter};
 use crate::stereo::solve::normal_equations::Equations;
 use crate::stereo::solve::problem::{Problem, Solved};
-use crate::stereo::solve::uncertainty::Uncertainty;
+use crate::stereo::solve::uncertainty::{Uncertainty, WORST_FOCAL_SIGMA};
 
 /// Quantile of the normal distribution at whose level of chi-squared additional terms are more than chance: one clean set of pairs in two hundred
 /// has such a witness.
@@ -79,14 +79,22 @@ pub fn state(
     Stated { uncertainty: by_noise.with_shared(shared, &equations.blocks), pair_scatter, witnesses }
 }
 
-/// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs tell; at least one.
+/// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs tell; at least that of the
+/// corners. `None` where the pairs do not tell how they scatter.
+pub fn told_scatter(solved: &Solved, layout: &Layout, board: &Board) -> Option<f64> {
+    let inflation = corner_scatter(solved, board);
+    let by_noise = solved.uncertainty(layout).ok()?.scaled(inflation);
+    let ratio = scattered(solved, layout, &by_noise.shared, inflation, 1.0)?.2.ratio?;
+    Some(inflation * ratio.max(1.0))
+}
+
+/// The same, by the corners alone where the pairs do not tell.
 pub fn excess_scatter(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
-    let inflation = solved.neighbours(board).inflation() * solved.loss_factor;
-    let ratio = || {
-        let by_noise = solved.uncertainty(layout).ok()?.scaled(inflation);
-        scattered(solved, layout, &by_noise.shared, inflation, 1.0)?.2.ratio
-    };
-    inflation * ratio().unwrap_or(1.0).max(1.0)
+    told_scatter(solved, layout, board).unwrap_or_else(|| corner_scatter(solved, board))
+}
+
+fn corner_scatter(solved: &Solved, board: &Board) -> f64 {
+    solved.neighbours(board).inflation() * solved.loss_factor
 }
 
 /// Variance of the numbers over that of the weighted normal equations, by these pairs or as an earlier calibration of the rig knows it, whichever is
@@ -98,9 +106,8 @@ pub fn scatter_beside(
     pair_excess: f64,
     noise: Option<&Noise>,
 ) -> [f64; 2] {
-    let by_corners = solved.neighbours(board).inflation() * solved.loss_factor;
     let scatter = excess_scatter(solved, layout, board).max(pair_excess) * solved.noise_of(noise);
-    [scatter, scatter / by_corners]
+    [scatter, scatter / corner_scatter(solved, board)]
 }
 
 /// The normal equations, the covariance of the shared numbers that allows for the pairs' scatter, and that scatter.
@@ -114,7 +121,8 @@ fn scattered(
     let Problem { views, values, .. } = &solved.problem;
     let groups = cross_validation::groups(views, &values.poses);
     let (equations, curvature) = (solved.problem.equations(layout)?, solved.curvature(layout)?);
-    let without = cross_validation::leave_out_with(&curvature, &equations, layout, &values.shared, &groups);
+    let sure = WORST_FOCAL_SIGMA;
+    let without = cross_validation::leave_out(&curvature, &equations, layout, &values.shared, &groups, sure);
     let jackknife =
         Jackknife { equations: &equations, curvature: &curvature, group_of: &groups, layout, without: &without, least };
     let (shared, pair_scatter) = jackknife.covariance(by_noise, inflation);
@@ -169,7 +177,10 @@ pub fn step(layout: &Layout, from: &Shared, to: &Shared) -> DVector<f64> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
+    use crate::geometry::transform;
     use crate::stereo::calibrate::calibrate;
     use crate::stereo::select::options::Options;
     use crate::stereo::synthetic::World;
@@ -185,5 +196,25 @@ mod tests {
         assert!(bowed.witnesses.iter().any(|w| w.layout.shape), "{:?}", bowed.witnesses);
         let off = (bowed.rig().left.fx - world.rig.left.fx).abs();
         assert!(off < 2.0 * bowed.uncertainty.shared[(0, 0)].sqrt(), "{off}");
+    }
+
+    #[test]
+    fn pairs_of_which_none_can_be_spared_do_not_tell_how_they_scatter() {
+        let flat = Options { lens: Some(Lens::Brown4), shape: Some(false), known: None };
+        let told = |world: &World| {
+            let found = calibrate(&world.corners(1), &flat).ok()?;
+            let solved = found.problem().solve(&found.layout).ok()?;
+            Some(told_scatter(&solved, &found.layout, &world.board))
+        };
+        assert!(told(&World::new(12, 3)).unwrap().is_some_and(|scatter| scatter >= 1.0));
+        // Nearly parallel boards: with all of them the focal lengths are known somewhat, without one they are not.
+        let mut world = World::new(5, 1);
+        world.rig.right_from_left = transform(Vector3::zeros(), Vector3::new(-40.0, 0.0, 0.0));
+        for (i, pose) in world.poses.iter_mut().enumerate() {
+            let tilt = Vector3::new(0.02 * (i as f64 - 2.0), 0.03, 0.1 * i as f64);
+            *pose = transform(tilt, Vector3::new(i as f64, -(i as f64), 550.0));
+        }
+        let of = |sigma_px: f64| told(&World { sigma_px, ..world.clone() });
+        assert!([0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0].into_iter().any(|sigma_px| of(sigma_px) == Some(None)));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::bend::{Bend, Point, Rule};
 use super::line::line_bend;
-use super::parallel;
+use super::parallel::{self, Line};
 use crate::imaging::lattice::Lattice;
 
 /// Bends of the two edges at each place of the grid; `None` on lines with fewer than three corners that count. A place that is off its line by many
@@ -10,20 +10,16 @@ use crate::imaging::lattice::Lattice;
 pub fn bends(grid: &Lattice<Point>, rule: Rule) -> Vec<[Option<Bend>; 2]> {
     let mut bends = vec![[None; 2]; grid.columns * grid.rows];
     let at = |c: usize, r: usize| Some((r * grid.columns + c, *grid.get(c, r)?));
-    if rule.in_part {
-        let rows = (0..grid.rows).map(|row| (0..grid.columns).filter_map(|c| at(c, row)).collect());
-        parallel::bends(&rows.collect::<Vec<_>>(), rule.good_px, |at, bend| bends[at][0] = Some(bend));
-        let columns = (0..grid.columns).map(|col| (0..grid.rows).filter_map(|r| at(col, r)).collect());
-        parallel::bends(&columns.collect::<Vec<_>>(), rule.good_px, |at, bend| bends[at][1] = Some(bend));
-        return bends;
-    }
-    for row in 0..grid.rows {
-        let line: Vec<_> = (0..grid.columns).filter_map(|c| at(c, row)).collect();
-        line_bend(&line, rule.good_px, |at, bend| bends[at][0] = Some(bend));
-    }
-    for col in 0..grid.columns {
-        let line: Vec<_> = (0..grid.rows).filter_map(|r| at(col, r)).collect();
-        line_bend(&line, rule.good_px, |at, bend| bends[at][1] = Some(bend));
+    let rows = (0..grid.rows).map(|row| (0..grid.columns).filter_map(|c| at(c, row)).collect()).collect();
+    let columns = (0..grid.columns).map(|col| (0..grid.rows).filter_map(|r| at(col, r)).collect()).collect();
+    let ways: [Vec<Line>; 2] = [rows, columns];
+    for (way, lines) in ways.iter().enumerate() {
+        let mut set = |at: usize, bend: Bend| bends[at][way] = Some(bend);
+        if rule.in_part {
+            parallel::bends(lines, rule.good_px, set);
+        } else {
+            lines.iter().for_each(|line| line_bend(line, rule.good_px, &mut set));
+        }
     }
     bends
 }

@@ -160,7 +160,7 @@ fn folds(calibration: &Calibration) -> Option<Folds> {
     let Calibration { views, values, layout, .. } = calibration;
     let equations = calibration.problem().equations(layout)?;
     let of_pair = cross_validation::folds(views, &values.poses, FOLDS);
-    let within = |focal| cross_validation::leave_out_within(focal, &equations, layout, &values.shared, &of_pair);
+    let within = |sure| cross_validation::leave_out(&equations, &equations, layout, &values.shared, &of_pair, sure);
     let mut without = within(WORST_FOCAL_SIGMA);
     let determined = without.iter().any(Option::is_some);
     if !determined {
