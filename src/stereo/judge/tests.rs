@@ -4,7 +4,6 @@ use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
 use crate::geometry::{Transform, transform};
 use crate::imaging::{Corner, Corners, PairCorners};
-use crate::stereo::Rig;
 use crate::stereo::data::view::View;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::judge::assessment::{Demand, Judged, Standards};
@@ -15,6 +14,7 @@ use crate::stereo::select::options::Options;
 use crate::stereo::synthetic::World;
 use crate::stereo::triangulate::{common, triangulate};
 use crate::stereo::volume::Extent;
+use crate::stereo::{Camera, Lens, Rig};
 
 /// Corners of 0.004 px on this rig: lengths to some 0.03 mm.
 const SIGMA_PX: f64 = 0.004;
@@ -192,4 +192,25 @@ fn last_pairs_that_contradict_the_rig_leave_open_whether_it_stands() {
         judged.evidence
     );
     assert_ne!(judged.verdict, Verdict::Pass);
+}
+
+#[test]
+fn a_focal_length_that_no_lens_has_is_no_basis_of_a_pass() {
+    // The same pictures but for their perspective: shorter lenses, boards that much nearer.
+    for (focal_px, pass) in [(2000.0, true), (600.0, true), (150.0, false)] {
+        let mut world = world(12, 69);
+        let shorter = focal_px / 2000.0;
+        for camera in [&mut world.rig.left, &mut world.rig.right] {
+            *camera = Camera { lens: Lens::Brown4, ..Camera::pinhole(1280, 1024, focal_px) };
+        }
+        world.rig.right_from_left = transform(Vector3::zeros(), Vector3::new(-190.0 * shorter, 0.0, 0.0));
+        world.board.square_mm *= shorter.max(0.3);
+        for pose in &mut world.poses {
+            pose.translation.vector *= shorter;
+        }
+        let judged = judge(&world.corners(70));
+        let wide = judged.evidence.iter().find(|line| line.what == "focal lengths");
+        assert_eq!(wide.is_none(), pass, "{focal_px}: {wide:?}");
+        assert!(wide.is_none_or(|line| line.allows == Verdict::Undecided && line.detail.contains("no lens")));
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::facts::Facts;
 use crate::imaging::Side;
+use crate::stereo::Camera;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::findings::standing::MATERIAL_SHARE;
@@ -167,20 +168,40 @@ pub(super) fn tilts(facts: &Facts) -> Evidence {
     }
 }
 
-/// A focal length that the pictures hardly tell; lengths elsewhere than where the boards were are then anybody's guess.
+/// A focal length that the pictures hardly tell, or that is none of a lens; lengths elsewhere than where the boards were are then anybody's guess.
 pub(super) fn focal_lengths(facts: &Facts) -> Option<Evidence> {
+    /// From corner to corner, deg. What these lens models say of a ray grows beyond all bounds towards 180, and lenses that see wider than this
+    /// are calibrated with others.
+    const WIDEST_DEG: f64 = 150.0;
     let Calibration { uncertainty, layout, .. } = facts.calibration;
-    let worst = worst_focal_sigma(&uncertainty.shared, layout, facts.calibration.rig());
-    (worst > WORST_FOCAL_SIGMA).then(|| Evidence {
+    let rig = facts.calibration.rig();
+    let undecided = |value, limit, unit, detail| Evidence {
         what: "focal lengths",
         remedy: "add pairs tilted by 20 to 45 degrees about both axes, at several distances",
-        value: Some(100.0 * worst),
-        limit: Some(100.0 * WORST_FOCAL_SIGMA),
-        unit: "%",
+        value: Some(value),
+        limit: Some(limit),
+        unit,
         allows: Verdict::Undecided,
-        detail: "standard deviation of the focal length that the pictures tell least: boards that all lie alike do not tell it from \
-                 their distance"
-            .to_owned(),
+        detail,
+    };
+    let worst = worst_focal_sigma(&uncertainty.shared, layout, rig);
+    if worst > WORST_FOCAL_SIGMA {
+        let detail = "standard deviation of the focal length that the pictures tell least: boards that all lie alike do not tell it from \
+                      their distance";
+        return Some(undecided(100.0 * worst, 100.0 * WORST_FOCAL_SIGMA, "%", detail.to_owned()));
+    }
+    let seen_deg = |camera: &Camera| {
+        let corner = (f64::from(camera.width) / camera.fx).hypot(f64::from(camera.height) / camera.fy);
+        2.0 * (0.5 * corner).atan().to_degrees()
+    };
+    let widest = [&rig.left, &rig.right].into_iter().max_by(|a, b| seen_deg(a).total_cmp(&seen_deg(b)))?;
+    let (seen, [fx, fy]) = (seen_deg(widest), [widest.fx, widest.fy]);
+    (seen > WIDEST_DEG && !facts.calibration.lenses_are_known()).then(|| {
+        let detail = format!(
+            "what a camera sees from corner to corner if its focal lengths are the {fx:.1} and {fy:.1} px that fit best: no lens of these \
+             models does; boards that all lie alike, or that are not as flat as they are taken to be, do not tell a focal length"
+        );
+        undecided(seen, WIDEST_DEG, "deg", detail)
     })
 }
 

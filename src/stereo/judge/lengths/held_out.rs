@@ -18,7 +18,7 @@ use crate::stereo::select::cross_validation::{self, FOLDS, Without};
 use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, WORST_FOCAL_SIGMA};
 use crate::stereo::triangulate::{RigCovariance, common};
 use crate::stereo::volume::lengths::LONG_SQUARES;
-use crate::stereo::{Error, Rig};
+use crate::stereo::{Camera, Error, Rig};
 
 /// The short range of Fig. 6 (b), in squares: 10 mm on the paper's board; the long one is [`LONG_SQUARES`].
 const SHORT_SQUARES: usize = 1;
@@ -197,7 +197,7 @@ fn summarise(
     Some(Accuracy {
         extremes: lengths::extremes(measured, |i| Some(&folds.of(i)?.covariance), expansion, share)?,
         rays_chi_square,
-        epipolar: epipolar(calibration.rig(), measured)?,
+        epipolar: epipolar(&folds, measured)?,
         doubtful,
         folds: folds.rigs.len(),
         unchecked,
@@ -209,10 +209,15 @@ fn summarise(
     })
 }
 
-/// From the gap between two rays, as large as it looks from the left camera; doubtful corners are left out.
-fn epipolar(rig: &Rig, measured: &[Measured]) -> Option<EpipolarError> {
-    let sure = measured.iter().flat_map(|m| m.points.iter().zip(&m.doubtful)).filter(|(_, doubtful)| !**doubtful);
-    let misses: Vec<f64> = sure.map(|(p, _)| p.gap_mm.abs() * rig.left.fx / p.point_mm.z).collect();
+/// From the gap between two rays, as large as it looks from the left camera of the rig that measured it; doubtful corners are left out.
+fn epipolar(folds: &Folds, measured: &[Measured]) -> Option<EpipolarError> {
+    let misses = measured.iter().enumerate().filter_map(|(i, m)| {
+        let Camera { fx, fy, .. } = folds.of(i)?.rig.left;
+        let focal = (fx * fy).sqrt();
+        let sure = m.points.iter().zip(&m.doubtful).filter(|(_, doubtful)| !**doubtful);
+        Some(sure.map(move |(p, _)| p.gap_mm.abs() * focal / p.point_mm.z))
+    });
+    let misses: Vec<f64> = misses.flatten().collect();
     let squares: Vec<f64> = misses.iter().map(|px| px * px).collect();
     Some(EpipolarError { rms_px: mean(&squares)?.sqrt(), max_px: misses.into_iter().fold(0.0, f64::max) })
 }
