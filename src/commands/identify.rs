@@ -37,7 +37,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let file = robot_file(args.robot.as_deref());
     let given = nominal_robot(file.as_deref(), args.robot.is_some())?;
     let rows = read(&source, &given)?;
-    let mut set = Dataset::new(&rows)?;
+    let mut set = Dataset::of_robot(&rows, &given)?;
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }

@@ -15,6 +15,7 @@ use crate::progress;
 use crate::report::robot as report;
 use crate::robot::catalogue::names;
 use crate::robot::catalogue::{self, Convention};
+use crate::robot::tool_fit::Start;
 use crate::robot::{Error, Robot, file};
 
 pub fn run(args: &RobotCommand, config: &Config, run: Run) -> Result<Outcome> {
@@ -152,7 +153,9 @@ fn left_mm(robot: &Robot, source: &Source) -> Option<f64> {
         }
     }
     let (joints, points) = groups.into_values().max_by_key(|(joints, _)| joints.len())?;
-    (joints.first()?.len() == robot.joints.len()).then(|| robot.fit_tool(&joints, &points))?.map(|fit| fit.left_mm)
+    (joints.first()?.len() == robot.joints.len())
+        .then(|| robot.fit_tool(&joints, &points, Start::Around))?
+        .map(|fit| fit.left_mm)
 }
 
 fn new(args: &RobotNew, config: &Config, run: Run) -> Result<String> {

@@ -8,12 +8,13 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::layout::point;
 use super::part::{At, Part};
 use super::pick::Picked;
 use crate::robot::Robot;
+use crate::robot::tool_fit::{Start, middle_spread};
 use crate::tables::names::{Unit, What};
 
 /// What is left as a share of the points' spread at the most where columns and units are right and the robot's file is of this robot: a robot of a
@@ -135,7 +136,10 @@ pub(super) fn usual(candidates: &[Picked], forced: Forced) -> Vec<Way> {
 /// Judges all ways.
 pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Forced) -> Verdict {
     let unknown = |at: &At| parts[at.part].spare().contains(&at.column);
-    let guessed = |p: &Picked| p.joints.iter().any(unknown) || p.points.iter().flat_map(|(_, at)| at).any(unknown);
+    let guessed = |p: &Picked| p.columns().any(|at| unknown(&at));
+    let free = |at: &At| !parts[at.part].is_named() || unknown(at);
+    let points_alone = |picked: &Picked| points_that_fit(parts, picked, robot, forced, &free);
+    let candidates: &[Picked] = &candidates.iter().map(points_alone).collect::<Vec<_>>();
     let ways = in_all_units(parts, candidates, robot, forced);
     let Some(best) = ways.first().cloned() else { return Verdict::None };
     let near = |way: &Way| way.left.is_some_and(|left| left < NEAR);
@@ -183,6 +187,31 @@ pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, force
         return Verdict::None;
     }
     by_sizes(parts, &candidates[0], forced, &ways)
+}
+
+/// The same without those of several guessed targets that the robot does not carry: three angles beside a point keep about one distance from it, too.
+fn points_that_fit(
+    parts: &[Part],
+    picked: &Picked,
+    robot: &Robot,
+    forced: Forced,
+    unknown: &dyn Fn(&At) -> bool,
+) -> Picked {
+    if picked.points.len() < 2 || !picked.points.iter().flat_map(|(_, at)| at).any(unknown) {
+        return picked.clone();
+    }
+    let fits = |target: &&(String, [At; 3])| {
+        let alone = Picked { points: vec![(*target).clone()], ..picked.clone() };
+        let ways = in_all_units(parts, &[alone], robot, forced);
+        ways.first().and_then(|way| way.left).is_some_and(|left| left < NEAR)
+    };
+    let mut points: Vec<(String, [At; 3])> = picked.points.iter().filter(fits).cloned().collect();
+    match &mut points[..] {
+        [] => return picked.clone(),
+        [(name, _)] => name.clear(),
+        _ => {}
+    }
+    Picked { points, ..picked.clone() }
 }
 
 /// Of a way with several targets two, one that the nominal robot computed and one that it did not: these are no two targets of a body.
@@ -303,11 +332,10 @@ pub(super) fn left_of(
             points.push(point.map(|v| lengths.converted(v)));
         }
     }
-    let fit = robot.fit_tool(&readings, &points).filter(|_| readings.len() >= FEWEST)?;
-    let predicted: Vec<Point3<f64>> = readings.iter().map(|q| robot.target_mm(q)).collect();
-    let mean = predicted.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / predicted.len() as f64;
-    let spread = predicted.iter().map(|p| (p.coords - mean).norm_squared()).sum::<f64>() / predicted.len() as f64;
+    let from = if picked.is_sure(parts) { Start::Around } else { Start::File };
+    let fit = robot.fit_tool(&readings, &points, from).filter(|_| readings.len() >= FEWEST)?;
+    let predicted: Vec<Vector3<f64>> = readings.iter().map(|q| robot.target_mm(q).coords).collect();
     // Tiny motions under a tool that all but cancels them would come near to points that are small by a wrong unit.
-    let least = spread.sqrt().min(fit.spread_mm);
+    let least = middle_spread(&predicted)?.min(fit.spread_mm);
     (least > 0.0).then(|| (fit.left_mm / least, fit.left_mm))
 }

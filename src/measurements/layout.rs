@@ -29,13 +29,19 @@ const ROWS: usize = 200;
 /// and more apart, and what was commanded differs from what was measured by tenths at the least.
 pub(super) const ONE_POINT: f64 = 1e-3;
 
-/// All ways to complete what the names say.
+/// All ways to complete what the names say; columns of zeros are joints only where there is none without them.
 pub(super) fn candidates(parts: &[Part], picked: &Picked, count: usize) -> Vec<Picked> {
+    let moving = of_columns(parts, picked, count, Part::free);
+    if moving.is_empty() { of_columns(parts, picked, count, Part::free_and_still) } else { moving }
+}
+
+/// The same of these columns without names, and of those whose names are not known.
+fn of_columns(parts: &[Part], picked: &Picked, count: usize, free: fn(&Part) -> Vec<usize>) -> Vec<Picked> {
     let free: Vec<Vec<At>> = parts
         .iter()
         .enumerate()
         .map(|(part, file)| {
-            let columns = file.free().into_iter().chain(file.spare());
+            let columns = free(file).into_iter().chain(file.spare());
             columns.take(MOST_FREE).map(|column| At { part, column }).collect()
         })
         .collect();

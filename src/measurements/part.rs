@@ -73,7 +73,20 @@ impl Part {
         if let Form::Program { degrees, .. } = grid.form {
             meanings = Some((0..width).map(|column| of_program(column, joints, degrees)).collect());
         }
-        Ok(Part { grid, names: headed.names, meanings, rows: headed.rows, kinds })
+        let part = Part { grid, names: headed.names, meanings, rows: headed.rows, kinds };
+        match part.unread_unit().filter(|_| !named) {
+            Some(error) => Err(error),
+            None => Ok(part),
+        }
+    }
+
+    /// That a column is in a unit that is not read.
+    fn unread_unit(&self) -> Option<Error> {
+        let (names, meanings) = (self.names.as_ref()?, self.meanings.as_ref()?);
+        let (name, unit) = names.iter().zip(meanings).find_map(|(name, m)| Some((name, m.unread_unit()?)))?;
+        let message = format!("`{name}` is in `{unit}`, which is no unit that is read");
+        let hint = "convert the column: joints to deg or rad; points and distances to mm, m, um, cm or inches";
+        Some(self.refuse(message, Some(hint)))
     }
 
     /// Number of columns.
@@ -102,6 +115,14 @@ impl Part {
             return Vec::new();
         }
         (0..self.width()).filter(|&c| self.kinds[c] == Kind::Numbers).collect()
+    }
+
+    /// The same with those of zeros: a joint that never moved is one.
+    pub fn free_and_still(&self) -> Vec<usize> {
+        if self.is_named() {
+            return Vec::new();
+        }
+        (0..self.width()).filter(|&c| matches!(self.kinds[c], Kind::Numbers | Kind::Zeros)).collect()
     }
 
     /// Columns of numbers whose names are of no word that is known.

@@ -22,6 +22,16 @@ pub(super) struct Picked {
 }
 
 impl Picked {
+    /// Joints and coordinates.
+    pub fn columns(&self) -> impl Iterator<Item = At> {
+        self.joints.iter().copied().chain(self.points.iter().flat_map(|(_, at)| *at))
+    }
+
+    /// Whether names say all of it.
+    pub fn is_sure(&self, parts: &[Part]) -> bool {
+        self.columns().all(|at| parts[at.part].is_named() && !parts[at.part].spare().contains(&at.column))
+    }
+
     /// Whether there is something measured.
     pub fn is_measured(&self) -> bool {
         !self.points.is_empty() || self.distance.is_some()

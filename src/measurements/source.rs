@@ -15,7 +15,8 @@ use super::layout;
 use super::part::{At, Part};
 use super::pick::{self, Picked, columns_flag, listed};
 use super::{Measurement, read};
-use crate::files::Result;
+use crate::diagnostic::Place;
+use crate::files::{Error, Result};
 use crate::robot::Robot;
 use crate::tables::Form;
 use crate::tables::names::{Name, Unit, What};
@@ -74,6 +75,11 @@ impl Source {
     /// Reads everything; the sentences say what was taken.
     pub fn read(&self, robot: &Robot) -> Result<(Vec<Measurement>, Vec<String>)> {
         let count = robot.joints.len();
+        if let Some(file) = (1..self.files.len()).find(|&i| self.files[..i].contains(&self.files[i])) {
+            let place = Place { path: self.files[file].clone(), line: None };
+            let message = "the file is named twice; each of its rows would count twice".to_owned();
+            return Err(Error::Format { message, place, hint: Some("name each file once".to_owned()) });
+        }
         let mut parts = Vec::with_capacity(self.files.len());
         for file in &self.files {
             if let [only] = &self.files[..]

@@ -19,6 +19,18 @@ const FEWEST: usize = 4;
 /// Steps at the most.
 const STEPS: usize = 40;
 
+/// Times the middle distance beyond which a row does not take part: nine standard deviations of normal errors in three coordinates.
+const GROSS: f64 = 6.0;
+
+/// Rounds of choosing the rows.
+const ROUNDS: usize = 10;
+
+/// Rows that are enough to leave others out: three numbers each against the nine unknowns.
+const ENOUGH: usize = 8;
+
+/// A start from which this share of the points' spread is left needs no other.
+const SETTLED: f64 = 0.01;
+
 /// What a nominal chain leaves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolFit {
@@ -26,80 +38,165 @@ pub struct ToolFit {
     pub tool_mm: Vector3<f64>,
     /// Middle distance of a predicted point from the measured one, mm.
     pub left_mm: f64,
-    /// Root mean square distance of the measured points from their centre, mm.
+    /// Middle distance of the measured points from their middle, mm.
     pub spread_mm: f64,
 }
 
 impl Robot {
-    /// Middle distance of the points that this robot predicts from the measured ones, mm, once the sensor is placed.
+    /// Middle distance of the points that this robot predicts from the measured ones, mm, once the sensor is placed; rows that miss by several
+    /// times as much do not help to place it.
     pub fn left_mm(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>]) -> Option<f64> {
-        let predicted: Vec<Vector3<f64>> = joints_rad.iter().map(|q| self.target_mm(q).coords).collect();
-        let measured: Vec<Vector3<f64>> = points_mm.iter().map(|p| p.coords).collect();
-        let frame = nearest(&predicted, &measured);
-        median(predicted.iter().zip(&measured).map(|(p, m)| (frame * Point3::from(*p) - m).coords.norm()))
+        let rows = self.rows(joints_rad, points_mm, 1);
+        let start = (placed(&rows, &self.tool_mm), self.tool_mm);
+        let (frame, tool) = without_gross(&rows, start, |near, _, tool| (placed(near, &tool), tool));
+        Some(middle(&rows, &frame, &tool)).filter(|left| left.is_finite())
     }
 
-    /// The tool with which this chain comes nearest to the points; `None` for fewer than four poses.
-    pub fn fit_tool(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>]) -> Option<ToolFit> {
+    fn rows(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>], step: usize) -> Vec<Row> {
+        let row = |(q, p): (&Vec<f64>, &Point3<f64>)| Row { flange: self.base_from_flange(q), point: p.coords };
+        joints_rad.iter().zip(points_mm).step_by(step).map(row).collect()
+    }
+
+    /// The tool with which this chain comes nearest to the points; `None` for fewer than four poses. Up to a fifth of the rows may be gross
+    /// errors (a reading that failed, a mean below the table).
+    pub fn fit_tool(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>], from: Start) -> Option<ToolFit> {
         let count = joints_rad.len().min(points_mm.len());
         if count < FEWEST {
             return None;
         }
-        let step = count.div_ceil(POSES);
-        let rows: Vec<usize> = (0..count).step_by(step).collect();
-        let flanges: Vec<_> = rows.iter().map(|&i| self.base_from_flange(&joints_rad[i])).collect();
-        let measured: Vec<Vector3<f64>> = rows.iter().map(|&i| points_mm[i].coords).collect();
-        let mut tool = self.tool_mm;
-        let predicted: Vec<Vector3<f64>> = flanges.iter().map(|f| (f * Point3::from(tool)).coords).collect();
-        let mut frame = nearest(&predicted, &measured);
-        let residuals = |frame: &Transform, tool: &Vector3<f64>| -> Vec<Vector3<f64>> {
-            let off = |(f, m): (&Transform, &Vector3<f64>)| (frame * (f * Point3::from(*tool))).coords - m;
-            flanges.iter().zip(&measured).map(off).collect()
-        };
-        let cost = |r: &[Vector3<f64>]| r.iter().map(Vector3::norm_squared).sum::<f64>();
-        let (mut now, mut damping) = (residuals(&frame, &tool), 1e-6);
-        for _ in 0..STEPS {
-            let (mut normal, mut gradient) = (SMatrix::<f64, 9, 9>::zeros(), SVector::<f64, 9>::zeros());
-            for (flange, residual) in flanges.iter().zip(&now) {
-                let turned = frame.rotation * (flange * Point3::from(tool)).coords;
-                let mut jacobian = SMatrix::<f64, 3, 9>::zeros();
-                jacobian.fixed_view_mut::<3, 6>(0, 0).copy_from(&rigid_columns(&turned));
-                let of_tool = (frame.rotation * flange.rotation).to_rotation_matrix().into_inner();
-                jacobian.fixed_view_mut::<3, 3>(0, 6).copy_from(&of_tool);
-                normal += jacobian.transpose() * jacobian;
-                gradient += jacobian.transpose() * residual;
-            }
-            for i in 0..9 {
-                normal[(i, i)] *= 1.0 + damping;
-                normal[(i, i)] += f64::MIN_POSITIVE;
-            }
-            let Some(step) = normal.cholesky().map(|c| c.solve(&-gradient)) else {
-                damping *= 10.0;
-                continue;
-            };
-            let next = perturb(&frame, step.as_slice());
-            let moved = tool + step.fixed_rows::<3>(6);
-            let then = residuals(&next, &moved);
-            let (before, after) = (cost(&now), cost(&then));
-            if after < before {
-                (frame, tool, now, damping) = (next, moved, then, (damping / 10.0).max(1e-12));
-                if after > before * (1.0 - 1e-6) {
-                    break;
-                }
-            } else {
-                damping *= 10.0;
-            }
+        let all = self.rows(joints_rad, points_mm, count.div_ceil(POSES));
+        let spread_mm = middle_spread(&all.iter().map(|row| row.point).collect::<Vec<_>>())?;
+        let of_start = |tool| without_gross(&all, from_start(&all, tool), descended);
+        let left = |(frame, tool): &(Transform, Vector3<f64>)| middle(&all, frame, tool);
+        let mut best = of_start(self.tool_mm);
+        if from == Start::Around && left(&best) > SETTLED * spread_mm {
+            let off = |k: usize| Vector3::ith(k % 3, if k < 3 { spread_mm } else { -spread_mm });
+            let others = (0..6).map(|k| of_start(self.tool_mm + off(k)));
+            best = others.fold(best, |best, other| if left(&other) < left(&best) { other } else { best });
         }
-        let left_mm = median(now.iter().map(Vector3::norm))?;
-        let centre = measured.iter().sum::<Vector3<f64>>() / measured.len() as f64;
-        let spread_mm = (cost(&measured.iter().map(|m| m - centre).collect::<Vec<_>>()) / measured.len() as f64).sqrt();
-        left_mm.is_finite().then_some(ToolFit { tool_mm: tool, left_mm, spread_mm })
+        let left_mm = left(&best);
+        left_mm.is_finite().then_some(ToolFit { tool_mm: best.1, left_mm, spread_mm })
     }
 }
 
-/// The transform that takes `from` nearest to `to`.
-fn nearest(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Transform {
-    fitted_frame(from.iter().zip(to).map(|(a, b)| (Point3::from(*a), Point3::from(*b), 1.0)))
+/// Where the search for a tool begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// At the tool of the file.
+    File,
+    /// There, and where that comes not near, around it, as far off as the points are apart: where the wrist alone turned, the place of the
+    /// file's tool says nothing of the sensor's.
+    Around,
+}
+
+/// Middle distance of points from their middle, mm: angles that jump by a turn spread no farther than the others.
+pub fn middle_spread(points: &[Vector3<f64>]) -> Option<f64> {
+    let [x, y, z] = [0, 1, 2].map(|axis| median(points.iter().map(|p| p[axis])));
+    let centre = Vector3::new(x?, y?, z?);
+    median(points.iter().map(|p| (p - centre).norm()))
+}
+
+/// A pose: where the flange is, and the point that was measured.
+#[derive(Clone, Copy)]
+struct Row {
+    flange: Transform,
+    point: Vector3<f64>,
+}
+
+impl Row {
+    fn off(&self, frame: &Transform, tool: &Vector3<f64>) -> Vector3<f64> {
+        (frame * (self.flange * Point3::from(*tool))).coords - self.point
+    }
+}
+
+/// Middle distance of these from the measured ones, mm.
+fn middle(rows: &[Row], frame: &Transform, tool: &Vector3<f64>) -> f64 {
+    median(rows.iter().map(|row| row.off(frame, tool).norm())).unwrap_or(f64::INFINITY)
+}
+
+/// A placement and a tool fitted again to the four fifths of the rows that they come nearest to, until these are the same (the concentration
+/// steps of Rousseeuw and Van Driessen, Technometrics 41, 1999), and then to all but those that miss by many times what the middle one does.
+fn without_gross(
+    all: &[Row],
+    (mut frame, mut tool): (Transform, Vector3<f64>),
+    fit: impl Fn(&[Row], Transform, Vector3<f64>) -> (Transform, Vector3<f64>),
+) -> (Transform, Vector3<f64>) {
+    let fifth = all.len() / 5;
+    if fifth == 0 || all.len() - fifth < ENOUGH {
+        return (frame, tool);
+    }
+    let nearest = |count: usize, frame: &Transform, tool: &Vector3<f64>| -> Vec<usize> {
+        let mut order: Vec<usize> = (0..all.len()).collect();
+        order.sort_by(|a, b| all[*a].off(frame, tool).norm().total_cmp(&all[*b].off(frame, tool).norm()));
+        order.truncate(count);
+        order.sort_unstable();
+        order
+    };
+    let of = |rows: &[usize]| rows.iter().map(|&i| all[i]).collect::<Vec<Row>>();
+    let mut taken = Vec::new();
+    for _ in 0..ROUNDS {
+        let near = nearest(all.len() - fifth, &frame, &tool);
+        if near == taken {
+            break;
+        }
+        (frame, tool) = fit(&of(&near), frame, tool);
+        taken = near;
+    }
+    let limit = GROSS * middle(all, &frame, &tool);
+    let near: Vec<Row> = all.iter().filter(|row| row.off(&frame, &tool).norm() <= limit).copied().collect();
+    fit(&near, frame, tool)
+}
+
+/// The placement that takes this tool's points nearest to the measured ones.
+fn placed(rows: &[Row], tool: &Vector3<f64>) -> Transform {
+    fitted_frame(rows.iter().map(|row| (row.flange * Point3::from(*tool), Point3::from(row.point), 1.0)))
+}
+
+/// The least squares of placement and tool from this tool on.
+fn from_start(rows: &[Row], tool: Vector3<f64>) -> (Transform, Vector3<f64>) {
+    descended(rows, placed(rows, &tool), tool)
+}
+
+/// The same from this placement and tool on.
+fn descended(rows: &[Row], mut frame: Transform, mut tool: Vector3<f64>) -> (Transform, Vector3<f64>) {
+    let residuals = |frame: &Transform, tool: &Vector3<f64>| -> Vec<Vector3<f64>> {
+        rows.iter().map(|r| r.off(frame, tool)).collect()
+    };
+    let cost = |r: &[Vector3<f64>]| r.iter().map(Vector3::norm_squared).sum::<f64>();
+    let (mut now, mut damping) = (residuals(&frame, &tool), 1e-6);
+    for _ in 0..STEPS {
+        let (mut normal, mut gradient) = (SMatrix::<f64, 9, 9>::zeros(), SVector::<f64, 9>::zeros());
+        for (row, residual) in rows.iter().zip(&now) {
+            let turned = frame.rotation * (row.flange * Point3::from(tool)).coords;
+            let mut jacobian = SMatrix::<f64, 3, 9>::zeros();
+            jacobian.fixed_view_mut::<3, 6>(0, 0).copy_from(&rigid_columns(&turned));
+            let of_tool = (frame.rotation * row.flange.rotation).to_rotation_matrix().into_inner();
+            jacobian.fixed_view_mut::<3, 3>(0, 6).copy_from(&of_tool);
+            normal += jacobian.transpose() * jacobian;
+            gradient += jacobian.transpose() * residual;
+        }
+        for i in 0..9 {
+            normal[(i, i)] *= 1.0 + damping;
+            normal[(i, i)] += f64::MIN_POSITIVE;
+        }
+        let Some(step) = normal.cholesky().map(|c| c.solve(&-gradient)) else {
+            damping *= 10.0;
+            continue;
+        };
+        let next = perturb(&frame, step.as_slice());
+        let moved = tool + step.fixed_rows::<3>(6);
+        let then = residuals(&next, &moved);
+        let (before, after) = (cost(&now), cost(&then));
+        if after < before {
+            (frame, tool, now, damping) = (next, moved, then, (damping / 10.0).max(1e-12));
+            if after > before * (1.0 - 1e-6) {
+                break;
+            }
+        } else {
+            damping *= 10.0;
+        }
+    }
+    (frame, tool)
 }
 
 #[cfg(test)]
@@ -116,11 +213,31 @@ mod tests {
             let joints: Vec<Vec<f64>> =
                 (0..20).map(|i| (0..6).map(|j| ((7 * i + 3 * j * j) as f64).sin() * 1.4).collect()).collect();
             let points: Vec<Point3<f64>> = joints.iter().map(|q| sensor * truth.target_mm(q)).collect();
-            let found = Robot::paper().fit_tool(&joints, &points).unwrap();
+            let found = Robot::paper().fit_tool(&joints, &points, Start::File).unwrap();
             assert!((found.tool_mm - truth.tool_mm).norm() < 1e-3 && found.left_mm < 1e-3, "{size}: {found:?}");
             // Metres taken for mm leave about as much as the points are apart.
             let small: Vec<Point3<f64>> = points.iter().map(|p| p / 1000.0).collect();
-            assert!(Robot::paper().fit_tool(&joints, &small).unwrap().left_mm > 10.0);
+            assert!(Robot::paper().fit_tool(&joints, &small, Start::Around).unwrap().left_mm > 10.0);
+            // Readings that failed, at zero.
+            let mut failed = points.clone();
+            for bad in [3, 11, 12, 17] {
+                failed[bad] = Point3::origin();
+                let found = Robot::paper().fit_tool(&joints, &failed, Start::File).unwrap();
+                assert!(found.left_mm < 1e-3 && (found.tool_mm - truth.tool_mm).norm() < 1e-3, "{size}: {found:?}");
+            }
         }
+    }
+
+    #[test]
+    fn a_tool_about_which_the_wrist_turns_is_found() {
+        let mut truth = Robot::paper();
+        truth.tool_mm = Vector3::new(24.0, -10.0, 55.0);
+        let sensor = transform(Vector3::new(0.4, 2.0, -0.7), Vector3::new(900.0, -2000.0, 300.0));
+        let turns = |i: usize| vec![0.3, -0.2, 0.4, 0.1, (0.7 * i as f64).sin() * 0.8, 0.4 * i as f64 - 2.0];
+        let joints: Vec<Vec<f64>> = (0..12).map(turns).collect();
+        let points: Vec<Point3<f64>> = joints.iter().map(|q| sensor * truth.target_mm(q)).collect();
+        let mut nominal = Robot::paper();
+        nominal.tool_mm = Vector3::zeros();
+        assert!(nominal.fit_tool(&joints, &points, Start::Around).unwrap().left_mm < 1e-2);
     }
 }

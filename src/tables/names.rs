@@ -126,13 +126,23 @@ const ELSE: &str = "tau torque torques force f current effort i vel velocity spe
     rot rotation roll pitch yaw euler quat quaternion orientation offset normal min";
 
 const COMMANDED: &str = "cmd command commanded nominal nom n t target goal desired des d ref reference set setpoint plan \
-    planned theo theoretical ideal taught programmed fk calc calculated computed c model robot soll theorie consigne \
+    planned program prog controller pred predicted theo theoretical ideal taught programmed fk calc calculated computed c model robot soll theorie consigne \
     理论 名义 指令 期望 目标 规划 理想 计算 命令";
 
 const MEASURED: &str = "m meas measure measured measurement act actual laser tracker lt leica faro smr camera vicon ndi \
     mocap observed obs real cmm marker reflector ist gemessen mesure mesurée mesuré 实际 实测 测量 激光 跟踪仪";
 
+/// Units that are not read: a column in one of them is none in degrees or mm.
+const UNREAD: &str = "gon gons gradian gradians mrad urad µrad μrad arcmin arcsec rev revs turns count counts pulse pulses ticks dm km nm \
+    ft foot feet mil mils thou";
+
 impl Name {
+    /// The unit of a joint, a point or a distance that is not read, where the name states one.
+    pub fn unread_unit(&self) -> Option<&str> {
+        let counts = matches!(self.what, What::Joint(_) | What::Coordinate(_) | What::Distance);
+        self.key.iter().find(|word| counts && is_in(UNREAD, word)).map(String::as_str)
+    }
+
     /// Reads a name.
     pub fn of(name: &str) -> Name {
         let name = name.trim().trim_start_matches(['#', '%']).trim();
@@ -335,7 +345,26 @@ mod tests {
         assert_eq!(what("MX Coord."), (What::Coordinate(0), None, Some(true)));
         assert_eq!(what("实测X(mm)"), (What::Coordinate(0), Some(Unit::Mm), Some(true)));
         assert_eq!(what("x [cm]"), (What::Coordinate(0), Some(Unit::Cm), None));
-        for name in ["x_t", "x_cmd", "Nominal X", "xc", "x_nominal [mm]", "target x", "x_n", "理论X", "x soll"] {
+        assert_eq!(Name::of("J1[gon]").unread_unit(), Some("gon"));
+        assert_eq!(Name::of("joint 2 (mrad)").unread_unit(), Some("mrad"));
+        assert_eq!(Name::of("x_km").unread_unit(), Some("km"));
+        for name in ["J1[deg]", "x [mm]", "q_1(rad)", "tracker x", "joint[1]"] {
+            assert_eq!(Name::of(name).unread_unit(), None, "{name}");
+        }
+        for name in [
+            "x_program",
+            "x_pred",
+            "controller x",
+            "x_t",
+            "x_cmd",
+            "Nominal X",
+            "xc",
+            "x_nominal [mm]",
+            "target x",
+            "x_n",
+            "理论X",
+            "x soll",
+        ] {
             assert_eq!((what(name).0, what(name).2), (What::Coordinate(0), Some(false)), "{name}");
         }
         for name in ["U(95) X  [mm]", "x_dif", "Rx", "rx", "dx", "vx", "x error", "fx"] {

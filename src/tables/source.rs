@@ -64,7 +64,11 @@ pub(super) fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<So
     if let Some((kind, hint)) = foreign(&bytes, &file) {
         return Err(refuse(&file, format!("{what}: {kind}, which is not read"), Some(hint.to_owned())));
     }
-    let (text, encoding) = decoded(&bytes);
+    let (mut text, encoding) = decoded(&bytes);
+    if text.contains('\0') {
+        // Some loggers end their lines with one.
+        text = text.lines().map(|line| line.trim_end_matches('\0')).collect::<Vec<_>>().join("\n");
+    }
     if text.contains('\0') {
         let hint = "save it as CSV (comma, semicolon, tab or blanks) or as a spreadsheet (xlsx, xls, ods)";
         return Err(refuse(&file, format!("{what}: not a text, and no spreadsheet"), Some(hint.to_owned())));
@@ -206,6 +210,10 @@ mod tests {
         assert!(refused("a.mat", b"MATLAB 5.0 MAT-file").contains("writematrix"));
         assert!(refused("b.dat", b"MATLAB 5.0 MAT-file").contains("MATLAB file"));
         assert!(refused("a.npy", b"\x93NUMPY\x01").contains("numpy.savetxt"));
+        let lines = Utf8PathBuf::from_path_buf(folder.path().join("lines.csv")).unwrap();
+        std::fs::write(&lines, b"j1,x\0\r\n1,2\0\r\n").unwrap();
+        let Ok(Source::Text(text, None)) = read(&lines, "the table", "") else { panic!("not read") };
+        assert_eq!(text.lines().collect::<Vec<_>>(), ["j1,x", "1,2"]);
         assert!(refused("a.csv", b"\x00\x01\x02\xffabc").contains("no spreadsheet"));
         assert!(refused("a.xlsx", b"PK\x03\x04 nothing").contains("not readable as a spreadsheet"));
     }

@@ -13,6 +13,7 @@ use stereocal::robot::Robot;
 
 use crate::run::{shared, stderr, stereocal, workplace};
 
+mod doubtful;
 mod forms;
 mod owners;
 

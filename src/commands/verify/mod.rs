@@ -101,7 +101,10 @@ pub fn run(args: &Verify, config: &Config, run: Run) -> Result<Outcome> {
         super::identify::check_joints(robot, &rows, &args.measurements[0])?;
     }
     let only_verify = place_by_verify_rows(&mut rows);
-    let mut set = Dataset::new(&rows)?;
+    let mut set = match robots.first() {
+        Some((_, robot)) => Dataset::of_robot(&rows, robot)?,
+        None => Dataset::new(&rows)?,
+    };
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }

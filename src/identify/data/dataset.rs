@@ -11,6 +11,7 @@ use super::targets::{self, Targets};
 use crate::identify::Error;
 use crate::identify::sensor::{Extra, FLOOR_MM2};
 use crate::measurements::{Measurement, Observed, Role};
+use crate::robot::Robot;
 
 /// What all readings of a set are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,7 +127,19 @@ impl Dataset {
     /// Sorts the rows, several targets of a pose and repeated readings made one.
     pub fn new(rows: &[Measurement]) -> Result<Dataset, Error> {
         let (of_targets, targets) = targets::as_one(rows)?.unzip();
-        let (merged, repeats) = repeats::as_one(of_targets.as_deref().unwrap_or(rows));
+        Dataset::of_rows(of_targets.as_deref().unwrap_or(rows), targets)
+    }
+
+    /// The same where the nominal robot is known: it joins targets of which no pose shows two.
+    pub fn of_robot(rows: &[Measurement], nominal: &Robot) -> Result<Dataset, Error> {
+        let Some(apart) = targets::Apart::new(rows, nominal) else { return Dataset::new(rows) };
+        let mut set = Dataset::of_rows(&apart.rows, Some(apart.targets.clone()))?;
+        set.shared = apart.columns(&set, nominal);
+        Ok(set)
+    }
+
+    fn of_rows(rows: &[Measurement], targets: Option<Targets>) -> Result<Dataset, Error> {
+        let (merged, repeats) = repeats::as_one(rows);
         let rows = merged.as_slice();
         let positions = rows.iter().any(|r| matches!(r.observed, Observed::Position { .. }));
         let kind = if positions { Kind::Positions } else { Kind::Distances };

@@ -2,7 +2,9 @@
 
 use super::file::{Advice, Record};
 use super::findings::{self, Findings};
-use crate::identify::data::dataset::Dataset;
+use super::gather;
+use crate::identify::data::dataset::{Dataset, Reading};
+use crate::identify::data::still::constant_joints;
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Spread;
 use crate::identify::run::Against;
@@ -12,7 +14,7 @@ use crate::robot::Robot;
 /// Orientations within this are one: a robot keeps an orientation to far less, and so small a turn shows nothing.
 const ONE_ORIENTATION_DEG: f64 = 1.0;
 
-/// Mean distance error of a nominal robot, mm, beyond which units or robots are mixed up: built robots are off by a few mm.
+/// Error of a nominal robot, mm, beyond which units or robots are mixed up: built robots are off by a few mm.
 const IMPLAUSIBLE_MM: f64 = 20.0;
 
 impl Record {
@@ -39,7 +41,9 @@ impl Record {
         let kept = found.candidates[found.chosen].found.is_none().then(|| self.kept_nominal(found));
         let sentences = |list: &[Finding]| list.iter().map(Finding::sentence).collect::<Vec<_>>();
         let mut doubts = sentences(&findings.doubts);
-        doubts.extend(self.implausible());
+        doubts.extend(self.implausible(set, nominal));
+        doubts.extend(self.computed(set));
+        doubts.extend(still(set));
         doubts.extend(one_orientation(set, nominal, found));
         doubts.extend(self.at_limit(found));
         let against = findings.against.first().map(|finding| finding.finding.clone());
@@ -61,15 +65,39 @@ impl Record {
 
     /// A nominal robot that is farther off than built ones are. The tool is a free number, and usually unknown: what is left once it is
     /// solved counts.
-    fn implausible(&self) -> Option<String> {
+    fn implausible(&self, set: &Dataset, nominal: &Robot) -> Option<String> {
+        let (joints, points) = gather::most_points(set);
         let before = match self.tool_mm {
             Some((_, left)) => Some(left),
-            None => self.before.verify.distance.mean_abs_mm,
+            None => nominal.left_mm(&joints, &points).or(self.before.verify.distance.mean_abs_mm),
         };
-        let before = before.filter(|&mean| mean > IMPLAUSIBLE_MM)?;
+        let before = before.filter(|&off| off > IMPLAUSIBLE_MM)?;
         Some(format!(
-            "the nominal robot is off by {before:.0} mm on average, which is implausible for a real robot: check that the lengths are mm, \
-             the angles deg, and that the robot file is of the robot that was measured"
+            "the nominal robot is off by {before:.0} mm in the middle of the rows, which is implausible for a real robot: check that the lengths \
+             are mm, the angles deg, and that the robot file is of the robot that was measured"
+        ))
+    }
+
+    /// Points that a chain of links predicts as no instrument measures them.
+    fn computed(&self, set: &Dataset) -> Option<String> {
+        /// Two digits of the last place that is printed, where that is a hundredth of a mm: no arm keeps to a chain of links so well. Nor does an
+        /// instrument read the points of one to two micrometres, whatever is printed.
+        const PRINTED_MM: f64 = 0.01;
+        const READ_MM: f64 = 0.001;
+        let rows = set.rows(|p| matches!(p.reading, Reading::Position { .. }));
+        let is_printed = |&row: &usize| match set.poses[row].reading {
+            Reading::Position { point_mm, .. } => {
+                point_mm.iter().all(|v| (v / PRINTED_MM - (v / PRINTED_MM).round()).abs() < 1e-5)
+            }
+            _ => true,
+        };
+        let limit_mm = 2.0 * if rows.iter().all(is_printed) { PRINTED_MM } else { READ_MM };
+        let after = self.chosen_method().map_or(&self.before.verify, |method| &method.verify);
+        let largest_mm = after.point.as_ref()?.max_abs_mm.filter(|&most| most < limit_mm)?;
+        Some(format!(
+            "the largest error is {:.2} um, and no instrument measures an arm so: these points were computed, by the robot's controller or in a \
+             simulation; only points that were measured show how a robot was built",
+            1000.0 * largest_mm
         ))
     }
 
@@ -174,6 +202,17 @@ impl Record {
             _ => "the nominal robot is kept: no model predicts held-out samples better".to_owned(),
         }
     }
+}
+
+/// Several joints that did not move.
+fn still(set: &Dataset) -> Option<String> {
+    let joints: Vec<String> = constant_joints(set).into_iter().map(|joint| (joint + 1).to_string()).collect();
+    (joints.len() > 1).then(|| {
+        format!(
+            "joints {} did not move: the identified robot is right for these readings of theirs only; move every joint between poses",
+            joints.join(", ")
+        )
+    })
 }
 
 /// A flange that hardly turns within a group.

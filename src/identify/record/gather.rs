@@ -1,5 +1,7 @@
 //! Gathers what stands in `identification.json`.
 
+use nalgebra::Point3;
+
 use super::file::{Advice, Record, Smooth};
 use super::findings::Findings;
 use super::parameters::{self, Identifiability, MethodRecord};
@@ -11,6 +13,7 @@ use crate::identify::run::{Identification, certainty};
 use crate::identify::sensor::Extra;
 use crate::identify::settings::{Model, Settings};
 use crate::robot::Robot;
+use crate::robot::tool_fit::Start;
 
 /// Name and value of an unknown of the sensor; a supposed scale in thousandths.
 fn of_sensor(set: &Dataset, extra: Extra, value: f64) -> (String, f64) {
@@ -81,13 +84,18 @@ impl Record {
 fn tool(set: &Dataset, nominal: &Robot) -> Option<([f64; 3], f64)> {
     /// Times that the chain must come nearer by a tool of its own.
     const FAR_NEARER: f64 = 3.0;
+    let (joints, points) = most_points(set);
+    let (before, after) = (nominal.left_mm(&joints, &points)?, nominal.fit_tool(&joints, &points, Start::Around)?);
+    (after.left_mm * FAR_NEARER < before).then(|| (after.tool_mm.into(), after.left_mm))
+}
+
+/// Joints, rad, and points of the placement with most rows, but for those that stand on a body.
+pub(super) fn most_points(set: &Dataset) -> (Vec<Vec<f64>>, Vec<Point3<f64>>) {
     let of_group = |g: usize| set.rows(|p| p.group == g && p.on_body_mm.is_none());
-    let rows = (0..set.groups.len()).map(of_group).max_by_key(Vec::len)?;
+    let rows = (0..set.groups.len()).map(of_group).max_by_key(Vec::len).unwrap_or_default();
     let point = |&r: &usize| match set.poses[r].reading {
         Reading::Position { point_mm, .. } => Some((set.poses[r].joints_rad.clone(), point_mm)),
         _ => None,
     };
-    let (joints, points): (Vec<_>, Vec<_>) = rows.iter().filter_map(point).unzip();
-    let (before, after) = (nominal.left_mm(&joints, &points)?, nominal.fit_tool(&joints, &points)?);
-    (after.left_mm * FAR_NEARER < before).then(|| (after.tool_mm.into(), after.left_mm))
+    rows.iter().filter_map(point).unzip()
 }

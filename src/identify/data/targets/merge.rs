@@ -27,8 +27,8 @@ const LEAST_VARIANCE: f64 = 1e-6;
 pub struct Targets {
     /// Their names, in order of appearance.
     pub names: Vec<String>,
-    /// Root mean square of a coordinate's residual against the body, mm.
-    pub scatter_mm: f64,
+    /// Root mean square of a coordinate's residual against the body, mm; `null` where no pose shows two of them.
+    pub scatter_mm: Option<f64>,
     /// Where they stand in a frame of their own, whose origin is the mark point, mm; `null` for one that no pose joins to the others.
     pub places_mm: Vec<Option<[f64; 3]>>,
     /// Whether they tell an orientation.
@@ -51,10 +51,15 @@ pub struct Part {
 impl Targets {
     /// For the terminal and the page.
     pub fn sentence(&self) -> String {
+        let names = self.names.join(", ");
+        let Some(scatter_mm) = self.scatter_mm else {
+            return format!(
+                "each pose shows one target of {names}: how they stand to each other is solved with the robot; the mark point is the one with \
+                 most rows"
+            );
+        };
         format!(
-            "the targets of a pose ({}) agree within {:.4} mm a coordinate; the mark point is their mean{}",
-            self.names.join(", "),
-            self.scatter_mm,
+            "the targets of a pose ({names}) agree within {scatter_mm:.4} mm a coordinate; the mark point is their mean{}",
             if self.oriented { "" } else { ", without an orientation, for they stand on a line" }
         ) + &match self.parts.values().map(|part| part.poses).sum() {
             0 => String::new(),
@@ -115,7 +120,7 @@ pub fn as_one(rows: &[Measurement]) -> Result<Option<(Vec<Measurement>, Targets)
     };
     let rows = poses.iter().zip(judged).map(one).collect();
     let targets = Targets {
-        scatter_mm,
+        scatter_mm: Some(scatter_mm),
         places_mm: sorter.body.places_mm.iter().map(|p| p.map(Into::into)).collect(),
         oriented: !sorter.body.is_line(),
         names,

@@ -43,7 +43,8 @@ fn the_mark_point_is_the_mean_and_turns_with_the_flange() {
         let world = synthetic::world(40, 0.0, 3);
         let (poses, targets) = one(&rows(count, 3));
         assert_eq!((poses.len(), targets.names.len(), targets.oriented), (world.rows.len(), count, true));
-        assert!((targets.scatter_mm / NOISE_MM - 1.0).abs() < 0.15, "{}", targets.scatter_mm);
+        let scatter_mm = targets.scatter_mm.unwrap();
+        assert!((scatter_mm / NOISE_MM - 1.0).abs() < 0.15, "{scatter_mm}");
         let mean = TARGETS[..count].iter().map(|(_, p)| p).sum::<Vector3<f64>>() / count as f64;
         let truth = Robot { tool_mm: mean, ..world.truth.clone() };
         let mut turns = Vec::new();
@@ -250,6 +251,37 @@ fn single_targets_tell_as_much_of_the_robot_as_their_points() {
             "{count} targets, {from} whole poses: {all} with the single ones, {alone} without"
         );
     }
+}
+
+#[test]
+fn targets_that_no_pose_shows_together_are_joined_by_the_robot() {
+    use crate::identify::run::identify;
+    let settings = crate::identify::Settings {
+        method: Some(crate::identify::Method::TrustRegion),
+        ..crate::identify::Settings::default()
+    };
+    let world = synthetic::world(60, 0.0, 3);
+    let truth = Robot { tool_mm: TARGETS[0].1, ..world.truth.clone() };
+    let joints: Vec<Vec<f64>> = world.rows.iter().map(|r| r.at.joints_rad()).collect();
+    let miss = |rows: &[Measurement]| {
+        let set = Dataset::of_robot(rows, &world.nominal).unwrap();
+        assert_eq!((set.skipped.len(), set.poses.len()), (0, rows.len()));
+        let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
+        let robot = &found.candidates[found.chosen].robot;
+        let pairs = joints.iter().map(|q| (robot.target_mm(q), truth.target_mm(q), 1.0));
+        let frame = crate::geometry::fitted_frame(pairs);
+        let of = |q: &Vec<f64>| (frame * robot.target_mm(q) - truth.target_mm(q)).norm();
+        joints.iter().map(of).sum::<f64>() / joints.len() as f64
+    };
+    let all = synthetic::of_targets(&world, &TARGETS[..3], NOISE_MM, 3);
+    // The first is shown by half of the poses, the others by a quarter each.
+    let shows = |i: usize| i % 3 == [0, 1, 0, 2][(i / 3 + i / 12) % 4];
+    let mixed: Vec<Measurement> =
+        all.iter().enumerate().filter(|(i, _)| shows(*i)).map(|(_, row)| row.clone()).collect();
+    let alone: Vec<Measurement> = mixed.iter().filter(|row| row.target == "a").cloned().collect();
+    let whole: Vec<Measurement> = all.iter().filter(|row| row.target == "a").cloned().collect();
+    let [mixed, alone, whole] = [&mixed, &alone, &whole].map(|rows| miss(rows));
+    assert!(mixed < 0.8 * alone && mixed < 2.0 * whole, "{mixed} mm, {alone} of one target, {whole} of all poses");
 }
 
 #[test]

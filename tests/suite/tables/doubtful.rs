@@ -1,0 +1,118 @@
+//! Rows that failed, angles that look like a point, units that are not read: none of them decides what a table says.
+
+use super::*;
+
+/// Columns of joints and points without names.
+fn bare(rows: &Rows) -> String {
+    text("", rows, ",", joined)
+}
+
+#[test]
+fn readings_that_failed_change_no_choice() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(40);
+    let of = |bad: &[(usize, [f64; 3])]| {
+        let mut rows = rows.clone();
+        bad.iter().for_each(|(row, point)| rows[*row].1 = *point);
+        rows
+    };
+    let mean = |k: usize| rows.iter().map(|(_, p)| p[k]).sum::<f64>() / rows.len() as f64;
+    let kinds: [&[(usize, [f64; 3])]; 4] = [
+        &[(7, [0.0; 3])],
+        &[(7, [0.0; 3]), (20, [0.0; 3]), (21, [9e4, -9e4, 9e4])],
+        &[(39, [mean(0), mean(1), mean(2)]), (38, [300.0, 280.0, 310.0])],
+        &[(0, [1e6, 0.0, 0.0])],
+    ];
+    for bad in kinds {
+        let rows = of(bad);
+        let file = folder.file("bare.csv", bare(&rows));
+        let (found, said) = source(&[&file]).read(&robot).expect("it is read");
+        same(&found, &rows, &said[0]);
+        assert!(said[0].contains("confirms"), "{said:?}");
+        // Radians and metres, which no name says.
+        let small = text("q1 q2 q3 q4 q5 q6 x y z", &rows, " ", |q, p| {
+            q.iter().map(|v| v.to_radians()).chain(p.iter().map(|v| v / 1000.0)).collect()
+        });
+        let file = folder.file("small.txt", small);
+        let (found, said) = source(&[&file]).read(&robot).expect("it is read");
+        same(&found, &rows, &said[0]);
+        assert!(said[0].contains("in radians") && said[0].contains("in m "), "{said:?}");
+    }
+}
+
+#[test]
+fn three_angles_beside_a_point_are_no_second_target() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(40);
+    let turn = transform(Vector3::new(0.4, 2.0, -0.7), Vector3::zeros());
+    let angles = |q: &[f64]| -> [[f64; 3]; 2] {
+        let radians: Vec<f64> = q.iter().map(|v| v.to_radians()).collect();
+        let rotation = (turn * robot.base_from_flange(&radians)).rotation;
+        let (a, b, c) = rotation.euler_angles();
+        [[a, b, c].map(f64::to_degrees), rotation.scaled_axis().into()]
+    };
+    for kind in [0, 1] {
+        let after = text("", &rows, ",", |q, p| [q, p, &angles(q)[kind]].concat());
+        let before = text("", &rows, ",", |q, p| [&angles(q)[kind], p.as_slice(), q].concat());
+        for (name, table) in [("after.csv", after), ("before.csv", before)] {
+            let file = folder.file(name, table);
+            let (found, said) =
+                source(&[&file]).read(&robot).unwrap_or_else(|e| panic!("{name} {kind}: {}", report(&e)));
+            same(&found, &rows, &said[0]);
+            assert!(said[0].contains("not used"), "{said:?}");
+        }
+    }
+    // A second target is one.
+    let second = text("", &rows, ",", |q, p| {
+        let radians: Vec<f64> = q.iter().map(|v| v.to_radians()).collect();
+        let offset = turn * robot.base_from_flange(&radians) * Vector3::new(30.0, 40.0, 0.0);
+        [q, p, &[p[0] + offset.x, p[1] + offset.y, p[2] + offset.z]].concat()
+    });
+    let file = folder.file("second.csv", second);
+    let (found, _) = source(&[&file]).read(&robot).expect("it is read");
+    assert_eq!(found.len(), 2 * rows.len());
+}
+
+#[test]
+fn what_is_not_read_is_refused_and_a_joint_that_stands_still_is_a_joint() {
+    let folder = Folder(workplace());
+    let (robot, mut rows) = world(40);
+    for (unit, per_deg) in [("gon", 1.0 / 0.9), ("mrad", 1000.0 / 57.295_779_513_082_32), ("arcmin", 60.0)] {
+        let header = (1..=6).map(|j| format!("J{j}[{unit}]")).chain(["x", "y", "z"].map(str::to_owned));
+        let header = header.collect::<Vec<_>>().join(",");
+        let table = text(&header, &rows, ",", |q, p| q.iter().map(|v| v * per_deg).chain(*p).collect());
+        refused(&source(&[&folder.file("unit.csv", table)]), &robot, &["J1[", unit, "no unit that is read"]);
+    }
+    let twice = folder.file("twice.csv", bare(&rows));
+    refused(&source(&[&twice, &twice]), &robot, &["named twice"]);
+    let sensor = transform(Vector3::new(0.4, 2.0, -0.7), Vector3::new(1900.0, -2000.0, 300.0));
+    for (joints, point) in &mut rows {
+        (joints[3], joints[5]) = (0.0, 0.0);
+        let radians: Vec<f64> = joints.iter().map(|q| q.to_radians()).collect();
+        *point = (sensor * robot.target_mm(&radians)).into();
+    }
+    let still = folder.file("still.csv", bare(&rows));
+    let (found, said) = source(&[&still]).read(&robot).expect("it is read");
+    same(&found, &rows, &said[0]);
+}
+
+#[test]
+fn points_that_were_computed_are_said_to_be() {
+    let folder = workplace();
+    let (_, rows) = world(30);
+    let stated = |digits: i32| -> String {
+        let rounded = |v: f64| (v * 10f64.powi(digits)).round() / 10f64.powi(digits);
+        let table =
+            text("J1,J2,J3,J4,J5,J6,X,Y,Z", &rows, ",", |q, p| q.iter().copied().chain(p.map(rounded)).collect());
+        std::fs::write(folder.path().join("table.csv"), table).expect("it is written");
+        let arguments = ["identify", "--measurements", "table.csv", "--method", "trust-region", "--force"];
+        let run = stereocal(folder.path(), &arguments);
+        assert!(run.status.success(), "{}", stderr(&run));
+        String::from_utf8_lossy(&run.stdout).lines().next().unwrap_or_default().to_owned()
+    };
+    for digits in [2, 3, 9] {
+        assert!(stated(digits).contains("these points were computed"), "{digits}: {}", stated(digits));
+    }
+    // To tenths of a mm an arm may be as good as the digits.
+    assert_eq!(stated(1), "use the identified robot");
+}
