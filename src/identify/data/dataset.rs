@@ -296,10 +296,15 @@ impl Dataset {
         whole.peek().is_some() && whole.all(|p| matches!(p.reading, Reading::Position { rotation_rad: Some(_), .. }))
     }
 
+    /// Whether the places of targets are those in the flange's frame: of targets that the robot joined.
+    pub fn are_on_flange(&self) -> bool {
+        self.targets.as_ref().is_some_and(|targets| targets.scatter_mm.is_none())
+    }
+
     /// How the target is turned on the flange, where orientations are used, or where a point cannot be predicted without it: where poses show a
     /// part of a body of several targets.
     pub fn target_unknowns(&self, oriented: bool) -> &'static [Extra] {
-        match oriented || self.poses.iter().any(|p| p.on_body_mm.is_some()) {
+        match oriented || !self.are_on_flange() && self.poses.iter().any(|p| p.on_body_mm.is_some()) {
             true => &[Extra::Target(0), Extra::Target(1), Extra::Target(2)],
             false => &[],
         }

@@ -379,7 +379,8 @@ impl Inputs<'_> {
             .map(|rows| rows.iter().filter_map(|&i| self.spot(i)).collect::<Vec<_>>())
             .filter(|spots| spots.len() >= 3)
             .collect();
-        let turned = oriented || lists.iter().flatten().any(|spot| spot.on_body_mm.is_some());
+        let of_body = |spot: &Spot| spot.on_body_mm.is_some() && !self.spec.set.are_on_flange();
+        let turned = oriented || lists.iter().flatten().any(of_body);
         let (frames, flange_from_target) = frames_and_turn(&lists, self.places, turned);
         let target = if turned { Points::target_extras(self.spec.extras) } else { Vec::new() };
         let scatter = &self.spec.scatter;

@@ -5,7 +5,7 @@
 //! two, tell no turn about it: then there is the mean alone. A pose that shows fewer than that takes is a point of the body: the mean of what
 //! it shows, and where that stands on the body.
 //! What a robot does wrong at a pose, all its targets share; as rows of their own they would count it several times.
-//! What goes wrong: targets that are no rigid body, or that no pose shows together; both are errors.
+//! What goes wrong: targets that are no rigid body, or that neither a pose nor the robot joins; both are errors.
 
 use std::collections::BTreeMap;
 
@@ -97,7 +97,8 @@ pub fn as_one(rows: &[Measurement]) -> Result<Option<(Vec<Measurement>, Targets)
     let seen: Vec<Vec<Sighting>> = poses.iter().map(|p| p.sightings.clone()).collect();
     let body = Body::new(&seen, names.len()).ok_or_else(|| Error::Targets {
         message: format!("the rows are of {} targets ({}), but no pose shows two of them", names.len(), names.join(", ")),
-        hint: "one pose at which all of them were measured joins them: its rows have the same `pose` and joints; without one, identify the rows of one target at a time",
+        hint: "the robot joins them where one of them has six rows at each place of the sensor and the others two; else one pose at which all of them \
+               were measured does: its rows have the same `pose` and joints",
     })?;
     let sorter = Sorter::new(body, &seen, stated).refined(&seen);
     let scatter_mm = sorter.scatter_mm(&seen);

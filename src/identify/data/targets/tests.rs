@@ -255,6 +255,7 @@ fn single_targets_tell_as_much_of_the_robot_as_their_points() {
 
 #[test]
 fn targets_that_no_pose_shows_together_are_joined_by_the_robot() {
+    use crate::identify::judge::errors::Judge;
     use crate::identify::run::identify;
     let settings = crate::identify::Settings {
         method: Some(crate::identify::Method::TrustRegion),
@@ -268,6 +269,10 @@ fn targets_that_no_pose_shows_together_are_joined_by_the_robot() {
         assert_eq!((set.skipped.len(), set.poses.len()), (0, rows.len()));
         let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
         let robot = &found.candidates[found.chosen].robot;
+        let (extras, values): (Vec<_>, Vec<_>) = found.extras.iter().copied().unzip();
+        let judge = Judge { extras: &extras, values: &values, ..Judge::plain(&set, &found.fitted, true) };
+        let errors = judge.errors(robot, &found.fitted).into_iter().filter_map(|e| e.point_mm).map(|e| e.norm());
+        assert!(errors.fold(0.0, f64::max) < 10.0 * NOISE_MM);
         let pairs = joints.iter().map(|q| (robot.target_mm(q), truth.target_mm(q), 1.0));
         let frame = crate::geometry::fitted_frame(pairs);
         let of = |q: &Vec<f64>| (frame * robot.target_mm(q) - truth.target_mm(q)).norm();
