@@ -66,9 +66,15 @@ impl Shot {
     }
 }
 
+/// The grey values of a picture.
+pub fn eight_bits(picture: &Picture) -> &Image<u8> {
+    let Picture { grey: Grey::Eight(image), .. } = picture else { panic!("eight bits") };
+    image
+}
+
 /// The picture with some of its pixels changed.
 pub fn with_pixels(picture: &Picture, change: impl Fn(&Image<u8>, usize, usize) -> u8) -> Picture {
-    let Picture { grey: Grey::Eight(image), .. } = picture else { panic!("eight bits") };
+    let image = eight_bits(picture);
     let (width, height) = (image.width, image.height);
     let pixels = (0..width * height).map(|k| change(image, k % width, k / width)).collect();
     Image { width, height, pixels }.into()

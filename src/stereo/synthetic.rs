@@ -1,11 +1,27 @@
-//! A rig, boards and corners whose truth is known, for the tests of this stage.
+//! A rig, boards and corners whose truth is known, for the tests of this stage, and what is asked of a calibration there.
 
 use nalgebra::{Matrix2, Point2, Vector2, Vector3};
 
 use crate::geometry::{Transform, transform};
 use crate::imaging::{Board, Corner, Corners, PairCorners, Squares};
 use crate::simulate::draws::{Draws, Purpose};
+use crate::stereo::calibrate::Calibration;
+use crate::stereo::findings::Finding;
+use crate::stereo::judge::assessment::{Demand, Judged, Standards};
+use crate::stereo::judge::lengths::held_out;
+use crate::stereo::select::options::Options;
+use crate::stereo::volume::Extent;
 use crate::stereo::{Camera, Lens, Rig};
+
+/// The simplest lens that the worlds have, and a flat board.
+pub(crate) const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: Some(false), known: None };
+
+/// A calibration judged by its held-out lengths.
+pub(crate) fn judged(found: &Calibration, findings: Vec<Finding>, standards: Standards, tolerance_mm: f64) -> Judged {
+    let accuracy = held_out::hold_out(found, None).unwrap();
+    let demand = Demand { tolerance_mm, board_uncertainty_mm: None, extent: Extent::Boards };
+    Judged::new(found, findings, accuracy, standards, &demand)
+}
 
 /// A known world.
 #[derive(Debug, Clone)]
@@ -84,6 +100,25 @@ impl World {
             *pose = transform(turn, Vector3::new(between(-20.0, 20.0), between(-20.0, 20.0), between(500.0, 550.0)));
         }
         world
+    }
+
+    /// Two cameras side by side, 40 mm apart, and boards square to them but for the tilt of each.
+    pub fn facing(pairs: usize, tilt: impl Fn(f64) -> Vector3<f64>) -> World {
+        let mut world = World::new(pairs, 1);
+        world.rig.right_from_left = transform(Vector3::zeros(), Vector3::new(-40.0, 0.0, 0.0));
+        for (i, pose) in (0..pairs).map(|i| i as f64).zip(&mut world.poses) {
+            *pose = transform(tilt(i), Vector3::new(i, -i, 550.0));
+        }
+        world
+    }
+
+    /// The same with another lens on both cameras.
+    pub fn with_lens(mut self, lens: Lens, change: impl Fn(&mut [f64; 14])) -> World {
+        for camera in [&mut self.rig.left, &mut self.rig.right] {
+            camera.lens = lens;
+            change(&mut camera.distortion);
+        }
+        self
     }
 
     /// The same where the right camera turns by so much at random between pairs, as a board in a hand before cameras that nobody triggers looks.

@@ -4,16 +4,13 @@ use nalgebra::Vector3;
 
 use crate::geometry::transform;
 use crate::imaging::{Corners, PairCorners};
-use crate::stereo::Lens;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::options::Options;
-use crate::stereo::synthetic::World;
+use crate::stereo::synthetic::{BROWN4, World};
 use crate::stereo::volume::Extent;
-
-const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: Some(false), known: None };
 
 /// The paper's rig, and the same at a fifth of its pixels.
 fn worlds(pairs: usize, seed: u64) -> [World; 2] {

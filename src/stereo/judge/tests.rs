@@ -6,12 +6,11 @@ use crate::geometry::{Transform, transform};
 use crate::imaging::{Corner, Corners, PairCorners};
 use crate::stereo::data::view::View;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
-use crate::stereo::judge::assessment::{Demand, Judged, Standards};
-use crate::stereo::judge::lengths::held_out;
+use crate::stereo::judge::assessment::{Judged, Standards};
 use crate::stereo::judge::lengths::second_board::second_board;
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::select::options::Options;
-use crate::stereo::synthetic::World;
+use crate::stereo::synthetic::{self, World};
 use crate::stereo::triangulate::{common, triangulate};
 use crate::stereo::volume::Extent;
 use crate::stereo::{Camera, Lens, Rig};
@@ -31,12 +30,9 @@ fn judge_with(corners: &Corners, second: Option<&Corners>) -> Judged {
 fn calibrated_and_judged(corners: &Corners, second: Option<&Corners>) -> (Rig, Judged) {
     let asked = Asked { options: Options::default(), tolerance_mm: TOLERANCE_MM, extent: Extent::Boards };
     let (found, findings) = calibrate_standing(corners, &asked).unwrap();
-    let accuracy = held_out::hold_out(&found, None).unwrap();
     let second = second.map(|corners| second_board(&found, corners, None));
     let standards = Standards { second, ..Standards::default() };
-    let demand = Demand { tolerance_mm: TOLERANCE_MM, board_uncertainty_mm: None, extent: Extent::Boards };
-    let rig = found.rig().clone();
-    (rig, Judged::new(&found, findings, accuracy, standards, &demand))
+    (found.rig().clone(), synthetic::judged(&found, findings, standards, TOLERANCE_MM))
 }
 
 /// The largest error with which a rig measures lengths between the corners of the world's boards, mm, from places without noise.

@@ -213,7 +213,7 @@ mod tests {
     use crate::imaging::{Corner, Corners, Squares};
     use crate::stereo::calibrate::calibrate;
     use crate::stereo::select::options::Options;
-    use crate::stereo::synthetic::World;
+    use crate::stereo::synthetic::{BROWN4, World};
 
     /// Two cameras that see a board of so many squares; a mix-up; what is said of each pair that is left out.
     fn said(squares: Squares, mix: impl Fn(&World, &mut Corners)) -> Vec<(String, String)> {
@@ -221,10 +221,7 @@ mod tests {
         world.board.squares = squares;
         let mut corners = world.corners(6);
         mix(&world, &mut corners);
-        let found =
-            calibrate(&corners, &Options { lens: Some(crate::stereo::Lens::Brown4), shape: Some(false), known: None })
-                .unwrap();
-        found.skipped.into_iter().map(|s| (s.pair, s.reason)).collect()
+        calibrate(&corners, &BROWN4).unwrap().skipped.into_iter().map(|s| (s.pair, s.reason)).collect()
     }
 
     /// Boards with and without a turn that looks the same.

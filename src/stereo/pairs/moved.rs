@@ -128,13 +128,11 @@ mod tests {
     use crate::geometry::transform;
     use crate::imaging::Corners;
     use crate::stereo::calibrate::calibrate;
-    use crate::stereo::select::options::Options;
-    use crate::stereo::synthetic::World;
+    use crate::stereo::synthetic::{BROWN4, World};
 
     /// What is said of the pairs that are left out.
     fn said(corners: &Corners) -> Vec<(String, Cause, String)> {
-        let options = Options { lens: Some(crate::stereo::Lens::Brown4), shape: Some(false), known: None };
-        let pairs = calibrate(corners, &options).unwrap().discarded.pairs;
+        let pairs = calibrate(corners, &BROWN4).unwrap().discarded.pairs;
         pairs.into_iter().map(|d| (d.pair, d.cause, d.reason)).collect()
     }
 

@@ -180,19 +180,16 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::geometry::transform;
     use crate::stereo::calibrate::calibrate;
-    use crate::stereo::select::options::Options;
-    use crate::stereo::synthetic::World;
+    use crate::stereo::synthetic::{BROWN4, World};
 
     #[test]
     fn a_bow_that_was_ruled_out_is_a_witness_and_widens_the_covariance() {
-        let flat = Options { lens: Some(Lens::Brown4), shape: Some(false), known: None };
         let mut world = World::new(12, 3);
-        let clean = calibrate(&world.corners(4), &flat).unwrap();
+        let clean = calibrate(&world.corners(4), &BROWN4).unwrap();
         assert!(clean.witnesses.iter().all(|w| !w.layout.shape), "{:?}", clean.witnesses);
         world.bow_mm[0] = 0.1;
-        let bowed = calibrate(&world.corners(4), &flat).unwrap();
+        let bowed = calibrate(&world.corners(4), &BROWN4).unwrap();
         assert!(bowed.witnesses.iter().any(|w| w.layout.shape), "{:?}", bowed.witnesses);
         let off = (bowed.rig().left.fx - world.rig.left.fx).abs();
         assert!(off < 2.0 * bowed.uncertainty.shared[(0, 0)].sqrt(), "{off}");
@@ -200,20 +197,14 @@ mod tests {
 
     #[test]
     fn pairs_of_which_none_can_be_spared_do_not_tell_how_they_scatter() {
-        let flat = Options { lens: Some(Lens::Brown4), shape: Some(false), known: None };
         let told = |world: &World| {
-            let found = calibrate(&world.corners(1), &flat).ok()?;
+            let found = calibrate(&world.corners(1), &BROWN4).ok()?;
             let solved = found.problem().solve(&found.layout).ok()?;
             Some(told_scatter(&solved, &found.layout, &world.board))
         };
         assert!(told(&World::new(12, 3)).unwrap().is_some_and(|scatter| scatter >= 1.0));
         // Nearly parallel boards: with all of them the focal lengths are known somewhat, without one they are not.
-        let mut world = World::new(5, 1);
-        world.rig.right_from_left = transform(Vector3::zeros(), Vector3::new(-40.0, 0.0, 0.0));
-        for (i, pose) in world.poses.iter_mut().enumerate() {
-            let tilt = Vector3::new(0.02 * (i as f64 - 2.0), 0.03, 0.1 * i as f64);
-            *pose = transform(tilt, Vector3::new(i as f64, -(i as f64), 550.0));
-        }
+        let world = World::facing(5, |i| Vector3::new(0.02 * (i - 2.0), 0.03, 0.1 * i));
         let of = |sigma_px: f64| told(&World { sigma_px, ..world.clone() });
         assert!([0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0].into_iter().any(|sigma_px| of(sigma_px) == Some(None)));
     }

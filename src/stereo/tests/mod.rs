@@ -10,27 +10,15 @@ mod scatter;
 mod target;
 
 use crate::imaging::Corners;
-use crate::stereo::Lens;
 use crate::stereo::calibrate::{Calibration, calibrate};
-use crate::stereo::judge::assessment::{Demand, Judged, Standards};
+use crate::stereo::judge::assessment::{Judged, Standards};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::model::parameters::Shared;
 use crate::stereo::select::options::Options;
-use crate::stereo::synthetic::World;
-use crate::stereo::volume::Extent;
-
-const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: Some(false), known: None };
+use crate::stereo::synthetic::{self, BROWN4, World};
 
 fn judged(corners: &Corners, options: &Options, tolerance_mm: f64) -> Judged {
-    let found = calibrate(corners, options).unwrap();
-    let accuracy = held_out::hold_out(&found, None).unwrap();
-    Judged::new(
-        &found,
-        Vec::new(),
-        accuracy,
-        Standards::default(),
-        &Demand { tolerance_mm, board_uncertainty_mm: None, extent: Extent::Boards },
-    )
+    synthetic::judged(&calibrate(corners, options).unwrap(), Vec::new(), Standards::default(), tolerance_mm)
 }
 
 /// Deviations of the shared numbers from the truth, in the coordinates of the covariance.

@@ -13,8 +13,7 @@ use crate::stereo::{Camera, Rig};
 
 #[test]
 fn a_bowed_board_is_seen_and_corrected() {
-    let mut world = World::new(14, 7);
-    world.bow_mm = [0.05, 0.03];
+    let world = World { bow_mm: [0.05, 0.03], ..World::new(14, 7) };
     let corners = world.corners(8);
     let found = calibrate(&corners, &Options::default()).unwrap();
     assert!(found.layout.shape, "the bow was not noticed");
@@ -28,8 +27,7 @@ fn a_bowed_board_is_seen_and_corrected() {
 #[test]
 fn a_twisted_board_is_seen_and_corrected() {
     for twist_mm in [0.05, 0.2, -0.2] {
-        let mut world = World::paper(12, 47);
-        world.twist_mm = twist_mm;
+        let world = World { twist_mm, ..World::paper(12, 47) };
         let found = calibrate(&world.corners(48), &Options::default()).unwrap();
         assert!(found.layout.shape, "a twist of {twist_mm} mm was not noticed");
         let worst = worst_point_mm(&found, &world);
@@ -51,12 +49,8 @@ fn a_lens_model_that_the_corners_refute_is_no_witness() {
 
 #[test]
 fn a_lens_term_too_weak_to_be_chosen_is_a_spread_of_lengths() {
-    let mut world = World::new(14, 19);
-    for camera in [&mut world.rig.left, &mut world.rig.right] {
-        camera.lens = Lens::Brown5;
-        // A pixel at the border of the picture, 0.3 of the distance.
-        camera.distortion[4] = 1.0 / 2000.0 / 0.3_f64.powi(7);
-    }
+    // A pixel at the border of the picture, 0.3 of the distance.
+    let world = World::new(14, 19).with_lens(Lens::Brown5, |d| d[4] = 1.0 / 2000.0 / 0.3_f64.powi(7));
     let corners = world.corners(20);
     let judged = judged(&corners, &BROWN4, 1.0);
     let spread = judged.disagreements.iter().find(|d| d.other == "brown5").expect("brown5 measures other lengths");
@@ -93,8 +87,7 @@ fn the_papers_rig_measures_to_two_micrometres() {
 
 #[test]
 fn a_board_bowed_by_50_micrometres_costs_little_once_its_shape_is_free() {
-    let mut world = World::paper(12, 43);
-    world.bow_mm = [0.05, 0.0];
+    let world = World { bow_mm: [0.05, 0.0], ..World::paper(12, 43) };
     let found = calibrate(&world.corners(44), &Options::default()).unwrap();
     let flat = calibrate(&world.corners(44), &Options { shape: Some(false), ..Options::default() }).unwrap();
     let (bowed, flat) = (worst_point_mm(&found, &world), worst_point_mm(&flat, &world));
@@ -104,12 +97,8 @@ fn a_board_bowed_by_50_micrometres_costs_little_once_its_shape_is_free() {
 
 #[test]
 fn a_lens_term_of_half_a_pixel_is_found_by_the_ladder() {
-    let mut world = World::paper(14, 45);
-    for camera in [&mut world.rig.left, &mut world.rig.right] {
-        camera.lens = Lens::Brown5;
-        // 0.5 px at the border of the field, 0.26 of the distance.
-        camera.distortion[4] = 0.5 / 10_000.0 / 0.256_f64.powi(7);
-    }
+    // 0.5 px at the border of the field, 0.26 of the distance.
+    let world = World::paper(14, 45).with_lens(Lens::Brown5, |d| d[4] = 0.5 / 10_000.0 / 0.256_f64.powi(7));
     let corners = world.corners(46);
     let found = calibrate(&corners, &Options::default()).unwrap();
     let lens = found.layout.left.unwrap();
@@ -147,16 +136,10 @@ fn the_borders_of_a_wide_picture_are_no_outliers() {
 #[test]
 fn a_prism_needs_no_rational_terms() {
     for seed in 0..6 {
-        let mut world = World::new(16, seed);
-        world.board = Board::checker(Squares { columns: 20, rows: 20 }, 10.0);
-        world.sigma_px = 0.006;
-        world.print_mm = 0.001;
-        for camera in [&mut world.rig.left, &mut world.rig.right] {
-            camera.lens = Lens::ThinPrism12;
-            // 1.5 px at the corners of the picture.
-            camera.distortion[8] = 4.5e-3;
-            camera.distortion[10] = -3e-3;
-        }
+        let board = Board::checker(Squares { columns: 20, rows: 20 }, 10.0);
+        let world = World { board, sigma_px: 0.006, print_mm: 0.001, ..World::new(16, seed) };
+        // 1.5 px at the corners of the picture.
+        let world = world.with_lens(Lens::ThinPrism12, |d| (d[8], d[10]) = (4.5e-3, -3e-3));
         let corners = world.corners(seed + 50);
         for asked in [None, Some(Lens::ThinPrism12)] {
             let found = calibrate(&corners, &Options { lens: asked, ..Options::default() }).unwrap();
@@ -173,15 +156,9 @@ fn a_prism_needs_no_rational_terms() {
 fn what_a_simple_lens_lacks_is_no_scatter_of_the_pairs() {
     // Rational terms and a prism of a pixel: either alone explains little of what is left, and what the simplest lens leaves scatters the pairs.
     for seed in 0..2 {
-        let mut world = World::paper(16, seed);
-        world.sigma_px = 0.002;
-        world.print_mm = 0.001;
-        for camera in [&mut world.rig.left, &mut world.rig.right] {
-            camera.lens = Lens::ThinPrism12;
-            camera.distortion[..8].copy_from_slice(&[0.25, 0.12, 2e-4, -3e-4, 0.02, 0.35, 0.18, 0.03]);
-            camera.distortion[8] = 1.5e-3;
-            camera.distortion[10] = -1e-3;
-        }
+        let world = World { sigma_px: 0.002, print_mm: 0.001, ..World::paper(16, seed) };
+        let distortion = [0.25, 0.12, 2e-4, -3e-4, 0.02, 0.35, 0.18, 0.03, 1.5e-3, 0.0, -1e-3];
+        let world = world.with_lens(Lens::ThinPrism12, |d| d[..11].copy_from_slice(&distortion));
         let found = calibrate(&world.corners(seed + 60), &Options::default()).unwrap();
         assert!(found.layout.left >= Some(Lens::ThinPrism12), "seed {seed}: {:?}", found.layout.left);
     }

@@ -68,13 +68,8 @@ fn three_pairs_are_too_few() {
 
 #[test]
 fn boards_that_are_never_tilted_do_not_tell_the_cameras() {
-    let mut world = World::new(8, 1);
     // Side by side and square to the board, so that neither camera sees it from the side.
-    world.rig.right_from_left = transform(Vector3::zeros(), Vector3::new(-40.0, 0.0, 0.0));
-    for (i, pose) in world.poses.iter_mut().enumerate() {
-        *pose = transform(Vector3::new(0.0, 0.0, 0.1 * i as f64), Vector3::new(i as f64, -(i as f64), 550.0));
-    }
-    let refused = calibrate(&world.corners(1), &Options::default());
+    let refused = calibrate(&World::facing(8, |i| Vector3::z() * 0.1 * i).corners(1), &Options::default());
     let told = |c: Calibration| (c.rig().left.fx, c.uncertainty.shared[(0, 0)].sqrt(), c.layout);
     assert!(matches!(refused, Err(Error::Undetermined { .. })), "{:?}", refused.map(told));
 }
@@ -98,11 +93,8 @@ fn pictures_of_one_camera_are_no_rig() {
 
 #[test]
 fn a_pair_that_alone_tells_the_cameras_leaves_the_verdict_open() {
-    let mut world = World::new(9, 1);
-    world.rig.right_from_left = transform(Vector3::zeros(), Vector3::new(-40.0, 0.0, 0.0));
-    for (i, pose) in world.poses.iter_mut().enumerate().skip(1) {
-        *pose = transform(Vector3::new(0.0, 0.0, 0.1 * i as f64), Vector3::new(i as f64, -(i as f64), 550.0));
-    }
+    let mut world = World::facing(9, |i| Vector3::z() * 0.1 * i);
+    world.poses[0] = World::new(1, 1).poses[0];
     let tilted = judged(&world.corners(1), &BROWN4, 0.5);
     assert_eq!(tilted.accuracy.unchecked, ["00"]);
     assert_eq!(tilted.verdict, Verdict::Undecided);
@@ -118,13 +110,8 @@ fn few_boards_that_lie_alike_are_calibrated_and_nothing_is_promised() {
     let all = ["00", "01", "02", "03", "04"];
     let mut unchecked = 0;
     for sigma_px in [0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0] {
-        let mut world = World::new(5, 1);
-        world.rig.right_from_left = transform(Vector3::zeros(), Vector3::new(-40.0, 0.0, 0.0));
-        for (i, pose) in world.poses.iter_mut().enumerate() {
-            let tilt = Vector3::new(0.02 * (i as f64 - 2.0), 0.03, 0.1 * i as f64);
-            *pose = transform(tilt, Vector3::new(i as f64, -(i as f64), 550.0));
-        }
-        world.sigma_px = sigma_px;
+        let world = World::facing(5, |i| Vector3::new(0.02 * (i - 2.0), 0.03, 0.1 * i));
+        let world = World { sigma_px, ..world };
         let Ok(found) = calibrate(&world.corners(1), &BROWN4) else { continue };
         let Ok(accuracy) = held_out::hold_out(&found, None) else { continue };
         if accuracy.unchecked == all {

@@ -10,7 +10,6 @@ use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::view::View;
 use crate::stereo::judge::verdict::{LengthError, Verdict};
 use crate::stereo::triangulate::{RigCovariance, common, triangulate};
-use crate::stereo::volume::Extent;
 
 /// Noise as fits in windows of whole squares have it: across each edge, half of a corner's noise is that of the edge's other end.
 fn with_noise_of_shared_edges(exact: &Corners, sigma_px: f64, seed: u64) -> Corners {
@@ -222,11 +221,9 @@ fn a_board_whose_print_scatters_is_told_from_corners_that_do() {
     world.sigma_px = 0.01;
     world.print_mm = 0.03;
     let found = calibrate(&world.corners(18), &BROWN4).unwrap();
-    let accuracy = held_out::hold_out(&found, None).unwrap();
+    let judged = synthetic::judged(&found, Vec::new(), Standards::default(), 0.05);
     // 0.02 mm (root mean square) is 0.07 px here, seven times the corners' own scatter.
-    assert!(accuracy.rays_chi_square < 0.1, "{}", accuracy.rays_chi_square);
-    let demand = Demand { tolerance_mm: 0.05, board_uncertainty_mm: None, extent: Extent::Boards };
-    let judged = Judged::new(&found, Vec::new(), accuracy, Standards::default(), &demand);
+    assert!(judged.accuracy.rays_chi_square < 0.1, "{}", judged.accuracy.rays_chi_square);
     assert!(judged.warnings.iter().any(|w| w.text.contains("corners' places on the board")), "{:?}", judged.warnings);
 }
 

@@ -4,11 +4,21 @@ use nalgebra::{Vector3, Vector6};
 
 use super::*;
 use crate::geometry::transform;
+use crate::imaging::Board;
+use crate::stereo::Rig;
+use crate::stereo::board_pose::pair_excess::pair_excess;
+use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::series;
 use crate::stereo::board_pose::{Knowledge, Seen};
 
+/// A rig and a target of which nothing else is known.
+fn known(rig: &Rig, board: Board) -> Knowledge {
+    let rig = rig.clone();
+    Knowledge { rig, noise: None, pair_excess: None, volume: None, board, crossing_mm: 0.01, tolerance_mm: 0.05 }
+}
+
 /// All poses of a world as a robot's run.
-fn run_of(corners: crate::imaging::Corners) -> Vec<Seen> {
+fn run_of(corners: Corners) -> Vec<Seen> {
     let at = |pose: &str| crate::measurements::RobotPose {
         pose: pose.to_owned(),
         group: "1".to_owned(),
@@ -22,18 +32,9 @@ fn run_of(corners: crate::imaging::Corners) -> Vec<Seen> {
 #[test]
 fn the_targets_scatter_is_the_predicted_one() {
     let mut world = World::new(60, 23);
-    world.board = crate::imaging::Board::checker("7x6".parse().unwrap(), 10.0);
-    let known = Knowledge {
-        rig: world.rig.clone(),
-        noise: None,
-        pair_excess: None,
-        volume: None,
-        board: world.board,
-        crossing_mm: 0.01,
-        tolerance_mm: 0.05,
-    };
+    world.board = Board::checker("7x6".parse().unwrap(), 10.0);
     let mut sums = Vector6::<f64>::zeros();
-    let measured = series::measure(&known, run_of(world.corners(24)));
+    let measured = series::measure(&known(&world.rig, world.board), run_of(world.corners(24)));
     for (pose, truth) in measured.poses.iter().zip(&world.poses) {
         let pose = pose.target.as_ref().unwrap();
         let turn = (pose.cam_from_board.rotation * truth.rotation.inverse()).scaled_axis();
@@ -48,26 +49,17 @@ fn the_targets_scatter_is_the_predicted_one() {
         // corners' usual scatter the poses' own is counted, along the line of sight generously.
         assert!((0.35..1.7).contains(&(sum / 60.0)), "{sums}");
     }
-    assert_eq!(measured.judgement, crate::stereo::board_pose::rig_change::judgement::Judgement::Agrees);
+    assert_eq!(measured.judgement, Judgement::Agrees);
 }
 
 #[test]
 fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
     let mut world = World::new(30, 29);
-    world.board = crate::imaging::Board::checker("7x6".parse().unwrap(), 10.0);
+    world.board = Board::checker("7x6".parse().unwrap(), 10.0);
     let corners = world.corners(30);
-    let judged = |rig: &crate::stereo::Rig, square_mm: f64| {
-        let board = crate::imaging::Board { square_mm, ..world.board };
-        let known = Knowledge {
-            rig: rig.clone(),
-            noise: None,
-            pair_excess: None,
-            volume: None,
-            board,
-            crossing_mm: 0.01,
-            tolerance_mm: 0.05,
-        };
-        let judgement = series::measure(&known, run_of(corners.clone())).judgement;
+    let judged = |rig: &Rig, square_mm: f64| {
+        let board = Board { square_mm, ..world.board };
+        let judgement = series::measure(&known(rig, board), run_of(corners.clone())).judgement;
         judgement.describe(rig, &board).unwrap_or_default()
     };
     assert_eq!(judged(&world.rig, 10.0), "");
@@ -78,7 +70,7 @@ fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
         transform(Vector3::new(0.0, 0.1_f64.to_radians(), 0.0), Vector3::zeros()) * turned.right_from_left;
     let yaw = judged(&turned, 10.0);
     assert!((yaw.contains("-0.10") || yaw.contains("-0.09")) && yaw.contains("yaw"), "{yaw}");
-    let exchanged = crate::stereo::Rig {
+    let exchanged = Rig {
         left: turned.right,
         right: turned.left,
         right_from_left: world.rig.right_from_left.inverse(),
@@ -95,13 +87,10 @@ fn the_pairs_of_a_calibration_are_measured_by_it() {
         let mut corners = world.corners_by_hand(41, turn_deg);
         let found = calibrate(&corners, &BROWN4).unwrap();
         let known = Knowledge {
-            rig: found.rig().clone(),
             noise: Some(found.own_noise),
-            pair_excess: Some(crate::stereo::board_pose::pair_excess::pair_excess(&found)),
-            volume: None,
-            board: world.board,
-            crossing_mm: 0.01,
+            pair_excess: Some(pair_excess(&found)),
             tolerance_mm: 5.0,
+            ..known(found.rig(), world.board)
         };
         // No pose keeps to a part of its corners that happens to agree.
         for pose in series::measure(&known, run_of(corners.clone())).poses {
@@ -109,7 +98,7 @@ fn the_pairs_of_a_calibration_are_measured_by_it() {
             let seen = seen.map_or(0, |pair| pair.left.len() + pair.right.len());
             assert!(10 * target.corners > 9 * seen && target.fit_rms_mm.is_some(), "{turn_deg}: {}", pose.at.pose);
         }
-        let refused = |corners: &crate::imaging::Corners| -> Vec<String> {
+        let refused = |corners: &Corners| -> Vec<String> {
             let poses = series::measure(&known, run_of(corners.clone())).poses.into_iter();
             poses.filter(|pose| pose.target.is_err()).map(|pose| pose.at.pose).collect()
         };

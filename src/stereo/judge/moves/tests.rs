@@ -9,13 +9,11 @@ use crate::imaging::{Board, Corners};
 use crate::simulate::draws::{Draws, Purpose};
 use crate::stereo::calibrate::calibrate;
 use crate::stereo::findings::Finding;
-use crate::stereo::judge::assessment::{Demand, Judged, Standards};
-use crate::stereo::judge::lengths::held_out;
+use crate::stereo::judge::assessment::{Judged, Standards};
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::options::Options;
-use crate::stereo::synthetic::World;
-use crate::stereo::volume::Extent;
+use crate::stereo::synthetic::{self, World};
 
 const PAIRS: usize = 12;
 
@@ -56,9 +54,7 @@ fn measured(corners: &Corners, moves: &[&str]) -> KnownMoves {
 fn judged(corners: &Corners, moves: &[&str], tolerance_mm: f64) -> (Judged, Verdict, Option<Finding>) {
     let found = calibrated(corners);
     let standards = Standards { second: None, moves: measure(&found, &stated(moves)).unwrap() };
-    let accuracy = held_out::hold_out(&found, None).unwrap();
-    let demand = Demand { tolerance_mm, board_uncertainty_mm: None, extent: Extent::Boards };
-    let judged = Judged::new(&found, Vec::new(), accuracy, standards, &demand);
+    let judged = synthetic::judged(&found, Vec::new(), standards, tolerance_mm);
     let line = judged.evidence.iter().filter(|line| line.what == "known move").map(|line| line.allows);
     let (allows, finding) = (line.fold(Verdict::Pass, Verdict::and), judged.of_scale());
     (judged, allows, finding)
