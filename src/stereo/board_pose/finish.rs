@@ -14,7 +14,7 @@ use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::run::Run;
 use crate::stereo::board_pose::solve::alone::{Alone, Known};
 use crate::stereo::board_pose::solve::bundle::Bundle;
-use crate::stereo::board_pose::solve::estimate::{Estimate, own_covariance};
+use crate::stereo::board_pose::solve::estimate::Estimate;
 use crate::stereo::board_pose::solve::prior::frame_modes;
 use crate::stereo::board_pose::solve::window::Window;
 use crate::stereo::board_pose::start::{FEWEST_CORNERS, Start, enough};
@@ -123,16 +123,14 @@ impl Finisher<'_> {
     }
 
     fn answer(&self, i: usize, alone: &Alone) -> TargetPose {
-        let by_shared = -(alone.part.pose_inverse * alone.part.mixed.transpose());
+        let by_shared = alone.part.by_shared();
         let through = &by_shared * self.shared_covariance * by_shared.transpose();
         let chance = 1.0 + POSE_SIGMAS * (2.0 / alone.freedom.max(1.0)).sqrt();
         let grown = if alone.chi_square > chance { alone.chi_square } else { 1.0 };
-        let by_change = alone.part.by_change();
-        let mut own_covariance =
-            own_covariance(&alone.part.pose_inverse, &alone.part.change, &by_change, self.found.excess) * grown;
+        let mut own_covariance = alone.part.own_covariance(self.found.excess) * grown;
         if let Some(along) = &self.run.along {
             // Whether the common rig is the one before or the one after is not known.
-            let moved = by_change * along.change.change * along.shares[i].max(1.0 - along.shares[i]);
+            let moved = alone.part.by_change() * along.change.change * along.shares[i].max(1.0 - along.shares[i]);
             own_covariance += moved * moved.transpose();
         }
         let sensitivity = self.sensitivity(alone);

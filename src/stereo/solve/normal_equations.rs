@@ -4,19 +4,20 @@
 //! `H = [A B; B' C]` a pair contributes `A - B C^-1 B'` to the shared system (Triggs et al. 2000, section 6.1), so that a
 //! dense system of some forty unknowns remains however many pairs there are.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, RowVector3, Vector2, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Matrix6, Point3, RowVector3, Vector2, Vector3, Vector6};
 
 use crate::geometry::{Transform, rotation_matrix};
 use crate::imaging::Side;
 use crate::linear_algebra::to_unit_diagonal;
-use crate::stereo::Camera;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
 use crate::stereo::model::board_shape;
 use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::model::projection::CAMERA_NUMBERS;
 use crate::stereo::solve::gram_matrix::{Products, WIDEST};
 use crate::stereo::solve::priors::Information;
 use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::{Camera, Rig};
 
 /// One pair's share of the normal equations.
 #[derive(Debug, Clone)]
@@ -61,7 +62,7 @@ impl Packing {
 }
 
 /// A picture's camera and the ways there from the board, as matrices.
-struct Way<'a> {
+pub struct Way<'a> {
     camera: &'a Camera,
     left_turn: Matrix3<f64>,
     left_shift: Vector3<f64>,
@@ -69,9 +70,21 @@ struct Way<'a> {
     on: Option<(Matrix3<f64>, Vector3<f64>)>,
 }
 
+/// A corner as predicted: the whitened residual `predicted - seen`, and its derivatives.
+pub struct Predicted {
+    pub residual: Vector2<f64>,
+    /// By the camera's numbers, not whitened.
+    pub by_camera: [Vector2<f64>; CAMERA_NUMBERS],
+    /// By the point in the camera's frame, and by the same in the left camera's.
+    pub by_point: Matrix2x3<f64>,
+    pub by_left: Matrix2x3<f64>,
+    /// The point turned as the board is, and turned into the camera's frame, before each shift.
+    pub turned: Vector3<f64>,
+    pub turned_on: Vector3<f64>,
+}
+
 impl<'a> Way<'a> {
-    fn new(shared: &'a Shared, left_from_board: &Transform, side: Side) -> Way<'a> {
-        let rig = &shared.rig;
+    pub fn new(rig: &'a Rig, left_from_board: &Transform, side: Side) -> Way<'a> {
         let right = &rig.right_from_left;
         let (camera, on) = match side {
             Side::Left => (&rig.left, None),
@@ -81,15 +94,14 @@ impl<'a> Way<'a> {
         Way { camera, left_turn, left_shift, on }
     }
 
-    /// Writes the whitened residual `predicted - seen` and its derivatives: two rows of the Jacobian. `None` where the corner would lie behind its camera.
-    fn rows(
-        &self,
-        packing: &Packing,
-        shape_mm: &[f64; board_shape::NUMBERS],
-        o: &Observation,
-        rows: &mut [[f64; WIDEST]],
-    ) -> Option<Vector2<f64>> {
-        let turned = self.left_turn * o.board_point(shape_mm).coords;
+    /// Derivatives by the point on the board.
+    pub fn by_board(&self, predicted: &Predicted) -> Matrix2x3<f64> {
+        predicted.by_left * self.left_turn
+    }
+
+    /// A corner from its place on the board. `None` where it would lie behind its camera.
+    pub fn predict(&self, board_mm: &Point3<f64>, o: &Observation) -> Option<Predicted> {
+        let turned = self.left_turn * board_mm.coords;
         let in_left = turned + self.left_shift;
         let (turned_on, in_camera) = match &self.on {
             None => (in_left, in_left),
@@ -105,35 +117,51 @@ impl<'a> Way<'a> {
             return None;
         }
         let by_point = o.whitener * projection.by_point;
+        let by_left = self.on.as_ref().map_or(by_point, |(turn, _)| by_point * turn);
+        Some(Predicted { residual, by_camera: projection.by_camera, by_point, by_left, turned, turned_on })
+    }
+
+    /// Writes two rows of the Jacobian and gives the residual. `None` where the corner would lie behind its camera.
+    fn rows(
+        &self,
+        packing: &Packing,
+        shape_mm: &[f64; board_shape::NUMBERS],
+        o: &Observation,
+        rows: &mut [[f64; WIDEST]],
+    ) -> Option<Vector2<f64>> {
+        let predicted = self.predict(&o.board_point(shape_mm), o)?;
+        let Predicted { residual, by_camera, by_point, by_left, turned, turned_on } = &predicted;
+        let by_height = packing.shape.then(|| self.by_board(&predicted).column(2).into_owned());
         for (k, row) in rows.iter_mut().enumerate() {
-            let by_point: RowVector3<f64> = by_point.row(k).into();
-            let by_left = self.on.as_ref().map_or(by_point, |(turn, _)| by_point * turn);
             let (w0, w1) = (o.whitener[(k, 0)], o.whitener[(k, 1)]);
             let (camera, rest) = row.split_at_mut(packing.camera);
-            for (column, by) in camera.iter_mut().zip(&projection.by_camera) {
+            for (column, by) in camera.iter_mut().zip(by_camera) {
                 *column = w0 * by.x + w1 * by.y;
             }
             let mut rest = rest;
             if packing.transform {
-                rest = write_turn_and_shift(rest, &turned_on, &by_point);
+                rest = write_turn_and_shift(rest, turned_on, &by_point.row(k).into());
             }
-            if packing.shape {
-                let by_height = (by_left * self.left_turn)[2];
+            if let Some(by_height) = by_height {
                 for (column, lift) in rest.iter_mut().zip(&o.lift) {
-                    *column = by_height * lift;
+                    *column = by_height[k] * lift;
                 }
                 rest = &mut rest[board_shape::NUMBERS..];
             }
-            let end = write_turn_and_shift(rest, &turned, &by_left);
+            let end = write_turn_and_shift(rest, turned, &by_left.row(k).into());
             end[0] = residual[k];
         }
-        Some(residual)
+        Some(*residual)
     }
 }
 
 /// Derivatives by a small turn of `turned` and by a shift, from the derivative by the point; what is left of the row.
 /// A turn moves the point by `turn x turned`, so that its slope is `turned x by_point`.
-fn write_turn_and_shift<'a>(row: &'a mut [f64], turned: &Vector3<f64>, by_point: &RowVector3<f64>) -> &'a mut [f64] {
+pub fn write_turn_and_shift<'a>(
+    row: &'a mut [f64],
+    turned: &Vector3<f64>,
+    by_point: &RowVector3<f64>,
+) -> &'a mut [f64] {
     let by = by_point.transpose();
     let by_turn = turned.cross(&by);
     let (here, rest) = row.split_at_mut(6);
@@ -155,7 +183,7 @@ pub fn block(shared: &Shared, layout: &Layout, left_from_board: &Transform, view
     };
     for side in Side::BOTH {
         let packing = Packing::new(layout, side);
-        let way = Way::new(shared, left_from_board, side);
+        let way = Way::new(&shared.rig, left_from_board, side);
         let mut products = Products::new(packing.width());
         for o in view.active(side) {
             let rows = products.next_two();

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
 
 use crate::statistics::median;
-use crate::stereo::board_pose::solve::bundle::{Normal, PosePart};
+use crate::stereo::board_pose::solve::bundle::Normal;
 use crate::stereo::board_pose::solve::pose_block::Eliminated;
 use crate::stereo::solve::normal_equations::inverse6;
 
@@ -110,7 +110,7 @@ fn from_one_on(normal: &Normal, covariance: &DMatrix<f64>, first: usize) -> Opti
 /// What a change at each pose alone would gain after one of which each has its share.
 fn left(normal: &Normal, covariance: &DMatrix<f64>, change: &Vector6<f64>, shares: &[f64]) -> Vec<Option<Change>> {
     let shared: DVector<f64> = -(covariance * Sums::of(normal, shares).shared.tr_mul(change));
-    let of = |(part, share): (&Option<PosePart>, &f64)| {
+    let of = |(part, share): (&Option<Eliminated>, &f64)| {
         let part = part.as_ref()?;
         let gradient = part.change_gradient + part.change * change * *share + &part.change_shared * &shared;
         score(&part.change, &part.change_shared, &gradient, covariance)
@@ -154,7 +154,7 @@ impl Sums {
         sums
     }
 
-    fn add(&mut self, part: &PosePart, share: f64) {
+    fn add(&mut self, part: &Eliminated, share: f64) {
         self.own += part.change * share.powi(2);
         self.shared += &part.change_shared * share;
         self.gradient += part.change_gradient * share;

@@ -74,7 +74,7 @@ impl<'a> Run<'a> {
         let alone = estimate(bundle, values, self.known.usual(), None);
         let one_side = alone.as_ref().unwrap_or(found);
         let shift_mm = |i: usize| {
-            let by_change = one_side.normal.poses[i].as_ref()?.by_change;
+            let by_change = one_side.normal.poses[i].as_ref()?.by_change();
             Some((by_change * along.change.change).fixed_rows::<3>(3).into_owned())
         };
         median(side.iter().filter_map(|&i| one_side.beyond(one_side, i, &shift_mm(i)?))).unwrap_or(f64::INFINITY)

@@ -4,7 +4,7 @@
 //! equations there. Method: Gauss-Newton with the poses eliminated (Triggs et al. 2000, section 6.1); a step that does not lower the cost
 //! is halved. Poses are worked on in parallel and summed in their order, so that the bytes do not depend on the threads.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 use crate::geometry::{Transform, perturb};
@@ -14,7 +14,7 @@ use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, SeenFr
 use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior, weights};
 use crate::stereo::board_pose::solve::totals::Totals;
 use crate::stereo::data::view::View;
-use crate::stereo::solve::normal_equations::solve_scaled;
+use crate::stereo::solve::normal_equations::{inverse6, solve_scaled};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
 
@@ -59,23 +59,6 @@ pub(in crate::stereo::board_pose) struct Bundle<'a> {
     pub edge_bends_mm: Vec<f64>,
 }
 
-/// A pose's part of the normal equations at the minimum.
-#[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct PosePart {
-    /// Covariance from its own corners, everything shared held.
-    pub own: Matrix6<f64>,
-    /// Derivative of the pose by the shared unknowns.
-    pub by_shared: Matrix6xX<f64>,
-    /// A change of `right_from_left` at this pose alone: curvature with the pose eliminated.
-    pub change: Matrix6<f64>,
-    /// The same by the shared unknowns.
-    pub change_shared: DMatrix<f64>,
-    pub change_gradient: Vector6<f64>,
-    /// Derivative of the pose by such a change that nobody knows of.
-    pub by_change: Matrix6<f64>,
-    step_to: Vector6<f64>,
-}
-
 /// The normal equations.
 #[derive(Debug, Clone)]
 pub(in crate::stereo::board_pose) struct Normal {
@@ -92,7 +75,7 @@ pub(in crate::stereo::board_pose) struct Normal {
     /// See above.
     pub rig_gradient: DVector<f64>,
     /// A part a pose that takes part.
-    pub poses: Vec<Option<PosePart>>,
+    pub poses: Vec<Option<Eliminated>>,
 }
 
 impl Bundle<'_> {
@@ -124,7 +107,7 @@ impl Bundle<'_> {
                 let view = &self.views[i];
                 PoseBlock::of(&SeenFrom { rig: &rig, crossings: &crossings, board: self.board, pose, view }, loss)
             },
-            |k, _, part| poses[present[k].0] = Some(PosePart::of(part)),
+            |k, _, part| poses[present[k].0] = Some(part),
         )?;
         let weights = weights(&self.rig, &self.shape, self.board, &data);
         Some(Normal { data, weights, gradient, rig, rig_shared, rig_gradient, poses })
@@ -192,26 +175,10 @@ impl Values {
                 .zip(&normal.poses)
                 .map(|(pose, part)| {
                     let (pose, part) = (pose.as_ref()?, part.as_ref()?);
-                    let shared = &part.by_shared * step;
-                    Some(perturb(pose, ((part.step_to + shared) * share).as_slice()))
+                    let shared = part.by_shared() * step;
+                    Some(perturb(pose, ((part.step() + shared) * share).as_slice()))
                 })
                 .collect(),
-        }
-    }
-}
-
-impl PosePart {
-    fn of(part: Eliminated) -> PosePart {
-        let by_change = part.by_change();
-        let Eliminated { mixed, pose_inverse, pose_gradient, change, change_shared, change_gradient, .. } = part;
-        PosePart {
-            own: pose_inverse,
-            by_shared: -(pose_inverse * mixed.transpose()),
-            change,
-            change_shared,
-            change_gradient,
-            by_change,
-            step_to: -(pose_inverse * pose_gradient),
         }
     }
 }
@@ -222,8 +189,8 @@ impl Normal {
         let gradient = &self.gradient + &self.weights * shared;
         let step = -solve_scaled(&(&self.data + &self.weights), &gradient)?;
         let own = self.poses.iter().flatten().map(|part| {
-            let s = &part.step_to;
-            invert6(&part.own).map_or(0.0, |curvature| 0.5 * s.dot(&(curvature * s)))
+            let s = part.step();
+            inverse6(&part.pose_inverse).map_or(0.0, |curvature| 0.5 * s.dot(&(curvature * s)))
         });
         let promise = -0.5 * gradient.dot(&step) + own.sum::<f64>();
         Some((step, promise))
@@ -233,8 +200,4 @@ impl Normal {
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         invert(&(&self.data + &self.weights))
     }
-}
-
-fn invert6(matrix: &Matrix6<f64>) -> Option<Matrix6<f64>> {
-    crate::stereo::solve::normal_equations::inverse6(matrix)
 }

@@ -7,7 +7,7 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
 
 use crate::geometry::Transform;
@@ -22,7 +22,6 @@ use crate::stereo::data::corner_noise::{Noise, whitener};
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
-use crate::stereo::solve::normal_equations::inverse6;
 use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::solve::uncertainty::invert;
 
@@ -154,25 +153,10 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
     Some(Estimate { bundle, values, normal, covariance, noise, excess, inflation: inflation * excess })
 }
 
-/// Covariance of a pose, which is `pose_inverse` from its corners, where `right_from_left` scatters from pose to pose so much that each tells
-/// it `excess` times as badly as its corners say; the whiteners hold that. What the target's size and the rays leave undetermined of the
-/// scatter is the pose's. `change` and `by_change` are as a pose's part of the normal equations has them.
-pub(in crate::stereo::board_pose) fn own_covariance(
-    pose_inverse: &Matrix6<f64>,
-    change: &Matrix6<f64>,
-    by_change: &Matrix6<f64>,
-    excess: f64,
-) -> Matrix6<f64> {
-    let Some(change) = inverse6(change).filter(|_| excess > 1.0) else { return *pose_inverse };
-    let all = pose_inverse / excess + by_change * change * by_change.transpose() * (1.0 - 1.0 / excess);
-    0.5 * (all + all.transpose())
-}
-
 impl Estimate<'_> {
     /// Covariance of a pose's point without what all poses share, mm^2.
     fn own_point_mm2(&self, i: usize) -> Option<Matrix3<f64>> {
-        let part = self.normal.poses[i].as_ref()?;
-        let own = own_covariance(&part.own, &part.change, &part.by_change, self.excess);
+        let own = self.normal.poses[i].as_ref()?.own_covariance(self.excess);
         Some(own.fixed_view::<3, 3>(3, 3).into_owned())
     }
 
@@ -184,7 +168,7 @@ impl Estimate<'_> {
     /// By how much a shift of a pose's point exceeds its uncertainty, as chi-square with three degrees of freedom: its own, and what `known`
     /// leaves open of all that the poses share.
     pub fn beyond(&self, known: &Estimate<'_>, i: usize, shift_mm: &Vector3<f64>) -> Option<f64> {
-        let by_shared = known.normal.poses[i].as_ref()?.by_shared.fixed_rows::<3>(3).into_owned();
+        let by_shared = known.normal.poses[i].as_ref()?.by_shared().fixed_rows::<3>(3).into_owned();
         let covariance = self.own_point_mm2(i)? + &by_shared * &known.covariance * by_shared.transpose();
         Some(shift_mm.dot(&(covariance.try_inverse()? * shift_mm)))
     }

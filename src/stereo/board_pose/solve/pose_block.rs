@@ -4,16 +4,16 @@
 //! crossings' deviations and by the pose, then the same with the pose eliminated. A corner touches the rig, its own crossing and its own
 //! pose only, so that the crossings' part of a single pose is block diagonal; only what the poses' freedom takes off is dense.
 
-use nalgebra::{DMatrix, Matrix2x3, Matrix3, Matrix3x6, Matrix6, Point3, SMatrix, SVector, Vector2, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix3, Matrix3x6, Matrix6, Matrix6xX, Point3, SMatrix, SVector, Vector2, Vector3, Vector6};
 
-use crate::geometry::{Transform, rotation_matrix};
+use crate::geometry::Transform;
 use crate::imaging::Board;
 use crate::stereo::Rig;
 use crate::stereo::data::observation::{Observation, Side};
 use crate::stereo::data::residuals::of_point;
 use crate::stereo::data::view::View;
 use crate::stereo::model::projection::CAMERA_NUMBERS;
-use crate::stereo::solve::normal_equations::inverse6;
+use crate::stereo::solve::normal_equations::{Way, inverse6, write_turn_and_shift};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::triangulate::RIG_NUMBERS;
 
@@ -58,11 +58,11 @@ pub(in crate::stereo::board_pose) struct SeenFrom<'a> {
 impl SeenFrom<'_> {
     /// Hands over the rows of every active corner, with its side and its crossing's number. `None` where one would lie behind its camera.
     fn each_corner(&self, mut take: impl FnMut(Side, usize, &[Row; 2])) -> Option<()> {
-        let turns = [rotation_matrix(self.pose), rotation_matrix(&self.rig.right_from_left)];
         for side in Side::BOTH {
+            let way = Way::new(self.rig, self.pose, side);
             for o in self.view.active(side) {
                 let at = self.board.index(o.col, o.row);
-                take(side, at, &rows(self.rig, &turns, self.pose, &(self.crossings[at] + o.seen_off_mm), o)?);
+                take(side, at, &rows(&way, &(self.crossings[at] + o.seen_off_mm), o)?);
             }
         }
         Some(())
@@ -260,6 +260,7 @@ impl PoseBlock {
 }
 
 /// A pose's share with the pose eliminated.
+#[derive(Debug, Clone)]
 pub(in crate::stereo::board_pose) struct Eliminated {
     /// Shared by pose, before the elimination.
     pub mixed: DMatrix<f64>,
@@ -276,6 +277,26 @@ pub(in crate::stereo::board_pose) struct Eliminated {
 }
 
 impl Eliminated {
+    /// Derivative of the pose by the shared unknowns.
+    pub fn by_shared(&self) -> Matrix6xX<f64> {
+        -(self.pose_inverse * self.mixed.transpose())
+    }
+
+    /// The step of the pose, the shared unknowns held.
+    pub fn step(&self) -> Vector6<f64> {
+        -(self.pose_inverse * self.pose_gradient)
+    }
+
+    /// Covariance of the pose, which is `pose_inverse` from its corners, where `right_from_left` scatters from pose to pose so much that each
+    /// tells it `excess` times as badly as its corners say; the whiteners hold that. What the target's size and the rays leave undetermined of the
+    /// scatter is the pose's.
+    pub fn own_covariance(&self, excess: f64) -> Matrix6<f64> {
+        let (own, by_change) = (&self.pose_inverse, self.by_change());
+        let Some(change) = inverse6(&self.change).filter(|_| excess > 1.0) else { return *own };
+        let all = own / excess + by_change * change * by_change.transpose() * (1.0 - 1.0 / excess);
+        0.5 * (all + all.transpose())
+    }
+
     /// Derivative of the pose by a change of `right_from_left` that nobody knows of.
     pub fn by_change(&self) -> Matrix6<f64> {
         -(self.pose_inverse * self.rig_mixed.fixed_rows::<6>(TRANSFORM).transpose())
@@ -283,51 +304,22 @@ impl Eliminated {
 }
 
 /// The two rows of a corner. `None` where it would lie behind its camera.
-fn rows(
-    rig: &Rig,
-    turns: &[Matrix3<f64>; 2],
-    pose: &Transform,
-    crossing: &Point3<f64>,
-    o: &Observation,
-) -> Option<[Row; 2]> {
-    let turned = turns[0] * crossing.coords;
-    let in_left = turned + pose.translation.vector;
-    let turned_on = turns[1] * in_left;
-    let projection = match o.side {
-        Side::Left => rig.left.project_with_derivatives(&in_left.into())?,
-        Side::Right => {
-            rig.right.project_with_derivatives(&(turned_on + rig.right_from_left.translation.vector).into())?
-        }
-    };
-    let residual = o.whiten(projection.px - o.px);
-    if !(residual.x.is_finite() && residual.y.is_finite()) {
-        return None;
-    }
-    let by_point: Matrix2x3<f64> = o.whitener * projection.by_point;
-    let (by_left, camera) = match o.side {
-        Side::Left => (by_point, 0),
-        Side::Right => (by_point * turns[1], CAMERA_NUMBERS),
-    };
-    let by_crossing = by_left * turns[0];
+fn rows(way: &Way, crossing: &Point3<f64>, o: &Observation) -> Option<[Row; 2]> {
+    let predicted = way.predict(crossing, o)?;
+    let by_crossing = way.by_board(&predicted);
+    let camera = if o.side == Side::Left { 0 } else { CAMERA_NUMBERS };
     let row = |k: usize| {
-        let mut rig_row = [0.0; RIG_NUMBERS];
+        let (mut rig, mut pose) = ([0.0; RIG_NUMBERS], [0.0; 6]);
         let (w0, w1) = (o.whitener[(k, 0)], o.whitener[(k, 1)]);
-        for (column, by) in rig_row[camera..].iter_mut().zip(&projection.by_camera) {
+        for (column, by) in rig[camera..].iter_mut().zip(&predicted.by_camera) {
             *column = w0 * by.x + w1 * by.y;
         }
         if o.side == Side::Right {
-            let by: Vector3<f64> = by_point.row(k).transpose();
-            rig_row[TRANSFORM..TRANSFORM + 3].copy_from_slice(turned_on.cross(&by).as_slice());
-            rig_row[TRANSFORM + 3..].copy_from_slice(by.as_slice());
+            write_turn_and_shift(&mut rig[TRANSFORM..], &predicted.turned_on, &predicted.by_point.row(k).into());
         }
-        let by: Vector3<f64> = by_left.row(k).transpose();
-        let turn = turned.cross(&by);
-        Row {
-            rig: rig_row,
-            pose: [turn.x, turn.y, turn.z, by.x, by.y, by.z],
-            crossing: [by_crossing[(k, 0)], by_crossing[(k, 1)], by_crossing[(k, 2)]],
-            residual: residual[k],
-        }
+        write_turn_and_shift(&mut pose, &predicted.turned, &predicted.by_left.row(k).into());
+        let crossing = [by_crossing[(k, 0)], by_crossing[(k, 1)], by_crossing[(k, 2)]];
+        Row { rig, pose, crossing, residual: predicted.residual[k] }
     };
     Some([row(0), row(1)])
 }
