@@ -73,24 +73,25 @@ pub struct CameraCheckFile {
 impl CameraCheckFile {
     /// Gathers the figures.
     pub fn new(calibration: &Calibration, judged: &Judged) -> CameraCheckFile {
-        let accuracy = &judged.accuracy;
+        let accuracy = &judged.facts.accuracy;
         let worst = &accuracy.extremes.largest;
         let all = || calibration.views.iter().flat_map(|view| &view.observations);
         CameraCheckFile {
             passed: judged.verdict == Verdict::Pass,
             verdict: judged.verdict,
-            tolerance_mm: judged.tolerance_mm,
+            tolerance_mm: judged.facts.tolerance_mm,
             evidence: judged.evidence.clone(),
             trusted_mm: judged.trusted_mm(),
             max_abs_error_mm: accuracy.extremes.max_abs_error_mm,
             within_95_mm: accuracy.extremes.one_in_twenty_mm,
-            volume: judged.volume.volume.clone(),
+            volume: judged.facts.volume.volume.clone(),
             moment: calibration.moment(),
             findings: judged
+                .facts
                 .findings
                 .iter()
                 .cloned()
-                .chain(findings::of_lenses(calibration, &judged.volume))
+                .chain(findings::of_lenses(calibration, &judged.facts.volume))
                 .chain(judged.of_scale())
                 .chain(findings::of_pairs(&calibration.discarded.pairs))
                 .collect(),
@@ -116,11 +117,11 @@ impl CameraCheckFile {
             reduced_chi_square: calibration.noise.reduced_chi_square,
             ranges: accuracy.ranges.clone(),
             pairs: accuracy.pairs.clone(),
-            second_board: judged.standards.second.clone(),
-            known_moves: judged.standards.moves.measured.clone(),
+            second_board: judged.facts.standards.second.clone(),
+            known_moves: judged.facts.standards.moves.measured.clone(),
             lens_scores: calibration.lens_scores.clone(),
-            disagreements: judged.disagreements.clone(),
-            neighbour_correlation: judged.residual_pattern.neighbours,
+            disagreements: judged.facts.disagreements.clone(),
+            neighbour_correlation: judged.facts.residual_pattern.neighbours,
             pair_scatter: calibration.pair_scatter.clone(),
             warnings: judged.advice.iter().cloned().chain(judged.warnings.iter().map(Warning::whole)).collect(),
         }

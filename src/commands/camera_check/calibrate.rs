@@ -25,7 +25,8 @@ use crate::stereo::board_pose::pair_excess::pair_excess;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::residuals;
 use crate::stereo::findings::standing::{self, Asked};
-use crate::stereo::judge::assessment::{Demand, Judged, Standards};
+use crate::stereo::judge::assessment::{Demand, Judged};
+use crate::stereo::judge::ledger::Standards;
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::lengths::second_board::{self, SecondBoard};
 use crate::stereo::judge::moves;
@@ -70,9 +71,9 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
         &CalibrationFile::from(calibration.rig()).with_check(
             &calibration,
             pair_excess(&calibration),
-            judged.coverage.corner_depths_mm,
-            &judged.volume.volume,
-            &judged.standards.moves.measured,
+            judged.facts.coverage.corner_depths_mm,
+            &judged.facts.volume.volume,
+            &judged.facts.standards.moves.measured,
         ),
     )?;
     if !out.is_input("corners.csv") {

@@ -12,11 +12,11 @@ use maud::{Markup, html};
 
 /// Fig. 6 of the paper, (a) to (d).
 pub(super) fn lengths(judged: &Judged) -> Result<Markup> {
-    let accuracy = &judged.accuracy;
+    let accuracy = &judged.facts.accuracy;
     let [long, _] = accuracy.long_mm;
     let [short, _] = accuracy.short_mm;
     let every = every_length(accuracy);
-    let guard = |plot: Plot| plot.hline(judged.tolerance_mm, "tolerance").hline(-judged.tolerance_mm, "");
+    let guard = |plot: Plot| plot.hline(judged.facts.tolerance_mm, "tolerance").hline(-judged.facts.tolerance_mm, "");
     let a = guard(
         Plot::new(&format!("(a) Errors of all lengths of {long} mm"), "pair used, in the order of names", "error, mm")
             .whole_x()
@@ -84,7 +84,7 @@ pub(super) fn every_length(accuracy: &Accuracy) -> Vec<(f64, f64)> {
 pub(super) fn residuals(calibration: &Calibration, judged: &Judged) -> Result<Markup> {
     let rig = calibration.rig();
     let mut figures = Vec::new();
-    for (field, camera) in judged.residual_pattern.fields.iter().zip([&rig.left, &rig.right]) {
+    for (field, camera) in judged.facts.residual_pattern.fields.iter().zip([&rig.left, &rig.right]) {
         figures.push(field_figure(field, camera.width, camera.height)?);
     }
     let noise = &calibration.noise;
@@ -103,8 +103,8 @@ pub(super) fn residuals(calibration: &Calibration, judged: &Judged) -> Result<Ma
                  Neighbouring corners' residuals correlate by {:.3} (chance: {:.3}).",
                 calibration.rms_px,
                 noise.typical_px(&calibration.views),
-                judged.residual_pattern.neighbours.along,
-                judged.residual_pattern.neighbours.standard_error))
+                judged.facts.residual_pattern.neighbours.along,
+                judged.facts.residual_pattern.neighbours.standard_error))
         }
         div.side { @for (svg, caption) in &figures { (page::figure(svg, caption)) } }
     })
@@ -141,10 +141,10 @@ fn field_figure(field: &Field, width: u32, height: u32) -> Result<(String, Strin
 }
 
 pub(super) fn volume(judged: &Judged) -> Result<Markup> {
-    let lying = |axis: usize| judged.volume.lengths.iter().filter(move |l| l.direction[axis].abs() > 0.7);
+    let lying = |axis: usize| judged.facts.volume.lengths.iter().filter(move |l| l.direction[axis].abs() > 0.7);
     let along = |axis: usize| -> Vec<(f64, f64)> { lying(axis).map(|l| (l.at_mm.z, l.sigma_mm())).collect() };
     let svg = Plot::new(
-        &format!("Standard deviation of a length of {} mm", judged.volume.length_mm),
+        &format!("Standard deviation of a length of {} mm", judged.facts.volume.length_mm),
         "distance from the left camera, mm",
         "mm",
     )
@@ -156,7 +156,7 @@ pub(super) fn volume(judged: &Judged) -> Result<Markup> {
     let caption = format!(
         "{} lengths in the volume in which the boards stood, as far as both cameras see them; corner noise at both ends and the calibration together. The worst: \
          {:.4} mm across, {:.4} mm along the line of sight. Where points rise above the tolerance, add pairs at that distance.",
-        judged.volume.lengths.len(),
+        judged.facts.volume.lengths.len(),
         worst(0).max(worst(1)),
         worst(2)
     );

@@ -26,7 +26,7 @@ pub use crate::report::blur::warning as blurred;
 
 /// The pairs by their largest held-out error, the worst first.
 pub fn worst_first(judged: &Judged) -> Vec<usize> {
-    let pairs = &judged.accuracy.pairs;
+    let pairs = &judged.facts.accuracy.pairs;
     let mut order: Vec<usize> = (0..pairs.len()).collect();
     let worst = |i: usize| pairs[i].max_abs_error_mm.unwrap_or(-1.0);
     order.sort_by(|&a, &b| worst(b).total_cmp(&worst(a)));
@@ -35,7 +35,7 @@ pub fn worst_first(judged: &Judged) -> Vec<usize> {
 
 /// What was found over the pairs.
 fn happened(judged: &Judged) -> Vec<String> {
-    judged.findings.iter().map(|finding| finding.action.clone()).collect()
+    judged.facts.findings.iter().map(|finding| finding.action.clone()).collect()
 }
 
 /// Warnings with their reasons, but for those whose reason stands in the table of evidence.
@@ -53,7 +53,7 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
     };
     let content = html! {
         (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), page::capital(&deciding(judged)))))
-        @if !judged.findings.is_empty() { p { "What happened over the pairs:" } (page::warnings(&happened(judged))) }
+        @if !judged.facts.findings.is_empty() { p { "What happened over the pairs:" } (page::warnings(&happened(judged))) }
         (ledger(judged))
         @if !judged.advice.is_empty() { p { "What to photograph next:" } (page::warnings(&judged.advice)) }
         @if !judged.warnings.is_empty() { p { "What to do, and what else to know:" } }
@@ -91,7 +91,7 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
 
 /// The three numbers of the verdict.
 fn numbers(judged: &Judged) -> [(String, String); 3] {
-    let extremes = &judged.accuracy.extremes;
+    let extremes = &judged.facts.accuracy.extremes;
     let mm = |value: f64| format!("{} mm", number(Some(value), 3));
     [
         (
@@ -100,14 +100,15 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
         ),
         (mm(extremes.max_abs_error_mm), "largest error of such a length".to_owned()),
         match judged.trusted_mm() {
-            Some(trusted_mm) => {
-                (mm(trusted_mm), format!("lengths can be trusted to this; the tolerance is {} mm", judged.tolerance_mm))
-            }
+            Some(trusted_mm) => (
+                mm(trusted_mm),
+                format!("lengths can be trusted to this; the tolerance is {} mm", judged.facts.tolerance_mm),
+            ),
             None => (
                 "not known".to_owned(),
                 format!(
                     "what lengths can be trusted to, as long as a check is open; the tolerance is {} mm",
-                    judged.tolerance_mm
+                    judged.facts.tolerance_mm
                 ),
             ),
         },
@@ -155,8 +156,8 @@ fn lines(evidence: &[&Evidence]) -> Markup {
 /// What the figures do not show: the scale.
 fn scale(judged: &Judged) -> Markup {
     html! {
-        @for known in &judged.standards.moves.measured { p { (page::capital(&known.statement())) "." } }
-        @match &judged.standards.second {
+        @for known in &judged.facts.standards.moves.measured { p { (page::capital(&known.statement())) "." } }
+        @match &judged.facts.standards.second {
             Some(second) => p {
                 @match (second.scale_error, second.scale_error_sigma, second.max_abs_error_mm) {
                     (Some(scale), Some(sigma), Some(error)) => (format!(
@@ -166,7 +167,7 @@ fn scale(judged: &Judged) -> Markup {
                     _ => "A second board was asked for, and no length on it could be measured.",
                 }
             }
-            None if !judged.standards.moves.measured.is_empty() => {}
+            None if !judged.facts.standards.moves.measured.is_empty() => {}
             None => p {
                 "The scale of every length is that of the board: an error of its pitch does not show in these figures. A second board of known pitch checks it: " code { "--check-images DIR" } "; or a slide of the board by a known length: " code { "--known-move MM" } "."
             }
@@ -178,7 +179,7 @@ fn pairs(calibration: &Calibration, judged: &Judged) -> Markup {
     let rows: Vec<Vec<String>> = worst_first(judged)
         .iter()
         .map(|&i| {
-            let pair = &judged.accuracy.pairs[i];
+            let pair = &judged.facts.accuracy.pairs[i];
             let view = &calibration.views[i];
             let rms = |side| {
                 crate::stereo::data::residuals::rms_px(
@@ -235,7 +236,7 @@ fn in_space(calibration: &Calibration, judged: &Judged) -> Markup {
         };
         rig::board(&mut scene, ink, &calibration.board, pose);
     }
-    rig::volume(&mut scene, &calibration.rig().left, &judged.volume.volume);
+    rig::volume(&mut scene, &calibration.rig().left, &judged.facts.volume.volume);
     scene.figure(
         "cameras, boards and the volume of the verdict",
         "Both cameras, the boards of all pairs (the worst pair's in red, the best one's in green) and, as two outlines joined by lines, the \
@@ -275,6 +276,7 @@ fn lenses(calibration: &Calibration) -> Markup {
 
 fn disagreements(judged: &Judged) -> Markup {
     let rows: Vec<Vec<String>> = judged
+        .facts
         .disagreements
         .iter()
         .map(|d| {

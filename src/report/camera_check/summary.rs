@@ -36,7 +36,7 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
     lines.extend(standing(calibration));
     lines.extend(lenses(calibration));
     lines.extend(scale(judged));
-    lines.extend(judged.findings.iter().map(|finding| format!("over the pairs: {}", finding.action)));
+    lines.extend(judged.facts.findings.iter().map(|finding| format!("over the pairs: {}", finding.action)));
     lines.extend(pairs(calibration));
     lines.push(rig(calibration, judged));
     lines.push(board(calibration));
@@ -48,7 +48,7 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
 fn ranges(judged: &Judged) -> Table {
     let mut table = Table::new(["range mm", "lengths", "mean mm", "std mm", "max |error| mm"]);
     for along in [Axis::X, Axis::Y] {
-        let ranges: Vec<&Range> = judged.accuracy.ranges.iter().filter(|r| r.axis == along).collect();
+        let ranges: Vec<&Range> = judged.facts.accuracy.ranges.iter().filter(|r| r.axis == along).collect();
         let mut shown: Vec<usize> =
             (0..TABLE_ROWS).map(|k| k * ranges.len().saturating_sub(1) / (TABLE_ROWS - 1)).collect();
         shown.dedup();
@@ -67,7 +67,7 @@ fn ranges(judged: &Judged) -> Table {
 
 /// Where the verdict holds.
 pub(super) fn volume(judged: &Judged) -> String {
-    let volume = &judged.volume.volume;
+    let volume = &judged.facts.volume.volume;
     let [near, far] = volume.depth_mm;
     let [x0, x1, y0, y1] = volume.tilt_deg;
     format!(
@@ -100,7 +100,7 @@ fn lenses(calibration: &Calibration) -> Option<String> {
 
 /// What known moves say of the scale.
 fn scale(judged: &Judged) -> Vec<String> {
-    let moves = &judged.standards.moves;
+    let moves = &judged.facts.standards.moves;
     let measured = moves.measured.iter().map(KnownMove::statement);
     let why = judged.of_scale().and_then(|_| moves.why());
     measured.chain(moves.missing.iter().cloned()).chain(why).collect()
@@ -132,7 +132,7 @@ fn pairs(calibration: &Calibration) -> Vec<String> {
 }
 
 fn rig(calibration: &Calibration, judged: &Judged) -> String {
-    let (rig, epipolar) = (calibration.rig(), &judged.accuracy.epipolar);
+    let (rig, epipolar) = (calibration.rig(), &judged.facts.accuracy.epipolar);
     format!(
         "{} lens, baseline {} mm, reprojection RMS {} px, epipolar error RMS {} px",
         rig.left.lens.name(),
@@ -160,8 +160,8 @@ fn next(judged: &Judged) -> impl Iterator<Item = &str> {
 }
 
 pub(super) fn explanation(judged: &Judged) -> String {
-    let extremes = &judged.accuracy.extremes;
-    let pairs = judged.accuracy.pairs.iter().filter_map(|pair| Some((pair.max_abs_error_mm?, &pair.pair)));
+    let extremes = &judged.facts.accuracy.extremes;
+    let pairs = judged.facts.accuracy.pairs.iter().filter_map(|pair| Some((pair.max_abs_error_mm?, &pair.pair)));
     let worst = pairs.max_by(|a, b| a.0.total_cmp(&b.0));
     format!(
         "95 % of held-out lengths within {:.4} mm, largest error {:.4} mm in pair {} ({:.4} with its uncertainty), tolerance {} mm",
@@ -169,7 +169,7 @@ pub(super) fn explanation(judged: &Judged) -> String {
         extremes.max_abs_error_mm,
         worst.map_or("", |(_, pair)| pair.as_str()),
         extremes.largest.at_most_mm(),
-        judged.tolerance_mm
+        judged.facts.tolerance_mm
     )
 }
 
@@ -204,7 +204,7 @@ pub(super) fn trusted(judged: &Judged) -> String {
 
 /// What the verdict means for somebody who must decide.
 pub(super) fn advice(judged: &Judged) -> String {
-    let sure = judged.tolerance_mm;
+    let sure = judged.facts.tolerance_mm;
     match judged.verdict {
         Verdict::Pass => {
             let trusted = judged.trusted_mm().unwrap_or(sure);

@@ -4,12 +4,10 @@ use crate::diagnostic::Warning;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::judge::evidence::{self, Evidence};
-use crate::stereo::judge::ledger::{Facts, KNOWN_MOVE, ledger};
+use crate::stereo::judge::ledger::{Case, Facts, KNOWN_MOVE, Standards, ledger};
 use crate::stereo::judge::lengths::held_out::Accuracy;
-use crate::stereo::judge::lengths::model_disagreement::{self, Disagreement};
-use crate::stereo::judge::lengths::second_board::SecondBoard;
-use crate::stereo::judge::moves::KnownMoves;
-use crate::stereo::judge::residual_correlation::{self, ResidualPattern};
+use crate::stereo::judge::lengths::model_disagreement;
+use crate::stereo::judge::residual_correlation;
 use crate::stereo::judge::verdict::{Expansion, Verdict};
 use crate::stereo::judge::view_coverage::Coverage;
 use crate::stereo::pairs::Cause;
@@ -19,37 +17,16 @@ use crate::stereo::volume::lengths::VolumeLengths;
 /// A calibration with everything that was asked of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
-    pub tolerance_mm: f64,
+    /// What was asked of it.
+    pub facts: Facts,
     /// Pass, fail or undecided: the worst line of the evidence.
     pub verdict: Verdict,
     /// Every fact with its limit; the held-out lengths first.
     pub evidence: Vec<Evidence>,
-    /// Held-out accuracy.
-    pub accuracy: Accuracy,
-    /// What checks the scale.
-    pub standards: Standards,
-    /// Whether the residuals are noise.
-    pub residual_pattern: ResidualPattern,
-    /// Lens models that disagree.
-    pub disagreements: Vec<Disagreement>,
-    /// Lengths of the long range over the volume that the verdict is for.
-    pub volume: VolumeLengths,
-    /// What happened to the rig while it was photographed.
-    pub findings: Vec<Finding>,
-    /// How the boards are spread.
-    pub coverage: Coverage,
     /// What to photograph next, where the views are too few or too much alike.
     pub advice: Vec<String>,
     /// What else a person should know.
     pub warnings: Vec<Warning>,
-}
-
-/// Lengths that are known by something else than the board that calibrated.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Standards {
-    pub second: Option<SecondBoard>,
-    /// Slides of known lengths.
-    pub moves: KnownMoves,
 }
 
 /// What lengths are judged by.
@@ -71,53 +48,37 @@ impl Judged {
         standards: Standards,
         demand: &Demand,
     ) -> Judged {
-        let tolerance_mm = demand.tolerance_mm;
         let residual_pattern = residual_correlation::check(calibration);
         let share = accuracy.disagreement_share();
         let volume = VolumeLengths::new(calibration, demand.extent, accuracy.long_mm[0], share);
-        let disagreements = model_disagreement::find(calibration, &volume);
-        let coverage = Coverage::of(calibration, &residual_pattern);
-        let evidence = ledger(&Facts {
-            calibration,
-            accuracy: &accuracy,
-            second: standards.second.as_ref(),
-            moves: &standards.moves,
-            volume: &volume,
-            findings: &findings,
-            residual_pattern: &residual_pattern,
-            disagreements: &disagreements,
-            coverage: &coverage,
-            tolerance_mm,
+        let facts = Facts {
+            tolerance_mm: demand.tolerance_mm,
             expansion: Expansion::new(calibration.pair_scatter.groups, demand.board_uncertainty_mm),
-        });
+            disagreements: model_disagreement::find(calibration, &volume),
+            coverage: Coverage::of(calibration, &residual_pattern),
+            accuracy,
+            standards,
+            residual_pattern,
+            volume,
+            findings,
+        };
+        let evidence = ledger(&Case { calibration, facts: &facts });
         let mut warnings = Vec::from_iter(calibration.rig().unusual().map(Warning::from));
         // The held-out lengths are the result itself and stand in its first line.
         let doubts = evidence.iter().skip(1).filter(|line| line.allows != Verdict::Pass);
         warnings.extend(doubts.map(Evidence::warning));
         // A board that was said wrongly is no board that scatters.
-        if !findings.iter().any(|finding| finding.cause == Cause::OtherBoard.word()) {
-            warnings.extend(print_scatter(calibration, &accuracy, tolerance_mm));
+        if !facts.findings.iter().any(|finding| finding.cause == Cause::OtherBoard.word()) {
+            warnings.extend(print_scatter(calibration, &facts));
         }
-        Judged {
-            tolerance_mm,
-            verdict: evidence::verdict(&evidence),
-            evidence,
-            accuracy,
-            standards,
-            residual_pattern,
-            disagreements,
-            findings,
-            volume,
-            advice: coverage.advice(),
-            coverage,
-            warnings,
-        }
+        let (verdict, advice) = (evidence::verdict(&evidence), facts.coverage.advice());
+        Judged { facts, verdict, evidence, advice, warnings }
     }
 
     /// What known moves say of the scale, where they contradict it and nothing else shows the rig itself to be wrong.
     pub fn of_scale(&self) -> Option<Finding> {
         let rig_fails = self.evidence.iter().any(|line| line.allows == Verdict::Fail && line.what != KNOWN_MOVE);
-        self.standards.moves.finding(self.volume.length_mm).filter(|_| !rig_fails)
+        self.facts.standards.moves.finding(self.facts.volume.length_mm).filter(|_| !rig_fails)
     }
 
     /// The line of the ledger that decides: the worst, and of several that are equally bad the one farthest beyond its limit.
@@ -143,26 +104,26 @@ impl Judged {
 }
 
 /// Says where it is the board that scatters and not the corners, by enough to matter: both pictures then see the same deviations.
-fn print_scatter(calibration: &Calibration, accuracy: &Accuracy, tolerance_mm: f64) -> Option<Warning> {
+fn print_scatter(calibration: &Calibration, facts: &Facts) -> Option<Warning> {
     /// Of independent corners the mean of thousands of points lies within a tenth of one.
     const SHARED: f64 = 0.25;
     /// At both ends, at 95 %, a place that scatters by this share of the tolerance takes a twelfth of it.
     const MATTERS: f64 = 0.03;
-    if accuracy.rays_chi_square > SHARED {
+    if facts.accuracy.rays_chi_square > SHARED {
         return None;
     }
     let depths = calibration.values.poses.iter().map(|pose| pose.translation.vector.z);
     let depth_mm = depths.sum::<f64>() / calibration.values.poses.len().max(1) as f64;
     let sigma_px = calibration.noise.typical_px(&calibration.views);
     let place_mm = sigma_px * depth_mm / calibration.rig().left.fx;
-    (place_mm > MATTERS * tolerance_mm).then(|| Warning {
+    (place_mm > MATTERS * facts.tolerance_mm).then(|| Warning {
         text: format!(
             "the corners' places on the board scatter by about {place_mm:.4} mm each: a better board, not more pictures, would lower the \
              errors"
         ),
         reason: format!(
             "left and right picture agree on the corners {:.0} times better than the residuals suggest, so that the error is the board's, not the cameras'",
-            1.0 / accuracy.rays_chi_square.sqrt()
+            1.0 / facts.accuracy.rays_chi_square.sqrt()
         ),
     })
 }

@@ -11,7 +11,8 @@ mod target;
 
 use crate::imaging::Corners;
 use crate::stereo::calibrate::{Calibration, calibrate};
-use crate::stereo::judge::assessment::{Judged, Standards};
+use crate::stereo::judge::assessment::Judged;
+use crate::stereo::judge::ledger::Standards;
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::model::parameters::Shared;
 use crate::stereo::select::options::Options;

@@ -44,7 +44,7 @@ fn a_twisted_board_is_seen_and_corrected() {
 fn a_lens_model_that_the_corners_refute_is_no_witness() {
     // Without the tangential terms the principal points move by hundreds of their sigmas, and chi-squared with them.
     let judged = judged(&World::new(14, 19).corners(20), &Options::default(), 1.0);
-    assert_eq!(judged.disagreements, []);
+    assert_eq!(judged.facts.disagreements, []);
 }
 
 #[test]
@@ -53,7 +53,8 @@ fn a_lens_term_too_weak_to_be_chosen_is_a_spread_of_lengths() {
     let world = World::new(14, 19).with_lens(Lens::Brown5, |d| d[4] = 1.0 / 2000.0 / 0.3_f64.powi(7));
     let corners = world.corners(20);
     let judged = judged(&corners, &BROWN4, 1.0);
-    let spread = judged.disagreements.iter().find(|d| d.other == "brown5").expect("brown5 measures other lengths");
+    let spread =
+        judged.facts.disagreements.iter().find(|d| d.other == "brown5").expect("brown5 measures other lengths");
     assert!(spread.chi_square_fall > spread.chance && spread.length_change_mm > 0.01, "{spread:?}");
     let line = judged.evidence.iter().find(|line| line.what == "spread of admissible models").unwrap();
     assert!(line.value.is_some_and(|mm| mm >= spread.length_change_mm), "{line:?}");

@@ -96,12 +96,12 @@ fn a_pair_that_alone_tells_the_cameras_leaves_the_verdict_open() {
     let mut world = World::facing(9, |i| Vector3::z() * 0.1 * i);
     world.poses[0] = World::new(1, 1).poses[0];
     let tilted = judged(&world.corners(1), &BROWN4, 0.5);
-    assert_eq!(tilted.accuracy.unchecked, ["00"]);
+    assert_eq!(tilted.facts.accuracy.unchecked, ["00"]);
     assert_eq!(tilted.verdict, Verdict::Undecided);
     let line = tilted.evidence.iter().find(|line| line.what == "rigs without some pairs").unwrap();
     assert!(line.value.is_none() && line.detail.contains("Without 00 the others do not"), "{}", line.detail);
     // With tilts enough nothing hangs on one pair.
-    assert!(judged(&World::new(9, 1).corners(1), &BROWN4, 0.5).accuracy.unchecked.is_empty());
+    assert!(judged(&World::new(9, 1).corners(1), &BROWN4, 0.5).facts.accuracy.unchecked.is_empty());
 }
 
 /// Five boards that all lie nearly alike: where no four of them tell the focal lengths, what these usually are still holds all five.

@@ -223,7 +223,7 @@ fn a_board_whose_print_scatters_is_told_from_corners_that_do() {
     let found = calibrate(&world.corners(18), &BROWN4).unwrap();
     let judged = synthetic::judged(&found, Vec::new(), Standards::default(), 0.05);
     // 0.02 mm (root mean square) is 0.07 px here, seven times the corners' own scatter.
-    assert!(judged.accuracy.rays_chi_square < 0.1, "{}", judged.accuracy.rays_chi_square);
+    assert!(judged.facts.accuracy.rays_chi_square < 0.1, "{}", judged.facts.accuracy.rays_chi_square);
     assert!(judged.warnings.iter().any(|w| w.text.contains("corners' places on the board")), "{:?}", judged.warnings);
 }
 

@@ -13,28 +13,40 @@ use crate::stereo::judge::view_coverage::Coverage;
 use crate::stereo::volume::lengths::{VolumeLength, VolumeLengths};
 
 /// All that was asked of a calibration.
-pub struct Facts<'a> {
-    pub calibration: &'a Calibration,
-    /// Held-out lengths.
-    pub accuracy: &'a Accuracy,
-    /// A second board, where one was asked for.
-    pub second: Option<&'a SecondBoard>,
-    /// Slides of known lengths.
-    pub moves: &'a KnownMoves,
-    /// Lengths through the volume that the verdict is for.
-    pub volume: &'a VolumeLengths,
-    /// What happened to the rig while it was photographed.
-    pub findings: &'a [Finding],
-    /// Whether the residuals are noise.
-    pub residual_pattern: &'a ResidualPattern,
-    /// Models that measure other lengths.
-    pub disagreements: &'a [Disagreement],
-    /// How the views are spread.
-    pub coverage: &'a Coverage,
+#[derive(Debug, Clone, PartialEq)]
+pub struct Facts {
     /// The largest error that passes, mm.
     pub tolerance_mm: f64,
     /// How uncertainties are expanded.
     pub expansion: Expansion,
+    /// Held-out accuracy.
+    pub accuracy: Accuracy,
+    /// What checks the scale.
+    pub standards: Standards,
+    /// Whether the residuals are noise.
+    pub residual_pattern: ResidualPattern,
+    /// Lens models that disagree.
+    pub disagreements: Vec<Disagreement>,
+    /// Lengths of the long range over the volume that the verdict is for.
+    pub volume: VolumeLengths,
+    /// What happened to the rig while it was photographed.
+    pub findings: Vec<Finding>,
+    /// How the boards are spread.
+    pub coverage: Coverage,
+}
+
+/// Lengths that are known by something else than the board that calibrated.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Standards {
+    pub second: Option<SecondBoard>,
+    /// Slides of known lengths.
+    pub moves: KnownMoves,
+}
+
+/// What a line of the ledger is made of.
+pub struct Case<'a> {
+    pub calibration: &'a Calibration,
+    pub facts: &'a Facts,
 }
 
 impl Evidence {
@@ -43,17 +55,17 @@ impl Evidence {
         what: &'static str,
         remedy: &'static str,
         value_mm: Option<f64>,
-        facts: &Facts,
+        case: &Case,
         detail: String,
     ) -> Evidence {
-        let allows = Verdict::within(value_mm.unwrap_or(f64::NAN), facts.tolerance_mm);
-        Evidence { what, remedy, value: value_mm, limit: Some(facts.tolerance_mm), unit: "mm", allows, detail }
+        let allows = Verdict::within(value_mm.unwrap_or(f64::NAN), case.facts.tolerance_mm);
+        Evidence { what, remedy, value: value_mm, limit: Some(case.facts.tolerance_mm), unit: "mm", allows, detail }
     }
 }
 
-impl Facts<'_> {
+impl Case<'_> {
     /// Expanded uncertainty of a length, the board's certificate left out, mm.
     pub(super) fn expanded_mm(&self, length: &VolumeLength) -> f64 {
-        (COVERAGE * length.corners_mm).hypot(self.expansion.calibration * length.calibration_mm)
+        (COVERAGE * length.corners_mm).hypot(self.facts.expansion.calibration * length.calibration_mm)
     }
 }

@@ -1,17 +1,17 @@
 //! Lines on lengths: held out, anywhere in the volume, with other models, without some pairs, on a second board; and on what residuals, rays and
 //! epipolar lines say of them.
 
-use super::facts::Facts;
+use super::facts::Case;
 use crate::statistics::median;
 use crate::stereo::judge::doubtful_corners::CONTRADICTED;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::model_disagreement::{self};
 use crate::stereo::judge::verdict::Verdict;
 
-pub(super) fn held_out_lengths(facts: &Facts) -> Evidence {
-    let extremes = &facts.accuracy.extremes;
+pub(super) fn held_out_lengths(case: &Case) -> Evidence {
+    let extremes = &case.facts.accuracy.extremes;
     let worst = &extremes.largest;
-    let doubtful = &facts.accuracy.doubtful;
+    let doubtful = &case.facts.accuracy.doubtful;
     let left_out = if doubtful.lengths_left_out > 0 {
         format!(
             "; {} lengths that end in doubtful corners are not counted (see the check of rays)",
@@ -25,24 +25,24 @@ pub(super) fn held_out_lengths(facts: &Facts) -> Evidence {
         remedy: "look at the worst pair in camera-check.html; where all are alike: a flat board on a stand, both cameras triggered at once, \
                  or the `--tolerance-mm` that your robot needs",
         value: Some(worst.at_most_mm()),
-        limit: Some(facts.tolerance_mm),
+        limit: Some(case.facts.tolerance_mm),
         unit: "mm",
-        allows: extremes.verdict(facts.tolerance_mm),
+        allows: extremes.verdict(case.facts.tolerance_mm),
         detail: format!(
             "largest error plus its own expanded uncertainty ({:.4} + {:.4}) over all lengths between corners of pairs that the rig had \
              not seen, {} folds; the limit is the tolerance. The largest error alone is {:.4}, one length in twenty \
              is off by more than {:.4}{left_out}",
             worst.error_mm,
             worst.expanded_uncertainty_mm(),
-            facts.accuracy.folds,
+            case.facts.accuracy.folds,
             extremes.max_abs_error_mm,
             extremes.one_in_twenty_mm
         ),
     }
 }
 
-pub(super) fn any_length(facts: &Facts) -> Evidence {
-    let worst = facts.volume.worst(|length| facts.expanded_mm(length));
+pub(super) fn any_length(case: &Case) -> Evidence {
+    let worst = case.facts.volume.worst(|length| case.expanded_mm(length));
     let value = worst.map(|(mm, _)| mm);
     let detail = match worst {
         None => "the rig has no covariance over the volume in which the boards stood".to_owned(),
@@ -50,52 +50,52 @@ pub(super) fn any_length(facts: &Facts) -> Evidence {
             "expanded uncertainty of a length of {:.0} mm where it is largest, {} {:.0} mm away (standard deviations: corners {:.4}, \
              calibration {:.4}, the latter times {:.2} for so few pairs; what the models leave open is in it), over the volume where the \
              boards were and in the directions that they took there{}",
-            facts.volume.length_mm,
+            case.facts.volume.length_mm,
             length.lies(),
             length.at_mm.z,
             length.corners_mm,
             length.calibration_mm,
-            facts.expansion.calibration,
-            along_sight(facts)
+            case.facts.expansion.calibration,
+            along_sight(case)
         ),
     };
     Evidence::of_length(
         "any length in the volume",
         "add pairs with the board where it is least certain, and tilted",
         value,
-        facts,
+        case,
         detail,
     )
 }
 
 /// What lengths that no board showed would be known to.
-fn along_sight(facts: &Facts) -> String {
-    let worst = facts.volume.along_sight.iter().map(|length| facts.expanded_mm(length)).reduce(f64::max);
+fn along_sight(case: &Case) -> String {
+    let worst = case.facts.volume.along_sight.iter().map(|length| case.expanded_mm(length)).reduce(f64::max);
     worst.map_or(String::new(), |mm| format!(". Along the line of sight, where no board lay, it would be {mm:.4} mm"))
 }
 
-pub(super) fn models(facts: &Facts) -> Evidence {
-    let value = facts.disagreements.iter().map(|d| d.length_change_mm).fold(0.0, f64::max);
-    let detail = model_disagreement::describe(facts.disagreements).unwrap_or_else(|| {
+pub(super) fn models(case: &Case) -> Evidence {
+    let value = case.facts.disagreements.iter().map(|d| d.length_change_mm).fold(0.0, f64::max);
+    let detail = model_disagreement::describe(&case.facts.disagreements).unwrap_or_else(|| {
         "no richer lens, and no board that is not flat, has additional terms that are more than chance: no admissible model measures other lengths".to_owned()
     });
     Evidence::of_length(
         "spread of admissible models",
         "add pairs with the board at the borders of both pictures",
         Some(value),
-        facts,
+        case,
         detail,
     )
 }
 
-pub(super) fn residuals(facts: &Facts) -> Evidence {
-    let sigma_px = facts.calibration.noise.typical_px(&facts.calibration.views);
-    let systematic_px = facts.residual_pattern.systematic_px(sigma_px);
+pub(super) fn residuals(case: &Case) -> Evidence {
+    let sigma_px = case.calibration.noise.typical_px(&case.calibration.views);
+    let systematic_px = case.facts.residual_pattern.systematic_px(sigma_px);
     // What both pictures see alike moves no point, but the rig that is fitted to it: the corners' whole scatter counts here.
-    let share = facts.accuracy.disagreement_share().sqrt();
-    let corners_mm = facts.volume.worst(|length| length.corners_mm / share).map(|(mm, _)| mm);
+    let share = case.facts.accuracy.disagreement_share().sqrt();
+    let corners_mm = case.facts.volume.worst(|length| length.corners_mm / share).map(|(mm, _)| mm);
     let value = corners_mm.map(|mm| mm * systematic_px / sigma_px);
-    let neighbours = &facts.residual_pattern.neighbours;
+    let neighbours = &case.facts.residual_pattern.neighbours;
     let detail = if systematic_px > 0.0 {
         format!(
             "the residuals are not noise: those of neighbouring corners correlate by {:.2} (chance: {:.2}), {:.3} px of pattern over \
@@ -103,7 +103,7 @@ pub(super) fn residuals(facts: &Facts) -> Evidence {
              at both ends move a length by so much where it matters most",
             neighbours.along,
             neighbours.standard_error,
-            facts.residual_pattern.pattern_px()
+            case.facts.residual_pattern.pattern_px()
         )
     } else {
         format!(
@@ -115,16 +115,17 @@ pub(super) fn residuals(facts: &Facts) -> Evidence {
         "residual correlation",
         "look at the map of residuals in camera-check.html; it takes another `--lens` or a better board, or `--board-shape bowed` where it was taken as flat",
         value,
-        facts,
+        case,
         detail,
     )
 }
 
-pub(super) fn folds(facts: &Facts) -> Evidence {
-    let layout = &facts.calibration.layout;
-    let changes = facts.accuracy.fold_steps.iter().flat_map(|step| facts.volume.changes_by_step_mm(layout, step));
+pub(super) fn folds(case: &Case) -> Evidence {
+    let layout = &case.calibration.layout;
+    let changes =
+        case.facts.accuracy.fold_steps.iter().flat_map(|step| case.facts.volume.changes_by_step_mm(layout, step));
     let value = changes.fold(0.0_f64, |most, mm| most.max(mm.abs()));
-    let unchecked = &facts.accuracy.unchecked;
+    let unchecked = &case.facts.accuracy.unchecked;
     let alone = if unchecked.is_empty() {
         String::new()
     } else {
@@ -135,21 +136,21 @@ pub(super) fn folds(facts: &Facts) -> Evidence {
     };
     let detail = format!(
         "largest change of a length of {:.0} mm anywhere in the working volume when a block of similar pairs is left out; a rig that depends on one block has the errors of that block{alone}",
-        facts.volume.length_mm
+        case.facts.volume.length_mm
     );
     Evidence::of_length(
         "rigs without some pairs",
         "add pairs with the board elsewhere and tilted otherwise",
         unchecked.is_empty().then_some(value),
-        facts,
+        case,
         detail,
     )
 }
 
-pub(super) fn rays(facts: &Facts) -> Evidence {
+pub(super) fn rays(case: &Case) -> Evidence {
     /// Share of corners whose rays may contradict each other: a hand or a reflection, not the rig.
     const LIMIT_PERCENT: f64 = 2.0;
-    let doubtful = &facts.accuracy.doubtful;
+    let doubtful = &case.facts.accuracy.doubtful;
     let value = 100.0 * doubtful.contradicted_share();
     let named = if doubtful.pairs.is_empty() { String::new() } else { format!(", in {}", doubtful.named()) };
     Evidence {
@@ -167,13 +168,13 @@ pub(super) fn rays(facts: &Facts) -> Evidence {
     }
 }
 
-pub(super) fn epipolar(facts: &Facts) -> Evidence {
-    let error = &facts.accuracy.epipolar;
-    let sigma_px = facts.calibration.noise.typical_px(&facts.calibration.views);
-    let sigma_px = sigma_px * facts.accuracy.disagreement_share().sqrt();
+pub(super) fn epipolar(case: &Case) -> Evidence {
+    let error = &case.facts.accuracy.epipolar;
+    let sigma_px = case.calibration.noise.typical_px(&case.calibration.views);
+    let sigma_px = sigma_px * case.facts.accuracy.disagreement_share().sqrt();
     // A miss as large along the epipolar line is depth, and moves lengths as corners do.
-    let px_per_mm = median(facts.volume.lengths.iter().map(|length| sigma_px / length.corners_mm));
-    let limit = px_per_mm.map(|px| px * facts.tolerance_mm);
+    let px_per_mm = median(case.facts.volume.lengths.iter().map(|length| sigma_px / length.corners_mm));
+    let limit = px_per_mm.map(|px| px * case.facts.tolerance_mm);
     Evidence {
         what: "epipolar error",
         remedy: "look at the worst pair in camera-check.html",
@@ -189,17 +190,17 @@ pub(super) fn epipolar(facts: &Facts) -> Evidence {
     }
 }
 
-pub(super) fn second_board(facts: &Facts) -> Evidence {
+pub(super) fn second_board(case: &Case) -> Evidence {
     let line = |value, allows, detail| Evidence {
         what: "second board",
         remedy: "check `--check-squares` and `--check-square-mm`, and that the rig has not moved between the two boards",
         value,
-        limit: Some(facts.tolerance_mm),
+        limit: Some(case.facts.tolerance_mm),
         unit: "mm",
         allows,
         detail,
     };
-    let Some(second) = facts.second else {
+    let Some(second) = &case.facts.standards.second else {
         let detail = "not asked for: the scale of every length is the pitch of the board, and an error of its pitch does not show here. `--check-images DIR` names pictures of a second board, `--known-move MM` a slide of a known length";
         return Evidence { limit: None, ..line(None, Verdict::Pass, detail.to_owned()) };
     };
@@ -223,7 +224,7 @@ pub(super) fn second_board(facts: &Facts) -> Evidence {
     };
     // A board that can be measured in half of its pairs only, or with rays that contradict each other, is no witness for a pass.
     let measured = second.pairs >= second.pairs_skipped.len() && second.doubtful.contradicted_share() <= 0.1;
-    let own = extremes.verdict(facts.tolerance_mm);
+    let own = extremes.verdict(case.facts.tolerance_mm);
     let allows = if measured { own } else { own.and(Verdict::Undecided) };
     let detail = format!(
         "largest error plus its own expanded uncertainty ({:.4} + {:.4}) over all lengths in {} pairs of a board that took no part in the calibration{scale}; {} of {} corners have rays that contradict each other",

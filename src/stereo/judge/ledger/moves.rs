@@ -1,6 +1,6 @@
 //! Lines on known moves, where some were asked for.
 
-use super::facts::Facts;
+use super::facts::Case;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::judge::verdict::Verdict;
@@ -10,21 +10,21 @@ use crate::stereo::pairs::Cause;
 pub const KNOWN_MOVE: &str = "known move";
 
 /// A line a move.
-pub(super) fn known_moves(facts: &Facts) -> Vec<Evidence> {
+pub(super) fn known_moves(case: &Case) -> Vec<Evidence> {
     let line = |value, allows, detail| Evidence {
         what: KNOWN_MOVE,
         remedy: "slide the board farther, or by a length that is known better, without turning it",
         value,
-        limit: Some(facts.tolerance_mm),
+        limit: Some(case.facts.tolerance_mm),
         unit: "mm",
         allows,
         detail,
     };
-    let length_mm = facts.volume.length_mm;
+    let length_mm = case.facts.volume.length_mm;
     // Moves that contradict each other are no proof against the rig.
-    let told = facts.moves.causes();
+    let told = case.facts.standards.moves.causes();
     let measured = |known: &KnownMove| {
-        let mut allows = known.verdict(length_mm, facts.tolerance_mm);
+        let mut allows = known.verdict(length_mm, case.facts.tolerance_mm);
         if allows == Verdict::Fail && told == [Cause::KnownMove] {
             allows = Verdict::Undecided;
         }
@@ -35,5 +35,12 @@ pub(super) fn known_moves(facts: &Facts) -> Vec<Evidence> {
         line(Some((known.scale_error.abs() + known.expanded()) * length_mm), allows, detail)
     };
     let missing = |reason: &String| line(None, Verdict::Undecided, reason.clone());
-    facts.moves.measured.iter().map(measured).chain(facts.moves.missing.iter().map(missing)).collect()
+    case.facts
+        .standards
+        .moves
+        .measured
+        .iter()
+        .map(measured)
+        .chain(case.facts.standards.moves.missing.iter().map(missing))
+        .collect()
 }

@@ -1,6 +1,6 @@
 //! Lines on the pairs: what happened over them, how they scatter, which are missing, how the boards stood, and lenses that were known.
 
-use super::facts::Facts;
+use super::facts::Case;
 use crate::imaging::Side;
 use crate::stereo::Camera;
 use crate::stereo::calibrate::Calibration;
@@ -11,10 +11,10 @@ use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::solve::uncertainty::{WORST_FOCAL_SIGMA, worst_focal_sigma};
 
 /// Steps and drifts that are in the rig.
-pub(super) fn findings(facts: &Facts) -> Evidence {
-    let since = facts.calibration.standing.since.as_deref();
+pub(super) fn findings(case: &Case) -> Evidence {
+    let since = case.calibration.standing.since.as_deref();
     let within = |finding: &&Finding| finding.pairs.first().map(String::as_str) != since || since.is_none();
-    let left: Vec<&Finding> = facts.findings.iter().filter(within).collect();
+    let left: Vec<&Finding> = case.facts.findings.iter().filter(within).collect();
     let value = left.iter().filter_map(|finding| finding.effect_mm).fold(0.0, f64::max);
     let detail = if left.is_empty() {
         "no change over the pairs that were used: no step, drift or change of focus beyond their scatter".to_owned()
@@ -34,13 +34,13 @@ pub(super) fn findings(facts: &Facts) -> Evidence {
         "changes over the pairs",
         "clamp the cameras, switch autofocus off, and photograph again",
         Some(value),
-        facts,
+        case,
         detail,
     )
 }
 
-pub(super) fn pair_scatter(facts: &Facts) -> Evidence {
-    let scatter = &facts.calibration.pair_scatter;
+pub(super) fn pair_scatter(case: &Case) -> Evidence {
+    let scatter = &case.calibration.pair_scatter;
     let detail = match scatter.ratio {
         Some(_) => format!(
             "variance of the rig by how {} pairs with poses of their own scatter about it, over the one by the corners' noise; what \
@@ -64,16 +64,16 @@ pub(super) fn pair_scatter(facts: &Facts) -> Evidence {
 }
 
 /// Pairs with a board that do not fit the rig now standing: not those without a board, shown twice, or of a rig that stood before.
-fn contradicting<'a>(facts: &'a Facts) -> Vec<&'a str> {
-    let all = facts.calibration.discarded.pairs.iter();
+fn contradicting<'a>(case: &'a Case) -> Vec<&'a str> {
+    let all = case.calibration.discarded.pairs.iter();
     all.filter(|p| p.cause.contradicts()).map(|p| p.pair.as_str()).collect()
 }
 
-pub(super) fn pairs_discarded(facts: &Facts) -> Evidence {
+pub(super) fn pairs_discarded(case: &Case) -> Evidence {
     /// Up to a third single pairs are wrong; beyond it what was kept may be the wrong choice.
     const LIMIT_PERCENT: f64 = 34.0;
-    let contradicting = contradicting(facts);
-    let judged = facts.calibration.views.len() + contradicting.len();
+    let contradicting = contradicting(case);
+    let judged = case.calibration.views.len() + contradicting.len();
     let value = 100.0 * contradicting.len() as f64 / judged.max(1) as f64;
     let named: Vec<&str> = contradicting.iter().take(5).copied().collect();
     let named = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
@@ -92,8 +92,8 @@ pub(super) fn pairs_discarded(facts: &Facts) -> Evidence {
 }
 
 /// Whether the rig that was calibrated is the one that stands now.
-pub(super) fn standing(facts: &Facts) -> Evidence {
-    let standing = &facts.calibration.standing;
+pub(super) fn standing(case: &Case) -> Evidence {
+    let standing = &case.calibration.standing;
     let after = &standing.unconfirmed;
     let before = match &standing.since {
         Some(since) => format!(
@@ -122,13 +122,13 @@ pub(super) fn standing(facts: &Facts) -> Evidence {
     }
 }
 
-pub(super) fn poses(facts: &Facts) -> Evidence {
+pub(super) fn poses(case: &Case) -> Evidence {
     /// With fewer, leaving out one loses a fifth or more of all that is known, and one wrong pair cannot be told from the others.
     const FEWEST: f64 = 6.0;
     /// Where the lenses are known, only where the cameras stand is left to be found.
     const FEWEST_OF_KNOWN: f64 = 3.0;
-    let fewest = if facts.calibration.lenses_are_known() { FEWEST_OF_KNOWN } else { FEWEST };
-    let groups = facts.calibration.pair_scatter.groups as f64;
+    let fewest = if case.calibration.lenses_are_known() { FEWEST_OF_KNOWN } else { FEWEST };
+    let groups = case.calibration.pair_scatter.groups as f64;
     Evidence {
         what: "pairs with poses of their own",
         remedy: "add pairs with the board elsewhere and tilted otherwise",
@@ -139,15 +139,15 @@ pub(super) fn poses(facts: &Facts) -> Evidence {
         detail: format!(
             "{} pairs were used. Few pairs cannot show one that is wrong by a little, a rig that drifts, or a lens that differs at the \
              border: with fewer than {fewest:.0} different poses each held-out pair is judged by too few others",
-            facts.coverage.pairs
+            case.facts.coverage.pairs
         ),
     }
 }
 
-pub(super) fn tilts(facts: &Facts) -> Evidence {
+pub(super) fn tilts(case: &Case) -> Evidence {
     /// Below, perspective hardly tells the focal length from the distance, and the lens model decides instead of the data.
     const LEAST_DEG: f64 = 5.0;
-    let [horizontal, vertical] = facts.coverage.tilts_deg;
+    let [horizontal, vertical] = case.facts.coverage.tilts_deg;
     let value = horizontal.max(vertical);
     Evidence {
         what: "tilts of the boards",
@@ -155,7 +155,7 @@ pub(super) fn tilts(facts: &Facts) -> Evidence {
         value: Some(value),
         limit: Some(LEAST_DEG),
         unit: "deg",
-        allows: if value >= LEAST_DEG || facts.calibration.lenses_are_known() {
+        allows: if value >= LEAST_DEG || case.calibration.lenses_are_known() {
             Verdict::Pass
         } else {
             Verdict::Undecided
@@ -169,12 +169,12 @@ pub(super) fn tilts(facts: &Facts) -> Evidence {
 }
 
 /// A focal length that the pictures hardly tell, or that is none of a lens; lengths elsewhere than where the boards were are then anybody's guess.
-pub(super) fn focal_lengths(facts: &Facts) -> Option<Evidence> {
+pub(super) fn focal_lengths(case: &Case) -> Option<Evidence> {
     /// From corner to corner, deg. What these lens models say of a ray grows beyond all bounds towards 180, and lenses that see wider than this
     /// are calibrated with others.
     const WIDEST_DEG: f64 = 150.0;
-    let Calibration { uncertainty, layout, .. } = facts.calibration;
-    let rig = facts.calibration.rig();
+    let Calibration { uncertainty, layout, .. } = case.calibration;
+    let rig = case.calibration.rig();
     let undecided = |value, limit, unit, detail| Evidence {
         what: "focal lengths",
         remedy: "add pairs tilted by 20 to 45 degrees about both axes, at several distances",
@@ -196,7 +196,7 @@ pub(super) fn focal_lengths(facts: &Facts) -> Option<Evidence> {
     };
     let widest = [&rig.left, &rig.right].into_iter().max_by(|a, b| seen_deg(a).total_cmp(&seen_deg(b)))?;
     let (seen, [fx, fy]) = (seen_deg(widest), [widest.fx, widest.fy]);
-    (seen > WIDEST_DEG && !facts.calibration.lenses_are_known()).then(|| {
+    (seen > WIDEST_DEG && !case.calibration.lenses_are_known()).then(|| {
         let detail = format!(
             "what a camera sees from corner to corner if its focal lengths are the {fx:.1} and {fy:.1} px that fit best: no lens of these \
              models does; boards that all lie alike, or that are not as flat as they are taken to be, do not tell a focal length"
@@ -206,8 +206,8 @@ pub(super) fn focal_lengths(facts: &Facts) -> Option<Evidence> {
 }
 
 /// Whether the pictures agree with lenses that were known.
-pub(super) fn known_lenses(facts: &Facts) -> Option<Evidence> {
-    let check = facts.calibration.lens_check.as_ref()?;
+pub(super) fn known_lenses(case: &Case) -> Option<Evidence> {
+    let check = case.calibration.lens_check.as_ref()?;
     let seen: Vec<String> = Side::BOTH
         .into_iter()
         .filter_map(|side| Some(format!("{} {:.3} %", side.name(), 100.0 * check.focus_seen[side as usize]?)))
@@ -230,9 +230,9 @@ pub(super) fn known_lenses(facts: &Facts) -> Option<Evidence> {
 }
 
 /// Depth and field: what lies beyond is extrapolated; within, the uncertainty of lengths says what it costs.
-pub(super) fn reach(facts: &Facts) -> [Evidence; 2] {
-    let [near, far] = facts.coverage.depths_mm;
-    let [left, right] = facts.coverage.field_shares;
+pub(super) fn reach(case: &Case) -> [Evidence; 2] {
+    let [near, far] = case.facts.coverage.depths_mm;
+    let [left, right] = case.facts.coverage.field_shares;
     let line = |what, value, unit, detail| Evidence {
         what,
         value: Some(value),

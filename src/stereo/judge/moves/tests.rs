@@ -9,7 +9,8 @@ use crate::imaging::{Board, Corners};
 use crate::simulate::draws::{Draws, Purpose};
 use crate::stereo::calibrate::calibrate;
 use crate::stereo::findings::Finding;
-use crate::stereo::judge::assessment::{Judged, Standards};
+use crate::stereo::judge::assessment::Judged;
+use crate::stereo::judge::ledger::Standards;
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::options::Options;
@@ -88,7 +89,7 @@ fn a_scale_that_is_wrong_is_seen_from_the_stated_size_on_with_its_size() {
         for seed in 0..6 {
             let corners = said_larger(&slid(seed, &[(5.0, 0.0)]), seed, percent / 100.0);
             let (judged, allows, finding) = judged(&corners, &["5mm+-0.002:11,12"], 0.05);
-            let known = &judged.standards.moves.measured[0];
+            let known = &judged.facts.standards.moves.measured[0];
             assert!((known.scale_error - percent / 100.0).abs() < 1.5 * known.expanded(), "{}", known.statement());
             assert_ne!(allows, Verdict::Pass, "{percent} {seed}: {}", known.statement());
             assert!(allows == Verdict::Fail || percent < 0.2, "{percent} {seed}: {}", known.statement());
@@ -126,7 +127,7 @@ fn a_board_that_turned_is_said_with_its_turn_and_is_no_proof() {
         for seed in 30..34 {
             let corners = slid(seed, &[(5.0, deg)]).corners(seed);
             let (judged, allows, finding) = judged(&corners, &["5mm:11,12"], 0.05);
-            let known = &judged.standards.moves.measured[0];
+            let known = &judged.facts.standards.moves.measured[0];
             assert!(known.turned && (known.turn_deg - deg).abs() < 0.02, "{}", known.statement());
             assert!(known.statement().contains("it must only slide"));
             assert!(!known.contradicts() && finding.is_none(), "{}", known.statement());
@@ -164,6 +165,6 @@ fn a_pair_that_was_not_used_is_no_proof_and_named() {
     corners.pairs.push(crate::imaging::PairCorners { pair: "13".to_owned(), ..same });
     let (judged, allows, _) = judged(&corners, &["5mm:11,13"], 0.05);
     assert_eq!(allows, Verdict::Undecided);
-    let said = &judged.standards.moves.missing[0];
+    let said = &judged.facts.standards.moves.missing[0];
     assert!(said.contains("pair 13 is not used, the same pictures as pair 12"), "{said}");
 }
