@@ -1,10 +1,25 @@
-//! `board`: a board to print.
+//! Boards: the target on the robot, and one to print.
 
 use clap::Args;
 
 use super::output::Output;
 use crate::formats::boards::files::named;
-use crate::imaging::Board;
+use crate::imaging::{Board, Squares};
+
+/// The target on the robot.
+#[derive(Debug, Args)]
+pub struct Target {
+    /// The target by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
+    /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm)
+    #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
+    pub board: Option<Board>,
+    /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
+    #[arg(long, value_name = "CxR")]
+    pub squares: Option<Squares>,
+    /// Side of a square, mm; key `target_board.square_mm` [default: 10]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub square_mm: Option<f64>,
+}
 
 /// `stereocal board`
 #[derive(Debug, Args)]

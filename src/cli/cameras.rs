@@ -3,7 +3,8 @@
 use camino::{Utf8Path, Utf8PathBuf};
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::output::Output;
+use super::board::Target;
+use super::output::{Files, Output};
 use super::placement::ExportPlacement;
 use super::robot::ExportRobot;
 use super::values::{AskedSquares, between};
@@ -150,16 +151,9 @@ pub struct Measure {
     /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
-    /// The target by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
-    /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm)
-    #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
-    pub board: Option<Board>,
-    /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
-    #[arg(long, value_name = "CxR")]
-    pub squares: Option<Squares>,
-    /// Side of a square, mm; key `target_board.square_mm` [default: 10]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
-    pub square_mm: Option<f64>,
+    /// The target on the robot.
+    #[command(flatten)]
+    pub target: Target,
     /// Filters of pictures that are raw colour mosaics: RGGB, BGGR, GRBG or GBRG
     #[arg(long, value_name = "PATTERN")]
     pub bayer: Option<Mosaic>,
@@ -240,12 +234,9 @@ pub struct ExportCalibration {
     /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
-    /// Folder for results; key `out` [default: out]
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<Utf8PathBuf>,
-    /// Replace files that stereocal did not write, or that were changed since
-    #[arg(long)]
-    pub force: bool,
+    /// Where it goes.
+    #[command(flatten)]
+    pub files: Files,
 }
 
 /// Programs that a calibration can be written for.

@@ -18,7 +18,7 @@ pub use self::cameras::{
     BoardShape, CalibrationFormat, CameraCheck, Export, ExportCalibration, ExportWhat, Measure, Rectify,
 };
 pub use self::locate::Locate;
-pub use self::output::Output;
+pub use self::output::{Files, Output};
 pub use self::placement::{ExportPlacement, PlacementFormat};
 pub use self::robot::{
     Compensate, DhConvention, ExportRobot, Identify, Plan, PlanKind, RobotCommand, RobotFormat, RobotImport, RobotNew,

@@ -3,6 +3,17 @@
 use camino::Utf8PathBuf;
 use clap::Args;
 
+/// Where files for other programs go.
+#[derive(Debug, Args)]
+pub struct Files {
+    /// Folder for results; key `out` [default: out]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<Utf8PathBuf>,
+    /// Replace files that stereocal did not write, or that were changed since
+    #[arg(long)]
+    pub force: bool,
+}
+
 /// Where results go and how they are shown.
 #[derive(Debug, Args)]
 pub struct Output {

@@ -3,6 +3,8 @@
 use camino::Utf8PathBuf;
 use clap::{Args, ValueEnum};
 
+use super::output::Files;
+
 /// `stereocal export placement`
 #[derive(Debug, Args)]
 pub struct ExportPlacement {
@@ -27,12 +29,9 @@ pub struct ExportPlacement {
     /// Name of the target's frame
     #[arg(long, value_name = "NAME", default_value = "target")]
     pub target_frame: String,
-    /// Folder for results; key `out` [default: out]
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<Utf8PathBuf>,
-    /// Replace files that stereocal did not write, or that were changed since
-    #[arg(long)]
-    pub force: bool,
+    /// Where it goes.
+    #[command(flatten)]
+    pub files: Files,
 }
 
 /// Programs that a placement can be written for.

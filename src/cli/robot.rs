@@ -3,10 +3,9 @@
 use camino::Utf8PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::output::Output;
+use super::board::Target;
+use super::output::{Files, Output};
 use super::values::{between, count};
-use crate::formats::boards::files::named;
-use crate::imaging::{Board, Squares};
 
 /// `stereocal identify`
 #[derive(Debug, Args)]
@@ -137,16 +136,9 @@ pub struct Plan {
     /// Pose repeatability (ISO 9283 RP), mm
     #[arg(long, value_name = "MM", default_value_t = 0.02, value_parser = between(0.0, 100.0))]
     pub repeatability_mm: f64,
-    /// The target by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
-    /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm)
-    #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
-    pub board: Option<Board>,
-    /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
-    #[arg(long, value_name = "CxR")]
-    pub squares: Option<Squares>,
-    /// Side of a square, mm; key `target_board.square_mm` [default: 10]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
-    pub square_mm: Option<f64>,
+    /// The target on the robot.
+    #[command(flatten)]
+    pub target: Target,
     /// Speed of the programs, per cent of the joints' own
     #[arg(long, value_name = "PERCENT", default_value_t = 20.0, value_parser = between(1.0, 100.0))]
     pub speed_percent: f64,
@@ -297,12 +289,9 @@ pub struct ExportRobot {
     /// The nominal robot that deviations are counted from (--format ur-calibration) [default: the common arm of the same name]
     #[arg(long, value_name = "FILE")]
     pub nominal: Option<Utf8PathBuf>,
-    /// Folder for results; key `out` [default: out]
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<Utf8PathBuf>,
-    /// Replace files that stereocal did not write, or that were changed since
-    #[arg(long)]
-    pub force: bool,
+    /// Where it goes.
+    #[command(flatten)]
+    pub files: Files,
 }
 
 /// Programs that a robot can be written for.

@@ -59,7 +59,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let inputs: Vec<&camino::Utf8Path> = inputs.into_iter().flatten().map(|path| path.as_path()).collect();
     let out = out.for_run(&Run { force: args.output.force, ..run }, &inputs);
     out.check_free(&["poses.csv", "plan.json", "plan.html"])?;
-    let board = config.target_board.board(args.board, args.squares, args.square_mm)?;
+    let board = config.target_board.board(args.target.board, args.target.squares, args.target.square_mm)?;
     let corner_px = noise.map_or(CORNER_PX, |n| n.added_px.max(CORNER_PX / 3.0));
     let scene = Scene::new(rig, board, corner_px, args.tilt_deg.to_radians(), args.depth_mm, args.margin_mm)?;
     let measured = earlier.as_deref().zip(args.after.as_ref().map(|path| path.as_str()));

@@ -22,10 +22,10 @@ pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
 }
 
 fn calibration(args: &ExportCalibration, config: &Config, run: Run) -> Result<Outcome> {
-    let out = OutDir::open(args.out.as_deref().unwrap_or(&config.out))?;
+    let out = OutDir::open(args.files.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = rig::file(args.calibration.as_deref(), &out)?;
     let rig = rig::read(&rig_file)?;
-    let out = out.for_run(&Run { force: args.force, ..run }, &[&rig_file]);
+    let out = out.for_run(&Run { force: args.files.force, ..run }, &[&rig_file]);
     let files = match args.format {
         CalibrationFormat::Opencv => export::file_storage::files(&rig)?,
         CalibrationFormat::Ros => export::ros::files(&rig)?,

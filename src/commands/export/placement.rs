@@ -11,11 +11,11 @@ use crate::formats::placements::{Frames, Placement, easy_handeye, file_storage, 
 
 /// Runs the command.
 pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome> {
-    let out = OutDir::open(args.out.as_deref().unwrap_or(&config.out))?;
+    let out = OutDir::open(args.files.out.as_deref().unwrap_or(&config.out))?;
     let path = args.placement.clone().unwrap_or_else(|| out.join(PLACEMENT));
     let file = PlacementFile::read(&path)?;
     let groups = groups(args, &file)?;
-    let out = out.for_run(&Run { force: args.force, ..run }, &[&path]);
+    let out = out.for_run(&Run { force: args.files.force, ..run }, &[&path]);
     let flange_from_target = file.flange_from_target.as_ref().and_then(|record| record.transform());
     let mut stdout = String::new();
     for group in &groups {

@@ -19,12 +19,12 @@ const ROUNDING_MM: f64 = 1e-4;
 /// Runs the command.
 pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
     let robot = file::read(&args.robot)?;
-    let out = OutDir::open(args.out.as_deref().unwrap_or(&config.out))?;
+    let out = OutDir::open(args.files.out.as_deref().unwrap_or(&config.out))?;
     let inputs = [Some(&args.robot), args.nominal_urdf.as_ref(), args.nominal.as_ref()];
     let inputs: Vec<&camino::Utf8Path> = inputs.into_iter().flatten().map(|path| path.as_path()).collect();
-    let out = out.for_run(&Run { force: args.force, ..run }, &inputs);
+    let out = out.for_run(&Run { force: args.files.force, ..run }, &inputs);
     let exported = export(args, &robot)?;
-    if !args.force {
+    if !args.files.force {
         spare_other_robots(&out.join(exported.name), &exported)?;
     }
     match args.format {

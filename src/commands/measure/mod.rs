@@ -91,7 +91,7 @@ fn list_of_poses(source: &Source<'_>) -> Utf8PathBuf {
 
 /// The rig, the target and what is known of both.
 fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Knowledge> {
-    let board = config.target_board.board(args.board, args.squares, args.square_mm)?;
+    let board = config.target_board.board(args.target.board, args.target.squares, args.target.square_mm)?;
     let Calibrated { rig, noise, pair_excess, volume, unconfirmed, .. } = calibration::read_with_check(rig_file)?;
     if rig.covariance.is_none() {
         progress::warn(format!(
