@@ -43,7 +43,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
         Some(path) => robot::file::read(path)?,
         None => {
             progress::note("nominal robot: Table 1 of the paper (no --robot, and no robot.toml here)");
-            catalogue::robot(catalogue::PAPER).unwrap_or_else(Robot::paper)
+            catalogue::paper()
         }
     };
     check(args, &robot)?;

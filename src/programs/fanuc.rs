@@ -13,14 +13,9 @@ const MOTIONS: [char; 5] = ['J', 'L', 'C', 'A', 'S'];
 /// Options that move a point from where it was taught.
 const OFFSETS: [&str; 4] = ["OFFSET", "TOOL_OFFSET", "VOFFSET", "INC"];
 
-/// Names of the axes: those of the robot, then extended ones.
-fn axes(count: usize) -> Vec<String> {
-    (0..count).map(|k| if k < 6 { format!("J{}", k + 1) } else { format!("E{}", k - 5) }).collect()
-}
-
 /// Positions in joint coordinates, by their number.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
-    let names = axes(count);
+    let names = scan::axes('J', count);
     let position = |at: usize| {
         let (numbers, _) = scan::labelled(text, at, &names, &["deg", "mm", ","])?;
         let before = &text[..at];
@@ -124,7 +119,8 @@ pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(St
         for (side, list) in [&stop.approach, &stop.readings].into_iter().enumerate() {
             let number = 2 * k + side + 1;
             lines.push(format!("J P[{number}] {:.0}% FINE ;", motion.speed_percent));
-            let parts: Vec<String> = axes(list.len()).iter().zip(list).map(|(n, v)| format!("{n}= {v} deg")).collect();
+            let parts: Vec<String> =
+                scan::axes('J', list.len()).iter().zip(list).map(|(n, v)| format!("{n}= {v} deg")).collect();
             let _ = writeln!(positions, "P[{number}]{{\n   GP1:\n  UF : 0, UT : 1,\n  {}\n}};", parts.join(", "));
         }
         lines.push(format!("WAIT {:.2}(sec) ;", motion.dwell_s));

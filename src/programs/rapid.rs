@@ -128,22 +128,12 @@ fn unknown(code: &str, at: Range<usize>) -> Option<(Range<usize>, Option<Cause>)
     parts.iter().skip(1).find(|part| motion(part))?;
     // The word before the first argument: the last one but the argument's own.
     let first = parts.first()?.clone();
-    let mut words: Vec<Range<usize>> = Vec::new();
-    let mut brackets = 0usize;
-    let mut seen = first.start;
-    for word in scan::words(&code[first.clone()]).map(|w| first.start + w.start..first.start + w.end) {
-        for c in code[seen..word.start].chars() {
-            match c {
-                '(' | '[' | '{' => brackets += 1,
-                ')' | ']' | '}' => brackets = brackets.saturating_sub(1),
-                _ => {}
-            }
-        }
-        seen = word.end;
-        if brackets == 0 && !code[..word.start].ends_with(['\\', '.']) {
-            words.push(word);
-        }
-    }
+    let is_outside =
+        |word: &Range<usize>| scan::levels(&code[first.start..word.start]).last().is_none_or(|(.., depth)| depth == 0);
+    let words: Vec<Range<usize>> = scan::words(&code[first.clone()])
+        .map(|w| first.start + w.start..first.start + w.end)
+        .filter(|word| is_outside(word) && !code[..word.start].ends_with(['\\', '.']))
+        .collect();
     let literal = code[..first.end].ends_with(']');
     let word = words.iter().rev().nth(usize::from(!literal))?.clone();
     Some((word, Some(Cause::Elsewhere)))
@@ -152,15 +142,8 @@ fn unknown(code: &str, at: Range<usize>) -> Option<(Range<usize>, Option<Cause>)
 /// Arguments without switches (`\Conc`) and without what is optional behind them (`\NoEOffs`).
 fn arguments(code: &str, at: Range<usize>) -> Vec<Range<usize>> {
     let plain = |part: Range<usize>| {
-        let mut depth = 0usize;
-        let optional = code[part.clone()].find(|c: char| {
-            match c {
-                '(' | '[' | '{' => depth += 1,
-                ')' | ']' | '}' => depth = depth.saturating_sub(1),
-                _ => {}
-            }
-            c == '\\' && depth == 0
-        });
+        let mut optional = scan::levels(&code[part.clone()]).filter(|(_, c, depth)| *c == '\\' && *depth == 0);
+        let optional = optional.next().map(|(at, ..)| at);
         (optional != Some(0)).then(|| scan::trimmed(code, part.start..optional.map_or(part.end, |k| part.start + k)))
     };
     scan::parts(code, at).into_iter().filter_map(plain).collect()

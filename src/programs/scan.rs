@@ -62,6 +62,11 @@ pub fn target(text: &str, name: Option<String>, numbers: Vec<Number>, open: Opti
     Some(Target { name: name.unwrap_or_else(|| format!("line {line}")), line, readings, places, whole, pulses: false })
 }
 
+/// Names of the axes: those of the robot by this letter, then `E1`, `E2` and so on of external ones.
+pub fn axes(letter: char, count: usize) -> Vec<String> {
+    (0..count).map(|k| if k < 6 { format!("{letter}{}", k + 1) } else { format!("E{}", k - 5) }).collect()
+}
+
 /// Line of a place, from 1.
 pub fn line(text: &str, at: usize) -> u64 {
     1 + text[..at].bytes().filter(|b| *b == b'\n').count() as u64
@@ -119,19 +124,24 @@ pub fn closed(code: &str, open: usize) -> Option<usize> {
     None
 }
 
-/// The parts between the commas of `range` that stand in no bracket, without blanks around them.
-pub fn parts(code: &str, range: Range<usize>) -> Vec<Range<usize>> {
-    let (mut depth, mut from, mut found) = (0usize, range.start, Vec::new());
-    for (at, c) in code[range.clone()].char_indices() {
+/// Every character with its place and how many brackets are open behind it; more that close than open count as none.
+pub fn levels(code: &str) -> impl Iterator<Item = (usize, char, usize)> + '_ {
+    code.char_indices().scan(0usize, |depth, (at, c)| {
         match c {
-            '(' | '[' | '{' => depth += 1,
-            ')' | ']' | '}' => depth = depth.saturating_sub(1),
-            ',' if depth == 0 => {
-                found.push(trimmed(code, from..range.start + at));
-                from = range.start + at + 1;
-            }
+            '(' | '[' | '{' => *depth += 1,
+            ')' | ']' | '}' => *depth = depth.saturating_sub(1),
             _ => {}
         }
+        Some((at, c, *depth))
+    })
+}
+
+/// The parts between the commas of `range` that stand in no bracket, without blanks around them.
+pub fn parts(code: &str, range: Range<usize>) -> Vec<Range<usize>> {
+    let (mut from, mut found) = (range.start, Vec::new());
+    for (at, _, _) in levels(&code[range.clone()]).filter(|(_, c, depth)| *c == ',' && *depth == 0) {
+        found.push(trimmed(code, from..range.start + at));
+        from = range.start + at + 1;
     }
     found.push(trimmed(code, from..range.end));
     found

@@ -160,16 +160,8 @@ impl Variables {
     }
 
     fn end(&self, code: &str, from: usize) -> usize {
-        let mut depth = 0usize;
-        for (at, c) in code[from..].char_indices() {
-            match c {
-                '(' | '[' | '{' => depth += 1,
-                ')' | ']' | '}' => depth = depth.saturating_sub(1),
-                _ if c == self.syntax.end && depth == 0 => return from + at,
-                _ => {}
-            }
-        }
-        code.len()
+        let mut ends = scan::levels(&code[from..]).filter(|(_, c, depth)| *c == self.syntax.end && *depth == 0);
+        ends.next().map_or(code.len(), |(at, ..)| from + at)
     }
 
     /// What stands at a place; of a list of targets all, where it is not to be a `single` one.

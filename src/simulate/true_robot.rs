@@ -4,11 +4,8 @@ use nalgebra::Vector3;
 
 use super::draws::{Draws, Purpose};
 use super::settings::RobotDeviations;
-use crate::robot::Robot;
 use crate::robot::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
-
-/// Ranges of the joints, deg. The paper gives none; these are a common arm's.
-const LIMITS_DEG: [f64; 6] = [175.0, 130.0, 150.0, 175.0, 175.0, 175.0];
+use crate::robot::{Robot, catalogue};
 
 /// The target's nominal mark point in the flange's frame, mm.
 const TOOL_MM: [f64; 3] = [12.0, -8.0, 25.0];
@@ -18,12 +15,7 @@ const PARALLEL: f64 = 1e-3;
 
 /// The robot of Table 1 with joint limits and a target at its flange.
 pub fn nominal() -> Robot {
-    let mut robot = Robot::paper();
-    for (joint, limit) in robot.joints.iter_mut().zip(LIMITS_DEG) {
-        joint.limits_rad = Some((-limit.to_radians(), limit.to_radians()));
-    }
-    robot.tool_mm = Vector3::from(TOOL_MM);
-    robot
+    Robot { tool_mm: Vector3::from(TOOL_MM), ..catalogue::paper() }
 }
 
 /// A robot whose parameters differ from the nominal one's as drawn from the seed.

@@ -256,15 +256,20 @@ pub const PAPER: &str = "paper";
 const PAPER_LIMITS_DEG: [[f64; 2]; 6] =
     [[-175.0, 175.0], [-130.0, 130.0], [-150.0, 150.0], [-175.0, 175.0], [-175.0, 175.0], [-175.0, 175.0]];
 
+/// The paper's robot, with ranges for its joints.
+pub fn paper() -> Robot {
+    let mut robot = Robot::paper();
+    for (joint, [low, high]) in robot.joints.iter_mut().zip(PAPER_LIMITS_DEG) {
+        joint.limits_rad = Some((low.to_radians(), high.to_radians()));
+    }
+    robot
+}
+
 /// The arm of a name, as its maker delivers it.
 pub fn robot(name: &str) -> Option<Robot> {
     let name = name.to_ascii_lowercase();
     if name == PAPER {
-        let mut robot = Robot::paper();
-        for (joint, [low, high]) in robot.joints.iter_mut().zip(PAPER_LIMITS_DEG) {
-            joint.limits_rad = Some((low.to_radians(), high.to_radians()));
-        }
-        return Some(robot);
+        return Some(paper());
     }
     ARMS.iter().find(|arm| arm.name == name).map(Arm::robot)
 }

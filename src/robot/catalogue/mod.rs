@@ -5,4 +5,4 @@ pub mod arms;
 pub mod names;
 
 pub use arm::{Arm, Convention, Row, from_rows};
-pub use arms::{ARMS, PAPER, robot};
+pub use arms::{ARMS, PAPER, paper, robot};
