@@ -11,8 +11,8 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
-use crate::formats::plan::{PlanFile, poses_csv};
-use crate::measurements::{Measurement, Role, Source};
+use crate::formats::plan::PlanFile;
+use crate::measurements::{Measurement, Role, Source, poses_csv, reading_name};
 use crate::plan::scene::Scene;
 use crate::plan::{PAPER_SAMPLES, Plan, Planned, Settings, plan};
 use crate::programs::{Joints, Language, Motion, Stop, program};
@@ -66,7 +66,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let found = plan(&robot, &scene, &settings(args), measured)?;
     found.warnings.iter().for_each(progress::warn);
     let record = PlanFile::new(&found);
-    out.write("poses.csv", poses_csv(&robot, &found.poses).as_bytes())?;
+    out.write("poses.csv", poses_csv(found.poses.iter().map(|pose| &pose.at)).as_bytes())?;
     for (name, text) in programs(args, &robot, &found.poses) {
         out.write(&format!("programs/{name}"), text.as_bytes())?;
     }
@@ -132,9 +132,8 @@ fn programs(args: &Arguments, robot: &Robot, poses: &[Planned]) -> Vec<(String, 
     let stops: Vec<Stop> = poses.iter().map(stop).collect();
     let mut files: Vec<(String, String)> =
         Language::ALL.into_iter().flat_map(|language| program(language, PROGRAM, &stops, &motion, joints)).collect();
-    let header: Vec<String> =
-        (1..=slides.len()).map(|j| format!("j{j}_{}", if slides[j - 1] { "mm" } else { "deg" })).collect();
-    let mut csv = format!("name,step,{}\n", header.join(","));
+    let names = slides.iter().enumerate().map(|(joint, slides)| reading_name(joint, *slides));
+    let mut csv = format!("name,step,{}\n", names.collect::<Vec<String>>().join(","));
     for stop in &stops {
         for (step, readings) in [("approach", &stop.approach), ("stop", &stop.readings)] {
             let fields: Vec<String> = readings.iter().map(|r| format!("{r:.4}")).collect();

@@ -341,8 +341,7 @@ fn grown(series: &Series) -> Vec<String> {
 
 /// `measurements.csv`: one row a pose in the order of the list; numbers are empty where there is no measurement.
 pub fn to_csv(measured: &[MeasuredPose]) -> String {
-    let joints = measured.first().map_or(0, |m| m.at.joints_deg.len());
-    let mut text = format!("{},{COLUMNS}\n", pose_header(joints));
+    let mut text = format!("{},{COLUMNS}\n", pose_header(measured.first().map(|m| &m.at)));
     for m in measured {
         text.push_str(&pose_fields(&m.at));
         match &m.target {

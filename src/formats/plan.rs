@@ -1,12 +1,10 @@
-//! `plan.json` and `poses.csv`: a plan as files.
+//! `plan.json`: a plan as a file.
 
 use serde::Serialize;
 
 use crate::geometry::rotation_matrix;
-use crate::measurements::pose_fields;
+use crate::plan::Plan;
 use crate::plan::predict::Accuracy;
-use crate::plan::{Plan, Planned};
-use crate::robot::Robot;
 
 /// The accuracy with so many samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -92,18 +90,4 @@ impl PlanFile {
 fn determined(accuracy: &Accuracy, expected: &[(usize, f64)]) -> Determined {
     let expected = expected.iter().map(|&(poses, rms_mm)| Expected { poses, rms_mm }).collect();
     Determined { accuracy: accuracy.clone(), expected }
-}
-
-/// `poses.csv` as `measure` reads it.
-pub fn poses_csv(robot: &Robot, poses: &[Planned]) -> String {
-    let mut text = String::from("pose,group,role");
-    for (j, joint) in robot.joints.iter().enumerate() {
-        text.push_str(&format!(",j{}_{}", j + 1, if joint.slides { "mm" } else { "deg" }));
-    }
-    text.push('\n');
-    for pose in poses {
-        text.push_str(&pose_fields(&pose.at));
-        text.push('\n');
-    }
-    text
 }

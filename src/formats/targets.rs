@@ -10,6 +10,7 @@ use camino::Utf8Path;
 use crate::compensate::{Target, pose};
 use crate::csv_table::{Fields, Table, quoted};
 use crate::files::Result;
+use crate::measurements::{Source, reading_name};
 use crate::progress;
 use crate::robot::Robot;
 
@@ -75,7 +76,7 @@ pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
 
 /// Readings in a table whose columns have other names, or none: as measurements are read.
 fn of_other_names(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
-    let (poses, said) = crate::measurements::Source::of(path.to_owned()).readings(robot)?;
+    let (poses, said) = Source::of(path.to_owned()).readings(robot)?;
     let row = |(line, name, given): (u64, String, Vec<f64>)| Row {
         name,
         line,
@@ -94,7 +95,7 @@ fn joint_columns(table: &Table, robot: &Robot) -> Result<Vec<usize>> {
     }
     for (i, joint) in robot.joints.iter().enumerate() {
         if slides.get(i).copied().unwrap_or(false) != joint.slides {
-            let needed = reading_name(robot, i);
+            let needed = reading_name(i, joint.slides);
             return Err(table.refuse(1, format!("no column `{needed}`, as the robot's joint {} needs", i + 1)));
         }
     }
@@ -107,15 +108,14 @@ pub fn radians(readings: &[f64], robot: &Robot) -> Vec<f64> {
     readings.iter().zip(&robot.joints).map(reading).collect()
 }
 
-/// `j1_deg`, or `j1_mm` of a joint that slides.
-fn reading_name(robot: &Robot, joint: usize) -> String {
-    format!("j{}_{}", joint + 1, if robot.joints[joint].slides { "mm" } else { "deg" })
-}
-
 /// `compensated.csv`: a row a target with its readings, deg (mm), where there are any, and `ok` or the reason.
 pub fn to_csv<'a>(robot: &Robot, rows: impl Iterator<Item = (&'a str, Option<Vec<f64>>, String)>) -> String {
     let mut text = String::from("name");
-    (0..robot.joints.len()).for_each(|j| text.push_str(&format!(",{}", reading_name(robot, j))));
+    robot
+        .joints
+        .iter()
+        .enumerate()
+        .for_each(|(j, joint)| text.push_str(&format!(",{}", reading_name(j, joint.slides))));
     text.push_str(",status\n");
     for (name, readings, status) in rows {
         text.push_str(&quoted(name));

@@ -7,7 +7,7 @@ use super::judge::{Basis, Way};
 use super::layout::{ONE_POINT, are_readings, is_kept};
 use super::part::{At, Kind, Part};
 use super::pick::listed;
-use super::rows::{Measurement, from_table};
+use super::rows::{Measurement, from_table, reading_name};
 use crate::csv_table::Table;
 use crate::files::Result;
 use crate::tables::Fields;
@@ -102,9 +102,7 @@ impl Taken<'_> {
         let mut header: Vec<String> = ["pose", "group", "role"].map(str::to_owned).into();
         let several = picked.points.len() > 1 && !places;
         header.extend((several && !own.contains_key("target")).then(|| "target".to_owned()));
-        header.extend(
-            self.slides.iter().enumerate().map(|(j, s)| format!("j{}_{}", j + 1, if *s { "mm" } else { "deg" })),
-        );
+        header.extend(self.slides.iter().enumerate().map(|(j, slides)| reading_name(j, *slides)));
         header.extend(match picked.distance {
             Some(_) => vec!["distance_mm".to_owned()],
             None => ["x_mm", "y_mm", "z_mm"].map(str::to_owned).to_vec(),

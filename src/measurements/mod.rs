@@ -10,5 +10,7 @@ mod rows;
 pub mod source;
 
 pub use crate::csv_table::quoted;
-pub use rows::{Measurement, Observed, RobotPose, Role, pose_fields, pose_header, read, read_poses};
+pub use rows::{
+    Measurement, Observed, RobotPose, Role, pose_fields, pose_header, poses_csv, read, read_poses, reading_name,
+};
 pub use source::Source;

@@ -246,12 +246,26 @@ fn is_covariance(matrix: &Matrix3<f64>) -> bool {
     eigen.min() >= -1e-4 * eigen.max() && eigen.max() >= 0.0
 }
 
-/// The header's first columns: `pose,group,role,j1_deg,...`.
-pub fn pose_header(joint_count: usize) -> String {
+/// Name of a joint's column of readings, counted from 0: `j1_deg`, or `j1_mm` where it slides.
+pub fn reading_name(joint: usize, slides: bool) -> String {
+    format!("j{}_{}", joint + 1, if slides { "mm" } else { "deg" })
+}
+
+/// The header's first columns where the first row is this pose: `pose,group,role,j1_deg,...`.
+pub fn pose_header(first: Option<&RobotPose>) -> String {
     let mut text = String::from("pose,group,role");
-    for i in 1..=joint_count {
-        let _ = write!(text, ",j{i}_deg");
+    for joint in 0..first.map_or(0, |pose| pose.joints_deg.len()) {
+        let slides = first.is_some_and(|pose| pose.slides.get(joint) == Some(&true));
+        let _ = write!(text, ",{}", reading_name(joint, slides));
     }
+    text
+}
+
+/// Poses as a list that [`read_poses`] reads.
+pub fn poses_csv<'a>(poses: impl Iterator<Item = &'a RobotPose>) -> String {
+    let mut poses = poses.peekable();
+    let mut text = format!("{}\n", pose_header(poses.peek().copied()));
+    poses.for_each(|pose| text.push_str(&format!("{}\n", pose_fields(pose))));
     text
 }
 
@@ -286,6 +300,24 @@ mod tests {
         assert_eq!(rows[1].observed, Observed::Missing { reason: "no board".into() });
         let rows = read_str("pose;group;role;j1_deg;distance_mm;sigma_mm\na;1;sample;0;12.5;0.1\n").unwrap();
         assert_eq!(rows[0].observed, Observed::Distance { distance_mm: 12.5, sigma_mm: Some(0.1) });
+    }
+
+    #[test]
+    fn poses_read_back_as_they_are_written() {
+        let pose = |name: &str, slides: Vec<bool>| RobotPose {
+            pose: name.to_owned(),
+            group: "1, left".to_owned(),
+            role: Role::Sample,
+            joints_deg: vec![5.5, -120.0],
+            slides,
+        };
+        for slides in [vec![], vec![false, true]] {
+            let poses = [pose("a", slides.clone()), pose("b", slides)];
+            let dir = tempfile::tempdir().unwrap();
+            let path = Utf8Path::from_path(dir.path()).unwrap().join("poses.csv");
+            std::fs::write(&path, poses_csv(poses.iter())).unwrap();
+            assert_eq!(read_poses(&path).unwrap(), poses);
+        }
     }
 
     #[test]

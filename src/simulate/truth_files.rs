@@ -8,7 +8,7 @@ use super::world::World;
 use crate::files::{OutDir, Result};
 use crate::formats::calibration::CalibrationFile;
 use crate::imaging::input::corners_csv;
-use crate::measurements::{RobotPose, pose_fields, pose_header};
+use crate::measurements::{RobotPose, pose_fields, pose_header, poses_csv};
 use crate::robot::file::to_toml;
 
 /// The columns of `measurements.csv` behind the pose.
@@ -17,7 +17,8 @@ const MEASURED: &str =
 
 /// Writes `poses/poses.csv`, `robot.toml` and `truth/`.
 pub fn write(world: &World, out: &OutDir) -> Result<()> {
-    out.write("poses/poses.csv", poses_csv(world).as_bytes())?;
+    let commanded = world.poses.iter().map(|pose| &pose.commanded);
+    out.write("poses/poses.csv", poses_csv(commanded).as_bytes())?;
     out.write("robot.toml", to_toml(&world.arm.nominal).as_bytes())?;
     out.write("truth/robot.toml", to_toml(&world.arm.truth).as_bytes())?;
     out.write_json("truth/calibration.json", &CalibrationFile::from(&world.rig))?;
@@ -34,23 +35,9 @@ pub fn write_points_only(world: &World, out: &OutDir) -> Result<()> {
     out.write("truth/measurements.csv", measurements_csv(world, 0.0).as_bytes())
 }
 
-fn joint_count(world: &World) -> usize {
-    world.arm.nominal.joints.len()
-}
-
-fn poses_csv(world: &World) -> String {
-    let mut text = pose_header(joint_count(world));
-    text.push('\n');
-    for pose in &world.poses {
-        text.push_str(&pose_fields(&pose.commanded));
-        text.push('\n');
-    }
-    text
-}
-
 /// True positions, or with noise of a standard deviation (mm) on each coordinate and the covariance that belongs to it.
 fn measurements_csv(world: &World, noise_mm: f64) -> String {
-    let mut text = pose_header(joint_count(world));
+    let mut text = pose_header(world.poses.first().map(|pose| &pose.commanded));
     let _ = writeln!(text, ",{MEASURED}");
     for (k, pose) in world.poses.iter().enumerate() {
         let noise = Draws::new(world.settings.seed, Purpose::Points, k as u64).normal3() * noise_mm;

@@ -5,7 +5,7 @@ use crate::cli::Init;
 use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::measurements::{RobotPose, Role, pose_fields, pose_header};
+use crate::measurements::{RobotPose, Role, poses_csv};
 use crate::robot::{self, Robot};
 
 /// Every key with its default and where it comes from.
@@ -38,9 +38,7 @@ fn poses() -> String {
         pose("002", Role::Sample, [5.0, -85.0, 92.0, -88.0, -85.0, 4.0]),
         pose("003", Role::Verify, [-4.0, -92.0, 88.0, -86.0, -94.0, -6.0]),
     ];
-    let mut text = format!("{}\n", pose_header(6));
-    rows.iter().for_each(|row| text.push_str(&format!("{}\n", pose_fields(row))));
-    text
+    poses_csv(rows.iter())
 }
 
 #[cfg(test)]
