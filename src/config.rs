@@ -1,5 +1,7 @@
 //! `stereocal.toml`: every default in one place. A flag beats the file, the file beats the default.
 
+use std::ops::RangeInclusive;
+
 use camino::{Utf8Path, Utf8PathBuf};
 use serde::Deserialize;
 
@@ -146,13 +148,12 @@ impl BoardSettings {
 
     /// The board, with what was given on the command line instead of the file's values: a board, or squares and their size.
     pub fn board(&self, named: Option<Board>, squares: Option<Squares>, square_mm: Option<f64>) -> Result<Board> {
-        let (own, mut problems) = (self.board, Vec::new());
+        let own = self.board;
         let board = named.unwrap_or(match (squares, square_mm) {
             (None, None) => own,
             _ => Board::checker(squares.unwrap_or(own.squares), square_mm.unwrap_or(own.square_mm)),
         });
-        within(&mut problems, "square_mm", board.square_mm, SQUARES_MM);
-        reject(problems)?;
+        check_within("square_mm", board.square_mm, SQUARES_MM)?;
         Ok(board)
     }
 }
@@ -197,6 +198,13 @@ impl Config {
         self.identify.validate(&mut problems);
         reject(problems)
     }
+}
+
+/// An error where a setting is beyond its range.
+pub fn check_within(name: &str, value: f64, range: RangeInclusive<f64>) -> Result<()> {
+    let mut problems = Vec::new();
+    within(&mut problems, name, value, range);
+    reject(problems)
 }
 
 /// An error where there are problems.

@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 
 use camino::Utf8Path;
 
-use crate::diagnostic::Place;
 use crate::files::{self, Result};
 pub use crate::tables::Fields;
 use crate::tables::Grid;
@@ -82,8 +81,7 @@ impl<'a> Table<'a> {
 
     /// A complaint about a line, with what to do about it.
     pub fn refuse_with(&self, line: u64, message: String, hint: Option<&str>) -> files::Error {
-        let place = Place { path: self.path.to_owned(), line: Some(line) };
-        files::Error::Format { message, place, hint: hint.map(str::to_owned) }
+        files::Error::format(self.path, Some(line), message, hint)
     }
 
     /// The place of a column, where the header has it.

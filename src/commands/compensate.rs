@@ -9,7 +9,7 @@ use crate::cli::Compensate;
 use crate::compensate::{Compensated, Compensator, Target};
 use crate::config::{self, Config};
 use crate::csv_table::MOST_ROWS;
-use crate::diagnostic::{Place, Status};
+use crate::diagnostic::Status;
 use crate::files::provenance::Run;
 use crate::files::{self, OutDir};
 use crate::formats::targets::{self, Row};
@@ -65,9 +65,9 @@ struct Refused {
 /// Runs the command.
 pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let (nominal, identified) = (file::read(&args.robot)?, file::read(&args.identified)?);
-    check(args, &nominal, &identified)?;
     let slides: Vec<bool> = nominal.joints.iter().map(|j| j.slides).collect();
     let joints = Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg };
+    check(args, &nominal, &identified, joints)?;
     let program = Language::of(&args.targets).map(|language| Program::read(args, language, joints)).transpose()?;
     let rows = match &program {
         Some(program) => program.rows(&nominal),
@@ -107,7 +107,7 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     Ok(Outcome { stdout, status })
 }
 
-fn check(args: &Compensate, nominal: &Robot, identified: &Robot) -> Result<()> {
+fn check(args: &Compensate, nominal: &Robot, identified: &Robot, joints: Joints) -> Result<()> {
     let kinds = |robot: &Robot| {
         let sliding = robot.joints.iter().filter(|j| j.slides).count();
         format!("{}{}", robot.joints.len(), if sliding > 0 { format!(" ({sliding} sliding)") } else { String::new() })
@@ -120,10 +120,7 @@ fn check(args: &Compensate, nominal: &Robot, identified: &Robot) -> Result<()> {
     if !(args.tool.is_empty() || args.tool.len() == 3 && args.tool.iter().all(|v| v.is_finite())) {
         problems.push(format!("--tool has {} numbers; X,Y,Z in mm are needed", args.tool.len()));
     }
-    let (pulses, count) = (&args.pulses_per_deg, nominal.joints.len());
-    if !pulses.is_empty() && (pulses.len() != count || pulses.iter().any(|p| !p.is_finite() || *p == 0.0)) {
-        problems.push(format!("--pulses-per-deg has {} numbers; {count} that are not zero are needed", pulses.len()));
-    }
+    problems.extend(joints.problem());
     Ok(config::reject(problems)?)
 }
 
@@ -139,10 +136,7 @@ impl Program {
     fn read(args: &Compensate, language: Language, joints: Joints) -> files::Result<Program> {
         let path = &args.targets;
         let text = files::read_text(path, "robot program", None)?;
-        let refuse = |message: String, hint: &str| {
-            let place = Place { path: path.clone(), line: None };
-            files::Error::Format { message, place, hint: Some(hint.to_owned()) }
-        };
+        let refuse = |message: String, hint: &str| files::Error::format(path, None, message, Some(hint));
         let read = programs::Program::read(language, &text, joints)
             .map_err(|message| refuse(message, "`--pulses-per-deg N,N,...`, from the controller's parameters"))?;
         if !args.joint_targets_only

@@ -222,6 +222,6 @@ fn write(
     out.write_toml(IDENTIFIED, &format!("# {holds}\n{scale}{}", robot::file::to_toml(identified)))?;
     let json = out.write_json("identification.json", record)?;
     out.write_json(PLACEMENT, &placement)?;
-    out.write("identify.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
+    report::page::write(out, "identify.html", page)?;
     Ok(json)
 }

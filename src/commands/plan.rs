@@ -46,7 +46,9 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
             catalogue::paper()
         }
     };
-    check(args, &robot)?;
+    let slides: Vec<bool> = robot.joints.iter().map(|j| j.slides).collect();
+    let joints = Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg };
+    config::reject(joints.problem().into_iter().collect())?;
     let earlier = match &args.after {
         Some(path) => Some(super::identify::read(&Source::of(path.clone()), &robot)?),
         None => None,
@@ -67,12 +69,12 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     found.warnings.iter().for_each(progress::warn);
     let record = PlanFile::new(&found);
     out.write("poses.csv", poses_csv(found.poses.iter().map(|pose| &pose.at)).as_bytes())?;
-    for (name, text) in programs(args, &robot, &found.poses) {
+    for (name, text) in programs(args, &robot, joints, &found.poses) {
         out.write(&format!("programs/{name}"), text.as_bytes())?;
     }
     let json = out.write_json("plan.json", &record)?;
     let page = report::plan::page(&scene, &robot, &found, &record)?;
-    out.write("plan.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
+    report::page::write(&out, "plan.html", page)?;
     let stdout = if args.output.json { json } else { said(args, &found, &record, &out, earlier.as_deref()) };
     Ok(Outcome { stdout, status: Status::Done })
 }
@@ -92,15 +94,6 @@ fn check_one_target(rows: &[Measurement], path: &Utf8Path) -> Result<()> {
     }
 }
 
-fn check(args: &Arguments, robot: &Robot) -> Result<()> {
-    let (pulses, count) = (&args.pulses_per_deg, robot.joints.len());
-    let mut problems = Vec::new();
-    if !pulses.is_empty() && (pulses.len() != count || pulses.iter().any(|p| !p.is_finite() || *p == 0.0)) {
-        problems.push(format!("--pulses-per-deg has {} numbers; {count} that are not zero are needed", pulses.len()));
-    }
-    Ok(config::reject(problems)?)
-}
-
 fn settings(args: &Arguments) -> Settings {
     let paper = args.plan == PlanKind::Paper;
     Settings {
@@ -118,9 +111,7 @@ fn settings(args: &Arguments) -> Settings {
 }
 
 /// One program a controller, plain CSV among them.
-fn programs(args: &Arguments, robot: &Robot, poses: &[Planned]) -> Vec<(String, String)> {
-    let slides: Vec<bool> = robot.joints.iter().map(|j| j.slides).collect();
-    let joints = Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg };
+fn programs(args: &Arguments, robot: &Robot, joints: Joints, poses: &[Planned]) -> Vec<(String, String)> {
     let motion = Motion { speed_percent: args.speed_percent, dwell_s: args.dwell_s };
     let stop = |pose: &Planned| {
         let from = pose.at.joints_deg.iter().zip(&robot.joints).map(|(reading, joint)| {
@@ -132,7 +123,7 @@ fn programs(args: &Arguments, robot: &Robot, poses: &[Planned]) -> Vec<(String, 
     let stops: Vec<Stop> = poses.iter().map(stop).collect();
     let mut files: Vec<(String, String)> =
         Language::ALL.into_iter().flat_map(|language| program(language, PROGRAM, &stops, &motion, joints)).collect();
-    let names = slides.iter().enumerate().map(|(joint, slides)| reading_name(joint, *slides));
+    let names = joints.slides.iter().enumerate().map(|(joint, slides)| reading_name(joint, *slides));
     let mut csv = format!("name,step,{}\n", names.collect::<Vec<String>>().join(","));
     for stop in &stops {
         for (step, readings) in [("approach", &stop.approach), ("stop", &stop.readings)] {

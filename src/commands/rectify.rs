@@ -81,7 +81,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let (file, shown) = judge(file, kept, found);
     let json = out.write_json("rectified.json", &file)?;
     let page = report::rectify::page(&file, &rectified, shown.as_ref())?;
-    out.write("rectify.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
+    report::page::write(&out, "rectify.html", page)?;
     let stdout = if args.output.json { json } else { report::rectify::summary(&file, &out) };
     Ok(Outcome { stdout, status: Status::Done })
 }

@@ -28,8 +28,7 @@ pub fn run(args: &Report, config: &Config, run: Run) -> Result<Outcome> {
     let breaks = breaks(folder);
     breaks.iter().for_each(progress::warn);
     let day = Day { check, measured, robot, breaks };
-    let page = report::page::signed(report::day::page(&day), out.provenance().as_ref());
-    out.write("report.html", page.as_bytes())?;
+    report::page::write(&out, "report.html", report::day::page(&day))?;
     let status = if day.is_good() { Status::Done } else { Status::OutOfTolerance };
     Ok(Outcome { stdout: report::day::summary(&day, &out), status })
 }

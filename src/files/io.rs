@@ -50,6 +50,14 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// Of a file that is not what it must be; `hint` says what to change.
+    pub fn format(path: &Utf8Path, line: Option<u64>, message: impl Into<String>, hint: Option<&str>) -> Error {
+        let place = Place { path: path.to_owned(), line };
+        Error::Format { message: message.into(), place, hint: hint.map(str::to_owned) }
+    }
+}
+
 impl Explain for Error {
     fn place(&self) -> Option<String> {
         match self {
@@ -85,8 +93,7 @@ pub fn read_text(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Res
 pub fn read_text_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, most_bytes: u64) -> Result<String> {
     let mut bytes = Vec::new();
     let read = std::fs::File::open(path).and_then(|file| file.take(most_bytes + 1).read_to_end(&mut bytes));
-    let refuse =
-        |message: String| Error::Format { message, place: Place { path: path.to_owned(), line: None }, hint: None };
+    let refuse = |message: String| Error::format(path, None, message, None);
     match read {
         Ok(_) if bytes.len() as u64 > most_bytes => {
             Err(refuse(format!("{what}: more than {} MB of text; no such file is that long", most_bytes >> 20)))
@@ -102,29 +109,20 @@ pub fn read_text_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, 
 pub fn read_json<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<T> {
     let text = read_text(path, what, hint)?;
     let of_another_kind = !text.trim_start().starts_with(['{', '[']);
-    serde_json::from_str(&text).map_err(|e| Error::Format {
-        message: if of_another_kind { format!("{what}: this is no JSON") } else { format!("{what}: {e}") },
-        place: Place { path: path.to_owned(), line: (!of_another_kind).then_some(e.line() as u64) },
-        hint: hint.filter(|_| of_another_kind).map(str::to_owned),
+    serde_json::from_str(&text).map_err(|e| match of_another_kind {
+        true => Error::format(path, None, format!("{what}: this is no JSON"), hint),
+        false => Error::format(path, Some(e.line() as u64), format!("{what}: {e}"), None),
     })
 }
 
 pub fn read_toml<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<T> {
     let text = read_text(path, what, hint)?;
     if text.trim_start().starts_with('{') {
-        return Err(Error::Format {
-            message: format!("{what}: this is JSON, and TOML is needed"),
-            place: Place { path: path.to_owned(), line: None },
-            hint: hint.map(str::to_owned),
-        });
+        return Err(Error::format(path, None, format!("{what}: this is JSON, and TOML is needed"), hint));
     }
     toml::from_str(&text).map_err(|e| {
         let line = e.span().map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count() as u64);
-        Error::Format {
-            message: format!("{what}: {}", e.message()),
-            place: Place { path: path.to_owned(), line },
-            hint: None,
-        }
+        Error::format(path, line, format!("{what}: {}", e.message()), None)
     })
 }
 

@@ -15,7 +15,6 @@ use serde::Serialize;
 
 use super::io::{Durability, Error, Result, is_temporary, to_json, write_atomically};
 use super::provenance::{Digested, KEY, Provenance, Run, pictures, sha256};
-use crate::diagnostic::Place;
 use crate::progress;
 
 /// Endings of files that are written: no folder is meant by such a name.
@@ -57,11 +56,9 @@ impl OutDir {
     /// Creates the folder where needed, checks that a file can be made in it, and waits for other runs that write into it.
     pub fn open(path: &Utf8Path) -> Result<OutDir> {
         if !path.is_dir() && (path.is_file() || path.extension().is_some_and(|e| RESULTS.contains(&e))) {
-            return Err(Error::Format {
-                message: "results go into a folder, and this is the name of a file".to_owned(),
-                place: Place { path: path.to_owned(), line: None },
-                hint: Some("`--out DIR` names the folder; `--out .` is the one that you are in".to_owned()),
-            });
+            let hint = "`--out DIR` names the folder; `--out .` is the one that you are in";
+            let message = "results go into a folder, and this is the name of a file";
+            return Err(Error::format(path, None, message, Some(hint)));
         }
         let io = |action, source| Error::Io { action, path: path.to_owned(), source };
         std::fs::create_dir_all(path).map_err(|e| io("create", e))?;

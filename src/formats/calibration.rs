@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{checked, export};
-use crate::diagnostic::Place;
 use crate::files::{self, OutDir, Result};
 use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
@@ -288,14 +287,13 @@ pub fn file(named: Option<&Utf8Path>, out: &OutDir) -> Result<Utf8PathBuf> {
     };
     match found[..] {
         [one] => Ok(named.join(one)),
-        _ => Err(files::Error::Format {
-            message: match found[..] {
+        _ => {
+            let message = match found[..] {
                 [] => format!("no calibration in this folder: neither {OWN_NAME} nor {}", export::NAMES.join(", ")),
                 _ => format!("this folder holds several calibrations: {}", found.join(", ")),
-            },
-            place: Place { path: named.to_owned(), line: None },
-            hint: Some("name the file: `--calibration FILE`".to_owned()),
-        }),
+            };
+            Err(files::Error::format(named, None, message, Some("name the file: `--calibration FILE`")))
+        }
     }
 }
 
@@ -309,8 +307,7 @@ pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
     const WHAT: &str = "calibration file";
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
     let text = files::read_text(path, WHAT, Some(hint))?;
-    let refused =
-        |message| files::Error::Format { message, place: Place { path: path.to_owned(), line: None }, hint: None };
+    let refused = |message: String| files::Error::format(path, None, message, None);
     if let Some(rig) = export::read(path, &text) {
         return Ok(Calibrated::of_rig(rig.map_err(refused)?));
     }

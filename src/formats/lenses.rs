@@ -8,7 +8,6 @@ use std::str::FromStr;
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::{calibration, export};
-use crate::diagnostic::Place;
 use crate::files::{self, Result};
 use crate::imaging::Side;
 use crate::stereo::model::known_lenses::KnownLenses;
@@ -73,9 +72,5 @@ fn read_one(file: &LensFile) -> Result<KnownLenses> {
 fn one_camera(path: &Utf8Path) -> Result<Option<crate::stereo::Camera>> {
     let text = files::read_text(path, "file of a lens", Some("`--intrinsics FILE,left` or `--intrinsics FILE,right`"))?;
     let camera = export::read_camera(&text);
-    camera.transpose().map_err(|message| files::Error::Format {
-        message,
-        place: Place { path: path.to_owned(), line: None },
-        hint: None,
-    })
+    camera.transpose().map_err(|message| files::Error::format(path, None, message, None))
 }

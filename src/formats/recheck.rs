@@ -3,7 +3,7 @@
 use camino::Utf8Path;
 use serde::{Deserialize, Serialize};
 
-use crate::diagnostic::{Place, Status};
+use crate::diagnostic::Status;
 use crate::files::{self, OutDir, Result};
 use crate::imaging::Skipped;
 use crate::stereo::findings::standing::MATERIAL_SHARE;
@@ -134,10 +134,10 @@ pub fn history(out: &OutDir, name: &str) -> Result<Vec<Check>> {
     }
     let text = files::read_text(&path, "history of checks", None)?;
     let mut reader = csv::Reader::from_reader(text.as_bytes());
-    reader.deserialize().collect::<Result<Vec<Check>, csv::Error>>().map_err(|error| files::Error::Format {
-        message: format!("not a history of checks: {error}"),
-        place: Place { path, line: error.position().map(|position| position.line()) },
-        hint: Some("move it away, or name another `--out`".to_owned()),
+    reader.deserialize().collect::<Result<Vec<Check>, csv::Error>>().map_err(|error| {
+        let line = error.position().map(csv::Position::line);
+        let message = format!("not a history of checks: {error}");
+        files::Error::format(&path, line, message, Some("move it away, or name another `--out`"))
     })
 }
 

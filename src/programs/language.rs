@@ -85,6 +85,14 @@ pub struct Joints<'a> {
 }
 
 impl Joints<'_> {
+    /// What is wrong with the pulses a degree, for a person.
+    pub fn problem(&self) -> Option<String> {
+        let (pulses, count) = (self.pulses_per_deg, self.count());
+        let fit = pulses.is_empty() || pulses.len() == count && pulses.iter().all(|p| p.is_finite() && *p != 0.0);
+        let said = || format!("--pulses-per-deg has {} numbers; {count} that are not zero are needed", pulses.len());
+        (!fit).then(said)
+    }
+
     pub(super) fn count(&self) -> usize {
         self.slides.len()
     }

@@ -2,6 +2,7 @@
 
 use super::drawing::script::SCRIPT;
 use crate::files::provenance::{Digested, Provenance};
+use crate::files::{self, OutDir};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// How the verdict at the top of a page is coloured.
@@ -97,8 +98,12 @@ pub fn page(title: &str, lead: &str, content: &Markup) -> String {
     .into_string()
 }
 
-/// The page with where it came from at its end.
-pub fn signed(page: String, provenance: Option<&Provenance>) -> String {
+/// Writes a page with where it came from at its end.
+pub fn write(out: &OutDir, name: &str, page: String) -> files::Result<()> {
+    out.write(name, signed(page, out.provenance().as_ref()).as_bytes())
+}
+
+fn signed(page: String, provenance: Option<&Provenance>) -> String {
     let Some(p) = provenance else { return page };
     let files = |files: &[Digested]| {
         html! { @for file in files { li { (file.file) @if let Some(n) = file.pictures { " (" (n) " pictures)" } br; code { (file.sha256) } } } }

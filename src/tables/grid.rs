@@ -11,7 +11,6 @@ use super::fields::{Fields, Form};
 use super::numbers::Style;
 use super::program_lines;
 use super::source::{self, Source};
-use crate::diagnostic::Place;
 use crate::files::{Error, Result};
 
 /// Columns of the widest table that is read.
@@ -133,14 +132,12 @@ impl Grid {
 
     fn unreadable(&self, e: &csv::Error) -> Error {
         let line = e.position().map(csv::Position::line);
-        let place = Place { path: self.path.clone(), line };
-        Error::Format { message: format!("not readable as CSV: {e}"), place, hint: None }
+        Error::format(&self.path, line, format!("not readable as CSV: {e}"), None)
     }
 
     /// A complaint about a line.
     pub fn refuse(&self, line: u64, message: String, hint: Option<&str>) -> Error {
-        let place = Place { path: self.path.clone(), line: Some(line) };
-        Error::Format { message, place, hint: hint.map(str::to_owned) }
+        Error::format(&self.path, Some(line), message, hint)
     }
 }
 

@@ -9,7 +9,6 @@ use calamine::{Data, Reader, Sheets, open_workbook_auto_from_rs};
 use camino::{Utf8Path, Utf8PathBuf};
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-use crate::diagnostic::Place;
 use crate::files::{Error, Result};
 
 /// The longest table that is read, bytes.
@@ -62,7 +61,7 @@ pub(super) fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<So
         return Err(refuse(&file, "a sheet is named behind `#`, but the file is no spreadsheet".to_owned(), None));
     }
     if let Some((kind, hint)) = foreign(&bytes, &file) {
-        return Err(refuse(&file, format!("{what}: {kind}, which is not read"), Some(hint.to_owned())));
+        return Err(refuse(&file, format!("{what}: {kind}, which is not read"), Some(hint)));
     }
     let (mut text, encoding) = decoded(&bytes);
     if text.contains('\0') {
@@ -71,13 +70,13 @@ pub(super) fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<So
     }
     if text.contains('\0') {
         let hint = "save it as CSV (comma, semicolon, tab or blanks) or as a spreadsheet (xlsx, xls, ods)";
-        return Err(refuse(&file, format!("{what}: not a text, and no spreadsheet"), Some(hint.to_owned())));
+        return Err(refuse(&file, format!("{what}: not a text, and no spreadsheet"), Some(hint)));
     }
     Ok(Source::Text(text, encoding))
 }
 
-fn refuse(path: &Utf8Path, message: String, hint: Option<String>) -> Error {
-    Error::Format { message, place: Place { path: path.to_owned(), line: None }, hint }
+fn refuse(path: &Utf8Path, message: String, hint: Option<&str>) -> Error {
+    Error::format(path, None, message, hint)
 }
 
 /// What a file of another program is, and how its table is exported.
@@ -135,11 +134,10 @@ fn utf_16_without_mark(bytes: &[u8]) -> Option<&'static Encoding> {
 fn cells(bytes: Vec<u8>, path: &Utf8Path, sheet: Option<&str>) -> Result<Source> {
     if bytes.len() > MOST_SHEET_BYTES {
         let message = format!("a spreadsheet of more than {} MB", MOST_SHEET_BYTES >> 20);
-        return Err(refuse(path, message, Some("save the sheet as CSV".to_owned())));
+        return Err(refuse(path, message, Some("save the sheet as CSV")));
     }
-    let unreadable = |e: calamine::Error| {
-        refuse(path, format!("not readable as a spreadsheet: {e}"), Some("save the sheet as CSV".to_owned()))
-    };
+    let unreadable =
+        |e: calamine::Error| refuse(path, format!("not readable as a spreadsheet: {e}"), Some("save the sheet as CSV"));
     let mut book: Sheets<_> = open_workbook_auto_from_rs(Cursor::new(bytes)).map_err(unreadable)?;
     let names = book.sheet_names();
     let name = match sheet {
@@ -152,7 +150,7 @@ fn cells(bytes: Vec<u8>, path: &Utf8Path, sheet: Option<&str>) -> Result<Source>
     };
     let Some(name) = name else {
         let message = format!("no sheet `{}`; the file has: {}", sheet.unwrap_or("1"), names.join(", "));
-        return Err(refuse(path, message, Some(format!("`{path}#SHEET` names a sheet"))));
+        return Err(refuse(path, message, Some(&format!("`{path}#SHEET` names a sheet"))));
     };
     let range = book.worksheet_range(&name).map_err(unreadable)?;
     let first = range.start().map_or(0, |(row, _)| u64::from(row)) + 1;

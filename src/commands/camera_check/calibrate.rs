@@ -83,8 +83,7 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let names = corners.pairs.iter().map(|pair| pair.pair.as_str());
     let drawn = args.draw && args.images.is_some();
     let page = if drawn { report::page::with_overlays(page, names) } else { page };
-    let page = report::page::signed(page, out.provenance().as_ref());
-    out.write("camera-check.html", page.as_bytes())?;
+    report::page::write(&out, "camera-check.html", page)?;
 
     let stdout = if args.output.json { json } else { report::camera_check::summary(&calibration, &judged, &out) };
     let status = if judged.verdict == Verdict::Pass { Status::Done } else { Status::OutOfTolerance };
@@ -251,9 +250,7 @@ fn second_board(
         (None, None) => board,
         (squares, mm) => Board::checker(squares.unwrap_or(board.squares), mm.unwrap_or(board.square_mm)),
     });
-    let mut problems = Vec::new();
-    ranges::within(&mut problems, "check_square_mm", board.square_mm, SQUARES_MM);
-    config::reject(problems)?;
+    config::check_within("check_square_mm", board.square_mm, SQUARES_MM)?;
     let (mosaic, cache) = (args.bayer, Some(Cache { out, thumbnails: false }));
     let pairing = Source::folder("camera-check", images).pairs(out)?;
     let corners = find_corners(&pairing, &Wanted { board, needed: 1, mosaic, cache, overlays: None })?;

@@ -21,9 +21,7 @@ use crate::{progress, ranges, report};
 /// Runs the command.
 pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
-    let mut problems = Vec::new();
-    ranges::within(&mut problems, "tolerance_mm", tolerance_mm, ranges::TOLERANCES_MM);
-    config::reject(problems)?;
+    config::check_within("tolerance_mm", tolerance_mm, ranges::TOLERANCES_MM)?;
     let run = Run { force: args.output.force, ..run };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let file = calibration::file(Some(against), &out)?;
@@ -53,7 +51,7 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let page = report::recheck::page(&found, standing, tolerance_mm, &checks)?;
     let json = out.write_json("recheck.json", &content)?;
     out.write(HISTORY, formats::to_csv(&checks, "pairs").as_bytes())?;
-    out.write("recheck.html", report::page::signed(page, out.provenance().as_ref()).as_bytes())?;
+    report::page::write(&out, "recheck.html", page)?;
     let summary = || report::recheck::summary(&found, standing, tolerance_mm, checks.len(), &out);
     Ok(Outcome { stdout: if args.output.json { json } else { summary() }, status: standing.status() })
 }

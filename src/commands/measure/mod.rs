@@ -73,8 +73,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let page = report::measure::page(&series, &file, &known, &Extras { thumbnails, distances })?;
     let names = corners.pairs.iter().map(|pair| pair.pair.as_str());
     let page = if args.draw { report::page::with_overlays(page, names) } else { page };
-    let page = report::page::signed(page, out.provenance().as_ref());
-    out.write("measure.html", page.as_bytes())?;
+    report::page::write(&out, "measure.html", page)?;
     end(&series, &known)?;
     let stdout = if args.output.json { json } else { report::measure::summary(&file, &out) };
     Ok(Outcome { stdout, status: Status::Done })

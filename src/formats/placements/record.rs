@@ -4,7 +4,6 @@ use camino::Utf8Path;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::diagnostic::Place;
 use crate::files::{self, Result};
 use crate::formats::checked;
 use crate::geometry::{Transform, rotation_matrix};
@@ -135,11 +134,8 @@ impl PlacementFile {
         for record in all {
             let Some(rotation) = record.rotation else { continue };
             let matrix = Matrix3::from_fn(|r, c| rotation[r][c]);
-            checked::rotation("a rotation", matrix).map_err(|message| files::Error::Format {
-                message,
-                place: Place { path: path.to_owned(), line: None },
-                hint: Some(hint.to_owned()),
-            })?;
+            checked::rotation("a rotation", matrix)
+                .map_err(|message| files::Error::format(path, None, message, Some(hint)))?;
         }
         Ok(file)
     }

@@ -3,11 +3,10 @@
 //! In: XML text. Out: the joints from the root link to a tip link, lengths in mm. Joints that no serial chain of motors has
 //! (mimic, floating, planar) are refused with the longest chain that does without them.
 
-use camino::Utf8Path;
+use camino::{Utf8Path, Utf8PathBuf};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 
-use crate::diagnostic::Place;
 use crate::files::{self, Result};
 use crate::geometry::{Transform, transform};
 use crate::robot::Robot;
@@ -62,7 +61,7 @@ pub struct Urdf {
     /// The link that is no joint's child.
     pub root: String,
     text: String,
-    place: Place,
+    path: Utf8PathBuf,
 }
 
 /// Joints from the root to a tip.
@@ -96,10 +95,7 @@ impl Urdf {
 
     /// Understands the text of a file.
     pub fn parse(text: String, path: &Utf8Path) -> Result<Urdf> {
-        let place = |line| Place { path: path.to_owned(), line };
-        let refuse = |line, message: String, hint: Option<&str>| -> files::Error {
-            files::Error::Format { message, place: place(line), hint: hint.map(str::to_owned) }
-        };
+        let refuse = |line, message: String, hint| files::Error::format(path, line, message, hint);
         let text = without_declaration(text);
         let document = Document::parse(&text)
             .map_err(|e| refuse(Some(u64::from(e.pos().row)), format!("not readable as XML: {e}"), None))?;
@@ -125,12 +121,11 @@ impl Urdf {
             return Err(refuse(None, message, None));
         };
         let name = root.attribute("name").unwrap_or("robot").to_owned();
-        let (root, place) = (root_link.to_owned(), place(None));
-        Ok(Urdf { name, joints, root, text, place })
+        Ok(Urdf { name, joints, root: root_link.to_owned(), text, path: path.to_owned() })
     }
 
     fn refuse(&self, line: Option<u64>, message: String, hint: Option<String>) -> files::Error {
-        files::Error::Format { message, place: Place { line, ..self.place.clone() }, hint }
+        files::Error::format(&self.path, line, message, hint.as_deref())
     }
 
     /// The joints from the root to the link `tip`, or to the flange where none is named.

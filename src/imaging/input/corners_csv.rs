@@ -16,8 +16,7 @@ use nalgebra::Point2;
 use self::line::{Columns, Line, Row};
 use super::pairs::natural_order;
 use crate::csv_table::{Table, quoted};
-use crate::diagnostic::Place;
-use crate::files::{self, Result};
+use crate::files::Result;
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side, Skipped};
 
 /// The header of `corners.csv`.
@@ -79,11 +78,9 @@ fn size_of(table: &Table, rows: &[Row], side: Side, said: Option<(u32, u32)>) ->
     let Some(size) = of_side().find_map(|row| row.size).or(said) else {
         // A side without corners has no pictures whose size could matter.
         let Some(row) = of_side().next() else { return Ok((0, 0)) };
-        return Err(files::Error::Format {
-            message: "the corners file does not hold the pictures' size".to_owned(),
-            place: Place { path: table.path.to_owned(), line: Some(row.line) },
-            hint: Some("`--picture-size WxH`, or columns width_px and height_px".to_owned()),
-        });
+        let message = "the corners file does not hold the pictures' size".to_owned();
+        let hint = "`--picture-size WxH`, or columns width_px and height_px";
+        return Err(table.refuse_with(row.line, message, Some(hint)));
     };
     let (w, h) = size;
     for row in of_side() {
@@ -140,20 +137,18 @@ fn fit_to_board(table: &Table, rows: &mut [Row], board: Board) -> Result<bool> {
     let col = rows.iter().map(|r| r.corner.col).max().unwrap_or(0);
     let row = rows.iter().map(|r| r.corner.row).max().unwrap_or(0);
     let line = rows.iter().find(|r| r.corner.col >= columns || r.corner.row >= lines).map_or(1, |r| r.line);
-    Err(files::Error::Format {
-        message: format!(
-            "corners reach col {col} and row {row}, but a board of {} squares has {columns}x{lines} inner corners",
-            board.squares
-        ),
-        place: Place { path: table.path.to_owned(), line: Some(line) },
-        hint: Some(if table.column("id").is_some() && !board.is_coded() {
-            UNUSED_ID.to_owned()
-        } else if board.is_coded() {
+    let message = format!(
+        "corners reach col {col} and row {row}, but a board of {} squares has {columns}x{lines} inner corners",
+        board.squares
+    );
+    let hint = match (board.is_coded(), table.column("id")) {
+        (false, Some(_)) => UNUSED_ID.to_owned(),
+        (false, None) => format!("`--squares {}x{}` if the board has that many squares", col + 2, row + 2),
+        (true, _) => {
             format!("a board of {}x{} squares or more, columns first as printed, has such corners", col + 2, row + 2)
-        } else {
-            format!("`--squares {}x{}` if the board has that many squares", col + 2, row + 2)
-        }),
-    })
+        }
+    };
+    Err(table.refuse_with(line, message, Some(&hint)))
 }
 
 fn gather(rows: Vec<Row>, board: Board) -> (Vec<PairCorners>, Vec<Skipped>) {
