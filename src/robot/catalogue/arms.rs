@@ -34,83 +34,66 @@ macro_rules! ur {
     };
 }
 
+const IRB1200_SOURCE: &str = "ABB, product specification IRB 1200 (3HAC046982), dimensions and working range";
+
+macro_rules! abb {
+    ($name:literal, $title:literal, $source:expr, $d1:literal, $a2:literal, $a3:literal, $d4:literal, $d6:literal, $limits:expr) => {
+        Arm {
+            name: $name,
+            title: $title,
+            source: $source,
+            note: "",
+            convention: Convention::Modified,
+            rows: &[
+                [0.0, 0.0, 0.0, $d1],
+                [-90.0, 0.0, -90.0, 0.0],
+                [0.0, $a2, 0.0, 0.0],
+                [-90.0, $a3, 0.0, $d4],
+                [90.0, 0.0, 0.0, 0.0],
+                [-90.0, 0.0, 0.0, $d6],
+            ],
+            limits_deg: $limits,
+            flange_deg: [0.0, 0.0, 180.0],
+            coupled: &[],
+        }
+    };
+}
+
 /// All of them, by name.
 pub const ARMS: &[Arm] = &[
-    Arm {
-        name: "abb-irb120",
-        title: "ABB IRB 120-3/0.6",
-        source: "ABB, product specification IRB 120 (3HAC035960), dimensions and working range",
-        note: "",
-        convention: Convention::Modified,
-        rows: &[
-            [0.0, 0.0, 0.0, 290.0],
-            [-90.0, 0.0, -90.0, 0.0],
-            [0.0, 270.0, 0.0, 0.0],
-            [-90.0, 70.0, 0.0, 302.0],
-            [90.0, 0.0, 0.0, 0.0],
-            [-90.0, 0.0, 0.0, 72.0],
-        ],
-        limits_deg: &[
-            [-165.0, 165.0],
-            [-110.0, 110.0],
-            [-110.0, 70.0],
-            [-160.0, 160.0],
-            [-120.0, 120.0],
-            [-400.0, 400.0],
-        ],
-        flange_deg: [0.0, 0.0, 180.0],
-        coupled: &[],
-    },
-    Arm {
-        name: "abb-irb1200-5-0.9",
-        title: "ABB IRB 1200-5/0.9",
-        source: "ABB, product specification IRB 1200 (3HAC046982), dimensions and working range",
-        note: "",
-        convention: Convention::Modified,
-        rows: &[
-            [0.0, 0.0, 0.0, 399.1],
-            [-90.0, 0.0, -90.0, 0.0],
-            [0.0, 448.0, 0.0, 0.0],
-            [-90.0, 42.0, 0.0, 451.0],
-            [90.0, 0.0, 0.0, 0.0],
-            [-90.0, 0.0, 0.0, 82.0],
-        ],
-        limits_deg: &[
-            [-170.0, 170.0],
-            [-100.0, 130.0],
-            [-200.0, 70.0],
-            [-270.0, 270.0],
-            [-130.0, 130.0],
-            [-360.0, 360.0],
-        ],
-        flange_deg: [0.0, 0.0, 180.0],
-        coupled: &[],
-    },
-    Arm {
-        name: "abb-irb1200-7-0.7",
-        title: "ABB IRB 1200-7/0.7",
-        source: "ABB, product specification IRB 1200 (3HAC046982), dimensions and working range",
-        note: "",
-        convention: Convention::Modified,
-        rows: &[
-            [0.0, 0.0, 0.0, 399.1],
-            [-90.0, 0.0, -90.0, 0.0],
-            [0.0, 350.0, 0.0, 0.0],
-            [-90.0, 42.0, 0.0, 351.0],
-            [90.0, 0.0, 0.0, 0.0],
-            [-90.0, 0.0, 0.0, 82.0],
-        ],
-        limits_deg: &[
-            [-170.0, 170.0],
-            [-100.0, 135.0],
-            [-200.0, 70.0],
-            [-270.0, 270.0],
-            [-130.0, 130.0],
-            [-360.0, 360.0],
-        ],
-        flange_deg: [0.0, 0.0, 180.0],
-        coupled: &[],
-    },
+    abb!(
+        "abb-irb120",
+        "ABB IRB 120-3/0.6",
+        "ABB, product specification IRB 120 (3HAC035960), dimensions and working range",
+        290.0,
+        270.0,
+        70.0,
+        302.0,
+        72.0,
+        &[[-165.0, 165.0], [-110.0, 110.0], [-110.0, 70.0], [-160.0, 160.0], [-120.0, 120.0], [-400.0, 400.0]]
+    ),
+    abb!(
+        "abb-irb1200-5-0.9",
+        "ABB IRB 1200-5/0.9",
+        IRB1200_SOURCE,
+        399.1,
+        448.0,
+        42.0,
+        451.0,
+        82.0,
+        &[[-170.0, 170.0], [-100.0, 130.0], [-200.0, 70.0], [-270.0, 270.0], [-130.0, 130.0], [-360.0, 360.0]]
+    ),
+    abb!(
+        "abb-irb1200-7-0.7",
+        "ABB IRB 1200-7/0.7",
+        IRB1200_SOURCE,
+        399.1,
+        350.0,
+        42.0,
+        351.0,
+        82.0,
+        &[[-170.0, 170.0], [-100.0, 135.0], [-200.0, 70.0], [-270.0, 270.0], [-130.0, 130.0], [-360.0, 360.0]]
+    ),
     Arm {
         name: "fanuc-lrmate200id",
         title: "Fanuc LR Mate 200iD",
