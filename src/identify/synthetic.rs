@@ -1,6 +1,6 @@
 //! A small world for tests: the paper's robot with Table 2's errors, measured on spheres round the paper's four start points.
 
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -100,6 +100,31 @@ pub fn of_targets(world: &World, targets: &[(&str, Vector3<f64>)], noise_mm: f64
         }
     }
     rows
+}
+
+/// The point of a row.
+pub fn point(row: &mut Measurement) -> &mut Point3<f64> {
+    match &mut row.observed {
+        Observed::Position { point_mm, .. } => point_mm,
+        _ => panic!("a point"),
+    }
+}
+
+/// How a target with an orientation sits on the flange.
+pub fn turned() -> UnitQuaternion<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::new(Vector3::new(0.2, -0.1, 2.9)))
+}
+
+/// Orientations of a robot's rows, with this noise.
+pub fn orient(rows: &mut [Measurement], truth: &Robot, noise_rad: f64, random: &mut Pcg64Mcg) {
+    for row in rows {
+        let group = row.at.group[1..].parse().unwrap_or(0);
+        let flange = sensor(group).rotation * truth.base_from_flange(&row.at.joints_rad()).rotation;
+        let noise = UnitQuaternion::from_scaled_axis(noise_rad * normal(random));
+        if let Observed::Position { rotation_rad, .. } = &mut row.observed {
+            *rotation_rad = Some((noise * flange * turned()).scaled_axis());
+        }
+    }
 }
 
 /// Where the camera of a group is.

@@ -270,16 +270,14 @@ fn a_zero_that_is_off_costs_next_to_nothing_and_is_said() {
 #[test]
 fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain() {
     use crate::identify::judge::uncertainty::Expected;
-    use crate::measurements::Observed;
     let world = synthetic::world(120, NOISE_MM, 3);
     let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let told = |size_mm: f64| {
         let mut rows = world.rows.clone();
         for row in &mut rows {
             let group = row.at.group.bytes().last().map_or(0.0, f64::from);
-            if let Observed::Position { point_mm, .. } = &mut row.observed {
-                *point_mm += size_mm * point_mm.coords.map(|c| (c / 60.0 + 1.7 * group).sin());
-            }
+            let point = synthetic::point(row);
+            *point += size_mm * point.coords.map(|c| (c / 60.0 + 1.7 * group).sin());
         }
         let set = Dataset::new(&rows).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
@@ -304,16 +302,14 @@ fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain()
 
 #[test]
 fn a_row_that_is_a_little_off_is_named_though_it_is_fitted_and_a_verify_row_too() {
-    use crate::measurements::{Observed, Role};
+    use crate::measurements::Role;
     let world = synthetic::world(120, NOISE_MM, 6);
     let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let verify = world.rows.iter().position(|r| r.at.role == Role::Verify).unwrap();
     for sigmas in [0.0, 6.5, 9.0, 100.0] {
         let mut rows = world.rows.clone();
         for i in [40, verify] {
-            if let Observed::Position { point_mm, .. } = &mut rows[i].observed {
-                point_mm.x += sigmas * NOISE_MM;
-            }
+            synthetic::point(&mut rows[i]).x += sigmas * NOISE_MM;
         }
         let set = Dataset::new(&rows).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
@@ -328,16 +324,11 @@ fn a_row_that_is_a_little_off_is_named_though_it_is_fitted_and_a_verify_row_too(
 
 #[test]
 fn readings_of_another_scale_are_said_to_be_so() {
-    use crate::measurements::Observed;
     let world = synthetic::world(120, NOISE_MM, 8);
     let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     for (scale, said) in [(1.0, false), (0.95, true), (1.05, true)] {
         let mut rows = world.rows.clone();
-        for row in &mut rows {
-            if let Observed::Position { point_mm, .. } = &mut row.observed {
-                *point_mm *= scale;
-            }
-        }
+        rows.iter_mut().for_each(|row| *synthetic::point(row) *= scale);
         let set = Dataset::new(&rows).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
         let findings = crate::identify::record::findings::findings(&set, &found, &Default::default());

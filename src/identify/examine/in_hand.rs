@@ -31,7 +31,6 @@ mod tests {
     use super::*;
     use crate::geometry::transform;
     use crate::identify::synthetic;
-    use crate::measurements::Observed;
 
     #[test]
     fn cameras_on_the_hand_are_told_from_cameras_that_stand() {
@@ -44,9 +43,7 @@ mod tests {
                 row.at.group = "g0".into();
                 row.at.role = crate::measurements::Role::Sample;
                 let camera = world.truth.base_from_flange(&row.at.joints_rad()) * hand;
-                if let Observed::Position { point_mm, .. } = &mut row.observed {
-                    *point_mm = camera.inverse() * Point3::new(420.0, -150.0, 20.0);
-                }
+                *synthetic::point(row) = camera.inverse() * Point3::new(420.0, -150.0, 20.0);
             }
             let refused = refuse(&Dataset::new(&world.rows).unwrap(), &world.nominal);
             assert!(matches!(refused, Err(Error::CamerasOnHand { .. })), "{seed}: {refused:?}");

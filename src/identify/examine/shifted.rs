@@ -318,10 +318,9 @@ mod tests {
             // The cameras were knocked halfway.
             let half = world.rows.len() / 2;
             for row in &mut world.rows[half..] {
-                if let crate::measurements::Observed::Position { point_mm, .. } = &mut row.observed {
-                    *point_mm = crate::geometry::transform(Vector3::new(0.1, 0.0, 0.05), Vector3::new(20.0, 0.0, 0.0))
-                        * *point_mm;
-                }
+                let point = synthetic::point(row);
+                *point =
+                    crate::geometry::transform(Vector3::new(0.1, 0.0, 0.05), Vector3::new(20.0, 0.0, 0.0)) * *point;
             }
             assert_eq!(find(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}, cameras moved");
         }

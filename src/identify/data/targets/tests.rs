@@ -4,7 +4,7 @@ use super::*;
 use crate::geometry::transform;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::orientations;
-use crate::identify::synthetic;
+use crate::identify::synthetic::{self, point};
 use crate::measurements::{Measurement, Observed, Role};
 use crate::robot::Robot;
 
@@ -20,13 +20,6 @@ const TARGETS: [(&str, Vector3<f64>); 4] = [
 
 fn rows(count: usize, seed: u64) -> Vec<Measurement> {
     synthetic::of_targets(&synthetic::world(40, 0.0, seed), &TARGETS[..count], NOISE_MM, seed)
-}
-
-fn point(row: &mut Measurement) -> &mut Point3<f64> {
-    match &mut row.observed {
-        Observed::Position { point_mm, .. } => point_mm,
-        _ => panic!("a point"),
-    }
 }
 
 fn one(rows: &[Measurement]) -> (Vec<Measurement>, Targets) {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::identify::synthetic::{World, planned};
+use crate::identify::synthetic::{World, planned, point};
 use crate::measurements::{Measurement, Observed};
 
 /// One sphere with tilts of so many degrees, by an arm that is off by what a good one is off.
@@ -33,9 +33,7 @@ fn joints(rows: &[Measurement], change: impl Fn(&mut Vec<f64>)) -> Vec<Measureme
 fn shifted(rows: &[Measurement], by: impl Fn(usize) -> f64) -> Vec<Measurement> {
     let mut rows = rows.to_vec();
     for (i, row) in rows.iter_mut().enumerate() {
-        if let Observed::Position { point_mm, .. } = &mut row.observed {
-            point_mm.x += by(i);
-        }
+        point(row).x += by(i);
     }
     rows
 }

@@ -9,13 +9,13 @@ fn rows(count: usize, noise_mm: f64, oriented: bool, seed: u64) -> (Robot, Vec<M
     let mut world = synthetic::planned(4 * count, 0, 25.0, noise_mm, seed, &|_| {});
     world.rows.retain(|row| row.at.group == "g1");
     world.rows.truncate(count);
-    let mut random = rand_pcg::Pcg64Mcg::new(u128::from(seed) + 77);
+    if oriented {
+        let mut random = rand_pcg::Pcg64Mcg::new(u128::from(seed) + 77);
+        synthetic::orient(&mut world.rows, &world.truth, NOISE_RAD, &mut random);
+    }
     for row in &mut world.rows {
-        let noise = nalgebra::UnitQuaternion::from_scaled_axis(NOISE_RAD * synthetic::normal(&mut random));
-        let flange = synthetic::sensor(1).rotation * world.truth.base_from_flange(&row.at.joints_rad()).rotation;
-        if let Observed::Position { covariance_mm2, rotation_rad, .. } = &mut row.observed {
+        if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
             *covariance_mm2 = Some(Matrix3::identity() * noise_mm * noise_mm);
-            *rotation_rad = oriented.then(|| (noise * flange).scaled_axis());
         }
     }
     (world.truth, world.rows)

@@ -1,4 +1,4 @@
-use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
@@ -9,7 +9,6 @@ use crate::identify::judge::placement::Uncertain;
 use crate::identify::run::identify;
 use crate::identify::settings::{Extensions, Method, Settings};
 use crate::identify::synthetic;
-use crate::measurements::{Measurement, Observed};
 use crate::robot::{Parameter, Robot};
 
 const NOISE_MM: f64 = 0.03;
@@ -22,19 +21,6 @@ struct Cell {
     before: Before,
 }
 
-fn turned(rows: &mut [Measurement], truth: &Robot, seed: u64) {
-    let mut random = Pcg64Mcg::seed_from_u64(seed);
-    for row in rows {
-        let group = row.at.group[1..].parse().unwrap();
-        let flange = synthetic::sensor(group).rotation * truth.base_from_flange(&row.at.joints_rad()).rotation;
-        let noise = UnitQuaternion::from_scaled_axis(NOISE_RAD * synthetic::normal(&mut random));
-        let target = UnitQuaternion::from_rotation_matrix(&Rotation3::new(Vector3::new(0.2, -0.1, 2.9)));
-        if let Observed::Position { rotation_rad, .. } = &mut row.observed {
-            *rotation_rad = Some((noise * flange * target).scaled_axis());
-        }
-    }
-}
-
 fn cell(oriented: bool, seed: u64) -> Cell {
     let spoil = |robot: &mut Robot| {
         let mut random = Pcg64Mcg::seed_from_u64(1000 + seed);
@@ -44,7 +30,7 @@ fn cell(oriented: bool, seed: u64) -> Cell {
     };
     let mut world = synthetic::planned(60, 0, 25.0, NOISE_MM, seed, &spoil);
     if oriented {
-        turned(&mut world.rows, &world.truth, 3000 + seed);
+        synthetic::orient(&mut world.rows, &world.truth, NOISE_RAD, &mut Pcg64Mcg::seed_from_u64(3000 + seed));
     }
     let set = Dataset::new(&world.rows).unwrap();
     let settings = Settings { method: Some(Method::TrustRegion), extensions: Extensions::None, ..Settings::default() };
@@ -83,13 +69,9 @@ impl Cell {
         world.rows.retain(|row| row.at.group == "g2");
         world.rows.truncate(10);
         if self.before.trust.rotation_rad.is_some() {
-            turned(&mut world.rows, &world.truth, 4000 + seed);
+            synthetic::orient(&mut world.rows, &world.truth, NOISE_RAD, &mut Pcg64Mcg::seed_from_u64(4000 + seed));
         }
-        for row in &mut world.rows {
-            if let Observed::Position { point_mm, .. } = &mut row.observed {
-                *point_mm = (point_mm.coords * scale).into();
-            }
-        }
+        world.rows.iter_mut().for_each(|row| *synthetic::point(row) *= scale);
         recheck(&Dataset::new(&world.rows).unwrap(), &self.found, &self.before, stood).unwrap()
     }
 }

@@ -1,4 +1,4 @@
-use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Point3, Vector3, Vector6};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
@@ -8,7 +8,6 @@ use crate::identify::judge::placement::{Placed, Uncertain, is_held};
 use crate::identify::run::identify;
 use crate::identify::settings::{Extensions, Method, Model, Settings};
 use crate::identify::synthetic::{self, World};
-use crate::measurements::Observed;
 use crate::robot::{Parameter, Robot};
 
 /// Noise of a coordinate, mm, and of a turn, rad.
@@ -26,22 +25,10 @@ fn spoiled(seed: u64) -> impl Fn(&mut Robot) {
     }
 }
 
-/// How the target sits on the flange.
-fn turned() -> Matrix3<f64> {
-    Rotation3::new(Vector3::new(0.2, -0.1, 2.9)).into_inner()
-}
-
 fn world(samples: usize, oriented: bool, seed: u64) -> World {
     let mut world = synthetic::planned(samples, 0, 25.0, NOISE_MM, seed, &spoiled(seed));
-    let mut random = Pcg64Mcg::seed_from_u64(2000 + seed);
-    for row in &mut world.rows {
-        let group = row.at.group[1..].parse().unwrap();
-        let flange = (synthetic::sensor(group) * world.truth.base_from_flange(&row.at.joints_rad())).rotation;
-        let noise = UnitQuaternion::from_scaled_axis(NOISE_RAD * synthetic::normal(&mut random));
-        let target = flange * UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turned()));
-        if let (true, Observed::Position { rotation_rad, .. }) = (oriented, &mut row.observed) {
-            *rotation_rad = Some((noise * target).scaled_axis());
-        }
+    if oriented {
+        synthetic::orient(&mut world.rows, &world.truth, NOISE_RAD, &mut Pcg64Mcg::seed_from_u64(2000 + seed));
     }
     world
 }
@@ -54,10 +41,7 @@ fn truth(world: &World, found: &Robot, group: usize) -> (Transform, Transform) {
         transform(Vector3::z() * joint.theta_rad, Vector3::z() * joint.d_mm)
     };
     let sensor = synthetic::sensor(group) * first(&world.truth) * first(found).inverse();
-    let target = Transform::from_parts(
-        world.truth.tool_mm.into(),
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turned())),
-    );
+    let target = Transform::from_parts(world.truth.tool_mm.into(), synthetic::turned());
     (sensor, last(found).inverse() * last(&world.truth) * target)
 }
 
