@@ -129,10 +129,10 @@ pub(in crate::stereo::board_pose) fn explanations(found: &Estimate<'_>) -> Vec<E
 
 fn of_rig(found: &Estimate<'_>, cause: Cause, direction: &DVector<f64>) -> Option<Explanation> {
     let normal = &found.normal;
-    let shared = normal.rig_shared.tr_mul(direction);
-    let own = direction.dot(&(&normal.rig * direction));
+    let shared = normal.told.rig_shared.tr_mul(direction);
+    let own = direction.dot(&(&normal.told.rig * direction));
     let curvature = own - shared.dot(&(&found.covariance * &shared));
-    let gradient = direction.dot(&normal.rig_gradient);
+    let gradient = direction.dot(&normal.told.rig_gradient);
     // What nothing tells apart from the poses or from what was unknown before leaves only rounding.
     (curvature > 1e-9 * own).then(|| Explanation {
         cause,

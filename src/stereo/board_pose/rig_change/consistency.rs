@@ -145,7 +145,7 @@ impl Sums {
 
     /// Over all poses, of which each has a share of the change.
     fn of(normal: &Normal, shares: &[f64]) -> Sums {
-        let mut sums = Sums::zeros(normal.data.nrows());
+        let mut sums = Sums::zeros(normal.told.matrix.nrows());
         for (part, share) in normal.poses.iter().zip(shares) {
             if let Some(part) = part {
                 sums.add(part, *share);

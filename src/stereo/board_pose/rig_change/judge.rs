@@ -159,7 +159,7 @@ fn deviance(fit: &Estimate<'_>) -> f64 {
 /// What the width of the crossings' prior costs: without it a print that is assumed to be rough would explain anything.
 fn shape_evidence(fit: &Estimate<'_>) -> f64 {
     let (n, m) = (fit.values.rig.len(), 3 * fit.values.deviations_mm.len());
-    let block = (&fit.normal.data + &fit.normal.weights).view((n, n), (m, m)).into_owned();
+    let block = (&fit.normal.told.matrix + &fit.normal.weights).view((n, n), (m, m)).into_owned();
     let mut values: Vec<f64> = block.symmetric_eigenvalues().iter().copied().collect();
     values.sort_by(f64::total_cmp);
     // The largest six hold the frame.

@@ -62,18 +62,10 @@ pub(in crate::stereo::board_pose) struct Bundle<'a> {
 /// The normal equations.
 #[derive(Debug, Clone)]
 pub(in crate::stereo::board_pose) struct Normal {
-    /// What the corners say of the shared unknowns.
-    pub data: DMatrix<f64>,
+    /// What the corners say.
+    pub told: Totals,
     /// What is known before.
     pub weights: DMatrix<f64>,
-    /// Gradient of the corners' cost by the shared unknowns.
-    pub gradient: DVector<f64>,
-    /// The rig's raw numbers with the poses eliminated, by themselves and by the shared unknowns, and their gradient.
-    pub rig: DMatrix<f64>,
-    /// See above.
-    pub rig_shared: DMatrix<f64>,
-    /// See above.
-    pub rig_gradient: DVector<f64>,
     /// A part a pose that takes part.
     pub poses: Vec<Option<Eliminated>>,
 }
@@ -100,7 +92,7 @@ impl Bundle<'_> {
             return None;
         }
         let mut poses = vec![None; values.poses.len()];
-        let Totals { matrix: data, gradient, rig, rig_shared, rig_gradient } = Totals::of(
+        let told = Totals::of(
             &present,
             (&self.rig.basis, crossings.len()),
             |&(i, pose)| {
@@ -109,8 +101,8 @@ impl Bundle<'_> {
             },
             |k, _, part| poses[present[k].0] = Some(part),
         )?;
-        let weights = weights(&self.rig, &self.shape, self.board, &data);
-        Some(Normal { data, weights, gradient, rig, rig_shared, rig_gradient, poses })
+        let weights = weights(&self.rig, &self.shape, self.board, &told.matrix);
+        Some(Normal { told, weights, poses })
     }
 
     /// Cost of the corners at these values; infinite where a corner would lie behind its camera.
@@ -186,8 +178,8 @@ impl Values {
 impl Normal {
     /// The step of the shared unknowns from these values, and by how much the cost would fall if the equations were straight.
     fn step(&self, shared: &DVector<f64>) -> Option<(DVector<f64>, f64)> {
-        let gradient = &self.gradient + &self.weights * shared;
-        let step = -solve_scaled(&(&self.data + &self.weights), &gradient)?;
+        let gradient = &self.told.gradient + &self.weights * shared;
+        let step = -solve_scaled(&(&self.told.matrix + &self.weights), &gradient)?;
         let own = self.poses.iter().flatten().map(|part| {
             let s = part.step();
             inverse6(&part.pose_inverse).map_or(0.0, |curvature| 0.5 * s.dot(&(curvature * s)))
@@ -198,6 +190,6 @@ impl Normal {
 
     /// Covariance of the shared unknowns.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
-        invert(&(&self.data + &self.weights))
+        invert(&(&self.told.matrix + &self.weights))
     }
 }

@@ -130,7 +130,7 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
             bundle.edge_bends_mm = edge_bends_mm(&bundle, &values, &noise);
         }
         // How many of the shared unknowns the corners determine rather than what was known before.
-        let told = covariance.component_mul(&normal.data).sum();
+        let told = covariance.component_mul(&normal.told.matrix).sum();
         let active = residuals(&bundle, &values, |o| o.active);
         noise = match usual.noise {
             Some(usual) if poses < TELLING_POSES => usual,
@@ -192,7 +192,7 @@ pub(in crate::stereo::board_pose) fn leave_outliers_out(
 /// How much of each crossing's place, which are the shared unknowns from `first` on, its corners determine rather than what was known
 /// before, from none to one.
 fn told_of_crossings(normal: &Normal, covariance: &DMatrix<f64>, first: usize) -> Vec<Vector3<f64>> {
-    let told = covariance.component_mul(&normal.data).column_sum();
+    let told = covariance.component_mul(&normal.told.matrix).column_sum();
     told.as_slice()[first..]
         .chunks_exact(3)
         .map(|d| Vector3::new(d[0], d[1], d[2]).map(|t| t.clamp(0.0, 1.0)))
@@ -294,7 +294,7 @@ fn settle_shape(
     let bent = bent_modes(bundle.board);
     let ways = bent.len() as f64;
     let free = [2.0 * crossings - 4.0, crossings - 3.0 - ways, ways];
-    let right = &normal.data * Bundle::shared(values) - &normal.gradient;
+    let right = &normal.told.matrix * Bundle::shared(values) - &normal.told.gradient;
     let mut covariance = Cow::Borrowed(covariance);
     for _ in 0..FIXED_POINT_STEPS {
         let before = [bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm, bundle.shape.bent_mm];
@@ -319,8 +319,8 @@ fn settle_shape(
         if next.iter().zip(before).all(|(next, before)| (next / before - 1.0).abs() < SETTLED) {
             break;
         }
-        let weights = weights(&bundle.rig, &bundle.shape, bundle.board, &normal.data);
-        covariance = Cow::Owned(invert(&(&normal.data + weights))?);
+        let weights = weights(&bundle.rig, &bundle.shape, bundle.board, &normal.told.matrix);
+        covariance = Cow::Owned(invert(&(&normal.told.matrix + weights))?);
     }
     Some(())
 }
