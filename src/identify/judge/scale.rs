@@ -81,9 +81,8 @@ impl CommonScale {
                 Weighed::new(&covariance, &normal, &gradient, &longer, before)
             })
             .collect();
-        let Summary { log_odds, share, sigma, unseen } = summed_up(&all);
-        let of = if set.known.is_empty() { "readings" } else { "known distances" };
-        (sigma.is_finite() && log_odds.is_finite()).then_some(CommonScale { share, sigma, log_odds, unseen, of })
+        let found = summed_up(&all, if set.known.is_empty() { "readings" } else { "known distances" });
+        (found.sigma.is_finite() && found.log_odds.is_finite()).then_some(found)
     }
 
     /// Whether it is more than the links' own errors make by chance.
@@ -152,16 +151,8 @@ impl Weighed {
     }
 }
 
-/// What all tolerances together say of a scale.
-struct Summary {
-    log_odds: f64,
-    share: f64,
-    sigma: f64,
-    unseen: f64,
-}
-
-/// Over all tolerances, each with its weight.
-fn summed_up(weighed: &[Weighed]) -> Summary {
+/// What all tolerances together say of a scale, each with its weight.
+fn summed_up(weighed: &[Weighed], of: &'static str) -> CommonScale {
     let without = log_sum(weighed.iter().map(|w| w.log_evidence));
     let with = |scale: f64| log_sum(weighed.iter().map(|w| w.log_evidence + w.gain(scale)));
     let log_odds = SCALES.iter().map(|&s| with(s) - without).fold(f64::NEG_INFINITY, f64::max);
@@ -185,7 +176,7 @@ fn summed_up(weighed: &[Weighed]) -> Summary {
         let middle = 0.5 * (low + high);
         if larger(middle) > LARGER { low = middle } else { high = middle }
     }
-    Summary { log_odds, share, sigma, unseen: high }
+    CommonScale { share, sigma, log_odds, unseen: high, of }
 }
 
 /// Logarithm of the sum of exponentials.
@@ -199,7 +190,7 @@ mod tests {
     use super::*;
 
     /// Links of 50 to 400 mm, found exactly, off by errors of about `error_mm` and by a share.
-    fn of_links(error_mm: f64, share: f64) -> Summary {
+    fn of_links(error_mm: f64, share: f64) -> CommonScale {
         let lengths = [400.0, -300.0, 250.0, 100.0, 50.0];
         let errors = [0.9, 1.2, -0.7, -1.1, 0.8].map(|e| e * error_mm);
         let longer = DVector::from_row_slice(&lengths);
@@ -213,7 +204,7 @@ mod tests {
                 Weighed::new(&covariance, &normal, &gradient, &longer, before).unwrap()
             })
             .collect();
-        summed_up(&all)
+        summed_up(&all, "readings")
     }
 
     #[test]
@@ -221,7 +212,7 @@ mod tests {
         for (error_mm, share, told) in
             [(0.5, 0.0, false), (0.5, 0.001, false), (0.5, 0.01, true), (5.0, 0.01, false), (0.02, -0.001, true)]
         {
-            let Summary { log_odds, share: found, sigma, unseen } = of_links(error_mm, share);
+            let CommonScale { log_odds, share: found, sigma, unseen, .. } = of_links(error_mm, share);
             assert!(
                 unseen > found.abs() + 2.0 * sigma && unseen < found.abs() + 5.0 * sigma,
                 "{found} {sigma} {unseen}"

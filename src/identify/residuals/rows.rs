@@ -11,9 +11,9 @@ use super::pairwise::{CHUNK, Pairs};
 use super::points::Points;
 use super::smooth::Field;
 use super::starts::{first_anchor, frames_and_turn, middle};
-use super::touch::{Contact, Known, Touch};
+use super::touch::{Contact, Touch};
 use crate::geometry::Transform;
-use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::data::dataset::{Dataset, Kind, KnownDistance, Reading};
 use crate::identify::model::kinematics::{Kinematics, Place};
 use crate::identify::residuals::raw::Raw;
 use crate::identify::sensor::{Extra, Length, Scatter, Spot};
@@ -306,10 +306,10 @@ impl Inputs<'_> {
                 }));
             }
             let at = |group: usize| members.iter().position(|(g, _)| *g == group);
-            let known = set.known.iter().enumerate().filter_map(|(index, k)| {
-                Some(Known { a: at(k.a)?, b: at(k.b)?, distance_mm: k.distance_mm, sigma_mm: k.sigma_mm, index })
-            });
-            Block::Touch(Touch { sockets, contacts, known: known.collect() })
+            let known =
+                |(index, k): (usize, &KnownDistance)| Some((index, KnownDistance { a: at(k.a)?, b: at(k.b)?, ..*k }));
+            let known = set.known.iter().enumerate().filter_map(known).collect();
+            Block::Touch(Touch { sockets, contacts, known })
         };
         let mut roots: Vec<usize> = touched.iter().map(|(g, _)| tied[*g]).collect();
         roots.sort_unstable();

@@ -5,6 +5,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::geometry::direction;
+use crate::identify::data::dataset::KnownDistance;
 use crate::identify::model::kinematics::Place;
 use crate::identify::residuals::raw::Raw;
 use crate::identify::sensor::Scatter;
@@ -22,27 +23,14 @@ pub struct Contact {
     pub weight: f64,
 }
 
-/// A known distance between two sockets of the block.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Known {
-    /// Index of one.
-    pub a: usize,
-    /// Index of the other.
-    pub b: usize,
-    pub distance_mm: f64,
-    pub sigma_mm: f64,
-    /// Which of the data set's known distances it is.
-    pub index: usize,
-}
-
 /// Sockets that belong together, and when they were touched.
 #[derive(Debug, Clone)]
 pub struct Touch {
     /// Where the search for each socket starts, base frame, mm.
     pub sockets: Vec<Vector3<f64>>,
     pub contacts: Vec<Contact>,
-    /// The known distances.
-    pub known: Vec<Known>,
+    /// The known distances between sockets of the block, each with which of the data set's it is.
+    pub known: Vec<(usize, KnownDistance)>,
 }
 
 impl Touch {
@@ -74,7 +62,7 @@ impl Touch {
             residuals.fixed_rows_mut::<3>(3 * i).copy_from(&(residual * by));
             design.fixed_view_mut::<3, 3>(3 * i, 3 * contact.socket).copy_from(&(-by * Matrix3::identity()));
         }
-        for (k, known) in self.known.iter().enumerate() {
+        for (k, (_, known)) in self.known.iter().enumerate() {
             let row = 3 * self.contacts.len() + k;
             let (u, distance) = direction(&(sockets[known.b] - sockets[known.a]));
             residuals[row] = (distance - known.distance_mm) / known.sigma_mm;

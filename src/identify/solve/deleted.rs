@@ -181,10 +181,9 @@ impl Robust<'_> {
                 (residual, leverage)
             };
             // The known distances stand behind the touches.
-            for (at, known) in (poses.len() - known.len()..poses.len()).zip(known) {
+            for (at, (index, _)) in (poses.len() - known.len()..poses.len()).zip(known) {
                 let (residual, leverage) = held(&(at..at + 1));
-                of_known[known.index] =
-                    square_of_deleted(&residual, leverage, 1.0).map_or(0.0, |(square, _)| square.sqrt());
+                of_known[*index] = square_of_deleted(&residual, leverage, 1.0).map_or(0.0, |(square, _)| square.sqrt());
             }
             for at in by_pose(poses) {
                 let Some(pose) = poses[at.start] else { continue };
