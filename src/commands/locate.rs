@@ -16,7 +16,7 @@ use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::{self, Examined};
 use crate::identify::judge::errors::Judge;
 use crate::identify::judge::folds;
-use crate::identify::judge::locate::{Located, locate};
+use crate::identify::judge::locate::{Fit, locate};
 use crate::{progress, report, robot};
 
 /// `placement.json` with the fit that it is from.
@@ -25,16 +25,6 @@ struct LocatedFile {
     #[serde(flatten)]
     placement: PlacementFile,
     fit: Fit,
-}
-
-/// How the points agree with the robot.
-#[derive(Debug, Serialize)]
-struct Fit {
-    poses: usize,
-    rms_mm: f64,
-    chi_square: f64,
-    freedom: usize,
-    contradicted: bool,
 }
 
 /// Runs the command.
@@ -62,22 +52,12 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let all = set.rows(|_| true);
     let held_out = folds::judged(&Judge::plain(&set, &all, false), located.placed.robot(), &all);
     let placement = PlacementFile::new(args.robot.as_str(), &set, Some(&located.placed), &held_out);
-    let content = LocatedFile { fit: fit(&set, &located), placement };
+    let content = LocatedFile { placement, fit: located.fit };
     let json = out.write_json(PLACEMENT, &content)?;
-    let summary = || report::located::summary(&content.placement, &located, set.poses.len(), &out);
+    let summary = || report::located::summary(&content.placement, &content.fit, &out);
     let stdout = if args.measure.output.json { json } else { summary() };
-    let status = if located.contradicted { Status::OutOfTolerance } else { Status::Done };
+    let status = if content.fit.contradicted { Status::OutOfTolerance } else { Status::Done };
     Ok(Outcome { stdout, status })
-}
-
-fn fit(set: &Dataset, located: &Located) -> Fit {
-    Fit {
-        poses: set.poses.len(),
-        rms_mm: located.rms_mm,
-        chi_square: located.chi_square,
-        freedom: located.freedom,
-        contradicted: located.contradicted,
-    }
 }
 
 /// The measurements: those of a folder of pictures are made first, as `measure` makes them.

@@ -3,7 +3,7 @@
 use crate::files::OutDir;
 use crate::formats::placements::record::{PLACEMENT, PlacementFile, TransformRecord};
 use crate::geometry::rotation_vector;
-use crate::identify::judge::locate::Located;
+use crate::identify::judge::locate::Fit;
 use crate::report::table::number;
 
 fn line(what: &str, record: &TransformRecord) -> String {
@@ -22,7 +22,8 @@ fn line(what: &str, record: &TransformRecord) -> String {
 }
 
 /// The placement, the error to expect, and whether the robot agrees with the points.
-pub fn summary(placement: &PlacementFile, located: &Located, poses: usize, out: &OutDir) -> String {
+pub fn summary(placement: &PlacementFile, fit: &Fit, out: &OutDir) -> String {
+    let poses = fit.poses;
     let mut lines = Vec::new();
     for group in &placement.groups {
         lines.push(line(&format!("base from rig, {}", group.group), &group.base_from_rig));
@@ -34,16 +35,16 @@ pub fn summary(placement: &PlacementFile, located: &Located, poses: usize, out: 
         ));
     }
     lines.extend(placement.flange_from_target.as_ref().map(|target| line("flange from target", target)));
-    lines.push(match located.freedom {
+    lines.push(match fit.freedom {
         0 => format!(
             "{poses} poses are as many as the placement takes: none is left to check the robot by; add two or more"
         ),
         freedom => format!(
             "{poses} poses fit to {:.4} mm; chi-squared {:.1} over {freedom} degrees of freedom",
-            located.rms_mm, located.chi_square
+            fit.rms_mm, fit.chi_square
         ),
     });
-    if located.contradicted {
+    if fit.contradicted {
         lines.push(
             "the points contradict this robot by more than is stated of both: identify the robot, or look whether cameras, target and joint angles are those of these rows"
                 .to_owned(),

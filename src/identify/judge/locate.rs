@@ -7,6 +7,7 @@
 //! way that a placement can take up is not seen.
 
 use nalgebra::{DMatrix, DVector, Vector3};
+use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::placement::Placed;
@@ -51,12 +52,21 @@ pub struct Trust {
 pub struct Located {
     /// The placements.
     pub placed: Placed,
+    /// How the points agree with the robot.
+    pub fit: Fit,
+}
+
+/// How the points agree with the robot.
+#[derive(Debug, Clone, Serialize)]
+pub struct Fit {
+    /// Poses that were given.
+    pub poses: usize,
+    /// Root mean square of a point's residual, mm.
+    pub rms_mm: f64,
     /// Squared residuals of points over what is stated of them.
     pub chi_square: f64,
     /// Degrees of freedom of it.
     pub freedom: usize,
-    /// Root mean square of a point's residual, mm.
-    pub rms_mm: f64,
     /// Whether the points contradict the robot.
     pub contradicted: bool,
 }
@@ -106,7 +116,8 @@ fn fitted(task: &Task, trust: Trust) -> Result<Located, Error> {
     let (chi_square, freedom, rms_mm) = misfit(task, trust, &offsets);
     let contradicted =
         ChiSquared::new(freedom as f64).is_ok_and(|law| law.cdf(chi_square) > 1.0 - FALSE_ALARM && freedom > 0);
-    Ok(Located { placed, chi_square, freedom, rms_mm, contradicted })
+    let poses = task.set.poses.len();
+    Ok(Located { placed, fit: Fit { poses, rms_mm, chi_square, freedom, contradicted } })
 }
 
 /// By how much variances that so many degrees of freedom told are to be larger, that intervals of 1.96 standard deviations hold.

@@ -35,7 +35,7 @@ fn intervals_of_few_poses_hold() {
             // The target is looked for from where another robot's file has it.
             let robot = Robot { tool_mm: truth.tool_mm + Vector3::new(30.0, -20.0, 40.0), ..truth.clone() };
             let located = locate(&Dataset::new(&rows).unwrap(), &robot, EXACT, &Settings::default()).unwrap();
-            alarms += usize::from(located.contradicted);
+            alarms += usize::from(located.fit.contradicted);
             let fresh = synthetic::planned(24, 0, 25.0, 0.0, 900 + seed, &|_| {});
             let joints: Vec<Vec<f64>> =
                 fresh.rows.iter().filter(|r| r.at.group == "g1").map(|r| r.at.joints_rad()).collect();
@@ -56,7 +56,7 @@ fn intervals_of_few_poses_hold() {
 fn three_points_alone_place_the_cameras_with_the_target_of_the_file() {
     let (truth, rows) = rows(3, 0.01, false, 5);
     let located = locate(&Dataset::new(&rows).unwrap(), &truth, EXACT, &Settings::default()).unwrap();
-    assert!(!located.placed.target_found && !located.placed.oriented && !located.contradicted);
+    assert!(!located.placed.target_found && !located.placed.oriented && !located.fit.contradicted);
     let off = located.placed.groups[0].1.translation.vector - synthetic::sensor(1).translation.vector;
     assert!(off.norm() < 0.5, "{off}");
 }
@@ -68,8 +68,8 @@ fn a_robot_that_contradicts_the_points_is_said() {
         let nominal = Robot { tool_mm: truth.tool_mm, ..Robot::paper() };
         let trust = Trust { point_mm: REPEATABILITY_MM, rotation_rad: None };
         let set = Dataset::new(&rows).unwrap();
-        assert!(locate(&set, &nominal, trust, &Settings::default()).unwrap().contradicted);
-        assert!(!locate(&set, &truth, trust, &Settings::default()).unwrap().contradicted);
+        assert!(locate(&set, &nominal, trust, &Settings::default()).unwrap().fit.contradicted);
+        assert!(!locate(&set, &truth, trust, &Settings::default()).unwrap().fit.contradicted);
     }
 }
 
