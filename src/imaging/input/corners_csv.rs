@@ -194,10 +194,14 @@ mod tests {
     use crate::diagnostic::Explain;
 
     fn read_str(text: &str, squares: &str, size: Option<(u32, u32)>) -> Result<Corners> {
+        read_of(text, Board::checker(squares.parse().unwrap(), 10.0), size)
+    }
+
+    fn read_of(text: &str, board: Board, size: Option<(u32, u32)>) -> Result<Corners> {
         let dir = tempfile::tempdir().unwrap();
         let path = Utf8Path::from_path(dir.path()).unwrap().join("corners.csv");
         std::fs::write(&path, text).unwrap();
-        read(&path, Board::checker(squares.parse().unwrap(), 10.0), size)
+        read(&path, board, size)
     }
 
     #[test]
@@ -288,12 +292,7 @@ mod tests {
     #[test]
     fn corners_of_a_board_with_markers_have_ids_and_may_be_seen_by_one_camera() {
         let board: Board = "charuco:4x5:20:14:DICT_4X4_50".parse().unwrap();
-        let read = |text: &str| {
-            let dir = tempfile::tempdir().unwrap();
-            let path = Utf8Path::from_path(dir.path()).unwrap().join("corners.csv");
-            std::fs::write(&path, text).unwrap();
-            read(&path, board, Some((640, 480)))
-        };
+        let read = |text: &str| read_of(text, board, Some((640, 480)));
         let corners = read("pair,side,id,x_px,y_px\na,left,0,1,2\na,left,10,3,4\nb,right,11,5,6\n").unwrap();
         let places: Vec<_> = corners.pairs[0].left.iter().map(|c| (c.col, c.row)).collect();
         assert_eq!((places, corners.pairs[1].left.len()), (vec![(0, 0), (1, 3)], 0));

@@ -18,6 +18,22 @@ fn total(window: &Window) -> Matrix4<f64> {
     sum
 }
 
+const START: Point2<f64> = Point2::new(49.3, 50.2);
+
+/// The same sums, pixel by pixel of the ramp.
+fn expected(halves: [Vector2<f64>; 2], is_hidden: impl Fn(Vector2<f64>) -> bool) -> Matrix4<f64> {
+    let inverse = Matrix2::from_columns(&halves).try_inverse().unwrap();
+    let mut sum = Matrix4::zeros();
+    for (x, y) in (0..100 * 100).map(|k| (k % 100, k / 100)) {
+        let d = Vector2::new(f64::from(x), f64::from(y)) - START.coords;
+        if (inverse * d).amax() <= 1.0 && !is_hidden(d) {
+            let v = Vector4::new(1.0, d.x, d.y, f64::from(x + y));
+            sum += v * v.transpose();
+        }
+    }
+    sum
+}
+
 #[test]
 fn every_pixel_inside_is_counted_once() {
     let (picture, mut window) = (ramp(), Window::default());
@@ -26,18 +42,9 @@ fn every_pixel_inside_is_counted_once() {
         [Vector2::new(30.0, 0.0), Vector2::new(0.0, 30.0)],
         [Vector2::new(-20.0, 20.0), Vector2::new(25.0, 14.0)],
     ] {
-        let start = Point2::new(49.3, 50.2);
-        let inverse = Matrix2::from_columns(&halves).try_inverse().unwrap();
-        let mut expected = Matrix4::zeros();
-        for (x, y) in (0..100 * 100).map(|k| (k % 100, k / 100)) {
-            let d = Vector2::new(f64::from(x), f64::from(y)) - start.coords;
-            if (inverse * d).amax() <= 1.0 {
-                let v = Vector4::new(1.0, d.x, d.y, f64::from(x + y));
-                expected += v * v.transpose();
-            }
-        }
+        let expected = expected(halves, |_| false);
         for band_px in [f64::MAX, 6.0, 0.4] {
-            window.collect(&picture, 0.0, &Below(256.0), &Frame { start, halves, band_px, hidden: [None; 2] });
+            window.collect(&picture, 0.0, &Below(256.0), &Frame { start: START, halves, band_px, hidden: [None; 2] });
             // Sums of a few thousand products of numbers with seven digits.
             assert!((total(&window) - expected).amax() < 1e-7 * expected.amax(), "{halves:?} {band_px}");
             assert_eq!(window.count(), expected[(0, 0)] as usize);
@@ -49,21 +56,12 @@ fn every_pixel_inside_is_counted_once() {
 #[test]
 fn what_is_hidden_is_left_out_and_nothing_else() {
     let (picture, mut window) = (ramp(), Window::default());
-    let start = Point2::new(49.3, 50.2);
     let halves = [Vector2::new(30.0, 8.0), Vector2::new(-8.0, 30.0)];
     let corners = [(6.0, 9.0), (28.0, 12.0), (21.0, 33.0), (4.0, 27.0)].map(|(x, y)| Vector2::new(x, y));
     let inside = |d: Vector2<f64>| (0..4).all(|k| (corners[(k + 1) % 4] - corners[k]).perp(&(d - corners[k])) >= 0.0);
-    let inverse = Matrix2::from_columns(&halves).try_inverse().unwrap();
-    let mut expected = Matrix4::zeros();
-    for (x, y) in (0..100 * 100).map(|k| (k % 100, k / 100)) {
-        let d = Vector2::new(f64::from(x), f64::from(y)) - start.coords;
-        if (inverse * d).amax() <= 1.0 && !inside(d) {
-            let v = Vector4::new(1.0, d.x, d.y, f64::from(x + y));
-            expected += v * v.transpose();
-        }
-    }
+    let expected = expected(halves, inside);
     for band_px in [f64::MAX, 6.0] {
-        let frame = Frame { start, halves, band_px, hidden: [None, Some(Quad(corners))] };
+        let frame = Frame { start: START, halves, band_px, hidden: [None, Some(Quad(corners))] };
         window.collect(&picture, 0.0, &Below(256.0), &frame);
         assert!((total(&window) - expected).amax() < 1e-7 * expected.amax(), "{band_px}");
         assert_eq!((window.count(), window.left_out), (expected[(0, 0)] as usize, 0));
