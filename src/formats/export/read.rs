@@ -86,6 +86,14 @@ mod tests {
         assert_eq!((a.left.width, a.right.height), (b.left.width, b.right.height));
     }
 
+    /// What is read of files whose text is changed so.
+    fn read_changed(files: &[ExportedFile], change: impl Fn(&str) -> String) -> Result<Rig, String> {
+        let dir = tempfile::tempdir().unwrap();
+        let dir = Utf8Path::from_path(dir.path()).unwrap();
+        files.iter().for_each(|file| std::fs::write(dir.join(file.name), change(&file.text)).unwrap());
+        super::read(&dir.join(files[0].name), &change(&files[0].text)).unwrap()
+    }
+
     #[test]
     fn every_format_reads_back() {
         for lens in Lens::LADDER {
@@ -102,13 +110,7 @@ mod tests {
             };
             assert_eq!(written.len(), expected, "{lens:?}");
             for files in written {
-                let dir = tempfile::tempdir().unwrap();
-                let dir = Utf8Path::from_path(dir.path()).unwrap();
-                for file in &files {
-                    std::fs::write(dir.join(file.name), &file.text).unwrap();
-                }
-                let back = super::read(&dir.join(files[0].name), &files[0].text).unwrap().unwrap();
-                assert_same(&rig, &back);
+                assert_same(&rig, &read_changed(&files, |text| text.to_owned()).unwrap());
             }
         }
     }
@@ -155,14 +157,8 @@ mod tests {
     fn what_is_no_rig_is_refused_in_every_format() {
         let rig = rig(Lens::Brown4);
         let read = |files: &[ExportedFile], from: &str, to: &str| {
-            let dir = tempfile::tempdir().unwrap();
-            let dir = Utf8Path::from_path(dir.path()).unwrap();
-            let changed: Vec<String> = files.iter().map(|file| file.text.replacen(from, to, 1)).collect();
-            assert!(files.iter().zip(&changed).any(|(file, changed)| file.text != *changed), "{from}");
-            for (file, text) in files.iter().zip(&changed) {
-                std::fs::write(dir.join(file.name), text).unwrap();
-            }
-            super::read(&dir.join(files[0].name), &changed[0]).unwrap().unwrap_err()
+            assert!(files.iter().any(|file| file.text != file.text.replacen(from, to, 1)), "{from}");
+            read_changed(files, |text| text.replacen(from, to, 1)).unwrap_err()
         };
         let opencv = file_storage::files(&rig).unwrap();
         let (ros, kalibr, mrcal) =

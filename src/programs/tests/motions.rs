@@ -2,6 +2,8 @@
 
 use crate::programs::*;
 
+const ELSEWHERE: &str = "moves by values that are not numbers in this file";
+
 fn read(language: Language, text: &str) -> Program {
     Program::read(language, text, Joints { slides: &[false; 6], pulses_per_deg: &[] }).unwrap()
 }
@@ -55,24 +57,23 @@ MoveAbsJ jOther, v100, fine, tool0;
   PROC moveLamp(num a, num b, num c) ENDPROC
 ENDMODULE
 "#;
-    let elsewhere = "moves by values that are not numbers in this file";
     let expected = [
         "12 MoveAbsJ: jHome".to_owned(),
         "line 17: MoveL Offs(p10, 0, 0, 50) is Cartesian".to_owned(),
         "line 18: MoveJ RelTool(p10, 0, 0, 10\\Rz:=90) is Cartesian".to_owned(),
         "19 MoveAbsJ: line 3 line 4".to_owned(),
         "20 MoveAbsJ: jHome".to_owned(),
-        format!("line 21: MoveAbsJ jTurned {elsewhere}"),
-        format!("line 22: MoveAbsJ jNow {elsewhere}"),
+        format!("line 21: MoveAbsJ jTurned {ELSEWHERE}"),
+        format!("line 22: MoveAbsJ jNow {ELSEWHERE}"),
         "23 MoveAbsJ: line 23".to_owned(),
         "line 24: MoveC p1 is Cartesian".to_owned(),
         "line 25: SearchL p10 is Cartesian".to_owned(),
         "line 26: TriggL p10 is Cartesian".to_owned(),
         "line 27: ArcL p10 is Cartesian".to_owned(),
         "line 28: MoveExtJ jHome moves external axes".to_owned(),
-        format!("line 29: CutAlong p10 {elsewhere}"),
-        format!("line 31: MoveAbsJ jOther {elsewhere}"),
-        format!("line 33: MoveAbsJ jTo {elsewhere}"),
+        format!("line 29: CutAlong p10 {ELSEWHERE}"),
+        format!("line 31: MoveAbsJ jOther {ELSEWHERE}"),
+        format!("line 33: MoveAbsJ jTo {ELSEWHERE}"),
     ];
     assert_eq!(said(Language::Rapid, text), expected);
 }
@@ -114,9 +115,8 @@ movel(pose_trans(Waypoint_1_p, p[0,0,0.1,0,0,0]))
   my_movej(home)
 end
 "#;
-    let elsewhere = "moves by values that are not numbers in this file";
     let expected = [
-        format!("line 10: movej q {elsewhere}"),
+        format!("line 10: movej q {ELSEWHERE}"),
         "line 14: movej get_inverse_kin(Waypoint_1_p, qnear=Waypoint_1_q) is Cartesian".to_owned(),
         "15 movej: Waypoint_2_q".to_owned(),
         "line 18: movel pose_trans(Waypoint_1_p, p[0,0,0.1,0,0,0]) is Cartesian".to_owned(),
@@ -124,7 +124,7 @@ end
         "21 movej: home".to_owned(),
         "22 movec: home Waypoint_2_q".to_owned(),
         "line 23: movec home, Waypoint_1_p is Cartesian".to_owned(),
-        format!("line 26: movej turned {elsewhere}"),
+        format!("line 26: movej turned {ELSEWHERE}"),
         "line 27: movej home + [0.1,0,0,0,0,0] adds an offset to its target".to_owned(),
         "28 movej: line 28".to_owned(),
         "29 servoj: line 29".to_owned(),
@@ -147,13 +147,12 @@ fn krl() {
                 IF X == 1 THEN\n    LIN XP2 C_DIS\n  ENDIF\n  PTP P[1]\n  PTP XP2\n  PTP XP1\n  \
                 PTP {A1 30, A2 -60, A3 75, A4 0, A5 15, A6 0} ; here\n  PTP {A1 30}\n  PTP_REL {A1 10}\n  \
                 CIRC {X 1,Y 2,Z 3,A 4,B 5,C 6}, XP2, CA 90\n  SPTP HOME WITH $VEL_AXIS[1]=50\n  PTP HOME:SHIFT\n  LIN_REL {Z 10}\nEND\n";
-    let elsewhere = "moves by values that are not numbers in this file";
     let expected = [
         "11 PTP: HOME".to_owned(),
         "line 13: LIN XP2 is Cartesian".to_owned(),
         "15 PTP: P[1]".to_owned(),
         "line 16: PTP XP2 is Cartesian".to_owned(),
-        format!("line 17: PTP XP1 {elsewhere}"),
+        format!("line 17: PTP XP1 {ELSEWHERE}"),
         "18 PTP: line 18".to_owned(),
         "line 19: PTP {A1 30} does not give all joints of the robot".to_owned(),
         "line 20: PTP_REL {A1 10} adds an offset to its target".to_owned(),
@@ -182,14 +181,13 @@ fn fanuc() {
         joint(1, 1),
         joint(2, 2)
     );
-    let elsewhere = "moves by values that are not numbers in this file";
     let expected = [
         "7 J: P[1]".to_owned(),
         "8 L: P[2]".to_owned(),
         "line 10: L P[3:place] is Cartesian".to_owned(),
         "line 11: J P[1] adds an offset to its target".to_owned(),
-        format!("line 12: J PR[2:home] {elsewhere}"),
-        format!("line 13: J P[R[3]] {elsewhere}"),
+        format!("line 12: J PR[2:home] {ELSEWHERE}"),
+        format!("line 13: J P[R[3]] {ELSEWHERE}"),
         "line 14: C P[1] : P[3] is Cartesian".to_owned(),
         "line 17: J P[1] adds an offset to its target".to_owned(),
         "19 C: P[1] P[2]".to_owned(),
@@ -212,15 +210,14 @@ fn yaskawa() {
                 'MOVL C00002 V=10.0\nMOVJ C00000 VJ=20.00 PL=5\n+MOVJ C00001 VJ=20.00 UNTIL IN#(1)=ON\nMOVL C00002 V=166.6\n\
                 MOVJ P[I000] VJ=5.00\nIMOV P013 V=100.0\nSFTON P013\nMOVJ C00000 VJ=20.00\nSFTOF\nMOVJ P020 VJ=5.00\n\
                 IFTHENEXP I080<>1\n\tMOVC C00002 V=10.0\nENDIF\nEND\n";
-    let elsewhere = "moves by values that are not numbers in this file";
     let expected = [
         "18 MOVJ: C00000".to_owned(),
         "19 +MOVJ: C00001".to_owned(),
         "line 20: MOVL C00002 is Cartesian".to_owned(),
-        format!("line 21: MOVJ P[I000] {elsewhere}"),
+        format!("line 21: MOVJ P[I000] {ELSEWHERE}"),
         "line 22: IMOV P013 adds an offset to its target".to_owned(),
         "line 24: MOVJ C00000 adds an offset to its target".to_owned(),
-        format!("line 26: MOVJ P020 {elsewhere}"),
+        format!("line 26: MOVJ P020 {ELSEWHERE}"),
         "line 28: MOVC C00002 is Cartesian".to_owned(),
     ];
     assert_eq!(said(Language::Jbi, text), expected);

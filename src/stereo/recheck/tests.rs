@@ -11,13 +11,17 @@ use nalgebra::Vector3;
 
 /// A calibration as its file has it.
 fn calibrated(seed: u64) -> Before {
-    let found: Calibration = calibrate(&World::new(12, seed).corners(seed), &Options::default()).unwrap();
+    let found = calibrate(&World::new(12, seed).corners(seed), &Options::default()).unwrap();
+    before(&found, 1.0, 12)
+}
+
+fn before(found: &Calibration, pair_excess: f64, pairs: usize) -> Before {
     Before {
         rig: found.rig().clone(),
         noise: Some(found.own_noise),
-        pair_excess: 1.0,
-        pairs: Some(12),
-        volume: Some(Volume::of(&found, Extent::Boards)),
+        pair_excess,
+        pairs: Some(pairs),
+        volume: Some(Volume::of(found, Extent::Boards)),
     }
 }
 
@@ -26,13 +30,7 @@ fn by_hand(seed: u64, pairs: usize, leaning: f64, turn_deg: f64) -> Before {
     let mut world = World::new(pairs, seed);
     leaning_by(&mut world, leaning);
     let found = calibrate(&world.corners_by_hand(seed, turn_deg), &Options::default()).unwrap();
-    Before {
-        rig: found.rig().clone(),
-        noise: Some(found.own_noise),
-        pair_excess: pair_excess(&found),
-        pairs: Some(found.pair_scatter.groups),
-        volume: Some(Volume::of(&found, Extent::Boards)),
-    }
+    before(&found, pair_excess(&found), found.pair_scatter.groups)
 }
 
 /// Boards that lean less than those of the world.
