@@ -217,7 +217,7 @@ pub struct RobotImport {
     /// Link of a URDF that carries the target [default: the end of the chain]
     #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
-    /// Where alpha and a of a table's row stand: behind the joint (classic) or before it [default: what fits --measurements, else what the names or the first and last rows show]
+    /// Where alpha and a of a table's row stand: behind the joint (classic) or before it [default: what fits --measurements, else what names and words say, else what the first and last rows show]
     #[arg(long, value_enum)]
     pub dh: Option<DhConvention>,
     /// Measurements of the robot, which tell what a table leaves open; repeat as for `identify`
@@ -226,6 +226,9 @@ pub struct RobotImport {
     /// What a table's columns are, in their order: alpha,a,d,theta
     #[arg(long, value_name = "NAME,NAME,...")]
     pub columns: Option<String>,
+    /// Units of a table's angles and lengths: deg or rad, mm, cm, m, um or in [default: what the names say, else what the numbers and words around them show]
+    #[arg(long, value_name = "UNIT,UNIT", value_parser = units)]
+    pub units: Option<String>,
     /// Where it goes.
     #[command(flatten)]
     pub place: RobotPlace,
@@ -320,6 +323,6 @@ fn point(text: &str) -> Result<[f64; 3], String> {
 fn units(text: &str) -> Result<String, String> {
     match text.split(',').all(|word| crate::tables::names::Unit::of(word).is_some()) {
         true => Ok(text.to_owned()),
-        false => Err("deg or rad, mm, m or um, or one of each with a comma between are needed".to_owned()),
+        false => Err("deg or rad, mm, cm, m, um or in, or one of each with a comma between are needed".to_owned()),
     }
 }

@@ -17,6 +17,7 @@ use crate::robot::catalogue::names;
 use crate::robot::catalogue::{self, Convention};
 use crate::robot::tool_fit::Start;
 use crate::robot::{Error, Robot, file};
+use crate::tables::names::Unit;
 
 pub fn run(args: &RobotCommand, config: &Config, run: Run) -> Result<Outcome> {
     let stdout = match &args.what {
@@ -30,7 +31,8 @@ pub fn run(args: &RobotCommand, config: &Config, run: Run) -> Result<Outcome> {
 
 fn import(args: &RobotImport, config: &Config, run: Run) -> Result<String> {
     let name = args.file.file_stem().unwrap_or("robot");
-    let description = args.file.extension().is_some_and(|e| ["urdf", "xml"].iter().any(|u| e.eq_ignore_ascii_case(u)));
+    let description =
+        args.file.extension().is_some_and(|e| ["urdf", "xml", "xacro"].iter().any(|u| e.eq_ignore_ascii_case(u)));
     let robot = if description {
         let description = urdf::Urdf::read(&args.file)?;
         description.chain(args.tip.as_deref())?.robot(&description.name)
@@ -46,25 +48,29 @@ const CLEAR: f64 = 4.0;
 /// A way to read a table.
 type Way<'a> = (&'a dh_csv::Reading, Convention);
 
-fn convention_name(convention: Convention) -> &'static str {
-    if convention == Convention::Classic { "classic" } else { "modified" }
-}
-
 fn refuse(args: &RobotImport, message: String, hint: &str) -> Error {
     Error::Table { message, place: args.file.to_string(), hint: hint.to_owned() }
 }
 
-fn tell(args: &RobotImport, reading: &dh_csv::Reading, convention: Convention) {
-    progress::note(format!("{}: {}, {} convention", args.file, reading.said, convention_name(convention)));
+/// The robot of the way that is taken for a reason, unless it leaves a unit open.
+fn take(args: &RobotImport, name: &str, (reading, convention): Way, why: &str) -> Result<Robot> {
+    if let Some(open) = &reading.open {
+        return Err(refuse(args, format!("{} ({})", open.message, reading.said), open.hint).into());
+    }
+    progress::note(format!("{}: {}, {} convention ({why})", args.file, reading.said, convention.name()));
+    Ok(reading.robot(name, convention))
 }
 
 /// The robot of a table: of several ways to read it the one that fits the measurements.
 fn table(args: &RobotImport, name: &str) -> Result<Robot> {
-    let readings = dh_csv::readings(&args.file, args.columns.as_deref())?;
+    let units: Vec<Unit> = args.units.iter().flat_map(|u| u.split(',')).filter_map(Unit::of).collect();
+    let of = |angle: bool| units.iter().copied().find(|unit| unit.is_angle() == angle);
+    let asked = dh_csv::Asked { columns: args.columns.as_deref(), units: [of(true), of(false)] };
+    let readings = dh_csv::readings(&args.file, &asked)?;
     let conventions = |reading: &dh_csv::Reading| match (args.dh, reading.convention()) {
         (Some(typed), _) => vec![typed.into()],
         // Measurements are heard before what the table's ends show.
-        (None, Some(shown)) if args.measurements.is_empty() => vec![shown],
+        (None, (Some(shown), _)) if args.measurements.is_empty() => vec![shown],
         _ => vec![Convention::Modified, Convention::Classic],
     };
     let ways: Vec<Way> = readings
@@ -81,9 +87,9 @@ fn table(args: &RobotImport, name: &str) -> Result<Robot> {
             )
             .into());
         }
-        [(reading, convention)] => {
-            tell(args, reading, *convention);
-            return Ok(reading.robot(name, *convention));
+        [way] => {
+            let why = if args.dh.is_some() { "--dh says so".to_owned() } else { way.0.convention().1 };
+            return take(args, name, *way, &why);
         }
         _ if args.measurements.is_empty() => return Err(open(args, &readings, &ways).into()),
         _ => {}
@@ -99,9 +105,9 @@ fn open(args: &RobotImport, readings: &[dh_csv::Reading], ways: &[Way]) -> Error
         let hint = format!("{} says which; `--measurements FILE` lets the readings decide", orders.join(" or "));
         return refuse(args, message, &hint);
     }
-    let place = ways.first().map_or(String::new(), |(r, _)| format!(" ({})", r.said));
+    let why = ways.first().map_or(String::new(), |(r, _)| format!(": {} ({})", r.convention().1, r.said));
     let message = format!(
-        "whether alpha and a of a row stand before the joint or behind it is not said, and the table could be either{place}"
+        "whether alpha and a of a row stand before the joint or behind it is not said, and the table could be either{why}"
     );
     let hint = "`--dh modified` (Craig: before) or `--dh classic` (Denavit and Hartenberg: behind) says which; `--measurements FILE` lets the readings decide";
     refuse(args, message, hint)
@@ -126,15 +132,12 @@ fn by_readings(args: &RobotImport, name: &str, ways: &[Way]) -> Result<Robot> {
         .into()),
         [best, next, ..] if next.0 < CLEAR * best.0 => {
             let way = |(left, r, c): &(f64, &dh_csv::Reading, Convention)| {
-                format!("`--dh {} --columns {}` ({left:.2} mm)", convention_name(*c), r.columns)
+                format!("`--dh {} --columns {}` ({left:.2} mm)", c.name(), r.columns)
             };
             let message = "more than one way to read the table fits the measurements".to_owned();
             Err(refuse(args, message, &format!("{} or {} says which", way(best), way(next))).into())
         }
-        [best, ..] => {
-            tell(args, best.1, best.2);
-            Ok(best.1.robot(name, best.2))
-        }
+        [best, ..] => take(args, name, (best.1, best.2), &format!("it leaves {:.2} mm of the measurements", best.0)),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Numbers as formulas have them: `pi/2`, `-np.pi / 2`, `deg2rad(90)`, `135*mm`, `q2 - 90°`.
 //!
 //! In: text, and what its names stand for. Out: the number, whether it was written with pi, and whether a joint's variable is part of it, which
-//! counts as zero. What goes wrong: a name that stands for nothing, or anything that is no sum of products; there is no number then.
+//! counts as zero. What goes wrong: a name that stands for nothing, a joint's variable that counts the other way, or anything that is no sum of products; there is no number then.
 
 use std::f64::consts::PI;
 
@@ -16,7 +16,14 @@ pub struct Value {
 }
 
 /// Functions that turn degrees into radians.
-const TO_RADIANS: [&str; 4] = ["deg2rad", "radians", "rad", "to_radians"];
+const TO_RADIANS: [&str; 4] = ["radians", "rad", "toradians", "to_radians"];
+
+/// Functions that do, and numbers to multiply with.
+const PER_DEGREE: [&str; 6] = ["deg2rad", "d2r", "degtorad", "deg_to_rad", "dtor", "to_rad"];
+
+/// Names of parts of a half turn, with what they are of it.
+const OF_PI: [(&str, f64); 7] =
+    [("pi", 1.0), ("m_pi", 1.0), ("π", 1.0), ("m_pi_2", 0.5), ("half_pi", 0.5), ("m_pi_4", 0.25), ("two_pi", 2.0)];
 
 /// Letters that joints' variables have.
 const VARIABLES: [&str; 5] = ["theta", "θ", "q", "th", "t"];
@@ -25,12 +32,17 @@ const VARIABLES: [&str; 5] = ["theta", "θ", "q", "th", "t"];
 const DEEPEST: usize = 20;
 
 /// Evaluates a formula; `known` says what a name stands for.
-pub fn evaluate(text: &str, known: &dyn Fn(&str) -> Option<f64>) -> Option<Value> {
+pub fn evaluate(text: &str, known: &dyn Fn(&str) -> Option<Value>) -> Option<Value> {
     let plain = plain(text);
-    let mut parser = Parser { rest: plain.trim(), known, radians: false, variable: false };
-    let number = parser.sum(0)?;
-    let whole = parser.rest.trim_start().is_empty() && number.is_finite();
-    whole.then_some(Value { number, radians: parser.radians, variable: parser.variable })
+    let at = |reading: f64| {
+        let mut parser = Parser { rest: plain.trim(), known, reading, radians: false, variable: false };
+        let number = parser.sum(0)?;
+        let whole = parser.rest.trim_start().is_empty() && number.is_finite();
+        whole.then_some(Value { number, radians: parser.radians, variable: parser.variable })
+    };
+    let value = at(0.0)?;
+    // A joint that counts the other way, `-q2`, is another one.
+    (!value.variable || at(1.0)?.number > value.number).then_some(value)
 }
 
 /// Without the marks of HTML and LaTeX: `θ<sub>2</sub>`, `\\theta_2`.
@@ -43,7 +55,9 @@ fn plain(text: &str) -> std::borrow::Cow<'_, str> {
 
 struct Parser<'a> {
     rest: &'a str,
-    known: &'a dyn Fn(&str) -> Option<f64>,
+    known: &'a dyn Fn(&str) -> Option<Value>,
+    /// What a joint's variable stands at.
+    reading: f64,
     radians: bool,
     variable: bool,
 }
@@ -125,6 +139,12 @@ impl Parser<'_> {
         }
         let value = self.rest[..end].parse().ok()?;
         self.rest = self.rest[end..].trim_start_matches(['°', 'º']);
+        // `0.5f`, as C has it.
+        if let Some(rest) = self.rest.strip_prefix(['f', 'F'])
+            && !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_')
+        {
+            self.rest = rest;
+        }
         // `2pi` is a product without its sign.
         let times = ["pi", "π"].iter().find_map(|pi| self.rest.strip_prefix(pi));
         Some(match times {
@@ -142,25 +162,37 @@ impl Parser<'_> {
         let (name, rest) = self.rest.split_at(end);
         let plain = name.rsplit('.').next().unwrap_or(name);
         self.rest = rest;
-        if TO_RADIANS.contains(&plain) && rest.trim_start().starts_with('(') {
+        let lower = plain.to_lowercase();
+        let per_degree = PER_DEGREE.contains(&lower.as_str());
+        if (per_degree || TO_RADIANS.contains(&lower.as_str())) && rest.trim_start().starts_with('(') {
             self.takes('(');
             let degrees = self.sum(depth + 1)?;
             self.radians = true;
             return self.takes(')').then(|| degrees.to_radians());
         }
-        if matches!(plain.to_lowercase().as_str(), "pi" | "m_pi" | "π") {
+        if let Some((_, part)) = OF_PI.iter().find(|(name, _)| *name == lower) {
             self.radians = true;
-            return Some(PI);
+            return Some(part * PI);
         }
         if let Some(value) = (self.known)(name) {
-            return Some(value);
+            self.radians |= value.radians;
+            self.variable |= value.variable;
+            return Some(value.number);
+        }
+        if per_degree {
+            self.radians = true;
+            return Some(1f64.to_radians());
         }
         let letters = plain.trim_end_matches(|c: char| c.is_numeric() || matches!(c, '_' | '{' | '}' | 'i' | '*'));
         let is_variable = VARIABLES.contains(&letters.to_lowercase().as_str());
         is_variable.then(|| {
             self.variable = true;
-            self.takes('*');
-            0.0
+            // `th5* + 90`: a star marks it.
+            let behind = self.rest.trim_start().strip_prefix('*').map(str::trim_start);
+            if let Some(behind) = behind.filter(|b| b.is_empty() || b.starts_with(['+', '-', '\u{2212}'])) {
+                self.rest = behind;
+            }
+            self.reading
         })
     }
 }
@@ -171,7 +203,12 @@ mod tests {
 
     #[test]
     fn formulas_of_tables() {
-        let known = |name: &str| (name == "mm").then_some(1e-3);
+        let plain = |number| Value { number, radians: false, variable: false };
+        let known = |name: &str| match name {
+            "mm" => Some(plain(1e-3)),
+            "quarter" => Some(Value { radians: true, ..plain(PI / 2.0) }),
+            _ => None,
+        };
         let of = |text: &str| evaluate(text, &known).map(|v| (v.number, v.radians, v.variable));
         for text in [
             "pi/2",
@@ -181,6 +218,14 @@ mod tests {
             "π/2",
             "deg2rad(90)",
             "np.radians(90.0)",
+            "Math.toRadians(90)",
+            "90 * DEG2RAD",
+            "d2r(90)",
+            "M_PI_2",
+            "2*M_PI_4",
+            "HALF_PI",
+            "TWO_PI/4",
+            "quarter",
             "-(-pi)/2",
             "0.5pi",
         ] {
@@ -188,6 +233,7 @@ mod tests {
             assert!((number - PI / 2.0).abs() < 1e-12 && radians && !variable, "{text}");
         }
         assert_eq!(of("-90°"), Some((-90.0, false, false)));
+        assert_eq!((of("0.5f"), of("0.5foot")), (Some((0.5, false, false)), None));
         assert_eq!(of("135*mm"), Some((0.135, false, false)));
         assert_eq!(of("-1.5e-3 + 2"), Some((1.9985, false, false)));
         assert_eq!(of("\u{2212}90"), Some((-90.0, false, false)));
@@ -197,12 +243,13 @@ mod tests {
             ("theta_3 + 90", 90.0),
             ("q_{4}", 0.0),
             ("th5*", 0.0),
+            ("th5* + 90", 90.0),
             ("90 + \\theta_2", 90.0),
             ("θ<sub>3</sub>", 0.0),
         ] {
             assert_eq!(of(text), Some((number, false, true)), "{text}");
         }
-        for text in ["", "a1", "pi/", "2 3", "x+1", "2**3", "(1", "1/0", "nan", "1e999"] {
+        for text in ["", "a1", "-q2", "90 - theta_3", "pi2", "pi/", "2 3", "x+1", "2**3", "(1", "1/0", "nan", "1e999"] {
             assert_eq!(of(text), None, "{text}");
         }
         assert_eq!(of(&"(".repeat(10_000)), None);

@@ -40,6 +40,19 @@ impl Grid {
         Grid::of(path, source::read(path, what, hint)?, None)
     }
 
+    /// The text of a file in whatever encoding; `None` of a spreadsheet.
+    pub fn text(path: &Utf8Path, what: &'static str, hint: &str) -> Result<Option<String>> {
+        Ok(match source::read(path, what, hint)? {
+            Source::Text(text, _) => Some(text),
+            Source::Sheet { .. } => None,
+        })
+    }
+
+    /// The rows of a text that was read from a file.
+    pub fn of_text(path: &Utf8Path, text: String) -> Result<Grid> {
+        Grid::of(path, Source::Text(text, None), None)
+    }
+
     /// Reads a file that may be a program's: lines that hold a joint target of at least so many numbers are rows of those.
     pub fn read_with_programs(path: &Utf8Path, what: &'static str, hint: &str, joints: usize) -> Result<Grid> {
         Grid::of(path, source::read(path, what, hint)?, Some(joints))

@@ -144,3 +144,29 @@ fn robots_that_a_format_is_not_for_are_refused() {
     assert!(said.contains("joint 1 slides") && said.contains("--format urdf"), "{said}");
     run(at, &["export", "robot", "--robot", "sliding.toml", "--format", "urdf", "--out", "sliding"], 0);
 }
+
+#[test]
+fn what_a_table_leaves_open_is_asked_with_the_flag_that_says_it() {
+    let folder = workplace();
+    let at = folder.path();
+    std::fs::write(at.join("arm.csv"), "theta,d,a,alpha\n1.3,0,12,0\n0.2,0,11,0\n-0.4,0,9,0\n").unwrap();
+    let import = |flags: &[&str], status| {
+        run(at, &[&["robot", "import", "arm.csv", "--out", "arm", "--force"], flags].concat(), status)
+    };
+    assert!(import(&[], 2).contains("--dh modified"));
+    assert!(import(&["--dh", "classic"], 2).contains("`--units deg` or `--units rad`"));
+    assert!(import(&["--dh", "classic", "--units", "rad"], 2).contains("--units cm"));
+    let said = import(&["--dh", "classic", "--units", "rad,cm"], 0);
+    assert!(said.contains("angles in radians, lengths in cm, classic convention (--dh says so)"), "{said}");
+    let robot = read(at, "arm/robot.toml");
+    assert!((robot.joints[1].a_mm - 120.0).abs() < 1e-9 && (robot.joints[0].theta_rad - 1.3).abs() < 1e-9);
+    // A limit that a macro left in a description.
+    run(at, &["export", "robot", "--robot", "arm/robot.toml", "--format", "urdf", "--out", "maker"], 0);
+    let text = std::fs::read_to_string(at.join("maker/robot.urdf")).unwrap();
+    let joint = text.replacen("type=\"continuous\"", "type=\"revolute\"", 1);
+    let joint = joint.replacen("<limit effort", "<limit lower=\"${-pi}\" upper=\"${pi}\" effort", 1);
+    std::fs::write(at.join("limited.urdf"), joint).unwrap();
+    run(at, &["robot", "import", "limited.urdf", "--out", "limited"], 0);
+    let limits = read(at, "limited/robot.toml").joints[0].limits_rad;
+    assert!(limits.is_some_and(|(low, high)| (low + high).abs() < 1e-9 && (high - std::f64::consts::PI).abs() < 1e-9));
+}

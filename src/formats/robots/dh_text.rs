@@ -7,7 +7,9 @@
 //! does not name are zero. Names that the text sets to a number stand for it.
 //! What goes wrong: a parameter that is no number, sliding joints, axes that are turned round; all refused with the line.
 
+mod comments;
 mod link;
+mod lists;
 mod matrix;
 mod numbered;
 #[cfg(test)]
@@ -18,7 +20,10 @@ use std::collections::BTreeMap;
 pub use self::matrix::{Matrix, matrix};
 
 use self::link::{KEYS, Link};
-use crate::robot::catalogue::{Convention, Row};
+pub use self::link::{Known, Wrong};
+use self::lists::{Lists, extent, list};
+use super::dh_words::Words;
+use crate::robot::catalogue::Convention;
 use crate::tables::expression::{Value, evaluate};
 
 /// Calls that make a link.
@@ -30,41 +35,59 @@ const SLIDES: &str = "a joint that slides, which a table of turning joints has n
 
 /// What a text holds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Links {
-    /// Line and parameters.
-    pub rows: Vec<(u64, Row)>,
-    /// Whether angles were written with pi or turned into radians.
-    pub radians: bool,
-    /// What the text's words say.
-    pub convention: Option<Convention>,
+pub struct Text {
+    pub links: Option<Links>,
+    /// What the words say.
+    pub words: Words,
+    /// The names that the text sets to numbers.
+    pub known: Known,
 }
 
-/// A line and what is wrong there.
-pub type Wrong = (u64, String);
+/// Links that a text names the parameters of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Links {
+    /// Line and parameters; of theta it is known whether the joint's variable is part of it.
+    pub rows: Vec<(u64, [Value; 4])>,
+    /// What the calls that make links or the numbers in names show, and how that is said.
+    pub convention: Option<(Convention, &'static str)>,
+    /// Whether calls of a toolbox make them, which are classic where nothing says otherwise.
+    pub calls: bool,
+    pub limits: Vec<Option<[Value; 2]>>,
+    /// Whether the text speaks of limits, read or not.
+    pub limited: bool,
+}
 
-/// The links of a text; none where it has none.
-pub fn read(text: &str) -> Result<Option<Links>, Wrong> {
-    let text = without_comments(text);
+/// Reads a text; `prose` says that it is one of sentences, without code.
+pub fn read(text: &str, prose: bool) -> Result<Text, Wrong> {
+    let (code, comments) = comments::split(text);
+    let words = if prose { Words::of(text, "") } else { Words::of(&comments, &code) };
     let mut scan = Scan {
-        text: &text,
+        text: &code,
         at: 0,
         depth: 0,
         line: 1,
-        known: BTreeMap::new(),
+        known: Known::new(),
         links: Vec::new(),
         lists: Default::default(),
+        families: BTreeMap::new(),
         of_calls: None,
         numbered: Default::default(),
         wrong: None,
     };
     scan.run()?;
-    let lower = text.to_lowercase();
+    let lower = code.to_lowercase();
     if ["'prismatic'", "\"prismatic\"", ": prismatic"].iter().any(|word| lower.contains(word)) && scan.links.len() > 1 {
         return Err((1, SLIDES.to_owned()));
     }
-    let Scan { mut links, lists, of_calls, numbered, wrong, .. } = scan;
+    let known = std::mem::take(&mut scan.known);
+    Ok(Text { links: links(scan, lower.contains("qlim"))?, words, known })
+}
+
+/// The links of what was read; none where there are fewer than two.
+fn links(scan: Scan, limited: bool) -> Result<Option<Links>, Wrong> {
+    let Scan { mut links, lists, families, of_calls, numbered, wrong, .. } = scan;
     let others = || -> Result<(Vec<Link>, Option<Convention>), Wrong> {
-        let of_lists = of_lists(&lists)?;
+        let of_lists = lists::links(&lists, &families)?;
         Ok(if of_lists.is_empty() { numbered::links(&numbered) } else { (of_lists, None) })
     };
     // What a loop takes out of lists is no number where the link is made.
@@ -89,53 +112,21 @@ pub fn read(text: &str) -> Result<Option<Links>, Wrong> {
     if links.len() < 2 {
         return Ok(None);
     }
-    let values = || links.iter().flat_map(|link| [link.values[0], link.values[2]]).flatten();
+    let none = Value { number: 0.0, radians: false, variable: false };
+    // What a call makes turns, whatever its theta says.
+    let value = |link: &Link, v: Option<Value>| {
+        let v = v.unwrap_or(none);
+        Value { variable: v.variable && !link.call, ..v }
+    };
     Ok(Some(Links {
-        radians: values().any(|v| v.radians),
-        rows: links.iter().map(|link| (link.line, link.values.map(|v| v.map_or(0.0, |v| v.number)))).collect(),
-        convention: of_calls.or(shown).or_else(|| convention(&lower, links.iter().any(|link| link.call))),
+        rows: links.iter().map(|link| (link.line, link.values.map(|v| value(link, v)))).collect(),
+        convention: of_calls
+            .map(|c| (c, "the calls that make its links say so"))
+            .or(shown.map(|c| (c, "alpha and a are numbered from 0, d from 1"))),
+        calls: links.iter().any(|link| link.call),
+        limits: links.iter().map(|link| link.limits).collect(),
+        limited,
     }))
-}
-
-/// What the words of a text say; a toolbox's call that says nothing makes a classic link.
-fn convention(lower: &str, calls: bool) -> Option<Convention> {
-    let has = |words: &[&str]| words.iter().any(|word| lower.contains(word));
-    match (has(&["mdh", "modified", "craig"]), has(&["standard", "classic"])) {
-        (true, false) => Some(Convention::Modified),
-        (false, true) => Some(Convention::Classic),
-        (false, false) if calls => Some(Convention::Classic),
-        _ => None,
-    }
-}
-
-/// The text with comments as blanks, so that lines stay where they are.
-fn without_comments(text: &str) -> String {
-    let mut plain = String::with_capacity(text.len());
-    let mut quoted: Option<&str> = None;
-    for line in text.lines() {
-        let mut rest = line;
-        while !rest.is_empty() {
-            if let Some(mark) = quoted {
-                let Some(end) = rest.find(mark) else { break };
-                (rest, quoted) = (&rest[end + mark.len()..], None);
-                continue;
-            }
-            let comment = ["#", "%", "//"].iter().filter_map(|mark| rest.find(mark)).min().unwrap_or(rest.len());
-            let block = ["\"\"\"", "'''"].iter().filter_map(|mark| Some((rest.find(mark)?, *mark))).min();
-            match block {
-                Some((start, mark)) if start < comment => {
-                    plain.push_str(&rest[..start]);
-                    (rest, quoted) = (&rest[start + mark.len()..], Some(mark));
-                }
-                _ => {
-                    plain.push_str(&rest[..comment]);
-                    break;
-                }
-            }
-        }
-        plain.push('\n');
-    }
-    plain
 }
 
 struct Scan<'a> {
@@ -144,10 +135,11 @@ struct Scan<'a> {
     depth: usize,
     line: u64,
     /// Names that the text has set to numbers.
-    known: BTreeMap<String, f64>,
+    known: Known,
     links: Vec<Link>,
-    /// The first list of each parameter, with its line.
-    lists: [Option<(u64, Vec<Value>)>; 4],
+    lists: Lists,
+    /// Lists whose names have the same before the parameter's.
+    families: BTreeMap<String, Lists>,
     /// The convention of the calls that make links.
     of_calls: Option<Convention>,
     numbered: numbered::Numbered,
@@ -212,6 +204,7 @@ impl Scan<'_> {
         }
         let quote = rest.chars().next().filter(|c| matches!(c, '\'' | '"'));
         let behind = rest[quote.map_or(0, char::len_utf8)..].trim_start_matches([' ', '\t']);
+        let behind = sized(behind).unwrap_or(behind);
         let separator = behind.chars().next().filter(|c| matches!(c, '=' | ':') || *c == ',' && quote.is_some());
         let Some(separator) = separator else { return Ok(()) };
         let value = &behind[separator.len_utf8()..];
@@ -221,7 +214,7 @@ impl Scan<'_> {
         let value_at = self.text.len() - value.len();
         let which = KEYS.iter().position(|names| names.contains(&word.to_lowercase().as_str()));
         if let Some(which) = which {
-            if let Some(list) = self.list(value) {
+            if let Some(list) = list(value, &self.known) {
                 self.lists[which].get_or_insert((self.line, list));
                 return Ok(());
             }
@@ -247,14 +240,31 @@ impl Scan<'_> {
                 self.numbered[which].entry(number).or_insert((self.line, v));
             }
         }
+        self.other(word, value)?;
+        if separator == '=' && self.depth == 0 {
+            self.assign(start, word.to_owned(), value);
+        }
+        Ok(())
+    }
+
+    /// What else a name with a value may be: a list of a family, a link's limits, a joint that counts the other way.
+    fn other(&mut self, word: &str, value: &str) -> Result<(), Wrong> {
+        if let Some((family, which)) = lists::affixed(word)
+            && let Some(list) = list(value, &self.known)
+        {
+            self.families.entry(family).or_default()[which].get_or_insert((self.line, list));
+        }
+        if word == "qlim"
+            && let Some([low, high]) = list(value, &self.known).as_deref()
+            && let Some(link) = self.links.last_mut().filter(|link| link.depth == self.depth)
+        {
+            link.limits = Some([*low, *high]);
+        }
         if word == "flip" && value.trim_start().starts_with(['T', 't']) {
             return Err((
                 self.line,
                 "`flip`: a joint that counts the other way, which a table has no place for".to_owned(),
             ));
-        }
-        if separator == '=' && self.depth == 0 {
-            self.assign(start, word.to_owned(), value);
         }
         Ok(())
     }
@@ -269,7 +279,7 @@ impl Scan<'_> {
             let text = &rest[..extent(rest)];
             let known = |name: &str| self.known.get(name).copied();
             if let Some(v) = evaluate(text, &known).filter(|v| !v.variable) {
-                self.known.insert(name, v.number);
+                self.known.insert(name, v);
             }
             rest = rest[text.len()..].strip_prefix(',').unwrap_or("");
         }
@@ -281,9 +291,9 @@ impl Scan<'_> {
         match open {
             Some(link) => link.values[which] = Some(value),
             None => {
-                let mut values = [None; 4];
-                values[which] = Some(value);
-                self.links.push(Link { line, depth, call: false, values });
+                let mut link = Link::at(line, depth);
+                link.values[which] = Some(value);
+                self.links.push(link);
             }
         }
     }
@@ -303,9 +313,9 @@ impl Scan<'_> {
             _ => self.of_calls,
         };
         let inside = self.text[self.at..].trim_start_matches(' ')[1..].trim_start();
-        let mut link = Link { line: self.line, depth: self.depth + 1, call: true, values: [None; 4] };
+        let mut link = Link { call: true, ..Link::at(self.line, self.depth + 1) };
         if inside.starts_with('[') && word == "Link" {
-            let numbers = self.list(inside).filter(|list| (4..=6).contains(&list.len()));
+            let numbers = list(inside, &self.known).filter(|list| (4..=6).contains(&list.len()));
             let Some(list) = numbers else {
                 return Err((self.line, "`Link([...])` without the numbers theta, d, a, alpha".to_owned()));
             };
@@ -328,55 +338,12 @@ impl Scan<'_> {
         self.links.push(link);
         Ok(())
     }
-
-    /// The numbers of a list, `[0, pi/2]`, `np.array([0 1])`, `np.deg2rad([0, 90])`; `None` where it is none.
-    fn list(&self, value: &str) -> Option<Vec<Value>> {
-        let value = value.trim_start();
-        let open = value.find(['[', '{'])?;
-        let head = value[..open].trim();
-        let turned = head.trim_end_matches('(').rsplit('.').next().is_some_and(|f| matches!(f, "deg2rad" | "radians"));
-        if !(head.is_empty() || head.ends_with('(') && head.len() < 30) || head.contains(['\n', ',', ';']) {
-            return None;
-        }
-        let end = open + value[open..].find([']', '}'])?;
-        let inside = &value[open + 1..end];
-        let known = |name: &str| self.known.get(name).copied();
-        let numbers: Option<Vec<Value>> = match inside.contains([',', ';']) {
-            true => {
-                inside.trim_end_matches([',', ';', ' ', '\n']).split([',', ';']).map(|t| evaluate(t, &known)).collect()
-            }
-            false => inside.split_whitespace().map(|t| evaluate(t, &known)).collect(),
-        };
-        let turn = |v: Value| if turned { Value { number: v.number.to_radians(), radians: true, ..v } } else { v };
-        numbers.map(|list| list.into_iter().map(turn).collect())
-    }
 }
 
-/// Bytes of a value: to the comma, the end of the line or the bracket that ends it.
-fn extent(value: &str) -> usize {
-    let mut depth = 0usize;
-    for (at, c) in value.char_indices() {
-        match c {
-            '(' | '[' | '{' => depth += 1,
-            ')' | ']' | '}' if depth == 0 => return at,
-            ')' | ']' | '}' => depth -= 1,
-            ',' | ';' | '\n' if depth == 0 => return at,
-            _ => {}
-        }
-    }
-    value.len()
-}
-
-/// Links of lists, where the three that every table has are there.
-fn of_lists(lists: &[Option<(u64, Vec<Value>)>; 4]) -> Result<Vec<Link>, Wrong> {
-    let [Some((line, alpha)), Some((_, a)), theta, Some((_, d))] = lists else { return Ok(Vec::new()) };
-    let theta = theta.as_ref().map(|(_, list)| list);
-    if [a.len(), d.len(), theta.map_or(a.len(), Vec::len)].iter().any(|n| *n != alpha.len()) {
-        return Err((*line, "the lists of alpha, a, d and theta have different lengths".to_owned()));
-    }
-    let link = |i: usize| {
-        let values = [Some(alpha[i]), Some(a[i]), theta.map(|list| list[i]), Some(d[i])];
-        Link { line: *line, depth: 0, call: false, values }
-    };
-    Ok((0..alpha.len()).map(link).collect())
+/// What is behind the size of an array that a list follows, `[6] = {0, 1}`.
+fn sized(behind: &str) -> Option<&str> {
+    let (size, rest) = behind.strip_prefix('[')?.split_once(']')?;
+    let rest = rest.trim_start();
+    let listed = rest.strip_prefix('=')?.trim_start().starts_with(['{', '[']);
+    (size.trim().chars().all(|c| c.is_alphanumeric() || c == '_') && listed).then_some(rest)
 }

@@ -4,6 +4,7 @@
 
 pub mod dh_csv;
 pub mod dh_text;
+pub mod dh_words;
 pub mod known;
 pub mod ros_kinematics;
 pub mod ur_calibration;

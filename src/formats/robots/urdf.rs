@@ -9,8 +9,10 @@ use roxmltree::{Document, Node};
 
 use crate::files::{self, Result};
 use crate::geometry::{Transform, transform};
+use crate::progress;
 use crate::robot::Robot;
 use crate::robot::axes::{self, Axis};
+use crate::tables::expression;
 
 /// Names that descriptions give to the flange, the best first: taken where several links end the same chain.
 const FLANGES: [&str; 5] = ["tool0", "flange", "ee_link", "link8", "link_ee"];
@@ -322,7 +324,15 @@ fn joint(node: &Node, line: u64) -> std::result::Result<UrdfJoint, String> {
         return Err(format!("joint `{name}` has an axis of length zero"));
     }
     let limit = child_named("limit");
-    let bound = |name: &str| limit.and_then(|n| n.attribute(name)).and_then(|v| v.trim().parse::<f64>().ok());
+    let bound = |bound: &str| {
+        let text = limit.and_then(|n| n.attribute(bound))?.trim();
+        let formula = text.strip_prefix("${").and_then(|rest| rest.strip_suffix('}')).unwrap_or(text);
+        let number = expression::evaluate(formula, &|_| None).filter(|v| !v.variable).map(|v| v.number);
+        if number.is_none() {
+            progress::warn(format!("joint `{name}`: {bound}=\"{text}\" is no number; this limit is left out"));
+        }
+        number
+    };
     let limits_rad = match (word.as_str(), bound("lower"), bound("upper")) {
         ("revolute", Some(low), Some(high)) if low < high => Some((low, high)),
         ("prismatic", Some(low), Some(high)) if low < high => Some((1000.0 * low, 1000.0 * high)),

@@ -15,6 +15,13 @@ pub enum Convention {
     Modified,
 }
 
+impl Convention {
+    /// For a sentence, and as `--dh` has it.
+    pub fn name(self) -> &'static str {
+        if self == Convention::Classic { "classic" } else { "modified" }
+    }
+}
+
 /// A row of a table: alpha (deg), a (mm), theta (deg), d (mm).
 pub type Row = [f64; 4];
 

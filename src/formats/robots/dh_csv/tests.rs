@@ -1,10 +1,28 @@
 use super::*;
 
-fn all(text: &str) -> Result<Vec<Reading>> {
+use crate::files::Result;
+use crate::robot::catalogue::Convention;
+use crate::tables::names::Unit;
+
+fn of(name: &str, text: &str, asked: Asked) -> Result<Vec<Reading>> {
     let folder = tempfile::tempdir().unwrap();
-    let path = camino::Utf8PathBuf::from_path_buf(folder.path().join("dh.csv")).unwrap();
+    let path = camino::Utf8PathBuf::from_path_buf(folder.path().join(name)).unwrap();
     std::fs::write(&path, text).unwrap();
-    readings(&path, None)
+    readings(&path, &asked)
+}
+
+fn all(text: &str) -> Result<Vec<Reading>> {
+    of("dh.csv", text, Asked::default())
+}
+
+fn one(name: &str, text: &str) -> Reading {
+    let mut found = of(name, text, Asked::default()).unwrap();
+    assert_eq!(found.len(), 1, "{text}");
+    found.remove(0)
+}
+
+fn said(name: &str, text: &str) -> String {
+    crate::diagnostic::report(&of(name, text, Asked::default()).unwrap_err())
 }
 
 #[test]
@@ -26,7 +44,7 @@ fn one_table_in_all_its_forms() {
 
 #[test]
 fn the_ends_of_a_table_show_its_convention_where_no_word_says_it() {
-    let of = |text: &str| all(text).unwrap()[0].convention();
+    let of = |text: &str| all(text).unwrap()[0].convention().0;
     let classic = "theta,d,a,alpha\nq1,0.31,0,pi/2\nq2 - pi/2,0,-0.52,0\nq3,0.1,0,-pi/2\nq4,0.09,0,0\n";
     assert_eq!(of(classic), Some(Convention::Classic));
     let [alpha, a, theta, d] = all(classic).unwrap()[0].rows[1];
@@ -48,7 +66,7 @@ fn the_ends_of_a_table_show_its_convention_where_no_word_says_it() {
     assert!(said(&classic.replace("q2 - pi/2", "q2 - 90")).contains("in radians stand beside one of 90"));
     let words = "Link Length (a<sub>i-1</sub>),Link Twist (α<sub>i-1</sub>),Joint Offset (d<sub>i</sub>),Joint Angle (θ<sub>i</sub>)\n0,0,310,θ<sub>1</sub>\n0,-90,0,\\theta_2 - 90\n520,0,0,θ<sub>3</sub>\n";
     let found = all(words).unwrap();
-    assert_eq!((found[0].rows[1], found[0].convention()), ([-90.0, 0.0, -90.0, 0.0], Some(Convention::Modified)));
+    assert_eq!((found[0].rows[1], found[0].convention().0), ([-90.0, 0.0, -90.0, 0.0], Some(Convention::Modified)));
 }
 
 #[test]
@@ -59,4 +77,130 @@ fn without_names_every_order_that_could_be_is_offered() {
     assert!(said("alpha_deg,a_mm,theta_deg,d_mm\n1.5708,85,0,0\n0,640,1.5708,12\n").contains("radians"));
     assert!(said("alpha_deg,a_mm,theta_deg,d_mm\n90,0.085,0,0\n0,0.640,0,0\n").contains("metres"));
     assert!(said("alpha,a,theta\n90,85,0\n0,640,0\n").contains("no column `d_mm`"));
+}
+
+#[test]
+fn a_length_at_an_end_of_a_table_does_not_tell_its_convention() {
+    let of = |text: &str| one("dh.csv", text).convention();
+    // A gripper's length behind a plain first row is of either.
+    let (open, why) = of("theta,d,a,alpha\n0,310,0,0\n-90,0,0,-90\n0,0,520,0\n");
+    assert!(open.is_none() && why.contains("a length without a twist"), "{why}");
+    assert_eq!(of("theta,d,a,alpha\n0,310,225,0\n-90,0,0,-90\n0,90,0,0\n").0, None);
+    let (shown, why) = of("theta,d,a,alpha\n0,310,0,0\n-90,0,0,-90\n0,0,520,0\n0,90,0,90\n");
+    assert!(shown == Some(Convention::Modified) && why.contains("--dh classic"), "{why}");
+}
+
+#[test]
+fn words_say_the_convention_and_ask_where_the_ends_show_the_other() {
+    let table = "dh = [\n [0, 0.31, 0, 0],\n [0, 0, 0, -pi/2],\n [0, 0.09, 0, pi/2]]\n";
+    let of = |words: &str| one("dh.py", &format!("# {words}: theta, d, a, alpha\n{table}")).convention();
+    assert_eq!(of("Modified DH").0, Some(Convention::Modified));
+    assert_eq!(of("modified by the author").0, Some(Convention::Modified));
+    let (open, why) = of("standard DH");
+    assert!(open.is_none() && why.contains("words of the file say classic"), "{why}");
+    let twists = table.replace("0, 0],", "0, pi/2],");
+    assert_eq!(
+        one("dh.py", &format!("# Craig's DH: theta, d, a, alpha\n{twists}")).convention().0,
+        Some(Convention::Modified)
+    );
+    // Numbers from 1 in names show nothing.
+    let numbered =
+        "a1 = 0; alpha1 = 0; d1 = 0.3;\na2 = 0.4; alpha2 = pi/2; d2 = 0;\na3 = 0; alpha3 = pi/2; d3 = 0.1;\n";
+    assert_eq!(one("dh.m", numbered).convention().0, Some(Convention::Modified));
+}
+
+#[test]
+fn units_are_asked_where_neither_numbers_nor_words_tell() {
+    let lists = "dh:\n  theta: [1.3, -0.9]\n  a: [0.3, 0.25]\n  d: [0.0, 0.0]\n  alpha: [0.0, 0.0]\n";
+    assert!(one("arm.yml", lists).open.is_some_and(|open| open.message.contains("1.3")));
+    let stated = one("arm.yml", &format!("# Unit [radian]\n{lists}"));
+    assert!(stated.open.is_none() && (stated.rows[0][2] - 1.3f64.to_degrees()).abs() < 1e-9);
+    let asked = Asked { units: [Some(Unit::Deg), Some(Unit::Cm)], ..Asked::default() };
+    let flagged = of("arm.yml", lists, asked).unwrap().remove(0);
+    assert!(flagged.open.is_none() && flagged.rows[0] == [0.0, 3.0, 1.3, 0.0], "{flagged:?}");
+    // Lengths of a program.
+    let short = "L1, L2 = 13.8, 14.7\nalpha = [0, pi/2, 0]\na = [0, 0, L2]\nd = [L1, 0, 0]\n";
+    assert!(one("arm.py", short).open.is_some_and(|open| open.message.contains("28.5 in all")));
+    let stated = one("arm.py", &short.replace("14.7\n", "14.7 # lengths in cm\n"));
+    assert!(stated.open.is_none() && stated.rows[0][3] == 138.0, "{stated:?}");
+    // Words that the numbers rule out are not heard, or asked about.
+    let metres = short.replace("13.8, 14.7", "0.138, 0.147 # lengths in mm");
+    assert!((one("arm.py", &metres).rows[0][3] - 138.0).abs() < 1e-9);
+    assert!(one("arm.py", &metres.replace("in mm", "in cm")).open.is_some());
+    assert!(said("dh.csv", "theta,d,a,alpha\n90,310,0,1.5708\n0,0,220,0\n").contains("quarter turn in radians"));
+    let each = one("dh.csv", "theta [deg],d,a,alpha [rad]\n90,310,0,1.5707963267948966\n30,0,220,0\n");
+    assert!((each.rows[0][0] - 90.0).abs() < 1e-9 && each.rows[1][2] == 30.0, "{each:?}");
+}
+
+#[test]
+fn columns_that_a_flag_names_are_those_of_any_text() {
+    let asked = Asked { columns: Some("theta,d,a,alpha"), ..Asked::default() };
+    let yaml = "dh:\n - [0, 0.15, 0.0, 1.5708]\n - [0, 0.0, -0.24, 0.0]\n - [0, 0.08, 0.0, 0.0]\n";
+    for (name, text) in [
+        ("arm.yaml", yaml),
+        ("arm.txt", "0 0.15 0 pi/2\n0 0 -0.24 0\n0 0.08 0 0\n"),
+        ("arm.csv", "q1,0.15,0,pi/2\nq2,0,-0.24,0\nq3,0.08,0,0\n"),
+        ("arm.csv", "q1,0.15,q1,pi/2\nq1,0.15,0,pi/2\nq2,0,-0.24,0\nq3,0.08,0,0\n".split_once('\n').unwrap().1),
+    ] {
+        let found = of(name, text, asked).unwrap();
+        assert_eq!((found.len(), found[0].rows.len()), (1, 3), "{text}");
+        assert!((found[0].rows[0][0] - 90.0).abs() < 1e-3 && found[0].rows[1][1] == -240.0, "{found:?}");
+    }
+    let refused = |name: &str, text: &str| crate::diagnostic::report(&of(name, text, asked).unwrap_err());
+    assert!(refused("arm.csv", "0,150,0,90,7\n0,0,240,0,8\n").contains("the table has 5"));
+    assert!(refused("arm.py", "RevoluteDH(d=0.3, alpha=pi/2)\nRevoluteDH(a=0.3)\n").contains("names of their own"));
+    assert!(said("arm.csv", "0,150,0,90,7,5\n0,0,240,0,8,5\n").contains("`--columns"));
+}
+
+#[test]
+fn a_last_row_that_holds_still_is_the_flange() {
+    let numbered = "s = {alpha0: 0, a0: 0, d1: 0.75,\n alpha1: -pi/2, a1: 0.35, d2: 0, q2: q2 - pi/2,\n alpha2: 0, a2: 1.25, d3: 0,\n alpha3: pi/2, a3: 0, d4: 0.3, q4: 0}\n";
+    let found = one("fk.py", numbered);
+    assert_eq!(found.rows.len(), 3);
+    let robot = found.robot("arm", Convention::Modified);
+    let turning = one("fk.py", &numbered.replace(", q4: 0", "")).robot("arm", Convention::Modified);
+    let (flange, expected) =
+        (robot.root_from_flange(&[0.1, 0.2, 0.3]), turning.root_from_flange(&[0.1, 0.2, 0.3, 0.0]));
+    assert!((flange.inverse() * expected).translation.vector.norm() < 1e-9, "{flange} {expected}");
+    assert!((flange.rotation.inverse() * expected.rotation).angle() < 1e-9);
+    let table = "theta,d,a,alpha\nq1,0.31,0,pi/2\nq2,0,0.5,0\nq3,0.1,0,-pi/2\n0,0.2,0,0\n";
+    let classic = one("dh.csv", table).robot("arm", Convention::Classic);
+    let all = one("dh.csv", &table.replace("\n0,", "\nq4,")).robot("arm", Convention::Classic);
+    let (flange, expected) = (classic.root_from_flange(&[0.1, 0.2, 0.3]), all.root_from_flange(&[0.1, 0.2, 0.3, 0.0]));
+    assert!((flange.inverse() * expected).translation.vector.norm() < 1e-9, "{flange} {expected}");
+}
+
+#[test]
+fn limits_are_read_or_said_to_be_left_out() {
+    let table = "joint,a,alpha,d,theta,q_min,q_max\n1,0,90,400,0,-170,170\n2,560,0,0,90,-90,90\n3,35,90,0,0,-80,80\n";
+    assert_eq!(one("dh.csv", table).limits_deg, [Some((-170.0, 170.0)), Some((-90.0, 90.0)), Some((-80.0, 80.0))]);
+    let radians = table.replace("-170,170", "-3,3").replace("-90,90", "-1,1").replace("-80,80", "-1,1");
+    assert_eq!(one("dh.csv", &radians).limits_deg[1], Some((-1f64.to_degrees(), 1f64.to_degrees())));
+    let other = table.replace("q_min,q_max", "limits,mass");
+    assert!(one("dh.csv", &other).said.ends_with("left out: limits, mass"));
+    let links = "deg = pi/180;\nL = [Revolute('d', 0.3, 'alpha', pi/2, 'qlim', [-240 240]*deg)\n Revolute('a', 0.2, 'qlim', [-pi/2 pi/2])\n Revolute('a', 0.1, 'qlim', [0, 160]*pi/180)];\n";
+    let limits = one("arm.m", links).limits_deg;
+    let expected = [(-240.0, 240.0), (-90.0, 90.0), (0.0, 160.0)];
+    let near = |(found, (low, high)): (&Option<(f64, f64)>, (f64, f64))| {
+        found.is_some_and(|f| (f.0 - low).abs() < 1e-9 && (f.1 - high).abs() < 1e-9)
+    };
+    assert!(limits.len() == 3 && limits.iter().zip(expected).all(near), "{limits:?}");
+    assert!(one("arm.m", &links.replace("[-pi/2 pi/2]", "range(2)")).said.ends_with("left out: qlim"));
+    // Names over other columns.
+    let mixed = "a,alpha,d,theta\n290,0,1.5707963267948966,-165\n0,270,0,-110\n72,0,0,-100\n";
+    assert!(said("dh.csv", mixed).contains("stands in a column of lengths"));
+}
+
+#[test]
+fn a_table_in_a_document_is_read_without_what_is_around_it() {
+    let rows = "&alpha; | a | d | &theta;\n:--:|:--:|:--:|:--:\n0 | 0 | 0.75 | q&#8321;\n-&pi;/2 | 0.35 | 0 | q&#x2082;-&pi;/2\n0 | 1.25 | 0 | q<sub>3</sub>\n";
+    let document = format!("# An arm\n\nAs | said | in | [1]:\n\n{rows}\nThe offset is what `q` begins at, in rad.\n");
+    let found = one("README.md", &document);
+    assert_eq!((found.rows.len(), found.rows[1]), (3, [-90.0, 350.0, -90.0, 0.0]));
+    assert!(said("README.md", &format!("{document}\n{rows}")).contains("a second table begins here"));
+    let ruled = "  a\talpha\t d\t theta\n\n1-0 | 0.09 | 0 | 0.38 | 0 |\n-----------\n2-1 | 0.12 | 1.5708 | 0.35 | 0 |\n-----------\n3-2 | 0.11 | 0 | 0 | 0 |\n";
+    let found = one("arm.txt", ruled);
+    assert_eq!((found.rows.len(), found.rows[0]), (3, [0.0, 90.0, 0.0, 380.0]));
+    let two = "alpha a theta d\n0 0.2 0 -0.2\npi/2 0 0 0\n\nLeft\n0 -0.2 0 -0.2\npi/2 0 0 0\n";
+    assert!(said("leg.txt", two).contains("a second table of numbers begins here"));
 }

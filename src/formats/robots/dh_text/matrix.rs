@@ -1,5 +1,10 @@
 //! A table in brackets in the text of a program, a row a joint, with the order of its columns in a comment.
+//!
+//! In: text, and what its names stand for. Out: the rows of the one table in it. What goes wrong: a row with a word that stands for no number, a line inside
+//! of the table's brackets that is no row, and two tables; all refused with the line, since a row less is another robot.
 
+use super::comments;
+use super::link::{Known, Wrong};
 use crate::tables::Fields;
 use crate::tables::expression::evaluate;
 use crate::tables::names;
@@ -14,36 +19,135 @@ pub struct Matrix {
     pub names: Option<[&'static str; 4]>,
 }
 
-/// The longest run of lines that hold four numbers each; none where there are fewer than two, or two as long.
-pub fn matrix(text: &str) -> Option<Matrix> {
-    let lines: Vec<&str> = text.lines().collect();
-    let cells: Vec<Option<Vec<&str>>> = lines.iter().map(|line| four(line)).collect();
-    let mut runs: Vec<(usize, usize)> = Vec::new();
-    for (at, row) in cells.iter().enumerate() {
-        match (row, runs.last_mut()) {
-            (Some(_), Some((start, end))) if *end == at && *start < at => *end = at + 1,
-            (Some(_), _) => runs.push((at, at + 1)),
-            _ => {}
-        }
-    }
-    let longest = runs.iter().map(|(start, end)| end - start).max().filter(|n| *n > 1)?;
-    let mut of_longest = runs.iter().filter(|(start, end)| end - start == longest);
-    let (&(start, end), None) = (of_longest.next()?, of_longest.next()) else { return None };
-    let rows = (start..end).filter_map(|at| Some((at as u64 + 1, Fields::new(cells[at].as_ref()?.iter().copied()))));
-    let named = lines[start.saturating_sub(ABOVE)..=start].iter().rev().find_map(|line| order(line));
-    Some(Matrix { rows: rows.collect(), names: named })
+/// What a line is to a table.
+#[derive(Debug, PartialEq)]
+enum Line<'a> {
+    /// Its cells.
+    Row(Vec<&'a str>),
+    /// A row but for this cell.
+    Broken(&'a str),
+    /// Nothing but a comment or brackets; whether it is empty.
+    Nothing { empty: bool },
+    /// Anything else, which may be a list of another number of numbers.
+    Other { code: &'a str, list: bool },
 }
 
-/// The four cells of a row, without brackets and comments.
-fn four(line: &str) -> Option<Vec<&str>> {
-    let line = line[..["#", "%", "//"].iter().filter_map(|mark| line.find(mark)).min().unwrap_or(line.len())].trim();
-    let bracketed = line.rfind(['[', '{']).map(|at| &line[at + 1..]).unwrap_or(line);
-    let inside = bracketed.trim_end_matches([']', '}', ')', ',', ';', '.', ' ']);
-    let cells: Vec<&str> = match inside.contains(',') {
+/// The longest run of lines that hold `width` numbers each; none where there are fewer than two.
+pub fn matrix(text: &str, known: &Known, width: usize) -> Result<Option<Matrix>, Wrong> {
+    let lines: Vec<&str> = text.lines().collect();
+    let mut read: Vec<(usize, Line)> = Vec::with_capacity(lines.len());
+    let mut depth = 0usize;
+    for line in &lines {
+        let code = &line[..comments::start(line)];
+        read.push((depth, of(line, code.trim(), known, width)));
+        let opened = code.matches(['[', '{', '(']).count();
+        depth = (depth + opened).saturating_sub(code.matches([']', '}', ')']).count());
+    }
+    let runs = runs(&read);
+    let rows = |run: &std::ops::Range<usize>| run.clone().filter(|&at| matches!(read[at].1, Line::Row(_))).count();
+    let tables = || runs.iter().filter(|run| rows(run) > 1);
+    let Some(longest) = tables().map(|run| run.len()).max() else { return Ok(None) };
+    let mut of_longest = tables().filter(|run| run.len() == longest);
+    let Some(run) = of_longest.next() else { return Ok(None) };
+    let apart = |a: &std::ops::Range<usize>, b: &std::ops::Range<usize>| {
+        let between = a.end.min(b.end)..a.start.max(b.start);
+        !between.is_empty() && between.into_iter().all(|at| matches!(read[at].1, Line::Nothing { .. }))
+    };
+    let second = of_longest.next().or_else(|| tables().find(|other| apart(run, other)));
+    if let Some(second) = second {
+        let message = format!(
+            "a second table of numbers begins here; another is at line {}, and which is the robot's is not said",
+            run.start + 1
+        );
+        return Err((second.start as u64 + 1, message + ": leave one of them in the file"));
+    }
+    let alike = |at: usize| {
+        let indented = |at: usize| lines[at].len() - lines[at].trim_start().len();
+        matches!(read.get(at), Some((depth, Line::Other { list: true, .. })) if *depth == read[run.end - 1].0)
+            && indented(at) == indented(run.end - 1)
+    };
+    let beside = [run.start.wrapping_sub(1), run.end].into_iter().filter(|&at| alike(at));
+    for at in whole(&read, run).chain(beside) {
+        let wrong = match &read[at].1 {
+            Line::Broken(cell) => format!("`{cell}` stands for no number"),
+            Line::Other { code, .. } => format!("`{code}` is no row of {width} numbers, but stands among such rows"),
+            _ => continue,
+        };
+        return Err((at as u64 + 1, wrong + ", and without this row it is another robot"));
+    }
+    let cells = |at: usize| match &read[at].1 {
+        Line::Row(cells) => Some((at as u64 + 1, Fields::new(cells.iter().copied()))),
+        _ => None,
+    };
+    let named = lines[run.start.saturating_sub(ABOVE)..=run.start].iter().rev().find_map(|line| order(line));
+    Ok(Some(Matrix { rows: run.clone().filter_map(cells).collect(), names: named }))
+}
+
+/// The lines of each table: an empty line ends one that is not inside of brackets.
+fn runs(read: &[(usize, Line)]) -> Vec<std::ops::Range<usize>> {
+    let mut runs: Vec<std::ops::Range<usize>> = Vec::new();
+    let mut open = false;
+    for (at, (depth, line)) in read.iter().enumerate() {
+        match line {
+            Line::Row(_) | Line::Broken(_) => {
+                match runs.last_mut().filter(|_| open) {
+                    Some(run) => run.end = at + 1,
+                    None => runs.push(at..at + 1),
+                }
+                open = true;
+            }
+            Line::Nothing { empty } => open &= !empty || *depth > 0,
+            Line::Other { .. } => open = false,
+        }
+    }
+    runs
+}
+
+/// The lines of a table with those before and behind it that stand inside of its brackets.
+fn whole(read: &[(usize, Line)], run: &std::ops::Range<usize>) -> std::ops::Range<usize> {
+    let depth = read[run.end - 1].0;
+    let inside = |at: &usize| depth > 0 && read[*at].0 >= depth;
+    let first = (0..run.start).rev().take_while(inside).last().unwrap_or(run.start);
+    let end = (run.end..read.len()).take_while(inside).last().map_or(run.end, |last| last + 1);
+    first..end
+}
+
+/// What a line is; `code` is what it has without comments.
+fn of<'a>(line: &'a str, code: &'a str, known: &Known, width: usize) -> Line<'a> {
+    let is_rule = |c: char| matches!(c, '[' | ']' | '{' | '}' | '(' | ')' | ',' | ';' | ' ' | '-' | '=' | '+' | '|');
+    if code.chars().all(is_rule) {
+        return Line::Nothing { empty: line.trim().is_empty() };
+    }
+    let bracketed = code.rfind(['[', '{']).map(|at| &code[at + 1..]);
+    let mut inside = bracketed.unwrap_or(code).trim();
+    // A bracket that closes what is not opened here is the table's.
+    while let Some(rest) = inside.strip_suffix([']', '}', ')', ',', ';', '.', ' ']) {
+        if inside.ends_with(')') && inside.matches('(').count() >= inside.matches(')').count() {
+            break;
+        }
+        inside = rest;
+    }
+    let by_comma = inside.contains(',');
+    let cells: Vec<&str> = match by_comma {
         true => inside.split(',').map(str::trim).collect(),
         false => inside.split_whitespace().collect(),
     };
-    (cells.len() == 4 && cells.iter().all(|cell| evaluate(cell, &|_| None).is_some())).then_some(cells)
+    let is_number = |cell: &&str| evaluate(cell, &|name| known.get(name).copied()).is_some();
+    let numbers = cells.iter().filter(|cell| is_number(cell)).count();
+    // Words with blanks between them may be a sentence.
+    let most = if by_comma { 1 } else { width.saturating_sub(1) };
+    // `x = f(0, 1, 2, 3)` is none.
+    let first = cells.first().copied().unwrap_or("");
+    let is_call = first.contains('=') || first.matches('(').count() != first.matches(')').count();
+    match cells.iter().find(|cell| !is_number(cell)) {
+        _ if cells.len() != width => {
+            let list = bracketed.is_some() && by_comma && numbers == cells.len();
+            Line::Other { code, list }
+        }
+        None => Line::Row(cells),
+        Some(cell) if numbers >= most && !is_call && order(line).is_none() => Line::Broken(cell),
+        Some(_) => Line::Other { code, list: false },
+    }
 }
 
 /// The four parameters in the order in which a line names them, one behind the other.

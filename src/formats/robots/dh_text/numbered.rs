@@ -28,11 +28,14 @@ pub(super) fn links(numbered: &Numbered) -> (Vec<Link>, Option<Convention>) {
     if first > 1 || !whole(alpha, first) || !whole(a, first) || !whole(d, 1) || count < 2 {
         return (Vec::new(), None);
     }
+    // Where one is its joint's variable, those that are not named are, too; a number holds still.
+    let turns = theta.values().any(|(_, v)| v.variable);
     let link = |joint: usize| {
         let of = |of: &BTreeMap<usize, (u64, Value)>, i: usize| of.get(&i).map(|(_, v)| *v);
         let before = first + joint - 1;
-        let values = [of(alpha, before), of(a, before), of(theta, joint), of(d, joint)];
-        Link { line: d[&joint].0, depth: 0, call: true, values }
+        let unnamed = Value { number: 0.0, radians: false, variable: turns };
+        let values = [of(alpha, before), of(a, before), Some(of(theta, joint).unwrap_or(unnamed)), of(d, joint)];
+        Link { values, ..Link::at(d[&joint].0, 0) }
     };
     ((1..=count).map(link).collect(), (first == 0).then_some(Convention::Modified))
 }

@@ -2,9 +2,18 @@ use super::*;
 
 const PI: f64 = std::f64::consts::PI;
 
+type Row = [f64; 4];
+
 fn rows(text: &str) -> (Vec<Row>, Option<Convention>) {
-    let links = read(text).unwrap().unwrap();
-    (links.rows.into_iter().map(|(_, row)| row).collect(), links.convention)
+    let text = read(text, false).unwrap();
+    let links = text.links.unwrap();
+    let rows = links.rows.into_iter().map(|(_, row)| row.map(|v| v.number)).collect();
+    let of_calls = links.calls.then_some(Convention::Classic);
+    (rows, links.convention.map(|(c, _)| c).or(text.words.convention).or(of_calls))
+}
+
+fn table(text: &str) -> Result<Option<Matrix>, Wrong> {
+    matrix(text, &read(text, false)?.known, 4)
 }
 
 fn close(found: &[Row], expected: &[Row]) -> bool {
@@ -54,21 +63,21 @@ fn links_of_loops_over_lists_of_names_and_of_numbers() {
 #[test]
 fn a_table_in_brackets_has_its_order_in_a_comment() {
     let body = "dh = np.array([\n    [0, -90, 10, 0],  # joint 1\n    [50, 0, 0, -90],\n    [0, -90, 5, 0]])\n";
-    let found = matrix(&format!("# four parameters a row: [a, alpha, d, theta]\n{body}")).unwrap();
+    let found = table(&format!("# four parameters a row: [a, alpha, d, theta]\n{body}")).unwrap().unwrap();
     assert_eq!((found.rows.len(), found.rows[1].0), (3, 4));
     assert_eq!(found.names, Some(["a", "alpha", "d", "theta"]));
-    assert_eq!(matrix(body).unwrap().names, None);
+    assert_eq!(table(body).unwrap().unwrap().names, None);
     let matlab = "%   a(i-1)  alpha(i-1)  d(i)  theta_offset\nDH = [0, 0, 77, 0;      % 1\n      0, -pi/2, 0, -pi/2; % 2\n      128, 0, 0, pi/2];\n";
-    let found = matrix(matlab).unwrap();
+    let found = table(matlab).unwrap().unwrap();
     assert_eq!((found.names, &found.rows[2].1[3]), (Some(["a", "alpha", "d", "theta"]), "pi/2"));
-    for text in ["x = [1, 2, 3, 4]\n", "[1,2,3,4]\n[1,2,3,4]\n\n[1,2,3,4]\n[1,2,3,4]\n", ""] {
-        assert_eq!(matrix(text), None, "{text}");
+    for text in ["x = [1, 2, 3, 4]\n", ""] {
+        assert_eq!(table(text), Ok(None), "{text}");
     }
 }
 
 #[test]
 fn what_a_table_has_no_place_for_is_refused_with_its_line() {
-    let wrong = |text: &str| read(text).unwrap_err();
+    let wrong = |text: &str| read(text, false).unwrap_err();
     let two = "RevoluteDH(d=0.3, alpha=pi/2)\n";
     assert_eq!(wrong(&format!("{two}PrismaticDH(a=0.2)\n")).0, 2);
     assert!(wrong(&format!("{two}RevoluteDH(d=d2, a=0.2)\n")).1.contains("`d2`"));
@@ -82,6 +91,44 @@ fn what_a_table_has_no_place_for_is_refused_with_its_line() {
     for text in
         ["", "x = 3\n", "alpha_deg,a_mm,theta_deg,d_mm\n0,0,0,1\n1,2,3,4\n", "delta_a = [0, 1]\ndelta_d = [0, 1]\n"]
     {
-        assert_eq!(read(text).unwrap(), None, "{text}");
+        assert_eq!(read(text, false).unwrap().links, None, "{text}");
+    }
+}
+
+#[test]
+fn a_row_that_cannot_be_read_is_named_and_not_left_out() {
+    let body = "L2 = 0.4\ndh = [\n # theta, d, a, alpha\n [0, 0.1, 0, pi/2],\n\n [0, 0, -L2, 0],  # elbow\n [0, 0.1, 0, -math.radians(90)],\n [0, 0.1, 0, 0],\n]\nprint(f(a, 0, 0, 1))\n";
+    let found = table(body).unwrap().unwrap();
+    assert_eq!((found.rows.len(), &found.rows[1].1[2], &found.rows[2].1[3]), (4, "-L2", "-math.radians(90)"));
+    for (old, new, line, word) in [
+        ("-L2", "-L3", 6, "`-L3`"),
+        ("0.1, 0, pi/2]", "0.1, 0, pi2]", 4, "`pi2`"),
+        (" [0, 0.1, 0, 0],", " [0, 0.1, 0],", 8, "no row of 4"),
+        (" [0, 0, -L2, 0],  # elbow", " *elbow,", 6, "`*elbow,`"),
+    ] {
+        let (at, message) = table(&body.replace(old, new)).unwrap_err();
+        assert!(at == line && message.contains(word), "{at} {message}");
+    }
+    let c = "Row rows[3] = {\n // a alpha d theta\n { 0.0f, M_PI_2, 0.1f, 0.0f }, // 1\n { 0.3f, 0.0f, 0.0f, 0.0f },\n { 0.0f, 90 * DEG2RAD, 0.1f, 0.0f }\n};\n";
+    assert_eq!(table(c).unwrap().unwrap().rows.len(), 3);
+    assert_eq!(table("- [0, 0.1, 0, 0]\n- [0, L, 0, 0]\n- [0, 0.2, 0, 0]\n").unwrap_err().0, 2);
+    for two in
+        ["[1,2,3,4]\n[1,2,3,4]\n\n[1,2,3,4]\n[1,2,3,4]\n", "[1,2,3,4]\n[1,2,3,4]\n[1,2,3,4]\n\n[1,2,3,4]\n[1,2,3,4]\n"]
+    {
+        assert!(table(two).unwrap_err().1.contains("second table"), "{two}");
+    }
+}
+
+#[test]
+fn lists_have_sizes_factors_and_names_of_a_family() {
+    let expected = [[PI / 2.0, 0.0, 0.0, 0.33], [0.0, 0.27, 0.0, 0.0], [-PI / 2.0, -0.06, 0.0, 0.0]];
+    let sized = "static double a[3] = {0, 0.27, -0.06};\nstatic double d[3] = {0.33, 0, 0};\nstatic double alpha[N] = {M_PI/2, 0, -M_PI_2};\n";
+    let family = "ar_alpha_vals = [pi/2, 0, -pi/2]\nar_a_vals = [0, 0.27, -0.06]\nar_d_vals = [0.33, 0, 0]\nar_theta_offsets = [0, 0, 0]\n";
+    let factor = "alpha = [90, 0, -90]*pi/180;\na = [0 270 -60]/1000;\nd = [330 0 0]./1000;\n";
+    for text in [sized, family, factor] {
+        assert!(close(&rows(text).0, &expected), "{text}\n{:?}", rows(text));
+    }
+    for text in [factor.replace("*pi/180", "*k"), family.replace("ar_a", "br_a"), family.replace("ar_", "delta_")] {
+        assert_eq!(read(&text, false).unwrap().links, None, "{text}");
     }
 }

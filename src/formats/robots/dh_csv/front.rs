@@ -1,0 +1,237 @@
+//! The table of a file, whatever it is: a sheet, a text of rows, a document with a table in it, a program or settings.
+
+use std::borrow::Cow;
+
+use camino::Utf8Path;
+
+use super::beside;
+use super::names::{HINT, named};
+use super::orders::without_names;
+use super::reading::{Reading, reading};
+use super::table::Table;
+use crate::files::{self, Result};
+use crate::formats::robots::dh_text::{self, Known, Links, Text};
+use crate::formats::robots::dh_words::Words;
+use crate::tables::expression::{self, Value};
+use crate::tables::header::{self, Headed};
+use crate::tables::names::Unit;
+use crate::tables::{Fields, Form, Grid};
+
+/// What flags say of a table.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Asked<'a> {
+    /// The columns' names in their order.
+    pub columns: Option<&'a str>,
+    /// Of angles and of lengths.
+    pub units: [Option<Unit>; 2],
+}
+
+const WHAT: &str = "the table of Denavit-Hartenberg parameters";
+
+/// Extensions of files that are tables whatever stands in them.
+const TABLES: [&str; 5] = ["csv", "tsv", "xlsx", "xls", "ods"];
+
+/// Extensions of texts in sentences, where words in brackets are no code.
+const PROSE: [&str; 3] = ["md", "txt", "rst"];
+
+/// Characters that pages name.
+const ENTITIES: [(&str, &str); 8] = [
+    ("&alpha;", "\u{3b1}"),
+    ("&theta;", "\u{3b8}"),
+    ("&pi;", "\u{3c0}"),
+    ("&minus;", "-"),
+    ("&deg;", "\u{b0}"),
+    ("&nbsp;", " "),
+    ("&lowast;", "*"),
+    ("&amp;", "&"),
+];
+
+/// Every way to read a file.
+pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
+    let is = |list: &[&str]| path.extension().is_some_and(|e| list.iter().any(|known| e.eq_ignore_ascii_case(known)));
+    let text = match files::read_text(path, WHAT, Some(HINT)) {
+        _ if is(&TABLES) => None,
+        Ok(text) => Some(text),
+        // Another encoding, or a spreadsheet.
+        Err(_) => Grid::text(path, WHAT, HINT)?,
+    };
+    let Some(text) = text else { return of_grid(&Grid::read(path, WHAT, HINT)?, asked, None) };
+    let text = without_entities(&text);
+    let refuse = |(line, message): dh_text::Wrong| empty(path).refuse(line, message, Some(HINT));
+    let read = dh_text::read(&text, is(&PROSE)).map_err(refuse)?;
+    let given = given(asked);
+    if let (Some(links), None) = (&read.links, &given) {
+        return Ok(vec![of_links(path, &read, links, asked)?]);
+    }
+    let width = given.as_ref().map_or(4, Vec::len);
+    if let Some(matrix) = dh_text::matrix(&text, &read.known, width).map_err(refuse)? {
+        let grid = Grid { rows: matrix.rows.clone(), ..empty(path) };
+        let names = given.clone().or(matrix.names.map(|names| names.map(str::to_owned).to_vec()));
+        let names = names.as_deref();
+        return ways(&Table {
+            names,
+            known: &read.known,
+            ..table(&grid, &matrix.rows, asked, read.words, given.as_deref())
+        });
+    }
+    if let Some((line, _)) = read.links.as_ref().and_then(|links| links.rows.first()) {
+        let message = "the parameters have names of their own here, and no table has columns to name".to_owned();
+        return Err(empty(path).refuse(*line, message, Some("leave out `--columns`")));
+    }
+    of_grid(&Grid::of_text(path, alone(path, &text)?.into_owned())?, asked, Some(read.words))
+}
+
+fn empty(path: &Utf8Path) -> Grid {
+    Grid { path: path.to_owned(), form: Form::Delimited(','), encoding: None, rows: Vec::new() }
+}
+
+/// The names of `--columns`.
+fn given(asked: &Asked) -> Option<Vec<String>> {
+    asked.columns.map(|c| c.split(',').map(|word| word.trim().to_owned()).collect())
+}
+
+fn table<'a>(
+    grid: &'a Grid,
+    rows: &'a [(u64, Fields)],
+    asked: &Asked,
+    words: Words,
+    given: Option<&'a [String]>,
+) -> Table<'a> {
+    static NONE: Known = Known::new();
+    Table { grid, rows, names: given, given, known: &NONE, words, units: asked.units }
+}
+
+/// The one way to read a table with names, or all of one without.
+fn ways(table: &Table) -> Result<Vec<Reading>> {
+    match table.names {
+        Some(names) => Ok(vec![reading(table, named(table.grid, names)?)?]),
+        None => without_names(table),
+    }
+}
+
+/// The rows of a file; `words` are of all its text, where that is known.
+fn of_grid(grid: &Grid, asked: &Asked, words: Option<Words>) -> Result<Vec<Reading>> {
+    let given = given(asked);
+    let Headed { names, rows } = if given.is_some() { header::rows_alone(grid)? } else { header::split(grid)? };
+    let width = rows.first().map_or(0, |(_, row)| row.len());
+    if let Some(given) = given.as_ref().filter(|given| given.len() != width) {
+        let line = rows.first().map_or(1, |(line, _)| *line);
+        let message = format!("--columns names {} columns, but the table has {width}", given.len());
+        return Err(grid.refuse(line, message, Some("`-` stands for a column that is none of alpha, a, d and theta")));
+    }
+    let prose = || grid.rows.iter().map(|(_, row)| row.iter().collect::<Vec<_>>().join(" ") + "\n").collect::<String>();
+    let words = words.unwrap_or_else(|| Words::of(&prose(), ""));
+    let names = given.clone().or(names);
+    let rows = [above(grid, given.as_deref(), &rows)?, rows].concat();
+    ways(&Table { names: names.as_deref(), ..table(grid, &rows, asked, words, given.as_deref()) })
+}
+
+/// Rows before those with most cells numbers, where a flag names the columns: `q1, 0, pi/2, 0` is one, and names of columns are none.
+fn above(grid: &Grid, given: Option<&[String]>, rows: &[(u64, Fields)]) -> Result<Vec<(u64, Fields)>> {
+    let (Some(given), Some((first, below))) = (given, rows.first()) else { return Ok(Vec::new()) };
+    let columns = named(grid, given)?;
+    let is_row = |row: &Fields| {
+        row.len() == below.len() && columns.iter().all(|&c| expression::evaluate(&row[c], &|_| None).is_some())
+    };
+    let before = grid.rows.iter().take_while(|(line, _)| line < first);
+    Ok(before.filter(|(_, row)| is_row(row)).cloned().collect())
+}
+
+/// Links whose parameters a text names.
+fn of_links(path: &Utf8Path, read: &Text, links: &Links, asked: &Asked) -> Result<Reading> {
+    let values = || links.rows.iter().flat_map(|(_, row)| [row[0], row[2]]);
+    let unit = if values().any(|v| v.radians) { " [rad]" } else { "" };
+    let names = [format!("alpha{unit}"), "a".to_owned(), format!("theta{unit}"), "d".to_owned()];
+    let cell = |v: &Value| if v.variable { format!("q + {}", v.number) } else { v.number.to_string() };
+    let cells = |row: &[Value; 4]| Fields::new(row.iter().map(cell).collect::<Vec<_>>().iter().map(String::as_str));
+    let rows: Vec<(u64, Fields)> = links.rows.iter().map(|(line, row)| (*line, cells(row))).collect();
+    let grid = Grid { rows: rows.clone(), ..empty(path) };
+    let table = Table { names: Some(&names), ..table(&grid, &rows, asked, read.words, None) };
+    let mut found = reading(&table, [0, 1, 2, 3])?;
+    found.stated = links.convention;
+    found.calls = links.calls;
+    let radians = links.limits.iter().flatten().flatten().any(|v| v.radians);
+    found.limits_deg = links.limits.iter().map(|limits| limits.map(|[low, high]| (low.number, high.number))).collect();
+    found.limits_deg.truncate(found.rows.len());
+    found.limits_deg.iter_mut().for_each(|limits| *limits = limits.filter(|(low, high)| low < high));
+    beside::in_deg(&mut found.limits_deg, radians.then_some(Unit::Rad));
+    if links.limited && found.limits_deg.iter().any(Option::is_none) {
+        found.said.push_str(", left out: qlim");
+    }
+    Ok(found)
+}
+
+/// The text with characters for what pages write for them, `&theta;` and `&#8321;`.
+fn without_entities(text: &str) -> Cow<'_, str> {
+    if !text.contains('&') {
+        return text.into();
+    }
+    let text = ENTITIES.iter().fold(text.to_owned(), |text, (name, c)| text.replace(name, c));
+    let mut pieces = text.split("&#");
+    let mut plain = pieces.next().unwrap_or("").to_owned();
+    for piece in pieces {
+        let decoded = piece.split_once(';').and_then(|(code, rest)| {
+            let number =
+                code.strip_prefix('x').map_or_else(|| code.parse().ok(), |hex| u32::from_str_radix(hex, 16).ok());
+            Some((char::from_u32(number?)?, rest))
+        });
+        match decoded {
+            Some((c, rest)) => {
+                plain.push(c);
+                plain.push_str(rest);
+            }
+            None => plain.push_str(&format!("&#{piece}")),
+        }
+    }
+    plain.into()
+}
+
+/// The table of a document alone, whose rows have bars between their cells, in lines where they stand; the text where it has none.
+fn alone<'a>(path: &Utf8Path, text: &'a str) -> Result<Cow<'a, str>> {
+    let lines: Vec<&str> = text.lines().collect();
+    let is_rule = |line: &str| !line.trim().is_empty() && line.chars().all(|c| "-=+|: \t".contains(c));
+    let is_row = |line: &str| line.matches('|').count() > 2;
+    let mut blocks: Vec<Vec<usize>> = Vec::new();
+    let mut open = false;
+    for (at, line) in lines.iter().enumerate().filter(|(_, line)| !is_rule(line)) {
+        match (is_row(line), blocks.last_mut().filter(|_| open)) {
+            (true, Some(block)) => block.push(at),
+            (true, None) => blocks.push(vec![at]),
+            (false, _) => {}
+        }
+        open = is_row(line);
+    }
+    // A table that is none of a robot has other names.
+    let is_named = |block: &&Vec<usize>| {
+        let first = lines[block[0]].to_lowercase();
+        (first.contains("alpha") || first.contains('\u{3b1}')) && block.len() > 2
+    };
+    let long = |block: &&Vec<usize>| block.len() > 2;
+    let mut found: Vec<&Vec<usize>> = blocks.iter().filter(is_named).collect();
+    if found.is_empty() {
+        found = blocks.iter().filter(long).collect();
+    }
+    let block = match found[..] {
+        [] => return Ok(text.into()),
+        [block] => block,
+        [one, other, ..] => {
+            let message = format!(
+                "a second table begins here; another is at line {}, and which is the robot's is not said",
+                one[0] + 1
+            );
+            return Err(empty(path).refuse(other[0] as u64 + 1, message, Some("leave one of them in the file")));
+        }
+    };
+    // Names may stand above a table without bars between them.
+    let cells = |line: &str| line.trim().trim_matches('|').matches('|').count() + 1;
+    let above = (0..block[0]).rev().find(|&at| !lines[at].trim().is_empty());
+    let words = above.map(|at| lines[at].split_whitespace().collect::<Vec<_>>()).unwrap_or_default();
+    let mut rows = vec![String::new(); lines.len()];
+    if let Some(at) = above.filter(|_| words.len() == 4 && cells(lines[block[0]]) == 5) {
+        rows[at] = format!("-|{}", words.join("|"));
+    }
+    for &at in block {
+        rows[at] = lines[at].trim().trim_matches('|').to_owned();
+    }
+    Ok((rows.join("\n") + "\n").into())
+}

@@ -1,0 +1,110 @@
+//! One way to read a table, and its robot.
+
+use std::fmt::Write as _;
+
+use super::beside::{Beside, Limits};
+use super::names::{NAMES, OWN, plain};
+use super::table::Table;
+use super::units::{Open, units};
+use crate::files::Result;
+use crate::geometry::Transform;
+use crate::robot::Robot;
+use crate::robot::catalogue::{Convention, Row, from_rows};
+use crate::tables::names::Unit;
+
+/// A way to read a table.
+#[derive(Debug, Clone)]
+pub struct Reading {
+    /// In deg and mm.
+    pub(super) rows: Vec<Row>,
+    /// Rows behind the last joint.
+    pub(super) flange: Vec<Row>,
+    /// Other columns, of a table with names.
+    pub(super) beta_deg: Vec<Option<f64>>,
+    pub(super) limits_deg: Vec<Option<Limits>>,
+    /// What was taken, for a sentence.
+    pub said: String,
+    /// The columns' names in their order, as `--columns` has them.
+    pub columns: String,
+    /// The convention that names or calls say, and which.
+    pub(super) stated: Option<(Convention, &'static str)>,
+    /// The convention that words say.
+    pub(super) words: Option<Convention>,
+    /// Whether calls of a toolbox make its links.
+    pub(super) calls: bool,
+    /// Whether the names are this program's own, whose tables are modified ones.
+    pub(super) own: bool,
+    /// A unit that nothing says.
+    pub open: Option<Open>,
+}
+
+impl Reading {
+    /// The robot of this table.
+    pub fn robot(&self, name: &str, convention: Convention) -> Robot {
+        let mut robot = from_rows(name, convention, &self.rows);
+        for (joint, (beta, limits)) in robot.joints.iter_mut().zip(self.beta_deg.iter().zip(&self.limits_deg)) {
+            joint.beta_rad = beta.map_or(0.0, f64::to_radians);
+            joint.limits_rad = limits.map(|(low, high)| (low.to_radians(), high.to_radians()));
+        }
+        if !self.flange.is_empty() {
+            let held = from_rows(name, convention, &self.flange);
+            let still = vec![0.0; self.flange.len()];
+            let flange: Transform = robot.ends.last_frame_from_flange * held.root_from_flange(&still);
+            robot.ends.last_frame_from_flange = flange;
+            robot.tool_mm = flange.translation.vector;
+        }
+        robot
+    }
+
+    /// Whether it has a column that stands beside alpha and a of a modified table alone.
+    pub fn is_modified(&self) -> bool {
+        self.beta_deg.iter().any(Option::is_some)
+    }
+}
+
+/// The table with these columns for alpha, a, theta and d.
+pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
+    let joints = table.turning(columns)?;
+    let (mut rows, radians) = table.numbers(columns)?;
+    let names = table.names;
+    let of_pi = |at: usize| (radians && matches!(at, 0 | 2)).then_some(Unit::Rad);
+    let stated = |at: usize| names.and_then(|n| plain(&n[columns[at]]).1).or_else(|| of_pi(at));
+    let ([alpha, theta], angles_open) = units(table, &rows, [0, 2], [stated(0), stated(2)])?;
+    let ([a, d], lengths_open) = units(table, &rows, [1, 3], [stated(1), stated(3)])?;
+    for row in &mut rows {
+        *row = [alpha.converted(row[0]), a.converted(row[1]), theta.converted(row[2]), d.converted(row[3])];
+    }
+    let flange = rows.split_off(joints);
+    let Beside { mut beta_deg, mut limits_deg, left_out } = table.beside(columns)?;
+    beta_deg.truncate(joints);
+    limits_deg.truncate(joints);
+    // `a(i-1)`, `alpha_{i-1}`: those of the link before.
+    let before = |name: &String| {
+        let bare: String = name.chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '\u{2212}')).collect();
+        ["i-1", "i\u{2212}1", "j-1", "n-1"].iter().any(|index| bare.contains(index))
+    };
+    let stated = names
+        .filter(|n| before(&n[columns[0]]) || before(&n[columns[1]]))
+        .map(|_| (Convention::Modified, "alpha and a are named as those of the link before"));
+    let own = names.is_some_and(|n| columns.iter().zip(OWN).all(|(&c, own)| n[c].eq_ignore_ascii_case(own)));
+    let mut order: Vec<(usize, &str)> = columns.iter().copied().zip(NAMES).collect();
+    order.sort_unstable();
+    let columns = order.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(",");
+    let word = |one: Unit, other: Unit| match one == other {
+        true => one.word().to_owned(),
+        false => format!("{} and {}", one.word(), other.word()),
+    };
+    let (angle, length) = (word(alpha, theta), word(a, d));
+    let mut said = format!("{joints} joints; columns {columns}, angles in {angle}, lengths in {length}");
+    if names.is_none() {
+        said.push_str(", no header");
+    }
+    if !flange.is_empty() {
+        let _ = write!(said, ", flange behind row {joints}");
+    }
+    if !left_out.is_empty() {
+        let _ = write!(said, ", left out: {}", left_out.join(", "));
+    }
+    let (words, open) = (table.words.convention, angles_open.or(lengths_open));
+    Ok(Reading { rows, flange, beta_deg, limits_deg, said, columns, stated, words, calls: false, own, open })
+}

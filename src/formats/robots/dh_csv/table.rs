@@ -1,0 +1,78 @@
+//! The rows of a table as numbers.
+
+use super::names::{HINT, NAMES};
+use crate::files::Result;
+use crate::formats::robots::dh_text::Known;
+use crate::formats::robots::dh_words::Words;
+use crate::robot::catalogue::Row;
+use crate::tables::expression::{self, Value};
+use crate::tables::names::Unit;
+use crate::tables::{Fields, Grid};
+
+/// Rows with what their names, cells and words mean.
+pub(super) struct Table<'a> {
+    pub grid: &'a Grid,
+    pub rows: &'a [(u64, Fields)],
+    pub names: Option<&'a [String]>,
+    /// The names that a flag gave.
+    pub given: Option<&'a [String]>,
+    pub known: &'a Known,
+    pub words: Words,
+    /// What a flag says of angles and lengths.
+    pub units: [Option<Unit>; 2],
+}
+
+impl Table<'_> {
+    /// What a cell says: a number, or a formula.
+    pub fn value(&self, cell: &str) -> Option<Value> {
+        expression::evaluate(cell, &|name| self.known.get(name).copied())
+    }
+
+    /// The number of a cell.
+    pub fn number(&self, line: u64, row: &Fields, column: usize) -> Result<Value> {
+        let refuse = || self.grid.refuse(line, format!("`{}` is not a number", &row[column]), Some(HINT));
+        self.value(&row[column]).filter(|value| value.number.is_finite()).ok_or_else(refuse)
+    }
+
+    /// How many rows turn: where some have the joint's variable for theta, rows at the end without one are the flange.
+    pub fn turning(&self, columns: [usize; 4]) -> Result<usize> {
+        let theta = columns[2];
+        let turns = |row: &(u64, Fields)| self.value(&row.1[theta]).is_some_and(|v| v.variable);
+        // What is no number, or slides, is said of the cell.
+        let stands = |row: &&(u64, Fields)| columns.iter().all(|&c| self.value(&row.1[c]).is_some_and(|v| !v.variable));
+        let Some(last) = self.rows.iter().rposition(turns) else { return Ok(self.rows.len()) };
+        match self.rows[..last].iter().find(stands) {
+            Some((line, row)) => {
+                let message = format!(
+                    "theta is `{}`, but other rows have their joint's variable there: this one does not turn",
+                    &row[theta]
+                );
+                Err(self.grid.refuse(*line, message, Some("a row a joint; add what stands still to the row before")))
+            }
+            None if self.rows[last + 1..].iter().all(|row| stands(&row)) => Ok(last + 1),
+            None => Ok(self.rows.len()),
+        }
+    }
+
+    /// Alpha, a, theta and d of all rows as they stand, and whether angles are written with pi.
+    pub fn numbers(&self, columns: [usize; 4]) -> Result<(Vec<Row>, bool)> {
+        let mut numbers: Vec<Row> = Vec::with_capacity(self.rows.len());
+        let mut radians = false;
+        for (line, row) in self.rows {
+            let mut of_row = [0.0; 4];
+            for (which, (slot, &column)) in of_row.iter_mut().zip(&columns).enumerate() {
+                let value = self.number(*line, row, column)?;
+                if value.variable && which != 2 {
+                    let message =
+                        format!("`{}`: the joint's variable is {}, so the joint slides", &row[column], NAMES[which]);
+                    let hint = "a table has turning joints alone; `robot import` takes a sliding one from a URDF";
+                    return Err(self.grid.refuse(*line, message, Some(hint)));
+                }
+                radians |= value.radians && matches!(which, 0 | 2);
+                *slot = value.number;
+            }
+            numbers.push(of_row);
+        }
+        Ok((numbers, radians))
+    }
+}
