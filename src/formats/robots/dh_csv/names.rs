@@ -8,7 +8,7 @@ use crate::tables::names::{self, Unit};
 pub(super) const HINT: &str =
     "a row a joint, from the base: alpha_deg,a_mm,theta_deg,d_mm (deg and mm), or alpha, a, d, theta in any order";
 
-/// What the columns of a row are called, in the order of [`Row`].
+/// What the columns of a row are called, in the order of a row: alpha, a, theta, d.
 pub(super) const NAMES: [&str; 4] = ["alpha", "a", "theta", "d"];
 
 /// The same with units, as this program writes them.
