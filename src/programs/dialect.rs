@@ -26,6 +26,14 @@ pub(super) fn motions(language: Language, text: &str, targets: &[Target]) -> Vec
     }
 }
 
+/// A number in place of `before`, in its form where the language has several.
+pub(super) fn written(language: Language, before: &str, number: String, value: f64) -> String {
+    match language {
+        Language::UrScript => urscript::written(before, number, value),
+        _ => number,
+    }
+}
+
 /// Files of a program that visits the stops: name and text.
 pub(super) fn program(
     language: Language,

@@ -8,10 +8,17 @@ use super::instruction::{Cause, Instruction};
 use super::language::{Motion, Target, Written};
 use super::scan;
 
-/// Words that begin a motion: joint, linear, circular, circular arc, spline.
-const MOTIONS: [char; 5] = ['J', 'L', 'C', 'A', 'S'];
-/// Options that move a point from where it was taught.
-const OFFSETS: [&str; 4] = ["OFFSET", "TOOL_OFFSET", "VOFFSET", "INC"];
+/// Words of a motion: joint, linear, circular, circular arc, spline; as groups of axes that move independently have them too.
+const MOTIONS: [&str; 10] = ["J", "L", "C", "A", "S", "JP", "LP", "CP", "AP", "SP"];
+/// How options end, in several languages of the controller, that move a point from where it was taught.
+const OFFSET: &str = "OFFSET";
+/// The one that makes it relative to the point before.
+const RELATIVE: &str = "INC";
+/// Options that follow a sensor.
+const LED: [&str; 3] = ["TRACK", "TAST", "AVC"];
+
+/// What begins a comment inside of a line: nothing, as no line has an end in it.
+const NO_MARK: &str = "\n";
 
 /// Positions in joint coordinates, by their number.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
@@ -32,25 +39,88 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
     let start = text.find("/MN").map_or(0, |at| at + 3);
     let end = text[start..].find("/POS").map_or(text.len(), |length| start + length);
     let code = instructions(&text[..end]);
+    let written = written(&code[start..]);
     let mut from = start;
     let statements =
         code[start..].match_indices(';').map(|(k, _)| std::mem::replace(&mut from, start + k + 1)..start + k);
-    let motion = |at: Range<usize>| {
-        let at = scan::trimmed(&code, at);
-        let word = at.start..at.start + 1;
-        if !code.get(word.clone())?.starts_with(MOTIONS) {
-            return None;
-        }
-        let points = points(&code, word.end..at.end);
-        let last = points.last()?.end;
-        let moves_by = points.iter().map(|point| position(text, end, &code[point.clone()], targets));
+    let motion = |word: Range<usize>, group: Option<&str>, end_of_it: usize| {
+        let points = points(&code, word.end..end_of_it);
+        let Some(last) = points.last().map(|point| point.end) else {
+            // Positions of a pallet, and what else is none of the program's own.
+            let target = scan::trimmed(&code, word.end..end_of_it);
+            let end = code[target.clone()].find(char::is_whitespace).map_or(target.end, |k| target.start + k);
+            return Instruction::new(text, word, target.start..end, Err(Cause::Elsewhere));
+        };
+        let moves_by = points.iter().map(|point| position(text, end, &code[point.clone()], targets, &written));
         let moves_by = moves_by.collect::<Result<Vec<usize>, Cause>>();
-        let options = scan::words(&code[last..at.end]).map(|w| code[last + w.start..last + w.end].to_ascii_uppercase());
-        let offset = options.into_iter().any(|word| OFFSETS.contains(&word.as_str()));
-        let moves_by = moves_by.and_then(|found| if offset { Err(Cause::Offset) } else { Ok(found) });
-        Some(Instruction::new(text, word, points[0].start..last, moves_by))
+        let group = group.filter(|group| *group != "GP1").map(|_| Cause::Group);
+        let moves_by = moves_by.and_then(|found| match option(&code[last..end_of_it]).or(group) {
+            Some(cause) => Err(cause),
+            None => Ok(found),
+        });
+        Instruction::new(text, word, points[0].start..last, moves_by)
     };
-    statements.filter_map(motion).collect()
+    let in_statement = |at: Range<usize>| {
+        let words = words(&code, at.clone());
+        let ends: Vec<usize> = words.iter().skip(1).map(|(word, _)| word.start).chain([at.end]).collect();
+        words.into_iter().zip(ends).map(|((word, group), end)| motion(word, group, end)).collect::<Vec<_>>()
+    };
+    statements.flat_map(in_statement).collect()
+}
+
+/// The words of a statement that move, each with the group of axes named before it: one that stands first, or that has a position behind it.
+fn words(code: &str, at: Range<usize>) -> Vec<(Range<usize>, Option<&str>)> {
+    let (mut depth, mut seen) = (0i32, at.start);
+    let mut found = Vec::new();
+    let mut last = "";
+    for word in scan::words(&code[at.clone()]).map(|w| at.start + w.start..at.start + w.end) {
+        let gap = &code[seen..word.start];
+        depth += gap.matches('[').count() as i32 - gap.matches(']').count() as i32;
+        seen = word.end;
+        let name = &code[word.clone()];
+        let behind = code[word.end..at.end].trim_start().trim_start_matches('@').trim_start();
+        let first = code[at.start..word.start].trim().is_empty();
+        let positions = behind.starts_with("P[") || behind.starts_with("PR[");
+        let named = || {
+            first && name.len() == 1 && behind.starts_with(|c: char| c.is_ascii_alphabetic()) && behind.contains('[')
+        };
+        if depth == 0 && MOTIONS.contains(&name) && (positions || named()) {
+            found.push((word, Some(last).filter(|last| last.starts_with("GP") && gap.trim() == ",")));
+        }
+        last = name;
+    }
+    found
+}
+
+/// Why a motion with these options is not corrected: what stands in brackets are names and numbers.
+fn option(options: &str) -> Option<Cause> {
+    let mut depth = 0i32;
+    let plain = |c: char| {
+        depth += i32::from(c == '[') - i32::from(c == ']');
+        if depth > 0 { ' ' } else { c }
+    };
+    let plain: String = options.chars().map(plain).collect::<String>().to_ascii_uppercase();
+    // A register behind an option is what it adds; one that an option writes into has a sign of equality behind it.
+    let register = |word: &Range<usize>| {
+        ["PR", "VR"].contains(&&plain[word.clone()])
+            && !plain[word.end..].trim_start_matches([' ', ']']).starts_with('=')
+    };
+    let offset = |word: &Range<usize>| plain[word.clone()].ends_with(OFFSET) || &plain[word.clone()] == RELATIVE;
+    if scan::words(&plain).any(|word| offset(&word) || register(&word)) {
+        return Some(Cause::Offset);
+    }
+    scan::words(&plain).any(|word| LED.contains(&&plain[word])).then_some(Cause::Led)
+}
+
+/// Positions of the program that an instruction writes into, by their numbers; `None` where a register holds the number.
+fn written(code: &str) -> Vec<Option<u64>> {
+    let own = |at: &usize| !code[..*at].ends_with(|c: char| c.is_ascii_alphanumeric() || c == '_');
+    let places = code.match_indices("P[").map(|(at, _)| at).filter(own);
+    let assigned = |at: usize| {
+        let end = scan::closed(code, at + 1)?;
+        code[end..].trim_start().starts_with('=').then(|| number(&code[at..end]))
+    };
+    places.filter_map(assigned).collect()
 }
 
 /// The text with blanks in place of the numbers of lines and of remarks (`!` and `//`); of the same length.
@@ -64,7 +134,7 @@ fn instructions(text: &str) -> String {
         let (hidden, shown) = line.split_at(blank);
         out.extend(hidden.bytes().map(|b| if b == b'\n' { '\n' } else { ' ' }));
         // Names in quotes may hold anything.
-        out.push_str(&scan::code(shown, "\0"));
+        out.push_str(&scan::code(shown, NO_MARK));
     }
     out
 }
@@ -76,17 +146,29 @@ fn points(code: &str, at: Range<usize>) -> Vec<Range<usize>> {
     loop {
         let start = scan::word(code, from, "@").unwrap_or(from);
         let open = scan::word(code, start, "PR[").or(scan::word(code, start, "P[")).filter(|open| *open <= at.end);
-        let Some(end) = open.and_then(|open| scan::closed(code, open - 1)) else { return found };
+        let Some(open) = open else { return found };
+        // Names of other code pages may have brackets among their bytes.
+        let numbered = code[open..].starts_with(|c: char| c.is_ascii_digit());
+        let end =
+            if numbered { code[open..at.end].find(']').map(|k| open + k + 1) } else { scan::closed(code, open - 1) };
+        let end = end.map_or(at.end, |end| end.min(at.end));
         found.push(scan::trimmed(code, start..end));
         from = end;
     }
 }
 
 /// The joint target of a point of a motion, from the positions behind `/POS`.
-fn position(text: &str, positions: usize, point: &str, targets: &[Target]) -> Result<usize, Cause> {
+fn position(
+    text: &str,
+    positions: usize,
+    point: &str,
+    targets: &[Target],
+    written: &[Option<u64>],
+) -> Result<usize, Cause> {
     let number = number(point).ok_or(Cause::Elsewhere)?;
     let mut found = targets.iter().enumerate().filter(|(_, t)| self::number(&t.name) == Some(number));
     match (found.next(), found.next()) {
+        (Some(_), None) if written.iter().any(|w| w.is_none_or(|w| w == number)) => Err(Cause::Elsewhere),
         (Some((k, _)), None) => Ok(k),
         (Some(_), Some(_)) => Err(Cause::Groups),
         (None, _) => {
@@ -96,7 +178,8 @@ fn position(text: &str, positions: usize, point: &str, targets: &[Target]) -> Re
             let body = listed.and_then(|(at, _)| text[positions + at..].split('}').next());
             Err(match body {
                 None => Cause::Elsewhere,
-                Some(body) if scan::words(body).any(|w| &body[w] == "X") => Cause::Cartesian,
+                // Of a tool that is held in place, RX.
+                Some(body) if scan::words(body).any(|w| ["X", "RX"].contains(&&body[w])) => Cause::Cartesian,
                 Some(_) => Cause::Incomplete,
             })
         }

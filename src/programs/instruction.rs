@@ -10,7 +10,7 @@ const QUOTED: usize = 60;
 pub enum Cause {
     /// Its target is a pose of the tool.
     Cartesian,
-    /// Its joint values are computed, or stand in another file, a register or a parameter.
+    /// Its joint values are computed or written at run time, or stand in another file, a register or a parameter.
     Elsewhere,
     /// It adds something to its target.
     Offset,
@@ -20,6 +20,10 @@ pub enum Cause {
     Led,
     /// It moves other axes than the robot's.
     External,
+    /// It moves another group of axes, as of a second robot.
+    Group,
+    /// Its word says that it moves, and no more is known of it.
+    Unknown,
     /// Two groups of the program have as many joints.
     Groups,
     /// The correction of its target was refused, for this reason.
@@ -32,9 +36,11 @@ impl std::fmt::Display for Cause {
             Cause::Cartesian => write!(f, "is Cartesian"),
             Cause::Elsewhere => write!(f, "moves by values that are not numbers in this file"),
             Cause::Offset => write!(f, "adds an offset to its target"),
-            Cause::Incomplete => write!(f, "does not give all joints of the robot"),
+            Cause::Incomplete => write!(f, "does not give the robot's joints, all of them and no others"),
             Cause::Led => write!(f, "follows a speed, a force or a sensor"),
             Cause::External => write!(f, "moves external axes"),
+            Cause::Group => write!(f, "moves another group of axes than the robot's"),
+            Cause::Unknown => write!(f, "is an instruction that is not known here"),
             Cause::Groups => write!(f, "moves two groups with as many joints"),
             Cause::Refused(reason) => write!(f, "is not corrected: {reason}"),
         }
@@ -64,6 +70,8 @@ impl Instruction {
     ) -> Instruction {
         let quoted: Vec<&str> = text[target].split_whitespace().collect();
         let quoted = quoted.join(" ");
+        // Bytes of any encoding stand here.
+        let quoted = quoted.replace(char::is_control, "?");
         let short: String = quoted.chars().take(QUOTED).collect();
         let target = if short.len() < quoted.len() { format!("{short}...") } else { quoted };
         Instruction { line: scan::line(text, word.start), word: text[word].to_owned(), target, moves_by }

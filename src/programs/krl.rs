@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::handed::{self, Calls};
 use super::instruction::{Cause, Instruction};
 use super::language::{Motion, Target, Written};
 use super::scan;
@@ -13,15 +14,32 @@ const EITHER: [&str; 2] = ["PTP", "SPTP"];
 const CARTESIAN: [&str; 5] = ["LIN", "CIRC", "SLIN", "SCIRC", "SPL"];
 /// Motions from where the robot stands.
 const RELATIVE: [&str; 7] = ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL", "SPL_REL"];
+/// A motion along recorded points.
+const RECORDED: &str = "MOVE_EMI";
 /// What moves nothing: a motion to where the robot stands.
 const HERE: [&str; 2] = ["$AXIS_ACT", "$POS_ACT"];
+
+/// Functions that leave what they are given as it is.
+const READING: &str = "BAS INV_POS FORWARD VARSTATE ABS SWRITE CWRITE EKI_SetReal EKI_SetFrame EKI_SetInt SQRT";
+/// What lets a sensor lead the robot or change its path, in the packages RobotSensorInterface 2 to 4.
+const LED: &str = "RSI_ON RSI_AXISCORR RSI_PATHCORR RSI_MOVECORR ST_ON ST_ON1 ST_SKIPSENS ST_MOVESENS ST_AXISCORR ST_PATHCORR ST_PATHCORR1";
 
 const SYNTAX: Syntax = Syntax {
     assign: "=",
     end: '\n',
     any_case: true,
     routines: &["DEF", "DEFFCT"],
-    changes: &[],
+    calls: Some(Calls {
+        reads: |word| handed::of(READING, word),
+        by_value: |parameters| {
+            let mut each = parameters.trim_matches(['(', ')']).split(',').map(str::trim);
+            each.all(|p| p.is_empty() || p.to_ascii_uppercase().replace(' ', "").ends_with(":IN"))
+        },
+        keywords: "IF WHILE UNTIL FOR SWITCH CASE RETURN AND OR NOT EXOR WHEN DO",
+        declares: "DECL GLOBAL CONST",
+        bare: false,
+        by_name: "",
+    }),
     cartesian: |value| {
         let first = scan::words(value).next().map_or("", |word| &value[word]);
         value.starts_with('{')
@@ -29,14 +47,27 @@ const SYNTAX: Syntax = Syntax {
     },
 };
 
-/// Aggregates of all axes, with or without their type before them.
+/// Names of the axes: those of the robot, then external ones.
+fn axes(count: usize) -> Vec<String> {
+    (0..count).map(|k| if k < 6 { format!("A{}", k + 1) } else { format!("E{}", k - 5) }).collect()
+}
+
+/// Aggregates of all axes in any order, with or without their type before them.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
-    let names = scan::axes('A', count);
+    let names = axes(count);
     let text = &scan::code(text, ";");
     let aggregate = |at: usize| {
         let typed = ["E6AXIS", "AXIS"].iter().find_map(|t| scan::word(text, at + 1, t));
         let from = typed.and_then(|end| scan::word(text, end, ":")).unwrap_or(at + 1);
-        let (numbers, _) = scan::labelled(text, from, &names, &[","])?;
+        let parts = scan::parts(text, from..scan::closed(text, at)? - 1);
+        let number = |name: &String| {
+            let (part, label) = parts.iter().find_map(|part| {
+                let label = scan::words(&text[part.clone()]).next().filter(|w| w.start == 0)?;
+                text[part.start..part.start + label.end].eq_ignore_ascii_case(name).then_some((part, label))
+            })?;
+            scan::number(text, part.start + label.end).filter(|(_, place)| place.end == part.end)
+        };
+        let numbers = names.iter().map(number).collect::<Option<Vec<_>>>()?;
         let before = text[..at].trim_end();
         let name = before.strip_suffix('=').and_then(|b| b.split_whitespace().last()).map(str::to_owned);
         scan::target(text, name, numbers, Some(at))
@@ -56,11 +87,11 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
         let end = code[word.end..].find('\n').map_or(code.len(), |length| word.end + length);
         let behind = code[word.end..end].trim();
         let declared = SYNTAX.routines.iter().any(|r| r.eq_ignore_ascii_case(before));
-        if name == "RSI_MOVECORR" && !declared {
+        let of = |words: &[&str]| words.contains(&name.as_str());
+        if handed::of(LED, &name) && !declared {
             found.push(Instruction::new(text, word.clone(), word.end..word.end, Err(Cause::Led)));
         }
-        let of = |words: &[&str]| words.contains(&name.as_str());
-        let moves = of(&EITHER) || of(&CARTESIAN) || of(&RELATIVE) || name == "ASYPTP";
+        let moves = of(&EITHER) || of(&CARTESIAN) || of(&RELATIVE) || name == "ASYPTP" || name == RECORDED;
         if !moves || declared || behind.is_empty() || behind.starts_with(['=', '(', ')', ',', '.', '[']) {
             continue;
         }
@@ -72,6 +103,7 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
             () if of(&EITHER) => variables.expression(&code, at.clone(), targets),
             () if of(&CARTESIAN) => Err(Cause::Cartesian),
             () if of(&RELATIVE) => Err(Cause::Offset),
+            () if name == RECORDED => Err(Cause::Elsewhere),
             () => Err(Cause::External),
         };
         found.push(Instruction::new(text, word, at, moves_by));
@@ -91,7 +123,7 @@ fn point(code: &str, at: std::ops::Range<usize>) -> std::ops::Range<usize> {
 pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(String, String)> {
     let aggregate = |list: &[String]| {
         let parts: Vec<String> =
-            scan::axes('A', list.len()).iter().zip(list).map(|(n, v)| format!("{n} {v}")).collect();
+            axes(list.len()).iter().zip(list).map(|(n, v)| format!("{n} {v}")).collect();
         format!("{{{}}}", parts.join(","))
     };
     let mut text = format!(

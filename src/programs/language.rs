@@ -49,6 +49,21 @@ impl Language {
         Language::ALL.into_iter().find(|language| language.endings().contains(&ending.as_str()))
     }
 
+    /// What the language calls the number behind the six axes of a robot; `None` where all are in one list.
+    pub fn seventh(self) -> Option<&'static str> {
+        match self {
+            Language::UrScript => None,
+            Language::Rapid => Some("`eax_a`"),
+            Language::Krl | Language::FanucLs => Some("`E1`"),
+            Language::Jbi => Some("the seventh number"),
+        }
+    }
+
+    /// Whether points of this file stand in one of data beside it.
+    pub fn has_data_file(self, path: &Utf8Path) -> bool {
+        self == Language::Krl && path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("src"))
+    }
+
     /// What a number of a target is times degrees.
     fn per_degree(self, pulses: bool, pulses_per_deg: &[f64], joint: usize) -> f64 {
         match self {

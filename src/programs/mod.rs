@@ -4,9 +4,12 @@
 //! readings in deg (mm where a joint slides), the text with other readings and nothing else changed; or a program that moves, waits,
 //! triggers and logs. Only targets written as numbers in joint coordinates can be changed; an instruction that moves by anything
 //! else is named with the reason. What goes wrong: pulses (Yaskawa) without their number a degree.
+//! Doubt counts as not corrected: a variable that anything may write into at run time holds what the file does not say.
 
 mod dialect;
+mod encoding;
 mod fanuc;
+mod handed;
 mod instruction;
 mod krl;
 mod language;
@@ -20,6 +23,7 @@ mod variables;
 mod write;
 mod yaskawa;
 
+pub use encoding::{Encoding, decoded};
 pub use instruction::{Cause, Instruction};
 pub use language::{Joints, Language, Motion, Stop, Target};
 pub use read::{Program, targets, with_readings};

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use std::ops::Range;
 
+use super::handed::{self, Calls};
 use super::instruction::{Cause, Instruction};
 use super::language::{Motion, Target, Written};
 use super::scan;
@@ -18,18 +19,36 @@ const CARTESIAN: [&str; 22] = [
     "SpotJ", "SpotML", "SpotMJ", "DispL", "DispC", "PaintL", "PaintC", "NutL", "NutJ", "ContactL",
 ];
 /// Those that move to joint targets.
-const JOINT: [&str; 2] = ["MoveAbsJ", "TriggAbsJ"];
+const JOINT: &str = "MoveAbsJ MoveAbsJAO MoveAbsJDO MoveAbsJGO MoveAbsJSync TriggAbsJ";
+/// How routines begin that are called after them.
+const LIKE_JOINT: [&str; 2] = ["MoveAbsJ", "TriggAbsJ"];
 /// Those that move external axes alone.
 const EXTERNAL: [&str; 6] = ["MoveExtJ", "SearchExtJ", "IndAMove", "IndCMove", "IndDMove", "IndRMove"];
 /// Those that follow a sensor or a force.
 const LED: [&str; 6] = ["EGMRun", "EGMMove", "FCPress", "FCAct", "CapL", "CapC"];
+
+/// Instructions and functions that leave what they are given as it is.
+const READING: &str = "MoveExtJ IndAMove IndCMove IndDMove IndRMove TPWrite TPShow Write WriteAnyBin WriteStrBin PackRawBytes ErrWrite \
+    ErrLog SocketSend RMQSendMessage RMQSendWait IPers WaitUntil CalcRobT ValToStr NumToStr Abs Round Trunc Dim \
+    IsPers IsVar";
+/// Words that are no calls.
+const KEYWORDS: &str = "IF THEN ELSEIF ELSE ENDIF WHILE DO ENDWHILE FOR FROM TO STEP ENDFOR TEST CASE DEFAULT ENDTEST RETURN RAISE GOTO \
+    CONNECT WITH AND OR NOT XOR DIV MOD PROC ENDPROC FUNC ENDFUNC TRAP ENDTRAP MODULE ENDMODULE ERROR UNDO BACKWARD \
+    RECORD ENDRECORD VAR PERS CONST LOCAL TASK EXIT RETRY";
 
 const SYNTAX: Syntax = Syntax {
     assign: ":=",
     end: ';',
     any_case: true,
     routines: &["PROC", "FUNC", "TRAP"],
-    changes: &["Add", "Incr", "Decr", "Clear"],
+    calls: Some(Calls {
+        reads: |word| handed::of(JOINT, word) || handed::of(READING, word),
+        by_value: |parameters| !scan::words(parameters).any(|word| handed::of("INOUT VAR PERS REF", &parameters[word])),
+        keywords: KEYWORDS,
+        declares: "VAR PERS CONST LOCAL TASK",
+        bare: true,
+        by_name: "SetDataVal SetAllDataVal",
+    }),
     // A pose begins with three numbers, and no joint target does.
     cartesian: |_| false,
 };
@@ -97,7 +116,8 @@ fn known(code: &str, at: Range<usize>) -> Option<(Range<usize>, Option<Cause>)> 
         let of = |words: &[&str]| words.iter().any(|w| begins(name, w));
         let given = arguments(code, word.end..at.end).len();
         let kind = match () {
-            () if of(&JOINT) => None,
+            () if handed::of(JOINT, name) => None,
+            () if of(&LIKE_JOINT) => Some(Cause::Unknown),
             () if of(&EXTERNAL) => Some(Cause::External),
             () if of(&LED) => Some(Cause::Led),
             // A routine may have such a name, as in `MoveLeft 10;`.

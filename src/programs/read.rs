@@ -72,7 +72,8 @@ pub fn with_readings(language: Language, text: &str, joints: Joints, changed: &[
     for (target, readings) in changed {
         for (joint, (place, reading)) in target.places.iter().zip(readings).enumerate() {
             let value = reading * joints.factor(language, target.pulses, joint);
-            edits.push((place.clone(), number(language, target.pulses, value)));
+            let written = number(language, target.pulses, value);
+            edits.push((place.clone(), dialect::written(language, &text[place.clone()], written, value)));
         }
     }
     edits.sort_by_key(|(place, _)| place.start);

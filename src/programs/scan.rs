@@ -27,6 +27,16 @@ pub fn word(text: &str, at: usize, word: &str) -> Option<usize> {
 
 /// Numbers from `at` with commas between, up to `most` of them, and the place behind the last.
 pub fn list(text: &str, at: usize, most: usize) -> (Vec<Number>, usize) {
+    list_of(text, at, most, number)
+}
+
+/// The same of what else is a number in a language.
+pub fn list_of(
+    text: &str,
+    at: usize,
+    most: usize,
+    number: impl Fn(&str, usize) -> Option<Number>,
+) -> (Vec<Number>, usize) {
     let (mut numbers, mut end) = (Vec::new(), at);
     while numbers.len() < most {
         let from = if numbers.is_empty() { Some(end) } else { word(text, end, ",") };
@@ -72,14 +82,16 @@ pub fn line(text: &str, at: usize) -> u64 {
     1 + text[..at].bytes().filter(|b| *b == b'\n').count() as u64
 }
 
-/// The text with blanks in place of comments (from `mark` to the line's end) and of what stands in double quotes; of the same length.
+/// The text with blanks in place of comments (from `mark` to the line's end) and of what stands between double quotes on a line; of the same
+/// length.
 pub fn code(text: &str, mark: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let (mut quoted, mut comment) = (false, false);
     for (at, c) in text.char_indices() {
         match c {
             '\n' => (quoted, comment) = (false, false),
-            '"' if !comment => quoted = !quoted,
+            '"' if quoted => quoted = false,
+            '"' if !comment => quoted = text[at + 1..].chars().find(|c| matches!(c, '"' | '\n')) == Some('"'),
             _ if !quoted && !comment => comment = text[at..].starts_with(mark),
             _ => {}
         }

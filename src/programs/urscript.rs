@@ -4,14 +4,14 @@ use std::fmt::Write as _;
 
 use super::instruction::{Cause, Instruction};
 use super::language::{Motion, Target, Written};
-use super::scan;
+use super::scan::{self, Number};
 use super::variables::{Syntax, Variables};
 
 /// Calls that move to their first arguments, lists of joint angles or poses, and how many of these they have.
 const MOVES: [(&str, usize); 7] =
     [("movej", 1), ("movel", 1), ("movep", 1), ("movec", 2), ("servoj", 1), ("optimovej", 1), ("optimovel", 1)];
 /// Calls that move by a speed, a force or a path that is set elsewhere, or follow poses.
-const LED: [&str; 10] = [
+const LED: [&str; 16] = [
     "servoc",
     "servol",
     "speedj",
@@ -22,6 +22,20 @@ const LED: [&str; 10] = [
     "path_offset_set",
     "screw_driving",
     "track_conveyor_linear",
+    "track_conveyor_circular",
+    "freedrive_mode_no_incorrect_payload_check",
+    "path_offset_enable",
+    "torque_command",
+    "direct_torque",
+    "jog_start",
+];
+/// Calls of a path that is put together elsewhere, and of its parts, which are poses.
+const PATHS: [(&str, Cause); 5] = [
+    ("mc_add_linear", Cause::Cartesian),
+    ("mc_add_circular", Cause::Cartesian),
+    ("mc_add_path", Cause::Elsewhere),
+    ("mc_load_path", Cause::Elsewhere),
+    ("mc_run_motion", Cause::Elsewhere),
 ];
 /// Functions whose value is a pose, or joint angles that belong to one.
 const POSES: [&str; 10] = [
@@ -42,9 +56,13 @@ const SYNTAX: Syntax = Syntax {
     end: '\n',
     any_case: false,
     routines: &["def", "thread"],
-    changes: &[],
+    // Every call gets values.
+    calls: None,
     cartesian: |value| POSES.iter().any(|p| value.starts_with(p)),
 };
+
+/// The function that makes radians of degrees.
+const DEGREES: &str = "d2r";
 
 /// Full speed of a joint, rad/s.
 const FULL_SPEED: f64 = std::f64::consts::PI;
@@ -57,13 +75,29 @@ pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
         if !before.ends_with(['(', '=', ',', '[']) {
             return None;
         }
-        let (numbers, end) = scan::list(text, at + 1, count + 1);
+        let (numbers, end) = scan::list_of(text, at + 1, count + 1, angle);
         scan::word(text, end, "]").filter(|_| numbers.len() == count)?;
         let assigned = before.strip_suffix('=');
         let name = assigned.map(|before| before.split_whitespace().last().unwrap_or_default().to_owned());
         scan::target(text, name, numbers, Some(at))
     };
     text.match_indices('[').filter_map(|(at, _)| list(at)).collect()
+}
+
+/// A number in rad, or of degrees as `d2r(90)`; the place is then all of that.
+fn angle(text: &str, at: usize) -> Option<Number> {
+    let of_degrees = || {
+        let open = scan::word(text, scan::word(text, at, DEGREES)?, "(")?;
+        let (degrees, place) = scan::number(text, open)?;
+        let place = scan::trimmed(text, at..scan::word(text, place.end, ")")?);
+        Some((degrees.to_radians(), place))
+    };
+    scan::number(text, at).or_else(of_degrees)
+}
+
+/// A reading as it is written in place of `before`.
+pub(super) fn written(before: &str, number: String, value: f64) -> String {
+    if before.starts_with(DEGREES) { format!("{DEGREES}({:.7})", value.to_degrees()) } else { number }
 }
 
 /// Every call that moves.
@@ -80,8 +114,10 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
         };
         let end = scan::closed(&code, open - 1).map_or(code.len(), |end| end - 1);
         let arguments = scan::parts(&code, open..end);
-        if LED.contains(&name) {
-            found.push(Instruction::new(text, word, open..open, Err(Cause::Led)));
+        let led = LED.contains(&name).then_some(Cause::Led);
+        let path = || PATHS.iter().find(|(path, _)| *path == name).map(|(_, cause)| cause.clone());
+        if let Some(cause) = led.or_else(path) {
+            found.push(Instruction::new(text, word, open..open, Err(cause)));
             continue;
         }
         let Some((_, count)) = MOVES.iter().find(|(move_, _)| *move_ == name) else { continue };

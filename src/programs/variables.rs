@@ -1,12 +1,13 @@
 //! What a program writes into its variables.
 //!
 //! In: the code without comments and strings, and the joint targets written as numbers in it. Out: by variable, the targets that it can hold.
-//! A variable that is given anything else anywhere (a computed value, one of its fields, a routine's parameter) holds what this file
-//! does not say. Variables of one name in several routines are taken together, so that doubt about one is doubt about all.
+//! A variable that is given anything else anywhere (a computed value, one of its fields, a routine's parameter), or is handed to
+//! something that may write into it, holds what this file does not say. Variables of one name in several routines are taken together, so that doubt about one is doubt about all.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use super::handed::{self, Calls};
 use super::instruction::Cause;
 use super::language::Target;
 use super::scan;
@@ -22,8 +23,8 @@ pub(super) struct Syntax {
     pub any_case: bool,
     /// The words before a routine's name and its parameters.
     pub routines: &'static [&'static str],
-    /// Instructions that change the variable behind them.
-    pub changes: &'static [&'static str],
+    /// What is handed to calls, where these get variables and not their values.
+    pub calls: Option<Calls>,
     /// Whether a value is Cartesian.
     pub cartesian: fn(&str) -> bool,
 }
@@ -51,7 +52,7 @@ impl Variables {
     pub(super) fn read(code: &str, syntax: Syntax, targets: &[Target]) -> Variables {
         let mut variables = Variables { syntax, values: BTreeMap::new() };
         let mut brackets = 0usize;
-        let (mut seen, mut last) = (0, "");
+        let mut seen = 0;
         for word in scan::words(code) {
             for c in code[seen..word.start].chars() {
                 match c {
@@ -62,14 +63,14 @@ impl Variables {
             }
             seen = word.end;
             let name = &code[word.clone()];
-            if syntax.routines.iter().any(|r| r.eq_ignore_ascii_case(last)) {
-                variables.parameters(code, word.end);
-            } else if syntax.changes.iter().any(|c| c.eq_ignore_ascii_case(last)) {
-                variables.add(name, Value::Other(Cause::Elsewhere));
-            }
-            last = name;
             if brackets == 0 && scan::is_name(name) && !code[..word.start].ends_with(['\\', '.']) {
                 variables.assigned(code, word, targets);
+            }
+        }
+        variables.parameters(code);
+        if let Some(calls) = syntax.calls {
+            for name in handed::handed(code, &calls, syntax.end, syntax.routines) {
+                variables.add(name, Value::Other(Cause::Elsewhere));
             }
         }
         variables
@@ -114,17 +115,10 @@ impl Variables {
     }
 
     /// Parameters of a routine hold what its callers say.
-    fn parameters(&mut self, code: &str, at: usize) {
-        // The type of a function's value stands before its name.
-        let name = |c: char| c.is_alphanumeric() || c == '_' || c == ' ';
-        let open = at + code[at..].len() - code[at..].trim_start_matches(name).len();
-        let Some(end) =
-            Some(open).filter(|&open| code[open..].starts_with('(')).and_then(|open| scan::closed(code, open))
-        else {
-            return;
-        };
-        for word in scan::words(&code[open..end]) {
-            self.add(&code[open + word.start..open + word.end], Value::Other(Cause::Elsewhere));
+    fn parameters(&mut self, code: &str) {
+        for (header, name) in handed::headers(code, self.syntax.routines) {
+            let parameters = &code[name.end..header.end];
+            scan::words(parameters).for_each(|word| self.add(&parameters[word], Value::Other(Cause::Elsewhere)));
         }
     }
 
@@ -141,7 +135,12 @@ impl Variables {
                 },
                 Some('.') => {
                     field = true;
-                    at = scan::words(&code[at..]).next().map_or(code.len(), |w| at + w.end);
+                    let Some(part) = scan::words(&code[at..]).next() else { return };
+                    // A call of a variable's own, `list.append(...)`.
+                    if code[at + part.end..].starts_with('(') && &code[at + part.start..at + part.end] != "length" {
+                        return self.add(&code[word], Value::Other(Cause::Elsewhere));
+                    }
+                    at += part.end;
                 }
                 _ => break,
             }
@@ -177,7 +176,7 @@ impl Variables {
             return Value::Other(Cause::Cartesian);
         }
         if text.starts_with(['[', '{']) && from == to {
-            return Value::Other(Cause::Incomplete);
+            return Value::Other(if is_numbers(text) { Cause::Incomplete } else { Cause::Elsewhere });
         }
         let mut words = scan::words(text);
         let Some(first) = words.next().filter(|w| w.start == 0 && scan::is_name(&text[w.clone()])) else {
@@ -190,6 +189,12 @@ impl Variables {
         }
         Value::Other(if rest.starts_with(['+', '-', ':']) { Cause::Offset } else { Cause::Elsewhere })
     }
+}
+
+/// Whether a list has a number in each of its places, labels before them allowed (`A1 30`).
+fn is_numbers(list: &str) -> bool {
+    let mut places = list.split(['[', ']', '{', '}', ',']).map(str::trim).filter(|place| !place.is_empty());
+    places.all(|place| place.split_whitespace().last().is_some_and(|number| number.parse::<f64>().is_ok()))
 }
 
 /// Whether nothing but these targets, brackets and commas stand at a place.

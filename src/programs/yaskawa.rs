@@ -2,9 +2,21 @@
 
 use std::fmt::Write as _;
 
+use std::ops::Range;
+
 use super::instruction::{Cause, Instruction};
 use super::language::{Motion, Target, Written};
 use super::scan;
+
+/// The most axes of a robot or of a position.
+const MOST_AXES: usize = 16;
+/// Positions of a station, a base or external axes.
+const EXTERNAL: [&str; 6] = ["EC", "BC", "EX", "BP", "LEX", "LBP"];
+/// Instructions that read positions alone.
+const READING: [&str; 7] = ["SFTON", "MFRAME", "SAVEV", "GETE", "CALL", "JUMP", "COMM"];
+/// Instructions that write into the first of their arguments and read the others.
+const WRITING_FIRST: [&str; 12] =
+    ["SET", "SETE", "ADD", "SUB", "MUL", "DIV", "GETS", "CNVRT", "CONVSFT", "GETPOS", "LOADV", "MULMAT"];
 
 /// Positions in pulses or angles; Cartesian ones are left out.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
@@ -26,49 +38,90 @@ fn position(text: &str, at: usize, line: &str, count: usize) -> Option<Target> {
     if number.is_empty() || !number.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
-    let (numbers, _) = scan::list(text, at + name.len() + 1, count);
+    let (mut numbers, _) = scan::list(text, at + name.len() + 1, MOST_AXES);
+    // Axes that the arm lacks are written as zero.
+    if numbers.iter().skip(count).any(|(value, _)| *value != 0.0) {
+        return None;
+    }
+    numbers.truncate(count);
     scan::target(text, Some(name.trim().to_owned()), numbers, None).filter(|t| t.readings.len() == count)
 }
 
 /// Every instruction that moves, behind `//INST`.
 pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
-    let mut at = text.find("//INST").unwrap_or(0);
-    let (mut shifted, mut found) = (false, Vec::new());
+    let first = text.find("//INST").unwrap_or(0);
+    let (mut at, mut shifted, mut found) = (first, false, Vec::new());
+    let written = written(&text[first..]);
     for line in text[at..].split_inclusive('\n') {
-        let start = at + line.len() - line.trim_start().len();
+        let tokens: Vec<Range<usize>> = tokens(line).map(|token| at + token.start..at + token.end).collect();
         at += line.len();
-        let end = at;
-        let mut tokens = line.split_whitespace();
-        let Some(word) = tokens.next() else { continue };
-        match word.to_ascii_uppercase().as_str() {
+        let Some(word) = tokens.first().cloned() else { continue };
+        match text[word.clone()].to_ascii_uppercase().as_str() {
             "SFTON" => shifted = true,
             "SFTOF" => shifted = false,
             _ => {}
         }
-        if !moves(word) {
-            continue;
+        let (Some(moves), Some(point)) = (kind(&text[word.clone()]), tokens.get(1).cloned()) else { continue };
+        let added = shifted || tokens[2..].iter().any(|token| text[token.clone()].starts_with("+P"));
+        let moves_by = match moves {
+            Err(cause) => Err(cause),
+            Ok(()) if added => Err(Cause::Offset),
+            Ok(()) => held(text, &text[point.clone()], targets, &written),
+        };
+        found.push(Instruction::new(text, word, point, moves_by));
+        // A second robot's motion stands behind the first one's; what a station does is none of a robot.
+        for pair in tokens[2..].windows(2).filter(|pair| text[pair[0].clone()].starts_with('+')) {
+            let (word, point) = (pair[0].clone(), pair[1].clone());
+            let station = is_external(&text[point.clone()]);
+            if let Some(moves_by @ Err(_)) = kind(&text[word.clone()]).filter(|_| !station) {
+                found.push(Instruction::new(text, word, point, moves_by.map(|()| Vec::new())));
+            }
         }
-        let Some(point) = tokens.next() else { continue };
-        let place = scan::trimmed(text, start + word.len()..end).start;
-        let added = shifted || word.to_ascii_uppercase().contains("IMOV") || tokens.any(|t| t.starts_with("+P"));
-        let moves_by = if added { Err(Cause::Offset) } else { held(text, point, targets) };
-        found.push(Instruction::new(text, start..start + word.len(), place..place + point.len(), moves_by));
     }
     found
 }
 
-/// `MOVJ`, `MOVL`, `MOVC`, `MOVS`, `IMOV`, of several robots with `S`, `+` or `E` before it. A remark begins with an apostrophe.
-fn moves(word: &str) -> bool {
-    let word = word.trim_start_matches('+').to_ascii_uppercase();
+/// Places of what stands between blanks.
+fn tokens(line: &str) -> impl Iterator<Item = Range<usize>> + '_ {
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        let start = at + line[at..].find(|c: char| !c.is_ascii_whitespace())?;
+        at = line[start..].find(|c: char| c.is_ascii_whitespace()).map_or(line.len(), |length| start + length);
+        Some(start..at)
+    })
+}
+
+/// Whether an instruction moves, to its target or otherwise: `MOVJ`, `MOVL`, `MOVC`, `MOVS`, `SMOVL`, `IMOV`, ... A remark begins with an
+/// apostrophe, a label with an asterisk.
+fn kind(word: &str) -> Option<Result<(), Cause>> {
+    let word = word.to_ascii_uppercase();
     let stem = word.strip_suffix(['J', 'L', 'C', 'S']).unwrap_or(&word);
-    ["MOV", "IMOV", "SMOV", "EIMOV", "EMOV", "AMOV"].contains(&stem)
+    Some(match stem {
+        _ if !word.contains("MOV") || !word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '+') => return None,
+        _ if word.starts_with('+') => Err(Cause::Group),
+        "MOV" | "SMOV" | "AMOV" | "EMOV" => Ok(()),
+        _ if stem.ends_with("IMOV") => Err(Cause::Offset),
+        // A conveyor's.
+        "SYMOV" => Err(Cause::Led),
+        _ => Err(Cause::Unknown),
+    })
+}
+
+/// Whether a position is one of a station, a base or external axes.
+fn is_external(point: &str) -> bool {
+    let numbered = |rest: &str| rest.starts_with(|c: char| c.is_ascii_digit() || c == '[');
+    EXTERNAL.iter().any(|head| point.strip_prefix(head).is_some_and(numbered))
 }
 
 /// The joint target of a position, or why there is none.
-fn held(text: &str, point: &str, targets: &[Target]) -> Result<Vec<usize>, Cause> {
+fn held(text: &str, point: &str, targets: &[Target], written: &[Option<(char, u64)>]) -> Result<Vec<usize>, Cause> {
+    if is_external(point) {
+        return Err(Cause::External);
+    }
     let number = key(point).ok_or(Cause::Elsewhere)?;
     if let Some(k) = targets.iter().position(|t| key(&t.name) == Some(number)) {
-        return Ok(vec![k]);
+        let overwritten = written.iter().any(|w| w.is_none_or(|w| w == number));
+        return if overwritten { Err(Cause::Elsewhere) } else { Ok(vec![k]) };
     }
     let mut kind = "";
     for line in text.lines() {
@@ -79,6 +132,30 @@ fn held(text: &str, point: &str, targets: &[Target]) -> Result<Vec<usize>, Cause
         }
     }
     Err(Cause::Elsewhere)
+}
+
+/// Positions that instructions write into; `None` for one whose number is computed. Of an instruction that is not known all its positions may be.
+fn written(text: &str) -> Vec<Option<(char, u64)>> {
+    let of_line = |line: &str| {
+        let all: Vec<&str> = tokens(line).map(|token| &line[token]).collect();
+        let word = all.first().map_or("", |word| *word);
+        let instruction = word.starts_with(|c: char| c.is_ascii_alphabetic());
+        let count = match () {
+            () if !instruction || READING.contains(&word) || kind(word).is_some() => 0,
+            () if WRITING_FIRST.contains(&word) => 1,
+            () => all.len(),
+        };
+        let position = |token: &&str| {
+            let name = token.trim_start_matches(|c: char| !c.is_ascii_alphanumeric());
+            let number = name.strip_prefix("PX").or(name.strip_prefix('P'))?;
+            match number.parse() {
+                Ok(number) => Some(Some(('P', number))),
+                Err(_) => number.starts_with('[').then_some(None),
+            }
+        };
+        all.into_iter().skip(1).take(count).filter_map(|token| position(&token)).collect::<Vec<_>>()
+    };
+    text.lines().flat_map(of_line).collect()
 }
 
 /// Letter and number of a position.

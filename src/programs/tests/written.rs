@@ -49,6 +49,21 @@ fn what_is_written_is_read_and_put_back_in_place() {
     }
 }
 
+/// `d2r` stays where it is, with other degrees in it.
+#[test]
+fn degrees_of_urscript_stay_degrees() {
+    let joints = Joints { slides: &[false; 6], pulses_per_deg: &[] };
+    let text = "movej([d2r(-90), 0.5, d2r( 10 ), 0, 0, d2r(0)], a=1)\n";
+    let target = targets(Language::UrScript, text, joints).unwrap().swap_remove(0);
+    same(&target.readings, &[-90.0, 0.5f64.to_degrees(), 10.0, 0.0, 0.0, 0.0], 1e-9);
+    let changed =
+        with_readings(Language::UrScript, text, joints, &[(&target, vec![-91.0, 30.0, 11.5, 0.0, 0.0, -1.0])]);
+    assert_eq!(
+        changed,
+        "movej([d2r(-91.0000000), 0.523598776, d2r(11.5000000), 0.000000000, 0.000000000, d2r(-1.0000000)], a=1)\n"
+    );
+}
+
 #[test]
 fn poses_and_comments_are_no_joint_targets() {
     let slides = [false; 6];
