@@ -99,6 +99,14 @@ impl Part {
         matches!(self.grid.form, Form::Program { .. })
     }
 
+    /// The calls that hold a program's targets, where its language is not known.
+    pub fn calls(&self) -> &[String] {
+        match &self.grid.form {
+            Form::Program { calls, .. } => calls,
+            _ => &[],
+        }
+    }
+
     /// Whether names say what it has.
     pub fn is_named(&self) -> bool {
         self.meanings.as_ref().is_some_and(|m| m.iter().any(|name| name.what != What::Other))

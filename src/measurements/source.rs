@@ -121,6 +121,11 @@ impl Source {
         let count = robot.joints.len();
         let parts: Vec<Part> =
             self.files.iter().take(1).map(|file| Part::read(file, count, false)).collect::<Result<_>>()?;
+        if let [call, ..] = parts[0].calls() {
+            let message = format!("a program with `{call}`, in a language that is not known");
+            let hint = "a table of the joint targets alone, `name,j1_deg,j2_deg,...`; programs are .script, .mod, .src, .dat, .ls and .jbi";
+            return Err(parts[0].refuse(message, Some(hint)));
+        }
         let mut picked = pick::joints_alone(&parts, count)?;
         let free: Vec<At> = parts[0].free().into_iter().map(|column| At { part: 0, column }).collect();
         if picked.joints.is_empty() && free.len() == count {

@@ -57,5 +57,7 @@ pub enum Form {
         others: usize,
         /// Whether the language says that the numbers are degrees.
         degrees: bool,
+        /// The calls with the targets in them, where the language is none that is known; each once.
+        calls: Vec<String>,
     },
 }

@@ -3,7 +3,10 @@
 //! Programs in the makers' languages are read as `compensate` reads them; of any other text each line counts that holds a list of numbers in
 //! brackets, `j:{1.0,2.0,...}`, `Angles(1.0, 2.0, ...)`, `[1.0, 2.0, ...]`, as long as most of its lines do, or
 //! one of five where each has a word beside the list.
+//! Lists in calls of different names are no targets of one kind.
 //! A list is a row as it stands; numbers beyond the joints are those of axes that the robot does not have.
+
+use std::ops::Range;
 
 use camino::Utf8Path;
 
@@ -28,7 +31,7 @@ pub(super) fn read(path: &Utf8Path, text: &str, joints: usize) -> Option<(Vec<(u
             };
             let rows: Vec<(u64, Fields)> = targets.iter().map(row).collect();
             let others = lines.saturating_sub(rows.len());
-            return Some((rows, Form::Program { others, degrees: true }));
+            return Some((rows, Form::Program { others, degrees: true, calls: Vec::new() }));
         }
     }
     let found: Vec<(u64, &str, Fields)> =
@@ -41,20 +44,45 @@ pub(super) fn read(path: &Utf8Path, text: &str, joints: usize) -> Option<(Vec<(u
     // What a program commands between its moves holds no list, and its moves are more than what a table says of itself.
     let enough = 2 * found.len() > lines || found.len() >= MOVES && words == found.len() && 5 * found.len() > lines;
     (enough && !table).then(|| {
+        let mut calls: Vec<String> = Vec::new();
+        for call in found.iter().filter_map(|(_, line, _)| call(line, joints)) {
+            if !calls.iter().any(|seen| seen == call) {
+                calls.push(call.to_owned());
+            }
+        }
         let rows: Vec<(u64, Fields)> = found.into_iter().map(|(line, _, row)| (line, row)).collect();
         let others = lines - rows.len();
-        (rows, Form::Program { others, degrees: false })
+        (rows, Form::Program { others, degrees: false, calls })
     })
+}
+
+/// The word of the call that a list of numbers stands in.
+fn call(line: &str, joints: usize) -> Option<&str> {
+    let list = place(line, joints)?.start;
+    let mut open = Vec::new();
+    for (at, c) in line[..list + 1].char_indices() {
+        match c {
+            '(' => open.push(at),
+            ')' => drop(open.pop()),
+            _ => {}
+        }
+    }
+    let before = line[..*open.first()?].trim_end();
+    let part = |c: char| c.is_alphanumeric() || c == '_';
+    Some(&before[before.trim_end_matches(part).len()..]).filter(|word| word.starts_with(|c: char| c.is_alphabetic()))
 }
 
 /// The first list in brackets with nothing but numbers in it, as many as joints at the least.
 fn list(line: &str, joints: usize) -> Option<Fields> {
+    place(line, joints).map(|at| Fields::new(line[at.start + 1..at.end].split(',').map(str::trim)))
+}
+
+/// Where it stands, from its bracket on.
+fn place(line: &str, joints: usize) -> Option<Range<usize>> {
     line.match_indices(['{', '[', '(']).find_map(|(at, _)| {
-        let rest = &line[at + 1..];
-        let end = rest.find(['{', '[', '(', '}', ']', ')'])?;
-        let numbers: Vec<&str> = rest[..end].split(',').map(str::trim).collect();
-        let all = numbers.len() >= joints && numbers.iter().all(|n| n.parse::<f64>().is_ok());
-        all.then(|| Fields::new(numbers.into_iter()))
+        let end = at + 1 + line[at + 1..].find(['{', '[', '(', '}', ']', ')'])?;
+        let mut numbers = line[at + 1..end].split(',').map(|n| n.trim().parse::<f64>().is_ok());
+        (numbers.clone().count() >= joints && numbers.all(|is| is)).then_some(at..end)
     })
 }
 
