@@ -180,6 +180,10 @@ pub struct Compensate {
     /// Pulses a degree of each joint, for Yaskawa jobs in pulses
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true)]
     pub pulses_per_deg: Vec<f64>,
+    /// Which joint of the robot file each number of a program's target is, as in 1,2,4,5,6,7,3 where the seventh is the third joint;
+    /// needed with more than six, as makers' languages have six axes and then external ones
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    pub joint_order: Vec<usize>,
     /// Correct a program's joint targets although other motions stay as they are; these are named, and the exit status is 1
     #[arg(long)]
     pub joint_targets_only: bool,

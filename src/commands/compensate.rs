@@ -13,11 +13,14 @@ use crate::diagnostic::Status;
 use crate::files::provenance::Run;
 use crate::files::{self, OutDir};
 use crate::formats::targets::{self, Row};
-use crate::programs::{self, Cause, Instruction, Joints, Language};
+use crate::programs::{self, Cause, Encoding, Instruction, Joints, Language};
 use crate::robot::{Error, Robot, file};
 
 /// Length of the lists of refused targets and of motions that stay as they are on the terminal.
 const MOST_SAID: usize = 20;
+
+/// Joints whose order every program has: a robot's own.
+const MOST_ORDERED: usize = 6;
 
 /// What `compensate.json` says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -52,6 +55,8 @@ struct Moved {
 /// What to do about motions that are not corrected.
 const LEFT_HINT: &str = "`--joint-targets-only` corrects the joint targets and names the motions that it leaves as they are; \
                          their poses can be compensated as a CSV of name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad";
+const DATA_HINT: &str = "points of inline forms stand in the .dat file of this name: `stereocal compensate NAME.dat --joint-targets-only` corrects \
+                         the joint targets among them; `--joint-targets-only` corrects those in this file and names the motions that it leaves";
 const CSV_HINT: &str =
     "give the targets as a CSV of name,j1_deg,...,jN_deg or name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad";
 
@@ -66,11 +71,16 @@ struct Refused {
 pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let (nominal, identified) = (file::read(&args.robot)?, file::read(&args.identified)?);
     let slides: Vec<bool> = nominal.joints.iter().map(|j| j.slides).collect();
+    check(args, &nominal, &identified, Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg })?;
+    let order: Vec<usize> = match args.joint_order.as_slice() {
+        [] => (0..slides.len()).collect(),
+        order => order.iter().map(|number| number - 1).collect(),
+    };
+    let slides: Vec<bool> = order.iter().map(|&joint| slides[joint]).collect();
     let joints = Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg };
-    check(args, &nominal, &identified, joints)?;
     let program = Language::of(&args.targets).map(|language| Program::read(args, language, joints)).transpose()?;
     let rows = match &program {
-        Some(program) => program.rows(&nominal),
+        Some(program) => program.rows(&nominal, &order),
         None => targets::read(&args.targets, &nominal)?,
     };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
@@ -83,7 +93,7 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let list: Vec<_> = rows.iter().map(|row| row.target.clone()).collect();
     let found = compensator.compensate(&list);
     let in_file = |readings: &[f64]| -> Vec<f64> {
-        readings.iter().zip(&slides).map(|(r, slides)| if *slides { *r } else { r.to_degrees() }).collect()
+        readings.iter().zip(&nominal.joints).map(|(r, joint)| if joint.slides { *r } else { r.to_degrees() }).collect()
     };
     let table = rows.iter().zip(&found).map(|(row, found)| match &found.readings {
         Ok(readings) => (row.name.as_str(), Some(in_file(readings)), "ok".to_owned()),
@@ -92,9 +102,10 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     out.write("compensated.csv", targets::to_csv(&nominal, table).as_bytes())?;
     if let Some(program) = &program {
         let changed = program.targets().zip(&found);
-        let changed: Vec<_> = changed.filter_map(|(t, f)| Some((t, in_file(f.readings.as_ref().ok()?)))).collect();
+        let in_program = |readings: &[f64]| order.iter().map(|&joint| in_file(readings)[joint]).collect::<Vec<f64>>();
+        let changed: Vec<_> = changed.filter_map(|(t, f)| Some((t, in_program(f.readings.as_ref().ok()?)))).collect();
         let text = programs::with_readings(program.language, &program.text, joints, &changed);
-        out.write(&program_name, text.as_bytes())?;
+        out.write(&program_name, &program.encoding.encoded(&text))?;
     }
     let motions = program.as_ref().map(|program| program.outcome(&found));
     let summary = Summary::new(&rows, &found, motions.as_deref());
@@ -121,6 +132,11 @@ fn check(args: &Compensate, nominal: &Robot, identified: &Robot, joints: Joints)
         problems.push(format!("--tool has {} numbers; X,Y,Z in mm are needed", args.tool.len()));
     }
     problems.extend(joints.problem());
+    let (mut order, count) = (args.joint_order.clone(), nominal.joints.len());
+    order.sort_unstable();
+    if !order.is_empty() && !order.iter().copied().eq(1..=count) {
+        problems.push(format!("--joint-order is to have each of the numbers 1 to {count} once"));
+    }
     Ok(config::reject(problems)?)
 }
 
@@ -128,6 +144,7 @@ fn check(args: &Compensate, nominal: &Robot, identified: &Robot, joints: Joints)
 struct Program {
     language: Language,
     text: String,
+    encoding: Encoding,
     read: programs::Program,
     moved_by: Vec<usize>,
 }
@@ -135,18 +152,34 @@ struct Program {
 impl Program {
     fn read(args: &Compensate, language: Language, joints: Joints) -> files::Result<Program> {
         let path = &args.targets;
-        let text = files::read_text(path, "robot program", None)?;
+        let bytes = files::read_text_bytes(path, "robot program")?;
         let refuse = |message: String, hint: &str| files::Error::format(path, None, message, Some(hint));
+        let Some((text, encoding)) = programs::decoded(bytes) else {
+            return Err(refuse("robot program: UTF-16 text".to_owned(), "save it as UTF-8, or as the controller does"));
+        };
+        let count = joints.slides.len();
+        if let Some(axis) = language.seventh().filter(|_| count > MOST_ORDERED && args.joint_order.is_empty()) {
+            let message = format!(
+                "the robot has {count} joints; which of them {axis} of {} is, the file does not say",
+                language.name()
+            );
+            let hint = "`--joint-order` names the joint of the robot file that each number is; `1,2,4,5,6,7,3` where the seventh is the third joint";
+            return Err(refuse(message, hint));
+        }
         let read = programs::Program::read(language, &text, joints)
             .map_err(|message| refuse(message, "`--pulses-per-deg N,N,...`, from the controller's parameters"))?;
         if !args.joint_targets_only
             && let Some(first) = read.motions.iter().find(|motion| motion.moves_by.is_err())
         {
-            return Err(refuse(counted(&read.motions, first), LEFT_HINT));
+            let name = first.target.chars().all(|c| c.is_alphanumeric() || c == '_');
+            let hint = match first.moves_by {
+                Err(Cause::Elsewhere) if name && language.has_data_file(path) => DATA_HINT,
+                _ => LEFT_HINT,
+            };
+            return Err(refuse(counted(&read.motions, first), hint));
         }
         let moved_by = read.moved_by(language);
         if moved_by.is_empty() {
-            let count = joints.slides.len();
             let message =
                 format!("nothing in this {} program moves to a joint target of {count} numbers", language.name());
             return Err(refuse(message, CSV_HINT));
@@ -164,7 +197,7 @@ impl Program {
         if moved_by.len() > MOST_ROWS {
             return Err(refuse(format!("more than {MOST_ROWS} targets"), "split the program"));
         }
-        Ok(Program { language, text, read, moved_by })
+        Ok(Program { language, text, encoding, read, moved_by })
     }
 
     /// The joint targets that are corrected, in the order of the text.
@@ -172,10 +205,13 @@ impl Program {
         self.moved_by.iter().filter_map(|&k| self.read.targets.get(k))
     }
 
-    fn rows(&self, nominal: &Robot) -> Vec<Row> {
+    /// Readings in the robot's order of joints, of which `order` has the one of each number.
+    fn rows(&self, nominal: &Robot, order: &[usize]) -> Vec<Row> {
         let row = |t: &programs::Target| {
-            let target = Target::Readings(targets::radians(&t.readings, nominal));
-            Row { name: t.name.clone(), line: t.line, target, given: Some(t.readings.clone()) }
+            let mut given = vec![0.0; t.readings.len()];
+            order.iter().zip(&t.readings).for_each(|(&joint, reading)| given[joint] = *reading);
+            let target = Target::Readings(targets::radians(&given, nominal));
+            Row { name: t.name.clone(), line: t.line, target, given: Some(given) }
         };
         self.targets().map(row).collect()
     }

@@ -91,6 +91,19 @@ pub fn read_text(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Res
 
 /// Reads a text file of a size that the caller thinks possible; a longer one is refused, and never read to its end.
 pub fn read_text_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, most_bytes: u64) -> Result<String> {
+    let not_text = |_| {
+        let place = Place { path: path.to_owned(), line: None };
+        Error::Format { message: format!("{what}: not UTF-8 text"), place, hint: None }
+    };
+    String::from_utf8(read_bytes_up_to(path, what, hint, most_bytes)?).map_err(not_text)
+}
+
+/// Reads a text file in whatever encoding.
+pub fn read_text_bytes(path: &Utf8Path, what: &'static str) -> Result<Vec<u8>> {
+    read_bytes_up_to(path, what, None, MOST_TEXT_BYTES)
+}
+
+fn read_bytes_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, most_bytes: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let read = std::fs::File::open(path).and_then(|file| file.take(most_bytes + 1).read_to_end(&mut bytes));
     let refuse = |message: String| Error::format(path, None, message, None);
@@ -98,7 +111,7 @@ pub fn read_text_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, 
         Ok(_) if bytes.len() as u64 > most_bytes => {
             Err(refuse(format!("{what}: more than {} MB of text; no such file is that long", most_bytes >> 20)))
         }
-        Ok(_) => String::from_utf8(bytes).map_err(|_| refuse(format!("{what}: not UTF-8 text"))),
+        Ok(_) => Ok(bytes),
         Err(source) if source.kind() == std::io::ErrorKind::NotFound => {
             Err(Error::Missing { what, path: path.to_owned(), hint: hint.map(str::to_owned) })
         }

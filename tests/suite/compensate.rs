@@ -13,7 +13,11 @@ const SAME_MM: f64 = 1e-3;
 const SAME_RAD: f64 = 1e-6;
 
 fn robots(folder: &Path) -> (Robot, Robot) {
-    let nominal = catalogue::robot("ur5e").unwrap();
+    robots_of(folder, "ur5e")
+}
+
+fn robots_of(folder: &Path, arm: &str) -> (Robot, Robot) {
+    let nominal = catalogue::robot(arm).unwrap();
     let mut real = nominal.clone();
     for (k, joint) in real.joints.iter_mut().enumerate() {
         joint.alpha_rad += 2e-3 * (k as f64).sin();
@@ -193,6 +197,84 @@ fn programs_keep_everything_but_their_joint_targets() {
     std::fs::write(folder.path().join("job.jbi"), "///POSTYPE PULSE\n///PULSE\nC00000=1,2,3,4,5,6\n").unwrap();
     let said = run(folder.path(), &["job.jbi", "--out", "x"], 2);
     assert!(said.contains("pulses a degree") && said.contains("--pulses-per-deg"), "{said}");
+}
+
+/// A program in RAPID that moves to these readings, deg.
+fn rapid(postures: &[Vec<f64>], comment: &str) -> String {
+    let list = |q: &[f64]| q.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let mut text = format!("MODULE m\n! {comment}\nPROC main()\n");
+    for q in postures {
+        let (robot, external) = q.split_at(6);
+        let external: Vec<f64> = external.iter().copied().chain(std::iter::repeat(9e9)).take(6).collect();
+        let _ = writeln!(text, "MoveAbsJ [[{}],[{}]],v100,fine,tool0;", list(robot), list(&external));
+    }
+    text + "ENDPROC\nENDMODULE\n"
+}
+
+#[test]
+fn bytes_of_any_encoding_stay_as_they_are() {
+    let folder = workplace();
+    let (nominal, _) = robots(folder.path());
+    let text = rapid(&postures(&nominal, 2), "COMMENT");
+    let (before, after) = text.split_once("COMMENT").unwrap();
+    let all: Vec<u8> = (0..=255).filter(|byte| *byte != b'\n').collect();
+    std::fs::write(folder.path().join("bytes.mod"), [before.as_bytes(), &all, after.as_bytes()].concat()).unwrap();
+    let said = run(folder.path(), &["bytes.mod"], 0);
+    assert!(said.contains("all 2 motions move to them"), "{said}");
+    let written = std::fs::read(folder.path().join("out/compensated/bytes.mod")).unwrap();
+    std::fs::write(folder.path().join("plain.mod"), &text).unwrap();
+    run(folder.path(), &["plain.mod"], 0);
+    let plain = std::fs::read_to_string(folder.path().join("out/compensated/plain.mod")).unwrap();
+    let (before, after) = plain.split_once("COMMENT").unwrap();
+    assert!(plain != text && written == [before.as_bytes(), &all, after.as_bytes()].concat());
+    let utf16: Vec<u8> = std::iter::once(0xfeff).chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    std::fs::write(folder.path().join("wide.mod"), utf16).unwrap();
+    let said = run(folder.path(), &["wide.mod"], 2);
+    assert!(said.contains("UTF-16") && said.contains("save it as UTF-8"), "{said}");
+}
+
+#[test]
+fn seven_joints_need_their_order() {
+    let folder = workplace();
+    let (nominal, real) = robots_of(folder.path(), "franka-panda");
+    // The third joint is written behind the others.
+    let order = [0, 1, 3, 4, 5, 6, 2];
+    let meant = postures(&nominal, 3);
+    let written: Vec<Vec<f64>> = meant.iter().map(|q| order.map(|joint| q[joint]).to_vec()).collect();
+    std::fs::write(folder.path().join("seven.mod"), rapid(&written, "")).unwrap();
+    let said = run(folder.path(), &["seven.mod"], 2);
+    assert!(said.contains("7 joints; which of them `eax_a`") && said.contains("--joint-order"), "{said}");
+    let said = run(folder.path(), &["seven.mod", "--joint-order", "1,2,4,5,6,7,7"], 2);
+    assert!(said.contains("each of the numbers 1 to 7 once"), "{said}");
+    run(folder.path(), &["seven.mod", "--joint-order", "1,2,4,5,6,7,3"], 0);
+    let text = std::fs::read_to_string(folder.path().join("out/compensated/seven.mod")).unwrap();
+    for (q, line) in meant.iter().zip(text.lines().filter(|line| line.starts_with("MoveAbsJ"))) {
+        let numbers = line.split(['[', ']', ',']).filter_map(|v| v.parse().ok()).take(7).collect::<Vec<f64>>();
+        let mut found = vec![0.0; 7];
+        order.iter().zip(&numbers).for_each(|(&joint, value)| found[joint] = *value);
+        let off = nominal.base_from_flange(&radians(q)).inverse() * real.base_from_flange(&radians(&found));
+        assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD, "{line}");
+    }
+}
+
+#[test]
+fn what_only_looks_like_joint_targets_is_refused() {
+    let folder = workplace();
+    robots(folder.path());
+    let moves = "MoveJoints(0,10,20,30,40,50)\nMoveJoints(1,10,20,30,40,50)\nMoveJoints(2,10,20,30,40,50)\n";
+    for (text, parts) in [
+        (moves.to_owned(), ["`MoveJoints`", "in a language that is not known"]),
+        (format!("{moves}MovePose(1,10,20,30,40,50)\n"), ["`MoveJoints`, `MovePose`", "not all of them can be joint"]),
+        ("arm.set_angle(angle=[0,10,20,30,40,50], wait=True)\n".repeat(3), ["`set_angle`", "is not known"]),
+    ] {
+        std::fs::write(folder.path().join("moves.txt"), text).unwrap();
+        let said = run(folder.path(), &["moves.txt"], 2);
+        assert!(parts.iter().all(|part| said.contains(part)) && said.contains("hint:"), "{said}");
+    }
+    // Points of inline forms.
+    std::fs::write(folder.path().join("inline.src"), "DEF a( )\nPTP XP1\nEND\n").unwrap();
+    let said = run(folder.path(), &["inline.src"], 2);
+    assert!(said.contains("PTP XP1 moves by values") && said.contains(".dat file of this name"), "{said}");
 }
 
 #[test]
