@@ -122,8 +122,7 @@ fn point(code: &str, at: std::ops::Range<usize>) -> std::ops::Range<usize> {
 
 pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(String, String)> {
     let aggregate = |list: &[String]| {
-        let parts: Vec<String> =
-            axes(list.len()).iter().zip(list).map(|(n, v)| format!("{n} {v}")).collect();
+        let parts: Vec<String> = axes(list.len()).iter().zip(list).map(|(n, v)| format!("{n} {v}")).collect();
         format!("{{{}}}", parts.join(","))
     };
     let mut text = format!(

@@ -41,61 +41,44 @@ pub struct Apart {
     doubt_mm: f64,
 }
 
+/// A row and the point that it shows.
+type Seen<'a> = (&'a Measurement, Point3<f64>);
+
 impl Apart {
     /// `None` where there is one target, where a pose shows several, or where the rows are too few.
     pub fn new(rows: &[Measurement], nominal: &Robot) -> Option<Apart> {
         let of_target = by_target(rows)?;
         let most = of_target.values().map(Vec::len).max()?;
-        let (reference, _) = of_target.iter().find(|(_, rows)| rows.len() == most)?;
-        let mut groups: BTreeMap<&str, (Vec<Vec<f64>>, Vec<Point3<f64>>)> = BTreeMap::new();
-        for (row, point) in &of_target[reference] {
-            let (joints, points) = groups.entry(&row.at.group).or_default();
-            joints.push(row.at.joints_rad());
-            points.push(*point);
-        }
-        let (joints, points) = groups.values().max_by_key(|(joints, _)| joints.len())?;
-        let fit = nominal.fit_tool(joints, points, Start::Around).filter(|_| joints.len() >= FEWEST)?;
-        let place = |joints: &[Vec<f64>], points: &[Point3<f64>]| {
-            let predicted = joints.iter().map(|q| nominal.base_from_flange(q) * Point3::from(fit.tool_mm));
-            fitted_frame(predicted.zip(points).map(|(from, to)| (from, *to, 1.0)))
-        };
-        let sensor_from_base: BTreeMap<String, Transform> = groups
-            .iter()
-            .filter(|(_, (joints, _))| joints.len() >= FEWEST_PLACED)
-            .map(|(group, (joints, points))| ((*group).to_owned(), place(joints, points)))
-            .collect();
+        let (reference, seen) = of_target.iter().find(|(_, rows)| rows.len() == most)?;
+        let (sensor_from_base, off_mm) = placements(seen, nominal)?;
         if rows.iter().any(|row| !sensor_from_base.contains_key(&row.at.group)) {
             return None;
         }
-        let tool = |rows: &[(&Measurement, Point3<f64>)]| {
-            let seen = |(row, point): &(&Measurement, Point3<f64>)| {
+        let tool = |seen: &[Seen]| {
+            let on_flange = |(row, point): &Seen| {
                 (sensor_from_base[&row.at.group] * nominal.base_from_flange(&row.at.joints_rad())).inverse() * point
             };
-            let seen: Vec<Point3<f64>> = rows.iter().map(seen).collect();
-            Vector3::from_fn(|axis, _| median(seen.iter().map(|p| p[axis])).unwrap_or(0.0))
+            let places: Vec<Point3<f64>> = seen.iter().map(on_flange).collect();
+            Vector3::from_fn(|axis, _| median(places.iter().map(|p| p[axis])).unwrap_or(0.0))
         };
-        let origin = tool(&of_target[reference]);
-        let others = of_target.iter().filter(|(name, _)| *name != reference);
-        let part = |(name, rows): (&String, &Vec<(&Measurement, Point3<f64>)>)| {
-            (name.clone(), Part { place_mm: (tool(rows) - origin).into(), poses: rows.len() })
+        let origin = tool(seen);
+        let part = |(name, seen): (&String, &Vec<Seen>)| {
+            (name.clone(), Part { place_mm: (tool(seen) - origin).into(), poses: seen.len() })
         };
-        let parts: BTreeMap<String, Part> = others.map(part).collect();
+        let parts: BTreeMap<String, Part> = of_target.iter().filter(|(name, _)| *name != reference).map(part).collect();
         let place_of = |name: &String| parts.get(name).map_or([0.0; 3], |part| part.place_mm);
         let names: Vec<String> = of_target.keys().cloned().collect();
-        let targets = Targets {
-            scatter_mm: None,
-            places_mm: names.iter().map(|name| Some(place_of(name))).collect(),
-            oriented: false,
-            names,
-            parts,
-            findings: Vec::new(),
-        };
+        let places_mm = names.iter().map(|name| Some(place_of(name))).collect();
         let of_body = |row: &Measurement| Measurement {
             target: if row.target == *reference { String::new() } else { row.target.clone() },
             ..row.clone()
         };
-        let doubt_mm = (DOUBT * fit.left_mm).max(LEAST_DOUBT_MM);
-        Some(Apart { rows: rows.iter().map(of_body).collect(), targets, sensor_from_base, doubt_mm })
+        Some(Apart {
+            rows: rows.iter().map(of_body).collect(),
+            targets: Targets { scatter_mm: None, places_mm, oriented: false, names, parts, findings: Vec::new() },
+            sensor_from_base,
+            doubt_mm: (DOUBT * off_mm).max(LEAST_DOUBT_MM),
+        })
     }
 
     /// What each row's point gains, mm, from each coordinate of each part's place that is off by a standard deviation.
@@ -115,9 +98,29 @@ impl Apart {
     }
 }
 
+/// Where the base stands at the sensor, by group, from what one target shows, and what the nominal robot is off by in the middle of the rows, mm.
+fn placements(seen: &[Seen], nominal: &Robot) -> Option<(BTreeMap<String, Transform>, f64)> {
+    let mut groups: BTreeMap<&str, Vec<&Seen>> = BTreeMap::new();
+    for row in seen {
+        groups.entry(&row.0.at.group).or_default().push(row);
+    }
+    let joints = |rows: &[&Seen]| rows.iter().map(|(row, _)| row.at.joints_rad()).collect::<Vec<_>>();
+    let points = |rows: &[&Seen]| rows.iter().map(|(_, point)| *point).collect::<Vec<_>>();
+    let most = groups.values().max_by_key(|rows| rows.len()).filter(|rows| rows.len() >= FEWEST)?;
+    let fit = nominal.fit_tool(&joints(most), &points(most), Start::Around)?;
+    let place = |(group, rows): (&&str, &Vec<&Seen>)| {
+        let predicted = rows.iter().map(|(row, point)| {
+            (nominal.base_from_flange(&row.at.joints_rad()) * Point3::from(fit.tool_mm), *point, 1.0)
+        });
+        ((*group).to_owned(), fitted_frame(predicted))
+    };
+    let placed = groups.iter().filter(|(_, rows)| rows.len() >= FEWEST_PLACED).map(place).collect();
+    Some((placed, fit.left_mm))
+}
+
 /// The points by the names of their targets; `None` where there is one, or a pose shows two, or a target has too few.
-fn by_target(rows: &[Measurement]) -> Option<BTreeMap<String, Vec<(&Measurement, Point3<f64>)>>> {
-    let mut of_target: BTreeMap<String, Vec<(&Measurement, Point3<f64>)>> = BTreeMap::new();
+fn by_target(rows: &[Measurement]) -> Option<BTreeMap<String, Vec<Seen<'_>>>> {
+    let mut of_target: BTreeMap<String, Vec<Seen>> = BTreeMap::new();
     let mut shown: BTreeMap<&str, &str> = BTreeMap::new();
     for row in rows {
         match &row.observed {
