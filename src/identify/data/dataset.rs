@@ -298,7 +298,7 @@ impl Dataset {
 
     /// Whether the places of targets are those in the flange's frame: of targets that the robot joined.
     pub fn are_on_flange(&self) -> bool {
-        self.targets.as_ref().is_some_and(|targets| targets.scatter_mm.is_none())
+        self.targets.as_ref().is_some_and(|targets| targets.doubt_mm.is_some())
     }
 
     /// How the target is turned on the flange, where orientations are used, or where a point cannot be predicted without it: where poses show a

@@ -68,12 +68,12 @@ impl Record {
             whole_covariance: chosen.found.as_ref().map(|(f, _)| Covariance::new(f, &f.whole_covariance())),
             expected: chosen.found.as_ref().map(|(f, _)| Expected::new(f, set, &found.fitted)),
             scale: found.scale(set),
-            targets: set.targets.clone(),
+            targets: set.targets.clone().map(|targets| targets.solved(&found.extras)),
             repeats: set.repeats,
             certainty: certainty(&found.judged, &found.terms),
             folded: !found.deletions.is_empty(),
             tool_mm: tool(set, nominal),
-            sensor: found.extras.iter().map(|(extra, value)| of_sensor(set, *extra, *value)).collect(),
+            sensor: found.extras.iter().filter(|_| !set.are_on_flange()).map(|(e, v)| of_sensor(set, *e, *v)).collect(),
         };
         record.advise(set, nominal, found, &findings, found.against_nominal(set, nominal, settings));
         record

@@ -73,11 +73,13 @@ impl Apart {
             target: if row.target == *reference { String::new() } else { row.target.clone() },
             ..row.clone()
         };
+        let doubt_mm = (DOUBT * off_mm).max(LEAST_DOUBT_MM);
+        let (scatter_mm, oriented, findings) = (None, false, Vec::new());
         Some(Apart {
             rows: rows.iter().map(of_body).collect(),
-            targets: Targets { scatter_mm: None, places_mm, oriented: false, names, parts, findings: Vec::new() },
+            targets: Targets { scatter_mm, doubt_mm: Some(doubt_mm), places_mm, oriented, names, parts, findings },
             sensor_from_base,
-            doubt_mm: (DOUBT * off_mm).max(LEAST_DOUBT_MM),
+            doubt_mm,
         })
     }
 

@@ -17,6 +17,7 @@ use super::moved::{self, Moved};
 use super::sorter::{Judged, Shown, Sorter};
 use crate::identify::Error;
 use crate::identify::finding::Finding;
+use crate::identify::sensor::Extra;
 use crate::measurements::{Measurement, Observed};
 
 /// Variance that a stated covariance has in each direction at the least, as a share of its largest.
@@ -31,6 +32,9 @@ pub struct Targets {
     pub scatter_mm: Option<f64>,
     /// Where they stand in a frame of their own, whose origin is the mark point, mm; `null` for one that no pose joins to the others.
     pub places_mm: Vec<Option<[f64; 3]>>,
+    /// How far the places may be off where the robot joined the targets, a standard deviation a coordinate, mm.
+    #[serde(skip)]
+    pub doubt_mm: Option<f64>,
     /// Whether they tell an orientation.
     pub oriented: bool,
     /// Poses that show too few of them for a turn: points of the body, by the names of what they show, and where that stands, mm.
@@ -66,6 +70,21 @@ impl Targets {
             1 => "; 1 pose shows fewer: what it shows is a point of the body".to_owned(),
             n => format!("; {n} poses show fewer: what they show is a point of the body"),
         }
+    }
+
+    /// The same with the places as they were solved: the unknowns of [`super::Apart::columns`], by the parts in the order of their names.
+    pub fn solved(mut self, unknowns: &[(Extra, f64)]) -> Targets {
+        let Some(doubt_mm) = self.doubt_mm else { return self };
+        let names: Vec<String> = self.parts.keys().cloned().collect();
+        for (extra, value) in unknowns {
+            let Extra::Shared(k) = extra else { continue };
+            let Some(part) = names.get(k / 3).and_then(|name| self.parts.get_mut(name)) else { continue };
+            part.place_mm[k % 3] += doubt_mm * value;
+        }
+        for (name, place) in self.names.iter().zip(&mut self.places_mm) {
+            *place = self.parts.get(name).map(|part| part.place_mm).or(*place);
+        }
+        self
     }
 
     /// Where on the body the targets of this name stand, from the mark point, mm; `None` where it is the mark point.
@@ -122,6 +141,7 @@ pub fn as_one(rows: &[Measurement]) -> Result<Option<(Vec<Measurement>, Targets)
     let rows = poses.iter().zip(judged).map(one).collect();
     let targets = Targets {
         scatter_mm: Some(scatter_mm),
+        doubt_mm: None,
         places_mm: sorter.body.places_mm.iter().map(|p| p.map(Into::into)).collect(),
         oriented: !sorter.body.is_line(),
         names,

@@ -266,6 +266,11 @@ fn targets_that_no_pose_shows_together_are_joined_by_the_robot() {
         let judge = Judge { extras: &extras, values: &values, ..Judge::plain(&set, &found.fitted, true) };
         let errors = judge.errors(robot, &found.fitted).into_iter().filter_map(|e| e.point_mm).map(|e| e.norm());
         assert!(errors.fold(0.0, f64::max) < 10.0 * NOISE_MM);
+        let solved = set.targets.clone().map(|targets| targets.solved(&found.extras));
+        for (name, part) in solved.iter().flat_map(|targets| &targets.parts) {
+            let place = TARGETS.iter().find(|(n, _)| n == name).unwrap().1 - TARGETS[0].1;
+            assert!((Vector3::from(part.place_mm) - place).norm() < 2.0, "{name}: {part:?} for {place:?}");
+        }
         let pairs = joints.iter().map(|q| (robot.target_mm(q), truth.target_mm(q), 1.0));
         let frame = crate::geometry::fitted_frame(pairs);
         let of = |q: &Vec<f64>| (frame * robot.target_mm(q) - truth.target_mm(q)).norm();
