@@ -134,7 +134,8 @@ impl Dataset {
     pub fn of_robot(rows: &[Measurement], nominal: &Robot) -> Result<Dataset, Error> {
         let Some(apart) = targets::Apart::new(rows, nominal) else { return Dataset::new(rows) };
         let mut set = Dataset::of_rows(&apart.rows, Some(apart.targets.clone()))?;
-        set.shared = apart.columns(&set, nominal);
+        let columns = |p: &Pose| apart.columns(&set.groups[p.group].name, &p.joints_rad, p.on_body_mm, nominal);
+        set.shared = set.poses.iter().map(columns).collect();
         Ok(set)
     }
 

@@ -11,7 +11,6 @@ use nalgebra::{Matrix3xX, Point3, Vector3};
 
 use super::merge::{Part, Targets};
 use crate::geometry::{Transform, fitted_frame};
-use crate::identify::data::dataset::Dataset;
 use crate::measurements::{Measurement, Observed};
 use crate::robot::Robot;
 use crate::robot::tool_fit::Start;
@@ -83,20 +82,23 @@ impl Apart {
         })
     }
 
-    /// What each row's point gains, mm, from each coordinate of each part's place that is off by a standard deviation.
-    pub fn columns(&self, set: &Dataset, nominal: &Robot) -> Vec<Matrix3xX<f64>> {
-        let parts: Vec<&String> = self.targets.parts.keys().collect();
-        let of_pose = |pose: &crate::identify::data::dataset::Pose| {
-            let mut columns = Matrix3xX::zeros(3 * parts.len());
-            let frame = &self.sensor_from_base[&set.groups[pose.group].name];
-            let turn = (frame * nominal.base_from_flange(&pose.joints_rad)).rotation.to_rotation_matrix();
-            let own = parts.iter().position(|name| pose.on_body_mm == self.targets.part_mm(name));
-            if let Some(part) = own {
-                columns.fixed_columns_mut::<3>(3 * part).copy_from(&(turn.matrix() * self.doubt_mm));
-            }
-            columns
-        };
-        set.poses.iter().map(of_pose).collect()
+    /// What the point of a pose of this group gains, mm, from each coordinate of each part's place that is off by a standard deviation, the pose
+    /// showing the part that stands there on the body.
+    pub fn columns(
+        &self,
+        group: &str,
+        joints_rad: &[f64],
+        on_body_mm: Option<Vector3<f64>>,
+        nominal: &Robot,
+    ) -> Matrix3xX<f64> {
+        let mut columns = Matrix3xX::zeros(3 * self.targets.parts.len());
+        let own = self.targets.parts.values().position(|part| on_body_mm == Some(part.place_mm.into()));
+        if let Some(part) = own {
+            let turn = (self.sensor_from_base[group] * nominal.base_from_flange(joints_rad)).rotation;
+            let moved = turn.to_rotation_matrix().into_inner() * self.doubt_mm;
+            columns.fixed_columns_mut::<3>(3 * part).copy_from(&moved);
+        }
+        columns
     }
 }
 
