@@ -130,14 +130,14 @@ impl CrossValidation {
     }
 
     /// What the most probable values of these parameters change by where each fold is left out, beside those of all; mm and mrad, one a
-    /// parameter.
+    /// parameter, and behind them one an unknown of the sensor.
     pub fn deletions(&self, parameters: &[Parameter], tolerance: &Tolerance) -> Vec<Option<Vec<f64>>> {
         let columns = self.columns(parameters);
         let sds = tolerance.standard_deviations(parameters, &self.extras);
         let whole = self.whole.solve(&columns, &sds);
         let change = |fold: &Fold| {
             let change = fold.solve(&columns, &sds)? - whole.as_ref()?;
-            Some(columns.iter().take(parameters.len()).map(|&c| change[c]).collect())
+            Some(columns.iter().map(|&c| change[c]).collect())
         };
         self.folds.iter().map(change).collect()
     }

@@ -3,6 +3,8 @@
 use super::file::{Advice, Record};
 use super::findings::{self, Findings};
 use super::gather;
+use super::parameters::MethodRecord;
+use super::quality::PointSpread;
 use crate::identify::data::dataset::{Dataset, Reading};
 use crate::identify::data::still::constant_joints;
 use crate::identify::finding::Finding;
@@ -92,8 +94,15 @@ impl Record {
             _ => true,
         };
         let limit_mm = 2.0 * if rows.iter().all(is_printed) { PRINTED_MM } else { READ_MM };
-        let after = self.chosen_method().map_or(&self.before.verify, |method| &method.verify);
-        let largest_mm = after.point.as_ref()?.max_abs_mm.filter(|&most| most < limit_mm)?;
+        let largest = |figures: &PointSpread| figures.point.as_ref().and_then(|spread| spread.max_abs_mm);
+        let held_out_mm = largest(self.chosen_method().map_or(&self.before.verify, |method| &method.verify))?;
+        // What is left where the numbers are twice the unknowns is no better for being fitted, and free of what rounding does to rows left out.
+        let redundant = |m: &&MethodRecord| 3 * rows.len() >= 2 * (m.parameters.len() + 6 * set.groups.len());
+        let left_mm = self.chosen_method().filter(redundant).and_then(|method| largest(&method.fit));
+        let largest_mm = held_out_mm.min(left_mm.unwrap_or(f64::INFINITY));
+        if largest_mm >= limit_mm {
+            return None;
+        }
         Some(format!(
             "the largest error is {:.2} um, and no instrument measures an arm so: these points were computed, by the robot's controller or in a \
              simulation; only points that were measured show how a robot was built",

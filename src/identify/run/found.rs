@@ -64,7 +64,7 @@ pub struct Identification {
 pub struct Deletion {
     /// The rows that were left out.
     pub rows: Vec<usize>,
-    /// What the parameters change by, mm and mrad.
+    /// What the parameters change by, mm and mrad, and behind them the unknowns of the sensor.
     pub change: Vec<f64>,
 }
 

@@ -47,8 +47,17 @@ impl Identification {
             return judge.errors(robot, &judge.set.verify_rows());
         }
         let part = |Deletion { rows, change }: &Deletion| {
-            let changed = if fitted { robot.shifted(&self.deleted_parameters, change) } else { robot.clone() };
-            folds::without(judge, &changed, rows)
+            if !fitted {
+                return folds::without(judge, robot, rows);
+            }
+            let (of_robot, of_sensor) = change.split_at(self.deleted_parameters.len());
+            let changed = |(extra, value): (&Extra, &f64)| {
+                let at = self.extras.iter().position(|(e, _)| e == extra);
+                value + at.and_then(|at| of_sensor.get(at)).unwrap_or(&0.0)
+            };
+            let values: Vec<f64> = judge.extras.iter().zip(judge.values).map(changed).collect();
+            let judge = Judge { values: &values, ..judge.clone() };
+            folds::without(&judge, &robot.shifted(&self.deleted_parameters, of_robot), rows)
         };
         folds::one_a_row(judge.set, self.deletions.iter().flat_map(part))
     }

@@ -110,7 +110,7 @@ fn points_that_were_computed_are_said_to_be() {
         assert!(run.status.success(), "{}", stderr(&run));
         String::from_utf8_lossy(&run.stdout).lines().next().unwrap_or_default().to_owned()
     };
-    for digits in [2, 3, 6] {
+    for digits in [2, 3, 6, 12] {
         assert!(stated(digits).contains("these points were computed"), "{digits}: {}", stated(digits));
     }
     // To tenths of a mm an arm may be as good as the digits.
