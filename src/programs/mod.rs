@@ -8,20 +8,15 @@
 
 mod dialect;
 mod encoding;
-mod fanuc;
 mod handed;
 mod instruction;
-mod krl;
 mod language;
-mod rapid;
 mod read;
 mod scan;
 #[cfg(test)]
 mod tests;
-mod urscript;
 mod variables;
 mod write;
-mod yaskawa;
 
 pub use encoding::{Encoding, decoded};
 pub use instruction::{Cause, Instruction};

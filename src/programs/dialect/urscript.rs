@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::instruction::{Cause, Instruction};
-use super::language::{Motion, Target, Written};
-use super::scan::{self, Number};
-use super::variables::{Syntax, Variables};
+use crate::programs::instruction::{Cause, Instruction};
+use crate::programs::language::{Motion, Target, Written};
+use crate::programs::scan::{self, Number};
+use crate::programs::variables::{Syntax, Variables};
 
 /// Calls that move to their first arguments, lists of joint angles or poses, and how many of these they have.
 const MOVES: [(&str, usize); 7] =

@@ -1,8 +1,13 @@
-//! Which module reads and writes which language.
+//! The languages of the makers' controllers, a module each: where joint targets stand, what moves the robot, and programs in it.
 
-use super::instruction::Instruction;
-use super::language::{Language, Motion, Target, Written};
-use super::{fanuc, krl, rapid, urscript, yaskawa};
+mod fanuc;
+mod krl;
+mod rapid;
+mod urscript;
+mod yaskawa;
+
+use crate::programs::instruction::Instruction;
+use crate::programs::language::{Language, Motion, Target, Written};
 
 /// Every list of joint values, in the order of the text, as it stands there.
 pub(super) fn targets(language: Language, text: &str, count: usize) -> Vec<Target> {

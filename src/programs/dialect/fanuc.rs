@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use std::ops::Range;
 
-use super::instruction::{Cause, Instruction};
-use super::language::{Motion, Target, Written};
-use super::scan;
+use crate::programs::instruction::{Cause, Instruction};
+use crate::programs::language::{Motion, Target, Written};
+use crate::programs::scan;
 
 /// Words of a motion: joint, linear, circular, circular arc, spline; as groups of axes that move independently have them too.
 const MOTIONS: [&str; 10] = ["J", "L", "C", "A", "S", "JP", "LP", "CP", "AP", "SP"];

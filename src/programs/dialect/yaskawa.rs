@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use std::ops::Range;
 
-use super::instruction::{Cause, Instruction};
-use super::language::{Motion, Target, Written};
-use super::scan;
+use crate::programs::instruction::{Cause, Instruction};
+use crate::programs::language::{Motion, Target, Written};
+use crate::programs::scan;
 
 /// The most axes of a robot or of a position.
 const MOST_AXES: usize = 16;

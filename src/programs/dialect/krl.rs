@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use super::handed::{self, Calls};
-use super::instruction::{Cause, Instruction};
-use super::language::{Motion, Target, Written};
-use super::scan;
-use super::variables::{Syntax, Variables};
+use crate::programs::handed::{self, Calls};
+use crate::programs::instruction::{Cause, Instruction};
+use crate::programs::language::{Motion, Target, Written};
+use crate::programs::scan;
+use crate::programs::variables::{Syntax, Variables};
 
 /// Motions to axis values or poses.
 const EITHER: [&str; 2] = ["PTP", "SPTP"];

@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use std::ops::Range;
 
-use super::handed::{self, Calls};
-use super::instruction::{Cause, Instruction};
-use super::language::{Motion, Target, Written};
-use super::scan;
-use super::variables::{Syntax, Variables};
+use crate::programs::handed::{self, Calls};
+use crate::programs::instruction::{Cause, Instruction};
+use crate::programs::language::{Motion, Target, Written};
+use crate::programs::scan;
+use crate::programs::variables::{Syntax, Variables};
 
 /// Robot axes of a jointtarget; more are external ones.
 const AXES: usize = 6;
