@@ -91,10 +91,7 @@ pub fn read_text(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Res
 
 /// Reads a text file of a size that the caller thinks possible; a longer one is refused, and never read to its end.
 pub fn read_text_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, most_bytes: u64) -> Result<String> {
-    let not_text = |_| {
-        let place = Place { path: path.to_owned(), line: None };
-        Error::Format { message: format!("{what}: not UTF-8 text"), place, hint: None }
-    };
+    let not_text = |_| Error::format(path, None, format!("{what}: not UTF-8 text"), None);
     String::from_utf8(read_bytes_up_to(path, what, hint, most_bytes)?).map_err(not_text)
 }
 

@@ -119,18 +119,16 @@ impl Part {
 
     /// Columns of numbers without a name that says anything.
     pub fn free(&self) -> Vec<usize> {
-        if self.is_named() {
-            return Vec::new();
-        }
-        (0..self.width()).filter(|&c| self.kinds[c] == Kind::Numbers).collect()
+        self.unnamed(|kind| *kind == Kind::Numbers)
     }
 
     /// The same with those of zeros: a joint that never moved is one.
     pub fn free_and_still(&self) -> Vec<usize> {
-        if self.is_named() {
-            return Vec::new();
-        }
-        (0..self.width()).filter(|&c| matches!(self.kinds[c], Kind::Numbers | Kind::Zeros)).collect()
+        self.unnamed(|kind| matches!(kind, Kind::Numbers | Kind::Zeros))
+    }
+
+    fn unnamed(&self, wanted: impl Fn(&Kind) -> bool) -> Vec<usize> {
+        if self.is_named() { Vec::new() } else { (0..self.width()).filter(|&c| wanted(&self.kinds[c])).collect() }
     }
 
     /// Columns of numbers whose names are of no word that is known.

@@ -132,9 +132,9 @@ impl Dataset {
 
     /// The same where the nominal robot is known: it joins targets of which no pose shows two.
     pub fn of_robot(rows: &[Measurement], nominal: &Robot) -> Result<Dataset, Error> {
-        let Some(apart) = targets::Apart::new(rows, nominal) else { return Dataset::new(rows) };
-        let mut set = Dataset::of_rows(&apart.rows, Some(apart.targets.clone()))?;
-        let columns = |p: &Pose| apart.columns(&set.groups[p.group].name, &p.joints_rad, p.on_body_mm, nominal);
+        let Some(joined) = targets::Joined::new(rows, nominal) else { return Dataset::new(rows) };
+        let mut set = Dataset::of_rows(&joined.rows, Some(joined.targets.clone()))?;
+        let columns = |p: &Pose| joined.columns(&set.groups[p.group].name, &p.joints_rad, p.on_body_mm, nominal);
         set.shared = set.poses.iter().map(columns).collect();
         Ok(set)
     }
@@ -299,7 +299,7 @@ impl Dataset {
 
     /// Whether the places of targets are those in the flange's frame: of targets that the robot joined.
     pub fn are_on_flange(&self) -> bool {
-        self.targets.as_ref().is_some_and(|targets| targets.doubt_mm.is_some())
+        self.targets.as_ref().is_some_and(|targets| targets.place_sigma_mm.is_some())
     }
 
     /// How the target is turned on the flange, where orientations are used, or where a point cannot be predicted without it: where poses show a

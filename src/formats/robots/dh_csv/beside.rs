@@ -2,6 +2,7 @@
 
 use super::names::plain;
 use super::table::Table;
+use super::units::TWO_TURNS;
 use crate::files::Result;
 use crate::tables::names::{self, Unit};
 
@@ -15,9 +16,6 @@ pub(super) struct Beside {
     /// Columns with numbers that nothing was read of.
     pub left_out: Vec<String>,
 }
-
-/// The largest limit that may be radians: two turns.
-const TWO_TURNS: f64 = 2.0 * std::f64::consts::TAU;
 
 /// Limits in degrees: in radians where they say so, or none is beyond two turns.
 pub(super) fn in_deg(limits: &mut [Option<Limits>], stated: Option<Unit>) {
@@ -75,9 +73,7 @@ impl Table<'_> {
         let numbers = |c: usize| {
             let is_number =
                 |cell: &str| cell.contains(|c: char| c.is_ascii_digit()) && !cell.contains(|c: char| c.is_alphabetic());
-            let counts =
-                self.rows.iter().zip(1..).all(|((_, row), n)| row[c].parse() == Ok(n) || row[c].parse() == Ok(n - 1));
-            !counts && self.rows.iter().all(|(_, row)| is_number(&row[c]))
+            !self.counts(c) && self.rows.iter().all(|(_, row)| is_number(&row[c]))
         };
         let left_out = (0..names.len()).filter(|&c| !read(c) && !names[c].is_empty() && names[c] != "-" && numbers(c));
         let left_out = left_out.map(|c| names[c].clone()).collect();

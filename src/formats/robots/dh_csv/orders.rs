@@ -11,10 +11,9 @@ const ORDERS: [[usize; 4]; 4] = [[0, 1, 3, 2], [0, 1, 2, 3], [1, 0, 3, 2], [2, 3
 pub(super) fn without_names(table: &Table) -> Result<Vec<Reading>> {
     let rows = table.rows;
     // Columns of words and of the joint's number are no parameters.
-    let counts =
-        |c: usize| rows.iter().enumerate().all(|(i, (_, r))| r[c] == i.to_string() || r[c] == (i + 1).to_string());
     let is_number = |c: usize| rows.iter().all(|(_, r)| table.value(&r[c]).is_some());
-    let free: Vec<usize> = (0..rows[0].1.len()).filter(|&c| is_number(c) && !(counts(c) && rows.len() > 2)).collect();
+    let free: Vec<usize> =
+        (0..rows[0].1.len()).filter(|&c| is_number(c) && !(table.counts(c) && rows.len() > 2)).collect();
     let [w, x, y, z] = free[..] else {
         let message = format!("{} columns of numbers without names; four are needed", free.len());
         let hint = format!(

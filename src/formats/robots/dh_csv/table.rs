@@ -28,6 +28,12 @@ impl Table<'_> {
         expression::evaluate(cell, &|name| self.known.get(name).copied())
     }
 
+    /// Whether a column counts the rows, from 0 or from 1.
+    pub fn counts(&self, column: usize) -> bool {
+        let from = |first: usize| (first..).zip(self.rows).all(|(n, (_, row))| row[column].parse() == Ok(n));
+        from(0) || from(1)
+    }
+
     /// The number of a cell.
     pub fn number(&self, line: u64, row: &Fields, column: usize) -> Result<Value> {
         let refuse = || self.grid.refuse(line, format!("`{}` is not a number", &row[column]), Some(HINT));

@@ -19,7 +19,7 @@ const SHORTEST_MM: f64 = 200.0;
 const MOST: [(Unit, f64); 3] = [(Unit::M, 10.0), (Unit::Cm, 300.0), (Unit::Inch, 150.0)];
 
 /// The largest angle that may be radians: two turns.
-const TWO_TURNS: f64 = 2.0 * std::f64::consts::TAU;
+pub(super) const TWO_TURNS: f64 = 2.0 * std::f64::consts::TAU;
 
 /// How near an angle must be to a multiple of a quarter turn in radians to be taken for one.
 const QUARTER: f64 = 2e-3;

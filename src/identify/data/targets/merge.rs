@@ -32,9 +32,9 @@ pub struct Targets {
     pub scatter_mm: Option<f64>,
     /// Where they stand in a frame of their own, whose origin is the mark point, mm; `null` for one that no pose joins to the others.
     pub places_mm: Vec<Option<[f64; 3]>>,
-    /// How far the places may be off where the robot joined the targets, a standard deviation a coordinate, mm.
+    /// Standard deviation of a place's coordinate, mm, where the nominal robot joined the targets.
     #[serde(skip)]
-    pub doubt_mm: Option<f64>,
+    pub place_sigma_mm: Option<f64>,
     /// Whether they tell an orientation.
     pub oriented: bool,
     /// Poses that show too few of them for a turn: points of the body, by the names of what they show, and where that stands, mm.
@@ -72,14 +72,14 @@ impl Targets {
         }
     }
 
-    /// The same with the places as they were solved: the unknowns of [`super::Apart::columns`], by the parts in the order of their names.
+    /// The same with the places as they were solved: the unknowns of [`super::Joined::columns`], by the parts in the order of their names.
     pub fn solved(mut self, unknowns: &[(Extra, f64)]) -> Targets {
-        let Some(doubt_mm) = self.doubt_mm else { return self };
+        let Some(place_sigma_mm) = self.place_sigma_mm else { return self };
         let names: Vec<String> = self.parts.keys().cloned().collect();
         for (extra, value) in unknowns {
             let Extra::Shared(k) = extra else { continue };
             let Some(part) = names.get(k / 3).and_then(|name| self.parts.get_mut(name)) else { continue };
-            part.place_mm[k % 3] += doubt_mm * value;
+            part.place_mm[k % 3] += place_sigma_mm * value;
         }
         for (name, place) in self.names.iter().zip(&mut self.places_mm) {
             *place = self.parts.get(name).map(|part| part.place_mm).or(*place);
@@ -141,7 +141,7 @@ pub fn as_one(rows: &[Measurement]) -> Result<Option<(Vec<Measurement>, Targets)
     let rows = poses.iter().zip(judged).map(one).collect();
     let targets = Targets {
         scatter_mm: Some(scatter_mm),
-        doubt_mm: None,
+        place_sigma_mm: None,
         places_mm: sorter.body.places_mm.iter().map(|p| p.map(Into::into)).collect(),
         oriented: !sorter.body.is_line(),
         names,

@@ -25,27 +25,27 @@ const FEWEST_PLACED: usize = 4;
 /// Rows of any other target: as many numbers as its place has, and more.
 const FEWEST_OF_OTHER: usize = 2;
 
-/// How far a place may be off, as a multiple of what the nominal robot is off by in the middle of the rows, and mm at the least.
-const DOUBT: f64 = 3.0;
-const LEAST_DOUBT_MM: f64 = 0.5;
+/// Standard deviation of a place's coordinate, as a multiple of what the nominal robot is off by in the middle of the rows, and mm at the least.
+const SIGMA_OVER_ROBOT: f64 = 3.0;
+const LEAST_SIGMA_MM: f64 = 0.5;
 
 /// Targets that the nominal robot joins.
-pub struct Apart {
+pub struct Joined {
     /// The rows; those of the target that has most are the mark point's, the others are of parts of the body.
     pub rows: Vec<Measurement>,
     pub targets: Targets,
     /// Where the base stands at the sensor, by group.
     sensor_from_base: BTreeMap<String, Transform>,
-    /// Standard deviation of a coordinate of a place, mm.
-    doubt_mm: f64,
+    /// Standard deviation of a place's coordinate, mm.
+    sigma_mm: f64,
 }
 
 /// A row and the point that it shows.
 type Seen<'a> = (&'a Measurement, Point3<f64>);
 
-impl Apart {
+impl Joined {
     /// `None` where there is one target, where a pose shows several, or where the rows are too few.
-    pub fn new(rows: &[Measurement], nominal: &Robot) -> Option<Apart> {
+    pub fn new(rows: &[Measurement], nominal: &Robot) -> Option<Joined> {
         let of_target = by_target(rows)?;
         let most = of_target.values().map(Vec::len).max()?;
         let (reference, seen) = of_target.iter().find(|(_, rows)| rows.len() == most)?;
@@ -72,13 +72,21 @@ impl Apart {
             target: if row.target == *reference { String::new() } else { row.target.clone() },
             ..row.clone()
         };
-        let doubt_mm = (DOUBT * off_mm).max(LEAST_DOUBT_MM);
+        let sigma_mm = (SIGMA_OVER_ROBOT * off_mm).max(LEAST_SIGMA_MM);
         let (scatter_mm, oriented, findings) = (None, false, Vec::new());
-        Some(Apart {
+        Some(Joined {
             rows: rows.iter().map(of_body).collect(),
-            targets: Targets { scatter_mm, doubt_mm: Some(doubt_mm), places_mm, oriented, names, parts, findings },
+            targets: Targets {
+                scatter_mm,
+                place_sigma_mm: Some(sigma_mm),
+                places_mm,
+                oriented,
+                names,
+                parts,
+                findings,
+            },
             sensor_from_base,
-            doubt_mm,
+            sigma_mm,
         })
     }
 
@@ -95,7 +103,7 @@ impl Apart {
         let own = self.targets.parts.values().position(|part| on_body_mm == Some(part.place_mm.into()));
         if let Some(part) = own {
             let turn = (self.sensor_from_base[group] * nominal.base_from_flange(joints_rad)).rotation;
-            let moved = turn.to_rotation_matrix().into_inner() * self.doubt_mm;
+            let moved = turn.to_rotation_matrix().into_inner() * self.sigma_mm;
             columns.fixed_columns_mut::<3>(3 * part).copy_from(&moved);
         }
         columns
