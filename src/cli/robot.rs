@@ -148,6 +148,10 @@ pub struct Plan {
     /// Pulses a degree of each joint: the Yaskawa job is then in pulses
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true)]
     pub pulses_per_deg: Vec<f64>,
+    /// Which joint of the robot file each number of a program's target is, as in 1,2,4,5,6,7,3 where the seventh is the third joint;
+    /// with more than six joints it is needed for programs in makers' languages with six axes and then external ones
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    pub joint_order: Vec<usize>,
     /// Results.
     #[command(flatten)]
     pub output: Output,

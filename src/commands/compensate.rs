@@ -13,14 +13,11 @@ use crate::diagnostic::Status;
 use crate::files::provenance::Run;
 use crate::files::{self, OutDir};
 use crate::formats::targets::{self, Row};
-use crate::programs::{self, Cause, Encoding, Instruction, Joints, Language};
+use crate::programs::{self, Cause, Encoding, Instruction, JointOrder, Joints, Language};
 use crate::robot::{Error, Robot, file};
 
 /// Length of the lists of refused targets and of motions that stay as they are on the terminal.
 const MOST_SAID: usize = 20;
-
-/// Joints whose order every program has: a robot's own.
-const MOST_ORDERED: usize = 6;
 
 /// What `compensate.json` says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -71,14 +68,11 @@ struct Refused {
 pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let (nominal, identified) = (file::read(&args.robot)?, file::read(&args.identified)?);
     let slides: Vec<bool> = nominal.joints.iter().map(|j| j.slides).collect();
-    check(args, &nominal, &identified, Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg })?;
-    let order: Vec<usize> = match args.joint_order.as_slice() {
-        [] => (0..slides.len()).collect(),
-        order => order.iter().map(|number| number - 1).collect(),
-    };
-    let slides: Vec<bool> = order.iter().map(|&joint| slides[joint]).collect();
+    let order = check(args, &nominal, &identified, Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg })?;
+    let slides = order.in_program(&slides);
     let joints = Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg };
-    let program = Language::of(&args.targets).map(|language| Program::read(args, language, joints)).transpose()?;
+    let read = |language| Program::read(args, language, joints, &order);
+    let program = Language::of(&args.targets).map(read).transpose()?;
     let rows = match &program {
         Some(program) => program.rows(&nominal, &order),
         None => targets::read(&args.targets, &nominal)?,
@@ -102,7 +96,7 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     out.write("compensated.csv", targets::to_csv(&nominal, table).as_bytes())?;
     if let Some(program) = &program {
         let changed = program.targets().zip(&found);
-        let in_program = |readings: &[f64]| order.iter().map(|&joint| in_file(readings)[joint]).collect::<Vec<f64>>();
+        let in_program = |readings: &[f64]| order.in_program(&in_file(readings));
         let changed: Vec<_> = changed.filter_map(|(t, f)| Some((t, in_program(f.readings.as_ref().ok()?)))).collect();
         let text = programs::with_readings(program.language, &program.text, joints, &changed);
         out.write(&program_name, &program.encoding.encoded(&text))?;
@@ -118,7 +112,8 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     Ok(Outcome { stdout, status })
 }
 
-fn check(args: &Compensate, nominal: &Robot, identified: &Robot, joints: Joints) -> Result<()> {
+/// What the options say of the joints, where all of them suit both robots.
+fn check(args: &Compensate, nominal: &Robot, identified: &Robot, joints: Joints) -> Result<JointOrder> {
     let kinds = |robot: &Robot| {
         let sliding = robot.joints.iter().filter(|j| j.slides).count();
         format!("{}{}", robot.joints.len(), if sliding > 0 { format!(" ({sliding} sliding)") } else { String::new() })
@@ -132,12 +127,13 @@ fn check(args: &Compensate, nominal: &Robot, identified: &Robot, joints: Joints)
         problems.push(format!("--tool has {} numbers; X,Y,Z in mm are needed", args.tool.len()));
     }
     problems.extend(joints.problem());
-    let (mut order, count) = (args.joint_order.clone(), nominal.joints.len());
-    order.sort_unstable();
-    if !order.is_empty() && !order.iter().copied().eq(1..=count) {
-        problems.push(format!("--joint-order is to have each of the numbers 1 to {count} once"));
+    match JointOrder::new(&args.joint_order, nominal.joints.len()) {
+        Ok(order) if problems.is_empty() => Ok(order),
+        order => {
+            problems.extend(order.err());
+            Err(config::Error::Invalid { problems }.into())
+        }
     }
-    Ok(config::reject(problems)?)
 }
 
 /// A robot program, and which of its joint targets it moves by.
@@ -150,7 +146,7 @@ struct Program {
 }
 
 impl Program {
-    fn read(args: &Compensate, language: Language, joints: Joints) -> files::Result<Program> {
+    fn read(args: &Compensate, language: Language, joints: Joints, order: &JointOrder) -> files::Result<Program> {
         let path = &args.targets;
         let bytes = files::read_text_bytes(path, "robot program")?;
         let refuse = |message: String, hint: &str| files::Error::format(path, None, message, Some(hint));
@@ -158,13 +154,12 @@ impl Program {
             return Err(refuse("robot program: UTF-16 text".to_owned(), "save it as UTF-8, or as the controller does"));
         };
         let count = joints.slides.len();
-        if let Some(axis) = language.seventh().filter(|_| count > MOST_ORDERED && args.joint_order.is_empty()) {
+        if let Some(axis) = order.unknown_axis(language) {
             let message = format!(
                 "the robot has {count} joints; which of them {axis} of {} is, the file does not say",
                 language.name()
             );
-            let hint = "`--joint-order` names the joint of the robot file that each number is; `1,2,4,5,6,7,3` where the seventh is the third joint";
-            return Err(refuse(message, hint));
+            return Err(refuse(message, JointOrder::HINT));
         }
         let read = programs::Program::read(language, &text, joints)
             .map_err(|message| refuse(message, "`--pulses-per-deg N,N,...`, from the controller's parameters"))?;
@@ -205,11 +200,10 @@ impl Program {
         self.moved_by.iter().filter_map(|&k| self.read.targets.get(k))
     }
 
-    /// Readings in the robot's order of joints, of which `order` has the one of each number.
-    fn rows(&self, nominal: &Robot, order: &[usize]) -> Vec<Row> {
+    /// Readings in the robot's order of joints.
+    fn rows(&self, nominal: &Robot, order: &JointOrder) -> Vec<Row> {
         let row = |t: &programs::Target| {
-            let mut given = vec![0.0; t.readings.len()];
-            order.iter().zip(&t.readings).for_each(|(&joint, reading)| given[joint] = *reading);
+            let given = order.of_robot(&t.readings);
             let target = Target::Readings(targets::radians(&given, nominal));
             Row { name: t.name.clone(), line: t.line, target, given: Some(given) }
         };

@@ -15,7 +15,7 @@ use crate::formats::plan::PlanFile;
 use crate::measurements::{Measurement, Role, Source, poses_csv, reading_name};
 use crate::plan::scene::Scene;
 use crate::plan::{PAPER_SAMPLES, Plan, Planned, Settings, plan};
-use crate::programs::{Joints, Language, Motion, Stop, program};
+use crate::programs::{JointOrder, Joints, Language, Motion, Stop, program};
 use crate::robot::{self, Robot, catalogue};
 use crate::{progress, report};
 
@@ -47,8 +47,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
         }
     };
     let slides: Vec<bool> = robot.joints.iter().map(|j| j.slides).collect();
-    let joints = Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg };
-    config::reject(joints.problem().into_iter().collect())?;
+    let order = joint_order(args, &slides)?;
     let earlier = match &args.after {
         Some(path) => Some(super::identify::read(&Source::of(path.clone()), &robot)?),
         None => None,
@@ -69,7 +68,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     found.warnings.iter().for_each(progress::warn);
     let record = PlanFile::new(&found);
     out.write("poses.csv", poses_csv(found.poses.iter().map(|pose| &pose.at)).as_bytes())?;
-    for (name, text) in programs(args, &robot, joints, &found.poses) {
+    for (name, text) in programs(args, &robot, &order, &found.poses) {
         out.write(&format!("programs/{name}"), text.as_bytes())?;
     }
     let json = out.write_json("plan.json", &record)?;
@@ -77,6 +76,13 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     report::page::write(&out, "plan.html", page)?;
     let stdout = if args.output.json { json } else { said(args, &found, &record, &out, earlier.as_deref()) };
     Ok(Outcome { stdout, status: Status::Done })
+}
+
+/// What the options say of the joints of programs, where it suits the robot.
+fn joint_order(args: &Arguments, slides: &[bool]) -> Result<JointOrder> {
+    config::reject(Joints { slides, pulses_per_deg: &args.pulses_per_deg }.problem().into_iter().collect())?;
+    Ok(JointOrder::new(&args.joint_order, slides.len())
+        .map_err(|problem| config::Error::Invalid { problems: vec![problem] })?)
 }
 
 /// A plan is for the board whose centre is the mark point.
@@ -110,8 +116,9 @@ fn settings(args: &Arguments) -> Settings {
     }
 }
 
-/// One program a controller, plain CSV among them.
-fn programs(args: &Arguments, robot: &Robot, joints: Joints, poses: &[Planned]) -> Vec<(String, String)> {
+/// One program a controller, plain CSV among them. Where a language has an axis of which nobody said which joint it is, no program.
+fn programs(args: &Arguments, robot: &Robot, order: &JointOrder, poses: &[Planned]) -> Vec<(String, String)> {
+    let slides: Vec<bool> = robot.joints.iter().map(|j| j.slides).collect();
     let motion = Motion { speed_percent: args.speed_percent, dwell_s: args.dwell_s };
     let stop = |pose: &Planned| {
         let from = pose.at.joints_deg.iter().zip(&robot.joints).map(|(reading, joint)| {
@@ -121,9 +128,28 @@ fn programs(args: &Arguments, robot: &Robot, joints: Joints, poses: &[Planned]) 
         Stop { name: pose.at.pose.clone(), readings: pose.at.joints_deg.clone(), approach: from.collect() }
     };
     let stops: Vec<Stop> = poses.iter().map(stop).collect();
-    let mut files: Vec<(String, String)> =
-        Language::ALL.into_iter().flat_map(|language| program(language, PROGRAM, &stops, &motion, joints)).collect();
-    let names = joints.slides.iter().enumerate().map(|(joint, slides)| reading_name(joint, *slides));
+    let ordered = |stop: &Stop| Stop {
+        name: stop.name.clone(),
+        readings: order.in_program(&stop.readings),
+        approach: order.in_program(&stop.approach),
+    };
+    let (open, known): (Vec<Language>, Vec<Language>) =
+        Language::ALL.into_iter().partition(|language| order.unknown_axis(*language).is_some());
+    if !open.is_empty() {
+        let names: Vec<&str> = open.into_iter().map(Language::name).collect();
+        progress::warn(&format!(
+            "no programs for {}: which of the {} joints the number behind the six axes is, nobody said; {}",
+            names.join(", "),
+            slides.len(),
+            JointOrder::HINT
+        ));
+    }
+    let ordered: Vec<Stop> = stops.iter().map(ordered).collect();
+    let ordered_slides = order.in_program(&slides);
+    let joints = Joints { slides: &ordered_slides, pulses_per_deg: &args.pulses_per_deg };
+    let write = |language| program(language, PROGRAM, &ordered, &motion, joints);
+    let mut files: Vec<(String, String)> = known.into_iter().flat_map(write).collect();
+    let names = slides.iter().enumerate().map(|(joint, slides)| reading_name(joint, *slides));
     let mut csv = format!("name,step,{}\n", names.collect::<Vec<String>>().join(","));
     for stop in &stops {
         for (step, readings) in [("approach", &stop.approach), ("stop", &stop.readings)] {

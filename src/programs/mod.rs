@@ -10,6 +10,7 @@ mod dialect;
 mod encoding;
 mod handed;
 mod instruction;
+mod joint_order;
 mod language;
 mod read;
 mod scan;
@@ -20,6 +21,7 @@ mod write;
 
 pub use encoding::{Encoding, decoded};
 pub use instruction::{Cause, Instruction};
+pub use joint_order::JointOrder;
 pub use language::{Joints, Language, Motion, Stop, Target};
 pub use read::{Program, targets, with_readings};
 pub use write::program;

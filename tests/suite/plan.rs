@@ -142,3 +142,28 @@ fn plans_that_nobody_can_run_are_refused() {
         assert!(said.contains(part), "{flags:?}: {said}");
     }
 }
+
+#[test]
+fn programs_of_seven_joints_need_their_order() {
+    let folder = workplace();
+    let at = folder.path();
+    world(at);
+    let robot = catalogue::robot("franka-panda").unwrap();
+    std::fs::write(at.join("robot.toml"), file::to_toml(&robot)).unwrap();
+    let few = ["--poses", "12", "--verify", "2", "--calibration", "out/calibration.json"];
+    let said = run(at, &[&few[..], &["--out", "open"], &QUICK[..]].concat(), 0);
+    assert!(said.contains("no programs for ABB RAPID") && said.contains("--joint-order"), "{said}");
+    let open: Vec<bool> =
+        ["mod", "src", "script", "csv"].map(|e| at.join(format!("open/programs/stereocal_plan.{e}")).exists()).into();
+    assert_eq!(open, [false, false, true, true]);
+    let said = run(at, &[&few[..], &["--out", "bad", "--joint-order", "1,2,3"], &QUICK[..]].concat(), 2);
+    assert!(said.contains("each of the numbers 1 to 7 once"), "{said}");
+    let ordered = ["--out", "ordered", "--joint-order", "1,2,4,5,6,7,3"];
+    let said = run(at, &[&few[..], &ordered, &QUICK[..]].concat(), 0);
+    assert!(!said.contains("no programs"), "{said}");
+    // The first pose's third joint stands behind the six axes.
+    let poses = read_poses(Utf8Path::from_path(&at.join("ordered/poses.csv")).unwrap()).unwrap();
+    let text = std::fs::read_to_string(at.join("ordered/programs/stereocal_plan.mod")).unwrap();
+    let third = format!("{:.6},9E9", poses[0].joints_deg[2]);
+    assert!(text.contains(&third), "{third}\n{}", &text[..2000]);
+}
