@@ -3,6 +3,7 @@
 use clap::Args;
 
 use super::output::Output;
+use super::values::number;
 use crate::formats::boards::files::named;
 use crate::imaging::{Board, Squares};
 
@@ -17,7 +18,7 @@ pub struct Target {
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,
     /// Side of a square, mm; key `target_board.square_mm` [default: 10]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = number)]
     pub square_mm: Option<f64>,
 }
 
@@ -38,7 +39,7 @@ pub struct PrintBoard {
     #[arg(long)]
     pub png: bool,
     /// Dots per inch of the PNG
-    #[arg(long, default_value_t = 300.0, requires = "png", value_name = "DPI")]
+    #[arg(long, default_value_t = 300.0, requires = "png", value_name = "DPI", value_parser = number)]
     pub dpi: f64,
     /// Results.
     #[command(flatten)]

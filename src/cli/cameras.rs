@@ -7,7 +7,7 @@ use super::board::Target;
 use super::output::{Files, Output};
 use super::placement::ExportPlacement;
 use super::robot::ExportRobot;
-use super::values::{AskedSquares, between};
+use super::values::{AskedSquares, between, number};
 use crate::formats::boards::files::named;
 use crate::formats::lenses::LensFile;
 use crate::imaging::board::printed::PrintedExtent;
@@ -61,7 +61,7 @@ pub struct CameraCheck {
     #[arg(long, value_name = "CxR")]
     pub squares: Option<AskedSquares>,
     /// Side of a square, mm; key `check_board.square_mm` [default: 10]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = number)]
     pub square_mm: Option<f64>,
     /// The print by a caliper, mm: its width along the columns and its height, from the outer edge of the first square to that of the last
     /// (149.7x99.8). Both are scales of their own; the caliper's uncertainty counts in the verdict, where --board-uncertainty-mm says no other
@@ -73,10 +73,10 @@ pub struct CameraCheck {
     #[arg(long, value_name = "MM[+-U][:FIRST,SECOND]", allow_negative_numbers = true)]
     pub known_move: Vec<StatedMove>,
     /// Largest length error that passes, mm; key `tolerance_mm` [default: 0.05]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = number)]
     pub tolerance_mm: Option<f64>,
     /// Expanded uncertainty (k = 2) of the board's lengths, from its certificate, mm: widens the guard band of the verdict
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = number)]
     pub board_uncertainty_mm: Option<f64>,
     /// Lens model: radial2, brown4, brown5, rational8, thin-prism12 or tilted14 [default: chosen by held-out pairs]
     #[arg(long, value_name = "NAME", value_parser = lens)]
@@ -114,7 +114,7 @@ pub struct CameraCheck {
     #[arg(long, value_name = "CxR", requires = "check_images")]
     pub check_squares: Option<Squares>,
     /// Side of the second board's squares, mm [default: as the first]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "check_images")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "check_images", value_parser = number)]
     pub check_square_mm: Option<f64>,
     /// Width and height of the pictures that --corners come from, px, where the file does not hold them
     #[arg(long, value_name = "WxH", requires = "corners", value_parser = picture_size)]

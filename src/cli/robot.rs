@@ -5,7 +5,7 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use super::board::Target;
 use super::output::{Files, Output};
-use super::values::{between, count};
+use super::values::{between, count, number, whole};
 
 /// `stereocal identify`
 #[derive(Debug, Args)]
@@ -35,7 +35,7 @@ pub struct Identify {
     #[arg(long, value_name = "NAME")]
     pub constants: Option<crate::identify::settings::Constants>,
     /// Seed of every random draw
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     pub seed: u64,
     /// Results.
     #[command(flatten)]
@@ -110,7 +110,7 @@ pub struct Plan {
     #[arg(long, value_name = "MEASUREMENTS")]
     pub after: Option<Utf8PathBuf>,
     /// Seed of the candidates
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     pub seed: u64,
     /// Candidates to choose from
     #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = count(200, 200_000))]
@@ -146,11 +146,11 @@ pub struct Plan {
     #[arg(long, value_name = "S", default_value_t = 1.5, value_parser = between(0.0, 60.0))]
     pub dwell_s: f64,
     /// Pulses a degree of each joint: the Yaskawa job is then in pulses
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = number)]
     pub pulses_per_deg: Vec<f64>,
     /// Which joint of the robot file each number of a program's target is, as in 1,2,4,5,6,7,3 where the seventh is the third joint;
     /// with more than six joints it is needed for programs in makers' languages with six axes and then external ones
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = whole::<usize>)]
     pub joint_order: Vec<usize>,
     /// Results.
     #[command(flatten)]
@@ -179,14 +179,14 @@ pub struct Compensate {
     #[arg(long, value_name = "FILE")]
     pub identified: Utf8PathBuf,
     /// The tool in the last frame, mm, instead of both files' `[tool]`
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true, value_parser = number)]
     pub tool: Vec<f64>,
     /// Pulses a degree of each joint, for Yaskawa jobs in pulses
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = number)]
     pub pulses_per_deg: Vec<f64>,
     /// Which joint of the robot file each number of a program's target is, as in 1,2,4,5,6,7,3 where the seventh is the third joint;
     /// needed with more than six, as makers' languages have six axes and then external ones
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = whole::<usize>)]
     pub joint_order: Vec<usize>,
     /// Correct a program's joint targets although other motions stay as they are; these are named, and the exit status is 1
     #[arg(long)]
@@ -269,7 +269,7 @@ pub struct RobotShow {
     /// The robot file
     pub file: Utf8PathBuf,
     /// Joint angles, deg, with commas [default: all zero]
-    #[arg(long, value_name = "DEG,DEG,...", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEG,DEG,...", value_delimiter = ',', allow_hyphen_values = true, value_parser = number)]
     pub joints: Vec<f64>,
 }
 

@@ -3,7 +3,7 @@
 use camino::Utf8PathBuf;
 use clap::{Args, ValueEnum};
 
-use super::values::{between, count};
+use super::values::{between, count, whole};
 use crate::simulate::settings::Orientation;
 
 /// `stereocal simulate`
@@ -16,7 +16,7 @@ pub struct Simulate {
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(320..=16384))]
     pub size: Option<u32>,
     /// Seed of every random draw
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     pub seed: u64,
     /// How the flange is turned along a group's poses [default: the preset's]
     #[arg(long, value_enum)]

@@ -22,6 +22,16 @@ impl FromStr for AskedSquares {
     }
 }
 
+/// Reads a number; what it may be is checked where it is used.
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "a number is needed, with a decimal point".to_owned())
+}
+
+/// Reads a whole number.
+pub(super) fn whole<T: FromStr>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|_| "a whole number is needed, 0 or more".to_owned())
+}
+
 /// Reads a number of a range.
 pub(super) fn between(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
     move |text| match text.parse::<f64>() {
