@@ -4,6 +4,7 @@ use crate::files::OutDir;
 use crate::imaging::corners::named;
 use crate::report::table::{Table, number};
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::findings::Finding;
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::lengths::{Axis, Range};
 use crate::stereo::judge::moves::KnownMove;
@@ -152,11 +153,19 @@ fn board(calibration: &Calibration) -> String {
     format!("board of {}{bow}", calibration.board.said())
 }
 
-/// What to do next: what the deciding line asks for, then what the views lack.
+/// What to do next: about what happened to the rig and about the board, then what the deciding line asks for, then what the views lack.
 fn next(judged: &Judged) -> impl Iterator<Item = &str> {
     const MOST: usize = 2;
-    let remedy = judged.deciding().filter(|line| line.allows != Verdict::Pass).map(|line| line.remedy);
-    remedy.into_iter().filter(|remedy| !remedy.is_empty()).chain(judged.advice.iter().map(String::as_str)).take(MOST)
+    let passes = judged.verdict == Verdict::Pass;
+    let tolerance_mm = judged.facts.tolerance_mm;
+    let matters = move |finding: &&Finding| !passes && finding.effect_mm.is_none_or(|_| finding.material(tolerance_mm));
+    let happened = judged.facts.findings.iter().filter(matters).filter_map(|finding| finding.remedy.as_deref());
+    let board = judged.print_scatter.iter().filter(move |_| !passes).map(|board| board.text.as_str());
+    let deciding = judged.deciding().filter(|line| line.allows != Verdict::Pass).map(|line| line.remedy);
+    let mut told: Vec<&str> = happened.chain(board).chain(deciding.filter(|remedy| !remedy.is_empty())).collect();
+    told.extend(judged.advice.iter().map(String::as_str));
+    told.dedup();
+    told.into_iter().take(MOST)
 }
 
 pub(super) fn explanation(judged: &Judged) -> String {

@@ -76,6 +76,7 @@ fn not_simultaneous(alone_px: f64, misfit: Misfit) -> Finding {
         ),
         pairs: misfit.worst_first,
         along: None,
+        remedy: None,
     }
 }
 
@@ -130,6 +131,7 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
             said * (1.0 + stretch),
         ),
         along: None,
+        remedy: None,
     })
 }
 

@@ -8,6 +8,7 @@
 
 pub mod common_misfit;
 pub mod hypothesis;
+mod remedy;
 pub mod series;
 pub mod standing;
 #[cfg(test)]
@@ -24,6 +25,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use crate::difference::TOLD_APART;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::hypothesis::{Hypothesis, any_place};
+use crate::stereo::findings::remedy::hold;
 use crate::stereo::findings::series::{Change, Line, Linear};
 use crate::stereo::model::parameters::Layout;
 use crate::stereo::pairs::{Cause, DiscardedPair};
@@ -74,6 +76,9 @@ pub struct Finding {
     /// The change of the shared numbers over the pairs that the common rig was made from.
     #[serde(skip)]
     pub along: Option<Along>,
+    /// What to do about it, where what happened does not say so itself.
+    #[serde(skip)]
+    pub remedy: Option<String>,
 }
 
 /// How the shared numbers change over the pairs, in the layout's order.
@@ -133,6 +138,7 @@ pub fn of_lenses(calibration: &Calibration, lengths: &VolumeLengths) -> Option<F
         effect_mm: otherwise.map(|mm| (mm - lengths.length_mm).abs()).reduce(f64::max),
         action: check.statement.clone(),
         along: None,
+        remedy: Some(check.remedy().to_owned()),
     })
 }
 
@@ -151,6 +157,7 @@ pub fn of_pairs(discarded: &[DiscardedPair]) -> Vec<Finding> {
                 effect_mm: None,
                 action: pair.reason.clone(),
                 along: None,
+                remedy: None,
             }),
         }
     }
@@ -315,8 +322,10 @@ fn finding(
         let at = if before == after { format!("pair {before}") } else { format!("pairs {before} and {after}") };
         action += &format!("; the rig is that of the middle of the series, at {at}");
     }
+    let cause = causes(&equals);
     Some(Finding {
-        cause: causes(&equals),
+        remedy: hold(&cause, None),
+        cause,
         kind: best.kind,
         pairs: (best.first..count).map(name).collect(),
         size: Some(size),

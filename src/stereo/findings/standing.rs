@@ -9,6 +9,7 @@
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
 use crate::stereo::calibrate::{Calibration, calibrate, calibrate_with};
+use crate::stereo::findings::remedy::hold;
 use crate::stereo::findings::{self, Finding, Kind, common_misfit, without_drift};
 use crate::stereo::model::rig::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
@@ -126,7 +127,8 @@ fn another_rig(told: Option<Finding>, pairs: Vec<String>) -> Finding {
             "a camera moved or was focused: from pair {first} on the pairs are of another rig than those before. Clamp both cameras"
         );
         let cause = format!("{}|{}", Cause::CameraMoved.word(), Cause::Focus.word());
-        Finding { cause, kind: Kind::Step, pairs, size: None, unit: "", effect_mm: None, action, along: None }
+        let remedy = hold(&cause, None);
+        Finding { cause, kind: Kind::Step, pairs, size: None, unit: "", effect_mm: None, action, along: None, remedy }
     })
 }
 
@@ -178,8 +180,8 @@ impl Finding {
     }
 
     /// Whether it moves a length by more than the share of the tolerance up to which a change is harmless.
-    pub fn material(&self, asked: &Asked) -> bool {
-        self.effect_mm.is_some_and(|mm| mm > MATERIAL_SHARE * asked.tolerance_mm)
+    pub fn material(&self, tolerance_mm: f64) -> bool {
+        self.effect_mm.is_some_and(|mm| mm > MATERIAL_SHARE * tolerance_mm)
     }
 }
 
@@ -195,7 +197,7 @@ struct Later {
 /// focus that hunts) no part is the one that stands, and all pairs together say best what it does.
 fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Finding) -> Option<Later> {
     if change.kind != Kind::Step
-        || !change.material(asked)
+        || !change.material(asked.tolerance_mm)
         || change.pairs.len() < fewest_pairs(asked.options.known.as_ref())
     {
         return None;
@@ -208,9 +210,13 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
     };
     let with_step = worst(all).hypot(change.effect_mm?);
     let further = self::change(&calibration, asked);
-    if let Some(again) = further.as_ref().filter(|again| again.kind == Kind::Step && again.material(asked)) {
+    if let Some(again) = further.as_ref().filter(|again| again.kind == Kind::Step && again.material(asked.tolerance_mm))
+    {
         let from = again.pairs.first().map_or("", String::as_str);
         change.cause = Cause::Unknown.word().to_owned();
+        let fewest = fewest_pairs(asked.options.known.as_ref());
+        change.remedy =
+            hold(&change.cause, Some(&again.pairs).filter(|pairs| pairs.len() >= fewest).map(Vec::as_slice));
         change.action =
             format!("the rig goes on changing: {}, and again from pair {from} on ({})", change.action, again.action);
         return None;
@@ -246,7 +252,7 @@ fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked, corners: 
         found.values.shared.rig.covariance = Some(Covariance { order: found.layout.names(), matrix });
     }
     let fewer = 2 * change.pairs.len() < found.views.len();
-    if change.kind == Kind::Step && change.material(asked) && fewer {
+    if change.kind == Kind::Step && change.material(asked.tolerance_mm) && fewer {
         found.standing.unconfirmed = change.pairs.clone();
     }
 }

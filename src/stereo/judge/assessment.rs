@@ -23,6 +23,8 @@ pub struct Judged {
     pub verdict: Verdict,
     /// Every fact with its limit; the held-out lengths first.
     pub evidence: Vec<Evidence>,
+    /// Where the board's print scatters by so much that pictures do not help.
+    pub print_scatter: Option<Warning>,
     /// What to photograph next, where the views are too few or too much alike.
     pub advice: Vec<String>,
     /// What else a person should know.
@@ -68,11 +70,11 @@ impl Judged {
         let doubts = evidence.iter().skip(1).filter(|line| line.allows != Verdict::Pass);
         warnings.extend(doubts.map(Evidence::warning));
         // A board that was said wrongly is no board that scatters.
-        if !facts.findings.iter().any(|finding| finding.cause == Cause::OtherBoard.word()) {
-            warnings.extend(print_scatter(calibration, &facts));
-        }
+        let other_board = facts.findings.iter().any(|finding| finding.cause == Cause::OtherBoard.word());
+        let print_scatter = if other_board { None } else { print_scatter(calibration, &facts) };
+        warnings.extend(print_scatter.clone());
         let (verdict, advice) = (evidence::verdict(&evidence), facts.coverage.advice());
-        Judged { facts, verdict, evidence, advice, warnings }
+        Judged { facts, verdict, evidence, print_scatter, advice, warnings }
     }
 
     /// What known moves say of the scale, where they contradict it and nothing else shows the rig itself to be wrong.

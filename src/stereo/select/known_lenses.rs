@@ -188,6 +188,18 @@ struct Explanation {
     evidence: f64,
 }
 
+impl LensCheck {
+    /// What to do where the pictures contradict the lenses.
+    pub fn remedy(&self) -> &'static str {
+        match self.causes.as_slice() {
+            [Cause::Exchanged] => {
+                "give each lens to the other camera: `--intrinsics FILE,left` and `--intrinsics FILE,right`"
+            }
+            _ => "give the lenses as they are now, or leave `--intrinsics` out and photograph more pairs",
+        }
+    }
+}
+
 /// The causes that explain the difference and are not told apart, the likeliest first.
 fn causes(known: &KnownLenses, pictures: &Pictures, difference: &Difference) -> Vec<Explanation> {
     let numbers = known.numbers();

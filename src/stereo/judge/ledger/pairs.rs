@@ -214,7 +214,7 @@ pub(super) fn known_lenses(case: &Case) -> Option<Evidence> {
         .collect();
     Some(Evidence {
         what: "known lenses",
-        remedy: "give the lenses as they are now, or leave `--intrinsics` out and photograph more pairs",
+        remedy: check.remedy(),
         value: Some(check.chi_square),
         limit: Some(check.limit),
         unit: "",

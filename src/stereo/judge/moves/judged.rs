@@ -170,6 +170,7 @@ impl KnownMoves {
             effect_mm: Some(surest.scale_error.abs() * length_mm),
             action: format!("{}: {why}", surest.statement()),
             along: None,
+            remedy: None,
         })
     }
 }
