@@ -14,6 +14,7 @@ use crate::files::provenance::Run;
 use crate::files::{self, OutDir};
 use crate::formats::targets::{self, Row};
 use crate::programs::{self, Cause, Encoding, Instruction, JointOrder, Joints, Language};
+use crate::progress;
 use crate::robot::{Error, Robot, file};
 
 /// Length of the lists of refused targets and of motions that stay as they are on the terminal.
@@ -67,6 +68,9 @@ struct Refused {
 /// Runs the command.
 pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let (nominal, identified) = (file::read(&args.robot)?, file::read(&args.identified)?);
+    if file::is_identified(&args.robot) && !file::is_identified(&args.identified) {
+        return Err(Error::Exchanged { robot: args.robot.to_string(), identified: args.identified.to_string() }.into());
+    }
     let slides: Vec<bool> = nominal.joints.iter().map(|j| j.slides).collect();
     let order = check(args, &nominal, &identified, Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg })?;
     let slides = order.in_program(&slides);
@@ -85,6 +89,12 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let tool_mm = <[f64; 3]>::try_from(args.tool.as_slice()).ok().map(Vector3::from);
     let compensator = Compensator::new(&nominal, &identified, tool_mm);
     let list: Vec<_> = rows.iter().map(|row| row.target.clone()).collect();
+    if list.iter().any(|target| matches!(target, Target::Pose { near_rad: None, .. })) {
+        progress::note(
+            "poses without readings: of all postures the one farthest from limits and singular ones is taken; columns j1_deg.. beside a pose say \
+             another",
+        );
+    }
     let found = compensator.compensate(&list);
     let in_file = |readings: &[f64]| -> Vec<f64> {
         readings.iter().zip(&nominal.joints).map(|(r, joint)| if joint.slides { *r } else { r.to_degrees() }).collect()

@@ -213,7 +213,7 @@ fn write(
     let page = report::identify::page(set, record, &placement, &places, &arm, &errors(nominal, false), &after)?;
     let mut holds = record.expected.as_ref().map_or_else(
         || "The nominal robot was kept.".to_owned(),
-        |expected| format!("Identified; {}; it holds within {}.", expected.sentence(), expected.poses),
+        |expected| format!("{}; {}; it holds within {}.", robot::file::IDENTIFIED, expected.sentence(), expected.poses),
     );
     if record.advice == Advice::DoNotUse {
         holds = format!("Do not use this robot: {}.", record.reason);

@@ -131,6 +131,16 @@ pub fn read(path: &Utf8Path) -> Result<Robot> {
     record.robot().map_err(|message| Error::File { message, place: Place { path: path.to_owned(), line: None } })
 }
 
+/// How the comment of a robot file begins that `identify` wrote.
+pub const IDENTIFIED: &str = "Identified";
+
+/// Whether `identify` wrote a robot file and found another robot than the nominal one.
+pub fn is_identified(path: &Utf8Path) -> bool {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let comments = text.lines().map_while(|line| line.strip_prefix('#'));
+    comments.map(str::trim_start).any(|comment| comment.starts_with(IDENTIFIED))
+}
+
 /// The text of `robot.toml`.
 pub fn to_toml(robot: &Robot) -> String {
     // A struct of numbers and strings, tables last: serialisation has no way to fail.

@@ -74,6 +74,16 @@ pub enum Error {
         /// Joints of the nominal one.
         nominal: String,
     },
+    /// `identify` wrote the file of the nominal robot, and not the other one.
+    #[error(
+        "`--robot` names a robot that `identify` found, and `--identified` one that it did not find: are they exchanged?"
+    )]
+    Exchanged {
+        /// The file of `--robot`.
+        robot: String,
+        /// The file of `--identified`.
+        identified: String,
+    },
     /// A format that does not fit this robot.
     #[error("{message}")]
     NotExportable {
@@ -115,6 +125,7 @@ impl Explain for Error {
             Error::Different { .. } => {
                 Some("both files are of one robot, before and after `stereocal identify`".to_owned())
             }
+            Error::Exchanged { robot, identified } => Some(format!("`--robot {identified} --identified {robot}`")),
             Error::NotExportable { hint, .. } => Some(hint.clone()),
             Error::Table { hint, .. } => Some(hint.clone()),
             Error::File { .. } => None,

@@ -234,6 +234,22 @@ fn bytes_of_any_encoding_stay_as_they_are() {
 }
 
 #[test]
+fn exchanged_robots_are_refused() {
+    let folder = workplace();
+    let (nominal, _) = robots_of(folder.path(), "abb-irb120");
+    let at = |name: &str| folder.path().join(name);
+    let found = std::fs::read_to_string(at("identified.toml")).unwrap();
+    std::fs::write(at("identified.toml"), format!("# stereocal identify\n# Identified; expected\n{found}")).unwrap();
+    std::fs::write(at("one.mod"), rapid(&postures(&nominal, 2), "")).unwrap();
+    run(folder.path(), &["one.mod"], 0);
+    std::fs::rename(at("robot.toml"), at("aside.toml")).unwrap();
+    std::fs::rename(at("identified.toml"), at("robot.toml")).unwrap();
+    std::fs::rename(at("aside.toml"), at("identified.toml")).unwrap();
+    let said = run(folder.path(), &["one.mod", "--force"], 2);
+    assert!(said.contains("are they exchanged?") && said.contains("--robot identified.toml"), "{said}");
+}
+
+#[test]
 fn seven_joints_need_their_order() {
     let folder = workplace();
     let (nominal, real) = robots_of(folder.path(), "franka-panda");
