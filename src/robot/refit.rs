@@ -1,8 +1,8 @@
 //! A robot without corrections that comes as near as it can to one with them: for formats that have no place for sag and waves.
 //!
 //! In: a robot with all of its terms. Out: parameters of the plain chain (beta included), and what the flange's pose is off by. Method:
-//! Gauss-Newton on the flange's places and turns at postures spread over the joints' ranges; directions that no posture tells apart
-//! stay where they are (a small ridge).
+//! Gauss-Newton on the flange's places and turns at postures spread over the joints' ranges, or over those in which the robot is known;
+//! directions that no posture tells apart stay where they are (a small ridge).
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
@@ -49,6 +49,13 @@ impl Residual {
 }
 
 impl Robot {
+    /// The same robot with other ranges of its joints, rad (mm).
+    pub fn within(&self, ranges: &[(f64, f64)]) -> Robot {
+        let mut robot = self.clone();
+        robot.joints.iter_mut().zip(ranges).for_each(|(joint, range)| joint.limits_rad = Some(*range));
+        robot
+    }
+
     /// The robot as a plain chain: itself where it has no corrections, else the nearest one without.
     pub fn without_corrections(&self) -> Robot {
         let gravity_direction = self.corrections.gravity_direction;

@@ -103,6 +103,19 @@ fn what_a_format_cannot_carry_is_said_in_mm() {
     let off = Residual::between(&read(at, "sagging.toml"), &back);
     let said = run(at, &["export", "robot", "--robot", "sagging.toml", "--format", "urdf", "--out", "again"], 0);
     assert!(said.contains(&format!("{:.4} mm on average", off.mean_mm)), "{said} {off:?}");
+    // Where it is known over which ranges the robot was measured, it is met there.
+    let ranges = vec![[20.0, 60.0]; 6];
+    let expected = serde_json::json!({ "mean_mm": 0.05, "p95_mm": 0.1, "map": [], "joint_ranges": ranges });
+    std::fs::write(at.join("identification.json"), serde_json::json!({ "expected": expected }).to_string()).unwrap();
+    let said = run(at, &["export", "robot", "--robot", "sagging.toml", "--format", "urdf", "--out", "near"], 0);
+    assert!(
+        said.contains("refitted over the ranges that were measured") && said.contains("--extensions none"),
+        "{said}"
+    );
+    let there = read(at, "sagging.toml").within(&[(20f64.to_radians(), 60f64.to_radians()); 6]);
+    let [near, far] = ["near", "again"]
+        .map(|folder| Residual::between(&there, &chain(at, &format!("{folder}/robot.urdf"), None)).mean_mm);
+    assert!(near < 0.3 * far, "{near} {far}");
     run(at, &["robot", "import", "plain-dh-csv/robot.csv", "--out", "table"], 0);
     let off = Residual::between(&read(at, "plain.toml"), &read(at, "table/robot.toml"));
     assert!(off.max_mm < 1e-9, "{off:?}");

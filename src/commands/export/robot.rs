@@ -7,6 +7,7 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::robots::dh_csv;
+use crate::formats::robots::known;
 use crate::formats::robots::urdf::Urdf;
 use crate::formats::robots::{ExportedRobot, ros_kinematics, ur_calibration, urdf_corrected, urdf_plain};
 use crate::geometry::Transform;
@@ -23,7 +24,8 @@ pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
     let inputs = [Some(&args.robot), args.nominal_urdf.as_ref(), args.nominal.as_ref()];
     let inputs: Vec<&camino::Utf8Path> = inputs.into_iter().flatten().map(|path| path.as_path()).collect();
     let out = out.for_run(&Run { force: args.files.force, ..run }, &inputs);
-    let exported = export(args, &robot)?;
+    let known = Known { over: known::identified_over(&args.robot, &robot), robot };
+    let exported = export(args, &known)?;
     if !args.files.force {
         spare_other_robots(&out.join(exported.name), &exported)?;
     }
@@ -31,7 +33,7 @@ pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
         RobotFormat::Toml => out.write_toml(exported.name, &exported.text)?,
         _ => out.write(exported.name, exported.text.as_bytes())?,
     }
-    let mut stdout = format!("{}\n{}\n", out.join(exported.name), fidelity(&robot, &exported.carried));
+    let mut stdout = format!("{}\n{}\n", out.join(exported.name), fidelity(&known, &exported.carried));
     exported.notes.iter().for_each(|note| stdout.push_str(&format!("note: {note}\n")));
     Ok(Outcome { stdout, status: Status::Done })
 }
@@ -48,8 +50,8 @@ fn spare_other_robots(path: &camino::Utf8Path, exported: &ExportedRobot) -> Resu
     Err(Error::NotExportable { message, hint: "another `--out`, or `--force`".to_owned() }.into())
 }
 
-fn export(args: &ExportRobot, robot: &Robot) -> Result<ExportedRobot> {
-    let plain = || robot.without_corrections();
+fn export(args: &ExportRobot, known: &Known) -> Result<ExportedRobot> {
+    let (robot, plain) = (&known.robot, || known.plain());
     Ok(match (args.format, &args.nominal_urdf) {
         (RobotFormat::Toml, _) => {
             ExportedRobot { name: "robot.toml", text: file::to_toml(robot), carried: robot.clone(), notes: Vec::new() }
@@ -120,11 +122,33 @@ fn nominal(args: &ExportRobot, robot: &Robot) -> Result<Robot> {
     Ok(nominal)
 }
 
+/// A robot, and the ranges of its joints over which it was identified, where they are known.
+struct Known {
+    robot: Robot,
+    over: Option<Vec<(f64, f64)>>,
+}
+
+impl Known {
+    /// With the ranges in which it is to be met.
+    fn met(&self) -> Robot {
+        self.over.as_ref().map_or_else(|| self.robot.clone(), |ranges| self.robot.within(ranges))
+    }
+
+    /// The nearest plain chain there, with its own limits.
+    fn plain(&self) -> Robot {
+        let mut plain = self.met().without_corrections();
+        plain.joints.iter_mut().zip(&self.robot.joints).for_each(|(plain, own)| plain.limits_rad = own.limits_rad);
+        plain
+    }
+}
+
 /// How well the file carries the robot.
-fn fidelity(robot: &Robot, carried: &Robot) -> String {
-    let off = Residual::between(robot, carried);
+fn fidelity(known: &Known, carried: &Robot) -> String {
+    let robot = &known.robot;
+    let off = Residual::between(&known.met(), carried);
+    let over = if known.over.is_some() { "the ranges that were measured" } else { "the joints' ranges" };
     if off.max_mm < ROUNDING_MM {
-        return format!("flange poses equal to {:.0e} mm over the joints' ranges", off.max_mm.max(1e-12));
+        return format!("flange poses equal to {:.0e} mm over {over}", off.max_mm.max(1e-12));
     }
     let terms = [
         ("gravity", !robot.corrections.gravity.is_empty() && carried.corrections.gravity.is_empty()),
@@ -137,10 +161,14 @@ fn fidelity(robot: &Robot, carried: &Robot) -> String {
     let why = if lost.is_empty() {
         "the format has no place for all of the robot's constants".to_owned()
     } else {
-        format!("the format has no place for {}: refitted over the joints' ranges", lost.join(" and "))
+        format!("the format has no place for {}: refitted over {over}", lost.join(" and "))
+    };
+    let hint = match lost.is_empty() {
+        true => "",
+        false => "\nhint: `identify --extensions none` finds the constants that this format can hold",
     };
     format!(
-        "{why}; remaining error: {:.4} mm on average, {:.4} mm and {:.4} mrad at most",
+        "{why}; remaining error: {:.4} mm on average, {:.4} mm and {:.4} mrad at most{hint}",
         off.mean_mm,
         off.max_mm,
         1e3 * off.max_rad

@@ -9,7 +9,7 @@ use crate::identify::judge::locate::{REPEATABILITY_MM, Trust};
 use crate::identify::judge::recheck::Before;
 use crate::identify::judge::uncertainty::{Covariance, MEAN_OVER_RMS};
 use crate::identify::model::ladder::Terms;
-use crate::robot::{Parameter, Robot};
+use crate::robot::{Joint, Parameter, Robot};
 
 #[derive(Debug, Deserialize)]
 struct Identified {
@@ -28,6 +28,8 @@ struct Identified {
 struct Expected {
     mean_mm: f64,
     p95_mm: f64,
+    #[serde(default)]
+    joint_ranges: Vec<[f64; 2]>,
     map: Vec<(String, f64)>,
 }
 
@@ -55,6 +57,14 @@ pub fn trust(robot: &Utf8Path) -> Trust {
         point_mm: identified.as_ref().and_then(|i| i.expected.as_ref()).map_or(REPEATABILITY_MM, of_coordinate),
         rotation_rad: identified.and_then(|i| i.scatter_rad),
     }
+}
+
+/// The ranges of the joints over which a robot was identified, rad (mm where a joint slides). `None` where nothing beside its file says so.
+pub fn identified_over(file: &Utf8Path, robot: &Robot) -> Option<Vec<(f64, f64)>> {
+    let ranges = beside(file)?.expected?.joint_ranges;
+    let unit = |slides: bool| if slides { 1.0 } else { 1f64.to_radians() };
+    let inside = |([low, high], joint): ([f64; 2], &Joint)| (low * unit(joint.slides), high * unit(joint.slides));
+    (ranges.len() == robot.joints.len()).then(|| ranges.into_iter().zip(&robot.joints).map(inside).collect())
 }
 
 /// What is known of an identified robot. `None` where its file has no record beside it, or one of another program's version.

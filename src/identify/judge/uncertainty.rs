@@ -50,6 +50,8 @@ pub struct Expected {
     pub scatter_mm: f64,
     /// For which poses it is said.
     pub poses: String,
+    /// From where to where each joint was read there, deg (mm where it slides).
+    pub joint_ranges: Vec<[f64; 2]>,
     /// Pose by pose of the file: name and expected length, mm.
     pub map: Vec<(String, f64)>,
 }
@@ -133,6 +135,7 @@ impl Expected {
             of_robot_mm: Lengths::of_squares(&of_rows(&of_robots)).mean_mm,
             scatter_mm: MEAN_OVER_RMS * (3.0 * (scatter * scatter + smooth_mm2)).sqrt(),
             poses: region(set),
+            joint_ranges: ranges(set),
             map: rows.iter().map(length).collect(),
         }
     }
@@ -148,18 +151,22 @@ impl Expected {
     }
 }
 
-/// The ranges of the joints that were measured.
-pub fn region(set: &Dataset) -> String {
+/// From where to where each joint was read, deg (mm where it slides).
+fn ranges(set: &Dataset) -> Vec<[f64; 2]> {
     let count = set.poses.first().map_or(0, |p| p.joints_rad.len());
     let range = |j: usize| {
         let values = set.poses.iter().map(|p| p.joints_rad[j]);
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-        match set.slides.get(j) {
-            Some(true) => format!("j{} {low:.0}..{high:.0} mm", j + 1),
-            _ => {
-                format!("j{} {:.0}..{:.0} deg", j + 1, low.to_degrees().round() + 0.0, high.to_degrees().round() + 0.0)
-            }
-        }
+        let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+        if set.slides.get(j) == Some(&true) { [low, high] } else { [low.to_degrees(), high.to_degrees()] }
     };
-    (0..count).map(range).collect::<Vec<_>>().join(", ")
+    (0..count).map(range).collect()
+}
+
+/// The ranges of the joints that were measured, for a person.
+pub fn region(set: &Dataset) -> String {
+    let of_joint = |(j, [low, high]): (usize, [f64; 2])| {
+        let unit = if set.slides.get(j) == Some(&true) { "mm" } else { "deg" };
+        format!("j{} {:.0}..{:.0} {unit}", j + 1, low.round() + 0.0, high.round() + 0.0)
+    };
+    ranges(set).into_iter().enumerate().map(of_joint).collect::<Vec<_>>().join(", ")
 }
