@@ -24,6 +24,8 @@ pub enum Standing {
     Undecided,
     /// It changed by more than the tolerance.
     Changed,
+    /// The data are those that it was made of: they show no change, and would show none.
+    OwnData,
 }
 
 impl Standing {
@@ -38,11 +40,17 @@ impl Standing {
         }
     }
 
+    /// The same where the data may be those that the calibration or the robot was made of.
+    #[must_use]
+    pub fn by(self, own_data: bool) -> Standing {
+        if own_data && self == Standing::StillValid { Standing::OwnData } else { self }
+    }
+
     /// With which status a check ends.
     pub fn status(self) -> Status {
         match self {
             Standing::StillValid => Status::Done,
-            Standing::ChangedWithin | Standing::Undecided => Status::OutOfTolerance,
+            Standing::ChangedWithin | Standing::Undecided | Standing::OwnData => Status::OutOfTolerance,
             Standing::Changed => Status::Undetermined,
         }
     }
@@ -71,9 +79,9 @@ pub struct RecheckFile {
 
 impl RecheckFile {
     /// Gathers the figures.
-    pub fn new(recheck: &Recheck, against: &Utf8Path, tolerance_mm: f64) -> RecheckFile {
+    pub fn new(recheck: &Recheck, standing: Standing, against: &Utf8Path, tolerance_mm: f64) -> RecheckFile {
         RecheckFile {
-            standing: Standing::of(recheck.change.is_some(), recheck.effect_mm, recheck.seen_mm, tolerance_mm),
+            standing,
             tolerance_mm,
             against: against.to_string(),
             pairs: recheck.pairs.clone(),

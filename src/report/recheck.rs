@@ -17,6 +17,7 @@ pub(super) fn word(standing: Standing) -> &'static str {
         Standing::StillValid => "STILL VALID",
         Standing::ChangedWithin => "CHANGED, WITHIN TOLERANCE",
         Standing::Undecided => "UNDECIDED",
+        Standing::OwnData => "UNDECIDED, ITS OWN DATA",
         Standing::Changed => "CHANGED",
     }
 }
@@ -25,7 +26,7 @@ pub(super) fn word(standing: Standing) -> &'static str {
 pub(super) fn tone(standing: Standing) -> Tone {
     match standing {
         Standing::StillValid => Tone::Good,
-        Standing::ChangedWithin | Standing::Undecided => Tone::Doubtful,
+        Standing::ChangedWithin | Standing::Undecided | Standing::OwnData => Tone::Doubtful,
         Standing::Changed => Tone::Bad,
     }
 }
@@ -38,6 +39,9 @@ fn sentence(recheck: &Recheck, standing: Standing, tolerance_mm: f64) -> String 
         Some(_) => format!("{}, which moves a length by only {:.4} mm", recheck.statement(), recheck.effect_mm),
     };
     match standing {
+        Standing::OwnData => {
+            "the calibration was made of these pairs, which agree with it whatever happened since".to_owned()
+        }
         Standing::StillValid | Standing::Undecided => format!(
             "{found}; {} pairs would have shown a change that moves a length of {length} mm by {:.4} mm, tolerance {tolerance_mm} mm",
             recheck.pairs.len(),
@@ -61,6 +65,7 @@ fn next(standing: Standing) -> &'static str {
         Standing::Undecided => {
             "add pairs with the board elsewhere and tilted otherwise: these would not have shown a change as large as the tolerance"
         }
+        Standing::OwnData => "take two or three new pairs of the board",
         Standing::Changed => "calibrate anew: what was measured since the rig changed is off by so much",
     }
 }

@@ -33,6 +33,9 @@ fn next(standing: Standing, recheck: &Recheck) -> &'static str {
         Standing::Undecided => {
             "add poses that bend every joint and turn the wrist, or say with --tolerance-mm what matters: these would not have shown a change as large as the tolerance"
         }
+        Standing::OwnData => {
+            "measure ten new poses: the robot was identified from these, which agree with it whatever happened since"
+        }
         _ if !recheck.changed => "`stereocal locate` finds the cameras anew; the robot stays",
         Standing::ChangedWithin => {
             "targets are within the tolerance still; look at what is named, and identify anew before it grows"

@@ -52,9 +52,15 @@ fn a_slide_confirms_the_scale_or_shows_squares_that_are_not_as_said() {
     let known = json(&at.join("out/calibration.json"))["known_moves"][0].clone();
     assert!((known["measured_mm"].as_f64().unwrap() - 5.0).abs() < 0.003, "{known}");
     assert!(std::fs::read_to_string(at.join("out/camera-check.html")).unwrap().contains("The move of 5 +- 0.002 mm"));
-    // What reads the calibration takes no offence.
+    // What reads the calibration takes no offence. The pairs are its own, which prove nothing.
     let again = stereocal(at, &["camera-check", "check", "--against", "out/calibration.json"]);
-    assert!(stdout(&again).starts_with("STILL VALID"), "{}{}", stdout(&again), stderr(&again));
+    assert!(stdout(&again).starts_with("UNDECIDED, ITS OWN DATA"), "{}{}", stdout(&again), stderr(&again));
+    assert_eq!(again.status.code(), Some(1));
+
+    let turned = check(&["--known-move", "5mm:05,06", "--force"]);
+    let said = stdout(&turned);
+    assert!(said.contains("is not measured: the board turned by") && said.contains("it must only slide"), "{said}");
+    assert_eq!(turned.status.code(), Some(1), "{said}{}", stderr(&turned));
 
     let wrong = check(&["--square-mm", "10.03", "--known-move", "5mm:10,11", "--known-move", "15mm:11,12"]);
     let said = stdout(&wrong);
@@ -70,7 +76,7 @@ fn a_slide_confirms_the_scale_or_shows_squares_that_are_not_as_said() {
     let unsettled = check(&["--known-move", "9mm"]);
     assert_eq!(unsettled.status.code(), Some(2), "{}", stdout(&unsettled));
     assert!(
-        stderr(&unsettled).contains("hint: name the pairs before and after it: `--known-move 9mm:1"),
+        stderr(&unsettled).contains("hint: name the pairs before and after it: `--known-move 9mm:BEFORE,AFTER`"),
         "{}",
         stderr(&unsettled)
     );

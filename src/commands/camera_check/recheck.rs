@@ -35,17 +35,17 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
 
     let corners = open_numbers::by_rig(corners(args, &calibrated, config, &out)?, &calibrated.rig);
     corners.notes.iter().for_each(progress::note);
-    if let Some(same) = out.provenance().as_ref().and_then(|run| run.shares(&file)) {
-        progress::warn(format!(
-            "this calibration was made of {same}: whether it still holds is told by new pairs alone"
-        ));
+    let run = out.provenance();
+    let own = run.as_ref().and_then(|run| run.shares(&file));
+    if let Some(same) = own {
+        progress::warn(format!("this calibration was made of {same}: only new pairs tell whether it still holds"));
     }
     let Calibrated { rig, noise, pair_excess, pairs, volume, .. } = calibrated;
     let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), pairs, volume };
     let found = recheck::recheck(&before, &corners)?;
 
-    let standing = Standing::of(found.change.is_some(), found.effect_mm, found.seen_mm, tolerance_mm);
-    let content = RecheckFile::new(&found, &file, tolerance_mm);
+    let standing = Standing::of(found.change.is_some(), found.effect_mm, found.seen_mm, tolerance_mm).by(own.is_some());
+    let content = RecheckFile::new(&found, standing, &file, tolerance_mm);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check::new(&content, date));
     let page = report::recheck::page(&found, standing, tolerance_mm, &checks)?;

@@ -46,9 +46,11 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
         ));
     }
     let record = against.with_file_name("identification.json");
-    if let Some(same) = out.provenance().as_ref().and_then(|run| run.shares(&record)) {
+    let made_by = out.provenance();
+    let own = made_by.as_ref().and_then(|run| run.shares(&record));
+    if let Some(same) = own {
         progress::warn(format!(
-            "this robot was identified from {same}: whether it still is that robot is told by new poses alone"
+            "this robot was identified from {same}: only new poses tell whether it still is that robot"
         ));
     }
     let found = recheck(&set, &robot, &before, &placed)?;
@@ -57,7 +59,8 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     }
     // A change that is smaller than what the robot was off by anyway is none to act on.
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm.max(before.p95_mm));
-    let content = RobotRecheckFile::new(&found, against, tolerance_mm);
+    let mut content = RobotRecheckFile::new(&found, against, tolerance_mm);
+    content.standing = content.standing.by(own.is_some());
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check {
         date,
