@@ -234,8 +234,8 @@ impl Explain for Error {
                     "trigger both cameras at once, clamp them and the board, and check that equal names belong together"
                 }
                 Error::NoSuchPair { .. } => "`--since` and `--known-move` take the names of pairs as the report lists them",
-                Error::MoveUnsettled { length_mm, candidates, .. } => {
-                    let pairs = candidates.first().map_or("FIRST,SECOND", |(pairs, _)| pairs);
+                Error::MoveUnsettled { length_mm, candidates, fits } => {
+                    let pairs = candidates.first().filter(|_| *fits > 0).map_or("BEFORE,AFTER", |(pairs, _)| pairs);
                     return Some(format!("name the pairs before and after it: `--known-move {length_mm}mm:{pairs}`"));
                 }
                 Error::MoveTwice { .. } => "give each move once",

@@ -8,6 +8,9 @@ use crate::stereo::Error;
 /// length. Scales that can be mistaken are within it; boards that are placed anew by hand are not.
 const NEAR: f64 = 0.1;
 
+/// Of named pairs: a board whose corners moved by so much more or less than its middle, as a share of the length, turned and did not slide.
+const NO_SLIDE: f64 = 0.5;
+
 /// Moves that are listed where none fits.
 const LISTED: usize = 4;
 
@@ -35,6 +38,18 @@ fn named(places: &Places, stated: &StatedMove, names: &[String; 2]) -> Result<Re
             let pairs = calibration.views.iter().map(|view| view.pair.clone()).collect();
             return Err(Error::NoSuchPair { pair: name.clone(), pairs });
         }
+    }
+    let slide = places.slide(ends);
+    if slide.half_range_mm() > NO_SLIDE * stated.length_mm {
+        let [least, most] = slide.corners_mm;
+        return Ok(Err(format!(
+            "the move of {} mm from pair {} to {} is not measured: the board turned by {:.1} deg between them, and its corners moved by {least:.1} \
+             to {most:.1} mm; it must only slide",
+            stated.length_mm,
+            names[0],
+            names[1],
+            slide.turn_rad.to_degrees()
+        )));
     }
     Ok(Ok(ends))
 }
