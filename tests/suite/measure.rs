@@ -66,6 +66,44 @@ fn another_size_of_squares_and_exchanged_pictures_end_the_run() {
 }
 
 #[test]
+fn names_that_a_spreadsheet_took_zeros_from_find_their_pictures() {
+    let folder = workplace();
+    let world = folder.path();
+    calibrated(world, "3");
+    assert_eq!(stereocal(world, &["measure", "poses/"]).status.code(), Some(0));
+    let list = world.join("poses/poses.csv");
+    let names = column(&list, "pose");
+    let points = column(&world.join("out/measurements.csv"), "x_mm");
+    // Pictures 001, 002, ...; the list has 1, 2, ... as a spreadsheet writes them, and one pose that nobody photographed.
+    for (k, name) in names.iter().enumerate() {
+        for side in ["left", "right"] {
+            let at = |name: &str| world.join(format!("poses/{side}/{name}.png"));
+            std::fs::rename(at(name), at(&format!("of-{:03}", k + 1))).unwrap();
+        }
+    }
+    for k in 1..=names.len() {
+        for side in ["left", "right"] {
+            let at = |prefix: &str| world.join(format!("poses/{side}/{prefix}{k:03}.png"));
+            std::fs::rename(at("of-"), at("")).unwrap();
+        }
+    }
+    let text = std::fs::read_to_string(&list).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    for (k, line) in lines.iter_mut().skip(1).enumerate() {
+        *line = format!("{},{}", k + 1, line.split_once(',').unwrap().1);
+    }
+    lines.push(lines.last().unwrap().replacen(&format!("{},", names.len()), "77,", 1));
+    lines.push(lines.last().unwrap().replacen("77,", "78,", 1));
+    std::fs::write(&list, lines.join("\n") + "\n").unwrap();
+    let again = stereocal(world, &["measure", "poses/", "--force"]);
+    let said = stderr(&again);
+    assert_eq!(again.status.code(), Some(0), "{said}");
+    assert!(said.contains("`1` of poses.csv is picture `001`"), "{said}");
+    assert!(said.contains("poses 77, 78 are not measured: no pictures of this name"), "{said}");
+    assert_eq!(column(&world.join("out/measurements.csv"), "x_mm")[..names.len()], points);
+}
+
+#[test]
 fn poses_beyond_the_depth_of_the_boards_are_named() {
     let folder = workplace();
     let world = folder.path();

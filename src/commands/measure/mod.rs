@@ -119,12 +119,20 @@ fn seen(poses: Vec<RobotPose>, corners: &Corners) -> Vec<Seen> {
     for skipped in &corners.skipped {
         by_name.insert(&skipped.pair, refused(&skipped.reason));
     }
+    let renamed = numbers_without_zeros(&poses, by_name.keys().copied());
     let of = |at: RobotPose| {
         let missing = || Err(Refusal { status: "no pictures", reason: "no pictures of this name".to_owned() });
-        let corners = by_name.remove(at.pose.as_str()).unwrap_or_else(missing);
+        let name = renamed.get(&at.pose).map_or(at.pose.as_str(), String::as_str);
+        let corners = by_name.remove(name).unwrap_or_else(missing);
         Seen { at, corners }
     };
     let seen = poses.into_iter().map(of).collect();
+    if let Some((pose, picture)) = renamed.first_key_value() {
+        let poses = count(renamed.len(), "pose");
+        progress::note(format!(
+            "{poses} by number, as a spreadsheet drops zeros: `{pose}` of poses.csv is picture `{picture}`"
+        ));
+    }
     let idle: Vec<String> = by_name.keys().map(|name| (*name).to_owned()).collect();
     if !idle.is_empty() {
         progress::warn(format!("{} belong to no pose of poses.csv: {}", count(idle.len(), "pair"), named(&idle)));
@@ -132,13 +140,44 @@ fn seen(poses: Vec<RobotPose>, corners: &Corners) -> Vec<Seen> {
     seen
 }
 
+/// The pictures of poses that have none of their name, but of the same number: `0105` of `105`, where no other is meant.
+fn numbers_without_zeros<'a>(poses: &[RobotPose], pictures: impl Iterator<Item = &'a str>) -> BTreeMap<String, String> {
+    let bare = |name: &str| {
+        let digits = !name.is_empty() && name.bytes().all(|b| b.is_ascii_digit());
+        digits.then(|| name.trim_start_matches('0').to_owned())
+    };
+    let mut by_number: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    for picture in pictures {
+        if let Some(number) = bare(picture) {
+            by_number.entry(number).or_default().push(picture);
+        }
+    }
+    let mut numbers: BTreeMap<String, usize> = BTreeMap::new();
+    poses.iter().filter_map(|at| bare(&at.pose)).for_each(|number| *numbers.entry(number).or_default() += 1);
+    let of = |at: &RobotPose| {
+        let number = bare(&at.pose)?;
+        let [picture] = by_number.get(&number)?[..] else { return None };
+        let alone = numbers.get(&number) == Some(&1) && picture != at.pose;
+        alone.then(|| (at.pose.clone(), picture.to_owned()))
+    };
+    poses.iter().filter_map(of).collect()
+}
+
 /// What a person should know, on stderr.
 fn say(series: &Series, file: &MeasureFile) {
     if !series.judgement.ends_the_run() {
+        let mut causes: Vec<(&str, Vec<String>)> = Vec::new();
         for pose in &series.poses {
-            if let Err(refusal) = &pose.target {
-                progress::warn(format!("pose {} is not measured: {}", pose.at.pose, refusal.reason));
+            let Err(Refusal { reason, .. }) = &pose.target else { continue };
+            match causes.iter_mut().find(|(cause, _)| cause == reason) {
+                Some((_, names)) => names.push(pose.at.pose.clone()),
+                None => causes.push((reason, vec![pose.at.pose.clone()])),
             }
+        }
+        for (reason, names) in causes {
+            let are = if names.len() == 1 { "pose" } else { "poses" };
+            let is = if names.len() == 1 { "is" } else { "are" };
+            progress::warn(format!("{are} {} {is} not measured: {reason}", named(&names)));
         }
         file.warnings.iter().for_each(progress::warn);
     }
