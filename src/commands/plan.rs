@@ -46,6 +46,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
             catalogue::paper()
         }
     };
+    let robot = within_a_turn(robot);
     let slides: Vec<bool> = robot.joints.iter().map(|j| j.slides).collect();
     let order = joint_order(args, &slides)?;
     let earlier = match &args.after {
@@ -76,6 +77,27 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     report::page::write(&out, "plan.html", page)?;
     let stdout = if args.output.json { json } else { said(args, &found, &record, &out, earlier.as_deref()) };
     Ok(Outcome { stdout, status: Status::Done })
+}
+
+/// Joints that turn and have no limits stay within half a turn either way: what they really can, the file does not say.
+fn within_a_turn(mut robot: Robot) -> Robot {
+    let open: Vec<String> = robot
+        .joints
+        .iter()
+        .zip(1..)
+        .filter(|(j, _)| j.limits_rad.is_none())
+        .map(|(_, number)| number.to_string())
+        .collect();
+    if !open.is_empty() {
+        progress::warn(format!(
+            "the robot file has no limits of joint {}: -180 to 180 deg are taken where a joint turns. Write `limits_deg` (`limits_mm`) of the \
+             real arm before you run the programs",
+            open.join(", ")
+        ));
+    }
+    let turn = std::f64::consts::PI;
+    robot.joints.iter_mut().filter(|j| !j.slides).for_each(|j| j.limits_rad = j.limits_rad.or(Some((-turn, turn))));
+    robot
 }
 
 /// What the options say of the joints of programs, where it suits the robot.

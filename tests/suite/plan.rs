@@ -148,7 +148,8 @@ fn programs_of_seven_joints_need_their_order() {
     let folder = workplace();
     let at = folder.path();
     world(at);
-    let robot = catalogue::robot("franka-panda").unwrap();
+    let mut robot = catalogue::robot("franka-panda").unwrap();
+    robot.joints[6].limits_rad = None;
     std::fs::write(at.join("robot.toml"), file::to_toml(&robot)).unwrap();
     let few = ["--poses", "12", "--verify", "2", "--calibration", "out/calibration.json"];
     let said = run(at, &[&few[..], &["--out", "open"], &QUICK[..]].concat(), 0);
@@ -161,8 +162,11 @@ fn programs_of_seven_joints_need_their_order() {
     let ordered = ["--out", "ordered", "--joint-order", "1,2,4,5,6,7,3"];
     let said = run(at, &[&few[..], &ordered, &QUICK[..]].concat(), 0);
     assert!(!said.contains("no programs"), "{said}");
-    // The first pose's third joint stands behind the six axes.
+    // The seventh joint has no limits: half a turn either way, and said.
+    assert!(said.contains("no limits of joint 7: -180 to 180 deg"), "{said}");
     let poses = read_poses(Utf8Path::from_path(&at.join("ordered/poses.csv")).unwrap()).unwrap();
+    assert!(poses.iter().all(|pose| pose.joints_deg[6].abs() <= 180.0));
+    // The first pose's third joint stands behind the six axes.
     let text = std::fs::read_to_string(at.join("ordered/programs/stereocal_plan.mod")).unwrap();
     let third = format!("{:.6},9E9", poses[0].joints_deg[2]);
     assert!(text.contains(&third), "{third}\n{}", &text[..2000]);
