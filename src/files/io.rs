@@ -110,10 +110,16 @@ fn read_bytes_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, mos
         }
         Ok(_) => Ok(bytes),
         Err(source) if source.kind() == std::io::ErrorKind::NotFound => {
-            Err(Error::Missing { what, path: path.to_owned(), hint: hint.map(str::to_owned) })
+            Err(Error::Missing { what, path: path.to_owned(), hint: found_elsewhere(path).or(hint.map(str::to_owned)) })
         }
         Err(source) => Err(Error::Io { action: "read", path: path.to_owned(), source }),
     }
+}
+
+/// A file of this name in the folder that results go to unless another is named.
+fn found_elsewhere(path: &Utf8Path) -> Option<String> {
+    let there = Utf8Path::new("out").join(path.file_name()?);
+    (there != path && there.is_file()).then(|| format!("there is {there}: is it meant?"))
 }
 
 pub fn read_json<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<T> {
