@@ -55,7 +55,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.begin(step))?;
     bar.finish_and_clear();
     let of_fit = record::findings::findings(&set, &found, &along);
-    let findings = Findings::new(findings, unexplained, of_fit, &found);
+    let findings = Findings::new(findings, unexplained, of_fit, &set, &found);
     let record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     said(&record, &out, args.output.json);
     let placed = found.placed(&set, &nominal, &settings)?;

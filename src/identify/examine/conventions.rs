@@ -80,6 +80,7 @@ pub struct Mended {
 /// Looks for what is wrong with the conventions of a set and of a robot's file, and mends it.
 pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
     let (mut set, mut robot, mut findings) = (set.clone(), robot.clone(), Vec::new());
+    let mut in_other_units = false;
     let Some(mut left) = Misfit::of(&set, &robot, settings, None) else {
         return Mended { set, robot, findings, unexplained_mm: None };
     };
@@ -90,11 +91,14 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
             break;
         }
         // Most faults bring the file's robot nearer to the readings; the others cost a fit each.
-        let mut tried = explaining(&set, &robot, settings, &now, true);
+        // Lengths have one unit.
+        let open: Vec<Hypothesis> =
+            hypotheses(&set).into_iter().filter(|h| !(in_other_units && h.factor() != 1.0)).collect();
+        let mut tried = explaining(&open, &set, &robot, settings, &now, true);
         let unexplained = tried.is_empty() && now.fitted >= IMPLAUSIBLE_MM;
         cut = if unexplained { in_sessions(&set, &robot, settings) } else { None };
         if unexplained {
-            tried = explaining(&set, &robot, settings, &now, false);
+            tried = explaining(&open, &set, &robot, settings, &now, false);
         }
         let least = tried.iter().map(|(there, _)| there.fitted).fold(f64::INFINITY, f64::min);
         let best = tried
@@ -110,6 +114,7 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
             .map(|(_, h)| format!(", or, which these readings do not tell apart, {}", h.name()))
             .collect();
         (set, robot) = hypothesis.applied(&set, &robot);
+        in_other_units |= hypothesis.factor() != 1.0;
         let (whose, from, to) = match there.fitted * EXPLAINS < now.fitted {
             true => ("the errors", now.fitted, there.fitted),
             false if there.nominal * EXPLAINS < now.nominal => {
@@ -132,14 +137,15 @@ pub fn unexplained(left_mm: f64) -> Finding {
     Finding::new(
         format!(
             "the best fit leaves {left_mm:.2} mm a coordinate, implausible for a real robot: the robot file is not of the robot that was \
-             measured, or joints and readings do not belong together"
+             measured, joints and readings do not belong together, or the readings scatter by as much"
         ),
-        "no change of units, signs or conventions explains it",
+        "no single change of units, signs or conventions of all rows explains it",
     )
 }
 
 /// The hypotheses that explain what is left, of those that bring the file's robot `nearer` or of all.
 fn explaining(
+    open: &[Hypothesis],
     set: &Dataset,
     robot: &Robot,
     settings: &Settings,
@@ -152,7 +158,7 @@ fn explaining(
         let there = Misfit::of(&s, &r, settings, nearer.then_some(&to_be_beaten))?.scaled(h.factor());
         there.explains(now).then_some((there, h))
     };
-    hypotheses(set).into_par_iter().filter_map(explains).collect()
+    open.par_iter().filter_map(|h| explains(*h)).collect()
 }
 
 impl Misfit {

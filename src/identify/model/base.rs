@@ -48,6 +48,21 @@ pub struct Observability {
     pub o5: f64,
 }
 
+/// A sum of [`Base::sum`] in words.
+pub fn sum_name(sum: &[(usize, f64)], names: &[String]) -> String {
+    let mut text = String::new();
+    for &(parameter, coefficient) in sum {
+        if !text.is_empty() {
+            text.push_str(if coefficient < 0.0 { " - " } else { " + " });
+        }
+        if (coefficient.abs() - 1.0).abs() >= NAMED {
+            text.push_str(&format!("{:.3} ", coefficient.abs()));
+        }
+        text.push_str(&names[parameter]);
+    }
+    text
+}
+
 impl Base {
     /// Of a Jacobian; `tolerance` is relative to its longest column.
     pub fn new(jacobian: &DMatrix<f64>, tolerance: f64) -> Base {
@@ -64,12 +79,6 @@ impl Base {
         let coefficients = combinations(jacobian, &free, &dependent);
         let singular_values = singular_values(jacobian, &free);
         Base { free, zero, dependent, coefficients, singular_values }
-    }
-
-    /// Whether a base parameter stands for others too.
-    pub fn in_group(&self, parameter: usize) -> bool {
-        let row = self.free.iter().position(|&i| i == parameter);
-        row.is_some_and(|k| self.coefficients.row(k).iter().any(|c| c.abs() > NAMED))
     }
 
     /// The paper's way (section 3.1): zero columns go, then, while two columns are as good as parallel or the rest lacks rank,
@@ -117,27 +126,18 @@ impl Base {
         Some(self.singular_values.first()? / self.singular_values.last()?)
     }
 
+    /// A base parameter by its place among them, and the parameters that act like it by at least such a share: what is determined is the
+    /// sum of their corrections, each times its coefficient.
+    pub fn sum(&self, row: usize, least: f64) -> Vec<(usize, f64)> {
+        let others =
+            self.dependent.iter().enumerate().map(|(column, &other)| (other, self.coefficients[(row, column)]));
+        std::iter::once((self.free[row], 1.0)).chain(others.filter(|(_, c)| c.abs() >= least)).collect()
+    }
+
     /// Each base parameter that stands for others too, with them: `d_2 + d_3 + d_4`, `theta_6 - 2.5 v_x`.
     pub fn groups(&self, names: &[String]) -> Vec<String> {
-        let mut groups = Vec::new();
-        for (row, &free) in self.free.iter().enumerate() {
-            let mut text = names[free].clone();
-            for (column, &other) in self.dependent.iter().enumerate() {
-                let coefficient: f64 = self.coefficients[(row, column)];
-                if coefficient.abs() < NAMED {
-                    continue;
-                }
-                text.push_str(if coefficient < 0.0 { " - " } else { " + " });
-                if (coefficient.abs() - 1.0).abs() >= NAMED {
-                    text.push_str(&format!("{:.3} ", coefficient.abs()));
-                }
-                text.push_str(&names[other]);
-            }
-            if text != names[free] {
-                groups.push(text);
-            }
-        }
-        groups
+        let sums = (0..self.free.len()).map(|row| self.sum(row, NAMED)).filter(|sum| sum.len() > 1);
+        sums.map(|sum| sum_name(&sum, names)).collect()
     }
 
     /// O1 to O5 for so many poses; `None` without columns.

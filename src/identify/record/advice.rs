@@ -9,6 +9,7 @@ use crate::identify::data::dataset::{Dataset, Reading};
 use crate::identify::data::still::constant_joints;
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Spread;
+use crate::identify::judge::locate::REPEATABILITY_MM;
 use crate::identify::run::Against;
 use crate::identify::run::Identification;
 use crate::robot::Robot;
@@ -44,7 +45,8 @@ impl Record {
         let sentences = |list: &[Finding]| list.iter().map(Finding::sentence).collect::<Vec<_>>();
         let mut doubts = sentences(&findings.doubts);
         doubts.extend(self.implausible(set, nominal));
-        doubts.extend(self.computed(set));
+        doubts.extend(self.computed(set).or(self.predicted(set, nominal)));
+        doubts.extend(self.promise(set, nominal));
         doubts.extend(still(set));
         doubts.extend(one_orientation(set, nominal, found));
         doubts.extend(self.at_limit(found));
@@ -108,6 +110,49 @@ impl Record {
              simulation; only points that were measured show how a robot was built",
             1000.0 * largest_mm
         ))
+    }
+
+    /// Points that the nominal robot, its tool solved, predicts better than arms come back to them.
+    fn predicted(&self, set: &Dataset, nominal: &Robot) -> Option<String> {
+        let left_mm = self.with_tool_mm(set, nominal).filter(|left| *left < REPEATABILITY_MM)?;
+        Some(format!(
+            "with the right tool the nominal robot is off by {left_mm:.4} mm in the middle of the rows, less than arms repeat to: these points \
+             were computed, by the robot's controller or in a simulation; only points that were measured show how a robot was built"
+        ))
+    }
+
+    /// What is left of the nominal robot once its tool is solved, mm in the middle of the rows.
+    fn with_tool_mm(&self, set: &Dataset, nominal: &Robot) -> Option<f64> {
+        let (joints, points) = gather::most_points(set);
+        self.tool_mm.map(|(_, left)| left).or_else(|| nominal.left_mm(&joints, &points))
+    }
+
+    /// An expected error that the rows themselves contradict: those left out miss by several times as much, or miss by more than the nominal
+    /// robot does with a tool of its own, or the nominal robot is off by less.
+    fn promise(&self, set: &Dataset, nominal: &Robot) -> Option<String> {
+        /// Beyond what leaving a row out costs where unknowns are half of the numbers.
+        const SEVERAL: f64 = 3.0;
+        /// What is expected holds the scatter of the readings, which the nominal robot's errors hold as well.
+        const FAR: f64 = 2.0;
+        let (chosen, expected_mm) = (self.chosen_method()?, self.expected.as_ref()?.mean_mm);
+        let mean = |figures: &PointSpread| figures.point.as_ref().and_then(|spread| spread.mean_abs_mm);
+        let held_out_mm = mean(&chosen.verify);
+        let few = "there are too few rows for so many unknowns; measure more, that bend every joint";
+        if let Some(off) = held_out_mm.filter(|off| *off > SEVERAL * expected_mm) {
+            return Some(format!(
+                "rows that the fit did not have are off by {off:.3} mm, expected are {expected_mm:.3} mm: {few}"
+            ));
+        }
+        let nominal_mm = self.with_tool_mm(set, nominal).filter(|_| held_out_mm.is_some());
+        if let Some((off, nominal)) = held_out_mm.zip(nominal_mm).filter(|(off, nominal)| *off > SEVERAL * nominal) {
+            return Some(format!(
+                "rows that the fit did not have are off by {off:.3} mm, and with a tool of its own the nominal robot is off by {nominal:.3} mm only: {few}"
+            ));
+        }
+        let before_mm = mean(&self.before.verify).or(self.before.verify.distance.mean_abs_mm)?;
+        (expected_mm > FAR * before_mm).then(|| {
+            format!("the identified robot is expected to be off by {expected_mm:.3} mm, and the nominal one is off by {before_mm:.3} mm only: {few}")
+        })
     }
 
     /// Parameters whose search ended at its limit.

@@ -28,12 +28,18 @@ impl Findings {
         examined: Vec<Finding>,
         unexplained: Option<Finding>,
         of_fit: Vec<Finding>,
+        set: &Dataset,
         found: &Identification,
     ) -> Findings {
         let unexplained = unexplained.filter(|_| !is_explained(found));
         let against: Vec<Finding> = unexplained.into_iter().chain(plausible::of_another_robot(found)).collect();
         let notes = of_fit.into_iter().filter(|finding| !against.contains(finding)).collect();
-        Findings { against, doubts: examined, notes }
+        // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much.
+        let scale = found.scale(set).filter(CommonScale::is_significant).map(|scale| {
+            Finding::new(scale.sentence(), "the robot that was found has this scale; check it on a known length")
+        });
+        let doubts = examined.into_iter().chain(scale).collect();
+        Findings { against, doubts, notes }
     }
 
     /// All of them, the gravest first.
@@ -55,7 +61,7 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
     let mut list = of_rows(set, found);
     list.extend(plausible::of_another_robot(found));
     list.extend(plausible::of_terms(found));
-    list.extend(of_sensor(set, found));
+    list.extend(of_sensor(found));
     list.extend(along_the_rows(along));
     list.extend(of_data(set, found));
     list
@@ -88,12 +94,9 @@ fn of_rows(set: &Dataset, found: &Identification) -> Vec<Finding> {
 }
 
 /// Errors that the readings share.
-fn of_sensor(set: &Dataset, found: &Identification) -> Vec<Finding> {
+fn of_sensor(found: &Identification) -> Vec<Finding> {
     let mut list = Vec::new();
     let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
-    if let Some(scale) = found.scale(set).filter(CommonScale::is_significant) {
-        add(scale.sentence(), Vec::new(), "the robot that was found has this scale; check it on a known length");
-    }
     if let Some((zero_mm, sigma_mm)) = zero(found) {
         let (size, way) = (zero_mm.abs(), if zero_mm > 0.0 { "long" } else { "short" });
         add(

@@ -1,6 +1,7 @@
 //! Whether the parameters that were found are those of a built robot.
 
 use crate::identify::finding::Finding;
+use crate::identify::model::base::sum_name;
 use crate::identify::run::Identification;
 use crate::robot::Parameter;
 
@@ -26,6 +27,9 @@ pub fn of_terms(found: &Identification) -> Option<Finding> {
         "the robot that was found holds where it was measured only, until the reason is known",
     ))
 }
+
+/// Coefficients below this share no correction that matters.
+const NEGLIGIBLE: f64 = 0.02;
 
 /// How many standard deviations a correction must have to be far from nominal.
 const FAR_SIGMAS: f64 = 5.0;
@@ -56,17 +60,27 @@ fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>) -> Opti
     let (covariance, nominal) = (formulation.robot_covariance(), formulation.rows.kinematics.nominal());
     let parameters = formulation.parameters();
     let moved = |p: Parameter| candidate.robot.value(p) - nominal.value(p);
-    let is_far = |i: &usize| {
-        let size = moved(parameters[*i]).abs();
-        let sigma = covariance[(*i, *i)].max(0.0).sqrt();
-        limit(parameters[*i]).is_some_and(|limit| size > limit) && size > FAR_SIGMAS * sigma
+    let base = &formulation.base;
+    // What poses determine of a link is the sum of it and what acts like it; terms are nothing else's.
+    let sum = |row: usize| {
+        let is_link = link_limit(parameters[base.free[row]]).is_some();
+        base.sum(row, if is_link { NEGLIGIBLE } else { f64::INFINITY })
     };
-    let name = |i: &usize| {
-        let (unit, factor) = parameters[*i].file_unit();
-        format!("{} {:+.1} {unit}", parameters[*i].name(), factor * moved(parameters[*i]))
+    let is_far = |sum: &Vec<(usize, f64)>| {
+        let of = |f: &dyn Fn(usize) -> f64| sum.iter().map(|&(i, c)| c * f(i)).sum::<f64>();
+        // Each may be off by its limit, and they are off independently; a sum with the tool's place in it is the tool's.
+        let limits: Option<Vec<f64>> = sum.iter().map(|&(i, c)| Some(c * limit(parameters[i])?)).collect();
+        let variance = of(&|i| of(&|j| covariance[(i, j)]));
+        let size = of(&|i| moved(parameters[i])).abs();
+        limits.is_some_and(|limits| size > limits.iter().map(|l| l * l).sum::<f64>().sqrt())
+            && size > FAR_SIGMAS * variance.max(0.0).sqrt()
     };
-    // What a link shares with others may be theirs; terms are nothing else's.
-    let shared = |i: &usize| link_limit(parameters[*i]).is_some() && formulation.base.in_group(*i);
-    let list: Vec<String> = formulation.base.free.iter().filter(|i| is_far(i) && !shared(i)).map(name).collect();
+    let names: Vec<String> = parameters.iter().map(|p| p.name()).collect();
+    let name = |sum: Vec<(usize, f64)>| {
+        let (unit, factor) = parameters[sum[0].0].file_unit();
+        let amount = factor * sum.iter().map(|&(i, c)| c * moved(parameters[i])).sum::<f64>();
+        format!("{} {amount:+.1} {unit}", sum_name(&sum, &names))
+    };
+    let list: Vec<String> = (0..base.free.len()).map(sum).filter(is_far).map(name).collect();
     (!list.is_empty()).then(|| list.join(", "))
 }

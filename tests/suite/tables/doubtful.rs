@@ -116,3 +116,67 @@ fn points_that_were_computed_are_said_to_be() {
     // To tenths of a mm an arm may be as good as the digits.
     assert_eq!(stated(1), "use the identified robot");
 }
+
+/// Rows of an arm with a tool of its own, its links as in `built`; each coordinate scattered by about `noise_mm`, lengths times `scale`.
+fn of_arm(built: &Robot, poses: usize, noise_mm: f64, scale: f64) -> Rows {
+    let sensor = transform(Vector3::new(0.4, 2.0, -0.7), Vector3::new(1900.0, -2000.0, 300.0));
+    let row = |i: usize| {
+        let joints: Vec<f64> =
+            (0..built.joints.len()).map(|j| 70.0 * ((7 * i + 3 * j * j + 1) as f64).sin()).collect();
+        let radians: Vec<f64> = joints.iter().map(|q| q.to_radians()).collect();
+        let point = (sensor * built.target_mm(&radians)).coords * scale;
+        let off = |k: usize| noise_mm * 1.4 * ((17 * i + 5 * k) as f64).sin();
+        (joints, [0, 1, 2].map(|k| point[k] + off(k)))
+    };
+    (0..poses).map(row).collect()
+}
+
+/// The first line and the status of an identification with this arm's file.
+fn verdict(arm: &str, rows: &Rows) -> (String, i32) {
+    let folder = workplace();
+    std::fs::write(folder.path().join("robot.toml"), file::to_toml(&catalogue::robot(arm).expect("it is known")))
+        .expect("it is written");
+    let table = text("J1,J2,J3,J4,J5,J6,X,Y,Z", rows, ",", joined);
+    std::fs::write(folder.path().join("table.csv"), table).expect("it is written");
+    let run = stereocal(folder.path(), &["identify", "--measurements", "table.csv", "--method", "trust-region"]);
+    let first = String::from_utf8_lossy(&run.stdout).lines().next().unwrap_or_default().to_owned();
+    (first, run.status.code().unwrap_or(-1))
+}
+
+/// A UR5e as one may be built, its tool and the file's links otherwise by `more`.
+fn built(more: impl Fn(&mut Robot)) -> Robot {
+    let mut robot = catalogue::robot("ur5e").expect("it is known");
+    for (k, joint) in robot.joints.iter_mut().enumerate() {
+        joint.theta_rad += 1e-3 * (k as f64 + 1.0).sin();
+        joint.a_mm += 0.3 * (2.0 * k as f64).cos();
+        joint.d_mm += 0.3 * (3.0 * k as f64).cos();
+    }
+    robot.tool_mm = Vector3::new(20.0, -35.0, 90.0);
+    more(&mut robot);
+    robot
+}
+
+#[test]
+fn the_links_of_another_arm_are_none_of_this_one() {
+    let (said, status) = verdict("ur5e", &of_arm(&built(|_| {}), 60, 0.03, 1.0));
+    assert!(said.starts_with("use") && status == 0, "{said}");
+    // Three parallel axes: their offsets are one sum, of which each has a third.
+    let (said, status) = verdict("ur5e", &of_arm(&built(|robot| robot.joints[3].d_mm += 24.0), 60, 0.03, 1.0));
+    assert!(said.contains("d_2 + d_3 + d_4 +2") && said.contains("another robot") && status == 1, "{said}");
+}
+
+#[test]
+fn what_a_tool_alone_explains_was_computed() {
+    let mut nominal = catalogue::robot("ur5e").expect("it is known");
+    nominal.tool_mm = Vector3::new(20.0, -35.0, 90.0);
+    let (said, _) = verdict("ur5e", &of_arm(&nominal, 40, 0.01, 1.0));
+    assert!(said.contains("these points were computed"), "{said}");
+    let (said, _) = verdict("ur5e", &of_arm(&nominal, 40, 0.1, 1.0));
+    assert!(!said.contains("computed"), "{said}");
+}
+
+#[test]
+fn a_scale_that_is_seen_is_a_doubt() {
+    let (said, _) = verdict("ur5e", &of_arm(&built(|_| {}), 60, 0.03, 1.01));
+    assert!(said.starts_with("check") && said.contains("longer than the nominal ones"), "{said}");
+}
