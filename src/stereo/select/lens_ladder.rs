@@ -10,7 +10,6 @@
 
 use crate::imaging::Board;
 use crate::stereo::board_pose::print_share::PrintShare;
-use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::Layout;
 use crate::stereo::select::known_lenses;
 use crate::stereo::select::model_comparison::{Chance, LensScore, OF_PAIR, Trial, gain_of_terms, score, simplest};
@@ -50,9 +49,9 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
     let mut chance = Chance { scatter, print: print_excess(&solved, &layout, board) };
     // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
     let mut scores = ladder(&solved.problem, layout.shape, &chance, &[]);
-    if let Some((views, told)) = of_richest(&solved.problem, &scores, &chance, board) {
+    if let Some((problem, told)) = of_richest(&solved.problem, &scores, &chance, board) {
         chance = told;
-        solved.problem.views = views;
+        (solved.problem.views, solved.problem.priors) = (problem.views, problem.priors);
         scores = ladder(&solved.problem, layout.shape, &chance, &scores);
     }
     let bent = simplest(&scores, &chance).filter(|_| forced_shape.is_none() && layout.shape);
@@ -77,14 +76,17 @@ fn print_excess(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
     PrintShare::of(solved, board, layout).map_or(1.0, |print| print.excess)
 }
 
-/// The corners as the richest lens weighs them with which the pairs tell how they scatter, and what chance does then, where a simpler one was
-/// chosen. What the simpler one lacks would else pass for scatter of the pairs, before which no term seems worth anything (Mallows,
-/// Technometrics 15, 1973, takes the variance from the full model for the same reason). At least half of what the pairs tell of a rig must be
-/// left to scatter.
-fn of_richest(problem: &Problem, scores: &[LensScore], chance: &Chance, board: &Board) -> Option<(Vec<View>, Chance)> {
+/// The corners as the richest lens weighs them with which the pairs tell how they scatter, what is expected beside pairs that scatter so, and
+/// what chance does then, where a richer lens than the simplest was tried. What the simpler one lacks would else pass for scatter of the
+/// pairs, before which no term seems worth anything (Mallows, Technometrics 15, 1973, takes the variance from the full model for the same
+/// reason). At least half of what the pairs tell of a rig must be left to scatter.
+fn of_richest(problem: &Problem, scores: &[LensScore], chance: &Chance, board: &Board) -> Option<(Problem, Chance)> {
+    /// Two standard deviations of the scatter of one pair that chance alone makes.
+    const BY_CHANCE: f64 = 1.5;
     let chosen = simplest(scores, chance)?.layout.count();
     let pairs = problem.views.len();
-    let richer = scores.iter().rev().filter_map(|score| score.trial.as_ref()).filter(|t| t.layout.count() > chosen);
+    let is_richer = |t: &&Trial| t.layout.count() >= chosen && t.layout.left > Some(SIMPLEST);
+    let richer = scores.iter().rev().filter_map(|score| score.trial.as_ref()).filter(is_richer);
     richer.filter(|trial| 2 * trial.layout.count() <= OF_PAIR * pairs).find_map(
         |Trial { layout, values, priors, .. }| {
             let near = Problem { views: problem.views.clone(), values: values.clone(), priors: priors.clone() };
@@ -92,7 +94,9 @@ fn of_richest(problem: &Problem, scores: &[LensScore], chance: &Chance, board: &
             let scatter = stated_uncertainty::told_scatter(&full, layout, board)?;
             let told =
                 Chance { scatter, print: print_excess(&full, layout, board) }.with_taken_up(layout.count(), pairs);
-            Some((full.problem.views, told))
+            let beyond = scatter / (1.0 + BY_CHANCE / (pairs as f64).sqrt());
+            let priors = problem.priors.beside(beyond);
+            Some((Problem { priors, ..full.problem }, told))
         },
     )
 }

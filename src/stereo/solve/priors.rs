@@ -65,9 +65,11 @@ enum Number {
 }
 
 /// All expectations.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Priors {
     all: Vec<Expectation>,
+    /// What the usual values of the terms of richer lenses weigh; see [`Priors::beside`].
+    weight: f64,
     /// Whether the rational terms are held at zero, so that a lens has those after them only.
     rational_held: bool,
 }
@@ -85,7 +87,7 @@ pub struct Information {
 
 impl Priors {
     /// Nothing is expected.
-    pub const NONE: Priors = Priors { all: Vec::new(), rational_held: false };
+    pub const NONE: Priors = Priors { all: Vec::new(), weight: 1.0, rational_held: false };
 
     /// What is expected of both cameras and a board with this diagonal.
     pub fn of_rig(start: &Rig, diagonal_mm: f64) -> Priors {
@@ -113,6 +115,13 @@ impl Priors {
     /// are not told apart.
     pub fn holding_rational(&self) -> Priors {
         Priors { rational_held: true, ..self.clone() }
+    }
+
+    /// The same beside corners that count so many times as much as the pairs bear out, as a variance: pairs that scatter by more than their
+    /// corners do tell of the terms of richer lenses as much less, and what these usually are decides as much more; a sensor would else be tilted
+    /// by five degrees to take up a hand that moved. The terms that all lenses have, the pairs tell for all that.
+    pub fn beside(&self, scatter: f64) -> Priors {
+        Priors { weight: scatter.max(1.0), ..self.clone() }
     }
 
     /// The same with what is known of some lenses in place of what lenses usually are.
@@ -208,7 +217,9 @@ impl Priors {
                 && !expectation.known
                 && expectation.terms.iter().any(|(number, _)| number.is_rational());
             let sigma = if held { HELD * expectation.sigma } else { expectation.sigma };
-            let weight = 1.0 / (sigma * sigma);
+            let of_richer =
+                !expectation.known && expectation.terms.iter().all(|(number, _)| number.is_of_richer_lens());
+            let weight = if of_richer { self.weight } else { 1.0 } / (sigma * sigma);
             sum.cost += 0.5 * weight * off * off;
             for (i, a) in &terms {
                 sum.gradient[*i] += weight * slope * a * off;
@@ -234,6 +245,11 @@ impl Priors {
 }
 
 impl Number {
+    /// True for the terms beyond the five that nearly all lenses need.
+    fn is_of_richer_lens(self) -> bool {
+        matches!(self, Number::Camera(_, 9..))
+    }
+
     /// True for k4, k5 and k6.
     fn is_rational(self) -> bool {
         matches!(self, Number::Camera(_, 9..=11))
