@@ -141,8 +141,14 @@ impl Pool<'_> {
                 _ => wanted,
             };
             if found.len() < needed {
-                let group = placement.name.clone();
-                return Err(Error::TooFew { group, found: found.len(), tried: most, needed });
+                return Err(Error::TooFew {
+                    group: placement.name.clone(),
+                    found: found.len(),
+                    tried: most,
+                    needed,
+                    asked: !matches!(kind, Kind::Center | Kind::Fresh),
+                    reached_mm: None,
+                });
             }
             all.extend(found);
         }
@@ -158,7 +164,8 @@ impl Pool<'_> {
                 return Ok(found);
             }
         }
-        Err(Error::TooFew { group: placement.name.clone(), found: 0, tried: STARTS, needed: 1 })
+        let group = placement.name.clone();
+        Err(Error::TooFew { group, found: 0, tried: STARTS, needed: 1, asked: false, reached_mm: None })
     }
 
     /// Postures with the target there, the best first.
