@@ -257,7 +257,8 @@ mod tests {
 
     #[test]
     fn what_may_not_be_read_is_answered_with_what_lets_it_be() {
-        let refused = |action| Error::Io { action, path: "x".into(), source: std::io::ErrorKind::PermissionDenied.into() };
+        let refused =
+            |action| Error::Io { action, path: "x".into(), source: std::io::ErrorKind::PermissionDenied.into() };
         assert!(refused("read").hint().is_some_and(|hint| hint.contains("chmod -R u+rX x")));
         assert!(refused("write").hint().is_some_and(|hint| hint.contains("--out DIR")));
     }

@@ -168,6 +168,12 @@ impl Pool<'_> {
         Err(Error::TooFew { group, found: 0, tried: STARTS, needed: 1, asked: false, reached_mm: None })
     }
 
+    /// Share of a sphere's places at which the cameras see the target wholly, whatever the arm reaches.
+    pub fn share_in_view(&self) -> f64 {
+        let seen = (0..FRESH).filter(|&k| self.scene.accepts(&self.drawn(Kind::Fresh, k, 0)));
+        seen.count() as f64 / FRESH as f64
+    }
+
     /// Postures with the target there, the best first.
     fn postures_at(&self, base_from_target: &Transform) -> Vec<Vec<f64>> {
         let wanted = scene::base_from_flange(self.robot, base_from_target);

@@ -60,6 +60,8 @@ pub fn plan(
 /// it, by itself. `None` where there is none.
 fn reached_mm(robot: &Robot, scene: &Scene, settings: &Settings, group: &str) -> Option<[f64; 3]> {
     const SHARES: [f64; 6] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5];
+    const MOST_TRIED: usize = 40;
+    const LEAST_IN_VIEW: f64 = 0.1;
     let all = scene::placements(robot, scene, settings).ok()?;
     let center_mm = all.iter().find(|placement| placement.name == group)?.center_mm;
     let turned = |deg: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), deg.to_radians()) * center_mm;
@@ -67,7 +69,12 @@ fn reached_mm(robot: &Robot, scene: &Scene, settings: &Settings, group: &str) ->
     let mut centers: Vec<Vector3<f64>> = turns.flat_map(|center| SHARES.map(|share| center * share)).collect();
     centers.retain(|center| (center - center_mm).norm() > 1.0);
     centers.sort_by(|a, b| (a - center_mm).norm().total_cmp(&(b - center_mm).norm()));
+    centers.truncate(MOST_TRIED);
     let noise = scene::PoseNoise { given_mm: settings.noise_mm, repeatability_mm: settings.repeatability_mm };
+    // A sphere that is larger than the field is not seen anywhere.
+    if (Pool { robot, scene, settings, placements: &all, noise }).share_in_view() < LEAST_IN_VIEW {
+        return None;
+    }
     let reaches = |center: &&Vector3<f64>| {
         // As it will be typed.
         let settings = Settings { centers_mm: vec![center.map(f64::round)], ..settings.clone() };

@@ -166,7 +166,10 @@ fn a_check_says_what_it_judged_and_by_what() {
     };
     let all = ["--corners", "out/corners.csv"];
     let said = check(&all);
-    assert!(said.contains("for where the boards were: ") && said.contains("deciding check: held-out lengths, "), "{said}");
+    assert!(
+        said.contains("for where the boards were: ") && said.contains("deciding check: held-out lengths, "),
+        "{said}"
+    );
     assert!(said.contains("compare that with a ruler"), "{said}");
     let said = check(&[&all[..], &["--volume", "all"]].concat());
     assert!(said.contains("for all that both cameras see ") && !said.contains("where the boards were: "), "{said}");
@@ -178,6 +181,25 @@ fn a_check_says_what_it_judged_and_by_what() {
     // Five pairs are too few poses, and that has a plain name.
     let said = check(&["--corners", "five.csv"]);
     assert!(said.contains("no length can be trusted until these checks are passed: "), "{said}");
+    assert!(said.contains("number of different poses"), "{said}");
+    // Corners that scatter by five px: what may be off by more than a tenth of itself is no length to trust.
+    let mut state = 7u64;
+    let mut scattered = |value: &str| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        format!("{}", value.parse::<f64>().unwrap() + 16.0 * ((state >> 40) as f64 / f64::from(1u32 << 24) - 0.5))
+    };
+    let text = std::fs::read_to_string(at.join("out/corners.csv")).unwrap();
+    let mut noisy = format!("{}\n", text.lines().next().unwrap());
+    for line in text.lines().skip(1) {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        (fields[4], fields[5]) = (scattered(&fields[4]), scattered(&fields[5]));
+        (fields[6], fields[7], fields[8]) = ("21.3".to_owned(), "0".to_owned(), "21.3".to_owned());
+        noisy += &format!("{}\n", fields.join(","));
+    }
+    std::fs::write(at.join("noisy.csv"), noisy).unwrap();
+    let bad = check(&["--corners", "noisy.csv", "--force"]);
+    assert!(bad.contains("no length can be trusted: of one of 70 mm an error of "), "{bad}");
+    let said = check(&["--corners", "five.csv"]);
     assert!(said.contains("number of different poses"), "{said}");
     let evidence = json(&at.join("said/camera-check.json"))["evidence"].to_string();
     assert!(evidence.contains("pairs with poses of their own"), "the names in the file are the contract's");

@@ -74,7 +74,9 @@ fn a_page_that_is_not_there_is_said_with_those_that_are() {
     // Every command has a page, its own or one about it.
     let help = stdout(&stereocal(folder.path(), &["--help"]));
     let commands = help.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
-    for command in commands.filter_map(|line| line.split_whitespace().next()).filter(|c| !["completions", "help"].contains(c)) {
+    for command in
+        commands.filter_map(|line| line.split_whitespace().next()).filter(|c| !["completions", "help"].contains(c))
+    {
         assert!(page(command).starts_with("# "), "{command}");
     }
     let output = stereocal(folder.path(), &["guide", "nothing"]);

@@ -24,7 +24,12 @@ fn no_command_is_bad_usage() {
     refused(&[], &[], 2, &["Usage"]);
     refused(&["camera-check"], &[], 2, &["required"]);
     refused(&["calibrate"], &[], 2, &["unrecognized subcommand", "hint: `camera-check` calibrates the cameras"]);
-    refused(&["identify", "points.csv"], &[], 2, &["unexpected argument", "hint: ", "here: `--measurements points.csv`"]);
+    refused(
+        &["identify", "points.csv"],
+        &[],
+        2,
+        &["unexpected argument", "hint: ", "here: `--measurements points.csv`"],
+    );
     refused(&["camera-check", "x", "--square-size", "12.5"], &[], 2, &["hint: there is `--square-mm MM`"]);
     refused(&["verify", "--measurements", "x"], &[], 2, &["hint: or `--against IDENTIFIED` in its place"]);
 }
@@ -171,8 +176,16 @@ fn another_file_of_the_program() {
     refused(&measure, &placement, 2, &["calibration file: this is a placement", "hint: "]);
     let table = [("m.csv", "pose,group,role,j1_deg\n1,a,sample,0\n")];
     refused(&["identify", "--robot", "m.csv"], &table, 2, &["this is a table, and TOML is needed", "robot new NAME"]);
-    let robot = [("robot.toml", "name = \"r\"\nconvention = \"mdh\"\n[[joint]]\nalpha_deg = 0.0\na_mm = 0.0\ntheta_deg = 0.0\nd_mm = 1.0\n")];
-    refused(&["measure", "x", "--calibration", "robot.toml"], &[placement[0], robot[0]], 2, &["no JSON, but a robot file"]);
+    let robot = [(
+        "robot.toml",
+        "name = \"r\"\nconvention = \"mdh\"\n[[joint]]\nalpha_deg = 0.0\na_mm = 0.0\ntheta_deg = 0.0\nd_mm = 1.0\n",
+    )];
+    refused(
+        &["measure", "x", "--calibration", "robot.toml"],
+        &[placement[0], robot[0]],
+        2,
+        &["no JSON, but a robot file"],
+    );
     refused(&["robot", "import", "robot.toml"], &robot, 2, &["this is a robot file already", "`--robot FILE`"]);
     let compensate = ["compensate", "robot.toml", "--robot", "robot.toml", "--identified", "robot.toml"];
     refused(&compensate, &robot, 2, &["this is a robot file, and a table is needed"]);

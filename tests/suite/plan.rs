@@ -126,13 +126,19 @@ fn plans_that_nobody_can_run_are_refused() {
     assert!(said.contains("does not reach (1500, 0, 300) mm") && said.contains("`--center "), "{said}");
     let said = run(at, &["--squares", "40x40"], 2);
     assert!(said.contains("never sees a target of 412 x 412 mm") && said.contains("smaller target"), "{said}");
-    // A middle that is reached, a sphere that is not: fewer poses do not help.
-    let out_of_reach = ["--center", "500,0,379", "--radius-mm", "150", "--poses", "10", "--verify", "3"];
-    let said = run(at, &[&out_of_reach[..], &QUICK[..]].concat(), 3);
-    assert!(said.contains("places in view can be reached") && !said.contains("fewer poses"), "{said}");
-    let center = said.split("`--center ").nth(1).and_then(|rest| rest.split('`').next()).unwrap_or_else(|| panic!("{said}"));
-    let nearer = ["--center", center, "--radius-mm", "150", "--poses", "10", "--verify", "3", "--calibration"];
-    let said = run(at, &[&nearer[..], &["out/calibration.json", "--out", "nearer"], &QUICK[..]].concat(), 0);
+    // A middle that is reached, a sphere that is not: fewer poses do not help, another middle does.
+    let sphere =
+        |center: &str| ["--center", center, "--radius-mm", "150", "--poses", "10", "--verify", "3"].map(str::to_owned);
+    let run_at = |center: &str, more: &[&str], status| {
+        let sphere = sphere(center);
+        let flags: Vec<&str> = sphere.iter().map(String::as_str).chain(more.iter().copied()).chain(QUICK).collect();
+        run(at, &flags, status)
+    };
+    let said = run_at("200,0,665", &[], 3);
+    assert!(said.contains("are in view and can be reached") && !said.contains("fewer poses"), "{said}");
+    let nearer =
+        said.split("`--center ").nth(1).and_then(|rest| rest.split('`').next()).unwrap_or_else(|| panic!("{said}"));
+    let said = run_at(nearer, &["--calibration", "out/calibration.json", "--out", "nearer"], 0);
     assert!(said.contains("report: nearer/plan.html") && said.contains("programs: nearer/programs"), "{said}");
     assert!(said.contains("in 1 group ("), "{said}");
     let text = std::fs::read_to_string(at.join("robot.toml")).unwrap();

@@ -47,6 +47,8 @@ fn the_guide_counts_the_cases_as_they_are() {
     let page = |topic| stereocal::guide::page(topic).unwrap().text;
     let all = of_check + of_measure;
     assert!(page("accuracy").contains(&format!("{all} cases")), "{all}");
-    let limits = format!("plants {all} faults and oddities in rendered pictures, {of_check} of the check board and {of_measure} of the");
+    let limits = format!(
+        "plants {all} faults and oddities in rendered pictures, {of_check} of the check board and {of_measure} of the"
+    );
     assert!(page("limits").contains(&limits), "{limits}");
 }

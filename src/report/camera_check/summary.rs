@@ -11,7 +11,7 @@ use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::{Axis, Range};
 use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::judge::verdict::Verdict;
-use crate::stereo::pairs::Cause;
+use crate::stereo::pairs::{Cause, DiscardedPair};
 use crate::stereo::volume::Extent;
 
 /// A rig that may be off by such a share of a length measures nothing.
@@ -141,41 +141,30 @@ fn second_board(judged: &Judged) -> Option<String> {
     ))
 }
 
-/// How many pairs were used, and in a line a cause which were not.
+/// How many pairs were used, and in a line a reason which were not.
 fn pairs(calibration: &Calibration) -> Vec<String> {
-    /// Causes with lines of their own, and different reasons of one cause; the page has all.
-    const MOST: usize = 4;
-    const MOST_REASONS: usize = 3;
+    /// Causes and reasons with a line of their own; the page has all.
+    const MOST: usize = 6;
     let total = calibration.views.len() + calibration.skipped.len();
     let mut lines = vec![format!("{} of {total} pairs used", calibration.views.len())];
-    let mut causes: Vec<(Cause, Vec<(&str, Vec<String>)>)> = Vec::new();
+    // Reasons that differ by a figure alone are one.
+    let without_figures = |reason: &str| reason.replace(|c: char| c.is_ascii_digit() || ".-".contains(c), "");
+    let mut groups: Vec<(Cause, String, Vec<&DiscardedPair>)> = Vec::new();
     for pair in &calibration.discarded.pairs {
-        let cause = match causes.iter().position(|(cause, _)| *cause == pair.cause) {
-            Some(known) => known,
-            None => {
-                causes.push((pair.cause, Vec::new()));
-                causes.len() - 1
-            }
-        };
-        let reasons = &mut causes[cause].1;
-        match reasons.iter_mut().find(|(reason, _)| *reason == pair.reason) {
-            Some((_, names)) => names.push(pair.pair.clone()),
-            None => reasons.push((&pair.reason, vec![pair.pair.clone()])),
+        let pattern = without_figures(&pair.reason);
+        match groups.iter_mut().find(|(cause, known, _)| *cause == pair.cause && *known == pattern) {
+            Some((.., pairs)) => pairs.push(pair),
+            None => groups.push((pair.cause, pattern, vec![pair])),
         }
     }
-    let of = |reasons: &[(&str, Vec<String>)]| reasons.iter().map(|(_, names)| names.len()).sum::<usize>();
-    causes.sort_by_key(|(_, reasons)| std::cmp::Reverse(of(reasons)));
-    let others: usize = causes.iter().skip(MOST).map(|(_, reasons)| of(reasons)).sum();
-    for (_, reasons) in causes.iter().take(MOST) {
-        // Reasons that differ by a figure alone are told once, and so are many.
-        let shown = if reasons.len() > MOST_REASONS { 1 } else { reasons.len() };
-        let (told, rest) = reasons.split_at(shown);
-        lines.extend(told.iter().map(|(reason, names)| format!("  without {}: {reason}", named(names))));
-        if !rest.is_empty() {
-            let names: Vec<String> = rest.iter().flat_map(|(_, names)| names.clone()).collect();
-            lines.push(format!("  without {}: likewise, each with its figures in the report", named(&names)));
-        }
-    }
+    groups.sort_by_key(|(.., pairs)| std::cmp::Reverse(pairs.len()));
+    let others: usize = groups.iter().skip(MOST).map(|(.., pairs)| pairs.len()).sum();
+    lines.extend(groups.iter().take(MOST).map(|(.., pairs)| {
+        let reason = &pairs[0].reason;
+        let of = if pairs.iter().all(|pair| pair.reason == *reason) { "" } else { "first: " };
+        let names: Vec<String> = pairs.iter().map(|pair| pair.pair.clone()).collect();
+        format!("  without {}: {of}{reason}", named(&names))
+    }));
     if others > 0 {
         lines.push(format!("  without {others} more, see the report"));
     }
