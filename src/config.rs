@@ -63,8 +63,10 @@ pub struct Config {
     /// Where results go.
     pub out: Utf8PathBuf,
     /// The ceramic check board: 20x20 squares of 10 mm (section 4 of the paper).
+    #[serde(deserialize_with = "check_board")]
     pub check_board: BoardSettings,
     /// The alumina target on the flange: 7x6 squares of 10 mm (section 4 of the paper).
+    #[serde(deserialize_with = "target_board")]
     pub target_board: BoardSettings,
     /// The accuracy the rig must have, mm (section 4 of the paper).
     pub tolerance_mm: f64,
@@ -77,8 +79,7 @@ pub struct Config {
 }
 
 /// A board, and whether it is the paper's because none was said.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(try_from = "BoardFields")]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoardSettings {
     board: Board,
     is_assumed: bool,
@@ -93,11 +94,11 @@ struct BoardFields {
     square_mm: Option<f64>,
 }
 
-impl TryFrom<BoardFields> for BoardSettings {
-    type Error = &'static str;
-
-    fn try_from(fields: BoardFields) -> Result<BoardSettings, &'static str> {
-        match fields {
+impl BoardFields {
+    /// The board of a section, where it is not empty.
+    fn settings(self, default: BoardSettings) -> Result<BoardSettings, &'static str> {
+        match self {
+            BoardFields { board: None, squares: None, square_mm: None } => Ok(default),
             BoardFields { board: Some(NamedBoard(board)), squares: None, square_mm: None } => {
                 Ok(BoardSettings::said(board))
             }
@@ -109,6 +110,14 @@ impl TryFrom<BoardFields> for BoardSettings {
             }
         }
     }
+}
+
+fn check_board<'de, D: serde::Deserializer<'de>>(from: D) -> Result<BoardSettings, D::Error> {
+    BoardFields::deserialize(from)?.settings(Config::default().check_board).map_err(serde::de::Error::custom)
+}
+
+fn target_board<'de, D: serde::Deserializer<'de>>(from: D) -> Result<BoardSettings, D::Error> {
+    BoardFields::deserialize(from)?.settings(Config::default().target_board).map_err(serde::de::Error::custom)
 }
 
 /// What is known of the target on the robot.
@@ -172,6 +181,21 @@ impl Default for Config {
     }
 }
 
+/// What makes the file.
+const HINT: &str = "`stereocal init` writes one with every key and its meaning";
+
+/// A key that stands where there is none of its name: most likely its section's line is a comment still.
+fn of_section(error: files::Error) -> files::Error {
+    match error {
+        files::Error::Format { message, place, hint: None } if message.contains("unknown field") => {
+            let hint = "a key belongs below the line of its section, as `squares` below `[check_board]`, and that line must not begin with `#`; \
+                        `stereocal init --out new` writes every key where it belongs";
+            files::Error::Format { message, place, hint: Some(hint.to_owned()) }
+        }
+        other => other,
+    }
+}
+
 impl Config {
     /// The named file, or `stereocal.toml` in the working directory if it is there.
     pub fn file(path: Option<&Utf8Path>) -> Option<Utf8PathBuf> {
@@ -181,7 +205,7 @@ impl Config {
     /// Reads the file of settings, where there is one, and checks all of it.
     pub fn load(path: Option<&Utf8Path>) -> Result<Config> {
         let config = match Config::file(path) {
-            Some(path) => files::read_toml(&path, "settings file", None)?,
+            Some(path) => files::read_toml(&path, "settings file", Some(HINT)).map_err(of_section)?,
             None => Config::default(),
         };
         config.validate()?;

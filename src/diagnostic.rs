@@ -72,6 +72,23 @@ pub fn count(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
+/// A number with so many digits that count: 0.0012 and 1.2 and 120 with two.
+pub fn significant(value: f64, digits: i32) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 { "0".to_owned() } else { "n/a".to_owned() };
+    }
+    let first = |value: f64| value.abs().log10().floor() as i32;
+    let decimals = (digits - 1 - first(value)).clamp(0, 12) as usize;
+    let text = format!("{value:.decimals$}");
+    // 0.0996 is 0.10, and not 0.100.
+    match text.parse::<f64>() {
+        Ok(rounded) if rounded != 0.0 && first(rounded) > first(value) => {
+            format!("{rounded:.*}", decimals.saturating_sub(1))
+        }
+        _ => text,
+    }
+}
+
 /// Something a person should know although the command ends well.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
@@ -112,6 +129,27 @@ impl std::fmt::Display for Place {
         match self.line {
             Some(line) => write!(f, "{}:{line}", self.path),
             None => write!(f, "{}", self.path),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_that_count() {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.00123, "0.0012"),
+            (-0.0996, "-0.10"),
+            (0.5, "0.50"),
+            (12.34, "12"),
+            (9.96, "10"),
+            (1234.5, "1234"),
+            (f64::NAN, "n/a"),
+        ] {
+            assert_eq!(significant(value, 2), text);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Files as the program reads and writes them: whole, atomically, with the path in every complaint.
 
 mod io;
+pub mod kind;
 pub mod out_dir;
 pub mod provenance;
 

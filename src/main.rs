@@ -16,9 +16,10 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(message) if message.use_stderr() => {
             let words: Vec<String> = std::env::args_os().skip(1).map(|w| w.to_string_lossy().into_owned()).collect();
+            let (message, hint) = unexpected::mended(&Cli::command(), &words, message);
             // A stderr that cannot be written leaves nowhere to complain to.
             let _ = message.print();
-            if let Some(hint) = unexpected::hint(&Cli::command(), &words, &message) {
+            if let Some(hint) = hint {
                 let _ = writeln!(std::io::stderr().lock(), "  hint: {hint}");
             }
             return ExitCode::from(BAD_USAGE);

@@ -3,8 +3,9 @@
 use clap::Args;
 
 use super::output::Output;
-use super::values::number;
+use super::values::{number, within};
 use crate::formats::boards::files::named;
+use crate::imaging::board::SQUARES_MM;
 use crate::imaging::{Board, Squares};
 
 /// The target on the robot.
@@ -18,7 +19,7 @@ pub struct Target {
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,
     /// Side of a square, mm; key `target_board.square_mm` [default: 10]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = number)]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = within(&SQUARES_MM))]
     pub square_mm: Option<f64>,
 }
 

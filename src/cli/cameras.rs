@@ -7,12 +7,14 @@ use super::board::Target;
 use super::output::{Files, Output};
 use super::placement::ExportPlacement;
 use super::robot::ExportRobot;
-use super::values::{AskedSquares, between, number};
+use super::values::{AskedSquares, between, within};
 use crate::formats::boards::files::named;
 use crate::formats::lenses::LensFile;
+use crate::imaging::board::SQUARES_MM;
 use crate::imaging::board::printed::PrintedExtent;
 use crate::imaging::input::pairs::{PairBy, Source};
 use crate::imaging::{Board, Mosaic, Squares};
+use crate::ranges::TOLERANCES_MM;
 use crate::stereo::Lens;
 use crate::stereo::judge::moves::StatedMove;
 use crate::stereo::volume::Extent;
@@ -61,7 +63,7 @@ pub struct CameraCheck {
     #[arg(long, value_name = "CxR")]
     pub squares: Option<AskedSquares>,
     /// Side of a square, mm; key `check_board.square_mm` [default: 10]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = number)]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = within(&SQUARES_MM))]
     pub square_mm: Option<f64>,
     /// The print by a caliper, mm: its width along the columns and its height, from the outer edge of the first square to that of the last
     /// (149.7x99.8). Both are scales of their own; the caliper's uncertainty counts in the verdict, where --board-uncertainty-mm says no other
@@ -73,16 +75,16 @@ pub struct CameraCheck {
     #[arg(long, value_name = "MM[+-U][:FIRST,SECOND]", allow_negative_numbers = true)]
     pub known_move: Vec<StatedMove>,
     /// Largest length error that passes, mm; key `tolerance_mm` [default: 0.05]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = number)]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = within(&TOLERANCES_MM))]
     pub tolerance_mm: Option<f64>,
     /// Expanded uncertainty (k = 2) of the board's lengths, from its certificate, mm: widens the guard band of the verdict
-    #[arg(long, value_name = "MM", value_parser = number)]
+    #[arg(long, value_name = "MM", value_parser = within(&TOLERANCES_MM))]
     pub board_uncertainty_mm: Option<f64>,
     /// Lens model: radial2, brown4, brown5, rational8, thin-prism12 or tilted14 [default: chosen by held-out pairs]
     #[arg(long, value_name = "NAME", value_parser = lens)]
     pub lens: Option<Lens>,
     /// Lenses that are known: a calibration of this program, OpenCV, ROS, Kalibr or mrcal, and `,left` or `,right` behind it where it is for one
-    /// camera; only the rig is looked for, and three pairs are enough
+    /// camera; only the rig is looked for, and three pairs are enough for that (ten make the held-out figures reliable)
     #[arg(long, value_name = "FILE[,SIDE]")]
     pub intrinsics: Vec<LensFile>,
     /// Whether this calibration still holds, by two or more new pairs: what changed, by how much a length, and what the pairs would have shown
@@ -114,7 +116,7 @@ pub struct CameraCheck {
     #[arg(long, value_name = "CxR", requires = "check_images")]
     pub check_squares: Option<Squares>,
     /// Side of the second board's squares, mm [default: as the first]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "check_images", value_parser = number)]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "check_images", value_parser = within(&SQUARES_MM))]
     pub check_square_mm: Option<f64>,
     /// Width and height of the pictures that --corners come from, px, where the file does not hold them
     #[arg(long, value_name = "WxH", requires = "corners", value_parser = picture_size)]

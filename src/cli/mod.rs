@@ -26,6 +26,7 @@ pub use self::robot::{
 };
 pub use self::simulate::{LensBlur, Preset, Simulate};
 pub use self::values::AskedSquares;
+use self::values::whole_between;
 
 /// What `--version` says of the build; `-V` says the version alone.
 const BUILD: &str = if cfg!(debug_assertions) {
@@ -45,7 +46,7 @@ pub struct Cli {
     #[arg(long, help_heading = "Global options", global = true)]
     pub quiet: bool,
     /// Threads, 1 to 1024; results don't depend on it [default: one a core]
-    #[arg(long, help_heading = "Global options", global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, help_heading = "Global options", global = true, value_name = "N", value_parser = whole_between::<u16>(1, 1024))]
     pub threads: Option<u16>,
     /// Leave program, date, command line and inputs out of the files
     #[arg(long, help_heading = "Global options", global = true)]
@@ -61,12 +62,17 @@ pub enum Command {
     /// Calibrate both cameras by pictures of the check board, and judge the rig
     #[command(after_help = "Examples:
   stereocal camera-check check/ --squares 20x20 --square-mm 10 --known-move 5mm:03,04
-  stereocal camera-check remounted/ --squares 20x20 --square-mm 10 --intrinsics out/calibration.json --out new
+  stereocal camera-check remounted/ --squares 20x20 --square-mm 10 \\
+      --intrinsics out/calibration.json --out new
   stereocal camera-check today/ --against out/calibration.json")]
     CameraCheck(Box<CameraCheck>),
     /// Measure the target's point and orientation for each robot pose
+    #[command(after_help = "Example: stereocal measure poses/ --squares 7x6 --square-mm 10")]
     Measure(Measure),
     /// Identify the robot's kinematic parameters from measurements and joint angles
+    #[command(after_help = "Examples:
+  stereocal identify --robot robot.toml
+  stereocal identify --measurements tracker.xlsx --robot out/robot.toml --units deg,mm")]
     Identify(Identify),
     /// Compare robot files with measurements, without fitting anything
     #[command(after_help = "Example: stereocal verify --measurements today.csv --against out/identified.toml")]
@@ -81,10 +87,17 @@ pub enum Command {
     /// Undistort and rectify pairs of pictures, for eyes and for dense stereo
     Rectify(Rectify),
     /// Simulate pictures and measurements with known true values
+    #[command(
+        after_help = "It draws two checkerboards: the check board of 20x20 squares of 10 mm, and the target of 7x6 squares of 10 mm."
+    )]
     Simulate(Simulate),
     /// Choose the poses that determine the robot best, as poses.csv and robot programs
+    #[command(after_help = "Example: stereocal plan --robot robot.toml --poses 40 --verify 10")]
     Plan(Plan),
     /// Correct targets for the real robot: of a CSV, or the joint targets of a program
+    #[command(
+        after_help = "Example: stereocal compensate program.mod --robot robot.toml --identified out/identified.toml"
+    )]
     Compensate(Compensate),
     /// Write a calibration or a robot for other programs
     Export(Export),
@@ -114,7 +127,7 @@ pub struct Init {
 /// `stereocal guide`
 #[derive(Debug, Args)]
 pub struct Guide {
-    /// Which page [default: the list of them]
+    /// Which page, or a command for the page about it [default: the list of them]
     #[arg(conflicts_with = "html")]
     pub topic: Option<String>,
     /// Folder for `guide.html`: all pages in one file, with their pictures

@@ -3,7 +3,7 @@
 use camino::Utf8PathBuf;
 use clap::{Args, ValueEnum};
 
-use super::values::{between, count, whole};
+use super::values::{between, count, whole, whole_between};
 use crate::simulate::settings::Orientation;
 
 /// `stereocal simulate`
@@ -13,7 +13,7 @@ pub struct Simulate {
     #[arg(long, value_enum, default_value = "small")]
     pub preset: Preset,
     /// Width and height of the pictures, px [default: the preset's]
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(320..=16384))]
+    #[arg(long, value_name = "PX", value_parser = whole_between::<u32>(320, 16384))]
     pub size: Option<u32>,
     /// Seed of every random draw
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
@@ -40,7 +40,7 @@ pub struct Simulate {
     #[arg(long, value_enum, default_value = "gaussian")]
     pub lens_blur: LensBlur,
     /// Bits a pixel, 8 to 16; more than 8 are stored as the high bits of 16 [default: 8]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(8..=16))]
+    #[arg(long, value_name = "N", value_parser = whole_between::<u8>(8, 16))]
     pub bits: Option<u8>,
     /// How far the check board's middle stands out, um [default: 0]
     #[arg(long, value_name = "UM", allow_negative_numbers = true, value_parser = between(-1e5, 1e5))]

@@ -13,27 +13,118 @@ const PICTURES: [&str; 5] = [".png", ".jpg", ".jpeg", ".tif", ".bmp"];
 const UNITS_MM: [(&str, f64); 7] =
     [("mm", 1.0), ("cm", 10.0), ("um", 1e-3), ("inch", 25.4), ("in", 25.4), ("\"", 25.4), ("m", 1000.0)];
 
-/// What was likely meant. `words` are those of the command line behind the program's name.
-pub fn hint(root: &Command, words: &[String], error: &clap::Error) -> Option<String> {
+/// The parser's message and what was likely meant. Its tips stay where they are a slip of the keys away; a word that only shares letters with the
+/// one that was typed is worse than none. `words` are those of the command line behind the program's name.
+pub fn mended(root: &Command, words: &[String], mut error: clap::Error) -> (clap::Error, Option<String>) {
+    const TIPS: [(ContextKind, ContextKind); 3] = [
+        (ContextKind::SuggestedSubcommand, ContextKind::InvalidSubcommand),
+        (ContextKind::SuggestedArg, ContextKind::InvalidArg),
+        (ContextKind::SuggestedValue, ContextKind::InvalidValue),
+    ];
+    for (tip, typed) in TIPS {
+        let typed = match error.get(typed) {
+            Some(ContextValue::String(typed)) => typed.clone(),
+            _ => continue,
+        };
+        let near: Vec<String> = match error.remove(tip) {
+            Some(ContextValue::String(word)) => vec![word],
+            Some(ContextValue::Strings(words)) => words,
+            _ => continue,
+        };
+        let near: Vec<String> = near.into_iter().filter(|word| is_slip(&typed, word)).collect();
+        match &near[..] {
+            [] => {}
+            [one] => _ = error.insert(tip, ContextValue::String(one.clone())),
+            _ => _ = error.insert(tip, ContextValue::Strings(near)),
+        }
+    }
+    let hint = hint(root, words, &error);
+    (error, hint)
+}
+
+/// Whether one word is the other with few letters wrong, missing or too many: one in three, as those make another word.
+fn is_slip(typed: &str, word: &str) -> bool {
+    let [typed, word] = [typed, word].map(|w| w.trim_start_matches('-').chars().collect::<Vec<char>>());
+    let mut before: Vec<usize> = (0..=word.len()).collect();
+    for (i, a) in typed.iter().enumerate() {
+        let mut row = vec![i + 1];
+        for (j, b) in word.iter().enumerate() {
+            row.push((before[j] + usize::from(a != b)).min(before[j + 1] + 1).min(row[j] + 1));
+        }
+        before = row;
+    }
+    before[word.len()] <= (typed.len().max(word.len()) / 3).max(1)
+}
+
+fn hint(root: &Command, words: &[String], error: &clap::Error) -> Option<String> {
     let command = words.iter().fold(root, |at, word| at.find_subcommand(word).unwrap_or(at));
     match (error.kind(), error.get(ContextKind::InvalidArg)) {
-        (ErrorKind::UnknownArgument, Some(ContextValue::String(given))) => without_flag(command, given),
+        (ErrorKind::UnknownArgument, Some(ContextValue::String(given))) => {
+            without_flag(command, given).or_else(|| named_otherwise(command, given, error))
+        }
         (ErrorKind::ValueValidation, Some(ContextValue::String(flag))) => match error.get(ContextKind::InvalidValue) {
             Some(ContextValue::String(value)) => as_mm(flag, value),
             _ => None,
         },
-        (ErrorKind::MissingRequiredArgument, Some(ContextValue::Strings(missing))) => choices(command, missing),
+        (ErrorKind::MissingRequiredArgument, Some(ContextValue::Strings(missing))) => {
+            choices(command, missing).or_else(|| in_place_of(command, missing))
+        }
         (ErrorKind::InvalidSubcommand, _) if command.get_name() != root.get_name() => {
             let names: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
             Some(format!("`{}` takes one of {}", command.get_name(), names.join(", ")))
         }
+        (ErrorKind::InvalidSubcommand, _) if error.get(ContextKind::SuggestedSubcommand).is_none() => Some(
+            "`camera-check` calibrates the cameras, `identify` the robot; `stereocal --help` lists all commands"
+                .to_owned(),
+        ),
         _ => None,
     }
+}
+
+/// For a flag that there is not: those that share most of its words, `--square-mm` for `--square-size`.
+fn named_otherwise(command: &Command, given: &str, error: &clap::Error) -> Option<String> {
+    const MOST: usize = 4;
+    let typed: Vec<&str> = given.strip_prefix("--")?.split('-').collect();
+    if error.get(ContextKind::SuggestedArg).is_some() {
+        return None;
+    }
+    // The words that both have, of all that either has, in thousandths.
+    let shared = |arg: &Arg| {
+        let own: Vec<&str> = arg.get_long()?.split('-').collect();
+        let both = own.iter().filter(|word| typed.contains(word)).count();
+        (both > 0).then(|| 1000 * both / (own.len() + typed.len() - both))
+    };
+    let best = command.get_arguments().filter_map(shared).max()?;
+    let flags = command.get_arguments().filter(|arg| shared(arg) == Some(best)).take(MOST);
+    let said = |arg: &Arg| {
+        let value = arg.get_value_names().and_then(|names| names.first().map(|name| format!(" {name}")));
+        format!("`--{}{}`", arg.get_long().unwrap_or_default(), value.unwrap_or_default())
+    };
+    let flags: Vec<String> = flags.map(said).collect();
+    Some(format!("there is {}", flags.join(" and ")))
+}
+
+/// For flags that are missing: others that do in their place.
+fn in_place_of(command: &Command, missing: &[String]) -> Option<String> {
+    let is_missing = |arg: &&Arg| {
+        arg.get_long().is_some_and(|long| missing.iter().any(|flag| flag.starts_with(&format!("--{long} "))))
+    };
+    let asked = command.get_arguments().find(is_missing)?;
+    let instead = command.get_arguments().find(|other| {
+        other.get_long().is_some()
+            && command.get_arg_conflicts_with(other).iter().any(|arg| arg.get_id() == asked.get_id())
+    })?;
+    let value = instead.get_value_names().and_then(|names| names.first())?;
+    Some(format!("or `--{} {value}` in its place", instead.get_long()?))
 }
 
 /// For a length with a unit or a decimal comma: the number that the flag takes.
 fn as_mm(flag: &str, value: &str) -> Option<String> {
     let name = flag.strip_suffix(" <MM>")?;
+    // One that is a number is not in the flag's range.
+    if value.trim().parse::<f64>().is_ok() {
+        return None;
+    }
     let value = value.trim().to_lowercase().replace(',', ".");
     let (number, of_one) =
         UNITS_MM.iter().find_map(|(unit, mm)| Some((value.strip_suffix(unit)?, *mm))).unwrap_or((value.as_str(), 1.0));
@@ -63,8 +154,10 @@ fn without_flag(command: &Command, given: &str) -> Option<String> {
             "pictures are named by their folder, or by one for the left and one for the right camera".to_owned(),
         );
     }
+    // What has an ending is a file.
+    let places = if camino::Utf8Path::new(given).extension().is_some() { &PLACES[..1] } else { &PLACES[..] };
     let takes_a_place = |arg: &&Arg| {
-        arg.get_value_names().is_some_and(|names| names.iter().any(|name| PLACES.contains(&name.as_str())))
+        arg.get_value_names().is_some_and(|names| names.iter().any(|name| places.contains(&name.as_str())))
     };
     let flags: Vec<String> = command
         .get_arguments()
@@ -86,13 +179,13 @@ mod tests {
     fn of(words: &[&str]) -> Option<String> {
         let words: Vec<String> = words.iter().map(|w| (*w).to_owned()).collect();
         let error = Cli::try_parse_from(std::iter::once("stereocal".to_owned()).chain(words.clone())).unwrap_err();
-        hint(&Cli::command(), &words, &error)
+        mended(&Cli::command(), &words, error).1
     }
 
     #[test]
     fn a_file_without_its_flag_is_answered_with_the_flags_that_take_one() {
         let said = of(&["identify", "points.csv"]).unwrap();
-        assert!(said.contains("`--measurements points.csv`") && said.contains("or `--out points.csv`"), "{said}");
+        assert!(said.contains("`--measurements points.csv`") && !said.contains("--out"), "{said}");
         assert!(of(&["--quiet", "camera-check", "left", "right", "more"]).unwrap().contains("--out"));
     }
 
@@ -111,8 +204,31 @@ mod tests {
     fn what_is_missing_or_unknown_is_answered_with_the_words_there_are() {
         assert_eq!(of(&["export", "calibration"]).unwrap(), "`--format` takes one of opencv, ros, kalibr, mrcal");
         assert!(of(&["export", "opencv"]).unwrap().starts_with("`export` takes one of calibration, robot, placement"));
-        assert_eq!(of(&["calibrate"]), None);
+        assert!(of(&["calibrate"]).unwrap().starts_with("`camera-check` calibrates the cameras"));
+        assert!(of(&["camera-check", "x", "--square-size", "12"]).unwrap().contains("`--square-mm MM`"));
+        assert!(of(&["verify", "--measurements", "x"]).unwrap().contains("`--against IDENTIFIED`"));
         assert!(of(&["camera-check", "l/1.png", "l/2.png", "l/3.PNG"]).unwrap().contains("by their folder"));
+    }
+
+    #[test]
+    fn tips_stay_where_they_are_a_slip_away() {
+        let said = |words: &[&str]| {
+            let words: Vec<String> = words.iter().map(|w| (*w).to_owned()).collect();
+            let error = Cli::try_parse_from(std::iter::once("stereocal".to_owned()).chain(words.clone())).unwrap_err();
+            mended(&Cli::command(), &words, error).0.to_string()
+        };
+        for (typed, tip) in [
+            (&["identfy"][..], Some("identify")),
+            (&["identify", "--sed", "3"], Some("--seed")),
+            (&["calibrate"], None),
+            (&["camera-check", "x", "--square-size", "12"], None),
+            (&["export", "calibration", "--format", "matlab"], None),
+            (&["export", "calibration", "--format", "opncv"], Some("opencv")),
+        ] {
+            let said = said(typed);
+            assert_eq!(said.contains("tip:"), tip.is_some(), "{typed:?}: {said}");
+            assert!(tip.is_none_or(|tip| said.contains(tip)), "{typed:?}: {said}");
+        }
     }
 
     #[test]

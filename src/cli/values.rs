@@ -1,5 +1,7 @@
 //! Numbers as flags take them.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use crate::imaging::Squares;
@@ -34,16 +36,29 @@ pub(super) fn whole<T: FromStr>(text: &str) -> Result<T, String> {
 
 /// Reads a number of a range.
 pub(super) fn between(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
-    move |text| match text.parse::<f64>() {
-        Ok(value) if (least..=most).contains(&value) => Ok(value),
+    move |text| match number(text)? {
+        value if (least..=most).contains(&value) => Ok(value),
         _ => Err(format!("a number from {least} to {most} is needed")),
+    }
+}
+
+/// Reads a number of a range of the settings.
+pub(super) fn within(range: &RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    between(*range.start(), *range.end())
+}
+
+/// Reads a whole number of a range.
+pub(super) fn whole_between<T>(least: T, most: T) -> impl Fn(&str) -> Result<T, String> + Clone
+where
+    T: FromStr + PartialOrd + Display + Copy,
+{
+    move |text| match text.parse::<T>() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("a whole number from {least} to {most} is needed")),
     }
 }
 
 /// Reads a count of a range.
 pub(super) fn count(least: usize, most: usize) -> impl Fn(&str) -> Result<usize, String> + Clone {
-    move |text| match text.parse::<usize>() {
-        Ok(value) if (least..=most).contains(&value) => Ok(value),
-        _ => Err(format!("a whole number from {least} to {most} is needed")),
-    }
+    whole_between(least, most)
 }

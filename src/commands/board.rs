@@ -7,6 +7,7 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::boards::sheet::{Sheet, TooLarge};
+use crate::progress;
 
 /// Runs the command.
 pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
@@ -26,6 +27,7 @@ pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
     .collect();
     let names: Vec<&str> = written.iter().map(|(name, _)| *name).collect();
     out.check_free(&names)?;
+    note_earlier(&out, &written);
     for (name, bytes) in &written {
         out.write(name, bytes)?;
     }
@@ -47,4 +49,19 @@ pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
         )
     };
     Ok(Outcome { stdout, status: Status::Done })
+}
+
+/// Says which sheets of an earlier run are replaced by another board's, and which stay beside it.
+fn note_earlier(out: &OutDir, written: &[(&str, Vec<u8>)]) {
+    for name in ["board.pdf", "board.svg", "board.png"] {
+        let Ok(earlier) = std::fs::read(out.join(name)) else { continue };
+        match written.iter().find(|(new, _)| *new == name) {
+            Some((_, bytes)) if *bytes == earlier => {}
+            Some(_) => progress::note(format!("{} of an earlier run is replaced", out.join(name))),
+            None => progress::warn(format!(
+                "{} stays as an earlier run wrote it: it may be of another board",
+                out.join(name)
+            )),
+        }
+    }
 }

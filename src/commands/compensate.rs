@@ -9,7 +9,7 @@ use crate::cli::Compensate;
 use crate::compensate::{Compensated, Compensator, Target};
 use crate::config::{self, Config};
 use crate::csv_table::MOST_ROWS;
-use crate::diagnostic::Status;
+use crate::diagnostic::{Status, count};
 use crate::files::provenance::Run;
 use crate::files::{self, OutDir};
 use crate::formats::targets::{self, Row};
@@ -279,12 +279,13 @@ impl Moved {
 const SAME_MM: f64 = 1e-6;
 
 fn said(summary: &Summary, motions: Option<&[Instruction]>, written: &Utf8Path) -> String {
-    let mut text = format!("{} of {} targets compensated: {written}\n", summary.compensated, summary.targets);
+    let mut text = format!("{} of {} compensated: {written}\n", summary.compensated, count(summary.targets, "target"));
     if let Some(motions) = motions {
         let through = motions.iter().filter(|m| m.moves_by.is_ok()).count();
         text += &match motions.len() {
             0 => "no instruction in this file moves to them: whether each use of them is a motion is not known\n"
                 .to_owned(),
+            1 if through == 1 => "the one motion to them is compensated\n".to_owned(),
             all if all == through => format!("all {all} motions move to them\n"),
             all => format!("{through} of {all} motions move to them; {} left as written\n", all - through),
         };
@@ -301,8 +302,8 @@ fn said(summary: &Summary, motions: Option<&[Instruction]>, written: &Utf8Path) 
     };
     let refused = |r: &Refused| format!("not compensated: {} (line {}): {}", r.name, r.line, r.reason);
     listed(&mut text, summary.refused.iter().map(refused), summary.refused.len(), "compensated.csv");
-    let count = left.len();
-    listed(&mut text, left.into_iter(), count, "compensate.json");
+    let of_motions = left.len();
+    listed(&mut text, left.into_iter(), of_motions, "compensate.json");
     text
 }
 

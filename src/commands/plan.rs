@@ -7,7 +7,7 @@ use super::identify::robot_file;
 use super::{Outcome, Result};
 use crate::cli::{Plan as Arguments, PlanKind};
 use crate::config::{self, Config};
-use crate::diagnostic::Status;
+use crate::diagnostic::{Status, count};
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
@@ -159,7 +159,7 @@ fn programs(args: &Arguments, robot: &Robot, order: &JointOrder, poses: &[Planne
         Language::ALL.into_iter().partition(|language| order.unknown_axis(*language).is_some());
     if !open.is_empty() {
         let names: Vec<&str> = open.into_iter().map(Language::name).collect();
-        progress::warn(&format!(
+        progress::warn(format!(
             "no programs for {}: which of the {} joints the number behind the six axes is, nobody said; {}",
             names.join(", "),
             slides.len(),
@@ -186,13 +186,14 @@ fn programs(args: &Arguments, robot: &Robot, order: &JointOrder, poses: &[Planne
 fn said(args: &Arguments, found: &Plan, record: &PlanFile, out: &OutDir, earlier: Option<&[Measurement]>) -> String {
     let of = |role: Role| found.poses.iter().filter(|p| p.at.role == role).count();
     let mut text = format!(
-        "{} poses in {} groups ({} to identify from, {} to verify, the others centres): {}\n",
+        "{} poses in {} ({} to identify from, {} to verify, the others centres): {}\n",
         found.poses.len(),
-        found.placements.len(),
+        count(found.placements.len(), "group"),
         of(Role::Sample),
         of(Role::Verify),
         out.join("poses.csv")
     );
+    text += &format!("programs: {}\nreport: {}\n", out.join("programs"), out.join("plan.html"));
     if args.first.is_some() {
         text += "measure them, then `stereocal plan --after out/measurements.csv` plans the rest where the cameras really stand\n";
         return text;

@@ -198,8 +198,8 @@ fn show(args: &RobotShow) -> Result<String> {
     Ok(format!("{}\n{}", report::chain(&robot), report::pose(&robot, joints_deg)))
 }
 
-/// The known name with the longest common run of letters, dashes left out.
-fn most_similar(name: &str) -> String {
+/// The known name with the longest common run of letters, dashes left out, where that is most of the name.
+fn most_similar(name: &str) -> Option<String> {
     let plain = |s: &str| s.to_ascii_lowercase().chars().filter(char::is_ascii_alphanumeric).collect::<String>();
     let wanted = plain(name);
     let common = |known: &str| {
@@ -209,7 +209,9 @@ fn most_similar(name: &str) -> String {
         (runs.map(|(from, to)| to - from).max().unwrap_or(0), std::cmp::Reverse(known.len()))
     };
     let names = catalogue::ARMS.iter().map(|arm| arm.name).chain([catalogue::PAPER]);
-    names.max_by_key(|known| common(known)).unwrap_or(catalogue::PAPER).to_owned()
+    let nearest = names.max_by_key(|known| common(known))?;
+    let run = common(nearest).0;
+    (run >= 3 && 2 * run > wanted.len()).then(|| nearest.to_owned())
 }
 
 impl From<DhConvention> for Convention {

@@ -3,7 +3,7 @@
 use super::{Outcome, Result};
 use crate::cli::{LensBlur, Preset, Simulate};
 use crate::config::Config;
-use crate::diagnostic::Status;
+use crate::diagnostic::{Status, count};
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::robot;
@@ -99,7 +99,7 @@ fn optics(blur: LensBlur, preset: Optics) -> Optics {
 
 fn summary(args: &Simulate, world: &World, out: &OutDir) -> String {
     let settings = &world.settings;
-    let poses = format!("{} robot poses in {} groups", world.poses.len(), settings.spheres.len());
+    let poses = format!("{} in {}", count(world.poses.len(), "robot pose"), count(settings.spheres.len(), "group"));
     if args.points_only {
         return format!("{poses}, {} mm noise a coordinate, in {}\n", settings.point_noise_mm, out.path());
     }

@@ -6,6 +6,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::kind::kind;
 use crate::diagnostic::{Explain, Place};
 
 /// Result of reading or writing a file.
@@ -56,6 +57,16 @@ impl Error {
         let place = Place { path: path.to_owned(), line };
         Error::Format { message: message.into(), place, hint: hint.map(str::to_owned) }
     }
+
+    /// The same error with another hint, where it has one: the command knows the flag that named the file.
+    pub fn with_hint(self, new: &str) -> Error {
+        let new = Some(new.to_owned());
+        match self {
+            Error::Missing { what, path, hint: Some(_) } => Error::Missing { what, path, hint: new },
+            Error::Format { message, place, hint: Some(_) } => Error::Format { message, place, hint: new },
+            other => other,
+        }
+    }
 }
 
 impl Explain for Error {
@@ -69,14 +80,17 @@ impl Explain for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Error::Missing { hint, .. } | Error::Format { hint, .. } => hint.clone(),
-            Error::Io { action, source, .. } => {
-                let may_not_write = *action != "read" && source.kind() == std::io::ErrorKind::PermissionDenied;
-                may_not_write.then(|| "`--out DIR` names a folder that you may write into".to_owned())
+            Error::Io { action, source, path } if source.kind() == std::io::ErrorKind::PermissionDenied => {
+                Some(match *action {
+                    "read" => format!("its owner can let you read it: `chmod -R u+rX {path}`"),
+                    _ => "`--out DIR` names a folder that you may write into".to_owned(),
+                })
             }
+            Error::Io { .. } => None,
             Error::OverInput { .. } => Some("`--out DIR` names another folder".to_owned()),
-            Error::OverForeign { .. } => Some(
-                "`--out DIR` names another folder; `--force`, where the command has it, replaces the file".to_owned(),
-            ),
+            Error::OverForeign { .. } => {
+                Some("`--out DIR` names another folder; `--force` replaces the file".to_owned())
+            }
         }
     }
 }
@@ -124,10 +138,14 @@ fn found_elsewhere(path: &Utf8Path) -> Option<String> {
 
 pub fn read_json<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<T> {
     let text = read_text(path, what, hint)?;
-    let of_another_kind = !text.trim_start().starts_with(['{', '[']);
-    serde_json::from_str(&text).map_err(|e| match of_another_kind {
-        true => Error::format(path, None, format!("{what}: this is no JSON"), hint),
-        false => Error::format(path, Some(e.line() as u64), format!("{what}: {e}"), None),
+    let is_json = text.trim_start().starts_with(['{', '[']);
+    serde_json::from_str(&text).map_err(|e| match (is_json, kind(&text)) {
+        (false, Some(other)) => Error::format(path, None, format!("{what}: this is no JSON, but {other}"), hint),
+        (false, None) => Error::format(path, None, format!("{what}: this is no JSON"), hint),
+        (true, Some(other)) if !what.split(' ').any(|word| other.split(' ').any(|own| own == word)) => {
+            Error::format(path, None, format!("{what}: this is {other}"), hint)
+        }
+        (true, _) => Error::format(path, Some(e.line() as u64), format!("{what}: {e}"), None),
     })
 }
 
@@ -137,8 +155,15 @@ pub fn read_toml<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint:
         return Err(Error::format(path, None, format!("{what}: this is JSON, and TOML is needed"), hint));
     }
     toml::from_str(&text).map_err(|e| {
+        if let Some(other @ "a table") = kind(&text) {
+            return Error::format(path, None, format!("{what}: this is {other}, and TOML is needed"), hint);
+        }
         let line = e.span().map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count() as u64);
-        Error::format(path, line, format!("{what}: {}", e.message()), None)
+        // Some messages do not say which key it is.
+        let key = e.span().and_then(|span| text.get(span)).filter(|key| !key.is_empty() && key.len() < 40);
+        let key = key.filter(|key| !e.message().contains('`') && !key.contains('\n'));
+        let key = key.map_or(String::new(), |key| format!(": `{key}`"));
+        Error::format(path, line, format!("{what}: {}{key}", e.message()), None)
     })
 }
 
@@ -169,7 +194,7 @@ pub fn is_temporary(name: &str) -> bool {
 
 /// Writes a file whole or not at all, making its folder where needed: to a temporary name beside it, then renamed.
 pub fn write_atomically(path: &Utf8Path, bytes: &[u8], durability: Durability) -> Result<()> {
-    let io = |source| Error::Io { action: "write", path: path.to_owned(), source };
+    let io = |source| Error::Io { action: "write", path: path.to_owned(), source: without_path(source) };
     let folder = match path.parent() {
         Some(folder) if !folder.as_str().is_empty() => folder,
         _ => Utf8Path::new("."),
@@ -186,6 +211,12 @@ pub fn write_atomically(path: &Utf8Path, bytes: &[u8], durability: Durability) -
         sync_folder(folder).map_err(io)?;
     }
     Ok(())
+}
+
+/// The system's reason alone: a temporary file's name is nothing that a person knows.
+pub fn without_path(error: std::io::Error) -> std::io::Error {
+    let told = error.raw_os_error().is_none() && error.kind().to_string() != "uncategorized error";
+    if told && error.kind() != std::io::ErrorKind::Other { error.kind().into() } else { error }
 }
 
 /// Flushes the renaming itself. Not every file system has an operation for that, and not every folder may be opened.
@@ -210,5 +241,25 @@ impl PermissionsLikeOthers for tempfile::Builder<'_, '_> {
             self.permissions(std::fs::Permissions::from_mode(0o666));
         }
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_temporary_name_is_not_told() {
+        let refused = tempfile::NamedTempFile::new_in("/nowhere at all").unwrap_err();
+        assert!(refused.to_string().contains("nowhere"));
+        assert!(!without_path(refused).to_string().contains("nowhere"));
+    }
+
+    #[test]
+    fn what_may_not_be_read_is_answered_with_what_lets_it_be() {
+        let refused =
+            |action| Error::Io { action, path: "x".into(), source: std::io::ErrorKind::PermissionDenied.into() };
+        assert!(refused("read").hint().is_some_and(|hint| hint.contains("chmod -R u+rX x")));
+        assert!(refused("write").hint().is_some_and(|hint| hint.contains("--out DIR")));
     }
 }

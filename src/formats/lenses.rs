@@ -46,6 +46,9 @@ pub fn read(named: &[LensFile]) -> Result<Option<KnownLenses>> {
     Ok(known)
 }
 
+/// What the flag takes.
+const HINT: &str = "`--intrinsics FILE` takes a calibration.json of `stereocal camera-check`, or a file of OpenCV, ROS, Kalibr or mrcal";
+
 fn read_one(file: &LensFile) -> Result<KnownLenses> {
     let LensFile { path, side } = file;
     if let Some(side) = side
@@ -58,7 +61,7 @@ fn read_one(file: &LensFile) -> Result<KnownLenses> {
             let hint = Some(format!("of a file with one camera say which: `--intrinsics {path},left`"));
             files::Error::Format { message, place, hint }
         }
-        (other, _) => other,
+        (other, _) => other.with_hint(HINT),
     })?;
     let sides = side.map_or(Side::BOTH.to_vec(), |side| vec![side]);
     let mut known = KnownLenses::of_rig(&read.rig, &sides);

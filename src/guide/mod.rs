@@ -57,9 +57,30 @@ pub const PICTURES: [Picture; 9] = pictures![
     "pictures/alike.png",
 ];
 
-/// The page of a topic.
+/// Commands, and the page that is about each.
+const COMMANDS: [(&str, &str); 15] = [
+    ("camera-check", "pictures"),
+    ("measure", "poses"),
+    ("identify", "robot"),
+    ("verify", "again"),
+    ("locate", "placement"),
+    ("board", "boards"),
+    ("report", "day"),
+    ("rectify", "formats"),
+    ("simulate", "accuracy"),
+    ("plan", "poses"),
+    ("compensate", "robot"),
+    ("export", "formats"),
+    ("init", "formats"),
+    ("guide", "day"),
+    ("man", "formats"),
+];
+
+/// The page of a topic, in any case, or of a command.
 pub fn page(topic: &str) -> Option<&'static Page> {
-    PAGES.iter().find(|page| page.topic == topic)
+    let topic = topic.to_lowercase();
+    let of_command = COMMANDS.iter().find(|(command, _)| *command == topic).map(|(_, page)| *page);
+    PAGES.iter().find(|page| page.topic == of_command.unwrap_or(&topic))
 }
 
 impl Page {
@@ -96,6 +117,9 @@ mod tests {
             assert_eq!(page(found.topic), Some(found));
         }
         assert_eq!(page("nothing"), None);
+        assert_eq!(page("Warnings"), page("warnings"));
+        assert!(COMMANDS.iter().all(|(command, _)| page(command).is_some()));
+        assert_eq!(page("camera-check"), page("pictures"));
     }
 
     #[test]

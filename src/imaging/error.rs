@@ -2,7 +2,7 @@
 
 use camino::Utf8PathBuf;
 
-use super::board::{self, Board, Kind, Squares};
+use super::board::{self, Board, Kind};
 use super::corners::{Skipped, reasons, too_few};
 use crate::diagnostic::Explain;
 
@@ -99,8 +99,8 @@ pub enum Error {
         path: Utf8PathBuf,
         /// The others, and why.
         skipped: Vec<Skipped>,
-        /// Another board size that the pictures show.
-        other: Option<Squares>,
+        /// Another board that the pictures show.
+        other: Option<Box<Board>>,
     },
 }
 
@@ -170,8 +170,11 @@ impl Explain for Error {
             {
                 Some(SAVED_AS.to_owned())
             }
-            Error::TooFewPairs { other: Some(squares), .. } => {
-                let (columns, rows) = (squares.columns - 1, squares.rows - 1);
+            Error::TooFewPairs { other: Some(other), .. } if other.is_coded() => {
+                Some(format!("`--board {other}`: the pictures show markers as that board has them"))
+            }
+            Error::TooFewPairs { other: Some(other), .. } => {
+                let (squares, columns, rows) = (other.squares, other.columns(), other.rows());
                 Some(format!("`--squares {squares}`: the pictures show a board with {columns}x{rows} inner corners"))
             }
             // The board is the right one: most pairs show it.

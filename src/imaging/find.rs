@@ -21,7 +21,7 @@ use super::lattice::{Lattice, Places};
 use super::open::{listed, open_pair};
 use super::refine::fields;
 use super::shown::{printed, unseen_lines};
-use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, Squares, order, overlay, refine};
+use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, order, overlay, refine};
 use crate::files::OutDir;
 use crate::files::provenance::picture_hash;
 use crate::progress;
@@ -50,7 +50,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
         pairing.pairs.par_iter().map(|files| [&files.left, &files.right].map(|path| image::header(path))).collect();
     let sizes = majority_sizes(&headers);
     let seen = look_at_all(pairing, &headers, sizes, wanted);
-    let other = other_size(&seen);
+    let other = other_board(&seen).map(Box::new);
     printed(&wanted.board, &seen).iter().for_each(progress::note);
     let Sorted { found, skipped, open } = sort_out(&pairing.pairs, seen, wanted.board);
     let total = pairing.pairs.len();
@@ -240,7 +240,9 @@ fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
                 squares.columns + columns,
                 squares.rows + rows
             ),
-            seen: detect::size_seen(detected).filter(|seen| *seen != squares),
+            seen: detect::size_seen(detected)
+                .filter(|seen| *seen != squares)
+                .map(|seen| Board { squares: seen, ..board }),
         });
     }
     let mut corners = refine::refine(picture, detected);
@@ -306,19 +308,18 @@ fn majority_sizes(headers: &[[Announced; 2]]) -> [(u32, u32); 2] {
 
 type Found = (String, Lattice<Corner>, Lattice<Corner>);
 
-/// The size of board that most of the refused pictures show instead.
-fn other_size(seen: &[[Look; 2]]) -> Option<Squares> {
+/// The board that most of the refused pictures show instead.
+fn other_board(seen: &[[Look; 2]]) -> Option<Board> {
     let refusal = |look: &'_ Look| match look {
         Ok(seen) => seen.open.as_ref().map(|open| open.refusal.clone()),
         Err(refusal) => Some(refusal.clone()),
     };
     let refused: Vec<Refusal> = seen.iter().flatten().filter_map(refusal).collect();
-    let mut counts: BTreeMap<(usize, usize), usize> = BTreeMap::new();
-    for squares in refused.iter().filter_map(|refusal| refusal.seen) {
-        *counts.entry((squares.columns, squares.rows)).or_default() += 1;
-    }
-    let ((columns, rows), count) = counts.into_iter().max_by_key(|&(size, count)| (count, size))?;
-    (2 * count > refused.len()).then_some(Squares { columns, rows })
+    let boards: Vec<Board> = refused.iter().filter_map(|refusal| refusal.seen).collect();
+    // Where the markers of one picture are of a small dictionary and those of another of a larger one that begins with it, it is the larger.
+    let shown = |board: &Board| boards.iter().filter(|other| board.has_all_of(other)).count();
+    let board = boards.iter().max_by_key(|board| shown(board))?;
+    (2 * shown(board) > refused.len()).then_some(*board)
 }
 
 /// Pairs by what they show.

@@ -6,6 +6,7 @@ mod judge;
 mod layout;
 mod part;
 mod pick;
+mod refused;
 mod rows;
 pub mod source;
 

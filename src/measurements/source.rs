@@ -13,12 +13,12 @@ use super::assemble::{self, Taken};
 use super::judge::{self, Basis, Forced, Verdict, Way};
 use super::layout;
 use super::part::{At, Part};
-use super::pick::{self, Picked, columns_flag, listed};
+use super::pick::{self, listed};
+use super::refused::{lacking, open, unplaced, wrong_unit};
 use super::{Measurement, read};
 use crate::diagnostic::Place;
 use crate::files::{Error, Result};
 use crate::robot::Robot;
-use crate::tables::Form;
 use crate::tables::names::{Name, Unit, What};
 
 /// Section `[measurements]`: what is known of tables beside what they say.
@@ -139,7 +139,7 @@ impl Source {
         let unit = self.forced().joints.or(picked.joint_unit).or_else(|| judge::angle_by_size(&parts, &picked));
         let Some(unit) = unit else {
             let message =
-                "whether the joints are degrees or radians is said by no name, and the numbers could be either";
+                "no column name tells whether the joints are degrees or radians, and the numbers could be either";
             return Err(parts[0]
                 .refuse(message.to_owned(), Some("name the columns j1_deg, j2_deg, ... or q1 [rad], q2 [rad], ...")));
         };
@@ -195,7 +195,7 @@ impl Source {
                     false => ("points are mm or m", "`--units mm` or `--units m` says it (`--units rad,m` both)"),
                 };
                 let message = format!(
-                    "whether the {what} is said by no name, the numbers could be either, and the nominal robot does not tell"
+                    "no column name tells whether the {what}, the numbers could be either, and the nominal robot does not tell"
                 );
                 Err(parts[0].refuse(message, Some(hint)))
             }
@@ -203,7 +203,10 @@ impl Source {
                 let ways = || judge::usual(&candidates, self.forced());
                 let apart = if self.columns.is_some() { None } else { apart::clearest(parts, ways(), robot) };
                 let mixed = || parts.iter().find_map(Part::mixed);
-                Err(apart.map(|a| a.asked(parts)).or_else(mixed).unwrap_or_else(|| unplaced(parts, &candidates[0])))
+                Err(apart
+                    .map(|a| a.asked(parts))
+                    .or_else(mixed)
+                    .unwrap_or_else(|| unplaced(parts, &candidates[0], self.forced())))
             }
         }
     }
@@ -299,101 +302,4 @@ fn sets(parts: Vec<Part>, count: usize) -> Vec<Vec<Part>> {
         list.push(open);
     }
     list
-}
-
-fn lacking(parts: &[Part], picked: &Picked, count: usize) -> crate::files::Error {
-    let names = |p: &Part| {
-        let shown = p.names.as_ref().map(|n| n.iter().take(40).cloned().collect::<Vec<_>>().join(", "));
-        match shown {
-            Some(names) => format!("{} has {names}", p.file_name()),
-            None if p.is_program() => format!("{} has the joint targets of a program", p.file_name()),
-            None => {
-                format!("{} has {} columns without names, {} of them numbers", p.file_name(), p.width(), p.free().len())
-            }
-        }
-    };
-    let found: Vec<String> = parts.iter().map(names).collect();
-    let what = match (picked.joints.is_empty(), picked.is_measured()) {
-        (true, true) => format!("no columns of {count} joints"),
-        (false, false) => "no columns of a measured point or a distance".to_owned(),
-        _ => format!("no columns of {count} joints and of a measured point or a distance"),
-    };
-    let sheets = parts.iter().find(|p| matches!(&p.grid.form, Form::Sheet(_, others) if *others > 0));
-    let sheets = sheets.map_or(String::new(), |p| format!(", `{}#SHEET` another sheet", p.file_name()));
-    let hint = format!(
-        "{}another `--measurements FILE` joins the file that has them row by row{sheets}; \
-         `--columns j1,j2,...,-,x,y,z` names the columns in their order, `-` skips one",
-        lying(parts, count)
-    );
-    parts[0].refuse(format!("{what}: {}", found.join("; ")), Some(&hint))
-}
-
-/// What to do with a table whose rows are as many as the columns that a pose has.
-fn lying(parts: &[Part], count: usize) -> &'static str {
-    let lies = |p: &Part| {
-        let rows = p.rows.len();
-        !p.is_named() && p.width() > 2 * rows && (rows == 3 || rows == count || rows >= count + 3)
-    };
-    if parts.iter().any(lies) { "if each column is a pose, exchange rows and columns; " } else { "" }
-}
-
-fn unplaced(parts: &[Part], first: &Picked) -> crate::files::Error {
-    let hint = format!(
-        "{}`--columns {}` if these are the columns; look at `--robot`, too: its file must be of this robot",
-        lying(parts, first.joints.len()),
-        columns_flag(parts, &first.joints, &first.points.first().map_or(Vec::new(), |(_, at)| at.to_vec()))
-    );
-    let what = match parts.iter().any(|p| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance))) {
-        true => "the joints",
-        false if parts.iter().any(|p| p.names_any(|w| matches!(w, What::Joint(_)))) => "the point",
-        false => "the joints and which the point",
-    };
-    let message =
-        format!("no name says which columns are {what}, and no choice of them comes near to the nominal robot");
-    parts[0].refuse(message, Some(&hint))
-}
-
-fn open(parts: &[Part], a: &Way, b: &Way) -> crate::files::Error {
-    let point = |way: &Way| way.picked.points.first().map(|(_, at)| *at);
-    match (point(a), point(b)) {
-        (Some(first), Some(second)) if first != second && a.picked.joints == b.picked.joints => {
-            let (first, second) = if first <= second { (first, second) } else { (second, first) };
-            pick::asked(parts, &a.picked.joints, [&first, &second], false)
-        }
-        _ => {
-            let message = format!(
-                "two sets of joints would do, {} and {}",
-                listed(parts, &a.picked.joints),
-                listed(parts, &b.picked.joints)
-            );
-            let flag =
-                |way: &Way| columns_flag(parts, &way.picked.joints, &point(way).map_or(Vec::new(), |p| p.to_vec()));
-            let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(a), flag(b));
-            parts[0].refuse(message, Some(&hint))
-        }
-    }
-}
-
-fn wrong_unit(parts: &[Part], stated: &Way, better: &Way) -> crate::files::Error {
-    let (what, columns, said, found) = match stated.joints == better.joints {
-        false => ("joints", better.picked.joints.clone(), stated.joints, better.joints),
-        true => {
-            let points = better.picked.points.first().map_or(Vec::new(), |(_, at)| at.to_vec());
-            ("points", points, stated.lengths, better.lengths)
-        }
-    };
-    let factor = stated.left.unwrap_or(f64::NAN) / better.left.unwrap_or(f64::NAN).max(f64::MIN_POSITIVE);
-    let message = format!(
-        "the names call the {what} ({}) {}, but the nominal robot is {factor:.0} times nearer to the points with {}",
-        listed(parts, &columns),
-        said.word(),
-        found.word()
-    );
-    let hint = format!(
-        "`--units {}` if they are {}; `--units {}` keeps what the names say",
-        found.flag(),
-        found.word(),
-        said.flag()
-    );
-    parts[columns[0].part].refuse(message, Some(&hint))
 }

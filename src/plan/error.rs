@@ -36,7 +36,7 @@ pub enum Error {
     },
     /// Too few candidates.
     #[error(
-        "group {group}: {found} of {tried} places in view can be reached within the joints' limits; {needed} poses are needed"
+        "group {group}: {found} of {tried} poses that were tried are in view and can be reached within the joints' limits; {needed} are needed"
     )]
     TooFew {
         group: String,
@@ -45,6 +45,10 @@ pub enum Error {
         tried: usize,
         /// Asked for.
         needed: usize,
+        /// Whether it is so many because so many poses were asked for.
+        asked: bool,
+        /// The nearest middle of a sphere, base frame, mm, about which the arm reaches enough places.
+        reached_mm: Option<[f64; 3]>,
     },
     /// The measurements are of other groups, or of nothing.
     #[error("{message}")]
@@ -79,9 +83,14 @@ impl Explain for Error {
             Error::NeverSeen { .. } => {
                 "a smaller target (`--squares`, `--square-mm`), or cameras that look at one place".to_owned()
             }
-            Error::TooFew { .. } => {
-                "fewer poses (`--poses`), another place (`--center X,Y,Z`), or wider limits_deg in the robot file"
-                    .to_owned()
+            Error::TooFew { asked, reached_mm, .. } => {
+                let place = reached_mm.map_or("another place of the sphere (`--center X,Y,Z`)".to_owned(), |[x, y, z]| {
+                    format!("`--center {x:.0},{y:.0},{z:.0}`, where the arm reaches enough of them (repeat --center for more spheres)")
+                });
+                let fewer = if *asked { ", fewer poses (`--poses`, `--verify`)" } else { "" };
+                format!(
+                    "{place}, smaller spheres (`--radius-mm`){fewer}, or joint limits (limits_deg) as wide as the arm's"
+                )
             }
             Error::Measured { .. } => {
                 "`--after` takes the measurements.csv of poses that `stereocal plan --first` made".to_owned()

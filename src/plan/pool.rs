@@ -141,8 +141,14 @@ impl Pool<'_> {
                 _ => wanted,
             };
             if found.len() < needed {
-                let group = placement.name.clone();
-                return Err(Error::TooFew { group, found: found.len(), tried: most, needed });
+                return Err(Error::TooFew {
+                    group: placement.name.clone(),
+                    found: found.len(),
+                    tried: most,
+                    needed,
+                    asked: !matches!(kind, Kind::Center | Kind::Fresh),
+                    reached_mm: None,
+                });
             }
             all.extend(found);
         }
@@ -158,7 +164,14 @@ impl Pool<'_> {
                 return Ok(found);
             }
         }
-        Err(Error::TooFew { group: placement.name.clone(), found: 0, tried: STARTS, needed: 1 })
+        let group = placement.name.clone();
+        Err(Error::TooFew { group, found: 0, tried: STARTS, needed: 1, asked: false, reached_mm: None })
+    }
+
+    /// Share of a sphere's places at which the cameras see the target wholly, whatever the arm reaches.
+    pub fn share_in_view(&self) -> f64 {
+        let seen = (0..FRESH).filter(|&k| self.scene.accepts(&self.drawn(Kind::Fresh, k, 0)));
+        seen.count() as f64 / FRESH as f64
     }
 
     /// Postures with the target there, the best first.

@@ -1,10 +1,10 @@
 //! A plan, step by step.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::after;
 use super::choose::{self, Information};
-use super::error::Result;
+use super::error::{Error, Result};
 use super::order::{self, Planned};
 use super::pool::{self, Candidate, Pool};
 use super::predict::{Accuracy, Problem};
@@ -46,6 +46,52 @@ pub fn plan(
     settings: &Settings,
     measured: Option<(&[Measurement], &str)>,
 ) -> Result<Plan> {
+    planned(robot, scene, settings, measured).map_err(|error| match error {
+        // Where cameras stand already, another sphere is none that they see.
+        Error::TooFew { group, found, tried, needed, asked, .. } if measured.is_none() => {
+            let reached_mm = reached_mm(robot, scene, settings, &group);
+            Error::TooFew { group, found, tried, needed, asked, reached_mm }
+        }
+        other => other,
+    })
+}
+
+/// The nearest middle of a sphere in place of a group's, mm, about which the arm reaches enough places: nearer to the base's axis, and turned about
+/// it, by itself. `None` where there is none.
+fn reached_mm(robot: &Robot, scene: &Scene, settings: &Settings, group: &str) -> Option<[f64; 3]> {
+    const SHARES: [f64; 6] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5];
+    const MOST_TRIED: usize = 40;
+    const LEAST_IN_VIEW: f64 = 0.1;
+    let all = scene::placements(robot, scene, settings).ok()?;
+    let center_mm = all.iter().find(|placement| placement.name == group)?.center_mm;
+    let turned = |deg: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), deg.to_radians()) * center_mm;
+    let turns = (-5..=6).map(|k| turned(30.0 * f64::from(k)));
+    let mut centers: Vec<Vector3<f64>> = turns.flat_map(|center| SHARES.map(|share| center * share)).collect();
+    centers.retain(|center| (center - center_mm).norm() > 1.0);
+    centers.sort_by(|a, b| (a - center_mm).norm().total_cmp(&(b - center_mm).norm()));
+    centers.truncate(MOST_TRIED);
+    let noise = scene::PoseNoise { given_mm: settings.noise_mm, repeatability_mm: settings.repeatability_mm };
+    // A sphere that is larger than the field is not seen anywhere.
+    if (Pool { robot, scene, settings, placements: &all, noise }).share_in_view() < LEAST_IN_VIEW {
+        return None;
+    }
+    let reaches = |center: &&Vector3<f64>| {
+        // As it will be typed.
+        let settings = Settings { centers_mm: vec![center.map(f64::round)], ..settings.clone() };
+        scene::placements(robot, scene, &settings).is_ok_and(|placements| {
+            let pool = Pool { robot, scene, settings: &settings, placements: &placements, noise };
+            pool.candidates(pool::Kind::Fresh).and(pool.candidates(pool::Kind::Center)).is_ok()
+        })
+    };
+    centers.iter().find(reaches).map(|center| center.map(f64::round).into())
+}
+
+fn planned(
+    robot: &Robot,
+    scene: &Scene,
+    settings: &Settings,
+    measured: Option<(&[Measurement], &str)>,
+) -> Result<Plan> {
     let mut placements = scene::placements(robot, scene, settings)?;
     let mut warnings = vec![COLLISIONS.to_owned()];
     let earlier = match measured {
@@ -77,7 +123,7 @@ pub fn plan(
     let held_out = candidates(pool::Kind::Verify(verify))?;
     if measured.is_none() && settings.first.is_none() {
         warnings.push(
-            "where the cameras stand is only assumed: place them as plan.json says, or `--first` and then `--after` find out".to_owned(),
+            "where the cameras stand is only assumed: place them as plan.html says, or `--first` and then `--after` find out".to_owned(),
         );
     }
     let poses = order::poses(robot, &placements, &centers, &chosen, &held_out, measured.map(|m| m.0));

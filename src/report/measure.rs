@@ -67,9 +67,9 @@ fn headline(file: &MeasureFile) -> String {
 
 fn quality(file: &MeasureFile) -> String {
     let along = |i: usize| number(file.sigma_mm.map(|s| s[i]), 4);
-    let usual = file.calibration_noise_px.map_or(String::new(), |px| format!(" (the calibration allows {px:.4})"));
+    let usual = file.calibration_noise_px.map_or(String::new(), |px| format!(" ({px:.4} at the calibration)"));
     format!(
-        "board fit {} mm, reprojection {} px RMS, corners scatter by {} px{usual}; median sigma of the mark point x {} y {} z {} mm",
+        "residuals of the fitted target {} mm, {} px RMS; corners scatter by {} px{usual}; median sigma of its centre x {} y {} z {} mm",
         number(file.fit_rms_mm, 4),
         number(file.reprojection_rms_px, 3),
         number(file.corner_noise_px, 4),

@@ -7,6 +7,7 @@ use super::Result;
 use super::drawing::figure::Plot;
 use super::page;
 use super::table::{Table, number};
+use crate::diagnostic::count;
 use crate::formats::plan::{Determined, PlanFile};
 use crate::measurements::Role;
 use crate::plan::scene::{Placement, Scene};
@@ -24,7 +25,7 @@ pub fn summary(record: &PlanFile) -> String {
     let of = |d: &Determined| {
         let o = d.accuracy.observability.as_ref();
         format!(
-            "rank {}, condition {}, O1 {}, O2 {}, O3 {}, O4 {}, O5 {}",
+            "{} parameters determined (rank), condition {}, observability O1 {}, O2 {}, O3 {}, O4 {}, O5 {}",
             d.accuracy.rank,
             number(d.accuracy.condition, 0),
             number(o.map(|o| o.o1), 2),
@@ -87,8 +88,12 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
         h2 { "What the cameras will see" }
         div.side { @for figure in pictures(scene, plan)? { (figure) } }
     };
-    let lead =
-        format!("{} poses in {} groups, chosen from {} candidates", plan.poses.len(), plan.placements.len(), plan.pool);
+    let lead = format!(
+        "{} poses in {}, chosen from {} candidates",
+        plan.poses.len(),
+        count(plan.placements.len(), "group"),
+        plan.pool
+    );
     Ok(page::page("Planned poses", &lead, &content))
 }
 

@@ -5,11 +5,11 @@ use maud::html;
 use super::Result;
 use super::drawing::figure::Plot;
 use super::page::{self, Tone};
-use super::table::{Table, number};
-use crate::diagnostic::count;
+use super::table::{Table, with_sigma};
+use crate::diagnostic::{count, significant};
 use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
-use crate::stereo::recheck::Recheck;
+use crate::stereo::recheck::{CauseSeen, Recheck};
 
 /// The verdict in words.
 pub(super) fn word(standing: Standing) -> &'static str {
@@ -55,6 +55,12 @@ fn sentence(recheck: &Recheck, standing: Standing, tolerance_mm: f64) -> String 
     }
 }
 
+/// By how much a cause changed, and within what: as many digits as that deserves.
+fn changed(cause: &CauseSeen) -> [String; 2] {
+    let [amount, within] = with_sigma(cause.amount, 2.0 * cause.sigma);
+    [format!("{amount} {}", cause.unit), within]
+}
+
 /// What to do next.
 fn next(standing: Standing) -> &'static str {
     match standing {
@@ -84,10 +90,10 @@ pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks:
     for cause in &recheck.causes {
         table.row([
             cause.words.clone(),
-            format!("{} {}", number(Some(cause.amount), 4), cause.unit),
-            format!("{:.4}", 2.0 * cause.sigma),
-            format!("{:.4} {}", cause.seen, cause.unit),
-            number(Some(cause.seen_mm), 4),
+            changed(cause)[0].clone(),
+            changed(cause)[1].clone(),
+            format!("{} {}", significant(cause.seen, 2), cause.unit),
+            significant(cause.seen_mm, 2),
         ]);
     }
     format!(
@@ -113,11 +119,11 @@ pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[
         .map(|cause| {
             vec![
                 cause.words.clone(),
-                format!("{} {}", number(Some(cause.amount), 4), cause.unit),
-                format!("{:.4}", 2.0 * cause.sigma),
-                number(Some(cause.effect_mm), 4),
-                format!("{:.4} {}", cause.seen, cause.unit),
-                number(Some(cause.seen_mm), 4),
+                changed(cause)[0].clone(),
+                changed(cause)[1].clone(),
+                significant(cause.effect_mm, 2),
+                format!("{} {}", significant(cause.seen, 2), cause.unit),
+                significant(cause.seen_mm, 2),
             ]
         })
         .collect();

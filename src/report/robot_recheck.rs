@@ -5,8 +5,8 @@ use maud::html;
 use super::Result;
 use super::page;
 use super::recheck::{history, tone, word};
-use super::table::{Table, number};
-use crate::diagnostic::count;
+use super::table::{Table, with_sigma};
+use crate::diagnostic::{count, significant};
 use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
 use crate::formats::robot_recheck::HISTORY;
@@ -47,25 +47,31 @@ fn next(standing: Standing, recheck: &Recheck) -> &'static str {
 /// Cause, change, its interval, its effect, what would be seen and its effect.
 fn cells(recheck: &Recheck) -> Vec<[String; 6]> {
     let of = |cause: &CauseSeen| {
-        let with_unit = |value: f64| format!("{} {}", number(Some(value), 4), cause.unit);
+        let with_unit = |value: f64| format!("{} {}", significant(value, 2), cause.unit);
+        let changed = cause.amount.map(|amount| {
+            let [amount, within] = with_sigma(amount, 2.0 * cause.sigma.unwrap_or(f64::NAN));
+            [format!("{amount} {}", cause.unit), within]
+        });
+        let [changed, within] =
+            changed.unwrap_or_else(|| ["not observable: the placement absorbs it".to_owned(), String::new()]);
         let told = |text: String| if cause.amount.is_some() { text } else { String::new() };
         [
             cause.what.clone(),
-            cause.amount.map_or_else(|| "not seen: the placement takes it up".to_owned(), with_unit),
-            cause.sigma.map_or_else(String::new, |sigma| format!("{:.4}", 2.0 * sigma)),
-            told(number(Some(cause.effect_mm), 4)),
+            changed,
+            within,
+            told(significant(cause.effect_mm, 2)),
             cause.seen.map_or_else(String::new, with_unit),
-            told(number(cause.seen_mm, 4)),
+            told(cause.seen_mm.map_or_else(String::new, |mm| significant(mm, 2))),
         ]
     };
     let placements = recheck.placements.iter().map(|moved| {
         [
             format!("the cameras of group {}", moved.group),
-            format!("{:.4} mm", moved.shift_mm),
+            format!("{} mm", significant(moved.shift_mm, 2)),
             String::new(),
-            number(Some(moved.shift_mm), 4),
-            format!("{:.4} mm", moved.seen_mm),
-            number(Some(moved.seen_mm), 4),
+            significant(moved.shift_mm, 2),
+            format!("{} mm", significant(moved.seen_mm, 2)),
+            significant(moved.seen_mm, 2),
         ]
     });
     recheck.causes.iter().map(of).chain(placements).collect()

@@ -52,8 +52,8 @@ pub enum Error {
     Unknown {
         /// What was asked for.
         name: String,
-        /// The name most like it.
-        nearest: String,
+        /// The name most like it, where one is like it.
+        nearest: Option<String>,
     },
     /// Several arms may be meant.
     #[error("`{name}` may be any of {}", candidates.join(", "))]
@@ -115,7 +115,12 @@ impl Explain for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Error::Unknown { nearest, .. } => {
-                Some(format!("`stereocal robot list` shows the names; the most similar one is {nearest}"))
+                let nearest =
+                    nearest.as_ref().map_or(String::new(), |name| format!("; the most similar one is {name}"));
+                Some(format!(
+                    "`stereocal robot list` shows the names{nearest}; of any other arm `stereocal robot import FILE` makes one from a URDF or a table \
+                     of Denavit-Hartenberg parameters"
+                ))
             }
             Error::Ambiguous { candidates, .. } => {
                 candidates.first().map(|name| format!("`stereocal robot new {name}` takes the first"))

@@ -134,7 +134,7 @@ pub enum Error {
         hint: &'static str,
     },
     /// A lens that another program has no words for.
-    #[error("the {lens} lens cannot be said in {format}'s format; it goes up to {most}")]
+    #[error("{format}'s format has no {lens} lens; its richest is {most}")]
     LensNotExportable {
         format: &'static str,
         /// The lens of the rig.

@@ -8,7 +8,7 @@
 use super::fields::Fields;
 use super::grid::Grid;
 use super::names::{Unit, is_said_of_another};
-use crate::files::Result;
+use crate::files::{self, Result};
 
 /// A table's rows, and names where it has them.
 #[derive(Debug, Clone)]
@@ -27,7 +27,13 @@ pub fn split(grid: &Grid) -> Result<Headed> {
     let first = grid.rows.iter().position(|(_, row)| is_data(row));
     let Some(mut first) = first else {
         let hint = "a table has rows of numbers, with names of the columns above them or without";
-        return Err(grid.refuse(1, "no row of numbers".to_owned(), Some(hint)));
+        let text = files::read_text(&grid.path, "table", None).unwrap_or_default();
+        return Err(match files::kind::kind(&text) {
+            Some(kind) if kind != "a table" => {
+                grid.refuse(1, format!("this is {kind}, and a table is needed"), Some(hint))
+            }
+            _ => grid.refuse(1, "no row of numbers".to_owned(), Some(hint)),
+        });
     };
     let mut names = None;
     if first == 0 && counts(&grid.rows[0].1) && grid.rows.len() > 1 {

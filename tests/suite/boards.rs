@@ -59,6 +59,10 @@ fn broken_pictures_are_skipped_with_their_reasons() {
     for reason in ["pair 01 is not used: left", "pair 02 is not used: left", "pair 03", "pair 04", "64x64"] {
         assert!(said.contains(reason), "{reason} is not in: {said}");
     }
+    // Each reason has its line on the screen, too.
+    for line in ["without 01: left picture: ", "without 02: left picture: ", "without 03: right picture: "] {
+        assert!(said.contains(line), "{line} is not in: {said}");
+    }
     assert!(!said.contains("pair 05 is not used"), "{said}");
     let corners = std::fs::read_to_string(folder.path().join("out/corners.csv")).unwrap();
     let left = corners.lines().filter(|line| line.starts_with("05,left")).count();

@@ -94,6 +94,7 @@ fn three_pairs_and_the_lenses_of_any_program_make_a_rig() {
         );
         let x = json(&at.join("known/calibration.json"))["right_from_left"]["translation_mm"][0].as_f64().unwrap();
         assert!((x - truth).abs() < 0.5, "{files:?}: {x} mm, the truth is {truth}");
+        assert!(!said.contains("differs by 0.00 %"), "{said}");
         let states = files[0] == "lens/calibration.json" && files.len() == 1;
         assert_eq!(stderr(&found).contains("comes without a covariance"), !states, "{files:?}");
     }
@@ -110,7 +111,8 @@ fn lenses_that_are_not_there_not_read_or_of_other_pictures_are_refused() {
         assert!(!at.join("known/calibration.json").exists());
         stderr(&output)
     };
-    assert!(refused("nowhere.json", &[]).contains("nowhere.json"));
+    let nowhere = refused("nowhere.json", &[]);
+    assert!(nowhere.contains("nowhere.json") && !nowhere.contains("--calibration"), "{nowhere}");
     assert!(refused("out/calibration.json", &["--lens", "brown4"]).contains("leave one out"));
     std::fs::write(at.join("one.yml"), "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 800., 0., 320., 0., 800., 240., 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ 0., 0., 0., 0., 0. ]\n").unwrap();
     let other = refused("one.yml,left", &[]);
@@ -133,6 +135,7 @@ fn a_rig_that_stands_is_valid_and_one_that_turned_is_named_with_a_history() {
     let (status, said, messages) = check("three.csv");
     assert_eq!(status, Some(0), "{said}{messages}");
     assert!(said.starts_with("STILL VALID: no change beyond chance; 3 pairs would have shown"), "{said}");
+    assert!(!said.split_whitespace().any(|word| ["0.0000", "-0.0000"].contains(&word)), "{said}");
     let focal = json(&at.join("before/calibration.json"))["right"]["fx"].as_f64().unwrap();
     turned(at, "three.csv", "turned.csv", focal, 0.01);
     let (status, said, messages) = check("turned.csv");
@@ -149,4 +152,55 @@ fn a_rig_that_stands_is_valid_and_one_that_turned_is_named_with_a_history() {
     assert!(std::fs::read_to_string(at.join("out/recheck.html")).unwrap().contains("Over time"));
     std::fs::write(at.join("one.csv"), "pair,side\n").unwrap();
     assert_eq!(check("one.csv").0, Some(2));
+}
+
+/// The volume that was judged, a second board, what lengths can be trusted to and why not, as the terminal has them.
+#[test]
+fn a_check_says_what_it_judged_and_by_what() {
+    let folder = calibrated();
+    let at = folder.path();
+    let check = |more: &[&str]| {
+        let output = stereocal(at, &[&["camera-check", "--out", "said", "--tolerance-mm", "1"], more].concat());
+        assert!(output.status.code().unwrap() <= 1, "{}", stderr(&output));
+        stdout(&output)
+    };
+    let all = ["--corners", "out/corners.csv"];
+    let said = check(&all);
+    assert!(
+        said.contains("for where the boards were: ") && said.contains("deciding check: held-out lengths, "),
+        "{said}"
+    );
+    assert!(said.contains("compare that with a ruler"), "{said}");
+    let said = check(&[&all[..], &["--volume", "all"]].concat());
+    assert!(said.contains("for all that both cameras see ") && !said.contains("where the boards were: "), "{said}");
+    let said = check(&[&all[..], &["--volume", "-20,-20,500,20,20,560"]].concat());
+    assert!(said.contains("for the box from -20, -20, 500 to 20, 20, 560 mm, in all directions"), "{said}");
+    // A second board: here the same one once more.
+    let said = check(&[&all[..], &["--check-images", "check"]].concat());
+    assert!(said.contains("second board: 8 pairs, largest error 0.0") && !said.contains("with a ruler"), "{said}");
+    // Five pairs are too few poses, and that has a plain name.
+    let said = check(&["--corners", "five.csv"]);
+    assert!(said.contains("no length can be trusted until these checks are passed: "), "{said}");
+    assert!(said.contains("number of different poses"), "{said}");
+    // Corners that scatter by five px: what may be off by more than a tenth of itself is no length to trust.
+    let mut state = 7u64;
+    let mut scattered = |value: &str| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        format!("{}", value.parse::<f64>().unwrap() + 16.0 * ((state >> 40) as f64 / f64::from(1u32 << 24) - 0.5))
+    };
+    let text = std::fs::read_to_string(at.join("out/corners.csv")).unwrap();
+    let mut noisy = format!("{}\n", text.lines().next().unwrap());
+    for line in text.lines().skip(1) {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        (fields[4], fields[5]) = (scattered(&fields[4]), scattered(&fields[5]));
+        (fields[6], fields[7], fields[8]) = ("21.3".to_owned(), "0".to_owned(), "21.3".to_owned());
+        noisy += &format!("{}\n", fields.join(","));
+    }
+    std::fs::write(at.join("noisy.csv"), noisy).unwrap();
+    let bad = check(&["--corners", "noisy.csv", "--force"]);
+    assert!(bad.contains("no length can be trusted: of one of 70 mm an error of "), "{bad}");
+    let said = check(&["--corners", "five.csv"]);
+    assert!(said.contains("number of different poses"), "{said}");
+    let evidence = json(&at.join("said/camera-check.json"))["evidence"].to_string();
+    assert!(evidence.contains("pairs with poses of their own"), "the names in the file are the contract's");
 }

@@ -295,8 +295,8 @@ fn a_board_that_is_larger_is_refused_with_its_size() {
             for squares in ["9x7", "10x7", "9x8", "8x6"] {
                 let board = Board::checker(squares.parse().unwrap(), SQUARE_MM);
                 let refusal = corners_in(&picture, board).expect_err(squares);
-                named_right += usize::from(refusal.seen == Some(shot.board.squares));
-                let known = way == 2 || refusal.seen == Some(shot.board.squares);
+                named_right += usize::from(refusal.seen == Some(shot.board));
+                let known = way == 2 || refusal.seen == Some(shot.board);
                 assert!(known, "{squares}, picture {seed}, {way}: {}, {:?}", refusal.reason, refusal.seen);
             }
         }

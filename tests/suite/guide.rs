@@ -69,6 +69,16 @@ fn a_page_that_is_not_there_is_said_with_those_that_are() {
     assert!(stdout(&stereocal(folder.path(), &["guide", "--html", "book"])).contains("book/guide.html"));
     let book = std::fs::read_to_string(folder.path().join("book/guide.html")).unwrap();
     assert!(PAGES.iter().all(|page| book.contains(page.title())));
+    let page = |asked: &str| stdout(&stereocal(folder.path(), &["guide", asked]));
+    assert_eq!(page("Warnings"), page("warnings"));
+    // Every command has a page, its own or one about it.
+    let help = stdout(&stereocal(folder.path(), &["--help"]));
+    let commands = help.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
+    for command in
+        commands.filter_map(|line| line.split_whitespace().next()).filter(|c| !["completions", "help"].contains(c))
+    {
+        assert!(page(command).starts_with("# "), "{command}");
+    }
     let output = stereocal(folder.path(), &["guide", "nothing"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("no page `nothing`") && stderr(&output).contains("boards"), "{}", stderr(&output));

@@ -65,7 +65,7 @@ fn a_slide_confirms_the_scale_or_shows_squares_that_are_not_as_said() {
     let wrong = check(&["--square-mm", "10.03", "--known-move", "5mm:10,11", "--known-move", "15mm:11,12"]);
     let said = stdout(&wrong);
     assert_eq!(wrong.status.code(), Some(1), "{said}{}", stderr(&wrong));
-    assert!(said.starts_with("FAIL") && said.contains("decided by known move"), "{said}");
+    assert!(said.starts_with("FAIL") && said.contains("deciding check: known move"), "{said}");
     assert!(said.contains("all moves show one scale: the board's pitch is not as said"), "{said}");
     let file = json(&at.join("out/camera-check.json"));
     let finding = file["findings"].as_array().unwrap().iter().find(|f| f["cause"] == "other-board").unwrap();

@@ -23,8 +23,15 @@ fn refused(arguments: &[&str], files: &[(&str, &str)], status: i32, parts: &[&st
 fn no_command_is_bad_usage() {
     refused(&[], &[], 2, &["Usage"]);
     refused(&["camera-check"], &[], 2, &["required"]);
-    refused(&["calibrate"], &[], 2, &["unrecognized subcommand"]);
-    refused(&["identify", "points.csv"], &[], 2, &["unexpected argument", "hint: ", "`--measurements points.csv`"]);
+    refused(&["calibrate"], &[], 2, &["unrecognized subcommand", "hint: `camera-check` calibrates the cameras"]);
+    refused(
+        &["identify", "points.csv"],
+        &[],
+        2,
+        &["unexpected argument", "hint: ", "here: `--measurements points.csv`"],
+    );
+    refused(&["camera-check", "x", "--square-size", "12.5"], &[], 2, &["hint: there is `--square-mm MM`"]);
+    refused(&["verify", "--measurements", "x"], &[], 2, &["hint: or `--against IDENTIFIED` in its place"]);
 }
 
 /// Slips of a first hour, each answered with what would do.
@@ -45,7 +52,12 @@ fn what_a_beginner_mistypes() {
     refused(&["measure", "x"], &[("x/poses.csv", "")], 2, &["calibration file not found", "`--calibration FILE`"]);
     let robot = [("x/poses.csv", ""), ("robot.toml", "name = \"r\"")];
     refused(&["measure", "x", "--calibration", "robot.toml"], &robot, 2, &["this is no JSON", "camera-check IMAGES"]);
+    another_file_of_the_program();
     refused(&["identify", "--robot", "a.json"], &[("a.json", "{}")], 2, &["this is JSON", "hint: ", "robot new"]);
+    refused(&["board", "9x6"], &[], 2, &["`9x6` names no board", "it is `checker:9x6:25`"]);
+    refused(&["camera-check", "x", "--square-mm", "12,5"], &[], 2, &["a number is needed", "`--square-mm 12.5`"]);
+    refused(&["camera-check", "x", "--tolerance-mm", "0"], &[], 2, &["--tolerance-mm", "from 0.000001 to 10000"]);
+    refused(&["camera-check", "x"], &[("x/y/none", "")], 2, &["no pictures here"]);
     refused(&["board", "checker:9x6:194.4"], &[], 2, &["the board is 1749.6 x 1166.4 mm", "hint: ", "66 %"]);
 }
 
@@ -56,7 +68,7 @@ fn a_board_that_is_none() {
         &["camera-check", "x", "--square-mm", "-3"],
         &[("x/a.txt", "")],
         2,
-        &["square_mm is -3", "from 0.001 to 100000"],
+        &["--square-mm", "from 0.001 to 100000"],
     );
 }
 
@@ -99,8 +111,8 @@ fn numbers_beyond_their_range() {
         (&["camera-check", "--corners", "x", "--picture-size", "0x7"], "from 1 to 100000"),
         (&["simulate", "--check-pairs", "99999999"], "from 0 to 10000"),
         (&["simulate", "--thermal-ppm", "nan"], "from -100000 to 100000"),
-        (&["simulate", "--bits", "17"], "8..=16"),
-        (&["identify", "--threads", "0"], "1..=1024"),
+        (&["simulate", "--bits", "17"], "from 8 to 16"),
+        (&["identify", "--threads", "0"], "from 1 to 1024"),
     ] {
         refused(flags, &[], 2, &[range]);
     }
@@ -155,4 +167,113 @@ fn an_arm_is_found_by_what_people_call_it() {
     assert!(stderr(&output).contains("`IRB 120` is abb-irb120"), "{}", stderr(&output));
     refused(&["robot", "new", "irb1200"], &[], 2, &["abb-irb1200-5-0.9, abb-irb1200-7-0.7", "hint: "]);
     refused(&["robot", "new", "irb9"], &[], 2, &["no arm `irb9`", "robot list"]);
+}
+
+/// A flag that was given a file of the program's that is for another one.
+fn another_file_of_the_program() {
+    let placement = [("x/poses.csv", ""), ("placement.json", r#"{"groups": [], "flange_from_target": null}"#)];
+    let measure = ["measure", "x", "--calibration", "placement.json"];
+    refused(&measure, &placement, 2, &["calibration file: this is a placement", "hint: "]);
+    let table = [("m.csv", "pose,group,role,j1_deg\n1,a,sample,0\n")];
+    refused(&["identify", "--robot", "m.csv"], &table, 2, &["this is a table, and TOML is needed", "robot new NAME"]);
+    let robot = [(
+        "robot.toml",
+        "name = \"r\"\nconvention = \"mdh\"\n[[joint]]\nalpha_deg = 0.0\na_mm = 0.0\ntheta_deg = 0.0\nd_mm = 1.0\n",
+    )];
+    refused(
+        &["measure", "x", "--calibration", "robot.toml"],
+        &[placement[0], robot[0]],
+        2,
+        &["no JSON, but a robot file"],
+    );
+    refused(&["robot", "import", "robot.toml"], &robot, 2, &["this is a robot file already", "`--robot FILE`"]);
+    let compensate = ["compensate", "robot.toml", "--robot", "robot.toml", "--identified", "robot.toml"];
+    refused(&compensate, &robot, 2, &["this is a robot file, and a table is needed"]);
+    let against = ["camera-check", "x", "--against", "robot.toml"];
+    refused(&against, &[placement[0], robot[0]], 2, &["a robot file", "`stereocal verify --against"]);
+}
+
+#[test]
+fn an_empty_folder_and_a_file_of_somebody_else() {
+    let folder = workplace();
+    std::fs::create_dir_all(folder.path().join("x")).unwrap();
+    let output = stereocal(folder.path(), &["camera-check", "x"]);
+    assert!(stderr(&output).contains("hint: is the path right?"), "{}", stderr(&output));
+    std::fs::create_dir_all(folder.path().join("out")).unwrap();
+    std::fs::write(folder.path().join("out/board.pdf"), "mine").unwrap();
+    let output = stereocal(folder.path(), &["board", "checker:9x6:20"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("`--force` replaces the file"), "{}", stderr(&output));
+}
+
+/// Of a board that was written before, nothing is replaced or left beside the new one without a word.
+#[test]
+fn a_second_board_in_one_folder() {
+    let folder = workplace();
+    let board = |name: &str, more: &[&str]| {
+        let output = stereocal(folder.path(), &[&["board", name], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        stderr(&output)
+    };
+    assert_eq!(board("checker:9x6:20", &["--png", "--dpi", "50"]), "");
+    assert!(board("checker:9x6:20", &[]).contains("board.png stays as an earlier run wrote it"));
+    assert!(board("checker:7x6:20", &[]).contains("board.pdf of an earlier run is replaced"));
+}
+
+/// Markers say which board they are of: the flag that fits is the hint, and one finding is one line.
+#[test]
+fn another_board_with_markers_is_answered_with_its_name() {
+    let folder = workplace();
+    let made = stereocal(folder.path(), &["board", "charuco:5x7:30:22:DICT_4X4_50", "--png", "--dpi", "120"]);
+    assert_eq!(made.status.code(), Some(0), "{}", stderr(&made));
+    for side in ["left", "right"] {
+        std::fs::create_dir_all(folder.path().join("x").join(side)).unwrap();
+        for name in ["1.png", "2.png", "3.png"] {
+            std::fs::copy(folder.path().join("out/board.png"), folder.path().join("x").join(side).join(name)).unwrap();
+        }
+    }
+    for (said, fits) in [
+        ("charuco:5x7:30:22:DICT_5X5_100", "hint: `--board charuco:5x7:30:22:DICT_4X4_"),
+        ("charuco:7x5:30:22:DICT_4X4_50", "hint: `--board charuco:5x7:30:22:DICT_4X4_50`"),
+    ] {
+        let output = stereocal(folder.path(), &["camera-check", "x", "--board", said, "--out", "y"]);
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains(fits), "{said}: {message}");
+        assert_eq!(message.matches("both pictures: ").count(), 1, "{message}");
+    }
+}
+
+#[test]
+fn settings_as_init_writes_them_can_be_changed_line_by_line() {
+    let folder = workplace();
+    let output = stereocal(folder.path(), &["init"]);
+    assert!(stdout(&output).contains("next: ") && stdout(&output).contains("robot.toml (it holds the paper's)"));
+    let robot = std::fs::read_to_string(folder.path().join("robot.toml")).unwrap();
+    assert!(robot.starts_with("# The nominal robot.") && robot.contains("degrees and mm"), "{robot}");
+    let settings = std::fs::read_to_string(folder.path().join("stereocal.toml")).unwrap();
+    let changed = settings.replace("# squares = \"20x20\"\n# square_mm = 10.0", "squares = \"9x7\"\nsquare_mm = 20.0");
+    assert_ne!(settings, changed);
+    let changed = changed.replace("# folds = 10", "folds = 8");
+    std::fs::write(folder.path().join("stereocal.toml"), changed).unwrap();
+    std::fs::create_dir_all(folder.path().join("x")).unwrap();
+    // What is said of the settings comes before what is said of the pictures.
+    let output = stereocal(folder.path(), &["camera-check", "x"]);
+    assert!(stderr(&output).contains("no pictures here"), "{}", stderr(&output));
+    refused(
+        &["identify"],
+        &[("stereocal.toml", "squares = \"9x7\"\n# [check_board]\n")],
+        2,
+        &["unknown field `squares`", "below `[check_board]`"],
+    );
+    let twice = "[check_board]\nsquares = \"9x7\"\nsquare_mm = 10.0\nsquare_mm = 20.0\n";
+    refused(&["identify"], &[("stereocal.toml", twice)], 2, &["duplicate key", "square_mm", "stereocal.toml:4"]);
+}
+
+#[test]
+fn an_arm_that_is_like_none_is_not_called_like_one() {
+    let folder = workplace();
+    let output = stereocal(folder.path(), &["robot", "new", "meca500"]);
+    let said = stderr(&output);
+    assert!(said.contains("robot import FILE") && !said.contains("most similar"), "{said}");
 }

@@ -126,6 +126,21 @@ fn plans_that_nobody_can_run_are_refused() {
     assert!(said.contains("does not reach (1500, 0, 300) mm") && said.contains("`--center "), "{said}");
     let said = run(at, &["--squares", "40x40"], 2);
     assert!(said.contains("never sees a target of 412 x 412 mm") && said.contains("smaller target"), "{said}");
+    // A middle that is reached, a sphere that is not: fewer poses do not help, another middle does.
+    let sphere =
+        |center: &str| ["--center", center, "--radius-mm", "150", "--poses", "10", "--verify", "3"].map(str::to_owned);
+    let run_at = |center: &str, more: &[&str], status| {
+        let sphere = sphere(center);
+        let flags: Vec<&str> = sphere.iter().map(String::as_str).chain(more.iter().copied()).chain(QUICK).collect();
+        run(at, &flags, status)
+    };
+    let said = run_at("200,0,665", &[], 3);
+    assert!(said.contains("are in view and can be reached") && !said.contains("fewer poses"), "{said}");
+    let nearer =
+        said.split("`--center ").nth(1).and_then(|rest| rest.split('`').next()).unwrap_or_else(|| panic!("{said}"));
+    let said = run_at(nearer, &["--calibration", "out/calibration.json", "--out", "nearer"], 0);
+    assert!(said.contains("report: nearer/plan.html") && said.contains("programs: nearer/programs"), "{said}");
+    assert!(said.contains("in 1 group ("), "{said}");
     let text = std::fs::read_to_string(at.join("robot.toml")).unwrap();
     let lines = text.lines().map(|l| if l.starts_with("limits_deg") { "limits_deg = [-1.0, 1.0]" } else { l });
     std::fs::write(at.join("stiff.toml"), lines.collect::<Vec<_>>().join("\n")).unwrap();

@@ -39,3 +39,16 @@ fn planted_faults_do_not_pass() {
         assert_ne!(judged.judgement, Judgement::FalsePass, "{}: {:?} {:?}", case.name(), judged.deviation, judged.said);
     }
 }
+
+/// The guide names what the benchmark runs.
+#[test]
+fn the_guide_counts_the_cases_as_they_are() {
+    let (of_check, of_measure) = (matrix::cases().len(), matrix::measure::cases(0).len());
+    let page = |topic| stereocal::guide::page(topic).unwrap().text;
+    let all = of_check + of_measure;
+    assert!(page("accuracy").contains(&format!("{all} cases")), "{all}");
+    let limits = format!(
+        "plants {all} faults and oddities in rendered pictures, {of_check} of the check board and {of_measure} of the"
+    );
+    assert!(page("limits").contains(&limits), "{limits}");
+}

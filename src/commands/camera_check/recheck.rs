@@ -18,14 +18,19 @@ use crate::stereo::pairs::open_numbers;
 use crate::stereo::recheck::{self, Before, FEWEST_PAIRS};
 use crate::{progress, ranges, report};
 
+/// What the flag takes.
+const HINT: &str = "`--against` takes the calibration.json that `stereocal camera-check IMAGES` wrote; whether a robot is still the identified one is asked by \
+                    `stereocal verify --against out/identified.toml --measurements FILE`";
+
 /// Runs the command.
 pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
     config::check_within("tolerance_mm", tolerance_mm, ranges::TOLERANCES_MM)?;
     let run = Run { force: args.output.force, ..run };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
-    let file = calibration::file(Some(against), &out)?;
-    let calibrated = calibration::read_with_check(&file)?;
+    let of_flag = |error: crate::files::Error| error.with_hint(HINT);
+    let file = calibration::file(Some(against), &out).map_err(of_flag)?;
+    let calibrated = calibration::read_with_check(&file).map_err(of_flag)?;
     let places = [&args.images, &args.pairs.right, &args.corners];
     let inputs: Vec<&Utf8Path> =
         places.into_iter().flatten().map(|path| path.as_path()).chain([file.as_path()]).collect();

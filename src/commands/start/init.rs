@@ -11,6 +11,16 @@ use crate::robot::{self, Robot};
 /// Every key with its default and where it comes from.
 pub const SETTINGS: &str = include_str!("init.toml");
 
+/// What stands above the parameters of the robot that is there to be replaced.
+const ROBOT: &str = "# The nominal robot. What stands here is the arm of the paper (Table 1), as an example: replace it by yours, or have it written by
+# `stereocal robot new NAME` (common arms) or `stereocal robot import FILE` (a URDF, a table).
+# Modified Denavit-Hartenberg parameters, degrees and mm: alpha and a of the link before a joint, theta and d of the joint. Optional in a
+# [[joint]]: limits_deg = [least, most], sign = -1 where the controller counts the other way round. [tool]: the target in the flange's frame.
+";
+
+/// What to do with them.
+const NEXT: &str = "next: write your boards into stereocal.toml and your arm into robot.toml (it holds the paper's): `stereocal robot list` names the common ones\n";
+
 /// Runs the command: `stereocal.toml`, `robot.toml`, `poses.csv`, none of them over another.
 pub fn run(args: &Init, run: Run) -> Result<Outcome> {
     // The settings file would stand in its own way.
@@ -19,9 +29,10 @@ pub fn run(args: &Init, run: Run) -> Result<Outcome> {
     let names = ["stereocal.toml", "robot.toml", "poses.csv"];
     out.check_free(&names)?;
     out.write(names[0], SETTINGS.as_bytes())?;
-    out.write(names[1], robot::file::to_toml(&Robot::paper()).as_bytes())?;
+    out.write(names[1], format!("{ROBOT}{}", robot::file::to_toml(&Robot::paper())).as_bytes())?;
     out.write(names[2], poses().as_bytes())?;
-    Ok(Outcome { stdout: names.map(|name| format!("{}\n", out.join(name))).concat(), status: Status::Done })
+    let stdout = names.map(|name| format!("{}\n", out.join(name))).concat() + NEXT;
+    Ok(Outcome { stdout, status: Status::Done })
 }
 
 /// A list that shows the columns: a centre, a sample and a pose to verify with.
@@ -52,7 +63,7 @@ mod tests {
             |line: &str| line.starts_with('[') || line.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
         SETTINGS
             .lines()
-            .filter_map(|line| line.strip_prefix("# "))
+            .map(|line| line.strip_prefix("# ").unwrap_or(line))
             .filter(|line| setting(line))
             .map(|line| format!("{line}\n"))
             .collect()

@@ -190,7 +190,8 @@ impl Record {
         let mut list = Vec::new();
         let i = &self.identifiability;
         if !i.zero.is_empty() {
-            list.push(format!("these poses do not determine {}: they stay nominal", i.zero.join(", ")));
+            let stay = if i.zero.len() == 1 { "it stays" } else { "they stay" };
+            list.push(format!("these poses do not determine {}: {stay} nominal", i.zero.join(", ")));
         }
         if !i.dependent.is_empty() {
             list.push(format!(

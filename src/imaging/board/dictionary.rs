@@ -87,6 +87,11 @@ impl Dictionary {
         self.0.codes().len()
     }
 
+    /// Whether its first markers are those of another.
+    pub fn begins_with(self, other: Dictionary) -> bool {
+        self.bits() == other.bits() && self.0.codes().starts_with(other.0.codes())
+    }
+
     /// The bits of a marker, row by row from the lowest, one for black; `None` where the dictionary has no such marker.
     pub fn code(self, id: usize) -> Option<u64> {
         self.0.codes().get(id).copied()

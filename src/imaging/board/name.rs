@@ -43,7 +43,7 @@ impl FromStr for Board {
     /// are counted as printed: columns first. A square that is not quite one has a width and a height: `checker:20x20:10x10.01`.
     fn from_str(text: &str) -> Result<Board, Error> {
         let refuse = |why: String| Error::Name { found: text.to_owned(), why };
-        let (kind, rest) = text.split_once(':').ok_or_else(|| refuse("it has no `:`".to_owned()))?;
+        let (kind, rest) = text.split_once(':').ok_or_else(|| refuse(without_colon(text)))?;
         let fields: Vec<&str> = rest.split(':').map(str::trim).collect();
         let length = |text: &str| length_mm(text).map_err(refuse);
         let sides = |text: &str| sides_mm(text).map_err(refuse);
@@ -93,6 +93,14 @@ impl FromStr for Board {
     }
 }
 
+/// What a name lacks that has no `:`.
+fn without_colon(text: &str) -> String {
+    match text.parse::<Squares>() {
+        Ok(squares) => format!("the kind and the size are missing; with squares of 25 mm it is `checker:{squares}:25`"),
+        Err(_) => "it has no `:`; a checkerboard is `checker:COLSxROWS:SQUARE_MM`".to_owned(),
+    }
+}
+
 /// A length, mm; the reason where it is none.
 fn length_mm(text: &str) -> Result<f64, String> {
     let (least, most) = SQUARES_MM.into_inner();
@@ -124,6 +132,29 @@ impl Board {
                 format!("{columns}x{rows} tags of {side} mm, {gap_mm} mm apart")
             }
         }
+    }
+
+    /// The same board with the markers of another dictionary, where that has enough of them.
+    pub fn with_dictionary(self, other: Dictionary) -> Option<Board> {
+        let kind = match self.kind {
+            Kind::Checker => return None,
+            Kind::Charuco { marker_mm, layout, .. } => Kind::Charuco { marker_mm, dictionary: other, layout },
+            Kind::Tags { gap_mm, .. } => Kind::Tags { gap_mm, family: other },
+        };
+        let board = Board { kind, ..self };
+        board.check_markers().is_ok().then_some(board)
+    }
+
+    /// Whether it is this board, or this board with the first markers of its dictionary alone.
+    pub fn has_all_of(&self, other: &Board) -> bool {
+        let dictionary = |board: &Board| match board.kind {
+            Kind::Checker => None,
+            Kind::Charuco { dictionary, .. } | Kind::Tags { family: dictionary, .. } => Some(dictionary),
+        };
+        self == other
+            || dictionary(self).zip(dictionary(other)).is_some_and(|(own, others)| {
+                own.begins_with(others) && other.with_dictionary(own).is_some_and(|same| same == *self)
+            })
     }
 
     /// Why there can be no such board, where there can be none.
@@ -186,7 +217,8 @@ mod tests {
     #[test]
     fn boards_that_cannot_be_are_refused_with_the_reason() {
         for (text, why) in [
-            ("20x20", "no `:`"),
+            ("20x20", "`checker:20x20:25`"),
+            ("board", "no `:`"),
             ("checker:20x20", "checker:COLSxROWS:SQUARE_MM"),
             ("dots:20x20:10", "there are checker, charuco and apriltag"),
             ("checker:20x20:10x12", "no square"),

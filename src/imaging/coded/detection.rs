@@ -68,7 +68,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
         if missed.by_layout {
             return Err(BY_LAYOUT.to_owned().into());
         }
-        return Err(explain::unnumbered(picture, &board, &missed.unnumbered).into());
+        return Err(explain::unnumbered(picture, &board, &missed.unnumbered));
     };
     let Part { placement, fields, .. } = parts[0];
     let merged = merged(&board, &parts);

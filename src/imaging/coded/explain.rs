@@ -1,6 +1,6 @@
 //! What else a board could be whose markers do not number it as the one that was named.
 //!
-//! In: grids of corners without a number. Out: the reason, for a person. Method: the same markers are read once more as on other boards: of another
+//! In: grids of corners without a number. Out: the reason, for a person, and the board that it is, where that is told. Method: the same markers are read once more as on other boards: of another
 //! dictionary, of other counts, with markers of another size, mirrored; the first that they fit is named.
 
 use super::in_grid::markers_in;
@@ -8,6 +8,7 @@ use super::marker::{Fields, TAG_BORDERS, fields};
 use super::numbering::{self, Read, Said};
 use crate::imaging::board::dictionary::Dictionary;
 use crate::imaging::board::{Board, Kind, Layout, Pitch, Squares};
+use crate::imaging::detect::Refusal;
 use crate::imaging::image::Picture;
 use crate::imaging::lattice::Places;
 
@@ -19,22 +20,24 @@ const SHARES: [f64; 8] = [0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85];
 const MOST_COLUMNS: usize = 40;
 
 /// Why none of these grids is a part of the board.
-pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> String {
+pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Refusal {
+    let none = || Refusal::from("no board found".to_owned());
     let dictionary = match board.kind {
-        Kind::Checker => return "no board found".to_owned(),
+        Kind::Checker => return none(),
         Kind::Charuco { dictionary, .. } | Kind::Tags { family: dictionary, .. } => dictionary,
     };
     let largest = grids.iter().max_by_key(|grid| grid.count());
-    let Some(grid) = largest.filter(|grid| grid.count() >= 4) else { return "no board found".to_owned() };
+    let Some(grid) = largest.filter(|grid| grid.count() >= 4) else { return none() };
     let size = (grid.columns, grid.rows);
     let markers_in = |grid: &Places, fields: Fields| markers_in(picture, grid, board.pitch(), fields);
     let all: Vec<(Fields, Vec<Read>)> = fields(board).into_iter().map(|own| (own, markers_in(grid, own))).collect();
     let by_known = |(_, reads): &(Fields, Vec<Read>)| (known_in(dictionary, reads), reads.len());
     let Some((own, reads)) = all.into_iter().max_by_key(by_known) else {
-        return "no board found".to_owned();
+        return none();
     };
     if let Some(layout) = other_layout(board, size, &reads) {
-        return format!("shows the markers in {}; --board says the other", layout.said());
+        let reason = format!("shows the markers in {}; --board says the other", layout.said());
+        return Refusal { reason, seen: Some(board.with_layout(layout)) };
     }
     if let Some(squares) = other_counts(board, size, &reads) {
         let (columns, said) = match board.kind {
@@ -43,21 +46,23 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> String 
             }
             _ => (format!("{} columns", squares.columns), board.squares.to_string()),
         };
-        return format!("shows the markers of a board of {columns}; --board says {said} (columns first, as printed)");
+        let reason =
+            format!("shows the markers of a board of {columns}; --board says {said} (columns first, as printed)");
+        return Refusal { reason, seen: Some(Board { squares, ..*board }) };
     }
     if let Said::Place(_) = numbering::place(board, size, &reads) {
-        return format!("shows a board larger than {}: its corners go on beyond those", board.said());
+        return format!("shows a board larger than {}: its corners go on beyond those", board.said()).into();
     }
     let mirrored = grid.flip_rows();
     let is_mirrored = |own| numbering::place(board, size, &markers_in(&mirrored, own)) != Said::Nothing;
     if fields(board).into_iter().any(is_mirrored) {
-        return "shows the board mirrored: the print or the picture is".to_owned();
+        return "shows the board mirrored: the print or the picture is".to_owned().into();
     }
     other_markers(picture, board, (dictionary, own), grid)
 }
 
 /// What else the markers of a grid are: of another dictionary, of another size, in another order, or none.
-fn other_markers(picture: &Picture, board: &Board, (dictionary, own): (Dictionary, Fields), grid: &Places) -> String {
+fn other_markers(picture: &Picture, board: &Board, (dictionary, own): (Dictionary, Fields), grid: &Places) -> Refusal {
     let mut best: Option<(usize, Dictionary, f64)> = None;
     for fields in other_fields(board, own) {
         let reads = markers_in(picture, grid, board.pitch(), fields);
@@ -68,24 +73,26 @@ fn other_markers(picture: &Picture, board: &Board, (dictionary, own): (Dictionar
             }
         }
     }
-    match (best, board.kind) {
-        (Some((known, other, share)), Kind::Charuco { marker_mm, .. })
+    let reason = match (best, board.kind) {
+        (Some((_, other, share)), Kind::Charuco { marker_mm, .. })
             if (share - own.share).abs() > 0.03 && other == dictionary =>
         {
             format!(
-                "shows {known} markers of about {:.3} mm in squares of {} mm; --board says {marker_mm} mm",
+                "shows markers of about {:.3} mm in squares of {} mm; --board says {marker_mm} mm",
                 share * board.square_mm,
                 board.square_mm
             )
         }
-        (Some((known, other, _)), _) if other != dictionary => {
-            format!("shows {known} markers of {}, the board has those of {}", other.said(), dictionary.said())
+        (Some((_, other, _)), _) if other != dictionary => {
+            let reason = format!("shows markers of {}, the board has those of {}", other.said(), dictionary.said());
+            return Refusal { reason, seen: board.with_dictionary(other) };
         }
-        (Some((known, ..)), _) => {
-            format!("shows {known} markers of {} in another order than {board} has them", dictionary.said())
+        (Some(_), _) => {
+            format!("shows markers of {} in another order than {board} has them", dictionary.said())
         }
         (None, _) => format!("shows {} corners of squares, and no marker among them that can be read", grid.count()),
-    }
+    };
+    reason.into()
 }
 
 /// How the markers of other boards may be divided.
@@ -125,7 +132,10 @@ fn other_counts(board: &Board, size: (usize, usize), reads: &[Read]) -> Option<S
     });
     let first = counts.next()?;
     let (_, columns) = counts.fold(first, |best, next| if next.0 > best.0 { next } else { best });
-    (columns != board.squares.columns).then_some(Squares { columns, rows: board.squares.rows })
+    // Columns and rows are easily said in the wrong order.
+    let exchanged = !matches!(board.kind, Kind::Tags { .. }) && columns == board.squares.rows;
+    let rows = if exchanged { board.squares.columns } else { board.squares.rows };
+    (columns != board.squares.columns).then_some(Squares { columns, rows })
 }
 
 /// How many of what was read are markers of a dictionary, in one of the four directions.

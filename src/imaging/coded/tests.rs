@@ -4,7 +4,7 @@
 use nalgebra::{Point2, Vector3};
 
 use crate::imaging::Board;
-use crate::imaging::detect::detect;
+use crate::imaging::detect::{Refusal, detect};
 use crate::imaging::find::corners_in;
 use crate::imaging::image::Picture;
 use crate::imaging::refine::refine;
@@ -96,7 +96,22 @@ fn parts_cut_by_the_border_are_as_certain_as_they_say() {
 
 /// Why a picture holds no board that was `said`.
 fn refusal(picture: &Picture, said: &str) -> String {
-    corners_in(picture, said.parse().unwrap()).map(|corners| corners.count()).expect_err(said).reason
+    refused(picture, said).reason
+}
+
+fn refused(picture: &Picture, said: &str) -> Refusal {
+    corners_in(picture, said.parse().unwrap()).map(|corners| corners.count()).expect_err(said)
+}
+
+#[test]
+fn the_board_that_it_is_comes_with_the_reason() {
+    let (picture, _) = Shot::of(BOARD, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
+    let board = |name: &str| Some(name.parse::<Board>().unwrap());
+    let shown = refused(&picture, "charuco:9x7:20:14:DICT_6X6_100").seen.unwrap();
+    assert!(board(BOARD).unwrap().has_all_of(&shown) || shown.has_all_of(&board(BOARD).unwrap()), "{shown}");
+    assert_eq!(refused(&picture, &BOARD.replace("9x7", "7x9")).seen, board(BOARD));
+    assert_eq!(refused(&picture, &BOARD.replace("9x7", "10x7")).seen, board(BOARD));
+    assert_eq!(refused(&picture, &BOARD.replace("9x7", "9x6")).seen, None);
 }
 
 #[test]

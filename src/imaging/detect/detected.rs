@@ -1,6 +1,6 @@
 //! What looking for a board in a picture gives.
 
-use crate::imaging::Squares;
+use crate::imaging::Board;
 use crate::imaging::board::Print;
 use crate::imaging::image::pyramid::{Level, factor_for};
 use crate::imaging::image::{Grey8, Picture};
@@ -28,12 +28,12 @@ pub struct Detected {
 }
 
 /// Why a picture gave no corners.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Refusal {
     /// For a person.
     pub reason: String,
-    /// The board of another size that the picture shows instead.
-    pub seen: Option<Squares>,
+    /// The other board that the picture shows instead.
+    pub seen: Option<Board>,
 }
 
 impl From<String> for Refusal {
@@ -44,7 +44,7 @@ impl From<String> for Refusal {
 }
 
 /// That the corners of a picture may have other numbers as well.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Open {
     /// The others, each from the one that they have.
     pub others: Vec<Renumbering>,

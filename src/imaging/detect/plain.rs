@@ -235,7 +235,7 @@ fn refusal(seen: Option<&Places>, board: Board) -> Refusal {
     let shows = format!("shows {} corners in {long} columns and {short} rows", grid.count());
     // A corner or two are lost easily; the size is but a hint.
     let complete = 10 * grid.count() >= 9 * long * short;
-    let seen = complete.then_some(Squares { columns: long + 1, rows: short + 1 });
+    let seen = complete.then_some(Board { squares: Squares { columns: long + 1, rows: short + 1 }, ..board });
     let reason = if long <= columns && short <= rows {
         format!("{shows}: which of the board's {columns}x{rows} they are cannot be told")
     } else {

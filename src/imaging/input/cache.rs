@@ -9,7 +9,7 @@ use nalgebra::{Matrix2, Point2};
 use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
 
 use crate::files::OutDir;
-use crate::imaging::board::{Layout, Print};
+use crate::imaging::board::{Kind, Layout, Print};
 use crate::imaging::detect::Open;
 use crate::imaging::detect::Refusal;
 use crate::imaging::image::Grey8;
@@ -108,12 +108,12 @@ fn text(look: &Look) -> String {
     let mut body = format!("{ALGORITHM}\n");
     match look {
         Err(Refusal { reason, seen }) => {
-            let seen = seen.map_or("-".to_owned(), |squares| squares.to_string());
+            let seen = seen.map_or("-".to_owned(), |board| board.to_string());
             body.push_str(&format!("none {seen} {}\n", reason.replace('\n', " ")));
         }
         Ok(Sighting { corners, print, open }) => {
             if let Some(Open { others, refusal: Refusal { reason, seen } }) = open {
-                let seen = seen.map_or("-".to_owned(), |squares| squares.to_string());
+                let seen = seen.map_or("-".to_owned(), |board| board.to_string());
                 let others: Vec<String> =
                     others.iter().map(|o| format!("{},{},{}", o.quarters, o.columns, o.rows)).collect();
                 body.push_str(&format!("open {};{seen};{}\n", others.join(" "), reason.replace('\n', " ")));
@@ -142,14 +142,14 @@ fn parse(text: &str, board: Board) -> Option<Look> {
     let body = body.strip_prefix(ALGORITHM)?.strip_prefix('\n')?;
     if let Some(refusal) = body.strip_prefix("none ") {
         let (seen, reason) = refusal.split_once(' ')?;
-        let seen = if seen == "-" { None } else { Some(seen.parse().ok()?) };
+        let seen = parse_seen(seen, board)?;
         return Some(Err(Refusal { reason: reason.strip_suffix('\n')?.to_owned(), seen }));
     }
     let (open, body) = match body.strip_prefix("open ") {
         None => (None, body),
         Some(rest) => {
             let (line, rest) = rest.split_once('\n')?;
-            (Some(parse_open(line)?), rest)
+            (Some(parse_open(line, board)?), rest)
         }
     };
     let (print, body) = match body.strip_prefix("print ") {
@@ -183,14 +183,30 @@ fn parse(text: &str, board: Board) -> Option<Look> {
     Some(Ok(Sighting { corners: grid, print, open }))
 }
 
+/// The other board that a picture shows. An entry is for boards of all lengths of one ratio: they are those of the board that is looked for.
+fn parse_seen(text: &str, board: Board) -> Option<Option<Board>> {
+    if text == "-" {
+        return Some(None);
+    }
+    let seen: Board = text.parse().ok()?;
+    let kind = match (seen.kind, board.kind) {
+        (Kind::Charuco { dictionary, layout, .. }, Kind::Charuco { marker_mm, .. }) => {
+            Kind::Charuco { marker_mm, dictionary, layout }
+        }
+        (Kind::Tags { family, .. }, Kind::Tags { gap_mm, .. }) => Kind::Tags { gap_mm, family },
+        (kind, _) => kind,
+    };
+    Some(Some(Board { squares: seen.squares, kind, ..board }))
+}
+
 /// From a line of the entry.
-fn parse_open(line: &str) -> Option<Open> {
+fn parse_open(line: &str, board: Board) -> Option<Open> {
     let [others, seen, reason] = line.splitn(3, ';').collect::<Vec<_>>().try_into().ok()?;
     let other = |text: &str| {
         let [quarters, columns, rows] = text.split(',').collect::<Vec<_>>().try_into().ok()?;
         Some(Renumbering { quarters: quarters.parse().ok()?, columns: columns.parse().ok()?, rows: rows.parse().ok()? })
     };
-    let seen = if seen == "-" { None } else { Some(seen.parse().ok()?) };
+    let seen = parse_seen(seen, board)?;
     let others = others.split_whitespace().map(other).collect::<Option<_>>()?;
     Some(Open { others, refusal: Refusal { reason: reason.to_owned(), seen } })
 }
@@ -219,7 +235,9 @@ mod tests {
         let print = Some(Print { share: 0.7, pitch: Pitch::Even, layout: Layout::Old, inverted: true });
         let coded: Look = Ok(Sighting { corners: corners.clone(), print, open: None });
         assert_eq!(parse(&text(&coded), board()), Some(coded));
-        for (others, seen) in [(vec![(0, 1, 0), (3, -2, 4)], None), (Vec::new(), Some("4x4".parse().unwrap()))] {
+        for (others, seen) in
+            [(vec![(0, 1, 0), (3, -2, 4)], None), (Vec::new(), Some("checker:4x4:10".parse().unwrap()))]
+        {
             let renumbering = |(quarters, columns, rows)| Renumbering { quarters, columns, rows };
             let refusal = Refusal { reason: "shows 5 corners; which they are".to_owned(), seen };
             let open = Some(Open { others: others.into_iter().map(renumbering).collect(), refusal });
@@ -233,10 +251,17 @@ mod tests {
             assert_eq!(parse(&written[..cut], board()), None);
         }
         assert_eq!(parse(&written.replace("1 0 1.3", "1 0 1.4"), board()), None);
-        for seen in [None, Some("10x7".parse().unwrap())] {
+        for seen in [None, Some("checker:10x7:10".parse().unwrap())] {
             let none: Look = Err(Refusal { reason: "no board found".to_owned(), seen });
             assert_eq!(parse(&text(&none), board()), Some(none));
         }
+        let boards = |names: [&str; 2]| names.map(|name| name.parse::<Board>().unwrap());
+        let refusal = |board| Err(Refusal { reason: "another".to_owned(), seen: Some(board) });
+        let [seen, asked] = boards(["charuco:5x4:54:40.5:DICT_5X5_50:old", "charuco:4x5:54:40.5:DICT_4X4_100"]);
+        let entry = text(&refusal(seen));
+        assert_eq!(parse(&entry, asked), Some(refusal(seen)));
+        let [seen, asked] = boards(["charuco:5x4:60:45:DICT_5X5_50:old", "charuco:4x5:60:45:DICT_4X4_100"]);
+        assert_eq!(parse(&entry, asked), Some(refusal(seen)));
     }
 
     #[test]

@@ -53,7 +53,7 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
     };
     let content = html! {
         (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), page::capital(&deciding(judged)))))
-        @if !judged.facts.findings.is_empty() { p { "What happened over the pairs:" } (page::warnings(&happened(judged))) }
+        @if !judged.facts.findings.is_empty() { p { "What happened during the series:" } (page::warnings(&happened(judged))) }
         (ledger(judged))
         @if !judged.advice.is_empty() { p { "What to photograph next:" } (page::warnings(&judged.advice)) }
         @if !judged.warnings.is_empty() { p { "What to do, and what else to know:" } }
@@ -100,6 +100,10 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
         ),
         (mm(extremes.max_abs_error_mm), "largest error of such a length".to_owned()),
         match judged.trusted_mm() {
+            Some(trusted_mm) if trusted_mm > summary::NO_USE * judged.facts.volume.length_mm => (
+                "none".to_owned(),
+                "length can be trusted: what they may be off by is more than a tenth of them".to_owned(),
+            ),
             Some(trusted_mm) => (
                 mm(trusted_mm),
                 format!("lengths can be trusted to this; the tolerance is {} mm", judged.facts.tolerance_mm),
@@ -121,7 +125,6 @@ fn ledger(judged: &Judged) -> Markup {
     html! {
         @if !below.is_empty() {
             h2 { "Checks that are not passed" }
-            p { "No verdict is better than its worst check." }
             (lines(&below))
         }
         (page::details(
@@ -140,9 +143,9 @@ fn lines(evidence: &[&Evidence]) -> Markup {
     let cell = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), evidence::number);
     html! {
         div.wide { table.ledger {
-            thead { tr { th { "what" } th { "value" } th { "limit" } th { "unit" } th { "allows" } th { "detail" } } }
+            thead { tr { th { "what" } th { "value" } th { "limit" } th { "unit" } th { "result" } th { "detail" } } }
             tbody { @for line in evidence { tr {
-                td { (line.what) }
+                td { (line.name()) }
                 td { (cell(line.value)) }
                 td { (cell(line.limit)) }
                 td { (line.unit) }

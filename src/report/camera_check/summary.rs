@@ -1,15 +1,21 @@
 //! The verdict in words, and the table on stdout.
 
+use crate::diagnostic::{count, significant};
 use crate::files::OutDir;
 use crate::imaging::corners::named;
 use crate::report::table::{Table, number};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::judge::assessment::Judged;
+use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::{Axis, Range};
 use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::judge::verdict::Verdict;
-use crate::stereo::pairs::Cause;
+use crate::stereo::pairs::{Cause, DiscardedPair};
+use crate::stereo::volume::Extent;
+
+/// A rig that may be off by such a share of a length measures nothing.
+pub(super) const NO_USE: f64 = 0.1;
 
 /// Rows of the table on stdout along each axis.
 const TABLE_ROWS: usize = 3;
@@ -37,10 +43,11 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
     lines.extend(standing(calibration));
     lines.extend(lenses(calibration));
     lines.extend(scale(judged));
-    lines.extend(judged.facts.findings.iter().map(|finding| format!("over the pairs: {}", finding.action)));
+    lines.extend(second_board(judged));
+    lines.extend(judged.facts.findings.iter().map(|finding| format!("during the series: {}", finding.action)));
     lines.extend(pairs(calibration));
     lines.push(rig(calibration, judged));
-    lines.push(board(calibration));
+    lines.push(board(calibration, judged));
     lines.extend(next(judged).map(|what| format!("next: {what}")));
     format!("{}\n\n{}\nreport: {}\n", lines.join("\n"), ranges(judged), out.join("camera-check.html"))
 }
@@ -71,9 +78,15 @@ pub(super) fn volume(judged: &Judged) -> String {
     let volume = &judged.facts.volume.volume;
     let [near, far] = volume.depth_mm;
     let [x0, x1, y0, y1] = volume.tilt_deg;
-    format!(
-        "for where the boards were: {near:.0} to {far:.0} mm away, tilted by {x0:.0} to {x1:.0} deg about x and {y0:.0} to {y1:.0} deg about y"
-    )
+    match judged.facts.volume.extent {
+        Extent::Boards => format!(
+            "for where the boards were: {near:.0} to {far:.0} mm away, tilted by {x0:.0} to {x1:.0} deg about x and {y0:.0} to {y1:.0} deg about y"
+        ),
+        Extent::All => format!(
+            "for all that both cameras see {near:.0} to {far:.0} mm away, where the boards' depths were, in all directions"
+        ),
+        asked @ Extent::Box(_) => format!("for {}", asked.said()),
+    }
 }
 
 /// Which rig of several it is, where the rig changed.
@@ -96,7 +109,11 @@ fn lenses(calibration: &Calibration) -> Option<String> {
         return Some(check.statement.clone());
     }
     let seen = check.focus_seen.iter().flatten().copied().fold(0.0, f64::max);
-    Some(format!("{}; they would show a focal length that differs by {:.2} %", check.statement, 100.0 * seen))
+    Some(format!(
+        "{}; they would show a focal length that differs by {} %",
+        check.statement,
+        significant(100.0 * seen, 2)
+    ))
 }
 
 /// What known moves say of the scale.
@@ -107,24 +124,46 @@ fn scale(judged: &Judged) -> Vec<String> {
     measured.chain(moves.missing.iter().cloned()).chain(why).collect()
 }
 
-/// How many pairs were used, and in a line a cause which were not.
+/// What a second board says, where there was one.
+fn second_board(judged: &Judged) -> Option<String> {
+    let second = judged.facts.standards.second.as_ref()?;
+    let pairs = count(second.pairs, "pair");
+    let Some(extremes) = &second.extremes else {
+        return Some(format!("second board: no length on it could be measured in {pairs}"));
+    };
+    let scale = second.scale_error.zip(second.scale_error_sigma).map_or(String::new(), |(scale, sigma)| {
+        format!("; its scale is off by {} +- {} ppm", significant(1e6 * scale, 2), significant(2e6 * sigma, 2))
+    });
+    Some(format!(
+        "second board: {pairs}, largest error {} mm ({} with its uncertainty){scale}",
+        number(Some(extremes.max_abs_error_mm), 4),
+        number(Some(extremes.largest.at_most_mm()), 4)
+    ))
+}
+
+/// How many pairs were used, and in a line a reason which were not.
 fn pairs(calibration: &Calibration) -> Vec<String> {
-    /// Causes with a line of their own; the page has all.
-    const MOST: usize = 4;
+    /// Causes and reasons with a line of their own; the page has all.
+    const MOST: usize = 6;
     let total = calibration.views.len() + calibration.skipped.len();
     let mut lines = vec![format!("{} of {total} pairs used", calibration.views.len())];
-    let mut causes: Vec<(Cause, &str, Vec<String>)> = Vec::new();
+    // Reasons that differ by a figure alone are one.
+    let without_figures = |reason: &str| reason.replace(|c: char| c.is_ascii_digit() || ".-".contains(c), "");
+    let mut groups: Vec<(Cause, String, Vec<&DiscardedPair>)> = Vec::new();
     for pair in &calibration.discarded.pairs {
-        match causes.iter_mut().find(|(cause, ..)| *cause == pair.cause) {
-            Some((.., names)) => names.push(pair.pair.clone()),
-            None => causes.push((pair.cause, &pair.reason, vec![pair.pair.clone()])),
+        let pattern = without_figures(&pair.reason);
+        match groups.iter_mut().find(|(cause, known, _)| *cause == pair.cause && *known == pattern) {
+            Some((.., pairs)) => pairs.push(pair),
+            None => groups.push((pair.cause, pattern, vec![pair])),
         }
     }
-    causes.sort_by_key(|(.., names)| std::cmp::Reverse(names.len()));
-    let others: usize = causes.iter().skip(MOST).map(|(.., names)| names.len()).sum();
-    lines.extend(causes.iter().take(MOST).map(|(_, reason, names)| {
-        let of = if names.len() > 1 { "first: " } else { "" };
-        format!("  without {}: {of}{reason}", named(names))
+    groups.sort_by_key(|(.., pairs)| std::cmp::Reverse(pairs.len()));
+    let others: usize = groups.iter().skip(MOST).map(|(.., pairs)| pairs.len()).sum();
+    lines.extend(groups.iter().take(MOST).map(|(.., pairs)| {
+        let reason = &pairs[0].reason;
+        let of = if pairs.iter().all(|pair| pair.reason == *reason) { "" } else { "first: " };
+        let names: Vec<String> = pairs.iter().map(|pair| pair.pair.clone()).collect();
+        format!("  without {}: {of}{reason}", named(&names))
     }));
     if others > 0 {
         lines.push(format!("  without {others} more, see the report"));
@@ -143,14 +182,22 @@ fn rig(calibration: &Calibration, judged: &Judged) -> String {
     )
 }
 
-fn board(calibration: &Calibration) -> String {
+fn board(calibration: &Calibration, judged: &Judged) -> String {
     let [along_x, along_y, twist] = calibration.values.shared.shape_mm;
     let bow = if calibration.layout.shape {
         format!(", bowed by {along_x:.4} mm along x and {along_y:.4} mm along y, twisted by {twist:.4} mm")
     } else {
         ", taken as flat".to_owned()
     };
-    format!("board of {}{bow}", calibration.board.said())
+    let standards = &judged.facts.standards;
+    let by_itself = standards.second.is_none() && standards.moves.measured.is_empty();
+    // A wrong size makes a rig of another size, and nothing else.
+    let check = if by_itself {
+        "; a wrong size of its squares shows in the baseline alone: compare that with a ruler"
+    } else {
+        ""
+    };
+    format!("board of {}{bow}{check}", calibration.board.said())
 }
 
 /// What to do next: about what happened to the rig and about the board, then what the deciding line asks for, then what the views lack.
@@ -187,25 +234,36 @@ pub(super) fn deciding(judged: &Judged) -> String {
     let deciding = judged.deciding();
     let below = || judged.evidence.iter().filter(|line| line.allows != Verdict::Pass);
     let others: Vec<&str> =
-        below().filter(|line| deciding.is_none_or(|first| first.what != line.what)).map(|line| line.what).collect();
+        below().filter(|line| deciding.is_none_or(|first| first.what != line.what)).map(Evidence::name).collect();
     let others = match (below().next(), others.is_empty()) {
         (None, _) => format!("all {} checks passed", judged.evidence.len()),
         (_, true) => "all other checks passed".to_owned(),
-        _ => format!("not passed either: {}", others.join(", ")),
+        _ => format!("also not passed: {}", others.join(", ")),
     };
-    deciding.map_or(others.clone(), |line| format!("decided by {}: {}; {others}", line.what, line.figure()))
+    deciding.map_or(others.clone(), |line| format!("deciding check: {}, {}; {others}", line.name(), line.figure()))
 }
 
 /// What the rig can be trusted to, whatever the tolerance.
 pub(super) fn trusted(judged: &Judged) -> String {
-    match judged.trusted_mm() {
-        Some(mm) => format!("lengths can be trusted to {mm:.4} mm"),
-        None => {
+    match (judged.trusted(), judged.trusted_mm()) {
+        (Some(line), Some(mm)) if mm > NO_USE * judged.facts.volume.length_mm => format!(
+            "no length can be trusted: of one of {:.0} mm an error of {} mm is not ruled out ({})",
+            judged.facts.volume.length_mm,
+            significant(mm, 2),
+            line.name()
+        ),
+        (Some(line), Some(mm)) => {
+            // The held-out lengths stand in the line before.
+            let is_first = judged.evidence.first().is_some_and(|first| first.what == line.what);
+            let why = if is_first { String::new() } else { format!(" ({})", line.name()) };
+            format!("lengths can be trusted to {mm:.4} mm{why}")
+        }
+        _ => {
             let open = judged.evidence.iter().filter(|line| line.unit != "mm" && line.unit != "px");
-            let open: Vec<&str> = open.filter(|line| line.allows != Verdict::Pass).map(|line| line.what).collect();
+            let open: Vec<&str> = open.filter(|line| line.allows != Verdict::Pass).map(Evidence::name).collect();
             match open.is_empty() {
-                true => "lengths cannot be trusted to any tolerance: these pairs do not bound their errors".to_owned(),
-                false => format!("lengths cannot be trusted to any tolerance before this passes: {}", open.join(", ")),
+                true => "no length can be trusted: these pairs do not bound their errors".to_owned(),
+                false => format!("no length can be trusted until these checks are passed: {}", open.join(", ")),
             }
         }
     }
@@ -217,7 +275,11 @@ pub(super) fn advice(judged: &Judged) -> String {
     match judged.verdict {
         Verdict::Pass => {
             let trusted = judged.trusted_mm().unwrap_or(sure);
-            format!("Lengths can be trusted to {trusted:.4} mm in the volume where the boards stood.")
+            let over = match judged.facts.volume.extent {
+                Extent::Boards => "the volume where the boards stood".to_owned(),
+                asked => asked.said(),
+            };
+            format!("Lengths can be trusted to {trusted:.4} mm in {over}.")
         }
         Verdict::Undecided => format!(
             "Not decided: the checks below that are not passed say why and what to do; until then do not rely on {sure} mm."

@@ -48,7 +48,7 @@ pub(super) fn section(placement: &PlacementFile) -> Markup {
             predicted target, robot, placement and scatter together, at poses like these (" (placement.poses) ")." }
         div.wide { (page::table(&["transform", "x, y, z in mm", "sigma", "turn in deg", "sigma", "error to expect, mm", "95 of 100 below", "held out"], &rows)) }
         @for held in placement.held.iter().filter(|held| !held.parameters.is_empty()) {
-            p { "Held as " (placement.robot) " has them: " (held.parameters.join(", ")) " (" (held.because) ")." }
+            p { "Not observable from a placement, and taken from " (placement.robot) ": " (held.parameters.join(", ")) " (" (held.because) ")." }
         }
     }
 }

@@ -96,12 +96,20 @@ impl Judged {
 
     /// The tolerance that this rig would meet as far as lengths go, mm; `None` where something else than a length stands against it.
     pub fn trusted_mm(&self) -> Option<f64> {
+        self.trusted().and_then(|line| line.value)
+    }
+
+    /// The line of the ledger that sets that tolerance.
+    pub fn trusted(&self) -> Option<&Evidence> {
         let (lengths, others): (Vec<&Evidence>, Vec<&Evidence>) =
             self.evidence.iter().filter(|line| line.limit.is_some()).partition(|line| line.unit == "mm");
-        let bounds = lengths.iter().map(|line| line.value).collect::<Option<Vec<f64>>>()?;
+        let known = |line: &&Evidence| line.value.is_some_and(|mm| mm.is_finite());
         let epipolar = |line: &Evidence| line.unit == "px";
         let free = others.iter().all(|line| line.allows == Verdict::Pass || epipolar(line));
-        free.then(|| bounds.into_iter().fold(0.0, f64::max)).filter(|mm| mm.is_finite())
+        let of = |line: &Evidence| line.value.unwrap_or_default();
+        // Of equals the first, which is that of the held-out lengths.
+        let largest = |a, b| if of(b) > of(a) { b } else { a };
+        if free && lengths.iter().all(known) { lengths.into_iter().reduce(largest) } else { None }
     }
 }
 

@@ -34,9 +34,21 @@ pub fn number(value: f64) -> String {
 }
 
 impl Evidence {
+    /// Its name for a person; `what` is the one that scripts know.
+    pub fn name(&self) -> &'static str {
+        match self.what {
+            "rigs without some pairs" => "stability without a block of pairs",
+            "pairs with poses of their own" => "number of different poses",
+            "scatter of pairs" => "scatter from pair to pair",
+            "spread of admissible models" => "difference between models that fit",
+            "changes over the pairs" => "changes during the series",
+            same => same,
+        }
+    }
+
     /// The warning of a line that does not allow a pass.
     pub fn warning(&self) -> Warning {
-        Warning { text: format!("{}: {}; {}", self.what, self.figure(), self.remedy), reason: self.detail.clone() }
+        Warning { text: format!("{}: {}; {}", self.name(), self.figure(), self.remedy), reason: self.detail.clone() }
     }
 
     /// What this line says, in one: the value against its limit.

@@ -97,6 +97,8 @@ impl VolumeLength {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VolumeLengths {
     pub volume: Volume,
+    /// What it was asked for as.
+    pub extent: Extent,
     /// How long they are, mm.
     pub length_mm: f64,
     /// Those whose ends lie in the volume, as the boards lay in it.
@@ -112,7 +114,7 @@ impl VolumeLengths {
         let volume = Volume::of(calibration, extent);
         let rig = calibration.rig();
         let Some(covariance) = calibration.covariance_now().as_ref().map(RigCovariance::new) else {
-            return VolumeLengths { volume, length_mm, ..VolumeLengths::default() };
+            return VolumeLengths { volume, extent, length_mm, ..VolumeLengths::default() };
         };
         let sigma_px = calibration.noise.typical_px(&calibration.views) * share.sqrt();
         let directions = match extent {
@@ -120,7 +122,10 @@ impl VolumeLengths {
             _ => DIRECTIONS.iter().map(|d| Vector3::from(*d).normalize()).collect(),
         };
         let places = places(calibration, extent);
-        VolumeLengths::through(rig, &covariance, volume, &places, &directions, length_mm, sigma_px)
+        VolumeLengths {
+            extent,
+            ..VolumeLengths::through(rig, &covariance, volume, &places, &directions, length_mm, sigma_px)
+        }
     }
 
     /// The same through a volume that a file describes, in the directions of boards with its tilts; corners scatter by one px.
@@ -151,7 +156,7 @@ impl VolumeLengths {
             places.par_iter().flat_map_iter(|at| of_place(at, directions)).collect()
         };
         let (lengths, along_sight) = (through(directions), through(&[Vector3::z()]));
-        VolumeLengths { length_mm, lengths, along_sight, volume }
+        VolumeLengths { length_mm, lengths, along_sight, volume, extent: Extent::Boards }
     }
 
     /// The length for which this is largest, with its value.

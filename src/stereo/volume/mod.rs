@@ -28,6 +28,19 @@ pub enum Extent {
     Box([f64; 6]),
 }
 
+impl Extent {
+    /// What it holds, for a person.
+    pub fn said(self) -> String {
+        match self {
+            Extent::Boards => "the volume where the boards were and in the directions that they took there".to_owned(),
+            Extent::All => "all that both cameras see at the boards' depths, in all directions".to_owned(),
+            Extent::Box([x0, y0, z0, x1, y1, z1]) => {
+                format!("the box from {x0}, {y0}, {z0} to {x1}, {y1}, {z1} mm, in all directions")
+            }
+        }
+    }
+}
+
 impl std::str::FromStr for Extent {
     type Err = String;
 

@@ -181,3 +181,21 @@ fn a_scale_that_is_seen_is_a_doubt() {
     let (said, _) = verdict("ur5e", &of_arm(&built(|_| {}), 60, 0.03, 1.01));
     assert!(said.starts_with("check") && said.contains("longer than the nominal ones"), "{said}");
 }
+
+/// A unit that is forced against what the names say is the reason, not names that are missing.
+#[test]
+fn units_that_contradict_the_names_are_told_so() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(40);
+    let names = "pose,group,role,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,x_mm,y_mm,z_mm";
+    let mut table = format!("{names}\n");
+    for (i, (joints, point)) in rows.iter().enumerate() {
+        let cells: Vec<String> = joined(joints, point).iter().map(f64::to_string).collect();
+        let _ = writeln!(table, "p{i},1,sample,{}", cells.join(","));
+    }
+    let file = folder.file("own.csv", table);
+    let of = |units: &str| Source { units: Some(units.to_owned()), ..source(&[&file]) };
+    assert!(of("deg").read(&robot).is_ok());
+    refused(&of("rad"), &robot, &["`--units rad` contradicts the names j1_deg", "hint: leave `--units` out"]);
+    refused(&of("deg,um"), &robot, &["`--units um` contradicts the names x_mm to z_mm, which say mm"]);
+}

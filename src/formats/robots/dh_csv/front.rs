@@ -55,6 +55,15 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
         // Another encoding, or a spreadsheet.
         Err(_) => Grid::text(path, WHAT, HINT)?,
     };
+    if text.as_deref().and_then(files::kind::kind) == Some("a robot file") {
+        let hint = "`stereocal robot show FILE` says it in words; the commands take it by `--robot FILE`";
+        return Err(files::Error::format(
+            path,
+            None,
+            "this is a robot file already: there is nothing to import",
+            Some(hint),
+        ));
+    }
     let Some(text) = text else { return of_grid(&Grid::read(path, WHAT, HINT)?, asked, None) };
     let text = without_entities(&text);
     let refuse = |(line, message): dh_text::Wrong| empty(path).refuse(line, message, Some(HINT));

@@ -176,7 +176,13 @@ fn without_pictures(source: &Source<'_>, folders: &[Folder]) -> (String, String)
     let below = folders.first().into_iter().flat_map(|root| &root.folders).filter_map(|path| list(path).ok());
     let others: Vec<Utf8PathBuf> =
         folders.iter().flat_map(|f| f.others.clone()).chain(below.flat_map(|f| f.others)).collect();
-    let Some(first) = others.first() else { return (NONE.to_owned(), by_hand(source)) };
+    let Some(first) = others.first() else {
+        let hint = format!(
+            "is the path right? The pictures are in this folder, or in one for each camera: {}",
+            by_hand(source)
+        );
+        return (NONE.to_owned(), hint);
+    };
     let names = first.file_name().unwrap_or(first.as_str());
     let statement = format!(
         "{NONE}, but {} ({names}{})",

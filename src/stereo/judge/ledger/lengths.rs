@@ -7,6 +7,7 @@ use crate::stereo::judge::doubtful_corners::CONTRADICTED;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::model_disagreement::{self};
 use crate::stereo::judge::verdict::Verdict;
+use crate::stereo::volume::Extent;
 
 pub(super) fn held_out_lengths(case: &Case) -> Evidence {
     let extremes = &case.facts.accuracy.extremes;
@@ -48,14 +49,14 @@ pub(super) fn any_length(case: &Case) -> Evidence {
         None => "the rig has no covariance over the volume in which the boards stood".to_owned(),
         Some((_, length)) => format!(
             "expanded uncertainty of a length of {:.0} mm where it is largest, {} {:.0} mm away (standard deviations: corners {:.4}, \
-             calibration {:.4}, the latter times {:.2} for so few pairs; what the models leave open is in it), over the volume where the \
-             boards were and in the directions that they took there{}",
+             calibration {:.4}, the latter times {:.2} for so few pairs; what the models leave open is in it), over {}{}",
             case.facts.volume.length_mm,
             length.lies(),
             length.at_mm.z,
             length.corners_mm,
             length.calibration_mm,
             case.facts.expansion.calibration,
+            case.facts.volume.extent.said(),
             along_sight(case)
         ),
     };
@@ -70,6 +71,9 @@ pub(super) fn any_length(case: &Case) -> Evidence {
 
 /// What lengths that no board showed would be known to.
 fn along_sight(case: &Case) -> String {
+    if case.facts.volume.extent != Extent::Boards {
+        return String::new();
+    }
     let worst = case.facts.volume.along_sight.iter().map(|length| case.expanded_mm(length)).reduce(f64::max);
     worst.map_or(String::new(), |mm| format!(". Along the line of sight, where no board lay, it would be {mm:.4} mm"))
 }

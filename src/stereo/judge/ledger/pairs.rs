@@ -1,6 +1,7 @@
 //! Lines on the pairs: what happened over them, how they scatter, which are missing, how the boards stood, and lenses that were known.
 
 use super::facts::Case;
+use crate::diagnostic::significant;
 use crate::imaging::Side;
 use crate::stereo::Camera;
 use crate::stereo::calibrate::Calibration;
@@ -17,7 +18,7 @@ pub(super) fn findings(case: &Case) -> Evidence {
     let left: Vec<&Finding> = case.facts.findings.iter().filter(within).collect();
     let value = left.iter().filter_map(|finding| finding.effect_mm).fold(0.0, f64::max);
     let detail = if left.is_empty() {
-        "no change over the pairs that were used: no step, drift or change of focus beyond their scatter".to_owned()
+        "no change during the series: no step, drift or change of focus beyond their scatter".to_owned()
     } else {
         let told: Vec<&str> = left.iter().map(|finding| finding.action.as_str()).collect();
         let effect = if left.iter().any(|finding| finding.effect_mm.is_some()) {
@@ -43,12 +44,12 @@ pub(super) fn pair_scatter(case: &Case) -> Evidence {
     let scatter = &case.calibration.pair_scatter;
     let detail = match scatter.ratio {
         Some(_) => format!(
-            "variance of the rig by how {} pairs with poses of their own scatter about it, over the one by the corners' noise; what \
+            "variance of the rig by how {} pairs with different poses scatter about it, over the one by the corners' noise; what \
              exceeds one is in all uncertainties here",
             scatter.groups
         ),
         None => format!(
-            "one of {} pairs with poses of their own cannot be left out without losing the calibration: no other pair checks it",
+            "one of {} pairs with different poses cannot be left out without losing the calibration: no other pair checks it",
             scatter.groups
         ),
     };
@@ -210,7 +211,9 @@ pub(super) fn known_lenses(case: &Case) -> Option<Evidence> {
     let check = case.calibration.lens_check.as_ref()?;
     let seen: Vec<String> = Side::BOTH
         .into_iter()
-        .filter_map(|side| Some(format!("{} {:.3} %", side.name(), 100.0 * check.focus_seen[side as usize]?)))
+        .filter_map(|side| {
+            Some(format!("{} {} %", side.name(), significant(100.0 * check.focus_seen[side as usize]?, 2)))
+        })
         .collect();
     Some(Evidence {
         what: "known lenses",
