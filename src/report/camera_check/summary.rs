@@ -1,11 +1,13 @@
 //! The verdict in words, and the table on stdout.
 
+use crate::diagnostic::two_digits;
 use crate::files::OutDir;
 use crate::imaging::corners::named;
 use crate::report::table::{Table, number};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::judge::assessment::Judged;
+use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::{Axis, Range};
 use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::judge::verdict::Verdict;
@@ -183,7 +185,12 @@ pub(super) fn explanation(judged: &Judged) -> String {
 }
 
 /// The line of the ledger that decides, and which others are below a pass.
-pub(super) fn deciding(judged: &Judged) -> String {
+fn deciding(judged: &Judged) -> String {
+    deciding_by(judged, Evidence::figure)
+}
+
+/// The same, the figure as a page or the terminal has it.
+pub(super) fn deciding_by(judged: &Judged, figure: fn(&Evidence) -> String) -> String {
     let deciding = judged.deciding();
     let below = || judged.evidence.iter().filter(|line| line.allows != Verdict::Pass);
     let others: Vec<&str> =
@@ -193,7 +200,7 @@ pub(super) fn deciding(judged: &Judged) -> String {
         (_, true) => "all other checks passed".to_owned(),
         _ => format!("not passed either: {}", others.join(", ")),
     };
-    deciding.map_or(others.clone(), |line| format!("decided by {}: {}; {others}", line.what, line.figure()))
+    deciding.map_or(others.clone(), |line| format!("decided by {}: {}; {others}", line.what, figure(line)))
 }
 
 /// What the rig can be trusted to, whatever the tolerance.
@@ -217,7 +224,7 @@ pub(super) fn advice(judged: &Judged) -> String {
     match judged.verdict {
         Verdict::Pass => {
             let trusted = judged.trusted_mm().unwrap_or(sure);
-            format!("Lengths can be trusted to {trusted:.4} mm in the volume where the boards stood.")
+            format!("Lengths can be trusted to {} mm in the volume where the boards stood.", two_digits(trusted))
         }
         Verdict::Undecided => format!(
             "Not decided: the checks below that are not passed say why and what to do; until then do not rely on {sure} mm."
