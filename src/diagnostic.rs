@@ -72,21 +72,57 @@ pub fn count(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
-/// A number with so many digits that count: 0.0012 and 1.2 and 120 with two.
-pub fn significant(value: f64, digits: i32) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return if value == 0.0 { "0".to_owned() } else { "n/a".to_owned() };
+/// An error or an uncertainty as it is stated, with two significant digits: `0.0061`, `1.6`, `245`. Nothing finer than a nanometre (of mm) is told
+/// from zero; a value that is none is "n/a".
+pub fn two_digits(value: f64) -> String {
+    fixed(value, decimals_of(value))
+}
+
+/// Values of one kind below each other with the same decimals: two digits of those that are a tenth as large as the largest.
+pub fn aligned(values: &[Option<f64>]) -> Vec<String> {
+    let largest = values.iter().flatten().filter(|v| v.is_finite()).fold(0.0_f64, |most, v| most.max(v.abs()));
+    let decimals = if largest > 0.0 { (decimals_of(largest) + 1).min(FINEST) } else { 0 };
+    values.iter().map(|value| fixed(value.unwrap_or(f64::NAN), decimals)).collect()
+}
+
+/// A figure beside the limit that it is compared with: two digits, and more where these would put it on the other side.
+pub fn beside(value: f64, limit: f64) -> String {
+    let side = |v: f64| v.partial_cmp(&limit);
+    let texts = (decimals_of(value)..FINEST).map(|decimals| fixed(value, decimals));
+    let same = |text: &String| text.parse().is_ok_and(|rounded| side(rounded) == side(value));
+    texts.into_iter().find(same).unwrap_or_else(|| fixed(value, FINEST))
+}
+
+/// Two lengths and their sum, with the same decimals and so that what is written adds up: `[a, b, a + b]`.
+pub fn summed(a: f64, b: f64) -> [String; 3] {
+    let sum = a + b;
+    if !sum.is_finite() {
+        return ["n/a".to_owned(), "n/a".to_owned(), "n/a".to_owned()];
     }
-    let first = |value: f64| value.abs().log10().floor() as i32;
-    let decimals = (digits - 1 - first(value)).clamp(0, 12) as usize;
+    let (less, more) = (a.abs().min(b.abs()), a.abs().max(b.abs()));
+    let decimals = if less > 0.0 { decimals_of(less) } else { 0 }.max(decimals_of(more) + 1).min(FINEST);
+    let rounded = |v: f64| format!("{v:.decimals$}").parse::<f64>().unwrap_or(v);
+    // The last digit of the second gives way.
+    [a, rounded(sum) - rounded(a), sum].map(|v| format!("{v:.decimals$}"))
+}
+
+/// Most decimals of a length in mm.
+const FINEST: usize = 6;
+
+/// Decimals that leave two significant digits.
+fn decimals_of(value: f64) -> usize {
+    // Rounded first: 0.0996 is 0.10.
+    let exponent = format!("{value:.1e}").split_once('e').and_then(|(_, power)| power.parse::<i32>().ok());
+    (1 - exponent.unwrap_or(0)).clamp(0, FINEST as i32) as usize
+}
+
+/// With so many decimals; what rounds to zero is a bare zero.
+fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return "n/a".to_owned();
+    }
     let text = format!("{value:.decimals$}");
-    // 0.0996 is 0.10, and not 0.100.
-    match text.parse::<f64>() {
-        Ok(rounded) if rounded != 0.0 && first(rounded) > first(value) => {
-            format!("{rounded:.*}", decimals.saturating_sub(1))
-        }
-        _ => text,
-    }
+    if text.chars().all(|c| matches!(c, '0' | '.' | '-')) { "0".to_owned() } else { text }
 }
 
 /// Something a person should know although the command ends well.
@@ -138,18 +174,52 @@ mod tests {
     use super::*;
 
     #[test]
-    fn digits_that_count() {
+    fn two_digits_are_kept_whatever_the_size() {
         for (value, text) in [
             (0.0, "0"),
-            (0.00123, "0.0012"),
-            (-0.0996, "-0.10"),
-            (0.5, "0.50"),
-            (12.34, "12"),
+            (-0.0, "0"),
+            (1e-9, "0"),
+            (0.000_012, "0.000012"),
+            (0.00557, "0.0056"),
+            (0.0996, "0.10"),
+            (-0.0444, "-0.044"),
+            (1.5673, "1.6"),
             (9.96, "10"),
-            (1234.5, "1234"),
-            (f64::NAN, "n/a"),
+            (244.88, "245"),
+            (f64::INFINITY, "n/a"),
         ] {
-            assert_eq!(significant(value, 2), text);
+            assert_eq!(two_digits(value), text);
         }
+    }
+
+    #[test]
+    fn a_column_has_the_decimals_of_its_largest_value() {
+        let column = aligned(&[Some(1.5673), Some(-0.2104), None, Some(0.001)]);
+        assert_eq!(column, ["1.57", "-0.21", "n/a", "0"]);
+        assert_eq!(aligned(&[Some(0.0), None]), ["0", "n/a"]);
+    }
+
+    #[test]
+    fn what_is_written_of_a_sum_adds_up() {
+        assert_eq!(summed(1.0408, 1.2469), ["1.04", "1.25", "2.29"]);
+        assert_eq!(summed(0.005_565, 0.000_494), ["0.00556", "0.00050", "0.00606"]);
+        // 0.0144 and 0.0144 are 0.0288.
+        assert_eq!(summed(0.0144, 0.0144), ["0.0144", "0.0144", "0.0288"]);
+        for (a, b) in [(1.0449, 1.0449), (0.1, 0.033_35), (2.0, 0.0), (0.004_449, 0.004_449)] {
+            let texts = summed(a, b);
+            let [x, y, sum] = [0, 1, 2].map(|k| texts[k].parse::<f64>().unwrap());
+            assert!((x + y - sum).abs() < 1e-9, "{texts:?}");
+        }
+        assert_eq!(summed(1.0, f64::NAN)[2], "n/a");
+    }
+
+    #[test]
+    fn rounding_puts_no_figure_on_the_other_side_of_its_limit() {
+        for (value, limit, text) in
+            [(0.0061, 0.05, "0.0061"), (0.050_04, 0.05, "0.05004"), (0.049_96, 0.05, "0.04996"), (1.04, 1.0, "1.04")]
+        {
+            assert_eq!(beside(value, limit), text);
+        }
+        assert_eq!([beside(0.05, 0.05), beside(f64::NAN, 1.0)], ["0.050", "n/a"]);
     }
 }

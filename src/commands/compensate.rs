@@ -30,6 +30,9 @@ struct Summary {
     before_mean_mm: Option<f64>,
     /// Largest.
     before_max_mm: Option<f64>,
+    /// By how much the tools of both files differ, where none was named for both, mm.
+    #[serde(skip)]
+    tools_apart_mm: f64,
     /// Those without.
     refused: Vec<Refused>,
     /// Of a program: every instruction that moves the robot.
@@ -112,7 +115,8 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
         out.write(&program_name, &program.encoding.encoded(&text))?;
     }
     let motions = program.as_ref().map(|program| program.outcome(&found));
-    let summary = Summary::new(&rows, &found, motions.as_deref());
+    let tools_apart_mm = tool_mm.map_or((nominal.tool_mm - identified.tool_mm).norm(), |_| 0.0);
+    let summary = Summary::new(&rows, &found, motions.as_deref(), tools_apart_mm);
     let json = out.write_json("compensate.json", &summary)?;
     let whole =
         motions.as_ref().is_none_or(|motions| !motions.is_empty() && motions.iter().all(|m| m.moves_by.is_ok()));
@@ -245,7 +249,7 @@ fn counted(motions: &[Instruction], first: &Instruction) -> String {
 }
 
 impl Summary {
-    fn new(rows: &[Row], found: &[Compensated], motions: Option<&[Instruction]>) -> Summary {
+    fn new(rows: &[Row], found: &[Compensated], motions: Option<&[Instruction]>, tools_apart_mm: f64) -> Summary {
         let refused = rows.iter().zip(found).filter_map(|(row, found)| {
             let reason = found.readings.as_ref().err()?.to_string();
             Some(Refused { name: row.name.clone(), line: row.line, reason })
@@ -257,9 +261,23 @@ impl Summary {
             compensated: rows.len() - refused.len(),
             before_mean_mm: (!misses.is_empty()).then(|| misses.iter().sum::<f64>() / misses.len() as f64),
             before_max_mm: misses.iter().copied().reduce(f64::max),
+            tools_apart_mm,
             refused,
             motions: motions.map(|motions| motions.iter().map(Moved::new).collect()),
         }
+    }
+}
+
+impl Summary {
+    /// What of that is not the arm's.
+    fn tools(&self) -> String {
+        if self.tools_apart_mm < SAME_MM {
+            return String::new();
+        }
+        format!(
+            "; the tools of the two files are {:.3} mm apart: `--tool X,Y,Z` names the one that works",
+            self.tools_apart_mm
+        )
     }
 }
 
@@ -293,7 +311,11 @@ fn said(summary: &Summary, motions: Option<&[Instruction]>, written: &Utf8Path) 
     if let (Some(mean), Some(max)) = (summary.before_mean_mm, summary.before_max_mm) {
         text += &match max < SAME_MM {
             true => "both files describe the same robot, nothing was corrected: `--identified` names what `identify` wrote, identified.toml\n".to_owned(),
-            false => format!("without it the real tool would be off by {mean:.3} mm on average, {max:.3} at most\n"),
+            false => format!(
+                "without it the real tool would be off by {mean:.3} mm on average, {max:.3} at most (in the base frame; the errors of `identify` are \
+                 those after a rigid fit of each placement){}\n",
+                summary.tools()
+            ),
         };
     }
     let left: Vec<String> = match motions {

@@ -37,7 +37,9 @@ pub struct CameraCheckFile {
     moment: [String; 2],
     /// What happened over the pairs, and to pairs that are not used.
     findings: Vec<Finding>,
-    /// Of the length whose error may be largest: its own.
+    /// The length that the verdict on held-out lengths looks at.
+    judged_length: JudgedLength,
+    /// Expanded uncertainty (95 %) of that length's error with the scatter of the corners at its ends, mm.
     expanded_uncertainty_mm: f64,
     /// Its standard deviations through the corners, the calibration, and the board's certificate, mm; null without a certificate.
     uncertainty_shares_mm: [Option<f64>; 3],
@@ -70,6 +72,16 @@ pub struct CameraCheckFile {
     warnings: Vec<String>,
 }
 
+/// Of the length whose error and uncertainty together are largest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct JudgedLength {
+    error_mm: f64,
+    /// Expanded uncertainty (95 %) through calibration and board: what the corners scatter by is in the error already, mm.
+    uncertainty_mm: f64,
+    /// Their sum, which is compared with the tolerance, mm.
+    at_most_mm: f64,
+}
+
 impl CameraCheckFile {
     /// Gathers the figures.
     pub fn new(calibration: &Calibration, judged: &Judged) -> CameraCheckFile {
@@ -95,6 +107,11 @@ impl CameraCheckFile {
                 .chain(judged.of_scale())
                 .chain(findings::of_pairs(&calibration.discarded.pairs))
                 .collect(),
+            judged_length: JudgedLength {
+                error_mm: worst.error_mm,
+                uncertainty_mm: worst.expanded_without_corners_mm(),
+                at_most_mm: worst.at_most_mm(),
+            },
             expanded_uncertainty_mm: worst.expanded_uncertainty_mm(),
             uncertainty_shares_mm: [
                 Some(worst.corners_mm),

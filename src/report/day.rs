@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::page::{self, Tone};
 use super::table::number;
+use crate::diagnostic::{summed, two_digits};
 use crate::files::OutDir;
 
 /// What the commands wrote, as far as it is there.
@@ -43,6 +44,15 @@ fn text<'a>(value: &'a Value, pointer: &str) -> &'a str {
 }
 
 fn mm(value: &Value, pointer: &str) -> String {
+    value.pointer(pointer).and_then(Value::as_f64).map_or_else(|| "n/a".to_owned(), two_digits)
+}
+
+/// A length that is no error, mm.
+fn length(value: &Value, pointer: &str) -> String {
+    number(value.pointer(pointer).and_then(Value::as_f64), 3)
+}
+
+fn px(value: &Value, pointer: &str) -> String {
     number(value.pointer(pointer).and_then(Value::as_f64), 4)
 }
 
@@ -79,12 +89,31 @@ fn rig_words(check: &Value) -> String {
 }
 
 fn length_words(check: &Value) -> String {
+    let [error, uncertainty, sum] = judged(check);
     format!(
-        "largest length error {} mm, expanded uncertainty {} mm, tolerance {} mm",
-        mm(check, "/max_abs_error_mm"),
-        mm(check, "/expanded_uncertainty_mm"),
-        mm(check, "/tolerance_mm")
+        "error {error} mm + expanded uncertainty {uncertainty} mm = {sum} mm of the length where that is most, tolerance {} mm",
+        limit(check)
     )
+}
+
+/// Error and expanded uncertainty of the length that the verdict looks at, and their sum, mm.
+fn judged(check: &Value) -> [String; 3] {
+    let of = |key: &str| check.pointer(&format!("/judged_length/{key}")).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    summed(of("error_mm"), of("uncertainty_mm"))
+}
+
+/// The tolerance as it was given, mm.
+fn limit(check: &Value) -> String {
+    check.pointer("/tolerance_mm").map_or_else(|| "n/a".to_owned(), Value::to_string)
+}
+
+/// Which of the checks says to what lengths can be trusted: the largest of those in mm.
+fn trusted_by(check: &Value) -> String {
+    let trusted = check.pointer("/trusted_mm").and_then(Value::as_f64);
+    let lines = check.get("evidence").and_then(Value::as_array);
+    let of = |line: &Value| line.get("value").and_then(Value::as_f64).filter(|_| text(line, "/unit") == "mm");
+    let line = lines.into_iter().flatten().find(|line| trusted.is_some() && of(line) == trusted);
+    line.map_or_else(String::new, |line| format!(" (the largest of all checks in mm: {})", text(line, "/what")))
 }
 
 fn measured_words(measured: &Value) -> String {
@@ -105,7 +134,12 @@ fn numbers(day: &Day) -> Vec<(String, String)> {
         part.as_ref().map(say).map(|(value, what)| (value, what.to_owned()))
     };
     [
-        of(&day.check, &|c| (format!("{} mm", mm(c, "/max_abs_error_mm")), "largest length error of the rig")),
+        of(&day.check, &|c| {
+            (
+                format!("{} mm", mm(c, "/judged_length/at_most_mm")),
+                "largest length error of the rig with its uncertainty",
+            )
+        }),
         of(&day.measured, &|m| (format!("{} of {}", count(m, "/measured"), count(m, "/poses")), "poses measured")),
         of(&day.robot, &|r| {
             let after = chosen(r).map_or_else(|| "n/a".to_owned(), |m| mm(m, "/verify/mean_abs_mm"));
@@ -160,23 +194,29 @@ fn rig(check: &Value) -> Markup {
     let lengths: u64 = ranges.into_iter().flatten().filter_map(|r| r.get("count")?.as_u64()).sum();
     let nominal = ranges.into_iter().flatten().filter_map(|r| r.get("nominal_mm")?.as_f64());
     let (least, most) = nominal.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
+    let [error, uncertainty, sum] = judged(check);
+    let trusted = format!("lengths can be trusted to{}", trusted_by(check));
     let rows = [
-        ("length measurement error E, largest", mm(check, "/max_abs_error_mm"), "mm"),
-        ("its expanded uncertainty (k = 2)", mm(check, "/expanded_uncertainty_mm"), "mm"),
-        ("limit (tolerance)", mm(check, "/tolerance_mm"), "mm"),
-        ("lengths can be trusted to", mm(check, "/trusted_mm"), "mm"),
-        ("reprojection residual, RMS", mm(check, "/reprojection_rms_px"), "px"),
-        ("epipolar error, RMS", mm(check, "/epipolar/rms_px"), "px"),
-        ("baseline", mm(check, "/baseline_mm"), "mm"),
+        ("length measurement error E of the length where E + U is largest", error, "mm"),
+        ("its expanded uncertainty U (95 %)", uncertainty, "mm"),
+        ("E + U", sum, "mm"),
+        ("limit of E + U (tolerance)", limit(check), "mm"),
+        ("largest E of any length", mm(check, "/max_abs_error_mm"), "mm"),
+        ("95 % of lengths have an E below", mm(check, "/within_95_mm"), "mm"),
+        (trusted.as_str(), mm(check, "/trusted_mm"), "mm"),
+        ("reprojection residual, RMS", px(check, "/reprojection_rms_px"), "px"),
+        ("epipolar error, RMS", px(check, "/epipolar/rms_px"), "px"),
+        ("baseline", length(check, "/baseline_mm"), "mm"),
         ("pairs used", count(check, "/pairs_used"), ""),
     ];
     let second = check.get("second_board").is_some_and(|board| !board.is_null());
     html! {
         (quantities(&rows))
         p { (format!(
-            "E is the largest deviation of {lengths} lengths of {} to {} mm between corners of the board, on pairs that did not help to calibrate the cameras that \
-             measured them. The verdict keeps the uncertainty as a guard band, as ISO 14253-1 asks: a pass needs the length of greatest E and uncertainty together within the limit (here {}).",
-            number(Some(least).filter(|v| v.is_finite()), 1), number(Some(most), 1), mm(check, "/trusted_mm"))) }
+            "E is the absolute deviation of a length on the board, here of {lengths} lengths of {} to {} mm between its corners, on pairs that did not help to calibrate the \
+             cameras that measured them. U is that of the calibration and of the board; what the corners at both ends scatter by is part of E. The verdict keeps U as \
+             a guard band, as ISO 14253-1 asks: a pass needs E + U of every length within the limit, and the other checks in camera-check.html passed.",
+            number(Some(least).filter(|v| v.is_finite()), 1), number(Some(most), 1))) }
         p {
             "A test by VDI/VDE 2634 part 1 takes lengths of an artefact calibrated by others, on at least seven lines through the measuring volume. "
             @if second { "Here a second board was measured that took no part in the calibration; see camera-check.html." }
@@ -213,15 +253,19 @@ fn arm(robot: &Value) -> Markup {
         row("positioning accuracy (AP): mean error, mm", "/verify/point/mean_abs_mm"),
         row("positioning accuracy: largest error, mm", "/verify/point/max_abs_mm"),
     ];
+    let (on, poses) = match robot.get("folded").and_then(Value::as_bool) {
+        Some(true) => ("on poses that were left out of a fit", "poses, each judged by fits without it"),
+        _ => ("on verify poses, which took no part in the fit", "verify poses"),
+    };
     html! {
-        (page::table(&["on verify poses, which took no part in the fit", "before", "after"], &rows))
+        (page::table(&[on, "before", "after"], &rows))
         p { (format!(
-            "{} verify poses; {} kept; {} of {} parameters determined. To expect at other poses of the same range: {} mm on average, {} mm at 95 %.",
+            "{} {poses}; {} kept; {} of {} parameters determined. To expect at other poses of the same range: {} mm on average, {} mm at 95 %.",
             count(after, "/verify/count"), text(robot, "/chosen"), count(robot, "/identifiability/rank"),
             count(robot, "/identifiability/parameters"), mm(robot, "/expected/mean_mm"), mm(robot, "/expected/p95_mm"))) }
         p {
             "The terms are those of ISO 9283; a test by it visits each of five poses thirty times at rated load and speed and reports pose repeatability (RP) as well. Here each \
-             pose was visited once: repeatability is part of the errors above and was not separated. Positions are compared after a rigid fit of each camera placement."
+             pose was visited once: repeatability is part of the errors above and was not separated. Positions are compared after a rigid fit of each placement."
         }
         (page::warnings(&warnings(robot)))
     }
@@ -240,6 +284,10 @@ mod tests {
 
     fn day(verdict: &str) -> Day {
         let check = json!({"verdict": verdict, "max_abs_error_mm": 0.0123, "tolerance_mm": 0.05, "second_board": null,
+            "judged_length": {"error_mm": 0.0118, "uncertainty_mm": 0.00213, "at_most_mm": 0.01393},
+            "trusted_mm": 0.0214, "evidence": [
+                {"what": "held-out lengths", "value": 0.01393, "unit": "mm"}, {"what": "spread", "value": 0.0214, "unit": "px"},
+                {"what": "any length", "value": 0.0214, "unit": "mm"}],
             "ranges": [{"nominal_mm": 10.0, "count": 7}, {"nominal_mm": 70.0, "count": 5}]});
         let verify = |mm: f64| json!({"verify": {"count": 16, "mean_abs_mm": mm}});
         let mut kept = verify(0.0456);
@@ -252,12 +300,29 @@ mod tests {
     #[test]
     fn figures_of_the_method_kept_and_parts_not_done() {
         let page = page(&day("pass"));
-        for part in
-            ["PASS", "0.0123", "12 lengths of 10.0 to 70.0 mm", "1.5000", "0.0456", "there is no measure.json", "n/a"]
-        {
+        for part in ["PASS", "12 lengths of 10.0 to 70.0 mm", "1.5", "0.046", "there is no measure.json", "n/a"] {
             assert!(page.contains(part), "{part}");
         }
-        assert!(!page.contains("9.0000"));
+        assert!(!page.contains(">9.0<"));
+    }
+
+    #[test]
+    fn the_error_and_its_uncertainty_add_up_to_what_is_judged() {
+        let page = page(&day("pass"));
+        let shown = |what: &str, value: &str| {
+            assert!(page.contains(&format!("<td>{what}</td><td>{value}</td>")), "{what}: {value}: {page}");
+        };
+        shown("length measurement error E of the length where E + U is largest", "0.0118");
+        shown("its expanded uncertainty U (95 %)", "0.0021");
+        shown("E + U", "0.0139");
+        shown("limit of E + U (tolerance)", "0.05");
+        shown("largest E of any length", "0.012");
+        shown("lengths can be trusted to (the largest of all checks in mm: any length)", "0.021");
+        assert!(summary_line(&day("pass")).contains("error 0.0118 mm + expanded uncertainty 0.0021 mm = 0.0139 mm"));
+    }
+
+    fn summary_line(day: &Day) -> String {
+        rig_words(day.check.as_ref().unwrap())
     }
 
     #[test]

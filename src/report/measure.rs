@@ -10,6 +10,7 @@ use super::drawing::scene::{Ink, Scene};
 use super::page::{self, Tone};
 use super::rig;
 use super::table::number;
+use crate::diagnostic::{aligned, two_digits};
 use crate::files::OutDir;
 use crate::formats::measure::MeasureFile;
 use crate::measurements::Role;
@@ -30,7 +31,7 @@ pub struct Thumbnail {
     pub pose: String,
     /// What is to be seen.
     pub caption: String,
-    /// A JPEG in base64; empty where the pictures could not be read.
+    /// A JPEG in base64; empty where there are no pictures, or none that can be read: then the page shows none.
     pub jpeg_base64: String,
 }
 
@@ -62,15 +63,16 @@ pub fn summary(file: &MeasureFile, out: &OutDir) -> String {
 }
 
 fn headline(file: &MeasureFile) -> String {
-    format!("{} of {} poses measured; {}", file.measured, file.poses, quality(file))
+    format!("{} of {} poses measured; {}", file.measured, file.poses, quality(file, |mm| number(mm, 4)))
 }
 
-fn quality(file: &MeasureFile) -> String {
-    let along = |i: usize| number(file.sigma_mm.map(|s| s[i]), 4);
+/// How well the boards fit and the points are known; `mm` writes a length.
+fn quality(file: &MeasureFile, mm: fn(Option<f64>) -> String) -> String {
+    let along = |i: usize| mm(file.sigma_mm.map(|s| s[i]));
     let usual = file.calibration_noise_px.map_or(String::new(), |px| format!(" ({px:.4} at the calibration)"));
     format!(
         "residuals of the fitted target {} mm, {} px RMS; corners scatter by {} px{usual}; median sigma of its centre x {} y {} z {} mm",
-        number(file.fit_rms_mm, 4),
+        mm(file.fit_rms_mm),
         number(file.reprojection_rms_px, 3),
         number(file.corner_noise_px, 4),
         along(0),
@@ -79,16 +81,21 @@ fn quality(file: &MeasureFile) -> String {
     )
 }
 
+/// A length on the page.
+fn short(mm: Option<f64>) -> String {
+    mm.map_or_else(|| "n/a".to_owned(), two_digits)
+}
+
 /// The three numbers of the page: how well the point is known, and how well boards fit.
 fn numbers(file: &MeasureFile) -> [(String, String); 3] {
     let worst = file.sigma_mm.map(|sigma| sigma.into_iter().fold(0.0, f64::max));
     [
         (
-            format!("{} mm", number(worst, 4)),
+            format!("{} mm", short(worst)),
             "median standard deviation of the mark point, along its least certain axis".to_owned(),
         ),
         (
-            format!("{} mm", number(file.fit_rms_mm, 4)),
+            format!("{} mm", short(file.fit_rms_mm)),
             "what is left of the corners after fitting the target (RMS)".to_owned(),
         ),
         (format!("{} px", number(file.reprojection_rms_px, 3)), "reprojection residual (RMS)".to_owned()),
@@ -116,7 +123,7 @@ pub fn page(series: &Series, file: &MeasureFile, known: &Knowledge, extras: &Ext
         })
         .collect();
     let content = html! {
-        (page::verdict(tone(series, file), &format!("{count} of {poses} poses measured"), &numbers(file), &format!("{}.", quality(file))))
+        (page::verdict(tone(series, file), &format!("{count} of {poses} poses measured"), &numbers(file), &format!("{}.", quality(file, short))))
         (page::warnings(&file.warnings))
         @if !missing.is_empty() {
             h2 { "Poses without a measurement" }
@@ -194,22 +201,19 @@ fn residuals(measured: &[MeasuredPose]) -> Result<Markup> {
 fn worst_table(measured: &[MeasuredPose]) -> Markup {
     let mut found: Vec<_> = measured.iter().filter_map(|m| Some((m, m.target.as_ref().ok()?))).collect();
     found.sort_by(|a, b| b.1.chi_square.total_cmp(&a.1.chi_square));
-    let row = |(m, t): &(&MeasuredPose, &TargetPose)| {
-        let sigma = |k: usize| number(Some(t.covariance[(k, k)].sqrt()), 4);
-        let figures = [
-            number(Some(t.chi_square), 2),
-            number(Some(t.rms_px), 4),
-            number(t.fit_rms_mm, 4),
-            sigma(3),
-            sigma(4),
-            sigma(5),
-        ];
+    found.truncate(WORST);
+    let column =
+        |of: &dyn Fn(&TargetPose) -> Option<f64>| aligned(&found.iter().map(|(_, t)| of(t)).collect::<Vec<_>>());
+    let sigma = |k: usize| column(&|t| Some(t.covariance[(k, k)].sqrt()));
+    let lengths = [column(&|t| t.fit_rms_mm), sigma(3), sigma(4), sigma(5)];
+    let row = |(k, (m, t)): (usize, &(&MeasuredPose, &TargetPose))| {
         let mut row = vec![m.at.pose.clone(), m.at.group.clone()];
-        row.extend(figures);
+        row.extend([number(Some(t.chi_square), 2), number(Some(t.rms_px), 4)]);
+        row.extend(lengths.iter().map(|column| column[k].clone()));
         row.extend([t.corners.to_string(), t.outliers.to_string()]);
         row
     };
-    let rows: Vec<Vec<String>> = found.iter().take(WORST).map(row).collect();
+    let rows: Vec<Vec<String>> = found.iter().enumerate().map(row).collect();
     let header = [
         "pose",
         "group",
@@ -336,24 +340,41 @@ fn distances(distances: &[Distance]) -> Result<Markup> {
         .svg()?;
     Ok(html! {
         h2 { "Distances" }
-        (page::figure(&svg, "Against the nominal robot (robot.toml here, else Table 1 of the paper): what identification will explain. A single point far from the others is a pose that the robot did not go to, or another pose's pictures."))
+        (page::figure(&svg, "Against the nominal robot (robot.toml here, else the arm of Shi et al.): what identification will explain. A single point far from the others is a pose that the robot did not go to, or another pose's pictures."))
     })
 }
 
+/// Poses without pictures have their row in the table of those that are not measured.
 fn thumbnails(list: &[Thumbnail]) -> Markup {
+    let shown: Vec<&Thumbnail> = list.iter().filter(|picture| !picture.jpeg_base64.is_empty()).collect();
     html! {
-        @if !list.is_empty() {
+        @if !shown.is_empty() {
             h2 { "Pictures of failures and of the worst poses" }
             div.side {
-                @for picture in list {
+                @for picture in shown {
                     figure {
-                        @if !picture.jpeg_base64.is_empty() {
-                            img alt={ "pose " (picture.pose) } style="max-width: 100%" src={ "data:image/jpeg;base64," (picture.jpeg_base64) };
-                        }
+                        img alt={ "pose " (picture.pose) } style="max-width: 100%" src={ "data:image/jpeg;base64," (picture.jpeg_base64) };
                         figcaption { strong { (picture.pose) } ": " (picture.caption) }
                     }
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_without_pictures_has_no_empty_frame() {
+        let of = |pose: &str, jpeg_base64: &str| Thumbnail {
+            pose: pose.to_owned(),
+            caption: "why".to_owned(),
+            jpeg_base64: jpeg_base64.to_owned(),
+        };
+        assert_eq!(thumbnails(&[of("01", "")]).into_string(), "");
+        let page = thumbnails(&[of("01", ""), of("02", "/9j/")]).into_string();
+        assert!(page.contains(">02<") && !page.contains(">01<") && page.matches("<figure").count() == 1, "{page}");
     }
 }

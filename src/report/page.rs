@@ -31,15 +31,16 @@ const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inlin
 
 const STYLE: &str = "
 :root { color-scheme: light; --ink: #1c2430; --soft: #5a6472; --ground: #fff; --around: #f4f5f7; --rule: #d9dde3; --hair: #eceef1;
-  --good: #2e8b57; --good-bg: #eaf6ef; --doubt: #d39b00; --doubt-bg: #fdf6e3; --bad: #c0392b; --bad-bg: #fbebe9; --plain: #0072b2; }
+  --good: #2e8b57; --good-bg: #eaf6ef; --doubt: #d39b00; --doubt-bg: #fdf6e3; --bad: #c0392b; --bad-bg: #fbebe9; --plain: #0072b2; --shade: rgba(0, 0, 0, 0.28); }
 @media screen and (prefers-color-scheme: dark) {
   :root { color-scheme: dark; --ink: #e3e6ea; --soft: #a3acb8; --ground: #1a1a1a; --around: #101010; --rule: #3c424b; --hair: #2a2e34;
-    --good: #4cbf82; --good-bg: #16281f; --doubt: #e0b030; --doubt-bg: #2b2515; --bad: #ee6a5c; --bad-bg: #301b19; --plain: #56b4e9; }
+    --good: #4cbf82; --good-bg: #16281f; --doubt: #e0b030; --doubt-bg: #2b2515; --bad: #ee6a5c; --bad-bg: #301b19; --plain: #56b4e9; --shade: rgba(255, 255, 255, 0.3); }
   svg.plot { filter: invert(0.9) hue-rotate(180deg); }
 }
 body { font: 15px/1.5 system-ui, 'DejaVu Sans', sans-serif; color: var(--ink); background: var(--around); margin: 0; }
 main { max-width: 1040px; margin: 0 auto; padding: 28px 32px 64px; background: var(--ground); }
 h1 { font-size: 24px; margin: 0 0 4px; } h2 { font-size: 18px; margin: 36px 0 8px; border-bottom: 1px solid var(--rule); padding-bottom: 4px; }
+a { color: var(--plain); }
 p, li, figcaption { max-width: 80ch; overflow-wrap: anywhere; } p.lead { color: var(--soft); margin: 0 0 16px; }
 .verdict { border-left: 8px solid; padding: 12px 16px; margin: 16px 0; border-radius: 4px; }
 .verdict strong { display: block; font-size: 44px; line-height: 1.1; } .verdict p { margin: 8px 0 0; }
@@ -51,7 +52,12 @@ details { margin: 12px 0; } summary { cursor: pointer; font-weight: 600; color: 
 table { border-collapse: collapse; margin: 8px 0 16px; font-variant-numeric: tabular-nums; font-size: 14px; }
 th { text-align: right; color: var(--soft); font-weight: 600; border-bottom: 1px solid var(--rule); padding: 3px 12px; }
 td { text-align: right; padding: 2px 12px; border-bottom: 1px solid var(--hair); } th:first-child, td:first-child { text-align: left; padding-left: 4px; }
-.wide { overflow-x: auto; } table.ledger td { vertical-align: top; } table.ledger td.detail { text-align: left; font-size: 13px; min-width: 320px; }
+th.text, td.text { text-align: left; }
+.wide { overflow-x: auto; background: linear-gradient(to right, var(--ground) 40%, transparent) left / 36px 100% no-repeat local,
+  linear-gradient(to left, var(--ground) 40%, transparent) right / 36px 100% no-repeat local,
+  linear-gradient(to right, var(--shade), transparent) left / 14px 100% no-repeat scroll,
+  linear-gradient(to left, var(--shade), transparent) right / 14px 100% no-repeat scroll; }
+table.ledger td { vertical-align: top; } table.ledger td.detail { text-align: left; font-size: 13px; min-width: 320px; }
 table.ledger td:first-child { min-width: 120px; } .allows { border-left-style: solid; border-left-width: 4px; padding: 0 6px; border-radius: 3px; }
 table.ledger th:last-child { text-align: left; }
 .scroll { max-height: 420px; overflow: auto; border: 1px solid var(--hair); }
@@ -71,7 +77,7 @@ footer { color: var(--soft); font-size: 13px; overflow-wrap: anywhere; }
   .verdict strong { font-size: 30px; } .numbers b { font-size: 28px; } .numbers { gap: 6px 22px; } }
 @page { margin: 14mm; }
 @media print { details::details-content { content-visibility: visible; height: auto; } body { background: #fff; font-size: 12px; } main { padding: 0; max-width: none; } .scroll { max-height: none; overflow: visible; border: 0; }
-  .wide { overflow: visible; } table { font-size: 11px; } td, th { padding-left: 5px; padding-right: 5px; } tr { break-inside: avoid; } h2 { break-after: avoid; } }
+  .wide { overflow: visible; background: none; } table { font-size: 11px; } td, th { padding-left: 5px; padding-right: 5px; } tr { break-inside: avoid; } h2 { break-after: avoid; } }
 ";
 
 /// A whole page. `lead` is a line under the title that says from what it was made.
@@ -166,14 +172,30 @@ pub fn figure(svg: &str, caption: &str) -> Markup {
     html! { figure { (PreEscaped(svg)) figcaption { (caption) } } }
 }
 
-/// A table; the first column is text, the others numbers.
+/// A table; numbers are aligned right, text left.
 pub fn table(header: &[&str], rows: &[Vec<String>]) -> Markup {
+    let columns = header.len().max(rows.iter().map(Vec::len).max().unwrap_or(0));
+    let class: Vec<Option<&str>> = (0..columns).map(|k| (k > 0 && holds_text(rows, k)).then_some("text")).collect();
     html! {
         div.wide { table {
-            thead { tr { @for cell in header { th { (cell) } } } }
-            tbody { @for row in rows { tr { @for cell in row { td { (text(cell)) } } } } }
+            thead { tr { @for (cell, class) in header.iter().zip(&class) { th class=[class] { (cell) } } } }
+            tbody { @for row in rows { tr { @for (cell, class) in row.iter().zip(&class) { td class=[class] { (text(cell)) } } } } }
         } }
     }
+}
+
+/// Whether a column holds words more often than numbers, or nothing at all.
+fn holds_text(rows: &[Vec<String>], column: usize) -> bool {
+    /// Words of a number with its unit, of "3 of 12" and of three coordinates.
+    const OF_NUMBER: usize = 3;
+    let is_number = |cell: &str| {
+        let digits = cell.trim_start_matches(['+', '-', '.']);
+        digits.starts_with(|c: char| c.is_ascii_digit()) && cell.split_whitespace().count() <= OF_NUMBER
+    };
+    let cells = rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.trim());
+    let blank = cells.clone().all(str::is_empty);
+    let said = || cells.clone().filter(|cell| !matches!(*cell, "" | "n/a" | "-"));
+    blank || 2 * said().filter(|cell| is_number(cell)).count() < said().count()
 }
 
 /// Warnings, where there are any.
@@ -206,6 +228,25 @@ mod tests {
         let page = with_overlays("<main></main>".to_owned(), ["01", "a b#ü"].into_iter());
         assert!(page.contains("<a href=\"overlays/01.png\">01</a>"), "{page}");
         assert!(page.contains("href=\"overlays/a%20b%23%C3%BC.png\"") && page.ends_with("</main>"), "{page}");
+    }
+
+    #[test]
+    fn numbers_stand_right_and_words_left() {
+        let rows = [
+            ["01", "0.012", "not-found", "12 corners of 54 were found, all of them at the left border", "", "n/a"],
+            ["02", "n/a", "blurred", "the board was moved", "", "-1.2 mm"],
+            ["03", "not seen", "", "moved", "", "3 of 12"],
+            ["04", "+1.2, -3, 4", "ok", "moved", "", "-"],
+        ];
+        let page =
+            table(&["", "a", "b", "c", "d", "e"], &rows.map(|row| row.map(str::to_owned).to_vec())).into_string();
+        for text in ["b", "c", "d"] {
+            assert!(page.contains(&format!("<th class=\"text\">{text}</th>")), "{page}");
+        }
+        for number in ["a", "e"] {
+            assert!(page.contains(&format!("<th>{number}</th>")), "{page}");
+        }
+        assert!(page.contains("<td class=\"text\">blurred</td>") && page.contains("<td>0.012</td>"), "{page}");
     }
 
     #[test]

@@ -7,8 +7,8 @@ use super::Result;
 use super::drawing::figure::Plot;
 use super::page;
 use super::table::{Table, number};
-use crate::diagnostic::count;
-use crate::formats::plan::{Determined, PlanFile};
+use crate::diagnostic::{count, two_digits};
+use crate::formats::plan::{Determined, Expected, PlanFile};
 use crate::measurements::Role;
 use crate::plan::scene::{Placement, Scene};
 use crate::plan::{COLLISIONS, Plan};
@@ -17,10 +17,11 @@ use crate::robot::Robot;
 /// The figures on the terminal.
 pub fn summary(record: &PlanFile) -> String {
     let mut table = Table::new(["samples", "this plan, mm", "the paper's, mm"]);
-    let at = |of: &Determined, poses: usize| of.expected.iter().find(|e| e.poses == poses).map(|e| e.rms_mm);
-    for poses in counts(record) {
-        let paper = record.paper.as_ref().and_then(|p| at(p, poses));
-        table.row([poses.to_string(), number(at(&record.plan, poses), 4), number(paper, 4)]);
+    for expected in &record.plan.expected {
+        let same = |e: &&Expected| e.poses == expected.poses;
+        let paper = record.paper.as_ref().and_then(|paper| paper.expected.iter().find(same));
+        let paper = paper.map_or_else(String::new, |e| number(Some(e.rms_mm), 4));
+        table.row([expected.poses.to_string(), number(Some(expected.rms_mm), 4), paper]);
     }
     let of = |d: &Determined| {
         let o = d.accuracy.observability.as_ref();
@@ -43,38 +44,26 @@ pub fn summary(record: &PlanFile) -> String {
         text += &format!("not determined: {}\n", record.plan.accuracy.zero.join(", "));
     }
     text += &format!(
-        "expected error of the target over the spheres (root mean square, {:.4} mm noise a coordinate):\n{table}",
+        "error of the target over the spheres through the parameters alone (root mean square, {:.4} mm noise a coordinate); what `identify` expects \
+         holds the robot's own scatter, too:\n{table}",
         record.noise_mm
     );
     text
 }
 
-fn counts(record: &PlanFile) -> Vec<usize> {
-    let of = |d: &Determined| d.expected.iter().map(|e| e.poses).collect::<Vec<_>>();
-    let mut all = of(&record.plan);
-    all.extend(record.paper.iter().flat_map(of));
-    all.sort_unstable();
-    all.dedup();
-    all
-}
-
 pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Result<String> {
-    let rows: Vec<Vec<String>> = counts(record)
-        .into_iter()
-        .map(|poses| {
-            let at = |of: &Determined| of.expected.iter().find(|e| e.poses == poses).map(|e| e.rms_mm);
-            vec![poses.to_string(), number(at(&record.plan), 4), number(record.paper.as_ref().and_then(at), 4)]
-        })
-        .collect();
+    let row = |e: &Expected| vec![e.poses.to_string(), two_digits(e.rms_mm)];
+    let rows: Vec<Vec<String>> = record.plan.expected.iter().map(row).collect();
     let others: Vec<String> = record.warnings.iter().filter(|warning| *warning != COLLISIONS).cloned().collect();
     let content = html! {
         (page::verdict(page::Tone::Doubtful, "Collisions are not checked", &numbers(record, plan),
             "Neither the arm with itself, nor with the cameras or the cell. Run the program slowly, hand on the stop."))
         (page::warnings(&others))
         h2 { "Accuracy to expect" }
-        (page::table(&["samples", "this plan, mm", "the paper's plan, mm"], &rows))
-        p { "Root mean square of the target's position error over the spheres, tilts to 25 degrees, after one rigid fit; "
-            (format!("{:.4}", record.noise_mm)) " mm noise a coordinate. Rank " (record.plan.accuracy.rank) ", condition " (number(record.plan.accuracy.condition, 0)) "." }
+        (page::table(&["samples", "error, mm"], &rows))
+        p { "Root mean square of the target's position error that the identified parameters will leave over the spheres, tilts to 25 degrees, after one rigid fit; "
+            (two_digits(record.noise_mm)) " mm noise a coordinate. The robot's own scatter (repeatability, and what the model lacks) comes on top: what "
+            code { "identify" } " expects holds both, and its page tells them apart. Rank " (record.plan.accuracy.rank) ", condition " (number(record.plan.accuracy.condition, 0)) "." }
         (curve(record)?)
         (map(plan)?)
         h2 { "Where the cameras stand" }
@@ -103,8 +92,8 @@ fn numbers(record: &PlanFile, plan: &Plan) -> [(String, String); 3] {
     let best = record.plan.expected.iter().filter(|e| e.poses <= samples).max_by_key(|e| e.poses);
     [
         (
-            format!("{} mm", number(best.map(|e| e.rms_mm), 3)),
-            format!("expected position error after {} samples", best.map_or(samples, |e| e.poses)),
+            format!("{} mm", best.map_or_else(|| "n/a".to_owned(), |e| two_digits(e.rms_mm))),
+            format!("position error that the parameters leave after {} samples", best.map_or(samples, |e| e.poses)),
         ),
         (plan.poses.len().to_string(), format!("poses, {samples} of them samples")),
         (record.plan.accuracy.rank.to_string(), "parameters determined".to_owned()),
@@ -123,24 +112,25 @@ fn standing(placement: &Placement) -> Vec<String> {
 
 fn curve(record: &PlanFile) -> Result<maud::Markup> {
     let line = |d: &Determined| d.expected.iter().map(|e| (e.poses as f64, e.rms_mm)).collect::<Vec<_>>();
-    let mut plot = Plot::new("Error by the number of poses", "samples", "expected error, mm").log_y();
+    let mut plot = Plot::new("Error by the number of poses", "samples", "error by the parameters, mm").log_y();
     plot = plot.line("this plan", &line(&record.plan));
     if let Some(paper) = &record.paper {
-        plot = plot.line("the paper's plan", &line(paper));
+        plot = plot.line("as planned by Shi et al.", &line(paper));
     }
     Ok(page::figure(
         &plot.svg()?,
-        "Where the line is flat, more poses do not help: the rest comes from what the plan does not vary, not from noise.",
+        "Where the line is flat, more poses do not help: the rest comes from what the plan does not vary, not from noise. Shi et al. visit points on \
+         the same spheres with one orientation of the flange.",
     ))
 }
 
 /// Places of the spheres by thirds of the expected error.
 fn map(plan: &Plan) -> Result<maud::Markup> {
     let points: Vec<(f64, f64, f64)> = plan.map.iter().map(|m| (m.0.x, m.0.y, m.1)).collect();
-    let plot = Plot::new("Expected error over the workspace, from above", "x, mm", "y, mm").equal_axes();
+    let plot = Plot::new("Error over the workspace, from above", "x, mm", "y, mm").equal_axes();
     Ok(page::figure(
         &plot.points_by_thirds(&points, 0.0).svg()?,
-        "The position error to expect at new poses, base frame; a third of them each. Work where it is small, or measure more poses where it is large.",
+        "The position error that the parameters will leave at new poses, base frame; a third of them each. Work where it is small, or measure more poses where it is large.",
     ))
 }
 

@@ -6,7 +6,7 @@ use super::Result;
 use super::drawing::figure::Plot;
 use super::page::{self, Tone};
 use super::table::{Table, with_sigma};
-use crate::diagnostic::{count, significant};
+use crate::diagnostic::{count, two_digits};
 use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
 use crate::stereo::recheck::{CauseSeen, Recheck};
@@ -32,25 +32,25 @@ pub(super) fn tone(standing: Standing) -> Tone {
 }
 
 /// What was found and what it means, in a sentence.
-fn sentence(recheck: &Recheck, standing: Standing, tolerance_mm: f64) -> String {
+fn sentence(recheck: &Recheck, standing: Standing, tolerance_mm: f64, mm: fn(f64) -> String) -> String {
     let length = recheck.length_mm;
     let found = match recheck.change {
         None => recheck.statement(),
-        Some(_) => format!("{}, which moves a length by only {:.4} mm", recheck.statement(), recheck.effect_mm),
+        Some(_) => format!("{}, which moves a length by only {} mm", recheck.statement(), mm(recheck.effect_mm)),
     };
     match standing {
         Standing::OwnData => {
             "the calibration was made of these pairs, which agree with it whatever happened since".to_owned()
         }
         Standing::StillValid | Standing::Undecided => format!(
-            "{found}; {} pairs would have shown a change that moves a length of {length} mm by {:.4} mm, tolerance {tolerance_mm} mm",
+            "{found}; {} pairs would have shown a change that moves a length of {length} mm by {} mm, tolerance {tolerance_mm} mm",
             recheck.pairs.len(),
-            recheck.seen_mm
+            mm(recheck.seen_mm)
         ),
         Standing::ChangedWithin | Standing::Changed => format!(
-            "{}, which moves a length of {length} mm by up to {:.4} mm, tolerance {tolerance_mm} mm",
+            "{}, which moves a length of {length} mm by up to {} mm, tolerance {tolerance_mm} mm",
             recheck.statement(),
-            recheck.effect_mm
+            mm(recheck.effect_mm)
         ),
     }
 }
@@ -79,7 +79,7 @@ fn next(standing: Standing) -> &'static str {
 /// The lines on stdout.
 pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: usize, out: &OutDir) -> String {
     let mut lines = vec![
-        format!("{}: {}", word(standing), sentence(recheck, standing, tolerance_mm)),
+        format!("{}: {}", word(standing), sentence(recheck, standing, tolerance_mm, |mm| format!("{mm:.4}"))),
         format!("{} of {} pairs compared", recheck.pairs.len(), recheck.pairs.len() + recheck.skipped.len()),
     ];
     lines.extend(
@@ -92,8 +92,8 @@ pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks:
             cause.words.clone(),
             changed(cause)[0].clone(),
             changed(cause)[1].clone(),
-            format!("{} {}", significant(cause.seen, 2), cause.unit),
-            significant(cause.seen_mm, 2),
+            format!("{} {}", two_digits(cause.seen), cause.unit),
+            two_digits(cause.seen_mm),
         ]);
     }
     format!(
@@ -105,14 +105,20 @@ pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks:
     )
 }
 
-/// The report.
-pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[Check]) -> Result<String> {
+/// The report. Also shows the run's `warnings`; `not_new` where the pairs are those of the calibration.
+pub fn page(
+    recheck: &Recheck,
+    standing: Standing,
+    tolerance_mm: f64,
+    checks: &[Check],
+    (warnings, not_new): (&[String], bool),
+) -> Result<String> {
     let numbers = vec![
-        (format!("{:.4} mm", recheck.effect_mm), "change of a length beyond chance".to_owned()),
-        (format!("{:.4} mm", recheck.seen_mm), "would have been seen".to_owned()),
+        (format!("{} mm", two_digits(recheck.effect_mm)), "change of a length beyond chance".to_owned()),
+        (format!("{} mm", two_digits(recheck.seen_mm)), "would have been seen".to_owned()),
         (format!("{tolerance_mm} mm"), "tolerance".to_owned()),
     ];
-    let text = format!("{}. Next: {}.", sentence(recheck, standing, tolerance_mm), next(standing));
+    let text = format!("{}. Next: {}.", sentence(recheck, standing, tolerance_mm, two_digits), next(standing));
     let rows: Vec<Vec<String>> = recheck
         .causes
         .iter()
@@ -121,9 +127,9 @@ pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[
                 cause.words.clone(),
                 changed(cause)[0].clone(),
                 changed(cause)[1].clone(),
-                significant(cause.effect_mm, 2),
-                format!("{} {}", significant(cause.seen, 2), cause.unit),
-                significant(cause.seen_mm, 2),
+                two_digits(cause.effect_mm),
+                format!("{} {}", two_digits(cause.seen), cause.unit),
+                two_digits(cause.seen_mm),
             ]
         })
         .collect();
@@ -131,19 +137,24 @@ pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[
         ["cause", "changed by, if it alone did", "+- (95 %)", "mm of a length", "would be seen", "mm of a length"];
     let content = html! {
         (page::verdict(tone(standing), word(standing), &numbers, &text))
+        (page::warnings(warnings))
         h2 { "What may have changed" }
         p { "Each cause by itself, and the smallest change of it that nineteen of twenty such checks see. Of causes that move the same corners the same way \
              all show a change where one did." }
-        div.wide { (page::table(&header, &rows)) }
+        (page::table(&header, &rows))
         h2 { "Over time" }
-        (page::figure(&history(checks, tolerance_mm, "Change of a length")?, "Each check in this folder's history: a dot above what would have been seen is a change; \
-            above the tolerance the calibration no longer holds."))
+        (page::figure(&history(checks, tolerance_mm, "Change of a length")?, "Each check in this folder's history: a change above what would have been seen is none of chance, \
+            above the tolerance the calibration no longer holds. A check that found no change has the dot of what it would have seen alone."))
     };
-    let lead = format!("{} new pairs against the calibration", recheck.pairs.len());
+    let compared = count(recheck.pairs.len(), if not_new { "pair" } else { "new pair" });
+    let lead = match not_new {
+        true => format!("{compared} against the calibration that was made of them"),
+        false => format!("{compared} against the calibration"),
+    };
     Ok(page::page("Is the rig still the calibrated one?", &lead, &content))
 }
 
-/// The changes of all checks over their number.
+/// The changes of all checks over their number; where nothing changed there is none.
 pub(super) fn history(checks: &[Check], tolerance_mm: f64, title: &str) -> Result<String> {
     let over = |of: fn(&Check) -> f64| -> Vec<(f64, f64)> {
         checks.iter().enumerate().map(|(i, check)| ((i + 1) as f64, of(check))).collect()
@@ -153,5 +164,6 @@ pub(super) fn history(checks: &[Check], tolerance_mm: f64, title: &str) -> Resul
         .points("changed by", &over(|check| check.effect_mm))
         .points("would have been seen", &over(|check| check.seen_mm))
         .hline(tolerance_mm, "tolerance")
+        .log_y()
         .svg()
 }

@@ -5,25 +5,25 @@ use maud::html;
 use super::Result;
 use super::page;
 use super::recheck::{history, tone, word};
-use super::table::{Table, with_sigma};
-use crate::diagnostic::{count, significant};
+use super::table::{Table, number, with_sigma};
+use crate::diagnostic::{count, two_digits};
 use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
 use crate::formats::robot_recheck::HISTORY;
 use crate::identify::judge::recheck::{CauseSeen, Recheck};
 
-fn sentence(recheck: &Recheck, tolerance_mm: f64) -> String {
+fn sentence(recheck: &Recheck, tolerance_mm: f64, mm: fn(f64) -> String) -> String {
+    let tolerance = mm(tolerance_mm);
     let statement = recheck.statement();
     match recheck.cause().is_empty() {
         true => format!(
-            "{statement}; {} poses would have shown a single cause that moves the target by {:.4} mm, tolerance {tolerance_mm:.4} mm",
+            "{statement}; {} poses would have shown a single cause that moves the target by {} mm, tolerance {tolerance} mm",
             recheck.poses.len(),
-            recheck.seen_mm
+            mm(recheck.seen_mm)
         ),
-        false => format!(
-            "{statement}; the target is off by up to {:.4} mm, tolerance {tolerance_mm:.4} mm",
-            recheck.effect_mm
-        ),
+        false => {
+            format!("{statement}; the target is off by up to {} mm, tolerance {tolerance} mm", mm(recheck.effect_mm))
+        }
     }
 }
 
@@ -36,18 +36,22 @@ fn next(standing: Standing, recheck: &Recheck) -> &'static str {
         Standing::OwnData => {
             "measure ten new poses: the robot was identified from these, which agree with it whatever happened since"
         }
-        _ if !recheck.changed => "`stereocal locate` finds the cameras anew; the robot stays",
+        _ if !recheck.changed && recheck.by_cameras => "`stereocal locate` finds the cameras anew; the robot stays",
+        _ if !recheck.changed => "`stereocal locate` finds the instrument's placement anew; the robot stays",
         Standing::ChangedWithin => {
             "targets are within the tolerance still; look at what is named, and identify anew before it grows"
         }
-        Standing::Changed => "look for what happened to arm, tool and cameras since, then identify anew",
+        Standing::Changed if recheck.by_cameras => {
+            "look for what happened to arm, tool and cameras since, then identify anew"
+        }
+        Standing::Changed => "look for what happened to arm, tool and instrument since, then identify anew",
     }
 }
 
 /// Cause, change, its interval, its effect, what would be seen and its effect.
 fn cells(recheck: &Recheck) -> Vec<[String; 6]> {
     let of = |cause: &CauseSeen| {
-        let with_unit = |value: f64| format!("{} {}", significant(value, 2), cause.unit);
+        let with_unit = |value: f64| format!("{} {}", two_digits(value), cause.unit);
         let changed = cause.amount.map(|amount| {
             let [amount, within] = with_sigma(amount, 2.0 * cause.sigma.unwrap_or(f64::NAN));
             [format!("{amount} {}", cause.unit), within]
@@ -59,20 +63,16 @@ fn cells(recheck: &Recheck) -> Vec<[String; 6]> {
             cause.what.clone(),
             changed,
             within,
-            told(significant(cause.effect_mm, 2)),
+            told(two_digits(cause.effect_mm)),
             cause.seen.map_or_else(String::new, with_unit),
-            told(cause.seen_mm.map_or_else(String::new, |mm| significant(mm, 2))),
+            told(cause.seen_mm.map_or_else(String::new, |mm| two_digits(mm))),
         ]
     };
     let placements = recheck.placements.iter().map(|moved| {
-        [
-            format!("the cameras of group {}", moved.group),
-            format!("{} mm", significant(moved.shift_mm, 2)),
-            String::new(),
-            significant(moved.shift_mm, 2),
-            format!("{} mm", significant(moved.seen_mm, 2)),
-            significant(moved.seen_mm, 2),
-        ]
+        let [shift, seen] = [moved.shift_mm, moved.seen_mm].map(two_digits);
+        let placed =
+            format!("the {} of group {}", if recheck.by_cameras { "cameras" } else { "instrument" }, moved.group);
+        [placed, format!("{shift} mm"), String::new(), shift, format!("{seen} mm"), seen]
     });
     recheck.causes.iter().map(of).chain(placements).collect()
 }
@@ -80,40 +80,78 @@ fn cells(recheck: &Recheck) -> Vec<[String; 6]> {
 const HEADER: [&str; 6] =
     ["cause", "changed by, if it alone did", "+- (95 %)", "mm at the target", "would be seen", "mm at the target"];
 
+/// The same for a terminal of 80 columns: change with its interval, unit, its effect, what would be seen and its effect.
+fn lines(recheck: &Recheck) -> Table {
+    let four = |value: f64| number(Some(value), 4);
+    let mut table = Table::new(["cause", "changed by", "", "mm", "seen", "mm"]);
+    for cause in &recheck.causes {
+        let what = cause.what.trim_start_matches("the ").to_owned();
+        let (Some(amount), Some(sigma)) = (cause.amount, cause.sigma) else {
+            table.row([what, "not seen".to_owned()]);
+            continue;
+        };
+        let seen = [cause.seen, cause.seen_mm].map(|value| value.map_or_else(String::new, four));
+        let [seen, seen_mm] = seen;
+        let by = format!("{} +- {}", four(amount), four(2.0 * sigma));
+        table.row([what, by, cause.unit.to_owned(), four(cause.effect_mm), seen, seen_mm]);
+    }
+    for moved in &recheck.placements {
+        let what = format!("{} of group {}", if recheck.by_cameras { "cameras" } else { "instrument" }, moved.group);
+        let [shift, seen] = [moved.shift_mm, moved.seen_mm].map(four);
+        table.row([what, shift.clone(), "mm".to_owned(), shift, seen.clone(), seen]);
+    }
+    table
+}
+
 /// The lines on stdout.
 pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: usize, out: &OutDir) -> String {
-    let mut table = Table::new(HEADER);
-    cells(recheck).into_iter().for_each(|row| table.row(row));
     format!(
-        "{}: {}\nnext: {}\n\n{table}\n{} in {}\nreport: {}\n",
+        "{}: {}\nnext: {}\n\neach cause by itself, 95 % intervals; seen: from so much on; mm: at the target\n{}\n{} in {}\nreport: {}\n",
         word(standing),
-        sentence(recheck, tolerance_mm),
+        sentence(recheck, tolerance_mm, |mm| format!("{mm:.4}")),
         next(standing, recheck),
+        lines(recheck),
         count(checks, "check"),
         out.join(HISTORY),
         out.join("verify.html")
     )
 }
 
-/// The report.
-pub fn page(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: &[Check]) -> Result<String> {
+/// The report. Also shows the run's `warnings`; `not_new` where the poses are those that the robot was identified from.
+pub fn page(
+    recheck: &Recheck,
+    standing: Standing,
+    tolerance_mm: f64,
+    checks: &[Check],
+    (warnings, not_new): (&[String], bool),
+) -> Result<String> {
     let numbers = vec![
-        (format!("{:.4} mm", recheck.effect_mm), "movement of the target beyond chance".to_owned()),
-        (format!("{:.4} mm", recheck.seen_mm), "would have been seen".to_owned()),
-        (format!("{tolerance_mm:.4} mm"), "tolerance".to_owned()),
+        (format!("{} mm", two_digits(recheck.effect_mm)), "movement of the target beyond chance".to_owned()),
+        (format!("{} mm", two_digits(recheck.seen_mm)), "would have been seen".to_owned()),
+        (format!("{} mm", two_digits(tolerance_mm)), "tolerance".to_owned()),
     ];
-    let text = format!("{}. Next: {}.", sentence(recheck, tolerance_mm), next(standing, recheck));
+    let text = format!("{}. Next: {}.", sentence(recheck, tolerance_mm, two_digits), next(standing, recheck));
+    let (sensor, moved) = match recheck.by_cameras {
+        true => ("once the cameras' place was found anew", "cameras that moved"),
+        false => ("once the instrument's place was found anew", "an instrument that moved"),
+    };
     let rows: Vec<Vec<String>> = cells(recheck).into_iter().map(|row| row.to_vec()).collect();
     let content = html! {
         (page::verdict(tone(standing), word(standing), &numbers, &text))
+        (page::warnings(warnings))
         h2 { "What may have changed" }
         p { "Each cause by itself, and the smallest change of it that nineteen of twenty such checks see; mm at the pose where it moves the target most, \
-             once the cameras' place was found anew. The zero of joint 1 is seen as cameras that moved." }
-        div.wide { (page::table(&HEADER, &rows)) }
+             " (sensor) ". The zero of joint 1 is seen as " (moved) "." }
+        (page::table(&HEADER, &rows))
         h2 { "Over time" }
-        (page::figure(&history(checks, tolerance_mm, "Movement of the target")?, "Each check in this folder's history: a dot above what would have been seen \
-            is a change; above the tolerance the robot is no longer the identified one."))
+        (page::figure(&history(checks, tolerance_mm, "Movement of the target")?, "Each check in this folder's history: a change above what would have been seen \
+            is none of chance, above the tolerance the robot is no longer the identified one. A check that found no change has the dot of what it would have \
+            seen alone."))
     };
-    let lead = format!("{} new poses against the identified robot", recheck.poses.len());
+    let compared = count(recheck.poses.len(), if not_new { "pose" } else { "new pose" });
+    let lead = match not_new {
+        true => format!("{compared} against the robot that was identified from them"),
+        false => format!("{compared} against the identified robot"),
+    };
     Ok(page::page("Is it still the identified robot?", &lead, &content))
 }

@@ -71,6 +71,16 @@ fn targets_come_back_where_they_were_meant() {
     std::fs::write(folder.path().join("targets.csv"), csv(&postures)).unwrap();
     let said = run(folder.path(), &["targets.csv"], 0);
     assert!(said.contains("300 of 300 targets compensated"), "{said}");
+    // Why `identify` names another figure; the tools are the same.
+    assert!(said.contains("at most (in the base frame; ") && !said.contains("the tools of the two files"), "{said}");
+    let mut tipped = real.clone();
+    tipped.tool_mm += nalgebra::Vector3::new(0.0, 3.0, 4.0);
+    std::fs::write(folder.path().join("identified.toml"), file::to_toml(&tipped)).unwrap();
+    let apart = run(folder.path(), &["targets.csv", "--out", "tipped"], 0);
+    assert!(apart.contains("the tools of the two files are 5.000 mm apart: `--tool X,Y,Z`"), "{apart}");
+    let named = run(folder.path(), &["targets.csv", "--out", "named", "--tool", "0,0,100"], 0);
+    assert!(!named.contains("the tools of the two files"), "{named}");
+    robots(folder.path());
     for (q, (found, status)) in postures.iter().zip(rows(&folder.path().join("out/compensated.csv"))) {
         assert_eq!(status, "ok");
         let (q, found) = (radians(q), radians(&found));

@@ -153,6 +153,63 @@ fn locate_finds_what_identify_found_and_names_a_robot_that_is_wrong() {
 }
 
 #[test]
+fn points_of_a_tracker_are_an_instruments() {
+    let folder = identified();
+    let at = folder.path();
+    let identify = |table: &str, out: &str| {
+        let found =
+            ["identify", "--measurements", table, "--method", "trust-region", "--extensions", "none", "--out", out];
+        let found = stereocal(at, &found);
+        assert_eq!(found.status.code(), Some(0), "{}", stderr(&found));
+        std::fs::read_to_string(at.join(out).join("identify.html")).unwrap()
+    };
+    // Cameras state how sure they are of a point, and its orientation.
+    let mut reader = csv::Reader::from_path(at.join("truth/measurements.csv")).unwrap();
+    let header = reader.headers().unwrap().clone();
+    let variance = |name: &str| match name {
+        "sxx_mm2" | "syy_mm2" | "szz_mm2" => Some("1e-4"),
+        "sxy_mm2" | "sxz_mm2" | "syz_mm2" => Some("0"),
+        _ => None,
+    };
+    let sure = |row: csv::StringRecord| {
+        let cells = row.iter().zip(&header).map(|(cell, name)| variance(name).unwrap_or(cell).to_owned());
+        cells.collect::<Vec<_>>().join(",")
+    };
+    let first = header.iter().collect::<Vec<_>>().join(",");
+    let rows = reader.records().map(|row| sure(row.unwrap()));
+    let table: String = std::iter::once(first).chain(rows).map(|line| line + "\n").collect();
+    std::fs::write(at.join("cameras.csv"), table).unwrap();
+    let page = identify("cameras.csv", "c");
+    for part in ["Where the cameras stand", "the cameras or its centre moved", "Distance errors of the verify rows"] {
+        assert!(page.contains(part), "{part}");
+    }
+    // Joints and points alone, as a tracker's table has them: no orientation, no covariance, no roles.
+    let mut reader = csv::Reader::from_path(at.join("truth/measurements.csv")).unwrap();
+    let header = reader.headers().unwrap().clone();
+    let kept = ["group", "j1_deg", "j2_deg", "j3_deg", "j4_deg", "j5_deg", "j6_deg", "x_mm", "y_mm", "z_mm"];
+    let columns = kept.map(|name| header.iter().position(|h| h == name).unwrap());
+    let rows = reader.records().map(|row| columns.map(|k| row.as_ref().unwrap()[k].to_owned()).join(","));
+    let table: String = std::iter::once(kept.join(",")).chain(rows).map(|line| line + "\n").collect();
+    std::fs::write(at.join("tracker.csv"), table).unwrap();
+    let page = identify("tracker.csv", "t");
+    let (body, _) = page.split_once("<footer").unwrap();
+    for part in ["Where the instrument stands", "Distance errors of rows held out of the fit", "nearest to the middle"]
+    {
+        assert!(body.contains(part), "{part}");
+    }
+    for part in ["camera", "verify row", "of the paper"] {
+        assert!(!body.contains(part), "{part}");
+    }
+    let said = stereocal(
+        at,
+        &["verify", "--against", "t/identified.toml", "--measurements", "tracker.csv", "--out", "t", "--force"],
+    );
+    assert!(stdout(&said).contains("instrument of group"), "{}{}", stdout(&said), stderr(&said));
+    let verified = stereocal(at, &["verify", "--measurements", "tracker.csv", "--robot", "t/identified.toml"]);
+    assert!(stdout(&verified).starts_with("rows, mm"), "{}", stdout(&verified));
+}
+
+#[test]
 fn ten_poses_say_whether_the_robot_is_still_the_same() {
     let folder = identified();
     let at = folder.path();
@@ -182,6 +239,11 @@ fn ten_poses_say_whether_the_robot_is_still_the_same() {
     let same = check("same.csv", "5");
     assert_eq!(same.status.code(), Some(0), "{}{}", stdout(&same), stderr(&same));
     assert!(stdout(&same).starts_with("STILL VALID"), "{}", stdout(&same));
+    let page = || std::fs::read_to_string(at.join("out/verify.html")).unwrap();
+    assert!(page().contains("10 new poses against the identified robot"), "{}", page());
+    let said = stdout(&same);
+    let table: Vec<&str> = said.lines().skip_while(|line| !line.starts_with("cause")).take(12).collect();
+    assert!(table.len() == 12 && table.iter().all(|line| line.chars().count() <= 80), "{said}");
     // Whatever the plan called the poses.
     std::fs::write(at.join("verify.csv"), ten(0.0).replace(",sample,", ",verify,").replace(",center,", ",verify,"))
         .unwrap();
@@ -196,6 +258,10 @@ fn ten_poses_say_whether_the_robot_is_still_the_same() {
     assert!(history.starts_with("date,against,poses,standing,cause,"), "{history}");
     assert_eq!(history.lines().count(), 5, "{history}");
     assert!(history.lines().last().unwrap().contains("joint-3"), "{history}");
+    // The poses that it was identified from prove nothing, and the page says so, too.
+    let own = check("truth/measurements.csv", "5");
+    assert!(stderr(&own).contains("this robot was identified from truth/measurements.csv"), "{}", stderr(&own));
+    assert!(page().contains("this robot was identified from truth/measurements.csv") && !page().contains("new pose"));
     std::fs::remove_file(at.join("out/identification.json")).unwrap();
     let unknown = check("same.csv", "5");
     assert_eq!(unknown.status.code(), Some(2));

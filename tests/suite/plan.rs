@@ -60,7 +60,11 @@ fn the_files_are_those_of_the_contract() {
     }
     let counts: Vec<u64> = plan["expected"].as_array().unwrap().iter().map(|e| e["poses"].as_u64().unwrap()).collect();
     assert_eq!(counts, [10, 20, 24, 40, 80]);
-    assert!(std::fs::read_to_string(at.join("out/plan.html")).unwrap().contains("What the cameras will see"));
+    let page = std::fs::read_to_string(at.join("out/plan.html")).unwrap();
+    assert!(page.contains("What the cameras will see") && page.contains("as planned by Shi et al."));
+    // What the figure is of, and no rows of another plan's counts.
+    assert!(page.contains("that the identified parameters will leave") && !page.contains("n/a"), "{page}");
+    assert!(said.contains("through the parameters alone") && !said.contains("n/a"), "{said}");
     // Fanuc's and Yaskawa's controllers take names in capitals.
     for (stem, ending) in
         [("stereocal_plan", "csv"), ("stereocal_plan", "script"), ("stereocal_plan", "mod")].into_iter().chain([

@@ -37,6 +37,28 @@ fn what_happened_over_the_pairs_stands_before_the_checks() {
     }
 }
 
+/// Error and uncertainty are those of one length, in the record, on the page to sign and on that of the check; the rig comes first there.
+fn what_is_judged_adds_up(world: &Path, report: &str) {
+    let check: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(world.join("out/camera-check.json")).unwrap()).unwrap();
+    let of = |pointer: &str| check.pointer(pointer).and_then(serde_json::Value::as_f64).unwrap();
+    let judged = ["error_mm", "uncertainty_mm", "at_most_mm"].map(|key| of(&format!("/judged_length/{key}")));
+    assert!((judged[0] + judged[1] - judged[2]).abs() < 1e-12 && judged[2] == of("/evidence/0/value"), "{judged:?}");
+    let page = std::fs::read_to_string(world.join("out/camera-check.html")).unwrap();
+    let (before, after) = page.split_once(" mm, the uncertainty being that of").unwrap();
+    assert!(after.starts_with(" calibration and board"));
+    let sum: Vec<&str> = before.rsplit(": ").next().unwrap().split([' ', '+', '=']).filter(|n| !n.is_empty()).collect();
+    let numbers: Vec<f64> = sum.iter().map(|n| n.parse().unwrap()).collect();
+    assert!((numbers[0] + numbers[1] - numbers[2]).abs() < 1e-9, "{sum:?}");
+    for (number, value) in numbers.iter().zip(judged) {
+        assert!((number - value).abs() <= 0.1 * value, "{sum:?} {judged:?}");
+    }
+    assert!(sum.iter().all(|number| report.contains(&format!("<td>{number}</td>"))), "{sum:?}");
+    assert!(!page.contains("0 mm along"), "a length along the line of sight that is not there");
+    let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("no {text}"));
+    assert!(at("right_from_left.tx_mm") < at("left.fx"));
+}
+
 #[test]
 fn one_page_of_the_day() {
     let folder = workplace();
@@ -83,6 +105,7 @@ fn one_page_of_the_day() {
     for part in ["ISO 9283", "VDI/VDE 2634", "Signatures", "camera-check.json"] {
         assert!(page.contains(part), "{part}");
     }
+    what_is_judged_adds_up(world, &page);
 
     // The same measurements with another calibration beside them.
     done(world, &["camera-check", "check/", "--tolerance-mm", "0.5", "--lens", "brown5"]);

@@ -42,9 +42,9 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     corners.notes.iter().for_each(progress::note);
     let run = out.provenance();
     let own = run.as_ref().and_then(|run| run.shares(&file));
-    if let Some(same) = own {
-        progress::warn(format!("this calibration was made of {same}: only new pairs tell whether it still holds"));
-    }
+    let said = |same| format!("this calibration was made of {same}: only new pairs tell whether it still holds");
+    let warnings: Vec<String> = own.map(said).into_iter().collect();
+    warnings.iter().for_each(progress::warn);
     let Calibrated { rig, noise, pair_excess, pairs, volume, .. } = calibrated;
     let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), pairs, volume };
     let found = recheck::recheck(&before, &corners)?;
@@ -53,7 +53,7 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let content = RecheckFile::new(&found, standing, &file, tolerance_mm);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check::new(&content, date));
-    let page = report::recheck::page(&found, standing, tolerance_mm, &checks)?;
+    let page = report::recheck::page(&found, standing, tolerance_mm, &checks, (&warnings, own.is_some()))?;
     let json = out.write_json("recheck.json", &content)?;
     out.write(HISTORY, formats::to_csv(&checks, "pairs").as_bytes())?;
     report::page::write(&out, "recheck.html", page)?;

@@ -32,7 +32,9 @@ pub(super) fn thumbnails(
     files: &[PairFiles],
     wanted: &Wanted<'_>,
 ) -> Vec<Thumbnail> {
-    let failures = series.poses.iter().filter_map(|m| Some((m, m.target.as_ref().err()?.reason.clone())));
+    let has_pictures = |m: &&MeasuredPose| files.iter().any(|f| f.pair == m.at.pose);
+    let failures = series.poses.iter().filter(has_pictures);
+    let failures = failures.filter_map(|m| Some((m, m.target.as_ref().err()?.reason.clone())));
     let mut chosen: Vec<(&MeasuredPose, String)> = failures.take(FAILURES).collect();
     let mut measured: Vec<(f64, &MeasuredPose)> =
         series.poses.iter().filter_map(|m| Some((m.target.as_ref().ok()?.chi_square, m))).collect();

@@ -133,7 +133,7 @@ pub fn run(args: &Verify, config: &Config, run: Run) -> Result<Outcome> {
         true => files::to_json(&Verified { robots }),
         false => {
             let rows: Vec<(&str, &PointSpread)> = robots.iter().map(|r| (r.file.as_str(), &r.verify)).collect();
-            report::identify::verified(&rows)
+            report::identify::verified(&rows, folded)
         }
     };
     Ok(Outcome { stdout, status: if explained { Status::Done } else { Status::OutOfTolerance } })

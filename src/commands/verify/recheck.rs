@@ -39,23 +39,20 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     out.check_free(&["verify.json", HISTORY, "verify.html"])?;
     let mut checks = formats::history(&out, HISTORY)?;
 
-    if let Some(shift) = shifted::find(&set, &robot) {
-        progress::warn(format!(
-            "{}; mend the file first: below, this looks like a change of the robot",
-            shift.statement(&set)
-        ));
-    }
+    let shift = shifted::find(&set, &robot).map(|shift| {
+        format!("{}; mend the file first: below, this looks like a change of the robot", shift.statement(&set))
+    });
     let record = against.with_file_name("identification.json");
     let made_by = out.provenance();
     let own = made_by.as_ref().and_then(|run| run.shares(&record));
-    if let Some(same) = own {
-        progress::warn(format!(
-            "this robot was identified from {same}: only new poses tell whether it still is that robot"
-        ));
-    }
+    let said =
+        |same| format!("this robot was identified from {same}: only new poses tell whether it still is that robot");
+    let mut warnings: Vec<String> = shift.into_iter().chain(own.map(said)).collect();
+    warnings.iter().for_each(progress::warn);
     let found = recheck(&set, &robot, &before, &placed)?;
     for skipped in &set.skipped {
-        progress::warn(format!("pose {} is not compared: {}", skipped.pose, skipped.reason));
+        warnings.push(format!("pose {} is not compared: {}", skipped.pose, skipped.reason));
+        warnings.last().into_iter().for_each(progress::warn);
     }
     // A change that is smaller than what the robot was off by anyway is none to act on.
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm.max(before.p95_mm));
@@ -72,7 +69,8 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
         seen_mm: found.seen_mm,
         length_mm: None,
     });
-    let page = report::robot_recheck::page(&found, content.standing, tolerance_mm, &checks)?;
+    let page =
+        report::robot_recheck::page(&found, content.standing, tolerance_mm, &checks, (&warnings, own.is_some()))?;
     let json = out.write_json("verify.json", &content)?;
     out.write(HISTORY, formats::to_csv(&checks, "poses").as_bytes())?;
     report::page::write(&out, "verify.html", page)?;

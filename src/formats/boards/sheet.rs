@@ -21,6 +21,11 @@ const FOOT_MM: f64 = 16.0;
 const TICK_MM: f64 = 10.0;
 /// Longest ruler, mm.
 const RULER_MM: f64 = 200.0;
+/// Ticks of the ruler down to its numbers' feet, and the height of these, mm.
+const NUMBERS_MM: f64 = 7.0;
+const NUMBER_MM: f64 = 2.6;
+/// Width of a digit of Helvetica as a share of its letters' height.
+const DIGIT: f64 = 0.556;
 /// Height of letters, mm.
 const LETTER_MM: f64 = 3.0;
 /// A point of PDF, mm.
@@ -47,6 +52,8 @@ pub struct Sheet {
     pub foot: String,
     pub(super) patches: Vec<Patch>,
     foot_at: (f64, f64),
+    /// The ruler's numbers, and where their middle stands.
+    numbers: Vec<(String, (f64, f64))>,
 }
 
 /// A board that no paper holds.
@@ -104,10 +111,16 @@ impl Sheet {
         patches.extend(markers.bits.iter().map(|face| of(face, false)));
         let ruler_mm = ((width_mm - 2.0 * MARGIN_MM).min(RULER_MM) / TICK_MM).floor() * TICK_MM;
         let ruler_top = top + height + MARGIN_MM / 2.0;
-        patches.extend(ruler((width_mm - ruler_mm) / 2.0, ruler_top, ruler_mm));
+        let ruler_left = (width_mm - ruler_mm) / 2.0;
+        patches.extend(ruler(ruler_left, ruler_top, ruler_mm));
+        let ticks = (ruler_mm / TICK_MM).round() as usize;
+        let number = |k: usize| {
+            let mm = k as f64 * TICK_MM;
+            (format!("{mm:.0}"), (ruler_left + mm, ruler_top + NUMBERS_MM))
+        };
         let foot = format!("--board {board}    the ruler is {ruler_mm} mm long: print at 100 %, not \"fit to page\"");
-        let foot_at = ((width_mm - ruler_mm) / 2.0, ruler_top + 5.0 + LETTER_MM);
-        Ok(Sheet { paper, width_mm, height_mm, foot, patches, foot_at })
+        let foot_at = (ruler_left, ruler_top + NUMBERS_MM + 1.0 + LETTER_MM);
+        Ok(Sheet { paper, width_mm, height_mm, foot, patches, foot_at, numbers: (0..=ticks).map(number).collect() })
     }
 
     pub fn svg(&self) -> String {
@@ -121,6 +134,12 @@ impl Sheet {
             let _ = writeln!(
                 text,
                 "<rect x=\"{x:.6}\" y=\"{y:.6}\" width=\"{width:.6}\" height=\"{height:.6}\" fill=\"{fill}\"/>"
+            );
+        }
+        for (number, (x, y)) in &self.numbers {
+            let _ = writeln!(
+                text,
+                "<text x=\"{x}\" y=\"{y}\" text-anchor=\"middle\" font-family=\"Helvetica, Arial, sans-serif\" font-size=\"{NUMBER_MM}\">{number}</text>"
             );
         }
         let ((x, y), foot) = (self.foot_at, self.foot.replace('"', "&quot;"));
@@ -156,11 +175,18 @@ impl Sheet {
             content.fill_nonzero();
         }
         content.set_fill_gray(0.0);
-        content.begin_text();
-        content.set_font(letters, LETTER_MM as f32);
-        content.next_line(self.foot_at.0 as f32, (self.height_mm - self.foot_at.1) as f32);
-        content.show(Str(self.foot.as_bytes()));
-        content.end_text();
+        let mut write = |text: &str, size_mm: f64, (x, y): (f64, f64)| {
+            content.begin_text();
+            content.set_font(letters, size_mm as f32);
+            content.next_line(x as f32, (self.height_mm - y) as f32);
+            content.show(Str(text.as_bytes()));
+            content.end_text();
+        };
+        for (number, (middle, y)) in &self.numbers {
+            let wide = number.len() as f64 * DIGIT * NUMBER_MM;
+            write(number, NUMBER_MM, (middle - wide / 2.0, *y));
+        }
+        write(&self.foot, LETTER_MM, self.foot_at);
         pdf.stream(contents, &content.finish());
         pdf.finish()
     }
@@ -204,6 +230,14 @@ mod tests {
             let right = squares.iter().map(|patch| patch.x + patch.width).fold(0.0, f64::max);
             assert!((right - left - board.squares.columns as f64 * board.square_mm).abs() < 1e-9);
             assert!(sheet.svg().contains(name) && sheet.pdf().starts_with(b"%PDF"));
+            let pdf = String::from_utf8_lossy(&sheet.pdf()).into_owned();
+            for number in ["0", "10", "100", "190"] {
+                assert!(sheet.svg().contains(&format!(">{number}</text>")), "{name}: {number}");
+                assert!(pdf.contains(&format!("({number}) Tj")), "{name}: {number}");
+            }
+            let ruler = sheet.patches.iter().filter(|patch| patch.height < 0.3 && patch.width > 50.0);
+            let ruler_mm = ruler.map(|patch| patch.width).fold(0.0, f64::max);
+            assert_eq!(sheet.numbers.last().map(|(number, _)| number.parse().unwrap()), Some(ruler_mm), "{name}");
             assert!(
                 sheet
                     .patches

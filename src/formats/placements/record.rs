@@ -152,7 +152,7 @@ fn held(placed: &Placed) -> Vec<Held> {
         because: because.to_owned(),
     };
     vec![
-        record(of_base, "they move the whole robot, as the place of the cameras does"),
+        record(of_base, "they move the whole robot, as the placement does"),
         record(of_flange, "they move the target on the flange, as its own place does"),
     ]
 }

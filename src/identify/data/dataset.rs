@@ -286,6 +286,14 @@ impl Dataset {
         self.poses.iter().all(|p| matches!(p.reading, Reading::Position { covariance_mm2: Some(_), .. }))
     }
 
+    /// Whether cameras read it: they state an orientation and a covariance with each point. Other instruments (a tracker, a wire, a probe) state
+    /// at most one of these.
+    pub fn is_of_cameras(&self) -> bool {
+        let both =
+            |p: &Pose| matches!(p.reading, Reading::Position { rotation_rad: Some(_), covariance_mm2: Some(_), .. });
+        !self.shared.is_empty() || self.poses.iter().any(both)
+    }
+
     /// Whether distances are read to centres.
     pub fn to_centers(&self) -> bool {
         self.kind == Kind::Distances && self.groups.iter().any(|g| g.center.is_some())

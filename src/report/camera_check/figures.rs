@@ -1,5 +1,6 @@
 //! The plots: errors of lengths, what the model leaves of the corners, and how uncertain lengths are over the volume.
 
+use crate::diagnostic::two_digits;
 use crate::report::Result;
 use crate::report::drawing::figure::Plot;
 use crate::report::page::{self};
@@ -155,10 +156,20 @@ pub(super) fn volume(judged: &Judged) -> Result<Markup> {
     let worst = |axis: usize| lying(axis).map(|l| l.sigma_mm()).fold(0.0, f64::max);
     let caption = format!(
         "{} lengths in the volume in which the boards stood, as far as both cameras see them; corner noise at both ends and the calibration together. The worst: \
-         {:.4} mm across, {:.4} mm along the line of sight. Where points rise above the tolerance, add pairs at that distance.",
+         {} mm across the line of sight{}. Where points rise above the tolerance, add pairs at that distance.",
         judged.facts.volume.lengths.len(),
-        worst(0).max(worst(1)),
-        worst(2)
+        two_digits(worst(0).max(worst(1))),
+        along_sight(judged, worst(2))
     );
     Ok(page::figure(&svg, &caption))
+}
+
+/// What the lengths along the line of sight are uncertain by: those that boards showed, else those of which none showed any.
+fn along_sight(judged: &Judged, shown_mm: f64) -> String {
+    let unseen = judged.facts.volume.along_sight.iter().map(|length| length.sigma_mm()).reduce(f64::max);
+    match unseen {
+        _ if shown_mm > 0.0 => format!(", {} mm along it", two_digits(shown_mm)),
+        Some(mm) => format!("; along it, where no board lay, it would be {} mm", two_digits(mm)),
+        None => String::new(),
+    }
 }

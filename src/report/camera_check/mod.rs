@@ -3,7 +3,7 @@
 mod figures;
 mod summary;
 
-use crate::diagnostic::Warning;
+use crate::diagnostic::{Warning, aligned, two_digits};
 use crate::imaging::Corners;
 use crate::report::Result;
 use crate::report::blur;
@@ -15,13 +15,14 @@ use crate::report::table::{number, with_sigma};
 use crate::stereo::Side;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::assessment::Judged;
-use crate::stereo::judge::evidence::{self, Evidence};
+use crate::stereo::judge::evidence::Evidence;
+use crate::stereo::judge::lengths::held_out::HeldOutPair;
 use crate::stereo::judge::verdict::Verdict;
 use maud::{Markup, html};
 
 use self::figures::{lengths, residuals, volume};
 pub use self::summary::summary;
-use self::summary::{advice, deciding, word};
+use self::summary::{advice, deciding_by, word};
 pub use crate::report::blur::warning as blurred;
 
 /// The pairs by their largest held-out error, the worst first.
@@ -40,8 +41,12 @@ fn happened(judged: &Judged) -> Vec<String> {
 
 /// Warnings with their reasons, but for those whose reason stands in the table of evidence.
 fn warnings(judged: &Judged) -> Vec<String> {
-    let said = |warning: &Warning| judged.evidence.iter().any(|line| line.detail == warning.reason);
-    judged.warnings.iter().map(|warning| if said(warning) { warning.text.clone() } else { warning.whole() }).collect()
+    let line = |warning: &Warning| judged.evidence.iter().find(|line| line.detail == warning.reason);
+    let said = |warning: &Warning| match line(warning) {
+        Some(line) => format!("{}: {}; {}", line.what, line.short_figure(), line.remedy),
+        None => warning.whole(),
+    };
+    judged.warnings.iter().map(said).collect()
 }
 
 /// The report, with pictures of some pairs.
@@ -52,7 +57,7 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
         Verdict::Fail => Tone::Bad,
     };
     let content = html! {
-        (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), page::capital(&deciding(judged)))))
+        (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), page::capital(&deciding_by(judged, Evidence::short_figure)))))
         @if !judged.facts.findings.is_empty() { p { "What happened during the series:" } (page::warnings(&happened(judged))) }
         (ledger(judged))
         @if !judged.advice.is_empty() { p { "What to photograph next:" } (page::warnings(&judged.advice)) }
@@ -92,7 +97,7 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
 /// The three numbers of the verdict.
 fn numbers(judged: &Judged) -> [(String, String); 3] {
     let extremes = &judged.facts.accuracy.extremes;
-    let mm = |value: f64| format!("{} mm", number(Some(value), 3));
+    let mm = |value: f64| format!("{} mm", two_digits(value));
     [
         (
             mm(extremes.one_in_twenty_mm),
@@ -140,14 +145,14 @@ fn lines(evidence: &[&Evidence]) -> Markup {
         Verdict::Undecided => "allows doubtful",
         Verdict::Fail => "allows bad",
     };
-    let cell = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), evidence::number);
+    let cell = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
     html! {
         div.wide { table.ledger {
             thead { tr { th { "what" } th { "value" } th { "limit" } th { "unit" } th { "result" } th { "detail" } } }
-            tbody { @for line in evidence { tr {
+            tbody { @for line in evidence { @let [value, limit] = line.rounded(); tr {
                 td { (line.name()) }
-                td { (cell(line.value)) }
-                td { (cell(line.limit)) }
+                td { (cell(value)) }
+                td { (cell(limit)) }
                 td { (line.unit) }
                 td { span class=(class(line.allows)) { (word(line.allows).to_lowercase()) } }
                 td.detail { (page::text(&line.detail)) }
@@ -165,8 +170,8 @@ fn scale(judged: &Judged) -> Markup {
                 @match (second.scale_error, second.scale_error_sigma, second.max_abs_error_mm) {
                     (Some(scale), Some(sigma), Some(error)) => (format!(
                         "The second board, which took no part in the calibration, comes out too large by {:.1} +- {:.1} parts in a million (k = 2); its worst length over \
-                         {} pairs is off by {error:.4} mm.",
-                        1e6 * scale, 2e6 * sigma, second.pairs)),
+                         {} pairs is off by {} mm.",
+                        1e6 * scale, 2e6 * sigma, second.pairs, two_digits(error))),
                     _ => "A second board was asked for, and no length on it could be measured.",
                 }
             }
@@ -179,9 +184,20 @@ fn scale(judged: &Judged) -> Markup {
 }
 
 fn pairs(calibration: &Calibration, judged: &Judged) -> Markup {
-    let rows: Vec<Vec<String>> = worst_first(judged)
+    let order = worst_first(judged);
+    let column = |of: fn(&HeldOutPair) -> Option<f64>| {
+        aligned(&order.iter().map(|&i| of(&judged.facts.accuracy.pairs[i])).collect::<Vec<_>>())
+    };
+    let errors = [
+        column(|pair| pair.max_abs_error_mm),
+        column(|pair| pair.mean_error_x_long_mm),
+        column(|pair| pair.mean_error_y_long_mm),
+        column(|pair| pair.gap_rms_mm),
+    ];
+    let rows: Vec<Vec<String>> = order
         .iter()
-        .map(|&i| {
+        .enumerate()
+        .map(|(row, &i)| {
             let pair = &judged.facts.accuracy.pairs[i];
             let view = &calibration.views[i];
             let rms = |side| {
@@ -192,12 +208,13 @@ fn pairs(calibration: &Calibration, judged: &Judged) -> Markup {
                     side,
                 )
             };
+            let [most, x, y, gap] = errors.each_ref().map(|column| column[row].clone());
             vec![
                 pair.pair.clone(),
-                number(pair.max_abs_error_mm, 4),
-                number(pair.mean_error_x_long_mm, 4),
-                number(pair.mean_error_y_long_mm, 4),
-                number(pair.gap_rms_mm, 4),
+                most,
+                x,
+                y,
+                gap,
                 number(rms(Side::Left), 3),
                 number(rms(Side::Right), 3),
                 view.active(Side::Left).count().to_string(),
@@ -251,13 +268,23 @@ fn parameters(calibration: &Calibration) -> Markup {
     let layout = &calibration.layout;
     let values = layout.numbers(&calibration.values.shared);
     let covariance = &calibration.uncertainty.shared;
-    let rows: Vec<Vec<String>> = layout
+    let mut rows: Vec<Vec<String>> = layout
         .names()
         .into_iter()
         .enumerate()
         .map(|(i, name)| std::iter::once(name).chain(with_sigma(values[i], covariance[(i, i)].sqrt())).collect())
         .collect();
-    html! { div.scroll { (page::table(&["number", "value", "standard deviation"], &rows)) } }
+    // How the cameras stand to each other first: lenses are known from elsewhere, too.
+    rows.sort_by_key(|row| !row[0].starts_with("right_from_left"));
+    let rig = calibration.rig();
+    html! {
+        p {
+            "Baseline " (number(Some(rig.baseline_mm()), 3)) " mm, the right camera turned by "
+            (number(Some(rig.right_from_left.rotation.angle().to_degrees()), 3)) " degrees against the left one. A point in the left camera's frame is brought into the right \
+             one's by " code { "right_from_left" } "."
+        }
+        (page::table(&["number", "value", "standard deviation"], &rows))
+    }
 }
 
 fn lenses(calibration: &Calibration) -> Markup {
@@ -286,7 +313,7 @@ fn disagreements(judged: &Judged) -> Markup {
             let [x, y, z] = d.translation_change_mm;
             vec![
                 d.name(),
-                format!("{:.4}", d.length_change_mm),
+                two_digits(d.length_change_mm),
                 format!("{:.0}", d.chi_square_fall),
                 format!("{:.0}", d.chance),
                 format!("{x:.3}, {y:.3}, {z:.3}"),

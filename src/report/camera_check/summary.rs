@@ -1,6 +1,6 @@
 //! The verdict in words, and the table on stdout.
 
-use crate::diagnostic::{count, significant};
+use crate::diagnostic::{count, two_digits};
 use crate::files::OutDir;
 use crate::imaging::corners::named;
 use crate::report::table::{Table, number};
@@ -109,11 +109,7 @@ fn lenses(calibration: &Calibration) -> Option<String> {
         return Some(check.statement.clone());
     }
     let seen = check.focus_seen.iter().flatten().copied().fold(0.0, f64::max);
-    Some(format!(
-        "{}; they would show a focal length that differs by {} %",
-        check.statement,
-        significant(100.0 * seen, 2)
-    ))
+    Some(format!("{}; they would show a focal length that differs by {} %", check.statement, two_digits(100.0 * seen)))
 }
 
 /// What known moves say of the scale.
@@ -132,7 +128,7 @@ fn second_board(judged: &Judged) -> Option<String> {
         return Some(format!("second board: no length on it could be measured in {pairs}"));
     };
     let scale = second.scale_error.zip(second.scale_error_sigma).map_or(String::new(), |(scale, sigma)| {
-        format!("; its scale is off by {} +- {} ppm", significant(1e6 * scale, 2), significant(2e6 * sigma, 2))
+        format!("; its scale is off by {} +- {} ppm", two_digits(1e6 * scale), two_digits(2e6 * sigma))
     });
     Some(format!(
         "second board: {pairs}, largest error {} mm ({} with its uncertainty){scale}",
@@ -230,7 +226,12 @@ pub(super) fn explanation(judged: &Judged) -> String {
 }
 
 /// The line of the ledger that decides, and which others are below a pass.
-pub(super) fn deciding(judged: &Judged) -> String {
+fn deciding(judged: &Judged) -> String {
+    deciding_by(judged, Evidence::figure)
+}
+
+/// The same, the figure as a page or the terminal has it.
+pub(super) fn deciding_by(judged: &Judged, figure: fn(&Evidence) -> String) -> String {
     let deciding = judged.deciding();
     let below = || judged.evidence.iter().filter(|line| line.allows != Verdict::Pass);
     let others: Vec<&str> =
@@ -240,7 +241,7 @@ pub(super) fn deciding(judged: &Judged) -> String {
         (_, true) => "all other checks passed".to_owned(),
         _ => format!("also not passed: {}", others.join(", ")),
     };
-    deciding.map_or(others.clone(), |line| format!("deciding check: {}, {}; {others}", line.name(), line.figure()))
+    deciding.map_or(others.clone(), |line| format!("deciding check: {}, {}; {others}", line.name(), figure(line)))
 }
 
 /// What the rig can be trusted to, whatever the tolerance.
@@ -249,7 +250,7 @@ pub(super) fn trusted(judged: &Judged) -> String {
         (Some(line), Some(mm)) if mm > NO_USE * judged.facts.volume.length_mm => format!(
             "no length can be trusted: of one of {:.0} mm an error of {} mm is not ruled out ({})",
             judged.facts.volume.length_mm,
-            significant(mm, 2),
+            two_digits(mm),
             line.name()
         ),
         (Some(line), Some(mm)) => {
@@ -279,7 +280,7 @@ pub(super) fn advice(judged: &Judged) -> String {
                 Extent::Boards => "the volume where the boards stood".to_owned(),
                 asked => asked.said(),
             };
-            format!("Lengths can be trusted to {trusted:.4} mm in {over}.")
+            format!("Lengths can be trusted to {} mm in {over}.", two_digits(trusted))
         }
         Verdict::Undecided => format!(
             "Not decided: the checks below that are not passed say why and what to do; until then do not rely on {sure} mm."

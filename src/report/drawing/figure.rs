@@ -3,9 +3,11 @@
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::axis::{padded, power_of_ten, tick, widened};
+use super::axis::{Ticked, padded, power_of_ten, tick, widened};
+use super::label::{Area, LABEL_PX};
+use super::marks::Marks;
+use crate::diagnostic::aligned;
 use crate::report::Error;
 use crate::report::Result;
 
@@ -27,28 +29,6 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(180, 140, 0),
     RGBColor(90, 90, 90),
 ];
-
-/// How a series is drawn.
-#[derive(Debug, Clone, PartialEq)]
-enum Marks {
-    Points(Vec<(f64, f64)>),
-    Line(Vec<(f64, f64)>),
-    /// x, y, half length of the bar.
-    ErrorBars(Vec<(f64, f64, f64)>),
-    /// x, y, dx, dy; the arrows' lengths are in the axes' units.
-    Vectors(Vec<[f64; 4]>),
-}
-
-impl Marks {
-    /// Every place that must lie inside the axes.
-    fn extent(&self) -> Vec<(f64, f64)> {
-        match self {
-            Marks::Points(xy) | Marks::Line(xy) => xy.clone(),
-            Marks::ErrorBars(bars) => bars.iter().flat_map(|&(x, y, h)| [(x, y - h), (x, y + h)]).collect(),
-            Marks::Vectors(v) => v.iter().flat_map(|&[x, y, dx, dy]| [(x, y), (x + dx, y + dy)]).collect(),
-        }
-    }
-}
 
 /// A figure with one pair of axes.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,9 +83,10 @@ impl Plot {
         let third = |k: usize| lengths.get(k * lengths.len() / 3).copied().unwrap_or(0.0);
         for (low, high) in [(least_mm, third(1)), (third(1), third(2)), (third(2), f64::INFINITY)] {
             let within = points.iter().filter(|(.., mm)| *mm >= low && *mm < high);
-            let label = match high.is_finite() {
-                true => format!("{low:.4} to {high:.4} mm"),
-                false => format!("{low:.4} mm and more"),
+            let label = match aligned(&[Some(low), Some(high).filter(|mm| mm.is_finite())]).as_slice() {
+                [low, high] if high != "n/a" => format!("{low} to {high} mm"),
+                [low, ..] => format!("{low} mm and more"),
+                [] => String::new(),
             };
             self = self.points(&label, &within.map(|&(x, y, _)| (x, y)).collect::<Vec<_>>());
         }
@@ -208,7 +189,7 @@ impl Plot {
         let mut x = padded(places.iter().map(|p| p.0));
         let mut y = padded(places.iter().map(|p| p.1).chain(guides));
         // Room above for the legend, so that it covers no point.
-        let labels = self.series.iter().filter(|(label, _)| !label.is_empty()).count();
+        let labels = self.series.iter().filter(|series| self.is_in_legend(series)).count();
         if labels > 0 {
             y.1 += (y.1 - y.0) * LEGEND_ROW * (labels as f64 + 0.5);
         }
@@ -238,9 +219,9 @@ impl Plot {
             .margin(10 * SCALE)
             .x_label_area_size(44 * SCALE)
             .y_label_area_size(74 * SCALE)
-            .build_cartesian_2d(x.0..x.1, y.0..y.1)
+            .build_cartesian_2d(x.0..x.1, Ticked::new(y, self.log_y))
             .map_err(say)?;
-        let y_text = |v: &f64| if self.log_y { power_of_ten(*v) } else { tick(*v, y) };
+        let y_text = |v: &f64| if self.log_y { power_of_ten(*v, y) } else { tick(*v, y) };
         let x_text = |v: &f64| if self.whole_x { format!("{v:.0}") } else { tick(*v, x) };
         // So few that a step is one at least.
         let x_labels = if self.whole_x { (1.0 + (x.1 - x.0).floor()).clamp(1.0, 7.0) as usize } else { 7 };
@@ -251,18 +232,17 @@ impl Plot {
             .x_label_formatter(&x_text)
             .y_label_formatter(&y_text)
             .x_labels(x_labels)
-            .y_labels(7)
             .label_style(font(13))
             .axis_desc_style(font(14))
             .light_line_style(TRANSPARENT)
             .bold_line_style(BLACK.mix(0.1))
             .draw()
             .map_err(say)?;
-        for (k, (label, marks)) in self.series.iter().enumerate() {
-            self.draw_series(&mut chart, label, marks, COLOURS[k % COLOURS.len()])?;
+        for (k, series) in self.series.iter().enumerate() {
+            self.draw_series(&mut chart, series, COLOURS[k % COLOURS.len()])?;
         }
-        self.draw_guides(&mut chart, x)?;
-        if self.series.iter().any(|(label, _)| !label.is_empty()) {
+        self.draw_guides(&mut chart, x, y)?;
+        if self.series.iter().any(|series| self.is_in_legend(series)) {
             chart
                 .configure_series_labels()
                 .position(SeriesLabelPosition::UpperRight)
@@ -280,11 +260,11 @@ impl Plot {
     fn draw_series(
         &self,
         chart: &mut Chart<'_, '_>,
-        label: &str,
-        marks: &Marks,
+        series: &(String, Marks),
         colour: RGBColor,
     ) -> std::result::Result<(), String> {
         let say = |e: DrawingAreaErrorKind<_>| e.to_string();
+        let (label, marks) = series;
         let keep = |xy: &[(f64, f64)]| -> Vec<(f64, f64)> { xy.iter().filter_map(|&p| self.plotted(p)).collect() };
         let width = SCALE + SCALE / 2;
         let anno = match marks {
@@ -318,7 +298,7 @@ impl Plot {
             }
         }
         .map_err(say)?;
-        if !label.is_empty() {
+        if self.is_in_legend(series) {
             let s = SCALE as i32;
             anno.label(label).legend(move |(x, y)| {
                 Rectangle::new([(x, y - 4 * s), (x + 16 * s, y + 4 * s)], colour.mix(0.8).filled())
@@ -327,24 +307,34 @@ impl Plot {
         Ok(())
     }
 
-    fn draw_guides(&self, chart: &mut Chart<'_, '_>, x: (f64, f64)) -> std::result::Result<(), String> {
+    /// Whether a series has a name and anything that is drawn.
+    fn is_in_legend(&self, (label, marks): &(String, Marks)) -> bool {
+        !label.is_empty() && marks.extent().into_iter().any(|p| self.plotted(p).is_some())
+    }
+
+    fn draw_guides(&self, chart: &mut Chart<'_, '_>, x: (f64, f64), y: (f64, f64)) -> std::result::Result<(), String> {
         let say = |e: DrawingAreaErrorKind<_>| e.to_string();
         let colour = RGBColor(170, 30, 30);
+        let area = Area::new(x, y, self.size);
+        let drawn: Vec<(f64, f64)> =
+            self.series.iter().flat_map(|(_, marks)| marks.covered(|p| self.plotted(p))).collect();
         for (level, label) in &self.guides {
-            let Some((_, y)) = self.plotted((0.0, *level)) else { continue };
-            let dashes = DashedLineSeries::new([(x.0, y), (x.1, y)], 8 * SCALE, 5 * SCALE, colour.stroke_width(SCALE));
+            let Some((_, at_y)) = self.plotted((0.0, *level)) else { continue };
+            let dashes =
+                DashedLineSeries::new([(x.0, at_y), (x.1, at_y)], 8 * SCALE, 5 * SCALE, colour.stroke_width(SCALE));
             chart.draw_series(dashes).map_err(say)?;
-            let at = (x.0 + 0.01 * (x.1 - x.0), y);
-            let style = TextStyle::from(("sans-serif", 12 * SCALE).into_font())
-                .color(&colour)
-                .pos(Pos::new(HPos::Left, VPos::Bottom));
-            chart.draw_series([Text::new(label.clone(), at, style)]).map_err(say)?;
+            if label.is_empty() {
+                continue;
+            }
+            let (at_x, pos) = area.free_place(label, at_y, &drawn);
+            let style = TextStyle::from(("sans-serif", LABEL_PX * SCALE).into_font()).color(&colour).pos(pos);
+            chart.draw_series([Text::new(label.clone(), (at_x, at_y), style)]).map_err(say)?;
         }
         Ok(())
     }
 }
 
-type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, Ticked>>;
 
 #[cfg(test)]
 mod tests {
@@ -364,6 +354,13 @@ mod tests {
             assert!(svg.contains(part), "{part} is missing");
         }
         assert!(!svg.contains("NaN"));
+    }
+
+    #[test]
+    fn what_is_not_drawn_has_no_place_in_the_legend() {
+        let plot = Plot::new("t", "x", "y").points("seen", &[(0.0, 1.0)]).points("absent", &[]);
+        let svg = plot.log_y().points("zero", &[(0.0, 0.0)]).svg().unwrap();
+        assert!(svg.contains("seen") && !svg.contains("absent") && !svg.contains("zero"), "{svg}");
     }
 
     #[test]

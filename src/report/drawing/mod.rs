@@ -2,6 +2,8 @@
 
 mod axis;
 pub mod figure;
+mod label;
+mod marks;
 pub mod pair_picture;
 pub mod picture;
 pub mod scene;

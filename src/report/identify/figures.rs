@@ -13,21 +13,25 @@ use crate::report::drawing::figure::Plot;
 use crate::report::drawing::scene::{Ink, Scene};
 use crate::report::page;
 
-pub(super) fn verification_figure(before: &[RowError], after: &[RowError]) -> Result<Markup> {
+/// The errors of rows that took no part in the fit; `folded` where each was left out of a fit of its own.
+pub(super) fn verification_figure(before: &[RowError], after: &[RowError], folded: bool) -> Result<Markup> {
     let series = |errors: &[RowError]| -> Vec<(f64, f64)> {
         let numbered = errors.iter().enumerate().filter_map(|(i, e)| Some(((i + 1) as f64, e.distance_mm?.abs())));
         numbered.filter(|(_, error)| *error > 0.0).collect()
     };
-    let svg =
-        Plot::new("Distance errors of the verify rows", "verify row, in the order of the file", "absolute error, mm")
-            .whole_x()
-            .points("before", &series(before))
-            .points("after", &series(after))
-            .log_y()
-            .svg()?;
+    let (title, rows) = match folded {
+        true => ("Distance errors of rows held out of the fit", "row, in the order of the file"),
+        false => ("Distance errors of the verify rows", "verify row, in the order of the file"),
+    };
+    let svg = Plot::new(title, rows, "absolute error, mm")
+        .whole_x()
+        .points("before", &series(before))
+        .points("after", &series(after))
+        .log_y()
+        .svg()?;
     Ok(page::figure(
         &svg,
-        "Fig. 9 of the paper: each verification distance before and after; the scale is logarithmic. A pose that is \
+        "Each distance before and after identification; the scale is logarithmic. A pose that is \
          as far off after as before is one that the model cannot explain: see the table of the worst.",
     ))
 }
@@ -55,10 +59,7 @@ pub(super) fn convergence_figure(record: &Record) -> Result<Markup> {
     for method in record.methods.iter().filter(|m| m.model == model) {
         plot = plot.line(method.name, &series(method));
     }
-    Ok(page::figure(
-        &plot.svg()?,
-        "Fig. 8 of the paper: lines that end above the lowest one have stopped short of the minimum.",
-    ))
+    Ok(page::figure(&plot.svg()?, "Lines that end above the lowest one have stopped short of the minimum."))
 }
 
 /// The arm and the points at which it was measured.
@@ -74,11 +75,11 @@ pub(super) fn in_space(places: &[(Role, Point3<f64>)], arm: &[Point3<f64>]) -> M
         scene.line(ink, vec![at]);
     }
     scene.word(Point3::origin(), "base");
-    let caption = "The arm at the first centre pose and the points of the target in the base frame: samples in blue, verify rows in red, centres in green. The identified robot holds where these points are.";
+    let caption = "The arm at the first centre pose and the points of the target in the base frame: samples in blue, rows to verify in red, centres in green. The identified robot holds where these points are.";
     scene.upright().figure("the arm and where it was measured", caption)
 }
 
-/// Fig. 7: the poses from above and from the side.
+/// Fig. 7 of the paper: the poses from above and from the side.
 pub(super) fn layout_figures(places: &[(Role, Point3<f64>)]) -> Result<Markup> {
     let view = |title: &str, vertical: &str, axes: (usize, usize)| {
         let series = |role: Role| -> Vec<(f64, f64)> {
@@ -87,11 +88,11 @@ pub(super) fn layout_figures(places: &[(Role, Point3<f64>)]) -> Result<Markup> {
         Plot::new(title, "x, mm", vertical)
             .points("sample", &series(Role::Sample))
             .points("verify", &series(Role::Verify))
-            .points("center", &series(Role::Center))
+            .points("centre", &series(Role::Center))
             .equal_axes()
             .svg()
     };
-    let caption = "Fig. 7 of the paper: where the nominal robot puts the target, base frame. What lies outside of these points was not \
+    let caption = "Where the nominal robot puts the target, base frame. What lies outside of these points was not \
                    identified, and the corrections hold there only as far as the model is right.";
     Ok(html! { div.side {
         (page::figure(&view("Poses from above", "y, mm", (0, 1))?, caption))
@@ -102,7 +103,7 @@ pub(super) fn layout_figures(places: &[(Role, Point3<f64>)]) -> Result<Markup> {
 /// Points of each start in Fig. 3.
 const START_POINTS: usize = 200;
 
-/// Fig. 3: Halton's sequence beside pseudo-random numbers.
+/// Fig. 3 of the paper: Halton's sequence beside pseudo-random numbers.
 pub(super) fn start_figures(seed: u64) -> Result<Markup> {
     let pairs = |numbers: &[f64]| -> Vec<(f64, f64)> { numbers.chunks_exact(2).map(|p| (p[0], p[1])).collect() };
     let plot = |title: &str, numbers: &[f64]| {
@@ -111,7 +112,7 @@ pub(super) fn start_figures(seed: u64) -> Result<Markup> {
     let halton = plot("Halton sequence", &halton::points(START_POINTS, 2, seed))?;
     let random = plot("Pseudo-random numbers", &crate::identify::solve::swarm::uniform(2 * START_POINTS, seed))?;
     Ok(html! { div.side {
-        (page::figure(&halton, "Fig. 3 of the paper: Halton's points, where STAPSO starts, leave neither clusters nor holes."))
+        (page::figure(&halton, "Halton's points, where STAPSO starts, leave neither clusters nor holes."))
         (page::figure(&random, "Pseudo-random points, where the other swarms start, have both."))
     } })
 }

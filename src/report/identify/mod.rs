@@ -10,7 +10,7 @@ use nalgebra::Point3;
 
 use super::Result;
 use super::page::{self, Tone};
-use super::table::number;
+use crate::diagnostic::two_digits;
 use crate::formats::placements::record::PlacementFile;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::RowError;
@@ -47,13 +47,7 @@ pub fn page(
     let content = html! {
         (verdict(record))
         (page::warnings(&others))
-        h2 { "Verification" }
-        (figures::verification_figure(before, after)?)
-        (tables::verification_table(record))
-        @if let Some(targets) = &record.targets {
-            p { "Several targets: " (targets.sentence()) "." }
-        }
-        (tables::worst_table(set, before, after))
+        (verification(set, record, before, after)?)
         @if let Some(expected) = &record.expected {
             h2 { "How far to trust it" }
             (tables::expected_table(expected))
@@ -62,9 +56,9 @@ pub fn page(
             }
             (figures::expected_map(expected, places)?)
         }
-        (placement::section(placement))
+        (placement::section(placement, set.is_of_cameras()))
         h2 { "Parameters" }
-        p { "Table 2 of the paper: the corrected parameters of each link and joint; alpha and a of link j - 1, theta and d of joint j." }
+        p { "The corrected parameters of each link and joint, nominal value and correction: alpha and a of link j - 1, theta and d of joint j." }
         (tables::joint_table(record))
         (tables::parameter_table(record))
         h2 { "What the poses determine" }
@@ -82,6 +76,20 @@ pub fn page(
     Ok(page::page("Identification", &lead, &content))
 }
 
+/// Errors before and after on rows that took no part in the fit.
+fn verification(set: &Dataset, record: &Record, before: &[RowError], after: &[RowError]) -> Result<Markup> {
+    Ok(html! {
+        h2 { "Verification" }
+        (tables::distances(set))
+        (figures::verification_figure(before, after, record.folded)?)
+        (tables::verification_table(record))
+        @if let Some(targets) = &record.targets {
+            p { "Several targets: " (targets.sentence()) "." }
+        }
+        (tables::worst_table(set, before, after, record.folded))
+    })
+}
+
 /// Whether to use the robot, with the errors before and after and what to expect.
 fn verdict(record: &Record) -> Markup {
     let (tone, word) = match record.advice {
@@ -92,7 +100,7 @@ fn verdict(record: &Record) -> Markup {
     };
     let mean = |spread: Option<&PointSpread>| {
         let of = |s: &PointSpread| s.point.and_then(|p| p.mean_abs_mm).or(s.distance.mean_abs_mm);
-        number(spread.and_then(of), 3)
+        spread.and_then(of).map_or_else(|| "n/a".to_owned(), two_digits)
     };
     let what = if record.before.verify.point.is_some() { "position" } else { "distance" };
     let mut numbers = vec![
@@ -100,15 +108,15 @@ fn verdict(record: &Record) -> Markup {
         (format!("{} mm", mean(record.chosen_method().map(|m| &m.verify))), format!("mean {what} error after")),
     ];
     if let Some(expected) = &record.expected {
-        let p95 = format!("{} mm", number(Some(expected.p95_mm), 3));
+        let p95 = format!("{} mm", two_digits(expected.p95_mm));
         numbers.push((p95, "95 of 100 positions are better than this".to_owned()));
     }
-    let after = record.chosen_method().map_or_else(|| "n/a".to_owned(), |m| screen::errors(&m.verify));
+    let after = record.chosen_method().map_or_else(|| "n/a".to_owned(), |m| screen::errors(&m.verify, two_digits));
     let reason = record.whole_reason();
     let reason = if reason.is_empty() { String::new() } else { format!("{}. ", page::capital(reason)) };
     let detail = format!(
         "{reason}Before: {}. After: {after}; {}.",
-        screen::errors(&record.before.verify),
+        screen::errors(&record.before.verify, two_digits),
         screen::judged_on(record)
     );
     page::verdict(tone, word, &numbers, &detail)

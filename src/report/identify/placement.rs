@@ -2,10 +2,10 @@
 
 use maud::{Markup, html};
 
+use crate::diagnostic::two_digits;
 use crate::formats::placements::record::{PlacementFile, TransformRecord};
 use crate::geometry::rotation_vector;
 use crate::report::page;
-use crate::report::table::number;
 
 /// Turn in degrees and shift in mm, three numbers each, and their standard deviations.
 fn cells(record: &TransformRecord) -> Vec<String> {
@@ -14,24 +14,24 @@ fn cells(record: &TransformRecord) -> Vec<String> {
     let [turn_rad, shift_mm] = record.sigmas();
     vec![
         three(record.translation_mm, 3),
-        number(shift_mm, 4),
+        shift_mm.map_or_else(|| "n/a".to_owned(), two_digits),
         turn.unwrap_or_else(|| "not in the readings".to_owned()),
-        number(turn_rad.map(f64::to_degrees), 5),
+        turn_rad.map_or_else(|| "n/a".to_owned(), |rad| two_digits(rad.to_degrees())),
     ]
 }
 
 /// The section of a page; nothing without placements.
-pub(super) fn section(placement: &PlacementFile) -> Markup {
+pub(super) fn section(placement: &PlacementFile, by_cameras: bool) -> Markup {
     if placement.groups.is_empty() {
         return html! {};
     }
     let groups = placement.groups.iter().map(|group| {
-        let mut row = vec![format!("base from rig, {}", group.group)];
+        let mut row = vec![format!("base from {}, {}", if by_cameras { "rig" } else { "instrument" }, group.group)];
         row.extend(cells(&group.base_from_rig));
         row.extend([
-            number(Some(group.error_mm.mean_mm), 4),
-            number(Some(group.error_mm.p95_mm), 4),
-            number(group.held_out.mean_abs_mm, 4),
+            two_digits(group.error_mm.mean_mm),
+            two_digits(group.error_mm.p95_mm),
+            group.held_out.mean_abs_mm.map_or_else(|| "n/a".to_owned(), two_digits),
         ]);
         row
     });
@@ -42,11 +42,15 @@ pub(super) fn section(placement: &PlacementFile) -> Markup {
         row
     });
     let rows: Vec<Vec<String>> = groups.chain(target).collect();
+    let (heading, what) = match by_cameras {
+        true => ("Where the cameras stand", "The left camera"),
+        false => ("Where the instrument stands", "The frame of the points as they were read"),
+    };
     html! {
-        h2 { "Where the cameras stand" }
-        p { "The left camera in the robot's base frame, and the target on its flange; shift, and turn as axis times angle. The error is that of the \
+        h2 { (heading) }
+        p { (what) " in the robot's base frame, and the target on its flange; shift, and turn as axis times angle. The error is that of the \
             predicted target, robot, placement and scatter together, at poses like these (" (placement.poses) ")." }
-        div.wide { (page::table(&["transform", "x, y, z in mm", "sigma", "turn in deg", "sigma", "error to expect, mm", "95 of 100 below", "held out"], &rows)) }
+        (page::table(&["transform", "x, y, z in mm", "sigma", "turn in deg", "sigma", "error to expect, mm", "95 of 100 below", "held out"], &rows))
         @for held in placement.held.iter().filter(|held| !held.parameters.is_empty()) {
             p { "Not observable from a placement, and taken from " (placement.robot) ": " (held.parameters.join(", ")) " (" (held.because) ")." }
         }

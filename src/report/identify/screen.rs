@@ -7,6 +7,7 @@ use crate::report::table::{Table, number};
 
 /// What goes to stdout: whether to use the result, before, after, what to expect; then how it was found.
 pub fn summary(record: &Record, out: &OutDir) -> String {
+    let errors = |spread| errors(spread, |mm| number(Some(mm), 4));
     let before = &record.before.verify;
     let after = record.chosen_method().map(|m| &m.verify);
     let mut lines = vec![advice(record), format!("before: {}", errors(before))];
@@ -43,12 +44,12 @@ pub(super) fn advice(record: &Record) -> String {
     }
 }
 
-/// Errors of a robot in a line.
-pub(super) fn errors(spread: &PointSpread) -> String {
+/// Errors of a robot in a line; `mm` writes a length.
+pub(super) fn errors(spread: &PointSpread, mm: fn(f64) -> String) -> String {
+    let mm = |length: Option<f64>| length.map_or_else(|| "n/a".to_owned(), mm);
     let figures = |what: &str, s: &Spread| {
-        (s.count > 0).then(|| {
-            format!("{what} off by {} mm on average, {} at most", number(s.mean_abs_mm, 4), number(s.max_abs_mm, 4))
-        })
+        (s.count > 0)
+            .then(|| format!("{what} off by {} mm on average, {} at most", mm(s.mean_abs_mm), mm(s.max_abs_mm)))
     };
     let kinds = [
         figures("distances", &spread.distance),
@@ -107,28 +108,16 @@ fn sure(record: &Record) -> Option<String> {
     })
 }
 
-/// Table 3 for robots from anywhere.
-pub fn verified(robots: &[(&str, &PointSpread)]) -> String {
-    let mut table = Table::new(["verify rows, mm", "mean", "std", "max", "min", "point mean", "point max"]);
+/// Table 3 of the paper for robots from anywhere; `folded` where the file has no verify rows.
+pub fn verified(robots: &[(&str, &PointSpread)], folded: bool) -> String {
+    let rows = if folded { "rows, mm" } else { "verify rows, mm" };
+    let mut table = Table::new([rows, "mean", "std", "max", "min", "point mean", "point max"]);
     for (name, spread) in robots {
-        let mut row = distance_row(name, &spread.distance, None);
-        row.pop();
+        let Spread { mean_abs_mm, std_mm, max_abs_mm, min_abs_mm, .. } = spread.distance;
         let points = spread.point.or(spread.distortion);
-        row.push(number(points.and_then(|p| p.mean_abs_mm), 4));
-        row.push(number(points.and_then(|p| p.max_abs_mm), 4));
-        table.row(row);
+        let of_points = [points.and_then(|p| p.mean_abs_mm), points.and_then(|p| p.max_abs_mm)];
+        let figures = [mean_abs_mm, std_mm, max_abs_mm, min_abs_mm].into_iter().chain(of_points);
+        table.row(std::iter::once((*name).to_owned()).chain(figures.map(|figure| number(figure, 4))));
     }
     table.to_string()
-}
-
-pub(super) fn distance_row(name: &str, spread: &Spread, before: Option<&Spread>) -> Vec<String> {
-    let gain = match (before.and_then(|b| b.mean_abs_mm), spread.mean_abs_mm) {
-        (Some(before), Some(after)) if before > 0.0 => format!("{:.1} %", 100.0 * (1.0 - after / before)),
-        _ => String::new(),
-    };
-    let figures = [spread.mean_abs_mm, spread.std_mm, spread.max_abs_mm, spread.min_abs_mm];
-    let mut row = vec![name.to_owned()];
-    row.extend(figures.map(|f| number(f, 4)));
-    row.push(gain);
-    row
 }

@@ -2,59 +2,112 @@
 
 use maud::{Markup, html};
 
-use super::screen::distance_row;
-use crate::identify::data::dataset::Dataset;
+use crate::diagnostic::{aligned, two_digits};
+use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::judge::errors::{RowError, Spread};
 use crate::identify::judge::uncertainty::Expected;
-use crate::identify::record::{ParameterRecord, PointSpread, Record};
+use crate::identify::record::{MethodRecord, ParameterRecord, PointSpread, Record};
 use crate::report::page;
-use crate::report::table::number;
+use crate::report::table::{number, with_sigma};
 
-/// Verify rows in the table of the worst.
+/// Rows in the table of the worst.
 const WORST: usize = 10;
 
-/// The verify rows with the largest errors after identification.
-pub(super) fn worst_table(set: &Dataset, before: &[RowError], after: &[RowError]) -> Markup {
-    let mut errors: Vec<(f64, &RowError, &RowError)> =
-        before.iter().zip(after).filter_map(|(b, a)| Some((a.distance_mm?, b, a))).collect();
-    errors.sort_by(|x, y| y.0.abs().total_cmp(&x.0.abs()));
-    let row = |(_, b, a): &(f64, &RowError, &RowError)| {
-        let pose = &set.poses[a.row];
-        let point = |e: &RowError| number(e.point_mm.map(|p| p.norm()), 4);
-        let distance = |e: &RowError| number(e.distance_mm, 4);
-        vec![pose.name.clone(), set.groups[pose.group].name.clone(), distance(b), distance(a), point(b), point(a)]
+/// Poses that a sentence names.
+const FEW: usize = 4;
+
+/// What distances are from.
+pub(super) fn distances(set: &Dataset) -> Markup {
+    let centers = set.groups.iter().filter(|group| group.center.is_some()).count();
+    let fitted = set.fit_rows();
+    let nearest =
+        (0..set.groups.len()).filter_map(|group| Some(set.poses[set.reference(group, &fitted)?].name.as_str()));
+    let from = if (0..set.poses.len()).any(|row| set.touches(row)) {
+        "A row's distance is that of the predicted target from the mean of its group's predicted points: all of them touched one point.".to_owned()
+    } else if centers == set.groups.len() {
+        "A row's distance is that of the target from where it is at its group's centre pose.".to_owned()
+    } else if set.kind == Kind::Distances {
+        "A row's distance is that of the target from a point that stands still, whose place is found from the rows."
+            .to_owned()
+    } else {
+        let centre = if centers > 0 { "its group's centre pose or, in a group without one, at " } else { "" };
+        format!(
+            "A row's distance is that of the target from where it is at {centre}the pose nearest to the middle of the group's points (pose {}).",
+            nearest.take(FEW).collect::<Vec<_>>().join(", ")
+        )
     };
-    let rows: Vec<Vec<String>> = errors.iter().take(WORST).map(row).collect();
-    let header = ["verify row", "group", "distance before, mm", "after, mm", "point before, mm", "after, mm"];
+    let point = " A position error is what is left of a point after one rigid fit to the points of each group.";
+    html! { p { (from) @if set.kind == Kind::Positions { (point) } } }
+}
+
+/// A row's distance error after identification, and all its errors before and after.
+type Worst<'a> = (f64, &'a RowError, &'a RowError);
+
+/// The rows that were not fitted with the largest errors after identification.
+pub(super) fn worst_table(set: &Dataset, before: &[RowError], after: &[RowError], folded: bool) -> Markup {
+    let mut errors: Vec<Worst> = before.iter().zip(after).filter_map(|(b, a)| Some((a.distance_mm?, b, a))).collect();
+    errors.sort_by(|x, y| y.0.abs().total_cmp(&x.0.abs()));
+    errors.truncate(WORST);
+    let column = |of: fn(&Worst) -> Option<f64>| aligned(&errors.iter().map(of).collect::<Vec<_>>());
+    let figures = [
+        column(|(_, before, _)| before.distance_mm),
+        column(|(_, _, after)| after.distance_mm),
+        column(|(_, before, _)| before.point_mm.map(|p| p.norm())),
+        column(|(_, _, after)| after.point_mm.map(|p| p.norm())),
+    ];
+    let row = |(k, (_, _, after)): (usize, &Worst)| {
+        let pose = &set.poses[after.row];
+        let names = [pose.name.clone(), set.groups[pose.group].name.clone()];
+        names.into_iter().chain(figures.iter().map(|column| column[k].clone())).collect()
+    };
+    let rows: Vec<Vec<String>> = errors.iter().enumerate().map(row).collect();
+    let named = if folded { "row" } else { "verify row" };
+    let header = [named, "group", "distance before, mm", "after, mm", "point before, mm", "after, mm"];
     html! {
-        p { "The worst after identification, predicted minus measured. One group among them: its cameras or its centre moved; one \
-             region of the workspace: the model is not enough there." }
+        p { "The worst after identification, predicted minus measured. "
+            @if set.groups.len() > 1 { "One group among them: the " (sensor(set.is_of_cameras())) " or its centre moved there. " }
+            "One region of the workspace among them: the model is not enough there." }
         (page::table(&header, &rows))
     }
 }
 
+/// What reads the points.
+fn sensor(by_cameras: bool) -> &'static str {
+    if by_cameras { "cameras" } else { "instrument" }
+}
+
 pub(super) fn verification_table(record: &Record) -> Markup {
-    let row = |name: &str, s: &PointSpread, before: Option<&Spread>| {
-        let mut row = distance_row(name, &s.distance, before);
-        row.push(number(s.point.and_then(|p| p.mean_abs_mm), 4));
-        row.push(number(s.point.and_then(|p| p.max_abs_mm), 4));
-        row
-    };
     let before = &record.before.verify;
-    let mut rows = vec![row("before", before, None)];
-    rows.extend(record.methods.iter().map(|m| {
+    let named = |m: &MethodRecord| {
         let name = format!("{}/{}", m.name, m.model);
-        let mark = if name == record.chosen { " (kept)" } else { "" };
-        row(&format!("{name}{mark}"), &m.verify, Some(&before.distance))
-    }));
+        if name == record.chosen { format!("{name} (kept)") } else { name }
+    };
+    let methods = record.methods.iter().map(|m| (named(m), &m.verify));
+    let robots: Vec<(String, &PointSpread)> = std::iter::once(("before".to_owned(), before)).chain(methods).collect();
+    let mm = |figure: Option<f64>| figure.map_or_else(|| "n/a".to_owned(), two_digits);
+    let row = |(name, s): &(String, &PointSpread)| {
+        let better = gain(&before.distance, &s.distance).filter(|_| name != "before").unwrap_or_default();
+        let Spread { mean_abs_mm, std_mm, max_abs_mm, min_abs_mm, .. } = s.distance;
+        let points = [s.point.and_then(|p| p.mean_abs_mm), s.point.and_then(|p| p.max_abs_mm)];
+        let distances = [mean_abs_mm, std_mm, max_abs_mm, min_abs_mm].map(mm);
+        let cells = std::iter::once(name.clone()).chain(distances).chain(std::iter::once(better));
+        cells.chain(points.map(mm)).collect()
+    };
+    let rows: Vec<Vec<String>> = robots.iter().map(row).collect();
     html! {
-        p { "Table 3 of the paper, for every method and model. Methods that differ by less than their scatter have found the same robot." }
+        p { "Every method and model. Methods that differ by less than their scatter have found the same robot." }
         (page::table(&["distances, mm", "mean", "std", "max", "min", "better by", "point mean", "point max"], &rows))
     }
 }
 
+/// By how much smaller the mean error is.
+fn gain(before: &Spread, after: &Spread) -> Option<String> {
+    let (before, after) = (before.mean_abs_mm.filter(|mm| *mm > 0.0)?, after.mean_abs_mm?);
+    Some(format!("{:.1} %", 100.0 * (1.0 - after / before)))
+}
+
 pub(super) fn expected_table(expected: &Expected) -> Markup {
-    let row = |what: &str, mm: f64| vec![what.to_owned(), number(Some(mm), 4)];
+    let row = |what: &str, mm: f64| vec![what.to_owned(), two_digits(mm)];
     html! {
         p { "The position error to expect of the identified robot at poses like these, after one rigid fit to each placement, from the \
              covariance of the parameters and what is left of the residuals. It holds within " (expected.poses)
@@ -81,14 +134,11 @@ pub(super) fn parameter_table(record: &Record) -> Markup {
             (false, _) => "stays nominal",
             (true, false) => "",
         };
-        vec![
-            p.name.clone(),
-            p.unit.to_owned(),
-            number(Some(p.nominal), 4),
-            number(Some(p.delta), 4),
-            number(p.sigma, 4),
-            state.to_owned(),
-        ]
+        let [delta, sigma] = match p.sigma {
+            Some(sigma) => with_sigma(p.delta, sigma),
+            None => [number(Some(p.delta), 4), "n/a".to_owned()],
+        };
+        vec![p.name.clone(), p.unit.to_owned(), number(Some(p.nominal), 4), delta, sigma, state.to_owned()]
     };
     let rows: Vec<Vec<String>> = method.parameters.iter().map(row).collect();
     page::table(&["parameter", "unit", "nominal", "correction", "sigma", ""], &rows)
@@ -139,7 +189,8 @@ pub(super) fn joint_table(record: &Record) -> Markup {
 pub(super) fn judged_table(record: &Record) -> Markup {
     let row = |j: &crate::identify::run::Judged| {
         let mark = if j.terms == record.terms { " (kept)" } else { "" };
-        vec![j.model.to_owned(), format!("{}{mark}", j.terms), number(j.held_out_mm, 4)]
+        let held_out = j.held_out_mm.map_or_else(|| "n/a".to_owned(), two_digits);
+        vec![j.model.to_owned(), format!("{}{mark}", j.terms), held_out]
     };
     let rows: Vec<Vec<String>> = record.judged.iter().map(row).collect();
     if rows.is_empty() {

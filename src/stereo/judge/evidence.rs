@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::diagnostic::Warning;
+use crate::diagnostic::{Warning, beside, two_digits};
 use crate::stereo::judge::verdict::Verdict;
 
 /// One line of the ledger.
@@ -33,6 +33,13 @@ pub fn number(value: f64) -> String {
     }
 }
 
+/// A limit that a person gave has few digits; of one that was reckoned two are enough.
+fn as_given(limit: f64) -> String {
+    /// Characters of a number that somebody typed.
+    const TYPED: usize = 7;
+    Some(limit.to_string()).filter(|text| text.len() <= TYPED).unwrap_or_else(|| two_digits(limit))
+}
+
 impl Evidence {
     /// Its name for a person; `what` is the one that scripts know.
     pub fn name(&self) -> &'static str {
@@ -53,12 +60,33 @@ impl Evidence {
 
     /// What this line says, in one: the value against its limit.
     pub fn figure(&self) -> String {
+        self.in_one([self.value.map(number), self.limit.map(number)])
+    }
+
+    /// The same with the digits of a page, see [`Evidence::rounded`].
+    pub fn short_figure(&self) -> String {
+        self.in_one(self.rounded())
+    }
+
+    fn in_one(&self, [value, limit]: [Option<String>; 2]) -> String {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
-        match (self.value, self.limit) {
-            (Some(value), Some(limit)) => format!("{}{unit} (limit {}{unit})", number(value), number(limit)),
-            (Some(value), None) => format!("{}{unit}", number(value)),
+        match (value, limit) {
+            (Some(value), Some(limit)) => format!("{value}{unit} (limit {limit}{unit})"),
+            (Some(value), None) => format!("{value}{unit}"),
             (None, _) => "not measurable".to_owned(),
         }
+    }
+
+    /// Value and limit for a page: lengths with two digits, a limit as it was given; what is not within its limit is not rounded to it.
+    pub fn rounded(&self) -> [Option<String>; 2] {
+        let is_length = self.unit == "mm";
+        let value = self.value.map(|value| match self.limit {
+            _ if !is_length => number(value),
+            Some(limit) => beside(value, limit),
+            None => two_digits(value),
+        });
+        let limit = self.limit.map(|limit| if is_length { as_given(limit) } else { number(limit) });
+        [value, limit]
     }
 }
 

@@ -45,5 +45,5 @@ pub fn recheck(
     };
     let effect_mm = placements.iter().filter(|p| p.moved).map(|p| p.shift_mm).fold(effect_mm, f64::max);
     let poses = set.names(&used);
-    Ok(Recheck { poses, causes, changed, likeliest, placements, effect_mm, seen_mm })
+    Ok(Recheck { poses, causes, changed, likeliest, placements, effect_mm, seen_mm, by_cameras: set.is_of_cameras() })
 }

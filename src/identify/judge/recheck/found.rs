@@ -74,6 +74,8 @@ pub struct Recheck {
     pub effect_mm: f64,
     /// The largest movement of the target that a single cause could make without being seen, mm.
     pub seen_mm: f64,
+    /// Whether the points are those of cameras, or another instrument's.
+    pub by_cameras: bool,
 }
 
 impl Recheck {
@@ -99,10 +101,8 @@ impl Recheck {
             (true, true) => "the robot changed, and no single cause explains how".to_owned(),
             (true, false) => self.likeliest.iter().map(|(_, words)| words.as_str()).collect::<Vec<_>>().join(", or "),
             (false, _) if !moved.is_empty() => {
-                format!(
-                    "the robot is the same; the cameras stand elsewhere, or the zero of joint 1 moved: {}",
-                    moved.join(", ")
-                )
+                let stands = if self.by_cameras { "the cameras stand" } else { "the instrument stands" };
+                format!("the robot is the same; {stands} elsewhere, or the zero of joint 1 moved: {}", moved.join(", "))
             }
             (false, _) => "no change beyond chance".to_owned(),
         }

@@ -2,11 +2,12 @@
 //! epipolar lines say of them.
 
 use super::facts::Case;
+use crate::diagnostic::{summed, two_digits};
 use crate::statistics::median;
 use crate::stereo::judge::doubtful_corners::CONTRADICTED;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::model_disagreement::{self};
-use crate::stereo::judge::verdict::Verdict;
+use crate::stereo::judge::verdict::{LengthError, Verdict};
 use crate::stereo::volume::Extent;
 
 pub(super) fn held_out_lengths(case: &Case) -> Evidence {
@@ -30,16 +31,27 @@ pub(super) fn held_out_lengths(case: &Case) -> Evidence {
         unit: "mm",
         allows: extremes.verdict(case.facts.tolerance_mm),
         detail: format!(
-            "largest error plus its own expanded uncertainty ({:.4} + {:.4}) over all lengths between corners of pairs that the rig had \
-             not seen, {} folds; the limit is the tolerance. The largest error alone is {:.4}, one length in twenty \
-             is off by more than {:.4}{left_out}",
-            worst.error_mm,
-            worst.expanded_uncertainty_mm(),
+            "{} of all lengths between corners of pairs that the rig had not seen, {} folds: {}. The limit is the tolerance. The largest error of \
+             any length is {} mm, one length in twenty is off by more than {} mm{left_out}",
+            LARGEST_SUM,
             case.facts.accuracy.folds,
-            extremes.max_abs_error_mm,
-            extremes.one_in_twenty_mm
+            as_added(worst),
+            two_digits(extremes.max_abs_error_mm),
+            two_digits(extremes.one_in_twenty_mm)
         ),
     }
+}
+
+/// What is compared with the tolerance.
+const LARGEST_SUM: &str = "largest sum of error and expanded uncertainty (95 %)";
+
+/// The error and the uncertainty that are added.
+fn as_added(length: &LengthError) -> String {
+    let [error, uncertainty, sum] = summed(length.error_mm, length.expanded_without_corners_mm());
+    format!(
+        "{error} + {uncertainty} = {sum} mm, the uncertainty being that of calibration and board, since what the corners scatter by is in the \
+         error already"
+    )
 }
 
 pub(super) fn any_length(case: &Case) -> Evidence {
@@ -48,13 +60,13 @@ pub(super) fn any_length(case: &Case) -> Evidence {
     let detail = match worst {
         None => "the rig has no covariance over the volume in which the boards stood".to_owned(),
         Some((_, length)) => format!(
-            "expanded uncertainty of a length of {:.0} mm where it is largest, {} {:.0} mm away (standard deviations: corners {:.4}, \
-             calibration {:.4}, the latter times {:.2} for so few pairs; what the models leave open is in it), over {}{}",
+            "expanded uncertainty of a length of {:.0} mm where it is largest, {} {:.0} mm away (standard deviations: corners {} mm, \
+             calibration {} mm, the latter times {:.2} for so few pairs; what the models leave open is in it), over {}{}",
             case.facts.volume.length_mm,
             length.lies(),
             length.at_mm.z,
-            length.corners_mm,
-            length.calibration_mm,
+            two_digits(length.corners_mm),
+            two_digits(length.calibration_mm),
             case.facts.expansion.calibration,
             case.facts.volume.extent.said(),
             along_sight(case)
@@ -75,7 +87,9 @@ fn along_sight(case: &Case) -> String {
         return String::new();
     }
     let worst = case.facts.volume.along_sight.iter().map(|length| case.expanded_mm(length)).reduce(f64::max);
-    worst.map_or(String::new(), |mm| format!(". Along the line of sight, where no board lay, it would be {mm:.4} mm"))
+    worst.map_or(String::new(), |mm| {
+        format!(". Along the line of sight, where no board lay, it would be {} mm", two_digits(mm))
+    })
 }
 
 pub(super) fn models(case: &Case) -> Evidence {
@@ -216,10 +230,9 @@ pub(super) fn second_board(case: &Case) -> Evidence {
         );
         return line(None, Verdict::Undecided, detail);
     };
-    let worst = &extremes.largest;
     let scale = match (second.scale_error, second.scale_error_sigma) {
         (Some(scale), Some(sigma)) => format!(
-            ", its scale by {:.1} +- {:.1} parts in a million (k = 2). Either board's pitch is wrong, or the rig has moved, where this \
+            "; its scale is off by {:.1} +- {:.1} parts in a million (k = 2). Either board's pitch is wrong, or the rig has moved, where this \
              is beyond the limit",
             1e6 * scale,
             2e6 * sigma
@@ -231,12 +244,12 @@ pub(super) fn second_board(case: &Case) -> Evidence {
     let own = extremes.verdict(case.facts.tolerance_mm);
     let allows = if measured { own } else { own.and(Verdict::Undecided) };
     let detail = format!(
-        "largest error plus its own expanded uncertainty ({:.4} + {:.4}) over all lengths in {} pairs of a board that took no part in the calibration{scale}; {} of {} corners have rays that contradict each other",
-        worst.error_mm,
-        worst.expanded_uncertainty_mm(),
+        "{} of all lengths in {} pairs of a board that took no part in the calibration: {}{scale}; {} of {} corners have rays that contradict each other",
+        LARGEST_SUM,
         second.pairs,
+        as_added(&extremes.largest),
         second.doubtful.contradicted,
         second.doubtful.corners
     );
-    line(Some(worst.at_most_mm()), allows, detail)
+    line(Some(extremes.largest.at_most_mm()), allows, detail)
 }

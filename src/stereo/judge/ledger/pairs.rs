@@ -1,7 +1,7 @@
 //! Lines on the pairs: what happened over them, how they scatter, which are missing, how the boards stood, and lenses that were known.
 
 use super::facts::Case;
-use crate::diagnostic::significant;
+use crate::diagnostic::two_digits;
 use crate::imaging::Side;
 use crate::stereo::Camera;
 use crate::stereo::calibrate::Calibration;
@@ -211,9 +211,7 @@ pub(super) fn known_lenses(case: &Case) -> Option<Evidence> {
     let check = case.calibration.lens_check.as_ref()?;
     let seen: Vec<String> = Side::BOTH
         .into_iter()
-        .filter_map(|side| {
-            Some(format!("{} {} %", side.name(), significant(100.0 * check.focus_seen[side as usize]?, 2)))
-        })
+        .filter_map(|side| Some(format!("{} {} %", side.name(), two_digits(100.0 * check.focus_seen[side as usize]?))))
         .collect();
     Some(Evidence {
         what: "known lenses",

@@ -8,6 +8,7 @@
 
 use serde::Serialize;
 
+use crate::diagnostic::two_digits;
 use crate::statistics::{NORMAL_999, chi_square_quantile};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::select::stated_uncertainty::Witness;
@@ -60,8 +61,11 @@ fn compare(calibration: &Calibration, volume: &VolumeLengths, witness: &Witness)
 /// The findings for a person, where there are any: the one that changes lengths most, and the names of the others.
 pub fn describe(all: &[Disagreement]) -> Option<String> {
     let worst = all.iter().max_by(|a, b| a.length_change_mm.total_cmp(&b.length_change_mm))?;
-    let others: Vec<String> =
-        all.iter().filter(|d| *d != worst).map(|d| format!("{} ({:.4} mm)", d.name(), d.length_change_mm)).collect();
+    let others: Vec<String> = all
+        .iter()
+        .filter(|d| *d != worst)
+        .map(|d| format!("{} ({} mm)", d.name(), two_digits(d.length_change_mm)))
+        .collect();
     let and = if others.is_empty() { String::new() } else { format!(". So does {}", others.join(", ")) };
     Some(worst.describe() + &and)
 }
@@ -79,12 +83,12 @@ impl Disagreement {
     /// The finding for a person: what differs, what it does to lengths, which pictures would settle it.
     pub fn describe(&self) -> String {
         format!(
-            "{} instead of {} measures lengths in the working volume that differ by up to {:.4} mm, and its additional terms are more than chance (chi-squared \
+            "{} instead of {} measures lengths in the working volume that differ by up to {} mm, and its additional terms are more than chance (chi-squared \
              falls by {:.0}, by chance {:.0} at most), though too weak to predict other pairs better. To settle it, photograph the board in all four \
              corners and along the edges of both pictures, tilted by 30 to 45 degrees about both axes, and at the nearest and the farthest distance",
             self.name(),
             if self.other_board_shape { "a flat one" } else { self.chosen },
-            self.length_change_mm,
+            two_digits(self.length_change_mm),
             self.chi_square_fall,
             self.chance
         )
