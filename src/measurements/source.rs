@@ -10,15 +10,17 @@ use serde::Deserialize;
 
 use super::apart;
 use super::assemble::{self, Taken};
+use super::copies;
 use super::judge::{self, Basis, Forced, Verdict, Way};
+use super::keys;
 use super::layout;
-use super::part::{At, Part};
-use super::pick::{self, Picked, columns_flag, listed};
+use super::part::{At, Kind, Part};
+use super::pick::{self, listed};
+use super::unsettled;
 use super::{Measurement, read};
 use crate::diagnostic::Place;
 use crate::files::{Error, Result};
 use crate::robot::Robot;
-use crate::tables::Form;
 use crate::tables::names::{Name, Unit, What};
 
 /// Section `[measurements]`: what is known of tables beside what they say.
@@ -87,7 +89,7 @@ impl Source {
                 && self.units.is_none()
                 && is_own(&Part::read(only, count, false)?)
             {
-                return Ok((read(only)?, Vec::new()));
+                return Ok(copies::counted_once(read(only)?));
             }
             parts.push(Part::read(file, count, self.columns.is_some())?);
         }
@@ -99,12 +101,14 @@ impl Source {
         let several = sets.len() > 1;
         let (mut rows, mut said) = (Vec::new(), Vec::new());
         for (number, mut set) in sets.into_iter().enumerate() {
+            let joined = keys::align(&mut set)?;
             let widened = assemble::widen(&mut set)?;
             let (way, basis) = self.way(&set, robot, widened)?;
             let (way, slides) = (way, robot.joints.iter().map(|j| j.slides).collect::<Vec<_>>());
             let taken = Taken { parts: &set, way: &way, basis, slides: &slides, number: several.then_some(number + 1) };
             rows.extend(taken.rows()?);
             said.push(taken.sentence());
+            said.extend(joined);
             if way.is_computed() {
                 said.push(
                     "the nominal robot predicts these points to a micrometre: they were computed from the joints, not measured"
@@ -112,6 +116,8 @@ impl Source {
                 );
             }
         }
+        let (rows, copied) = copies::counted_once(rows);
+        said.extend(copied);
         Ok((rows, said))
     }
 
@@ -179,7 +185,10 @@ impl Source {
         let complete = picked.joints.len() == count && picked.is_measured();
         let candidates = if complete { vec![picked.clone()] } else { layout::candidates(parts, &picked, count) };
         if candidates.is_empty() {
-            return Err(parts.iter().find_map(Part::mixed).unwrap_or_else(|| lacking(parts, &picked, count)));
+            return Err(parts
+                .iter()
+                .find_map(Part::mixed)
+                .unwrap_or_else(|| unsettled::lacking(parts, &picked, count)));
         }
         match judge::decide(parts, &candidates, robot, self.forced()) {
             Verdict::Taken(way, basis) => {
@@ -187,8 +196,8 @@ impl Source {
                     if self.columns.is_some() { None } else { apart::clearest(parts, vec![way.clone()], robot) };
                 apart.map_or(Ok((way, basis)), |apart| Err(apart.asked(parts)))
             }
-            Verdict::WrongUnit { stated, better } => Err(wrong_unit(parts, &stated, &better)),
-            Verdict::Open(a, b) => Err(open(parts, &a, &b)),
+            Verdict::WrongUnit { stated, better } => Err(unsettled::wrong_unit(parts, &stated, &better)),
+            Verdict::Open(a, b) => Err(unsettled::open(parts, &a, &b)),
             Verdict::NoUnit { joints } => {
                 let (what, hint) = match joints {
                     true => ("joints are degrees or radians", "`--units deg` or `--units rad` says it"),
@@ -203,7 +212,10 @@ impl Source {
                 let ways = || judge::usual(&candidates, self.forced());
                 let apart = if self.columns.is_some() { None } else { apart::clearest(parts, ways(), robot) };
                 let mixed = || parts.iter().find_map(Part::mixed);
-                Err(apart.map(|a| a.asked(parts)).or_else(mixed).unwrap_or_else(|| unplaced(parts, &candidates[0])))
+                Err(apart
+                    .map(|a| a.asked(parts))
+                    .or_else(mixed)
+                    .unwrap_or_else(|| unsettled::unplaced(parts, &candidates[0])))
             }
         }
     }
@@ -254,11 +266,12 @@ fn name_columns(parts: &mut [Part], columns: &str, count: usize) -> Result<bool>
             Name { unit: name.unit.or(unit), ..name }
         };
         let mut meanings: Vec<Name> = own.into_iter().enumerate().map(with_unit).collect();
+        let named = meanings.len();
         meanings.resize(part.width(), Name::of(""));
         // What is not named is not looked at.
-        part.kinds.iter_mut().zip(&meanings).filter(|(_, n)| n.what == What::Other).for_each(|(kind, _)| {
-            *kind = super::part::Kind::Words;
-        });
+        for (column, kind) in part.kinds.iter_mut().enumerate().filter(|(c, _)| meanings[*c].what == What::Other) {
+            *kind = if column >= named && *kind == Kind::Numbers { Kind::Beyond } else { Kind::Words };
+        }
         part.meanings = Some(meanings);
     }
     Ok(!each)
@@ -299,101 +312,4 @@ fn sets(parts: Vec<Part>, count: usize) -> Vec<Vec<Part>> {
         list.push(open);
     }
     list
-}
-
-fn lacking(parts: &[Part], picked: &Picked, count: usize) -> crate::files::Error {
-    let names = |p: &Part| {
-        let shown = p.names.as_ref().map(|n| n.iter().take(40).cloned().collect::<Vec<_>>().join(", "));
-        match shown {
-            Some(names) => format!("{} has {names}", p.file_name()),
-            None if p.is_program() => format!("{} has the joint targets of a program", p.file_name()),
-            None => {
-                format!("{} has {} columns without names, {} of them numbers", p.file_name(), p.width(), p.free().len())
-            }
-        }
-    };
-    let found: Vec<String> = parts.iter().map(names).collect();
-    let what = match (picked.joints.is_empty(), picked.is_measured()) {
-        (true, true) => format!("no columns of {count} joints"),
-        (false, false) => "no columns of a measured point or a distance".to_owned(),
-        _ => format!("no columns of {count} joints and of a measured point or a distance"),
-    };
-    let sheets = parts.iter().find(|p| matches!(&p.grid.form, Form::Sheet(_, others) if *others > 0));
-    let sheets = sheets.map_or(String::new(), |p| format!(", `{}#SHEET` another sheet", p.file_name()));
-    let hint = format!(
-        "{}another `--measurements FILE` joins the file that has them row by row{sheets}; \
-         `--columns j1,j2,...,-,x,y,z` names the columns in their order, `-` skips one",
-        lying(parts, count)
-    );
-    parts[0].refuse(format!("{what}: {}", found.join("; ")), Some(&hint))
-}
-
-/// What to do with a table whose rows are as many as the columns that a pose has.
-fn lying(parts: &[Part], count: usize) -> &'static str {
-    let lies = |p: &Part| {
-        let rows = p.rows.len();
-        !p.is_named() && p.width() > 2 * rows && (rows == 3 || rows == count || rows >= count + 3)
-    };
-    if parts.iter().any(lies) { "if each column is a pose, exchange rows and columns; " } else { "" }
-}
-
-fn unplaced(parts: &[Part], first: &Picked) -> crate::files::Error {
-    let hint = format!(
-        "{}`--columns {}` if these are the columns; look at `--robot`, too: its file must be of this robot",
-        lying(parts, first.joints.len()),
-        columns_flag(parts, &first.joints, &first.points.first().map_or(Vec::new(), |(_, at)| at.to_vec()))
-    );
-    let what = match parts.iter().any(|p| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance))) {
-        true => "the joints",
-        false if parts.iter().any(|p| p.names_any(|w| matches!(w, What::Joint(_)))) => "the point",
-        false => "the joints and which the point",
-    };
-    let message =
-        format!("no name says which columns are {what}, and no choice of them comes near to the nominal robot");
-    parts[0].refuse(message, Some(&hint))
-}
-
-fn open(parts: &[Part], a: &Way, b: &Way) -> crate::files::Error {
-    let point = |way: &Way| way.picked.points.first().map(|(_, at)| *at);
-    match (point(a), point(b)) {
-        (Some(first), Some(second)) if first != second && a.picked.joints == b.picked.joints => {
-            let (first, second) = if first <= second { (first, second) } else { (second, first) };
-            pick::asked(parts, &a.picked.joints, [&first, &second], false)
-        }
-        _ => {
-            let message = format!(
-                "two sets of joints would do, {} and {}",
-                listed(parts, &a.picked.joints),
-                listed(parts, &b.picked.joints)
-            );
-            let flag =
-                |way: &Way| columns_flag(parts, &way.picked.joints, &point(way).map_or(Vec::new(), |p| p.to_vec()));
-            let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(a), flag(b));
-            parts[0].refuse(message, Some(&hint))
-        }
-    }
-}
-
-fn wrong_unit(parts: &[Part], stated: &Way, better: &Way) -> crate::files::Error {
-    let (what, columns, said, found) = match stated.joints == better.joints {
-        false => ("joints", better.picked.joints.clone(), stated.joints, better.joints),
-        true => {
-            let points = better.picked.points.first().map_or(Vec::new(), |(_, at)| at.to_vec());
-            ("points", points, stated.lengths, better.lengths)
-        }
-    };
-    let factor = stated.left.unwrap_or(f64::NAN) / better.left.unwrap_or(f64::NAN).max(f64::MIN_POSITIVE);
-    let message = format!(
-        "the names call the {what} ({}) {}, but the nominal robot is {factor:.0} times nearer to the points with {}",
-        listed(parts, &columns),
-        said.word(),
-        found.word()
-    );
-    let hint = format!(
-        "`--units {}` if they are {}; `--units {}` keeps what the names say",
-        found.flag(),
-        found.word(),
-        said.flag()
-    );
-    parts[columns[0].part].refuse(message, Some(&hint))
 }

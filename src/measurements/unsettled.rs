@@ -1,0 +1,130 @@
+//! What is said where a table does not tell what its columns are: what was found, what was needed, and the flags that settle it.
+
+use super::judge::Way;
+use super::part::{Kind, Part};
+use super::pick::{self, Picked, columns_flag, listed};
+use crate::files::Error;
+use crate::tables::Form;
+use crate::tables::names::What;
+
+/// That the files lack joints or what was measured.
+pub(super) fn lacking(parts: &[Part], picked: &Picked, count: usize) -> Error {
+    let names = |p: &Part| {
+        let shown = p.names.as_ref().map(|n| n.iter().take(40).cloned().collect::<Vec<_>>().join(", "));
+        match shown {
+            Some(names) => format!("{} has {names}", p.file_name()),
+            None if p.is_program() => format!("{} has the joint targets of a program", p.file_name()),
+            None => {
+                format!("{} has {} columns without names, {} of them numbers", p.file_name(), p.width(), p.free().len())
+            }
+        }
+    };
+    let found: Vec<String> = parts.iter().map(names).collect();
+    let what = match (picked.joints.is_empty(), picked.is_measured()) {
+        (true, true) => format!("no columns of {count} joints"),
+        (false, false) => "no columns of a measured point or a distance".to_owned(),
+        _ => format!("no columns of {count} joints and of a measured point or a distance"),
+    };
+    let sheets = parts.iter().find(|p| matches!(&p.grid.form, Form::Sheet(_, others) if *others > 0));
+    let sheets = sheets.map_or(String::new(), |p| format!(", `{}#SHEET` another sheet", p.file_name()));
+    let hint = format!(
+        "{}{}another `--measurements FILE` joins the file that has them row by row{sheets}; \
+         `--columns j1,j2,...,-,x,y,z` names the columns in their order, `-` skips one",
+        lying(parts, count),
+        touches(parts, count)
+    );
+    parts[0].refuse(format!("{what}: {}", found.join("; ")), Some(&hint))
+}
+
+/// What to do with a table whose rows are as many as the columns that a pose has.
+fn lying(parts: &[Part], count: usize) -> &'static str {
+    let lies = |p: &Part| {
+        let rows = p.rows.len();
+        !p.is_named() && p.width() > 2 * rows && (rows == 3 || rows == count || rows >= count + 3)
+    };
+    if parts.iter().any(lies) { "if each column is a pose, exchange rows and columns; " } else { "" }
+}
+
+/// What to do with files of nothing but joints: what a robot touches is measured without an instrument.
+fn touches(parts: &[Part], count: usize) -> &'static str {
+    let alone = |p: &Part| match p.is_named() {
+        true => pick::names_joints(p, count) && p.kinds.iter().filter(|kind| **kind == Kind::Numbers).count() == count,
+        false => p.free().len() == count,
+    };
+    if parts.iter().all(alone) {
+        "if the target was at one point in all rows of a file, a touch, one table of all with the columns \
+         `pose,group,role,j1_deg,...,distance_mm` says so: `distance_mm` 0, a `group` for each point, and \
+         `--known-distances FILE` for the distances between the points; else "
+    } else {
+        ""
+    }
+}
+
+/// That no choice of columns comes near to the robot.
+pub(super) fn unplaced(parts: &[Part], picked: &Picked) -> Error {
+    let count = picked.joints.len();
+    if !touches(parts, count).is_empty() {
+        return lacking(parts, &Picked { joints: picked.joints.clone(), ..Picked::default() }, count);
+    }
+    let hint = format!(
+        "{}`--columns` names the {} columns in their order: j1 to j{count} for the joints, x, y, z for the point, `-` for each that is neither; \
+         look at `--robot`, too: its file must be of this robot",
+        lying(parts, count),
+        parts.iter().map(Part::width).sum::<usize>()
+    );
+    let what = match parts.iter().any(|p| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance))) {
+        true => "the joints",
+        false if parts.iter().any(|p| p.names_any(|w| matches!(w, What::Joint(_)))) => "the point",
+        false => "the joints and which the point",
+    };
+    let message =
+        format!("no name says which columns are {what}, and no choice of them comes near to the nominal robot");
+    parts[0].refuse(message, Some(&hint))
+}
+
+/// That two ways would do, with the flags that take either.
+pub(super) fn open(parts: &[Part], a: &Way, b: &Way) -> Error {
+    let point = |way: &Way| way.picked.points.first().map(|(_, at)| *at);
+    match (point(a), point(b)) {
+        (Some(first), Some(second)) if first != second && a.picked.joints == b.picked.joints => {
+            let (first, second) = if first <= second { (first, second) } else { (second, first) };
+            pick::asked(parts, &a.picked.joints, [&first, &second], false)
+        }
+        _ => {
+            let message = format!(
+                "two sets of joints would do, {} and {}",
+                listed(parts, &a.picked.joints),
+                listed(parts, &b.picked.joints)
+            );
+            let flag =
+                |way: &Way| columns_flag(parts, &way.picked.joints, &point(way).map_or(Vec::new(), |p| p.to_vec()));
+            let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(a), flag(b));
+            parts[0].refuse(message, Some(&hint))
+        }
+    }
+}
+
+/// That a name states a unit in which the robot is far from the points.
+pub(super) fn wrong_unit(parts: &[Part], stated: &Way, better: &Way) -> Error {
+    let (what, columns, said, found) = match stated.joints == better.joints {
+        false => ("joints", better.picked.joints.clone(), stated.joints, better.joints),
+        true => {
+            let points = better.picked.points.first().map_or(Vec::new(), |(_, at)| at.to_vec());
+            ("points", points, stated.lengths, better.lengths)
+        }
+    };
+    let factor = stated.left.unwrap_or(f64::NAN) / better.left.unwrap_or(f64::NAN).max(f64::MIN_POSITIVE);
+    let message = format!(
+        "the names call the {what} ({}) {}, but the nominal robot is {factor:.0} times nearer to the points with {}",
+        listed(parts, &columns),
+        said.word(),
+        found.word()
+    );
+    let hint = format!(
+        "`--units {}` if they are {}; `--units {}` keeps what the names say",
+        found.flag(),
+        found.word(),
+        said.flag()
+    );
+    parts[columns[0].part].refuse(message, Some(&hint))
+}
