@@ -159,7 +159,7 @@ fn programs(args: &Arguments, robot: &Robot, order: &JointOrder, poses: &[Planne
         Language::ALL.into_iter().partition(|language| order.unknown_axis(*language).is_some());
     if !open.is_empty() {
         let names: Vec<&str> = open.into_iter().map(Language::name).collect();
-        progress::warn(&format!(
+        progress::warn(format!(
             "no programs for {}: which of the {} joints the number behind the six axes is, nobody said; {}",
             names.join(", "),
             slides.len(),

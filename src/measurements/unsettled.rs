@@ -20,7 +20,8 @@ pub(super) fn lacking(parts: &[Part], picked: &Picked, count: usize) -> Error {
         }
     };
     let found: Vec<String> = parts.iter().map(names).collect();
-    let what = match (picked.joints.is_empty(), picked.is_measured()) {
+    let touches = touches(parts, count);
+    let what = match (picked.joints.is_empty() && touches.is_empty(), picked.is_measured()) {
         (true, true) => format!("no columns of {count} joints"),
         (false, false) => "no columns of a measured point or a distance".to_owned(),
         _ => format!("no columns of {count} joints and of a measured point or a distance"),
@@ -31,7 +32,7 @@ pub(super) fn lacking(parts: &[Part], picked: &Picked, count: usize) -> Error {
         "{}{}another `--measurements FILE` joins the file that has them row by row{sheets}; \
          `--columns j1,j2,...,-,x,y,z` names the columns in their order, `-` skips one",
         lying(parts, count),
-        touches(parts, count)
+        touches
     );
     parts[0].refuse(format!("{what}: {}", found.join("; ")), Some(&hint))
 }

@@ -133,6 +133,15 @@ fn kind_of(cell: &str) -> Column {
     with_unit(cell).map_or(Column::Plain, |(_, unit)| Column::Unit(unit))
 }
 
+/// How many numbers a cell holds.
+pub(super) fn count(cell: &str) -> usize {
+    match kind_of(cell) {
+        Column::Lists(length, _) => length,
+        Column::Unit(_) => 1,
+        Column::Plain => usize::from(cell.parse::<f64>().is_ok()),
+    }
+}
+
 /// The numbers of a list in a cell, lists in it one after the other.
 fn list(cell: &str) -> Option<Vec<&str>> {
     let inside = cell.strip_prefix(['[', '('])?.strip_suffix([']', ')'])?;

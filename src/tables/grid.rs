@@ -234,7 +234,7 @@ fn delimiter(text: &str) -> char {
             return (0, 0);
         };
         let of_mode = grid.rows.iter().filter(|(_, row)| row.len() == mode.0);
-        let numbers = of_mode.flat_map(|(_, row)| row.iter()).filter(|cell| cell.parse::<f64>().is_ok()).count();
+        let numbers = of_mode.flat_map(|(_, row)| row.iter()).map(cells::count).sum();
         (mode.1, numbers)
     };
     let scores = [',', ';', '\t', '|', ' '].map(|d| (d, score(d)));

@@ -1,5 +1,7 @@
 //! Rows that failed, angles that look like a point, units that are not read: none of them decides what a table says.
 
+use stereocal::robot::{catalogue, file};
+
 use super::*;
 
 /// Columns of joints and points without names.
@@ -121,8 +123,7 @@ fn points_that_were_computed_are_said_to_be() {
 fn of_arm(built: &Robot, poses: usize, noise_mm: f64, scale: f64) -> Rows {
     let sensor = transform(Vector3::new(0.4, 2.0, -0.7), Vector3::new(1900.0, -2000.0, 300.0));
     let row = |i: usize| {
-        let joints: Vec<f64> =
-            (0..built.joints.len()).map(|j| 70.0 * ((7 * i + 3 * j * j + 1) as f64).sin()).collect();
+        let joints: Vec<f64> = (0..built.joints.len()).map(|j| 70.0 * ((7 * i + 3 * j * j + 1) as f64).sin()).collect();
         let radians: Vec<f64> = joints.iter().map(|q| q.to_radians()).collect();
         let point = (sensor * built.target_mm(&radians)).coords * scale;
         let off = |k: usize| noise_mm * 1.4 * ((17 * i + 5 * k) as f64).sin();
