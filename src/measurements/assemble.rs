@@ -155,6 +155,10 @@ impl Taken<'_> {
                 }
             }
         }
+        let joined = self.parts.iter().enumerate().find_map(|(part, p)| Some(At { part, column: p.key? }));
+        if let Some(at) = joined {
+            list.entry("pose").or_insert(at);
+        }
         list
     }
 
@@ -272,7 +276,9 @@ impl Taken<'_> {
         for (part, file) in self.parts.iter().enumerate().filter(|(_, p)| !p.is_program()) {
             let is_left = |column: &usize| {
                 let at = At { part, column: *column };
-                file.kinds[*column] == Kind::Numbers && !taken.contains(&at) && !own.contains(&at)
+                matches!(file.kinds[*column], Kind::Numbers | Kind::Beyond)
+                    && !taken.contains(&at)
+                    && !own.contains(&at)
             };
             left.extend((0..file.width()).filter(is_left).map(|column| file.column_name(column)));
         }

@@ -32,7 +32,8 @@ pub(super) const ONE_POINT: f64 = 1e-3;
 /// All ways to complete what the names say; columns of zeros are joints only where there is none without them.
 pub(super) fn candidates(parts: &[Part], picked: &Picked, count: usize) -> Vec<Picked> {
     let moving = of_columns(parts, picked, count, Part::free);
-    if moving.is_empty() { of_columns(parts, picked, count, Part::free_and_still) } else { moving }
+    let all = if moving.is_empty() { of_columns(parts, picked, count, Part::free_and_still) } else { moving };
+    all.into_iter().map(|picked| picked.with_units(parts)).collect()
 }
 
 /// The same of these columns without names, and of those whose names are not known.

@@ -2,13 +2,15 @@
 
 mod apart;
 mod assemble;
+mod copies;
 mod judge;
+mod keys;
 mod layout;
 mod part;
 mod pick;
-mod refused;
 mod rows;
 pub mod source;
+mod unsettled;
 
 pub use crate::csv_table::quoted;
 pub use rows::{

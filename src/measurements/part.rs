@@ -26,6 +26,8 @@ pub(super) enum Kind {
     /// Nothing but zeros.
     Zeros,
     Words,
+    /// Numbers in a column that flags do not name.
+    Beyond,
     /// Numbers and, in this row, a word.
     Mixed(usize),
 }
@@ -42,6 +44,8 @@ pub(super) struct Part {
     pub rows: Vec<(u64, Fields)>,
     /// What is in each column.
     pub kinds: Vec<Kind>,
+    /// The column by which rows were joined with those of another file.
+    pub key: Option<usize>,
 }
 
 /// Cells that say that there is no number.
@@ -73,7 +77,7 @@ impl Part {
         if let Form::Program { degrees, .. } = grid.form {
             meanings = Some((0..width).map(|column| of_program(column, joints, degrees)).collect());
         }
-        let part = Part { grid, names: headed.names, meanings, rows: headed.rows, kinds };
+        let part = Part { grid, names: headed.names, meanings, rows: headed.rows, kinds, key: None };
         match part.unread_unit().filter(|_| !named) {
             Some(error) => Err(error),
             None => Ok(part),

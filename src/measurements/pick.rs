@@ -32,6 +32,15 @@ impl Picked {
         self.columns().all(|at| parts[at.part].is_named() && !parts[at.part].spare().contains(&at.column))
     }
 
+    /// With the units that the columns state.
+    pub fn with_units(mut self, parts: &[Part]) -> Picked {
+        let unit = |at: &At| parts[at.part].meanings.as_ref().and_then(|m| m[at.column].unit);
+        let mut measured = self.points.iter().flat_map(|(_, at)| at).chain(self.distance.iter());
+        self.length_unit = measured.find_map(unit).filter(|u| !u.is_angle());
+        self.joint_unit = self.joints.iter().find_map(unit).filter(|u| u.is_angle());
+        self
+    }
+
     /// Whether there is something measured.
     pub fn is_measured(&self) -> bool {
         !self.points.is_empty() || self.distance.is_some()
@@ -41,6 +50,7 @@ impl Picked {
 /// A set of columns that belong together.
 struct Group {
     key: Vec<String>,
+    unit: Option<Unit>,
     measured: Option<bool>,
     columns: Vec<(usize, At)>,
 }
@@ -51,10 +61,15 @@ fn groups(parts: &[Part], number: impl Fn(&Name) -> Option<usize>) -> Vec<Group>
         for (column, name) in meanings.iter().enumerate() {
             let Some(number) = number(name) else { continue };
             let at = (number, At { part, column });
-            let same = |g: &&mut Group| g.key == name.key && g.columns[0].1.part == part;
+            // One number in two units is of two sets.
+            let other = |g: &Group| g.unit != name.unit && g.columns.iter().any(|(n, _)| *n == number);
+            let same = |g: &&mut Group| g.key == name.key && g.columns[0].1.part == part && !other(g);
             match list.iter_mut().find(same) {
                 Some(group) => group.columns.push(at),
-                None => list.push(Group { key: name.key.clone(), measured: name.measured, columns: vec![at] }),
+                None => {
+                    let (key, unit, measured) = (name.key.clone(), name.unit, name.measured);
+                    list.push(Group { key, unit, measured, columns: vec![at] });
+                }
             }
         }
     }
@@ -79,10 +94,9 @@ pub(super) fn by_names(parts: &[Part], count: usize) -> Result<Picked> {
         }
         _ => picked.points = points.into_iter().map(|(name, at, _)| (name, at)).collect(),
     }
+    let picked = picked.with_units(parts);
     let unit = |at: &At| parts[at.part].meanings.as_ref().and_then(|m| m[at.column].unit);
-    picked.joint_unit = picked.joints.iter().find_map(unit).filter(|u| u.is_angle());
     let measured = picked.points.iter().flat_map(|(_, at)| at).chain(picked.distance.iter());
-    picked.length_unit = measured.clone().find_map(unit).filter(|u| !u.is_angle());
     let mixed = |columns: Vec<At>| {
         let units: Vec<Unit> = columns.iter().filter_map(unit).collect();
         units.windows(2).any(|two| two[0] != two[1]).then_some(columns)
@@ -99,10 +113,7 @@ pub(super) fn by_names(parts: &[Part], count: usize) -> Result<Picked> {
 
 /// The joints alone, of a table that measured nothing.
 pub(super) fn joints_alone(parts: &[Part], count: usize) -> Result<Picked> {
-    let joints = joints(parts, count)?;
-    let unit = |at: &At| parts[at.part].meanings.as_ref().and_then(|m| m[at.column].unit);
-    let joint_unit = joints.iter().find_map(unit).filter(|unit| unit.is_angle());
-    Ok(Picked { joints, joint_unit, ..Picked::default() })
+    Ok(Picked { joints: joints(parts, count)?, ..Picked::default() }.with_units(parts))
 }
 
 /// Whether a file names as many joints as the robot has; a quaternion `Q0..Q3` is none.
@@ -256,11 +267,21 @@ pub(super) fn listed(parts: &[Part], columns: &[At]) -> String {
 }
 
 fn twice(parts: &[Part], what: &str, columns: &[At]) -> Error {
+    let part = &parts[columns[0].part];
     let numbers: Vec<String> =
         columns.iter().map(|at| format!("{} (`{}`)", at.column + 1, parts[at.part].column_name(at.column))).collect();
     let message = format!("{what} is named twice: columns {}", numbers.join(" and "));
-    parts[columns[0].part]
-        .refuse(message, Some("`--columns NAME,NAME,...` names the columns in their order; `-` skips one"))
+    let name = |column: usize| part.names.as_ref().and_then(|names| names.get(column));
+    let again =
+        |second: usize| (0..3).all(|i| name(columns[0].column + i).is_some_and(|n| name(second + i) == Some(n)));
+    match columns.iter().skip(1).find(|at| at.part == columns[0].part && again(at.column)) {
+        Some(second) => {
+            let message =
+                format!("a second table stands beside the first, from column {} on: {message}", second.column + 1);
+            part.refuse(message, Some("save each table as a file of its own and name each with `--measurements FILE`"))
+        }
+        None => part.refuse(message, Some("`--columns NAME,NAME,...` names the columns in their order; `-` skips one")),
+    }
 }
 
 /// That two sets of points would do, with the flags that take either, or both as readings of one point.

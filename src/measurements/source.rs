@@ -10,11 +10,13 @@ use serde::Deserialize;
 
 use super::apart;
 use super::assemble::{self, Taken};
+use super::copies;
 use super::judge::{self, Basis, Forced, Verdict, Way};
+use super::keys;
 use super::layout;
-use super::part::{At, Part};
+use super::part::{At, Kind, Part};
 use super::pick::{self, listed};
-use super::refused::{lacking, open, unplaced, wrong_unit};
+use super::unsettled;
 use super::{Measurement, read};
 use crate::diagnostic::Place;
 use crate::files::{Error, Result};
@@ -87,7 +89,7 @@ impl Source {
                 && self.units.is_none()
                 && is_own(&Part::read(only, count, false)?)
             {
-                return Ok((read(only)?, Vec::new()));
+                return Ok(copies::counted_once(read(only)?));
             }
             parts.push(Part::read(file, count, self.columns.is_some())?);
         }
@@ -99,12 +101,14 @@ impl Source {
         let several = sets.len() > 1;
         let (mut rows, mut said) = (Vec::new(), Vec::new());
         for (number, mut set) in sets.into_iter().enumerate() {
+            let joined = keys::align(&mut set)?;
             let widened = assemble::widen(&mut set)?;
             let (way, basis) = self.way(&set, robot, widened)?;
             let (way, slides) = (way, robot.joints.iter().map(|j| j.slides).collect::<Vec<_>>());
             let taken = Taken { parts: &set, way: &way, basis, slides: &slides, number: several.then_some(number + 1) };
             rows.extend(taken.rows()?);
             said.push(taken.sentence());
+            said.extend(joined);
             if way.is_computed() {
                 said.push(
                     "the nominal robot predicts these points to a micrometre: they were computed from the joints, not measured"
@@ -112,6 +116,8 @@ impl Source {
                 );
             }
         }
+        let (rows, copied) = copies::counted_once(rows);
+        said.extend(copied);
         Ok((rows, said))
     }
 
@@ -179,7 +185,10 @@ impl Source {
         let complete = picked.joints.len() == count && picked.is_measured();
         let candidates = if complete { vec![picked.clone()] } else { layout::candidates(parts, &picked, count) };
         if candidates.is_empty() {
-            return Err(parts.iter().find_map(Part::mixed).unwrap_or_else(|| lacking(parts, &picked, count)));
+            return Err(parts
+                .iter()
+                .find_map(Part::mixed)
+                .unwrap_or_else(|| unsettled::lacking(parts, &picked, count)));
         }
         match judge::decide(parts, &candidates, robot, self.forced()) {
             Verdict::Taken(way, basis) => {
@@ -187,8 +196,8 @@ impl Source {
                     if self.columns.is_some() { None } else { apart::clearest(parts, vec![way.clone()], robot) };
                 apart.map_or(Ok((way, basis)), |apart| Err(apart.asked(parts)))
             }
-            Verdict::WrongUnit { stated, better } => Err(wrong_unit(parts, &stated, &better)),
-            Verdict::Open(a, b) => Err(open(parts, &a, &b)),
+            Verdict::WrongUnit { stated, better } => Err(unsettled::wrong_unit(parts, &stated, &better)),
+            Verdict::Open(a, b) => Err(unsettled::open(parts, &a, &b)),
             Verdict::NoUnit { joints } => {
                 let (what, hint) = match joints {
                     true => ("joints are degrees or radians", "`--units deg` or `--units rad` says it"),
@@ -206,7 +215,7 @@ impl Source {
                 Err(apart
                     .map(|a| a.asked(parts))
                     .or_else(mixed)
-                    .unwrap_or_else(|| unplaced(parts, &candidates[0], self.forced())))
+                    .unwrap_or_else(|| unsettled::unplaced(parts, &candidates[0], self.forced())))
             }
         }
     }
@@ -257,11 +266,12 @@ fn name_columns(parts: &mut [Part], columns: &str, count: usize) -> Result<bool>
             Name { unit: name.unit.or(unit), ..name }
         };
         let mut meanings: Vec<Name> = own.into_iter().enumerate().map(with_unit).collect();
+        let named = meanings.len();
         meanings.resize(part.width(), Name::of(""));
         // What is not named is not looked at.
-        part.kinds.iter_mut().zip(&meanings).filter(|(_, n)| n.what == What::Other).for_each(|(kind, _)| {
-            *kind = super::part::Kind::Words;
-        });
+        for (column, kind) in part.kinds.iter_mut().enumerate().filter(|(c, _)| meanings[*c].what == What::Other) {
+            *kind = if column >= named && *kind == Kind::Numbers { Kind::Beyond } else { Kind::Words };
+        }
         part.meanings = Some(meanings);
     }
     Ok(!each)

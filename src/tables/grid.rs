@@ -7,6 +7,7 @@
 
 use camino::{Utf8Path, Utf8PathBuf};
 
+use super::cells;
 use super::fields::{Fields, Form};
 use super::numbers::Style;
 use super::program_lines;
@@ -53,9 +54,12 @@ impl Grid {
         Grid::of(path, Source::Text(text, None), None)
     }
 
-    /// Reads a file that may be a program's: lines that hold a joint target of at least so many numbers are rows of those.
+    /// Reads a file of readings, which may be a program's: lines that hold a joint target of at least so many numbers are rows of those. Lists, units and
+    /// comments in its cells are read.
     pub fn read_with_programs(path: &Utf8Path, what: &'static str, hint: &str, joints: usize) -> Result<Grid> {
-        Grid::of(path, source::read(path, what, hint)?, Some(joints))
+        let mut grid = Grid::of(path, source::read(path, what, hint)?, Some(joints))?;
+        cells::plain(&mut grid.rows, grid.form == Form::Delimited(' '));
+        Ok(grid)
     }
 
     fn of(path: &Utf8Path, source: Source, joints: Option<usize>) -> Result<Grid> {
@@ -73,6 +77,9 @@ impl Grid {
                         Form::Program { calls, .. } if calls.len() > 1 => Err(grid.of_several_calls(calls)),
                         _ => Ok(grid),
                     };
+                }
+                if let Some(rows) = joints.and_then(|_| cells::named(&text)) {
+                    return Ok(Grid { rows, ..empty(Form::Delimited(','), encoding) });
                 }
                 let text = without_brackets(&text).unwrap_or(text);
                 let delimiter = delimiter(&text);
@@ -168,7 +175,7 @@ impl Grid {
 /// none of its rows.
 fn without_brackets(text: &str) -> Option<String> {
     let is_bracket = |c: char| matches!(c, '[' | ']' | '{' | '}' | '(' | ')');
-    let of_numbers = |c: char| c.is_ascii_digit() || " \t\r,;.+-eE\"".contains(c);
+    let of_numbers = |c: char| c.is_ascii_digit() || " \t\r,;.+-eE".contains(c);
     let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
     let is_row = |line: &str| line.chars().all(|c| is_bracket(c) || of_numbers(c));
     let rows = lines.iter().filter(|line| is_row(line));
@@ -186,7 +193,7 @@ fn without_brackets(text: &str) -> Option<String> {
             return String::new();
         }
         let plain = |c: char| match c {
-            _ if is_bracket(c) || c == '"' => ' ',
+            _ if is_bracket(c) => ' ',
             ';' if lists && line.contains(',') => ',',
             _ => c,
         };
@@ -227,7 +234,7 @@ fn delimiter(text: &str) -> char {
             return (0, 0);
         };
         let of_mode = grid.rows.iter().filter(|(_, row)| row.len() == mode.0);
-        let numbers = of_mode.flat_map(|(_, row)| row.iter()).filter(|cell| cell.parse::<f64>().is_ok()).count();
+        let numbers = of_mode.flat_map(|(_, row)| row.iter()).map(cells::count).sum();
         (mode.1, numbers)
     };
     let scores = [',', ';', '\t', '|', ' '].map(|d| (d, score(d)));

@@ -3,11 +3,13 @@
 //! In: a grid. Out: names, or none, and the rows below. The first row that is mostly numbers is the first row of the table; the row above it has
 //! the names, one that has nothing but units below the names goes with them, and what stands above is a title. Names that count the columns,
 //! 0, 1, 2, ..., are none.
-//! What goes wrong: rows of other lengths than the others, and names of another count than the columns; both are refused with the line.
+//! A comment above the numbers whose words are none of their columns is no row of names.
+//! What goes wrong: rows of other lengths than the others, names of another count than the columns, and a second table below the first; all are
+//! refused with the line.
 
 use super::fields::Fields;
 use super::grid::Grid;
-use super::names::{Unit, is_said_of_another};
+use super::names::{Name, Unit, What, is_said_of_another, words};
 use crate::files::{self, Result};
 
 /// A table's rows, and names where it has them.
@@ -26,7 +28,13 @@ const COUNTED: usize = 4;
 pub fn split(grid: &Grid) -> Result<Headed> {
     let first = grid.rows.iter().position(|(_, row)| is_data(row));
     let Some(mut first) = first else {
-        let hint = "a table has rows of numbers, with names of the columns above them or without";
+        let records = grid.rows.iter().flat_map(|(_, row)| row.iter()).any(|cell| cell.starts_with("[{"));
+        let hint = match records {
+            true => {
+                "a cell holds a list of records: make a table of that list, `record_path` in `pandas.json_normalize`"
+            }
+            false => "a table has rows of numbers, with names of the columns above them or without",
+        };
         let text = files::read_text(&grid.path, "table", None).unwrap_or_default();
         return Err(match files::kind::kind(&text) {
             Some(kind) if kind != "a table" => {
@@ -41,7 +49,11 @@ pub fn split(grid: &Grid) -> Result<Headed> {
     } else {
         // Names may be numbers, too: the joints' 1 to 6 beside x, y and z.
         first += usize::from(names_below(grid, first));
-        names = (first > 0).then(|| above(grid, first));
+        let width = grid.rows[first].1.len();
+        let head = (0..first).rev().find(|&at| !is_remark(&grid.rows[at].1, width));
+        // What stands above a remark may be a title as well.
+        let fits = |at: &usize| at + 1 == first || grid.rows[*at].1.len().abs_diff(width) < 2;
+        names = head.filter(fits).map(|at| above(grid, at));
     }
     let rows = even(grid, first, names.as_ref().map_or(0, |(_, names)| names.len()))?;
     let width = rows.first().map_or(0, |(_, row)| row.len());
@@ -80,6 +92,32 @@ fn is_comment(row: &Fields) -> bool {
         && !ERRORS.iter().any(|error| row[0].starts_with(error))
 }
 
+/// Whether a row above the numbers is a comment that names no columns.
+fn is_remark(row: &Fields, width: usize) -> bool {
+    if row.len() == 1 {
+        return is_comment(row) && without_title(vec![row[0].to_owned()], width).is_none();
+    }
+    let unknown = |cell: &str| Name::of(cell).what == What::Other;
+    // A mark, or the number of the row, may be one more or one less.
+    is_comment(row) && row.len().abs_diff(width) > 1 && row.iter().all(unknown)
+}
+
+/// Refuses a second table below the first: names that stand again, or a row of other names of columns.
+fn refuse_second_table(grid: &Grid, first: usize) -> Result<()> {
+    let names = first.checked_sub(1).map(|at| &grid.rows[at].1);
+    let known = |cell: &&str| !matches!(Name::of(cell).what, What::Other | What::Own(_));
+    let is_names = |row: &Fields| {
+        let filled = row.iter().filter(|cell| !cell.trim().is_empty()).count();
+        let understood = row.iter().filter(known).count();
+        let words = row.iter().all(|cell| cell.parse::<f64>().is_err());
+        let others = understood > 1 && 2 * understood >= filled && !is_comment(row);
+        words && filled > 1 && (Some(row) == names || others)
+    };
+    let Some((line, _)) = grid.rows[first..].iter().find(|(_, row)| is_names(row)) else { return Ok(()) };
+    let hint = "save each table as a file of its own, each with `--measurements`, where the robot or the sensor was moved between them; else remove the line";
+    Err(grid.refuse(*line, "a second table begins here: this row holds names of columns".to_owned(), Some(hint)))
+}
+
 /// Whether a row counts its columns, but for that of the rows' own numbers.
 fn counts(row: &Fields) -> bool {
     let skipped = usize::from(row[0].is_empty());
@@ -89,10 +127,10 @@ fn counts(row: &Fields) -> bool {
         && row.iter().skip(skipped).zip(from..).all(|(cell, i)| cell == i.to_string())
 }
 
-/// The names above a row, with the units below them and the headings above them, and their line.
-fn above(grid: &Grid, first: usize) -> (u64, Vec<String>) {
+/// The names of a row, or above it where it has their units, with the headings above them, and their line.
+fn above(grid: &Grid, mut at: usize) -> (u64, Vec<String>) {
     let cells = |at: usize| -> Vec<String> { grid.rows[at].1.iter().map(|c| c.trim().to_owned()).collect() };
-    let (mut at, mut names) = (first - 1, cells(first - 1));
+    let mut names = cells(at);
     let unit = |cell: &String| cell.is_empty() || Unit::of(cell.trim_matches(['[', ']', '(', ')'])).is_some();
     if at > 0 && names.iter().all(unit) && cells(at - 1).len() == names.len() {
         let joined = |(name, unit): (String, &String)| match unit.is_empty() {
@@ -104,13 +142,19 @@ fn above(grid: &Grid, first: usize) -> (u64, Vec<String>) {
     }
     let filled = |cells: &[String]| cells.iter().filter(|cell| !cell.is_empty()).count();
     let twice = (1..names.len()).any(|i| !names[i].is_empty() && names[..i].contains(&names[i]));
-    if at > 0 && twice && filled(&cells(at - 1)) > 1 {
-        // Names that stand twice are of what is written above them, in the first of the cells that it spans.
+    if at > 0 && filled(&cells(at - 1)) > 1 {
+        // A heading stands in the first of the cells that it spans. Names that stand twice are of it, and others have its unit.
         let mut heading = String::new();
         let headings = cells(at - 1).into_iter().chain(std::iter::repeat(String::new()));
         for (name, above) in names.iter_mut().zip(headings) {
             heading = if above.is_empty() { heading } else { above };
-            *name = format!("{heading} {name}").trim().to_owned();
+            match words(&heading).1 {
+                _ if twice => *name = format!("{heading} {name}").trim().to_owned(),
+                Some(unit) if Name::of(name).unit.is_none() && !name.is_empty() => {
+                    *name += &format!(" [{}]", unit.flag())
+                }
+                _ => {}
+            }
         }
     }
     (grid.rows[at].0, names)
@@ -130,6 +174,7 @@ fn without_title(names: Vec<String>, width: usize) -> Option<Vec<String>> {
 
 /// The rows from `first` on, made equally long: cells at the end that are empty everywhere are none.
 fn even(grid: &Grid, first: usize, names: usize) -> Result<Vec<(u64, Fields)>> {
+    refuse_second_table(grid, first)?;
     let filled =
         |row: &Fields| row.len() - row.iter().collect::<Vec<_>>().iter().rev().take_while(|c| c.is_empty()).count();
     let rows: Vec<&(u64, Fields)> = grid.rows[first..].iter().filter(|(_, row)| !is_comment(row)).collect();

@@ -1,16 +1,20 @@
 //! Tables as people have them: files of any common form as rows of cells, and names of columns as what they mean.
 //!
 //! ```text
-//!  source   a file's bytes -> text in whatever encoding, or the cells of a spreadsheet; what is no table is refused with how to export it
+//!  source   a file's bytes -> text in whatever encoding, or the cells of a spreadsheet
+//!  foreign  what is no table: which program's file it is, and how to export it
 //!  grid     text -> rows of cells: which delimiter, decimal comma, lines of a program; line numbers as an editor counts them
+//!  cells    a unit, a list, a name or a comment beside the number of a cell
 //!  numbers  a cell with a decimal comma, or with thousands set apart, as a number
 //!  expression   a cell with a formula, `pi/2`, `q2 - 90`, as a number
 //!  header   where the names of the columns stand, if there are any
 //!  names    a name -> a joint, a coordinate, a distance, its unit, and whether it was commanded
 //! ```
 
+mod cells;
 pub mod expression;
 mod fields;
+mod foreign;
 pub mod grid;
 pub mod header;
 pub mod names;

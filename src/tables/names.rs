@@ -123,7 +123,7 @@ const PLAIN: &str = "angle angles pos position positions value values coord coor
 /// Words that say that a number is something else.
 const ELSE: &str = "tau torque torques force f current effort i vel velocity speed v qd dq acc temp temperature dif diff delta \
     err error errors e res residual residuals dev deviation std sd sigma unc uncertainty u rms var cov \
-    rot rotation roll pitch yaw euler quat quaternion orientation offset normal min";
+    rot rotation rvec rotvec roll pitch yaw euler quat quaternion orientation offset normal min";
 
 const COMMANDED: &str = "cmd command commanded nominal nom n t target goal desired des d ref reference set setpoint plan \
     planned program prog controller pred predicted theo theoretical ideal taught programmed fk calc calculated computed c model robot soll theorie consigne \
@@ -263,20 +263,21 @@ fn axis(c: char) -> Option<usize> {
 /// `x`, `px`, `xm`, `x_1`, `tracker x`.
 fn coordinate(words: &[String]) -> Option<(What, Vec<String>)> {
     let single = |i: &usize| {
-        let mut chars = words[*i].chars();
-        let (first, second) = (chars.next()?, chars.next());
-        if chars.next().is_some() {
-            return None;
-        }
-        match (axis(first), second) {
-            (Some(a), None) => Some((a, None)),
-            // xm: measured; xc, xn, xt: computed, nominal, target.
-            (Some(a), Some(s)) if axis(s).is_none() => Some((a, Some(s))),
-            (None, Some(s)) if "pmtc".contains(first) => axis(s).map(|a| (a, Some(first).filter(|f| *f == 'm'))),
+        let (first, rest) = words[*i].split_at_checked(1)?;
+        let letter = |word: &str| word.chars().next().filter(|_| word.len() == 1).and_then(axis);
+        // xm, xist: measured; xc, xn, xt, xsoll: computed, nominal, target.
+        let marks = rest.chars().count() == 1 || is_in(MEASURED, rest) || is_in(COMMANDED, rest);
+        match (letter(first), letter(rest)) {
+            (Some(a), None) if rest.is_empty() || marks => Some((a, Some(rest).filter(|rest| !rest.is_empty()))),
+            (None, Some(a)) if "pmtc".contains(first) => Some((a, Some(first).filter(|f| *f == "m"))),
             _ => None,
         }
     };
-    let found: Vec<(usize, (usize, Option<char>))> = (0..words.len()).filter_map(|i| Some((i, single(&i)?))).collect();
+    // `3x3` is a size.
+    let number = |i: usize| words.get(i).is_some_and(|word| word.chars().all(|c| c.is_ascii_digit()));
+    let size = |i: usize| i > 0 && words[i] == "x" && number(i - 1) && number(i + 1);
+    let found: Vec<(usize, (usize, Option<&str>))> =
+        (0..words.len()).filter(|&i| !size(i)).filter_map(|i| Some((i, single(&i)?))).collect();
     let [(at, (axis, mark))] = found[..] else { return None };
     let mut rest = without(words, &[at]);
     rest.extend(mark.map(String::from));
@@ -340,6 +341,8 @@ mod tests {
         assert_eq!(what("X  [mm]"), (What::Coordinate(0), Some(Unit::Mm), None));
         assert_eq!(what("y_m"), (What::Coordinate(1), Some(Unit::M), None));
         assert_eq!(what("zm"), (What::Coordinate(2), None, Some(true)));
+        assert_eq!(what("Xist"), (What::Coordinate(0), None, Some(true)));
+        assert_eq!(what("camera_matrix_3x3").0, What::Other);
         assert_eq!(what("X_meas"), (What::Coordinate(0), None, Some(true)));
         assert_eq!(what("pz"), (What::Coordinate(2), None, None));
         assert_eq!(what("MX Coord."), (What::Coordinate(0), None, Some(true)));
@@ -364,6 +367,7 @@ mod tests {
             "x_n",
             "理论X",
             "x soll",
+            "Xsoll",
         ] {
             assert_eq!((what(name).0, what(name).2), (What::Coordinate(0), Some(false)), "{name}");
         }

@@ -74,7 +74,9 @@ fn call(line: &str, joints: usize) -> Option<&str> {
 
 /// The first list in brackets with nothing but numbers in it, as many as joints at the least.
 fn list(line: &str, joints: usize) -> Option<Fields> {
-    place(line, joints).map(|at| Fields::new(line[at.start + 1..at.end].split(',').map(str::trim)))
+    // A list in quotes is a cell of a table.
+    let place = place(line, joints).filter(|at| at.start == 0 || !line[..at.start].ends_with('"'));
+    place.map(|at| Fields::new(line[at.start + 1..at.end].split(',').map(str::trim)))
 }
 
 /// Where it stands, from its bracket on.

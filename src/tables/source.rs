@@ -1,7 +1,8 @@
 //! A file's bytes as text or as the cells of a spreadsheet.
 //!
 //! In: a path, for spreadsheets with `#SHEET` behind it. Out: text decoded from UTF-8, UTF-16 or Latin-1 (as Windows has it, code page
-//! 1252), or cells. What goes wrong: files of MATLAB, NumPy and the like are no text; the message says how to export them.
+//! 1252), or cells. What goes wrong: files of MATLAB, NumPy and the like are no text; the message says how to export them. A formula whose value the
+//! spreadsheet does not hold is refused with its cell.
 
 use std::io::{Cursor, Read};
 
@@ -9,6 +10,8 @@ use calamine::{Data, Reader, Sheets, open_workbook_auto_from_rs};
 use camino::{Utf8Path, Utf8PathBuf};
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
+use super::foreign;
+use super::numbers::Style;
 use crate::files::{Error, Result};
 
 /// The longest table that is read, bytes.
@@ -60,8 +63,8 @@ pub(super) fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<So
     if sheet.is_some() {
         return Err(refuse(&file, "a sheet is named behind `#`, but the file is no spreadsheet".to_owned(), None));
     }
-    if let Some((kind, hint)) = foreign(&bytes, &file) {
-        return Err(refuse(&file, format!("{what}: {kind}, which is not read"), Some(hint)));
+    if let Some((kind, hint)) = foreign::of_bytes(&bytes, &file) {
+        return Err(refuse(&file, format!("{what}: {kind}, which is not read"), Some(&hint)));
     }
     let (mut text, encoding) = decoded(&bytes);
     if text.contains('\0') {
@@ -72,38 +75,14 @@ pub(super) fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<So
         let hint = "save it as CSV (comma, semicolon, tab or blanks) or as a spreadsheet (xlsx, xls, ods)";
         return Err(refuse(&file, format!("{what}: not a text, and no spreadsheet"), Some(hint)));
     }
+    if let Some(hint) = foreign::of_yaml(&text, &file) {
+        return Err(refuse(&file, format!("{what}: a YAML file, which is not read"), Some(&hint)));
+    }
     Ok(Source::Text(text, encoding))
 }
 
 fn refuse(path: &Utf8Path, message: String, hint: Option<&str>) -> Error {
     Error::format(path, None, message, hint)
-}
-
-/// What a file of another program is, and how its table is exported.
-fn foreign(bytes: &[u8], path: &Utf8Path) -> Option<(&'static str, &'static str)> {
-    const MATLAB: &str = "in MATLAB: `writematrix(NAME, 'table.csv')` for each array that is needed, joints and points; \
-                          in Python: `numpy.savetxt('table.csv', scipy.io.loadmat('FILE.mat')['NAME'], delimiter=',')`";
-    let hdf5 = bytes.starts_with(b"\x89HDF\r\n\x1a\n");
-    if bytes.starts_with(b"MATLAB ") || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) {
-        return Some(("a MATLAB file (.mat)", MATLAB));
-    }
-    if hdf5 {
-        return Some(("an HDF5 file", "export the arrays that are needed as CSV, e.g. with `h5dump -y -w 0 -d NAME`"));
-    }
-    if bytes.starts_with(b"\x93NUMPY") {
-        return Some((
-            "a NumPy file",
-            "in Python: `numpy.savetxt('table.csv', numpy.load('FILE.npy'), delimiter=',')`",
-        ));
-    }
-    let start = bytes.iter().find(|b| !b.is_ascii_whitespace());
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) || start == Some(&b'{') {
-        return Some((
-            "a JSON file",
-            "in Python: `pandas.json_normalize(json.load(open('FILE.json'))).to_csv('table.csv')`, lists first made columns",
-        ));
-    }
-    bytes.starts_with(&[0x1f, 0x8b]).then_some(("a compressed file", "unpack it first: `gunzip FILE`"))
 }
 
 /// Text from bytes, and the encoding's name where it is not UTF-8.
@@ -153,8 +132,30 @@ fn cells(bytes: Vec<u8>, path: &Utf8Path, sheet: Option<&str>) -> Result<Source>
         return Err(refuse(path, message, Some(&format!("`{path}#SHEET` names a sheet"))));
     };
     let range = book.worksheet_range(&name).map_err(unreadable)?;
+    // A program that writes a sheet without computing it leaves formulas without values.
+    let formulas = book.worksheet_formula(&name).map_err(unreadable)?;
+    let corner = formulas.start().unwrap_or_default();
+    let at = |(row, column, _): (usize, usize, &String)| (corner.0 + row as u32, corner.1 + column as u32);
+    let is_empty = |at: &(u32, u32)| range.get_value(*at).is_none_or(|value| *value == Data::Empty);
+    let open: Vec<(u32, u32)> = formulas.used_cells().map(at).filter(is_empty).collect();
+    if let Some((row, column)) = open.first() {
+        let message = format!(
+            "sheet {name}: {} cells hold a formula without its value, the first is in column {} of this row",
+            open.len(),
+            column + 1
+        );
+        let hint = "open the file in a spreadsheet program and save it: that stores the values; a row of sums or means is no row of the table, remove it";
+        return Err(Error::format(path, Some(u64::from(*row) + 1), message, Some(hint)));
+    }
     let first = range.start().map_or(0, |(row, _)| u64::from(row)) + 1;
-    let rows = range.rows().zip(first..).map(|(row, line)| (line, row.iter().map(cell).collect())).collect();
+    let texts =
+        range.used_cells().filter_map(|(_, _, data)| if let Data::String(v) = data { Some(v.trim()) } else { None });
+    let style = Style::of(texts, false);
+    let text = |data: &Data| match data {
+        Data::String(v) => style.number(v.trim()).unwrap_or_else(|| cell(data)),
+        _ => cell(data),
+    };
+    let rows = range.rows().zip(first..).map(|(row, line)| (line, row.iter().map(text).collect())).collect();
     Ok(Source::Sheet { rows, name, others: names.len() - 1 })
 }
 

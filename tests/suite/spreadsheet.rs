@@ -1,6 +1,6 @@
 //! The least workbook that a spreadsheet program opens, for tests of reading one: parts stored in a ZIP without compression.
 
-/// A workbook of these sheets, each from a text with commas.
+/// A workbook of these sheets, each from a text with commas; a cell that begins with `=` is a formula without its value.
 pub fn xlsx(sheets: &[(&str, &str)]) -> Vec<u8> {
     let spreadsheetml = "http://schemas.openxmlformats.org/spreadsheetml/2006/main";
     let office = "http://schemas.openxmlformats.org/officeDocument/2006/relationships";
@@ -46,11 +46,14 @@ pub fn xlsx(sheets: &[(&str, &str)]) -> Vec<u8> {
             let at = format!("{}{row}", char::from(b'A' + column as u8));
             match cell.parse::<f64>() {
                 Ok(_) => format!("<c r=\"{at}\"><v>{cell}</v></c>"),
+                Err(_) if cell.starts_with('=') => format!("<c r=\"{at}\"><f>{}</f><v></v></c>", &cell[1..]),
                 Err(_) => format!("<c r=\"{at}\" t=\"inlineStr\"><is><t>{cell}</t></is></c>"),
             }
         };
         let row = |(r, line): (usize, &str)| {
-            let cells: String = line.split(',').enumerate().map(|c| cell(c, r + 1)).collect();
+            let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(line.as_bytes());
+            let record = reader.records().next().and_then(Result::ok).unwrap_or_default();
+            let cells: String = record.iter().enumerate().map(|c| cell(c, r + 1)).collect();
             format!("<row r=\"{}\">{cells}</row>", r + 1)
         };
         let rows: String = text.lines().enumerate().map(row).collect();

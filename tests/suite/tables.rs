@@ -15,7 +15,9 @@ use crate::run::{shared, stderr, stereocal, workplace};
 
 mod doubtful;
 mod forms;
+mod joined;
 mod owners;
+mod written;
 
 /// Readings that were converted agree to this, deg and mm: rounding of the last digit of a double, times a thousand.
 const SAME: f64 = 1e-9;

@@ -17,6 +17,9 @@ use crate::tables::expression;
 /// Names that descriptions give to the flange, the best first: taken where several links end the same chain.
 const FLANGES: [&str; 5] = ["tool0", "flange", "ee_link", "link8", "link_ee"];
 
+/// Words in the names of links and joints of a gripper.
+const FINGERS: [&str; 5] = ["finger", "gripper", "jaw", "knuckle", "thumb"];
+
 /// What a joint does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
@@ -216,7 +219,11 @@ impl Urdf {
                 let list: Vec<String> = ends.iter().map(|e| format!("{e} ({} joints)", self.moving(e).len())).collect();
                 let message = format!("several links end a chain: {}", list.join(", "));
                 let usable = ends.iter().filter(|e| self.chain(Some(e)).is_ok());
-                let best = usable.max_by_key(|e| (self.moving(e).len(), FLANGES.iter().any(|f| e.ends_with(f))));
+                // A finger is not where an arm ends.
+                let grips = |name: &str| FINGERS.iter().any(|finger| name.to_lowercase().contains(finger));
+                let of_arm = |e: &&String| !grips(e) && !self.moving(e).into_iter().any(grips);
+                let best =
+                    usable.max_by_key(|e| (of_arm(e), self.moving(e).len(), FLANGES.iter().any(|f| e.ends_with(f))));
                 let example =
                     best.map_or(String::new(), |e| format!("; `--tip {e}` has the most joints that move on their own"));
                 let hint = format!("`--tip LINK` names the one that carries the target{example}");

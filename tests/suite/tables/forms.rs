@@ -136,7 +136,9 @@ fn two_points_that_are_nearly_one_are_asked_about() {
                 continue;
             }
             let (found, said) = told.read(&robot).expect("told");
-            assert!(found.len() == 60 && said[0].contains("2 readings a pose"), "{off} {names}: {said:?}");
+            // Readings that are alike to the last digit are copies.
+            let count = if off > 0.0 { 60 } else { 30 };
+            assert!(found.len() == count && said[0].contains("2 readings a pose"), "{off} {names}: {said:?}");
         }
     }
     // Reflectors that are counted by letters are targets of a body.

@@ -1,12 +1,14 @@
-//! What is said of tables that cannot be read: what was found, and the flags that settle it.
+//! What is said where a table does not tell what its columns are: what was found, what was needed, and the flags that settle it.
 
 use super::judge::{Forced, Way};
-use super::part::Part;
+use super::part::{Kind, Part};
 use super::pick::{self, Picked, columns_flag, listed};
+use crate::files::Error;
 use crate::tables::Form;
 use crate::tables::names::{Unit, What};
 
-pub(super) fn lacking(parts: &[Part], picked: &Picked, count: usize) -> crate::files::Error {
+/// That the files lack joints or what was measured.
+pub(super) fn lacking(parts: &[Part], picked: &Picked, count: usize) -> Error {
     let names = |p: &Part| {
         let shown = p.names.as_ref().map(|n| n.iter().take(40).cloned().collect::<Vec<_>>().join(", "));
         match shown {
@@ -18,7 +20,8 @@ pub(super) fn lacking(parts: &[Part], picked: &Picked, count: usize) -> crate::f
         }
     };
     let found: Vec<String> = parts.iter().map(names).collect();
-    let what = match (picked.joints.is_empty(), picked.is_measured()) {
+    let touches = touches(parts, count);
+    let what = match (picked.joints.is_empty() && touches.is_empty(), picked.is_measured()) {
         (true, true) => format!("no columns of {count} joints"),
         (false, false) => "no columns of a measured point or a distance".to_owned(),
         _ => format!("no columns of {count} joints and of a measured point or a distance"),
@@ -26,9 +29,10 @@ pub(super) fn lacking(parts: &[Part], picked: &Picked, count: usize) -> crate::f
     let sheets = parts.iter().find(|p| matches!(&p.grid.form, Form::Sheet(_, others) if *others > 0));
     let sheets = sheets.map_or(String::new(), |p| format!(", `{}#SHEET` another sheet", p.file_name()));
     let hint = format!(
-        "{}another `--measurements FILE` joins the file that has them row by row{sheets}; \
+        "{}{}another `--measurements FILE` joins the file that has them row by row{sheets}; \
          `--columns j1,j2,...,-,x,y,z` names the columns in their order, `-` skips one",
-        lying(parts, count)
+        lying(parts, count),
+        touches
     );
     parts[0].refuse(format!("{what}: {}", found.join("; ")), Some(&hint))
 }
@@ -42,8 +46,23 @@ fn lying(parts: &[Part], count: usize) -> &'static str {
     if parts.iter().any(lies) { "if each column is a pose, exchange rows and columns; " } else { "" }
 }
 
+/// What to do with files of nothing but joints: what a robot touches is measured without an instrument.
+fn touches(parts: &[Part], count: usize) -> &'static str {
+    let alone = |p: &Part| match p.is_named() {
+        true => pick::names_joints(p, count) && p.kinds.iter().filter(|kind| **kind == Kind::Numbers).count() == count,
+        false => p.free().len() == count,
+    };
+    if parts.iter().all(alone) {
+        "if the target was at one point in all rows of a file, a touch, one table of all with the columns \
+         `pose,group,role,j1_deg,...,distance_mm` says so: `distance_mm` 0, a `group` for each point, and \
+         `--known-distances FILE` for the distances between the points; else "
+    } else {
+        ""
+    }
+}
+
 /// The columns have names, and nothing comes near to the nominal robot by them.
-fn contradicted(parts: &[Part], first: &Picked, forced: Forced) -> Option<crate::files::Error> {
+fn contradicted(parts: &[Part], first: &Picked, forced: Forced) -> Option<Error> {
     let points = || first.points.first().map_or(Vec::new(), |(_, at)| at.to_vec());
     let against =
         |forced: Option<Unit>, named: Option<Unit>| forced.zip(named).filter(|(forced, named)| forced != named);
@@ -59,14 +78,20 @@ fn contradicted(parts: &[Part], first: &Picked, forced: Forced) -> Option<crate:
     Some(parts[0].refuse(message, Some("leave `--units` out: the names say it")))
 }
 
-pub(super) fn unplaced(parts: &[Part], first: &Picked, forced: Forced) -> crate::files::Error {
-    if let Some(contradicted) = contradicted(parts, first, forced) {
+/// That no choice of columns comes near to the robot.
+pub(super) fn unplaced(parts: &[Part], picked: &Picked, forced: Forced) -> Error {
+    if let Some(contradicted) = contradicted(parts, picked, forced) {
         return contradicted;
     }
+    let count = picked.joints.len();
+    if !touches(parts, count).is_empty() {
+        return lacking(parts, &Picked { joints: picked.joints.clone(), ..Picked::default() }, count);
+    }
     let hint = format!(
-        "{}`--columns {}` if these are the columns; look at `--robot`, too: its file must be of this robot",
-        lying(parts, first.joints.len()),
-        columns_flag(parts, &first.joints, &first.points.first().map_or(Vec::new(), |(_, at)| at.to_vec()))
+        "{}`--columns` names the {} columns in their order: j1 to j{count} for the joints, x, y, z for the point, `-` for each that is neither; \
+         look at `--robot`, too: its file must be of this robot",
+        lying(parts, count),
+        parts.iter().map(Part::width).sum::<usize>()
     );
     let what = match parts.iter().any(|p| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance))) {
         true => "the joints",
@@ -78,7 +103,8 @@ pub(super) fn unplaced(parts: &[Part], first: &Picked, forced: Forced) -> crate:
     parts[0].refuse(message, Some(&hint))
 }
 
-pub(super) fn open(parts: &[Part], a: &Way, b: &Way) -> crate::files::Error {
+/// That two ways would do, with the flags that take either.
+pub(super) fn open(parts: &[Part], a: &Way, b: &Way) -> Error {
     let point = |way: &Way| way.picked.points.first().map(|(_, at)| *at);
     match (point(a), point(b)) {
         (Some(first), Some(second)) if first != second && a.picked.joints == b.picked.joints => {
@@ -99,7 +125,8 @@ pub(super) fn open(parts: &[Part], a: &Way, b: &Way) -> crate::files::Error {
     }
 }
 
-pub(super) fn wrong_unit(parts: &[Part], stated: &Way, better: &Way) -> crate::files::Error {
+/// That a name states a unit in which the robot is far from the points.
+pub(super) fn wrong_unit(parts: &[Part], stated: &Way, better: &Way) -> Error {
     let (what, columns, said, found) = match stated.joints == better.joints {
         false => ("joints", better.picked.joints.clone(), stated.joints, better.joints),
         true => {

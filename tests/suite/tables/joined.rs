@@ -1,0 +1,132 @@
+//! Files that name their rows: joined by these names, rows without a partner said, contradictions said, copies counted once.
+
+use super::*;
+
+/// Joints and points of the rows, each with a name.
+fn tables(
+    folder: &Folder,
+    rows: &Rows,
+    joints: &[(usize, String)],
+    points: &[(usize, String)],
+    head: bool,
+) -> [Utf8PathBuf; 2] {
+    let line = |name: &str, numbers: &[f64]| {
+        format!("{name},{}\n", numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(","))
+    };
+    let title = |text: &str| if head { text.to_owned() } else { String::new() };
+    let q: String = joints.iter().map(|(i, name)| line(name, &rows[*i].0)).collect();
+    let p: String = points.iter().map(|(i, name)| line(name, &rows[*i].1)).collect();
+    [folder.file("q.csv", title("pose,j1,j2,j3,j4,j5,j6\n") + &q), folder.file("p.csv", title("pose,x,y,z\n") + &p)]
+}
+
+/// The rows in this order, each with its number from 1 behind these letters.
+fn numbered(order: impl Iterator<Item = usize>, letters: &str) -> Vec<(usize, String)> {
+    order.map(|i| (i, format!("{letters}{}", i + 1))).collect()
+}
+
+#[test]
+fn rows_are_joined_by_their_names() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    let mut as_text: Vec<usize> = (0..30).collect();
+    as_text.sort_by_key(|i| (i + 1).to_string());
+    let mut exchanged: Vec<usize> = (0..30).collect();
+    [(3, 20), (8, 9)].iter().for_each(|(a, b)| exchanged.swap(*a, *b));
+    for head in [true, false] {
+        for order in [&as_text, &exchanged] {
+            for (a, b) in [("", ""), ("Motion", ""), ("P", "M")] {
+                let (joints, points) = (numbered(order.iter().copied(), a), numbered(0..30, b));
+                let [q, p] = tables(&folder, &rows, &joints, &points, head);
+                let (found, said) = source(&[&q, &p]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+                let expected: Rows = order.iter().map(|i| rows[*i].clone()).collect();
+                same(&found, &expected, "by name");
+                assert!(said[1].contains("rows joined by") && !said[1].contains("left out"), "{said:?}");
+            }
+        }
+        // Rows of which the other file has none.
+        let lost = |skipped: &'static [usize]| (0..30).filter(|i| !skipped.contains(i));
+        for (first, second, says) in [
+            (&[][..], &[4, 17][..], vec!["left out of q.csv, as the other file has no such row: 5, 18"]),
+            (&[4], &[], vec!["left out of p.csv, as the other file has no such row: 5"]),
+        ] {
+            let [q, p] = tables(&folder, &rows, &numbered(lost(first), ""), &numbered(lost(second), ""), head);
+            let (found, said) = source(&[&q, &p]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+            let both = lost(first).filter(|i| !second.contains(i));
+            same(&found, &both.map(|i| rows[i].clone()).collect(), "lost");
+            assert!(says.iter().all(|part| said[1].contains(part)), "{said:?}");
+            assert!(found.iter().any(|row| row.at.pose == "30"), "{said:?}");
+        }
+    }
+    // As many rows, each file without another one.
+    let [q, p] = tables(&folder, &rows, &numbered(0..29, ""), &numbered(1..30, ""), true);
+    let (found, said) = source(&[&q, &p]).read(&robot).expect("both");
+    same(&found, &rows[1..29].to_vec(), "each lacks one");
+    assert!(said[1].contains("left out of q.csv") && said[1].contains("left out of p.csv"), "{said:?}");
+}
+
+#[test]
+fn rows_that_are_in_order_stay_and_names_that_contradict_are_said() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    let from = |first: usize| (0..30).map(|i| (i, (first + i).to_string())).collect::<Vec<_>>();
+    // Counts from 0 and from 1 are of the same rows.
+    for head in [true, false] {
+        for (a, b) in [(1, 1), (0, 1), (1, 0)] {
+            let [q, p] = tables(&folder, &rows, &from(a), &from(b), head);
+            let (found, said) = source(&[&q, &p]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+            same(&found, &rows, "counted");
+            assert_eq!(said.len(), 1, "{said:?}");
+        }
+    }
+    let words = |stem: &str| (0..30).map(|i| (i, format!("{stem} {i} late"))).collect::<Vec<_>>();
+    let [q, p] = tables(&folder, &rows, &words("day"), &words("night"), true);
+    let (found, said) = source(&[&q, &p]).read(&robot).expect("by order");
+    same(&found, &rows, "contradiction");
+    assert!(
+        said[1].contains("row 1 is `day 0 late` in `pose` of") && said[1].contains("paired in their order"),
+        "{said:?}"
+    );
+    // Whether a count from 0 or one from 1 lacks a row, nobody can say.
+    let [q, p] = tables(&folder, &rows, &from(0), &numbered(0..29, ""), true);
+    refused(&source(&[&q, &p]), &robot, &["q.csv has 30 rows, p.csv has 29 rows"]);
+}
+
+#[test]
+fn several_readings_a_pose_are_joined_by_its_name() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(24);
+    let mut shuffled: Vec<usize> = (0..24).map(|i| i * 7 % 24).collect();
+    let readings: Vec<(usize, String)> =
+        shuffled.iter().flat_map(|i| [(*i, format!("{}", i + 1)), (*i, format!("{}", i + 1))]).collect();
+    let [q, p] = tables(&folder, &rows, &numbered(0..24, ""), &readings, true);
+    let (found, _) = source(&[&q, &p]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+    same(&found, &rows, "twice, and copies");
+    shuffled.push(3);
+    let uneven: Vec<(usize, String)> = numbered(shuffled.into_iter(), "");
+    let [q, p] = tables(&folder, &rows, &numbered(0..24, ""), &uneven, true);
+    refused(&source(&[&q, &p]), &robot, &["`4` has 2 rows, others have 1"]);
+}
+
+#[test]
+fn copies_are_counted_once() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    let twice = [rows.clone(), rows.clone()].concat();
+    let names = "J1,J2,J3,J4,J5,J6,X,Y,Z";
+    let (found, said) =
+        source(&[&folder.file("twice.csv", text(names, &twice, ",", joined))]).read(&robot).expect("twice");
+    same(&found, &rows, "copies");
+    assert!(
+        said[1].contains("30 of 60 rows are copies of others to the last digit, the first `31` of `1`"),
+        "{said:?}"
+    );
+    // Readings that differ are none, nor are those of an instrument that shows hundredths.
+    let again = |(q, p): &(Vec<f64>, [f64; 3])| (q.clone(), p.map(|v| v + 1e-3 * v.sin()));
+    let revisited: Rows = [rows.clone(), rows.iter().map(again).collect()].concat();
+    let coarse: Rows = twice.iter().map(|(q, p)| (q.clone(), p.map(|v| (v * 100.0).round() / 100.0))).collect();
+    for (name, rows) in [("again.csv", revisited), ("coarse.csv", coarse)] {
+        let file = folder.file(name, text(names, &rows, ",", joined));
+        let (found, said) = source(&[&file]).read(&robot).expect(name);
+        assert!(found.len() == 60 && said.len() == 1, "{name}: {said:?}");
+    }
+}
