@@ -98,8 +98,9 @@ fn is_remark(row: &Fields, width: usize) -> bool {
         return is_comment(row) && without_title(vec![row[0].to_owned()], width).is_none();
     }
     let unknown = |cell: &str| Name::of(cell).what == What::Other;
-    // A mark, or the number of the row, may be one more or one less.
-    is_comment(row) && row.len().abs_diff(width) > 1 && row.iter().all(unknown)
+    // Units stand apart from their names; the number of the row may be one more or one less.
+    let names = row.iter().filter(|cell| !cell.starts_with(['[', '(']) && !matches!(*cell, "#" | "%" | "//")).count();
+    is_comment(row) && names.abs_diff(width) > 1 && row.iter().all(unknown)
 }
 
 /// Refuses a second table below the first: names that stand again, or a row of other names of columns.

@@ -281,6 +281,21 @@ mod tests {
     }
 
     #[test]
+    fn beside_pairs_that_scatter_only_terms_of_richer_lenses_weigh_more() {
+        let rig = World::new(1, 1).rig;
+        let usual = Priors::of_rig(&rig, 200.0);
+        let layout = Layout::rig(Lens::Tilted14, true);
+        let shared = Shared { rig, shape_mm: [0.1, -0.2, 0.3] };
+        let of = |priors: &Priors| priors.information(&layout, &shared).matrix.diagonal();
+        let (once, beside) = (of(&usual), of(&usual.beside(9.0)));
+        for (i, name) in layout.names().iter().enumerate().filter(|(i, _)| once[*i] > 0.0) {
+            let richer = ["k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau"].iter().any(|term| name.contains(term));
+            assert!((beside[i] / once[i] - if richer { 9.0 } else { 1.0 }).abs() < 1e-9, "{name}");
+        }
+        assert_eq!(of(&usual.beside(0.5)), once);
+    }
+
+    #[test]
     fn pixels_that_are_not_square_and_cameras_of_two_makes_are_left_alone() {
         let mut rig = World::new(1, 1).rig;
         let layout = Layout::rig(Lens::Radial2, false);
