@@ -130,27 +130,13 @@ fn plans_that_nobody_can_run_are_refused() {
     assert!(said.contains("does not reach (1500, 0, 300) mm") && said.contains("`--center "), "{said}");
     let said = run(at, &["--squares", "40x40"], 2);
     assert!(said.contains("never sees a target of 412 x 412 mm") && said.contains("smaller target"), "{said}");
-    // Middles that are reached, spheres that are not: fewer poses do not help, another middle does.
-    let sphere = |center: &str, out: &str| {
-        let flags = ["plan", "--center", center, "--radius-mm", "120", "--poses", "10", "--verify", "3"];
-        stereocal(at, &[&flags[..], &["--calibration", "out/calibration.json", "--out", out], &QUICK[..]].concat())
-    };
-    let proposal = |center: &&str| {
-        let refused = sphere(center, "far");
-        let said = stderr(&refused);
-        if refused.status.code() == Some(3) {
-            assert!(said.contains("are in view and can be reached") && !said.contains("fewer poses"), "{said}");
-        }
-        let center = said.split("`--center ").nth(1)?.split('`').next()?;
-        (refused.status.code() == Some(3) && !center.starts_with('X')).then(|| center.to_owned())
-    };
-    let far = ["150,0,700", "150,0,715", "150,0,730", "150,0,745", "170,0,700", "190,0,700", "210,0,690"];
-    let nearer = far.iter().find_map(proposal).expect("one of these spheres is reached in part");
-    let planned = sphere(&nearer, "nearer");
-    let said = stdout(&planned);
-    assert_eq!(planned.status.code(), Some(0), "{nearer}: {}", stderr(&planned));
-    assert!(said.contains("report: nearer/plan.html") && said.contains("programs: nearer/programs"), "{said}");
-    assert!(said.contains("in 1 group ("), "{said}");
+    // A middle that is reached, a sphere that is not: fewer poses do not help.
+    let sphere = ["--center", "200,0,665", "--radius-mm", "150", "--poses", "10", "--verify", "3"];
+    let said = run(at, &[&sphere[..], &QUICK[..]].concat(), 3);
+    assert!(said.contains("are in view and can be reached") && !said.contains("fewer poses"), "{said}");
+    let here = ["--poses", "10", "--verify", "3", "--calibration", "out/calibration.json", "--out", "here"];
+    let said = run(at, &[&here[..], &QUICK[..]].concat(), 0);
+    assert!(said.contains("report: here/plan.html") && said.contains("programs: here/programs"), "{said}");
     let text = std::fs::read_to_string(at.join("robot.toml")).unwrap();
     let lines = text.lines().map(|l| if l.starts_with("limits_deg") { "limits_deg = [-1.0, 1.0]" } else { l });
     std::fs::write(at.join("stiff.toml"), lines.collect::<Vec<_>>().join("\n")).unwrap();
