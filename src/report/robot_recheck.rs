@@ -65,7 +65,7 @@ fn cells(recheck: &Recheck) -> Vec<[String; 6]> {
             within,
             told(two_digits(cause.effect_mm)),
             cause.seen.map_or_else(String::new, with_unit),
-            told(cause.seen_mm.map_or_else(String::new, |mm| two_digits(mm))),
+            told(cause.seen_mm.map_or_else(String::new, two_digits)),
         ]
     };
     let placements = recheck.placements.iter().map(|moved| {
