@@ -26,7 +26,7 @@ fn units_names_and_comments_beside_numbers() {
     let unit = |i: usize, v: f64| if i < 6 { format!("{v}\u{b0}") } else { format!("{v} mm") };
     let names = ["A1", "A2", "A3", "A4", "A5", "A6", "X", "Y", "Z"];
     let in_braces = |i: usize, v: f64| {
-        let (open, close) = (if i % 6 == 0 { "{" } else { "" }, if i == 5 || i == 8 { "}" } else { "" });
+        let (open, close) = (if i.is_multiple_of(6) { "{" } else { "" }, if i == 5 || i == 8 { "}" } else { "" });
         format!("{open}{} {v}{close}", names[i])
     };
     let plain = written(NAMES, &rows, ",", |_, v| v.to_string());
@@ -164,7 +164,7 @@ fn sheets_with_texts_formulas_and_headings() {
         &robot,
         &[unsaved.as_slice(), &["30 cells", "column.xlsx:2"]].concat(),
     );
-    let total = format!("{table}{}\n", vec!["=AVERAGE(A2:A31)"; 9].join(","));
+    let total = format!("{table}{}\n", ["=AVERAGE(A2:A31)"; 9].join(","));
     refused(
         &source(&[&sheet("total.xlsx", &total)]),
         &robot,
