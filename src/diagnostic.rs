@@ -93,6 +93,18 @@ pub fn beside(value: f64, limit: f64) -> String {
     texts.into_iter().find(same).unwrap_or_else(|| fixed(value, FINEST))
 }
 
+/// What something is at most, rounded up to two digits, and to more where these would put it beyond a limit that it is within.
+pub fn at_most(value: f64, limit: f64) -> String {
+    let up = |decimals: usize| {
+        let steps = 10f64.powi(decimals as i32);
+        // What is a number of these digits but for the last bits of a double stays that.
+        (value * steps - 1e-6).ceil() / steps
+    };
+    let all = decimals_of(value)..FINEST;
+    let decimals = all.into_iter().find(|&d| value > limit || up(d) <= limit).unwrap_or(FINEST);
+    fixed(up(decimals), decimals)
+}
+
 /// Two lengths and their sum, with the same decimals and so that what is written adds up: `[a, b, a + b]`.
 pub fn summed(a: f64, b: f64) -> [String; 3] {
     let sum = a + b;
@@ -197,6 +209,22 @@ mod tests {
         let column = aligned(&[Some(1.5673), Some(-0.2104), None, Some(0.001)]);
         assert_eq!(column, ["1.57", "-0.21", "n/a", "0"]);
         assert_eq!(aligned(&[Some(0.0), None]), ["0", "n/a"]);
+    }
+
+    #[test]
+    fn a_bound_is_rounded_up_and_not_beyond_its_limit() {
+        for (value, limit, text) in [
+            (2.1383, 2.5, "2.2"),
+            (2.1383, 2.17, "2.14"),
+            (0.0061, 0.05, "0.0061"),
+            (0.006_01, 0.05, "0.0061"),
+            (0.049_96, 0.05, "0.050"),
+            (3.21, 0.05, "3.3"),
+            (0.3, 0.3, "0.30"),
+        ] {
+            assert_eq!(at_most(value, limit), text);
+        }
+        assert_eq!(at_most(f64::INFINITY, 1.0), "n/a");
     }
 
     #[test]

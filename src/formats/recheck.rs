@@ -43,7 +43,10 @@ impl Standing {
     /// The same where the data may be those that the calibration or the robot was made of.
     #[must_use]
     pub fn by(self, own_data: bool) -> Standing {
-        if own_data && self == Standing::StillValid { Standing::OwnData } else { self }
+        match self {
+            Standing::StillValid | Standing::Undecided if own_data => Standing::OwnData,
+            other => other,
+        }
     }
 
     /// With which status a check ends.

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::page::{self, Tone};
 use super::table::number;
-use crate::diagnostic::{summed, two_digits};
+use crate::diagnostic::{at_most, summed, two_digits};
 use crate::files::OutDir;
 
 /// What the commands wrote, as far as it is there.
@@ -107,6 +107,12 @@ fn limit(check: &Value) -> String {
     check.pointer("/tolerance_mm").map_or_else(|| "n/a".to_owned(), Value::to_string)
 }
 
+/// A bound on lengths, mm, which is rounded up.
+fn bound(check: &Value, pointer: &str) -> String {
+    let of = |pointer: &str| check.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    at_most(of(pointer), of("/tolerance_mm"))
+}
+
 /// Which of the checks says to what lengths can be trusted: the largest of those in mm.
 fn trusted_by(check: &Value) -> String {
     let trusted = check.pointer("/trusted_mm").and_then(Value::as_f64);
@@ -136,7 +142,7 @@ fn numbers(day: &Day) -> Vec<(String, String)> {
     [
         of(&day.check, &|c| {
             (
-                format!("{} mm", mm(c, "/judged_length/at_most_mm")),
+                format!("{} mm", bound(c, "/judged_length/at_most_mm")),
                 "largest length error of the rig with its uncertainty",
             )
         }),
@@ -203,7 +209,7 @@ fn rig(check: &Value) -> Markup {
         ("limit of E + U (tolerance)", limit(check), "mm"),
         ("largest E of any length", mm(check, "/max_abs_error_mm"), "mm"),
         ("95 % of lengths have an E below", mm(check, "/within_95_mm"), "mm"),
-        (trusted.as_str(), mm(check, "/trusted_mm"), "mm"),
+        (trusted.as_str(), bound(check, "/trusted_mm"), "mm"),
         ("reprojection residual, RMS", px(check, "/reprojection_rms_px"), "px"),
         ("epipolar error, RMS", px(check, "/epipolar/rms_px"), "px"),
         ("baseline", length(check, "/baseline_mm"), "mm"),

@@ -1,6 +1,6 @@
 //! `recheck.html` and the lines on stdout: whether the rig still stands, what the pairs would have shown, and how it stood before.
 
-use maud::html;
+use maud::{Markup, html};
 
 use super::Result;
 use super::drawing::figure::Plot;
@@ -105,13 +105,13 @@ pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks:
     )
 }
 
-/// The report. Also shows the run's `warnings`; `not_new` where the pairs are those of the calibration.
+/// The report. Also shows the run's `warnings`.
 pub fn page(
     recheck: &Recheck,
     standing: Standing,
     tolerance_mm: f64,
     checks: &[Check],
-    (warnings, not_new): (&[String], bool),
+    warnings: &[String],
 ) -> Result<String> {
     let numbers = vec![
         (format!("{} mm", two_digits(recheck.effect_mm)), "change of a length beyond chance".to_owned()),
@@ -142,28 +142,36 @@ pub fn page(
         p { "Each cause by itself, and the smallest change of it that nineteen of twenty such checks see. Of causes that move the same corners the same way \
              all show a change where one did." }
         (page::table(&header, &rows))
-        h2 { "Over time" }
-        (page::figure(&history(checks, tolerance_mm, "Change of a length")?, "Each check in this folder's history: a change above what would have been seen is none of chance, \
-            above the tolerance the calibration no longer holds. A check that found no change has the dot of what it would have seen alone."))
+        (history(checks, tolerance_mm, "Change of a length", "the calibration no longer holds")?)
     };
-    let compared = count(recheck.pairs.len(), if not_new { "pair" } else { "new pair" });
-    let lead = match not_new {
-        true => format!("{compared} against the calibration that was made of them"),
-        false => format!("{compared} against the calibration"),
-    };
+    let lead =
+        compared(recheck.pairs.len(), "pair", standing, ["the calibration", "the calibration that was made of them"]);
     Ok(page::page("Is the rig still the calibrated one?", &lead, &content))
 }
 
-/// The changes of all checks over their number; where nothing changed there is none.
-pub(super) fn history(checks: &[Check], tolerance_mm: f64, title: &str) -> Result<String> {
+/// What was compared with what: of `names` the second is for data that it was made of.
+pub(super) fn compared(found: usize, noun: &str, standing: Standing, [name, of_own]: [&str; 2]) -> String {
+    match standing {
+        Standing::OwnData => format!("{} against {of_own}", count(found, noun)),
+        _ => format!("{} against {name}", count(found, &format!("new {noun}"))),
+    }
+}
+
+/// The changes of all checks over their number; where nothing changed there is none. `beyond`: what a change above the tolerance means.
+pub(super) fn history(checks: &[Check], tolerance_mm: f64, title: &str, beyond: &str) -> Result<Markup> {
     let over = |of: fn(&Check) -> f64| -> Vec<(f64, f64)> {
         checks.iter().enumerate().map(|(i, check)| ((i + 1) as f64, of(check))).collect()
     };
-    Plot::new(title, "check", "mm")
+    let svg = Plot::new(title, "check", "mm")
         .whole_x()
         .points("changed by", &over(|check| check.effect_mm))
         .points("would have been seen", &over(|check| check.seen_mm))
         .hline(tolerance_mm, "tolerance")
         .log_y()
-        .svg()
+        .svg()?;
+    let caption = format!(
+        "Each check in this folder's history: a change above what would have been seen is none of chance, above the tolerance {beyond}. A check that \
+         found no change has the dot of what it would have seen alone."
+    );
+    Ok(html! { h2 { "Over time" } (page::figure(&svg, &caption)) })
 }

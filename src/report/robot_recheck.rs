@@ -4,7 +4,7 @@ use maud::html;
 
 use super::Result;
 use super::page;
-use super::recheck::{history, tone, word};
+use super::recheck::{compared, history, tone, word};
 use super::table::{Table, number, with_sigma};
 use crate::diagnostic::{count, two_digits};
 use crate::files::OutDir;
@@ -117,13 +117,13 @@ pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks:
     )
 }
 
-/// The report. Also shows the run's `warnings`; `not_new` where the poses are those that the robot was identified from.
+/// The report. Also shows the run's `warnings`.
 pub fn page(
     recheck: &Recheck,
     standing: Standing,
     tolerance_mm: f64,
     checks: &[Check],
-    (warnings, not_new): (&[String], bool),
+    warnings: &[String],
 ) -> Result<String> {
     let numbers = vec![
         (format!("{} mm", two_digits(recheck.effect_mm)), "movement of the target beyond chance".to_owned()),
@@ -143,15 +143,9 @@ pub fn page(
         p { "Each cause by itself, and the smallest change of it that nineteen of twenty such checks see; mm at the pose where it moves the target most, \
              " (sensor) ". The zero of joint 1 is seen as " (moved) "." }
         (page::table(&HEADER, &rows))
-        h2 { "Over time" }
-        (page::figure(&history(checks, tolerance_mm, "Movement of the target")?, "Each check in this folder's history: a change above what would have been seen \
-            is none of chance, above the tolerance the robot is no longer the identified one. A check that found no change has the dot of what it would have \
-            seen alone."))
+        (history(checks, tolerance_mm, "Movement of the target", "the robot is no longer the identified one")?)
     };
-    let compared = count(recheck.poses.len(), if not_new { "pose" } else { "new pose" });
-    let lead = match not_new {
-        true => format!("{compared} against the robot that was identified from them"),
-        false => format!("{compared} against the identified robot"),
-    };
+    let names = ["the identified robot", "the robot that was identified from them"];
+    let lead = compared(recheck.poses.len(), "pose", standing, names);
     Ok(page::page("Is it still the identified robot?", &lead, &content))
 }

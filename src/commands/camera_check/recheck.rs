@@ -53,7 +53,7 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let content = RecheckFile::new(&found, standing, &file, tolerance_mm);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check::new(&content, date));
-    let page = report::recheck::page(&found, standing, tolerance_mm, &checks, (&warnings, own.is_some()))?;
+    let page = report::recheck::page(&found, standing, tolerance_mm, &checks, &warnings)?;
     let json = out.write_json("recheck.json", &content)?;
     out.write(HISTORY, formats::to_csv(&checks, "pairs").as_bytes())?;
     report::page::write(&out, "recheck.html", page)?;

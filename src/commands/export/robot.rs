@@ -24,8 +24,8 @@ pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
     let inputs = [Some(&args.robot), args.nominal_urdf.as_ref(), args.nominal.as_ref()];
     let inputs: Vec<&camino::Utf8Path> = inputs.into_iter().flatten().map(|path| path.as_path()).collect();
     let out = out.for_run(&Run { force: args.files.force, ..run }, &inputs);
-    let known = Known { over: known::identified_over(&args.robot, &robot), robot };
-    let exported = export(args, &known)?;
+    let identified = Identified { over: known::identified_over(&args.robot, &robot), robot };
+    let exported = export(args, &identified)?;
     if !args.files.force {
         spare_other_robots(&out.join(exported.name), &exported)?;
     }
@@ -33,7 +33,7 @@ pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
         RobotFormat::Toml => out.write_toml(exported.name, &exported.text)?,
         _ => out.write(exported.name, exported.text.as_bytes())?,
     }
-    let mut stdout = format!("{}\n{}\n", out.join(exported.name), fidelity(&known, &exported.carried));
+    let mut stdout = format!("{}\n{}\n", out.join(exported.name), fidelity(&identified, &exported.carried));
     exported.notes.iter().for_each(|note| stdout.push_str(&format!("note: {note}\n")));
     Ok(Outcome { stdout, status: Status::Done })
 }
@@ -50,8 +50,8 @@ fn spare_other_robots(path: &camino::Utf8Path, exported: &ExportedRobot) -> Resu
     Err(Error::NotExportable { message, hint: "another `--out`, or `--force`".to_owned() }.into())
 }
 
-fn export(args: &ExportRobot, known: &Known) -> Result<ExportedRobot> {
-    let (robot, plain) = (&known.robot, || known.plain());
+fn export(args: &ExportRobot, identified: &Identified) -> Result<ExportedRobot> {
+    let (robot, plain) = (&identified.robot, || identified.plain());
     Ok(match (args.format, &args.nominal_urdf) {
         (RobotFormat::Toml, _) => {
             ExportedRobot { name: "robot.toml", text: file::to_toml(robot), carried: robot.clone(), notes: Vec::new() }
@@ -123,12 +123,12 @@ fn nominal(args: &ExportRobot, robot: &Robot) -> Result<Robot> {
 }
 
 /// A robot, and the ranges of its joints over which it was identified, where they are known.
-struct Known {
+struct Identified {
     robot: Robot,
     over: Option<Vec<(f64, f64)>>,
 }
 
-impl Known {
+impl Identified {
     /// With the ranges in which it is to be met.
     fn met(&self) -> Robot {
         self.over.as_ref().map_or_else(|| self.robot.clone(), |ranges| self.robot.within(ranges))
@@ -143,10 +143,10 @@ impl Known {
 }
 
 /// How well the file carries the robot.
-fn fidelity(known: &Known, carried: &Robot) -> String {
-    let robot = &known.robot;
-    let off = Residual::between(&known.met(), carried);
-    let over = if known.over.is_some() { "the ranges that were measured" } else { "the joints' ranges" };
+fn fidelity(identified: &Identified, carried: &Robot) -> String {
+    let robot = &identified.robot;
+    let off = Residual::between(&identified.met(), carried);
+    let over = if identified.over.is_some() { "the ranges that were measured" } else { "the joints' ranges" };
     if off.max_mm < ROUNDING_MM {
         return format!("flange poses equal to {:.0e} mm over {over}", off.max_mm.max(1e-12));
     }

@@ -47,13 +47,10 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let own = made_by.as_ref().and_then(|run| run.shares(&record));
     let said =
         |same| format!("this robot was identified from {same}: only new poses tell whether it still is that robot");
-    let mut warnings: Vec<String> = shift.into_iter().chain(own.map(said)).collect();
+    let skipped = set.skipped.iter().map(|pose| format!("pose {} is not compared: {}", pose.pose, pose.reason));
+    let warnings: Vec<String> = shift.into_iter().chain(own.map(said)).chain(skipped).collect();
     warnings.iter().for_each(progress::warn);
     let found = recheck(&set, &robot, &before, &placed)?;
-    for skipped in &set.skipped {
-        warnings.push(format!("pose {} is not compared: {}", skipped.pose, skipped.reason));
-        warnings.last().into_iter().for_each(progress::warn);
-    }
     // A change that is smaller than what the robot was off by anyway is none to act on.
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm.max(before.p95_mm));
     let mut content = RobotRecheckFile::new(&found, against, tolerance_mm);
@@ -69,8 +66,7 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
         seen_mm: found.seen_mm,
         length_mm: None,
     });
-    let page =
-        report::robot_recheck::page(&found, content.standing, tolerance_mm, &checks, (&warnings, own.is_some()))?;
+    let page = report::robot_recheck::page(&found, content.standing, tolerance_mm, &checks, &warnings)?;
     let json = out.write_json("verify.json", &content)?;
     out.write(HISTORY, formats::to_csv(&checks, "poses").as_bytes())?;
     report::page::write(&out, "verify.html", page)?;

@@ -3,7 +3,7 @@
 mod figures;
 mod summary;
 
-use crate::diagnostic::{Warning, aligned, two_digits};
+use crate::diagnostic::{Warning, aligned, at_most, two_digits};
 use crate::imaging::Corners;
 use crate::report::Result;
 use crate::report::blur;
@@ -43,7 +43,7 @@ fn happened(judged: &Judged) -> Vec<String> {
 fn warnings(judged: &Judged) -> Vec<String> {
     let line = |warning: &Warning| judged.evidence.iter().find(|line| line.detail == warning.reason);
     let said = |warning: &Warning| match line(warning) {
-        Some(line) => format!("{}: {}; {}", line.what, line.short_figure(), line.remedy),
+        Some(line) => format!("{}: {}; {}", line.name(), line.short_figure(), line.remedy),
         None => warning.whole(),
     };
     judged.warnings.iter().map(said).collect()
@@ -110,7 +110,7 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
                 "length can be trusted: what they may be off by is more than a tenth of them".to_owned(),
             ),
             Some(trusted_mm) => (
-                mm(trusted_mm),
+                format!("{} mm", at_most(trusted_mm, judged.facts.tolerance_mm)),
                 format!("lengths can be trusted to this; the tolerance is {} mm", judged.facts.tolerance_mm),
             ),
             None => (

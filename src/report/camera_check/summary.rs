@@ -1,6 +1,6 @@
 //! The verdict in words, and the table on stdout.
 
-use crate::diagnostic::{count, two_digits};
+use crate::diagnostic::{at_most, count, two_digits};
 use crate::files::OutDir;
 use crate::imaging::corners::named;
 use crate::report::table::{Table, number};
@@ -280,7 +280,7 @@ pub(super) fn advice(judged: &Judged) -> String {
                 Extent::Boards => "the volume where the boards stood".to_owned(),
                 asked => asked.said(),
             };
-            format!("Lengths can be trusted to {} mm in {over}.", two_digits(trusted))
+            format!("Lengths can be trusted to {} mm in {over}.", at_most(trusted, sure))
         }
         Verdict::Undecided => format!(
             "Not decided: the checks below that are not passed say why and what to do; until then do not rely on {sure} mm."
