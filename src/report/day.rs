@@ -323,7 +323,7 @@ mod tests {
         shown("E + U", "0.0139");
         shown("limit of E + U (tolerance)", "0.05");
         shown("largest E of any length", "0.012");
-        shown("lengths can be trusted to (the largest of all checks in mm: any length)", "0.021");
+        shown("lengths can be trusted to (the largest of all checks in mm: any length)", "0.022");
         assert!(summary_line(&day("pass")).contains("error 0.0118 mm + expanded uncertainty 0.0021 mm = 0.0139 mm"));
     }
 
