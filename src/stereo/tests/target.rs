@@ -5,11 +5,11 @@ use nalgebra::{Vector3, Vector6};
 use super::*;
 use crate::geometry::transform;
 use crate::imaging::Board;
-use crate::stereo::Rig;
 use crate::stereo::board_pose::pair_excess::pair_excess;
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::series;
 use crate::stereo::board_pose::{Knowledge, Seen};
+use crate::stereo::{Lens, Rig};
 
 /// A rig and a target of which nothing else is known.
 fn known(rig: &Rig, board: Board) -> Knowledge {
@@ -105,5 +105,27 @@ fn the_pairs_of_a_calibration_are_measured_by_it() {
         assert_eq!(refused(&corners), Vec::<String>::new(), "{turn_deg}");
         corners.pairs[7] = world.corners_by_hand(43, 30.0 * turn_deg).pairs[7].clone();
         assert_eq!(refused(&corners), [corners.pairs[7].pair.clone()], "{turn_deg}");
+    }
+}
+
+/// A lens with a free tilt and no distortion leaves open where its axis points: what turns all points about the camera together is no error.
+#[test]
+fn points_are_not_off_by_what_turns_them_all_together() {
+    let mut world = World::new(20, 37).with_lens(Lens::Tilted14, |d| d.fill(0.0));
+    world.sigma_px = 0.02;
+    let tilted = Options { lens: Some(Lens::Tilted14), ..BROWN4 };
+    let found = calibrate(&world.corners(38), &tilted).unwrap();
+    let known = Knowledge { noise: Some(found.own_noise), ..known(found.rig(), world.board) };
+    for turn_deg in [0.02_f64, 0.05] {
+        let mut turned = world.clone();
+        let turn = transform(Vector3::new(0.0, turn_deg.to_radians(), 0.0), Vector3::zeros());
+        turned.rig.right_from_left = turn * turned.rig.right_from_left;
+        let measured = series::measure(&known, run_of(turned.corners(39)));
+        let (Judgement::Allowed(changed) | Judgement::Contradicts(changed)) = measured.judgement else {
+            panic!("{turn_deg}: {:?}", measured.judgement)
+        };
+        // A depth of 560 mm is off by 560^2 / 192 times the turn.
+        let depth_mm = 560.0 * 560.0 / 192.0 * turn_deg.to_radians();
+        assert!((0.5 * depth_mm..1.5 * depth_mm).contains(&changed.moves_mm), "{turn_deg}: {changed:?}, {depth_mm}");
     }
 }

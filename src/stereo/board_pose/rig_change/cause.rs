@@ -6,6 +6,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use crate::geometry::nearest_rotation;
 use crate::imaging::Board;
 use crate::stereo::board_pose::solve::estimate::Estimate;
 use crate::stereo::board_pose::solve::prior::{stretch_length_mm, stretch_mode};
@@ -166,16 +167,20 @@ pub(in crate::stereo::board_pose) fn stretch(found: &Estimate<'_>) -> [f64; 2] {
     [mode.dot(&deviations) / length, variance.max(0.0).sqrt() / length]
 }
 
-/// Change of the mark points between two minima: the root of the mean square over the poses, mm.
-pub(in crate::stereo::board_pose) fn moved_mm(a: &Estimate<'_>, b: &Estimate<'_>) -> f64 {
-    let squares: Vec<f64> = a
+/// By how much the mark point of each pose moves from one minimum to another, mm, but for a turn of all points about the left camera. Where
+/// the left camera's axis points is a word of its lens: with an open tilt of the sensor or an open picture centre, all points turn together, and
+/// nothing that is measured between them does.
+pub(in crate::stereo::board_pose) fn shifts_mm(a: &Estimate<'_>, b: &Estimate<'_>) -> Vec<Option<Vector3<f64>>> {
+    let points: Vec<_> = a
         .values
         .poses
         .iter()
         .zip(&b.values.poses)
-        .filter_map(|(a, b)| Some((a.as_ref()?.translation.vector - b.as_ref()?.translation.vector).norm_squared()))
+        .map(|(a, b)| Some((a.as_ref()?.translation.vector, b.as_ref()?.translation.vector)))
         .collect();
-    crate::stereo::data::residuals::root_mean_square(&squares).unwrap_or(0.0)
+    let together = points.iter().flatten().map(|(a, b)| a * b.transpose()).sum();
+    let a_from_b = nearest_rotation(&together);
+    points.iter().map(|both| both.map(|(a, b)| a_from_b * b - a)).collect()
 }
 
 /// The matrix that takes the shared unknowns to the rig's named numbers and the crossings' deviations.

@@ -5,14 +5,16 @@
 //! points by less than the tolerance, or than their own uncertainty allows, goes into their covariance: the calibration is believed only
 //! as far as the change reaches. A larger one ends the run.
 
+use nalgebra::Vector3;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::statistics::median;
-use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, moved_mm, stretch};
+use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, shifts_mm, stretch};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
 use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
 use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
 use crate::stereo::board_pose::solve::prior::{bent_modes, stretch_length_mm};
+use crate::stereo::data::residuals::root_mean_square;
 
 /// A cause that lowers chi-square by less than this is chance, where the scatter of the poses is known before: four standard deviations.
 const CHANCE: f64 = 16.0;
@@ -72,8 +74,10 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
     let on_rig = fitted.iter().map(|(_, e)| e).find(|e| e.cause != Cause::Pitch).unwrap_or(&first);
     let known = on_rig.amount.powi(2).max(f64::MIN_POSITIVE);
     let Some(free) = with_cause(&found, on_rig, f64::INFINITY, usual) else { return (found, None) };
-    let changed =
-        Changed { explanations: equals, moves_mm: moved_mm(&found, &free), beyond: beyond(&found, &free), fall: best };
+    let shifts_mm = shifts_mm(&found, &free);
+    let squares: Vec<f64> = shifts_mm.iter().flatten().map(|shift| shift.norm_squared()).collect();
+    let moves_mm = root_mean_square(&squares).unwrap_or(0.0);
+    let changed = Changed { explanations: equals, moves_mm, beyond: beyond(&found, &free, &shifts_mm), fall: best };
     match with_cause(&found, on_rig, known, usual) {
         Some(allowed) => (allowed, Some(changed)),
         None => (free, Some(changed)),
@@ -90,12 +94,8 @@ fn chance(found: &Estimate<'_>, usual: Usual) -> f64 {
 }
 
 /// By how much the points move between two minima, in units of what the second leaves open of each and the first of what they share.
-fn beyond(known: &Estimate<'_>, free: &Estimate<'_>) -> f64 {
-    let poses = known.values.poses.iter().zip(&free.values.poses).enumerate();
-    let each = poses.filter_map(|(i, (a, b))| {
-        let shift_mm = b.as_ref()?.translation.vector - a.as_ref()?.translation.vector;
-        free.beyond(known, i, &shift_mm)
-    });
+fn beyond(known: &Estimate<'_>, free: &Estimate<'_>, shifts_mm: &[Option<Vector3<f64>>]) -> f64 {
+    let each = shifts_mm.iter().enumerate().filter_map(|(i, shift_mm)| free.beyond(known, i, shift_mm.as_ref()?));
     median(each).unwrap_or(0.0)
 }
 
