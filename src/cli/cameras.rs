@@ -12,7 +12,7 @@ use crate::formats::boards::files::named;
 use crate::formats::lenses::LensFile;
 use crate::imaging::board::SQUARES_MM;
 use crate::imaging::board::printed::PrintedExtent;
-use crate::imaging::input::pairs::{PairBy, Source};
+use crate::imaging::input::pairs::{Halves, PairBy, Source};
 use crate::imaging::{Board, Mosaic, Squares};
 use crate::ranges::TOLERANCES_MM;
 use crate::stereo::Lens;
@@ -26,18 +26,25 @@ pub struct Pairs {
     #[arg(value_name = "RIGHT")]
     pub right: Option<Utf8PathBuf>,
     /// How pictures are paired [default: names, else the numbers in them]
-    #[arg(long, value_name = "HOW", conflicts_with = "side_by_side")]
+    #[arg(long, value_name = "HOW", conflicts_with_all = ["side_by_side", "top_bottom"])]
     pub pair_by: Option<PairBy>,
     /// Each picture holds both views: its left half is the left camera's
     #[arg(long, conflicts_with_all = ["right", "bayer"])]
     pub side_by_side: bool,
+    /// Each picture holds both views: its upper half is the left camera's
+    #[arg(long, conflicts_with_all = ["right", "bayer", "side_by_side"])]
+    pub top_bottom: bool,
 }
 
 impl Pairs {
     /// Where the pictures are.
     pub fn source<'a>(&'a self, command: &'a str, images: &'a Utf8Path) -> Source<'a> {
-        let Pairs { right, pair_by, side_by_side } = self;
-        Source { command, images, right: right.as_deref(), by: *pair_by, side_by_side: *side_by_side }
+        let halves = match (self.side_by_side, self.top_bottom) {
+            (true, _) => Some(Halves::SideBySide),
+            (_, true) => Some(Halves::TopBottom),
+            _ => None,
+        };
+        Source { command, images, right: self.right.as_deref(), by: self.pair_by, halves }
     }
 }
 
@@ -160,7 +167,7 @@ pub struct Measure {
     #[arg(long, value_name = "PATTERN")]
     pub bayer: Option<Mosaic>,
     /// Measure pictures as they arrive; ends when all of poses.csv are there, or on Ctrl-C
-    #[arg(long, conflicts_with = "side_by_side")]
+    #[arg(long, conflicts_with_all = ["side_by_side", "top_bottom"])]
     pub watch: bool,
     /// Draw the corners found over each pair, into overlays/ in the results folder
     #[arg(long)]

@@ -50,12 +50,14 @@ pub enum Error {
         hint: String,
     },
     /// A picture that cannot be cut into two equal halves.
-    #[error("the picture is {width} px wide, which are no two equal halves")]
-    OddWidth {
+    #[error("the picture is {px} px {}, which are no two equal halves", .way.0)]
+    NoHalves {
         /// The picture.
         path: Utf8PathBuf,
-        /// Its width, px.
-        width: usize,
+        /// Its width or height, px.
+        px: usize,
+        /// "wide" or "high", and the flag that asked for the halves.
+        way: (&'static str, &'static str),
     },
     /// Two files that would be the same picture of the same pair.
     #[error("two pictures claim the same side of pair `{pair}`: {first} and {second}")]
@@ -139,7 +141,7 @@ impl Explain for Error {
             | Error::NotAFolder { path }
             | Error::NotRight { path, .. }
             | Error::Unpaired { path, .. }
-            | Error::OddWidth { path, .. }
+            | Error::NoHalves { path, .. }
             | Error::NoneReadable { path, .. }
             | Error::NotCounted { path, .. }
             | Error::TooFewPairs { path, .. } => Some(path.to_string()),
@@ -159,7 +161,9 @@ impl Explain for Error {
                 "a second folder is that of the right camera's pictures; other places are named by their flags, results by `--out {path}`"
             )),
             Error::Unpaired { hint, .. } => Some(hint.clone()),
-            Error::OddWidth { .. } => Some("`--side-by-side` is for pictures that hold both views, each as wide as the other".to_owned()),
+            Error::NoHalves { way: (extent, flag), .. } => {
+                Some(format!("`{flag}` is for pictures that hold both views, one as {extent} as the other"))
+            }
             Error::SameName { .. } => Some("remove or rename one of them".to_owned()),
             Error::NoneReadable { .. } => Some(SAVED_AS.to_owned()),
             Error::NotCounted { .. } => {

@@ -11,12 +11,12 @@ fn done(folder: &Path, arguments: &[&str]) -> String {
     stderr(&output)
 }
 
-/// A small world, its pictures also under other names: `cams/cam1/b0001.png` with `cams/cam2/a0001.png`, halves in `wide/`.
+/// A small world, its pictures also under other names: `cams/cam1/b0001.png` with `cams/cam2/a0001.png`, both views in each of `wide/` and `high/`.
 fn world() -> tempfile::TempDir {
     let folder = workplace();
     let root = folder.path();
     done(root, &["simulate", "--preset", "small", "--check-pairs", "10", "--out", "world"]);
-    for name in ["cams/cam1", "cams/cam2", "wide"] {
+    for name in ["cams/cam1", "cams/cam2", "wide", "high"] {
         std::fs::create_dir_all(root.join(name)).unwrap();
     }
     for entry in std::fs::read_dir(root.join("world/check/left")).unwrap() {
@@ -29,7 +29,11 @@ fn world() -> tempfile::TempDir {
         let both = image::GrayImage::from_fn(2 * left.width(), left.height(), |x, y| {
             *if x < left.width() { left.get_pixel(x, y) } else { right.get_pixel(x - left.width(), y) }
         });
-        both.save(root.join("wide").join(name)).unwrap();
+        both.save(root.join("wide").join(&name)).unwrap();
+        let both = image::GrayImage::from_fn(left.width(), 2 * left.height(), |x, y| {
+            *if y < left.height() { left.get_pixel(x, y) } else { right.get_pixel(x, y - left.height()) }
+        });
+        both.save(root.join("high").join(name)).unwrap();
     }
     folder
 }
@@ -59,6 +63,17 @@ fn the_same_pictures_give_the_same_rig_whatever_their_names() {
     let (halves, said) = check(&["wide", "--side-by-side"], "halves");
     assert!(said.contains("10 pairs: the left and the right half of each picture in wide"), "{said}");
     assert!(halves == plain);
+    let (halves, said) = check(&["high", "--top-bottom"], "halves");
+    assert!(said.contains("10 pairs: the upper and the lower half of each picture in high"), "{said}");
+    assert!(halves == plain);
+    // Neither can be told from the names; the form of the pictures says which flag may be meant.
+    for (name, flag) in [
+        ("wide", "`stereocal camera-check wide --side-by-side`"),
+        ("high", "`stereocal camera-check high --top-bottom`"),
+    ] {
+        let output = stereocal(root, &["camera-check", name]);
+        assert!(output.status.code() == Some(2) && stderr(&output).contains(flag), "{}", stderr(&output));
+    }
     // Exchanged by name: the geometry says so.
     let (_, said) = check(&["cams/cam2", "cams/cam1"], "exchanged");
     assert!(said.contains("are left and right exchanged?"), "{said}");

@@ -7,7 +7,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 use super::listing::{Aside, Folder, list};
 use super::names::{Open, Reach};
 use super::readings::{Reading, Told};
-use super::{PairBy, Pairing, Source};
+use super::{Halves, PairBy, Pairing, Source};
 use crate::diagnostic::count;
 use crate::imaging::{Error, Side, image, video};
 
@@ -256,10 +256,11 @@ pub fn same(source: &Source<'_>) -> Error {
 
 /// Nothing tells left from right.
 fn untold(source: &Source<'_>, holding: &[&Folder], pictures: usize) -> (String, String) {
-    let wide = holding.iter().find(|folder| folder.pictures.first().is_some_and(|path| is_wide(path)));
-    let halves = wide.map(|folder| {
-        let call = Call::new(source, vec![&folder.path], "--side-by-side");
-        format!("if each picture holds both halves: {call}")
+    let two_views = holding.iter().find_map(|folder| Some((folder, as_of_two(folder.pictures.first()?)?)));
+    let halves = two_views.map(|(folder, halves)| {
+        let call = Call::new(source, vec![&folder.path], halves.flag());
+        let [left, right] = halves.words();
+        format!("if the {left} half of each picture is the left camera's and the {right} one the right's: {call}")
     });
     let below = left_first(holding);
     let (statement, hint) = match below.as_slice() {
@@ -275,9 +276,14 @@ fn untold(source: &Source<'_>, holding: &[&Folder], pictures: usize) -> (String,
     (statement, halves.map_or(hint.clone(), |halves| format!("{halves}; else {hint}")))
 }
 
-/// Whether a picture is as wide as two beside each other, none of which is taller than wide.
-fn is_wide(path: &Utf8Path) -> bool {
-    image::header(path).is_ok_and(|header| header.width >= 2 * header.height)
+/// How a picture of this form would hold two, none of which is taller than wide.
+fn as_of_two(path: &Utf8Path) -> Option<Halves> {
+    let header = image::header(path).ok()?;
+    match (header.width, header.height) {
+        (width, height) if width >= 2 * height => Some(Halves::SideBySide),
+        (width, height) if height >= width => Some(Halves::TopBottom),
+        _ => None,
+    }
 }
 
 impl Pairing {

@@ -9,6 +9,9 @@ impl Source<'_> {
     /// Finds the pairs. At least one, else an error that says what was there. Halves of pictures are written among the program's own
     /// files in `out`.
     pub fn pairs(&self, out: &OutDir) -> Result<Pairing> {
-        if self.side_by_side { halves::split(self, out) } else { self.whole_pictures() }
+        match self.halves {
+            Some(halves) => halves::split(self, halves, out),
+            None => self.whole_pictures(),
+        }
     }
 }

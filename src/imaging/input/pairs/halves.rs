@@ -1,14 +1,14 @@
-//! Pictures that hold both views beside each other, cut into two.
+//! Pictures that hold both views, beside or above each other, cut into two.
 //!
-//! In: pictures of even width. Out: pairs of pictures of half the width in the pictures' own depth and colours, PNG, among the program's
-//! own files in the results folder. Goes wrong: an odd width. A picture that cannot be decoded stays as it is, and its reader says why.
+//! In: pictures of even width or height. Out: pairs of pictures of half of it in the pictures' own depth and colours, PNG, among the program's
+//! own files in the results folder. Goes wrong: an odd width or height. A picture that cannot be decoded stays as it is, and its reader says why.
 
 use camino::{Utf8Path, Utf8PathBuf};
 use rayon::prelude::*;
 
 use super::folders::the_pictures;
 use super::listing::list;
-use super::{PairFiles, Pairing, Source, natural_order};
+use super::{Halves, PairFiles, Pairing, Source, natural_order};
 use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::imaging::image::raster::{Raster, Samples};
@@ -16,16 +16,17 @@ use crate::imaging::image::{self, Claim};
 use crate::imaging::{Error, Result, Side};
 
 /// Cuts the pictures of the folder, or of the only one below that holds any.
-pub fn split(source: &Source<'_>, out: &OutDir) -> Result<Pairing> {
+pub fn split(source: &Source<'_>, halves: Halves, out: &OutDir) -> Result<Pairing> {
     let mut folder = the_pictures(source, list(source.images)?)?;
     folder.pictures.sort_by(|a, b| natural_order(stem(a), stem(b)));
     if let Some(two) = folder.pictures.windows(2).find(|two| stem(&two[0]) == stem(&two[1])) {
         let (pair, first, second) = (stem(&two[0]).to_owned(), two[0].clone(), two[1].clone());
         return Err(Error::SameName { pair, first, second });
     }
-    let pairs = folder.pictures.par_iter().map(|path| one(path, out)).collect::<Result<Vec<PairFiles>>>()?;
+    let pairs = folder.pictures.par_iter().map(|path| one(path, halves, out)).collect::<Result<Vec<PairFiles>>>()?;
+    let [left, right] = halves.words();
     let taken =
-        format!("{}: the left and the right half of each picture in {}", count(pairs.len(), "pair"), folder.path);
+        format!("{}: the {left} and the {right} half of each picture in {}", count(pairs.len(), "pair"), folder.path);
     Ok(Pairing { place: source.images.to_owned(), pairs, taken, aside: folder.aside, ..Pairing::default() })
 }
 
@@ -33,15 +34,16 @@ fn stem(path: &Utf8Path) -> &str {
     path.file_stem().unwrap_or_default()
 }
 
-fn one(path: &Utf8PathBuf, out: &OutDir) -> Result<PairFiles> {
+fn one(path: &Utf8PathBuf, halves: Halves, out: &OutDir) -> Result<PairFiles> {
     let pair = stem(path).to_owned();
     let Ok(whole) = read(path) else { return Ok(PairFiles { pair, left: path.clone(), right: path.clone() }) };
-    if whole.width % 2 == 1 {
-        return Err(Error::OddWidth { path: path.clone(), width: whole.width });
+    let px = if halves == Halves::SideBySide { whole.width } else { whole.height };
+    if px % 2 == 1 {
+        return Err(Error::NoHalves { path: path.clone(), px, way: (halves.extent(), halves.flag()) });
     }
     let write = |side: Side| {
         let name = format!(".stereocal/halves/{}/{pair}.png", side.name());
-        let png = half(&whole, side).png();
+        let png = half(&whole, halves, side).png();
         png.map_or(Ok(path.clone()), |png| out.write_scratch(&name, &png).map(|()| out.join(&name)))
     };
     Ok(PairFiles { left: write(Side::Left)?, right: write(Side::Right)?, pair })
@@ -53,18 +55,25 @@ fn read(path: &Utf8Path) -> std::result::Result<Raster, String> {
     Raster::read(path, &header, None)
 }
 
-/// One half of a picture of even width.
-fn half(whole: &Raster, side: Side) -> Raster {
-    let width = whole.width / 2;
-    let (row, half) = (whole.width * whole.channels, width * whole.channels);
-    let start = if side == Side::Left { 0 } else { half };
+/// One half of a picture whose extent there is even.
+fn half(whole: &Raster, halves: Halves, side: Side) -> Raster {
+    let (width, height) = match halves {
+        Halves::SideBySide => (whole.width / 2, whole.height),
+        Halves::TopBottom => (whole.width, whole.height / 2),
+    };
+    // Both views above each other are two runs of samples; beside each other, two runs in each row.
+    let run = match halves {
+        Halves::SideBySide => width * whole.channels,
+        Halves::TopBottom => width * height * whole.channels,
+    };
+    let start = if side == Side::Left { 0 } else { run };
     let samples = match &whole.samples {
         Samples::Eight(v) => {
-            Samples::Eight(v.chunks_exact(row).flat_map(|r| &r[start..start + half]).copied().collect())
+            Samples::Eight(v.chunks_exact(2 * run).flat_map(|r| &r[start..start + run]).copied().collect())
         }
         Samples::Sixteen(v) => {
-            Samples::Sixteen(v.chunks_exact(row).flat_map(|r| &r[start..start + half]).copied().collect())
+            Samples::Sixteen(v.chunks_exact(2 * run).flat_map(|r| &r[start..start + run]).copied().collect())
         }
     };
-    Raster { width, height: whole.height, channels: whole.channels, samples }
+    Raster { width, height, channels: whole.channels, samples }
 }

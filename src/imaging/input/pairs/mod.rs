@@ -21,4 +21,4 @@ mod readings;
 mod tests;
 
 pub use names::natural_order;
-pub use pairing::{PairBy, PairFiles, Pairing, Source};
+pub use pairing::{Halves, PairBy, PairFiles, Pairing, Source};

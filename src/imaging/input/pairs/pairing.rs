@@ -48,8 +48,43 @@ pub struct Source<'a> {
     pub right: Option<&'a Utf8Path>,
     /// How they are paired; `None` is by name, else by number.
     pub by: Option<PairBy>,
-    /// Whether each picture holds both halves.
-    pub side_by_side: bool,
+    /// How each picture holds both views, if it does.
+    pub halves: Option<Halves>,
+}
+
+/// How a picture holds both views.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Halves {
+    /// The left camera's on the left.
+    SideBySide,
+    /// The left camera's on top.
+    TopBottom,
+}
+
+impl Halves {
+    /// The flag that says so.
+    pub fn flag(self) -> &'static str {
+        match self {
+            Halves::SideBySide => "--side-by-side",
+            Halves::TopBottom => "--top-bottom",
+        }
+    }
+
+    /// The two halves, the left camera's first.
+    pub fn words(self) -> [&'static str; 2] {
+        match self {
+            Halves::SideBySide => ["left", "right"],
+            Halves::TopBottom => ["upper", "lower"],
+        }
+    }
+
+    /// The extent that is cut.
+    pub fn extent(self) -> &'static str {
+        match self {
+            Halves::SideBySide => "wide",
+            Halves::TopBottom => "high",
+        }
+    }
 }
 
 /// A folder understood.
@@ -72,7 +107,7 @@ pub struct Pairing {
 impl<'a> Source<'a> {
     /// One folder, read as it is.
     pub fn folder(command: &'a str, images: &'a Utf8Path) -> Source<'a> {
-        Source { command, images, right: None, by: None, side_by_side: false }
+        Source { command, images, right: None, by: None, halves: None }
     }
 
     /// The folders that were named.
