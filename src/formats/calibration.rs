@@ -5,12 +5,15 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{checked, export};
+use crate::diagnostic::two_digits;
 use crate::files::{self, OutDir, Result};
 use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::moves::KnownMove;
+use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::model::rig::{Covariance, Rig};
 use crate::stereo::volume::Volume;
 use crate::stereo::{Camera, Lens};
@@ -39,6 +42,9 @@ pub struct CalibrationFile {
     /// The volume that the verdict was for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     volume: Option<Volume>,
+    /// The verdict on the rig.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    check: Option<Check>,
     /// The board that calibrated, by its name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     board: Option<String>,
@@ -60,6 +66,16 @@ struct BoardsRecord {
     farthest_mm: f64,
 }
 
+/// How the check of the rig's lengths ended.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct Check {
+    verdict: Verdict,
+    tolerance_mm: f64,
+    /// What lengths can be trusted to; none where something else than a length stands against the rig.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    trusted_mm: Option<f64>,
+}
+
 /// A rig and what its calibration says beside it; files made elsewhere do not say that.
 #[derive(Debug, Clone)]
 pub struct Calibrated {
@@ -72,6 +88,8 @@ pub struct Calibrated {
     pub pairs: Option<usize>,
     /// The volume that the verdict was for.
     pub volume: Option<Volume>,
+    /// The verdict.
+    pub check: Option<Check>,
     pub board: Option<Board>,
     /// The calibration's last pairs, where they contradict the rig.
     pub unconfirmed: Vec<String>,
@@ -86,9 +104,29 @@ impl Calibrated {
             pair_excess: None,
             pairs: None,
             volume: None,
+            check: None,
             board: None,
             unconfirmed: Vec::new(),
         }
+    }
+
+    /// What its own calibration says against the rig, for those who use it.
+    pub fn doubts(&self) -> Vec<String> {
+        let changed = self.unconfirmed.first().map(|last| {
+            format!("the calibration's last pairs contradict it (from pair {last} on): the rig may have changed since. Calibrate it as it is now")
+        });
+        let failed = self.check.filter(|check| check.verdict != Verdict::Pass).map(|check| {
+            let verdict = if check.verdict == Verdict::Fail { "FAIL" } else { "UNDECIDED" };
+            let trusted = check.trusted_mm.filter(|mm| mm.is_finite()).map_or_else(
+                || "no length can be trusted".to_owned(),
+                |mm| format!("lengths can be trusted to {} mm", two_digits(mm)),
+            );
+            format!(
+                "this rig did not pass its check ({verdict} at a tolerance of {} mm): {trusted}",
+                check.tolerance_mm
+            )
+        });
+        changed.into_iter().chain(failed).collect()
     }
 }
 
@@ -183,6 +221,7 @@ impl From<&Rig> for CalibrationFile {
             corner_noise: None,
             boards: None,
             volume: None,
+            check: None,
             board: None,
             unconfirmed: Vec::new(),
             changes_since: Vec::new(),
@@ -192,18 +231,15 @@ impl From<&Rig> for CalibrationFile {
 }
 
 impl CalibrationFile {
-    /// The same with how corners scattered, between which depths the boards' corners were, the volume that the verdict was for, the last
-    /// pairs where they contradict the rig, and how it changed since the moment that it is that of.
-    pub fn with_check(
-        mut self,
-        calibration: &Calibration,
-        pair_excess: f64,
-        [nearest_mm, farthest_mm]: [f64; 2],
-        volume: &Volume,
-        moves: &[KnownMove],
-    ) -> CalibrationFile {
+    /// The same with how corners scattered, between which depths the boards' corners were, the verdict and the volume that it was for, the
+    /// last pairs where they contradict the rig, and how it changed since the moment that it is that of.
+    pub fn with_check(mut self, calibration: &Calibration, pair_excess: f64, judged: &Judged) -> CalibrationFile {
         let noise = &calibration.own_noise;
-        self.volume = Some(volume.clone());
+        let facts = &judged.facts;
+        let [nearest_mm, farthest_mm] = facts.coverage.corner_depths_mm;
+        let (verdict, tolerance_mm, trusted_mm) = (judged.verdict, facts.tolerance_mm, judged.trusted_mm());
+        self.check = Some(Check { verdict, tolerance_mm, trusted_mm });
+        self.volume = Some(facts.volume.volume.clone());
         self.unconfirmed = calibration.standing.unconfirmed.clone();
         self.changes_since = calibration.since_moment.iter().map(|step| step.as_slice().to_vec()).collect();
         self.corner_noise = Some(NoiseRecord {
@@ -214,7 +250,7 @@ impl CalibrationFile {
         });
         self.boards = Some(BoardsRecord { nearest_mm, farthest_mm });
         self.board = Some(calibration.board.to_string());
-        self.known_moves = moves.to_vec();
+        self.known_moves = facts.standards.moves.measured.clone();
         self
     }
 
@@ -319,6 +355,7 @@ pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
         pairs: file.corner_noise.and_then(|n| n.pairs),
         board: file.board(),
         volume: file.volume,
+        check: file.check,
         unconfirmed: file.unconfirmed,
     })
 }

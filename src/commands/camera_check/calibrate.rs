@@ -68,13 +68,7 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let page = report::camera_check::page(&calibration, &judged, &corners, &pictures)?;
     out.write_json(
         "calibration.json",
-        &CalibrationFile::from(calibration.rig()).with_check(
-            &calibration,
-            pair_excess(&calibration),
-            judged.facts.coverage.corner_depths_mm,
-            &judged.facts.volume.volume,
-            &judged.facts.standards.moves.measured,
-        ),
+        &CalibrationFile::from(calibration.rig()).with_check(&calibration, pair_excess(&calibration), &judged),
     )?;
     if !out.is_input("corners.csv") {
         out.write("corners.csv", corners_csv::to_csv(&calibration.mark(&corners)).as_bytes())?;

@@ -91,7 +91,9 @@ fn list_of_poses(source: &Source<'_>) -> Utf8PathBuf {
 /// The rig, the target and what is known of both.
 fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Knowledge> {
     let board = config.target_board.board(args.target.board, args.target.squares, args.target.square_mm)?;
-    let Calibrated { rig, noise, pair_excess, volume, unconfirmed, .. } = calibration::read_with_check(rig_file)?;
+    let calibrated = calibration::read_with_check(rig_file)?;
+    calibrated.doubts().into_iter().for_each(progress::warn);
+    let Calibrated { rig, noise, pair_excess, volume, .. } = calibrated;
     if rig.covariance.is_none() {
         progress::warn(format!(
             "{rig_file} holds no covariance: the points' uncertainties leave out that of the calibration"
@@ -103,11 +105,6 @@ fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Kno
         ));
     }
     let (crossing_mm, tolerance_mm) = (config.measure.crossing_mm, config.tolerance_mm);
-    if let Some(last) = unconfirmed.first() {
-        progress::warn(format!(
-            "the calibration's last pairs contradict it (from pair {last} on): the rig may have changed since. Calibrate it as it is now"
-        ));
-    }
     Ok(Knowledge { rig, noise, pair_excess, volume, board, crossing_mm, tolerance_mm })
 }
 

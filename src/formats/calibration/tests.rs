@@ -73,3 +73,31 @@ fn what_is_no_rig_is_refused_by_name() {
     named_elsewhere["left"]["model"] = "opencv".into();
     assert!(serde_json::from_value::<CalibrationFile>(named_elsewhere).unwrap().rig().is_ok());
 }
+
+#[test]
+fn a_rig_that_did_not_pass_says_so_to_those_who_use_it() {
+    let rig = Rig {
+        left: Camera::pinhole(640, 480, 500.0),
+        right: Camera::pinhole(640, 480, 500.0),
+        right_from_left: transform(Vector3::zeros(), Vector3::new(-120.0, 0.0, 0.0)),
+        covariance: None,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = Utf8Path::from_path(folder.path()).unwrap().join("calibration.json");
+    let doubts = |check: Option<(Verdict, Option<f64>)>, unconfirmed: &[&str]| {
+        let mut file = CalibrationFile::from(&rig);
+        file.check = check.map(|(verdict, trusted_mm)| Check { verdict, tolerance_mm: 0.05, trusted_mm });
+        file.unconfirmed = unconfirmed.iter().map(|pair| (*pair).to_owned()).collect();
+        std::fs::write(&path, files::to_json(&file)).unwrap();
+        read_with_check(&path).unwrap().doubts().join("; ")
+    };
+    assert_eq!(doubts(None, &[]), "");
+    assert_eq!(doubts(Some((Verdict::Pass, Some(0.0123))), &[]), "");
+    let failed = doubts(Some((Verdict::Fail, Some(1.3538))), &[]);
+    assert_eq!(
+        failed,
+        "this rig did not pass its check (FAIL at a tolerance of 0.05 mm): lengths can be trusted to 1.4 mm"
+    );
+    let open = doubts(Some((Verdict::Undecided, None)), &["0017"]);
+    assert!(open.contains("from pair 0017 on") && open.ends_with("no length can be trusted"), "{open}");
+}

@@ -1,6 +1,6 @@
 //! Pass, fail or undecided: the largest length errors and their uncertainty against the tolerance (ISO 14253-1).
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Coverage factor of the expanded uncertainty: 95 %.
 pub const COVERAGE: f64 = 2.0;
@@ -9,7 +9,7 @@ pub const COVERAGE: f64 = 2.0;
 const LARGEST_OF_MANY: f64 = 5.0;
 
 /// What the verdict is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// Within tolerance, uncertainty included.
