@@ -333,12 +333,7 @@ pub fn file(named: Option<&Utf8Path>, out: &OutDir) -> Result<Utf8PathBuf> {
     }
 }
 
-/// Reads `calibration.json`, or one of the formats that [`crate::formats::export`] writes.
-pub fn read(path: &Utf8Path) -> Result<Rig> {
-    Ok(read_with_check(path)?.rig)
-}
-
-/// The same with what the calibration says beside the rig.
+/// Reads `calibration.json` with what it says beside the rig, or one of the formats that [`crate::formats::export`] writes.
 pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
     const WHAT: &str = "calibration file";
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";

@@ -11,6 +11,7 @@ use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration as rig;
 use crate::formats::export;
+use crate::progress;
 
 /// Runs the command.
 pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
@@ -24,7 +25,9 @@ pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
 fn calibration(args: &ExportCalibration, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.files.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = rig::file(args.calibration.as_deref(), &out)?;
-    let rig = rig::read(&rig_file)?;
+    let calibrated = rig::read_with_check(&rig_file)?;
+    calibrated.doubts().into_iter().for_each(progress::warn);
+    let rig = calibrated.rig;
     let out = out.for_run(&Run { force: args.files.force, ..run }, &[&rig_file]);
     let files = match args.format {
         CalibrationFormat::Opencv => export::file_storage::files(&rig)?,

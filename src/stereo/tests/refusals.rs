@@ -92,6 +92,22 @@ fn pictures_of_one_camera_are_no_rig() {
 }
 
 #[test]
+fn boards_that_are_hardly_tilted_are_not_called_pictures_of_one_camera() {
+    // The distance of these cameras is open because the focal lengths are; that of one camera's pictures is none.
+    let mut lenses = 0;
+    for tilt in [0.01, 0.02, 0.03, 0.05, 0.08] {
+        let world = World {
+            sigma_px: 0.3,
+            ..World::facing(8, |i| Vector3::new((1.7 * i).sin(), (2.9 * i).cos(), 0.1 * i) * tilt)
+        };
+        let refused = calibrate(&world.corners(5), &BROWN4).and_then(|found| held_out::hold_out(&found, None));
+        assert!(!matches!(refused, Err(Error::NoBaseline { .. })), "{tilt}");
+        lenses += usize::from(matches!(refused, Err(Error::Undetermined { focal_sigma: Some(_), .. })));
+    }
+    assert!(lenses > 0);
+}
+
+#[test]
 fn a_pair_that_alone_tells_the_cameras_leaves_the_verdict_open() {
     let mut world = World::facing(9, |i| Vector3::z() * 0.1 * i);
     world.poses[0] = World::new(1, 1).poses[0];

@@ -4,7 +4,7 @@
 //! fold's rig triangulates the corners of the pairs it was not calibrated with. The board's pitch sets the scale, so that a wrong
 //! pitch is invisible here: only a second board shows it.
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -141,18 +141,30 @@ pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accu
     summarise(calibration, folds, &measured, doubtful, board_mm).ok_or_else(undetermined)
 }
 
-/// An error where the distance of the cameras is not told from none.
+/// An error where the distance of the cameras is not told from none: because they are one, or because boards that all lie alike leave focal
+/// lengths open and the distance with them, which is told once the lenses are known.
 fn check_baseline(calibration: &Calibration) -> Result<(), Error> {
     /// Standard deviations by which the distance must be more than nothing.
     const FEWEST: f64 = 3.0;
     let Calibration { layout, uncertainty, .. } = calibration;
     let between_mm = calibration.rig().right_from_left.translation.vector;
     let at = layout.transform_start() + 3;
-    let covariance = uncertainty.shared.fixed_view::<3, 3>(at, at);
     let direction = between_mm.try_normalize(0.0).unwrap_or_else(Vector3::x);
-    let (baseline_mm, sigma_mm) =
-        (between_mm.norm(), (direction.transpose() * covariance * direction).x.max(0.0).sqrt());
-    if baseline_mm < FEWEST * sigma_mm { Err(Error::NoBaseline { baseline_mm, sigma_mm }) } else { Ok(()) }
+    let sigma_mm = |covariance: &DMatrix<f64>, at: usize| {
+        (direction.transpose() * covariance.fixed_view::<3, 3>(at, at) * direction).x.max(0.0).sqrt()
+    };
+    let (baseline_mm, sigma_of_both_mm) = (between_mm.norm(), sigma_mm(&uncertainty.shared, at));
+    if baseline_mm >= FEWEST * sigma_of_both_mm {
+        return Ok(());
+    }
+    let (first, rest) = (layout.transform_start(), layout.count() - layout.transform_start());
+    let lenses_known = uncertainty::invert(&uncertainty.shared)
+        .and_then(|told| uncertainty::invert(&told.view((first, first), (rest, rest)).into_owned()));
+    if lenses_known.is_some_and(|covariance| baseline_mm >= FEWEST * sigma_mm(&covariance, 3)) {
+        let focal_sigma = Some(uncertainty::worst_focal_sigma(&uncertainty.shared, layout, calibration.rig()));
+        return Err(Error::Undetermined { focal_sigma, skipped: calibration.skipped.clone() });
+    }
+    Err(Error::NoBaseline { baseline_mm, sigma_mm: sigma_of_both_mm })
 }
 
 /// The rigs without each fold, with covariances that allow for the same as the final one's.
