@@ -193,6 +193,9 @@ impl Explain for Error {
                 let plain = "one without markers is named `--squares CxR --square-mm MM`";
                 Some(format!("`--board {board}` must be the board as printed: {named}; {plain}"))
             }
+            Error::TooFewPairs { skipped, .. } if let Some(dictionary) = markers(skipped) => Some(format!(
+                "name it: `--board charuco:COLUMNSxROWS:SQUARE:MARKER:{dictionary}`, counts in squares as printed, sizes in mm"
+            )),
             Error::TooFewPairs { board, .. } => {
                 let (columns, rows) = (board.columns(), board.rows());
                 Some(format!(
@@ -202,6 +205,17 @@ impl Explain for Error {
             }
         }
     }
+}
+
+/// The dictionary of the markers that pictures show in which a plain board was looked for; the one in most of them.
+fn markers(skipped: &[Skipped]) -> Option<String> {
+    let said = |skipped: &Skipped| {
+        let (_, after) = skipped.reason.split_once(super::coded::HAS_MARKERS)?;
+        Some(after.split_whitespace().next()?.to_owned())
+    };
+    let all: Vec<String> = skipped.iter().filter_map(said).collect();
+    let count = |one: &str| all.iter().filter(|other| *other == one).count();
+    all.iter().max_by_key(|one| count(one)).cloned()
 }
 
 #[cfg(test)]

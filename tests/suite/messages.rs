@@ -242,6 +242,9 @@ fn another_board_with_markers_is_answered_with_its_name() {
         assert!(message.contains(fits), "{said}: {message}");
         assert_eq!(message.matches("both pictures: ").count(), 1, "{message}");
     }
+    // Asked for a plain board, too.
+    let message = stderr(&stereocal(folder.path(), &["camera-check", "x", "--squares", "5x7", "--out", "y"]));
+    assert!(message.contains("`--board charuco:COLUMNSxROWS:SQUARE:MARKER:DICT_4X4_"), "{message}");
 }
 
 #[test]

@@ -32,6 +32,25 @@ const MOST_GRIDS: usize = 12;
 /// Why a part of a board has no number where the layout alone would give it one.
 pub const BY_LAYOUT: &str = "shows markers, but none at the board's sides: which corners they are depends on the layout, OpenCV's before or since 4.6";
 
+/// What a picture shows that has a board with markers where a plain one was looked for.
+pub const HAS_MARKERS: &str = "shows a board with markers of ";
+
+/// Whether a picture in which no plain board was found shows a ChArUco board.
+pub fn with_markers(picture: &Picture) -> Option<String> {
+    /// Copies and grids that are looked at: markers that number a board are on the largest of them.
+    const COPIES: usize = 2;
+    const GRIDS: usize = 3;
+    /// Most markers leave at least as much of a square free on each side.
+    const MARGIN: f64 = 0.1;
+    levels(picture).into_iter().take(COPIES).find_map(|level| {
+        let found = grids(&level.copy(picture), Pitch::Even, MARGIN, false).into_iter().take(GRIDS);
+        let mut in_picture =
+            found.map(|grid| without_strays(right_handed(grid.map(|p| level.to_picture(p))), Pitch::Even));
+        let dictionary = in_picture.find_map(|grid| explain::dictionary_in(picture, &grid))?;
+        Some(format!("{HAS_MARKERS}{} in its squares", dictionary.said()))
+    })
+}
+
 /// A part of the board in a picture.
 struct Part {
     corners: Places,

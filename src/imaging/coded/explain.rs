@@ -61,6 +61,26 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Refusal
     other_markers(picture, board, (dictionary, own), grid)
 }
 
+/// The dictionary of the markers in the squares of a grid, whatever board was asked for: more of them than chance finds.
+pub fn dictionary_in(picture: &Picture, grid: &Places) -> Option<Dictionary> {
+    /// In the squares of a plain board nothing has a marker's outline; of what lies round it one or two may be read as one.
+    const FEWEST_UNASKED: usize = 4;
+    let fields = SHARES.into_iter().flat_map(|share| (4..=7).map(move |bits| Fields::of_marker(share, bits)));
+    let known = fields.flat_map(|fields| {
+        let reads = markers_in(picture, grid, Pitch::Even, fields);
+        let all = if reads.len() < FEWEST_UNASKED { Vec::new() } else { Dictionary::all().collect() };
+        let of = move |dictionary: Dictionary| (known_in(dictionary, &reads), dictionary, reads.len());
+        all.into_iter().filter(move |dictionary| dictionary.bits() == fields.bits).map(of)
+    });
+    // Of two that begin alike the smaller.
+    let better = |best: Option<(usize, Dictionary, usize)>, next: (usize, Dictionary, usize)| match best {
+        Some(best) if best.0 >= next.0 => Some(best),
+        _ => Some(next),
+    };
+    let (count, dictionary, of) = known.fold(None, better)?;
+    (count >= FEWEST_UNASKED && 2 * count > of).then_some(dictionary)
+}
+
 /// What else the markers of a grid are: of another dictionary, of another size, in another order, or none.
 fn other_markers(picture: &Picture, board: &Board, (dictionary, own): (Dictionary, Fields), grid: &Places) -> Refusal {
     let mut best: Option<(usize, Dictionary, f64)> = None;

@@ -13,4 +13,4 @@ mod numbering;
 #[cfg(test)]
 mod tests;
 
-pub use detection::{BY_LAYOUT, detect};
+pub use detection::{BY_LAYOUT, HAS_MARKERS, detect, with_markers};

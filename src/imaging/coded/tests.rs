@@ -261,3 +261,20 @@ fn foreshortened_boards_are_measured() {
         assert!(count >= least && chi2 < most_chi2, "{board} {tilt} {spin} {z}: {count} corners, {chi2}");
     }
 }
+
+#[test]
+fn a_board_with_markers_is_told_from_a_plain_one_that_was_asked_for() {
+    let shot = |board: &'static str, at: [f64; 3]| Shot::of(board, [0.3, -0.25, 0.2], at).taken().0;
+    for (board, at) in [
+        (BOARD, [3.0, -2.0, 560.0]),
+        (BOARD, [110.0, 60.0, 420.0]),
+        ("charuco:8x11:24:18:DICT_4X4_50", [0.0, 0.0, 800.0]),
+    ] {
+        let dictionary = board.rsplit(':').next().unwrap();
+        let reason = detect(&shot(board, at), "checker:20x20:10".parse().unwrap()).unwrap_err().reason;
+        // One that begins alike has the same markers.
+        assert!(reason.contains(&format!("markers of {}", &dictionary[..9])), "{board}: {reason}");
+    }
+    let plain = detect(&shot("checker:9x7:20", [3.0, -2.0, 560.0]), "checker:20x20:10".parse().unwrap());
+    assert!(plain.is_err_and(|refusal| !refusal.reason.contains("markers")));
+}

@@ -7,5 +7,8 @@ use crate::imaging::{Board, coded};
 
 /// Looks for the board; the reason where it was not found.
 pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
-    if board.is_coded() { coded::detect(picture, board) } else { plain::detect(picture, board) }
+    if board.is_coded() {
+        return coded::detect(picture, board);
+    }
+    plain::detect(picture, board).map_err(|refusal| coded::with_markers(picture).map_or(refusal, Refusal::from))
 }

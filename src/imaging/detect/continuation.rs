@@ -133,7 +133,7 @@ pub(super) fn without_ends(copy: &Grey8, grid: Places) -> Places {
 
 /// Contrast of the four squares round a corner of the grid, or round a place one square beyond it, so many steps along both edges from it, with the
 /// sign that the order of colours gives it: the lesser of both differences between neighbours across an edge and their
-/// neighbours across the other. `before`: how many steps against the columns' order. `None` outside of the picture.
+/// neighbours across the other, and none where they have two signs, as across the board's outer edge. `before`: how many steps against the columns' order. `None` outside of the picture.
 fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, isize), steps: f64, before: Option<f64>) -> Option<f64> {
     let (place, along, across) = local(grid, col, row)?;
     let before = before.unwrap_or(steps);
@@ -146,7 +146,7 @@ fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, isize), steps: f64,
     let mean = differences.iter().sum::<f64>() / 4.0;
     let least = differences.into_iter().fold(f64::MAX, f64::min);
     let most = differences.into_iter().fold(f64::MIN, f64::max);
-    Some(if mean > 0.0 { least } else { most })
+    Some(if mean > 0.0 { least.max(0.0) } else { most.min(0.0) })
 }
 
 /// A corner of the grid or a place one square beyond it, and the steps to the next column and the next row there.
@@ -253,6 +253,25 @@ mod tests {
             let part = Lattice::from_fn(7, 7, |col, row| grid.get(col, row).copied());
             assert_eq!(lines_beyond(&detected(part)), (1, 0));
             assert_eq!(lines_beyond(&detected(grid)), (0, 0));
+        }
+    }
+
+    #[test]
+    fn the_edge_of_the_margin_is_no_line_of_corners() {
+        // Squares cut to a half, a light margin, and a dark wall whose edge lies where the next line of corners would be, or near it.
+        for margin in [0.2, 0.35, 0.45, 0.5, 0.55, 0.7, 1.0] {
+            let (Grey8 { width, height, mut pixels }, grid) = cut(0.5);
+            for (k, grey) in pixels.iter_mut().enumerate() {
+                let (x, y) = ((k % width) as f64, (k / width) as f64);
+                let outside = |v: f64, to: f64| (18.0 - v).max(v - to);
+                let beyond = outside(x, 113.0).max(outside(y, 101.0)) / 12.0;
+                if beyond > 0.0 {
+                    *grey = if beyond < margin { 200 } else { 40 };
+                }
+            }
+            let copy = Grey8 { width, height, pixels };
+            let detected = Detected { corners: grid, copy, level: Level::Reduced(1), print: None, open: None };
+            assert_eq!(lines_beyond(&detected), (0, 0), "{margin}");
         }
     }
 

@@ -301,7 +301,7 @@ impl Pairing {
         }
         let Aside { other, again } = self.aside;
         if again > 0 {
-            parts.push(format!("{} of the same names in a lossy format", count(again, "picture")));
+            parts.push(format!("{} in a lossy format beside others of the same names", count(again, "picture")));
         }
         if other > 0 {
             parts.push(count(other, "other file"));

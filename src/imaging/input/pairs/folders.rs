@@ -17,11 +17,14 @@ impl Source<'_> {
                 return Err(explain::same(self));
             }
             let reading = readings::two_folders(&left, &right, Told::Given, self.by)?;
-            return self.one(reading, &[left, right]);
+            let below = [left, right].into_iter().flat_map(tree);
+            // Each as it was named, so that the two are told apart.
+            let folders: Vec<Folder> = below.map(|f| Folder { below: f.path.to_string(), ..f }).collect();
+            return self.one(reading, &folders);
         }
         if let Some([left, right]) = left_and_right(&top)? {
             let reading = readings::two_folders(&left, &right, Told::Words, self.by)?;
-            return self.one(reading, &[top, left, right]);
+            return self.one(reading, &tree(top));
         }
         let folders = tree(top);
         let mut tried = Vec::new();

@@ -60,7 +60,7 @@ fn what_is_left_out_is_said() {
 
 #[test]
 fn what_was_taken_is_said() {
-    let sets: [(&[&str], &str); 5] = [
+    let sets: [(&[&str], &str); 6] = [
         (
             &[
                 "stereoLeft/imageL9.png",
@@ -78,6 +78,10 @@ fn what_was_taken_is_said() {
         (
             &["left/1.png", "left/2.jpg", "right/1.png", "right/2.png", "board.png"],
             "2 pairs by name: left left/*, right right/*.png; not taken: ./ (1 picture)",
+        ),
+        (
+            &["left/1.png", "left/rest/2.png", "right/1.png", "right/rest/2.png"],
+            "1 pair by name: left left/1.png, right right/1.png; not taken: left/rest/ (1 picture), right/rest/ (1 picture)",
         ),
         (
             &["original/1.png", "stereoLeft/1.png", "stereoRight/1.png"],
@@ -186,7 +190,7 @@ fn of_two_formats_of_one_name_the_one_without_loss_is_read() {
     let files: Vec<[&str; 2]> =
         found.pairs.iter().map(|p| [&p.left, &p.right].map(|path| path.file_name().unwrap())).collect();
     assert_eq!(files, [["left_1.png", "right_1.PNG"], ["left_2.bmp", "right_2.jpg"]]);
-    assert_eq!(found.left_out().unwrap(), "left out: 2 pictures of the same names in a lossy format");
+    assert_eq!(found.left_out().unwrap(), "left out: 2 pictures in a lossy format beside others of the same names");
 }
 
 #[test]

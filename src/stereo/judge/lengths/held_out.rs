@@ -160,9 +160,11 @@ fn check_baseline(calibration: &Calibration) -> Result<(), Error> {
     let (first, rest) = (layout.transform_start(), layout.count() - layout.transform_start());
     let lenses_known = uncertainty::invert(&uncertainty.shared)
         .and_then(|told| uncertainty::invert(&told.view((first, first), (rest, rest)).into_owned()));
-    if lenses_known.is_some_and(|covariance| baseline_mm >= FEWEST * sigma_mm(&covariance, 3)) {
-        let focal_sigma = Some(uncertainty::worst_focal_sigma(&uncertainty.shared, layout, calibration.rig()));
-        return Err(Error::Undetermined { focal_sigma, skipped: calibration.skipped.clone() });
+    let focal_sigma = uncertainty::worst_focal_sigma(&uncertainty.shared, layout, calibration.rig());
+    if focal_sigma > WORST_FOCAL_SIGMA
+        && lenses_known.is_some_and(|covariance| baseline_mm >= FEWEST * sigma_mm(&covariance, 3))
+    {
+        return Err(Error::Undetermined { focal_sigma: Some(focal_sigma), skipped: calibration.skipped.clone() });
     }
     Err(Error::NoBaseline { baseline_mm, sigma_mm: sigma_of_both_mm })
 }
