@@ -9,6 +9,7 @@ use crate::diagnostic::two_digits;
 use crate::files::{self, OutDir, Result};
 use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
+use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::judge::assessment::Judged;
@@ -84,6 +85,8 @@ pub struct Calibrated {
     pub noise: Option<Noise>,
     /// How far pairs scattered about the rig beyond that, as a variance.
     pub pair_excess: Option<f64>,
+    /// How far the pair disagreed that did most, as chi-square of six numbers beside that.
+    pub farthest_pair: Option<f64>,
     /// How many pairs with poses of their own made the rig.
     pub pairs: Option<usize>,
     /// The volume that the verdict was for.
@@ -102,6 +105,7 @@ impl Calibrated {
             rig,
             noise: None,
             pair_excess: None,
+            farthest_pair: None,
             pairs: None,
             volume: None,
             check: None,
@@ -138,6 +142,9 @@ struct NoiseRecord {
     /// How far pairs scattered about the rig beyond that, as a variance; one where they did not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pair_excess: Option<f64>,
+    /// How far the pair disagrees with the rig that does most, as chi-square of six numbers beside that excess.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    farthest_pair: Option<f64>,
     /// How many pairs with poses of their own say so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pairs: Option<usize>,
@@ -233,7 +240,7 @@ impl From<&Rig> for CalibrationFile {
 impl CalibrationFile {
     /// The same with how corners scattered, between which depths the boards' corners were, the verdict and the volume that it was for, the
     /// last pairs where they contradict the rig, and how it changed since the moment that it is that of.
-    pub fn with_check(mut self, calibration: &Calibration, pair_excess: f64, judged: &Judged) -> CalibrationFile {
+    pub fn with_check(mut self, calibration: &Calibration, judged: &Judged) -> CalibrationFile {
         let noise = &calibration.own_noise;
         let facts = &judged.facts;
         let [nearest_mm, farthest_mm] = facts.coverage.corner_depths_mm;
@@ -245,7 +252,8 @@ impl CalibrationFile {
         self.corner_noise = Some(NoiseRecord {
             factor: noise.factor,
             added_px: noise.added_px,
-            pair_excess: Some(pair_excess),
+            pair_excess: Some(pair_excess(calibration)),
+            farthest_pair: farthest_pair(calibration),
             pairs: Some(calibration.pair_scatter.groups),
         });
         self.boards = Some(BoardsRecord { nearest_mm, farthest_mm });
@@ -347,6 +355,7 @@ pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
         rig: file.rig().map_err(refused)?,
         noise: file.noise(),
         pair_excess: file.corner_noise.and_then(|n| n.pair_excess).filter(|e| *e >= 1.0),
+        farthest_pair: file.corner_noise.and_then(|n| n.farthest_pair),
         pairs: file.corner_noise.and_then(|n| n.pairs),
         board: file.board(),
         volume: file.volume,

@@ -21,7 +21,6 @@ use crate::imaging::overlay::SideBySide;
 use crate::imaging::{Board, Corners, Side, Wanted, find_corners};
 use crate::report::drawing::pair_picture::PairPicture;
 use crate::report::drawing::picture::PairJpeg;
-use crate::stereo::board_pose::pair_excess::pair_excess;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::residuals;
 use crate::stereo::findings::standing::{self, Asked};
@@ -61,15 +60,17 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let second = second_board(args, board, &calibration, demand.board_uncertainty_mm, &out)?;
     let standards = Standards { second, moves: moves::measure(&calibration, &args.known_move)? };
     let judged = Judged::new(&calibration, findings, accuracy, standards, &demand);
-    calibration.rig().unusual().into_iter().chain(report::camera_check::blurred(&corners)).for_each(progress::warn);
+    let rig = calibration.rig();
+    rig.unusual()
+        .into_iter()
+        .chain(rig.unusual_tilt())
+        .chain(report::camera_check::blurred(&corners))
+        .for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
     let pictures = pictures(args, pairing.as_ref(), &calibration, &judged);
     let page = report::camera_check::page(&calibration, &judged, &corners, &pictures)?;
-    out.write_json(
-        "calibration.json",
-        &CalibrationFile::from(calibration.rig()).with_check(&calibration, pair_excess(&calibration), &judged),
-    )?;
+    out.write_json("calibration.json", &CalibrationFile::from(calibration.rig()).with_check(&calibration, &judged))?;
     if !out.is_input("corners.csv") {
         out.write("corners.csv", corners_csv::to_csv(&calibration.mark(&corners)).as_bytes())?;
     }

@@ -93,7 +93,7 @@ fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Kno
     let board = config.target_board.board(args.target.board, args.target.squares, args.target.square_mm)?;
     let calibrated = calibration::read_with_check(rig_file)?;
     calibrated.doubts().into_iter().for_each(progress::warn);
-    let Calibrated { rig, noise, pair_excess, volume, .. } = calibrated;
+    let Calibrated { rig, noise, pair_excess, farthest_pair, volume, .. } = calibrated;
     if rig.covariance.is_none() {
         progress::warn(format!(
             "{rig_file} holds no covariance: the points' uncertainties leave out that of the calibration"
@@ -105,7 +105,7 @@ fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Kno
         ));
     }
     let (crossing_mm, tolerance_mm) = (config.measure.crossing_mm, config.tolerance_mm);
-    Ok(Knowledge { rig, noise, pair_excess, volume, board, crossing_mm, tolerance_mm })
+    Ok(Knowledge { rig, noise, pair_excess, farthest_pair, volume, board, crossing_mm, tolerance_mm })
 }
 
 /// Every pose of the list with its corners, or why there are none.

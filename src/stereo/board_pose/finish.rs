@@ -109,7 +109,8 @@ impl Finisher<'_> {
             Some(change) => Some(*change),
             None => consistency::of_outsider(&alone.part, &self.found.covariance),
         };
-        if let Some(change) = change.filter(|c| c.fall > POSE_LIMIT * alone.chi_square.clamp(1.0, OUTSIDER_LIMIT)) {
+        let own = alone.chi_square.clamp(1.0, OUTSIDER_LIMIT);
+        if let Some(change) = change.filter(|c| c.fall > self.run.known.pose_limit() * own) {
             return Err(self.two_moments(i, alone, &change));
         }
         if !self.run.taking_part[i] && alone.chi_square > OUTSIDER_LIMIT * self.found.excess {
@@ -119,15 +120,18 @@ impl Finisher<'_> {
                 reason: format!("its corners miss the common rig and target {times:.1} times as far as at other poses"),
             });
         }
-        Ok(self.answer(i, alone))
+        // As far as a pair went that the calibration used, but beyond chance: its own disagreement is what it is known to.
+        let disagrees = change.map(|c| c.fall / own).filter(|fall| *fall > POSE_LIMIT);
+        Ok(self.answer(i, alone, disagrees.map_or(1.0, |fall| fall / consistency::NUMBERS)))
     }
 
-    fn answer(&self, i: usize, alone: &Alone) -> TargetPose {
+    /// The answer, its own covariance so many times as large as usual.
+    fn answer(&self, i: usize, alone: &Alone, times: f64) -> TargetPose {
         let by_shared = alone.part.by_shared();
         let through = &by_shared * self.shared_covariance * by_shared.transpose();
         let chance = 1.0 + POSE_SIGMAS * (2.0 / alone.freedom.max(1.0)).sqrt();
         let grown = if alone.chi_square > chance { alone.chi_square } else { 1.0 };
-        let mut own_covariance = alone.part.own_covariance(self.found.excess) * grown;
+        let mut own_covariance = alone.part.own_covariance(self.found.excess) * grown * times;
         if let Some(along) = &self.run.along {
             // Whether the common rig is the one before or the one after is not known.
             let moved = alone.part.by_change() * along.change.change * along.shares[i].max(1.0 - along.shares[i]);

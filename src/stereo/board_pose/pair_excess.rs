@@ -20,9 +20,18 @@ const CHANCE: f64 = 1.5;
 
 /// Finds it; one where it is not beyond chance.
 pub fn pair_excess(calibration: &Calibration) -> f64 {
-    let each = changes(calibration).unwrap_or_default();
+    beyond_chance(&changes(calibration).unwrap_or_default())
+}
+
+/// How far the pair disagrees that does most, of those that made the rig: the fall of chi-square by a change at it alone, over the usual excess.
+pub fn farthest_pair(calibration: &Calibration) -> Option<f64> {
+    let each = changes(calibration)?;
+    each.iter().flatten().map(|change| change.fall).max_by(f64::total_cmp).map(|fall| fall / beyond_chance(&each))
+}
+
+fn beyond_chance(each: &[Option<Change>]) -> f64 {
     let chance = 1.0 + CHANCE / (each.iter().flatten().count().max(1) as f64).sqrt();
-    Some(of_usual(&each)).filter(|excess| *excess > chance).unwrap_or(1.0)
+    Some(of_usual(each)).filter(|excess| *excess > chance).unwrap_or(1.0)
 }
 
 /// What a change at each pair alone would gain. The rig was fitted to the same pairs, of which few determine it no better than their own

@@ -54,6 +54,8 @@ pub struct Knowledge {
     pub noise: Option<Noise>,
     /// How far its pairs scattered about it beyond their corners' scatter, as [`Series::excess`], where that is known.
     pub pair_excess: Option<f64>,
+    /// How far the pair disagreed that did most, as chi-square of six numbers beside that, where it is known.
+    pub farthest_pair: Option<f64>,
     /// Where the boards were at the calibration, where that is known.
     pub volume: Option<Volume>,
     /// The target as drawn.
@@ -65,6 +67,14 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
+    /// A change at one pose that lowers chi-square by more than this ends its measurement: twice what a pair did that the calibration used, at
+    /// least what chance does not.
+    pub(super) fn pose_limit(&self) -> f64 {
+        /// The farthest of some pairs is not the farthest of all.
+        const BEYOND: f64 = 2.0;
+        POSE_LIMIT.max(BEYOND * self.farthest_pair.unwrap_or(0.0))
+    }
+
     pub(super) fn usual(&self) -> Usual {
         Usual { noise: self.noise, excess: self.pair_excess.unwrap_or(1.0) }
     }

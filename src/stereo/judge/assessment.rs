@@ -65,7 +65,9 @@ impl Judged {
             findings,
         };
         let evidence = ledger(&Case { calibration, facts: &facts });
-        let mut warnings = Vec::from_iter(calibration.rig().unusual().map(Warning::from));
+        let rig = calibration.rig();
+        let mut warnings: Vec<Warning> =
+            rig.unusual().into_iter().chain(rig.unusual_tilt()).map(Warning::from).collect();
         // The held-out lengths are the result itself and stand in its first line.
         let doubts = evidence.iter().skip(1).filter(|line| line.allows != Verdict::Pass);
         warnings.extend(doubts.map(Evidence::warning));

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Point2, Point3};
 
 use crate::geometry::Transform;
 use crate::imaging::{Corners, Side};
-use crate::stereo::{Camera, Error};
+use crate::stereo::{Camera, Error, Lens};
 
 /// A calibrated pair of cameras.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,6 +111,24 @@ impl Rig {
         })
     }
 
+    /// A sensor that is tilted by more than sensors are that are not meant to be. Where a lens bends little, a tilt is exchanged for the picture's
+    /// centre and the camera's axis: then lengths hold, and neither of the three is what a person could measure on the camera.
+    pub fn unusual_tilt(&self) -> Option<String> {
+        const MOST_DEG: f64 = 3.0;
+        let tilt_deg = |side: Side| {
+            let camera = self.camera(side);
+            let [x, y] = [camera.distortion[12], camera.distortion[13]];
+            if camera.lens == Lens::Tilted14 { x.hypot(y).to_degrees() } else { 0.0 }
+        };
+        let side = Side::BOTH.into_iter().find(|side| tilt_deg(*side) > MOST_DEG)?;
+        Some(format!(
+            "the {} camera's sensor comes out tilted by {:.1} deg, more than sensors are unless they are meant to be: centres and axes of these cameras \
+             may not be theirs; `--lens brown5` shows how lengths compare",
+            side.name(),
+            tilt_deg(side)
+        ))
+    }
+
     /// Pictures of another size than the calibration's were binned, cut or taken by other cameras.
     pub fn check_size(&self, corners: &Corners) -> Result<(), Error> {
         self.check_picture_size(Side::Left, corners.left_size)?;
@@ -139,6 +157,23 @@ mod tests {
         let camera = Camera::pinhole(640, 480, 800.0);
         let left_from_right = transform(turn, right_mm);
         Rig { left: camera, right: camera, right_from_left: left_from_right.inverse(), covariance: None }.unusual()
+    }
+
+    #[test]
+    fn a_sensor_that_is_tilted_by_degrees_is_unusual() {
+        let mut camera = Camera::pinhole(640, 480, 500.0);
+        camera.distortion[13] = 4f64.to_radians();
+        let rig = |right: Camera| Rig {
+            left: Camera::pinhole(640, 480, 500.0),
+            right,
+            right_from_left: transform(Vector3::zeros(), Vector3::new(-120.0, 0.0, 0.0)),
+            covariance: None,
+        };
+        assert_eq!(rig(camera).unusual_tilt(), None);
+        camera.lens = Lens::Tilted14;
+        assert!(rig(camera).unusual_tilt().unwrap().contains("right camera's sensor comes out tilted by 4.0 deg"));
+        camera.distortion[13] = 1f64.to_radians();
+        assert_eq!(rig(camera).unusual_tilt(), None);
     }
 
     #[test]

@@ -50,7 +50,7 @@ impl Candidates {
             let [left, right] = Side::BOTH.map(|side| view.active(side).count());
             let is_enough = if corners.board.is_coded() { tells_a_pose(&view) } else { left.min(right) >= fewest };
             if !is_enough {
-                let reason = format!("too few corners: {left} left, {right} right");
+                let reason = too_few_corners(pair, [left, right]);
                 discarded.push(DiscardedPair::new(&view.pair, Cause::NoBoard, reason));
             } else {
                 views.push(view);
@@ -83,6 +83,18 @@ impl Candidates {
             fewest_pairs,
         })
     }
+}
+
+/// What is said of a pair of which so few corners count. Of those that were seen and not measured, smeared or in glare, the rest is.
+fn too_few_corners(pair: &PairCorners, counting: [usize; 2]) -> String {
+    let [left, right] = counting;
+    let [of_left, of_right] = [pair.left.len(), pair.right.len()];
+    if of_left + of_right == left + right {
+        return format!("too few corners: {left} left, {right} right");
+    }
+    format!(
+        "too few corners can be measured: {left} of {of_left} left, {right} of {of_right} right; the others are too blurred, smeared or in glare"
+    )
 }
 
 /// True where one of the pictures tells how the board lies; whatever the other one shows then counts as well.

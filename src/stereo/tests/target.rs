@@ -5,7 +5,7 @@ use nalgebra::{Vector3, Vector6};
 use super::*;
 use crate::geometry::transform;
 use crate::imaging::Board;
-use crate::stereo::board_pose::pair_excess::pair_excess;
+use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::series;
 use crate::stereo::board_pose::{Knowledge, Seen};
@@ -14,7 +14,16 @@ use crate::stereo::{Lens, Rig};
 /// A rig and a target of which nothing else is known.
 fn known(rig: &Rig, board: Board) -> Knowledge {
     let rig = rig.clone();
-    Knowledge { rig, noise: None, pair_excess: None, volume: None, board, crossing_mm: 0.01, tolerance_mm: 0.05 }
+    Knowledge {
+        rig,
+        noise: None,
+        pair_excess: None,
+        farthest_pair: None,
+        volume: None,
+        board,
+        crossing_mm: 0.01,
+        tolerance_mm: 0.05,
+    }
 }
 
 /// All poses of a world as a robot's run.
@@ -89,6 +98,7 @@ fn the_pairs_of_a_calibration_are_measured_by_it() {
         let known = Knowledge {
             noise: Some(found.own_noise),
             pair_excess: Some(pair_excess(&found)),
+            farthest_pair: farthest_pair(&found),
             tolerance_mm: 5.0,
             ..known(found.rig(), world.board)
         };
@@ -127,5 +137,33 @@ fn points_are_not_off_by_what_turns_them_all_together() {
         // A depth of 560 mm is off by 560^2 / 192 times the turn.
         let depth_mm = 560.0 * 560.0 / 192.0 * turn_deg.to_radians();
         assert!((0.5 * depth_mm..1.5 * depth_mm).contains(&changed.moves_mm), "{turn_deg}: {changed:?}, {depth_mm}");
+    }
+}
+
+/// What one pair of the calibration did, a pose may do: it is measured, and known as well as it agrees with the others.
+#[test]
+fn a_pose_that_strays_as_far_as_a_pair_that_was_used_is_measured_and_says_how_well() {
+    for times in [6.0, 10.0] {
+        let world = World::new(12, 47);
+        let mut corners = world.corners_by_hand(47, 0.01);
+        corners.pairs[3] = world.corners_by_hand(48, 0.01 * times).pairs[3].clone();
+        let found = calibrate(&corners, &BROWN4).unwrap();
+        let of_pairs = Knowledge {
+            noise: Some(found.own_noise),
+            pair_excess: Some(pair_excess(&found)),
+            tolerance_mm: 5.0,
+            ..known(found.rig(), world.board)
+        };
+        let poses = |known: &Knowledge| series::measure(known, run_of(corners.clone())).poses;
+        // Nobody said that a pair strayed so far.
+        let refused = poses(&of_pairs).into_iter().filter(|pose| pose.target.is_err()).count();
+        let known = Knowledge { farthest_pair: farthest_pair(&found), ..of_pairs };
+        assert!(known.farthest_pair.is_some_and(|far| far > 45.0), "{times}: {:?}", known.farthest_pair);
+        let all: Vec<_> = poses(&known).into_iter().map(|pose| pose.target.unwrap()).collect();
+        let variance = |i: usize| all[i].own_covariance.fixed_view::<3, 3>(3, 3).trace();
+        assert!(refused == 1 && variance(3) > 4.0 * variance(2), "{times}: {refused}, {} {}", variance(3), variance(2));
+        let off = all[3].cam_from_board.translation.vector - world.poses[3].translation.vector;
+        let own = all[3].covariance.fixed_view::<3, 3>(3, 3).into_owned();
+        assert!(off.dot(&(own.try_inverse().unwrap() * off)) < 16.0, "{times}: off by {off}");
     }
 }

@@ -6,7 +6,7 @@ use stereocal::simulate::draws::{Draws, Purpose};
 use stereocal::simulate::settings::Settings;
 use stereocal::simulate::world::World;
 use stereocal::stereo::Lens;
-use stereocal::stereo::board_pose::pair_excess::pair_excess;
+use stereocal::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use stereocal::stereo::board_pose::{Knowledge, Seen};
 use stereocal::stereo::calibrate::calibrate;
 use stereocal::stereo::select::options::Options;
@@ -41,6 +41,7 @@ fn known_from(world: &World, corners: &Corners) -> Option<Knowledge> {
         rig: found.rig().clone(),
         noise: Some(found.own_noise),
         pair_excess: Some(pair_excess(&found)),
+        farthest_pair: farthest_pair(&found),
         volume: None,
         board: world.target.drawing,
         crossing_mm: 0.01,

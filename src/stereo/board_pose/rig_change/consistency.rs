@@ -19,7 +19,7 @@ use crate::stereo::solve::normal_equations::inverse6;
 pub(in crate::stereo::board_pose) const MEDIAN_CHI_SQUARE_6: f64 = 5.348;
 
 /// Numbers of a change.
-const NUMBERS: f64 = 6.0;
+pub(in crate::stereo::board_pose) const NUMBERS: f64 = 6.0;
 
 /// A change of `right_from_left`, rotation (rad) and translation (mm), and by how much it would lower chi-square.
 #[derive(Debug, Clone, Copy, PartialEq)]
