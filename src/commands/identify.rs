@@ -38,6 +38,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let given = nominal_robot(file.as_deref(), args.robot.is_some())?;
     let rows = read(&source, &given)?;
     let mut set = Dataset::of_robot(&rows, &given)?;
+    set.files = files(&source, &rows);
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
@@ -55,7 +56,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.begin(step))?;
     bar.finish_and_clear();
     let of_fit = record::findings::findings(&set, &found, &along);
-    let findings = Findings::new(findings, unexplained, of_fit, &set, &found);
+    let findings = Findings::new(findings, unexplained, of_fit, &along, &set, &found);
     let record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     said(&record, &out, args.output.json);
     let placed = found.placed(&set, &nominal, &settings)?;
@@ -103,6 +104,17 @@ pub fn source(files: Vec<Utf8PathBuf>, typed: &TableFlags, config: &Config) -> S
         columns: typed.columns.clone().or_else(|| known.columns.clone()),
         units: typed.units.clone().or_else(|| known.units.clone()),
     }
+}
+
+/// Names of the tables of a run of several, by whose number its poses are named; a table that was joined of files has that number alone.
+fn files(source: &Source, rows: &[Measurement]) -> Vec<String> {
+    let number = |row: &Measurement| row.at.pose.split_once(':').and_then(|(number, _)| number.parse::<usize>().ok());
+    let last = rows.iter().map(number).try_fold(0, |last, number| Some(last.max(number?))).unwrap_or(0);
+    let name = |number: usize| match source.files.len() == last {
+        true => source.files[number - 1].file_name().unwrap_or(source.files[number - 1].as_str()).to_owned(),
+        false => format!("table {number}"),
+    };
+    if source.files.len() > 1 { (1..=last).map(name).collect() } else { Vec::new() }
 }
 
 /// Measurements of a robot; says what was taken of tables that are not in the contract's own columns.
