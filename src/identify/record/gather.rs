@@ -50,6 +50,7 @@ impl Record {
             terms: found.terms.name(),
             before,
             methods,
+            not_run: None,
             identifiability,
             advice: Advice::Use,
             reason: String::new(),
