@@ -15,7 +15,7 @@ use crate::identify::examine::{self, Examined};
 use crate::identify::judge::placement::Placed;
 use crate::identify::record::{self, Advice, Findings, Record, quality};
 use crate::identify::run::{Identification, identify, step_count};
-use crate::identify::{Error, Settings};
+use crate::identify::{Error, Method, Settings};
 use crate::measurements::{Measurement, Role, Source};
 use crate::progress;
 use crate::report;
@@ -38,6 +38,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let given = nominal_robot(file.as_deref(), args.robot.is_some())?;
     let rows = read(&source, &given)?;
     let mut set = Dataset::of_robot(&rows, &given)?;
+    set.files = files(&source, &rows);
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
@@ -52,17 +53,49 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     if unexplained.is_some() {
         examine::in_hand::refuse(&set, &nominal)?;
     }
-    let found = identify(&set, &nominal, &settings, args.seed, &|step| bar.begin(step))?;
+    let doubts = (unexplained.is_some(), along.robots.is_some());
+    let Searched { found, not_run } = search(&set, &nominal, &settings, args.seed, doubts, &|step| bar.begin(step))?;
     bar.finish_and_clear();
     let of_fit = record::findings::findings(&set, &found, &along);
-    let findings = Findings::new(findings, unexplained, of_fit, &set, &found);
-    let record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
+    let findings = Findings::new(findings, unexplained, of_fit, &along, &set, &found);
+    let mut record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
+    record.warnings.extend(not_run.clone());
+    record.not_run = not_run;
     said(&record, &out, args.output.json);
     let placed = found.placed(&set, &nominal, &settings)?;
     let json = write(&out, &set, &nominal, &found, &record, placed.as_ref(), &settings)?;
     let stdout = if args.output.json { json } else { report::identify::summary(&record, &out) };
     let status = if record.advice == Advice::DoNotUse { Status::OutOfTolerance } else { Status::Done };
     Ok(Outcome { stdout, status })
+}
+
+/// What was identified, and why not all methods were run.
+struct Searched {
+    found: Identification,
+    not_run: Option<String>,
+}
+
+/// Identifies. Rows that no robot near the file's explains, as far as was seen, and rows of several robots get one method: the others search the
+/// same neighbourhood, for longer where there is nothing to find, and change nothing of the verdict. If the robot of that method explains rows
+/// that seemed to be unexplained, the others follow.
+fn search(
+    set: &Dataset,
+    nominal: &Robot,
+    settings: &Settings,
+    seed: u64,
+    (unexplained, several_robots): (bool, bool),
+    step: &(dyn Fn(&str) + Sync),
+) -> std::result::Result<Searched, Error> {
+    if settings.method.is_none() && (unexplained || several_robots) {
+        let one = Settings { method: Some(Method::TrustRegion), ..settings.clone() };
+        let found = identify(set, nominal, &one, seed, step)?;
+        if several_robots || !record::findings::is_explained(&found) {
+            let not_run = "only trust-region was run: the other methods search the same neighbourhood of the robot file, and what speaks against \
+                           the result would stay; `--method stapso` runs one of them all the same";
+            return Ok(Searched { found, not_run: Some(not_run.to_owned()) });
+        }
+    }
+    Ok(Searched { found: identify(set, nominal, settings, seed, step)?, not_run: None })
 }
 
 /// The gravest warnings on the terminal; the page and the JSON have all. What the verdict says is not said before it, unless it goes elsewhere.
@@ -86,7 +119,7 @@ fn settings(args: &Identify, config: &Config) -> Settings {
     let mut settings = config.identify.clone();
     match args.method.as_deref() {
         Some("auto") => settings.method = None,
-        Some(name) => settings.method = crate::identify::Method::ALL.into_iter().find(|m| m.name() == name),
+        Some(name) => settings.method = Method::ALL.into_iter().find(|m| m.name() == name),
         None => {}
     }
     settings.model = args.model.or(settings.model);
@@ -103,6 +136,17 @@ pub fn source(files: Vec<Utf8PathBuf>, typed: &TableFlags, config: &Config) -> S
         columns: typed.columns.clone().or_else(|| known.columns.clone()),
         units: typed.units.clone().or_else(|| known.units.clone()),
     }
+}
+
+/// Names of the tables of a run of several, by whose number its poses are named; a table that was joined of files has that number alone.
+fn files(source: &Source, rows: &[Measurement]) -> Vec<String> {
+    let number = |row: &Measurement| row.at.pose.split_once(':').and_then(|(number, _)| number.parse::<usize>().ok());
+    let last = rows.iter().map(number).try_fold(0, |last, number| Some(last.max(number?))).unwrap_or(0);
+    let name = |number: usize| match source.files.len() == last {
+        true => source.files[number - 1].file_name().unwrap_or(source.files[number - 1].as_str()).to_owned(),
+        false => format!("table {number}"),
+    };
+    if source.files.len() > 1 { (1..=last).map(name).collect() } else { Vec::new() }
 }
 
 /// Measurements of a robot; says what was taken of tables that are not in the contract's own columns.

@@ -331,7 +331,14 @@ fn readings_of_another_scale_are_said_to_be_so() {
         rows.iter_mut().for_each(|row| *synthetic::point(row) *= scale);
         let set = Dataset::new(&rows).unwrap();
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
-        let findings = crate::identify::record::findings::Findings::new(Vec::new(), None, Vec::new(), &set, &found);
+        let findings = crate::identify::record::findings::Findings::new(
+            Vec::new(),
+            None,
+            Vec::new(),
+            &Default::default(),
+            &set,
+            &found,
+        );
         let doubt = findings.doubts.iter().any(|f| f.finding.contains("all links are found"));
         assert_eq!(doubt, said, "{scale}: {findings:?}");
     }

@@ -454,3 +454,28 @@ fn another_arms_file_is_advised_against() {
     assert!(out.lines().nth(2).is_some_and(|line| line.starts_with("after: ")), "{out}");
     assert!(!err.contains("do not use"), "{err}");
 }
+
+#[test]
+fn with_the_file_of_another_arm_only_one_method_is_run_and_the_screen_says_why() {
+    let folder = simulated();
+    let run = |robot: &str| {
+        let output =
+            identify(folder.path()).args(["--robot", robot, "--out", "out", "--force"]).output().expect("it runs");
+        let text = std::fs::read_to_string(folder.path().join("out/identification.json")).expect("a record");
+        let record: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        (output, record["methods"].as_array().map_or(0, Vec::len), record["not_run"].clone())
+    };
+    std::fs::copy(folder.path().join("measurements.csv"), folder.path().join("m.csv")).expect("copied");
+    Command::cargo_bin("stereocal")
+        .expect("built")
+        .current_dir(folder.path())
+        .args(["robot", "new", "ur10e", "--out", "other"])
+        .assert()
+        .success();
+    let (output, methods, not_run) = run("other/robot.toml");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!((output.status.code(), methods), (Some(1), 1), "{said}");
+    assert!(said.contains("only trust-region was run") && not_run.is_string(), "{said}");
+    let (output, methods, not_run) = run("robot.toml");
+    assert!(output.status.success() && methods > 5 && not_run.is_null(), "{methods}");
+}

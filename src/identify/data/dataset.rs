@@ -110,6 +110,8 @@ pub struct Dataset {
     pub known: Vec<KnownDistance>,
     /// The targets whose rows were made one a pose, where there were several.
     pub targets: Option<Targets>,
+    /// Names of the files of a run of several, by whose number the poses' names begin (`2:17`); empty of one.
+    pub files: Vec<String>,
 }
 
 /// A known distance between the points that two groups touched.
@@ -156,6 +158,7 @@ impl Dataset {
             floored: Vec::new(),
             known: Vec::new(),
             targets,
+            files: Vec::new(),
         };
         set.slides = rows.first().map_or_else(Vec::new, |r| r.at.slides.clone());
         for row in rows {

@@ -2,7 +2,7 @@
 
 use super::conventions::Mended;
 use super::sessions::{self, Along};
-use super::{conventions, covariances, known, orientations, shifted};
+use super::{conventions, covariances, known, orientations, robots, shifted};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::finding::Finding;
 use crate::identify::settings::{Model, Settings};
@@ -39,12 +39,17 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
         findings.extend(of_known.1);
     }
     step("sessions along the rows");
-    let (mut set, along) = sessions::find(&set, &robot, settings);
+    let robots = if settings.examine { robots::find(&set, &robot, settings) } else { None };
+    let (mut set, along) = match &robots {
+        Some(robots) => (robots.parted(&set), Along { robots: Some(robots.finding()), ..Along::default() }),
+        None => sessions::find(&set, &robot, settings),
+    };
     if settings.examine {
         let of_covariances = covariances::examine(&set, &robot, settings);
         set = of_covariances.0;
         findings.extend(of_covariances.1);
     }
     findings.splice(0..0, of_targets);
-    Examined { set, robot, along, findings, unexplained: unexplained_mm.map(conventions::unexplained) }
+    let unexplained = unexplained_mm.filter(|_| robots.is_none()).map(conventions::unexplained);
+    Examined { set, robot, along, findings, unexplained }
 }

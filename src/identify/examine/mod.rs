@@ -7,6 +7,7 @@ mod hypothesis;
 pub mod in_hand;
 pub mod known;
 pub mod orientations;
+pub mod robots;
 pub mod sessions;
 pub mod shifted;
 

@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use crate::identify::data::dataset::{Dataset, Group};
 use crate::identify::data::shared;
+use crate::identify::finding::Finding;
 use crate::identify::residuals::eliminate::Block;
 use crate::identify::settings::Settings;
 use crate::identify::solve::linearised::{Fresh, Placement};
@@ -60,6 +61,8 @@ pub struct Along {
     pub sessions: Vec<Session>,
     /// Names of the groups whose placement drifts.
     pub drifting: Vec<String>,
+    /// Rows that are not of one robot; whatever else a fit to all of them finds follows from that.
+    pub robots: Option<Finding>,
 }
 
 /// Cuts the groups of `set` into sessions.
@@ -311,7 +314,7 @@ impl Placed {
 }
 
 /// Starts a new group at `row`: it and all later rows of its group move there.
-fn split(set: &mut Dataset, row: usize) {
+pub(super) fn split(set: &mut Dataset, row: usize) {
     let group = set.poses[row].group;
     let name = set.groups[group].name.clone();
     set.groups.push(Group { name, center: None });

@@ -1,13 +1,15 @@
 //! How far to trust the result: covariance of the parameters, the position error to expect, and what poses would tell.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::rigid_columns;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::model::kinematics::Kinematics;
+use crate::identify::settings::Model;
 use crate::identify::solve::formulation::Formulation;
-use crate::linear_algebra::Eliminated;
+use crate::identify::solve::linearised::Linearised;
+use crate::linear_algebra::{Eliminated, product, pseudo_inverse};
 
 /// Covariance of the identified parameters, in the units of the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -87,7 +89,7 @@ pub const MEAN_OVER_RMS: f64 = 0.921_317_731_923_561_3;
 const P95_OVER_RMS: f64 = 1.613_973;
 
 impl Expected {
-    /// At the poses of the set, the placements fitted to `fitted`.
+    /// At poses like those of the set, the placements fitted to `fitted`: at a row that was fitted it is that of a fit without it.
     pub fn new(formulation: &Formulation, set: &Dataset, fitted: &[usize]) -> Expected {
         Expected::at(formulation, set, fitted, &(0..set.poses.len()).collect::<Vec<_>>())
     }
@@ -102,6 +104,7 @@ impl Expected {
         let robot = nominal.shifted(kinematics.parameters(), &offsets[..count]);
         let places = Kinematics::new(nominal, &robot, kinematics.parameters(), &joints).places(&offsets[..count], true);
         let covariance = formulation.whole_covariance();
+        let times = times_without(formulation, set);
         let scatter = formulation.rows.scatter.point_mm;
         // Readings are off by what placements share, too.
         let smooth_mm2 = formulation.rows.left_by_smooth_mm2();
@@ -121,8 +124,8 @@ impl Expected {
                 let of_robot = (&columns * &covariance * columns.transpose()).trace();
                 // The placement itself is found through the scatter of the rows it is fitted to.
                 let of_frame = (motion(i) * &inverse * motion(i).transpose()).trace() * scatter * scatter;
-                of_robots[i] = of_robot;
-                squares[i] = of_robot + of_frame + 3.0 * (scatter * scatter + smooth_mm2);
+                of_robots[i] = times[i] * of_robot;
+                squares[i] = times[i] * (of_robot + of_frame) + 3.0 * (scatter * scatter + smooth_mm2);
             }
         }
         let of_rows = |all: &[f64]| rows.iter().map(|&row| all[row]).collect::<Vec<f64>>();
@@ -139,6 +142,47 @@ impl Expected {
             map: rows.iter().map(length).collect(),
         }
     }
+}
+
+/// Share of a row's own reading in what is predicted there, of which on more is not told from all of it.
+const ALL: f64 = 0.99;
+
+/// Times that the variance of the point predicted at each row of the data set is larger without that row's reading; one at rows that were not fitted.
+/// A fit follows the rows that it has, and the fewer they are, the less what is uncertain there says of poses between them. Of white readings with the
+/// variance H predicted by the fit the one without a row is `H (I - H)^-1` (Cook and Weisberg, "Residuals and Influence in Regression", 1982). The
+/// sensor's own errors are taken as found: they are of all rows.
+fn times_without(formulation: &Formulation, set: &Dataset) -> Vec<f64> {
+    let mut times = vec![1.0; set.poses.len()];
+    if !matches!(formulation.model, Model::Position | Model::Pose) {
+        return times;
+    }
+    let offsets = formulation.offsets_of();
+    let count = formulation.parameters().len();
+    let rows = formulation.rows.with_sensor_fixed(&offsets);
+    let (_, jacobian) = rows.evaluate(&offsets[..count], true);
+    let sds = formulation.most.standard_deviations(formulation.parameters(), &[]);
+    let sds = DMatrix::from_diagonal(&DVector::from_vec(sds));
+    let before = DMatrix::identity(count, count) * if formulation.held { 1.0 } else { 0.0 };
+    let covariance = &sds * pseudo_inverse(before + &sds * product(&jacobian, &jacobian) * &sds) * &sds;
+    for placement in Linearised::new(&rows, &offsets[..count]).placements {
+        let Eliminated { follow, inverse, .. } = placement.eliminated();
+        let columns = &placement.linear.jacobian - &placement.linear.design * follow;
+        for place in 0..rows.rows.len() {
+            let of_row: Vec<usize> =
+                (0..placement.poses.len()).filter(|&k| placement.poses[k] == Some(place)).collect();
+            if of_row.is_empty() {
+                continue;
+            }
+            let (columns, own) = (columns.select_rows(&of_row), placement.linear.design.select_rows(&of_row));
+            let predicted = &columns * &covariance * columns.transpose() + &own * &inverse * own.transpose();
+            let shares = predicted.symmetric_eigenvalues().map(|share| share.clamp(0.0, ALL));
+            let without = shares.map(|share| share / (1.0 - share)).sum();
+            if shares.sum() > 0.0 {
+                times[rows.rows[place]] = without / shares.sum();
+            }
+        }
+    }
+    times
 }
 
 impl Expected {
@@ -170,3 +214,6 @@ pub fn region(set: &Dataset) -> String {
     };
     ranges(set).into_iter().enumerate().map(of_joint).collect::<Vec<_>>().join(", ")
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,7 +5,7 @@ use super::findings::{self, Findings};
 use super::gather;
 use super::parameters::MethodRecord;
 use super::quality::PointSpread;
-use crate::identify::data::dataset::{Dataset, Reading};
+use crate::identify::data::dataset::{Dataset, Kind, Reading};
 use crate::identify::data::still::constant_joints;
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Spread;
@@ -114,7 +114,8 @@ impl Record {
 
     /// Points that the nominal robot, its tool solved, predicts better than arms come back to them.
     fn predicted(&self, set: &Dataset, nominal: &Robot) -> Option<String> {
-        let left_mm = self.with_tool_mm(set, nominal).filter(|left| *left < REPEATABILITY_MM)?;
+        let of_points = self.with_tool_mm(set, nominal).filter(|_| set.kind == Kind::Positions);
+        let left_mm = of_points.filter(|left| *left < REPEATABILITY_MM)?;
         Some(format!(
             "with the right tool the nominal robot is off by {left_mm:.4} mm in the middle of the rows, less than arms repeat to: these points \
              were computed, by the robot's controller or in a simulation; only points that were measured show how a robot was built"
@@ -150,8 +151,12 @@ impl Record {
             ));
         }
         let before_mm = mean(&self.before.verify).or(self.before.verify.distance.mean_abs_mm)?;
+        let (before_mm, tool) = match self.tool_mm {
+            Some((_, left_mm)) if left_mm < before_mm => (left_mm, "with a tool of its own "),
+            _ => (before_mm, ""),
+        };
         (expected_mm > FAR * before_mm).then(|| {
-            format!("the identified robot is expected to be off by {expected_mm:.3} mm, and the nominal one is off by {before_mm:.3} mm only: {few}")
+            format!("the identified robot is expected to be off by {expected_mm:.3} mm, and {tool}the nominal one is off by {before_mm:.3} mm only: {few}")
         })
     }
 

@@ -39,6 +39,9 @@ pub struct Record {
     pub before: Quality,
     /// All that was run.
     pub methods: Vec<MethodRecord>,
+    /// Why methods were not run that were to be compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_run: Option<String>,
     /// What the poses determine.
     pub identifiability: Identifiability,
     /// Whether to use the robot that was found.

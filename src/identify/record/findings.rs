@@ -23,14 +23,19 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Those of the data, and those of the fit: what nothing explains, and a robot that is not the one of the file, speak against it.
+    /// Those of the data, and those of the fit: what nothing explains, and a robot that is not the one of the file, speak against it. Where the rows
+    /// are not of one robot, that is the cause of whatever is odd about a robot fitted to all of them.
     pub fn new(
         examined: Vec<Finding>,
         unexplained: Option<Finding>,
         of_fit: Vec<Finding>,
+        along: &Along,
         set: &Dataset,
         found: &Identification,
     ) -> Findings {
+        if let Some(robots) = &along.robots {
+            return Findings { against: vec![robots.clone()], doubts: examined, notes: Vec::new() };
+        }
         let unexplained = unexplained.filter(|_| !is_explained(found));
         let against: Vec<Finding> = unexplained.into_iter().chain(plausible::of_another_robot(found)).collect();
         let notes = of_fit.into_iter().filter(|finding| !against.contains(finding)).collect();
@@ -184,6 +189,7 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
 /// Sessions and drifts.
 pub fn along_the_rows(along: &Along) -> Vec<Finding> {
     let mut list = Vec::new();
+    list.extend(along.robots.clone());
     let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
     let drifts = |s: &Session| along.drifting.contains(&s.group);
     let ranges = |of: &dyn Fn(&&Session) -> bool| -> Vec<String> {

@@ -6,6 +6,7 @@ use super::file::{Advice, Record, Smooth};
 use super::findings::Findings;
 use super::parameters::{self, Identifiability, MethodRecord};
 use super::quality::quality;
+use super::touched::Touched;
 use crate::identify::data::dataset::{Dataset, Reading};
 use crate::identify::examine::sessions::Along;
 use crate::identify::judge::uncertainty::{Covariance, Expected};
@@ -50,6 +51,7 @@ impl Record {
             terms: found.terms.name(),
             before,
             methods,
+            not_run: None,
             identifiability,
             advice: Advice::Use,
             reason: String::new(),
@@ -80,10 +82,15 @@ impl Record {
     }
 }
 
-/// The tool that the nominal chain asks for, where it makes it far nearer to the points; of the placement with most rows.
+/// The tool that the nominal chain asks for, where it makes it far nearer to the points of the placement with most rows, or brings touches far
+/// nearer to each other.
 fn tool(set: &Dataset, nominal: &Robot) -> Option<([f64; 3], f64)> {
     /// Times that the chain must come nearer by a tool of its own.
     const FAR_NEARER: f64 = 3.0;
+    if let Some(touched) = Touched::new(set, nominal) {
+        let is_nearer = touched.left_mm * FAR_NEARER < touched.before_mm;
+        return is_nearer.then(|| (touched.tool_mm.into(), touched.left_mm));
+    }
     let (joints, points) = most_points(set);
     let (before, after) = (nominal.left_mm(&joints, &points)?, nominal.fit_tool(&joints, &points, Start::Around)?);
     (after.left_mm * FAR_NEARER < before).then(|| (after.tool_mm.into(), after.left_mm))

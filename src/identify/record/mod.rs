@@ -7,6 +7,7 @@ mod gather;
 mod parameters;
 mod plausible;
 mod quality;
+mod touched;
 
 pub use file::{Advice, Record, Smooth};
 pub use findings::Findings;

@@ -19,7 +19,7 @@ pub fn summary(record: &Record, out: &OutDir) -> String {
     }
     lines.push(String::new());
     lines.push(kept(record));
-    lines.extend(others(record));
+    lines.extend(others(record).or(record.not_run.clone()));
     lines.extend(sure(record));
     if let Some(([x, y, z], left)) = record.tool_mm {
         lines.push(format!(

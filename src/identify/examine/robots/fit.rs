@@ -1,0 +1,257 @@
+//! Robots fitted to parts of the rows: one for all of them, or one a part.
+//!
+//! In: the nominal robot, and points with their joints, cut into parts. Out: what is left, how many numbers the unknowns took, and the scatter
+//! that follows. Each placement of each part, and the target's place in each part, are unknowns of their own in either case, so that a sensor or
+//! a tool that was moved between parts costs one robot nothing. Gauss and Newton's steps with the placements eliminated; the links are held by
+//! a loose prior. Goes wrong: parts whose rows are no more than their unknowns; they leave nothing, and count no degrees of freedom.
+
+use nalgebra::{DMatrix, DVector, Point3, Vector3};
+
+use crate::geometry::{fitted_frame, rigid_columns};
+use crate::identify::model::kinematics::Kinematics;
+use crate::linear_algebra::{Eliminated, product, pseudo_inverse};
+use crate::robot::{Parameter, Robot, Unit};
+use crate::statistics::median;
+
+/// How far links are built from their file, mm and mrad, and how far the target may stand from where the file has it, mm: loose.
+const LINK: [f64; 2] = [3.0, 10.0];
+const TARGET_MM: f64 = 1000.0;
+
+/// Steps, of which the first ones bring the target near; and from a fit to more rows on.
+const STEPS: usize = 8;
+const STEPS_NEAR: usize = 3;
+
+/// Scatter before anything is known, mm, and its limits: what is below is rounding.
+const FIRST_MM: f64 = 0.1;
+const LEAST_MM: f64 = 1e-4;
+const LARGEST_MM: f64 = 1e3;
+
+/// Medians from which on an error is a gross one, and below which it keeps its whole influence on the way.
+const GROSS: f64 = 5.0;
+const WHOLE: f64 = 1.5;
+
+/// Unknowns of a placement, and of a target's place.
+const PLACEMENT: usize = 6;
+const TARGET: usize = 3;
+
+/// The typical size of an error.
+fn typical_mm(errors_mm: &[f64]) -> f64 {
+    median(errors_mm.iter().copied()).unwrap_or(0.0).max(LEAST_MM)
+}
+
+/// Points with the joints that they were measured at.
+#[derive(Debug, Clone)]
+pub(super) struct Points {
+    pub(super) robot: Robot,
+    /// Of the links, and behind them the target's place.
+    pub(super) parameters: Vec<Parameter>,
+    pub(super) joints_rad: Vec<Vec<f64>>,
+    pub(super) points_mm: Vec<Point3<f64>>,
+    pub(super) groups: Vec<usize>,
+}
+
+/// What a fit leaves.
+#[derive(Debug, Clone)]
+pub(super) struct Left {
+    /// Sum of the squares, mm^2; numbers measured less those of the placements; numbers that the other unknowns took.
+    pub(super) squares: f64,
+    numbers: f64,
+    pub(super) taken: f64,
+    /// Size of each row's error, mm, in the order of the parts' rows.
+    errors_mm: Vec<f64>,
+}
+
+impl Left {
+    /// Degrees of freedom that are left; none is never quite none.
+    pub(super) fn freedom(&self) -> f64 {
+        (self.numbers - self.taken).max(f64::EPSILON)
+    }
+
+    /// Scatter of a coordinate, mm.
+    pub(super) fn scatter_mm(&self) -> f64 {
+        (self.squares / self.freedom()).sqrt()
+    }
+
+    pub(super) fn and(mut self, other: Left) -> Left {
+        self.errors_mm.extend(other.errors_mm);
+        Left {
+            squares: self.squares + other.squares,
+            numbers: self.numbers + other.numbers,
+            taken: self.taken + other.taken,
+            errors_mm: self.errors_mm,
+        }
+    }
+}
+
+/// The normal equations of a part, its placements eliminated: of all parameters, and behind them of the residual.
+struct Normal {
+    matrix: DMatrix<f64>,
+    numbers: f64,
+    errors_mm: Vec<f64>,
+}
+
+/// What is left somewhere, and where to go from there.
+struct At {
+    left: Left,
+    step: DVector<f64>,
+}
+
+/// One robot for some parts: their rows, where the unknowns start, and how many steps are taken.
+struct Fit<'a> {
+    parts: &'a [Vec<usize>],
+    x: DVector<f64>,
+    steps: usize,
+}
+
+impl Points {
+    /// One robot for all parts.
+    pub(super) fn together(&self, parts: &[Vec<usize>], weights: &[f64]) -> Left {
+        self.fitted(self.at_file(parts), weights.to_vec(), &mut |_, _| ()).0
+    }
+
+    /// A robot a part, each with what it leaves.
+    pub(super) fn apart(&self, parts: &[Vec<usize>], weights: &[f64]) -> Vec<Left> {
+        parts.iter().map(|part| self.together(std::slice::from_ref(part), weights)).collect()
+    }
+
+    /// One robot for all these rows with the influence of gross errors bounded: where it ends, and what it leaves.
+    pub(super) fn bounded(&self, rows: &[usize], near: Option<&DVector<f64>>) -> (Left, DVector<f64>) {
+        let parts = [rows.to_vec()];
+        let fit = match near {
+            Some(x) => Fit { parts: &parts, x: x.clone(), steps: STEPS_NEAR },
+            None => self.at_file(&parts),
+        };
+        self.fitted(fit, vec![1.0; self.points_mm.len()], &mut |errors, weights| {
+            let typical = typical_mm(errors);
+            for (&row, error) in rows.iter().zip(errors) {
+                weights[row] = (WHOLE * typical / error.max(LEAST_MM)).min(1.0);
+            }
+        })
+    }
+
+    /// Weights without the rows that are gross errors for the robot of their own part.
+    pub(super) fn without_gross(&self, parts: &[Vec<usize>]) -> Vec<f64> {
+        let mut kept = vec![1.0; self.points_mm.len()];
+        for part in parts {
+            let (left, _) = self.bounded(part, None);
+            let limit = GROSS * typical_mm(&left.errors_mm);
+            part.iter().zip(&left.errors_mm).filter(|(_, error)| **error > limit).for_each(|(&row, _)| kept[row] = 0.0);
+        }
+        kept
+    }
+
+    fn at_file<'a>(&self, parts: &'a [Vec<usize>]) -> Fit<'a> {
+        let count = self.parameters.len() + TARGET * (parts.len() - 1);
+        Fit { parts, x: DVector::zeros(count), steps: STEPS }
+    }
+
+    /// What one robot leaves, and where it ends; `weigh` hears the errors after each step and changes the weights of all rows.
+    fn fitted(
+        &self,
+        fit: Fit,
+        mut weights: Vec<f64>,
+        weigh: &mut dyn FnMut(&[f64], &mut [f64]),
+    ) -> (Left, DVector<f64>) {
+        let Fit { parts, mut x, steps } = fit;
+        let kinematics: Vec<Kinematics> = parts.iter().map(|part| self.kinematics(part)).collect();
+        let mut at = self.at(parts, &kinematics, &x, &weights, FIRST_MM);
+        for _ in 0..steps {
+            x += &at.step;
+            weigh(&at.left.errors_mm, &mut weights);
+            let scatter_mm = at.left.scatter_mm().clamp(LEAST_MM, LARGEST_MM);
+            at = self.at(parts, &kinematics, &x, &weights, scatter_mm);
+        }
+        (at.left, x)
+    }
+
+    /// What is left at these values of the unknowns, and the step from there.
+    fn at(
+        &self,
+        parts: &[Vec<usize>],
+        kinematics: &[Kinematics],
+        x: &DVector<f64>,
+        weights: &[f64],
+        scatter_mm: f64,
+    ) -> At {
+        let count = x.len();
+        let (normal, mut left) = self.normals(parts, kinematics, x, weights);
+        let measured = normal.view((0, 0), (count, count)).into_owned();
+        let prior = self.prior(parts.len(), scatter_mm);
+        let inverse = pseudo_inverse(&measured + DMatrix::from_diagonal(&prior));
+        left.taken = product(&inverse, &measured).trace();
+        let step = &inverse * (normal.view((0, count), (count, 1)) - prior.component_mul(x));
+        At { left, step: step.column(0).into_owned() }
+    }
+
+    /// Normal equations of all parts, and what is left there.
+    fn normals(
+        &self,
+        parts: &[Vec<usize>],
+        kinematics: &[Kinematics],
+        x: &DVector<f64>,
+        weights: &[f64],
+    ) -> (DMatrix<f64>, Left) {
+        let (count, of_links) = (x.len(), self.parameters.len() - TARGET);
+        let mut normal = DMatrix::zeros(count + 1, count + 1);
+        let mut left = Left { squares: 0.0, numbers: 0.0, taken: 0.0, errors_mm: Vec::new() };
+        for (p, (part, kinematics)) in parts.iter().zip(kinematics).enumerate() {
+            let target = of_links + TARGET * p;
+            let at: Vec<usize> = (0..of_links).chain(target..target + TARGET).collect();
+            let offsets: Vec<f64> = at.iter().map(|&i| x[i]).collect();
+            let of_part = self.normal(part, kinematics, &offsets, weights);
+            let whole: Vec<usize> = at.into_iter().chain([count]).collect();
+            for (r, &row) in whole.iter().enumerate() {
+                whole.iter().enumerate().for_each(|(c, &column)| normal[(row, column)] += of_part.matrix[(r, c)]);
+            }
+            left.numbers += of_part.numbers;
+            left.errors_mm.extend(of_part.errors_mm);
+        }
+        left.squares = normal[(count, count)];
+        (normal, left)
+    }
+
+    fn kinematics(&self, part: &[usize]) -> Kinematics {
+        let joints: Vec<&[f64]> = part.iter().map(|&row| self.joints_rad[row].as_slice()).collect();
+        Kinematics::new(&self.robot, &self.robot, &self.parameters, &joints)
+    }
+
+    /// Inverse variances of the links and of the parts' targets, in units of the scatter.
+    fn prior(&self, parts: usize, scatter_mm: f64) -> DVector<f64> {
+        let links = self.parameters.iter().take(self.parameters.len() - TARGET);
+        let sigmas = links.map(|p| if p.unit() == Unit::Mm { LINK[0] } else { LINK[1] });
+        let all: Vec<f64> = sigmas.chain(std::iter::repeat_n(TARGET_MM, TARGET * parts)).collect();
+        DVector::from_iterator(all.len(), all.iter().map(|sigma| (scatter_mm / sigma).powi(2)))
+    }
+
+    fn normal(&self, part: &[usize], kinematics: &Kinematics, offsets: &[f64], weights: &[f64]) -> Normal {
+        let places = kinematics.places(offsets, true);
+        let kept = self.parameters.len() + 1;
+        let mut sum = Normal { matrix: DMatrix::zeros(kept, kept), numbers: 0.0, errors_mm: vec![0.0; part.len()] };
+        let mut groups: Vec<usize> = part.iter().map(|&row| self.groups[row]).collect();
+        groups.sort_unstable();
+        groups.dedup();
+        for group in groups {
+            let of_group: Vec<usize> = (0..part.len()).filter(|&i| self.groups[part[i]] == group).collect();
+            let pair = |&i: &usize| (self.points_mm[part[i]], places[i].point_mm, weights[part[i]]);
+            let weight: f64 = of_group.iter().map(|&i| weights[part[i]]).sum();
+            // So few rows place nothing.
+            if TARGET as f64 * weight <= PLACEMENT as f64 {
+                continue;
+            }
+            let frame = fitted_frame(of_group.iter().map(pair));
+            let mut columns = DMatrix::zeros(TARGET * of_group.len(), kept + PLACEMENT);
+            for (k, &i) in of_group.iter().enumerate() {
+                let root = weights[part[i]].sqrt();
+                let error: Vector3<f64> = frame * self.points_mm[part[i]] - places[i].point_mm;
+                sum.errors_mm[i] = error.norm();
+                let mut rows = columns.rows_mut(TARGET * k, TARGET);
+                rows.columns_mut(0, kept - 1).copy_from(&(root * &places[i].point_columns));
+                rows.column_mut(kept - 1).copy_from(&(root * error));
+                rows.columns_mut(kept, PLACEMENT).copy_from(&(root * rigid_columns(&places[i].point_mm.coords)));
+            }
+            sum.numbers += TARGET as f64 * weight - PLACEMENT as f64;
+            sum.matrix += Eliminated::new(&product(&columns, &columns), kept).normal;
+        }
+        sum
+    }
+}

@@ -1,0 +1,140 @@
+use nalgebra::Vector3;
+
+use super::*;
+use crate::geometry::transform;
+use crate::identify::synthetic::{World, planned, point};
+use crate::measurements::{Measurement, Role};
+
+const NOISE_MM: f64 = 0.05;
+
+/// Rows of one sphere by an arm whose links are off by so many mm and mrad more, and whose tool stands elsewhere.
+fn arm(samples: usize, off: f64, tool_mm: f64, seed: u64) -> World {
+    planned(4 * samples, 8, 25.0, NOISE_MM, seed, &|robot| {
+        for (i, joint) in robot.joints.iter_mut().enumerate() {
+            joint.theta_rad += 1e-3 * off * (1.0 + 2.0 * i as f64 + seed as f64).sin();
+            joint.a_mm += off * (2.0 + 3.0 * i as f64 + seed as f64).cos();
+        }
+        robot.tool_mm += Vector3::new(tool_mm, -tool_mm, 0.5 * tool_mm);
+    })
+}
+
+/// The rows of each world, as files of a run of several where `files`, else as the parts of one table that no column tells apart.
+fn tables(worlds: &[World], files: bool) -> (Dataset, Robot) {
+    let mut rows: Vec<Measurement> = Vec::new();
+    for (k, world) in worlds.iter().enumerate() {
+        let of_sphere = world.rows.iter().filter(|row| row.at.group == "g0" && row.at.role != Role::Center);
+        rows.extend(of_sphere.cloned().map(|mut row| {
+            let name = format!("{}:", k + 1);
+            row.at.group = if files { name.clone() + "1" } else { "1".into() };
+            row.at.pose = if files { name + &row.at.pose } else { rows_name(k, &row.at.pose) };
+            row
+        }));
+    }
+    let mut set = Dataset::new(&rows).unwrap();
+    set.files = if files { (1..=worlds.len()).map(|k| format!("arm_{k}.csv")).collect() } else { Vec::new() };
+    (set, worlds[0].nominal.clone())
+}
+
+fn rows_name(table: usize, pose: &str) -> String {
+    format!("{}{pose}", ["a", "b", "c"][table])
+}
+
+fn found(set: &Dataset, robot: &Robot) -> Option<Robots> {
+    find(set, robot, &Settings::default())
+}
+
+#[test]
+fn files_of_two_or_three_arms_are_told_with_what_each_leaves() {
+    // Some draws are of arms that are nearly one within a single sphere; these are not.
+    for (samples, off) in [(60, 1.0), (30, 1.0), (30, 3.0), (16, 3.0)] {
+        for seed in [1, 3, 4] {
+            let worlds = [arm(samples, 0.0, 0.0, seed), arm(samples, off, 0.0, seed + 20)];
+            let (set, robot) = tables(&worlds, true);
+            let Robots { parts, together_mm } = found(&set, &robot).expect("two arms");
+            let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
+            assert_eq!(names, ["arm_1.csv", "arm_2.csv"], "{samples} rows, {off}, seed {seed}");
+            for Part { alone_mm, .. } in parts {
+                assert!((0.5..2.0).contains(&(alone_mm / NOISE_MM)) && together_mm > 2.0 * alone_mm, "{alone_mm}");
+            }
+        }
+    }
+    let worlds = [arm(40, 0.0, 0.0, 1), arm(40, 1.0, 0.0, 2), arm(40, 1.0, 0.0, 3)];
+    let (set, robot) = tables(&worlds, true);
+    assert_eq!(found(&set, &robot).expect("three arms").parts.len(), 3);
+}
+
+#[test]
+fn the_part_of_a_table_that_is_of_another_arm_is_found_where_it_begins() {
+    for (first, second, off) in [(60, 60, 1.0), (60, 30, 1.0), (20, 60, 1.0), (60, 12, 3.0)] {
+        for seed in [1, 3] {
+            let worlds = [arm(first, 0.0, 0.0, seed), arm(second, off, 5.0, seed + 20)];
+            let (set, robot) = tables(&worlds, false);
+            let said = format!("{first} and {second} rows, {off}, seed {seed}");
+            let robots = found(&set, &robot).expect(&said);
+            let begins = robots.parts[1].rows[0];
+            let table_begins = set.poses.iter().position(|pose| pose.name.starts_with('b')).unwrap();
+            assert!(robots.parts.len() == 2 && begins.abs_diff(table_begins) <= 2, "{off}, seed {seed}: {robots:?}");
+            let parted = robots.parted(&set);
+            assert_eq!(parted.groups.len(), 2);
+            assert_ne!(parted.poses[begins].group, parted.poses[begins - 1].group);
+        }
+    }
+    let worlds = [arm(40, 0.0, 0.0, 1), arm(40, 2.0, 0.0, 2), arm(40, 2.0, 0.0, 3)];
+    let (set, robot) = tables(&worlds, false);
+    assert_eq!(found(&set, &robot).expect("three arms").parts.len(), 3);
+}
+
+#[test]
+fn one_robot_is_one_whatever_was_moved_beside_it() {
+    for seed in 0..24 {
+        let (samples, tool_mm) = ([12, 30, 60][seed as usize % 3], [0.0, 2.0, 60.0][seed as usize / 3 % 3]);
+        for files in [true, false] {
+            // The second table is by the same arm, with another tool, seen by a camera that was moved.
+            let worlds = [arm(samples, 0.0, 0.0, seed), arm(samples, 0.0, tool_mm, seed + 50)];
+            let (mut set, robot) = tables(&worlds, files);
+            assert_eq!(found(&set, &robot), None, "seed {seed}, a tool {tool_mm} mm elsewhere, files {files}");
+            let moved = transform(Vector3::new(0.02, 0.1, -0.05), Vector3::new(30.0, -80.0, 15.0));
+            let half = set.poses.len() / 2;
+            for (i, pose) in set.poses.iter_mut().enumerate() {
+                let Reading::Position { point_mm, .. } = &mut pose.reading else { continue };
+                if i > half {
+                    *point_mm = moved * *point_mm;
+                }
+                if i % 9 == 4 {
+                    point_mm.x += 3.0;
+                }
+            }
+            assert_eq!(found(&set, &robot), None, "seed {seed}, camera moved, gross errors, files {files}");
+        }
+    }
+}
+
+#[test]
+fn cameras_that_moved_several_times_are_no_robots() {
+    for seed in 0..6 {
+        let mut world = planned(240, 0, 25.0, NOISE_MM, seed, &|_| {});
+        world.rows.retain(|row| row.at.group == "g0");
+        for (i, row) in world.rows.iter_mut().enumerate() {
+            let step = (i / 15) as f64;
+            *point(row) =
+                transform(Vector3::new(0.01, 0.0, 0.02) * step, Vector3::new(3.0, 0.0, 1.0) * step) * *point(row);
+        }
+        assert_eq!(found(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}");
+    }
+}
+
+#[test]
+fn what_a_model_lacks_makes_no_robots() {
+    for seed in 0..8 {
+        // Gears and the weight of the arm, which the links do not describe, in rows in the order of a joint.
+        let mut world = planned(160, 0, 25.0, 0.02, seed, &|_| {});
+        world.rows.retain(|row| row.at.role != Role::Center);
+        for row in &mut world.rows {
+            row.at.joints_deg[1] += 0.1 * (2.0 * row.at.joints_deg[1].to_radians()).sin();
+            row.at.joints_deg[2] += 0.1 * row.at.joints_deg[2].to_radians().cos();
+        }
+        assert_eq!(found(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}");
+        world.rows.sort_by(|a, b| a.at.joints_deg[1].total_cmp(&b.at.joints_deg[1]));
+        assert_eq!(found(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}, in order");
+    }
+}
