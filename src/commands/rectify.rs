@@ -32,7 +32,7 @@ const FIRST_LOOKED_AT: usize = 4;
 pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
-    let calibrated = calibration::read_with_check(&rig_file)?;
+    let calibrated = calibration::read(&rig_file)?;
     calibrated.doubts().into_iter().for_each(progress::warn);
     let calibration::Calibrated { rig, board, .. } = calibrated;
     let run = Run { force: args.output.force, ..run };

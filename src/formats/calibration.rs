@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{checked, export};
-use crate::diagnostic::two_digits;
+use crate::diagnostic::at_most;
 use crate::files::{self, OutDir, Result};
 use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
@@ -72,7 +72,7 @@ struct BoardsRecord {
 pub struct Check {
     verdict: Verdict,
     tolerance_mm: f64,
-    /// What lengths can be trusted to; none where something else than a length stands against the rig.
+    /// What lengths can be trusted to; none where the rig measures nothing, or something else than a length stands against it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     trusted_mm: Option<f64>,
 }
@@ -123,7 +123,7 @@ impl Calibrated {
             let verdict = if check.verdict == Verdict::Fail { "FAIL" } else { "UNDECIDED" };
             let trusted = check.trusted_mm.filter(|mm| mm.is_finite()).map_or_else(
                 || "no length can be trusted".to_owned(),
-                |mm| format!("lengths can be trusted to {} mm", two_digits(mm)),
+                |mm| format!("lengths can be trusted to {} mm", at_most(mm, f64::INFINITY)),
             );
             format!(
                 "this rig did not pass its check ({verdict} at a tolerance of {} mm): {trusted}",
@@ -244,7 +244,8 @@ impl CalibrationFile {
         let noise = &calibration.own_noise;
         let facts = &judged.facts;
         let [nearest_mm, farthest_mm] = facts.coverage.corner_depths_mm;
-        let (verdict, tolerance_mm, trusted_mm) = (judged.verdict, facts.tolerance_mm, judged.trusted_mm());
+        let (verdict, tolerance_mm) = (judged.verdict, facts.tolerance_mm);
+        let trusted_mm = judged.trusted_mm().filter(|_| !judged.measures_nothing());
         self.check = Some(Check { verdict, tolerance_mm, trusted_mm });
         self.volume = Some(facts.volume.volume.clone());
         self.unconfirmed = calibration.standing.unconfirmed.clone();
@@ -342,7 +343,7 @@ pub fn file(named: Option<&Utf8Path>, out: &OutDir) -> Result<Utf8PathBuf> {
 }
 
 /// Reads `calibration.json` with what it says beside the rig, or one of the formats that [`crate::formats::export`] writes.
-pub fn read_with_check(path: &Utf8Path) -> Result<Calibrated> {
+pub fn read(path: &Utf8Path) -> Result<Calibrated> {
     const WHAT: &str = "calibration file";
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
     let text = files::read_text(path, WHAT, Some(hint))?;

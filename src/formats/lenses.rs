@@ -56,7 +56,7 @@ fn read_one(file: &LensFile) -> Result<KnownLenses> {
     {
         return Ok(KnownLenses::of_cameras(Side::BOTH.map(|of| (of == *side).then_some(camera))));
     }
-    let read = calibration::read_with_check(path).map_err(|error| match (error, side) {
+    let read = calibration::read(path).map_err(|error| match (error, side) {
         (files::Error::Format { message, place, hint: None }, None) => {
             let hint = Some(format!("of a file with one camera say which: `--intrinsics {path},left`"));
             files::Error::Format { message, place, hint }

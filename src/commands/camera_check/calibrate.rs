@@ -60,12 +60,7 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let second = second_board(args, board, &calibration, demand.board_uncertainty_mm, &out)?;
     let standards = Standards { second, moves: moves::measure(&calibration, &args.known_move)? };
     let judged = Judged::new(&calibration, findings, accuracy, standards, &demand);
-    let rig = calibration.rig();
-    rig.unusual()
-        .into_iter()
-        .chain(rig.unusual_tilt())
-        .chain(report::camera_check::blurred(&corners))
-        .for_each(progress::warn);
+    calibration.rig().unusual().into_iter().chain(report::camera_check::blurred(&corners)).for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);
     let pictures = pictures(args, pairing.as_ref(), &calibration, &judged);

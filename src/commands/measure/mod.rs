@@ -91,7 +91,7 @@ fn list_of_poses(source: &Source<'_>) -> Utf8PathBuf {
 /// The rig, the target and what is known of both.
 fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Knowledge> {
     let board = config.target_board.board(args.target.board, args.target.squares, args.target.square_mm)?;
-    let calibrated = calibration::read_with_check(rig_file)?;
+    let calibrated = calibration::read(rig_file)?;
     calibrated.doubts().into_iter().for_each(progress::warn);
     let Calibrated { rig, noise, pair_excess, farthest_pair, volume, .. } = calibrated;
     if rig.covariance.is_none() {

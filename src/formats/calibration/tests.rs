@@ -89,7 +89,7 @@ fn a_rig_that_did_not_pass_says_so_to_those_who_use_it() {
         file.check = check.map(|(verdict, trusted_mm)| Check { verdict, tolerance_mm: 0.05, trusted_mm });
         file.unconfirmed = unconfirmed.iter().map(|pair| (*pair).to_owned()).collect();
         std::fs::write(&path, files::to_json(&file)).unwrap();
-        read_with_check(&path).unwrap().doubts().join("; ")
+        read(&path).unwrap().doubts().join("; ")
     };
     assert_eq!(doubts(None, &[]), "");
     assert_eq!(doubts(Some((Verdict::Pass, Some(0.0123))), &[]), "");

@@ -105,7 +105,7 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
         ),
         (mm(extremes.max_abs_error_mm), "largest error of such a length".to_owned()),
         match judged.trusted_mm() {
-            Some(trusted_mm) if trusted_mm > summary::NO_USE * judged.facts.volume.length_mm => (
+            Some(_) if judged.measures_nothing() => (
                 "none".to_owned(),
                 "length can be trusted: what they may be off by is more than a tenth of them".to_owned(),
             ),

@@ -14,9 +14,6 @@ use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::pairs::{Cause, DiscardedPair};
 use crate::stereo::volume::Extent;
 
-/// A rig that may be off by such a share of a length measures nothing.
-pub(super) const NO_USE: f64 = 0.1;
-
 /// Rows of the table on stdout along each axis.
 const TABLE_ROWS: usize = 3;
 
@@ -247,7 +244,7 @@ pub(super) fn deciding_by(judged: &Judged, figure: fn(&Evidence) -> String) -> S
 /// What the rig can be trusted to, whatever the tolerance.
 pub(super) fn trusted(judged: &Judged) -> String {
     match (judged.trusted(), judged.trusted_mm()) {
-        (Some(line), Some(mm)) if mm > NO_USE * judged.facts.volume.length_mm => format!(
+        (Some(line), Some(mm)) if judged.measures_nothing() => format!(
             "no length can be trusted: of one of {:.0} mm an error of {} mm is not ruled out ({})",
             judged.facts.volume.length_mm,
             two_digits(mm),

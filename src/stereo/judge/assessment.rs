@@ -65,9 +65,7 @@ impl Judged {
             findings,
         };
         let evidence = ledger(&Case { calibration, facts: &facts });
-        let rig = calibration.rig();
-        let mut warnings: Vec<Warning> =
-            rig.unusual().into_iter().chain(rig.unusual_tilt()).map(Warning::from).collect();
+        let mut warnings: Vec<Warning> = calibration.rig().unusual().into_iter().map(Warning::from).collect();
         // The held-out lengths are the result itself and stand in its first line.
         let doubts = evidence.iter().skip(1).filter(|line| line.allows != Verdict::Pass);
         warnings.extend(doubts.map(Evidence::warning));
@@ -99,6 +97,12 @@ impl Judged {
     /// The tolerance that this rig would meet as far as lengths go, mm; `None` where something else than a length stands against it.
     pub fn trusted_mm(&self) -> Option<f64> {
         self.trusted().and_then(|line| line.value)
+    }
+
+    /// Whether lengths may be off by such a share of themselves that the rig measures nothing.
+    pub fn measures_nothing(&self) -> bool {
+        const NO_USE: f64 = 0.1;
+        self.trusted_mm().is_some_and(|mm| mm > NO_USE * self.facts.volume.length_mm)
     }
 
     /// The line of the ledger that sets that tolerance.

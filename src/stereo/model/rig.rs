@@ -78,10 +78,15 @@ impl Rig {
         self.right_from_left.translation.vector.norm()
     }
 
+    /// What is unusual in the rig and may be meant, for a person.
+    pub fn unusual(&self) -> Vec<String> {
+        self.unusual_place().into_iter().chain(self.unusual_tilt()).collect()
+    }
+
     /// What is unusual in how the cameras stand, where something is: nearer to each other than cameras are wide, the left one on the right
     /// side, one rolled against the other. All may be meant, and no residual tells: a rig whose folders are exchanged, or with all pictures
     /// of one side turned, is a rig, and so is one of a board in other units.
-    pub fn unusual(&self) -> Option<String> {
+    fn unusual_place(&self) -> Option<String> {
         /// Endoscopes have 4 mm.
         const LEAST_BASELINE_MM: f64 = 3.0;
         if self.baseline_mm() < LEAST_BASELINE_MM {
@@ -113,7 +118,7 @@ impl Rig {
 
     /// A sensor that is tilted by more than sensors are that are not meant to be. Where a lens bends little, a tilt is exchanged for the picture's
     /// centre and the camera's axis: then lengths hold, and neither of the three is what a person could measure on the camera.
-    pub fn unusual_tilt(&self) -> Option<String> {
+    fn unusual_tilt(&self) -> Option<String> {
         const MOST_DEG: f64 = 3.0;
         let tilt_deg = |side: Side| {
             let camera = self.camera(side);
@@ -156,7 +161,9 @@ mod tests {
     fn unusual(turn: Vector3<f64>, right_mm: Vector3<f64>) -> Option<String> {
         let camera = Camera::pinhole(640, 480, 800.0);
         let left_from_right = transform(turn, right_mm);
-        Rig { left: camera, right: camera, right_from_left: left_from_right.inverse(), covariance: None }.unusual()
+        Rig { left: camera, right: camera, right_from_left: left_from_right.inverse(), covariance: None }
+            .unusual()
+            .pop()
     }
 
     #[test]
@@ -169,11 +176,11 @@ mod tests {
             right_from_left: transform(Vector3::zeros(), Vector3::new(-120.0, 0.0, 0.0)),
             covariance: None,
         };
-        assert_eq!(rig(camera).unusual_tilt(), None);
+        assert!(rig(camera).unusual().is_empty());
         camera.lens = Lens::Tilted14;
-        assert!(rig(camera).unusual_tilt().unwrap().contains("right camera's sensor comes out tilted by 4.0 deg"));
+        assert!(rig(camera).unusual()[0].contains("right camera's sensor comes out tilted by 4.0 deg"));
         camera.distortion[13] = 1f64.to_radians();
-        assert_eq!(rig(camera).unusual_tilt(), None);
+        assert!(rig(camera).unusual().is_empty());
     }
 
     #[test]
