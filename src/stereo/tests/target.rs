@@ -6,6 +6,7 @@ use super::*;
 use crate::geometry::transform;
 use crate::imaging::Board;
 use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
+use crate::stereo::board_pose::rig_change::cause::Cause;
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::series;
 use crate::stereo::board_pose::{Knowledge, Seen};
@@ -126,7 +127,7 @@ fn points_are_not_off_by_what_turns_them_all_together() {
     let tilted = Options { lens: Some(Lens::Tilted14), ..BROWN4 };
     let found = calibrate(&world.corners(38), &tilted).unwrap();
     let known = Knowledge { noise: Some(found.own_noise), ..known(found.rig(), world.board) };
-    for turn_deg in [0.02_f64, 0.05] {
+    for turn_deg in [0.02_f64, 0.2] {
         let mut turned = world.clone();
         let turn = transform(Vector3::new(0.0, turn_deg.to_radians(), 0.0), Vector3::zeros());
         turned.rig.right_from_left = turn * turned.rig.right_from_left;
@@ -136,6 +137,7 @@ fn points_are_not_off_by_what_turns_them_all_together() {
         };
         // A depth of 560 mm is off by 560^2 / 192 times the turn.
         let depth_mm = 560.0 * 560.0 / 192.0 * turn_deg.to_radians();
+        assert_eq!(changed.explanations[0].cause, Cause::Turn(1), "{turn_deg}: {changed:?}");
         assert!((0.5 * depth_mm..1.5 * depth_mm).contains(&changed.moves_mm), "{turn_deg}: {changed:?}, {depth_mm}");
     }
 }

@@ -118,6 +118,8 @@ fn subset<'a>(found: &Estimate<'a>) -> Estimate<'a> {
 fn with_cause<'a>(found: &Estimate<'a>, cause: &Explanation, variance: f64, usual: Usual) -> Option<Estimate<'a>> {
     let mut bundle = found.bundle.clone();
     let mut values = found.values.clone();
+    // From the rig that was calibrated: what a fit without the cause made of the rig is far off where a lens leaves much open.
+    values.rig.fill(0.0);
     match cause.cause.direction(&bundle.rig_at(&values)) {
         Some(direction) => {
             bundle.rig = bundle.rig.with_change(&direction, variance);

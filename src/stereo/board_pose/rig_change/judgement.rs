@@ -1,5 +1,6 @@
 //! What is found of the rig as a whole, and how it is said.
 
+use crate::diagnostic::two_digits;
 use crate::imaging::Board;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation};
@@ -70,13 +71,17 @@ impl Judgement {
             Judgement::Mirrored(flip) => {
                 format!("all pictures are {}: they fit this rig the other way round", flip.describe())
             }
-            Judgement::Moved { since, creeps: true, turned_deg, moved_mm } => format!(
-                "the rig drifts: during the run the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the \
-                 left; from pose {since} on that is more than the points' uncertainty allows"
-            ),
-            Judgement::Moved { since, creeps: false, turned_deg, moved_mm } => format!(
-                "the rig moved before pose {since}: the right camera turned by {turned_deg:.3} deg and moved by {moved_mm:.2} mm against the left"
-            ),
+            Judgement::Moved { since, creeps, turned_deg, moved_mm } => {
+                let (turned_deg, moved_mm) = (two_digits(*turned_deg), two_digits(*moved_mm));
+                let change =
+                    format!("the right camera turned by {turned_deg} deg and moved by {moved_mm} mm against the left");
+                match creeps {
+                    true => format!(
+                        "the rig drifts: during the run {change}; from pose {since} on that is more than the points' uncertainty allows"
+                    ),
+                    false => format!("the rig moved before pose {since}: {change}"),
+                }
+            }
             Judgement::Loose { times, sigma_mm } => format!(
                 "the rig changes from pose to pose: the poses disagree with one rig {times:.1} times as far as the pairs of the calibration \
                  did, and their points are known to {sigma_mm:.3} mm only; a camera is loose, or left and right are not of one moment"
