@@ -85,7 +85,7 @@ pub struct CameraCheck {
     #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = within(&TOLERANCES_MM))]
     pub tolerance_mm: Option<f64>,
     /// Expanded uncertainty (k = 2) of the board's lengths, from its certificate, mm: widens the guard band of the verdict
-    #[arg(long, value_name = "MM", value_parser = within(&TOLERANCES_MM))]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = within(&TOLERANCES_MM))]
     pub board_uncertainty_mm: Option<f64>,
     /// Lens model: radial2, brown4, brown5, rational8, thin-prism12 or tilted14 [default: chosen by held-out pairs]
     #[arg(long, value_name = "NAME", value_parser = lens)]
@@ -192,7 +192,7 @@ pub struct Rectify {
     #[arg(long, conflicts_with_all = ["alpha", "zero_disparity"])]
     pub undistort_only: bool,
     /// How much is kept: 0 only what both lenses saw, 1 every raw pixel [default: OpenCV's own choice between]
-    #[arg(long, value_name = "A", value_parser = between(0.0, 1.0))]
+    #[arg(long, value_name = "A", allow_negative_numbers = true, value_parser = between(0.0, 1.0))]
     pub alpha: Option<f64>,
     /// Give both pictures one principal point: points at infinity then have no disparity, but cameras that are turned towards
     /// each other lose what is near from view

@@ -69,7 +69,7 @@ pub struct Verify {
     #[arg(long, value_name = "IDENTIFIED", conflicts_with_all = ["robot", "known_distances"])]
     pub against: Option<Utf8PathBuf>,
     /// With --against: how far the target may move, mm [default: key `tolerance_mm`, or what 95 % of the errors were stated to be below, where that is more]
-    #[arg(long, value_name = "MM", requires = "against", value_parser = between(1e-4, 1e3))]
+    #[arg(long, value_name = "MM", requires = "against", allow_negative_numbers = true, value_parser = between(1e-4, 1e3))]
     pub tolerance_mm: Option<f64>,
     /// With --against: folder for results; key `out` [default: out]
     #[arg(long, value_name = "DIR", requires = "against")]
@@ -119,31 +119,31 @@ pub struct Plan {
     #[arg(long, value_name = "X,Y,Z", allow_negative_numbers = true, value_parser = point)]
     pub center: Vec<[f64; 3]>,
     /// Radius of the spheres, mm
-    #[arg(long, value_name = "MM", default_value_t = 100.0, value_parser = between(1.0, 1e4))]
+    #[arg(long, value_name = "MM", default_value_t = 100.0, allow_negative_numbers = true, value_parser = between(1.0, 1e4))]
     pub radius_mm: f64,
     /// Largest tilt of the target out of the field's plane, deg
-    #[arg(long, value_name = "DEG", default_value_t = 35.0, value_parser = between(0.0, 70.0))]
+    #[arg(long, value_name = "DEG", default_value_t = 35.0, allow_negative_numbers = true, value_parser = between(0.0, 70.0))]
     pub tilt_deg: f64,
     /// Depth of field: largest distance of the target before or behind the field's middle, mm
-    #[arg(long, value_name = "MM", default_value_t = 120.0, value_parser = between(1.0, 1e4))]
+    #[arg(long, value_name = "MM", default_value_t = 120.0, allow_negative_numbers = true, value_parser = between(1.0, 1e4))]
     pub depth_mm: f64,
     /// How far off its place the target may be and still be seen whole, mm
-    #[arg(long, value_name = "MM", default_value_t = 8.0, value_parser = between(0.0, 1e3))]
+    #[arg(long, value_name = "MM", default_value_t = 8.0, allow_negative_numbers = true, value_parser = between(0.0, 1e3))]
     pub margin_mm: f64,
     /// Standard deviation of a coordinate of the measured point, mm [default: from the rig's corners and the repeatability]
-    #[arg(long, value_name = "MM", value_parser = between(1e-6, 100.0))]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = between(1e-6, 100.0))]
     pub noise_mm: Option<f64>,
     /// Pose repeatability (ISO 9283 RP), mm
-    #[arg(long, value_name = "MM", default_value_t = 0.02, value_parser = between(0.0, 100.0))]
+    #[arg(long, value_name = "MM", default_value_t = 0.02, allow_negative_numbers = true, value_parser = between(0.0, 100.0))]
     pub repeatability_mm: f64,
     /// The target on the robot.
     #[command(flatten)]
     pub target: Target,
     /// Speed of the programs, per cent of the joints' own
-    #[arg(long, value_name = "PERCENT", default_value_t = 20.0, value_parser = between(1.0, 100.0))]
+    #[arg(long, value_name = "PERCENT", default_value_t = 20.0, allow_negative_numbers = true, value_parser = between(1.0, 100.0))]
     pub speed_percent: f64,
     /// Rest before the pictures, s
-    #[arg(long, value_name = "S", default_value_t = 1.5, value_parser = between(0.0, 60.0))]
+    #[arg(long, value_name = "S", default_value_t = 1.5, allow_negative_numbers = true, value_parser = between(0.0, 60.0))]
     pub dwell_s: f64,
     /// Pulses a degree of each joint: the Yaskawa job is then in pulses
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = number)]

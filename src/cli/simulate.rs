@@ -34,7 +34,7 @@ pub struct Simulate {
     #[arg(long)]
     pub points_only: bool,
     /// Noise of each coordinate with --points-only, mm [default: 0.01]
-    #[arg(long, value_name = "MM", value_parser = between(0.0, 1e3), requires = "points_only")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = between(0.0, 1e3), requires = "points_only")]
     pub point_noise_mm: Option<f64>,
     /// What the lens does to a point
     #[arg(long, value_enum, default_value = "gaussian")]
@@ -46,10 +46,10 @@ pub struct Simulate {
     #[arg(long, value_name = "UM", allow_negative_numbers = true, value_parser = between(-1e5, 1e5))]
     pub bow_um: Option<f64>,
     /// Standard deviation of the check board's crossings, um [default: 1]
-    #[arg(long, value_name = "UM", value_parser = between(0.0, 1e3))]
+    #[arg(long, value_name = "UM", allow_negative_numbers = true, value_parser = between(0.0, 1e3))]
     pub pitch_um: Option<f64>,
     /// How far black runs over each edge of both boards, um [default: 0]
-    #[arg(long, value_name = "UM", value_parser = between(0.0, 1e3))]
+    #[arg(long, value_name = "UM", allow_negative_numbers = true, value_parser = between(0.0, 1e3))]
     pub ink_um: Option<f64>,
     /// Stretch of both boards against their certificates, parts per million [default: 0]
     #[arg(long, value_name = "PPM", allow_negative_numbers = true, value_parser = between(-1e5, 1e5))]
@@ -59,16 +59,16 @@ pub struct Simulate {
     #[arg(long, value_name = "FILE|table-2")]
     pub true_robot: Option<Utf8PathBuf>,
     /// Largest misalignment of parallel axes, deg [default: 0]
-    #[arg(long, value_name = "DEG", value_parser = between(0.0, 10.0))]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = between(0.0, 10.0))]
     pub beta_deg: Option<f64>,
     /// Sag of joints 2 and 3 under a unit weight, mrad a metre of lever [default: 0]
-    #[arg(long, value_name = "MRAD", value_parser = between(0.0, 100.0))]
+    #[arg(long, value_name = "MRAD", allow_negative_numbers = true, value_parser = between(0.0, 100.0))]
     pub gravity_mrad: Option<f64>,
     /// Amplitude of the drives' periodic errors, mrad [default: 0]
-    #[arg(long, value_name = "MRAD", value_parser = between(0.0, 100.0))]
+    #[arg(long, value_name = "MRAD", allow_negative_numbers = true, value_parser = between(0.0, 100.0))]
     pub harmonics_mrad: Option<f64>,
     /// Pose repeatability (ISO 9283 RP) [default: 0.02]
-    #[arg(long, value_name = "MM", value_parser = between(0.0, 100.0))]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = between(0.0, 100.0))]
     pub repeatability_mm: Option<f64>,
     /// Folder for the simulated world; key `out` [default: out]
     #[arg(long, value_name = "DIR")]

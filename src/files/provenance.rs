@@ -19,6 +19,9 @@ pub const KEY: &str = "provenance";
 /// Extensions of pictures: of a folder that is read, these files count as read.
 const PICTURES: [&str; 8] = ["png", "tif", "tiff", "bmp", "jpg", "jpeg", "pgm", "pnm"];
 
+/// Digits of a picture's hash that are kept: 64 bits tell any two of a million pictures apart.
+const HASH_KEPT: usize = 16;
+
 /// What was typed, when, and what may be overwritten.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Run {
@@ -69,10 +72,13 @@ impl Provenance {
 }
 
 impl Provenance {
-    /// What this run read that the JSON file there was made of, too: of that it is no test.
+    /// What this run read that the JSON file there was made of, too, a folder where it is some of its pictures: of that it is no test.
     pub fn shares(&self, file: &Utf8Path) -> Option<&str> {
         let made_of = Provenance::of_json(file)?.inputs;
-        let same = |read: &&Digested| made_of.iter().any(|input| input.sha256 == read.sha256);
+        let of = |input: &Digested, read: &Digested| {
+            input.sha256 == read.sha256 || input.picture_hashes.iter().any(|hash| read.picture_hashes.contains(hash))
+        };
+        let same = |read: &&Digested| made_of.iter().any(|input| of(input, read));
         self.inputs.iter().find(same).map(|read| read.file.as_str())
     }
 }
@@ -103,6 +109,9 @@ pub struct Digested {
     /// Pictures in the folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pictures: Option<usize>,
+    /// The first half of what `xxh128sum` prints for each, in the order of their names: some of them are known again in another folder.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub picture_hashes: Vec<String>,
     /// Of a JSON file with a provenance, what its bytes would hash to without: equal for equal results of two dates.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub content_sha256: Option<String>,
@@ -111,7 +120,7 @@ pub struct Digested {
 impl Digested {
     pub fn written(name: &str, bytes: &[u8]) -> Digested {
         let (sha256, content_sha256) = rayon::join(|| sha256(bytes), || content_sha256(name, bytes));
-        Digested { file: name.to_owned(), sha256, pictures: None, content_sha256 }
+        Digested { file: name.to_owned(), sha256, pictures: None, picture_hashes: Vec::new(), content_sha256 }
     }
 
     /// The pictures of a folder; `known` are the hashes of those that were read. `None` where one of the others cannot be read.
@@ -131,6 +140,7 @@ impl Digested {
             file: path.to_string(),
             sha256: sha256(lines.as_bytes()),
             pictures: Some(files.len()),
+            picture_hashes: hashes.iter().map(|hash| hash.chars().take(HASH_KEPT).collect()).collect(),
             content_sha256: None,
         })
     }
@@ -145,7 +155,7 @@ impl Digested {
             _ => None,
         };
         let sha256 = sha256_of_file(path)?;
-        Some(Digested { file: path.to_string(), sha256, pictures: None, content_sha256 })
+        Some(Digested { file: path.to_string(), sha256, pictures: None, picture_hashes: Vec::new(), content_sha256 })
     }
 
     /// Whether both were made of the same content, whatever their names and dates.
@@ -231,6 +241,27 @@ mod tests {
         assert_eq!(of(&[&new, &old]).shares(&result), Some(old.as_str()));
         assert_eq!(of(&[&new, &result]).shares(&result), None);
         assert_eq!(of(&[&old]).shares(&new), None);
+    }
+
+    #[test]
+    fn some_of_the_pictures_are_known_again_under_other_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = Utf8Path::from_path(folder.path()).unwrap();
+        let folder = |name: &str, pictures: &[(&str, &str)]| {
+            let folder = root.join(name);
+            std::fs::create_dir(&folder).unwrap();
+            pictures.iter().for_each(|(file, bytes)| std::fs::write(folder.join(file), bytes).unwrap());
+            Provenance {
+                inputs: vec![Digested::folder(&folder, &BTreeMap::new()).unwrap()],
+                ..Provenance::new(String::new())
+            }
+        };
+        let result = root.join("calibration.json");
+        let made_of = folder("all", &[("1.png", "a"), ("2.png", "b"), ("3.png", "c")]);
+        std::fs::write(&result, serde_json::json!({ KEY: made_of }).to_string()).unwrap();
+        let some = folder("some", &[("new.png", "d"), ("copy.png", "b")]);
+        assert_eq!(some.shares(&result), Some(root.join("some").as_str()));
+        assert_eq!(folder("others", &[("1.png", "d"), ("2.png", "e")]).shares(&result), None);
     }
 
     #[test]

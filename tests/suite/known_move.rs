@@ -58,7 +58,10 @@ fn a_slide_confirms_the_scale_or_shows_squares_that_are_not_as_said() {
     assert_eq!(again.status.code(), Some(1));
     // It stands on the page, too.
     let page = std::fs::read_to_string(at.join("out/recheck.html")).unwrap();
-    assert!(page.contains("this calibration was made of check") && !page.contains("new pairs against"), "{page}");
+    assert!(
+        page.contains("check holds what this calibration was made of") && !page.contains("new pairs against"),
+        "{page}"
+    );
 
     let turned = check(&["--known-move", "5mm:05,06", "--force"]);
     let said = stdout(&turned);

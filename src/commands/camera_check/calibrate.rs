@@ -59,7 +59,13 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let accuracy = held_out::hold_out(&calibration, demand.board_uncertainty_mm)?;
     let second = second_board(args, board, &calibration, demand.board_uncertainty_mm, &out)?;
     let standards = Standards { second, moves: moves::measure(&calibration, &args.known_move)? };
-    let judged = Judged::new(&calibration, findings, accuracy, standards, &demand);
+    let mut judged = Judged::new(&calibration, findings, accuracy, standards, &demand);
+    if args.lens.is_some() && judged.verdict != Verdict::Pass {
+        judged.advice.insert(
+            0,
+            "leave `--lens` away: the lens is then the one that best predicts pairs it has not seen".to_owned(),
+        );
+    }
     calibration.rig().unusual().into_iter().chain(report::camera_check::blurred(&corners)).for_each(progress::warn);
 
     let file = CameraCheckFile::new(&calibration, &judged);

@@ -42,7 +42,8 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     corners.notes.iter().for_each(progress::note);
     let run = out.provenance();
     let own = run.as_ref().and_then(|run| run.shares(&file));
-    let said = |same| format!("this calibration was made of {same}: only new pairs tell whether it still holds");
+    let said =
+        |same| format!("{same} holds what this calibration was made of: only new pairs tell whether it still holds");
     let warnings: Vec<String> = own.map(said).into_iter().collect();
     warnings.iter().for_each(progress::warn);
     let Calibrated { rig, noise, pair_excess, pairs, volume, .. } = calibrated;

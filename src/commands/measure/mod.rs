@@ -74,7 +74,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let names = corners.pairs.iter().map(|pair| pair.pair.as_str());
     let page = if args.draw { report::page::with_overlays(page, names) } else { page };
     report::page::write(&out, "measure.html", page)?;
-    end(&series, &known)?;
+    end(&series, &known, &out)?;
     let stdout = if args.output.json { json } else { report::measure::summary(&file, &out) };
     Ok(Outcome { stdout, status: Status::Done })
 }
@@ -181,12 +181,19 @@ fn say(series: &Series, file: &MeasureFile) {
 }
 
 /// A rig that is not the calibrated one, or not one measured pose, is the end of the run; the files say so as well.
-fn end(series: &Series, known: &Knowledge) -> Result<()> {
+fn end(series: &Series, known: &Knowledge, out: &OutDir) -> Result<()> {
     let judgement = &series.judgement;
+    let measured = series.poses.iter().filter(|pose| pose.target.is_ok()).count();
     if let (true, Some(statement)) = (judgement.ends_the_run(), judgement.describe(&known.rig, &known.board)) {
-        return Err(stereo::Error::RigChanged { statement, hint: judgement.hint().unwrap_or_default() }.into());
+        let kept = if measured > 0 {
+            format!("; {} before that: {}", count(measured, "measured pose"), out.join("measurements.csv"))
+        } else {
+            String::new()
+        };
+        let hint = judgement.hint().unwrap_or_default();
+        return Err(stereo::Error::RigChanged { statement: statement + &kept, hint }.into());
     }
-    if series.poses.iter().all(|pose| pose.target.is_err()) {
+    if measured == 0 {
         return Err(stereo::Error::NothingMeasured { poses: series.poses.len() }.into());
     }
     Ok(())

@@ -56,12 +56,13 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
         Verdict::Undecided => Tone::Doubtful,
         Verdict::Fail => Tone::Bad,
     };
+    let next: Vec<String> = summary::next(judged).into_iter().map(str::to_owned).collect();
     let content = html! {
         (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), page::capital(&deciding_by(judged, Evidence::short_figure)))))
         @if !judged.facts.findings.is_empty() { p { "What happened during the series:" } (page::warnings(&happened(judged))) }
         (ledger(judged))
-        @if !judged.advice.is_empty() { p { "What to photograph next:" } (page::warnings(&judged.advice)) }
-        @if !judged.warnings.is_empty() { p { "What to do, and what else to know:" } }
+        @if !next.is_empty() { p { "What to do next:" } (page::warnings(&next)) }
+        @if !judged.warnings.is_empty() { p { "What else to know:" } }
         (page::warnings(&warnings(judged)))
         (scale(judged))
         h2 { "Lengths on held-out pairs" }
@@ -106,8 +107,8 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
         (mm(extremes.max_abs_error_mm), "largest error of such a length".to_owned()),
         match judged.trusted_mm() {
             Some(_) if judged.measures_nothing() => (
-                "none".to_owned(),
-                "length can be trusted: what they may be off by is more than a tenth of them".to_owned(),
+                "no length".to_owned(),
+                "can be trusted: what they may be off by is more than a tenth of them".to_owned(),
             ),
             Some(trusted_mm) => (
                 format!("{} mm", at_most(trusted_mm, judged.facts.tolerance_mm)),

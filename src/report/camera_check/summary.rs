@@ -17,6 +17,9 @@ use crate::stereo::volume::Extent;
 /// Rows of the table on stdout along each axis.
 const TABLE_ROWS: usize = 3;
 
+/// Things to do on stdout; the page has all.
+const MOST_NEXT: usize = 2;
+
 pub(super) fn word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Pass => "PASS",
@@ -45,8 +48,9 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
     lines.extend(pairs(calibration));
     lines.push(rig(calibration, judged));
     lines.push(board(calibration, judged));
-    lines.extend(next(judged).map(|what| format!("next: {what}")));
-    format!("{}\n\n{}\nreport: {}\n", lines.join("\n"), ranges(judged), out.join("camera-check.html"))
+    lines.extend(next(judged).into_iter().take(MOST_NEXT).map(|what| format!("next: {what}")));
+    let [rig, page] = ["calibration.json", "camera-check.html"].map(|file| out.join(file));
+    format!("{}\n\n{}\ncalibration: {rig}\nreport: {page}\n", lines.join("\n"), ranges(judged))
 }
 
 /// The shortest, a middle and the longest range along each axis.
@@ -154,7 +158,8 @@ fn pairs(calibration: &Calibration) -> Vec<String> {
     let others: usize = groups.iter().skip(MOST).map(|(.., pairs)| pairs.len()).sum();
     lines.extend(groups.iter().take(MOST).map(|(.., pairs)| {
         let reason = &pairs[0].reason;
-        let of = if pairs.iter().all(|pair| pair.reason == *reason) { "" } else { "first: " };
+        let alike = pairs.iter().all(|pair| pair.reason == *reason);
+        let of = if alike { String::new() } else { format!("of {}: ", pairs[0].pair) };
         let names: Vec<String> = pairs.iter().map(|pair| pair.pair.clone()).collect();
         format!("  without {}: {of}{reason}", named(&names))
     }));
@@ -194,8 +199,7 @@ fn board(calibration: &Calibration, judged: &Judged) -> String {
 }
 
 /// What to do next: about what happened to the rig and about the board, then what the deciding line asks for, then what the views lack.
-fn next(judged: &Judged) -> impl Iterator<Item = &str> {
-    const MOST: usize = 2;
+pub(super) fn next(judged: &Judged) -> Vec<&str> {
     let passes = judged.verdict == Verdict::Pass;
     let tolerance_mm = judged.facts.tolerance_mm;
     let matters = move |finding: &&Finding| !passes && finding.effect_mm.is_none_or(|_| finding.material(tolerance_mm));
@@ -205,7 +209,7 @@ fn next(judged: &Judged) -> impl Iterator<Item = &str> {
     let mut told: Vec<&str> = happened.chain(board).chain(deciding.filter(|remedy| !remedy.is_empty())).collect();
     told.extend(judged.advice.iter().map(String::as_str));
     told.dedup();
-    told.into_iter().take(MOST)
+    told
 }
 
 pub(super) fn explanation(judged: &Judged) -> String {

@@ -285,7 +285,7 @@ fn described(equals: &[&Candidate]) -> String {
     match words.split_first() {
         None => "the right camera stands and looks otherwise".to_owned(),
         Some((first, [])) => first.clone(),
-        Some((first, others)) => format!("{first} (or {})", others.join(", or ")),
+        Some((first, others)) => format!("{first}, or {}", others.join(", or ")),
     }
 }
 

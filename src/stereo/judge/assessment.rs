@@ -88,8 +88,8 @@ impl Judged {
         let beyond = |line: &Evidence| line.value.zip(line.limit).map_or(f64::INFINITY, |(value, limit)| value / limit);
         let worst = self.evidence.iter().filter(|line| line.allows == self.verdict);
         match self.verdict {
-            // Nothing speaks against it: the lengths themselves decide.
-            Verdict::Pass => self.evidence.first(),
+            // Nothing speaks against it: the largest length decides.
+            Verdict::Pass => self.trusted().or(self.evidence.first()),
             _ => worst.max_by(|a, b| beyond(a).total_cmp(&beyond(b))),
         }
     }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::diagnostic::{Warning, beside, two_digits};
+use crate::diagnostic::{Warning, at_most, two_digits};
 use crate::stereo::judge::verdict::Verdict;
 
 /// One line of the ledger.
@@ -77,12 +77,12 @@ impl Evidence {
         }
     }
 
-    /// Value and limit for a page: lengths with two digits, a limit as it was given; what is not within its limit is not rounded to it.
+    /// Value and limit for a page: lengths, which are what an error is at most, with two digits and rounded up; a limit as it was given.
     pub fn rounded(&self) -> [Option<String>; 2] {
         let is_length = self.unit == "mm";
         let value = self.value.map(|value| match self.limit {
             _ if !is_length => number(value),
-            Some(limit) => beside(value, limit),
+            Some(limit) => at_most(value, limit),
             None => two_digits(value),
         });
         let limit = self.limit.map(|limit| if is_length { as_given(limit) } else { number(limit) });

@@ -121,6 +121,20 @@ fn boards_that_are_hardly_tilted_do_not_pass() {
 }
 
 #[test]
+fn a_board_in_other_units_does_not_pass() {
+    let corners = world(12, 60).corners(61);
+    // A rig of 190 mm: in metres, in feet, and as it is; the smaller the board is said to be, the smaller are all errors.
+    for (factor, is_told) in [(1e-3, true), (1.0 / 304.8, true), (1.0, false)] {
+        let said = Corners { board: corners.board.scaled(factor), ..corners.clone() };
+        let judged = judge(&said);
+        let told = judged.evidence.iter().find(|line| line.what == "distance of the cameras");
+        assert_eq!(told.map(|line| line.allows), is_told.then_some(Verdict::Undecided), "{factor}");
+        assert_eq!(judged.verdict == Verdict::Pass, !is_told, "{factor}: {:#?}", judged.evidence);
+        assert_eq!(judged.trusted().is_some(), !is_told, "{factor}");
+    }
+}
+
+#[test]
 fn few_pairs_are_said_to_be_few() {
     let judged = judge(&world(4, 58).corners(59));
     assert_eq!(line(&judged, "pairs with poses of their own").allows, Verdict::Undecided);

@@ -3,8 +3,8 @@
 //! In: a series with its rig, and those pairs. Out: a cause a pair, with figures. Method: a board whose squares are larger by a share is taken for
 //! nearer by each camera along its own rays: the two places that the cameras give it are apart along the baseline, by that share of
 //! it. One number explains such a pair; a board or a camera that moved between the two pictures takes six. A board that moved along the
-//! baseline looks the same, so that what the other pairs did decides: where several show one other size it is a board, where others
-//! moved this one did. Goes wrong: several boards of one other size that all moved alike.
+//! baseline looks the same, so that what the other pairs did decides: where others show the same other size it is a board, where others
+//! moved, and fewer than three show one size, this one did. Goes wrong: several boards of one other size that all moved alike.
 
 use nalgebra::Vector3;
 
@@ -24,6 +24,9 @@ const TIMES: f64 = 3.0;
 
 /// Shares that differ by no more than this part of them are of one board.
 const ONE_SIZE: f64 = 0.1;
+
+/// Others of one size beside which a pair is of a board even where boards moved: two that moved alike are found among any dozen.
+const ENOUGH_OF_MOVED: usize = 2;
 
 /// How the two pictures of a pair disagree.
 struct Apart {
@@ -51,7 +54,8 @@ pub fn explain(series: &Series, strays: &[(usize, Option<f64>)], usual_px: f64) 
         let same = |other: &Apart| {
             larger.zip(other.larger).is_some_and(|(own, other)| (own - other).abs() <= ONE_SIZE * own.abs())
         };
-        let shown_again = apart.iter().enumerate().any(|(other, a)| other != k && a.as_ref().is_some_and(same));
+        let again = apart.iter().enumerate().filter(|(other, a)| *other != k && a.as_ref().is_some_and(same)).count();
+        let shown_again = again >= if others_moved { ENOUGH_OF_MOVED } else { 1 };
         let (way, or_board) = match larger {
             Some(share) if shown_again || !others_moved => {
                 return (Cause::OtherBoard, other_board(*share, baseline_mm, shown_again) + &missed);
@@ -152,12 +156,18 @@ mod tests {
             let world = World::new(14, seed);
             let mut corners = world.corners_by_hand(seed, 0.03);
             pushed(&world, &mut corners, seed, &[(4, 6.0)]);
-            let [(pair, cause, reason)] = &said(&corners)[..] else { panic!("{:?}", said(&corners)) };
-            assert!(pair == "04" && *cause == Cause::NotSimultaneous, "{reason}");
-            assert!(
-                reason.contains("along the line between the cameras") && reason.contains("another board"),
-                "{reason}"
-            );
+            // Nor are two that moved by about as much.
+            for others in [&[][..], &[(9, 6.2)]] {
+                pushed(&world, &mut corners, seed, others);
+                let told = said(&corners);
+                assert_eq!(told.len(), 1 + others.len(), "{told:?}");
+                for (_, cause, reason) in &told {
+                    assert_eq!(*cause, Cause::NotSimultaneous, "{reason}");
+                    let both =
+                        reason.contains("along the line between the cameras") && reason.contains("another board");
+                    assert!(both, "{reason}");
+                }
+            }
         }
     }
 

@@ -241,7 +241,7 @@ fn statement(known: &KnownLenses, pictures: &Pictures, causes: &[Explanation]) -
         None => "the pictures agree with the known lenses".to_owned(),
         Some((first, [])) => format!("the pictures contradict the known lenses: {first}"),
         Some((first, others)) => {
-            format!("the pictures contradict the known lenses: {first} (or {})", others.join(", or "))
+            format!("the pictures contradict the known lenses: {first}, or {}", others.join(", or "))
         }
     }
 }

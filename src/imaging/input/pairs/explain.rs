@@ -276,12 +276,12 @@ fn untold(source: &Source<'_>, holding: &[&Folder], pictures: usize) -> (String,
     (statement, halves.map_or(hint.clone(), |halves| format!("{halves}; else {hint}")))
 }
 
-/// How a picture of this form would hold two, none of which is taller than wide.
+/// How a picture of this form would hold two, none of which is taller than wide; a square picture is one camera's.
 fn as_of_two(path: &Utf8Path) -> Option<Halves> {
     let header = image::header(path).ok()?;
     match (header.width, header.height) {
         (width, height) if width >= 2 * height => Some(Halves::SideBySide),
-        (width, height) if height >= width => Some(Halves::TopBottom),
+        (width, height) if height > width => Some(Halves::TopBottom),
         _ => None,
     }
 }

@@ -22,6 +22,7 @@ pub fn ledger(case: &Case) -> Vec<Evidence> {
         pairs::tilts(case),
     ];
     lines.extend(pairs::focal_lengths(case));
+    lines.extend(pairs::baseline(case));
     lines.extend(pairs::reach(case));
     lines.extend(pairs::known_lenses(case));
     lines.push(lengths::second_board(case));

@@ -61,13 +61,14 @@ pub(super) fn any_length(case: &Case) -> Evidence {
         None => "the rig has no covariance over the volume in which the boards stood".to_owned(),
         Some((_, length)) => format!(
             "expanded uncertainty of a length of {:.0} mm where it is largest, {} {:.0} mm away (standard deviations: corners {} mm, \
-             calibration {} mm, the latter times {:.2} for so few pairs; what the models leave open is in it), over {}{}",
+             calibration {} mm, the latter times {:.2}, as Student has it for {} pairs with poses of their own; what the models leave open is in it), over {}{}",
             case.facts.volume.length_mm,
             length.lies(),
             length.at_mm.z,
             two_digits(length.corners_mm),
             two_digits(length.calibration_mm),
             case.facts.expansion.calibration,
+            case.calibration.pair_scatter.groups,
             case.facts.volume.extent.said(),
             along_sight(case)
         ),

@@ -206,6 +206,24 @@ pub(super) fn focal_lengths(case: &Case) -> Option<Evidence> {
     })
 }
 
+/// Cameras that stand nearer to each other than any are built: a board whose side is in other units makes a rig that is as consistent as any.
+pub(super) fn baseline(case: &Case) -> Option<Evidence> {
+    /// Endoscopes have 4 mm.
+    const LEAST_MM: f64 = 3.0;
+    let baseline_mm = case.calibration.rig().baseline_mm();
+    (baseline_mm < LEAST_MM).then(|| Evidence {
+        what: "distance of the cameras",
+        remedy: "check `--square-mm`: it is in mm, and an inch is 25.4",
+        value: Some(baseline_mm),
+        limit: Some(LEAST_MM),
+        unit: "mm apart",
+        allows: Verdict::Undecided,
+        detail:
+            "cameras are wider than that: the side of the board's squares is in other units, and all lengths with it"
+                .to_owned(),
+    })
+}
+
 /// Whether the pictures agree with lenses that were known.
 pub(super) fn known_lenses(case: &Case) -> Option<Evidence> {
     let check = case.calibration.lens_check.as_ref()?;
