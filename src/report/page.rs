@@ -60,7 +60,7 @@ th.text, td.text { text-align: left; }
 table.ledger td { vertical-align: top; } table.ledger td.detail { text-align: left; font-size: 13px; min-width: 320px; }
 table.ledger td:first-child { min-width: 120px; } .allows { border-left-style: solid; border-left-width: 4px; padding: 0 6px; border-radius: 3px; }
 table.ledger th:last-child { text-align: left; }
-.scroll { max-height: 420px; overflow: auto; border: 1px solid var(--hair); }
+.scroll { max-height: 420px; overflow: auto; border: 1px solid var(--hair); box-shadow: inset 0 -12px 10px -10px rgba(0,0,0,.2); }
 figure { margin: 12px 0 20px; break-inside: avoid; } figure svg, figure img { max-width: 100%; height: auto; }
 figcaption { color: var(--soft); font-size: 14px; }
 .side { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(440px, 100%), 1fr)); gap: 16px; } .side > * { min-width: 0; }
