@@ -110,6 +110,12 @@ fn is_cut(copy: &Grey8, grid: &Places, column: isize) -> bool {
     !known.is_empty() && whole * BY_CHANCE <= known.len()
 }
 
+/// Whether a corner of the grid has four squares of the contrast that most have, in their order of colours.
+pub(super) fn is_crossing(copy: &Grey8, grid: &Places, (col, row): (usize, usize)) -> bool {
+    let here = contrast(copy, grid, (col as isize, row as isize), IN_SQUARES, None);
+    usual(copy, grid).zip(here).is_some_and(|(usual, here)| here / usual > CONTRAST)
+}
+
 /// Contrast of most corners, with the sign that the order of colours gives it.
 fn usual(copy: &Grey8, grid: &Places) -> Option<f64> {
     let seen =

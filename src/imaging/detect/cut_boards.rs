@@ -100,3 +100,38 @@ fn a_board_behind_a_hand_has_no_wrong_number() {
     }
     assert!(tally.open > 20, "{tally:?}");
 }
+
+#[test]
+fn a_finger_over_border_squares_hides_no_line_of_corners() {
+    let mut tally = Tally::default();
+    let mut pictures = 0;
+    for board in [BOARDS[0], BOARDS[2]] {
+        let (picture, truth) = Shot::of(board, TURNS[0], [0.0, 0.0, 420.0]).taken();
+        let board: Board = board.parse().unwrap();
+        let (columns, rows) = (board.columns(), board.rows());
+        let at = |col: usize, row: usize| truth[board.index(col, row)];
+        // In the outer square beside a corner of each border: outwards by half a step, and as long as it takes to hide half of the border's corners.
+        let sides = [
+            (at(0, rows / 2), at(1, rows / 2), rows),
+            (at(columns - 1, rows / 2), at(columns - 2, rows / 2), rows),
+            (at(columns / 2, 0), at(columns / 2, 1), columns),
+            (at(columns / 2, rows - 1), at(columns / 2, rows - 2), columns),
+        ];
+        for (corner, inner, count) in sides {
+            for (long, grey) in [(0.12, 150), (0.18, 110), (0.24, 150)] {
+                let outwards = corner - inner;
+                let (middle, long) = (corner + outwards * 0.4, long * count as f64);
+                let hidden = with_pixels(&picture, |image, x, y| {
+                    let off = (Point2::new(x as f64, y as f64) - middle) / outwards.norm();
+                    let (out, beside) = (off.dot(&outwards) / outwards.norm(), off.perp(&outwards) / outwards.norm());
+                    let covers = (out / 0.6).powi(2) + (beside / long).powi(2) < 1.0;
+                    if covers { grey } else { image.pixels[y * image.width + x] }
+                });
+                pictures += 1;
+                look(&board, &hidden, &truth, &format!("{board} {corner} {long}"), &mut tally);
+            }
+        }
+    }
+    // A finger may hide more than half of a border's corners.
+    assert!(tally.whole + tally.numbered + 1 >= pictures, "{tally:?}");
+}

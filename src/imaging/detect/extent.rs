@@ -7,6 +7,7 @@
 
 use nalgebra::{Point2, Vector2};
 
+use super::continuation;
 use crate::imaging::Board;
 use crate::imaging::image::Grey8;
 use crate::imaging::lattice::{Lattice, Places};
@@ -97,6 +98,7 @@ pub fn without_chance_lines(small: &Grey8, grid: Places) -> Places {
 }
 
 /// The grid without outer lines that are no corners but the board's own outline: without such a line the grid is seen to end there as a board does.
+/// So it does where a finger lies on the dark squares beyond a line of corners; these are crossings of four squares, and the outline has none.
 pub fn without_outline(small: &Grey8, grid: Places) -> Places {
     let mut grid = grid;
     for _ in 0..4 {
@@ -106,11 +108,18 @@ pub fn without_outline(small: &Grey8, grid: Places) -> Places {
             continue;
         }
         let inner = Lattice::from_fn(grid.columns - 1, grid.rows, |col, row| grid.get(col + 1, row).copied());
-        if end(small, &inner) == End::Board {
+        if end(small, &inner) == End::Board && !are_crossings(small, &grid) {
             grid = inner;
         }
     }
     grid
+}
+
+/// Whether most corners of the first column are crossings of four squares.
+fn are_crossings(small: &Grey8, grid: &Places) -> bool {
+    let found: Vec<usize> = (0..grid.rows).filter(|&row| grid.get(0, row).is_some()).collect();
+    let crossings = found.iter().filter(|&&row| continuation::is_crossing(small, grid, (0, row))).count();
+    2 * crossings > found.len()
 }
 
 /// Where the corners of the line before a column are, as far as the grid goes on evenly; each with the step that leads there.
