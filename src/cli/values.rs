@@ -26,7 +26,8 @@ impl FromStr for AskedSquares {
 
 /// Reads a number; what it may be is checked where it is used.
 pub(super) fn number(text: &str) -> Result<f64, String> {
-    text.parse().map_err(|_| "a number is needed, with a decimal point".to_owned())
+    let finite = text.parse().ok().filter(|value: &f64| value.is_finite());
+    finite.ok_or_else(|| "a number is needed, with a decimal point".to_owned())
 }
 
 /// Reads a whole number.
