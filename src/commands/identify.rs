@@ -63,7 +63,11 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     said(&record, &out, args.output.json);
     let placed = found.placed(&set, &nominal, &settings)?;
     let json = write(&out, &set, &nominal, &found, &record, placed.as_ref(), &settings)?;
-    let stdout = if args.output.json { json } else { report::identify::summary(&record, file.as_deref(), placed.is_some(), &out) };
+    let stdout = if args.output.json {
+        json
+    } else {
+        report::identify::summary(&record, file.as_deref(), placed.is_some(), &out)
+    };
     let status = if record.advice == Advice::DoNotUse { Status::OutOfTolerance } else { Status::Done };
     Ok(Outcome { stdout, status })
 }
@@ -264,8 +268,14 @@ fn write(
     if record.advice == Advice::DoNotUse {
         holds = format!("Do not use this robot: {}.", record.reason);
     }
-    let scale = record.scale.filter(|_| record.advice != Advice::DoNotUse).map_or(String::new(), |scale| format!("# Not in this: {}.\n", scale.sentence()));
-    out.write_toml(IDENTIFIED, &format!("# {holds}\n{scale}{}", robot::file::to_toml_checked(identified, Some(&check))))?;
+    let scale = record
+        .scale
+        .filter(|_| record.advice != Advice::DoNotUse)
+        .map_or(String::new(), |scale| format!("# Not in this: {}.\n", scale.sentence()));
+    out.write_toml(
+        IDENTIFIED,
+        &format!("# {holds}\n{scale}{}", robot::file::to_toml_checked(identified, Some(&check))),
+    )?;
     let json = out.write_json("identification.json", record)?;
     out.write_json(PLACEMENT, &placement)?;
     report::page::write(out, "identify.html", page)?;

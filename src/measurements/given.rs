@@ -64,9 +64,19 @@ mod tests {
     use crate::measurements::RobotPose;
 
     fn row(joint: f64, x: f64, role: Role) -> Measurement {
-        let at = RobotPose { pose: format!("{joint}"), group: "g".into(), role, joints_deg: vec![joint, -0.0], slides: vec![] };
+        let at = RobotPose {
+            pose: format!("{joint}"),
+            group: "g".into(),
+            role,
+            joints_deg: vec![joint, -0.0],
+            slides: vec![],
+        };
         let point_mm = Point3::new(x, 2.0, 3.0);
-        Measurement { at, target: String::new(), observed: Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None } }
+        Measurement {
+            at,
+            target: String::new(),
+            observed: Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None },
+        }
     }
 
     #[test]

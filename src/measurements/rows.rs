@@ -103,7 +103,8 @@ impl Measurement {
             Observed::Missing { .. } => return self,
         };
         if farthest_mm > FARTHEST_MM {
-            self.observed = Observed::Missing { reason: format!("{farthest_mm:e} mm, farther than anything is measured") };
+            self.observed =
+                Observed::Missing { reason: format!("{farthest_mm:e} mm, farther than anything is measured") };
         }
         self
     }

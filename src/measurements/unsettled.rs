@@ -82,7 +82,8 @@ fn contradicted(parts: &[Part], first: &Picked, forced: Forced) -> Option<Error>
 pub(super) fn other_units(parts: &[Part], forced: Forced, way: &Way) -> Error {
     let typed: Vec<&str> = forced.joints.iter().chain(&forced.lengths).map(|unit| unit.flag()).collect();
     let found = format!("{},{}", way.joints.flag(), way.lengths.flag());
-    let message = format!("with `--units {}` no choice of the columns comes near to the nominal robot", typed.join(","));
+    let message =
+        format!("with `--units {}` no choice of the columns comes near to the nominal robot", typed.join(","));
     parts[0].refuse(message, Some(&format!("with `--units {found}` it does; without `--units` that is found")))
 }
 

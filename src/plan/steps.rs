@@ -137,12 +137,7 @@ fn planned(
 }
 
 /// That nobody measured where the cameras stand in some of the groups; `rows` is the file of the earlier poses.
-fn assumed(
-    placements: &[Placement],
-    earlier: &[Candidate],
-    settings: &Settings,
-    rows: Option<&str>,
-) -> Option<String> {
+fn assumed(placements: &[Placement], earlier: &[Candidate], settings: &Settings, rows: Option<&str>) -> Option<String> {
     let is_seen = |group: usize| earlier.iter().any(|pose| pose.group == group);
     let unseen = placements.iter().enumerate().filter(|(group, _)| !is_seen(*group));
     let names: Vec<&str> = unseen.map(|(_, placement)| placement.name.as_str()).collect();

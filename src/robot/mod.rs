@@ -99,7 +99,8 @@ pub enum Error {
     /// Tools of which one must be wrong.
     #[error(
         "the tools of the two files are {apart_mm:.1} mm apart, {} mm in {robot} and {} mm in {identified}: which one works is not known",
-        tool_text(robot_mm), tool_text(identified_mm)
+        tool_text(robot_mm),
+        tool_text(identified_mm)
     )]
     TwoTools {
         /// The file of `--robot`.

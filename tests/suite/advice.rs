@@ -32,12 +32,16 @@ fn advise(at: &Path, advice: &str) {
     let text = std::fs::read_to_string(&path).unwrap();
     let (before, after) = text.split_once("[check]\n").unwrap();
     let rest = after.split_once("\n\n").unwrap().1;
-    std::fs::write(path, format!("{before}[check]\nadvice = \"{advice}\"\nreason = \"the floor shook\"\n\n{rest}")).unwrap();
+    std::fs::write(path, format!("{before}[check]\nadvice = \"{advice}\"\nreason = \"the floor shook\"\n\n{rest}"))
+        .unwrap();
 }
 
 /// Each command that uses the robot, and the status that it has where nothing speaks against it; then what it says and with which status.
 fn used(at: &Path) -> Vec<(&'static str, i32, String)> {
-    std::fs::write(at.join("targets.csv"), "name,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg\na,10,-20,30,5,60,7\n").unwrap();
+    let rows = std::fs::read_to_string(at.join("truth/measurements.csv")).unwrap();
+    let pose: Vec<&str> = rows.lines().nth(1).unwrap().split(',').collect();
+    let target = format!("name,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg\na,{}\n", pose[3..9].join(","));
+    std::fs::write(at.join("targets.csv"), target).unwrap();
     let with_robot = ["--robot", "out/identified.toml"];
     let commands: [&[&str]; 6] = [
         &["compensate", "targets.csv", "--robot", "robot.toml", "--identified", "out/identified.toml", "--out", "c"],
@@ -67,7 +71,10 @@ fn a_robot_that_is_advised_against_is_used_with_its_reason_and_a_status() {
     }
     advise(at, "do-not-use");
     for (name, status, said) in used(at) {
-        assert!(said.contains("do not use out/identified.toml, says its own `check`: the floor shook"), "{name}: {said}");
+        assert!(
+            said.contains("do not use out/identified.toml, says its own `check`: the floor shook"),
+            "{name}: {said}"
+        );
         assert_eq!(status, 1, "{name}: {said}");
     }
     for file in ["c/compensated.csv", "e/robot.urdf", "e/robot.toml", "e/robot.csv", "l/placement.json"] {
@@ -81,7 +88,10 @@ fn a_robot_that_is_advised_against_is_used_with_its_reason_and_a_status() {
     assert!(placed.status.code() == Some(1) && stderr(&placed).contains("the floor shook"), "{}", stderr(&placed));
     advise(at, "check");
     for ((name, status, said), (_, before, _)) in used(at).into_iter().zip(clean) {
-        assert!(said.contains("check before you use out/identified.toml") && said.contains("the floor shook"), "{said}");
+        assert!(
+            said.contains("check before you use out/identified.toml") && said.contains("the floor shook"),
+            "{said}"
+        );
         assert_eq!(status, before, "{name}: {said}");
     }
 }
@@ -118,7 +128,10 @@ fn verify_says_that_a_robot_was_fitted_to_the_rows_and_what_its_columns_are() {
     };
     // The verify rows took no part in the fit.
     let (said, messages) = verify("truth/measurements.csv");
-    assert!(said.contains("mean to min: errors of distances from") && said.contains("point: of points, after"), "{said}");
+    assert!(
+        said.contains("mean to min: errors of distances from") && said.contains("point: of points, after"),
+        "{said}"
+    );
     assert!(!messages.contains("was fitted to"), "{messages}");
     // The fitted rows under other names.
     let header = text.lines().next().unwrap();
@@ -128,4 +141,58 @@ fn verify_says_that_a_robot_was_fitted_to_the_rows_and_what_its_columns_are() {
     let (_, messages) = verify("own.csv");
     assert!(messages.contains("out/identified.toml was fitted to 15 of these 15 rows"), "{messages}");
     assert_eq!(messages.matches("was fitted to").count(), 1, "{messages}");
+}
+
+/// A table of the joints, deg, and points, m, with names that say no unit; a file with the rows of the first group alone.
+fn tables(at: &Path) {
+    let made = ["simulate", "--points-only", "--samples", "40", "--verify", "12", "--seed", "4", "--out", "."];
+    assert_eq!(stereocal(at, &made).status.code(), Some(0));
+    let text = std::fs::read_to_string(at.join("truth/measurements.csv")).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    let metres = |mm: &&str| (mm.parse::<f64>().unwrap() / 1000.0).to_string();
+    let of =
+        |row: &Vec<&str>| [row[3..9].join(","), row[9..12].iter().map(metres).collect::<Vec<_>>().join(",")].join(",");
+    let rows: Vec<Vec<&str>> = lines.collect();
+    let plain: Vec<String> = rows.iter().map(of).collect();
+    std::fs::write(at.join("metres.csv"), format!("j1,j2,j3,j4,j5,j6,x,y,z\n{}\n", plain.join("\n"))).unwrap();
+    let first: Vec<String> = rows.iter().filter(|row| row[1] == rows[0][1]).map(|row| row.join(",")).collect();
+    std::fs::write(at.join("first.csv"), format!("{}\n{}\n", header.join(","), first.join("\n"))).unwrap();
+}
+
+#[test]
+fn what_is_in_the_way_or_only_assumed_is_named() {
+    let folder = workplace();
+    let at = folder.path();
+    tables(at);
+    // Units that were typed, and those that fit.
+    let identify = ["identify", "--measurements", "metres.csv", "--method", "trust-region", "--extensions", "none"];
+    let wrong = stereocal(at, &[&identify[..], &["--units", "deg,mm"]].concat());
+    assert_eq!(wrong.status.code(), Some(2), "{}", stderr(&wrong));
+    let said = stderr(&wrong);
+    assert!(
+        said.contains("with `--units deg,mm` no choice") && said.contains("with `--units deg,m` it does"),
+        "{said}"
+    );
+    let right = stereocal(at, &[&identify[..], &["--units", "deg,m"]].concat());
+    assert_eq!(right.status.code(), Some(0), "{}", stderr(&right));
+    // A tool a millimetre off its drawing is not far from nominal.
+    assert!(!stderr(&right).contains("far from nominal"), "{}", stderr(&right));
+    // Places of the cameras that nobody measured.
+    let plan = ["plan", "--calibration", "truth/calibration.json", "--poses", "8", "--verify", "2", "--pool", "500"];
+    for (rows, is_assumed) in [("first.csv", true), ("truth/measurements.csv", false)] {
+        let planned = stereocal(at, &[&plan[..], &["--after", rows, "--out", "plan", "--force"]].concat());
+        assert_eq!(planned.status.code(), Some(0), "{}", stderr(&planned));
+        let said = stderr(&planned);
+        assert_eq!(said.contains("is only assumed, as first.csv has no three poses there"), is_assumed, "{said}");
+    }
+    // No angle, and a file that is elsewhere.
+    let shown = stereocal(at, &["robot", "show", "robot.toml", "--joints", "1,2,3,4,5,nan"]);
+    assert_eq!(shown.status.code(), Some(2), "{}", stdout(&shown));
+    let missing = stereocal(at, &["robot", "show", "nowhere.toml"]);
+    assert!(
+        !stderr(&missing).contains("--robot FILE") && stderr(&missing).contains("robot new"),
+        "{}",
+        stderr(&missing)
+    );
 }

@@ -73,8 +73,10 @@ fn targets_come_back_where_they_were_meant() {
     assert!(said.contains("300 of 300 targets compensated"), "{said}");
     // Why `identify` names another figure; the tools are the same.
     assert!(said.contains("at most (in the base frame; ") && !said.contains("the tools of the two files"), "{said}");
-    let mut tipped = real.clone();
-    tipped.tool_mm += nalgebra::Vector3::new(0.0, 3.0, 4.0);
+    let (mut tipped, mut drawn) = (real.clone(), nominal.clone());
+    drawn.tool_mm = nalgebra::Vector3::new(0.0, 0.0, 90.0);
+    tipped.tool_mm = nalgebra::Vector3::new(0.0, 3.0, 94.0);
+    std::fs::write(folder.path().join("robot.toml"), file::to_toml(&drawn)).unwrap();
     std::fs::write(folder.path().join("identified.toml"), file::to_toml(&tipped)).unwrap();
     let apart = run(folder.path(), &["targets.csv", "--out", "tipped"], 0);
     assert!(apart.contains("the tools of the two files are 5.000 mm apart, and this is corrected too"), "{apart}");
@@ -276,7 +278,11 @@ fn a_tool_that_one_file_lacks_is_taken_for_both() {
     for (drawn, found) in [([0.0; 3], [1.4, -1.1, 237.6]), ([1.4, -1.1, 237.6], [0.0; 3])] {
         let (nominal, real) = with_tools(folder.path(), drawn, found);
         let said = run(folder.path(), &["targets.csv", "--force"], 0);
-        let states = if drawn[2] == 0.0 { "robot.toml states no tool: that of identified.toml, 1.400, -1.100, 237.600 mm," } else { "identified.toml states no tool: that of robot.toml," };
+        let states = if drawn[2] == 0.0 {
+            "robot.toml states no tool: that of identified.toml, 1.400, -1.100, 237.600 mm,"
+        } else {
+            "identified.toml states no tool: that of robot.toml,"
+        };
         assert!(said.contains(states) && said.contains("is taken for both; `--tool X,Y,Z` names another"), "{said}");
         // The same as with that tool typed, and by the arm's errors alone: a few mm, not the tool's length.
         let typed = run(folder.path(), &["targets.csv", "--tool", "1.4,-1.1,237.6", "--out", "typed", "--force"], 0);
@@ -286,7 +292,8 @@ fn a_tool_that_one_file_lacks_is_taken_for_both() {
         assert!(mean > 0.5 && mean < 30.0, "{said}");
         let tool = nalgebra::Translation3::new(1.4, -1.1, 237.6);
         for (q, (found, _)) in postures(&nominal, 4).iter().zip(rows(&folder.path().join("out/compensated.csv"))) {
-            let off = (nominal.base_from_flange(&radians(q)) * tool).inverse() * (real.base_from_flange(&radians(&found)) * tool);
+            let off = (nominal.base_from_flange(&radians(q)) * tool).inverse()
+                * (real.base_from_flange(&radians(&found)) * tool);
             assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD);
         }
     }
@@ -299,7 +306,10 @@ fn two_tools_that_are_far_apart_are_asked_about() {
         with_tools(folder.path(), [0.0, 0.0, 100.0], [0.0, 0.0, 100.0 + apart]);
         let said = run(folder.path(), &["targets.csv", "--force"], status);
         if status == 2 {
-            let tools = format!("{apart:.1} mm apart, 0.000, 0.000, 100.000 mm in robot.toml and 0.000, 0.000, {:.3} mm in identified.toml", 100.0 + apart);
+            let tools = format!(
+                "{apart:.1} mm apart, 0.000, 0.000, 100.000 mm in robot.toml and 0.000, 0.000, {:.3} mm in identified.toml",
+                100.0 + apart
+            );
             assert!(said.contains(&tools) && said.contains("`--tool 0.000,0.000,"), "{said}");
             run(folder.path(), &["targets.csv", "--force", "--tool", "0,0,100"], 0);
         }
@@ -334,7 +344,10 @@ fn robots_that_are_not_one_arm_are_refused_and_one_robot_twice_is_said() {
     robot.joints[2].a_mm += 8.0;
     robot.joints[1].theta_rad += 0.05 - std::f64::consts::TAU;
     write("identified.toml", &robot);
-    run(folder.path(), &["targets.csv", "--force"], 0);
+    let arguments =
+        ["compensate", "targets.csv", "--force", "--robot", "robot.toml", "--identified", "identified.toml"];
+    let output = stereocal(folder.path(), &arguments);
+    assert!(output.status.code() != Some(2) && stdout(&output).contains("of 4 targets"), "{}", stderr(&output));
     write("identified.toml", &nominal);
     let said = run(folder.path(), &["targets.csv", "--force"], 1);
     assert!(said.starts_with("nothing to correct: robot.toml and identified.toml describe the same robot"), "{said}");
@@ -349,7 +362,10 @@ fn a_target_beyond_a_joints_range_is_named_so() {
     list[1][0] = 500.0;
     std::fs::write(folder.path().join("targets.csv"), csv(&list)).unwrap();
     let said = run(folder.path(), &["targets.csv"], 1);
-    assert!(said.contains("p1 (line 3): joint 1 of the target is at 500.000; its range is -165.000 to 165.000"), "{said}");
+    assert!(
+        said.contains("p1 (line 3): joint 1 of the target is at 500.000; its range is -165.000 to 165.000"),
+        "{said}"
+    );
 }
 
 #[test]

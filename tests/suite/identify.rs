@@ -226,7 +226,8 @@ fn one_bad_verify_row_is_the_reason_and_in_no_figure_of_the_verdict() {
         let spoil = |i: usize, mut fields: Vec<String>| {
             if i == 0 {
                 let at = |column: &str| fields.iter().position(|field| field == column).expect("a column");
-                (role.set(at("role")), x.set(at("x_mm")));
+                role.set(at("role"));
+                x.set(at("x_mm"));
                 name.borrow_mut().clear();
             } else if fields[role.get()] == "verify" && name.borrow().is_empty() {
                 name.replace(fields[0].clone());
@@ -244,10 +245,14 @@ fn one_bad_verify_row_is_the_reason_and_in_no_figure_of_the_verdict() {
             continue;
         }
         assert_eq!(record["advice"], "check", "{factor}: {reason}");
-        assert!(reason.starts_with("1 verify row fits far worse than the rest") && !reason.contains("too few rows"), "{reason}");
+        assert!(
+            reason.starts_with("1 verify row fits far worse than the rest") && !reason.contains("too few rows"),
+            "{reason}"
+        );
         assert_eq!(record["strays"], serde_json::json!([*name.borrow()]));
         let kept = &record["methods"][0];
-        let [all, judged] = ["verify", "verify_without_strays"].map(|k| kept[k]["point"]["mean_abs_mm"].as_f64().expect("a mean"));
+        let [all, judged] =
+            ["verify", "verify_without_strays"].map(|k| kept[k]["point"]["mean_abs_mm"].as_f64().expect("a mean"));
         assert!(judged < 0.5 && all > 2.0 * judged, "{judged} {all}");
         let page = std::fs::read_to_string(folder.path().join("out/identify.html")).expect("a page");
         assert!(page.contains(&format!("rows that took no part in the fit, without {}", name.borrow())), "{reason}");

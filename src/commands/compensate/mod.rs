@@ -62,7 +62,10 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let json = out.write_json("compensate.json", &summary)?;
     let written = out.join(if program.is_some() { &program_name } else { "compensated.csv" });
     let status = if summary.is_whole() && pair.same.is_none() { heeded } else { Status::OutOfTolerance };
-    Ok(Outcome { stdout: if args.output.json { json } else { said(&summary, &pair, motions.as_deref(), &written) }, status })
+    Ok(Outcome {
+        stdout: if args.output.json { json } else { said(&summary, &pair, motions.as_deref(), &written) },
+        status,
+    })
 }
 
 /// Where no row says the posture.

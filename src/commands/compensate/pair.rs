@@ -72,7 +72,9 @@ impl Pair {
         }
         let lacks = |without, with, tool_mm: Vector3<f64>| {
             let tool = tool_text(&tool_mm.into());
-            format!("{without} states no tool: that of {with}, {tool} mm, is taken for both; `--tool X,Y,Z` names another")
+            format!(
+                "{without} states no tool: that of {with}, {tool} mm, is taken for both; `--tool X,Y,Z` names another"
+            )
         };
         if drawn == Vector3::zeros() || found == Vector3::zeros() {
             let of_found = drawn == Vector3::zeros();

@@ -26,7 +26,12 @@ pub(super) struct Program {
 }
 
 impl Program {
-    pub(super) fn read(args: &Compensate, language: Language, joints: Joints, order: &JointOrder) -> files::Result<Program> {
+    pub(super) fn read(
+        args: &Compensate,
+        language: Language,
+        joints: Joints,
+        order: &JointOrder,
+    ) -> files::Result<Program> {
         let path = &args.targets;
         let bytes = files::read_text_bytes(path, "robot program")?;
         let refuse = |message: String, hint: &str| files::Error::format(path, None, message, Some(hint));

@@ -53,7 +53,8 @@ pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome>
     };
     stdout.push_str(&format!("{} from {camera_frame}{target}, in {unit}\n", args.base_frame));
     if flange_from_target.is_none() {
-        let only = format!("note: the target's turn on the flange is not known: only the {sensor}'s place is in the file\n");
+        let only =
+            format!("note: the target's turn on the flange is not known: only the {sensor}'s place is in the file\n");
         stdout.push_str(&only);
     }
     Ok(Outcome { stdout, status })

@@ -47,10 +47,14 @@ pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
 fn holds(format: RobotFormat) -> &'static str {
     match format {
         RobotFormat::Urdf => "joint origins and axes from the base to the flange, in m and rad",
-        RobotFormat::DhCsv => "modified Denavit-Hartenberg parameters (alpha and a of the link before the joint), in mm and deg",
+        RobotFormat::DhCsv => {
+            "modified Denavit-Hartenberg parameters (alpha and a of the link before the joint), in mm and deg"
+        }
         RobotFormat::Toml => "all of the robot, modified Denavit-Hartenberg parameters, in mm and deg",
         RobotFormat::RosKinematicsYaml => "each link's frame in the one before, in m and rad",
-        RobotFormat::UrCalibration => "what is added to the controller's own Denavit-Hartenberg parameters, in m and rad",
+        RobotFormat::UrCalibration => {
+            "what is added to the controller's own Denavit-Hartenberg parameters, in m and rad"
+        }
     }
 }
 
@@ -114,7 +118,9 @@ fn table(robot: &Robot) -> ExportedRobot {
     let mut notes: Vec<String> = notes.collect();
     if robot.tool_mm != Vector3::zeros() {
         let tool = tool_text(&robot.tool_mm.into());
-        notes.push(format!("the tool, {tool} mm in the last frame, has no place in a table: add it in the other program"));
+        notes.push(format!(
+            "the tool, {tool} mm in the last frame, has no place in a table: add it in the other program"
+        ));
     }
     ExportedRobot { name: "robot.csv", text: dh_csv::to_csv(robot), carried: robot.clone(), notes }
 }

@@ -49,7 +49,8 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let record = against.with_file_name("identification.json");
     let made_by = out.provenance();
     let whole = made_by.as_ref().and_then(|run| run.shares(&record)).filter(|_| own.rows == 0);
-    let said = |same| format!("this robot was identified from {same}: only new poses tell whether it still is that robot");
+    let said =
+        |same| format!("this robot was identified from {same}: only new poses tell whether it still is that robot");
     let of_own = own.statement().or(whole.map(str::to_owned)).map(said);
     let skipped = set.skipped.iter().map(|pose| format!("pose {} is not compared: {}", pose.pose, pose.reason));
     let advice = check.as_ref().and_then(|check| check.warning(against));

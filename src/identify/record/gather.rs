@@ -13,9 +13,9 @@ use crate::identify::judge::uncertainty::{Covariance, Expected};
 use crate::identify::run::{Identification, certainty};
 use crate::identify::sensor::Extra;
 use crate::identify::settings::{Model, Settings};
-use crate::robot::{Advice, Robot};
 use crate::measurements::Given;
 use crate::robot::tool_fit::Start;
+use crate::robot::{Advice, Robot};
 
 /// Name and value of an unknown of the sensor; a supposed scale in thousandths.
 fn of_sensor(set: &Dataset, extra: Extra, value: f64) -> (String, f64) {

@@ -57,7 +57,9 @@ fn next(advice: Advice, robot: &str, file: &str) -> String {
         Advice::Check => format!(
             "look at what is named above; ten new poses say whether it holds: `stereocal verify --measurements NEW.csv --robot {robot} --robot {file}`"
         ),
-        Advice::KeepNominal => format!("go on with {robot}; more rows, that bend every joint, may show more (`stereocal guide poses`)"),
+        Advice::KeepNominal => {
+            format!("go on with {robot}; more rows, that bend every joint, may show more (`stereocal guide poses`)")
+        }
         Advice::DoNotUse => "mend what is named above, and identify again (`stereocal guide warnings`)".to_owned(),
     }
 }
@@ -150,10 +152,15 @@ pub fn verified(robots: &[(&str, &PointSpread)], folded: bool) -> String {
         table.row(std::iter::once((*name).to_owned()).chain(figures.map(|figure| number(figure, 4))));
     }
     let any = |of: fn(&PointSpread) -> bool| robots.iter().any(|(_, spread)| of(spread));
-    let distances = "mean to min: errors of distances from the centre of each group, or from the row nearest to its middle";
-    let columns = match (any(|s| s.point.is_some()), any(|s| s.distortion.is_some()), any(|s| s.consistency.is_some())) {
+    let distances =
+        "mean to min: errors of distances from the centre of each group, or from the row nearest to its middle";
+    let columns = match (any(|s| s.point.is_some()), any(|s| s.distortion.is_some()), any(|s| s.consistency.is_some()))
+    {
         (true, ..) => format!("{distances}; point: of points, after one rigid fit to each placement"),
-        (_, true, _) => "mean to min: distances of touches from the middle of their point; point: errors of known distances".to_owned(),
+        (_, true, _) => {
+            "mean to min: distances of touches from the middle of their point; point: errors of known distances"
+                .to_owned()
+        }
         (.., true) => "mean to min: distances of touches from the middle of their point".to_owned(),
         _ => "mean to min: errors of distances".to_owned(),
     };

@@ -9,6 +9,7 @@
 
 mod compare;
 mod compared;
+mod comparison;
 mod found;
 mod looks;
 mod moves;

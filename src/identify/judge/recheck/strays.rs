@@ -5,7 +5,7 @@
 //! one cause. A single cause that explains all rows is believed before a stray is, unless the stray is much likelier. Goes wrong: two causes at
 //! once that few rows see.
 
-use super::compare::{Comparison, Said};
+use super::comparison::{Comparison, Said};
 use super::found::{FALSE_ALARM, Recheck};
 use super::looks::price;
 use crate::difference::TOLD_APART;

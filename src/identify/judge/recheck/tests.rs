@@ -68,7 +68,13 @@ impl Cell {
     }
 
     /// So many rows of one group, and what is said of them once they were spoilt.
-    fn spoilt(&self, fault: &dyn Fn(&mut Robot), count: usize, seed: u64, spoil: &dyn Fn(&mut [Measurement])) -> Recheck {
+    fn spoilt(
+        &self,
+        fault: &dyn Fn(&mut Robot),
+        count: usize,
+        seed: u64,
+        spoil: &dyn Fn(&mut [Measurement]),
+    ) -> Recheck {
         let mut rows = self.rows(fault, count, seed);
         spoil(&mut rows);
         recheck(&Dataset::new(&rows).unwrap(), &self.found, &self.before, &|_| None).unwrap()
@@ -222,7 +228,11 @@ fn a_robot_that_changed_is_told_beside_a_bad_reading() {
                     // Two small ones may be taken for a larger one and a row that strays, but never for none.
                     let is_one = found.cause().split('|').any(|cause| cause == word) && found.strays == strays;
                     if !found.changed || what != "two" && !is_one {
-                        wrong.push(format!("{seed} {word} {deg:.4} deg {what}: {} {:?}", found.statement(), found.strays));
+                        wrong.push(format!(
+                            "{seed} {word} {deg:.4} deg {what}: {} {:?}",
+                            found.statement(),
+                            found.strays
+                        ));
                     }
                 }
             }
