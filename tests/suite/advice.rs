@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+use stereocal::formats::calibration::CalibrationFile;
+use stereocal::simulate::rig::true_rig;
+
 use crate::run::{stderr, stdout, stereocal, workplace};
 
 /// A robot with points of 52 poses, identified into `out` as it is, or with a file of another arm.
@@ -143,21 +146,24 @@ fn verify_says_that_a_robot_was_fitted_to_the_rows_and_what_its_columns_are() {
     assert_eq!(messages.matches("was fitted to").count(), 1, "{messages}");
 }
 
-/// A table of the joints, deg, and points, m, with names that say no unit; a file with the rows of the first group alone.
+/// A table of joints, deg, and points, m, of one placement without names; a file with the rows of the first group alone; a rig.
 fn tables(at: &Path) {
     let made = ["simulate", "--points-only", "--samples", "40", "--verify", "12", "--seed", "4", "--out", "."];
     assert_eq!(stereocal(at, &made).status.code(), Some(0));
     let text = std::fs::read_to_string(at.join("truth/measurements.csv")).unwrap();
     let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let header = lines.next().unwrap();
-    let metres = |mm: &&str| (mm.parse::<f64>().unwrap() / 1000.0).to_string();
-    let of =
-        |row: &Vec<&str>| [row[3..9].join(","), row[9..12].iter().map(metres).collect::<Vec<_>>().join(",")].join(",");
     let rows: Vec<Vec<&str>> = lines.collect();
-    let plain: Vec<String> = rows.iter().map(of).collect();
-    std::fs::write(at.join("metres.csv"), format!("j1,j2,j3,j4,j5,j6,x,y,z\n{}\n", plain.join("\n"))).unwrap();
-    let first: Vec<String> = rows.iter().filter(|row| row[1] == rows[0][1]).map(|row| row.join(",")).collect();
-    std::fs::write(at.join("first.csv"), format!("{}\n{}\n", header.join(","), first.join("\n"))).unwrap();
+    let first: Vec<&Vec<&str>> = rows.iter().filter(|row| row[1] == rows[0][1]).collect();
+    let metres = |mm: &&str| (mm.parse::<f64>().unwrap() / 1000.0).to_string();
+    let plain = |row: &&Vec<&str>| {
+        format!("{},{}", row[3..9].join(","), row[9..12].iter().map(metres).collect::<Vec<_>>().join(","))
+    };
+    std::fs::write(at.join("metres.csv"), first.iter().map(plain).collect::<Vec<_>>().join("\n")).unwrap();
+    let whole: Vec<String> = first.iter().map(|row| row.join(",")).collect();
+    std::fs::write(at.join("first.csv"), format!("{}\n{}\n", header.join(","), whole.join("\n"))).unwrap();
+    let rig = serde_json::to_string(&CalibrationFile::from(&true_rig(1280))).unwrap();
+    std::fs::write(at.join("rig.json"), rig).unwrap();
 }
 
 #[test]
@@ -165,21 +171,30 @@ fn what_is_in_the_way_or_only_assumed_is_named() {
     let folder = workplace();
     let at = folder.path();
     tables(at);
+    let identify = |arguments: &[&str]| {
+        let quick = ["identify", "--method", "trust-region", "--extensions", "none", "--force", "--out", "found"];
+        stereocal(at, &[&quick[..], arguments].concat())
+    };
     // Units that were typed, and those that fit.
-    let identify = ["identify", "--measurements", "metres.csv", "--method", "trust-region", "--extensions", "none"];
-    let wrong = stereocal(at, &[&identify[..], &["--units", "deg,mm"]].concat());
+    let wrong = identify(&["--measurements", "metres.csv", "--units", "deg,mm"]);
     assert_eq!(wrong.status.code(), Some(2), "{}", stderr(&wrong));
     let said = stderr(&wrong);
     assert!(
         said.contains("with `--units deg,mm` no choice") && said.contains("with `--units deg,m` it does"),
         "{said}"
     );
-    let right = stereocal(at, &[&identify[..], &["--units", "deg,m"]].concat());
-    assert_eq!(right.status.code(), Some(0), "{}", stderr(&right));
-    // A tool a millimetre off its drawing is not far from nominal.
-    assert!(!stderr(&right).contains("far from nominal"), "{}", stderr(&right));
+    assert_eq!(identify(&["--measurements", "metres.csv", "--units", "deg,m"]).status.code(), Some(0));
+    // A tool three millimetres off its drawing is not far from nominal, one four centimetres off is.
+    let robot = std::fs::read_to_string(at.join("robot.toml")).unwrap();
+    for (x_mm, is_far) in [("9.0", false), ("15.0", false), ("52.0", true)] {
+        std::fs::write(at.join("moved.toml"), robot.replace("x_mm = 12.0", &format!("x_mm = {x_mm}"))).unwrap();
+        let said = stderr(&identify(&["--measurements", "truth/measurements.csv", "--robot", "moved.toml"]));
+        let far = said.lines().find(|line| line.contains("far from nominal")).unwrap_or_default();
+        assert_eq!(far.contains("v_x"), is_far, "{x_mm}: {said}");
+    }
     // Places of the cameras that nobody measured.
-    let plan = ["plan", "--calibration", "truth/calibration.json", "--poses", "8", "--verify", "2", "--pool", "500"];
+    let plan =
+        ["plan", "--calibration", "rig.json", "--poses", "8", "--verify", "2", "--pool", "600", "--noise-mm", "0.02"];
     for (rows, is_assumed) in [("first.csv", true), ("truth/measurements.csv", false)] {
         let planned = stereocal(at, &[&plan[..], &["--after", rows, "--out", "plan", "--force"]].concat());
         assert_eq!(planned.status.code(), Some(0), "{}", stderr(&planned));
