@@ -38,13 +38,33 @@ pub(super) fn left_out(comparison: &Comparison, used: &[usize], whole: &Said) ->
         left = without;
         rest.retain(|&other| other != row);
         strays.push(row);
-        let said = comparison.said(&rest).ok()?;
-        if !said.recheck.changed || said.likelihood.is_some() {
-            strays.sort_unstable();
-            return Some(Recheck { strays: comparison.set.names(&strays), ..said.recheck });
+        if let Some(recheck) = of_one_piece(comparison, &rest) {
+            return Some(only_strays(comparison, rest, strays, recheck));
         }
     }
     None
+}
+
+/// What rows say that agree with the old robot, or that one cause explains.
+fn of_one_piece(comparison: &Comparison, rows: &[usize]) -> Option<Recheck> {
+    let said = comparison.said(rows).ok()?;
+    (!said.recheck.changed || said.likelihood.is_some()).then_some(said.recheck)
+}
+
+/// Takes back rows that were left out before the worst one was: beside it, they only seemed to be far off.
+fn only_strays(comparison: &Comparison, mut rest: Vec<usize>, mut strays: Vec<usize>, mut recheck: Recheck) -> Recheck {
+    for row in strays.clone() {
+        let mut with = rest.clone();
+        with.push(row);
+        with.sort_unstable();
+        let same = |again: &Recheck| strays.len() > 1 && again.changed == recheck.changed;
+        if let Some(again) = of_one_piece(comparison, &with).filter(same) {
+            strays.retain(|&other| other != row);
+            (rest, recheck) = (with, again);
+        }
+    }
+    strays.sort_unstable();
+    Recheck { strays: comparison.set.names(&strays), ..recheck }
 }
 
 /// The row whose absence leaves the least squared residuals, and how much.
