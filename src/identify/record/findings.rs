@@ -36,10 +36,12 @@ impl Findings {
             return Findings { against: vec![robots.clone()], doubts: examined, notes: Vec::new() };
         }
         let unexplained = unexplained.filter(|_| !is_explained(found));
+        let is_reached = unexplained.is_none();
         let against: Vec<Finding> = unexplained.into_iter().chain(plausible::of_another_robot(found)).collect();
         let notes = of_fit.into_iter().filter(|finding| !against.contains(finding)).collect();
-        // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of another arm it says nothing.
-        let scale = found.scale(set).filter(|scale| scale.is_significant() && against.is_empty()).map(|scale| {
+        // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of rows that nothing explains it
+        // says nothing.
+        let scale = found.scale(set).filter(|scale| scale.is_significant() && is_reached).map(|scale| {
             Finding::new(scale.sentence(), "the robot that was found has this scale; check it on a known length")
         });
         let doubts = examined.into_iter().chain(of_verify(set, found)).chain(scale).collect();
