@@ -14,6 +14,9 @@ use crate::robot::{Robot, inverse};
 /// Largest turn of a joint that is still a correction, rad: more of it is another posture, or the side of a singular one.
 const MOST_TURN_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
+/// Rounding of a reading at a limit, rad or mm.
+const ROUNDING: f64 = 1e-9;
+
 /// Rows that are looked at to find a posture where none is given.
 const POSTURE_ROWS: usize = 20;
 
@@ -52,6 +55,15 @@ pub enum Refusal {
         /// Its range.
         range: (f64, f64),
     },
+    /// The target itself is where a joint does not go; deg or mm.
+    Outside {
+        /// The joint, from 1.
+        joint: usize,
+        /// The reading that was given.
+        given: f64,
+        /// Its range.
+        range: (f64, f64),
+    },
     /// The correction would turn a joint far: the posture is next to a singular one.
     Singular {
         /// The joint that turns most, from 1.
@@ -67,6 +79,9 @@ impl std::fmt::Display for Refusal {
             Refusal::OutOfReach { short_mm } => write!(f, "out of reach by {short_mm:.2} mm"),
             Refusal::Limit { joint, needed, range: (low, high) } => {
                 write!(f, "joint {joint} would need {needed:.3}; its range is {low:.3} to {high:.3}")
+            }
+            Refusal::Outside { joint, given, range: (low, high) } => {
+                write!(f, "joint {joint} of the target is at {given:.3}; its range is {low:.3} to {high:.3}")
             }
             Refusal::Singular { joint, turn_deg } => {
                 write!(f, "next to a singular posture: joint {joint} would turn by {turn_deg:.1} deg")
@@ -151,7 +166,9 @@ impl Compensator {
                 let meant = self.meant(given);
                 let there = self.reached(given);
                 let miss_mm = Some((meant.translation.vector - there.translation.vector).norm());
-                Compensated { readings: self.kept(&self.base_from_flange(&meant), given), miss_mm }
+                let outside = self.beyond(given, |joint, given, range| Refusal::Outside { joint, given, range });
+                let kept = || self.kept(&self.base_from_flange(&meant), given);
+                Compensated { readings: outside.map_or_else(kept, Err), miss_mm }
             }
             Target::Pose { root_from_tool, near_rad: Some(near) } => {
                 Compensated { readings: self.near(&self.base_from_flange(root_from_tool), near), miss_mm: None }
@@ -208,14 +225,19 @@ impl Compensator {
     /// What is in the way of the pose: a limit, where the robot would get there without its limits.
     fn refusal(&self, wanted: &Transform, start: &[f64], short_mm: f64) -> Refusal {
         let free = inverse::approach(&self.unlimited, wanted, start);
-        let beyond = |(j, (joint, q)): (usize, (&crate::robot::Joint, &f64))| {
+        let limit = self.beyond(&free.joints_rad, |joint, needed, range| Refusal::Limit { joint, needed, range });
+        limit.filter(|_| free.arrived()).unwrap_or(Refusal::OutOfReach { short_mm })
+    }
+
+    /// The first joint that these readings, rad (mm), put beyond its range: its number, the reading and the range, deg (mm).
+    fn beyond(&self, readings: &[f64], refusal: impl Fn(usize, f64, (f64, f64)) -> Refusal) -> Option<Refusal> {
+        let mut joints = self.identified.joints.iter().zip(readings).enumerate();
+        joints.find_map(|(j, (joint, &q))| {
             let (low, high) = joint.limits_rad?;
             let in_file = |v: f64| if joint.slides { v } else { v.to_degrees() };
-            let range = (in_file(low), in_file(high));
-            (*q < low || *q > high).then(|| Refusal::Limit { joint: j + 1, needed: in_file(*q), range })
-        };
-        let limit = self.identified.joints.iter().zip(&free.joints_rad).enumerate().find_map(beyond);
-        limit.filter(|_| free.arrived()).unwrap_or(Refusal::OutOfReach { short_mm })
+            let inside = (low - ROUNDING..=high + ROUNDING).contains(&q);
+            (!inside).then(|| refusal(j + 1, in_file(q), (in_file(low), in_file(high))))
+        })
     }
 }
 
@@ -316,6 +338,10 @@ mod tests {
         let q = vec![0.3, -1.2, 1.4, -0.9, -1.3, 0.4];
         identified.joints[3].limits_rad = Some((-0.5, 0.5));
         let limited = said(&identified, Target::Readings(q));
+        assert!(matches!(limited, Refusal::Outside { joint: 4, .. }), "{limited}");
+        // A target that the nominal robot reaches and the real one only beyond a limit.
+        identified.joints[3].limits_rad = Some((-1.5, -0.899));
+        let limited = said(&identified, Target::Readings(vec![0.3, -1.2, 1.4, -0.9, -1.3, 0.4]));
         assert!(matches!(limited, Refusal::Limit { joint: 4, .. }), "{limited}");
     }
 

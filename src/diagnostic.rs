@@ -28,6 +28,12 @@ impl Status {
             Status::Undetermined => 3,
         }
     }
+
+    /// The graver of two.
+    #[must_use]
+    pub fn or_worse(self, other: Status) -> Status {
+        if other.code() > self.code() { other } else { self }
+    }
 }
 
 /// What an error adds to its message.

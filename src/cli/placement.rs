@@ -23,9 +23,9 @@ pub struct ExportPlacement {
     /// Name of the flange's frame
     #[arg(long, value_name = "NAME", default_value = "tool0")]
     pub flange_frame: String,
-    /// Name of the left camera's optical frame
-    #[arg(long, value_name = "NAME", default_value = "left_camera_optical_frame")]
-    pub camera_frame: String,
+    /// Name of the left camera's optical frame [default: left_camera_optical_frame; instrument where no cameras measured]
+    #[arg(long, value_name = "NAME")]
+    pub camera_frame: Option<String>,
     /// Name of the target's frame
     #[arg(long, value_name = "NAME", default_value = "target")]
     pub target_frame: String,

@@ -285,9 +285,9 @@ pub enum DhConvention {
 /// `stereocal export robot`
 #[derive(Debug, Args)]
 pub struct ExportRobot {
-    /// The robot file, as `identify` wrote it
+    /// The robot file, as `identify` wrote it [default: identified.toml in the results folder]
     #[arg(long, value_name = "FILE")]
-    pub robot: Utf8PathBuf,
+    pub robot: Option<Utf8PathBuf>,
     /// For which program
     #[arg(long)]
     pub format: RobotFormat,

@@ -24,9 +24,10 @@ impl FromStr for AskedSquares {
     }
 }
 
-/// Reads a number; what it may be is checked where it is used.
+/// Reads a finite number; what else it may be is checked where it is used.
 pub(super) fn number(text: &str) -> Result<f64, String> {
-    text.parse().map_err(|_| "a number is needed, with a decimal point".to_owned())
+    let finite = text.parse().ok().filter(|value: &f64| value.is_finite());
+    finite.ok_or_else(|| "a number is needed, with a decimal point".to_owned())
 }
 
 /// Reads a whole number.
@@ -36,9 +37,10 @@ pub(super) fn whole<T: FromStr>(text: &str) -> Result<T, String> {
 
 /// Reads a number of a range.
 pub(super) fn between(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
-    move |text| match number(text)? {
-        value if (least..=most).contains(&value) => Ok(value),
-        _ => Err(format!("a number from {least} to {most} is needed")),
+    move |text| match text.parse::<f64>() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        Ok(_) => Err(format!("a number from {least} to {most} is needed")),
+        Err(_) => number(text),
     }
 }
 

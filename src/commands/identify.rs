@@ -16,16 +16,14 @@ use crate::identify::judge::placement::Placed;
 use crate::identify::record::{self, Advice, Findings, Record, quality};
 use crate::identify::run::{Identification, identify, step_count};
 use crate::identify::{Error, Method, Settings};
-use crate::measurements::{Measurement, Role, Source};
+use crate::measurements::{Given, Measurement, Role, Source};
 use crate::progress;
 use crate::report;
+use crate::robot::file::IDENTIFIED_FILE as IDENTIFIED;
 use crate::robot::{self, Robot};
 
 /// What `simulate` writes into the working directory.
 const DEFAULT_ROBOT: &str = "robot.toml";
-
-/// The robot that is written.
-const IDENTIFIED: &str = "identified.toml";
 
 /// Runs the command.
 pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
@@ -61,10 +59,15 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let mut record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     record.warnings.extend(not_run.clone());
     record.not_run = not_run;
+    record.rows = Given::new(&rows);
     said(&record, &out, args.output.json);
     let placed = found.placed(&set, &nominal, &settings)?;
     let json = write(&out, &set, &nominal, &found, &record, placed.as_ref(), &settings)?;
-    let stdout = if args.output.json { json } else { report::identify::summary(&record, &out) };
+    let stdout = if args.output.json {
+        json
+    } else {
+        report::identify::summary(&record, file.as_deref(), placed.is_some(), &out)
+    };
     let status = if record.advice == Advice::DoNotUse { Status::OutOfTolerance } else { Status::Done };
     Ok(Outcome { stdout, status })
 }
@@ -152,6 +155,7 @@ fn files(source: &Source, rows: &[Measurement]) -> Vec<String> {
 /// Measurements of a robot; says what was taken of tables that are not in the contract's own columns.
 pub fn read(source: &Source, robot: &Robot) -> Result<Vec<Measurement>> {
     let (rows, said) = source.read(robot)?;
+    let rows: Vec<Measurement> = rows.into_iter().map(Measurement::of_this_world).collect();
     said.into_iter().for_each(progress::note);
     if let Some(path) = source.files.first() {
         check_joints(robot, &rows, path)?;
@@ -253,7 +257,9 @@ fn write(
     let center = set.poses.iter().find(|p| p.role == Role::Center).or(set.poses.first());
     let arm = center.map_or_else(Vec::new, |p| nominal.skeleton_mm(&p.joints_rad));
     let after = errors(identified, is_fitted);
-    let placement = PlacementFile::new(IDENTIFIED, set, placed, &after);
+    let check = record.check();
+    let mut placement = PlacementFile::new(IDENTIFIED, set, placed, &after);
+    placement.check = Some(check.clone());
     let page = report::identify::page(set, record, &placement, &places, &arm, &errors(nominal, false), &after)?;
     let mut holds = record.expected.as_ref().map_or_else(
         || "The nominal robot was kept.".to_owned(),
@@ -262,8 +268,14 @@ fn write(
     if record.advice == Advice::DoNotUse {
         holds = format!("Do not use this robot: {}.", record.reason);
     }
-    let scale = record.scale.map_or(String::new(), |scale| format!("# Not in this: {}.\n", scale.sentence()));
-    out.write_toml(IDENTIFIED, &format!("# {holds}\n{scale}{}", robot::file::to_toml(identified)))?;
+    let scale = record
+        .scale
+        .filter(|_| record.advice != Advice::DoNotUse)
+        .map_or(String::new(), |scale| format!("# Not in this: {}.\n", scale.sentence()));
+    out.write_toml(
+        IDENTIFIED,
+        &format!("# {holds}\n{scale}{}", robot::file::to_toml_checked(identified, Some(&check))),
+    )?;
     let json = out.write_json("identification.json", record)?;
     out.write_json(PLACEMENT, &placement)?;
     report::page::write(out, "identify.html", page)?;

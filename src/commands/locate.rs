@@ -3,6 +3,7 @@
 use camino::{Utf8Path, Utf8PathBuf};
 use serde::Serialize;
 
+use super::heed::heed;
 use super::identify::{check_joints, read, source};
 use super::{Outcome, Result, measure};
 use crate::cli::Locate;
@@ -17,6 +18,7 @@ use crate::identify::examine::{self, Examined};
 use crate::identify::judge::errors::Judge;
 use crate::identify::judge::folds;
 use crate::identify::judge::locate::{Fit, locate};
+use crate::robot::{Advice, Check};
 use crate::{progress, report, robot};
 
 /// `placement.json` with the fit that it is from.
@@ -30,7 +32,8 @@ struct LocatedFile {
 /// Runs the command.
 pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let out = args.measure.output.out.clone().unwrap_or_else(|| config.out.clone());
-    let robot = robot::file::read(&args.robot)?;
+    let (robot, check) = robot::file::read_checked(&args.robot)?;
+    let heeded = heed(check.as_ref(), &args.robot);
     let file = measured(args, config, &run, &out)?;
     let source = source(vec![file], &args.table, config);
     let rows = read(&source, &robot)?;
@@ -51,13 +54,15 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let located = locate(&set, &robot, trust, &config.identify)?;
     let all = set.rows(|_| true);
     let held_out = folds::judged(&Judge::plain(&set, &all, false), located.placed.robot(), &all);
-    let placement = PlacementFile::new(args.robot.as_str(), &set, Some(&located.placed), &held_out);
+    let mut placement = PlacementFile::new(args.robot.as_str(), &set, Some(&located.placed), &held_out);
+    let contradicted = || Check { advice: Advice::DoNotUse, reason: Fit::CONTRADICTED.to_owned() };
+    placement.check = located.fit.contradicted.then(contradicted).or(check);
     let content = LocatedFile { placement, fit: located.fit };
     let json = out.write_json(PLACEMENT, &content)?;
     let summary = || report::located::summary(&content.placement, &content.fit, &out);
     let stdout = if args.measure.output.json { json } else { summary() };
     let status = if content.fit.contradicted { Status::OutOfTolerance } else { Status::Done };
-    Ok(Outcome { stdout, status })
+    Ok(Outcome { stdout, status: status.or_worse(heeded) })
 }
 
 /// The measurements: those of a folder of pictures are made first, as `measure` makes them.

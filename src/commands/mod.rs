@@ -6,6 +6,7 @@ pub mod compensate;
 mod dispatch;
 pub mod error;
 pub mod export;
+mod heed;
 pub mod identify;
 pub mod locate;
 mod measure;

@@ -124,7 +124,9 @@ fn read_bytes_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, mos
         }
         Ok(_) => Ok(bytes),
         Err(source) if source.kind() == std::io::ErrorKind::NotFound => {
-            Err(Error::Missing { what, path: path.to_owned(), hint: found_elsewhere(path).or(hint.map(str::to_owned)) })
+            let hints: Vec<String> = found_elsewhere(path).into_iter().chain(hint.map(str::to_owned)).collect();
+            let hint = (!hints.is_empty()).then(|| hints.join(" "));
+            Err(Error::Missing { what, path: path.to_owned(), hint })
         }
         Err(source) => Err(Error::Io { action: "read", path: path.to_owned(), source }),
     }

@@ -17,6 +17,9 @@ pub struct RobotRecheckFile {
     /// The robot that was compared with.
     against: String,
     poses: Vec<String>,
+    /// Poses that fit far worse than the rest and were left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    strays: Vec<String>,
     /// One or, not told apart, several with `|`; empty where nothing changed.
     cause: String,
     statement: String,
@@ -30,13 +33,20 @@ pub struct RobotRecheckFile {
 
 impl RobotRecheckFile {
     /// Gathers the figures.
-    pub fn new(recheck: &Recheck, against: &Utf8Path, tolerance_mm: f64) -> RobotRecheckFile {
+    pub fn new(recheck: &Recheck, against: &Utf8Path, tolerance_mm: f64, own_data: bool) -> RobotRecheckFile {
         let changed = !recheck.cause().is_empty();
+        let standing = match Standing::of(changed, recheck.effect_mm, recheck.seen_mm, tolerance_mm) {
+            // Rows from before say nothing of what happened since, whatever they say.
+            _ if own_data => Standing::OwnData,
+            Standing::StillValid if !recheck.strays.is_empty() => Standing::Undecided,
+            other => other,
+        };
         RobotRecheckFile {
-            standing: Standing::of(changed, recheck.effect_mm, recheck.seen_mm, tolerance_mm),
+            standing,
             tolerance_mm,
             against: against.to_string(),
             poses: recheck.poses.clone(),
+            strays: recheck.strays.clone(),
             cause: recheck.cause(),
             statement: recheck.statement(),
             effect_mm: recheck.effect_mm,

@@ -260,9 +260,10 @@ impl Taken<'_> {
         words.iter().map(|word| format!(", {word}")).collect()
     }
 
-    /// Columns of numbers that were left alone.
+    /// Columns of numbers that were left alone, but for those of `measure` that say how a row came about.
     fn unused(&self) -> String {
         const NAMED: usize = 12;
+        let of_measure = |name: &String| name.ends_with("_rad2") || ["fit_rms_mm", "corners"].contains(&name.as_str());
         let picked = &self.way.picked;
         let taken: Vec<At> = picked
             .joints
@@ -280,7 +281,8 @@ impl Taken<'_> {
                     && !taken.contains(&at)
                     && !own.contains(&at)
             };
-            left.extend((0..file.width()).filter(is_left).map(|column| file.column_name(column)));
+            let names = (0..file.width()).filter(is_left).map(|column| file.column_name(column));
+            left.extend(names.filter(|name| !of_measure(name)));
         }
         match left.len() {
             0 => String::new(),

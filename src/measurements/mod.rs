@@ -3,6 +3,7 @@
 mod apart;
 mod assemble;
 mod copies;
+mod given;
 mod judge;
 mod keys;
 mod layout;
@@ -13,6 +14,7 @@ pub mod source;
 mod unsettled;
 
 pub use crate::csv_table::quoted;
+pub use given::Given;
 pub use rows::{
     Measurement, Observed, RobotPose, Role, pose_fields, pose_header, poses_csv, read, read_poses, reading_name,
 };

@@ -90,6 +90,26 @@ pub struct Measurement {
     pub observed: Observed,
 }
 
+/// No instrument measures farther, mm: a thousand kilometres. Squares of such lengths are still numbers.
+const FARTHEST_MM: f64 = 1e9;
+
+impl Measurement {
+    /// The same, without a reading that is none.
+    #[must_use]
+    pub fn of_this_world(mut self) -> Measurement {
+        let farthest_mm = match &self.observed {
+            Observed::Position { point_mm, .. } => point_mm.coords.amax(),
+            Observed::Distance { distance_mm, .. } => distance_mm.abs(),
+            Observed::Missing { .. } => return self,
+        };
+        if farthest_mm > FARTHEST_MM {
+            self.observed =
+                Observed::Missing { reason: format!("{farthest_mm:e} mm, farther than anything is measured") };
+        }
+        self
+    }
+}
+
 impl Table<'_> {
     /// The columns `j1_deg`, `j2_deg`, ... without a gap, and which of them are `jN_mm`; no list where none is.
     pub fn joint_columns(&self) -> Result<(Vec<usize>, Vec<bool>)> {

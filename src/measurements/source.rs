@@ -15,7 +15,7 @@ use super::judge::{self, Basis, Forced, Verdict, Way};
 use super::keys;
 use super::layout;
 use super::part::{At, Kind, Part};
-use super::pick::{self, listed};
+use super::pick::{self, Picked, listed};
 use super::unsettled;
 use super::{Measurement, read};
 use crate::diagnostic::Place;
@@ -215,8 +215,20 @@ impl Source {
                 Err(apart
                     .map(|a| a.asked(parts))
                     .or_else(mixed)
+                    .or_else(|| self.other_units(parts, &candidates, robot))
                     .unwrap_or_else(|| unsettled::unplaced(parts, &candidates[0], self.forced())))
             }
+        }
+    }
+}
+
+impl Source {
+    /// That the units that were typed are what is in the way.
+    fn other_units(&self, parts: &[Part], candidates: &[Picked], robot: &Robot) -> Option<Error> {
+        let forced = Some(self.forced()).filter(|forced| *forced != Forced::default())?;
+        match judge::decide(parts, candidates, robot, Forced::default()) {
+            Verdict::Taken(way, Basis::Robot) => Some(unsettled::other_units(parts, forced, &way)),
+            _ => None,
         }
     }
 }

@@ -78,6 +78,15 @@ fn contradicted(parts: &[Part], first: &Picked, forced: Forced) -> Option<Error>
     Some(parts[0].refuse(message, Some("leave `--units` out: the names say it")))
 }
 
+/// That nothing comes near to the nominal robot in the units that were typed, and something does in others.
+pub(super) fn other_units(parts: &[Part], forced: Forced, way: &Way) -> Error {
+    let typed: Vec<&str> = forced.joints.iter().chain(&forced.lengths).map(|unit| unit.flag()).collect();
+    let found = format!("{},{}", way.joints.flag(), way.lengths.flag());
+    let message =
+        format!("with `--units {}` no choice of the columns comes near to the nominal robot", typed.join(","));
+    parts[0].refuse(message, Some(&format!("with `--units {found}` it does; without `--units` that is found")))
+}
+
 /// That no choice of columns comes near to the robot.
 pub(super) fn unplaced(parts: &[Part], picked: &Picked, forced: Forced) -> Error {
     if let Some(contradicted) = contradicted(parts, picked, forced) {

@@ -121,11 +121,7 @@ fn planned(
     let used: Vec<Candidate> = earlier.iter().chain(&centers).chain(&chosen).cloned().collect();
     let verify = if settings.first.is_some() { 0 } else { settings.verify };
     let held_out = candidates(pool::Kind::Verify(verify))?;
-    if measured.is_none() && settings.first.is_none() {
-        warnings.push(
-            "where the cameras stand is only assumed: place them as plan.html says, or `--first` and then `--after` find out".to_owned(),
-        );
-    }
+    warnings.extend(assumed(&placements, &earlier, settings, measured.map(|m| m.1)));
     let poses = order::poses(robot, &placements, &centers, &chosen, &held_out, measured.map(|m| m.0));
     Ok(Plan {
         accuracy: problem.accuracy(&used),
@@ -138,6 +134,25 @@ fn planned(
         poses,
         placements,
     })
+}
+
+/// That nobody measured where the cameras stand in some of the groups; `rows` is the file of the earlier poses.
+fn assumed(placements: &[Placement], earlier: &[Candidate], settings: &Settings, rows: Option<&str>) -> Option<String> {
+    let is_seen = |group: usize| earlier.iter().any(|pose| pose.group == group);
+    let unseen = placements.iter().enumerate().filter(|(group, _)| !is_seen(*group));
+    let names: Vec<&str> = unseen.map(|(_, placement)| placement.name.as_str()).collect();
+    match rows {
+        _ if settings.first.is_some() || names.is_empty() => None,
+        None => Some(
+            "where the cameras stand is only assumed: place them as plan.html says, or `--first` and then `--after` find out"
+                .to_owned(),
+        ),
+        Some(rows) => Some(format!(
+            "where the cameras stand in {} is only assumed, as {rows} has no three poses there: place them as plan.html says, or measure three \
+             poses in each and plan with these, too",
+            names.join(", ")
+        )),
+    }
 }
 
 /// What the paper's poses determine, and their accuracy by the number of samples.

@@ -26,7 +26,8 @@ pub fn summary(placement: &PlacementFile, fit: &Fit, out: &OutDir) -> String {
     let poses = fit.poses;
     let mut lines = Vec::new();
     for group in &placement.groups {
-        lines.push(line(&format!("base from rig, {}", group.group), &group.base_from_rig));
+        let sensor = if placement.by_instrument { "instrument" } else { "rig" };
+        lines.push(line(&format!("base from {sensor}, {}", group.group), &group.base_from_rig));
         lines.push(format!(
             "  error to expect of the target: {:.4} mm on average, 95 % below {:.4}; held out {}",
             group.error_mm.mean_mm,
@@ -45,10 +46,7 @@ pub fn summary(placement: &PlacementFile, fit: &Fit, out: &OutDir) -> String {
         ),
     });
     if fit.contradicted {
-        lines.push(
-            "the points contradict this robot by more than is stated of both: identify the robot, or look whether cameras, target and joint angles are those of these rows"
-                .to_owned(),
-        );
+        lines.push(Fit::CONTRADICTED.to_owned());
     }
     lines.push(format!("95 % intervals; covariances: {}", out.join(PLACEMENT)));
     lines.join("\n") + "\n"

@@ -12,10 +12,23 @@ use crate::formats::recheck::{Check, Standing};
 use crate::formats::robot_recheck::HISTORY;
 use crate::identify::judge::recheck::{CauseSeen, Recheck};
 
-fn sentence(recheck: &Recheck, tolerance_mm: f64, mm: fn(f64) -> String) -> String {
+/// What was judged of the robot, and by which tolerance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Judged {
+    pub standing: Standing,
+    pub tolerance_mm: f64,
+    /// Whether the robot's own file advises against its use.
+    pub advised_against: bool,
+}
+
+fn sentence(recheck: &Recheck, judged: Judged, mm: fn(f64) -> String) -> String {
+    let Judged { standing, tolerance_mm, .. } = judged;
+    if standing == Standing::OwnData {
+        return "the robot was identified from these poses, which say nothing of what happened since".to_owned();
+    }
     let tolerance = mm(tolerance_mm);
     let statement = recheck.statement();
-    match recheck.cause().is_empty() {
+    let of_rest = match recheck.cause().is_empty() {
         true => format!(
             "{statement}; {} poses would have shown a single cause that moves the target by {} mm, tolerance {tolerance} mm",
             recheck.poses.len(),
@@ -24,18 +37,23 @@ fn sentence(recheck: &Recheck, tolerance_mm: f64, mm: fn(f64) -> String) -> Stri
         false => {
             format!("{statement}; the target is off by up to {} mm, tolerance {tolerance} mm", mm(recheck.effect_mm))
         }
-    }
+    };
+    recheck.of_strays().map_or(of_rest.clone(), |strays| format!("{strays}; without: {of_rest}"))
 }
 
-fn next(standing: Standing, recheck: &Recheck) -> &'static str {
-    match standing {
+fn next(judged: Judged, recheck: &Recheck) -> &'static str {
+    match judged.standing {
+        Standing::StillValid if judged.advised_against => {
+            "identify anew: it is the same robot, and what was found of it is advised against"
+        }
         Standing::StillValid => "go on with this robot",
+        Standing::Undecided if !recheck.strays.is_empty() => {
+            "take again what is named, its joints or its reading are those of another pose or misread, and check with that"
+        }
         Standing::Undecided => {
             "add poses that bend every joint and turn the wrist, or say with --tolerance-mm what matters: these would not have shown a change as large as the tolerance"
         }
-        Standing::OwnData => {
-            "measure ten new poses: the robot was identified from these, which agree with it whatever happened since"
-        }
+        Standing::OwnData => "measure ten new poses",
         _ if !recheck.changed && recheck.by_cameras => "`stereocal locate` finds the cameras anew; the robot stays",
         _ if !recheck.changed => "`stereocal locate` finds the instrument's placement anew; the robot stays",
         Standing::ChangedWithin => {
@@ -104,12 +122,12 @@ fn lines(recheck: &Recheck) -> Table {
 }
 
 /// The lines on stdout.
-pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks: usize, out: &OutDir) -> String {
+pub fn summary(recheck: &Recheck, judged: Judged, checks: usize, out: &OutDir) -> String {
     format!(
         "{}: {}\nnext: {}\n\neach cause by itself, 95 % intervals; seen: from so much on; mm: at the target\n{}\n{} in {}\nreport: {}\n",
-        word(standing),
-        sentence(recheck, tolerance_mm, |mm| format!("{mm:.4}")),
-        next(standing, recheck),
+        word(judged.standing),
+        sentence(recheck, judged, |mm| format!("{mm:.4}")),
+        next(judged, recheck),
         lines(recheck),
         count(checks, "check"),
         out.join(HISTORY),
@@ -118,19 +136,14 @@ pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks:
 }
 
 /// The report. Also shows the run's `warnings`.
-pub fn page(
-    recheck: &Recheck,
-    standing: Standing,
-    tolerance_mm: f64,
-    checks: &[Check],
-    warnings: &[String],
-) -> Result<String> {
+pub fn page(recheck: &Recheck, judged: Judged, checks: &[Check], warnings: &[String]) -> Result<String> {
+    let Judged { standing, tolerance_mm, .. } = judged;
     let numbers = vec![
         (format!("{} mm", two_digits(recheck.effect_mm)), "movement of the target beyond chance".to_owned()),
         (format!("{} mm", two_digits(recheck.seen_mm)), "would have been seen".to_owned()),
         (format!("{} mm", two_digits(tolerance_mm)), "tolerance".to_owned()),
     ];
-    let text = format!("{}. Next: {}.", sentence(recheck, tolerance_mm, two_digits), next(standing, recheck));
+    let text = format!("{}. Next: {}.", sentence(recheck, judged, two_digits), next(judged, recheck));
     let (sensor, moved) = match recheck.by_cameras {
         true => ("once the cameras' place was found anew", "cameras that moved"),
         false => ("once the instrument's place was found anew", "an instrument that moved"),

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
 use super::ends::PoseRecord;
-use super::{Corrections, Ends, Error, Joint, Result, Robot};
+use super::{Advice, Check, Corrections, Ends, Error, Joint, Result, Robot};
 use crate::diagnostic::Place;
 use crate::files;
 
@@ -18,6 +18,9 @@ struct RobotRecord {
     /// Unit vector along gravity in the base frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     gravity_direction: Option<[f64; 3]>,
+    /// What the run that found it says of its use.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    check: Option<Check>,
     joint: Vec<JointRecord>,
     #[serde(default)]
     tool: ToolRecord,
@@ -126,16 +129,28 @@ fn is_zero(value: &f64) -> bool {
 
 /// Reads `robot.toml`.
 pub fn read(path: &Utf8Path) -> Result<Robot> {
-    let hint = "`--robot FILE` names the nominal robot; `stereocal robot new NAME` writes that of a common arm, `robot import` that of a URDF or table";
-    let record: RobotRecord = files::read_toml(path, "robot file", Some(hint))?;
-    record.robot().map_err(|message| Error::File { message, place: Place { path: path.to_owned(), line: None } })
+    read_checked(path).map(|(robot, _)| robot)
 }
+
+/// Reads `robot.toml` with what the run that found the robot says of its use; nobody says anything of a nominal one.
+pub fn read_checked(path: &Utf8Path) -> Result<(Robot, Option<Check>)> {
+    let hint = "`stereocal robot new NAME` writes the robot file of a common arm, `robot import` that of a URDF or table, `identify` identified.toml";
+    let record: RobotRecord = files::read_toml(path, "robot file", Some(hint))?;
+    let refuse = |message| Error::File { message, place: Place { path: path.to_owned(), line: None } };
+    Ok((record.robot().map_err(refuse)?, record.check))
+}
+
+/// The file of the robot that `identify` found.
+pub const IDENTIFIED_FILE: &str = "identified.toml";
 
 /// How the comment of a robot file begins that `identify` wrote.
 pub const IDENTIFIED: &str = "Identified";
 
 /// Whether `identify` wrote a robot file and found another robot than the nominal one.
 pub fn is_identified(path: &Utf8Path) -> bool {
+    if let Ok((_, Some(check))) = read_checked(path) {
+        return check.advice != Advice::KeepNominal;
+    }
     let text = std::fs::read_to_string(path).unwrap_or_default();
     let comments = text.lines().map_while(|line| line.strip_prefix('#'));
     comments.map(str::trim_start).any(|comment| comment.starts_with(IDENTIFIED))
@@ -143,8 +158,13 @@ pub fn is_identified(path: &Utf8Path) -> bool {
 
 /// The text of `robot.toml`.
 pub fn to_toml(robot: &Robot) -> String {
+    to_toml_checked(robot, None)
+}
+
+/// The same with what is said of the robot's use.
+pub fn to_toml_checked(robot: &Robot, check: Option<&Check>) -> String {
     // A struct of numbers and strings, tables last: serialisation has no way to fail.
-    toml::to_string(&RobotRecord::from(robot)).unwrap_or_default()
+    toml::to_string(&RobotRecord { check: check.cloned(), ..RobotRecord::from(robot) }).unwrap_or_default()
 }
 
 impl JointRecord {
@@ -294,6 +314,7 @@ impl From<&Robot> for RobotRecord {
         RobotRecord {
             name: robot.name.clone(),
             convention: "mdh".to_owned(),
+            check: None,
             gravity_direction: (direction != Corrections::default().gravity_direction).then(|| direction.into()),
             joint: robot
                 .joints
@@ -324,56 +345,4 @@ impl From<&Robot> for RobotRecord {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_robot_survives_the_file() {
-        let mut robot = Robot::paper();
-        robot.joints[2].beta_rad = 0.001;
-        robot.joints[0].limits_rad = Some((-3.0, 3.0));
-        robot.tool_mm = Vector3::new(1.5, -2.0, 30.0);
-        robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Origin(4), k_rad_per_m: 0.25 }];
-        robot.corrections.bending = vec![GravityTerm { joint: 3, point: LoadPoint::Tool, k_rad_per_m: 0.125 }];
-        robot.corrections.harmonics = vec![HarmonicTerm { joint: 5, wave: Wave::Sin2, amplitude_rad: 0.5 }];
-        robot.corrections.wobble = vec![HarmonicTerm { joint: 4, wave: Wave::Cos, amplitude_rad: 0.25 }];
-        robot.ends.last_frame_from_flange =
-            crate::geometry::transform(Vector3::new(0.3, -3.0, 0.5), Vector3::new(1.0, 2.0, 3.0));
-        let back = toml::from_str::<RobotRecord>(&to_toml(&robot)).unwrap().robot().unwrap();
-        for (a, b) in back.joints.iter().zip(&robot.joints) {
-            assert!((a.alpha_rad - b.alpha_rad).abs() < 1e-15 && (a.beta_rad - b.beta_rad).abs() < 1e-15);
-        }
-        assert_eq!(back.tool_mm, robot.tool_mm);
-        assert_eq!(back.corrections, robot.corrections);
-        assert_eq!(back.ends.root_from_frame0, robot.ends.root_from_frame0);
-        let q = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
-        let off = back.root_from_flange(&q).inverse() * robot.root_from_flange(&q);
-        assert!(off.translation.vector.norm() < 1e-10 && off.rotation.angle() < 1e-12);
-    }
-
-    #[test]
-    fn joints_turn_or_slide() {
-        let screwing = to_toml(&Robot::paper()).replacen("[[joint]]", "[[joint]]\ntype = \"screw\"", 1);
-        let message = toml::from_str::<RobotRecord>(&screwing).unwrap().robot().unwrap_err();
-        assert!(message.contains("joint 1: type is \"screw\""), "{message}");
-        let text = "[[joint]]\ntype = \"prismatic\"\nsign = -1.0\nlimits_mm = [0.0, 300.0]";
-        let sliding = to_toml(&Robot::paper()).replacen("[[joint]]", text, 1);
-        let robot = toml::from_str::<RobotRecord>(&sliding).unwrap().robot().unwrap();
-        assert!(robot.joints[0].slides && robot.joints[0].sign == -1.0);
-        assert_eq!(robot.joints[0].limits_rad, Some((0.0, 300.0)));
-        let lower = robot.target_mm(&[100.0, 0.0, 0.0, 0.0, 0.0, 0.0]) - robot.target_mm(&[0.0; 6]);
-        assert!((lower - Vector3::new(0.0, 0.0, -100.0)).norm() < 1e-9, "{lower}");
-        let back = toml::from_str::<RobotRecord>(&to_toml(&robot)).unwrap().robot().unwrap();
-        assert_eq!(back.joints, robot.joints);
-        let turning = to_toml(&Robot::paper()).replacen("[[joint]]", "[[joint]]\ntype = \"revolute\"", 1);
-        assert!(toml::from_str::<RobotRecord>(&turning).unwrap().robot().is_ok());
-    }
-
-    #[test]
-    fn a_joint_that_the_robot_lacks_is_refused() {
-        let text =
-            to_toml(&Robot::paper()) + "\n[harmonics]\nterms = [{ joint = 7, wave = \"sin\", amplitude_mrad = 1.0 }]\n";
-        let message = toml::from_str::<RobotRecord>(&text).unwrap().robot().unwrap_err();
-        assert!(message.contains("joint 7 of a robot with 6"), "{message}");
-    }
-}
+mod tests;

@@ -5,6 +5,7 @@ pub mod axes;
 pub mod bent;
 pub mod catalogue;
 pub mod chain;
+pub mod check;
 pub mod corrections;
 pub mod ends;
 pub mod file;
@@ -17,6 +18,7 @@ pub mod tool_fit;
 use crate::diagnostic::{Explain, Place};
 
 pub use chain::{Joint, Robot};
+pub use check::{Advice, Check};
 pub use corrections::Corrections;
 pub use ends::Ends;
 pub use parameters::{Parameter, Unit};
@@ -84,6 +86,31 @@ pub enum Error {
         /// The file of `--identified`.
         identified: String,
     },
+    /// Robots whose links are farther apart than robots are built.
+    #[error("`{identified}` is not the arm of `{robot}`: {apart}")]
+    OtherArm {
+        /// The file of `--robot`.
+        robot: String,
+        /// The file of `--identified`.
+        identified: String,
+        /// Which links, and by how much.
+        apart: String,
+    },
+    /// Tools of which one must be wrong.
+    #[error(
+        "the tools of the two files are {apart_mm:.1} mm apart, {} mm in {robot} and {} mm in {identified}: which one works is not known",
+        tool_text(robot_mm),
+        tool_text(identified_mm)
+    )]
+    TwoTools {
+        /// The file of `--robot`.
+        robot: String,
+        robot_mm: [f64; 3],
+        /// The file of `--identified`.
+        identified: String,
+        identified_mm: [f64; 3],
+        apart_mm: f64,
+    },
     /// A format that does not fit this robot.
     #[error("{message}")]
     NotExportable {
@@ -131,10 +158,24 @@ impl Explain for Error {
                 Some("both files are of one robot, before and after `stereocal identify`".to_owned())
             }
             Error::Exchanged { robot, identified } => Some(format!("`--robot {identified} --identified {robot}`")),
+            Error::OtherArm { .. } => Some(
+                "`--robot` names the file that `identify` was given, with the same signs and zeros of the joints, `--identified` the \
+                 identified.toml that it wrote; `stereocal robot show FILE` says what each of them is"
+                    .to_owned(),
+            ),
+            Error::TwoTools { identified_mm, .. } => Some(format!(
+                "`--tool X,Y,Z` names the one that works, for both: the target's as it was found is `--tool {}`",
+                tool_text(identified_mm).replace(", ", ",")
+            )),
             Error::NotExportable { hint, .. } => Some(hint.clone()),
             Error::Table { hint, .. } => Some(hint.clone()),
             Error::File { .. } => None,
             Error::Files(e) => e.hint(),
         }
     }
+}
+
+/// A tool's place as it is said and typed.
+pub fn tool_text(tool_mm: &[f64; 3]) -> String {
+    tool_mm.map(|mm| format!("{mm:.3}")).join(", ")
 }

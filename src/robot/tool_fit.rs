@@ -10,6 +10,10 @@ use super::Robot;
 use crate::geometry::{Transform, fitted_frame, perturb, rigid_columns};
 use crate::statistics::median;
 
+/// How far off a tool is that was typed off a drawing, mm: the guide asks for no more than a centimetre, and the search for the tool's tolerance
+/// starts there.
+pub const TYPED_MM: f64 = 10.0;
+
 /// Poses that are enough.
 const POSES: usize = 60;
 

@@ -73,11 +73,14 @@ fn targets_come_back_where_they_were_meant() {
     assert!(said.contains("300 of 300 targets compensated"), "{said}");
     // Why `identify` names another figure; the tools are the same.
     assert!(said.contains("at most (in the base frame; ") && !said.contains("the tools of the two files"), "{said}");
-    let mut tipped = real.clone();
-    tipped.tool_mm += nalgebra::Vector3::new(0.0, 3.0, 4.0);
+    let (mut tipped, mut drawn) = (real.clone(), nominal.clone());
+    drawn.tool_mm = nalgebra::Vector3::new(0.0, 0.0, 90.0);
+    tipped.tool_mm = nalgebra::Vector3::new(0.0, 3.0, 94.0);
+    std::fs::write(folder.path().join("robot.toml"), file::to_toml(&drawn)).unwrap();
     std::fs::write(folder.path().join("identified.toml"), file::to_toml(&tipped)).unwrap();
     let apart = run(folder.path(), &["targets.csv", "--out", "tipped"], 0);
-    assert!(apart.contains("the tools of the two files are 5.000 mm apart: `--tool X,Y,Z`"), "{apart}");
+    assert!(apart.contains("the tools of the two files are 5.000 mm apart, and this is corrected too"), "{apart}");
+    assert!(apart.contains("`--tool X,Y,Z` names the one that works"), "{apart}");
     let named = run(folder.path(), &["targets.csv", "--out", "named", "--tool", "0,0,100"], 0);
     assert!(!named.contains("the tools of the two files"), "{named}");
     robots(folder.path());
@@ -257,6 +260,112 @@ fn exchanged_robots_are_refused() {
     std::fs::rename(at("aside.toml"), at("identified.toml")).unwrap();
     let said = run(folder.path(), &["one.mod", "--force"], 2);
     assert!(said.contains("are they exchanged?") && said.contains("--robot identified.toml"), "{said}");
+}
+
+/// Writes both robots with these tools, and a target.
+fn with_tools(folder: &Path, drawn: [f64; 3], found: [f64; 3]) -> (Robot, Robot) {
+    let (mut nominal, mut real) = robots(folder);
+    (nominal.tool_mm, real.tool_mm) = (drawn.into(), found.into());
+    std::fs::write(folder.join("robot.toml"), file::to_toml(&nominal)).unwrap();
+    std::fs::write(folder.join("identified.toml"), file::to_toml(&real)).unwrap();
+    std::fs::write(folder.join("targets.csv"), csv(&postures(&nominal, 4))).unwrap();
+    (nominal, real)
+}
+
+#[test]
+fn a_tool_that_one_file_lacks_is_taken_for_both() {
+    let folder = workplace();
+    for (drawn, found) in [([0.0; 3], [1.4, -1.1, 237.6]), ([1.4, -1.1, 237.6], [0.0; 3])] {
+        let (nominal, real) = with_tools(folder.path(), drawn, found);
+        let said = run(folder.path(), &["targets.csv", "--force"], 0);
+        let states = if drawn[2] == 0.0 {
+            "robot.toml states no tool: that of identified.toml, 1.400, -1.100, 237.600 mm,"
+        } else {
+            "identified.toml states no tool: that of robot.toml,"
+        };
+        assert!(said.contains(states) && said.contains("is taken for both; `--tool X,Y,Z` names another"), "{said}");
+        // The same as with that tool typed, and by the arm's errors alone: a few mm, not the tool's length.
+        let typed = run(folder.path(), &["targets.csv", "--tool", "1.4,-1.1,237.6", "--out", "typed", "--force"], 0);
+        let line = |said: &str| said.lines().find(|l| l.starts_with("without it")).map(str::to_owned).unwrap();
+        assert_eq!(line(&said), line(&typed));
+        let mean: f64 = line(&said).split(' ').find_map(|word| word.parse().ok()).unwrap();
+        assert!(mean > 0.5 && mean < 30.0, "{said}");
+        let tool = nalgebra::Translation3::new(1.4, -1.1, 237.6);
+        for (q, (found, _)) in postures(&nominal, 4).iter().zip(rows(&folder.path().join("out/compensated.csv"))) {
+            let off = (nominal.base_from_flange(&radians(q)) * tool).inverse()
+                * (real.base_from_flange(&radians(&found)) * tool);
+            assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD);
+        }
+    }
+}
+
+#[test]
+fn two_tools_that_are_far_apart_are_asked_about() {
+    let folder = workplace();
+    for (apart, status) in [(0.5, 0), (9.9, 0), (10.1, 2), (235.0, 2)] {
+        with_tools(folder.path(), [0.0, 0.0, 100.0], [0.0, 0.0, 100.0 + apart]);
+        let said = run(folder.path(), &["targets.csv", "--force"], status);
+        if status == 2 {
+            let tools = format!(
+                "{apart:.1} mm apart, 0.000, 0.000, 100.000 mm in robot.toml and 0.000, 0.000, {:.3} mm in identified.toml",
+                100.0 + apart
+            );
+            assert!(said.contains(&tools) && said.contains("`--tool 0.000,0.000,"), "{said}");
+            run(folder.path(), &["targets.csv", "--force", "--tool", "0,0,100"], 0);
+        }
+    }
+}
+
+#[test]
+fn robots_that_are_not_one_arm_are_refused_and_one_robot_twice_is_said() {
+    let folder = workplace();
+    let (nominal, _) = with_tools(folder.path(), [0.0; 3], [0.0; 3]);
+    let write = |name: &str, robot: &Robot| std::fs::write(folder.path().join(name), file::to_toml(robot)).unwrap();
+    // Another arm of as many joints, links and twists beyond what robots are built to, a joint that is counted the other way.
+    let mut changed: Vec<(Robot, &str)> = vec![(catalogue::robot("abb-irb120").unwrap(), "d_1 ")];
+    for (size, part) in [(15.0, "a_2 +15.0 mm"), (80.0, "a_2 +80.0 mm")] {
+        let mut robot = nominal.clone();
+        robot.joints[2].a_mm += size;
+        changed.push((robot, part));
+    }
+    let mut robot = nominal.clone();
+    robot.joints[1].theta_rad += 0.1;
+    changed.push((robot, "theta_2 +5.7 deg"));
+    let mut robot = nominal.clone();
+    robot.joints[1].sign = -1.0;
+    changed.push((robot, "joint 2 is counted the other way round"));
+    for (robot, part) in changed {
+        write("identified.toml", &robot);
+        let said = run(folder.path(), &["targets.csv", "--force"], 2);
+        assert!(said.contains("`identified.toml` is not the arm of `robot.toml`: ") && said.contains(part), "{said}");
+    }
+    // As far as robots are built off their drawing, and by a whole turn more.
+    let mut robot = nominal.clone();
+    robot.joints[2].a_mm += 8.0;
+    robot.joints[1].theta_rad += 0.05 - std::f64::consts::TAU;
+    write("identified.toml", &robot);
+    let arguments =
+        ["compensate", "targets.csv", "--force", "--robot", "robot.toml", "--identified", "identified.toml"];
+    let output = stereocal(folder.path(), &arguments);
+    assert!(output.status.code() != Some(2) && stdout(&output).contains("of 4 targets"), "{}", stderr(&output));
+    write("identified.toml", &nominal);
+    let said = run(folder.path(), &["targets.csv", "--force"], 1);
+    assert!(said.starts_with("nothing to correct: robot.toml and identified.toml describe the same robot"), "{said}");
+    assert!(!said.contains("without it the real tool"), "{said}");
+}
+
+#[test]
+fn a_target_beyond_a_joints_range_is_named_so() {
+    let folder = workplace();
+    let (nominal, _) = robots_of(folder.path(), "abb-irb120");
+    let mut list = postures(&nominal, 2);
+    list[1][0] = 500.0;
+    std::fs::write(folder.path().join("targets.csv"), csv(&list)).unwrap();
+    let said = run(folder.path(), &["targets.csv"], 1);
+    assert!(
+        said.contains("p1 (line 3): joint 1 of the target is at 500.000; its range is -165.000 to 165.000"),
+        "{said}"
+    );
 }
 
 #[test]

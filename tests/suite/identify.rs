@@ -217,6 +217,48 @@ fn verify_reads_measurements_as_identify_does() {
     assert_verified(folder.path(), &record);
 }
 
+#[test]
+fn one_bad_verify_row_is_the_reason_and_in_no_figure_of_the_verdict() {
+    let folder = simulated();
+    for (factor, is_read) in [(1.01, true), (1000.0, true), (1e300, false)] {
+        let (role, x) = (std::cell::Cell::new(0), std::cell::Cell::new(0));
+        let name = std::cell::RefCell::new(String::new());
+        let spoil = |i: usize, mut fields: Vec<String>| {
+            if i == 0 {
+                let at = |column: &str| fields.iter().position(|field| field == column).expect("a column");
+                role.set(at("role"));
+                x.set(at("x_mm"));
+                name.borrow_mut().clear();
+            } else if fields[role.get()] == "verify" && name.borrow().is_empty() {
+                name.replace(fields[0].clone());
+                let value: f64 = fields[x.get()].parse().expect("a coordinate");
+                fields[x.get()] = format!("{:e}", if is_read { (value.abs() + 300.0) * factor } else { factor });
+            }
+            fields
+        };
+        let record = identified(folder.path(), spoil);
+        let (reason, text) = (record["reason"].as_str().expect("a sentence"), record.to_string());
+        assert!(!text.contains(" inf ") && !text.contains("NaN"), "{reason}");
+        if !is_read {
+            assert_eq!(record["advice"], "use", "{reason}");
+            assert!(text.contains("farther than anything is measured"), "{}", record["warnings"]);
+            continue;
+        }
+        assert_eq!(record["advice"], "check", "{factor}: {reason}");
+        assert!(
+            reason.starts_with("1 verify row fits far worse than the rest") && !reason.contains("too few rows"),
+            "{reason}"
+        );
+        assert_eq!(record["strays"], serde_json::json!([*name.borrow()]));
+        let kept = &record["methods"][0];
+        let [all, judged] =
+            ["verify", "verify_without_strays"].map(|k| kept[k]["point"]["mean_abs_mm"].as_f64().expect("a mean"));
+        assert!(judged < 0.5 && all > 2.0 * judged, "{judged} {all}");
+        let page = std::fs::read_to_string(folder.path().join("out/identify.html")).expect("a page");
+        assert!(page.contains(&format!("rows that took no part in the fit, without {}", name.borrow())), "{reason}");
+    }
+}
+
 /// `verify` on a file of these rows of the simulated measurements.
 fn verify_only(folder: &Path, robots: &[&str], keep: impl Fn(&str) -> bool) -> std::process::Output {
     let table = std::fs::read_to_string(folder.join("measurements.csv")).expect("it was simulated");

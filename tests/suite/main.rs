@@ -20,6 +20,7 @@ mod spreadsheet;
 mod tables;
 mod worlds;
 
+mod advice;
 mod compensate;
 mod daily;
 mod export_robot;

@@ -1,9 +1,9 @@
 //! `stereocal export placement`: where the cameras stand, for other programs.
 
+use super::super::heed::heed;
 use super::super::{Outcome, Result};
 use crate::cli::{ExportPlacement, PlacementFormat};
 use crate::config::{self, Config};
-use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::placements::record::{GroupRecord, PLACEMENT, PlacementFile};
@@ -15,8 +15,14 @@ pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome>
     let path = args.placement.clone().unwrap_or_else(|| out.join(PLACEMENT));
     let file = PlacementFile::read(&path)?;
     let groups = groups(args, &file)?;
+    let status = heed(file.check.as_ref(), &path);
     let out = out.for_run(&Run { force: args.files.force, ..run }, &[&path]);
     let flange_from_target = file.flange_from_target.as_ref().and_then(|record| record.transform());
+    let (sensor, default) = match file.by_instrument {
+        true => ("instrument", "instrument"),
+        false => ("camera", "left_camera_optical_frame"),
+    };
+    let camera_frame = args.camera_frame.as_deref().unwrap_or(default);
     let mut stdout = String::new();
     for group in &groups {
         let Some(base_from_camera) = group.base_from_rig.transform() else { continue };
@@ -25,7 +31,7 @@ pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome>
         let frames = Frames {
             base: args.base_frame.clone(),
             flange: args.flange_frame.clone(),
-            camera: format!("{}{suffix}", args.camera_frame),
+            camera: format!("{camera_frame}{suffix}"),
             target: args.target_frame.clone(),
         };
         let placement = Placement { frames: &frames, base_from_camera, flange_from_target };
@@ -40,10 +46,18 @@ pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome>
         out.write(&name, text.as_bytes())?;
         stdout.push_str(&format!("{}\n", out.join(&name)));
     }
+    let unit = if args.format == PlacementFormat::Opencv { "mm" } else { "m" };
+    let target = match flange_from_target {
+        Some(_) => format!(", and {} from {}", args.flange_frame, args.target_frame),
+        None => String::new(),
+    };
+    stdout.push_str(&format!("{} from {camera_frame}{target}, in {unit}\n", args.base_frame));
     if flange_from_target.is_none() {
-        stdout.push_str("note: the target's turn on the flange is not known: only the camera's place is in the file\n");
+        let only =
+            format!("note: the target's turn on the flange is not known: only the {sensor}'s place is in the file\n");
+        stdout.push_str(&only);
     }
-    Ok(Outcome { stdout, status: Status::Done })
+    Ok(Outcome { stdout, status })
 }
 
 /// The groups that are asked for.

@@ -1,9 +1,11 @@
 //! `stereocal export robot`: the identified robot for other programs, and what they cannot have of it.
 
+use nalgebra::Vector3;
+
+use super::super::heed::heed;
 use super::super::{Outcome, Result};
 use crate::cli::{ExportRobot, RobotFormat};
 use crate::config::Config;
-use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::robots::dh_csv;
@@ -12,19 +14,21 @@ use crate::formats::robots::urdf::Urdf;
 use crate::formats::robots::{ExportedRobot, ros_kinematics, ur_calibration, urdf_corrected, urdf_plain};
 use crate::geometry::Transform;
 use crate::robot::refit::Residual;
-use crate::robot::{Error, Robot, axes, catalogue, file};
+use crate::robot::{Check, Error, Robot, axes, catalogue, file, tool_text};
 
 /// Deviations below this are rounding, mm: common normals of nearly parallel axes lose half the digits.
 const ROUNDING_MM: f64 = 1e-4;
 
 /// Runs the command.
 pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
-    let robot = file::read(&args.robot)?;
+    let path = args.robot.clone().unwrap_or_else(|| config.out.join(file::IDENTIFIED_FILE));
+    let (robot, check) = file::read_checked(&path)?;
+    let status = heed(check.as_ref(), &path);
     let out = OutDir::open(args.files.out.as_deref().unwrap_or(&config.out))?;
-    let inputs = [Some(&args.robot), args.nominal_urdf.as_ref(), args.nominal.as_ref()];
+    let inputs = [Some(&path), args.nominal_urdf.as_ref(), args.nominal.as_ref()];
     let inputs: Vec<&camino::Utf8Path> = inputs.into_iter().flatten().map(|path| path.as_path()).collect();
     let out = out.for_run(&Run { force: args.files.force, ..run }, &inputs);
-    let identified = Identified { over: known::identified_over(&args.robot, &robot), robot };
+    let identified = Identified { over: known::identified_over(&path, &robot), robot, check };
     let exported = export(args, &identified)?;
     if !args.files.force {
         spare_other_robots(&out.join(exported.name), &exported)?;
@@ -33,9 +37,25 @@ pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
         RobotFormat::Toml => out.write_toml(exported.name, &exported.text)?,
         _ => out.write(exported.name, exported.text.as_bytes())?,
     }
-    let mut stdout = format!("{}\n{}\n", out.join(exported.name), fidelity(&identified, &exported.carried));
+    let written = out.join(exported.name);
+    let mut stdout = format!("{written}\n{}\n{}\n", holds(args.format), fidelity(&identified, &exported.carried));
     exported.notes.iter().for_each(|note| stdout.push_str(&format!("note: {note}\n")));
-    Ok(Outcome { stdout, status: Status::Done })
+    Ok(Outcome { stdout, status })
+}
+
+/// What a file of a format holds, and in which units.
+fn holds(format: RobotFormat) -> &'static str {
+    match format {
+        RobotFormat::Urdf => "joint origins and axes from the base to the flange, in m and rad",
+        RobotFormat::DhCsv => {
+            "modified Denavit-Hartenberg parameters (alpha and a of the link before the joint), in mm and deg"
+        }
+        RobotFormat::Toml => "all of the robot, modified Denavit-Hartenberg parameters, in mm and deg",
+        RobotFormat::RosKinematicsYaml => "each link's frame in the one before, in m and rad",
+        RobotFormat::UrCalibration => {
+            "what is added to the controller's own Denavit-Hartenberg parameters, in m and rad"
+        }
+    }
 }
 
 /// A robot file that is no export, such as the nominal one that `simulate` and `robot new` write under the same name, is not replaced
@@ -54,7 +74,8 @@ fn export(args: &ExportRobot, identified: &Identified) -> Result<ExportedRobot> 
     let (robot, plain) = (&identified.robot, || identified.plain());
     Ok(match (args.format, &args.nominal_urdf) {
         (RobotFormat::Toml, _) => {
-            ExportedRobot { name: "robot.toml", text: file::to_toml(robot), carried: robot.clone(), notes: Vec::new() }
+            let text = file::to_toml_checked(robot, identified.check.as_ref());
+            ExportedRobot { name: "robot.toml", text, carried: robot.clone(), notes: Vec::new() }
         }
         (RobotFormat::Urdf, None) => urdf_plain::build(&plain()),
         (RobotFormat::Urdf, Some(path)) => {
@@ -94,7 +115,14 @@ fn table(robot: &Robot) -> ExportedRobot {
     let missing = ends.iter().filter(|(_, t)| *t != Transform::identity());
     let notes =
         missing.map(|(name, _)| format!("the constant {name} of the robot file has no place in a table: add it"));
-    ExportedRobot { name: "robot.csv", text: dh_csv::to_csv(robot), carried: robot.clone(), notes: notes.collect() }
+    let mut notes: Vec<String> = notes.collect();
+    if robot.tool_mm != Vector3::zeros() {
+        let tool = tool_text(&robot.tool_mm.into());
+        notes.push(format!(
+            "the tool, {tool} mm in the last frame, has no place in a table: add it in the other program"
+        ));
+    }
+    ExportedRobot { name: "robot.csv", text: dh_csv::to_csv(robot), carried: robot.clone(), notes }
 }
 
 fn turning(robot: &Robot, why: &str) -> Result<()> {
@@ -122,9 +150,10 @@ fn nominal(args: &ExportRobot, robot: &Robot) -> Result<Robot> {
     Ok(nominal)
 }
 
-/// A robot, and the ranges of its joints over which it was identified, where they are known.
+/// A robot, what its file says of its use, and the ranges of its joints over which it was identified, where they are known.
 struct Identified {
     robot: Robot,
+    check: Option<Check>,
     over: Option<Vec<(f64, f64)>>,
 }
 

@@ -11,12 +11,13 @@ use serde::Serialize;
 use super::{Outcome, Result};
 use crate::cli::Verify;
 use crate::config::Config;
-use crate::diagnostic::Status;
+use crate::diagnostic::{Status, count};
 use crate::files;
 use crate::files::provenance::Run;
+use crate::formats::robots::known;
 use crate::identify;
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::known;
+use crate::identify::data::known as distances;
 use crate::identify::examine::{self, Examined};
 use crate::identify::judge::errors::{Judge, PLACED_BY_ITSELF};
 use crate::identify::judge::folds;
@@ -49,6 +50,21 @@ fn place_by_verify_rows(rows: &mut [Measurement]) -> bool {
         row.at.role = Role::Sample;
     }
     true
+}
+
+/// That a robot was fitted to rows by which it is judged.
+fn fitted_to(file: &Utf8Path, rows: &[Measurement]) -> Option<String> {
+    let is_kept = rows.iter().any(|row| row.at.role == Role::Verify);
+    let judged = |row: &&Measurement| !is_kept || row.at.role == Role::Verify;
+    let (of, given) = (rows.iter().filter(judged).count(), known::given(file));
+    let own = rows.iter().filter(judged).filter(|row| given.fitted(row)).count();
+    (own > 0).then(|| {
+        format!(
+            "{file} was fitted to {own} of these {}: its figures there are those of a fit; `identify` said how far off rows are that it was without, \
+             and new poses tell how far off it is now",
+            count(of, "row")
+        )
+    })
 }
 
 /// The set as the examination mends it, its findings said; and whether something explains the errors.
@@ -100,13 +116,14 @@ pub fn run(args: &Verify, config: &Config, run: Run) -> Result<Outcome> {
     for (_, robot) in &robots {
         super::identify::check_joints(robot, &rows, &args.measurements[0])?;
     }
+    args.robot.iter().filter_map(|file| fitted_to(file, &rows)).for_each(progress::warn);
     let only_verify = place_by_verify_rows(&mut rows);
     let mut set = match robots.first() {
         Some((_, robot)) => Dataset::of_robot(&rows, robot)?,
         None => Dataset::new(&rows)?,
     };
     if let Some(path) = &args.known_distances {
-        set.known = known::read(path, &set)?;
+        set.known = distances::read(path, &set)?;
     }
     let mut explained = true;
     if let Some((file, robot)) = robots.first() {

@@ -6,6 +6,7 @@ use super::super::identify::{check_joints, read, source};
 use super::super::{Outcome, Result};
 use crate::cli::Verify;
 use crate::config::Config;
+use crate::diagnostic::{Status, count};
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::placements::record::{PLACEMENT, PlacementFile};
@@ -15,19 +16,22 @@ use crate::formats::robots::known;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::shifted;
+use crate::identify::judge::locate::FEWEST_POSES;
 use crate::identify::judge::recheck::recheck;
-use crate::measurements::Role;
+use crate::measurements::{Given, Measurement, Observed, Role};
 use crate::progress;
+use crate::report::robot_recheck::Judged;
 use crate::{report, robot};
 
 pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
-    let robot = robot::file::read(against)?;
+    let (robot, check) = robot::file::read_checked(against)?;
     let before = known::before(against, &robot).ok_or_else(|| Error::NotKnown { path: against.to_string() })?;
     let source = source(args.measurements.clone(), &args.table, config);
     let mut rows = read(&source, &robot)?;
     // Nothing is fitted that rows could be kept from.
     rows.iter_mut().filter(|row| row.at.role == Role::Verify).for_each(|row| row.at.role = Role::Sample);
     check_joints(&robot, &rows, &args.measurements[0])?;
+    let own = Own::among(&mut rows, &known::given(against));
     let set = Dataset::new(&rows)?;
     let stood = PlacementFile::read(&against.with_file_name(PLACEMENT)).ok();
     let ends = robot.ends;
@@ -44,17 +48,19 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     });
     let record = against.with_file_name("identification.json");
     let made_by = out.provenance();
-    let own = made_by.as_ref().and_then(|run| run.shares(&record));
+    let whole = made_by.as_ref().and_then(|run| run.shares(&record)).filter(|_| own.rows == 0);
     let said =
         |same| format!("this robot was identified from {same}: only new poses tell whether it still is that robot");
+    let of_own = own.statement().or(whole.map(str::to_owned)).map(said);
     let skipped = set.skipped.iter().map(|pose| format!("pose {} is not compared: {}", pose.pose, pose.reason));
-    let warnings: Vec<String> = shift.into_iter().chain(own.map(said)).chain(skipped).collect();
+    let advice = check.as_ref().and_then(|check| check.warning(against));
+    let warnings: Vec<String> = advice.into_iter().chain(shift).chain(of_own).chain(skipped).collect();
     warnings.iter().for_each(progress::warn);
     let found = recheck(&set, &robot, &before, &placed)?;
     // A change that is smaller than what the robot was off by anyway is none to act on.
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm.max(before.p95_mm));
-    let mut content = RobotRecheckFile::new(&found, against, tolerance_mm);
-    content.standing = content.standing.by(own.is_some());
+    let own_data = whole.is_some() || own.all;
+    let content = RobotRecheckFile::new(&found, against, tolerance_mm, own_data);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check {
         date,
@@ -66,10 +72,43 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
         seen_mm: found.seen_mm,
         length_mm: None,
     });
-    let page = report::robot_recheck::page(&found, content.standing, tolerance_mm, &checks, &warnings)?;
+    let advised_against = check.is_some_and(|check| check.is_against());
+    let judged = Judged { standing: content.standing, tolerance_mm, advised_against };
+    let page = report::robot_recheck::page(&found, judged, &checks, &warnings)?;
     let json = out.write_json("verify.json", &content)?;
     out.write(HISTORY, formats::to_csv(&checks, "poses").as_bytes())?;
     report::page::write(&out, "verify.html", page)?;
-    let summary = || report::robot_recheck::summary(&found, content.standing, tolerance_mm, checks.len(), &out);
-    Ok(Outcome { stdout: if args.json { json } else { summary() }, status: content.standing.status() })
+    let summary = || report::robot_recheck::summary(&found, judged, checks.len(), &out);
+    let least = if advised_against { Status::OutOfTolerance } else { Status::Done };
+    let status = content.standing.status().or_worse(least);
+    Ok(Outcome { stdout: if args.json { json } else { summary() }, status })
+}
+
+/// Rows that the robot was identified from, among those that are to say whether it still is that robot.
+struct Own {
+    /// How many, of how many with a reading.
+    rows: usize,
+    of: usize,
+    /// Whether the others are too few to judge by: then all rows are kept.
+    all: bool,
+}
+
+impl Own {
+    /// Takes them out where the others are enough.
+    fn among(rows: &mut Vec<Measurement>, given: &Given) -> Own {
+        let read = |row: &&Measurement| !matches!(row.observed, Observed::Missing { .. });
+        let (of, own) = (rows.iter().filter(read).count(), rows.iter().filter(|row| given.holds(row)).count());
+        let others: Vec<Measurement> = rows.iter().filter(|row| !given.holds(row)).cloned().collect();
+        let enough = Dataset::new(&others).is_ok_and(|set| set.placing_rows(FEWEST_POSES + 1).is_ok());
+        if own > 0 && enough {
+            *rows = others;
+        }
+        Own { rows: own, of, all: own > 0 && !enough }
+    }
+
+    fn statement(&self) -> Option<String> {
+        let Own { rows, of, all } = self;
+        let left_out = if *all { "" } else { ", which are left out" };
+        (*rows > 0).then(|| format!("{rows} of these {}{left_out}", count(*of, "row")))
+    }
 }

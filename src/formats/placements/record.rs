@@ -11,7 +11,7 @@ use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::{RowError, Spread};
 use crate::identify::judge::placement::{Placed, Uncertain, is_held};
 use crate::identify::judge::uncertainty::{Lengths, region};
-use crate::robot::Parameter;
+use crate::robot::{Check, Parameter};
 
 /// The file's name in a results folder.
 pub const PLACEMENT: &str = "placement.json";
@@ -21,6 +21,12 @@ pub const PLACEMENT: &str = "placement.json";
 pub struct PlacementFile {
     /// The robot file that it belongs to: held numbers are its own.
     pub robot: String,
+    /// What the run that found it says of its use.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub check: Option<Check>,
+    /// Whether an instrument measured that is none of cameras: the "rig" is then the frame of its points.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub by_instrument: bool,
     /// Placements of the sensor; none where distances were read.
     pub groups: Vec<GroupRecord>,
     /// Where the target sits; `null` where there are no placements.
@@ -110,6 +116,8 @@ impl PlacementFile {
         };
         PlacementFile {
             robot: robot.to_owned(),
+            check: None,
+            by_instrument: !set.is_of_cameras(),
             groups: placed.map_or_else(Vec::new, |p| (0..p.groups.len()).map(|index| group(p, index)).collect()),
             flange_from_target: placed.map(target),
             covariance_order: ["rx", "ry", "rz", "tx", "ty", "tz"].map(str::to_owned),

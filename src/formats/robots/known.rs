@@ -9,6 +9,7 @@ use crate::identify::judge::locate::{REPEATABILITY_MM, Trust};
 use crate::identify::judge::recheck::Before;
 use crate::identify::judge::uncertainty::{Covariance, MEAN_OVER_RMS};
 use crate::identify::model::ladder::Terms;
+use crate::measurements::Given;
 use crate::robot::{Joint, Parameter, Robot};
 
 #[derive(Debug, Deserialize)]
@@ -22,6 +23,8 @@ struct Identified {
     smooth: Option<Smooth>,
     #[serde(default)]
     whole_covariance: Option<Covariance>,
+    #[serde(default)]
+    rows: Given,
 }
 
 #[derive(Debug, Deserialize)]
@@ -65,6 +68,11 @@ pub fn identified_over(file: &Utf8Path, robot: &Robot) -> Option<Vec<(f64, f64)>
     let unit = |slides: bool| if slides { 1.0 } else { 1f64.to_radians() };
     let inside = |([low, high], joint): ([f64; 2], &Joint)| (low * unit(joint.slides), high * unit(joint.slides));
     (ranges.len() == robot.joints.len()).then(|| ranges.into_iter().zip(&robot.joints).map(inside).collect())
+}
+
+/// The rows that a robot was identified from; none where nothing beside its file says so.
+pub fn given(file: &Utf8Path) -> Given {
+    beside(file).map_or_else(Given::default, |identified| identified.rows)
 }
 
 /// What is known of an identified robot. `None` where its file has no record beside it, or one of another program's version.

@@ -71,6 +71,12 @@ pub struct Fit {
     pub contradicted: bool,
 }
 
+impl Fit {
+    /// What points that contradict the robot mean.
+    pub const CONTRADICTED: &str = "the points contradict this robot by more than is stated of both: identify the robot, or look whether cameras, \
+                                    target and joint angles are those of these rows";
+}
+
 /// Finds it.
 pub fn locate(set: &Dataset, robot: &Robot, trust: Trust, settings: &Settings) -> Result<Located, Error> {
     let rows = set.placing_rows(FEWEST_POSES)?;

@@ -1,6 +1,6 @@
 //! Whether to use the robot that was found, and the warnings in the order of their weight.
 
-use super::file::{Advice, Record};
+use super::file::Record;
 use super::findings::{self, Findings};
 use super::gather;
 use super::parameters::MethodRecord;
@@ -12,7 +12,7 @@ use crate::identify::judge::errors::Spread;
 use crate::identify::judge::locate::REPEATABILITY_MM;
 use crate::identify::run::Against;
 use crate::identify::run::Identification;
-use crate::robot::Robot;
+use crate::robot::{Advice, Robot};
 
 /// Orientations within this are one: a robot keeps an orientation to far less, and so small a turn shows nothing.
 const ONE_ORIENTATION_DEG: f64 = 1.0;
@@ -73,7 +73,7 @@ impl Record {
         let (joints, points) = gather::most_points(set);
         let before = match self.tool_mm {
             Some((_, left)) => Some(left),
-            None => nominal.left_mm(&joints, &points).or(self.before.verify.distance.mean_abs_mm),
+            None => nominal.left_mm(&joints, &points).or(self.before.judged().distance.mean_abs_mm),
         };
         let before = before.filter(|&off| off > IMPLAUSIBLE_MM)?;
         Some(format!(
@@ -97,10 +97,10 @@ impl Record {
         };
         let limit_mm = 2.0 * if rows.iter().all(is_printed) { PRINTED_MM } else { READ_MM };
         let largest = |figures: &PointSpread| figures.point.as_ref().and_then(|spread| spread.max_abs_mm);
-        let held_out_mm = largest(self.chosen_method().map_or(&self.before.verify, |method| &method.verify))?;
+        let held_out_mm = largest(self.chosen_method().map_or(&self.before, |method| &method.quality).judged())?;
         // What is left where the numbers are twice the unknowns is no better for being fitted, and free of what rounding does to rows left out.
         let redundant = |m: &&MethodRecord| 3 * rows.len() >= 2 * (m.parameters.len() + 6 * set.groups.len());
-        let left_mm = self.chosen_method().filter(redundant).and_then(|method| largest(&method.fit));
+        let left_mm = self.chosen_method().filter(redundant).and_then(|method| largest(&method.quality.fit));
         let largest_mm = held_out_mm.min(left_mm.unwrap_or(f64::INFINITY));
         if largest_mm >= limit_mm {
             return None;
@@ -137,7 +137,7 @@ impl Record {
         const FAR: f64 = 2.0;
         let (chosen, expected_mm) = (self.chosen_method()?, self.expected.as_ref()?.mean_mm);
         let mean = |figures: &PointSpread| figures.point.as_ref().and_then(|spread| spread.mean_abs_mm);
-        let held_out_mm = mean(&chosen.verify);
+        let held_out_mm = mean(chosen.quality.judged());
         let few = "there are too few rows for so many unknowns; measure more, that bend every joint";
         if let Some(off) = held_out_mm.filter(|off| *off > SEVERAL * expected_mm) {
             return Some(format!(
@@ -150,7 +150,8 @@ impl Record {
                 "rows that the fit did not have are off by {off:.3} mm, and with a tool of its own the nominal robot is off by {nominal:.3} mm only: {few}"
             ));
         }
-        let before_mm = mean(&self.before.verify).or(self.before.verify.distance.mean_abs_mm)?;
+        let before = self.before.judged();
+        let before_mm = mean(before).or(before.distance.mean_abs_mm)?;
         let (before_mm, tool) = match self.tool_mm {
             Some((_, left_mm)) if left_mm < before_mm => (left_mm, "with a tool of its own "),
             _ => (before_mm, ""),
@@ -227,8 +228,9 @@ impl Record {
     fn worse(&self, rows: Against) -> Option<String> {
         let chosen = self.chosen_method()?;
         let pair = |before: &Spread, after: &Spread| Some((before.mean_abs_mm?, after.mean_abs_mm?));
-        let of_points = || pair(self.before.verify.point.as_ref()?, chosen.verify.point.as_ref()?);
-        let figures = of_points().or_else(|| pair(&self.before.verify.distance, &chosen.verify.distance));
+        let (before, after) = (self.before.judged(), chosen.quality.judged());
+        let of_points = || pair(before.point.as_ref()?, after.point.as_ref()?);
+        let figures = of_points().or_else(|| pair(&before.distance, &after.distance));
         let figures =
             figures.map_or_else(String::new, |(before, after)| format!(" ({after:.3} against {before:.3} mm)"));
         let on = if self.folded { "rows that were left out of the fit" } else { "the verify rows" };

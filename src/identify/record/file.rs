@@ -14,18 +14,8 @@ use crate::identify::judge::uncertainty::{Covariance, Expected};
 use crate::identify::model::prior::Tolerance;
 use crate::identify::run::{Certainty, Identification, Judged};
 use crate::identify::sensor::SmoothError;
-
-/// What to do with the robot that was found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Advice {
-    Use,
-    /// Use it once the reason was looked at.
-    Check,
-    /// Nothing better than the nominal robot was found, and that is the result.
-    KeepNominal,
-    DoNotUse,
-}
+use crate::measurements::Given;
+use crate::robot::{Advice, Check};
 
 #[derive(Debug, Clone, Serialize)]
 pub struct Record {
@@ -53,9 +43,14 @@ pub struct Record {
     /// Poses that fit far worse than the rest and were left out.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub outliers: Vec<String>,
+    /// Poses to verify that fit far worse than the rest and by which nothing is judged.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub strays: Vec<String>,
     /// Sessions found along the rows.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sessions: Vec<Session>,
+    /// The rows that were given, by which they are known again.
+    pub rows: Given,
     /// Rows without a usable reading.
     pub skipped: Vec<Skipped>,
     /// Held-out errors of models and terms.
@@ -119,6 +114,11 @@ impl Smooth {
 }
 
 impl Record {
+    /// Whether to use the robot, and why not, for its file.
+    pub fn check(&self) -> Check {
+        Check { advice: self.advice, reason: self.reason.clone() }
+    }
+
     pub fn chosen_method(&self) -> Option<&MethodRecord> {
         self.methods.iter().find(|m| self.chosen == format!("{}/{}", m.name, m.model))
     }

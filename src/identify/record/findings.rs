@@ -5,7 +5,6 @@ use crate::identify::data::still::{constant_joints, repeated};
 use crate::identify::examine::conventions;
 use crate::identify::examine::sessions::{Along, Session};
 use crate::identify::finding::Finding;
-use crate::identify::judge::scale::CommonScale;
 use crate::identify::record::file::Smooth;
 use crate::identify::record::plausible;
 use crate::identify::run::Identification;
@@ -37,13 +36,15 @@ impl Findings {
             return Findings { against: vec![robots.clone()], doubts: examined, notes: Vec::new() };
         }
         let unexplained = unexplained.filter(|_| !is_explained(found));
+        let is_reached = unexplained.is_none();
         let against: Vec<Finding> = unexplained.into_iter().chain(plausible::of_another_robot(found)).collect();
         let notes = of_fit.into_iter().filter(|finding| !against.contains(finding)).collect();
-        // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much.
-        let scale = found.scale(set).filter(CommonScale::is_significant).map(|scale| {
+        // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of rows that nothing explains it
+        // says nothing.
+        let scale = found.scale(set).filter(|scale| scale.is_significant() && is_reached).map(|scale| {
             Finding::new(scale.sentence(), "the robot that was found has this scale; check it on a known length")
         });
-        let doubts = examined.into_iter().chain(scale).collect();
+        let doubts = examined.into_iter().chain(of_verify(set, found)).chain(scale).collect();
         Findings { against, doubts, notes }
     }
 
@@ -76,26 +77,39 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
 fn of_rows(set: &Dataset, found: &Identification) -> Vec<Finding> {
     let share = 100.0 * found.outliers.len() as f64 / (found.fitted.len() + found.outliers.len()).max(1) as f64;
     let left_out = "left out of the fit (`outlier_sigmas = 0` in [identify] keeps them)";
-    let counted = "they are counted in the figures; measure them again";
     let kinds = [
-        (&found.outliers, "row", format!(" ({share:.0} %)"), "far worse than the rest", left_out),
+        (&found.outliers, format!(" ({share:.0} %)"), "far worse than the rest", left_out),
         (
             &found.doubtful,
-            "row",
             String::new(),
             "worse than the rest by more than chance allows",
             "fitted all the same; measure again",
         ),
-        (&found.verify_outliers, "verify row", String::new(), "far worse than the rest", counted),
     ];
-    let finding = |(rows, what, share, how, action): (&Vec<usize>, &str, String, &str, &str)| {
+    let finding = |(rows, share, how, action): (&Vec<usize>, String, &str, &str)| {
         let said = match rows.len() {
-            1 => format!("1 {what} fits {how}"),
-            count => format!("{count} {what}s{share} fit {how}"),
+            1 => format!("1 row fits {how}"),
+            count => format!("{count} rows{share} fit {how}"),
         };
         Finding::new(said, action).about(set.names(rows))
     };
     kinds.into_iter().filter(|kind| !kind.0.is_empty()).map(finding).collect()
+}
+
+/// Verify rows that do not fit with the others.
+fn of_verify(set: &Dataset, found: &Identification) -> Option<Finding> {
+    let rows = &found.verify_outliers;
+    let said = match rows.len() {
+        0 => return None,
+        1 => "1 verify row fits far worse than the rest".to_owned(),
+        count => format!("{count} verify rows fit far worse than the rest"),
+    };
+    let action = match (found.strays(set).is_empty(), rows.len()) {
+        (true, _) => "they are counted in the figures; measure them again",
+        (false, 1) => "the figures are without it; measure it again",
+        (false, _) => "the figures are without them; measure them again",
+    };
+    Some(Finding::new(said, action).about(set.names(rows)))
 }
 
 /// Errors that the readings share.

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::file::{Advice, Record, Smooth};
+use super::file::{Record, Smooth};
 use super::findings::Findings;
 use super::parameters::{self, Identifiability, MethodRecord};
 use super::quality::quality;
@@ -13,8 +13,9 @@ use crate::identify::judge::uncertainty::{Covariance, Expected};
 use crate::identify::run::{Identification, certainty};
 use crate::identify::sensor::Extra;
 use crate::identify::settings::{Model, Settings};
-use crate::robot::Robot;
+use crate::measurements::Given;
 use crate::robot::tool_fit::Start;
+use crate::robot::{Advice, Robot};
 
 /// Name and value of an unknown of the sensor; a supposed scale in thousandths.
 fn of_sensor(set: &Dataset, extra: Extra, value: f64) -> (String, f64) {
@@ -57,7 +58,9 @@ impl Record {
             reason: String::new(),
             warnings: Vec::new(),
             outliers: set.names(&found.outliers),
+            strays: set.names(found.strays(set)),
             sessions: along.sessions.clone(),
+            rows: Given::default(),
             skipped: set.skipped.clone(),
             judged: found.judged.clone(),
             smooth: Smooth::new(found),

@@ -9,7 +9,9 @@ mod plausible;
 mod quality;
 mod touched;
 
-pub use file::{Advice, Record, Smooth};
+pub use crate::robot::Advice;
+pub use file::{Record, Smooth};
 pub use findings::Findings;
 pub use parameters::{Identifiability, MethodRecord, ParameterRecord};
+pub use plausible::links_apart;
 pub use quality::{PointSpread, Quality, quality, spread};

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::identify::model::base::Observability;
-use crate::identify::record::quality::{PointSpread, Quality};
+use crate::identify::record::quality::Quality;
 use crate::identify::run::Candidate;
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::problem::{Problem, Solution, Stop};
@@ -19,10 +19,9 @@ pub struct MethodRecord {
     pub name: &'static str,
     pub model: &'static str,
     pub parameters: Vec<ParameterRecord>,
-    /// On the rows that were fitted.
-    pub fit: PointSpread,
-    /// On the rows that were not.
-    pub verify: PointSpread,
+    /// Its errors.
+    #[serde(flatten)]
+    pub quality: Quality,
     /// Root mean square held-out error that the choice went by, mm.
     pub held_out_mm: Option<f64>,
     /// Least cost, mm^2.
@@ -107,8 +106,7 @@ pub(super) fn method_record(candidate: &Candidate, quality: Quality) -> MethodRe
         name: candidate.name,
         model: candidate.model.name(),
         parameters: candidate.found.as_ref().map_or_else(Vec::new, |(f, s)| parameter_records(f, s)),
-        fit: quality.fit,
-        verify: quality.verify,
+        quality,
         held_out_mm: candidate.held_out_mm,
         cost_mm2: solution.map(|s| s.cost),
         iterations: solution.map_or(0, |s| s.iterations),

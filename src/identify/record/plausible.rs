@@ -3,7 +3,7 @@
 use crate::identify::finding::Finding;
 use crate::identify::model::base::sum_name;
 use crate::identify::run::Identification;
-use crate::robot::Parameter;
+use crate::robot::{Parameter, Robot, Unit};
 
 /// Links that are farther from the file's than they are built.
 pub fn of_another_robot(found: &Identification) -> Option<Finding> {
@@ -41,6 +41,25 @@ fn link_limit(parameter: Parameter) -> Option<f64> {
         Parameter::Alpha(_) | Parameter::Theta(_) => Some(60.0),
         _ => None,
     }
+}
+
+/// The links of two robots of the same joints that are farther apart than those of one robot are built, and joints that are counted the other way
+/// round, for a sentence.
+pub fn links_apart(nominal: &Robot, other: &Robot) -> Option<String> {
+    const WHOLE_TURN: f64 = 1000.0 * std::f64::consts::TAU;
+    let apart = |parameter: Parameter| {
+        let mut off = other.value(parameter) - nominal.value(parameter);
+        if parameter.unit() == Unit::Mrad {
+            off -= WHOLE_TURN * (off / WHOLE_TURN).round();
+        }
+        let (unit, factor) = parameter.file_unit();
+        (off.abs() > link_limit(parameter)?).then(|| format!("{} {:+.1} {unit}", parameter.name(), factor * off))
+    };
+    let mut list: Vec<String> = nominal.mdh_parameters().into_iter().filter_map(apart).collect();
+    let joints = nominal.joints.iter().zip(&other.joints).enumerate();
+    let turned = joints.filter(|(_, (a, b))| a.sign != b.sign);
+    list.extend(turned.map(|(j, _)| format!("joint {} is counted the other way round", j + 1)));
+    (!list.is_empty()).then(|| list.join(", "))
 }
 
 /// The size beyond which a term is no gear's, bearing's or encoder's any more: mrad, mrad a metre of lever, or thousandths. Those of the

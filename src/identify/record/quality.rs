@@ -16,6 +16,16 @@ pub struct Quality {
     pub fit: PointSpread,
     /// On the rows that were not.
     pub verify: PointSpread,
+    /// The same without those that fit far worse than the rest, by which nothing is judged; absent without any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub verify_without_strays: Option<PointSpread>,
+}
+
+impl Quality {
+    /// What the robot is judged by.
+    pub fn judged(&self) -> &PointSpread {
+        self.verify_without_strays.as_ref().unwrap_or(&self.verify)
+    }
 }
 
 /// Distance errors, and with positions point errors.
@@ -57,9 +67,16 @@ pub fn quality(
     let (extras, values): (Vec<Extra>, Vec<f64>) = of_sensor.unzip();
     let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &found.fitted, settings.wire_offset) };
     let (fit, verify) = (judge.errors(robot, &found.fitted), found.held_out_errors(&judge, robot, fitted));
+    let strays = found.strays(set);
+    let without_strays = || {
+        let errors: Vec<RowError> = verify.iter().filter(|error| !strays.contains(&error.row)).cloned().collect();
+        let rows: Vec<usize> = found.judged_rows(set).into_iter().filter(|row| !strays.contains(row)).collect();
+        spread(&judge, robot, &errors, &rows)
+    };
     let quality = Quality {
         fit: spread(&judge, robot, &fit, &found.fitted),
         verify: spread(&judge, robot, &verify, &found.judged_rows(set)),
+        verify_without_strays: (!strays.is_empty()).then(without_strays),
     };
     (quality, verify)
 }

@@ -40,6 +40,12 @@ impl Identification {
         }
     }
 
+    /// Rows to verify that fit far worse than the rest and by which nothing is judged: one, or a tenth of them. More than that are no strays.
+    pub fn strays(&self, set: &Dataset) -> &[usize] {
+        let most = (set.verify_rows().len() / 10).max(1);
+        if self.verify_outliers.len() <= most { &self.verify_outliers } else { &[] }
+    }
+
     /// Errors of a robot on rows that took no part in its fit: the rows to verify, or every row in the fits that it was left out of. A robot
     /// that was `fitted` changes as the chosen one does where rows are left out; the nominal one does not. `judge` is for all fitted rows.
     pub fn held_out_errors(&self, judge: &Judge, robot: &Robot, fitted: bool) -> Vec<RowError> {

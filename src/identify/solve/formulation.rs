@@ -20,6 +20,7 @@ use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::{Model, Prior, Settings};
 use crate::linear_algebra::{product, pseudo_inverse};
+use crate::robot::tool_fit::TYPED_MM;
 use crate::robot::{Parameter, Robot, Unit};
 
 /// Rounds of fitting and of estimating scatter and prior from the residuals.
@@ -356,7 +357,10 @@ fn bounds(base: &Base, parameters: &[Parameter], x: &[f64], settings: &Settings)
             Unit::Mrad => 1000.0 * settings.bound_deg.to_radians(),
         };
         if settings.widen_bounds && value.abs() > NEAR_WALL * bound {
-            widened.push(parameters[i].name());
+            // A tool is typed off a drawing.
+            if !(matches!(parameters[i], Parameter::V(_)) && value.abs() <= TYPED_MM) {
+                widened.push(parameters[i].name());
+            }
             while value.abs() > NEAR_WALL * bound {
                 bound *= 2.0;
             }

@@ -102,22 +102,24 @@ fn verdict(record: &Record) -> Markup {
         let of = |s: &PointSpread| s.point.and_then(|p| p.mean_abs_mm).or(s.distance.mean_abs_mm);
         spread.and_then(of).map_or_else(|| "n/a".to_owned(), two_digits)
     };
-    let what = if record.before.verify.point.is_some() { "position" } else { "distance" };
+    let (before, after) = (record.before.judged(), record.chosen_method().map(|m| m.quality.judged()));
+    let what = if before.point.is_some() { "position" } else { "distance" };
     let mut numbers = vec![
-        (format!("{} mm", mean(Some(&record.before.verify))), format!("mean {what} error before")),
-        (format!("{} mm", mean(record.chosen_method().map(|m| &m.verify))), format!("mean {what} error after")),
+        (format!("{} mm", mean(Some(before))), format!("mean {what} error before")),
+        (format!("{} mm", mean(after)), format!("mean {what} error after")),
     ];
     if let Some(expected) = &record.expected {
         let p95 = format!("{} mm", two_digits(expected.p95_mm));
         numbers.push((p95, "95 of 100 positions are better than this".to_owned()));
     }
-    let after = record.chosen_method().map_or_else(|| "n/a".to_owned(), |m| screen::errors(&m.verify, two_digits));
+    let after = after.map_or_else(|| "n/a".to_owned(), |after| screen::errors(after, two_digits));
     let reason = record.whole_reason();
     let reason = if reason.is_empty() { String::new() } else { format!("{}. ", page::capital(reason)) };
     let detail = format!(
-        "{reason}Before: {}. After: {after}; {}.",
-        screen::errors(&record.before.verify, two_digits),
-        screen::judged_on(record)
+        "{reason}Before: {}. After: {after}; {}.{}",
+        screen::errors(before, two_digits),
+        screen::judged_on(record),
+        screen::of_tool(record).map_or_else(String::new, |said| format!(" {}.", page::capital(&said)))
     );
     page::verdict(tone, word, &numbers, &detail)
 }

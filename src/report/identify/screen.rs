@@ -1,15 +1,20 @@
 //! What `identify` and `verify` print: whether to use the robot, what it was before and is now, which method was kept.
 
+use camino::Utf8Path;
+
 use crate::files::OutDir;
+use crate::formats::placements::record::PLACEMENT;
 use crate::identify::judge::errors::Spread;
 use crate::identify::record::{Advice, PointSpread, Record};
 use crate::report::table::{Table, number};
+use crate::robot::file::IDENTIFIED_FILE as IDENTIFIED;
 
-/// What goes to stdout: whether to use the result, before, after, what to expect; then how it was found.
-pub fn summary(record: &Record, out: &OutDir) -> String {
+/// What goes to stdout: whether to use the result, before, after, what to expect; how it was found; what was written, and what to do with it.
+/// `robot` is the nominal robot's file.
+pub fn summary(record: &Record, robot: Option<&Utf8Path>, is_placed: bool, out: &OutDir) -> String {
     let errors = |spread| errors(spread, |mm| number(Some(mm), 4));
-    let before = &record.before.verify;
-    let after = record.chosen_method().map(|m| &m.verify);
+    let before = record.before.judged();
+    let after = record.chosen_method().map(|m| m.quality.judged());
     let mut lines = vec![advice(record), format!("before: {}", errors(before))];
     if record.advice != Advice::KeepNominal {
         lines.push(format!("after: {}; {}", after.map_or_else(|| "n/a".to_owned(), errors), judged_on(record)));
@@ -21,15 +26,14 @@ pub fn summary(record: &Record, out: &OutDir) -> String {
     lines.push(kept(record));
     lines.extend(others(record).or(record.not_run.clone()));
     lines.extend(sure(record));
-    if let Some(([x, y, z], left)) = record.tool_mm {
-        lines.push(format!(
-            "with a tool of {x:.1}, {y:.1}, {z:.1} mm instead of the file's the nominal robot is off by {left:.3} mm (median); `before` has the tool of the file"
-        ));
-    }
+    lines.extend(of_tool(record));
     lines.extend(record.repeats.as_ref().map(|repeats| repeats.sentence()));
     lines.extend(record.targets.as_ref().map(|targets| targets.sentence()));
     lines.extend(record.scale.filter(|scale| !scale.is_significant()).map(|scale| scale.sentence()));
-    lines.push(format!("all methods and warnings: {}", out.join("identify.html")));
+    let placement = if is_placed { format!(", {}", out.join(PLACEMENT)) } else { String::new() };
+    let (file, page) = (out.join(IDENTIFIED), out.join("identify.html"));
+    lines.push(format!("written: {file}{placement}; all methods and warnings: {page}"));
+    lines.push(format!("next: {}", next(record.advice, robot.map_or("ROBOT", Utf8Path::as_str), file.as_str())));
     lines.join("\n") + "\n"
 }
 
@@ -42,6 +46,30 @@ pub(super) fn advice(record: &Record) -> String {
         Advice::KeepNominal => record.whole_reason().to_owned(),
         Advice::DoNotUse => format!("do not use {file}: {}", record.whole_reason()),
     }
+}
+
+/// What to do with the robot that was found in `file`.
+fn next(advice: Advice, robot: &str, file: &str) -> String {
+    match advice {
+        Advice::Use => format!(
+            "`stereocal compensate TARGETS --robot {robot} --identified {file}`, or `stereocal export robot --robot {file} --format urdf`"
+        ),
+        Advice::Check => format!(
+            "look at what is named above; ten new poses say whether it holds: `stereocal verify --measurements NEW.csv --robot {robot} --robot {file}`"
+        ),
+        Advice::KeepNominal => {
+            format!("go on with {robot}; more rows, that bend every joint, may show more (`stereocal guide poses`)")
+        }
+        Advice::DoNotUse => "mend what is named above, and identify again (`stereocal guide warnings`)".to_owned(),
+    }
+}
+
+/// The tool that the nominal robot asks for, where it is far from the file's.
+pub(super) fn of_tool(record: &Record) -> Option<String> {
+    let ([x, y, z], left) = record.tool_mm?;
+    Some(format!(
+        "with a tool of {x:.1}, {y:.1}, {z:.1} mm instead of the file's the nominal robot is off by {left:.3} mm (median); `before` has the tool of the file"
+    ))
 }
 
 /// Errors of a robot in a line; `mm` writes a length.
@@ -63,10 +91,13 @@ pub(super) fn errors(spread: &PointSpread, mm: fn(f64) -> String) -> String {
 
 /// The rows that both figures are of.
 pub(super) fn judged_on(record: &Record) -> String {
-    let count = record.before.verify.distance.count.max(record.before.verify.point.map_or(0, |p| p.count));
-    match record.folded {
-        true => format!("{count} rows, each in a fit without it"),
-        false => format!("{count} rows that took no part in the fit"),
+    let before = record.before.judged();
+    let count = before.distance.count.max(before.point.map_or(0, |p| p.count));
+    let without = record.strays.join(", ");
+    match (record.folded, record.strays.is_empty()) {
+        (true, _) => format!("{count} rows, each in a fit without it"),
+        (false, true) => format!("{count} rows that took no part in the fit"),
+        (false, false) => format!("{count} rows that took no part in the fit, without {without}"),
     }
 }
 
@@ -86,7 +117,8 @@ fn kept(record: &Record) -> String {
 /// The best and the worst of the other methods.
 fn others(record: &Record) -> Option<String> {
     let of = |m: &crate::identify::record::MethodRecord| {
-        let spread = m.verify.point.as_ref().filter(|p| p.count > 0).unwrap_or(&m.verify.distance);
+        let judged = m.quality.judged();
+        let spread = judged.point.as_ref().filter(|p| p.count > 0).unwrap_or(&judged.distance);
         Some((spread.mean_abs_mm?, format!("{}/{}", m.name, m.model)))
     };
     let mut others: Vec<(f64, String)> =
@@ -119,5 +151,18 @@ pub fn verified(robots: &[(&str, &PointSpread)], folded: bool) -> String {
         let figures = [mean_abs_mm, std_mm, max_abs_mm, min_abs_mm].into_iter().chain(of_points);
         table.row(std::iter::once((*name).to_owned()).chain(figures.map(|figure| number(figure, 4))));
     }
-    table.to_string()
+    let any = |of: fn(&PointSpread) -> bool| robots.iter().any(|(_, spread)| of(spread));
+    let distances =
+        "mean to min: errors of distances from the centre of each group, or from the row nearest to its middle";
+    let columns = match (any(|s| s.point.is_some()), any(|s| s.distortion.is_some()), any(|s| s.consistency.is_some()))
+    {
+        (true, ..) => format!("{distances}; point: of points, after one rigid fit to each placement"),
+        (_, true, _) => {
+            "mean to min: distances of touches from the middle of their point; point: errors of known distances"
+                .to_owned()
+        }
+        (.., true) => "mean to min: distances of touches from the middle of their point".to_owned(),
+        _ => "mean to min: errors of distances".to_owned(),
+    };
+    format!("{table}{columns}\n")
 }

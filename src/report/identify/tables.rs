@@ -77,12 +77,12 @@ fn sensor(by_cameras: bool) -> &'static str {
 }
 
 pub(super) fn verification_table(record: &Record) -> Markup {
-    let before = &record.before.verify;
+    let before = record.before.judged();
     let named = |m: &MethodRecord| {
         let name = format!("{}/{}", m.name, m.model);
         if name == record.chosen { format!("{name} (kept)") } else { name }
     };
-    let methods = record.methods.iter().map(|m| (named(m), &m.verify));
+    let methods = record.methods.iter().map(|m| (named(m), m.quality.judged()));
     let robots: Vec<(String, &PointSpread)> = std::iter::once(("before".to_owned(), before)).chain(methods).collect();
     let mm = |figure: Option<f64>| figure.map_or_else(|| "n/a".to_owned(), two_digits);
     let row = |(name, s): &(String, &PointSpread)| {
@@ -122,6 +122,9 @@ pub(super) fn expected_table(expected: &Expected) -> Markup {
     }
 }
 
+/// State of a parameter that acts like others.
+const PART: &str = "part of a sum";
+
 pub(super) fn parameter_table(record: &Record) -> Markup {
     let Some(method) = record.chosen_method() else { return html! {} };
     let seen = &record.identifiability;
@@ -130,11 +133,12 @@ pub(super) fn parameter_table(record: &Record) -> Markup {
         let state = match (p.identifiable, p.at_bound) {
             (true, true) => "at the search limit",
             (true, false) if seen.weak.contains(&p.name) => "from the tolerance alone",
-            _ if p.delta != 0.0 && in_sum(&p.name) => "part of a sum",
+            _ if p.delta != 0.0 && in_sum(&p.name) => PART,
             (false, _) => "stays nominal",
             (true, false) => "",
         };
-        let [delta, sigma] = match p.sigma {
+        // How sure the sum is says nothing of its parts, which the tolerance splits.
+        let [delta, sigma] = match p.sigma.filter(|_| state != PART) {
             Some(sigma) => with_sigma(p.delta, sigma),
             None => [number(Some(p.delta), 4), "n/a".to_owned()],
         };

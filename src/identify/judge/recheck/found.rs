@@ -62,6 +62,8 @@ pub struct Moved {
 pub struct Recheck {
     /// Poses that were compared.
     pub poses: Vec<String>,
+    /// Poses that fit far worse than the rest and were left out.
+    pub strays: Vec<String>,
     /// Every cause.
     pub causes: Vec<CauseSeen>,
     /// Whether the robot changed.
@@ -86,6 +88,15 @@ impl Recheck {
             (true, false) => self.likeliest.iter().map(|(word, _)| word.as_str()).collect::<Vec<_>>().join("|"),
             (false, _) if self.placements.iter().any(|p| p.moved) => "camera-moved|joint-1".to_owned(),
             (false, _) => String::new(),
+        }
+    }
+
+    /// The rows that fit far worse than the rest, for a person; `None` where there are none.
+    pub fn of_strays(&self) -> Option<String> {
+        match &self.strays[..] {
+            [] => None,
+            [one] => Some(format!("row {one} fits far worse than the rest: take it again")),
+            all => Some(format!("rows {} fit far worse than the rest: take them again", all.join(", "))),
         }
     }
 

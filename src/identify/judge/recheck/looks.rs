@@ -17,6 +17,11 @@ const UNSEEN: f64 = 1e-4;
 /// Rounds of looking anew where a suspect says that the robot is: a large turn is not linear.
 const ROUNDS: usize = 3;
 
+/// What so many numbers that are free cost of the logarithm of a likelihood of `count` residuals (Schwarz).
+pub(super) fn price(count: usize, numbers: usize) -> f64 {
+    0.5 * (count.max(2) as f64).ln() * numbers as f64
+}
+
 /// All looks at the residuals.
 pub(super) struct Looks<'a> {
     /// At the old robot.
@@ -64,22 +69,20 @@ impl<'a> Looks<'a> {
         difference.chi_square() > difference.limit(difference.off.len(), chance) || self.suspects.iter().any(over)
     }
 
-    /// Suspects that leave no more than chance and are not told apart, the likeliest first, with their numbers.
-    pub(super) fn explained(&self) -> Vec<(&'a Suspect, Vec<f64>)> {
+    /// Suspects that leave no more than chance and are not told apart, the likeliest first, with the logarithm of their likelihood and their numbers.
+    pub(super) fn explained(&self) -> Vec<(f64, &'a Suspect, Vec<f64>)> {
         let count = self.look.difference.off.len();
-        let price = 0.5 * (count.max(2) as f64).ln();
-        let mut explain: Vec<(f64, &Suspect, Vec<f64>)> = Vec::new();
+        let mut explain: Vec<(f64, &'a Suspect, Vec<f64>)> = Vec::new();
         for suspect in self.suspects.iter().filter(|s| self.is_seen(s)) {
             let numbers = suspect.columns.len();
             let Some((left, difference, amounts)) = self.left_by(suspect) else { continue };
             if left <= difference.limit(count - numbers, self.chance()) {
-                explain.push((difference.log_likelihood(left) - price * numbers as f64, suspect, amounts));
+                explain.push((difference.log_likelihood(left) - price(count, numbers), suspect, amounts));
             }
         }
         explain.sort_by(|a, b| b.0.total_cmp(&a.0));
         let best = explain.first().map_or(0.0, |(likely, ..)| *likely);
-        let near = explain.into_iter().filter(|(likely, ..)| best - likely < TOLD_APART);
-        near.map(|(_, suspect, amounts)| (suspect, amounts)).collect()
+        explain.into_iter().filter(|(likely, ..)| best - likely < TOLD_APART).collect()
     }
 
     /// What is left of the residuals where a suspect may take what it likes, and what it takes.

@@ -1,0 +1,91 @@
+//! `stereocal compensate`: targets written for the nominal robot to readings that bring the real one there.
+
+mod pair;
+mod program;
+mod told;
+
+use super::heed::heed;
+use super::{Outcome, Result};
+use crate::cli::Compensate;
+use crate::compensate::{Compensator, Target};
+use crate::config::{self, Config};
+use crate::diagnostic::Status;
+use crate::files::OutDir;
+use crate::files::provenance::Run;
+use crate::formats::targets::{self, Row};
+use crate::programs::{self, JointOrder, Joints, Language};
+use crate::progress;
+use pair::Pair;
+use program::Program;
+use told::{Summary, said};
+
+/// Runs the command.
+pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
+    let pair = Pair::read(args)?;
+    let nominal = &pair.nominal;
+    let heeded = heed(pair.check.as_ref(), &args.identified);
+    let slides: Vec<bool> = nominal.joints.iter().map(|j| j.slides).collect();
+    let order = check(args, Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg })?;
+    let slides = order.in_program(&slides);
+    let joints = Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg };
+    let read = |language| Program::read(args, language, joints, &order);
+    let program = Language::of(&args.targets).map(read).transpose()?;
+    let rows = match &program {
+        Some(program) => program.rows(nominal, &order),
+        None => targets::read(&args.targets, nominal)?,
+    };
+    let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
+    let run = Run { force: args.output.force, ..run };
+    let out = out.for_run(&run, &[&args.targets, &args.robot, &args.identified]);
+    let program_name = format!("compensated/{}", args.targets.file_name().unwrap_or("program"));
+    out.check_free(&["compensated.csv", "compensate.json"])?;
+    tell_of_postures(&rows);
+    let list: Vec<_> = rows.iter().map(|row| row.target.clone()).collect();
+    let found = Compensator::new(nominal, &pair.identified, pair.tool_mm).compensate(&list);
+    let in_file = |readings: &[f64]| -> Vec<f64> {
+        readings.iter().zip(&nominal.joints).map(|(r, joint)| if joint.slides { *r } else { r.to_degrees() }).collect()
+    };
+    let table = rows.iter().zip(&found).map(|(row, found)| match &found.readings {
+        Ok(readings) => (row.name.as_str(), Some(in_file(readings)), "ok".to_owned()),
+        Err(refusal) => (row.name.as_str(), row.given.clone(), refusal.to_string()),
+    });
+    out.write("compensated.csv", targets::to_csv(nominal, table).as_bytes())?;
+    if let Some(program) = &program {
+        let changed = program.targets().zip(&found);
+        let in_program = |readings: &[f64]| order.in_program(&in_file(readings));
+        let changed: Vec<_> = changed.filter_map(|(t, f)| Some((t, in_program(f.readings.as_ref().ok()?)))).collect();
+        let text = programs::with_readings(program.language, &program.text, joints, &changed);
+        out.write(&program_name, &program.encoding.encoded(&text))?;
+    }
+    let motions = program.as_ref().map(|program| program.outcome(&found));
+    let summary = Summary::new(&rows, &found, motions.as_deref(), &pair);
+    let json = out.write_json("compensate.json", &summary)?;
+    let written = out.join(if program.is_some() { &program_name } else { "compensated.csv" });
+    let status = if summary.is_whole() && pair.same.is_none() { heeded } else { Status::OutOfTolerance };
+    Ok(Outcome {
+        stdout: if args.output.json { json } else { said(&summary, &pair, motions.as_deref(), &written) },
+        status,
+    })
+}
+
+/// Where no row says the posture.
+fn tell_of_postures(rows: &[Row]) {
+    if rows.iter().any(|row| matches!(row.target, Target::Pose { near_rad: None, .. })) {
+        progress::note(
+            "poses without readings: of all postures the one farthest from limits and singular ones is taken; columns j1_deg.. beside a pose say \
+             another",
+        );
+    }
+}
+
+/// What the options say of the joints.
+fn check(args: &Compensate, joints: Joints) -> Result<JointOrder> {
+    let mut problems: Vec<String> = joints.problem().into_iter().collect();
+    match JointOrder::new(&args.joint_order, joints.slides.len()) {
+        Ok(order) if problems.is_empty() => Ok(order),
+        order => {
+            problems.extend(order.err());
+            Err(config::Error::Invalid { problems }.into())
+        }
+    }
+}

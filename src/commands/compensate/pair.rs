@@ -1,0 +1,110 @@
+//! The two robots of `compensate`: whether they are one arm, and which tool counts.
+
+use nalgebra::Vector3;
+
+use super::super::Result;
+use crate::cli::Compensate;
+use crate::config;
+use crate::identify::record;
+use crate::robot::refit::Residual;
+use crate::robot::tool_fit::TYPED_MM;
+use crate::robot::{Advice, Check, Error, Joint, Robot, file, tool_text};
+
+/// Robots and tools that differ by less are the same, mm.
+const SAME_MM: f64 = 1e-6;
+
+/// How far the flanges of one arm are apart on average, mm: a nominal robot is off by a few.
+const ONE_ARM_MM: f64 = 10.0;
+
+/// Both robots.
+pub(super) struct Pair {
+    pub(super) nominal: Robot,
+    pub(super) identified: Robot,
+    /// What the identified one's file says of its use.
+    pub(super) check: Option<Check>,
+    /// The tool that is used for both, mm in the last frame; `None` where each file has its own.
+    pub(super) tool_mm: Option<Vector3<f64>>,
+    /// What is to be said of the tools.
+    pub(super) of_tools: Option<String>,
+    /// That nothing is left to correct.
+    pub(super) same: Option<String>,
+}
+
+impl Pair {
+    /// Reads both. Refuses robots that are exchanged, of different joints or of two arms, and tools of which one must be wrong.
+    pub(super) fn read(args: &Compensate) -> Result<Pair> {
+        if !matches!(args.tool.len(), 0 | 3) {
+            let problem = format!("--tool has {} numbers; X,Y,Z in mm are needed", args.tool.len());
+            return Err(config::Error::Invalid { problems: vec![problem] }.into());
+        }
+        let nominal = file::read(&args.robot)?;
+        let (identified, check) = file::read_checked(&args.identified)?;
+        let [robot, found] = [args.robot.to_string(), args.identified.to_string()];
+        if file::is_identified(&args.robot) && !file::is_identified(&args.identified) {
+            return Err(Error::Exchanged { robot, identified: found }.into());
+        }
+        let same = |(a, b): (&Joint, &Joint)| a.slides == b.slides;
+        if nominal.joints.len() != identified.joints.len() || !nominal.joints.iter().zip(&identified.joints).all(same) {
+            return Err(Error::Different { identified: kinds(&identified), nominal: kinds(&nominal) }.into());
+        }
+        let off = Residual::between(&nominal, &identified);
+        let apart = record::links_apart(&nominal, &identified);
+        if let Some(apart) = apart.filter(|_| off.mean_mm > ONE_ARM_MM) {
+            return Err(Error::OtherArm { robot, identified: found, apart }.into());
+        }
+        let mut pair = Pair { nominal, identified, check, tool_mm: None, of_tools: None, same: None };
+        let tools_apart_mm = pair.choose_tool(args)?;
+        let kept = pair.check.as_ref().filter(|check| check.advice == Advice::KeepNominal);
+        pair.same = (off.max_mm < SAME_MM && tools_apart_mm < SAME_MM).then(|| {
+            let why = kept.map_or("`--identified` names what `identify` wrote, identified.toml", |c| c.reason.as_str());
+            format!("nothing to correct: {robot} and {found} describe the same robot; {why}")
+        });
+        Ok(pair)
+    }
+
+    /// The tool for both where one is named, or where one file alone has one; by how much those of the files are apart otherwise, mm. A file
+    /// without a tool, or with one in the last frame's origin, says nothing of it: its targets are moved by the arm's errors alone.
+    fn choose_tool(&mut self, args: &Compensate) -> Result<f64> {
+        let (drawn, found) = (self.nominal.tool_mm, self.identified.tool_mm);
+        self.tool_mm = <[f64; 3]>::try_from(args.tool.as_slice()).ok().map(Vector3::from);
+        if self.tool_mm.is_some() || drawn == found {
+            return Ok(0.0);
+        }
+        let lacks = |without, with, tool_mm: Vector3<f64>| {
+            let tool = tool_text(&tool_mm.into());
+            format!(
+                "{without} states no tool: that of {with}, {tool} mm, is taken for both; `--tool X,Y,Z` names another"
+            )
+        };
+        if drawn == Vector3::zeros() || found == Vector3::zeros() {
+            let of_found = drawn == Vector3::zeros();
+            self.tool_mm = Some(if of_found { found } else { drawn });
+            self.of_tools = Some(match of_found {
+                true => lacks(&args.robot, &args.identified, found),
+                false => lacks(&args.identified, &args.robot, drawn),
+            });
+            return Ok(0.0);
+        }
+        let apart_mm = (drawn - found).norm();
+        if apart_mm > TYPED_MM {
+            return Err(Error::TwoTools {
+                robot: args.robot.to_string(),
+                robot_mm: drawn.into(),
+                identified: args.identified.to_string(),
+                identified_mm: found.into(),
+                apart_mm,
+            }
+            .into());
+        }
+        self.of_tools = (apart_mm >= SAME_MM).then(|| {
+            format!("the tools of the two files are {apart_mm:.3} mm apart, and this is corrected too: `--tool X,Y,Z` names the one that works")
+        });
+        Ok(apart_mm)
+    }
+}
+
+/// How many joints a robot has, and how many of them slide.
+fn kinds(robot: &Robot) -> String {
+    let sliding = robot.joints.iter().filter(|j| j.slides).count();
+    format!("{}{}", robot.joints.len(), if sliding > 0 { format!(" ({sliding} sliding)") } else { String::new() })
+}

@@ -1,0 +1,138 @@
+//! What `compensate` says of its targets: the JSON file and the lines on the terminal.
+
+use camino::Utf8Path;
+use serde::Serialize;
+
+use super::pair::Pair;
+use crate::compensate::Compensated;
+use crate::diagnostic::count;
+use crate::formats::targets::Row;
+use crate::programs::{Cause, Instruction};
+use crate::robot::Check;
+
+/// Length of the lists of refused targets and of motions that stay as they are on the terminal.
+const MOST_SAID: usize = 20;
+
+/// What `compensate.json` says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Summary {
+    targets: usize,
+    /// Those with readings.
+    compensated: usize,
+    /// Mean distance of the real tool from where it was meant to be, without compensation, mm.
+    before_mean_mm: Option<f64>,
+    /// Largest.
+    before_max_mm: Option<f64>,
+    /// The tool that was used for both robots, in the last frame, mm; absent where each file has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tool_mm: Option<[f64; 3]>,
+    /// What the run that found the robot says of its use.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    check: Option<Check>,
+    /// Those without.
+    refused: Vec<Refused>,
+    /// Of a program: every instruction that moves the robot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    motions: Option<Vec<Moved>>,
+}
+
+/// A motion of a program.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Moved {
+    line: u64,
+    instruction: String,
+    target: String,
+    /// `compensated` or `unchanged`.
+    done: &'static str,
+    /// Why it is unchanged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<String>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Refused {
+    name: String,
+    line: u64,
+    reason: String,
+}
+
+impl Summary {
+    pub(super) fn new(rows: &[Row], found: &[Compensated], motions: Option<&[Instruction]>, pair: &Pair) -> Summary {
+        let refused = rows.iter().zip(found).filter_map(|(row, found)| {
+            let reason = found.readings.as_ref().err()?.to_string();
+            Some(Refused { name: row.name.clone(), line: row.line, reason })
+        });
+        let refused: Vec<Refused> = refused.collect();
+        let misses: Vec<f64> = found.iter().filter_map(|f| f.miss_mm).collect();
+        Summary {
+            targets: rows.len(),
+            compensated: rows.len() - refused.len(),
+            before_mean_mm: (!misses.is_empty()).then(|| misses.iter().sum::<f64>() / misses.len() as f64),
+            before_max_mm: misses.iter().copied().reduce(f64::max),
+            tool_mm: pair.tool_mm.map(Into::into),
+            check: pair.check.clone(),
+            refused,
+            motions: motions.map(|motions| motions.iter().map(Moved::new).collect()),
+        }
+    }
+}
+
+impl Summary {
+    /// Whether nothing was left as it is.
+    pub(super) fn is_whole(&self) -> bool {
+        let all = |motions: &Vec<Moved>| !motions.is_empty() && motions.iter().all(|m| m.reason.is_none());
+        self.refused.is_empty() && self.motions.as_ref().is_none_or(all)
+    }
+}
+
+impl Moved {
+    fn new(motion: &Instruction) -> Moved {
+        Moved {
+            line: motion.line,
+            instruction: motion.word.clone(),
+            target: motion.target.clone(),
+            done: if motion.moves_by.is_ok() { "compensated" } else { "unchanged" },
+            reason: motion.moves_by.as_ref().err().map(Cause::to_string),
+        }
+    }
+}
+
+/// The lines on the terminal.
+pub(super) fn said(summary: &Summary, pair: &Pair, motions: Option<&[Instruction]>, written: &Utf8Path) -> String {
+    let mut text = pair.same.as_ref().map_or_else(String::new, |same| format!("{same}\n"));
+    text += &format!("{} of {} compensated: {written}\n", summary.compensated, count(summary.targets, "target"));
+    if let Some(motions) = motions {
+        let through = motions.iter().filter(|m| m.moves_by.is_ok()).count();
+        text += &match motions.len() {
+            0 => "no instruction in this file moves to them: whether each use of them is a motion is not known\n"
+                .to_owned(),
+            1 if through == 1 => "the one motion to them is compensated\n".to_owned(),
+            all if all == through => format!("all {all} motions move to them\n"),
+            all => format!("{through} of {all} motions move to them; {} left as written\n", all - through),
+        };
+    }
+    if let (Some(mean), Some(max), None) = (summary.before_mean_mm, summary.before_max_mm, &pair.same) {
+        text += &format!(
+            "without it the real tool would be off by {mean:.3} mm on average, {max:.3} at most (in the base frame; the errors of `identify` are \
+             those after a rigid fit of each placement)\n"
+        );
+    }
+    pair.of_tools.iter().for_each(|said| text += &format!("{said}\n"));
+    let left: Vec<String> = match motions {
+        Some(motions) => motions.iter().filter(|m| m.moves_by.is_err()).map(|m| format!("left: {m}")).collect(),
+        None => Vec::new(),
+    };
+    let refused = |r: &Refused| format!("not compensated: {} (line {}): {}", r.name, r.line, r.reason);
+    listed(&mut text, summary.refused.iter().map(refused), summary.refused.len(), "compensated.csv");
+    let of_motions = left.len();
+    listed(&mut text, left.into_iter(), of_motions, "compensate.json");
+    text
+}
+
+/// At most so many lines of a list, and where the others are named.
+fn listed(text: &mut String, lines: impl Iterator<Item = String>, count: usize, file: &str) {
+    lines.take(MOST_SAID).for_each(|line| *text += &format!("{line}\n"));
+    if count > MOST_SAID {
+        *text += &format!("... and {} more, named in {file}\n", count - MOST_SAID);
+    }
+}

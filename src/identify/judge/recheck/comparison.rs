@@ -1,0 +1,83 @@
+//! What some rows say of the old robot.
+
+use super::compared::{Compared, Look, rows};
+use super::found::{Before, CauseSeen, Recheck};
+use super::looks::Looks;
+use super::moves::{Moves, placements};
+use super::suspects::{Suspect, suspects};
+use crate::difference::Difference;
+use crate::identify::Error;
+use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::placement::Uncertain;
+use crate::robot::{Parameter, Robot};
+
+/// Where the sensor stood by the name of the group.
+pub type Stood<'a> = &'a dyn Fn(&str) -> Option<Uncertain>;
+
+/// What is compared.
+pub(super) struct Comparison<'a> {
+    pub(super) set: &'a Dataset,
+    pub(super) robot: &'a Robot,
+    pub(super) before: &'a Before,
+    pub(super) stood: Stood<'a>,
+    /// What is known of the robot, and behind it what else may have changed.
+    pub(super) parameters: Vec<Parameter>,
+    pub(super) oriented: bool,
+}
+
+/// What some of the rows say.
+pub(super) struct Said {
+    pub(super) recheck: Recheck,
+    pub(super) difference: Difference,
+    /// Logarithm of the likelihood of the likeliest cause that explains a change.
+    pub(super) likelihood: Option<f64>,
+}
+
+impl Comparison<'_> {
+    /// Numbers that a row tells.
+    pub(super) fn numbers_of_row(&self) -> usize {
+        if self.oriented { 6 } else { 3 }
+    }
+
+    /// Calls `with` with these rows beside the old robot.
+    fn compared<T>(&self, used: &[usize], with: impl FnOnce(&Compared) -> T) -> T {
+        let rows = rows(self.set, self.robot, &self.parameters, used, self.oriented, self.before.trust);
+        with(&Compared { rows: &rows, before: self.before, count: self.parameters.len() + 1 })
+    }
+
+    /// What these rows leave of the old robot.
+    pub(super) fn look(&self, used: &[usize]) -> Option<Look> {
+        self.compared(used, |compared| Some(compared.at(&vec![0.0; compared.count])?.1))
+    }
+
+    pub(super) fn said(&self, used: &[usize]) -> Result<Said, Error> {
+        let undetermined = || Error::NothingDetermined { poses: used.len() };
+        self.compared(used, |compared| self.of(compared, used)).ok_or_else(undetermined)
+    }
+
+    fn of(&self, compared: &Compared, used: &[usize]) -> Option<Said> {
+        let suspects = suspects(self.robot, &self.parameters);
+        let (linear, look) = compared.at(&vec![0.0; compared.count])?;
+        let moves = Moves::new(&linear, compared.count);
+        let looks = Looks { look, again: &|offsets| compared.at(offsets).map(|(_, look)| look), suspects: &suspects };
+        let causes: Vec<CauseSeen> =
+            suspects.iter().filter(|s| s.columns.len() == 1).map(|s| looks.of(s, &moves)).collect();
+        let changed = looks.is_change();
+        let explained = if changed { looks.explained() } else { Vec::new() };
+        let named = |(_, suspect, amounts): &(f64, &Suspect, Vec<f64>)| (suspect.word.clone(), suspect.by(amounts));
+        let likeliest = explained.iter().map(named).collect();
+        let placements = if changed { Vec::new() } else { placements(self.set, compared, &linear, self.stood) };
+        let seen_mm = causes.iter().filter_map(|c| c.seen_mm).fold(0.0, f64::max);
+        let effect_mm = match (changed, explained.first()) {
+            (true, Some((_, suspect, amounts))) => moves.most_mm(&suspect.columns, amounts),
+            (true, None) => compared.misfit_mm(),
+            (false, _) => 0.0,
+        };
+        let effect_mm = placements.iter().filter(|p| p.moved).map(|p| p.shift_mm).fold(effect_mm, f64::max);
+        let likelihood = explained.first().map(|(likelihood, ..)| *likelihood);
+        let (poses, by_cameras) = (self.set.names(used), self.set.is_of_cameras());
+        let strays = Vec::new();
+        let recheck = Recheck { poses, strays, causes, changed, likeliest, placements, effect_mm, seen_mm, by_cameras };
+        Some(Said { recheck, difference: looks.look.difference, likelihood })
+    }
+}

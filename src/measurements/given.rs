@@ -1,0 +1,92 @@
+//! Rows that a result was made of, known again in another file.
+//!
+//! In: rows. Out: a word for each, of its joints and its reading to a thousandth of a degree and a mm: a file that was cut, sorted, renamed or
+//! written with fewer decimals has the same, and a pose that was measured anew has another for the scatter of the reading. Goes wrong: a number
+//! that lies half-way between two thousandths and is written anew may change its word.
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Measurement, Observed, Role};
+use crate::files::provenance::sha256;
+
+/// Digits of a word: among a million rows two different ones share it with a chance of one in ten million.
+const DIGITS: usize = 16;
+
+/// The rows of a run.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Given {
+    /// Those that may have been fitted.
+    pub fitted: BTreeSet<String>,
+    /// Those of role `verify`.
+    pub verify: BTreeSet<String>,
+}
+
+impl Given {
+    pub fn new(rows: &[Measurement]) -> Given {
+        let words = |of_verify: bool| {
+            let rows = rows.iter().filter(|row| (row.at.role == Role::Verify) == of_verify);
+            rows.filter_map(word).collect()
+        };
+        Given { fitted: words(false), verify: words(true) }
+    }
+
+    /// Whether a row is one of those that may have been fitted.
+    pub fn fitted(&self, row: &Measurement) -> bool {
+        word(row).is_some_and(|word| self.fitted.contains(&word))
+    }
+
+    /// Whether a row is any of them.
+    pub fn holds(&self, row: &Measurement) -> bool {
+        word(row).is_some_and(|word| self.fitted.contains(&word) || self.verify.contains(&word))
+    }
+}
+
+/// `None` of a row without a reading.
+fn word(row: &Measurement) -> Option<String> {
+    let reading: Vec<f64> = match &row.observed {
+        Observed::Position { point_mm, .. } => point_mm.iter().copied().collect(),
+        Observed::Distance { distance_mm, .. } => vec![*distance_mm],
+        Observed::Missing { .. } => return None,
+    };
+    // No zero has a sign.
+    let rounded = |number: &f64| format!("{:.0} ", (1000.0 * number).round() + 0.0);
+    let numbers: String = row.at.joints_deg.iter().chain(&reading).map(rounded).collect();
+    Some(sha256(numbers.as_bytes()).chars().take(DIGITS).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+
+    use super::*;
+    use crate::measurements::RobotPose;
+
+    fn row(joint: f64, x: f64, role: Role) -> Measurement {
+        let at = RobotPose {
+            pose: format!("{joint}"),
+            group: "g".into(),
+            role,
+            joints_deg: vec![joint, -0.0],
+            slides: vec![],
+        };
+        let point_mm = Point3::new(x, 2.0, 3.0);
+        Measurement {
+            at,
+            target: String::new(),
+            observed: Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None },
+        }
+    }
+
+    #[test]
+    fn rows_are_known_by_their_numbers_and_not_by_their_names() {
+        let given = Given::new(&[row(1.0, 5.0, Role::Sample), row(2.0, 6.0, Role::Verify)]);
+        let mut renamed = row(1.0, 5.000_04, Role::Verify);
+        renamed.at.pose = "other".to_owned();
+        assert!(given.fitted(&renamed) && given.holds(&renamed));
+        assert!(given.holds(&row(2.0, 6.0, Role::Sample)) && !given.fitted(&row(2.0, 6.0, Role::Sample)));
+        // The same pose measured anew, and another pose with the same reading.
+        assert!(!given.holds(&row(1.0, 5.01, Role::Sample)) && !given.holds(&row(1.1, 5.0, Role::Sample)));
+    }
+}
