@@ -96,21 +96,6 @@ pub enum Error {
         /// Which links, and by how much.
         apart: String,
     },
-    /// Tools of which one must be wrong.
-    #[error(
-        "the tools of the two files are {apart_mm:.1} mm apart, {} mm in {robot} and {} mm in {identified}: which one works is not known",
-        tool_text(robot_mm),
-        tool_text(identified_mm)
-    )]
-    TwoTools {
-        /// The file of `--robot`.
-        robot: String,
-        robot_mm: [f64; 3],
-        /// The file of `--identified`.
-        identified: String,
-        identified_mm: [f64; 3],
-        apart_mm: f64,
-    },
     /// A format that does not fit this robot.
     #[error("{message}")]
     NotExportable {
@@ -163,10 +148,6 @@ impl Explain for Error {
                  identified.toml that it wrote; `stereocal robot show FILE` says what each of them is"
                     .to_owned(),
             ),
-            Error::TwoTools { identified_mm, .. } => Some(format!(
-                "`--tool X,Y,Z` names the one that works, for both: the target's as it was found is `--tool {}`",
-                tool_text(identified_mm).replace(", ", ",")
-            )),
             Error::NotExportable { hint, .. } => Some(hint.clone()),
             Error::Table { hint, .. } => Some(hint.clone()),
             Error::File { .. } => None,

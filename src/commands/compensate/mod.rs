@@ -61,7 +61,8 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let summary = Summary::new(&rows, &found, motions.as_deref(), &pair);
     let json = out.write_json("compensate.json", &summary)?;
     let written = out.join(if program.is_some() { &program_name } else { "compensated.csv" });
-    let status = if summary.is_whole() && pair.same.is_none() { heeded } else { Status::OutOfTolerance };
+    let whole = summary.is_whole() && pair.same.is_none() && !pair.tools_differ;
+    let status = if whole { heeded } else { Status::OutOfTolerance };
     Ok(Outcome {
         stdout: if args.output.json { json } else { said(&summary, &pair, motions.as_deref(), &written) },
         status,

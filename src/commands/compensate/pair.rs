@@ -26,12 +26,14 @@ pub(super) struct Pair {
     pub(super) tool_mm: Option<Vector3<f64>>,
     /// What is to be said of the tools.
     pub(super) of_tools: Option<String>,
+    /// Whether the tools of the two files are farther apart than one that was typed off a drawing is off.
+    pub(super) tools_differ: bool,
     /// That nothing is left to correct.
     pub(super) same: Option<String>,
 }
 
 impl Pair {
-    /// Reads both. Refuses robots that are exchanged, of different joints or of two arms, and tools of which one must be wrong.
+    /// Reads both. Refuses robots that are exchanged, of different joints or of two arms.
     pub(super) fn read(args: &Compensate) -> Result<Pair> {
         if !matches!(args.tool.len(), 0 | 3) {
             let problem = format!("--tool has {} numbers; X,Y,Z in mm are needed", args.tool.len());
@@ -52,7 +54,8 @@ impl Pair {
         if let Some(apart) = apart.filter(|_| off.mean_mm > ONE_ARM_MM) {
             return Err(Error::OtherArm { robot, identified: found, apart }.into());
         }
-        let mut pair = Pair { nominal, identified, check, tool_mm: None, of_tools: None, same: None };
+        let mut pair =
+            Pair { nominal, identified, check, tool_mm: None, of_tools: None, tools_differ: false, same: None };
         let tools_apart_mm = pair.choose_tool(args)?;
         let kept = pair.check.as_ref().filter(|check| check.advice == Advice::KeepNominal);
         pair.same = (off.max_mm < SAME_MM && tools_apart_mm < SAME_MM).then(|| {
@@ -87,14 +90,14 @@ impl Pair {
         }
         let apart_mm = (drawn - found).norm();
         if apart_mm > TYPED_MM {
-            return Err(Error::TwoTools {
-                robot: args.robot.to_string(),
-                robot_mm: drawn.into(),
-                identified: args.identified.to_string(),
-                identified_mm: found.into(),
-                apart_mm,
-            }
-            .into());
+            self.tools_differ = true;
+            let [drawn, tool] = [drawn, found].map(|tool| tool_text(&tool.into()));
+            self.of_tools = Some(format!(
+                "the tools of the two files are {apart_mm:.1} mm apart, {drawn} mm in {} and {tool} mm in {}, and the arm is moved by that too: \
+                 `--tool X,Y,Z` names the one that works, for both",
+                args.robot, args.identified
+            ));
+            return Ok(apart_mm);
         }
         self.of_tools = (apart_mm >= SAME_MM).then(|| {
             format!("the tools of the two files are {apart_mm:.3} mm apart, and this is corrected too: `--tool X,Y,Z` names the one that works")
