@@ -56,7 +56,7 @@ impl Pair {
         }
         let mut pair =
             Pair { nominal, identified, check, tool_mm: None, of_tools: None, tools_differ: false, same: None };
-        let tools_apart_mm = pair.choose_tool(args)?;
+        let tools_apart_mm = pair.choose_tool(args);
         let kept = pair.check.as_ref().filter(|check| check.advice == Advice::KeepNominal);
         pair.same = (off.max_mm < SAME_MM && tools_apart_mm < SAME_MM).then(|| {
             let why = kept.map_or("`--identified` names what `identify` wrote, identified.toml", |c| c.reason.as_str());
@@ -67,11 +67,11 @@ impl Pair {
 
     /// The tool for both where one is named, or where one file alone has one; by how much those of the files are apart otherwise, mm. A file
     /// without a tool, or with one in the last frame's origin, says nothing of it: its targets are moved by the arm's errors alone.
-    fn choose_tool(&mut self, args: &Compensate) -> Result<f64> {
+    fn choose_tool(&mut self, args: &Compensate) -> f64 {
         let (drawn, found) = (self.nominal.tool_mm, self.identified.tool_mm);
         self.tool_mm = <[f64; 3]>::try_from(args.tool.as_slice()).ok().map(Vector3::from);
         if self.tool_mm.is_some() || drawn == found {
-            return Ok(0.0);
+            return 0.0;
         }
         let lacks = |without, with, tool_mm: Vector3<f64>| {
             let tool = tool_text(&tool_mm.into());
@@ -86,7 +86,7 @@ impl Pair {
                 true => lacks(&args.robot, &args.identified, found),
                 false => lacks(&args.identified, &args.robot, drawn),
             });
-            return Ok(0.0);
+            return 0.0;
         }
         let apart_mm = (drawn - found).norm();
         if apart_mm > TYPED_MM {
@@ -97,12 +97,12 @@ impl Pair {
                  `--tool X,Y,Z` names the one that works, for both",
                 args.robot, args.identified
             ));
-            return Ok(apart_mm);
+            return apart_mm;
         }
         self.of_tools = (apart_mm >= SAME_MM).then(|| {
             format!("the tools of the two files are {apart_mm:.3} mm apart, and this is corrected too: `--tool X,Y,Z` names the one that works")
         });
-        Ok(apart_mm)
+        apart_mm
     }
 }
 

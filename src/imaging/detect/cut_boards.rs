@@ -132,6 +132,6 @@ fn a_finger_over_border_squares_hides_no_line_of_corners() {
             }
         }
     }
-    // A finger may hide more than half of a border's corners.
+    // One of the pictures is still refused, with a reason, and not numbered wrongly.
     assert!(tally.whole + tally.numbered + 1 >= pictures, "{tally:?}");
 }
