@@ -133,8 +133,14 @@ pub fn page(
             ]
         })
         .collect();
-    let header =
-        ["cause", "changed by, if it alone did", "+- (95 %)", "mm of a length", "would be seen", "mm of a length"];
+    let header = [
+        "cause",
+        "changed by, if it alone did",
+        "+- (95 %)",
+        "moves a length by, mm",
+        "would be seen",
+        "would move it by, mm",
+    ];
     let content = html! {
         (page::verdict(tone(standing), word(standing), &numbers, &text))
         (page::warnings(warnings))

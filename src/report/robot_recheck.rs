@@ -95,8 +95,14 @@ fn cells(recheck: &Recheck) -> Vec<[String; 6]> {
     recheck.causes.iter().map(of).chain(placements).collect()
 }
 
-const HEADER: [&str; 6] =
-    ["cause", "changed by, if it alone did", "+- (95 %)", "mm at the target", "would be seen", "mm at the target"];
+const HEADER: [&str; 6] = [
+    "cause",
+    "changed by, if it alone did",
+    "+- (95 %)",
+    "moves the target by, mm",
+    "would be seen",
+    "would move it by, mm",
+];
 
 /// The same for a terminal of 80 columns: change with its interval, unit, its effect, what would be seen and its effect.
 fn lines(recheck: &Recheck) -> Table {
