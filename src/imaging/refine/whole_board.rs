@@ -16,7 +16,8 @@ use super::cell::Cell;
 use super::coarse::{coarse, enlarged};
 use super::curvature::{Bend, Point, Rule, bends};
 use super::full_size::Full;
-use super::light::{illumination, stray};
+use super::light::illumination;
+use super::light::stray::{self, Slope};
 use super::measured::Measured;
 use super::saddle_fit::Model;
 use super::saddle_fit::window::{Sample, Window};
@@ -27,7 +28,6 @@ use crate::imaging::Corner;
 use crate::imaging::detect::Detected;
 use crate::imaging::image::{Grey, Picture};
 use crate::imaging::lattice::{Lattice, Places};
-use crate::statistics::median;
 
 /// How good places on the copy are at least, px.
 const GOOD_PX: f64 = 0.1;
@@ -78,7 +78,7 @@ impl<T: Sample> Full<'_, T> {
             && let Some(stray) = self.stray_light(&seen.windows, &mut window)
         {
             let with_stray = self.with_stray(stray).look(detected, &mut window);
-            if unevenness(&with_stray.measured) <= unevenness(&seen.measured) {
+            if !is_more_uneven(&with_stray.measured, &seen.measured) {
                 seen = with_stray;
             }
         }
@@ -107,7 +107,8 @@ impl<T: Sample> Full<'_, T> {
             unbound.fit_from(&near, full_size::near_half_px(&windows.start), windows, window)
         });
         Scatter::of(&fits).carry(&mut fits);
-        stray::variance(&fits.iter().filter_map(|(_, _, fit)| fit.fit.stray).collect::<Vec<_>>())
+        let slope = |fit: &Measured| fit.fit.stray.map(|(slope, own)| Slope { px: fit.px, slope, own });
+        stray::variance(&fits.iter().filter_map(|(_, _, fit)| slope(fit)).collect::<Vec<_>>())
     }
 
     /// What the board's windows tell, from the first fits on.
@@ -195,19 +196,32 @@ impl<T: Sample> Full<'_, T> {
     }
 }
 
-/// How unevenly corners follow each other along the board's lines, px: the median of third differences, next to nothing of a board that a lens
-/// shows. Overshoot of a sharpened edge may look like stray light, with the corner beside its place; then it is large.
-fn unevenness(corners: &Lattice<Measured>) -> f64 {
-    let at = |col: usize, row: usize| corners.get(col, row).map(|m| m.px.coords);
-    let thirds =
-        (0..corners.rows).flat_map(|row| (0..corners.columns).map(move |col| (col, row))).flat_map(|(col, row)| {
-            let third = |step: [usize; 2]| {
-                let [a, b, c, d] = [0, 1, 2, 3].map(|k| at(col + k * step[0], row + k * step[1]));
-                Some((d? - a? - (c? - b?) * 3.0).norm())
-            };
-            [third([1, 0]), third([0, 1])].into_iter().flatten()
-        });
-    median(thirds).unwrap_or(0.0)
+/// Whether corners follow each other along the board's lines less evenly than other fits of them, beyond what their covariances and chance
+/// allow. Overshoot of a sharpened edge may look like stray light, with the corner beside its place, to another side at each.
+fn is_more_uneven(corners: &Lattice<Measured>, others: &Lattice<Measured>) -> bool {
+    /// Standard errors of a share of one half; differences overlap, hence more than for independent ones.
+    const BEYOND_CHANCE: f64 = 4.0;
+    let pairs = third_differences(corners).zip(third_differences(others));
+    let more: Vec<bool> = pairs.filter_map(|(own, other)| Some(own? > other?)).collect();
+    let beyond_half = more.iter().filter(|more| **more).count() as f64 - 0.5 * more.len() as f64;
+    beyond_half > BEYOND_CHANCE * 0.5 * (more.len() as f64).sqrt()
+}
+
+/// Third differences of the corners' places along the board's lines, which are next to nothing of a board that a lens shows, in units of what
+/// the corners' covariances say of them; `None` where a corner is missing.
+fn third_differences(corners: &Lattice<Measured>) -> impl Iterator<Item = Option<f64>> {
+    const STEPS: [[usize; 2]; 2] = [[1, 0], [0, 1]];
+    const WEIGHTS: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
+    let starts = (0..corners.rows).flat_map(|row| (0..corners.columns).map(move |col| (col, row)));
+    starts.flat_map(|start| STEPS.map(|step| (start, step))).map(|((col, row), step)| {
+        let (mut sum, mut variance) = (Vector2::zeros(), 0.0);
+        for (k, weight) in WEIGHTS.iter().enumerate() {
+            let corner = corners.get(col + k * step[0], row + k * step[1])?;
+            sum += corner.px.coords * *weight;
+            variance += corner.fit.covariance_px2.trace() * weight * weight;
+        }
+        Some(sum.norm() / variance.sqrt())
+    })
 }
 
 fn by_variance(a: &Measured, b: &Measured) -> std::cmp::Ordering {
@@ -239,7 +253,12 @@ mod tests {
             let inside = (0.0..8.0 * SIDE_PX).contains(&x) && (0.0..7.0 * SIDE_PX).contains(&y);
             if inside { 120.0 - 80.0 * across(x, 8.0) * across(y, 7.0) } else { 200.0 }
         };
-        let mut state = 11u64;
+        noisy(width, height, 11, grey)
+    }
+
+    /// A picture of these grey values with noise of 2 grey levels.
+    fn noisy(width: usize, height: usize, seed: u64, grey: impl Fn(f64, f64) -> f64) -> Picture {
+        let mut state = seed;
         let mut uniform = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 40) as f64 / f64::from(1u32 << 24) - 0.5
@@ -278,6 +297,39 @@ mod tests {
         let (straight, bent, bent_much) = (mean_reach(0.0), mean_reach(0.1), mean_reach(0.8));
         assert!((straight - 0.85).abs() < 0.02 && (bent - straight).abs() < 1e-3, "{straight} {bent}");
         assert!(bent_much < 0.3, "{bent_much}");
+    }
+
+    #[test]
+    fn haze_that_grows_over_a_slanted_board_moves_no_corner() {
+        const SIDE: f64 = 40.0;
+        const SLANT: f64 = 0.45;
+        const BLUR: f64 = 0.9;
+        let across = |px: f64, lines: f64| {
+            let nearest = (px / SIDE).round().clamp(0.0, lines);
+            let sign = if nearest.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
+            sign * erf((px - nearest * SIDE) / (BLUR * 2f64.sqrt()))
+        };
+        let board = Board::checker("10x7".parse().unwrap(), 10.0);
+        for seed in 0..4 {
+            let stretch = (1.0 + SLANT * SLANT).sqrt();
+            let (x0, y0) = (50.3 + 0.13 * seed as f64, 60.7);
+            let grey = |x: f64, y: f64| {
+                let (u, v) = ((x - x0 - SLANT * (y - y0)) / stretch, y - y0);
+                let inside = (0.0..10.0 * SIDE).contains(&u) && (0.0..7.0 * SIDE).contains(&v);
+                let board = if inside { 90.0 - 50.0 * across(u, 10.0) * across(v, 7.0) } else { 140.0 };
+                board + 0.12 * x
+            };
+            let picture = noisy(700, 400, seed, grey);
+            let measured = measure(&picture, &detect::detect(&picture, board).unwrap());
+            assert_eq!(measured.count(), 54);
+            let (mut off, mut variance) = (0.0, 0.0);
+            for (_, _, m) in measured.iter() {
+                let u = (m.px.x - x0 - SLANT * (m.px.y - y0)) / stretch;
+                off += (u - (u / SIDE).round() * SIDE) / 54.0;
+                variance += m.fit.covariance_px2.m11 / 54f64.powi(2);
+            }
+            assert!(off.abs() < 4.0 * variance.sqrt(), "{seed}: {off} px, {}", variance.sqrt());
+        }
     }
 
     /// An upright board of 9x7 squares of 25 px, its edges as sharp as pixels are, with `overshoot` (a share of the contrast) beside them as a
