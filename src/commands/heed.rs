@@ -3,11 +3,27 @@
 use camino::Utf8Path;
 
 use crate::diagnostic::Status;
+use crate::files::provenance::{Digested, Provenance};
+use crate::formats::recheck::{CheckedAgainst, Standing};
 use crate::progress;
 use crate::robot::Check;
 
 /// Warns of what a robot's or a placement's own file says of its use; with which status a command that uses it ends at best.
 pub fn heed(check: Option<&Check>, file: &Utf8Path) -> Status {
     check.and_then(|check| check.warning(file)).into_iter().for_each(progress::warn);
-    if check.is_some_and(Check::is_against) { Status::OutOfTolerance } else { Status::Done }
+    let changed =
+        file.file_name().zip(file.parent()).and_then(|(name, folder)| changed_since(folder, "verify.json", name));
+    changed.iter().for_each(progress::warn);
+    let is_against = check.is_some_and(Check::is_against) || changed.is_some();
+    if is_against { Status::OutOfTolerance } else { Status::Done }
+}
+
+/// What the last check beside a result says against it, if it was of that very result.
+pub fn changed_since(folder: &Utf8Path, check: &str, result: &str) -> Option<String> {
+    let path = folder.join(check);
+    let checked: CheckedAgainst = serde_json::from_slice(&std::fs::read(&path).ok()?).ok()?;
+    let now = Digested::read(&folder.join(result))?.sha256;
+    let is_of_it = Provenance::of_json(&path)?.inputs.iter().any(|input| input.sha256 == now);
+    let changed = matches!(checked.standing, Standing::Changed | Standing::ChangedWithin);
+    (is_of_it && changed).then(|| format!("{result} no longer holds by {path}: {}", checked.statement))
 }

@@ -3,6 +3,7 @@
 use camino::Utf8Path;
 use serde_json::Value;
 
+use super::heed::changed_since;
 use super::{Outcome, Result};
 use crate::cli::Report;
 use crate::config::Config;
@@ -25,7 +26,7 @@ pub fn run(args: &Report, config: &Config, run: Run) -> Result<Outcome> {
     let there: Vec<&Utf8Path> = parts.iter().filter(|path| path.is_file()).map(|path| path.as_path()).collect();
     let out = out.for_run(&Run { force: args.force, ..run }, &there);
     out.check_free(&["report.html"])?;
-    let breaks = breaks(folder);
+    let breaks: Vec<String> = breaks(folder).into_iter().chain(changed(folder)).collect();
     breaks.iter().for_each(progress::warn);
     let day = Day { check, measured, robot, breaks };
     report::page::write(&out, "report.html", report::day::page(&day))?;
@@ -36,6 +37,12 @@ pub fn run(args: &Report, config: &Config, run: Run) -> Result<Outcome> {
 /// A result of an earlier command; `None` where it is not there.
 fn read(path: &Utf8Path) -> Result<Option<Value>> {
     if path.is_file() { Ok(Some(files::read_json(path, "result", None)?)) } else { Ok(None) }
+}
+
+/// What a check of the rig or of the robot that was made since then says against it.
+fn changed(folder: &Utf8Path) -> Vec<String> {
+    let rig = changed_since(folder, "recheck.json", "calibration.json");
+    rig.into_iter().chain(changed_since(folder, "verify.json", "identified.toml")).collect()
 }
 
 /// Where a result was made of other files than those that stand in the folder now, as far as the results say what they were made of.

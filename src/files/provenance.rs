@@ -4,7 +4,7 @@
 //! `xxh128sum` prints them, and the list is hashed: SHA-256 of a picture takes a sixth of the time of decoding it. Everything but the
 //! date and the command line is the same for the same inputs; the date is that of `SOURCE_DATE_EPOCH` (reproducible-builds.org) where that is set.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, SystemTime};
 
 use camino::{Utf8Path, Utf8PathBuf};
@@ -72,6 +72,12 @@ impl Provenance {
 }
 
 impl Provenance {
+    /// The hashes of the pictures that the JSON file there was made of.
+    pub fn pictures_of(file: &Utf8Path) -> BTreeSet<String> {
+        let inputs = Provenance::of_json(file).map(|made| made.inputs).unwrap_or_default();
+        inputs.into_iter().flat_map(|input| input.picture_hashes).collect()
+    }
+
     /// What this run read that the JSON file there was made of, too, a folder where it is some of its pictures: of that it is no test.
     pub fn shares(&self, file: &Utf8Path) -> Option<&str> {
         let made_of = Provenance::of_json(file)?.inputs;
@@ -140,7 +146,7 @@ impl Digested {
             file: path.to_string(),
             sha256: sha256(lines.as_bytes()),
             pictures: Some(files.len()),
-            picture_hashes: hashes.iter().map(|hash| hash.chars().take(HASH_KEPT).collect()).collect(),
+            picture_hashes: hashes.iter().map(|hash| kept(hash)).collect(),
             content_sha256: None,
         })
     }
@@ -193,7 +199,18 @@ pub fn picture_hash(bytes: &[u8]) -> String {
     format!("{:032x}", xxh3_128(bytes))
 }
 
-fn hash_of_picture(path: &Utf8Path) -> Option<String> {
+/// Whether a picture is one of those whose hashes a result holds.
+pub fn is_among(pictures: &BTreeSet<String>, path: &Utf8Path) -> bool {
+    !pictures.is_empty() && hash_of_picture(path).is_some_and(|hash| pictures.contains(&kept(&hash)))
+}
+
+/// What a result holds of a picture's hash.
+fn kept(hash: &str) -> String {
+    hash.chars().take(HASH_KEPT).collect()
+}
+
+/// What `xxh128sum` prints for a picture; `None` where it cannot be read.
+pub fn hash_of_picture(path: &Utf8Path) -> Option<String> {
     Some(picture_hash(&std::fs::read(path).ok()?))
 }
 

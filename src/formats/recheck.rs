@@ -59,6 +59,13 @@ impl Standing {
     }
 }
 
+/// What a check of a rig or of a robot says, as far as those who use either need it.
+#[derive(Debug, Deserialize)]
+pub struct CheckedAgainst {
+    pub standing: Standing,
+    pub statement: String,
+}
+
 /// The content of `recheck.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecheckFile {

@@ -32,6 +32,12 @@ pub enum Error {
         /// Pairs with a board in one picture at least.
         pairs: usize,
     },
+    /// The box that a verdict is asked for lies where the cameras do not both look.
+    #[error("no place of the box of `--volume` is seen by both cameras")]
+    OutOfView {
+        /// The box in the left camera's frame that the boards' part of its picture and their depths span, mm: lowest and highest corner.
+        boards_mm: [[f64; 3]; 2],
+    },
     /// The distance of the cameras is not told from none: nothing can be measured by them.
     #[error(
         "the cameras cannot be told from one camera: their distance is {baseline_mm:.2} mm with a standard deviation of {sigma_mm:.2} mm; \
@@ -203,6 +209,7 @@ impl Explain for Error {
     fn status(&self) -> Status {
         match self {
             Error::TooFewPairs { .. }
+            | Error::OutOfView { .. }
             | Error::NoSuchPair { .. }
             | Error::MoveUnsettled { .. }
             | Error::MoveTwice { .. }
@@ -224,6 +231,12 @@ impl Explain for Error {
                 }
                 Error::NothingInCommon { .. } => {
                     "photograph the board where both cameras see it at once, and check that equal names belong together"
+                }
+                Error::OutOfView { boards_mm: [[x0, y0, z0], [x1, y1, z1]] } => {
+                    return Some(format!(
+                        "`--volume X0,Y0,Z0,X1,Y1,Z1` is in mm in the left camera's frame, z along its line of sight; the boards were within \
+                         {x0:.0},{y0:.0},{z0:.0},{x1:.0},{y1:.0},{z1:.0}"
+                    ));
                 }
                 Error::NoBaseline { .. } => {
                     "are these pictures all of one camera? Each side needs its own; of two cameras that stand apart add pairs nearer to them and tilted"

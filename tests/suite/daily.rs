@@ -175,7 +175,20 @@ fn a_check_says_what_it_judged_and_by_what() {
     assert!(said.contains("for all that both cameras see ") && !said.contains("where the boards were: "), "{said}");
     let said = check(&[&all[..], &["--volume", "-20,-20,500,20,20,560"]].concat());
     assert!(said.contains("for the box from -20, -20, 500 to 20, 20, 560 mm, in all directions"), "{said}");
-    // A second board: here the same one once more.
+    // In metres, beside the view, a temperature in K, an expansion in 1/K: refused with what was meant.
+    let refused = |more: &[&str], hint: &str| {
+        let output = stereocal(at, &[&["camera-check", "--out", "refused"], &all[..], more].concat());
+        assert_eq!(output.status.code(), Some(2), "{more:?}: {}", stdout(&output));
+        assert!(stderr(&output).contains(hint), "{more:?}: {}", stderr(&output));
+    };
+    refused(&["--volume", "-0.02,-0.02,0.5,0.02,0.02,0.56"], "is in mm in the left camera's frame");
+    refused(&["--volume", "2000,-20,500,2100,20,560"], "the boards were within ");
+    refused(&["--board-temperature-c", "293", "--expansion-ppm-per-k", "23"], "in deg C, not in K");
+    refused(&["--board-temperature-c", "25", "--expansion-ppm-per-k", "0.000023"], "it is in 1e-6/K, 23 for aluminium");
+    // A file of corners that shows less than the board that is named.
+    let larger = stereocal(at, &[&["camera-check", "--out", "larger", "--squares", "24x22"], &all[..]].concat());
+    assert!(stderr(&larger).contains(": `--squares 20x20` if the board has no more"), "{}", stderr(&larger));
+    // A second board: here the same one once more, its corners first, so that its pictures are not known again.
     let said = check(&[&all[..], &["--check-images", "check"]].concat());
     assert!(said.contains("second board: 8 pairs, largest error 0.0") && !said.contains("with a ruler"), "{said}");
     // Five pairs are too few poses, and that has a plain name.
@@ -203,4 +216,67 @@ fn a_check_says_what_it_judged_and_by_what() {
     assert!(said.contains("number of different poses"), "{said}");
     let evidence = json(&at.join("said/camera-check.json"))["evidence"].to_string();
     assert!(evidence.contains("pairs with poses of their own"), "the names in the file are the contract's");
+}
+
+/// Of pictures that the calibration was made of, under other names, a check says nothing: they are left out where the others are enough.
+#[test]
+fn pairs_that_the_calibration_was_made_of_are_no_test_of_it() {
+    let folder = calibrated();
+    let at = folder.path();
+    let copied = |to: &str, pairs: &[(usize, &str)]| {
+        for side in ["left", "right"] {
+            let mut pictures: Vec<_> =
+                std::fs::read_dir(at.join("check").join(side)).unwrap().map(|entry| entry.unwrap().path()).collect();
+            pictures.sort();
+            std::fs::create_dir_all(at.join(to).join(side)).unwrap();
+            for (pair, name) in pairs {
+                let ending = pictures[*pair].extension().unwrap().to_str().unwrap();
+                std::fs::copy(&pictures[*pair], at.join(to).join(side).join(format!("{name}.{ending}"))).unwrap();
+            }
+        }
+    };
+    copied("old", &[(3, "a"), (4, "b"), (5, "c"), (6, "d"), (7, "e")]);
+    copied("mixed", &[(0, "1"), (1, "2"), (2, "3"), (5, "4"), (0, "5")]);
+    copied("again", &[(3, "1"), (5, "2"), (0, "3")]);
+    let calibrated = stereocal(at, &["camera-check", "old", "--out", "before"]);
+    assert!(calibrated.status.code().unwrap() <= 1, "{}", stderr(&calibrated));
+    let check = |pictures: &str| {
+        let against = ["--against", "before/calibration.json", "--tolerance-mm", "1"];
+        let output = stereocal(at, &[&["camera-check", pictures], &against[..]].concat());
+        (output.status.code(), stdout(&output), stderr(&output))
+    };
+    let (status, said, messages) = check("mixed");
+    assert_eq!(status, Some(0), "{said}{messages}");
+    assert!(said.starts_with("STILL VALID") && said.contains("3 of 3 pairs compared"), "{said}");
+    assert!(messages.contains("1 of 5 pairs is left out, of which this calibration was made: 4"), "{messages}");
+    assert!(messages.contains("1 of 5 pairs is left out, the same pictures as another pair's: 5"), "{messages}");
+    // A check of this calibration in its own folder goes with it; one of another does not.
+    let report = || stereocal(at, &["report", "--out", "before"]);
+    assert!(!stderr(&report()).contains("no longer holds"));
+    let corners = std::fs::read_to_string(at.join("before/calibration.json")).unwrap();
+    let focal = serde_json::from_str::<Value>(&corners).unwrap()["right"]["fx"].as_f64().unwrap();
+    turned(at, "three.csv", "turned.csv", focal, 0.01);
+    let against = ["--against", "before/calibration.json", "--out", "before", "--tolerance-mm", "1"];
+    let changed = stereocal(at, &[&["camera-check", "--corners", "turned.csv"], &against[..]].concat());
+    assert_eq!(changed.status.code(), Some(3), "{}", stderr(&changed));
+    let said = report();
+    assert_eq!(said.status.code(), Some(1));
+    assert!(stderr(&said).contains("calibration.json no longer holds by before/recheck.json: "), "{}", stderr(&said));
+    // Lenses that were told by these very pairs count twice, and a board that calibrated is no second one.
+    let known =
+        ["camera-check", "old", "--intrinsics", "before/calibration.json", "--out", "known", "--tolerance-mm", "1"];
+    let twice = stereocal(at, &known);
+    assert_eq!(twice.status.code(), Some(1), "{}", stderr(&twice));
+    let file = json(&at.join("known/camera-check.json"));
+    assert!(file["evidence"].to_string().contains("lenses known from other pairs"), "{file}");
+    let second = stereocal(at, &["camera-check", "old", "--check-images", "mixed", "--out", "second"]);
+    assert_eq!(second.status.code(), Some(2));
+    assert!(stderr(&second).contains("2 of the 10 pictures in mixed are those"), "{}", stderr(&second));
+    // One new pair alone does not judge.
+    let (status, said, messages) = check("again");
+    assert_eq!(status, Some(1), "{said}{messages}");
+    assert!(
+        said.starts_with("UNDECIDED, ITS OWN DATA") && messages.contains("only new pairs tell"),
+        "{said}{messages}"
+    );
 }

@@ -1,5 +1,7 @@
 //! `stereocal camera-check`: Pictures of the check board to a calibrated rig and a verdict.
 
+use std::collections::BTreeSet;
+
 use camino::Utf8Path;
 
 use super::super::{Outcome, Result};
@@ -8,7 +10,7 @@ use crate::cli::{BoardShape, CameraCheck};
 use crate::config::{self, Config};
 use crate::diagnostic::Status;
 use crate::files::OutDir;
-use crate::files::provenance::Run;
+use crate::files::provenance::{Provenance, Run, hash_of_picture, is_among};
 use crate::formats::calibration::CalibrationFile;
 use crate::formats::camera_check::CameraCheckFile;
 use crate::formats::lenses;
@@ -16,9 +18,9 @@ use crate::imaging::board::SQUARES_MM;
 use crate::imaging::board::printed::Printed;
 use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
-use crate::imaging::input::pairs::{Pairing, Source};
+use crate::imaging::input::pairs::{PairFiles, Pairing, Source};
 use crate::imaging::overlay::SideBySide;
-use crate::imaging::{Board, Corners, Side, Wanted, find_corners};
+use crate::imaging::{self, Board, Corners, Side, Wanted, find_corners};
 use crate::report::drawing::pair_picture::PairPicture;
 use crate::report::drawing::picture::PairJpeg;
 use crate::stereo::calibrate::Calibration;
@@ -33,6 +35,7 @@ use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::model::known_lenses::{KnownLenses, TOLERANCE};
 use crate::stereo::pairs::{fewest_pairs, open_numbers};
 use crate::stereo::select::options::Options;
+use crate::stereo::volume;
 use crate::{progress, ranges, report};
 
 /// Runs the command.
@@ -46,6 +49,7 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let pairing = pairing(args, &out)?;
     let (board, by_caliper_mm) = board(args, config, pairing.as_ref())?;
     demand.board_uncertainty_mm = demand.board_uncertainty_mm.or(by_caliper_mm);
+    demand.lens_pairs = pairs_of_lenses(args, pairing.as_ref(), &out);
     let known = known_lenses(args)?;
     let corners = corners(args, board, pairing.as_ref(), known.as_ref(), &out)?;
     known.as_ref().map_or(Ok(()), |known| known.check_size(&corners))?;
@@ -56,8 +60,9 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
         Some(pair) => standing::calibrate_since(&corners, pair, &asked)?,
         None => standing::calibrate_standing(&corners, &asked)?,
     };
+    volume::lengths::check(&calibration, demand.extent)?;
     let accuracy = held_out::hold_out(&calibration, demand.board_uncertainty_mm)?;
-    let second = second_board(args, board, &calibration, demand.board_uncertainty_mm, &out)?;
+    let second = second_board(args, board, pairing.as_ref(), &calibration, (demand.board_uncertainty_mm, &out))?;
     let standards = Standards { second, moves: moves::measure(&calibration, &args.known_move)? };
     let mut judged = Judged::new(&calibration, findings, accuracy, standards, &demand);
     if args.lens.is_some() && judged.verdict != Verdict::Pass {
@@ -100,6 +105,7 @@ fn demand(args: &CameraCheck, config: &Config) -> Result<Demand> {
         tolerance_mm,
         board_uncertainty_mm: args.board_uncertainty_mm,
         extent: args.volume.unwrap_or_default(),
+        lens_pairs: 0,
     })
 }
 
@@ -170,10 +176,21 @@ fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Resu
 fn warm(args: &CameraCheck, board: Board) -> Result<Board> {
     /// Temperature at which lengths are certified (ISO 1), deg C.
     const REFERENCE_C: f64 = 20.0;
+    /// Inks and glues of boards go before that.
+    const HOTTEST_C: f64 = 200.0;
+    /// Nothing that boards are made of grows by less: Zerodur has 0.02.
+    const LEAST_PPM: f64 = 0.005;
     let (Some(celsius), Some(ppm)) = (args.board_temperature_c, args.expansion_ppm_per_k) else { return Ok(board) };
     let growth = 1.0 + 1e-6 * ppm * (celsius - REFERENCE_C);
     let mut problems = Vec::new();
     ranges::positive(&mut problems, "the board's thermal growth", growth);
+    if celsius > HOTTEST_C {
+        problems
+            .push(format!("--board-temperature-c {celsius}: no printed board is that hot; it is in deg C, not in K"));
+    }
+    if ppm != 0.0 && ppm.abs() < LEAST_PPM {
+        problems.push(format!("--expansion-ppm-per-k {ppm}: it is in 1e-6/K, 23 for aluminium"));
+    }
     config::reject(problems)?;
     Ok(board.scaled(growth))
 }
@@ -233,13 +250,29 @@ fn corners(
     }
 }
 
+/// Hashes of the pictures that can be read.
+fn hashes(pairs: &[PairFiles]) -> impl Iterator<Item = String> {
+    pairs.iter().flat_map(|pair| [&pair.left, &pair.right]).filter_map(|path| hash_of_picture(path))
+}
+
+/// How many of the pairs were among those from which the lenses of `--intrinsics` are known; all where the whole file of corners was.
+fn pairs_of_lenses(args: &CameraCheck, pairing: Option<&Pairing>, out: &OutDir) -> usize {
+    let files = || args.intrinsics.iter().map(|lens| lens.path.as_path());
+    let Some(pairing) = pairing else {
+        let run = out.provenance();
+        return files().filter(|file| run.as_ref().is_some_and(|run| run.shares(file).is_some())).count();
+    };
+    let known: BTreeSet<String> = files().flat_map(Provenance::pictures_of).collect();
+    pairing.pairs.iter().filter(|pair| is_among(&known, &pair.left) || is_among(&known, &pair.right)).count()
+}
+
 /// A second board measured by the rig, where its pictures were named.
 fn second_board(
     args: &CameraCheck,
     board: Board,
+    first: Option<&Pairing>,
     calibration: &Calibration,
-    board_uncertainty_mm: Option<f64>,
-    out: &OutDir,
+    (board_uncertainty_mm, out): (Option<f64>, &OutDir),
 ) -> Result<Option<SecondBoard>> {
     let Some(images) = &args.check_images else { return Ok(None) };
     let board = args.check_board.unwrap_or(match (args.check_squares, args.check_square_mm) {
@@ -249,7 +282,26 @@ fn second_board(
     config::check_within("check_square_mm", board.square_mm, SQUARES_MM)?;
     let (mosaic, cache) = (args.bayer, Some(Cache { out, thumbnails: false }));
     let pairing = Source::folder("camera-check", images).pairs(out)?;
-    let corners = find_corners(&pairing, &Wanted { board, needed: 1, mosaic, cache, overlays: None })?;
+    let known: BTreeSet<String> = first.into_iter().flat_map(|first| hashes(&first.pairs)).collect();
+    let again = hashes(&pairing.pairs).filter(|hash| known.contains(hash)).count();
+    if again > 0 {
+        let message = format!(
+            "{again} of the {} pictures in {images} are those that the rig is calibrated from: they check nothing",
+            2 * pairing.pairs.len()
+        );
+        let hint = "`--check-images` takes pictures of a second board, or others of the first".to_owned();
+        return Err(config::Error::Usage { message, hint }.into());
+    }
+    let corners = find_corners(&pairing, &Wanted { board, needed: 1, mosaic, cache, overlays: None }).map_err(|error| {
+        let shown = match &error {
+            imaging::Error::TooFewPairs { other: Some(other), .. } => format!("; the pictures show one of {} squares", other.squares),
+            _ => String::new(),
+        };
+        let hint = format!(
+            "`--check-squares CxR` and `--check-square-mm MM`, or `--check-board NAME`, say what the second board is{shown}"
+        );
+        config::Error::Usage { message: format!("the second board in {images}: {error}"), hint }
+    })?;
     calibration.rig().check_size(&corners)?;
     let corners = open_numbers::by_rig(corners, calibration.rig());
     Ok(Some(second_board::second_board(calibration, &corners, board_uncertainty_mm)))

@@ -40,6 +40,8 @@ pub struct Demand {
     pub board_uncertainty_mm: Option<f64>,
     /// The volume that the verdict is for.
     pub extent: Extent,
+    /// How many of the pairs were among those from which the lenses were known beforehand.
+    pub lens_pairs: usize,
 }
 
 impl Judged {
@@ -55,6 +57,7 @@ impl Judged {
         let volume = VolumeLengths::new(calibration, demand.extent, accuracy.long_mm[0], share);
         let facts = Facts {
             tolerance_mm: demand.tolerance_mm,
+            lens_pairs: demand.lens_pairs,
             expansion: Expansion::new(calibration.pair_scatter.groups, demand.board_uncertainty_mm),
             disagreements: model_disagreement::find(calibration, &volume),
             coverage: Coverage::of(calibration, &residual_pattern),

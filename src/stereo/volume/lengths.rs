@@ -9,6 +9,7 @@ use nalgebra::{DVector, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::imaging::{Board, Side};
+use crate::stereo::Error;
 use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::observation::Observation;
@@ -203,6 +204,17 @@ fn directions_of_tilts([x_least, x_most, y_least, y_most]: [f64; 4]) -> Vec<Vect
             [row, normal.cross(&row)]
         })
         .collect()
+}
+
+/// Refuses a box of which both cameras see nothing.
+pub fn check(calibration: &Calibration, extent: Extent) -> Result<(), Error> {
+    let volume = Volume::of(calibration, extent);
+    let rig = calibration.rig();
+    if !matches!(extent, Extent::Box(_)) || places(calibration, extent).iter().any(|at| volume.holds(rig, at)) {
+        return Ok(());
+    }
+    let boards = Volume::of(calibration, Extent::Boards).bounding_box_mm(rig);
+    Err(Error::OutOfView { boards_mm: boards.map(|corner| [corner.x, corner.y, corner.z]) })
 }
 
 /// A lattice through the box in the left camera's frame that the boards' corners filled, or that is asked for.

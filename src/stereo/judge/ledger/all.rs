@@ -25,6 +25,7 @@ pub fn ledger(case: &Case) -> Vec<Evidence> {
     lines.extend(pairs::baseline(case));
     lines.extend(pairs::reach(case));
     lines.extend(pairs::known_lenses(case));
+    lines.extend(pairs::lenses_of_these_pairs(case));
     lines.push(lengths::second_board(case));
     lines.extend(moves::known_moves(case));
     lines

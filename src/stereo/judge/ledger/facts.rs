@@ -17,6 +17,8 @@ use crate::stereo::volume::lengths::{VolumeLength, VolumeLengths};
 pub struct Facts {
     /// The largest error that passes, mm.
     pub tolerance_mm: f64,
+    /// How many of the pairs were among those from which the lenses were known beforehand.
+    pub lens_pairs: usize,
     /// How uncertainties are expanded.
     pub expansion: Expansion,
     /// Held-out accuracy.
