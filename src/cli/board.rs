@@ -28,8 +28,14 @@ pub struct Target {
 pub struct PrintBoard {
     /// The board as `--board` names it: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
     /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm)
-    #[arg(value_name = "NAME", value_parser = named)]
-    pub board: Board,
+    #[arg(value_name = "NAME", value_parser = named, required_unless_present = "squares", conflicts_with_all = ["squares", "square_mm"])]
+    pub board: Option<Board>,
+    /// A plain board of so many squares, as `camera-check` takes it
+    #[arg(long, value_name = "CxR", requires = "square_mm")]
+    pub squares: Option<Squares>,
+    /// Side of its squares, mm
+    #[arg(long, value_name = "MM", requires = "squares", allow_negative_numbers = true, value_parser = within(&SQUARES_MM))]
+    pub square_mm: Option<f64>,
     /// Only what is named of PDF, SVG and PNG [default: PDF and SVG]
     #[arg(long)]
     pub pdf: bool,

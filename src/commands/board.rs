@@ -7,12 +7,17 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::boards::sheet::{Sheet, TooLarge};
+use crate::imaging::Board;
 use crate::progress;
 
 /// Runs the command.
 pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
-    let sheet = Sheet::new(&args.board).map_err(|TooLarge { message, hint }| config::Error::Usage { message, hint })?;
+    // The command line asks for one of the two.
+    let nothing = || invalid("no board named".to_owned());
+    let plain = args.squares.zip(args.square_mm).map(|(squares, mm)| Board::checker(squares, mm));
+    let board = args.board.or(plain).ok_or_else(nothing)?;
+    let sheet = Sheet::new(&board).map_err(|TooLarge { message, hint }| config::Error::Usage { message, hint })?;
     let run = Run { force: args.output.force, ..run };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &[]);
     let all = !(args.pdf || args.svg || args.png);
@@ -34,18 +39,18 @@ pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
     let files: Vec<String> = names.iter().map(|name| out.join(name).to_string()).collect();
     let stdout = if args.output.json {
         let object = serde_json::json!({
-            "board": args.board.to_string(), "paper": sheet.paper, "width_mm": sheet.width_mm, "height_mm": sheet.height_mm, "files": files,
+            "board": board.to_string(), "paper": sheet.paper, "width_mm": sheet.width_mm, "height_mm": sheet.height_mm, "files": files,
         });
         format!("{object:#}\n")
     } else {
         format!(
             "{} on {} ({} x {} mm): {}\nnext: print it at 100 %, measure it, and name it as it came out: `camera-check IMAGES --board {}`\n",
-            args.board,
+            board,
             sheet.paper,
             sheet.width_mm,
             sheet.height_mm,
             files.join(", "),
-            args.board
+            board
         )
     };
     Ok(Outcome { stdout, status: Status::Done })

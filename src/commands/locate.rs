@@ -10,7 +10,7 @@ use crate::cli::Locate;
 use crate::config::Config;
 use crate::diagnostic::Status;
 use crate::files::OutDir;
-use crate::files::provenance::Run;
+use crate::files::provenance::{Provenance, Run};
 use crate::formats::placements::record::{PLACEMENT, PlacementFile};
 use crate::formats::robots::known;
 use crate::identify::data::dataset::Dataset;
@@ -34,6 +34,7 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let out = args.measure.output.out.clone().unwrap_or_else(|| config.out.clone());
     let (robot, check) = robot::file::read_checked(&args.robot)?;
     let heeded = heed(check.as_ref(), &args.robot);
+    replaced(&out).into_iter().for_each(progress::warn);
     let file = measured(args, config, &run, &out)?;
     let source = source(vec![file], &args.table, config);
     let rows = read(&source, &robot)?;
@@ -63,6 +64,16 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let stdout = if args.measure.output.json { json } else { summary() };
     let status = if content.fit.contradicted { Status::OutOfTolerance } else { Status::Done };
     Ok(Outcome { stdout, status: status.or_worse(heeded) })
+}
+
+/// What stands in the results folder that another command made, and that this one replaces.
+fn replaced(out: &Utf8Path) -> Vec<String> {
+    let by_other = |(name, what): (&str, &str)| {
+        let command = Provenance::of_json(&out.join(name))?.command;
+        let by = command.split_whitespace().find(|word| ["identify", "measure", "verify"].contains(word))?.to_owned();
+        Some(format!("{what} in {out} that `{by}` wrote is replaced: `--out DIR` keeps both"))
+    };
+    [(PLACEMENT, "placement.json"), ("measure.json", "measurements.csv")].into_iter().filter_map(by_other).collect()
 }
 
 /// The measurements: those of a folder of pictures are made first, as `measure` makes them.

@@ -37,7 +37,9 @@ const PROGRAM: &str = "stereocal_plan";
 pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let out = args.output.out.clone().unwrap_or_else(|| config.out.clone());
     let rig_file = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
-    let Calibrated { rig, noise, .. } = calibration::read(&rig_file)?;
+    let calibrated = calibration::read(&rig_file)?;
+    calibrated.doubts().into_iter().for_each(progress::warn);
+    let Calibrated { rig, noise, .. } = calibrated;
     let robot_file = robot_file(args.robot.as_deref());
     let robot = match &robot_file {
         Some(path) => robot::file::read(path)?,

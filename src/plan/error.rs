@@ -11,8 +11,8 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 pub enum Error {
     /// The middle of a sphere.
     #[error(
-        "group {group}: the robot does not reach ({:.0}, {:.0}, {:.0}) mm with its flange level or pointing down, within its limits",
-        point_mm[0], point_mm[1], point_mm[2]
+        "group {group}: the robot does not reach ({}, {}, {}) mm with its flange level or pointing down, within its limits",
+        tenths(point_mm[0]), tenths(point_mm[1]), tenths(point_mm[2])
     )]
     Unreachable {
         group: String,
@@ -59,6 +59,14 @@ pub enum Error {
     },
 }
 
+/// Nearer to the base than that no flange comes, mm.
+const LEAST_MM: f64 = 10.0;
+
+/// A length as a message shows it, to a tenth of a millimetre.
+fn tenths(mm: f64) -> f64 {
+    (10.0 * mm).round() / 10.0
+}
+
 impl Explain for Error {
     fn status(&self) -> Status {
         match self {
@@ -74,6 +82,9 @@ impl Explain for Error {
     }
     fn hint(&self) -> Option<String> {
         Some(match self {
+            Error::Unreachable { point_mm, .. } if point_mm.iter().all(|mm| mm.abs() < LEAST_MM) => {
+                "`--center` is in mm".to_owned()
+            }
             Error::Unreachable { nearest_mm: Some([x, y, z]), .. } => {
                 format!("`--center {x:.0},{y:.0},{z:.0}` is reached; repeat --center for more spheres")
             }

@@ -104,7 +104,9 @@ fn caption(name: &str, file: &RectifiedFile) -> String {
         (Some(common), Some(_)) => format!(
             "Pair {name}, the one whose {common} agree worst: each line passes through the same points in both pictures."
         ),
-        (Some(_), None) => format!("Pair {name}: each line passes through the same points in both pictures."),
+        (Some(_), None) => format!(
+            "Pair {name}: each line passes through the same points in both pictures if they are of this rig, which no board in them tells."
+        ),
         (None, _) => format!("Pair {name}: straight edges are straight."),
     }
 }

@@ -201,7 +201,7 @@ fn an_empty_folder_and_a_file_of_somebody_else() {
     assert!(stderr(&output).contains("hint: is the path right?"), "{}", stderr(&output));
     std::fs::create_dir_all(folder.path().join("out")).unwrap();
     std::fs::write(folder.path().join("out/board.pdf"), "mine").unwrap();
-    let output = stereocal(folder.path(), &["board", "checker:9x6:20"]);
+    let output = stereocal(folder.path(), &["board", "--squares", "9x6", "--square-mm", "20"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("`--force` replaces the file"), "{}", stderr(&output));
 }

@@ -66,6 +66,7 @@ pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<C
     if fit_to_board(&table, &mut rows, board)? {
         notes.push("the columns of the corners file run along the shorter side: turned by 90 degrees".to_owned());
     }
+    notes.extend(smaller(&rows, board));
     let [left_size, right_size] =
         [size_of(&table, &rows, Side::Left, size)?, size_of(&table, &rows, Side::Right, size)?];
     let (pairs, skipped) = gather(rows, board);
@@ -149,6 +150,21 @@ fn fit_to_board(table: &Table, rows: &mut [Row], board: Board) -> Result<bool> {
         }
     };
     Err(table.refuse_with(line, message, Some(&hint)))
+}
+
+/// Where no picture shows a plain board's last column or row: the board may be a smaller one.
+fn smaller(rows: &[Row], board: Board) -> Option<String> {
+    let reach = |of: fn(&Corner) -> usize| rows.iter().map(|row| of(&row.corner) + 1).max();
+    let (columns, lines) = (reach(|corner| corner.col)?, reach(|corner| corner.row)?);
+    let is_smaller = !board.is_coded() && (columns < board.columns() || lines < board.rows());
+    is_smaller.then(|| {
+        format!(
+            "no picture of the corners file shows more than {columns}x{lines} corners of this board of {} squares: `--squares {}x{}` if the board has no more",
+            board.squares,
+            columns + 1,
+            lines + 1
+        )
+    })
 }
 
 fn gather(rows: Vec<Row>, board: Board) -> (Vec<PairCorners>, Vec<Skipped>) {
