@@ -32,6 +32,11 @@ pub enum Error {
         /// Pairs with a board in one picture at least.
         pairs: usize,
     },
+    /// The pictures that are compared with a rig have the right camera on its other side.
+    #[error(
+        "left and right pictures are exchanged: by them, the right camera stands on the other side of the left one than in the calibration"
+    )]
+    Exchanged,
     /// The box that a verdict is asked for lies where the cameras do not both look.
     #[error("no place of the box of `--volume` is seen by both cameras")]
     OutOfView {
@@ -210,6 +215,7 @@ impl Explain for Error {
         match self {
             Error::TooFewPairs { .. }
             | Error::OutOfView { .. }
+            | Error::Exchanged
             | Error::NoSuchPair { .. }
             | Error::MoveUnsettled { .. }
             | Error::MoveTwice { .. }
@@ -231,6 +237,9 @@ impl Explain for Error {
                 }
                 Error::NothingInCommon { .. } => {
                     "photograph the board where both cameras see it at once, and check that equal names belong together"
+                }
+                Error::Exchanged => {
+                    "name the left camera's pictures first; if the cameras themselves changed places, calibrate anew"
                 }
                 Error::OutOfView { boards_mm: [[x0, y0, z0], [x1, y1, z1]] } => {
                     return Some(format!(

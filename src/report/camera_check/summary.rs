@@ -249,7 +249,13 @@ pub(super) fn deciding_by(judged: &Judged, figure: fn(&Evidence) -> String) -> S
 pub(super) fn trusted(judged: &Judged) -> String {
     match (judged.trusted(), judged.trusted_mm()) {
         (Some(line), Some(mm)) if judged.measures_nothing() => format!(
-            "no length can be trusted: of one of {:.0} mm an error of {} mm is not ruled out ({})",
+            "{}: of one of {:.0} mm an error of {} mm is not ruled out ({})",
+            // The tolerance that was asked for is as large.
+            if judged.verdict == Verdict::Pass {
+                "within a tolerance that bounds hardly any length"
+            } else {
+                "no length can be trusted"
+            },
             judged.facts.volume.length_mm,
             two_digits(mm),
             line.name()

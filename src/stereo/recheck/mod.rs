@@ -122,6 +122,12 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let layout =
         Layout { left: Some(before.rig.left.lens), right: Some(before.rig.right.lens), transform: true, shape: true };
     let solved = problem.solve(&layout)?;
+    let centre_mm = |rig: &Rig| rig.right_from_left.inverse().translation.vector;
+    let (then, now) = (centre_mm(&before.rig), centre_mm(&solved.problem.values.shared.rig));
+    // No knock moves a camera to the other side.
+    if then.dot(&now) < -0.5 * then.norm() * now.norm() {
+        return Err(Error::Exchanged);
+    }
     let [scatter, beyond] = scatter_beside(&solved, &layout, &corners.board, before.pair_excess, before.noise.as_ref());
     let trial = Trial::new(&solved.problem, layout).ok_or_else(Error::undetermined)?;
     let numbers = layout.shape_start();
