@@ -83,6 +83,21 @@ pub enum Error {
         /// The others.
         bad: Vec<Skipped>,
     },
+    /// The pictures of one side belong to those of the other side that come some pairs before or after.
+    #[error(
+        "the pictures of one side are shifted against the other's: with left picture {left} and right picture {right} as one pair, and so \
+         on, {fit} of {of} pairs fit one rig, and as they are named they do not"
+    )]
+    Shifted {
+        /// Pairs that fit one rig then.
+        fit: usize,
+        /// Pairs there are then.
+        of: usize,
+        /// The first left picture that has a partner.
+        left: String,
+        /// Its partner.
+        right: String,
+    },
     /// A pair that was asked for and is not there.
     #[error("there is no pair {pair} with a board in both pictures; there are {}", named(.pairs))]
     NoSuchPair {
@@ -255,6 +270,7 @@ impl Explain for Error {
                 Error::Contradiction { .. } => {
                     "trigger both cameras at once, clamp them and the board, and check that equal names belong together"
                 }
+                Error::Shifted { .. } => "give pictures of one moment the same name, and leave those without a partner out",
                 Error::NoSuchPair { .. } => "`--since` and `--known-move` take the names of pairs as the report lists them",
                 Error::MoveUnsettled { length_mm, candidates, fits } => {
                     let pairs = candidates.first().filter(|_| *fits > 0).map_or("BEFORE,AFTER", |(pairs, _)| pairs);

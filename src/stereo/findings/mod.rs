@@ -10,6 +10,7 @@ pub mod common_misfit;
 pub mod hypothesis;
 mod remedy;
 pub mod series;
+mod shifted;
 pub mod standing;
 #[cfg(test)]
 mod tests;

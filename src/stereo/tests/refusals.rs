@@ -6,8 +6,10 @@ use super::*;
 use crate::geometry::{Transform, transform};
 use crate::stereo::Error;
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::verdict::Verdict;
+use crate::stereo::volume::Extent;
 
 #[test]
 fn a_pair_that_was_not_taken_at_once_is_named_and_left_out() {
@@ -57,6 +59,31 @@ fn pairs_of_nothing_in_common_are_refused_by_name() {
             assert!(agreeing <= 4 && total == 8 && bad.len() >= 4, "{agreeing} {bad:?}")
         }
         other => panic!("{:?}", other.map(|c| c.rms_px)),
+    }
+}
+
+#[test]
+fn a_series_that_is_shifted_against_the_other_side_is_named() {
+    let world = World::new(10, 13);
+    for by in [1, 2, 8, 9] {
+        let mut corners = world.corners(14);
+        let mut rights: Vec<_> = corners.pairs.iter().map(|p| p.right.clone()).collect();
+        rights.rotate_left(by);
+        for (pair, right) in corners.pairs.iter_mut().zip(rights) {
+            pair.right = right;
+        }
+        let asked = Asked { options: Options::default(), tolerance_mm: 0.05, extent: Extent::default() };
+        match calibrate_standing(&corners, &asked) {
+            Err(Error::Shifted { fit, of, left, right }) => {
+                let (left, right): (usize, usize) = (left.parse().unwrap(), right.parse().unwrap());
+                // The rights were moved to the front by so many, or to the back by what is left of the ten.
+                assert!(
+                    (right + by) % 10 == left && fit >= 8 && of == 10 - right.abs_diff(left),
+                    "{by}: {left} {right}"
+                );
+            }
+            other => panic!("{by}: {:?}", other.map(|(c, _)| c.rms_px)),
+        }
     }
 }
 
