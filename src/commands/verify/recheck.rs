@@ -57,7 +57,7 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let skipped = set.skipped.iter().map(|pose| format!("pose {} is not compared: {}", pose.pose, pose.reason));
     let advice = check.as_ref().and_then(|check| check.warning(against));
     let warnings: Vec<String> =
-        advice.into_iter().chain(is_mended.said).chain(shift).chain(of_own).chain(skipped).collect();
+        advice.into_iter().chain(is_mended.said.clone()).chain(shift).chain(of_own).chain(skipped).collect();
     warnings.iter().for_each(progress::warn);
     let found = recheck(&set, &robot, &before, &placed)?;
     // A change that is smaller than what the robot was off by anyway is none to act on.
