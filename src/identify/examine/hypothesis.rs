@@ -37,15 +37,17 @@ pub enum Hypothesis {
 /// Way of a joint, rad or mm, below which it stands still but for what its encoder reads.
 const STILL: f64 = 0.02;
 
+/// How far a joint moves, rad or mm.
+fn way(set: &Dataset, joint: usize) -> f64 {
+    let ends = |(low, high): (f64, f64), q: f64| (low.min(q), high.max(q));
+    let (low, high) =
+        set.poses.iter().map(|pose| pose.joints_rad[joint]).fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+    high - low
+}
+
 /// Joints that hardly move: what is said of their columns the tool's place undoes.
 pub fn still(set: &Dataset) -> Vec<usize> {
-    let way = |j: usize| {
-        let (low, high) = set.poses.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), pose| {
-            (low.min(pose.joints_rad[j]), high.max(pose.joints_rad[j]))
-        });
-        high - low
-    };
-    (0..set.poses.first().map_or(0, |pose| pose.joints_rad.len())).filter(|&j| way(j) < STILL).collect()
+    (0..set.poses.first().map_or(0, |pose| pose.joints_rad.len())).filter(|&j| way(set, j) < STILL).collect()
 }
 
 /// All that may be wrong with a set of this kind.
@@ -70,7 +72,8 @@ pub fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
     for i in 0..joints {
         list.push(Hypothesis::Negated(i));
         list.extend((i + 1..joints).map(|j| Hypothesis::Exchanged(i, j)));
-        if turns(i) {
+        // Radians that were taken for degrees move the joint by a fraction of its way.
+        if !set.slides.get(i).copied().unwrap_or(false) && way(set, i).to_degrees() > STILL {
             list.push(Hypothesis::JointRadians(i));
         }
         if i > 0 && turns(i) && turns(i - 1) {

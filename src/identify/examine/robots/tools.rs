@@ -118,7 +118,8 @@ impl Table {
         let fisher = FisherSnedecor::new(further.max(1.0), tools.apart.freedom()).ok()?;
         let apart_mm = tools.apart.scatter_mm();
         let is_larger = tools.together.scatter_mm() > (MUCH_LARGER * apart_mm).max(REPEATABILITY_MM);
-        if !is_larger || fisher.sf(gain.max(0.0)) * tried as f64 > CHANCE {
+        let is_sensor = BEATS * tools.placed.scatter_mm() < apart_mm;
+        if !is_larger || is_sensor || fisher.sf(gain.max(0.0)) * tried as f64 > CHANCE {
             return None;
         }
         let share = |tools: &Tools| tools.apart.scatter_mm() / tools.together.scatter_mm();
