@@ -27,10 +27,15 @@ fn identify(at: &Path, status: i32) -> String {
 
 /// The verify rows alone, changed, and their names; the columns are those of the contract.
 fn rows(at: &Path, change: impl Fn(&mut Vec<Vec<String>>)) -> Vec<String> {
+    rows_of(at, ",verify,", change)
+}
+
+/// The same of the rows that hold this.
+fn rows_of(at: &Path, held: &str, change: impl Fn(&mut Vec<Vec<String>>)) -> Vec<String> {
     let text = std::fs::read_to_string(at.join("truth/measurements.csv")).unwrap();
     let mut lines = text.lines();
     let header = lines.next().unwrap();
-    let kept = lines.filter(|line| line.contains(",verify,"));
+    let kept = lines.filter(|line| line.contains(held));
     let mut rows: Vec<Vec<String>> = kept.map(|line| line.split(',').map(str::to_owned).collect()).collect();
     change(&mut rows);
     let body: Vec<String> = rows.iter().map(|row| row.join(",")).collect();
@@ -75,11 +80,12 @@ fn mean(json: &serde_json::Value, figures: &str) -> f64 {
 fn verify_says_what_its_figures_are_of() {
     let folder = identified();
     let at = folder.path();
-    rows(at, |_| ());
+    // Of the first placement all rows: those of few poses do not tell who strays.
+    rows_of(at, ",1,", |_| ());
     let (status, clean, said) = verify(at);
     assert!(status == 0 && clean.get("strays").is_none() && !said.contains("without"), "{said}");
     let right_mm = mean(&clean, "verify");
-    let names = rows(at, |rows| exchanged(rows, 2, 7));
+    let names = rows_of(at, ",1,", |rows| exchanged(rows, 2, 7));
     let (status, json, said) = verify(at);
     assert_eq!(status, 1, "{said}");
     let told = format!("the readings of rows {} and {}, or their joints, are exchanged", names[2], names[7]);
@@ -87,7 +93,7 @@ fn verify_says_what_its_figures_are_of() {
     assert_eq!(json["strays"], serde_json::json!([names[2], names[7]]));
     assert!(mean(&json, "verify") > 10.0 * right_mm && mean(&json, "verify_without_strays") < 2.0 * right_mm, "{json}");
     // What is mended is in the figures.
-    rows(at, |rows| scaled(rows, JOINT + 2..JOINT + 3, -1.0));
+    rows_of(at, ",1,", |rows| scaled(rows, JOINT + 2..JOINT + 3, -1.0));
     let (status, json, said) = verify(at);
     assert!(
         status == 1 && said.contains("joint 3 is counted the other way round") && said.contains("mended"),
@@ -144,14 +150,12 @@ fn a_check_of_rows_in_metres_or_with_a_sign_flipped_names_that() {
         (told.status.code().unwrap(), stdout(&told) + &stderr(&told))
     };
     rows(at, |_| ());
-    let (clean, said) = against();
+    let (_, said) = against();
     assert!(!said.contains("mended for this run") && !said.contains("CHANGED"), "{said}");
     rows(at, |rows| scaled(rows, POINT..POINT + 3, 0.001));
     let (status, said) = against();
-    assert!(
-        status == clean && said.contains("the readings are in m, not in mm") && !said.contains("per mille off"),
-        "{said}"
-    );
+    assert!(status == 1 && said.contains("the readings are in m, not in mm"), "{said}");
+    assert!(said.contains("whether the robot was identified from these rows is not known"), "{said}");
     assert!(!said.contains("CHANGED"), "{said}");
     rows(at, |rows| scaled(rows, JOINT + 2..JOINT + 3, -1.0));
     let (status, said) = against();
@@ -165,10 +169,10 @@ fn a_check_of_rows_in_metres_or_with_a_sign_flipped_names_that() {
 fn points_that_are_all_one_are_no_measurement() {
     let folder = identified();
     let at = folder.path();
-    rows(at, |rows| scaled(rows, POINT..POINT + 3, 0.0));
+    rows_of(at, ",sample,", |rows| scaled(rows, POINT..POINT + 3, 0.0));
     let told = stereocal(at, &["identify", "--measurements", "new.csv", "--robot", "robot.toml", "--out", "one"]);
     assert_eq!(told.status.code(), Some(2), "{}", stdout(&told));
-    assert!(stderr(&told).contains("all 12 points are one, 0.000, 0.000, 0.000 mm"), "{}", stderr(&told));
+    assert!(stderr(&told).contains("all 48 points are one, 0.000, 0.000, 0.000 mm"), "{}", stderr(&told));
 }
 
 #[test]

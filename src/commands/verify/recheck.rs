@@ -57,7 +57,7 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let skipped = set.skipped.iter().map(|pose| format!("pose {} is not compared: {}", pose.pose, pose.reason));
     let advice = check.as_ref().and_then(|check| check.warning(against));
     let warnings: Vec<String> =
-        advice.into_iter().chain(is_mended.said.clone()).chain(shift).chain(of_own).chain(skipped).collect();
+        advice.into_iter().chain(is_mended.clone()).chain(shift).chain(of_own).chain(skipped).collect();
     warnings.iter().for_each(progress::warn);
     let found = recheck(&set, &robot, &before, &placed)?;
     // A change that is smaller than what the robot was off by anyway is none to act on.
@@ -82,30 +82,20 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     out.write(HISTORY, formats::to_csv(&checks, "poses").as_bytes())?;
     report::page::write(&out, "verify.html", page)?;
     let summary = || report::robot_recheck::summary(&found, judged, checks.len(), &out);
-    let least = if advised_against { Status::OutOfTolerance } else { is_mended.status() };
+    let least = if advised_against || is_mended.is_some() { Status::OutOfTolerance } else { Status::Done };
     let status = content.standing.status().or_worse(least);
     Ok(Outcome { stdout: if args.json { json } else { summary() }, status })
 }
 
-/// What was mended in the rows before they were compared.
-struct IsMended {
-    said: Option<String>,
-    /// Whether it is more than the unit of all of them.
-    is_odd: bool,
-}
-
-impl IsMended {
-    fn status(&self) -> Status {
-        if self.is_odd { Status::OutOfTolerance } else { Status::Done }
-    }
-}
-
-/// The rows in the units, signs and columns that the robot has.
-fn mended(set: Dataset, robot: &Robot, p95_mm: f64, config: &Config) -> Result<(Dataset, IsMended)> {
+/// The rows in the units, signs and columns that the robot has, and what was mended. Rows that it was identified from are not known again in others.
+fn mended(set: Dataset, robot: &Robot, p95_mm: f64, config: &Config) -> Result<(Dataset, Option<String>)> {
     still::check_points(&set)?;
     Ok(match on_rows::of_known(&set, robot, p95_mm, &config.identify) {
-        Some(OfKnown { set, finding, is_unit }) => (set, IsMended { said: Some(finding.sentence()), is_odd: !is_unit }),
-        None => (set, IsMended { said: None, is_odd: false }),
+        Some(OfKnown { set, finding }) => (
+            set,
+            Some(format!("{}; whether the robot was identified from these rows is not known", finding.sentence())),
+        ),
+        None => (set, None),
     })
 }
 

@@ -45,8 +45,6 @@ pub struct OfKnown {
     /// The rows without it.
     pub set: Dataset,
     pub finding: Finding,
-    /// Whether it is nothing but the unit of all readings or angles.
-    pub is_unit: bool,
 }
 
 /// What of units, signs and columns brings the rows back to a robot of which 95 % of the errors are below `p95_mm`.
@@ -74,8 +72,7 @@ pub fn of_known(set: &Dataset, robot: &Robot, p95_mm: f64, settings: &Settings) 
         "mended for this run; mend the file",
     );
     let rows = set.names(&hypothesis.rows(set));
-    let is_unit = hypothesis.factor() != 1.0 || hypothesis == Hypothesis::Radians;
-    Some(OfKnown { set: mended, finding: finding.about(rows), is_unit })
+    Some(OfKnown { set: mended, finding: finding.about(rows) })
 }
 
 #[cfg(test)]
@@ -94,9 +91,9 @@ mod tests {
         };
         assert_eq!(said(&|_| {}), None);
         let metres = said(&|row| point(row).coords /= 1000.0).unwrap();
-        assert!(metres.is_unit && metres.finding.finding.contains("the readings are in m, not in mm"), "{metres:?}");
+        assert!(metres.finding.finding.contains("the readings are in m, not in mm"), "{metres:?}");
         let sign = said(&|row| row.at.joints_deg[2] *= -1.0).unwrap();
-        assert!(!sign.is_unit && sign.finding.finding.contains("joint 3 is counted the other way round"), "{sign:?}");
+        assert!(sign.finding.finding.contains("joint 3 is counted the other way round"), "{sign:?}");
         // The robot that is off by some degrees has changed, and so have two of its joints.
         for by_deg in [0.1, 1.0, 5.0] {
             assert_eq!(said(&|row| row.at.joints_deg[2] += by_deg), None, "{by_deg}");
