@@ -10,7 +10,7 @@ use crate::files::OutDir;
 use crate::files::provenance::{Digested, Provenance, Run};
 use crate::formats::placements::record::{PLACEMENT, PlacementFile};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::{known, shared};
+use crate::identify::data::{known, shared, still};
 use crate::identify::examine::{self, Examined};
 use crate::identify::judge::placement::Placed;
 use crate::identify::record::{self, Advice, Findings, Record, quality};
@@ -36,6 +36,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let given = nominal_robot(file.as_deref(), args.robot.is_some())?;
     let rows = read(&source, &given)?;
     let mut set = Dataset::of_robot(&rows, &given)?;
+    still::check_points(&set)?;
     set.files = files(&source, &rows);
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
@@ -46,7 +47,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     }
     shared::suppose_scale(&mut set);
     let bar = progress::bar("identifying", 2 + step_count(&settings));
-    let Examined { set, robot: nominal, along, findings, unexplained } =
+    let Examined { set, robot: nominal, along, findings, against, unexplained } =
         examine::examine(&set, &given, &settings, &|step| bar.begin(step));
     if unexplained.is_some() {
         examine::in_hand::refuse(&set, &nominal)?;
@@ -55,7 +56,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let Searched { found, not_run } = search(&set, &nominal, &settings, args.seed, doubts, &|step| bar.begin(step))?;
     bar.finish_and_clear();
     let of_fit = record::findings::findings(&set, &found, &along);
-    let findings = Findings::new(findings, unexplained, of_fit, &along, &set, &found);
+    let findings = Findings::new(findings, unexplained, of_fit, &along, &set, &found).with_against(against);
     let mut record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     record.warnings.extend(not_run.clone());
     record.not_run = not_run;
@@ -230,7 +231,9 @@ pub fn check_joints(robot: &Robot, rows: &[Measurement], path: &Utf8Path) -> Res
     let measured = rows.first().map_or(0, |r| r.at.joints_deg.len());
     if measured != robot.joints.len() {
         let place = path.to_string();
-        return Err(Error::JointCount { robot: robot.joints.len(), measurements: measured, place }.into());
+        let column = |joint: &robot::Joint| format!("j{}_{}", measured + 1, if joint.slides { "mm" } else { "deg" });
+        let missing = robot.joints.get(measured).map(column);
+        return Err(Error::JointCount { robot: robot.joints.len(), measurements: measured, missing, place }.into());
     }
     let slides = rows.first().map_or(&[][..], |r| &r.at.slides);
     let differs = |i: &usize| slides.get(*i).copied().unwrap_or(false) != robot.joints[*i].slides;

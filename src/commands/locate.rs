@@ -14,6 +14,7 @@ use crate::files::provenance::{Provenance, Run};
 use crate::formats::placements::record::{PLACEMENT, PlacementFile};
 use crate::formats::robots::known;
 use crate::identify::data::dataset::Dataset;
+use crate::identify::data::still;
 use crate::identify::examine::{self, Examined};
 use crate::identify::judge::errors::Judge;
 use crate::identify::judge::folds;
@@ -46,8 +47,12 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     out.check_free(&[PLACEMENT])?;
 
     let set = Dataset::new(&rows)?;
-    let Examined { set, findings, unexplained, .. } = examine::examine(&set, &robot, &config.identify, &|_| {});
-    findings.iter().chain(&unexplained).for_each(|finding| progress::warn(finding.sentence()));
+    still::check_points(&set)?;
+    let Examined { set, robot: mended, findings, against, unexplained, .. } =
+        examine::examine(&set, &robot, &config.identify, &|_| {});
+    // The robot is that of its file: what is wrong between the two is mended in the rows.
+    let set = examine::on_rows::mended(&set, &robot, &mended).unwrap_or(set);
+    against.iter().chain(&findings).chain(&unexplained).for_each(|finding| progress::warn(finding.sentence()));
     if unexplained.is_some() {
         examine::in_hand::refuse(&set, &robot)?;
     }

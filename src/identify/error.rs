@@ -1,6 +1,6 @@
 //! What can go wrong in an identification.
 
-use crate::diagnostic::{Explain, Status};
+use crate::diagnostic::{Explain, Status, count};
 
 /// What can go wrong in an identification.
 #[derive(Debug, thiserror::Error)]
@@ -16,11 +16,20 @@ pub enum Error {
         /// Why the first of them has none.
         reason: Option<String>,
     },
+    /// Points that do not move with the robot.
+    #[error("all {rows} points are one, {:.3}, {:.3}, {:.3} mm, although the joints moved: nothing was measured", point_mm[0], point_mm[1], point_mm[2])]
+    OnePoint {
+        rows: usize,
+        /// The point.
+        point_mm: [f64; 3],
+    },
     /// Robot and measurements are not about the same machine.
-    #[error("the robot has {robot} joints, the measurements have {measurements}")]
+    #[error("the robot has {robot} joints, the measurements have {measurements}{}", missing.as_ref().map_or_else(String::new, |column| format!("; there is no column `{column}`")))]
     JointCount {
         robot: usize,
         measurements: usize,
+        /// The column of the first joint that the measurements lack.
+        missing: Option<String>,
         /// The measurements' file.
         place: String,
     },
@@ -38,13 +47,14 @@ pub enum Error {
         place: String,
     },
     /// Moving any parameter changes nothing that was measured.
-    #[error("the {poses} poses determine no parameter: moving any of them changes nothing that was measured")]
+    #[error("the {} no parameter: moving any of them changes nothing that was measured", if *.poses == 1 { "1 pose determines".to_owned() } else { format!("{poses} poses determine") })]
     NothingDetermined {
         /// Poses to fit.
         poses: usize,
     },
     #[error(
-        "{poses} poses give {numbers} independent numbers for {parameters} parameters; more numbers than parameters are needed"
+        "{} {numbers} independent numbers for {parameters} parameters; more numbers than parameters are needed",
+        if *.poses == 1 { "1 pose gives".to_owned() } else { format!("{poses} poses give") }
     )]
     TooFew {
         /// Independent numbers.
@@ -76,7 +86,7 @@ pub enum Error {
     #[error("model `{model}` needs {needed}, which the measurements don't have")]
     ModelNeeds { model: &'static str, needed: &'static str },
     /// Too few poses to place the sensor by.
-    #[error("group `{group}` has {found} poses with a point; a placement takes {needed}")]
+    #[error("group `{group}` has {} with a point; a placement takes {needed}", count(*.found, "pose"))]
     TooFewToPlace {
         group: String,
         /// Poses with a point.
@@ -134,6 +144,9 @@ impl Explain for Error {
 
     fn hint(&self) -> Option<String> {
         match self {
+            Error::JointCount { missing: Some(column), .. } => {
+                Some(format!("add column `{column}`, or name the robot that was measured with `--robot FILE`"))
+            }
             Error::JointCount { .. } => Some("`--robot FILE` names the robot that was measured".to_owned()),
             Error::NothingDetermined { .. } | Error::TooFew { .. } | Error::NothingJudged { .. } => {
                 Some("measure more poses, spread over the workspace and with varied orientation".to_owned())
@@ -146,6 +159,9 @@ impl Explain for Error {
                  flange_from_target is where the camera sits on the hand"
                     .to_owned(),
             ),
+            Error::OnePoint { .. } => {
+                Some("`--columns` names the columns that hold the points, where they are others".to_owned())
+            }
             Error::NotKnown { .. } => {
                 Some("`identify` writes identification.json beside identified.toml: keep both together".to_owned())
             }

@@ -4,7 +4,7 @@
 //! Gauss-Newton on the flange's places and turns at postures spread over the joints' ranges, or over those in which the robot is known;
 //! directions that no posture tells apart stay where they are (a small ridge).
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::inverse::{self, ARM_MM};
@@ -49,6 +49,18 @@ impl Residual {
 }
 
 impl Robot {
+    /// The same robot, the last link that of `drawn`: what it was turned and moved by along its axis is the tool's, for nothing that is measured at a
+    /// tool's point tells the two apart. The tool stands where it stood.
+    pub fn with_last_link_of(&self, drawn: &Robot) -> Robot {
+        let mut robot = self.clone();
+        if let (Some(joint), Some(of_drawn)) = (robot.joints.last_mut(), drawn.joints.last()) {
+            let axis = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), joint.theta_rad - of_drawn.theta_rad);
+            robot.tool_mm = axis * (robot.tool_mm + Vector3::z() * (joint.d_mm - of_drawn.d_mm));
+            (joint.theta_rad, joint.d_mm) = (of_drawn.theta_rad, of_drawn.d_mm);
+        }
+        robot
+    }
+
     /// The same robot with other ranges of its joints, rad (mm).
     pub fn within(&self, ranges: &[(f64, f64)]) -> Robot {
         let mut robot = self.clone();
@@ -107,6 +119,22 @@ mod tests {
     use super::*;
     use crate::robot::catalogue;
     use crate::robot::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
+
+    #[test]
+    fn what_the_last_link_is_longer_and_turned_by_is_the_tools() {
+        let drawn = catalogue::robot("abb-irb120").unwrap();
+        let mut found = drawn.clone();
+        found.joints[2].a_mm += 0.4;
+        found.joints[5].d_mm += 93.0;
+        found.joints[5].theta_rad += 0.3;
+        found.tool_mm = Vector3::new(20.0, -3.0, 5.0);
+        let taken = found.with_last_link_of(&drawn);
+        assert_eq!((taken.joints[5], taken.joints[2]), (drawn.joints[5], found.joints[2]));
+        for k in 0..20 {
+            let q = inverse::spread_start(&drawn, k);
+            assert!((taken.target_mm(&q) - found.target_mm(&q)).norm() < 1e-9);
+        }
+    }
 
     #[test]
     fn a_plain_robot_is_its_own_nearest_one() {

@@ -33,6 +33,7 @@ mod house;
 mod identify;
 mod known_move;
 mod measure;
+mod mended;
 mod messages;
 mod picture_faults;
 mod pipeline;

@@ -1,20 +1,27 @@
 //! The two robots of `compensate`: whether they are one arm, and which tool counts.
 
-use nalgebra::Vector3;
+use camino::Utf8Path;
+use nalgebra::{Point3, Vector3};
 
 use super::super::Result;
 use crate::cli::Compensate;
 use crate::config;
+use crate::formats::robots::known;
 use crate::identify::record;
+use crate::progress;
 use crate::robot::refit::Residual;
-use crate::robot::tool_fit::TYPED_MM;
-use crate::robot::{Advice, Check, Error, Joint, Robot, file, tool_text};
+use crate::robot::tool_fit::{Start, TYPED_MM};
+use crate::robot::{Advice, Check, Error, Joint, Robot, file, inverse, tool_text};
 
 /// Robots and tools that differ by less are the same, mm.
 const SAME_MM: f64 = 1e-6;
 
 /// How far the flanges of one arm are apart on average, mm: a nominal robot is off by a few.
 const ONE_ARM_MM: f64 = 10.0;
+
+/// How far off a nominal robot is at most once its tool and its base are right, mm, and at how many postures that is looked at.
+const NEAR_MM: f64 = 5.0;
+const POSTURES: usize = 200;
 
 /// Both robots.
 pub(super) struct Pair {
@@ -49,9 +56,13 @@ impl Pair {
         if nominal.joints.len() != identified.joints.len() || !nominal.joints.iter().zip(&identified.joints).all(same) {
             return Err(Error::Different { identified: kinds(&identified), nominal: kinds(&nominal) }.into());
         }
+        let identified = of_one_tool(&nominal, identified, &args.identified);
         let off = Residual::between(&nominal, &identified);
         let apart = record::links_apart(&nominal, &identified);
-        if let Some(apart) = apart.filter(|_| off.mean_mm > ONE_ARM_MM) {
+        // Terms that were found over a part of the joints' ranges, and links that were split between them, mean nothing beyond it.
+        let over = known::identified_over(&args.identified, &identified);
+        let is_near = || over.is_some_and(|ranges| nearest_mm(&nominal.within(&ranges), &identified) < NEAR_MM);
+        if let Some(apart) = apart.filter(|_| off.mean_mm > ONE_ARM_MM && !is_near()) {
             return Err(Error::OtherArm { robot, identified: found, apart }.into());
         }
         let mut pair =
@@ -104,6 +115,29 @@ impl Pair {
         });
         apart_mm
     }
+}
+
+/// The identified robot with the nominal one's last link, where its own is longer or turned by more than links are built: that is a tool of which
+/// the nominal file knows nothing, and no measurement of a point tells the two apart.
+fn of_one_tool(nominal: &Robot, identified: Robot, file: &Utf8Path) -> Robot {
+    let taken = identified.with_last_link_of(nominal);
+    let is_tool = record::links_apart(nominal, &identified) != record::links_apart(nominal, &taken);
+    if !is_tool {
+        return identified;
+    }
+    let tool = tool_text(&taken.tool_mm.into());
+    progress::note(format!(
+        "the last link of {file} is not that of the nominal robot: what it has more is the tool's, which then stands at {tool} mm; a point cannot \
+         tell the two apart"
+    ));
+    taken
+}
+
+/// How far the target of another robot is from that of this one over its joints' ranges, in the middle, with a tool and a base of its own, mm.
+fn nearest_mm(nominal: &Robot, other: &Robot) -> f64 {
+    let joints: Vec<Vec<f64>> = (0..POSTURES).map(|k| inverse::spread_start(nominal, k)).collect();
+    let points: Vec<Point3<f64>> = joints.iter().map(|q| other.target_mm(q)).collect();
+    nominal.fit_tool(&joints, &points, Start::File).map_or(f64::INFINITY, |fit| fit.left_mm)
 }
 
 /// How many joints a robot has, and how many of them slide.

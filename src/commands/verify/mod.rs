@@ -3,6 +3,7 @@
 //! Measurements are examined as `identify` examines them, with the first robot, so that both judge by the same rows: units are mended and
 //! sessions get placements of their own. The robots are those of their files.
 
+mod beyond;
 mod recheck;
 
 use camino::Utf8Path;
@@ -18,9 +19,10 @@ use crate::formats::robots::known;
 use crate::identify;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::known as distances;
-use crate::identify::examine::{self, Examined};
+use crate::identify::data::still;
+use crate::identify::examine::{self, Examined, on_rows};
 use crate::identify::judge::errors::{Judge, PLACED_BY_ITSELF};
-use crate::identify::judge::folds;
+use crate::identify::judge::{folds, strays};
 use crate::identify::record::{self, PointSpread, spread};
 use crate::measurements::{Measurement, Observed, Role};
 use crate::progress;
@@ -31,12 +33,35 @@ use crate::robot::{self, Robot};
 #[derive(Debug, Serialize)]
 struct Verified {
     robots: Vec<RobotVerified>,
+    /// Rows that fit far worse than the rest, by pose.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    strays: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
 struct RobotVerified {
     file: String,
     verify: PointSpread,
+    /// The same without the strays; absent without any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    verify_without_strays: Option<PointSpread>,
+}
+
+impl RobotVerified {
+    /// Of these rows, `folded` where they place the sensor too, and without those that are far off.
+    fn new(file: &Utf8Path, robot: &Robot, (judge, judged, folded): (&Judge, &[usize], bool), far: &[usize]) -> Self {
+        let of = |judge: &Judge, judged: &[usize]| {
+            let errors = if folded { folds::judged(judge, robot, judged) } else { judge.errors(robot, judged) };
+            spread(judge, robot, &errors, judged)
+        };
+        let near = |rows: &[usize]| rows.iter().copied().filter(|row| !far.contains(row)).collect::<Vec<usize>>();
+        let without = || of(&Judge { fitted: &near(judge.fitted), ..judge.clone() }, &near(judged));
+        RobotVerified {
+            file: file.to_string(),
+            verify: of(judge, judged),
+            verify_without_strays: (!far.is_empty()).then(without),
+        }
+    }
 }
 
 /// Makes verify rows samples where the file has none to place the sensor by, as a file of nothing but fresh poses; says whether it did.
@@ -67,17 +92,32 @@ fn fitted_to(file: &Utf8Path, rows: &[Measurement]) -> Option<String> {
     })
 }
 
-/// The set as the examination mends it, its findings said; and whether something explains the errors.
-fn examined(set: &Dataset, file: &Utf8Path, robot: &Robot, settings: &identify::Settings) -> (Dataset, bool) {
-    let Examined { set, robot: mended, along, findings, unexplained } = examine::examine(set, robot, settings, &|_| {});
-    let explained = unexplained.is_none();
-    for finding in findings.into_iter().chain(unexplained).chain(record::findings::along_the_rows(&along)) {
+/// What the examination made of the rows and of the first robot.
+struct Mended {
+    set: Dataset,
+    /// The first robot, where its file was mended.
+    robot: Option<Robot>,
+    /// Whether rows and robots are what their files say, and something explains the errors.
+    is_sound: bool,
+}
+
+/// The set as the examination mends it, its findings said. Signs and zeros of joints are mended in the rows, so that all robots are judged by the same.
+fn examined(set: &Dataset, file: &Utf8Path, robot: &Robot, settings: &identify::Settings) -> Mended {
+    let Examined { set, robot: mended, along, findings, against, unexplained } =
+        examine::examine(set, robot, settings, &|_| {});
+    let is_sound = unexplained.is_none() && against.is_empty() && mended == *robot;
+    let along = record::findings::along_the_rows(&along);
+    for finding in against.into_iter().chain(findings).chain(unexplained).chain(along) {
         progress::warn(finding.sentence());
     }
-    if mended != *robot {
-        progress::warn(format!("the robot of {file} is judged without this correction"));
+    let of_rows = on_rows::mended(&set, robot, &mended);
+    if of_rows.is_none() {
+        progress::warn(format!(
+            "the figures of {file} are those with this correction, those of other robots are without it"
+        ));
     }
-    (set, explained)
+    let robot = of_rows.is_none().then_some(mended);
+    Mended { set: of_rows.unwrap_or(set), robot, is_sound }
 }
 
 /// What the user must know of the rows.
@@ -122,12 +162,15 @@ pub fn run(args: &Verify, config: &Config, run: Run) -> Result<Outcome> {
         Some((_, robot)) => Dataset::of_robot(&rows, robot)?,
         None => Dataset::new(&rows)?,
     };
+    still::check_points(&set)?;
     if let Some(path) = &args.known_distances {
         set.known = distances::read(path, &set)?;
     }
-    let mut explained = true;
-    if let Some((file, robot)) = robots.first() {
-        (set, explained) = examined(&set, file, robot, settings);
+    let mut is_sound = true;
+    if let Some((file, robot)) = robots.first_mut() {
+        let mended = examined(&set, file, robot, settings);
+        (set, is_sound) = (mended.set, mended.is_sound);
+        *robot = mended.robot.unwrap_or_else(|| robot.clone());
     }
     let folded = !only_verify && set.verify_rows().is_empty();
     let (fitted, judged) = match only_verify || folded {
@@ -135,23 +178,38 @@ pub fn run(args: &Verify, config: &Config, run: Run) -> Result<Outcome> {
         false => (set.fit_rows(), set.verify_rows()),
     };
     tell(&set, folded, only_verify);
+    robots.iter().filter_map(|(file, robot)| beyond::ranges(file, robot, &set, &judged)).for_each(progress::warn);
     let judge = Judge::plain(&set, &fitted, settings.wire_offset);
-    let robots: Vec<RobotVerified> = robots
-        .iter()
-        .map(|(file, robot)| {
-            let errors = if folded { folds::judged(&judge, robot, &judged) } else { judge.errors(robot, &judged) };
-            RobotVerified { file: file.to_string(), verify: spread(&judge, robot, &errors, &judged) }
-        })
-        .collect();
+    let strays = strays::find(&judge, &robots.iter().map(|(_, robot)| robot).collect::<Vec<_>>(), &judged);
+    strays.iter().for_each(|strays| progress::warn(strays.statement(&set)));
+    let far = strays.as_ref().map_or(&[][..], |strays| &strays.rows);
+    let robots: Vec<RobotVerified> =
+        robots.iter().map(|(file, robot)| RobotVerified::new(file, robot, (&judge, &judged, folded), far)).collect();
     if robots.iter().all(|robot| robot.verify.is_empty()) {
         return Err(identify::Error::NothingJudged { rows: judged.len(), needed: PLACED_BY_ITSELF }.into());
     }
+    let names = strays.as_ref().map_or_else(Vec::new, |strays| set.names(&strays.rows));
+    let status = if is_sound && strays.is_none() { Status::Done } else { Status::OutOfTolerance };
     let stdout = match args.json {
-        true => files::to_json(&Verified { robots }),
-        false => {
-            let rows: Vec<(&str, &PointSpread)> = robots.iter().map(|r| (r.file.as_str(), &r.verify)).collect();
-            report::identify::verified(&rows, folded)
-        }
+        true => files::to_json(&Verified { robots, strays: names }),
+        false => table(&robots, folded, &names),
     };
-    Ok(Outcome { stdout, status: if explained { Status::Done } else { Status::OutOfTolerance } })
+    Ok(Outcome { stdout, status })
+}
+
+/// The figures, and below them those without the strays.
+fn table(robots: &[RobotVerified], folded: bool, strays: &[String]) -> String {
+    let of = |figures: fn(&RobotVerified) -> Option<&PointSpread>| {
+        let rows: Vec<(&str, &PointSpread)> =
+            robots.iter().filter_map(|robot| Some((robot.file.as_str(), figures(robot)?))).collect();
+        report::identify::verified(&rows, folded)
+    };
+    let all = of(|robot| Some(&robot.verify));
+    match strays {
+        [] => all,
+        rows => {
+            let without = of(|robot| robot.verify_without_strays.as_ref());
+            format!("{all}\nwithout {}:\n{without}", rows.join(", "))
+        }
+    }
 }

@@ -15,13 +15,16 @@ use crate::formats::robot_recheck::{HISTORY, RobotRecheckFile};
 use crate::formats::robots::known;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
+use crate::identify::data::still;
+use crate::identify::examine::on_rows::{self, OfKnown};
 use crate::identify::examine::shifted;
 use crate::identify::judge::locate::FEWEST_POSES;
 use crate::identify::judge::recheck::recheck;
 use crate::measurements::{Given, Measurement, Observed, Role};
 use crate::progress;
+use crate::report;
 use crate::report::robot_recheck::Judged;
-use crate::{report, robot};
+use crate::robot::{self, Robot};
 
 pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
     let (robot, check) = robot::file::read_checked(against)?;
@@ -32,10 +35,9 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     rows.iter_mut().filter(|row| row.at.role == Role::Verify).for_each(|row| row.at.role = Role::Sample);
     check_joints(&robot, &rows, &args.measurements[0])?;
     let own = Own::among(&mut rows, &known::given(against));
-    let set = Dataset::new(&rows)?;
+    let (set, is_mended) = mended(Dataset::new(&rows)?, &robot, before.p95_mm, config)?;
     let stood = PlacementFile::read(&against.with_file_name(PLACEMENT)).ok();
-    let ends = robot.ends;
-    let placed = |group: &str| stood.as_ref()?.sensor_from_base(group, &ends.root_from_frame0);
+    let placed = |group: &str| stood.as_ref()?.sensor_from_base(group, &robot.ends.root_from_frame0);
     let paths = source.paths();
     let inputs: Vec<&Utf8Path> = paths.iter().map(Utf8PathBuf::as_path).chain([against]).collect();
     let run = Run { force: args.force, ..run };
@@ -54,7 +56,8 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let of_own = own.statement().or(whole.map(str::to_owned)).map(said);
     let skipped = set.skipped.iter().map(|pose| format!("pose {} is not compared: {}", pose.pose, pose.reason));
     let advice = check.as_ref().and_then(|check| check.warning(against));
-    let warnings: Vec<String> = advice.into_iter().chain(shift).chain(of_own).chain(skipped).collect();
+    let warnings: Vec<String> =
+        advice.into_iter().chain(is_mended.clone()).chain(shift).chain(of_own).chain(skipped).collect();
     warnings.iter().for_each(progress::warn);
     let found = recheck(&set, &robot, &before, &placed)?;
     // A change that is smaller than what the robot was off by anyway is none to act on.
@@ -79,9 +82,21 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     out.write(HISTORY, formats::to_csv(&checks, "poses").as_bytes())?;
     report::page::write(&out, "verify.html", page)?;
     let summary = || report::robot_recheck::summary(&found, judged, checks.len(), &out);
-    let least = if advised_against { Status::OutOfTolerance } else { Status::Done };
+    let least = if advised_against || is_mended.is_some() { Status::OutOfTolerance } else { Status::Done };
     let status = content.standing.status().or_worse(least);
     Ok(Outcome { stdout: if args.json { json } else { summary() }, status })
+}
+
+/// The rows in the units, signs and columns that the robot has, and what was mended. Rows that it was identified from are not known again in others.
+fn mended(set: Dataset, robot: &Robot, p95_mm: f64, config: &Config) -> Result<(Dataset, Option<String>)> {
+    still::check_points(&set)?;
+    Ok(match on_rows::of_known(&set, robot, p95_mm, &config.identify) {
+        Some(OfKnown { set, finding }) => (
+            set,
+            Some(format!("{}; whether the robot was identified from these rows is not known", finding.sentence())),
+        ),
+        None => (set, None),
+    })
 }
 
 /// Rows that the robot was identified from, among those that are to say whether it still is that robot.

@@ -1,9 +1,33 @@
 //! What did not move: poses that the robot came back to, and joints that are the same in all rows.
 
-use super::dataset::Dataset;
+use nalgebra::Point3;
+
+use super::dataset::{Dataset, Reading};
+use crate::identify::Error;
 
 /// Joints within this, rad or mm, are the same.
 const SAME_JOINT: f64 = 1e-9;
+
+/// Points within this of each other, mm, are one: no instrument reads twice the same so closely.
+const SAME_POINT_MM: f64 = 1e-9;
+
+/// Refuses points of which all are one although the robot moved: nothing was measured.
+pub fn check_points(set: &Dataset) -> Result<(), Error> {
+    let points: Vec<Point3<f64>> = set
+        .poses
+        .iter()
+        .filter_map(|pose| match pose.reading {
+            Reading::Position { point_mm, .. } => Some(point_mm),
+            _ => None,
+        })
+        .collect();
+    let is_one = points.len() > 1 && points.iter().all(|point| (point - points[0]).norm() <= SAME_POINT_MM);
+    let moved = set.poses.iter().any(|pose| pose.joints_rad != set.poses[0].joints_rad);
+    match is_one && moved {
+        true => Err(Error::OnePoint { rows: points.len(), point_mm: points[0].coords.into() }),
+        false => Ok(()),
+    }
+}
 
 /// Rows of the same group at the same joints.
 pub fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {

@@ -1,6 +1,7 @@
 //! All that is asked of the data before anything is identified, in its order.
 
 use super::conventions::Mended;
+use super::robots::tools::Moved;
 use super::sessions::{self, Along};
 use super::{conventions, covariances, known, orientations, robots, shifted};
 use crate::identify::data::dataset::Dataset;
@@ -18,6 +19,8 @@ pub struct Examined {
     pub along: Along,
     /// What was wrong, and what was done.
     pub findings: Vec<Finding>,
+    /// What was mended and yet speaks against the file.
+    pub against: Vec<Finding>,
     /// Errors that nothing explained so far.
     pub unexplained: Option<Finding>,
 }
@@ -25,11 +28,12 @@ pub struct Examined {
 /// Looks for what is wrong before anything is identified. `step` hears what is being done.
 pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(&str)) -> Examined {
     step("units, signs and conventions");
-    let (mut set, mut robot, mut findings, mut unexplained_mm) = (set.clone(), robot.clone(), Vec::new(), None);
+    let (mut set, mut robot, mut findings, mut against) = (set.clone(), robot.clone(), Vec::new(), Vec::new());
+    let mut unexplained_mm = None;
     let of_targets = set.targets.as_ref().map_or_else(Vec::new, |targets| targets.findings.clone());
     if settings.examine {
         let of_rows = shifted::examine(&set, &robot);
-        Mended { set, robot, findings, unexplained_mm } = conventions::examine(&of_rows.0, &robot, settings);
+        Mended { set, robot, findings, against, unexplained_mm } = conventions::examine(&of_rows.0, &robot, settings);
         findings.splice(0..0, of_rows.1);
         let of_orientations = orientations::examine(&set, &robot, settings.model == Some(Model::Pose));
         set = of_orientations.0;
@@ -40,10 +44,14 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     }
     step("sessions along the rows");
     let robots = if settings.examine { robots::find(&set, &robot, settings) } else { None };
+    let tool = if settings.examine && robots.is_none() { robots::tools::find(&set, &robot) } else { None };
     let (mut set, along) = match &robots {
         Some(robots) => (robots.parted(&set), Along { robots: Some(robots.finding()), ..Along::default() }),
         None => sessions::find(&set, &robot, settings),
     };
+    // Sessions have placements of their own: a sensor that was moved does no harm there.
+    let is_harmless = |tool: &Moved| tool.is_placed && !along.sessions.is_empty();
+    against.extend(tool.filter(|tool| !is_harmless(tool)).map(|tool| tool.finding));
     if settings.examine {
         let of_covariances = covariances::examine(&set, &robot, settings);
         set = of_covariances.0;
@@ -51,5 +59,5 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     }
     findings.splice(0..0, of_targets);
     let unexplained = unexplained_mm.filter(|_| robots.is_none()).map(conventions::unexplained);
-    Examined { set, robot, along, findings, unexplained }
+    Examined { set, robot, along, findings, against, unexplained }
 }

@@ -10,7 +10,7 @@
 
 use rayon::prelude::*;
 
-use super::hypothesis::{Hypothesis, hypotheses};
+use super::hypothesis::{Hypothesis, hypotheses, still};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::sessions;
 use crate::identify::finding::Finding;
@@ -73,16 +73,18 @@ pub struct Mended {
     pub robot: Robot,
     /// What was mended.
     pub findings: Vec<Finding>,
+    /// What was mended and yet speaks against the file: its rows are not of one kind.
+    pub against: Vec<Finding>,
     /// Errors that no hypothesis explains, mm a coordinate, where they are more than a built robot's.
     pub unexplained_mm: Option<f64>,
 }
 
 /// Looks for what is wrong with the conventions of a set and of a robot's file, and mends it.
 pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
-    let (mut set, mut robot, mut findings) = (set.clone(), robot.clone(), Vec::new());
+    let (mut set, mut robot, mut findings, mut against) = (set.clone(), robot.clone(), Vec::new(), Vec::new());
     let mut in_other_units = false;
     let Some(mut left) = Misfit::of(&set, &robot, settings, None) else {
-        return Mended { set, robot, findings, unexplained_mm: None };
+        return Mended { set, robot, findings, against, unexplained_mm: None };
     };
     let mut cut = None;
     for _ in 0..FAULTS {
@@ -113,6 +115,7 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
             .filter(|(other, h)| *h != hypothesis && other.is_the_same(&there))
             .map(|(_, h)| format!(", or, which these readings do not tell apart, {}", h.name()))
             .collect();
+        let rows = set.names(&hypothesis.rows(&set));
         (set, robot) = hypothesis.applied(&set, &robot);
         in_other_units |= hypothesis.factor() != 1.0;
         let (whose, from, to) = match there.fitted * EXPLAINS < now.fitted {
@@ -122,14 +125,18 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
             }
             false => ("the nominal links' errors", now.target, there.target),
         };
-        findings.push(Finding::new(
+        // What is left is in the file's unit, which is said to be another.
+        let to = to * hypothesis.factor();
+        let list = if rows.is_empty() { &mut findings } else { &mut against };
+        let finding = Finding::new(
             format!("{}{} ({whose} fall from {from:.2} to {to:.3} mm)", hypothesis.name(), same.concat()),
             "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)",
-        ));
+        );
+        list.push(finding.about(rows));
         left = there.scaled(1.0 / hypothesis.factor());
     }
     let unexplained_mm = (left.fitted >= IMPLAUSIBLE_MM && cut.is_none()).then_some(left.fitted);
-    Mended { set, robot, findings, unexplained_mm }
+    Mended { set, robot, findings, against, unexplained_mm }
 }
 
 /// What is said of errors that no hypothesis explains.
@@ -152,11 +159,14 @@ fn explaining(
     now: &Misfit,
     nearer: bool,
 ) -> Vec<(Misfit, Hypothesis)> {
+    let still = still(set);
     let explains = |h: Hypothesis| {
         let (s, r) = h.applied(set, robot);
         let to_be_beaten = now.scaled(1.0 / h.factor());
         let there = Misfit::of(&s, &r, settings, nearer.then_some(&to_be_beaten))?.scaled(h.factor());
-        there.explains(now).then_some((there, h))
+        // What stands still is told from the tool only where the tool's place is free in both.
+        let free = |of: Misfit| if h.is_of_still(&still) { Misfit { nominal: of.target, ..of } } else { of };
+        free(there).explains(&free(*now)).then_some((there, h))
     };
     open.par_iter().filter_map(|h| explains(*h)).collect()
 }

@@ -10,6 +10,12 @@ use crate::robot::Robot;
 pub enum Hypothesis {
     /// Joint angles are in radians.
     Radians,
+    /// Those of one joint are.
+    JointRadians(usize),
+    /// A part of the readings is in a unit of so many mm.
+    Part(f64, &'static str),
+    /// A joint's reading holds so many times that of the joint before it.
+    Coupled(usize, f64),
     /// Readings are in a unit of so many mm.
     Lengths(f64, &'static str),
     /// Known distances are in a unit of so many mm.
@@ -28,12 +34,29 @@ pub enum Hypothesis {
     Mirrored,
 }
 
+/// Way of a joint, rad or mm, below which it stands still but for what its encoder reads.
+const STILL: f64 = 0.02;
+
+/// How far a joint moves, rad or mm.
+fn way(set: &Dataset, joint: usize) -> f64 {
+    let ends = |(low, high): (f64, f64), q: f64| (low.min(q), high.max(q));
+    let (low, high) =
+        set.poses.iter().map(|pose| pose.joints_rad[joint]).fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+    high - low
+}
+
+/// Joints that hardly move: what is said of their columns the tool's place undoes.
+pub fn still(set: &Dataset) -> Vec<usize> {
+    (0..set.poses.first().map_or(0, |pose| pose.joints_rad.len())).filter(|&j| way(set, j) < STILL).collect()
+}
+
 /// All that may be wrong with a set of this kind.
 pub fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
     let joints = set.poses.first().map_or(0, |p| p.joints_rad.len());
     let mut list = vec![Hypothesis::Radians, Hypothesis::StandardDh];
     // A touch reads no length.
     let touches = (0..set.poses.len()).any(|row| set.touches(row));
+    list.extend(parts(set));
     for (factor, unit) in [(1000.0, "m"), (25.4, "inches"), (10.0, "cm"), (0.001, "um")] {
         match touches {
             false => list.push(Hypothesis::Lengths(factor, unit)),
@@ -44,9 +67,18 @@ pub fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
     if set.kind == Kind::Positions {
         list.push(Hypothesis::Mirrored);
     }
+    let still = still(set);
+    let turns = |i: usize| !still.contains(&i) && !set.slides.get(i).copied().unwrap_or(false);
     for i in 0..joints {
         list.push(Hypothesis::Negated(i));
         list.extend((i + 1..joints).map(|j| Hypothesis::Exchanged(i, j)));
+        // Radians that were taken for degrees move the joint by a fraction of its way.
+        if !set.slides.get(i).copied().unwrap_or(false) && way(set, i).to_degrees() > STILL {
+            list.push(Hypothesis::JointRadians(i));
+        }
+        if i > 0 && turns(i) && turns(i - 1) {
+            list.extend([1.0, -1.0].map(|times| Hypothesis::Coupled(i, times)));
+        }
         list.extend([90.0, -90.0, 180.0].map(|deg| Hypothesis::Offset(i, deg)));
         list.extend([1, -1].map(|by| Hypothesis::Lagging(Some(i), by)));
     }
@@ -60,9 +92,37 @@ impl Hypothesis {
         if let Hypothesis::Lengths(factor, _) = self { factor } else { 1.0 }
     }
 
+    /// Whether all that it is about stands still in the set: the tool's place then undoes what it says as well as it can say it.
+    pub fn is_of_still(self, still: &[usize]) -> bool {
+        match self {
+            Hypothesis::Exchanged(i, j) => still.contains(&i) && still.contains(&j),
+            Hypothesis::Negated(i) | Hypothesis::Offset(i, _) => still.contains(&i),
+            _ => false,
+        }
+    }
+
+    /// The rows that it is about, where it is not about all.
+    pub fn rows(self, set: &Dataset) -> Vec<usize> {
+        if let Hypothesis::Part(..) = self { small_part(set).unwrap_or_default() } else { Vec::new() }
+    }
+
     /// In words.
     pub fn name(self) -> String {
         match self {
+            Hypothesis::JointRadians(i) => {
+                format!("the angles of joint {} are in radians, those of the others in degrees", i + 1)
+            }
+            Hypothesis::Part(_, unit) => format!("a part of the readings is in {unit}, the others are in mm"),
+            Hypothesis::Coupled(i, times) => {
+                let (joint, before) = (i + 1, i);
+                let (way, as_on) = match times < 0.0 {
+                    true => ("+", " (as Fanuc counts joint 3, from the horizontal)"),
+                    false => ("-", ""),
+                };
+                format!(
+                    "joint {joint} is counted together with joint {before}{as_on}: the angle between its links is j{joint} {way} j{before}"
+                )
+            }
             Hypothesis::Radians => "the joint angles are in radians, not in degrees".to_owned(),
             Hypothesis::Lengths(_, unit) => format!("the readings are in {unit}, not in mm"),
             Hypothesis::KnownLengths(_, unit) => format!("the known distances are in {unit}, not in mm"),
@@ -92,6 +152,17 @@ impl Hypothesis {
                     known.sigma_mm *= factor;
                 }
             }
+            Hypothesis::JointRadians(i) => {
+                set.poses.iter_mut().for_each(|p| p.joints_rad[i] = p.joints_rad[i].to_degrees());
+            }
+            Hypothesis::Part(factor, _) => {
+                for row in small_part(&set).unwrap_or_default() {
+                    scale(&mut set.poses[row], factor);
+                }
+            }
+            Hypothesis::Coupled(i, times) => {
+                set.poses.iter_mut().for_each(|p| p.joints_rad[i] -= times * p.joints_rad[i - 1]);
+            }
             Hypothesis::Exchanged(i, j) => set.poses.iter_mut().for_each(|p| p.joints_rad.swap(i, j)),
             Hypothesis::Negated(i) => robot.joints[i].sign = -robot.joints[i].sign,
             Hypothesis::Offset(i, deg) => robot.joints[i].theta_rad += deg.to_radians(),
@@ -101,6 +172,34 @@ impl Hypothesis {
         }
         (set, robot)
     }
+}
+
+/// How far apart the sizes of readings in two units are at the least, and how many rows a part has.
+const UNITS_APART: f64 = 2.5;
+const FEWEST_OF_PART: usize = 2;
+
+/// Rows that are in a unit of their own: those below the widest gap between the sizes of readings.
+fn small_part(set: &Dataset) -> Option<Vec<usize>> {
+    let size = |pose: &Pose| match &pose.reading {
+        Reading::Position { point_mm, .. } => Some(point_mm.coords.norm()),
+        Reading::Distance { distance_mm, .. } => Some(*distance_mm),
+        Reading::Reference => None,
+    };
+    let mut sizes: Vec<(f64, usize)> =
+        set.poses.iter().enumerate().filter_map(|(row, pose)| Some((size(pose)?, row))).collect();
+    sizes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let last = sizes.len().checked_sub(FEWEST_OF_PART)?;
+    let gap = |&k: &usize| sizes[k].0 / sizes[k - 1].0.max(f64::MIN_POSITIVE);
+    let widest = (FEWEST_OF_PART..=last).max_by(|a, b| gap(a).total_cmp(&gap(b))).filter(|k| gap(k) > UNITS_APART)?;
+    let mut rows: Vec<usize> = sizes[..widest].iter().map(|(_, row)| *row).collect();
+    rows.sort_unstable();
+    Some(rows)
+}
+
+fn parts(set: &Dataset) -> Vec<Hypothesis> {
+    let units = [(1000.0, "m"), (25.4, "inches"), (10.0, "cm")].map(|(factor, unit)| Hypothesis::Part(factor, unit));
+    let touches = (0..set.poses.len()).any(|row| set.touches(row));
+    if !touches && small_part(set).is_some() { units.to_vec() } else { Vec::new() }
 }
 
 /// Joints that turn, their numbers taken for radians.

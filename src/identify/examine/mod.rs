@@ -6,6 +6,7 @@ pub mod covariances;
 mod hypothesis;
 pub mod in_hand;
 pub mod known;
+pub mod on_rows;
 pub mod orientations;
 pub mod robots;
 pub mod sessions;

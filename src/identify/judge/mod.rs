@@ -9,4 +9,5 @@ pub mod placement;
 pub mod recheck;
 pub mod scale;
 pub mod smooth;
+pub mod strays;
 pub mod uncertainty;

@@ -6,9 +6,12 @@ use crate::identify::examine::conventions;
 use crate::identify::examine::sessions::{Along, Session};
 use crate::identify::finding::Finding;
 use crate::identify::record::file::Smooth;
-use crate::identify::record::plausible;
+use crate::identify::record::{left_out, plausible, rounded};
 use crate::identify::run::Identification;
 use crate::identify::sensor::Extra;
+
+/// Times the scatter that no built robot has after a fit, from which on it speaks against the result whatever seemed to explain it before.
+const FAR_BEYOND: f64 = 3.0;
 
 /// What is wrong with the data, by weight.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -35,17 +38,40 @@ impl Findings {
         if let Some(robots) = &along.robots {
             return Findings { against: vec![robots.clone()], doubts: examined, notes: Vec::new() };
         }
-        let unexplained = unexplained.filter(|_| !is_explained(found));
+        let left_mm = found.scatter.point_mm;
+        let beyond_all =
+            || (left_mm > FAR_BEYOND * conventions::IMPLAUSIBLE_MM).then(|| conventions::unexplained(left_mm));
+        let unexplained = unexplained.filter(|_| !is_explained(found)).or_else(beyond_all);
         let is_reached = unexplained.is_none();
-        let against: Vec<Finding> = unexplained.into_iter().chain(plausible::of_another_robot(found)).collect();
+        let left_out = left_out::of_a_joint(set, found);
+        let is_still = left_out.as_ref().is_some_and(|left_out| left_out.is_still);
+        let (of_still, of_end) = if is_still { (left_out, None) } else { (None, left_out) };
+        let rounded = rounded::of_joints(set, found);
+        let (cause, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
+        let against: Vec<Finding> = of_still
+            .map(|left_out| left_out.finding)
+            .into_iter()
+            .chain(cause)
+            .chain(unexplained)
+            .chain(plausible::of_another_robot(found))
+            .collect();
         let notes = of_fit.into_iter().filter(|finding| !against.contains(finding)).collect();
         // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of rows that nothing explains it
         // says nothing.
         let scale = found.scale(set).filter(|scale| scale.is_significant() && is_reached).map(|scale| {
             Finding::new(scale.sentence(), "the robot that was found has this scale; check it on a known length")
         });
-        let doubts = examined.into_iter().chain(of_verify(set, found)).chain(scale).collect();
+        let of_rows = of_end.map(|left_out| left_out.finding).into_iter().chain(rounded);
+        let terms = plausible::of_terms(found);
+        let doubts =
+            examined.into_iter().chain(of_rows).chain(of_verify(set, found)).chain(scale).chain(terms).collect();
         Findings { against, doubts, notes }
+    }
+
+    /// With these as the gravest.
+    pub fn with_against(mut self, list: Vec<Finding>) -> Findings {
+        self.against.splice(0..0, list);
+        self
     }
 
     /// All of them, the gravest first.
@@ -66,7 +92,6 @@ pub fn is_explained(found: &Identification) -> bool {
 pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Finding> {
     let mut list = of_rows(set, found);
     list.extend(plausible::of_another_robot(found));
-    list.extend(plausible::of_terms(found));
     list.extend(of_sensor(found));
     list.extend(along_the_rows(along));
     list.extend(of_data(set, found));

@@ -4,9 +4,11 @@ mod advice;
 mod file;
 pub mod findings;
 mod gather;
+mod left_out;
 mod parameters;
 mod plausible;
 mod quality;
+mod rounded;
 mod touched;
 
 pub use crate::robot::Advice;

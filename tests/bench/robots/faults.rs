@@ -320,7 +320,7 @@ fn diagnosed(sensor: Sensor, plant: Plant, size: f64, seed: u64) -> (Vec<Finding
     };
     let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let set = Dataset::new(&rows).expect("rows");
-    let Examined { set, robot: nominal, along, findings: mut list, unexplained } =
+    let Examined { set, robot: nominal, along, findings: mut list, unexplained, .. } =
         examine::examine(&set, &nominal, &settings, &|_| {});
     let Ok(found) = identify(&set, &nominal, &settings, 1, &|_| {}) else {
         list.extend(unexplained);

@@ -1,4 +1,5 @@
 use super::*;
+use crate::identify::data::dataset::Reading;
 use crate::identify::synthetic::{World, planned, point};
 use crate::measurements::{Measurement, Observed};
 
@@ -113,4 +114,72 @@ fn micrometres_are_named_and_nothing_else_is_called_so() {
     assert!(said(&fine, &world.nominal)[0].contains("the readings are in um"));
     let wrong = said(&joints(&rows, |q| q[2] -= 90.0), &world.nominal);
     assert!(wrong.len() == 1 && wrong[0].contains("joint 3 is offset by 90"), "{wrong:?}");
+}
+
+#[test]
+fn what_is_said_of_joints_that_stand_still_is_not_what_a_tool_elsewhere_does() {
+    // One joint turns; the encoders of the others read a little.
+    let (world, mut rows) = one_sphere(8.0, 2);
+    let first = rows[0].at.joints_deg.clone();
+    for (i, row) in rows.iter_mut().enumerate() {
+        row.at.joints_deg = first.iter().enumerate().map(|(j, q)| q + 1e-3 * ((i * (j + 3)) as f64).sin()).collect();
+        row.at.joints_deg[0] = first[0] - 60.0 + 120.0 * i as f64 / 60.0;
+        let at = world.nominal.target_mm(&row.at.joints_rad());
+        *point(row) = at;
+    }
+    for by in [0.0, 40.0, 150.0] {
+        let mut elsewhere = world.nominal.clone();
+        elsewhere.tool_mm += nalgebra::Vector3::new(by, -0.5 * by, by);
+        assert_eq!(said(&rows, &elsewhere), [""; 0], "a target elsewhere by {by} mm");
+    }
+}
+
+#[test]
+fn joints_that_are_counted_together_and_one_in_radians_are_named() {
+    let (world, rows) = one_sphere(25.0, 4);
+    for (wrong, word) in [
+        (
+            joints(&rows, |q| q[2] += q[1]),
+            "joint 3 is counted together with joint 2: the angle between its links is j3 - j2",
+        ),
+        (joints(&rows, |q| q[2] -= q[1]), "from the horizontal): the angle between its links is j3 + j2"),
+        (joints(&rows, |q| q[4] = q[4].to_radians()), "the angles of joint 5 are in radians"),
+    ] {
+        let said = said(&wrong, &world.nominal);
+        assert!(said.len() == 1 && said[0].contains(word), "{word}: {said:?}");
+    }
+}
+
+#[test]
+fn errors_of_readings_in_metres_are_said_in_millimetres() {
+    let (world, rows) = one_sphere(25.0, 5);
+    let mut metres = rows.clone();
+    metres.iter_mut().for_each(|row| point(row).coords /= 1000.0);
+    let said = said(&metres, &world.nominal);
+    let left: f64 = said[0].split(" to ").nth(1).and_then(|text| text.split(' ').next()).unwrap().parse().unwrap();
+    assert!(said[0].contains("the readings are in m, not in mm") && (0.01..0.1).contains(&left), "{said:?}");
+}
+
+#[test]
+fn rows_in_metres_among_others_are_named_and_speak_against_the_file() {
+    let (world, rows) = one_sphere(25.0, 6);
+    for (share, of) in [(3, "m"), (5, "inches"), (2, "cm")] {
+        let factor = [("m", 1000.0), ("inches", 25.4), ("cm", 10.0)].iter().find(|unit| unit.0 == of).unwrap().1;
+        let mut mixed = rows.clone();
+        mixed.iter_mut().step_by(share).for_each(|row| point(row).coords /= factor);
+        let set = Dataset::new(&mixed).unwrap();
+        let Mended { set: mended, findings, against, .. } = examine(&set, &world.nominal, &Settings::default());
+        assert!(findings.is_empty() && against.len() == 1, "{of}: {findings:?} {against:?}");
+        assert!(against[0].finding.contains(&format!("a part of the readings is in {of}")), "{against:?}");
+        assert_eq!(against[0].rows.len(), rows.len().div_ceil(share));
+        let right = Dataset::new(&rows).unwrap();
+        for (pose, right) in mended.poses.iter().zip(&right.poses) {
+            let (Reading::Position { point_mm: a, .. }, Reading::Position { point_mm: b, .. }) =
+                (&pose.reading, &right.reading)
+            else {
+                continue;
+            };
+            assert!((a - b).norm() < 1e-6);
+        }
+    }
 }

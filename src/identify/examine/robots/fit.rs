@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 
 use crate::geometry::{fitted_frame, rigid_columns};
-use crate::identify::model::kinematics::Kinematics;
+use crate::identify::model::kinematics::{Kinematics, Place};
 use crate::linear_algebra::{Eliminated, product, pseudo_inverse};
 use crate::robot::{Parameter, Robot, Unit};
 use crate::statistics::median;
@@ -48,6 +48,8 @@ pub(super) struct Points {
     pub(super) joints_rad: Vec<Vec<f64>>,
     pub(super) points_mm: Vec<Point3<f64>>,
     pub(super) groups: Vec<usize>,
+    /// Of each row, which of several tools it is of, from 0; empty where all are of one.
+    pub(super) tools: Vec<usize>,
 }
 
 /// What a fit leaves.
@@ -70,6 +72,13 @@ impl Left {
     /// Scatter of a coordinate, mm.
     pub(super) fn scatter_mm(&self) -> f64 {
         (self.squares / self.freedom()).sqrt()
+    }
+
+    /// Weights of all rows without those of these that are gross errors.
+    pub(super) fn weights(&self, rows: &[usize], count: usize) -> Vec<f64> {
+        let (mut weights, limit) = (vec![1.0; count], GROSS * typical_mm(&self.errors_mm));
+        rows.iter().zip(&self.errors_mm).filter(|(_, error)| **error > limit).for_each(|(&row, _)| weights[row] = 0.0);
+        weights
     }
 
     pub(super) fn and(mut self, other: Left) -> Left {
@@ -109,6 +118,17 @@ impl Points {
         self.fitted(self.at_file(parts), weights.to_vec(), &mut |_, _| ()).0
     }
 
+    /// One robot for these rows with common placements, and where the further tools stand from the first, mm.
+    pub(super) fn with_tools(&self, rows: Vec<usize>, weights: &[f64]) -> (Left, Vec<Vector3<f64>>) {
+        let (left, x) = self.fitted(self.at_file(&[rows]), weights.to_vec(), &mut |_, _| ());
+        let tool = |k: usize| Vector3::from_fn(|axis, _| x[self.parameters.len() + TARGET * k + axis]);
+        (left, (0..self.further_tools()).map(tool).collect())
+    }
+
+    fn further_tools(&self) -> usize {
+        self.tools.iter().copied().max().unwrap_or(0)
+    }
+
     /// A robot a part, each with what it leaves.
     pub(super) fn apart(&self, parts: &[Vec<usize>], weights: &[f64]) -> Vec<Left> {
         parts.iter().map(|part| self.together(std::slice::from_ref(part), weights)).collect()
@@ -141,7 +161,7 @@ impl Points {
     }
 
     fn at_file<'a>(&self, parts: &'a [Vec<usize>]) -> Fit<'a> {
-        let count = self.parameters.len() + TARGET * (parts.len() - 1);
+        let count = self.parameters.len() + TARGET * (parts.len() - 1 + self.further_tools());
         Fit { parts, x: DVector::zeros(count), steps: STEPS }
     }
 
@@ -176,7 +196,7 @@ impl Points {
         let count = x.len();
         let (normal, mut left) = self.normals(parts, kinematics, x, weights);
         let measured = normal.view((0, 0), (count, count)).into_owned();
-        let prior = self.prior(parts.len(), scatter_mm);
+        let prior = self.prior(parts.len() + self.further_tools(), scatter_mm);
         let inverse = pseudo_inverse(&measured + DMatrix::from_diagonal(&prior));
         left.taken = product(&inverse, &measured).trace();
         let step = &inverse * (normal.view((0, count), (count, 1)) - prior.component_mul(x));
@@ -196,7 +216,8 @@ impl Points {
         let mut left = Left { squares: 0.0, numbers: 0.0, taken: 0.0, errors_mm: Vec::new() };
         for (p, (part, kinematics)) in parts.iter().zip(kinematics).enumerate() {
             let target = of_links + TARGET * p;
-            let at: Vec<usize> = (0..of_links).chain(target..target + TARGET).collect();
+            let further = count - TARGET * self.further_tools();
+            let at: Vec<usize> = (0..of_links).chain(target..target + TARGET).chain(further..count).collect();
             let offsets: Vec<f64> = at.iter().map(|&i| x[i]).collect();
             let of_part = self.normal(part, kinematics, &offsets, weights);
             let whole: Vec<usize> = at.into_iter().chain([count]).collect();
@@ -223,16 +244,31 @@ impl Points {
         DVector::from_iterator(all.len(), all.iter().map(|sigma| (scatter_mm / sigma).powi(2)))
     }
 
+    /// Where the offsets of a row's tool stand, if it is a further one.
+    fn further_tool(&self, row: usize) -> Option<usize> {
+        let k = self.tools.get(row)?.checked_sub(1)?;
+        Some(self.parameters.len() + TARGET * k)
+    }
+
+    /// How far a further tool takes the point of a row, mm.
+    fn of_tool(&self, row: usize, place: &Place, offsets: &[f64]) -> Vector3<f64> {
+        let Some(at) = self.further_tool(row) else { return Vector3::zeros() };
+        let columns = place.point_columns.columns(self.parameters.len() - TARGET, TARGET);
+        (0..TARGET).map(|axis| columns.column(axis) * offsets[at + axis]).sum()
+    }
+
     fn normal(&self, part: &[usize], kinematics: &Kinematics, offsets: &[f64], weights: &[f64]) -> Normal {
-        let places = kinematics.places(offsets, true);
-        let kept = self.parameters.len() + 1;
+        let places = kinematics.places(&offsets[..self.parameters.len()], true);
+        let kept = offsets.len() + 1;
+        let moved: Vec<Point3<f64>> =
+            part.iter().zip(&places).map(|(&row, place)| place.point_mm + self.of_tool(row, place, offsets)).collect();
         let mut sum = Normal { matrix: DMatrix::zeros(kept, kept), numbers: 0.0, errors_mm: vec![0.0; part.len()] };
         let mut groups: Vec<usize> = part.iter().map(|&row| self.groups[row]).collect();
         groups.sort_unstable();
         groups.dedup();
         for group in groups {
             let of_group: Vec<usize> = (0..part.len()).filter(|&i| self.groups[part[i]] == group).collect();
-            let pair = |&i: &usize| (self.points_mm[part[i]], places[i].point_mm, weights[part[i]]);
+            let pair = |&i: &usize| (self.points_mm[part[i]], moved[i], weights[part[i]]);
             let weight: f64 = of_group.iter().map(|&i| weights[part[i]]).sum();
             // So few rows place nothing.
             if TARGET as f64 * weight <= PLACEMENT as f64 {
@@ -242,12 +278,16 @@ impl Points {
             let mut columns = DMatrix::zeros(TARGET * of_group.len(), kept + PLACEMENT);
             for (k, &i) in of_group.iter().enumerate() {
                 let root = weights[part[i]].sqrt();
-                let error: Vector3<f64> = frame * self.points_mm[part[i]] - places[i].point_mm;
+                let error: Vector3<f64> = frame * self.points_mm[part[i]] - moved[i];
                 sum.errors_mm[i] = error.norm();
                 let mut rows = columns.rows_mut(TARGET * k, TARGET);
-                rows.columns_mut(0, kept - 1).copy_from(&(root * &places[i].point_columns));
+                rows.columns_mut(0, self.parameters.len()).copy_from(&(root * &places[i].point_columns));
+                if let Some(at) = self.further_tool(part[i]) {
+                    let columns = root * places[i].point_columns.columns(self.parameters.len() - TARGET, TARGET);
+                    rows.columns_mut(at, TARGET).copy_from(&columns);
+                }
                 rows.column_mut(kept - 1).copy_from(&(root * error));
-                rows.columns_mut(kept, PLACEMENT).copy_from(&(root * rigid_columns(&places[i].point_mm.coords)));
+                rows.columns_mut(kept, PLACEMENT).copy_from(&(root * rigid_columns(&moved[i].coords)));
             }
             sum.numbers += TARGET as f64 * weight - PLACEMENT as f64;
             sum.matrix += Eliminated::new(&product(&columns, &columns), kept).normal;

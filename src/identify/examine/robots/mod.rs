@@ -10,12 +10,14 @@
 //! parts, which looks like another robot.
 
 mod fit;
+pub(super) mod tools;
 
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use self::fit::{Left, Points};
 use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::examine::hypothesis::still;
 use crate::identify::examine::sessions;
 use crate::identify::finding::Finding;
 use crate::identify::judge::locate::REPEATABILITY_MM;
@@ -24,6 +26,9 @@ use crate::robot::Robot;
 
 /// Fewest rows of a part: they are more numbers than its tool and placement.
 const SHORTEST: usize = 8;
+
+/// Joints that must move.
+const FEWEST_MOVING: usize = 3;
 
 /// Most stretches that one table is cut into.
 const MOST_PARTS: usize = 4;
@@ -162,10 +167,11 @@ struct Table {
 }
 
 impl Table {
-    /// `None` of sets of anything but whole points.
+    /// `None` of sets of anything but whole points, and where so few joints move that links say nothing.
     fn new(set: &Dataset, robot: &Robot) -> Option<Table> {
         let whole = set.poses.iter().all(|pose| pose.on_body_mm.is_none());
-        if set.kind != Kind::Positions || !whole {
+        let moving = robot.joints.len() - still(set).len().min(robot.joints.len());
+        if set.kind != Kind::Positions || !whole || moving < FEWEST_MOVING {
             return None;
         }
         let rows = set.fit_rows();
@@ -179,6 +185,7 @@ impl Table {
             joints_rad: rows.iter().map(|&row| set.poses[row].joints_rad.clone()).collect(),
             points_mm: rows.iter().map(point).collect::<Option<Vec<_>>>()?,
             groups: rows.iter().map(|&row| set.poses[row].group).collect(),
+            tools: Vec::new(),
         };
         Some(Table { rows, points })
     }

@@ -142,3 +142,49 @@ fn what_a_model_lacks_makes_no_robots() {
         assert_eq!(found(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}, in order");
     }
 }
+
+#[test]
+fn a_tool_that_moved_between_rows_or_files_is_told_with_how_far() {
+    for seed in 0..6 {
+        for files in [true, false] {
+            let (samples, tool_mm) = ([20, 40, 60][seed as usize % 3], [2.0, 20.0][seed as usize % 2]);
+            let (set, robot) = tables(&[arm(samples, 0.0, 0.0, seed), arm(samples, 0.0, tool_mm, seed + 50)], files);
+            let told = tools::find(&set, &robot).unwrap_or_else(|| panic!("seed {seed}, files {files}"));
+            assert!(!told.is_placed, "{told:?}");
+            let finding = told.finding;
+            // The tool moves along x, y and half of that along z.
+            let text = finding.finding.split(" by ").nth(1).unwrap();
+            let far_mm: f64 = text.split(' ').next().unwrap().parse().unwrap();
+            assert!((far_mm / (1.5 * tool_mm) - 1.0).abs() < 0.1, "{seed} {files}: {finding:?}");
+            let where_ = if files { "elsewhere on the flange than in arm_1.csv: in arm_2.csv" } else { "from row b" };
+            assert!(finding.finding.contains(where_), "{seed} {files}: {finding:?}");
+            let (same, robot) = tables(&[arm(samples, 0.0, 0.0, seed), arm(samples, 0.0, 0.0, seed + 50)], files);
+            assert_eq!(tools::find(&same, &robot), None, "seed {seed}, files {files}");
+            // A camera that moved is no tool.
+            let mut moved = same.clone();
+            let step = transform(Vector3::new(0.02, 0.1, -0.05), Vector3::new(30.0, -80.0, 15.0));
+            let half = moved.poses.len() / 2;
+            for pose in &mut moved.poses[half..] {
+                let Reading::Position { point_mm, .. } = &mut pose.reading else { continue };
+                *point_mm = step * *point_mm;
+            }
+            let told = tools::find(&moved, &robot);
+            assert!(told.is_none_or(|told| told.is_placed), "seed {seed}, files {files}, camera moved");
+        }
+    }
+}
+
+#[test]
+fn what_a_model_lacks_moves_no_tool() {
+    for seed in 0..8 {
+        let mut world = planned(160, 0, 25.0, 0.02, seed, &|_| {});
+        world.rows.retain(|row| row.at.role != Role::Center);
+        for row in &mut world.rows {
+            row.at.joints_deg[1] += 0.1 * (2.0 * row.at.joints_deg[1].to_radians()).sin();
+            row.at.joints_deg[4] += 0.2 * row.at.joints_deg[4].to_radians().cos();
+        }
+        assert_eq!(tools::find(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}");
+        world.rows.sort_by(|a, b| a.at.joints_deg[4].total_cmp(&b.at.joints_deg[4]));
+        assert_eq!(tools::find(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}, in order");
+    }
+}

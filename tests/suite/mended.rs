@@ -1,0 +1,236 @@
+//! Tables that are not what they seem to be, judged by a robot that is known: what is said of them, with which figures and which status.
+
+use std::path::Path;
+
+use camino::Utf8Path;
+use stereocal::robot::{Robot, file};
+
+use crate::run::{stderr, stdout, stereocal, workplace};
+
+/// A robot with points of 60 poses, identified into `out`.
+fn identified() -> tempfile::TempDir {
+    let folder = workplace();
+    let at = folder.path();
+    let made = ["simulate", "--points-only", "--samples", "48", "--verify", "12", "--seed", "7", "--out", "."];
+    assert_eq!(stereocal(at, &made).status.code(), Some(0));
+    identify(at, 0);
+    folder
+}
+
+fn identify(at: &Path, status: i32) -> String {
+    let found = ["identify", "--measurements", "truth/measurements.csv", "--method", "trust-region"];
+    let found = stereocal(at, &[&found[..], &["--robot", "robot.toml", "--force"]].concat());
+    let said = stdout(&found) + &stderr(&found);
+    assert_eq!(found.status.code(), Some(status), "{said}");
+    said
+}
+
+/// The verify rows alone, changed, and their names; the columns are those of the contract.
+fn rows(at: &Path, change: impl Fn(&mut Vec<Vec<String>>)) -> Vec<String> {
+    rows_of(at, ",verify,", change)
+}
+
+/// The same of the rows that hold this.
+fn rows_of(at: &Path, held: &str, change: impl Fn(&mut Vec<Vec<String>>)) -> Vec<String> {
+    let text = std::fs::read_to_string(at.join("truth/measurements.csv")).unwrap();
+    let mut lines = text.lines();
+    let header = lines.next().unwrap();
+    let kept = lines.filter(|line| line.contains(held));
+    let mut rows: Vec<Vec<String>> = kept.map(|line| line.split(',').map(str::to_owned).collect()).collect();
+    change(&mut rows);
+    let body: Vec<String> = rows.iter().map(|row| row.join(",")).collect();
+    std::fs::write(at.join("new.csv"), format!("{header}\n{}\n", body.join("\n"))).unwrap();
+    rows.into_iter().map(|row| row[0].clone()).collect()
+}
+
+/// Column of joint `j1_deg`, and of `x_mm`.
+const JOINT: usize = 3;
+const POINT: usize = 9;
+
+fn scaled(rows: &mut [Vec<String>], columns: std::ops::Range<usize>, factor: f64) {
+    for row in rows {
+        for column in columns.clone() {
+            row[column] = (factor * row[column].parse::<f64>().unwrap()).to_string();
+        }
+    }
+}
+
+fn exchanged(rows: &mut [Vec<String>], a: usize, b: usize) {
+    for column in POINT..POINT + 3 {
+        let of_a = rows[a][column].clone();
+        rows[a][column] = std::mem::replace(&mut rows[b][column], of_a);
+    }
+}
+
+fn verify(at: &Path) -> (i32, serde_json::Value, String) {
+    let arguments = ["verify", "--measurements", "new.csv", "--robot", "robot.toml", "--robot", "out/identified.toml"];
+    let told = stereocal(at, &[&arguments[..], &["--json"]].concat());
+    let said = stereocal(at, &arguments);
+    assert_eq!(told.status.code(), said.status.code());
+    let json = serde_json::from_slice(told.stdout.as_slice()).unwrap();
+    (said.status.code().unwrap(), json, stdout(&said) + &stderr(&said))
+}
+
+/// Mean error of points of the identified robot.
+fn mean(json: &serde_json::Value, figures: &str) -> f64 {
+    json["robots"][1][figures]["point"]["mean_abs_mm"].as_f64().unwrap()
+}
+
+#[test]
+fn verify_says_what_its_figures_are_of() {
+    let folder = identified();
+    let at = folder.path();
+    // Of the first placement all rows: those of few poses do not tell who strays.
+    rows_of(at, ",1,", |_| ());
+    let (status, clean, said) = verify(at);
+    assert!(status == 0 && clean.get("strays").is_none() && !said.contains("without"), "{said}");
+    let right_mm = mean(&clean, "verify");
+    let names = rows_of(at, ",1,", |rows| exchanged(rows, 2, 7));
+    let (status, json, said) = verify(at);
+    assert_eq!(status, 1, "{said}");
+    let told = format!("the readings of rows {} and {}, or their joints, are exchanged", names[2], names[7]);
+    assert!(said.contains(&told) && said.contains(&format!("without {}, {}:", names[2], names[7])), "{said}");
+    assert_eq!(json["strays"], serde_json::json!([names[2], names[7]]));
+    assert!(mean(&json, "verify") > 10.0 * right_mm && mean(&json, "verify_without_strays") < 2.0 * right_mm, "{json}");
+    // What is mended is in the figures.
+    rows_of(at, ",1,", |rows| scaled(rows, JOINT + 2..JOINT + 3, -1.0));
+    let (status, json, said) = verify(at);
+    assert!(
+        status == 1 && said.contains("joint 3 is counted the other way round") && said.contains("mended"),
+        "{said}"
+    );
+    assert!((mean(&json, "verify") - right_mm).abs() < 1e-6, "{json}");
+}
+
+#[test]
+fn rows_outside_the_ranges_that_terms_were_identified_in_are_said() {
+    let folder = identified();
+    let at = folder.path();
+    let path = Utf8Path::from_path(at).unwrap().join("out/identified.toml");
+    // Without provenance nothing but the place says that record and robot belong together.
+    let found =
+        ["identify", "--measurements", "truth/measurements.csv", "--method", "trust-region", "--robot", "robot.toml"];
+    assert_eq!(stereocal(at, &[&found[..], &["--force", "--no-provenance"]].concat()).status.code(), Some(0));
+    let record = at.join("out/identification.json");
+    let mut json: serde_json::Value = serde_json::from_slice(&std::fs::read(&record).unwrap()).unwrap();
+    let of_joint = json["expected"]["joint_ranges"][1].clone();
+    let (low, high) = (of_joint[0].as_f64().unwrap(), of_joint[1].as_f64().unwrap());
+    let said = |json: &serde_json::Value, robot: &Robot| {
+        std::fs::write(&record, json.to_string()).unwrap();
+        std::fs::write(&path, file::to_toml(robot)).unwrap();
+        rows(at, |_| ());
+        verify(at).2
+    };
+    let mut robot = file::read(&path).unwrap();
+    let term = stereocal::robot::corrections::HarmonicTerm {
+        joint: 1,
+        wave: stereocal::robot::corrections::Wave::Cos,
+        amplitude_rad: 1e-9,
+    };
+    robot.corrections.harmonics = vec![term];
+    assert!(!said(&json, &robot).contains("are outside"), "{}", said(&json, &robot));
+    json["expected"]["joint_ranges"][1] = serde_json::json!([low, low + 0.3 * (high - low)]);
+    let told = said(&json, &robot);
+    assert!(told.contains("are outside: joint 2 in ") && told.contains("`identify --extensions none`"), "{told}");
+    robot.corrections = stereocal::robot::corrections::Corrections {
+        gravity_direction: robot.corrections.gravity_direction,
+        ..Default::default()
+    };
+    assert!(!said(&json, &robot).contains("are outside"), "{}", said(&json, &robot));
+}
+
+#[test]
+fn a_check_of_rows_in_metres_or_with_a_sign_flipped_names_that() {
+    let folder = identified();
+    let at = folder.path();
+    let against = || {
+        let arguments =
+            ["verify", "--measurements", "new.csv", "--against", "out/identified.toml", "--out", "checks", "--force"];
+        let told = stereocal(at, &arguments);
+        (told.status.code().unwrap(), stdout(&told) + &stderr(&told))
+    };
+    rows(at, |_| ());
+    let (_, said) = against();
+    assert!(!said.contains("mended for this run") && !said.contains("CHANGED"), "{said}");
+    rows(at, |rows| scaled(rows, POINT..POINT + 3, 0.001));
+    let (status, said) = against();
+    assert!(status == 1 && said.contains("the readings are in m, not in mm"), "{said}");
+    assert!(said.contains("whether the robot was identified from these rows is not known"), "{said}");
+    assert!(!said.contains("CHANGED"), "{said}");
+    rows(at, |rows| scaled(rows, JOINT + 2..JOINT + 3, -1.0));
+    let (status, said) = against();
+    assert!(
+        status != 0 && said.contains("joint 3 is counted the other way round") && !said.contains("CHANGED"),
+        "{said}"
+    );
+}
+
+#[test]
+fn points_that_are_all_one_are_no_measurement() {
+    let folder = identified();
+    let at = folder.path();
+    rows_of(at, ",sample,", |rows| scaled(rows, POINT..POINT + 3, 0.0));
+    let told = stereocal(at, &["identify", "--measurements", "new.csv", "--robot", "robot.toml", "--out", "one"]);
+    assert_eq!(told.status.code(), Some(2), "{}", stdout(&told));
+    assert!(stderr(&told).contains("all 48 points are one, 0.000, 0.000, 0.000 mm"), "{}", stderr(&told));
+}
+
+#[test]
+fn angles_that_were_rounded_are_the_reason() {
+    let folder = identified();
+    let at = folder.path();
+    let path = at.join("truth/measurements.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let rounded = |(k, line): (usize, &str)| {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if k > 0 {
+            fields[JOINT..JOINT + 6].iter_mut().for_each(|q| *q = format!("{:.0}", q.parse::<f64>().unwrap()));
+        }
+        fields.join(",") + "\n"
+    };
+    std::fs::write(&path, text.lines().enumerate().map(rounded).collect::<String>()).unwrap();
+    let said = identify(at, 1);
+    assert!(said.contains("do not use the identified robot: the joint angles are rounded to 1 deg"), "{said}");
+}
+
+#[test]
+fn a_robot_whose_last_link_holds_the_tool_is_compensated() {
+    let folder = identified();
+    let at = folder.path();
+    let path = Utf8Path::from_path(at).unwrap();
+    let mut nominal = file::read(&path.join("robot.toml")).unwrap();
+    let mut long = file::read(&path.join("out/identified.toml")).unwrap();
+    nominal.tool_mm = nalgebra::Vector3::zeros();
+    long.tool_mm = nalgebra::Vector3::zeros();
+    long.joints[5].d_mm += 93.0;
+    std::fs::write(at.join("bare.toml"), file::to_toml(&nominal)).unwrap();
+    std::fs::write(at.join("long.toml"), file::to_toml(&long)).unwrap();
+    let short = Robot {
+        joints: {
+            let mut joints = long.joints.clone();
+            joints[5].d_mm -= 93.0;
+            joints
+        },
+        ..long.clone()
+    };
+    std::fs::write(
+        at.join("short.toml"),
+        file::to_toml(&Robot { tool_mm: nalgebra::Vector3::new(0.0, 0.0, 93.0), ..short }),
+    )
+    .unwrap();
+    std::fs::write(at.join("t.csv"), "name,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg\na,10,20,-15,5,40,30\n").unwrap();
+    let readings = |identified: &str, out: &str| {
+        let told =
+            stereocal(at, &["compensate", "t.csv", "--robot", "bare.toml", "--identified", identified, "--out", out]);
+        let said = stdout(&told) + &stderr(&told);
+        assert_eq!(told.status.code(), Some(0), "{identified}: {said}");
+        let text = std::fs::read_to_string(at.join(out).join("compensated.csv")).unwrap();
+        let joints: Vec<f64> =
+            text.lines().nth(1).unwrap().split(',').skip(1).take(6).map(|q| q.parse().unwrap()).collect();
+        (joints, said)
+    };
+    let ((of_long, said), (of_short, _)) = (readings("long.toml", "a"), readings("short.toml", "b"));
+    assert!(said.contains("what it has more is the tool's"), "{said}");
+    // But for what the identified last link differs from the nominal one by, which is the tool's as well.
+    assert!(of_long.iter().zip(&of_short).all(|(a, b)| (a - b).abs() < 0.1), "{of_long:?} {of_short:?}");
+}
