@@ -56,10 +56,11 @@ fn scaled(rows: &mut [Vec<String>], columns: std::ops::Range<usize>, factor: f64
 }
 
 fn exchanged(rows: &mut [Vec<String>], a: usize, b: usize) {
-    for column in POINT..POINT + 3 {
-        let of_a = rows[a][column].clone();
-        rows[a][column] = std::mem::replace(&mut rows[b][column], of_a);
-    }
+    let points = POINT..POINT + 3;
+    let of_a = rows[a][points.clone()].to_vec();
+    let of_b = rows[b][points.clone()].to_vec();
+    rows[a][points.clone()].clone_from_slice(&of_b);
+    rows[b][points].clone_from_slice(&of_a);
 }
 
 fn verify(at: &Path) -> (i32, serde_json::Value, String) {
