@@ -88,7 +88,7 @@ impl Table {
         let step = count.div_ceil(ROWS);
         let (first, last) = (SHORTEST, count - SHORTEST);
         let grid = ((last - first) / GRID).max(1);
-        let thinned = |row: &usize| row % step == 0;
+        let thinned = |row: &usize| row.is_multiple_of(step);
         let (_, rough) = self.best_step((first..=last).step_by(grid), thinned)?;
         let around = |at: usize, by: usize| at.saturating_sub(by).max(first)..=(at + by).min(last);
         let (_, middle) = self.best_step(around(rough, grid).step_by(step), thinned)?;
