@@ -8,6 +8,7 @@ use crate::simulate::draws::{Draws, Purpose};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::judge::assessment::{Demand, Judged};
+use crate::stereo::judge::ledger::LensPairs;
 use crate::stereo::judge::ledger::Standards;
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::select::options::Options;
@@ -20,7 +21,8 @@ pub(crate) const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: So
 /// A calibration judged by its held-out lengths.
 pub(crate) fn judged(found: &Calibration, findings: Vec<Finding>, standards: Standards, tolerance_mm: f64) -> Judged {
     let accuracy = held_out::hold_out(found, None).unwrap();
-    let demand = Demand { tolerance_mm, board_uncertainty_mm: None, extent: Extent::Boards, lens_pairs: 0 };
+    let demand =
+        Demand { tolerance_mm, board_uncertainty_mm: None, extent: Extent::Boards, lens_pairs: LensPairs::default() };
     Judged::new(found, findings, accuracy, standards, &demand)
 }
 

@@ -279,6 +279,17 @@ fn pairs_that_the_calibration_was_made_of_are_no_test_of_it() {
     assert_eq!(twice.status.code(), Some(1), "{}", stderr(&twice));
     let file = json(&at.join("known/camera-check.json"));
     assert!(file["evidence"].to_string().contains("lenses known from other pairs"), "{file}");
+    // One of the five among new ones is said, and changes little.
+    let known =
+        ["camera-check", "mixed", "--intrinsics", "before/calibration.json", "--out", "mostly", "--tolerance-mm", "1"];
+    let mostly = stereocal(at, &known);
+    assert!(
+        stderr(&mostly).contains("calibrated from 1 of these pairs (of 5), which count twice"),
+        "{}",
+        stderr(&mostly)
+    );
+    let file = json(&at.join("mostly/camera-check.json"));
+    assert!(!file["evidence"].to_string().contains("lenses known from other pairs"), "{file}");
     let second = stereocal(at, &["camera-check", "old", "--check-images", "mixed", "--out", "second"]);
     assert_eq!(second.status.code(), Some(2));
     assert!(stderr(&second).contains("2 of the 10 pictures in mixed are those"), "{}", stderr(&second));

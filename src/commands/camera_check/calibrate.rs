@@ -27,7 +27,7 @@ use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::residuals;
 use crate::stereo::findings::standing::{self, Asked};
 use crate::stereo::judge::assessment::{Demand, Judged};
-use crate::stereo::judge::ledger::Standards;
+use crate::stereo::judge::ledger::{LensPairs, Standards};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::lengths::second_board::{self, SecondBoard};
 use crate::stereo::judge::moves;
@@ -50,6 +50,7 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let (board, by_caliper_mm) = board(args, config, pairing.as_ref())?;
     demand.board_uncertainty_mm = demand.board_uncertainty_mm.or(by_caliper_mm);
     demand.lens_pairs = pairs_of_lenses(args, pairing.as_ref(), &out);
+    demand.lens_pairs.statement().iter().for_each(progress::warn);
     let known = known_lenses(args)?;
     let corners = corners(args, board, pairing.as_ref(), known.as_ref(), &out)?;
     known.as_ref().map_or(Ok(()), |known| known.check_size(&corners))?;
@@ -105,7 +106,7 @@ fn demand(args: &CameraCheck, config: &Config) -> Result<Demand> {
         tolerance_mm,
         board_uncertainty_mm: args.board_uncertainty_mm,
         extent: args.volume.unwrap_or_default(),
-        lens_pairs: 0,
+        lens_pairs: LensPairs::default(),
     })
 }
 
@@ -255,15 +256,17 @@ fn hashes(pairs: &[PairFiles]) -> impl Iterator<Item = String> {
     pairs.iter().flat_map(|pair| [&pair.left, &pair.right]).filter_map(|path| hash_of_picture(path))
 }
 
-/// How many of the pairs were among those from which the lenses of `--intrinsics` are known; all where the whole file of corners was.
-fn pairs_of_lenses(args: &CameraCheck, pairing: Option<&Pairing>, out: &OutDir) -> usize {
+/// Which of the pairs were among those from which the lenses of `--intrinsics` are known; all where the whole file of corners was.
+fn pairs_of_lenses(args: &CameraCheck, pairing: Option<&Pairing>, out: &OutDir) -> LensPairs {
     let files = || args.intrinsics.iter().map(|lens| lens.path.as_path());
     let Some(pairing) = pairing else {
         let run = out.provenance();
-        return files().filter(|file| run.as_ref().is_some_and(|run| run.shares(file).is_some())).count();
+        let same = files().filter(|file| run.as_ref().is_some_and(|run| run.shares(file).is_some())).count();
+        return LensPairs { same, of: same };
     };
     let known: BTreeSet<String> = files().flat_map(Provenance::pictures_of).collect();
-    pairing.pairs.iter().filter(|pair| is_among(&known, &pair.left) || is_among(&known, &pair.right)).count()
+    let is_own = |pair: &&PairFiles| is_among(&known, &pair.left) || is_among(&known, &pair.right);
+    LensPairs { same: pairing.pairs.iter().filter(is_own).count(), of: known.len() / 2 }
 }
 
 /// A second board measured by the rig, where its pictures were named.

@@ -4,7 +4,7 @@ use crate::diagnostic::Warning;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::judge::evidence::{self, Evidence};
-use crate::stereo::judge::ledger::{Case, Facts, KNOWN_MOVE, Standards, ledger};
+use crate::stereo::judge::ledger::{Case, Facts, KNOWN_MOVE, LensPairs, Standards, ledger};
 use crate::stereo::judge::lengths::held_out::Accuracy;
 use crate::stereo::judge::lengths::model_disagreement;
 use crate::stereo::judge::residual_correlation;
@@ -40,8 +40,8 @@ pub struct Demand {
     pub board_uncertainty_mm: Option<f64>,
     /// The volume that the verdict is for.
     pub extent: Extent,
-    /// How many of the pairs were among those from which the lenses were known beforehand.
-    pub lens_pairs: usize,
+    /// The pairs from which the lenses were known beforehand.
+    pub lens_pairs: LensPairs,
 }
 
 impl Judged {

@@ -17,8 +17,8 @@ use crate::stereo::volume::lengths::{VolumeLength, VolumeLengths};
 pub struct Facts {
     /// The largest error that passes, mm.
     pub tolerance_mm: f64,
-    /// How many of the pairs were among those from which the lenses were known beforehand.
-    pub lens_pairs: usize,
+    /// The pairs from which the lenses were known beforehand.
+    pub lens_pairs: LensPairs,
     /// How uncertainties are expanded.
     pub expansion: Expansion,
     /// Held-out accuracy.
@@ -35,6 +35,30 @@ pub struct Facts {
     pub findings: Vec<Finding>,
     /// How the boards are spread.
     pub coverage: Coverage,
+}
+
+/// Pairs that are among those from which the lenses were known beforehand: what they tell counts twice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LensPairs {
+    /// How many are.
+    pub same: usize,
+    /// Of how many the lenses are known.
+    pub of: usize,
+}
+
+impl LensPairs {
+    /// Whether so many count twice that the uncertainty is too small by a good part.
+    pub fn are_many(&self) -> bool {
+        self.same > 0 && 2 * self.same >= self.of
+    }
+
+    /// For a person.
+    pub fn statement(&self) -> Option<String> {
+        let LensPairs { same, of } = self;
+        (*same > 0).then(|| {
+            format!("the lenses were calibrated from {same} of these pairs (of {of}), which count twice: the uncertainty that is stated is too small")
+        })
+    }
 }
 
 /// Lengths that are known by something else than the board that calibrated.

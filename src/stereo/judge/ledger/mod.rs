@@ -10,5 +10,5 @@ mod moves;
 mod pairs;
 
 pub use all::ledger;
-pub use facts::{Case, Facts, Standards};
+pub use facts::{Case, Facts, LensPairs, Standards};
 pub use moves::KNOWN_MOVE;

@@ -227,14 +227,14 @@ pub(super) fn baseline(case: &Case) -> Option<Evidence> {
 /// Lenses that were known from some of these very pairs: what those tell counts twice, and the uncertainty is too small.
 pub(super) fn lenses_of_these_pairs(case: &Case) -> Option<Evidence> {
     let pairs = case.facts.lens_pairs;
-    (pairs > 0).then(|| Evidence {
+    pairs.statement().filter(|_| pairs.are_many()).map(|detail| Evidence {
         what: "lenses known from other pairs",
         remedy: "leave `--intrinsics` away, or give it a calibration from other pictures",
-        value: Some(pairs as f64),
-        limit: Some(0.0),
-        unit: if pairs == 1 { "pair" } else { "pairs" },
+        value: Some(pairs.same as f64),
+        limit: Some(0.5 * pairs.of as f64),
+        unit: "pairs that are the same",
         allows: Verdict::Undecided,
-        detail: "the lenses were calibrated from these pairs, which count twice: the uncertainty that is stated is too small".to_owned(),
+        detail,
     })
 }
 
