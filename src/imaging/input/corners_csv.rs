@@ -60,13 +60,15 @@ pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<C
     let table = Table::read(path, "corners file", hint)?;
     let mut rows = parse(&table, board)?;
     let mut notes = Vec::new();
-    if table.column("id").is_some() && !board.is_coded() {
+    let is_unused = table.column("id").is_some() && !board.is_coded();
+    if is_unused {
         notes.push(UNUSED_ID.to_owned());
     }
     if fit_to_board(&table, &mut rows, board)? {
         notes.push("the columns of the corners file run along the shorter side: turned by 90 degrees".to_owned());
     }
-    notes.extend(smaller(&rows, board));
+    // Of a board with markers the part that is seen tells nothing of its size.
+    notes.extend(smaller(&rows, board).filter(|_| !is_unused));
     let [left_size, right_size] =
         [size_of(&table, &rows, Side::Left, size)?, size_of(&table, &rows, Side::Right, size)?];
     let (pairs, skipped) = gather(rows, board);
