@@ -75,8 +75,8 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
 fn replaced(out: &Utf8Path) -> Vec<String> {
     let by_other = |(name, what): (&str, &str)| {
         let command = Provenance::of_json(&out.join(name))?.command;
-        let by = command.split_whitespace().find(|word| ["identify", "measure", "verify"].contains(word))?.to_owned();
-        Some(format!("{what} in {out} that `{by}` wrote is replaced: `--out DIR` keeps both"))
+        let by = command.split_whitespace().find(|word| ["identify", "measure", "locate"].contains(word))?;
+        (by != "locate").then(|| format!("{what} in {out} that `{by}` wrote is replaced: `--out DIR` keeps both"))
     };
     [(PLACEMENT, "placement.json"), ("measure.json", "measurements.csv")].into_iter().filter_map(by_other).collect()
 }

@@ -199,9 +199,10 @@ pub fn picture_hash(bytes: &[u8]) -> String {
     format!("{:032x}", xxh3_128(bytes))
 }
 
-/// Whether a picture is one of those whose hashes a result holds.
-pub fn is_among(pictures: &BTreeSet<String>, path: &Utf8Path) -> bool {
-    !pictures.is_empty() && hash_of_picture(path).is_some_and(|hash| pictures.contains(&kept(&hash)))
+/// Whether one of these pictures is one of those whose hashes a result holds.
+pub fn are_among(pictures: &BTreeSet<String>, paths: [&Utf8Path; 2]) -> bool {
+    let is_among = |path| hash_of_picture(path).is_some_and(|hash| pictures.contains(&kept(&hash)));
+    !pictures.is_empty() && paths.into_iter().any(is_among)
 }
 
 /// What a result holds of a picture's hash.

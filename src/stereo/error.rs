@@ -32,10 +32,8 @@ pub enum Error {
         /// Pairs with a board in one picture at least.
         pairs: usize,
     },
-    /// The pictures that are compared with a rig have the right camera on its other side.
-    #[error(
-        "left and right pictures are exchanged: by them, the right camera stands on the other side of the left one than in the calibration"
-    )]
+    /// Pairs that are compared with a rig fit it with their pictures exchanged.
+    #[error("left and right pictures are exchanged: each pair fits the calibration the other way round")]
     Exchanged,
     /// The box that a verdict is asked for lies where the cameras do not both look.
     #[error("no place of the box of `--volume` is seen by both cameras")]

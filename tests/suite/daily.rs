@@ -150,6 +150,16 @@ fn a_rig_that_stands_is_valid_and_one_that_turned_is_named_with_a_history() {
             && history.lines().nth(2).unwrap().contains(",changed,")
     );
     assert!(std::fs::read_to_string(at.join("out/recheck.html")).unwrap().contains("Over time"));
+    // The pictures of the left camera for those of the right one are no change of the rig.
+    let other_side = |line: &str| match line.split(',').nth(1) {
+        Some("left") => line.replacen(",left,", ",right,", 1),
+        _ => line.replacen(",right,", ",left,", 1),
+    };
+    let three = std::fs::read_to_string(at.join("three.csv")).unwrap();
+    let exchanged: Vec<String> = three.lines().map(other_side).collect();
+    std::fs::write(at.join("exchanged.csv"), exchanged.join("\n")).unwrap();
+    let (status, _, messages) = check("exchanged.csv");
+    assert!(status == Some(2) && messages.contains("left and right pictures are exchanged"), "{status:?} {messages}");
     std::fs::write(at.join("one.csv"), "pair,side\n").unwrap();
     assert_eq!(check("one.csv").0, Some(2));
 }

@@ -10,7 +10,7 @@ use crate::cli::{BoardShape, CameraCheck};
 use crate::config::{self, Config};
 use crate::diagnostic::Status;
 use crate::files::OutDir;
-use crate::files::provenance::{Provenance, Run, hash_of_picture, is_among};
+use crate::files::provenance::{Provenance, Run, are_among, hash_of_picture};
 use crate::formats::calibration::CalibrationFile;
 use crate::formats::camera_check::CameraCheckFile;
 use crate::formats::lenses;
@@ -265,8 +265,24 @@ fn pairs_of_lenses(args: &CameraCheck, pairing: Option<&Pairing>, out: &OutDir) 
         return LensPairs { same, of: same };
     };
     let known: BTreeSet<String> = files().flat_map(Provenance::pictures_of).collect();
-    let is_own = |pair: &&PairFiles| is_among(&known, &pair.left) || is_among(&known, &pair.right);
+    let is_own = |pair: &&PairFiles| are_among(&known, [&pair.left, &pair.right]);
     LensPairs { same: pairing.pairs.iter().filter(is_own).count(), of: known.len() / 2 }
+}
+
+/// The error of a second board that is not found, with its own flags in the hint.
+fn no_second_board(error: &imaging::Error, images: &Utf8Path) -> config::Error {
+    let shown = match error {
+        imaging::Error::TooFewPairs { other: Some(other), .. } => {
+            format!("; the pictures show one of {} squares", other.squares)
+        }
+        _ => String::new(),
+    };
+    config::Error::Usage {
+        message: format!("the second board in {images}: {error}"),
+        hint: format!(
+            "`--check-squares CxR` and `--check-square-mm MM`, or `--check-board NAME`, say what the second board is{shown}"
+        ),
+    }
 }
 
 /// A second board measured by the rig, where its pictures were named.
@@ -295,16 +311,8 @@ fn second_board(
         let hint = "`--check-images` takes pictures of a second board, or others of the first".to_owned();
         return Err(config::Error::Usage { message, hint }.into());
     }
-    let corners = find_corners(&pairing, &Wanted { board, needed: 1, mosaic, cache, overlays: None }).map_err(|error| {
-        let shown = match &error {
-            imaging::Error::TooFewPairs { other: Some(other), .. } => format!("; the pictures show one of {} squares", other.squares),
-            _ => String::new(),
-        };
-        let hint = format!(
-            "`--check-squares CxR` and `--check-square-mm MM`, or `--check-board NAME`, say what the second board is{shown}"
-        );
-        config::Error::Usage { message: format!("the second board in {images}: {error}"), hint }
-    })?;
+    let wanted = Wanted { board, needed: 1, mosaic, cache, overlays: None };
+    let corners = find_corners(&pairing, &wanted).map_err(|error| no_second_board(&error, images))?;
     calibration.rig().check_size(&corners)?;
     let corners = open_numbers::by_rig(corners, calibration.rig());
     Ok(Some(second_board::second_board(calibration, &corners, board_uncertainty_mm)))

@@ -9,7 +9,7 @@ use super::squares::squares;
 use crate::cli::CameraCheck;
 use crate::config::{self, Config};
 use crate::files::OutDir;
-use crate::files::provenance::{Provenance, Run, hash_of_picture, is_among};
+use crate::files::provenance::{Provenance, Run, are_among, hash_of_picture};
 use crate::formats::calibration::{self, Calibrated};
 use crate::formats::recheck::{self as formats, Check, HISTORY, RecheckFile, Standing};
 use crate::imaging::corners::named;
@@ -102,7 +102,7 @@ impl Own {
         let is_first = |pair: &PairFiles| seen.insert([&pair.left, &pair.right].map(|path| hash_of_picture(path)));
         let (pairs, again): (Vec<PairFiles>, Vec<PairFiles>) = pairing.pairs.drain(..).partition(is_first);
         pairing.pairs = pairs;
-        let is_own = |pair: &PairFiles| is_among(&known, &pair.left) || is_among(&known, &pair.right);
+        let is_own = |pair: &PairFiles| are_among(&known, [&pair.left, &pair.right]);
         let (own, others): (Vec<PairFiles>, Vec<PairFiles>) = pairing.pairs.iter().cloned().partition(is_own);
         let left_out = !own.is_empty() && others.len() >= FEWEST_PAIRS;
         if left_out {

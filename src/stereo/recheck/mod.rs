@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use crate::difference::{Difference, SEEN, TOLD_APART};
-use crate::imaging::{Corners, Skipped};
+use crate::imaging::{Board, Corners, Skipped};
 use crate::stereo::Error;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
@@ -118,16 +118,13 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
         let total = corners.pairs.len() + corners.skipped.len();
         return Err(Error::TooFewPairs { found: problem.views.len(), needed: FEWEST_PAIRS, total, skipped });
     }
+    if are_exchanged(&problem, &corners.board) {
+        return Err(Error::Exchanged);
+    }
     skipped.sort_by(|a, b| a.pair.cmp(&b.pair));
     let layout =
         Layout { left: Some(before.rig.left.lens), right: Some(before.rig.right.lens), transform: true, shape: true };
     let solved = problem.solve(&layout)?;
-    let centre_mm = |rig: &Rig| rig.right_from_left.inverse().translation.vector;
-    let (then, now) = (centre_mm(&before.rig), centre_mm(&solved.problem.values.shared.rig));
-    // No knock moves a camera to the other side.
-    if then.dot(&now) < -0.5 * then.norm() * now.norm() {
-        return Err(Error::Exchanged);
-    }
     let [scatter, beyond] = scatter_beside(&solved, &layout, &corners.board, before.pair_excess, before.noise.as_ref());
     let trial = Trial::new(&solved.problem, layout).ok_or_else(Error::undetermined)?;
     let numbers = layout.shape_start();
@@ -170,6 +167,18 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let seen_mm = causes.iter().map(|cause| cause.seen_mm).fold(0.0, f64::max);
     let pairs = solved.problem.views.iter().map(|view| view.pair.clone()).collect();
     Ok(Recheck { pairs, skipped, length_mm, causes, change, effect_mm, seen_mm })
+}
+
+/// Whether each pair comes several times nearer to the old rig with its pictures exchanged: no knock moves a camera to the other side.
+fn are_exchanged(problem: &Problem, board: &Board) -> bool {
+    const SEVERAL: f64 = 4.0;
+    let shared = &problem.values.shared;
+    problem.views.iter().all(|view| {
+        let mut other = view.exchanged();
+        other.turn_right(board, numbering::on_rig(shared, board, &other).unwrap_or(0));
+        let miss_px = |view: &View| misfit_px(shared, view).map_or(f64::INFINITY, |(px, _)| px);
+        SEVERAL * miss_px(&other) < miss_px(view)
+    })
 }
 
 /// From the old rig to that of the pairs as the equations at the old one foretell it, with its covariance: where the pairs leave a bent valley,
