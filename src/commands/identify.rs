@@ -56,7 +56,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let Searched { found, not_run } = search(&set, &nominal, &settings, args.seed, doubts, &|step| bar.begin(step))?;
     bar.finish_and_clear();
     let of_fit = record::findings::findings(&set, &found, &along);
-    let findings = Findings::new(findings, unexplained, of_fit, &along, &set, &found).with_against(against);
+    let findings = Findings::new(findings, (against, unexplained), of_fit, &along, &set, &found);
     let mut record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     record.warnings.extend(not_run.clone());
     record.not_run = not_run;

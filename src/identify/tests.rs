@@ -333,7 +333,7 @@ fn readings_of_another_scale_are_said_to_be_so() {
         let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
         let findings = crate::identify::record::findings::Findings::new(
             Vec::new(),
-            None,
+            (Vec::new(), None),
             Vec::new(),
             &Default::default(),
             &set,

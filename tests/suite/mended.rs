@@ -235,3 +235,42 @@ fn a_robot_whose_last_link_holds_the_tool_is_compensated() {
     // But for what the identified last link differs from the nominal one by, which is the tool's as well.
     assert!(of_long.iter().zip(&of_short).all(|(a, b)| (a - b).abs() < 0.1), "{of_long:?} {of_short:?}");
 }
+
+#[test]
+fn a_tool_that_moved_is_the_only_reason_that_is_given() {
+    let folder = workplace();
+    let at = folder.path();
+    let made = stereocal(at, &["robot", "new", "abb-irb120", "--out", "."]);
+    assert_eq!(made.status.code(), Some(0), "{}", stderr(&made));
+    let path = Utf8Path::from_path(at).unwrap().join("robot.toml");
+    let mut built = file::read(&path).unwrap();
+    built.joints[1].a_mm += 0.3;
+    let tools = [nalgebra::Vector3::new(30.0, 0.0, 80.0), nalgebra::Vector3::new(30.0, 12.0, 96.0)];
+    let mut state = 5u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / f64::from(1u32 << 24) - 0.5
+    };
+    let mut text = "j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,x_mm,y_mm,z_mm\n".to_owned();
+    for row in 0..100 {
+        let joints: Vec<f64> = (0..6).map(|_| 90.0 * uniform()).collect();
+        built.tool_mm = tools[usize::from(row >= 50)];
+        let point = built.target_mm(&joints.iter().map(|q| q.to_radians()).collect::<Vec<_>>());
+        let numbers: Vec<String> = joints
+            .iter()
+            .copied()
+            .chain(point.iter().map(|v| v + 0.05 * uniform()))
+            .map(|v| format!("{v:.6}"))
+            .collect();
+        text += &format!("{}\n", numbers.join(","));
+    }
+    std::fs::write(at.join("rows.csv"), text).unwrap();
+    let identify = ["identify", "--measurements", "rows.csv", "--robot", "robot.toml", "--method", "trust-region"];
+    let told = stereocal(at, &identify);
+    let (said, warned) = (stdout(&told), stderr(&told));
+    assert_eq!(told.status.code(), Some(1), "{said}{warned}");
+    assert!(said.contains("the tool moved on the flange by 20.0 mm from row"), "{said}");
+    for other in ["too few rows", "sensor distortion", "sessions", "robot file is not of the robot"] {
+        assert!(!warned.contains(other) && !said.contains(other), "{other}: {said}{warned}");
+    }
+}

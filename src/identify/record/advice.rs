@@ -46,7 +46,8 @@ impl Record {
         let mut doubts = sentences(&findings.doubts);
         doubts.extend(self.implausible(set, nominal));
         doubts.extend(self.computed(set).or(self.predicted(set, nominal)));
-        doubts.extend(self.promise(set, nominal));
+        // What speaks against the result is why its figures are odd, whatever the number of rows.
+        doubts.extend(self.promise(set, nominal).filter(|_| findings.against.is_empty()));
         doubts.extend(still(set));
         doubts.extend(one_orientation(set, nominal, found));
         doubts.extend(self.at_limit(found));

@@ -26,17 +26,18 @@ pub struct Findings {
 
 impl Findings {
     /// Those of the data, and those of the fit: what nothing explains, and a robot that is not the one of the file, speak against it. Where the rows
-    /// are not of one robot, that is the cause of whatever is odd about a robot fitted to all of them.
+    /// are not of one robot, one tool or one unit, that is the cause of whatever is odd about a robot fitted to all of them.
     pub fn new(
         examined: Vec<Finding>,
-        unexplained: Option<Finding>,
+        (cause, unexplained): (Vec<Finding>, Option<Finding>),
         of_fit: Vec<Finding>,
         along: &Along,
         set: &Dataset,
         found: &Identification,
     ) -> Findings {
-        if let Some(robots) = &along.robots {
-            return Findings { against: vec![robots.clone()], doubts: examined, notes: Vec::new() };
+        let against: Vec<Finding> = along.robots.clone().into_iter().chain(cause).collect();
+        if !against.is_empty() {
+            return Findings { against, doubts: examined, notes: Vec::new() };
         }
         let left_mm = found.scatter.point_mm;
         let beyond_all =
@@ -47,11 +48,11 @@ impl Findings {
         let is_still = left_out.as_ref().is_some_and(|left_out| left_out.is_still);
         let (of_still, of_end) = if is_still { (left_out, None) } else { (None, left_out) };
         let rounded = rounded::of_joints(set, found);
-        let (cause, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
+        let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
         let against: Vec<Finding> = of_still
             .map(|left_out| left_out.finding)
             .into_iter()
-            .chain(cause)
+            .chain(of_rounding)
             .chain(unexplained)
             .chain(plausible::of_another_robot(found))
             .collect();
@@ -66,12 +67,6 @@ impl Findings {
         let doubts =
             examined.into_iter().chain(of_rows).chain(of_verify(set, found)).chain(scale).chain(terms).collect();
         Findings { against, doubts, notes }
-    }
-
-    /// With these as the gravest.
-    pub fn with_against(mut self, list: Vec<Finding>) -> Findings {
-        self.against.splice(0..0, list);
-        self
     }
 
     /// All of them, the gravest first.
