@@ -64,7 +64,7 @@ fn changed(cause: &CauseSeen) -> [String; 2] {
 /// What to do next.
 fn next(standing: Standing) -> &'static str {
     match standing {
-        Standing::StillValid => "go on with this calibration",
+        Standing::StillValid => "go on with this calibration: it is as good as it was",
         Standing::ChangedWithin => {
             "lengths are within the tolerance still; clamp the cameras, and calibrate anew before it grows"
         }
