@@ -87,12 +87,14 @@ pub enum Error {
         of: usize,
     },
     /// The board was not found often enough.
-    #[error("{} pairs show {}; {}{}", too_few(*.found, *.total), shown(.board), at_least(*.needed), reasons(.skipped))]
+    #[error("{} pairs show {}; {}{}{}", too_few(*.found, *.total), shown(.board), at_least(*.needed), reasons(.skipped), the_rest(*.not_searched))]
     TooFewPairs {
         /// Pairs with the board in both pictures.
         found: usize,
-        /// Pairs in the folder.
+        /// Pairs that were searched.
         total: usize,
+        /// The others of the folder: those searched leave no doubt of them.
+        not_searched: usize,
         /// Pairs needed.
         needed: usize,
         /// The board that was looked for; boxed, for errors are returned everywhere.
@@ -121,6 +123,16 @@ fn shown(board: &Board) -> String {
 
 fn at_least(needed: usize) -> String {
     if needed == 1 { "one is needed".to_owned() } else { format!("{needed} are needed") }
+}
+
+/// The pairs that were not searched, as a line of their own.
+fn the_rest(not_searched: usize) -> String {
+    match not_searched {
+        0 => String::new(),
+        n => format!(
+            "\n  {n} more pairs were not searched: those that were are spread over all, and show the same other board"
+        ),
+    }
 }
 
 /// Which whole boards were seen, and how often.
@@ -227,7 +239,9 @@ mod tests {
         let hint = |found: usize, total: usize, board: &str| {
             let board = Box::new(board.parse().unwrap());
             let (path, skipped) = ("pictures".into(), Vec::new());
-            Error::TooFewPairs { found, total, needed: 3, board, path, skipped, other: None }.hint().unwrap()
+            Error::TooFewPairs { found, total, not_searched: 0, needed: 3, board, path, skipped, other: None }
+                .hint()
+                .unwrap()
         };
         for board in ["checker:9x7:20", "charuco:5x4:30:22:DICT_4X4_50"] {
             assert!(hint(2, 3, board).contains("in more places"), "{}", hint(2, 3, board));

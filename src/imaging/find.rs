@@ -11,17 +11,16 @@ use rayon::prelude::*;
 
 use super::board::Layout;
 use super::coded;
-use super::corners::OpenPair;
 use super::detect::{self, Detected, Refusal, continuation};
 use super::image::pyramid::Small;
 use super::image::{self, Claim, Header, Mosaic, Picture};
 use super::input::cache::{Cache, Look, Sighting};
 use super::input::pairs::{PairFiles, Pairing};
-use super::lattice::{Lattice, Places};
-use super::open::{listed, open_pair};
+use super::lattice::Lattice;
 use super::refine::fields;
 use super::shown::{printed, unseen_lines};
-use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, order, overlay, refine};
+use super::sort::{Sorted, number_alike, other_board, shown_by_all, sort_out};
+use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, overlay, refine};
 use crate::files::OutDir;
 use crate::files::provenance::picture_hash;
 use crate::progress;
@@ -49,21 +48,37 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     let headers: Vec<[Announced; 2]> =
         pairing.pairs.par_iter().map(|files| [&files.left, &files.right].map(|path| image::header(path))).collect();
     let sizes = majority_sizes(&headers);
-    let seen = look_at_all(pairing, &headers, sizes, wanted);
-    let other = other_board(&seen).map(Box::new);
+    let bar = progress::bar("looking for the board", 2 * pairing.pairs.len() as u64);
+    let look_at = |indices: &[usize]| look_at_pairs(pairing, &headers, sizes, (wanted, &bar), indices);
+    let total = pairing.pairs.len();
+    let too_few = |found: usize, (skipped, searched): (Vec<Skipped>, usize), other: Option<Board>| Error::TooFewPairs {
+        found,
+        total: searched,
+        not_searched: total - searched,
+        needed: wanted.needed,
+        board: Box::new(wanted.board),
+        path: pairing.place.clone(),
+        skipped,
+        other: other.map(Box::new),
+    };
+    let [first, rest] = first_pairs(total);
+    let mut seen: Vec<(usize, [Look; 2])> = first.iter().copied().zip(look_at(&first)).collect();
+    if let Some(other) = shown_by_all(seen.iter().map(|(_, looks)| looks)).filter(|_| !rest.is_empty()) {
+        bar.finish_and_clear();
+        let files: Vec<PairFiles> = first.iter().map(|&i| pairing.pairs[i].clone()).collect();
+        let skipped = sort_out(&files, seen.into_iter().map(|(_, looks)| looks).collect(), wanted.board).skipped;
+        return Err(too_few(0, (skipped, first.len()), Some(other)));
+    }
+    seen.extend(rest.iter().copied().zip(look_at(&rest)));
+    seen.sort_by_key(|&(i, _)| i);
+    let seen =
+        in_common_layout(seen.into_iter().map(|(_, looks)| looks).collect(), pairing, &headers, sizes, (wanted, &bar));
+    bar.finish_and_clear();
+    let other = other_board(&seen);
     printed(&wanted.board, &seen).iter().for_each(progress::note);
     let Sorted { found, skipped, open } = sort_out(&pairing.pairs, seen, wanted.board);
-    let total = pairing.pairs.len();
     if found.len() < wanted.needed {
-        return Err(Error::TooFewPairs {
-            found: found.len(),
-            total,
-            needed: wanted.needed,
-            board: Box::new(wanted.board),
-            path: pairing.place.clone(),
-            skipped,
-            other,
-        });
+        return Err(too_few(found.len(), (skipped, total), other));
     }
     let pairs = number_alike(found, wanted.board);
     if let Some(out) = wanted.overlays {
@@ -76,48 +91,53 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, open, notes })
 }
 
-/// Every picture from file to corners; of a board whose layout the pictures tell, those that did not tell it once more.
-fn look_at_all(
+/// The pairs that are looked at before all others, spread over them all, and the others.
+fn first_pairs(total: usize) -> [Vec<usize>; 2] {
+    /// So many that agree on another board leave no doubt of the rest.
+    const FIRST: usize = 6;
+    let first: Vec<usize> = (0..FIRST.min(total)).map(|i| i * total / FIRST.min(total)).collect();
+    let rest = (0..total).filter(|i| !first.contains(i)).collect();
+    [first, rest]
+}
+
+/// The pictures of some pairs from file to corners.
+fn look_at_pairs(
     pairing: &Pairing,
     headers: &[[Announced; 2]],
     sizes: [(u32, u32); 2],
-    wanted: &Wanted<'_>,
+    (wanted, bar): (&Wanted<'_>, &progress::Step),
+    indices: &[usize],
 ) -> Vec<[Look; 2]> {
-    let bar = progress::bar("looking for the board", 2 * pairing.pairs.len() as u64);
-    let seen: Vec<[Look; 2]> = pairing
-        .pairs
-        .par_iter()
-        .zip(headers)
-        .map(|(files, [left, right])| {
-            let (left, right) = rayon::join(
-                || look(&files.left, left, wanted, sizes, &bar),
-                || look(&files.right, right, wanted, [sizes[1], sizes[0]], &bar),
-            );
-            [left, right]
-        })
-        .collect();
-    let again = |side: Look, path: &Utf8Path, header: &Announced, sizes: [(u32, u32); 2], board: Board| match side {
-        Err(refusal) if refusal.reason == coded::BY_LAYOUT => {
-            look(path, header, &Wanted { board, ..*wanted }, sizes, &bar)
-        }
+    let looks = indices.par_iter().map(|&i| {
+        let (files, [left, right]) = (&pairing.pairs[i], &headers[i]);
+        let (left, right) = rayon::join(
+            || look(&files.left, left, wanted, sizes, bar),
+            || look(&files.right, right, wanted, [sizes[1], sizes[0]], bar),
+        );
+        [left, right]
+    });
+    looks.collect()
+}
+
+/// Of a board whose layout the pictures tell, those that did not tell it are looked at once more.
+fn in_common_layout(
+    seen: Vec<[Look; 2]>,
+    pairing: &Pairing,
+    headers: &[[Announced; 2]],
+    sizes: [(u32, u32); 2],
+    (wanted, bar): (&Wanted<'_>, &progress::Step),
+) -> Vec<[Look; 2]> {
+    let Some(layout) = common_layout(&seen) else { return seen };
+    let wanted = Wanted { board: wanted.board.with_layout(layout), ..*wanted };
+    let again = |side: Look, path: &Utf8Path, header: &Announced, sizes: [(u32, u32); 2]| match side {
+        Err(refusal) if refusal.reason == coded::BY_LAYOUT => look(path, header, &wanted, sizes, bar),
         known => known,
     };
-    let seen = match common_layout(&seen) {
-        None => seen,
-        Some(layout) => {
-            let board = wanted.board.with_layout(layout);
-            let all = seen.into_par_iter().zip(&pairing.pairs).zip(headers);
-            all.map(|(([one, other], files), [left, right])| {
-                [
-                    again(one, &files.left, left, sizes, board),
-                    again(other, &files.right, right, [sizes[1], sizes[0]], board),
-                ]
-            })
-            .collect()
-        }
-    };
-    bar.finish_and_clear();
-    seen
+    let all = seen.into_par_iter().zip(&pairing.pairs).zip(headers);
+    all.map(|(([one, other], files), [left, right])| {
+        [again(one, &files.left, left, sizes), again(other, &files.right, right, [sizes[1], sizes[0]])]
+    })
+    .collect()
 }
 
 /// What a file's header says, or why it says nothing.
@@ -306,76 +326,18 @@ fn majority_sizes(headers: &[[Announced; 2]]) -> [(u32, u32); 2] {
     })
 }
 
-type Found = (String, Lattice<Corner>, Lattice<Corner>);
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// The board that most of the refused pictures show instead.
-fn other_board(seen: &[[Look; 2]]) -> Option<Board> {
-    let refusal = |look: &'_ Look| match look {
-        Ok(seen) => seen.open.as_ref().map(|open| open.refusal.clone()),
-        Err(refusal) => Some(refusal.clone()),
-    };
-    let refused: Vec<Refusal> = seen.iter().flatten().filter_map(refusal).collect();
-    let boards: Vec<Board> = refused.iter().filter_map(|refusal| refusal.seen).collect();
-    // Where the markers of one picture are of a small dictionary and those of another of a larger one that begins with it, it is the larger.
-    let shown = |board: &Board| boards.iter().filter(|other| board.has_all_of(other)).count();
-    let board = boards.iter().max_by_key(|board| shown(board))?;
-    (2 * shown(board) > refused.len()).then_some(*board)
-}
-
-/// Pairs by what they show.
-struct Sorted {
-    found: Vec<Found>,
-    skipped: Vec<Skipped>,
-    /// Those of the skipped ones whose corners could be numbered in several ways.
-    open: Vec<OpenPair>,
-}
-
-/// What was found in both pictures of a pair, or of a board with markers in one of them.
-fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>, board: Board) -> Sorted {
-    let nothing = || Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
-    let (mut found, mut skipped, mut open) = (Vec::new(), Vec::new(), Vec::new());
-    for (files, sides) in files.iter().zip(seen) {
-        let pair = files.pair.clone();
-        let reason = match sides.map(|look| look.map_err(|refusal| refusal.reason)) {
-            [Ok(left), Ok(right)] => {
-                match open_pair(&pair, &[&left, &right], found.len()) {
-                    None => found.push((pair, left.corners, right.corners)),
-                    Some((pair, reason)) => {
-                        open.push(pair);
-                        skipped.push(reason);
-                    }
-                }
-                continue;
-            }
-            [Ok(left), Err(_)] if board.is_coded() => {
-                found.push((pair, left.corners, nothing()));
-                continue;
-            }
-            [Err(_), Ok(right)] if board.is_coded() => {
-                found.push((pair, nothing(), right.corners));
-                continue;
-            }
-            [Err(left), Err(right)] if left == right => format!("both pictures: {left}"),
-            [Err(left), Err(right)] => format!("left picture: {left}; right picture: {right}"),
-            [Err(left), Ok(_)] => format!("left picture: {left}"),
-            [Ok(_), Err(right)] => format!("right picture: {right}"),
-        };
-        skipped.push(Skipped { pair, reason });
+    #[test]
+    fn the_first_pairs_are_spread_over_all_and_none_is_left_out_or_twice() {
+        for total in 0..40 {
+            let [first, rest] = first_pairs(total);
+            let mut all = [first.clone(), rest].concat();
+            all.sort_unstable();
+            assert_eq!(all, (0..total).collect::<Vec<_>>());
+            assert!(first.len() <= 6 && first.windows(2).all(|two| two[1] - two[0] <= total.div_ceil(6)));
+        }
     }
-    Sorted { found, skipped, open }
-}
-
-fn number_alike(found: Vec<Found>, board: Board) -> Vec<PairCorners> {
-    let places = |grid: &Lattice<Corner>| -> Places { grid.map(|c| c.px) };
-    let pairs: Vec<_> = found.iter().map(|(_, left, right)| (places(left), places(right))).collect();
-    let turns = order::agreed_turns(&pairs, board);
-    found
-        .into_iter()
-        .zip(turns)
-        .map(|((pair, left, right), (turn_left, turn_right))| PairCorners {
-            pair,
-            left: listed(&left.turned(turn_left), turn_left),
-            right: listed(&right.turned(turn_right), turn_right),
-        })
-        .collect()
 }

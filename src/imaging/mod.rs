@@ -17,6 +17,7 @@ pub mod refine;
 #[cfg(test)]
 pub mod shot;
 mod shown;
+mod sort;
 mod video;
 
 pub use board::{Board, Squares};
