@@ -14,6 +14,9 @@ use crate::robot::{Robot, inverse};
 /// Largest turn of a joint that is still a correction, rad: more of it is another posture, or the side of a singular one.
 const MOST_TURN_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
+/// How far a joint turns of which no file has the limits, rad: two turns, as the wrists of arms that turn farthest do.
+const MOST_TURNS_RAD: f64 = 2.0 * std::f64::consts::TAU;
+
 /// Rounding of a reading at a limit, rad or mm.
 const ROUNDING: f64 = 1e-9;
 
@@ -81,7 +84,12 @@ impl std::fmt::Display for Refusal {
                 write!(f, "joint {joint} would need {needed:.3}; its range is {low:.3} to {high:.3}")
             }
             Refusal::Outside { joint, given, range: (low, high) } => {
-                write!(f, "joint {joint} of the target is at {given:.3}; its range is {low:.3} to {high:.3}")
+                write!(f, "joint {joint} of the target is at {given:.3}; its range is {low:.3} to {high:.3}")?;
+                let as_degrees = given.to_radians();
+                if given.abs() > 360.0 && (*low..=*high).contains(&as_degrees) {
+                    write!(f, ": degrees, {as_degrees:.1}, where radians are read?")?;
+                }
+                Ok(())
             }
             Refusal::Singular { joint, turn_deg } => {
                 write!(f, "next to a singular posture: joint {joint} would turn by {turn_deg:.1} deg")
@@ -233,7 +241,8 @@ impl Compensator {
     fn beyond(&self, readings: &[f64], refusal: impl Fn(usize, f64, (f64, f64)) -> Refusal) -> Option<Refusal> {
         let mut joints = self.identified.joints.iter().zip(readings).enumerate();
         joints.find_map(|(j, (joint, &q))| {
-            let (low, high) = joint.limits_rad?;
+            let unknown = (!joint.slides).then_some((-MOST_TURNS_RAD, MOST_TURNS_RAD));
+            let (low, high) = joint.limits_rad.or(unknown)?;
             let in_file = |v: f64| if joint.slides { v } else { v.to_degrees() };
             let inside = (low - ROUNDING..=high + ROUNDING).contains(&q);
             (!inside).then(|| refusal(j + 1, in_file(q), (in_file(low), in_file(high))))

@@ -81,7 +81,7 @@ pub struct CameraCheck {
     /// such a move: 5mm+-0.003:03,04. May be given again
     #[arg(long, value_name = "MM[+-U][:FIRST,SECOND]", allow_negative_numbers = true)]
     pub known_move: Vec<StatedMove>,
-    /// Largest length error that passes, mm; key `tolerance_mm` [default: 0.05]
+    /// Largest length error that passes, mm; key `tolerance_mm` [default: 0.05; with --against that of the calibration]
     #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = within(&TOLERANCES_MM))]
     pub tolerance_mm: Option<f64>,
     /// Expanded uncertainty (k = 2) of the board's lengths, from its certificate, mm: widens the guard band of the verdict

@@ -10,6 +10,9 @@ use crate::formats::boards::sheet::{Sheet, TooLarge};
 use crate::imaging::Board;
 use crate::progress;
 
+/// A side of which a printer of 300 dots an inch draws a twelfth no longer, mm.
+const FINE_MM: f64 = 1.0;
+
 /// Runs the command.
 pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
@@ -20,6 +23,9 @@ pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
     let sheet = Sheet::new(&board).map_err(|TooLarge { message, hint }| config::Error::Usage { message, hint })?;
     let run = Run { force: args.output.force, ..run };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &[]);
+    if board.square_mm < FINE_MM {
+        progress::warn(format!("squares of {} mm: few printers draw them; sizes are in mm", board.square_mm));
+    }
     let all = !(args.pdf || args.svg || args.png);
     let png = if args.png { Some(sheet.png(args.dpi).map_err(invalid)?) } else { None };
     let written: Vec<(&str, Vec<u8>)> = [

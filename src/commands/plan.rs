@@ -39,7 +39,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let rig_file = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
     let calibrated = calibration::read(&rig_file)?;
     calibrated.doubts().into_iter().for_each(progress::warn);
-    let Calibrated { rig, noise, .. } = calibrated;
+    let Calibrated { rig, noise, pair_excess, .. } = calibrated;
     let robot_file = robot_file(args.robot.as_deref());
     let robot = match &robot_file {
         Some(path) => robot::file::read(path)?,
@@ -64,7 +64,9 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let out = out.for_run(&Run { force: args.output.force, ..run }, &inputs);
     out.check_free(&["poses.csv", "plan.json", "plan.html"])?;
     let board = config.target_board.board(args.target.board, args.target.squares, args.target.square_mm)?;
-    let corner_px = noise.map_or(CORNER_PX, |n| n.added_px.max(CORNER_PX / 3.0));
+    // Boards held by hand scatter about the rig by more than their corners do, and the target will, too.
+    let excess = pair_excess.unwrap_or(1.0).max(1.0).sqrt();
+    let corner_px = excess * noise.map_or(CORNER_PX, |n| n.added_px.max(CORNER_PX / 3.0));
     let scene = Scene::new(rig, board, corner_px, args.tilt_deg.to_radians(), args.depth_mm, args.margin_mm)?;
     let measured = earlier.as_deref().zip(args.after.as_ref().map(|path| path.as_str()));
     let found = plan(&robot, &scene, &settings(args), measured)?;

@@ -66,5 +66,16 @@ fn breaks(folder: &Utf8Path) -> Vec<String> {
     compare(used, "calibration.json", "measure.json", "measure");
     let fitted = provenance("identification.json").and_then(|p| named(p.inputs, "measurements.csv"));
     compare(fitted, "measurements.csv", "identification.json", "identify");
+    let results = [("camera-check.json", "camera-check"), ("measure.json", "measure")];
+    breaks.extend(results.into_iter().flat_map(|(name, command)| {
+        let inputs = provenance(name).map(|made| made.inputs).unwrap_or_default();
+        let changed =
+            inputs.into_iter().filter(|input| !Utf8Path::new(&input.file).starts_with(folder) && input.is_other_now());
+        changed
+            .map(move |input| {
+                format!("{} changed since {name} was made of it: run `stereocal {command}` again", input.file)
+            })
+            .collect::<Vec<_>>()
+    }));
     breaks
 }

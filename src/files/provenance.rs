@@ -164,6 +164,17 @@ impl Digested {
         Some(Digested { file: path.to_string(), sha256, pictures: None, picture_hashes: Vec::new(), content_sha256 })
     }
 
+    /// Whether something else stands where this was read; what is there no more, or lies elsewhere below a folder, says nothing.
+    pub fn is_other_now(&self) -> bool {
+        let path = Utf8Path::new(&self.file);
+        let now = match self.pictures {
+            Some(_) if pictures(path).is_empty() => None,
+            Some(_) => Digested::folder(path, &BTreeMap::new()),
+            None => Digested::read(path),
+        };
+        now.is_some_and(|now| !self.same_content(&now))
+    }
+
     /// Whether both were made of the same content, whatever their names and dates.
     pub fn same_content(&self, other: &Digested) -> bool {
         match (&self.content_sha256, &other.content_sha256) {
@@ -306,6 +317,7 @@ mod tests {
         assert_eq!(read(), first);
         std::fs::write(root.join("left/b.png"), "c").unwrap();
         assert_ne!(read().sha256, first.sha256);
+        assert!(first.is_other_now() && !read().is_other_now());
         // What counts is what was read, whatever stands there since.
         let known = BTreeMap::from([(root.join("left/b.png"), picture_hash(b"b"))]);
         assert_eq!(Digested::folder(root, &known).unwrap(), first);

@@ -71,7 +71,8 @@ struct BoardsRecord {
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Check {
     verdict: Verdict,
-    tolerance_mm: f64,
+    /// The largest error of a length that passed, mm.
+    pub tolerance_mm: f64,
     /// What lengths can be trusted to; none where the rig measures nothing, or something else than a length stands against it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     trusted_mm: Option<f64>,
@@ -316,7 +317,7 @@ impl CovarianceRecord {
 }
 
 /// The own format's name in a results folder.
-const OWN_NAME: &str = "calibration.json";
+pub const OWN_NAME: &str = "calibration.json";
 
 /// The file that a command reads its rig from: what was named, else `calibration.json` of the results folder. Of a folder, the own file
 /// or else the one that another format goes by; an error where there is none, or where it could be either of two.

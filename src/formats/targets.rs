@@ -17,6 +17,9 @@ use crate::robot::Robot;
 const HINT: &str =
     "a row a target: name,j1_deg,...,jN_deg, or name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad (optionally j1_deg,...)";
 
+const ROTATION_HINT: &str =
+    "rx_rad,ry_rad,rz_rad are a rotation vector: the axis of the turn, as long as the angle in radians";
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     pub name: String,
@@ -65,6 +68,12 @@ pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
                 let mut numbers = [0.0; 6];
                 for (number, &column) in numbers.iter_mut().zip(&poses) {
                     *number = table.number(*line, row, column)?;
+                }
+                let turn_rad = numbers[3].hypot(numbers[4]).hypot(numbers[5]);
+                if turn_rad > std::f64::consts::TAU {
+                    let message =
+                        format!("a tool turned by {turn_rad:.4} rad, more than a whole turn: are these degrees?");
+                    return Err(table.refuse_with(*line, message, Some(ROTATION_HINT)));
                 }
                 Target::Pose { root_from_tool: pose(&numbers), near_rad }
             }

@@ -71,9 +71,9 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     }
     seen.extend(rest.iter().copied().zip(look_at(&rest)));
     seen.sort_by_key(|&(i, _)| i);
-    let seen =
-        in_common_layout(seen.into_iter().map(|(_, looks)| looks).collect(), pairing, &headers, sizes, (wanted, &bar));
     bar.finish_and_clear();
+    let seen = seen.into_iter().map(|(_, looks)| looks).collect();
+    let seen = in_common_layout(seen, pairing, &headers, sizes, wanted);
     let other = other_board(&seen);
     printed(&wanted.board, &seen).iter().for_each(progress::note);
     let Sorted { found, skipped, open } = sort_out(&pairing.pairs, seen, wanted.board);
@@ -125,12 +125,14 @@ fn in_common_layout(
     pairing: &Pairing,
     headers: &[[Announced; 2]],
     sizes: [(u32, u32); 2],
-    (wanted, bar): (&Wanted<'_>, &progress::Step),
+    wanted: &Wanted<'_>,
 ) -> Vec<[Look; 2]> {
     let Some(layout) = common_layout(&seen) else { return seen };
+    let is_open = |look: &&Look| look.as_ref().is_err_and(|refusal| refusal.reason == coded::BY_LAYOUT);
+    let bar = progress::bar("looking once more", seen.iter().flatten().filter(is_open).count() as u64);
     let wanted = Wanted { board: wanted.board.with_layout(layout), ..*wanted };
     let again = |side: Look, path: &Utf8Path, header: &Announced, sizes: [(u32, u32); 2]| match side {
-        Err(refusal) if refusal.reason == coded::BY_LAYOUT => look(path, header, &wanted, sizes, bar),
+        Err(refusal) if refusal.reason == coded::BY_LAYOUT => look(path, header, &wanted, sizes, &bar),
         known => known,
     };
     let all = seen.into_par_iter().zip(&pairing.pairs).zip(headers);

@@ -45,7 +45,7 @@ pub fn summary(record: &PlanFile) -> String {
     }
     text += &format!(
         "error of the target over the spheres through the parameters alone (root mean square, {:.4} mm noise a coordinate); what `identify` expects \
-         holds the robot's own scatter, too:\n{table}",
+         holds the robot's own scatter and the rig's own error, too:\n{table}",
         record.noise_mm
     );
     text

@@ -5,6 +5,8 @@
 //! step. It finds the solution near its start, so callers pass several. What goes wrong: out of reach, a
 //! singular wrist, or a start on the wrong side of a limit all end in `None`.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{DMatrix, DVector, Vector6};
 
 use super::Robot;
@@ -111,7 +113,24 @@ pub fn approach(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]) 
             damping *= 10.0;
         }
     }
-    Approach { joints_rad: q, miss_mm: residual.norm() }
+    let found = Approach { joints_rad: q, miss_mm: residual.norm() };
+    if found.arrived() { unwound(robot, base_from_flange, found, start_rad) } else { found }
+}
+
+/// The same posture without the whole turns that the search took: each joint within half a turn of `near_rad`, as far as its limits let it. Where
+/// a joint's turn moves another one by a part of a turn (a coupling), the search's own answer stays.
+fn unwound(robot: &Robot, base_from_flange: &Transform, found: Approach, near_rad: &[f64]) -> Approach {
+    let turned = |(joint, (&q, near)): (&super::Joint, (&f64, &f64))| {
+        let turns = if joint.slides { 0.0 } else { ((q - near) / TAU).round() };
+        let is_allowed = |q: f64| joint.limits_rad.is_none_or(|(low, high)| (low..=high).contains(&q));
+        // Nearest to the start first; the search's own answer, no turn taken off, is always allowed.
+        let fewer = (0..=turns.abs() as usize).map(|left| q - turns.signum() * TAU * (turns.abs() - left as f64));
+        fewer.into_iter().find(|&q| is_allowed(q)).unwrap_or(q)
+    };
+    let joints_rad: Vec<f64> = robot.joints.iter().zip(found.joints_rad.iter().zip(near_rad)).map(turned).collect();
+    let miss_mm = miss(robot, base_from_flange, &joints_rad).norm();
+    let unwound = Approach { joints_rad, miss_mm };
+    if unwound.arrived() { unwound } else { found }
 }
 
 /// Angles (rad) that bring the flange to `base_from_flange`, searched from `start_rad`. `None` when the search does not arrive.
@@ -164,7 +183,12 @@ pub fn spread_start(robot: &Robot, k: usize) -> Vec<f64> {
 
 /// Of the postures found from so many starts spread over the joints' ranges, the best one ([`merit`]).
 pub fn best_posture(robot: &Robot, base_from_flange: &Transform, starts: usize) -> Option<Vec<f64>> {
-    let found = (0..starts).filter_map(|k| from_start(robot, base_from_flange, &spread_start(robot, k)));
+    let middle: Vec<f64> =
+        robot.joints.iter().map(|j| j.limits_rad.map_or(0.0, |(low, high)| 0.5 * (low + high))).collect();
+    let found = (0..starts).filter_map(|k| {
+        let found = approach(robot, base_from_flange, &spread_start(robot, k));
+        found.arrived().then(|| unwound(robot, base_from_flange, found, &middle).joints_rad)
+    });
     let judged = found.map(|q| (merit(robot, &q), q));
     judged.reduce(|best, next| if next.0 > best.0 { next } else { best }).map(|(_, q)| q)
 }
@@ -180,6 +204,11 @@ mod tests {
         robot
     }
 
+    fn with_wide_limits(mut robot: Robot) -> Robot {
+        robot.joints.iter_mut().for_each(|j: &mut Joint| j.limits_rad = Some((-TAU, TAU)));
+        robot
+    }
+
     #[test]
     fn forward_of_inverse_is_the_pose() {
         let robot = with_limits(Robot::paper());
@@ -191,6 +220,35 @@ mod tests {
         for (a, b) in q.iter().zip(&there) {
             assert!((a - b).abs() < 1e-6, "the nearby solution is the one we came from");
         }
+    }
+
+    #[test]
+    fn a_solution_has_no_whole_turns_that_its_start_has_not() {
+        for robot in [Robot::paper(), with_wide_limits(Robot::paper())] {
+            let there = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
+            let wanted = robot.base_from_flange(&there);
+            let wild = Approach { joints_rad: there.iter().map(|q| q + TAU).collect(), miss_mm: 0.0 };
+            let q = unwound(&robot, &wanted, wild, &[0.0; 6]);
+            assert!(q.joints_rad.iter().zip(&there).all(|(a, b)| (a - b).abs() < 1e-12), "{q:?}");
+            for k in 0..40 {
+                let start = spread_start(&robot, k);
+                let Some(q) = from_start(&robot, &wanted, &start) else { continue };
+                let far = q.iter().zip(&start).any(|(q, s)| (q - s).abs() > std::f64::consts::PI + 1e-9);
+                assert!(!far || robot.joints[0].limits_rad.is_some(), "{q:?} from {start:?}");
+            }
+            let best = best_posture(&robot, &wanted, 40).unwrap();
+            assert!(best.iter().all(|q| q.abs() < std::f64::consts::PI + 1e-9), "{best:?}");
+        }
+    }
+
+    #[test]
+    fn a_turn_of_a_coupled_joint_is_not_taken_off() {
+        let mut robot = Robot::paper();
+        robot.corrections.couplings = vec![CouplingTerm { joint: 5, of: 4, ratio: 0.3 }];
+        let there = [0.4, -0.6, 1.1, 0.3, -0.9 + TAU, 0.7];
+        let wanted = robot.base_from_flange(&there);
+        let q = unwound(&robot, &wanted, Approach { joints_rad: there.to_vec(), miss_mm: 0.0 }, &[0.0; 6]);
+        assert_eq!(q.joints_rad, there);
     }
 
     #[test]

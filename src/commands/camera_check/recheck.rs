@@ -27,13 +27,15 @@ const HINT: &str = "`--against` takes the calibration.json that `stereocal camer
 
 /// Runs the command.
 pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
-    let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm);
-    config::check_within("tolerance_mm", tolerance_mm, ranges::TOLERANCES_MM)?;
     let run = Run { force: args.output.force, ..run };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let of_flag = |error: crate::files::Error| error.with_hint(HINT);
     let file = calibration::file(Some(against), &out).map_err(of_flag)?;
     let calibrated = calibration::read(&file).map_err(of_flag)?;
+    // What the calibration was held against says what it has to hold still.
+    let of_check = || calibrated.check.map_or(config.tolerance_mm, |check| check.tolerance_mm);
+    let tolerance_mm = args.tolerance_mm.unwrap_or_else(of_check);
+    config::check_within("tolerance_mm", tolerance_mm, ranges::TOLERANCES_MM)?;
     let places = [&args.images, &args.pairs.right, &args.corners];
     let inputs: Vec<&Utf8Path> =
         places.into_iter().flatten().map(|path| path.as_path()).chain([file.as_path()]).collect();

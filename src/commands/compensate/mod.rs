@@ -1,5 +1,6 @@
 //! `stereocal compensate`: targets written for the nominal robot to readings that bring the real one there.
 
+mod doubts;
 mod pair;
 mod program;
 mod told;
@@ -21,6 +22,7 @@ use told::{Summary, said};
 
 /// Runs the command.
 pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
+    doubts::refuse_corrected(&args.targets)?;
     let pair = Pair::read(args)?;
     let nominal = &pair.nominal;
     let heeded = heed(pair.check.as_ref(), &args.identified);
@@ -40,6 +42,7 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let program_name = format!("compensated/{}", args.targets.file_name().unwrap_or("program"));
     out.check_free(&["compensated.csv", "compensate.json"])?;
     tell_of_postures(&rows);
+    doubts::warn(&rows, &pair.identified);
     let list: Vec<_> = rows.iter().map(|row| row.target.clone()).collect();
     let found = Compensator::new(nominal, &pair.identified, pair.tool_mm).compensate(&list);
     let in_file = |readings: &[f64]| -> Vec<f64> {

@@ -190,7 +190,7 @@ fn end(series: &Series, known: &Knowledge, out: &OutDir) -> Result<()> {
         } else {
             String::new()
         };
-        let hint = judgement.hint().unwrap_or_default();
+        let hint = judgement.hint(&known.rig).unwrap_or_default();
         return Err(stereo::Error::RigChanged { statement: statement + &kept, hint }.into());
     }
     if measured == 0 {

@@ -8,6 +8,7 @@ use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::evidence::Evidence;
+use crate::stereo::judge::ledger::KNOWN_LENSES;
 use crate::stereo::judge::lengths::{Axis, Range};
 use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::judge::verdict::Verdict;
@@ -205,7 +206,9 @@ pub(super) fn next(judged: &Judged) -> Vec<&str> {
     let matters = move |finding: &&Finding| !passes && finding.effect_mm.is_none_or(|_| finding.material(tolerance_mm));
     let happened = judged.facts.findings.iter().filter(matters).filter_map(|finding| finding.remedy.as_deref());
     let board = judged.print_scatter.iter().filter(move |_| !passes).map(|board| board.text.as_str());
-    let deciding = judged.deciding().filter(|line| line.allows != Verdict::Pass).map(|line| line.remedy);
+    // Lenses that are not these cameras' spoil all other lines.
+    let lenses = judged.evidence.iter().find(|line| line.what == KNOWN_LENSES && line.allows != Verdict::Pass);
+    let deciding = lenses.or(judged.deciding()).filter(|line| line.allows != Verdict::Pass).map(|line| line.remedy);
     let mut told: Vec<&str> = happened.chain(board).chain(deciding.filter(|remedy| !remedy.is_empty())).collect();
     told.extend(judged.advice.iter().map(String::as_str));
     told.dedup();
@@ -267,7 +270,8 @@ pub(super) fn trusted(judged: &Judged) -> String {
             format!("lengths can be trusted to {mm:.4} mm{why}")
         }
         _ => {
-            let open = judged.evidence.iter().filter(|line| line.unit != "mm" && line.unit != "px");
+            let is_open = |line: &&Evidence| line.value.is_none() || (line.unit != "mm" && line.unit != "px");
+            let open = judged.evidence.iter().filter(is_open);
             let open: Vec<&str> = open.filter(|line| line.allows != Verdict::Pass).map(Evidence::name).collect();
             match open.is_empty() {
                 true => "no length can be trusted: these pairs do not bound their errors".to_owned(),

@@ -4,7 +4,7 @@ use crate::diagnostic::Warning;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::judge::evidence::{self, Evidence};
-use crate::stereo::judge::ledger::{Case, Facts, KNOWN_MOVE, LensPairs, Standards, ledger};
+use crate::stereo::judge::ledger::{Case, Facts, KNOWN_MOVE, LensPairs, Standards, TOLERANCE, ledger};
 use crate::stereo::judge::lengths::held_out::Accuracy;
 use crate::stereo::judge::lengths::model_disagreement;
 use crate::stereo::judge::residual_correlation;
@@ -113,8 +113,8 @@ impl Judged {
         let (lengths, others): (Vec<&Evidence>, Vec<&Evidence>) =
             self.evidence.iter().filter(|line| line.limit.is_some()).partition(|line| line.unit == "mm");
         let known = |line: &&Evidence| line.value.is_some_and(|mm| mm.is_finite());
-        let epipolar = |line: &Evidence| line.unit == "px";
-        let free = others.iter().all(|line| line.allows == Verdict::Pass || epipolar(line));
+        let is_of_lengths = |line: &Evidence| line.unit != "px" && line.what != TOLERANCE;
+        let free = others.iter().all(|line| line.allows == Verdict::Pass || !is_of_lengths(line));
         let of = |line: &Evidence| line.value.unwrap_or_default();
         // Of equals the first, which is that of the held-out lengths.
         let largest = |a, b| if of(b) > of(a) { b } else { a };

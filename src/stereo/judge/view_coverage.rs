@@ -102,7 +102,7 @@ impl Coverage {
         let [near, far] = self.depths_mm;
         if far - near < LEAST_DEPTH_SHARE * far {
             advice.push(format!(
-                "all boards stand {near:.0} to {far:.0} mm away: add pairs nearer and farther by a tenth"
+                "all boards stand {near:.0} to {far:.0} mm away at their middles: add pairs nearer and farther by a tenth"
             ));
         }
         for (side, (share, empty)) in Side::BOTH.into_iter().zip(self.field_shares.into_iter().zip(self.empty)) {

@@ -56,7 +56,12 @@ impl Judgement {
         Some(match self {
             Judgement::Agrees => return None,
             Judgement::Allowed(changed) => format!(
-                "the rig is not quite the one that was calibrated: {}; the points move by {:.4} mm with it, and their covariance allows for that",
+                "{}: {}; the points move by {:.4} mm with it, and their covariance allows for that",
+                match changed.explanations.as_slice() {
+                    [Explanation { cause: Cause::Pitch, .. }, ..] =>
+                        "the target is not quite as it was said to be, or the rig is not quite the one that was calibrated",
+                    _ => "the rig is not quite the one that was calibrated",
+                },
                 causes(changed, rig, board),
                 changed.moves_mm
             ),
@@ -94,9 +99,13 @@ impl Judgement {
     }
 
     /// What to do about it.
-    pub fn hint(&self) -> Option<&'static str> {
+    pub fn hint(&self, rig: &Rig) -> Option<&'static str> {
         match self {
             Judgement::Agrees | Judgement::Allowed(_) => None,
+            Judgement::Contradicts(changed) if changed.explanations.iter().any(|e| unit_of(e, rig).is_some()) => Some(
+                "calibrate again with the side of that board's squares in mm: `stereocal camera-check IMAGES --square-mm MM`; or it is the target's \
+                 `--square-mm` that is not in mm",
+            ),
             Judgement::Contradicts(changed) if changed.explanations.iter().any(|e| e.cause == Cause::Pitch) => Some(
                 "check `--square-mm` and `--squares` against the target; if they are right, the rig changed: `stereocal camera-check IMAGES`",
             ),

@@ -23,6 +23,7 @@ pub fn ledger(case: &Case) -> Vec<Evidence> {
     ];
     lines.extend(pairs::focal_lengths(case));
     lines.extend(pairs::baseline(case));
+    lines.extend(lengths::tolerance(case));
     lines.extend(pairs::reach(case));
     lines.extend(pairs::known_lenses(case));
     lines.extend(pairs::lenses_of_these_pairs(case));

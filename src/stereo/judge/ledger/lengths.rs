@@ -54,6 +54,23 @@ fn as_added(length: &LengthError) -> String {
     )
 }
 
+/// Name of the line on the tolerance itself.
+pub const TOLERANCE: &str = "tolerance";
+
+/// A tolerance that no rig can miss whose corners were counted rightly: an error of half a square puts a corner nearer to another one.
+pub(super) fn tolerance(case: &Case) -> Option<Evidence> {
+    let (tolerance_mm, half_mm) = (case.facts.tolerance_mm, 0.5 * case.calibration.board.square_mm);
+    (tolerance_mm >= half_mm).then(|| Evidence {
+        what: TOLERANCE,
+        remedy: "`--tolerance-mm` and `--square-mm` are in mm: see that both are",
+        value: Some(tolerance_mm),
+        limit: Some(half_mm),
+        unit: "mm asked for",
+        allows: Verdict::Undecided,
+        detail: "as wide as half a square of the board or wider: any rig would be within it".to_owned(),
+    })
+}
+
 pub(super) fn any_length(case: &Case) -> Evidence {
     let worst = case.facts.volume.worst(|length| case.expanded_mm(length));
     let value = worst.map(|(mm, _)| mm);

@@ -11,4 +11,6 @@ mod pairs;
 
 pub use all::ledger;
 pub use facts::{Case, Facts, LensPairs, Standards};
+pub use lengths::TOLERANCE;
 pub use moves::KNOWN_MOVE;
+pub use pairs::KNOWN_LENSES;

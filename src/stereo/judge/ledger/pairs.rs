@@ -239,6 +239,9 @@ pub(super) fn lenses_of_these_pairs(case: &Case) -> Option<Evidence> {
 }
 
 /// Whether the pictures agree with lenses that were known.
+/// Name of the line on lenses that were known beforehand.
+pub const KNOWN_LENSES: &str = "known lenses";
+
 pub(super) fn known_lenses(case: &Case) -> Option<Evidence> {
     let check = case.calibration.lens_check.as_ref()?;
     let seen: Vec<String> = Side::BOTH
@@ -246,7 +249,7 @@ pub(super) fn known_lenses(case: &Case) -> Option<Evidence> {
         .filter_map(|side| Some(format!("{} {} %", side.name(), two_digits(100.0 * check.focus_seen[side as usize]?))))
         .collect();
     Some(Evidence {
-        what: "known lenses",
+        what: KNOWN_LENSES,
         remedy: check.remedy(),
         value: Some(check.chi_square),
         limit: Some(check.limit),
