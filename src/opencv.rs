@@ -85,6 +85,17 @@ pub fn stereo_rectify(
     ))
 }
 
+/// OpenCV's `undistortPoints` of raw pixels, to places at distance one. It takes five steps of an iteration that need not arrive.
+pub fn undistort_points(camera: &Lens, px: &[Point2<f64>]) -> Result<Vec<Point2<f64>>, Failure> {
+    hold_to_one_thread();
+    let (m, d) = camera.mats()?;
+    let from: Vector<core::Point2d> = px.iter().map(|p| core::Point2d::new(p.x, p.y)).collect();
+    let mut to = Vector::<core::Point2d>::new();
+    let none = core::no_array();
+    calib3d::undistort_points(&from, &mut to, &m, &d, &none, &none)?;
+    Ok(to.iter().map(|p| Point2::new(p.x, p.y)).collect())
+}
+
 /// Where each pixel of a rectified picture lies in the raw one, px: OpenCV's `initUndistortRectifyMap`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Map {
@@ -102,6 +113,49 @@ impl Map {
         };
         let count = self.x.iter().zip(&self.y).filter(|&place| inside(place)).count();
         count as f64 / self.x.len().max(1) as f64
+    }
+
+    /// Empties what a lens model that folds shows a second time: all beyond the line where the map turns back, seen from the pixel that lies nearest
+    /// to `centre_px` of the raw picture. The share of the pixels within a raw picture of this size that this takes.
+    pub fn empty_folds(&mut self, centre_px: &Point2<f64>, (width, height): (u32, u32)) -> f64 {
+        /// Outside of any picture.
+        const NOWHERE: f32 = -1e6;
+        let (columns, rows) = self.size();
+        let place = |i: usize| nalgebra::Vector2::new(f64::from(self.x[i]), f64::from(self.y[i]));
+        let from_centre = |i: &usize| (place(*i) - centre_px.coords).norm_squared();
+        let Some(start) = (0..self.x.len()).min_by(|a, b| from_centre(a).total_cmp(&from_centre(b))) else {
+            return 0.0;
+        };
+        // Of one pixel to the next on the right and below.
+        let keeps_hand = |i: usize| {
+            let (column, row) = (i % columns, i / columns);
+            let right = if column + 1 < columns { place(i + 1) - place(i) } else { place(i) - place(i - 1) };
+            let down = if row + 1 < rows { place(i + columns) - place(i) } else { place(i) - place(i - columns) };
+            right.perp(&down) > 0.0
+        };
+        let mut reached = vec![false; self.x.len()];
+        let mut open = vec![start];
+        reached[start] = true;
+        while let Some(i) = open.pop() {
+            let (column, row) = (i % columns, i / columns);
+            let beside = [
+                (column > 0, i.wrapping_sub(1)),
+                (column + 1 < columns, i + 1),
+                (row > 0, i.wrapping_sub(columns)),
+                (row + 1 < rows, i + columns),
+            ];
+            for (_, next) in beside.into_iter().filter(|(is_there, _)| *is_there) {
+                if !reached[next] && keeps_hand(next) {
+                    reached[next] = true;
+                    open.push(next);
+                }
+            }
+        }
+        let before = self.coverage((width, height));
+        for i in (0..self.x.len()).filter(|&i| !reached[i]) {
+            (self.x[i], self.y[i]) = (NOWHERE, NOWHERE);
+        }
+        before - self.coverage((width, height))
     }
 
     /// Width and height of the rectified picture, px.

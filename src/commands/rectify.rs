@@ -1,7 +1,7 @@
 //! `stereocal rectify`: pairs of pictures undistorted, on common rows, for eyes and for dense stereo.
 
 use camino::Utf8Path;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Point2};
 use rayon::prelude::*;
 
 use super::{Outcome, Result};
@@ -124,7 +124,18 @@ fn remapped(raw: &Raster, map: &Map) -> Result<Raster, Failure> {
 fn plan(args: &Rectify, rig: &Rig) -> Result<(RectifiedFile, [Map; 2])> {
     let (width, height) = (rig.left.width, rig.left.height);
     let map = |side: Side, r: &Matrix3<f64>, p: &Matrix3<f64>, size| {
-        undistort_rectify_map(&rig.camera(side).for_opencv(), r, p, size).map_err(stereo::Error::from)
+        let camera = rig.camera(side);
+        let mut map = undistort_rectify_map(&camera.for_opencv(), r, p, size).map_err(stereo::Error::from)?;
+        let folded = map.empty_folds(&Point2::new(camera.cx, camera.cy), (camera.width, camera.height));
+        if folded > 0.0 {
+            progress::warn(format!(
+                "the {} camera's lens model holds no longer toward the borders, where no board stood: {:.0} % of the rectified picture stays black. \
+                 Boards nearer to the borders at the calibration, or a poorer `--lens`, tell it there",
+                side.name(),
+                (100.0 * folded).max(1.0)
+            ));
+        }
+        Ok::<Map, stereo::Error>(map)
     };
     let raw = Side::BOTH.map(|side| (rig.camera(side).width, rig.camera(side).height));
     let coverage = |maps: &[Map; 2]| Coverage { left: maps[0].coverage(raw[0]), right: maps[1].coverage(raw[1]) };
@@ -211,7 +222,12 @@ fn look_for(pairs: &[PairFiles], boards: &[Board]) -> Option<(Board, Vec<PairCor
             return None;
         }
         found.extend(find(board, others));
-        Some((board, found))
+        // Of a plain board that a rectified picture cuts, one picture alone does not tell which columns are missing.
+        let is_whole = |pair: &PairCorners| {
+            board.is_coded() || [&pair.left, &pair.right].iter().all(|corners| corners.len() == board.corner_count())
+        };
+        let whole: Vec<PairCorners> = found.iter().filter(|pair| is_whole(pair)).cloned().collect();
+        Some((board, if whole.is_empty() { found } else { whole }))
     })
 }
 

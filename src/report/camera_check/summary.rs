@@ -8,7 +8,7 @@ use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::evidence::Evidence;
-use crate::stereo::judge::ledger::KNOWN_LENSES;
+use crate::stereo::judge::ledger::{KNOWN_LENSES, RAYS};
 use crate::stereo::judge::lengths::{Axis, Range};
 use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::judge::verdict::Verdict;
@@ -205,13 +205,20 @@ pub(super) fn next(judged: &Judged) -> Vec<&str> {
     let tolerance_mm = judged.facts.tolerance_mm;
     let matters = move |finding: &&Finding| !passes && finding.effect_mm.is_none_or(|_| finding.material(tolerance_mm));
     let happened = judged.facts.findings.iter().filter(matters).filter_map(|finding| finding.remedy.as_deref());
+    // Rays that miss each other because the rig changed are no matter of a hand or a shadow.
+    let is_explained = |line: &&Evidence| line.what == RAYS && !judged.facts.findings.is_empty();
+    let changed = judged.facts.findings.iter().filter_map(|finding| finding.remedy.as_deref());
+    let changed = changed.filter(|_| judged.deciding().is_some_and(|line| is_explained(&line)));
     let board = judged.print_scatter.iter().filter(move |_| !passes).map(|board| board.text.as_str());
     // Lenses that are not these cameras' spoil all other lines.
     let lenses = judged.evidence.iter().find(|line| line.what == KNOWN_LENSES && line.allows != Verdict::Pass);
-    let deciding = lenses.or(judged.deciding()).filter(|line| line.allows != Verdict::Pass).map(|line| line.remedy);
-    let mut told: Vec<&str> = happened.chain(board).chain(deciding.filter(|remedy| !remedy.is_empty())).collect();
+    let deciding = lenses.or(judged.deciding()).filter(|line| line.allows != Verdict::Pass && !is_explained(line));
+    let deciding = deciding.map(|line| line.remedy);
+    let mut told: Vec<&str> =
+        happened.chain(changed).chain(board).chain(deciding.filter(|remedy| !remedy.is_empty())).collect();
     told.extend(judged.advice.iter().map(String::as_str));
-    told.dedup();
+    let mut said = std::collections::BTreeSet::new();
+    told.retain(|what| said.insert(*what));
     told
 }
 
@@ -252,7 +259,7 @@ pub(super) fn deciding_by(judged: &Judged, figure: fn(&Evidence) -> String) -> S
 pub(super) fn trusted(judged: &Judged) -> String {
     match (judged.trusted(), judged.trusted_mm()) {
         (Some(line), Some(mm)) if judged.measures_nothing() => format!(
-            "{}: of one of {:.0} mm an error of {} mm is not ruled out ({})",
+            "{}: of one of {:.0} mm an error {} is not ruled out ({})",
             // The tolerance that was asked for is as large.
             if judged.verdict == Verdict::Pass {
                 "within a tolerance that bounds hardly any length"
@@ -260,7 +267,11 @@ pub(super) fn trusted(judged: &Judged) -> String {
                 "no length can be trusted"
             },
             judged.facts.volume.length_mm,
-            two_digits(mm),
+            if mm < judged.facts.volume.length_mm {
+                format!("of {} mm", two_digits(mm))
+            } else {
+                "as large as itself".to_owned()
+            },
             line.name()
         ),
         (Some(line), Some(mm)) => {

@@ -280,13 +280,16 @@ fn causes(equals: &[&Candidate]) -> String {
     Cause::words(equals.iter().map(|candidate| candidate.hypothesis.map_or(Cause::CameraMoved, |h| h.cause)))
 }
 
-/// What happened, in words.
-fn described(equals: &[&Candidate]) -> String {
-    let words: Vec<String> = equals.iter().filter_map(|c| Some(c.hypothesis?.words.clone())).collect();
-    match words.split_first() {
-        None => "the right camera stands and looks otherwise".to_owned(),
-        Some((first, [])) => first.clone(),
-        Some((first, others)) => format!("{first}, or {}", others.join(", or ")),
+/// What happened and by how much, in words, for each cause that it may have been.
+fn described(equals: &[&Candidate], turned_deg: f64) -> String {
+    let by = |c: &&Candidate| {
+        let hypothesis = c.hypothesis?;
+        Some(format!("{} by {:.3} {}", hypothesis.words, c.change.amounts[0], hypothesis.unit))
+    };
+    let words: Vec<String> = equals.iter().filter_map(by).collect();
+    match words.is_empty() {
+        true => format!("the right camera stands and looks otherwise by {turned_deg:.3} deg"),
+        false => words.join(", or "),
     }
 }
 
@@ -316,8 +319,7 @@ fn finding(
         Kind::Step => format!("from pair {} on", name(best.first)),
         _ => format!("from pair {} to pair {}", name(0), name(count - 1)),
     };
-    let mut action =
-        format!("{} by {size:.3} {unit} {which}, which moves a length by up to {effect_mm:.4} mm", described(&equals));
+    let mut action = format!("{} {which}, which moves a length by up to {effect_mm:.4} mm", described(&equals, size));
     if best.kind == Kind::Drift {
         let [before, after] = calibration.moment();
         let at = if before == after { format!("pair {before}") } else { format!("pairs {before} and {after}") };

@@ -4,13 +4,13 @@
 //! turn until x lies along the baseline), where a raw point falls, and how far the rows of measured points differ. Goes wrong: cameras
 //! that look at each other, or one that stands in front of the other, have no common rows.
 
-use nalgebra::{Matrix3, Matrix3x4, Matrix4, Point2, Vector3};
+use nalgebra::{Matrix3, Matrix3x4, Matrix4, Point2, Point3, Vector3};
 use serde::Serialize;
 
 use crate::geometry::rotation_matrix;
 use crate::imaging::PairCorners;
-use crate::opencv::{Failure, ZERO_DISPARITY, stereo_rectify};
-use crate::stereo::{Rig, Side};
+use crate::opencv::{Failure, Lens, ZERO_DISPARITY, stereo_rectify, undistort_points};
+use crate::stereo::{Camera, Rig, Side};
 
 /// How much of the raw pictures is kept, in OpenCV's words.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,6 +32,22 @@ impl Scaling {
     }
 }
 
+/// Four terms of a lens that does not distort.
+const NO_DISTORTION: [f64; 4] = [0.0; 4];
+
+/// Whether OpenCV finds the places of a picture's corners and of the middles of its sides without their distortion.
+fn holds_at_borders(camera: &Camera) -> Result<bool, Failure> {
+    /// Five steps of its iteration leave some pixels of a wide lens, and diverge where the model folds; a share of the picture's width.
+    const NEAR: f64 = 0.05;
+    let [right, bottom] = [camera.width, camera.height].map(|size| f64::from(size) - 1.0);
+    let along = |end: f64| [0.0, 0.5 * end, end];
+    let border: Vec<Point2<f64>> =
+        along(right).into_iter().flat_map(|x| along(bottom).map(|y| Point2::new(x, y))).collect();
+    let found = undistort_points(&camera.for_opencv(), &border)?;
+    let raw = |place: &Point2<f64>| camera.project(&Point3::new(place.x, place.y, 1.0));
+    Ok(found.iter().zip(&border).all(|(place, px)| (raw(place) - px).norm() < NEAR * f64::from(camera.width)))
+}
+
 /// What `stereoRectify` gives. The left camera is the first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matrices {
@@ -44,9 +60,15 @@ pub struct Matrices {
 }
 
 impl Matrices {
-    /// Asks OpenCV.
+    /// Asks OpenCV. It scales and centres the rectified pictures by where the raw ones' borders lie undistorted; where it does not find that, for a
+    /// lens model that holds no longer there, by cameras without distortion.
     pub fn new(rig: &Rig, scaling: Scaling) -> Result<Matrices, Failure> {
-        let cameras = [rig.left.for_opencv(), rig.right.for_opencv()];
+        let cameras = [&rig.left, &rig.right];
+        let holds = cameras.into_iter().map(holds_at_borders).collect::<Result<Vec<bool>, Failure>>()?;
+        let cameras = cameras.map(Camera::for_opencv).map(|lens| match holds.contains(&false) {
+            true => Lens { distortion: &NO_DISTORTION, ..lens },
+            false => lens,
+        });
         let (rotation, translation) = (rotation_matrix(&rig.right_from_left), &rig.right_from_left.translation.vector);
         let (rotations, projections, disparity_to_depth) =
             stereo_rectify(cameras, &rotation, translation, (scaling.flags(), scaling.alpha))?;
@@ -116,7 +138,6 @@ mod tests {
     use crate::geometry::transform;
     use crate::stereo::Lens;
     use crate::stereo::model::projection::tests::bent_camera;
-    use nalgebra::Point3;
 
     /// Cameras that look at one place 600 mm away.
     fn rig(lens: Lens, right_mm: Vector3<f64>) -> Rig {
@@ -177,6 +198,41 @@ mod tests {
         assert!((right_px.dot(&line) / line.xy().norm()).abs() < ROUNDING);
         let swapped = f.transpose() * left_px;
         assert!((right_px.dot(&swapped) / swapped.xy().norm()).abs() > 1.0);
+    }
+
+    /// A lens that turns back a little outside of the middle half of its picture: fine where boards stood, and nowhere else.
+    fn folding() -> Camera {
+        let mut camera = Camera::pinhole(640, 480, 490.0);
+        camera.lens = Lens::Brown5;
+        (camera.distortion[0], camera.distortion[1], camera.distortion[4]) = (-0.07, 0.47, -3.0);
+        camera
+    }
+
+    #[test]
+    fn a_lens_that_folds_toward_the_borders_scales_nothing_and_shows_nothing_twice() {
+        let folds = Rig {
+            left: folding(),
+            right: folding(),
+            right_from_left: transform(Vector3::zeros(), -60.0 * Vector3::x()),
+            covariance: None,
+        };
+        let plain =
+            Rig { left: Camera::pinhole(640, 480, 490.0), right: Camera::pinhole(640, 480, 490.0), ..folds.clone() };
+        let [found, expected] = [&folds, &plain].map(|rig| Matrices::new(rig, Scaling::OPENCV).unwrap());
+        assert_eq!(found.projections, expected.projections);
+        let (r, p) = found.of(Side::Left);
+        let map = |rig: &Rig| {
+            let p = p.fixed_view::<3, 3>(0, 0).into_owned();
+            crate::opencv::undistort_rectify_map(&rig.left.for_opencv(), r, &p, (640, 480)).unwrap()
+        };
+        let centre = Point2::new(folds.left.cx, folds.left.cy);
+        let mut twice = map(&folds);
+        let taken = twice.empty_folds(&centre, (640, 480));
+        assert!((0.05..0.6).contains(&taken), "{taken}");
+        let mut once = map(&plain);
+        let before = once.clone();
+        assert_eq!(once.empty_folds(&centre, (640, 480)), 0.0);
+        assert_eq!(once, before);
     }
 
     #[test]

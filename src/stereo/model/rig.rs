@@ -80,7 +80,7 @@ impl Rig {
 
     /// What is unusual in the rig and may be meant, for a person.
     pub fn unusual(&self) -> Vec<String> {
-        self.unusual_place().into_iter().chain(self.unusual_tilt()).collect()
+        self.unusual_place().into_iter().chain(self.unusual_tilt()).chain(self.unusual_centre()).collect()
     }
 
     /// What is unusual in how the cameras stand, where something is: the left one on the right side, or one rolled against the other. Both may
@@ -105,6 +105,21 @@ impl Rig {
                 -right_mm.x
             )
         })
+    }
+
+    /// A principal point far from the picture's middle, where lenses have it.
+    fn unusual_centre(&self) -> Option<String> {
+        /// A share of the picture's width and height.
+        const MOST_OFF: f64 = 0.25;
+        let off = |centre: f64, size: u32| (centre / f64::from(size) - 0.5).abs() > MOST_OFF;
+        let is_off = |camera: &Camera| off(camera.cx, camera.width) || off(camera.cy, camera.height);
+        let side = Side::BOTH.into_iter().find(|side| is_off(self.camera(*side)))?;
+        let Camera { cx, cy, width, height, .. } = self.camera(side);
+        Some(format!(
+            "the {} camera's principal point comes out at ({cx:.0}, {cy:.0}) of {width}x{height} px: either its pictures are cut out of larger ones, or \
+             the views do not tell it: tilt the board more",
+            side.name()
+        ))
     }
 
     /// A sensor that is tilted by more than sensors are that are not meant to be. Where a lens bends little, a tilt is exchanged for the picture's

@@ -183,6 +183,9 @@ pub(super) fn folds(case: &Case) -> Evidence {
     )
 }
 
+/// Name of the line on rays.
+pub const RAYS: &str = "rays that contradict each other";
+
 pub(super) fn rays(case: &Case) -> Evidence {
     /// Share of corners whose rays may contradict each other: a hand or a reflection, not the rig.
     const LIMIT_PERCENT: f64 = 2.0;
@@ -190,8 +193,8 @@ pub(super) fn rays(case: &Case) -> Evidence {
     let value = 100.0 * doubtful.contradicted_share();
     let named = if doubtful.pairs.is_empty() { String::new() } else { format!(", in {}", doubtful.named()) };
     Evidence {
-        what: "rays that contradict each other",
-        remedy: "look at the corners of the named pairs for a hand, glare or shadow",
+        what: RAYS,
+        remedy: "look at the corners of the pairs that the page names, for a hand, glare or shadow",
         value: Some(value),
         limit: Some(LIMIT_PERCENT),
         unit: "%",

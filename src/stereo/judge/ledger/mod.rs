@@ -11,6 +11,6 @@ mod pairs;
 
 pub use all::ledger;
 pub use facts::{Case, Facts, LensPairs, Standards};
-pub use lengths::TOLERANCE;
+pub use lengths::{RAYS, TOLERANCE};
 pub use moves::KNOWN_MOVE;
 pub use pairs::KNOWN_LENSES;
