@@ -199,3 +199,34 @@ fn units_that_contradict_the_names_are_told_so() {
     refused(&of("rad"), &robot, &["`--units rad` contradicts the names j1_deg", "hint: leave `--units` out"]);
     refused(&of("deg,um"), &robot, &["`--units um` contradicts the names x_mm to z_mm, which say mm"]);
 }
+
+#[test]
+fn rows_of_a_pose_in_another_order_are_told_with_a_form_that_takes_them() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(24);
+    let all = of_reflectors(&rows);
+    let cells = |cells: &[f64]| cells.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let joints = folder.file("joints.csv", text("", &rows, ",", |q, _| q.to_vec()));
+    // At every other pose the second target was measured first.
+    let order = |pose: usize| if pose.is_multiple_of(2) { [0, 1, 2] } else { [1, 0, 2] };
+    let point = |pose: usize, k: usize| cells(&all[pose][3 * k..3 * k + 3]);
+    let (mut below, mut named) =
+        (String::new(), "pose,target,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,x_mm,y_mm,z_mm\n".to_owned());
+    for (pose, (q, _)) in rows.iter().enumerate() {
+        for k in order(pose) {
+            let _ = writeln!(below, "{}", point(pose, k));
+            let _ = writeln!(named, "{pose},{},{},{}", ["a", "b", "c"][k], cells(q), point(pose, k));
+        }
+    }
+    let below = folder.file("below.csv", below);
+    for columns in [None, Some("j1,j2,j3,j4,j5,j6,x,y,z".to_owned())] {
+        let told = Source { columns, ..source(&[&joints, &below]) };
+        refused(
+            &told,
+            &robot,
+            &["below.csv has 3 rows a pose", "neither targets in one order", "`pose,target,j1_deg,...,x_mm,y_mm,z_mm`"],
+        );
+    }
+    let (found, _) = source(&[&folder.file("named.csv", named)]).read(&robot).expect("named");
+    assert!(found.len() == 72 && found[0].target == "a" && found[9].target == "b", "{:?}", found[9]);
+}
