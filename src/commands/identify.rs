@@ -38,6 +38,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let mut set = Dataset::of_robot(&rows, &given)?;
     still::check_points(&set)?;
     set.files = files(&source, &rows);
+    set.typed_unit = source.typed_length();
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }

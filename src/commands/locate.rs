@@ -13,6 +13,7 @@ use crate::files::OutDir;
 use crate::files::provenance::{Provenance, Run};
 use crate::formats::placements::record::{PLACEMENT, PlacementFile};
 use crate::formats::robots::known;
+use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::still;
 use crate::identify::examine::{self, Examined};
@@ -57,7 +58,11 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
         examine::in_hand::refuse(&set, &robot)?;
     }
     let trust = known::trust(&args.robot);
-    let located = locate(&set, &robot, trust, &config.identify)?;
+    // Of a robot that is another one nothing is told, whatever the poses are.
+    let located = locate(&set, &robot, trust, &config.identify).map_err(|error| match (error, &unexplained) {
+        (Error::Open { .. }, Some(finding)) => Error::OtherRobot { why: finding.finding.clone() },
+        (error, _) => error,
+    })?;
     let all = set.rows(|_| true);
     let held_out = folds::judged(&Judge::plain(&set, &all, false), located.placed.robot(), &all);
     let mut placement = PlacementFile::new(args.robot.as_str(), &set, Some(&located.placed), &held_out);

@@ -6,11 +6,11 @@ use nalgebra::Point3;
 use super::{Outcome, Result};
 use crate::cli::{DhConvention, RobotCommand, RobotImport, RobotNew, RobotPlace, RobotShow, RobotWhat};
 use crate::config::Config;
-use crate::diagnostic::Status;
-use crate::files::OutDir;
+use crate::diagnostic::{Explain, Status};
 use crate::files::provenance::Run;
+use crate::files::{self, OutDir};
 use crate::formats::robots::{dh_csv, urdf};
-use crate::measurements::{Observed, Source};
+use crate::measurements::{Measurement, Observed, Source, is_not_near};
 use crate::progress;
 use crate::report::robot as report;
 use crate::robot::catalogue::names;
@@ -116,14 +116,24 @@ fn open(args: &RobotImport, readings: &[dh_csv::Reading], ways: &[Way]) -> Error
 /// The way to read a table that measurements of the robot decide for.
 fn by_readings(args: &RobotImport, name: &str, ways: &[Way]) -> Result<Robot> {
     let source = Source { files: args.measurements.clone(), ..Source::default() };
-    let mut left: Vec<(f64, &dh_csv::Reading, Convention)> = ways
-        .iter()
-        .filter_map(|(reading, convention)| {
-            Some((left_mm(&reading.robot(name, *convention), &source)?, *reading, *convention))
-        })
-        .collect();
+    let mut left: Vec<(f64, &dh_csv::Reading, Convention)> = Vec::new();
+    let mut unread = Vec::new();
+    for (reading, convention) in ways {
+        match left_mm(&reading.robot(name, *convention), &source) {
+            Ok(of_way) => left.extend(of_way.map(|left| (left, *reading, *convention))),
+            Err(error) => unread.push(error),
+        }
+    }
     left.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // With a wrong way nothing is near; what is said with the right one is what the measurements leave open.
+    let unread = unread.iter().find(|error| !is_not_near(error));
     match &left[..] {
+        [] if let Some(error) = unread => {
+            let place = error.place().unwrap_or_else(|| args.file.to_string());
+            let message = format!("the measurements cannot be read yet: {error}");
+            let hint = "leave in the measurements the joints and the measured points alone, or `--dh` and `--columns` read the table without them";
+            Err(Error::Table { message, place, hint: hint.to_owned() }.into())
+        }
         [] => Err(refuse(
             args,
             "no way to read the table comes near to the measurements".to_owned(),
@@ -144,9 +154,13 @@ fn by_readings(args: &RobotImport, name: &str, ways: &[Way]) -> Result<Robot> {
 /// The joints, rad, and the measured points of one placement.
 type Placement = (Vec<Vec<f64>>, Vec<Point3<f64>>);
 
-/// What a robot leaves of the measured points of the placement that has most of them, its tool and the sensor solved for, mm.
-fn left_mm(robot: &Robot, source: &Source) -> Option<f64> {
-    let (rows, _) = source.read(robot).ok()?;
+/// What a robot leaves of the measured points of the placement that has most of them, its tool and the sensor solved for, mm; `None` where it does
+/// not fit them.
+fn left_mm(robot: &Robot, source: &Source) -> std::result::Result<Option<f64>, files::Error> {
+    Ok(of_rows_mm(robot, &source.read(robot)?.0))
+}
+
+fn of_rows_mm(robot: &Robot, rows: &[Measurement]) -> Option<f64> {
     let mut groups: std::collections::BTreeMap<&str, Placement> = std::collections::BTreeMap::new();
     for row in rows.iter().filter(|row| row.target == rows[0].target) {
         if let Observed::Position { point_mm, .. } = row.observed {

@@ -38,6 +38,7 @@ impl RobotRecheckFile {
         let standing = match Standing::of(changed, recheck.effect_mm, recheck.seen_mm, tolerance_mm) {
             // Rows from before say nothing of what happened since, whatever they say.
             _ if own_data => Standing::OwnData,
+            _ if !recheck.extrapolated.is_empty() => Standing::Undecided,
             Standing::StillValid if !recheck.strays.is_empty() => Standing::Undecided,
             other => other,
         };

@@ -117,6 +117,12 @@ pub enum Error {
         /// What moves along it.
         direction: String,
     },
+    /// The robot is not the one whose rows these are.
+    #[error("the cameras cannot be placed with this robot: {why}")]
+    OtherRobot {
+        /// What was found.
+        why: String,
+    },
     /// A solver started from numbers that are no numbers.
     #[error("the residuals at the nominal robot are not finite")]
     NotFinite,
@@ -130,6 +136,7 @@ impl Explain for Error {
             | Error::NothingJudged { .. }
             | Error::TooFewToPlace { .. }
             | Error::Open { .. }
+            | Error::OtherRobot { .. }
             | Error::NotFinite => Status::Undetermined,
             _ => Status::BadInput,
         }
@@ -154,6 +161,7 @@ impl Explain for Error {
             Error::TooFewToPlace { .. } | Error::Open { .. } => Some(
                 "turn the flange about two axes that are not parallel, by 20 deg or more, over three poses or more of each group".to_owned(),
             ),
+            Error::OtherRobot { .. } => Some("`--robot FILE` names the robot that was measured".to_owned()),
             Error::CamerasOnHand { .. } => Some(
                 "with orientations, give each row the inverse of its pose (point -R'p, rotation vector -r): the board is then the sensor, and \
                  flange_from_target is where the camera sits on the hand"

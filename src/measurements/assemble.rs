@@ -44,7 +44,7 @@ pub(super) fn widen(parts: &mut [Part]) -> Result<bool> {
         part.meanings = part.meanings.as_ref().map(|m| (1..=times).flat_map(|k| m.iter().map(repeated(k))).collect());
         part.names = part.names.as_ref().map(|n| n.iter().cycle().take(times * n.len()).cloned().collect());
         part.kinds = part.kinds.iter().cycle().take(times * part.kinds.len()).cloned().collect();
-        part.rows = rows;
+        (part.rows, part.times) = (rows, times);
     }
     Ok(widened)
 }

@@ -19,3 +19,4 @@ pub use rows::{
     Measurement, Observed, RobotPose, Role, pose_fields, pose_header, poses_csv, read, read_poses, reading_name,
 };
 pub use source::Source;
+pub use unsettled::is_not_near;

@@ -46,6 +46,8 @@ pub(super) struct Part {
     pub kinds: Vec<Kind>,
     /// The column by which rows were joined with those of another file.
     pub key: Option<usize>,
+    /// Rows of the file that stand side by side in each row here.
+    pub times: usize,
 }
 
 /// Cells that say that there is no number.
@@ -77,7 +79,7 @@ impl Part {
         if let Form::Program { degrees, .. } = grid.form {
             meanings = Some((0..width).map(|column| of_program(column, joints, degrees)).collect());
         }
-        let part = Part { grid, names: headed.names, meanings, rows: headed.rows, kinds, key: None };
+        let part = Part { grid, names: headed.names, meanings, rows: headed.rows, kinds, key: None, times: 1 };
         match part.unread_unit().filter(|_| !named) {
             Some(error) => Err(error),
             None => Ok(part),
@@ -96,6 +98,11 @@ impl Part {
     /// Number of columns.
     pub fn width(&self) -> usize {
         self.kinds.len()
+    }
+
+    /// The same as the file has them.
+    pub fn width_of_file(&self) -> usize {
+        self.kinds.len() / self.times
     }
 
     /// Whether it is a program's.

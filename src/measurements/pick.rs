@@ -317,7 +317,10 @@ pub(super) fn columns_flag_with(parts: &[Part], joints: &[At], points: &[At], mo
     let named_joints = if joints.is_empty() { named.as_slice() } else { joints };
     let mut words = Vec::new();
     for (part, file) in parts.iter().enumerate() {
-        let width = if file.is_program() { named_joints.len().max(1).min(file.width()) } else { file.width() };
+        let width = match file.is_program() {
+            true => named_joints.len().max(1).min(file.width()),
+            false => file.width_of_file(),
+        };
         for column in 0..width {
             let at = At { part, column };
             let joint = named_joints.iter().position(|j| *j == at).map(|i| format!("j{}", i + 1));

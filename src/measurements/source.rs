@@ -74,6 +74,11 @@ impl Source {
         }
     }
 
+    /// The unit of lengths that was typed.
+    pub fn typed_length(&self) -> Option<Unit> {
+        self.forced().lengths
+    }
+
     /// Reads everything; the sentences say what was taken.
     pub fn read(&self, robot: &Robot) -> Result<(Vec<Measurement>, Vec<String>)> {
         let count = robot.joints.len();
@@ -178,7 +183,11 @@ impl Source {
             let readings = layout::are_readings(parts, &picked);
             // Two that are nearly one may be where the robot was sent and what was measured there.
             let unsaid = picked.points.len() == 2 && !widened && self.columns.is_none();
-            if readings && unsaid || !readings && layout::changes_distance(parts, first, second) {
+            let differ = !readings && layout::changes_distance(parts, first, second);
+            if differ && widened {
+                return Err(unsettled::rows_of_pose(parts));
+            }
+            if readings && unsaid || differ {
                 return Err(pick::asked(parts, &[], [first, second], readings));
             }
         }
@@ -197,6 +206,7 @@ impl Source {
                 apart.map_or(Ok((way, basis)), |apart| Err(apart.asked(parts)))
             }
             Verdict::WrongUnit { stated, better } => Err(unsettled::wrong_unit(parts, &stated, &better)),
+            Verdict::Open(..) if widened => Err(unsettled::rows_of_pose(parts)),
             Verdict::Open(a, b) => Err(unsettled::open(parts, &a, &b)),
             Verdict::NoUnit { joints } => {
                 let (what, hint) = match joints {

@@ -100,16 +100,38 @@ pub(super) fn unplaced(parts: &[Part], picked: &Picked, forced: Forced) -> Error
         "{}`--columns` names the {} columns in their order: j1 to j{count} for the joints, x, y, z for the point, `-` for each that is neither; \
          look at `--robot`, too: its file must be of this robot",
         lying(parts, count),
-        parts.iter().map(Part::width).sum::<usize>()
+        parts.iter().map(Part::width_of_file).sum::<usize>()
     );
     let what = match parts.iter().any(|p| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance))) {
         true => "the joints",
         false if parts.iter().any(|p| p.names_any(|w| matches!(w, What::Joint(_)))) => "the point",
         false => "the joints and which the point",
     };
-    let message =
-        format!("no name says which columns are {what}, and no choice of them comes near to the nominal robot");
-    parts[0].refuse(message, Some(&hint))
+    // Joints that names say are not what is in question.
+    let is_open = |p: &&Part| what != "the point" || !(p.is_program() || pick::names_joints(p, count));
+    let message = format!("no name says which columns are {what}, {NOT_NEAR}");
+    parts.iter().find(is_open).unwrap_or(&parts[0]).refuse(message, Some(&hint))
+}
+
+/// What is said where no choice of columns does.
+const NOT_NEAR: &str = "and no choice of them comes near to the nominal robot";
+
+/// Whether it is said that no choice of columns comes near to the robot.
+pub fn is_not_near(error: &Error) -> bool {
+    error.to_string().contains(NOT_NEAR)
+}
+
+/// That the rows of a pose are neither targets of one body nor readings of one point.
+pub(super) fn rows_of_pose(parts: &[Part]) -> Error {
+    let part = parts.iter().find(|part| part.times > 1).unwrap_or(&parts[0]);
+    let message = format!(
+        "{} has {} rows a pose, one after the other, and they are neither targets in one order, whose distances are kept, nor readings of one point",
+        part.file_name(),
+        part.times
+    );
+    let hint = "look for rows that are missing, doubled or in another order; a table of all rows with the columns `pose,target,j1_deg,...,x_mm,y_mm,z_mm` \
+                says which is which; look at `--robot`, too: its file must be of this robot";
+    part.refuse(message, Some(hint))
 }
 
 /// That two ways would do, with the flags that take either.

@@ -50,6 +50,9 @@ fn next(judged: Judged, recheck: &Recheck) -> &'static str {
         Standing::Undecided if !recheck.strays.is_empty() => {
             "take again what is named, its joints or its reading are those of another pose or misread, and check with that"
         }
+        Standing::Undecided if !recheck.extrapolated.is_empty() => {
+            "check with poses inside these ranges, or identify anew with poses of both"
+        }
         Standing::Undecided => {
             "add poses that bend every joint and turn the wrist, or say with --tolerance-mm what matters: these would not have shown a change as large as the tolerance"
         }

@@ -274,3 +274,37 @@ fn a_tool_that_moved_is_the_only_reason_that_is_given() {
         assert!(!warned.contains(other) && !said.contains(other), "{other}: {said}{warned}");
     }
 }
+
+#[test]
+fn a_change_where_the_robot_was_not_identified_is_one_only_where_it_is_large() {
+    let folder = identified();
+    let at = folder.path();
+    let found =
+        ["identify", "--measurements", "truth/measurements.csv", "--method", "trust-region", "--robot", "robot.toml"];
+    assert_eq!(stereocal(at, &[&found[..], &["--force", "--no-provenance"]].concat()).status.code(), Some(0));
+    let record = at.join("out/identification.json");
+    let of_all: serde_json::Value = serde_json::from_slice(&std::fs::read(&record).unwrap()).unwrap();
+    let mut elsewhere = of_all.clone();
+    let low = of_all["expected"]["joint_ranges"][3][0].as_f64().unwrap();
+    elsewhere["expected"]["joint_ranges"][3] = serde_json::json!([low - 20.0, low - 10.0]);
+    let said = |json: &serde_json::Value, by_deg: f64| {
+        std::fs::write(&record, json.to_string()).unwrap();
+        rows(at, |rows| {
+            for row in rows {
+                row[JOINT + 3] = (row[JOINT + 3].parse::<f64>().unwrap() + by_deg).to_string();
+            }
+        });
+        let against =
+            ["verify", "--measurements", "new.csv", "--against", "out/identified.toml", "--out", "checks", "--force"];
+        stdout(&stereocal(at, &against))
+    };
+    for (json, by_deg, standing, word) in [
+        (&of_all, 0.2, "CHANGED", "the zero of joint 4"),
+        (&elsewhere, 0.2, "UNDECIDED", "these poses stand where the robot was not identified (joint 4 in 12 rows"),
+        (&elsewhere, 5.0, "CHANGED", "the zero of joint 4"),
+    ] {
+        let told = said(json, by_deg);
+        assert!(told.starts_with(standing) && told.contains(word), "{by_deg}: {told}");
+    }
+    assert!(!said(&elsewhere, 0.0).contains("CHANGED"));
+}

@@ -11,7 +11,7 @@ use stereocal::geometry::transform;
 use stereocal::measurements::{Measurement, Observed, Source};
 use stereocal::robot::Robot;
 
-use crate::run::{shared, stderr, stereocal, workplace};
+use crate::run::{shared, stderr, stdout, stereocal, workplace};
 
 mod doubtful;
 mod forms;

@@ -19,7 +19,7 @@ use crate::formats::robots::known;
 use crate::identify;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::known as distances;
-use crate::identify::data::still;
+use crate::identify::data::{still, targets};
 use crate::identify::examine::{self, Examined, on_rows};
 use crate::identify::judge::errors::{Judge, PLACED_BY_ITSELF};
 use crate::identify::judge::{folds, strays};
@@ -127,6 +127,7 @@ fn tell(set: &Dataset, folded: bool, only_verify: bool) {
     }
     if let Some(repeats) = &set.repeats {
         progress::note(repeats.sentence());
+        repeats.finding().iter().for_each(|finding| progress::warn(finding.sentence()));
     }
     if folded {
         progress::note("no row has the role `verify`: each row is judged with the sensor placed by the others");
@@ -158,9 +159,11 @@ pub fn run(args: &Verify, config: &Config, run: Run) -> Result<Outcome> {
     }
     args.robot.iter().filter_map(|file| fitted_to(file, &rows)).for_each(progress::warn);
     let only_verify = place_by_verify_rows(&mut rows);
-    let mut set = match robots.first() {
-        Some((_, robot)) => Dataset::of_robot(&rows, robot)?,
-        None => Dataset::new(&rows)?,
+    let of_places = args.robot.iter().find_map(|file| targets::of_places(&rows, &known::places_mm(file)));
+    let mut set = match (of_places, robots.first()) {
+        (Some((rows, targets)), _) => Dataset::of_rows(&rows, Some(targets))?,
+        (None, Some((_, robot))) => Dataset::of_robot(&rows, robot)?,
+        (None, None) => Dataset::new(&rows)?,
     };
     still::check_points(&set)?;
     if let Some(path) = &args.known_distances {

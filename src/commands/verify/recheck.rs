@@ -4,6 +4,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 
 use super::super::identify::{check_joints, read, source};
 use super::super::{Outcome, Result};
+use super::beyond::{self, Outside};
 use crate::cli::Verify;
 use crate::config::Config;
 use crate::diagnostic::{Status, count};
@@ -15,12 +16,12 @@ use crate::formats::robot_recheck::{HISTORY, RobotRecheckFile};
 use crate::formats::robots::known;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::still;
+use crate::identify::data::{still, targets};
 use crate::identify::examine::on_rows::{self, OfKnown};
 use crate::identify::examine::shifted;
 use crate::identify::judge::locate::FEWEST_POSES;
-use crate::identify::judge::recheck::recheck;
-use crate::measurements::{Given, Measurement, Observed, Role};
+use crate::identify::judge::recheck::{Before, Recheck, Stood, recheck};
+use crate::measurements::{Measurement, Observed, Role};
 use crate::progress;
 use crate::report;
 use crate::report::robot_recheck::Judged;
@@ -34,8 +35,8 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     // Nothing is fitted that rows could be kept from.
     rows.iter_mut().filter(|row| row.at.role == Role::Verify).for_each(|row| row.at.role = Role::Sample);
     check_joints(&robot, &rows, &args.measurements[0])?;
-    let own = Own::among(&mut rows, &known::given(against));
-    let (set, is_mended) = mended(Dataset::new(&rows)?, &robot, before.p95_mm, config)?;
+    let own = Own::among(&mut rows, against);
+    let (set, is_mended) = mended(of_targets(&rows, against)?, &robot, before.p95_mm, config)?;
     let stood = PlacementFile::read(&against.with_file_name(PLACEMENT)).ok();
     let placed = |group: &str| stood.as_ref()?.sensor_from_base(group, &robot.ends.root_from_frame0);
     let paths = source.paths();
@@ -59,7 +60,7 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let warnings: Vec<String> =
         advice.into_iter().chain(is_mended.clone()).chain(shift).chain(of_own).chain(skipped).collect();
     warnings.iter().for_each(progress::warn);
-    let found = recheck(&set, &robot, &before, &placed)?;
+    let found = within_ranges(recheck(&set, &robot, &before, &placed)?, (&set, &robot), against, &before, &placed);
     // A change that is smaller than what the robot was off by anyway is none to act on.
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm.max(before.p95_mm));
     let own_data = whole.is_some() || own.all;
@@ -87,6 +88,37 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     Ok(Outcome { stdout: if args.json { json } else { summary() }, status })
 }
 
+/// The rows, whose targets stand where the robot's identification found them.
+fn of_targets(rows: &[Measurement], against: &Utf8Path) -> std::result::Result<Dataset, Error> {
+    match targets::of_places(rows, &known::places_mm(against)) {
+        Some((rows, targets)) => Dataset::of_rows(&rows, Some(targets)),
+        None => Dataset::new(rows),
+    }
+}
+
+/// The same, where rows are outside of the ranges that the robot was identified in. A change that its model may lack there, nothing single or the zero
+/// of a joint that is outside, is none where the other rows do not show it as well, and it is no more than what was corrected of the robot.
+fn within_ranges(
+    found: Recheck,
+    (set, robot): (&Dataset, &Robot),
+    against: &Utf8Path,
+    before: &Before,
+    placed: Stood,
+) -> Recheck {
+    let Outside { joints, rows } = beyond::outside(against, robot, set, &set.rows(|_| true));
+    let is_outside = |cause: &str| joints.iter().any(|(joint, _)| cause == format!("joint-{}", joint + 1));
+    let is_lacking = found.likeliest.is_empty() || found.likeliest.iter().any(|(cause, _)| is_outside(cause));
+    if !found.changed || joints.is_empty() || !is_lacking || found.effect_mm > found.correction_mm {
+        return found;
+    }
+    let inside = set.clone().without(&rows, "it is outside of the ranges that the robot was identified in");
+    let enough = inside.placing_rows(FEWEST_POSES + 1).is_ok();
+    match enough && recheck(&inside, robot, before, placed).is_ok_and(|of_inside| of_inside.changed) {
+        true => found,
+        false => Recheck { extrapolated: joints.into_iter().map(|(_, said)| said).collect(), ..found },
+    }
+}
+
 /// The rows in the units, signs and columns that the robot has, and what was mended. Rows that it was identified from are not known again in others.
 fn mended(set: Dataset, robot: &Robot, p95_mm: f64, config: &Config) -> Result<(Dataset, Option<String>)> {
     still::check_points(&set)?;
@@ -110,11 +142,12 @@ struct Own {
 
 impl Own {
     /// Takes them out where the others are enough.
-    fn among(rows: &mut Vec<Measurement>, given: &Given) -> Own {
+    fn among(rows: &mut Vec<Measurement>, against: &Utf8Path) -> Own {
+        let given = known::given(against);
         let read = |row: &&Measurement| !matches!(row.observed, Observed::Missing { .. });
         let (of, own) = (rows.iter().filter(read).count(), rows.iter().filter(|row| given.holds(row)).count());
         let others: Vec<Measurement> = rows.iter().filter(|row| !given.holds(row)).cloned().collect();
-        let enough = Dataset::new(&others).is_ok_and(|set| set.placing_rows(FEWEST_POSES + 1).is_ok());
+        let enough = of_targets(&others, against).is_ok_and(|set| set.placing_rows(FEWEST_POSES + 1).is_ok());
         if own > 0 && enough {
             *rows = others;
         }

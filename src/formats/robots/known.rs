@@ -1,7 +1,9 @@
 //! What `identification.json` says of the robot file beside it: how far to trust the robot, and the covariance of what was identified.
 
+use std::collections::BTreeMap;
+
 use camino::Utf8Path;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 use serde::Deserialize;
 
 use crate::files::provenance::{Digested, Provenance};
@@ -25,6 +27,42 @@ struct Identified {
     whole_covariance: Option<Covariance>,
     #[serde(default)]
     rows: Given,
+    #[serde(default)]
+    targets: Option<Targets>,
+    #[serde(default)]
+    chosen: String,
+    #[serde(default)]
+    methods: Vec<Method>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Method {
+    name: String,
+    model: String,
+    parameters: Vec<Corrected>,
+}
+
+/// A parameter, in units of the file.
+#[derive(Debug, Deserialize)]
+struct Corrected {
+    name: String,
+    delta: f64,
+}
+
+#[derive(Debug, Deserialize)]
+struct Targets {
+    names: Vec<String>,
+    scatter_mm: Option<f64>,
+    places_mm: Vec<Option<[f64; 3]>>,
+}
+
+impl Identified {
+    /// By how much the identification corrected a parameter, in units of the file.
+    fn correction(&self, of: Parameter) -> f64 {
+        let chosen = self.methods.iter().find(|method| self.chosen == format!("{}/{}", method.name, method.model));
+        let found = chosen.and_then(|method| method.parameters.iter().find(|known| known.name == of.name()));
+        found.map_or(0.0, |known| known.delta)
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -75,10 +113,18 @@ pub fn given(file: &Utf8Path) -> Given {
     beside(file).map_or_else(Given::default, |identified| identified.rows)
 }
 
+/// Where targets stand from the mark point along the flange's axes, mm, by name, where the robot joined them; none where their poses did.
+pub fn places_mm(file: &Utf8Path) -> BTreeMap<String, Vector3<f64>> {
+    let joined = beside(file).and_then(|identified| identified.targets).filter(|t| t.scatter_mm.is_none());
+    let placed = joined.into_iter().flat_map(|t| t.names.into_iter().zip(t.places_mm));
+    placed.filter_map(|(name, place)| Some((name, place?.into()))).collect()
+}
+
 /// What is known of an identified robot. `None` where its file has no record beside it, or one of another program's version.
 pub fn before(file: &Utf8Path, robot: &Robot) -> Option<Before> {
     let identified = beside(file)?;
-    let (Covariance { order, matrix }, expected) = (identified.whole_covariance?, identified.expected?);
+    let (Covariance { order, matrix }, expected) =
+        (identified.whole_covariance.as_ref()?, identified.expected.as_ref()?);
     let all = Terms::ALL.parameters(robot);
     let named = |name: &String| all.iter().copied().find(|p| p.name() == *name);
     let parameters = order.iter().map(named).collect::<Option<Vec<Parameter>>>()?;
@@ -88,7 +134,9 @@ pub fn before(file: &Utf8Path, robot: &Robot) -> Option<Before> {
     }
     let factor = |i: usize| parameters[i].file_unit().1;
     let covariance = DMatrix::from_fn(count, count, |r, c| matrix[r][c] / (factor(r) * factor(c)));
-    let point_mm = identified.scatter_mm.hypot(identified.smooth.map_or(0.0, |smooth| smooth.left_mm));
+    let correction = parameters.iter().map(|of| identified.correction(*of)).collect();
+    let point_mm = identified.scatter_mm.hypot(identified.smooth.as_ref().map_or(0.0, |smooth| smooth.left_mm));
     let trust = Trust { point_mm, rotation_rad: identified.scatter_rad };
-    Some(Before { parameters, covariance, trust, poses: expected.map.len(), p95_mm: expected.p95_mm })
+    let (poses, p95_mm) = (expected.map.len(), expected.p95_mm);
+    Some(Before { parameters, covariance, correction, trust, poses, p95_mm })
 }

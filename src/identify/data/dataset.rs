@@ -12,6 +12,7 @@ use crate::identify::Error;
 use crate::identify::sensor::{Extra, FLOOR_MM2};
 use crate::measurements::{Measurement, Observed, Role};
 use crate::robot::Robot;
+use crate::tables::names::Unit;
 
 /// What all readings of a set are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +35,6 @@ pub enum Reading {
         rotation_rad: Option<Vector3<f64>>,
     },
     Distance {
-        /// Its value, mm.
         distance_mm: f64,
         /// Its standard deviation, mm.
         sigma_mm: Option<f64>,
@@ -112,6 +112,8 @@ pub struct Dataset {
     pub targets: Option<Targets>,
     /// Names of the files of a run of several, by whose number the poses' names begin (`2:17`); empty of one.
     pub files: Vec<String>,
+    /// The unit of lengths that was typed, where one was.
+    pub typed_unit: Option<Unit>,
 }
 
 /// A known distance between the points that two groups touched.
@@ -141,9 +143,9 @@ impl Dataset {
         Ok(set)
     }
 
-    fn of_rows(rows: &[Measurement], targets: Option<Targets>) -> Result<Dataset, Error> {
-        let (merged, repeats) = repeats::as_one(rows);
-        let rows = merged.as_slice();
+    /// Of one row a pose, whose targets are these.
+    pub fn of_rows(rows: &[Measurement], targets: Option<Targets>) -> Result<Dataset, Error> {
+        let (rows, repeats) = repeats::as_one(rows);
         let positions = rows.iter().any(|r| matches!(r.observed, Observed::Position { .. }));
         let kind = if positions { Kind::Positions } else { Kind::Distances };
         let mut set = Dataset {
@@ -159,9 +161,10 @@ impl Dataset {
             known: Vec::new(),
             targets,
             files: Vec::new(),
+            typed_unit: None,
         };
         set.slides = rows.first().map_or_else(Vec::new, |r| r.at.slides.clone());
-        for row in rows {
+        for row in &rows {
             let group = set.group(&row.at.group);
             if let Observed::Position { covariance_mm2: Some(c), .. } = &row.observed
                 && is_singular(c)

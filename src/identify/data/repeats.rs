@@ -2,15 +2,26 @@
 //!
 //! In: rows of measurements. Out: one row for rows of one group and role that follow each other with the same joints, and the standard deviation
 //! of a coordinate within them: what the instrument repeats. It says nothing about the robot, which stood still, so that as rows of their own
-//! they would count one error of the robot several times. A pose that the robot came back to is another row.
+//! they would count one error of the robot several times. A pose that the robot came back to is another row. One reading of three or more that is
+//! far from the others of its pose was misread, and is left out; of two nobody knows which.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
+use crate::identify::finding::Finding;
 use crate::measurements::{Measurement, Observed, Role};
+use crate::statistics::median;
+
+/// Readings of a pose that tell which of them was misread.
+const TELL: usize = 3;
+
+/// Times what readings are off the median of their pose, and mm at the least, that a reading which was misread is: an instrument drifts and
+/// settles by some times that, and by less than an arm repeats to.
+const FAR: f64 = 12.0;
+const LEAST_MM: f64 = 0.2;
 
 /// Readings repeated at one pose.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Repeats {
     /// Readings in all, of the poses that have several.
     pub readings: usize,
@@ -18,6 +29,9 @@ pub struct Repeats {
     pub poses: usize,
     /// Standard deviation of a coordinate, or of a distance, within a pose, mm.
     pub scatter_mm: f64,
+    /// Those that were misread and left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub misread: Vec<String>,
 }
 
 impl Repeats {
@@ -27,6 +41,16 @@ impl Repeats {
             "{} readings were repeated at {} poses: each pose counts once, with their mean; the instrument repeats to {:.4} mm",
             self.readings, self.poses, self.scatter_mm
         )
+    }
+
+    /// What was misread.
+    pub fn finding(&self) -> Option<Finding> {
+        let said = match self.misread.len() {
+            0 => return None,
+            1 => "1 reading is far from the others of its pose".to_owned(),
+            count => format!("{count} readings are far from the others of their poses"),
+        };
+        Some(Finding::new(said, "left out: the others of the pose are used").about(self.misread.clone()))
     }
 }
 
@@ -40,6 +64,10 @@ pub fn as_one(rows: &[Measurement]) -> (Vec<Measurement>, Option<Repeats>) {
     };
     let mut merged = Vec::with_capacity(rows.len());
     let (mut readings, mut poses, mut squares, mut freedom) = (0, 0, 0.0, 0usize);
+    let far = misread(rows, same);
+    let misread = far.iter().map(|&row| rows[row].at.pose.clone()).collect();
+    let kept = rows.iter().enumerate().filter(|(row, _)| !far.contains(row));
+    let rows: Vec<Measurement> = kept.map(|(_, row)| row.clone()).collect();
     for pose in rows.chunk_by(same) {
         merged.push(mean(pose));
         if pose.len() > 1 {
@@ -54,8 +82,26 @@ pub fn as_one(rows: &[Measurement]) -> (Vec<Measurement>, Option<Repeats>) {
         }
     }
     let repeats =
-        (poses > 0).then(|| Repeats { readings, poses, scatter_mm: (squares / freedom.max(1) as f64).sqrt() });
+        (poses > 0).then(|| Repeats { readings, poses, scatter_mm: (squares / freedom.max(1) as f64).sqrt(), misread });
     (merged, repeats)
+}
+
+/// The readings that are far from the median of their pose, by their row.
+fn misread(rows: &[Measurement], same: impl Fn(&Measurement, &Measurement) -> bool) -> Vec<usize> {
+    let mut start = 0;
+    let mut all: Vec<(f64, usize)> = Vec::new();
+    for pose in rows.chunk_by(same) {
+        let read: Vec<Vec<f64>> = pose.iter().filter_map(numbers).collect();
+        if read.len() >= TELL {
+            let middle = |k: usize| median(read.iter().map(|n| n[k])).unwrap_or(0.0);
+            let off = |n: &Vec<f64>| (0..n.len()).map(|k| (n[k] - middle(k)).powi(2)).sum::<f64>().sqrt();
+            all.extend(read.iter().map(off).zip(start..));
+        }
+        start += pose.len();
+    }
+    let usual = median(all.iter().map(|(off, _)| *off)).unwrap_or(0.0);
+    let is_far = |off: f64| off > (FAR * usual).max(LEAST_MM);
+    all.into_iter().filter(|(off, _)| is_far(*off)).map(|(_, row)| row).collect()
 }
 
 /// What was read, where it can be averaged; a touch says that the target was there, and has nothing to average.
@@ -121,5 +167,28 @@ mod tests {
         assert_eq!((repeats.readings, repeats.poses), (2, 1));
         assert!((repeats.scatter_mm - (0.02f64 / 3.0).sqrt()).abs() < 1e-12);
         assert_eq!(as_one(&[row(1.0, 0.1), row(2.0, 0.3)]).1, None);
+    }
+
+    #[test]
+    fn a_reading_that_was_misread_is_named_and_left_out() {
+        let triples: Vec<Measurement> = (0..8)
+            .flat_map(|k| [0.0, 0.01, 0.02].map(|dx| row(f64::from(k), 100.0 + 7.0 * f64::from(k) + dx)))
+            .collect();
+        assert!(as_one(&triples).1.unwrap().misread.is_empty());
+        for by_mm in [1.0, 10.0, 1e3, 1e7] {
+            let mut rows = triples.clone();
+            rows[10] = row(3.0, 121.01 + by_mm);
+            let (merged, repeats) = as_one(&rows);
+            let repeats = repeats.unwrap();
+            assert_eq!(repeats.misread, [rows[10].at.pose.clone()], "{by_mm}");
+            assert!(repeats.finding().unwrap().sentence().starts_with("1 reading is far from the others of its pose"));
+            assert!(
+                merged.len() == 8
+                    && repeats.scatter_mm < 0.02
+                    && (numbers(&merged[3]).unwrap()[0] - 121.01).abs() < 1e-9
+            );
+        }
+        // Of two readings nobody knows which is wrong.
+        assert!(as_one(&[row(1.0, 0.1), row(1.0, 90.0), row(2.0, 5.0)]).1.unwrap().misread.is_empty());
     }
 }

@@ -45,10 +45,14 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     step("sessions along the rows");
     let robots = if settings.examine { robots::find(&set, &robot, settings) } else { None };
     let tool = if settings.examine && robots.is_none() { robots::tools::find(&set, &robot) } else { None };
-    let (mut set, along) = match &robots {
-        Some(robots) => (robots.parted(&set), Along { robots: Some(robots.finding()), ..Along::default() }),
-        None => sessions::find(&set, &robot, settings),
+    let uncut = set;
+    let (mut set, mut along) = match &robots {
+        Some(robots) => (robots.parted(&uncut), Along { robots: Some(robots.finding()), ..Along::default() }),
+        None => sessions::find(&uncut, &robot, settings),
     };
+    if settings.examine && !along.sessions.is_empty() && along.drifting.is_empty() {
+        along.instead = robots::tools::of_sessions(&uncut, &set, &robot);
+    }
     // Sessions have placements of their own: a sensor that was moved does no harm there.
     let is_harmless = |tool: &Moved| tool.is_placed && !along.sessions.is_empty();
     against.extend(tool.filter(|tool| !is_harmless(tool)).map(|tool| tool.finding));

@@ -118,19 +118,20 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
         let rows = set.names(&hypothesis.rows(&set));
         (set, robot) = hypothesis.applied(&set, &robot);
         in_other_units |= hypothesis.factor() != 1.0;
-        let (whose, from, to) = match there.fitted * EXPLAINS < now.fitted {
-            true => ("the errors", now.fitted, there.fitted),
-            false if there.nominal * EXPLAINS < now.nominal => {
-                ("the nominal robot's errors", now.nominal, there.nominal)
-            }
-            false => ("the nominal links' errors", now.target, there.target),
-        };
-        // What is left is in the file's unit, which is said to be another.
-        let to = to * hypothesis.factor();
-        let list = if rows.is_empty() { &mut findings } else { &mut against };
+        let (whose, from, to) = there.fallen(&now, hypothesis.factor());
+        let typed = set.typed_unit.filter(|_| hypothesis.factor() != 1.0);
+        let list = if rows.is_empty() && typed.is_none() { &mut findings } else { &mut against };
+        let says = typed.map_or_else(String::new, |unit| format!(" as `--units {}` says", unit.flag()));
         let finding = Finding::new(
-            format!("{}{} ({whose} fall from {from:.2} to {to:.3} mm)", hypothesis.name(), same.concat()),
-            "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)",
+            format!("{}{says}{} ({whose} fall from {from:.2} to {to:.3} mm)", hypothesis.name(), same.concat()),
+            match (typed, hypothesis) {
+                (Some(_), Hypothesis::Lengths(.., unit)) => {
+                    format!("`--units {}` says so, if the robot file is the right one", unit.flag())
+                }
+                _ => {
+                    "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)".to_owned()
+                }
+            },
         );
         list.push(finding.about(rows));
         left = there.scaled(1.0 / hypothesis.factor());
@@ -166,7 +167,9 @@ fn explaining(
         let there = Misfit::of(&s, &r, settings, nearer.then_some(&to_be_beaten))?.scaled(h.factor());
         // What stands still is told from the tool only where the tool's place is free in both.
         let free = |of: Misfit| if h.is_of_still(&still) { Misfit { nominal: of.target, ..of } } else { of };
-        free(there).explains(&free(*now)).then_some((there, h))
+        // In larger units errors are a smaller share of the readings, and larger all the same.
+        let (_, from, to) = there.fallen(now, h.factor());
+        (free(there).explains(&free(*now)) && to < from).then_some((there, h))
     };
     open.par_iter().filter_map(|h| explains(*h)).collect()
 }
@@ -200,6 +203,16 @@ impl Misfit {
     /// All three at once, to compare hypotheses by.
     fn product(&self) -> f64 {
         self.nominal * self.target * self.fitted
+    }
+
+    /// Whose errors fall, mm: from what they were now to these, which are in the file's unit. That unit is so many times what it was said to be.
+    fn fallen(&self, now: &Misfit, factor: f64) -> (&'static str, f64, f64) {
+        let (whose, from, to) = match self.fitted * EXPLAINS < now.fitted {
+            true => ("the errors", now.fitted, self.fitted),
+            false if self.nominal * EXPLAINS < now.nominal => ("the nominal robot's errors", now.nominal, self.nominal),
+            false => ("the nominal links' errors", now.target, self.target),
+        };
+        (whose, from, to * factor)
     }
 
     /// Whether two hypotheses are one and the same robot in other words, as a shoulder turned over and a base that turns the other way.

@@ -4,6 +4,7 @@ use nalgebra::{Rotation3, Vector3};
 
 use crate::identify::data::dataset::{Dataset, Kind, Pose, Reading};
 use crate::robot::Robot;
+use crate::tables::names::Unit;
 
 /// One thing that may be wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,8 +17,8 @@ pub enum Hypothesis {
     Part(f64, &'static str),
     /// A joint's reading holds so many times that of the joint before it.
     Coupled(usize, f64),
-    /// Readings are in a unit of so many mm.
-    Lengths(f64, &'static str),
+    /// Readings, multiplied by so much, are in the second unit and not in the first.
+    Lengths(f64, Unit, Unit),
     /// Known distances are in a unit of so many mm.
     KnownLengths(f64, &'static str),
     /// Two columns are exchanged.
@@ -57,11 +58,12 @@ pub fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
     // A touch reads no length.
     let touches = (0..set.poses.len()).any(|row| set.touches(row));
     list.extend(parts(set));
-    for (factor, unit) in [(1000.0, "m"), (25.4, "inches"), (10.0, "cm"), (0.001, "um")] {
+    let read_as = set.typed_unit.unwrap_or(Unit::Mm);
+    for unit in [Unit::M, Unit::Inch, Unit::Cm, Unit::Um, Unit::Mm].into_iter().filter(|unit| *unit != read_as) {
         match touches {
-            false => list.push(Hypothesis::Lengths(factor, unit)),
-            true if set.known.is_empty() => {}
-            true => list.push(Hypothesis::KnownLengths(factor, unit)),
+            false => list.push(Hypothesis::Lengths(unit.converted(1.0) / read_as.converted(1.0), read_as, unit)),
+            true if set.known.is_empty() || unit == Unit::Mm => {}
+            true => list.push(Hypothesis::KnownLengths(unit.converted(1.0), unit.word())),
         }
     }
     if set.kind == Kind::Positions {
@@ -89,7 +91,7 @@ pub fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
 impl Hypothesis {
     /// What lengths are multiplied by, so that errors can be compared.
     pub fn factor(self) -> f64 {
-        if let Hypothesis::Lengths(factor, _) = self { factor } else { 1.0 }
+        if let Hypothesis::Lengths(factor, ..) = self { factor } else { 1.0 }
     }
 
     /// Whether all that it is about stands still in the set: the tool's place then undoes what it says as well as it can say it.
@@ -124,7 +126,9 @@ impl Hypothesis {
                 )
             }
             Hypothesis::Radians => "the joint angles are in radians, not in degrees".to_owned(),
-            Hypothesis::Lengths(_, unit) => format!("the readings are in {unit}, not in mm"),
+            Hypothesis::Lengths(_, read_as, unit) => {
+                format!("the readings are in {}, not in {}", unit.word(), read_as.word())
+            }
             Hypothesis::KnownLengths(_, unit) => format!("the known distances are in {unit}, not in mm"),
             Hypothesis::Exchanged(i, j) => {
                 format!("the columns of joints {} and {} are exchanged (swapped)", i + 1, j + 1)
@@ -145,7 +149,7 @@ impl Hypothesis {
         let (mut set, mut robot) = (set.clone(), robot.clone());
         match self {
             Hypothesis::Radians => in_degrees(&mut set),
-            Hypothesis::Lengths(factor, _) => set.poses.iter_mut().for_each(|pose| scale(pose, factor)),
+            Hypothesis::Lengths(factor, ..) => set.poses.iter_mut().for_each(|pose| scale(pose, factor)),
             Hypothesis::KnownLengths(factor, _) => {
                 for known in &mut set.known {
                     known.distance_mm *= factor;

@@ -63,6 +63,8 @@ pub struct Along {
     pub drifting: Vec<String>,
     /// Rows that are not of one robot; whatever else a fit to all of them finds follows from that.
     pub robots: Option<Finding>,
+    /// Said instead of a sensor that moved between the sessions where a tool or a joint that did is as likely.
+    pub instead: Option<Finding>,
 }
 
 /// Cuts the groups of `set` into sessions.

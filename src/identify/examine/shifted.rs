@@ -178,8 +178,13 @@ impl Rows {
 
     /// Median distance of the readings with the target's place free.
     pub(super) fn median_mm(&self, rounds: usize) -> f64 {
+        median(self.errors_mm(rounds).into_iter().filter(|error| error.is_finite())).unwrap_or(f64::INFINITY)
+    }
+
+    /// The distance of each reading with the target's place free; infinite where too few rows place it.
+    pub(super) fn errors_mm(&self, rounds: usize) -> Vec<f64> {
         let (distances, _) = self.distances(&self.pairs(self.points.len(), 0), self.tool_mm, true, rounds);
-        median(distances.into_iter().flatten()).unwrap_or(f64::INFINITY)
+        distances.into_iter().map(|distance| distance.unwrap_or(f64::INFINITY)).collect()
     }
 
     /// Pairs of a row and the reading that belongs to it.

@@ -5,6 +5,7 @@ use super::findings::{self, Findings};
 use super::gather;
 use super::parameters::MethodRecord;
 use super::quality::PointSpread;
+use super::rounded;
 use crate::identify::data::dataset::{Dataset, Kind, Reading};
 use crate::identify::data::still::constant_joints;
 use crate::identify::finding::Finding;
@@ -43,9 +44,11 @@ impl Record {
         let worse = self.worse(rows);
         let kept = found.candidates[found.chosen].found.is_none().then(|| self.kept_nominal(found));
         let sentences = |list: &[Finding]| list.iter().map(Finding::sentence).collect::<Vec<_>>();
-        let mut doubts = sentences(&findings.doubts);
+        // Points that nobody measured say nothing of a robot, whatever else is odd about them.
+        let computed = || self.computed(set).or_else(|| self.predicted(set, nominal));
+        let computed = computed().or_else(|| rounded::as_closely_as_digits(set, found));
+        let mut doubts: Vec<String> = computed.iter().cloned().chain(sentences(&findings.doubts)).collect();
         doubts.extend(self.implausible(set, nominal));
-        doubts.extend(self.computed(set).or(self.predicted(set, nominal)));
         // What speaks against the result is why its figures are odd, whatever the number of rows.
         doubts.extend(self.promise(set, nominal).filter(|_| findings.against.is_empty()));
         doubts.extend(still(set));
@@ -54,7 +57,7 @@ impl Record {
         let against = findings.against.first().map(|finding| finding.finding.clone());
         (self.advice, self.reason) = match (against.or(worse.clone()), &kept, doubts.first()) {
             (Some(reason), ..) => (Advice::DoNotUse, reason),
-            (None, Some(reason), _) => (Advice::KeepNominal, reason.clone()),
+            (None, Some(reason), _) => (Advice::KeepNominal, computed.as_ref().unwrap_or(reason).clone()),
             (None, None, Some(doubt)) => (Advice::Check, doubt.clone()),
             (None, None, None) => (Advice::Use, String::new()),
         };

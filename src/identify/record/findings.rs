@@ -1,6 +1,7 @@
 //! What was found along the way, each in words with the rows it is about and what was done.
 
 use crate::identify::data::dataset::{Dataset, Reading};
+use crate::identify::data::repeats::Repeats;
 use crate::identify::data::still::{constant_joints, repeated};
 use crate::identify::examine::conventions;
 use crate::identify::examine::sessions::{Along, Session};
@@ -64,8 +65,14 @@ impl Findings {
         });
         let of_rows = of_end.map(|left_out| left_out.finding).into_iter().chain(rounded);
         let terms = plausible::of_terms(found);
-        let doubts =
-            examined.into_iter().chain(of_rows).chain(of_verify(set, found)).chain(scale).chain(terms).collect();
+        let doubts = examined
+            .into_iter()
+            .chain(along.instead.clone())
+            .chain(of_rows)
+            .chain(of_verify(set, found))
+            .chain(scale)
+            .chain(terms)
+            .collect();
         Findings { against, doubts, notes }
     }
 
@@ -164,7 +171,7 @@ fn of_sensor(found: &Identification) -> Vec<Finding> {
 
 /// What the rows hold, and what their covariances state.
 fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
-    let mut list = Vec::new();
+    let mut list: Vec<Finding> = set.repeats.iter().filter_map(Repeats::finding).collect();
     let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
     if !set.floored.is_empty() {
         add(
@@ -230,7 +237,7 @@ pub fn along_the_rows(along: &Along) -> Vec<Finding> {
         along.sessions.iter().filter(of).map(|s| format!("{}..{}", s.first, s.last)).collect()
     };
     let stepping = ranges(&|s| !drifts(s));
-    if !stepping.is_empty() {
+    if along.instead.is_none() && !stepping.is_empty() {
         add(
             format!(
                 "the rows fall into {} sessions, between which the sensor, the socket, the wire's anchor or its zero, or the robot's base moved",

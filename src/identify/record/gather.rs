@@ -74,7 +74,7 @@ impl Record {
             expected: chosen.found.as_ref().map(|(f, _)| Expected::new(f, set, &found.fitted)),
             scale: found.scale(set),
             targets: set.targets.clone().map(|targets| targets.solved(&found.extras)),
-            repeats: set.repeats,
+            repeats: set.repeats.clone(),
             certainty: certainty(&found.judged, &found.terms),
             folded: !found.deletions.is_empty(),
             tool_mm: tool(set, nominal),

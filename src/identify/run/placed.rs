@@ -31,8 +31,12 @@ impl Identification {
         let whole: Vec<f64> = of_robot[..count].iter().chain(formulation.extras()).copied().collect();
         let joints = nominal.joints.len();
         let shared = formulation.offsets_covariance(&|parameter| is_held(parameter, joints));
-        // A placement is for readings as they are read: the sensor's own errors stay in them.
-        let of_target = |k: &usize| matches!(formulation.rows.extras[*k], Extra::Target(_));
+        // A placement is for readings as they are read: the sensor's own errors stay in them. Where targets stand is none of these.
+        let of_target = |k: &usize| match formulation.rows.extras[*k] {
+            Extra::Target(_) => true,
+            Extra::Shared(_) => set.are_on_flange(),
+            _ => false,
+        };
         let turns: Vec<usize> = (0..formulation.rows.extras.len()).filter(of_target).collect();
         let extras: Vec<Extra> = turns.iter().map(|&k| formulation.rows.extras[k]).collect();
         let kept: Vec<usize> = (0..count).chain(turns.iter().map(|k| count + k)).collect();

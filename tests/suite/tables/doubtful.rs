@@ -115,8 +115,9 @@ fn points_that_were_computed_are_said_to_be() {
     for digits in [2, 3, 6, 12] {
         assert!(stated(digits).contains("these points were computed"), "{digits}: {}", stated(digits));
     }
-    // To tenths of a mm an arm may be as good as the digits.
-    assert_eq!(stated(1), "use the identified robot");
+    // To tenths of a mm an arm may be as good as the digits: then nothing shows that it was measured.
+    let told = stated(1);
+    assert!(told.starts_with("check before") && told.contains("were computed, or have too few digits"), "{told}");
 }
 
 /// Rows of an arm with a tool of its own, its links as in `built`; each coordinate scattered by about `noise_mm`, lengths times `scale`.
@@ -198,4 +199,35 @@ fn units_that_contradict_the_names_are_told_so() {
     assert!(of("deg").read(&robot).is_ok());
     refused(&of("rad"), &robot, &["`--units rad` contradicts the names j1_deg", "hint: leave `--units` out"]);
     refused(&of("deg,um"), &robot, &["`--units um` contradicts the names x_mm to z_mm, which say mm"]);
+}
+
+#[test]
+fn rows_of_a_pose_of_which_one_is_missing_are_told_with_a_form_that_takes_them() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(24);
+    let all = of_reflectors(&rows);
+    let cells = |cells: &[f64]| cells.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let joints = folder.file("joints.csv", text("", &rows, ",", |q, _| q.to_vec()));
+    let point = |pose: usize, k: usize| cells(&all[pose][3 * k..3 * k + 3]);
+    let (mut below, mut named) =
+        (String::new(), "pose,target,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,x_mm,y_mm,z_mm\n".to_owned());
+    for (pose, (q, _)) in rows.iter().enumerate() {
+        for k in 0..3 {
+            // One row is missing, and the last one is there twice.
+            let times = usize::from((pose, k) != (4, 1)) + usize::from((pose, k) == (23, 2));
+            below.push_str(&format!("{}\n", point(pose, k)).repeat(times));
+            let _ = writeln!(named, "{pose},{},{},{}", ["a", "b", "c"][k], cells(q), point(pose, k));
+        }
+    }
+    let below = folder.file("below.csv", below);
+    for columns in [None, Some("j1,j2,j3,j4,j5,j6,x,y,z".to_owned())] {
+        let told = Source { columns, ..source(&[&joints, &below]) };
+        refused(
+            &told,
+            &robot,
+            &["below.csv has 3 rows a pose", "neither targets in one order", "`pose,target,j1_deg,...,x_mm,y_mm,z_mm`"],
+        );
+    }
+    let (found, _) = source(&[&folder.file("named.csv", named)]).read(&robot).expect("named");
+    assert!(found.len() == 72 && found[0].target == "a" && found[10].target == "b", "{:?}", found[10]);
 }

@@ -130,3 +130,56 @@ fn copies_are_counted_once() {
         assert!(found.len() == 60 && said.len() == 1, "{name}: {said:?}");
     }
 }
+
+#[test]
+fn new_rows_of_one_target_each_are_checked_by_where_the_robot_knows_them() {
+    let folder = Folder(workplace());
+    let at = folder.0.path();
+    let (robot, rows) = world(69);
+    let all = of_reflectors(&rows);
+    let mut tables = [String::new(), String::new()];
+    for (pose, ((q, _), p)) in rows.iter().zip(&all).enumerate() {
+        let target = pose % 3;
+        let noise = |axis: usize| 0.03 * (17.3 * pose as f64 + 5.1 * axis as f64).sin();
+        let point = (0..3).map(|axis| p[3 * target + axis] + noise(axis));
+        let cells: Vec<String> = q.iter().copied().chain(point).map(|v| v.to_string()).collect();
+        let _ = writeln!(tables[usize::from(pose >= 60)], "p{pose},{},{}", ["a", "b", "c"][target], cells.join(","));
+    }
+    let header = "pose,target,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,x_mm,y_mm,z_mm\n";
+    folder.file("all.csv", format!("{header}{}", tables[0]));
+    folder.file("new.csv", format!("{header}{}", tables[1]));
+    folder.file("robot.toml", stereocal::robot::file::to_toml(&robot));
+    let identify = ["identify", "--robot", "robot.toml", "--method", "trust-region", "--measurements", "all.csv"];
+    let found = stereocal(at, &identify);
+    assert_eq!(found.status.code(), Some(0), "{}", stderr(&found));
+    let check = ["verify", "--against", "out/identified.toml", "--out", "checks", "--measurements", "new.csv"];
+    let checked = stereocal(at, &check);
+    let said = stdout(&checked) + &stderr(&checked);
+    assert!(
+        checked.status.code() != Some(2) && !said.contains("CHANGED") && said.contains("zero of joint 4"),
+        "{said}"
+    );
+    let figures = stereocal(at, &["verify", "--robot", "out/identified.toml", "--measurements", "new.csv"]);
+    assert_eq!(figures.status.code(), Some(0), "{}", stderr(&figures));
+}
+
+#[test]
+fn what_measurements_leave_open_is_said_where_they_are_to_choose_a_way_to_read_a_table() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    let both = |q: &[f64], p: &[f64; 3]| [q.to_vec(), p.map(|v| v + 0.2 * v.sin()).to_vec(), p.to_vec()].concat();
+    folder.file("both.csv", text("", &rows, ",", both));
+    let links: String = robot
+        .joints
+        .iter()
+        .map(|j| format!("{},{},{},{}\n", j.alpha_rad.to_degrees(), j.a_mm, j.theta_rad.to_degrees(), j.d_mm))
+        .collect();
+    folder.file("dh.csv", format!("alpha_deg,a_mm,theta_deg,d_mm\n{links}"));
+    let told = stereocal(folder.0.path(), &["robot", "import", "dh.csv", "--measurements", "both.csv", "--out", "arm"]);
+    let said = stderr(&told);
+    assert!(
+        told.status.code() == Some(2) && said.contains("the measurements cannot be read yet: two points would do"),
+        "{said}"
+    );
+    assert!(said.contains("in: both.csv"), "{said}");
+}

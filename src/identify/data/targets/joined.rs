@@ -110,6 +110,31 @@ impl Joined {
     }
 }
 
+/// Rows of one target each as points of a body, whose targets' places on the flange an earlier identification joined; `None` where there is one target,
+/// or one that it does not know.
+pub fn of_places(
+    rows: &[Measurement],
+    places_mm: &BTreeMap<String, Vector3<f64>>,
+) -> Option<(Vec<Measurement>, Targets)> {
+    let mut parts: BTreeMap<String, Part> = BTreeMap::new();
+    let mut of_body = rows.to_vec();
+    for row in &mut of_body {
+        let place = places_mm.get(&row.target)?;
+        parts.entry(row.target.clone()).or_insert(Part { place_mm: (*place).into(), poses: 0 }).poses += 1;
+        if place.norm() == 0.0 {
+            row.target.clear();
+        }
+    }
+    let names: Vec<String> = parts.keys().cloned().collect();
+    let places_mm = parts.values().map(|part| Some(part.place_mm)).collect();
+    let is_several = names.len() > 1;
+    parts.retain(|_, part| part.place_mm != [0.0; 3]);
+    // They are not solved anew.
+    let (scatter_mm, place_sigma_mm, oriented, findings) = (None, Some(0.0), false, Vec::new());
+    let targets = Targets { scatter_mm, place_sigma_mm, places_mm, oriented, names, parts, findings };
+    is_several.then_some((of_body, targets))
+}
+
 /// Where the base stands at the sensor, by group, from what one target shows, and what the nominal robot is off by in the middle of the rows, mm.
 fn placements(seen: &[Seen], nominal: &Robot) -> Option<(BTreeMap<String, Transform>, f64)> {
     let mut groups: BTreeMap<&str, Vec<&Seen>> = BTreeMap::new();

@@ -199,15 +199,25 @@ fn inverse(covariance: &Matrix3<f64>) -> Matrix3<f64> {
 
 fn moved_targets(poses: &[Shown], moved: &[(Moved, usize)], names: &[String], sorter: &Sorter) -> Vec<Finding> {
     let mut list = Vec::new();
-    for (Moved { target, from }, new) in moved {
+    for (Moved { target, or, from }, new) in moved {
+        let either = or.map_or_else(String::new, |or| format!(" or {}", names[or]));
         let joined = [target, new].iter().all(|&&t| sorter.body.places_mm[t].is_some());
         list.push(Finding {
             finding: format!(
-                "target {} was moved before {}: its distances to the others are other ones from there on",
-                names[*target], poses[*from].first.at.pose
+                "target {}{either} was moved {} {}: {} from there on",
+                names[*target],
+                if or.is_some() { "about pose" } else { "before" },
+                poses[*from].first.at.pose,
+                match or {
+                    Some(_) => "they stand at another distance",
+                    None => "its distances to the others are other ones",
+                }
             ),
             rows: Vec::new(),
             action: match joined {
+                true if or.is_some() => {
+                    format!("which of them is not told: target {} counts as another one from there on", names[*target])
+                }
                 true => "it counts as another target from there on".to_owned(),
                 false => {
                     "the poses on the shorter side show too few other targets and are left out; measure them again"

@@ -8,5 +8,5 @@ mod sorter;
 #[cfg(test)]
 mod tests;
 
-pub use joined::Joined;
+pub use joined::{Joined, of_places};
 pub use merge::{Part, Targets, as_one};

@@ -17,6 +17,9 @@ const BOUNDED: f64 = 4.0;
 /// Standard deviations that a difference of two means must have.
 const CLEAR: f64 = 8.0;
 
+/// The same at a pose that is known: no place is looked for, and one in ten thousand has as much.
+const TOLD: f64 = 4.0;
+
 /// Median change from one normal number to the next, in standard deviations of one.
 const MEDIAN_CHANGE: f64 = 0.954;
 
@@ -24,6 +27,8 @@ const MEDIAN_CHANGE: f64 = 0.954;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Moved {
     pub target: usize,
+    /// Another one that is in as many of the distances that step: which of the two it was, nobody knows.
+    pub or: Option<usize>,
     /// Index of the pose.
     pub from: usize,
 }
@@ -33,18 +38,32 @@ pub fn next(poses: &[Vec<Sighting>], targets: usize) -> Option<Moved> {
     let mut of_target = vec![(0, 0.0, 0); targets];
     for a in 0..targets {
         for b in 0..a {
-            let Some((clear, from)) = step(&distances(poses, a, b)) else { continue };
+            let Some((clear, from)) = step(&distances(poses, a, b), None) else { continue };
             for target in [a, b] {
                 let (steps, clearest, at) = of_target[target];
                 of_target[target] = (steps + 1, f64::max(clearest, clear), if clear > clearest { from } else { at });
             }
         }
     }
-    let most = |(_, a): &(usize, (i32, f64, usize)), (_, b): &(usize, (i32, f64, usize))| {
+    let most = |(_, a): (usize, (i32, f64, usize)), (_, b): (usize, (i32, f64, usize))| {
         (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
     };
-    let (target, (steps, _, from)) = of_target.into_iter().enumerate().max_by(most)?;
-    (steps > 0).then_some(Moved { target, from })
+    let steps = |target: &usize| of_target[*target].0;
+    let (target, &(most_steps, _, from)) =
+        of_target.iter().enumerate().max_by(|a, b| most((a.0, *a.1), (b.0, *b.1)))?;
+    let rival = (0..targets).find(|other| *other != target && steps(other) == most_steps);
+    // Which of two it was, their distances to the others tell at the pose that is known now.
+    let clear = |of: usize, rival: usize| {
+        let others = (0..targets).filter(|other| ![of, rival].contains(other));
+        let steps = others.filter_map(|other| step(&distances(poses, of, other), Some(from)));
+        steps.map(|(clear, _)| clear).fold(0.0, f64::max)
+    };
+    let is_told = |of: usize, rival: usize| clear(of, rival) > TOLD.max(2.0 * clear(rival, of));
+    let (target, or) = match rival {
+        Some(rival) if is_told(rival, target) => (rival, None),
+        rival => (target, rival.filter(|rival| !is_told(target, *rival))),
+    };
+    (most_steps > 0).then_some(Moved { target, or, from })
 }
 
 /// The distance of two targets at the poses that show both, mm.
@@ -54,8 +73,8 @@ fn distances(poses: &[Vec<Sighting>], a: usize, b: usize) -> Vec<(usize, f64)> {
     poses.iter().enumerate().filter_map(apart).collect()
 }
 
-/// How clear the clearest step is, and the pose after it.
-fn step(distances: &[(usize, f64)]) -> Option<(f64, usize)> {
+/// How clear the clearest step is, and the pose after it; of those before this pose alone, however clear, where one is given.
+fn step(distances: &[(usize, f64)], only: Option<usize>) -> Option<(f64, usize)> {
     let count = distances.len();
     let middle = median(distances.iter().map(|d| d.1))?;
     let change = median(distances.windows(2).map(|two| (two[1].1 - two[0].1).abs()))?;
@@ -63,10 +82,10 @@ fn step(distances: &[(usize, f64)]) -> Option<(f64, usize)> {
     let bounded = |d: f64| ((d - middle) / scatter).clamp(-BOUNDED, BOUNDED);
     let total: f64 = distances.iter().map(|d| bounded(d.1)).sum();
     let mut before = 0.0;
-    let mut best = (CLEAR, None);
+    let mut best = (if only.is_some() { 0.0 } else { CLEAR }, None);
     for k in 1..count {
         before += bounded(distances[k - 1].1);
-        if k < FEWEST || count - k < FEWEST {
+        if k < FEWEST || count - k < FEWEST || only.is_some_and(|from| distances[k].0 != from) {
             continue;
         }
         let (first, second) = (before / k as f64, (total - before) / (count - k) as f64);

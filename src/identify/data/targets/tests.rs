@@ -157,7 +157,9 @@ fn a_target_that_moved_is_named_and_counts_as_another() {
         let list = rows_with_moved(3, 6, from, by_mm);
         let (poses, targets) = one(&list);
         let sentence = targets.findings[0].sentence();
-        assert!(sentence.contains("target c was moved") && sentence.contains("left out"), "{by_mm} {from}: {sentence}");
+        // Its distance to one of them hardly changes, and to the other it may be that one's.
+        let named = ["target c was moved", "target c or b was moved"].iter().any(|named| sentence.starts_with(named));
+        assert!(named && sentence.contains("left out"), "{by_mm} {from}: {sentence}");
         let kept = poses.iter().filter(|p| matches!(p.observed, Observed::Position { .. })).count();
         assert_eq!(kept, poses.len(), "{by_mm} {from}");
     }
@@ -357,5 +359,19 @@ fn exchanged_names_of_an_even_triangle_show_by_their_turn() {
     assert_eq!(kept.groups[0].center, None);
     for group in &kept.groups[1..] {
         assert_eq!(kept.poses[group.center.unwrap()].role, Role::Center);
+    }
+}
+
+#[test]
+fn of_two_targets_that_stand_at_another_distance_both_are_named() {
+    for by_mm in [0.3, 3.0] {
+        let (_, targets) = one(&rows_with_moved(2, 6, 25, by_mm));
+        let mut list = rows_with_moved(3, 6, 25, by_mm);
+        list.retain(|row| row.target != "a");
+        let (_, of_others) = one(&list);
+        // The second target of two is not the one that moves; of the others it is the second.
+        assert!(targets.findings.is_empty(), "{:?}", targets.findings);
+        let sentence = of_others.findings[0].sentence();
+        assert!(sentence.starts_with("target c or b was moved about pose"), "{by_mm}: {sentence}");
     }
 }

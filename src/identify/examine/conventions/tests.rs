@@ -2,6 +2,7 @@ use super::*;
 use crate::identify::data::dataset::Reading;
 use crate::identify::synthetic::{World, planned, point};
 use crate::measurements::{Measurement, Observed};
+use crate::tables::names::Unit;
 
 /// One sphere with tilts of so many degrees, by an arm that is off by what a good one is off.
 fn one_sphere(tilt_deg: f64, seed: u64) -> (World, Vec<Measurement>) {
@@ -180,6 +181,42 @@ fn rows_in_metres_among_others_are_named_and_speak_against_the_file() {
                 continue;
             };
             assert!((a - b).norm() < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn a_unit_that_was_typed_is_named_with_the_one_that_it_would_have_to_be() {
+    let (world, rows) = one_sphere(25.0, 5);
+    for (typed, is, factor) in
+        [(Unit::M, Unit::Cm, 100.0), (Unit::M, Unit::Mm, 1000.0), (Unit::Mm, Unit::M, 1e-3), (Unit::Cm, Unit::M, 0.01)]
+    {
+        let mut read = rows.clone();
+        read.iter_mut().for_each(|row| point(row).coords *= factor);
+        let mut set = Dataset::new(&read).unwrap();
+        set.typed_unit = Some(typed);
+        let Mended { findings, against, .. } = examine(&set, &world.nominal, &Settings::default());
+        assert!(findings.is_empty() && against.len() == 1, "{findings:?} {against:?}");
+        let named =
+            format!("the readings are in {}, not in {} as `--units {}` says (", is.word(), typed.word(), typed.flag());
+        assert!(against[0].finding.starts_with(&named), "{against:?}");
+    }
+}
+
+#[test]
+fn what_makes_no_error_fall_is_not_told_of_another_arm() {
+    let (_, rows) = one_sphere(25.0, 6);
+    for (seed, factor) in [(0, 1.0), (1, 0.3), (2, 3.0)] {
+        let mut robot = Robot::paper();
+        for (i, joint) in robot.joints.iter_mut().enumerate() {
+            joint.a_mm += 150.0 * (1.0 + 2.0 * i as f64 + f64::from(seed)).sin();
+            joint.d_mm *= factor;
+            joint.alpha_rad += 0.5 * (2.0 + i as f64).cos();
+        }
+        for finding in said(&rows, &robot) {
+            let Some(errors) = finding.split("fall from ").nth(1) else { continue };
+            let mut numbers = errors.split([' ', ')']).filter_map(|word| word.parse::<f64>().ok());
+            assert!(numbers.next().unwrap() > numbers.next().unwrap(), "{finding}");
         }
     }
 }

@@ -31,8 +31,8 @@ const GROSS: f64 = 5.0;
 const WHOLE: f64 = 1.5;
 
 /// Unknowns of a placement, and of a target's place.
-const PLACEMENT: usize = 6;
-const TARGET: usize = 3;
+pub(super) const PLACEMENT: usize = 6;
+pub(super) const TARGET: usize = 3;
 
 /// The typical size of an error.
 fn typical_mm(errors_mm: &[f64]) -> f64 {

@@ -6,6 +6,7 @@
 //! held against a robot a part. Fisher's test says whether what that gains is beyond chance and the further unknowns (the Chow test: Chow,
 //! 1960), with the number of places that were tried counted in; what is left must fall to half at the least; and the same rows cut along any of
 //! their joints must leave more, for a model that lacks something fits better in every smaller region.
+//! Rows that are far off by themselves are errors of their own and no part of a state: they are left out first.
 //! Goes wrong: arms that differ by less than the model lacks; parts that alternate row by row; a sensor whose own errors changed between
 //! parts, which looks like another robot.
 
@@ -19,10 +20,12 @@ use self::fit::{Left, Points};
 use crate::identify::data::dataset::{Dataset, Kind, Reading};
 use crate::identify::examine::hypothesis::still;
 use crate::identify::examine::sessions;
+use crate::identify::examine::shifted;
 use crate::identify::finding::Finding;
 use crate::identify::judge::locate::REPEATABILITY_MM;
 use crate::identify::settings::Settings;
 use crate::robot::Robot;
+use crate::statistics::median;
 
 /// Fewest rows of a part: they are more numbers than its tool and placement.
 const SHORTEST: usize = 8;
@@ -132,6 +135,26 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<Robots>
     Some(Robots { parts: each, together_mm: compared.together.scatter_mm() })
 }
 
+/// Times the median that rows which are errors of their own are off at the least, and rounds in which the target's place is found: errors of a
+/// robot vary with the posture by some times their median.
+const FAR: f64 = 12.0;
+const PLACING_ROUNDS: usize = 20;
+
+/// These rows without those that are far from the nominal links while most rows around them are not.
+fn without_lone(set: &Dataset, robot: &Robot, rows: Vec<usize>) -> Vec<usize> {
+    let Some(errors_mm) = shifted::Rows::new(set, robot, false).map(|rows| rows.errors_mm(PLACING_ROUNDS)) else {
+        return rows;
+    };
+    let limit_mm = FAR * median(errors_mm.iter().copied()).unwrap_or(f64::INFINITY).max(REPEATABILITY_MM);
+    let is_far: Vec<bool> = rows.iter().map(|&row| errors_mm[row] > limit_mm).collect();
+    let is_lone = |i: usize| {
+        let first = i.saturating_sub(SHORTEST / 2).min(rows.len().saturating_sub(SHORTEST));
+        let around = &is_far[first..(first + SHORTEST).min(rows.len())];
+        is_far[i] && 2 * around.iter().filter(|far| **far).count() < around.len()
+    };
+    rows.iter().enumerate().filter(|(i, _)| !is_lone(*i)).map(|(_, &row)| row).collect()
+}
+
 /// The file of a run of several that a row stands in, by the number before its name.
 fn file_of(set: &Dataset, row: usize) -> Option<usize> {
     let number = set.poses[row].name.split_once(':')?.0.parse::<usize>().ok()?;
@@ -174,7 +197,7 @@ impl Table {
         if set.kind != Kind::Positions || !whole || moving < FEWEST_MOVING {
             return None;
         }
-        let rows = set.fit_rows();
+        let rows = without_lone(set, robot, set.fit_rows());
         let point = |row: &usize| match &set.poses[*row].reading {
             Reading::Position { point_mm, .. } => Some(*point_mm),
             _ => None,

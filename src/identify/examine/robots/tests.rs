@@ -188,3 +188,65 @@ fn what_a_model_lacks_moves_no_tool() {
         assert_eq!(tools::find(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}, in order");
     }
 }
+
+#[test]
+fn rows_that_were_misread_are_no_other_tool_and_no_other_robot() {
+    for (seed, by_mm) in [(0, 10.0), (1, 10.0), (2, 1e3), (3, 1e3), (4, 1e7), (5, 1e7)] {
+        let (mut set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 0.0, seed + 50)], false);
+        for row in [9, 47] {
+            if let Reading::Position { point_mm, .. } = &mut set.poses[row].reading {
+                point_mm.y += by_mm;
+            }
+            assert_eq!((tools::find(&set, &robot), found(&set, &robot)), (None, None), "{by_mm} mm, {row}");
+        }
+        // Beside them a tool that moved is found all the same.
+        let (mut set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 20.0, seed + 50)], false);
+        if let Reading::Position { point_mm, .. } = &mut set.poses[9].reading {
+            point_mm.y += by_mm;
+        }
+        let told = tools::find(&set, &robot).expect("a tool").finding.finding;
+        assert!(told.contains("the tool moved on the flange by 30."), "{by_mm}: {told}");
+    }
+}
+
+/// What is said of rows that were cut into sessions.
+fn of_sessions(set: &Dataset, robot: &Robot) -> Option<(usize, Option<String>)> {
+    let (cut, along) = sessions::find(set, robot, &Settings::default());
+    let said = tools::of_sessions(set, &cut, robot).map(|finding| finding.finding);
+    (!along.sessions.is_empty()).then_some((along.sessions.len(), said))
+}
+
+#[test]
+fn sessions_that_a_tool_explains_better_are_not_said_to_be_the_sensors() {
+    for (seed, tool_mm) in [(1, 0.2), (2, 0.2), (3, 0.5), (4, 0.5), (5, 3.0)] {
+        let (set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, tool_mm, seed + 50)], false);
+        let Some((_, said)) = of_sessions(&set, &robot) else { continue };
+        let said = said.unwrap_or_else(|| panic!("{tool_mm} mm, seed {seed}"));
+        assert!(said.contains("the tool moved on the flange by"), "{tool_mm} mm, seed {seed}: {said}");
+        assert!(tool_mm < 0.5 || !said.contains("the sensor"), "{tool_mm} mm, seed {seed}: {said}");
+    }
+    for (seed, by) in [(1, 0.3), (2, 1.0), (3, 10.0)] {
+        let (mut set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 0.0, seed + 50)], false);
+        let step = transform(1e-3 * by * Vector3::new(1.0, 0.7, -0.5), by * Vector3::new(1.0, -0.5, 0.7));
+        let half = set.poses.len() / 2;
+        for pose in &mut set.poses[half..] {
+            let Reading::Position { point_mm, .. } = &mut pose.reading else { continue };
+            *point_mm = step * *point_mm;
+        }
+        let said = of_sessions(&set, &robot);
+        assert!(said.as_ref().is_none_or(|(_, said)| said.is_none()), "{by} mm, seed {seed}: {said:?}");
+        assert!(by < 10.0 || said.is_some(), "{by} mm, seed {seed}");
+    }
+}
+
+#[test]
+fn a_joint_that_was_mastered_anew_between_sessions_is_named() {
+    for (seed, joint, by_deg) in [(1, 1, 0.05), (2, 2, 0.1), (3, 4, 0.3)] {
+        let (mut set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 0.0, seed + 50)], false);
+        let half = set.poses.len() / 2;
+        set.poses[half..].iter_mut().for_each(|pose| pose.joints_rad[joint] -= f64::to_radians(by_deg));
+        let Some((_, said)) = of_sessions(&set, &robot) else { continue };
+        let said = said.unwrap_or_else(|| panic!("joint {}", joint + 1));
+        assert!(said.contains(&format!("the zero of joint {} moved by", joint + 1)), "{said}");
+    }
+}

@@ -2,16 +2,19 @@
 //!
 //! In: the fitted rows, and the robot of the file. Out: from which row on, or between which files, the target stands elsewhere on the flange, and by
 //! how much. Method: one robot for all rows with a tool of each part's own is held against one tool for all of them, both with placements of each
-//! part's own, so that a sensor that was moved is none. Fisher's test, and the same rows cut along any joint, as of robots. Goes wrong: parts that
-//! turn the flange too little for their tool to be told.
+//! part's own, so that a sensor that was moved is none. Fisher's test, and the same rows cut along any joint, as of robots. Where the rows were cut
+//! into sessions, tools and placements are compared there by their likelihood. Goes wrong: parts that turn the flange too little for their tool to
+//! be told.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::fit::{Left, Points};
+use super::fit::{Left, PLACEMENT, Points, TARGET};
 use super::{BEATS, CHANCE, GRID, MUCH_LARGER, ROWS, SHORTEST, Table, UNTOLD, are_alike, named};
+use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::Dataset;
+use crate::identify::examine::conventions::IMPLAUSIBLE_MM;
 use crate::identify::finding::Finding;
 use crate::identify::judge::locate::REPEATABILITY_MM;
 use crate::robot::Robot;
@@ -25,7 +28,13 @@ struct Tools {
     together: Left,
     /// Where the tools of the further parts stand from that of the first, mm in the last frame.
     off_mm: Vec<Vector3<f64>>,
+    /// Of all rows of the table, gross errors without.
+    weights: Vec<f64>,
 }
+
+/// Steps of a joint's zero by which its best value is found.
+const STEP_RAD: f64 = 1e-3;
+const STEP_MM: f64 = 0.5;
 
 /// A tool that moved.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,6 +79,99 @@ pub(in crate::identify::examine) fn find(set: &Dataset, robot: &Robot) -> Option
         "identify each part by itself, or measure again with one tool",
     );
     Some(Moved { finding, is_placed: tools.is_placed() })
+}
+
+/// What is said of rows that were cut into sessions where something else than a sensor that moved is likelier, or not told from it: a tool, or the
+/// zero of a joint. `None` where the sensor is likelier.
+pub(in crate::identify::examine) fn of_sessions(set: &Dataset, cut: &Dataset, robot: &Robot) -> Option<Finding> {
+    let table = Table::new(set, robot)?;
+    let parts = table.sessions(set, cut);
+    if parts.len() < 2 {
+        return None;
+    }
+    let causes = table.causes(&parts)?;
+    let likeliest = causes.iter().map(|cause| cause.likelihood).fold(f64::NEG_INFINITY, f64::max);
+    let told: Vec<&Cause> = causes.iter().filter(|cause| likeliest - cause.likelihood < TOLD_APART).collect();
+    if told.iter().all(|cause| cause.is_sensor) {
+        return None;
+    }
+    let begins: Vec<String> = parts[1..].iter().map(|part| set.poses[table.rows[part[0]]].name.clone()).collect();
+    let what = told.iter().map(|cause| cause.what.as_str()).collect::<Vec<_>>().join(", or ");
+    let left = told.iter().map(|cause| format!("{:.3}", cause.left_mm)).collect::<Vec<_>>().join(", ");
+    let apart = if told.len() > 1 { ", which the rows do not tell apart" } else { "" };
+    let finding =
+        format!("from row {} on {what}{apart}: with that are left {left} mm a coordinate", begins.join(" and "));
+    let action = "each session got a placement of its own, as if the sensor had moved: identify each by itself, or measure again without the change";
+    Some(Finding::new(finding, action))
+}
+
+/// What may have changed between sessions.
+struct Cause {
+    what: String,
+    is_sensor: bool,
+    /// Scatter of a coordinate that it leaves, mm.
+    left_mm: f64,
+    /// Logarithm of its likelihood, but for a constant.
+    likelihood: f64,
+}
+
+impl Table {
+    /// The rows by session: a session begins where a group was cut.
+    fn sessions(&self, set: &Dataset, cut: &Dataset) -> Vec<Vec<usize>> {
+        let mut parts: Vec<Vec<usize>> = vec![Vec::new()];
+        let mut begun = Vec::new();
+        for (i, &row) in self.rows.iter().enumerate() {
+            let group = cut.poses[row].group;
+            if group >= set.groups.len() && !begun.contains(&group) {
+                begun.push(group);
+                parts.push(Vec::new());
+            }
+            parts.last_mut().into_iter().for_each(|part| part.push(i));
+        }
+        parts.retain(|part| !part.is_empty());
+        parts
+    }
+
+    /// The sensor, the tool and, between two sessions, the zero of the joint that explains most. A first joint that stands elsewhere is a sensor that
+    /// turned.
+    fn causes(&self, parts: &[Vec<usize>]) -> Option<Vec<Cause>> {
+        let tools = self.with_tools(parts)?;
+        let numbers = TARGET as f64 * self.rows.len() as f64;
+        let changes = parts.len() as f64 - 1.0;
+        // The three coordinates of a row share what the model lacks, and count as one number; what is free costs as Schwarz has it.
+        let cause = |what: String, left: &Left, free: f64| Cause {
+            what,
+            is_sensor: false,
+            left_mm: left.scatter_mm(),
+            likelihood: -(numbers * left.squares.max(f64::MIN_POSITIVE).ln() + changes * free * numbers.ln()) / 6.0,
+        };
+        let most_mm = tools.off_mm.iter().map(Vector3::norm).fold(0.0, f64::max);
+        let sensor = cause("the sensor or the robot's base moved".to_owned(), &tools.placed, PLACEMENT as f64);
+        let tool = cause(format!("the tool moved on the flange by {most_mm:.2} mm"), &tools.apart, TARGET as f64);
+        let zeros = (1..self.points.robot.joints.len()).filter(|_| parts.len() == 2);
+        let zeros = zeros.filter_map(|joint| Some((joint, self.with_zero(joint, parts, &tools)?)));
+        let zero = zeros.min_by(|a, b| a.1.0.squares.total_cmp(&b.1.0.squares)).map(|(joint, (left, off))| {
+            let slides = self.points.robot.joints[joint].slides;
+            let by = if slides { format!("{off:.3} mm") } else { format!("{:.3} deg", off.to_degrees()) };
+            cause(format!("the zero of joint {} moved by {by}", joint + 1), &left, 1.0)
+        });
+        Some([Cause { is_sensor: true, ..sensor }, tool].into_iter().chain(zero).collect())
+    }
+
+    /// What one robot leaves where a joint stands elsewhere in the second part, by as much as leaves least: squares of errors are a parabola of that.
+    fn with_zero(&self, joint: usize, parts: &[Vec<usize>], tools: &Tools) -> Option<(Left, f64)> {
+        let all = parts.concat();
+        let left = |off: f64| {
+            let mut points = self.points.clone();
+            parts[1].iter().for_each(|&row| points.joints_rad[row][joint] += off);
+            points.together(std::slice::from_ref(&all), &tools.weights)
+        };
+        let step = if self.points.robot.joints[joint].slides { STEP_MM } else { STEP_RAD };
+        let [less, more] = [left(-step), left(step)].map(|left| left.squares - tools.together.squares);
+        let off = (less + more > 0.0).then(|| step * (less - more) / (2.0 * (less + more)))?;
+        // How the joint is counted is how its zero is.
+        Some((left(off), self.points.robot.joints[joint].sign * off))
+    }
 }
 
 impl Tools {
@@ -119,7 +221,8 @@ impl Table {
         let apart_mm = tools.apart.scatter_mm();
         let is_larger = tools.together.scatter_mm() > (MUCH_LARGER * apart_mm).max(REPEATABILITY_MM);
         let is_sensor = BEATS * tools.placed.scatter_mm() < apart_mm;
-        if !is_larger || is_sensor || fisher.sf(gain.max(0.0)) * tried as f64 > CHANCE {
+        // What no built robot is off by no tool explains.
+        if !is_larger || is_sensor || apart_mm > IMPLAUSIBLE_MM || fisher.sf(gain.max(0.0)) * tried as f64 > CHANCE {
             return None;
         }
         let share = |tools: &Tools| tools.apart.scatter_mm() / tools.together.scatter_mm();
@@ -148,6 +251,13 @@ impl Table {
         let whole = std::slice::from_ref(&all);
         let placed = Points { groups, ..self.points.clone() }.together(whole, &weights);
         let together = self.points.together(whole, &weights);
-        apart.scatter_mm().is_finite().then(|| Tools { parts: parts.to_vec(), apart, placed, together, off_mm })
+        apart.scatter_mm().is_finite().then(|| Tools {
+            parts: parts.to_vec(),
+            apart,
+            placed,
+            together,
+            off_mm,
+            weights,
+        })
     }
 }

@@ -1,11 +1,12 @@
 //! The new rows at the old robot: residuals that no placement reaches, what they are known to, and the columns of what may have changed.
 
-use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Point3, Vector3};
 
 use super::found::Before;
 use super::suspects::Suspect;
 use crate::difference::Difference;
-use crate::identify::data::dataset::{Dataset, Reading};
+use crate::geometry::{Transform, fitted_frame, rotation_matrix};
+use crate::identify::data::dataset::{Dataset, Pose, Reading};
 use crate::identify::judge::locate::Trust;
 use crate::identify::residuals::raw::Raw;
 use crate::identify::residuals::rows::{RowSpec, Rows};
@@ -63,7 +64,8 @@ impl Compared<'_> {
     }
 }
 
-/// The rows with a scale of the sensor as an unknown, and the target's turn where orientations are used.
+/// The rows with a scale of the sensor as an unknown, the target's turn where orientations are used, and where targets stand that the robot alone
+/// joined: that is known no better than the robot is.
 pub(super) fn rows(
     set: &Dataset,
     robot: &Robot,
@@ -77,10 +79,18 @@ pub(super) fn rows(
         Reading::Position { point_mm, .. } => point_mm.coords,
         _ => Vector3::zeros(),
     };
+    let places = places(&set, robot);
+    let more = places.first().map_or(0, Matrix3xX::ncols);
     // A thousandth of scale.
-    set.shared = set.poses.iter().map(|p| Matrix3xX::from_columns(&[-1e-3 * point(&p.reading)])).collect();
+    let columns = |(pose, places): (&Pose, &Matrix3xX<f64>)| {
+        let mut columns = places.clone().insert_column(0, 0.0);
+        columns.set_column(0, &(-1e-3 * point(&pose.reading)));
+        columns
+    };
+    set.shared = set.poses.iter().zip(&places).map(columns).collect();
     let turned = set.target_unknowns(oriented).iter().copied();
-    let extras: Vec<Extra> = std::iter::once(Extra::Shared(0)).chain(turned).collect();
+    let extras: Vec<Extra> =
+        std::iter::once(Extra::Shared(0)).chain(turned).chain((1..=more).map(Extra::Shared)).collect();
     let rotation_rad = trust.rotation_rad.unwrap_or(1e-4).max(LEAST_TURN_RAD);
     Rows::new(&RowSpec {
         set: &set,
@@ -94,6 +104,34 @@ pub(super) fn rows(
         scatter: Scatter { rotation_rad, ..Scatter::of_point(trust.point_mm) },
         wire_offset: false,
     })
+}
+
+/// What a millimetre of each coordinate of each place moves the point of each pose by, where the robot alone joined the targets; no columns elsewhere.
+fn places(set: &Dataset, robot: &Robot) -> Vec<Matrix3xX<f64>> {
+    let mut parts: Vec<Vector3<f64>> = Vec::new();
+    for place in set.poses.iter().filter_map(|pose| pose.on_body_mm).filter(|_| set.are_on_flange()) {
+        if !parts.contains(&place) {
+            parts.push(place);
+        }
+    }
+    let flange = |pose: &Pose| robot.base_from_flange(&pose.joints_rad);
+    let pair = |pose: &Pose| match &pose.reading {
+        Reading::Position { point_mm, .. } => {
+            let target = robot.tool_mm + pose.on_body_mm.unwrap_or_default();
+            Some((flange(pose) * Point3::from(target), *point_mm, 1.0))
+        }
+        _ => None,
+    };
+    let frame = |group: usize| fitted_frame(set.poses.iter().filter(|pose| pose.group == group).filter_map(pair));
+    let frames: Vec<Transform> = (0..set.groups.len()).map(frame).collect();
+    let of_pose = |pose: &Pose| {
+        let mut columns = Matrix3xX::zeros(3 * parts.len());
+        if let Some(part) = parts.iter().position(|place| Some(*place) == pose.on_body_mm) {
+            columns.fixed_columns_mut::<3>(3 * part).copy_from(&rotation_matrix(&(frames[pose.group] * flange(pose))));
+        }
+        columns
+    };
+    set.poses.iter().map(of_pose).collect()
 }
 
 /// White residuals and the columns of the first so many offsets, in coordinates that the placements and the target's turn do not reach.

@@ -76,8 +76,22 @@ impl Comparison<'_> {
         let effect_mm = placements.iter().filter(|p| p.moved).map(|p| p.shift_mm).fold(effect_mm, f64::max);
         let likelihood = explained.first().map(|(likelihood, ..)| *likelihood);
         let (poses, by_cameras) = (self.set.names(used), self.set.is_of_cameras());
-        let strays = Vec::new();
-        let recheck = Recheck { poses, strays, causes, changed, likeliest, placements, effect_mm, seen_mm, by_cameras };
+        let (columns, amounts) = self.before.corrected();
+        let correction_mm = moves.most_mm(&columns, &amounts);
+        let (strays, extrapolated) = (Vec::new(), Vec::new());
+        let recheck = Recheck {
+            poses,
+            strays,
+            causes,
+            changed,
+            likeliest,
+            placements,
+            effect_mm,
+            seen_mm,
+            by_cameras,
+            correction_mm,
+            extrapolated,
+        };
         Some(Said { recheck, difference: looks.look.difference, likelihood })
     }
 }

@@ -16,6 +16,8 @@ pub struct Before {
     pub parameters: Vec<Parameter>,
     /// Their covariance, mm and mrad.
     pub covariance: DMatrix<f64>,
+    /// By how much each was corrected, in units of the file.
+    pub correction: Vec<f64>,
     /// How it scattered.
     pub trust: Trust,
     /// Poses that this was found from.
@@ -78,6 +80,19 @@ pub struct Recheck {
     pub seen_mm: f64,
     /// Whether the points are those of cameras, or another instrument's.
     pub by_cameras: bool,
+    /// How far what was corrected of the links moves the target at these poses, mm: where they stand outside of what was identified, as much may be off.
+    pub correction_mm: f64,
+    /// The joints whose ranges many rows are outside of, where a change is no more than that.
+    pub extrapolated: Vec<String>,
+}
+
+impl Before {
+    /// Columns and amounts of what was corrected of the robot without its tool.
+    pub(super) fn corrected(&self) -> (Vec<(usize, f64)>, Vec<f64>) {
+        let links = self.parameters.iter().zip(&self.correction).enumerate();
+        let links = links.filter(|(_, (parameter, _))| !matches!(parameter, Parameter::V(_)));
+        links.map(|(at, (parameter, by))| ((at, 1.0 / parameter.file_unit().1), *by)).unzip()
+    }
 }
 
 impl Recheck {
@@ -108,6 +123,14 @@ impl Recheck {
             .filter(|p| p.moved)
             .map(|p| format!("group {} by {:.4} mm and {:.4} deg", p.group, p.shift_mm, p.turn_rad.to_degrees()))
             .collect();
+        if !self.extrapolated.is_empty() {
+            let found = self.likeliest.first().map_or_else(String::new, |(_, words)| format!(", as by {words},"));
+            return format!(
+                "these poses stand where the robot was not identified ({}): what is off there{found} is no more than what was corrected \
+                 of the robot, and may be what its model lacks as well as a change",
+                self.extrapolated.join(", ")
+            );
+        }
         match (self.changed, self.likeliest.is_empty()) {
             (true, true) => "the robot changed, and no single cause explains how".to_owned(),
             (true, false) => self.likeliest.iter().map(|(_, words)| words.as_str()).collect::<Vec<_>>().join(", or "),

@@ -10,9 +10,13 @@ use super::found::{CauseSeen, FALSE_ALARM};
 use super::moves::Moves;
 use super::suspects::Suspect;
 use crate::difference::{Difference, SEEN, TOLD_APART};
+use crate::tables::names::Unit;
 
 /// White size of a cause, a mrad or mm, below which the poses see nothing of it.
 const UNSEEN: f64 = 1e-4;
+
+/// A turn that must be larger than this to be seen, rad, is not seen either: up to here a turn moves points along its column to half a hundredth.
+const LINEAR_RAD: f64 = 0.1;
 
 /// Rounds of looking anew where a suspect says that the robot is: a large turn is not linear.
 const ROUNDS: usize = 3;
@@ -38,7 +42,18 @@ impl<'a> Looks<'a> {
     }
 
     fn is_seen(&self, suspect: &Suspect) -> bool {
-        suspect.columns.iter().all(|&(at, _)| self.look.columns.column(at).norm() > UNSEEN)
+        let is_large = suspect.columns.iter().all(|&(at, _)| self.look.columns.column(at).norm() > UNSEEN);
+        let seen_rad = |direction: &DVector<f64>| {
+            let along = self.look.difference.along(direction);
+            along.map_or(f64::INFINITY, |(_, sigma)| self.seen(sigma).to_radians())
+        };
+        let turns = suspect.unit == Unit::Deg.flag();
+        is_large && (!turns || self.look.directions(suspect).iter().all(|direction| seen_rad(direction) < LINEAR_RAD))
+    }
+
+    /// What nineteen of twenty checks see of something that is known to so much.
+    fn seen(&self, sigma: f64) -> f64 {
+        (self.look.difference.level(self.chance()) + SEEN) * sigma
     }
 
     pub(super) fn of(&self, suspect: &Suspect, moves: &Moves) -> CauseSeen {
@@ -46,7 +61,7 @@ impl<'a> Looks<'a> {
         let along = self.look.directions(suspect).first().and_then(|d| difference.along(d));
         let amount = along.filter(|_| self.is_seen(suspect));
         let unit_mm = moves.most_mm(&suspect.columns, &[1.0]);
-        let seen = amount.map(|(_, sigma)| (difference.level(self.chance()) + SEEN) * sigma);
+        let seen = amount.map(|(_, sigma)| self.seen(sigma));
         CauseSeen {
             cause: suspect.word.clone(),
             what: suspect.words.clone(),

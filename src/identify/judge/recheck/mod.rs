@@ -19,4 +19,5 @@ mod suspects;
 mod tests;
 
 pub use compare::recheck;
+pub use comparison::Stood;
 pub use found::{Before, CauseSeen, Moved, Recheck};

@@ -40,6 +40,7 @@ fn cell(oriented: bool, seed: u64) -> Cell {
     let (formulation, _) = candidate.found.as_ref().unwrap();
     let scatter = formulation.rows.scatter;
     let before = Before {
+        correction: Vec::new(),
         parameters: formulation.parameters().to_vec(),
         covariance: formulation.whole_covariance(),
         trust: Trust { point_mm: scatter.point_mm, rotation_rad: oriented.then_some(scatter.rotation_rad) },
@@ -239,4 +240,19 @@ fn a_robot_that_changed_is_told_beside_a_bad_reading() {
         }
     }
     assert!(wrong.is_empty(), "{} of 162:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn what_the_placement_takes_up_is_not_named_as_a_cause() {
+    for seed in 0..6 {
+        let cell = cell(false, seed);
+        for count in [5, 10, 30] {
+            let found = cell.spoilt(&|_| {}, count, 900 + seed, &|_| {});
+            let of_first = found.causes.iter().find(|cause| cause.cause == "joint-1").unwrap();
+            assert_eq!(of_first.amount, None, "{count} poses: {of_first:?}");
+            for cause in found.causes.iter().filter(|cause| cause.unit == "deg") {
+                assert!(cause.seen.is_none_or(|seen_deg| seen_deg < 6.0), "{count} poses: {cause:?}");
+            }
+        }
+    }
 }
