@@ -97,9 +97,12 @@ impl<T: Sample> Full<'_, T> {
         let most_half_px = if seen.alone || share == 1.0 { MOST_HALF_PX } else { share_px };
         let full = within(most_half_px);
         let reach_px = |full: &Measured| full.reach[0] * seen.cell.edges[0].norm();
-        let clips = full.is_some_and(|full| full.fit.left_out > 0 && reach_px(&full) > MOST_CLIPPED_HALF_PX);
+        // What a reflection adds to clipped squares nobody sees, and over a large window it is no slope.
+        let between_px = BETWEEN * near_half_px(&seen.start);
+        let clipped_px = if self.stray.is_some() { between_px.min(MOST_CLIPPED_HALF_PX) } else { MOST_CLIPPED_HALF_PX };
+        let clips = full.is_some_and(|full| full.fit.left_out > 0 && reach_px(&full) > clipped_px);
         if clips {
-            return Windows { full: within(MOST_CLIPPED_HALF_PX), most_half_px: MOST_CLIPPED_HALF_PX, ..seen };
+            return Windows { full: within(clipped_px), most_half_px: clipped_px, ..seen };
         }
         Windows { full, most_half_px, ..seen }
     }
