@@ -115,6 +115,12 @@ impl OutDir {
         self.path.join(name)
     }
 
+    /// The path of an earlier command's result: in this folder where it is there, else in the one where results usually are.
+    pub fn or_usual(&self, name: &str, usual: &Utf8Path) -> Utf8PathBuf {
+        let (here, usual) = (self.join(name), usual.join(name));
+        if here.is_file() || !usual.is_file() { here } else { usual }
+    }
+
     /// The folder itself.
     pub fn path(&self) -> &Utf8Path {
         &self.path

@@ -3,8 +3,6 @@
 mod placement;
 mod robot;
 
-use camino::Utf8PathBuf;
-
 use super::{Outcome, Result};
 use crate::cli::{CalibrationFormat, Export, ExportCalibration, ExportWhat};
 use crate::config::Config;
@@ -24,15 +22,9 @@ pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
     }
 }
 
-/// The result of an earlier command: the one in the folder that is written to where there is one, else the one where results usually are.
-fn of_earlier(name: &str, out: &OutDir, config: &Config) -> Utf8PathBuf {
-    let (here, usual) = (out.join(name), config.out.join(name));
-    if here.is_file() || !usual.is_file() { here } else { usual }
-}
-
 fn calibration(args: &ExportCalibration, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.files.out.as_deref().unwrap_or(&config.out))?;
-    let named = args.calibration.clone().unwrap_or_else(|| of_earlier(rig::OWN_NAME, &out, config));
+    let named = args.calibration.clone().unwrap_or_else(|| out.or_usual(rig::OWN_NAME, &config.out));
     let rig_file = rig::file(Some(&named), &out)?;
     let calibrated = rig::read(&rig_file)?;
     calibrated.doubts().into_iter().for_each(progress::warn);

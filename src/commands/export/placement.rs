@@ -12,7 +12,7 @@ use crate::formats::placements::{Frames, Placement, easy_handeye, file_storage, 
 /// Runs the command.
 pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.files.out.as_deref().unwrap_or(&config.out))?;
-    let path = args.placement.clone().unwrap_or_else(|| super::of_earlier(PLACEMENT, &out, config));
+    let path = args.placement.clone().unwrap_or_else(|| out.or_usual(PLACEMENT, &config.out));
     let file = PlacementFile::read(&path)?;
     let groups = groups(args, &file)?;
     let status = heed(file.check.as_ref(), &path);
