@@ -97,6 +97,19 @@ pub fn without_chance_lines(small: &Grey8, grid: Places) -> Places {
     }
 }
 
+/// The whole board, where a line beside it has no more than half of its corners: beside a board without a margin on a dark ground every other
+/// square of its border has a corner there, which is none of the board's. Whether the board goes on beyond is seen later.
+pub fn whole_without_sparse_line(grid: &Places, board: Board) -> Option<Places> {
+    let size = [board.columns(), board.rows()];
+    (0..4).map(|quarters| grid.turned(quarters)).filter(|turned| turned.columns > 1).find_map(|turned| {
+        let found = (0..turned.rows).filter(|&row| turned.get(0, row).is_some()).count();
+        let is_whole = turned.count() - found == board.corner_count();
+        let fits = [[turned.columns - 1, turned.rows], [turned.rows, turned.columns - 1]].contains(&size);
+        (2 * found <= turned.rows && is_whole && fits)
+            .then(|| Lattice::from_fn(turned.columns - 1, turned.rows, |col, row| turned.get(col + 1, row).copied()))
+    })
+}
+
 /// The grid without outer lines that are no corners but the board's own outline: without such a line the grid is seen to end there as a board does.
 /// So it does where a finger lies on the dark squares beyond a line of corners; these are crossings of four squares, and the outline has none.
 pub fn without_outline(small: &Grey8, grid: Places) -> Places {
@@ -304,6 +317,30 @@ mod tests {
                 Lattice::from_fn(columns, rows, |col, row| Some(Point2::new(30.0 + col as f64, 40.0 + row as f64)));
             assert_eq!(without_outline(&small, grid.clone()), grid, "{columns}x{rows}");
         }
+    }
+
+    #[test]
+    fn a_line_with_half_of_its_corners_is_taken_off_a_whole_board() {
+        let board: Board = Board::checker("10x7".parse().unwrap(), 25.0);
+        let grid = |is_there: &dyn Fn(usize, usize) -> bool| -> Places {
+            Lattice::from_fn(10, 6, |col, row| {
+                is_there(col, row).then(|| Point2::new(20.0 * col as f64, 20.0 * row as f64))
+            })
+        };
+        let beside = |last: usize| grid(&|col, row| col < 9 || row < last);
+        for last in 1..=3 {
+            for quarters in 0..4 {
+                let found = whole_without_sparse_line(&beside(last).turned(quarters), board).unwrap();
+                assert_eq!(found.count(), 54, "{last} {quarters}");
+            }
+        }
+        // Most of a line is a line, and what is left has to be the whole board.
+        assert_eq!(whole_without_sparse_line(&beside(4), board), None);
+        assert_eq!(
+            whole_without_sparse_line(&grid(&|col, row| col < 9 && (col, row) != (4, 3) || row < 3), board),
+            None
+        );
+        assert_eq!(whole_without_sparse_line(&beside(3), Board::checker("9x7".parse().unwrap(), 25.0)), None);
     }
 
     #[test]

@@ -207,7 +207,9 @@ fn whole(board: Board, corners: Vec<Point2<f64>>) -> Places {
 
 /// A grid as the board's, without lines of squares that are cut where those are too many.
 fn fitting(small: &Grey8, grid: &Places, board: Board) -> Option<Places> {
-    of_size(small, grid, board).or_else(|| of_size(small, &continuation::without_cut_lines(small, grid, board)?, board))
+    of_size(small, grid, board)
+        .or_else(|| of_size(small, &continuation::without_cut_lines(small, grid, board)?, board))
+        .or_else(|| of_size(small, &extent::whole_without_sparse_line(grid, board)?, board))
 }
 
 /// A grid as the board's, where it is known which of the board's corners are missing: it can lie on the board in one way only.
