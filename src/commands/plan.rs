@@ -85,13 +85,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
 
 /// Joints that turn and have no limits stay within half a turn either way: what they really can, the file does not say.
 fn within_a_turn(mut robot: Robot) -> Robot {
-    let open: Vec<String> = robot
-        .joints
-        .iter()
-        .zip(1..)
-        .filter(|(j, _)| j.limits_rad.is_none())
-        .map(|(_, number)| number.to_string())
-        .collect();
+    let open = robot.joints_without_limits();
     if !open.is_empty() {
         progress::warn(format!(
             "the robot file has no limits of joint {}: -180 to 180 deg are taken where a joint turns. Write `limits_deg` (`limits_mm`) of the \

@@ -111,6 +111,12 @@ impl Robot {
         places
     }
 
+    /// The numbers, from 1, of joints whose limits are not known.
+    pub fn joints_without_limits(&self) -> Vec<String> {
+        let open = self.joints.iter().zip(1..).filter(|(joint, _)| joint.limits_rad.is_none());
+        open.map(|(_, number)| number.to_string()).collect()
+    }
+
     /// The target's mark point in the base frame, mm.
     pub fn target_mm(&self, joints_rad: &[f64]) -> Point3<f64> {
         self.base_from_flange(joints_rad) * Point3::from(self.tool_mm)

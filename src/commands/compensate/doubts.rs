@@ -40,13 +40,7 @@ pub(super) fn warn(rows: &[Row], robot: &Robot) {
             "no joint of these targets is farther than {most_deg:.3} deg from zero: are they radians? A table says so by columns `j1_rad`.."
         ));
     }
-    let open: Vec<String> = robot
-        .joints
-        .iter()
-        .zip(1..)
-        .filter(|(joint, _)| joint.limits_rad.is_none())
-        .map(|(_, number)| number.to_string())
-        .collect();
+    let open = robot.joints_without_limits();
     if !open.is_empty() {
         progress::note(format!(
             "the robot file has no limits of joint {}: two turns either way are taken where a joint turns; `limits_deg` (`limits_mm`) says what \
