@@ -434,3 +434,18 @@ fn bad_targets_are_refused() {
     let said = run(folder.path(), &["t.csv"], 2);
     assert!(said.contains("the identified robot has 7 joints, the nominal one 6"), "{said}");
 }
+
+#[test]
+fn what_compensate_wrote_is_not_corrected_again() {
+    let folder = workplace();
+    let (nominal, _) = robots(folder.path());
+    std::fs::write(folder.path().join("targets.csv"), csv(&postures(&nominal, 3))).unwrap();
+    run(folder.path(), &["targets.csv", "--out", "once"], 0);
+    let said = run(folder.path(), &["once/compensated.csv", "--out", "twice"], 2);
+    assert!(said.contains("is what `compensate` wrote"), "{said}");
+    assert!(!folder.path().join("twice").exists(), "nothing is written");
+    // The same numbers elsewhere are anybody's.
+    std::fs::create_dir(folder.path().join("mine")).unwrap();
+    std::fs::copy(folder.path().join("once/compensated.csv"), folder.path().join("mine/targets.csv")).unwrap();
+    run(folder.path(), &["mine/targets.csv", "--out", "thrice"], 0);
+}
