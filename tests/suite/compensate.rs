@@ -449,3 +449,44 @@ fn what_compensate_wrote_is_not_corrected_again() {
     std::fs::copy(folder.path().join("once/compensated.csv"), folder.path().join("mine/targets.csv")).unwrap();
     run(folder.path(), &["mine/targets.csv", "--out", "thrice"], 0);
 }
+
+#[test]
+fn angles_in_another_unit_are_said() {
+    let folder = workplace();
+    let (nominal, _) = robots(folder.path());
+    let degrees = postures(&nominal, 3);
+    let with = |name: &str, q: &[Vec<f64>], status: i32| {
+        std::fs::write(folder.path().join("targets.csv"), name.to_owned() + csv(q).split_once('\n').unwrap().1)
+            .unwrap();
+        run(folder.path(), &["targets.csv", "--force", "--out", "out"], status)
+    };
+    let [deg, rad] = ["deg", "rad"].map(|unit| {
+        let names: Vec<String> = (1..7).map(|j| format!("j{j}_{unit}")).collect();
+        format!("name,{}\n", names.join(","))
+    });
+    let in_radians: Vec<Vec<f64>> = degrees.iter().map(|q| radians(q)).collect();
+    assert!(!with(&deg, &degrees, 0).contains("radians?"));
+    assert!(!with(&rad, &in_radians, 0).contains("where radians are read?"));
+    // So near to its zero the arm is stretched, and out of reach besides.
+    assert!(with(&deg, &in_radians, 1).contains("are they radians?"));
+    assert!(with(&rad, &degrees, 1).contains("where radians are read?"));
+    // What refuses a turn is the turn: whether the arm gets there is another question.
+    let poses = "name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad\na,300,200,300,0,";
+    for (turn, is_degrees) in [("3.14159", false), ("6.2", false), ("7", true), ("180", true)] {
+        std::fs::write(folder.path().join("targets.csv"), format!("{poses}{turn},0\n")).unwrap();
+        let all = [
+            "compensate",
+            "targets.csv",
+            "--robot",
+            "robot.toml",
+            "--identified",
+            "identified.toml",
+            "--force",
+            "--out",
+            "out",
+        ];
+        let output = stereocal(folder.path(), &all);
+        assert_eq!(stderr(&output).contains("are these degrees?"), is_degrees, "{turn}: {}", stderr(&output));
+        assert_eq!(output.status.code() == Some(2), is_degrees, "{turn}");
+    }
+}
