@@ -72,6 +72,22 @@ fn changed(mut corners: Corners, change: impl Fn(usize, bool, &mut Corner)) -> C
 }
 
 #[test]
+fn a_tolerance_of_half_a_square_is_no_check() {
+    let world = world(12, 1);
+    let asked = Asked { options: Options::default(), tolerance_mm: TOLERANCE_MM, extent: Extent::Boards };
+    let (found, findings) = calibrate_standing(&world.corners(1), &asked).unwrap();
+    let side_mm = world.board.square_mm;
+    for (share, passes) in [(0.1, true), (0.49, true), (0.5, false), (1.0, false), (200.0, false)] {
+        let judged = synthetic::judged(&found, findings.clone(), Standards::default(), share * side_mm);
+        assert_eq!(judged.verdict == Verdict::Pass, passes, "{share}");
+        let named = judged.evidence.iter().any(|line| line.what == "tolerance" && line.allows == Verdict::Undecided);
+        assert_eq!(named, !passes, "{share}");
+        // What lengths can be trusted to does not depend on what was asked.
+        assert!(judged.trusted_mm().is_some_and(|mm| mm < 0.2), "{share}: {:?}", judged.trusted_mm());
+    }
+}
+
+#[test]
 fn clean_corners_pass_without_a_warning() {
     for (pairs, seed) in [(12, 51), (20, 52), (7, 53)] {
         let judged = judge(&world(pairs, seed).corners(seed));
