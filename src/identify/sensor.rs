@@ -109,6 +109,9 @@ pub struct Scatter {
     pub rotation_rad: f64,
     /// What the stated covariances are multiplied by: one, where the residuals do not clearly say otherwise.
     pub stated: f64,
+    /// Variance of a coordinate by which the robot may be expected to scatter beyond that, where the readings' own noise hides it, mm^2: it is
+    /// in no weight, but in what is promised of fresh poses.
+    pub hidden_mm2: f64,
     /// A smooth error that the points of a placement share, beside all these.
     pub smooth: Option<SmoothError>,
 }
@@ -116,7 +119,12 @@ pub struct Scatter {
 impl Scatter {
     /// Of a point, its covariance taken at its word.
     pub fn of_point(point_mm: f64) -> Scatter {
-        Scatter { point_mm, rotation_rad: 1e-4, stated: 1.0, smooth: None }
+        Scatter { point_mm, rotation_rad: 1e-4, stated: 1.0, hidden_mm2: 0.0, smooth: None }
+    }
+
+    /// Mean square by which a coordinate of a fresh pose is to be expected off, mm^2.
+    pub fn fresh_mm2(&self) -> f64 {
+        self.point_mm * self.point_mm + self.hidden_mm2
     }
 
     /// Whole covariance of a point, mm^2.

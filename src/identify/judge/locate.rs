@@ -104,6 +104,7 @@ fn fitted(task: &Task, trust: Trust) -> Result<Located, Error> {
         point_mm: found.point_mm.max(trust.point_mm),
         rotation_rad: trust.rotation_rad.map_or(found.rotation_rad, |known| found.rotation_rad.max(known)),
         stated: found.stated.max(1.0),
+        hidden_mm2: 0.0,
         smooth: None,
     };
     let load_chain = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
@@ -117,7 +118,7 @@ fn fitted(task: &Task, trust: Trust) -> Result<Located, Error> {
     let turns_told = task.model == Model::Pose && scatter.rotation_rad > trust.rotation_rad.unwrap_or(0.0);
     let student = if told || turns_told { student(whole_freedom) } else { 1.0 };
     let shared = formulation.offsets_covariance(&|_| false) * student;
-    let placed = Placed::new(task.set, &formulation.rows, &offsets, &shared, student);
+    let placed = Placed::new(task.set, &formulation.rows, &offsets, &vec![0.0; offsets.len()], &shared, student);
     let placed = placed.ok_or(Error::NothingDetermined { poses: task.rows.len() })?;
     let (chi_square, freedom, rms_mm) = misfit(task, trust, &offsets);
     let contradicted =

@@ -4,9 +4,11 @@
 //! the target's place, and for any joints the point that the robot shows there in the sensor's frame, with its covariance. Method: the
 //! placements' own unknowns follow the shared ones (robot, sensor, target) as the linearised problem says, so that what is uncertain of the
 //! robot is uncertain of the placement with it. What only moves the whole robot, or only the target on the flange, is what a placement is: it
-//! is held as the robot's file has it ([`is_held`]). Goes wrong: errors that the rows share and nobody stated are in none of it.
+//! is held as the robot's file has it ([`is_held`]). Readings are taken as they are read: the sensor's own errors (its scale, a calibration's)
+//! were found beside the robot, and the placements are fitted to readings that still have them. Goes wrong: errors that the rows share and
+//! nobody stated are in none of it.
 
-use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6, Point3, Vector3};
 
 use crate::geometry::{Transform, rigid_columns, rotation_matrix, transform_from_matrix};
 use crate::identify::data::dataset::Dataset;
@@ -80,12 +82,21 @@ pub struct Placed {
     extras: Vec<Extra>,
     /// Of the shared offsets, then six numbers a group.
     covariance: DMatrix<f64>,
+    /// What the readings have of the sensor's errors and the placements' frames do not take up, in the same unknowns.
+    of_sensor: DVector<f64>,
 }
 
 impl Placed {
-    /// `rows` have points, `shared` is the covariance of the offsets, and `common` how many times larger than of independent errors variances
-    /// are. `None` where no group has a frame.
-    pub fn new(set: &Dataset, rows: &Rows, offsets: &[f64], shared: &DMatrix<f64>, common: f64) -> Option<Placed> {
+    /// `rows` have points, `offsets` are zero where `sensor` says what was found of the sensor's errors, `shared` is the covariance of both, and
+    /// `common` how many times larger than of independent errors variances are. `None` where no group has a frame.
+    pub fn new(
+        set: &Dataset,
+        rows: &Rows,
+        offsets: &[f64],
+        sensor: &[f64],
+        shared: &DMatrix<f64>,
+        common: f64,
+    ) -> Option<Placed> {
         let linear = Linearised::new(rows, offsets);
         let (of_robot, of_extras) = rows.split(offsets);
         let parameters = rows.kinematics.parameters();
@@ -106,12 +117,14 @@ impl Placed {
         if groups.is_empty() {
             return None;
         }
+        let follow = following(shared.ncols(), &follows);
         Some(Placed {
             flange_from_target: transform_from_matrix(turn.unwrap_or_else(Matrix3::identity), robot.tool_mm),
             oriented: turn.is_some(),
             target_found: parameters.iter().any(|p| matches!(p, Parameter::V(_))),
-            covariance: together(shared, &follows, &own),
-            fresh_mm2: 3.0 * (rows.scatter.point_mm.powi(2) + rows.left_by_smooth_mm2()),
+            covariance: together(shared, &follow, &own),
+            of_sensor: &follow * DVector::from_column_slice(sensor),
+            fresh_mm2: 3.0 * (rows.scatter.fresh_mm2() + rows.left_by_smooth_mm2()),
             kinematics: rows.kinematics.clone(),
             robot,
             offsets: of_robot.to_vec(),
@@ -147,47 +160,68 @@ impl Placed {
     }
 
     /// The target's point in the frame of a group's sensor at each of these joints (rad), and its covariance, mm^2: what the next reading there
-    /// is without its own noise and scatter.
+    /// is without its own noise and scatter, of a sensor without errors of its own.
     pub fn points(&self, index: usize, joints: &[&[f64]]) -> Vec<(Vector3<f64>, Matrix3<f64>)> {
+        let poses: Vec<(&[f64], Option<&Matrix3xX<f64>>)> = joints.iter().map(|&joints| (joints, None)).collect();
+        let of_columns = |(point, columns): (Point3<f64>, DMatrix<f64>)| {
+            let covariance = &columns * &self.covariance * columns.transpose();
+            (point.coords, covariance.fixed_view::<3, 3>(0, 0).into_owned())
+        };
+        self.columns(index, &poses).into_iter().map(of_columns).collect()
+    }
+
+    /// The point, and what it moves by with each unknown of the covariance, at each of these poses: joints (rad), and columns of what the
+    /// sensor's readings there have in common.
+    fn columns(&self, index: usize, poses: &[(&[f64], Option<&Matrix3xX<f64>>)]) -> Vec<(Point3<f64>, DMatrix<f64>)> {
         let nominal = self.kinematics.nominal();
-        let kinematics = Kinematics::new(nominal, &self.robot, self.kinematics.parameters(), joints);
+        let joints: Vec<&[f64]> = poses.iter().map(|(joints, _)| *joints).collect();
+        let kinematics = Kinematics::new(nominal, &self.robot, self.kinematics.parameters(), &joints);
         let frame = &self.groups[index].1;
-        let of_place = |place: Place| {
+        let of_place = |(place, (_, shared)): (Place, &(&[f64], Option<&Matrix3xX<f64>>))| {
             let turned = frame.rotation * place.point_mm.coords;
+            let point = Point3::from(turned + frame.translation.vector);
             let mut columns = DMatrix::zeros(3, self.covariance.ncols());
             let robot = place.point_columns.ncols();
             columns.view_mut((0, 0), (3, robot)).copy_from(&(rotation_matrix(frame) * place.point_columns));
+            for (k, extra) in self.extras.iter().enumerate() {
+                columns.fixed_view_mut::<3, 1>(0, robot + k).copy_from(&extra.of_point(&point, *shared));
+            }
             let at = self.offsets.len() + self.extras.len() + 6 * index;
             columns.fixed_view_mut::<3, 6>(0, at).copy_from(&rigid_columns(&turned));
-            let covariance = &columns * &self.covariance * columns.transpose();
-            (turned + frame.translation.vector, covariance.fixed_view::<3, 3>(0, 0).into_owned())
+            (point, columns)
         };
-        kinematics.places(&self.offsets, true).into_iter().map(of_place).collect()
+        kinematics.places(&self.offsets, true).into_iter().zip(poses).map(of_place).collect()
     }
 }
 
 impl Placed {
-    /// How far off the target is to be expected at the poses of one of the groups: against where it is at such a pose, beside the noise of a
-    /// reading that its covariance states.
+    /// How far off the target is to be expected at the poses of one of the groups: against where the same sensor reads it at such a pose, beside
+    /// the noise of a reading that its covariance states.
     pub fn expected(&self, set: &Dataset, index: usize) -> Lengths {
-        let poses = set.poses.iter().filter(|pose| pose.group == self.groups[index].0);
-        let joints: Vec<&[f64]> = poses.map(|pose| pose.joints_rad.as_slice()).collect();
-        let squares =
-            self.points(index, &joints).into_iter().map(|(_, covariance)| covariance.trace() + self.fresh_mm2);
-        Lengths::of_squares(&squares.collect::<Vec<f64>>())
+        let poses = set.poses.iter().enumerate().filter(|(_, pose)| pose.group == self.groups[index].0);
+        let poses = poses.map(|(row, pose)| (pose.joints_rad.as_slice(), set.shared.get(row))).collect::<Vec<_>>();
+        let square = |(_, columns): (Point3<f64>, DMatrix<f64>)| {
+            let covariance = &columns * &self.covariance * columns.transpose();
+            covariance.trace() + (columns * &self.of_sensor).norm_squared() + self.fresh_mm2
+        };
+        Lengths::of_squares(&self.columns(index, &poses).into_iter().map(square).collect::<Vec<f64>>())
     }
 }
 
-/// The covariance of shared offsets and of all placements' own unknowns, which follow them and have errors of their own.
-fn together(shared: &DMatrix<f64>, follows: &[DMatrix<f64>], own: &[DMatrix<f64>]) -> DMatrix<f64> {
-    let count = shared.ncols();
-    let all = count + 6 * follows.len();
-    let mut follow = DMatrix::zeros(all, count);
+/// What shared offsets move all unknowns by: themselves, and all placements' own, which follow them.
+fn following(count: usize, follows: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let mut follow = DMatrix::zeros(count + 6 * follows.len(), count);
     follow.view_mut((0, 0), (count, count)).fill_with_identity();
     for (k, of_group) in follows.iter().enumerate() {
         follow.view_mut((count + 6 * k, 0), (6, count)).copy_from(of_group);
     }
-    let mut covariance = &follow * shared * follow.transpose();
+    follow
+}
+
+/// The covariance of shared offsets and of all placements' own unknowns, which follow them and have errors of their own.
+fn together(shared: &DMatrix<f64>, follow: &DMatrix<f64>, own: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let count = shared.ncols();
+    let mut covariance = follow * shared * follow.transpose();
     for (k, own) in own.iter().enumerate() {
         let mut part = covariance.view_mut((count + 6 * k, count + 6 * k), (6, 6));
         part += own;

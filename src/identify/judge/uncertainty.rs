@@ -105,7 +105,7 @@ impl Expected {
         let places = Kinematics::new(nominal, &robot, kinematics.parameters(), &joints).places(&offsets[..count], true);
         let covariance = formulation.whole_covariance();
         let times = times_without(formulation, set);
-        let scatter = formulation.rows.scatter.point_mm;
+        let scatter_mm2 = formulation.rows.scatter.fresh_mm2();
         // Readings are off by what placements share, too.
         let smooth_mm2 = formulation.rows.left_by_smooth_mm2();
         let (mut squares, mut of_robots) = (vec![0.0; places.len()], vec![0.0; places.len()]);
@@ -123,9 +123,9 @@ impl Expected {
                 let columns = &places[i].point_columns - motion(i) * &follow;
                 let of_robot = (&columns * &covariance * columns.transpose()).trace();
                 // The placement itself is found through the scatter of the rows it is fitted to.
-                let of_frame = (motion(i) * &inverse * motion(i).transpose()).trace() * scatter * scatter;
+                let of_frame = (motion(i) * &inverse * motion(i).transpose()).trace() * scatter_mm2;
                 of_robots[i] = times[i] * of_robot;
-                squares[i] = times[i] * (of_robot + of_frame) + 3.0 * (scatter * scatter + smooth_mm2);
+                squares[i] = times[i] * (of_robot + of_frame) + 3.0 * (scatter_mm2 + smooth_mm2);
             }
         }
         let of_rows = |all: &[f64]| rows.iter().map(|&row| all[row]).collect::<Vec<f64>>();
@@ -136,7 +136,7 @@ impl Expected {
             p95_mm,
             max_mm,
             of_robot_mm: Lengths::of_squares(&of_rows(&of_robots)).mean_mm,
-            scatter_mm: MEAN_OVER_RMS * (3.0 * (scatter * scatter + smooth_mm2)).sqrt(),
+            scatter_mm: MEAN_OVER_RMS * (3.0 * (scatter_mm2 + smooth_mm2)).sqrt(),
             poses: region(set),
             joint_ranges: ranges(set),
             map: rows.iter().map(length).collect(),

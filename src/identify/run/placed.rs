@@ -28,34 +28,33 @@ impl Identification {
             }
         };
         let count = formulation.parameters().len();
-        let whole: Vec<f64> = of_robot[..count].iter().chain(formulation.extras()).copied().collect();
         let joints = nominal.joints.len();
         let shared = formulation.offsets_covariance(&|parameter| is_held(parameter, joints));
         // A placement is for readings as they are read: the sensor's own errors stay in them. Where targets stand is none of these.
-        let of_target = |k: &usize| match formulation.rows.extras[*k] {
-            Extra::Target(_) => true,
-            Extra::Shared(_) => set.are_on_flange(),
-            _ => false,
-        };
-        let turns: Vec<usize> = (0..formulation.rows.extras.len()).filter(of_target).collect();
-        let extras: Vec<Extra> = turns.iter().map(|&k| formulation.rows.extras[k]).collect();
-        let kept: Vec<usize> = (0..count).chain(turns.iter().map(|k| count + k)).collect();
-        let offsets: Vec<f64> = kept.iter().map(|&k| whole[k]).collect();
-        let shared = shared.select_rows(&kept).select_columns(&kept);
+        let (mut offsets, mut sensor) = (of_robot[..count].to_vec(), vec![0.0; count]);
+        for (extra, value) in formulation.rows.extras.iter().zip(formulation.extras()) {
+            let of_target = match extra {
+                Extra::Target(_) => true,
+                Extra::Shared(_) => set.are_on_flange(),
+                Extra::Zero | Extra::Warp(_) => false,
+            };
+            offsets.push(if of_target { *value } else { 0.0 });
+            sensor.push(if of_target { 0.0 } else { *value });
+        }
         let parameters = formulation.parameters();
-        let load_chain = nominal.shifted(parameters, &whole[..count]);
+        let load_chain = nominal.shifted(parameters, &offsets[..count]);
         let task = Task {
             set,
             robot: nominal,
             parameters,
-            extras: &extras,
+            extras: &formulation.rows.extras,
             rows: &self.fitted,
             model: formulation.model,
             smooth: None,
             settings,
         };
         let rows = task.rows_at(formulation.rows.scatter, &load_chain);
-        Ok(Placed::new(set, &rows, &offsets, &shared, formulation.common))
+        Ok(Placed::new(set, &rows, &offsets, &sensor, &shared, formulation.common))
     }
 
     /// The chosen terms with the points of all groups in frames of their own.

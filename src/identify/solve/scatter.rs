@@ -3,7 +3,9 @@
 //! In: residuals before whitening. Out: sizes of rows, their robust standard deviation, and the scatter at which the white sum of squares
 //! equals the degrees of freedom. The covariance of a row is `stated * C + point^2 I`, C the one of the file. Of all pairs with the
 //! right sum of squares the one of least determinant is the most probable; where the data do not tell the two apart, C is taken at
-//! its word.
+//! its word, though it leave a smaller sum of squares than expected.
+
+use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use crate::identify::residuals::raw::Raw;
 use crate::identify::residuals::rows::Rows;
@@ -23,6 +25,9 @@ const STATED: [f64; 10] = [1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3, 3.0, 10.0, 30.0, 10
 /// Stated covariances count as too large where the residuals ask for less than this share of them; a little less is what errors common to
 /// many rows look like, which scatter does not show.
 const OVERSTATED: f64 = 0.4;
+
+/// How many standard deviations below nothing a variance is taken to be at the most.
+const FARTHEST: f64 = -6.0;
 
 /// Halvings of the range of scatters, in its logarithm.
 const HALVINGS: usize = 40;
@@ -161,7 +166,7 @@ pub(super) fn robust_scatter(
     let excess =
         |scatter: &Scatter| (freedom * median_size(&sizes(residuals, scatter, 1.0, count), rows)).powi(2) - 1.0;
     match both {
-        true => most_probable(residuals, before, &excess),
+        true => most_probable(residuals, before, 1.0 / (freedom * freedom), &excess),
         false => with_point(before, &excess),
     }
 }
@@ -194,7 +199,31 @@ pub(super) fn estimate_scatter(
         let sum: f64 = residuals.iter().map(|r| r.weight * r.weight * r.white_square(scatter)).sum();
         sum / wanted.max(f64::MIN_POSITIVE) - 1.0
     };
-    Scatter { rotation_rad, ..most_probable(&residuals, before, &excess) }
+    let left = wanted / of_points.max(1.0);
+    let scatter = Scatter { rotation_rad, ..most_probable(&residuals, before, left, &excess) };
+    Scatter { hidden_mm2: hidden_mm2(&residuals, left, &scatter), ..scatter }
+}
+
+/// By how much the expectation of the scatter's variance is above the one that was found: residuals tell it to within a standard deviation that the
+/// readings' own noise makes, and it is not negative. `left` is the share of the numbers that the fit left.
+fn hidden_mm2(residuals: &[Residual], left: f64, scatter: &Scatter) -> f64 {
+    let (mut score, mut information) = (0.0, 0.0);
+    for residual in residuals {
+        for number in residual.numbers() {
+            let variance = number.variance(scatter);
+            let of_square = residual.weight.powi(2) * number.square - left * variance;
+            score += 0.5 * of_square * number.times / variance.powi(2);
+            information += 0.5 * left * (number.times / variance).powi(2);
+        }
+    }
+    let (found, sd) = (scatter.point_mm.powi(2), information.sqrt().recip());
+    // Of a scatter that was found nothing is left over; of one that was not, less than nothing may be.
+    let most_probable = found + if scatter.point_mm > LEAST_MM { 0.0 } else { (score / information).min(0.0) };
+    let z = (most_probable / sd).max(FARTHEST);
+    let Ok(law) = Normal::new(0.0, 1.0) else { return 0.0 };
+    // The mean of a normal number that is known not to be negative.
+    let above = sd * (z + law.pdf(z) / law.cdf(z)) - found;
+    if above.is_finite() { above.max(0.0) } else { 0.0 }
 }
 
 /// The scatter of a coordinate at which nothing is in excess, the factor of the stated covariances held.
@@ -208,15 +237,17 @@ fn with_point(before: Scatter, excess: &dyn Fn(&Scatter) -> f64) -> Scatter {
     scatter
 }
 
-/// Of the pairs of factor and scatter that leave nothing in excess the one of least determinant, where it is clearly less than that of
-/// covariances taken at their word.
-fn most_probable(residuals: &[Residual], before: Scatter, excess: &dyn Fn(&Scatter) -> f64) -> Scatter {
+/// Of the pairs of factor and scatter that leave nothing in excess the most probable one, where it is clearly more so than covariances taken at
+/// their word, and than these made smaller by what the residuals leave; `left` is the share of the numbers that the fit left.
+fn most_probable(residuals: &[Residual], before: Scatter, left: f64, excess: &dyn Fn(&Scatter) -> f64) -> Scatter {
     let at = |stated: f64| Scatter { point_mm: LEAST_MM, stated, ..before };
     if residuals.iter().all(|r| r.numbers().iter().all(|n| n.variance <= 0.0)) {
         return with_point(at(1.0), excess);
     }
-    let half_log_determinant = |scatter: &Scatter| -> f64 {
-        residuals.iter().flat_map(|r| r.numbers()).map(|n| 0.5 * n.variance(scatter).ln()).sum()
+    let numbers = || residuals.iter().flat_map(Residual::numbers);
+    // Minus the logarithm of the restricted likelihood, but for what all have.
+    let cost = |scatter: &Scatter, excess: f64| -> f64 {
+        0.5 * left * (numbers().map(|n| n.variance(scatter).ln()).sum::<f64>() + numbers().count() as f64 * excess)
     };
     let word = match excess(&at(1.0)) {
         above if above > 0.0 => with_point(at(1.0), excess),
@@ -224,9 +255,11 @@ fn most_probable(residuals: &[Residual], before: Scatter, excess: &dyn Fn(&Scatt
         _ => at(1.0),
     };
     let tried = STATED.iter().filter(|s| excess(&at(**s)) > 0.0).map(|&s| with_point(at(s), excess));
-    let best = tried.map(|s| (half_log_determinant(&s), s)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let best = tried.map(|s| (cost(&s, 0.0), s)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let above = excess(&word).min(0.0);
+    let smaller = Scatter { stated: word.stated * (1.0 + above).max(1e-12), ..word };
     match best {
-        Some((least, scatter)) if least < half_log_determinant(&word) - EVIDENCE => scatter,
+        Some((least, scatter)) if least < cost(&word, above).min(cost(&smaller, 0.0)) - EVIDENCE => scatter,
         _ => word,
     }
 }
@@ -251,7 +284,7 @@ mod tests {
     fn found(residuals: &[Residual]) -> Scatter {
         let wanted = 3.0 * residuals.len() as f64;
         let excess = |s: &Scatter| residuals.iter().map(|r| r.white_square(s)).sum::<f64>() / wanted - 1.0;
-        most_probable(residuals, Scatter::of_point(1.0), &excess)
+        most_probable(residuals, Scatter::of_point(1.0), 1.0, &excess)
     }
 
     #[test]
@@ -259,6 +292,17 @@ mod tests {
         let sd = Vector3::new(0.05, 0.04, 0.3);
         let scatter = found(&points(sd, sd));
         assert_eq!(scatter.stated, 1.0);
+    }
+
+    /// Residuals that are all a little smaller than their covariances say were taken for scatter, and the covariances for nothing.
+    #[test]
+    fn residuals_a_little_too_small_leave_covariances_at_their_word() {
+        for stated in [Vector3::repeat(0.02), Vector3::new(0.05, 0.04, 0.3)] {
+            for share in [1.0, 0.95, 0.9, 0.8, 0.7] {
+                let scatter = found(&points(stated, share * stated));
+                assert!(scatter.stated == 1.0 && scatter.point_mm <= LEAST_MM, "{share}: {scatter:?}");
+            }
+        }
     }
 
     #[test]

@@ -1,13 +1,15 @@
-use nalgebra::{Point3, Vector3, Vector6};
+use nalgebra::{Matrix3, Point3, Vector3, Vector6};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 use crate::geometry::{Transform, rotation_vector, transform};
 use crate::identify::data::dataset::Dataset;
+use crate::identify::data::shared::suppose_scale;
 use crate::identify::judge::placement::{Placed, Uncertain, is_held};
 use crate::identify::run::identify;
 use crate::identify::settings::{Extensions, Method, Model, Settings};
 use crate::identify::synthetic::{self, World};
+use crate::measurements::{Observed, Role};
 use crate::robot::{Parameter, Robot};
 
 /// Noise of a coordinate, mm, and of a turn, rad.
@@ -25,8 +27,8 @@ fn spoiled(seed: u64) -> impl Fn(&mut Robot) {
     }
 }
 
-fn world(samples: usize, oriented: bool, seed: u64) -> World {
-    let mut world = synthetic::planned(samples, 0, 25.0, NOISE_MM, seed, &spoiled(seed));
+fn world(samples: usize, verify: usize, oriented: bool, seed: u64) -> World {
+    let mut world = synthetic::planned(samples, verify, 25.0, NOISE_MM, seed, &spoiled(seed));
     if oriented {
         synthetic::orient(&mut world.rows, &world.truth, NOISE_RAD, &mut Pcg64Mcg::seed_from_u64(2000 + seed));
     }
@@ -108,7 +110,7 @@ fn tally(robots: u64, samples: usize, oriented: bool, extensions: Extensions) ->
     let settings = Settings { method: Some(Method::TrustRegion), extensions, ..Settings::default() };
     let mut tally = Tally::default();
     for seed in 0..robots {
-        let (world, fresh) = (world(samples, oriented, seed), world(24, false, 500 + seed));
+        let (world, fresh) = (world(samples, 0, oriented, seed), world(24, 0, false, 500 + seed));
         let set = Dataset::new(&world.rows).unwrap();
         let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
         let placed = found.placed(&set, &world.nominal, &settings).unwrap().unwrap();
@@ -136,7 +138,7 @@ fn stated_uncertainties_are_those_of_simulated_robots() {
 
 #[test]
 fn what_is_held_is_what_a_placement_stands_for() {
-    let world = world(40, true, 1);
+    let world = world(40, 0, true, 1);
     let set = Dataset::new(&world.rows).unwrap();
     let settings = Settings { method: Some(Method::TrustRegion), extensions: Extensions::None, ..Settings::default() };
     let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
@@ -151,7 +153,7 @@ fn what_is_held_is_what_a_placement_stands_for() {
 
 #[test]
 fn a_robot_found_by_distances_and_a_nominal_one_are_placed_too() {
-    let world = world(40, false, 2);
+    let world = world(40, 0, false, 2);
     let set = Dataset::new(&world.rows).unwrap();
     let plain = Settings { method: Some(Method::TrustRegion), extensions: Extensions::None, ..Settings::default() };
     let by_distance = Settings { model: Some(Model::CenterDistance), ..plain.clone() };
@@ -168,5 +170,53 @@ fn a_robot_found_by_distances_and_a_nominal_one_are_placed_too() {
         let bound = if is_nominal { 5.0 } else { 1.0 };
         assert!(off.fixed_rows::<3>(3).norm() < bound, "{is_nominal} {off}");
         assert_eq!(placed.target_found, !is_nominal);
+    }
+}
+
+/// Points whose noise is stated, with a rig that reads all lengths too long by this share.
+fn stated(world: &mut World, scale: f64) {
+    for row in &mut world.rows {
+        if let Observed::Position { covariance_mm2, point_mm, .. } = &mut row.observed {
+            *covariance_mm2 = Some(Matrix3::identity() * NOISE_MM * NOISE_MM);
+            *point_mm *= 1.0 + scale;
+        }
+    }
+}
+
+/// Where noise is stated cameras have an unknown scale: what is uncertain of it is uncertain of the robot, and not of what they read.
+#[test]
+fn a_rigs_own_scale_is_not_expected_in_what_it_reads() {
+    let settings = Settings { method: Some(Method::TrustRegion), extensions: Extensions::None, ..Settings::default() };
+    for oriented in [false, true] {
+        let mut ratios = Vec::new();
+        for seed in 0..12 {
+            let mut world = world(60, 60, oriented, seed);
+            stated(&mut world, 0.0);
+            let supposed = |world: &World| {
+                let mut set = Dataset::new(&world.rows).unwrap();
+                suppose_scale(&mut set);
+                set
+            };
+            let sd = supposed(&world).supposed_scale;
+            assert_eq!(sd.is_some(), oriented);
+            let scale = sd.unwrap_or(0.0) * synthetic::normal(&mut Pcg64Mcg::seed_from_u64(4000 + seed)).x;
+            stated(&mut world, scale);
+            let set = supposed(&world);
+            let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
+            let placed = found.placed(&set, &world.nominal, &settings).unwrap().unwrap();
+            for index in 0..placed.groups.len() {
+                let group = placed.groups[index].0;
+                let fresh = set.poses.iter().filter(|pose| pose.group == group && pose.role == Role::Verify);
+                let joints: Vec<&[f64]> = fresh.map(|pose| pose.joints_rad.as_slice()).collect();
+                let off = |(q, (point, _)): (&&[f64], (Vector3<f64>, _))| {
+                    let read = (synthetic::sensor(group) * world.truth.target_mm(q)) * (1.0 + scale);
+                    (point - read.coords).norm()
+                };
+                let mean = joints.iter().zip(placed.points(index, &joints)).map(off).sum::<f64>() / joints.len() as f64;
+                ratios.push(mean / placed.expected(&set, index).mean_mm);
+            }
+        }
+        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+        assert!((0.8..1.25).contains(&mean), "oriented {oriented}: {mean}");
     }
 }
