@@ -6,33 +6,28 @@
 use camino::Utf8PathBuf;
 
 /// Exit status of the program, as the contract has it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
     /// Done, and within tolerance where there is one.
-    Done,
+    Done = 0,
     /// Done, but out of tolerance.
-    OutOfTolerance,
+    OutOfTolerance = 1,
     /// Bad usage or bad input.
-    BadInput,
+    BadInput = 2,
     /// A computation did not converge, or the data cannot determine the answer.
-    Undetermined,
+    Undetermined = 3,
 }
 
 impl Status {
     /// The number the process ends with.
     pub fn code(self) -> u8 {
-        match self {
-            Status::Done => 0,
-            Status::OutOfTolerance => 1,
-            Status::BadInput => 2,
-            Status::Undetermined => 3,
-        }
+        self as u8
     }
 
     /// The graver of two.
     #[must_use]
     pub fn or_worse(self, other: Status) -> Status {
-        if other.code() > self.code() { other } else { self }
+        self.max(other)
     }
 }
 
@@ -115,7 +110,7 @@ pub fn at_most(value: f64, limit: f64) -> String {
 pub fn summed(a: f64, b: f64) -> [String; 3] {
     let sum = a + b;
     if !sum.is_finite() {
-        return ["n/a".to_owned(), "n/a".to_owned(), "n/a".to_owned()];
+        return ["n/a"; 3].map(str::to_owned);
     }
     let (less, more) = (a.abs().min(b.abs()), a.abs().max(b.abs()));
     let decimals = if less > 0.0 { decimals_of(less) } else { 0 }.max(decimals_of(more) + 1).min(FINEST);
