@@ -1,11 +1,9 @@
 //! What is said of a folder that was read, or could not be: what was found, and the call that would do.
 
-use std::fmt;
-
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::listing::{Aside, Folder, list};
-use super::names::{Open, Reach};
+use super::names::{Open, Reach, stem};
 use super::readings::{Reading, Told};
 use super::{Halves, PairBy, Pairing, Source};
 use crate::diagnostic::count;
@@ -14,28 +12,19 @@ use crate::imaging::{Error, Side, image, video};
 /// Folders, and readings, that a message shows at most.
 const MOST_SHOWN: usize = 8;
 
-/// A command to type.
-pub struct Call<'a> {
-    command: &'a str,
-    places: Vec<&'a Utf8Path>,
-    flag: &'a str,
-}
-
-impl<'a> Call<'a> {
-    fn new(source: &Source<'a>, places: Vec<&'a Utf8Path>, flag: &'a str) -> Call<'a> {
-        Call { command: source.command, places, flag }
-    }
-}
-
-impl fmt::Display for Call<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "`stereocal {}", self.command)?;
-        for place in &self.places {
-            let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
-            if place.as_str().chars().all(plain) { write!(f, " {place}")? } else { write!(f, " '{place}'")? }
-        }
-        if self.flag.is_empty() { write!(f, "`") } else { write!(f, " {}`", self.flag) }
-    }
+/// A command to type, with flags behind the places where there are any.
+fn call(source: &Source<'_>, places: &[&Utf8Path], flags: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
+    let mut words = vec!["stereocal".to_owned(), source.command.to_owned()];
+    words.extend(
+        places.iter().map(
+            |place| {
+                if place.as_str().chars().all(plain) { place.to_string() } else { format!("'{place}'") }
+            },
+        ),
+    );
+    words.extend(flags.split_whitespace().map(str::to_owned));
+    format!("`{}`", words.join(" "))
 }
 
 /// What was taken: `31 pairs by number: left stereoLeft/imageL*.png, right stereoRight/imageR*.png`.
@@ -65,8 +54,7 @@ pub fn taken(reading: &Reading, top: &Utf8Path) -> String {
 /// Whether the left pictures are all called right ones, and the right pictures left ones.
 fn names_disagree(reading: &Reading) -> bool {
     let all = |side: Side, paths: &[Utf8PathBuf]| {
-        let told = |path: &Utf8PathBuf| Open::new(path.file_stem().unwrap_or_default(), Reach::Words).side();
-        paths.iter().all(|path| told(path) == Some(side.other()))
+        paths.iter().all(|path| Open::new(stem(path), Reach::Words).side() == Some(side.other()))
     };
     Side::BOTH.into_iter().all(|side| all(side, &reading.sides[side as usize]))
 }
@@ -131,7 +119,7 @@ pub fn several(source: &Source<'_>, readings: &[Reading]) -> Error {
         statement.push_str(&format!("\n  {}", taken(reading, source.images)));
         let places: Vec<&Utf8Path> = reading.places.iter().map(Utf8PathBuf::as_path).collect();
         if places != [source.images] {
-            calls.push(Call::new(source, places, "").to_string());
+            calls.push(call(source, &places, ""));
         }
     }
     if readings.len() > MOST_SHOWN {
@@ -159,7 +147,7 @@ pub fn none(source: &Source<'_>, folders: &[Folder], readings: &[Reading]) -> Er
             Some((have, lacks)) => (
                 format!("there is {have}/ but no {lacks}/"),
                 match left_first(&holding).as_slice() {
-                    [a, b] => Call::new(source, vec![&a.path, &b.path], "").to_string(),
+                    [a, b] => call(source, &[&a.path, &b.path], ""),
                     _ => by_hand(source),
                 },
             ),
@@ -211,8 +199,7 @@ fn unmatched(source: &Source<'_>, reading: &Reading) -> (String, String) {
         count(left + right, "picture")
     );
     let hint = if left == right {
-        let places = std::iter::once(source.images).chain(source.right).collect();
-        format!("{} pairs them in the order of their names", Call::new(source, places, "--pair-by order"))
+        format!("{} pairs them in the order of their names", call(source, &source.places(), "--pair-by order"))
     } else {
         format!(
             "name partners alike; {left} left pictures and {right} right ones cannot be paired in their order either"
@@ -258,7 +245,7 @@ pub fn same(source: &Source<'_>) -> Error {
 fn untold(source: &Source<'_>, holding: &[&Folder], pictures: usize) -> (String, String) {
     let two_views = holding.iter().find_map(|folder| Some((folder, as_of_two(folder.pictures.first()?)?)));
     let halves = two_views.map(|(folder, halves)| {
-        let call = Call::new(source, vec![&folder.path], halves.flag());
+        let call = call(source, &[&folder.path], halves.flag());
         let [left, right] = halves.words();
         format!("if the {left} half of each picture is the left camera's and the {right} one the right's: {call}")
     });
@@ -266,7 +253,7 @@ fn untold(source: &Source<'_>, holding: &[&Folder], pictures: usize) -> (String,
     let (statement, hint) = match below.as_slice() {
         [first, second, ..] => (
             format!("which of these {} are left and right is not told", count(below.len(), "folder")),
-            format!("name two: {}", Call::new(source, vec![&first.path, &second.path], "")),
+            format!("name two: {}", call(source, &[&first.path, &second.path], "")),
         ),
         _ => (
             format!("no pair found: the names of {} tell neither left nor right", count(pictures, "picture")),

@@ -47,16 +47,9 @@ pub struct Aside {
     pub again: usize,
 }
 
-impl std::ops::Add for Aside {
-    type Output = Aside;
-    fn add(self, more: Aside) -> Aside {
-        Aside { other: self.other + more.other, again: self.again + more.again }
-    }
-}
-
 impl std::iter::Sum for Aside {
     fn sum<I: Iterator<Item = Aside>>(all: I) -> Aside {
-        all.fold(Aside::default(), |sum, one| sum + one)
+        all.fold(Aside::default(), |sum, one| Aside { other: sum.other + one.other, again: sum.again + one.again })
     }
 }
 

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use camino::{Utf8Path, Utf8PathBuf};
 
-use super::names::{Open, Reach, SEPARATORS, natural_order, numbers};
+use super::names::{Open, Reach, SEPARATORS, natural_order, numbers, stem};
 use super::{PairBy, PairFiles};
 use crate::imaging::{Error, Result, Side};
 
@@ -91,10 +91,6 @@ pub fn pair(left: &[Utf8PathBuf], right: &[Utf8PathBuf], by: Option<PairBy>) -> 
         Some(e) if best.pairs.is_empty() => Err(e),
         _ => Ok(best),
     }
-}
-
-fn stem(path: &Utf8Path) -> &str {
-    path.file_stem().unwrap_or_default()
 }
 
 /// Pairs by a key that each name has; `None` is a name without one.
