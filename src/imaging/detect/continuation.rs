@@ -178,18 +178,16 @@ mod tests {
 
     /// A board of 7x6 squares of 12 px in a light margin, of which the inner corners in the given ranges were found.
     fn found(cols: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> Detected {
-        let colour = |x: usize, y: usize| {
+        let copy = Grey8::from_fn(108, 96, |x, y| {
             let (i, j) = (x as isize / 12 - 1, y as isize / 12 - 1);
             let black = (0..7).contains(&i) && (0..6).contains(&j) && (i + j) % 2 == 0;
             if black { 40 } else { 200 }
-        };
-        let pixels = (0..108 * 96).map(|k| colour(k % 108, k / 108)).collect();
-        let copy = Grey8 { width: 108, height: 96, pixels };
+        });
         let corners = Lattice::from_fn(cols.len(), rows.len(), |col, row| {
             let (x, y) = ((cols.start + col + 2) * 12, (rows.start + row + 2) * 12);
             Some(Point2::new(x as f64 - 0.5, y as f64 - 0.5))
         });
-        Detected { corners, copy, level: Level::Reduced(1), print: None, open: None }
+        Detected::plain(corners, copy, Level::Reduced(1))
     }
 
     #[test]
@@ -219,19 +217,11 @@ mod tests {
     fn cut(share: f64) -> (Grey8, Places) {
         let (left, right) = (24.0 - 12.0 * share, 24.0 + 7.0 * 12.0 + 12.0 * share);
         let bottom = 24.0 + 6.0 * 12.0 + 12.0 * share;
-        let colour = |x: usize, y: usize| {
+        let copy = Grey8::from_fn(144, 132, |x, y| {
             let inside = |v: usize, to: f64| v as f64 >= left && (v as f64) < to;
-            let black = (x / 12 + y / 12).is_multiple_of(2);
-            if !inside(x, right) || !inside(y, bottom) {
-                70
-            } else if black {
-                40
-            } else {
-                200
-            }
-        };
-        let copy =
-            Grey8 { width: 144, height: 132, pixels: (0..144 * 132).map(|k| colour(k % 144, k / 144)).collect() };
+            let grey = if (x / 12 + y / 12).is_multiple_of(2) { 40 } else { 200 };
+            if inside(x, right) && inside(y, bottom) { grey } else { 70 }
+        });
         let place = |v: usize| (24 + 12 * v) as f64 - 0.5;
         (copy, Lattice::from_fn(8, 7, |col, row| Some(Point2::new(place(col), place(row)))))
     }
@@ -247,13 +237,7 @@ mod tests {
             // Which of two lines that are alike is not the board's cannot be told; and there are no more of them.
             assert_eq!(without_cut_lines(&copy, &grid, board("8x7")), None);
             assert_eq!(without_cut_lines(&copy, &grid, board("6x5")), None);
-            let detected = |corners: Places| Detected {
-                corners,
-                copy: copy.clone(),
-                level: Level::Reduced(1),
-                print: None,
-                open: None,
-            };
+            let detected = |corners: Places| Detected::plain(corners, copy.clone(), Level::Reduced(1));
             let inner = Lattice::from_fn(6, 5, |col, row| grid.get(col + 1, row + 1).copied());
             assert_eq!(lines_beyond(&detected(inner)), (0, 0));
             let part = Lattice::from_fn(7, 7, |col, row| grid.get(col, row).copied());
@@ -266,18 +250,14 @@ mod tests {
     fn the_edge_of_the_margin_is_no_line_of_corners() {
         // Squares cut to a half, a light margin, and a dark wall whose edge lies where the next line of corners would be, or near it.
         for margin in [0.2, 0.35, 0.45, 0.5, 0.55, 0.7, 1.0] {
-            let (Grey8 { width, height, mut pixels }, grid) = cut(0.5);
-            for (k, grey) in pixels.iter_mut().enumerate() {
-                let (x, y) = ((k % width) as f64, (k / width) as f64);
-                let outside = |v: f64, to: f64| (18.0 - v).max(v - to);
+            let (board, grid) = cut(0.5);
+            let copy = Grey8::from_fn(board.width, board.height, |x, y| {
+                let outside = |v: usize, to: f64| (18.0 - v as f64).max(v as f64 - to);
                 let beyond = outside(x, 113.0).max(outside(y, 101.0)) / 12.0;
-                if beyond > 0.0 {
-                    *grey = if beyond < margin { 200 } else { 40 };
-                }
-            }
-            let copy = Grey8 { width, height, pixels };
-            let detected = Detected { corners: grid, copy, level: Level::Reduced(1), print: None, open: None };
-            assert_eq!(lines_beyond(&detected), (0, 0), "{margin}");
+                let wall = if beyond < margin { 200 } else { 40 };
+                if beyond > 0.0 { wall } else { board.pixels[y * board.width + x] }
+            });
+            assert_eq!(lines_beyond(&Detected::plain(grid, copy, Level::Reduced(1))), (0, 0), "{margin}");
         }
     }
 

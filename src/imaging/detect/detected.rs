@@ -27,6 +27,13 @@ pub struct Detected {
     pub open: Option<Open>,
 }
 
+impl Detected {
+    /// A board without markers whose numbers are not open.
+    pub fn plain(corners: Places, copy: Grey8, level: Level) -> Detected {
+        Detected { corners, copy, level, print: None, open: None }
+    }
+}
+
 /// Why a picture gave no corners.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refusal {
@@ -62,13 +69,11 @@ pub fn glance_level(picture: &Picture) -> Level {
 /// What was found on a copy, on one that is no finer than the picture.
 pub fn on_a_copy(picture: &Picture, level: Level, small: &Grey8, corners: Places) -> Detected {
     match level {
-        Level::Reduced(_) | Level::Skimmed(_) => {
-            Detected { corners, copy: small.clone(), level, print: None, open: None }
-        }
+        Level::Reduced(_) | Level::Skimmed(_) => Detected::plain(corners, small.clone(), level),
         Level::Doubled => {
             let level = Level::Reduced(1);
             let corners = corners.map(|p| level.to_copy(&Level::Doubled.to_picture(p)));
-            Detected { corners, copy: level.copy(picture), level, print: None, open: None }
+            Detected::plain(corners, level.copy(picture), level)
         }
     }
 }

@@ -224,16 +224,10 @@ mod tests {
             let (wide, high) = (board.squares.columns as isize, board.squares.rows as isize);
             let black = (0..wide).contains(&i) && (0..high).contains(&j) && (i + j) % 2 == 0;
             let paper = (-1..=wide).contains(&i) && (-1..=high).contains(&j);
-            if hidden(x, y) || !paper {
-                120
-            } else if black {
-                30
-            } else {
-                220
-            }
+            let grey = if black { 30 } else { 220 };
+            if hidden(x, y) || !paper { 120 } else { grey }
         };
-        let small =
-            Grey8 { width: w, height: h, pixels: (0..w * h).map(|k| colour((k % w) as f64, (k / w) as f64)).collect() };
+        let small = Grey8::from_fn(w, h, |x, y| colour(x as f64, y as f64));
         let place = |col: usize, row: usize| Point2::new(at.0 + SIDE * col as f64, at.1 + SIDE * row as f64);
         let is = |col: usize, row: usize| {
             let p = place(col, row);
@@ -281,18 +275,12 @@ mod tests {
     #[test]
     fn the_outline_is_no_line_of_corners() {
         let small = |hidden: bool| {
-            let colour = |x: usize, y: usize| {
+            Grey8::from_fn(120, 100, |x, y| {
                 let (i, j) = (x / 10, y / 10);
                 let black = (2..10).contains(&i) && (2..8).contains(&j) && (i + j) % 2 == 0;
-                if hidden && x > 92 {
-                    120
-                } else if black {
-                    30
-                } else {
-                    220
-                }
-            };
-            Grey8 { width: 120, height: 100, pixels: (0..120 * 100).map(|k| colour(k % 120, k / 120)).collect() }
+                let grey = if black { 30 } else { 220 };
+                if hidden && x > 92 { 120 } else { grey }
+            })
         };
         // From the first column on, of which 2 is the outline.
         let grid = |first: usize, last: usize| {

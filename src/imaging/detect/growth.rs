@@ -345,28 +345,18 @@ mod tests {
 
     /// A board of 8x6 squares, skewed, with a part painted over.
     fn picture(hidden: impl Fn(f64, f64) -> bool) -> Grey8 {
-        let (w, h) = (240, 200);
-        let pixels = (0..w * h)
-            .map(|k| {
-                let mut sum = 0.0;
-                for (a, b) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
-                    let (x, y) = ((k % w) as f64 + a - 30.0, (k / w) as f64 + b - 20.0);
-                    let (u, v) = ((x - 0.2 * y) / 20.0, (y - 0.1 * x) / 20.0);
-                    let inside = (0.0..8.0).contains(&u) && (0.0..6.0).contains(&v);
-                    let black = inside && (u.floor() + v.floor()) as i32 % 2 == 0;
-                    let grey = if hidden(u, v) {
-                        130.0
-                    } else if black {
-                        30.0
-                    } else {
-                        210.0
-                    };
-                    sum += grey / 4.0;
-                }
-                sum as u8
-            })
-            .collect();
-        Grey8 { width: w, height: h, pixels }
+        Grey8::from_fn(240, 200, |x, y| {
+            let mut sum = 0.0;
+            for (a, b) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
+                let (x, y) = (x as f64 + a - 30.0, y as f64 + b - 20.0);
+                let (u, v) = ((x - 0.2 * y) / 20.0, (y - 0.1 * x) / 20.0);
+                let inside = (0.0..8.0).contains(&u) && (0.0..6.0).contains(&v);
+                let black = inside && (u.floor() + v.floor()) as i32 % 2 == 0;
+                let grey = if black { 30.0 } else { 210.0 };
+                sum += if hidden(u, v) { 130.0 } else { grey } / 4.0;
+            }
+            sum as u8
+        })
     }
 
     fn size(grid: &Places) -> (usize, usize) {

@@ -145,7 +145,7 @@ fn at_a_glance(picture: &Picture, board: Board) -> Option<Detected> {
         return None;
     }
     let corners = turn_by_colours(&copy, right_handed(grid), board);
-    Some(Detected { corners, copy, level, print: None, open: None })
+    Some(Detected::plain(corners, copy, level))
 }
 
 /// The board, or a part of it, by one attempt; another grid is kept as seen.
@@ -260,13 +260,12 @@ mod tests {
 
     /// A board of 8x6 squares of `side` px in a light margin, its crossings at whole multiples of `side`.
     fn picture(size: usize, side: usize) -> Picture {
-        let grey = |x: usize, y: usize| {
+        let image = Image::from_fn(size, size, |x, y| {
             let (i, j) = (x / side, y / side);
             let dark = (1..=8).contains(&i) && (1..=6).contains(&j) && (i + j) % 2 == 0;
             if dark { 40 } else { 200u8 }
-        };
-        let pixels = (0..size * size).map(|k| grey(k % size, k / size)).collect();
-        Picture::from(Image { width: size, height: size, pixels })
+        });
+        image.into()
     }
 
     #[test]

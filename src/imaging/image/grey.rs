@@ -1,6 +1,8 @@
-//! Grey values row by row, as a camera gave them.
+//! Grey values row by row, as a camera gave them, and the level at which they are clipped.
 
 use nalgebra::Point2;
+
+use super::clipping;
 
 /// Values row by row.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +27,13 @@ pub enum Grey {
     Sixteen(Image<u16>),
 }
 
+impl<T> Image<T> {
+    /// A picture filled by column and row, in order.
+    pub fn from_fn(width: usize, height: usize, mut at: impl FnMut(usize, usize) -> T) -> Image<T> {
+        Image { width, height, pixels: (0..width * height).map(|k| at(k % width, k / width)).collect() }
+    }
+}
+
 impl<T: Copy + Into<f64>> Image<T> {
     /// Mean of the 3 x 3 pixels at a place; `None` at the picture's border.
     pub fn mean_at(&self, at: Point2<f64>) -> Option<f64> {
@@ -35,5 +44,49 @@ impl<T: Copy + Into<f64>> Image<T> {
         let (x, y) = (x as usize, y as usize);
         let row = |y: usize| self.pixels[y * self.width + x - 1..][..3].iter().map(|&v| v.into()).sum::<f64>();
         Some((y - 1..=y + 1).map(row).sum::<f64>() / 9.0)
+    }
+}
+
+/// A grey picture and the level at which it is clipped.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Its grey values.
+    pub grey: Grey,
+    clip_level: f64,
+}
+
+impl From<Image<u8>> for Picture {
+    fn from(image: Image<u8>) -> Picture {
+        Picture { clip_level: clipping::level(&image), grey: Grey::Eight(image) }
+    }
+}
+
+impl From<Image<u16>> for Picture {
+    fn from(image: Image<u16>) -> Picture {
+        Picture { clip_level: clipping::level(&image), grey: Grey::Sixteen(image) }
+    }
+}
+
+impl Picture {
+    /// The grey value from which on a pixel tells only "too bright".
+    pub fn clip_level(&self) -> f64 {
+        self.clip_level
+    }
+
+    /// Width, px.
+    pub fn width(&self) -> usize {
+        self.size().0
+    }
+
+    /// Height, px.
+    pub fn height(&self) -> usize {
+        self.size().1
+    }
+
+    fn size(&self) -> (usize, usize) {
+        match &self.grey {
+            Grey::Eight(image) => (image.width, image.height),
+            Grey::Sixteen(image) => (image.width, image.height),
+        }
     }
 }

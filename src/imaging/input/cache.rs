@@ -334,29 +334,25 @@ mod tests {
     fn the_algorithm_is_named_by_what_it_finds() {
         let board = Board::checker("9x7".parse().unwrap(), 10.0);
         let eight = |size: usize, side: f64, zigzag: f64| {
-            let pixels = golden_picture(size, side, 255.0, zigzag).into_iter().map(|v| v as u8).collect();
-            Picture::from(Image { width: size, height: size, pixels })
+            let pixels = golden_picture(size, side, 255.0, zigzag);
+            Picture::from(Image::from_fn(size, size, |x, y| pixels[y * size + x] as u8))
         };
-        let sixteen = golden_picture(600, 50.0, 4000.0, 0.0).into_iter().map(|v| v as u16).collect();
-        let sixteen = Picture::from(Image { width: 600, height: 600, pixels: sixteen });
+        let sixteen = golden_picture(600, 50.0, 4000.0, 0.0);
+        let sixteen = Picture::from(Image::from_fn(600, 600, |x, y| sixteen[y * 600 + x] as u16));
         let mut hash = Xxh3Default::new();
         let eights = [(640, 52.0, 0.0), (2048, 170.0, 0.0), (2048, 170.0, 0.01), (2600, 12.0, 0.0)];
         let eights = eights.map(|(size, side, zigzag)| eight(size, side, zigzag));
         // What is clipped, and what glares on one side, as damaged pictures do.
+        let pixels = golden_picture(640, 52.0, 255.0, 0.0);
         let damaged = |change: &dyn Fn(usize, f64) -> f64| {
-            let pixels = golden_picture(640, 52.0, 255.0, 0.0).into_iter().enumerate();
-            let pixels = pixels.map(|(k, v)| change(k % 640, v).min(255.0) as u8).collect();
-            Picture::from(Image { width: 640, height: 640, pixels })
+            Picture::from(Image::from_fn(640, 640, |x, y| change(x, pixels[y * 640 + x]).min(255.0) as u8))
         };
         let clipped = damaged(&|_, v| v.min(170.0));
         let glary = damaged(&|x, v| v + 60.0 * (x as f64 / 400.0).powi(2));
         // And what the border cuts, on one side and on two.
         let cut = |left: usize, top: usize| {
-            let pixels = golden_picture(640, 52.0, 255.0, 0.0);
-            let (width, height) = (640 - left, 640 - top);
-            let pixels =
-                (0..width * height).map(|k| pixels[(k / width + top) * 640 + k % width + left] as u8).collect();
-            Picture::from(Image { width, height, pixels })
+            let pixel = |x: usize, y: usize| pixels[(y + top) * 640 + x + left] as u8;
+            Picture::from(Image::from_fn(640 - left, 640 - top, pixel))
         };
         // Boards with markers: whole, foreshortened, and seen in part.
         let coded = [([0.3, -0.25, 0.2], 0.0, 560.0), ([1.2, 0.07, 0.1], 0.0, 300.0), ([0.3, -0.25, 0.2], 60.0, 300.0)];

@@ -236,24 +236,24 @@ mod tests {
     use statrs::function::erf::erf;
 
     const SIDE_PX: f64 = 60.0;
+    const BLUR_PX: f64 = 0.9;
+
+    /// Light minus dark across the nearest of lines 0 to `lines`, which are a `side` apart, in the signs of the squares.
+    fn across(px: f64, lines: f64, side: f64) -> f64 {
+        let nearest = (px / side).round().clamp(0.0, lines);
+        let sign = if nearest.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
+        sign * erf((px - nearest * side) / (BLUR_PX * 2f64.sqrt()))
+    }
 
     /// A board of 8x7 squares whose every other row of crossings is off by `zigzag_px` along the rows, with noise of 2 grey levels.
     fn zigzag_board(zigzag_px: f64) -> Picture {
-        const BLUR_PX: f64 = 0.9;
-        let (width, height) = (600, 540);
-        // Light minus dark across the nearest of the lines that are a square apart, in the signs of the squares.
-        let across = |px: f64, lines: f64| {
-            let nearest = (px / SIDE_PX).round().clamp(0.0, lines);
-            let sign = if nearest.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
-            sign * erf((px - nearest * SIDE_PX) / (BLUR_PX * 2f64.sqrt()))
-        };
         let grey = |x: f64, y: f64| {
             let y = y - 60.3;
             let x = x - 60.7 - zigzag_px * ((y / SIDE_PX).rem_euclid(2.0) - 1.0).abs();
             let inside = (0.0..8.0 * SIDE_PX).contains(&x) && (0.0..7.0 * SIDE_PX).contains(&y);
-            if inside { 120.0 - 80.0 * across(x, 8.0) * across(y, 7.0) } else { 200.0 }
+            if inside { 120.0 - 80.0 * across(x, 8.0, SIDE_PX) * across(y, 7.0, SIDE_PX) } else { 200.0 }
         };
-        noisy(width, height, 11, grey)
+        noisy(600, 540, 11, grey)
     }
 
     /// A picture of these grey values with noise of 2 grey levels.
@@ -263,11 +263,11 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 40) as f64 / f64::from(1u32 << 24) - 0.5
         };
-        let pixels = (0..width * height).map(|k| {
+        let pixel = |x: usize, y: usize| {
             let noise = 2.0 * 12f64.sqrt() * uniform();
-            (grey((k % width) as f64, (k / width) as f64) + noise).round().clamp(0.0, 255.0) as u8
-        });
-        Picture::from(Image { width, height, pixels: pixels.collect() })
+            (grey(x as f64, y as f64) + noise).round().clamp(0.0, 255.0) as u8
+        };
+        Image::from_fn(width, height, pixel).into()
     }
 
     #[test]
@@ -303,12 +303,6 @@ mod tests {
     fn haze_that_grows_over_a_slanted_board_moves_no_corner() {
         const SIDE: f64 = 40.0;
         const SLANT: f64 = 0.45;
-        const BLUR: f64 = 0.9;
-        let across = |px: f64, lines: f64| {
-            let nearest = (px / SIDE).round().clamp(0.0, lines);
-            let sign = if nearest.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
-            sign * erf((px - nearest * SIDE) / (BLUR * 2f64.sqrt()))
-        };
         let board = Board::checker("10x7".parse().unwrap(), 10.0);
         for seed in 0..4 {
             let stretch = (1.0 + SLANT * SLANT).sqrt();
@@ -316,7 +310,7 @@ mod tests {
             let grey = |x: f64, y: f64| {
                 let (u, v) = ((x - x0 - SLANT * (y - y0)) / stretch, y - y0);
                 let inside = (0.0..10.0 * SIDE).contains(&u) && (0.0..7.0 * SIDE).contains(&v);
-                let board = if inside { 90.0 - 50.0 * across(u, 10.0) * across(v, 7.0) } else { 140.0 };
+                let board = if inside { 90.0 - 50.0 * across(u, 10.0, SIDE) * across(v, 7.0, SIDE) } else { 140.0 };
                 board + 0.12 * x
             };
             let picture = noisy(700, 400, seed, grey);
@@ -348,17 +342,17 @@ mod tests {
             let all = (0..PARTS * PARTS).map(|k| grey(part(x, k % PARTS), part(y, k / PARTS)));
             all.sum::<f64>() / (PARTS * PARTS) as f64
         };
-        let plain: Vec<f64> = (0..width * height).map(|k| pixel(k % width, k / width)).collect();
-        let pixels = (0..width * height).map(|k| {
-            let (x, y) = (k % width, k / width);
+        let plain = Image::from_fn(width, height, pixel).pixels;
+        let pixel = |x: usize, y: usize| {
+            let k = y * width + x;
             let beside = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(dx, dy): (isize, isize)| {
                 let (x, y) = (x.saturating_add_signed(dx).min(width - 1), y.saturating_add_signed(dy).min(height - 1));
                 plain[y * width + x]
             });
             let sharp = plain[k] + overshoot * (4.0 * plain[k] - beside.iter().sum::<f64>());
             (sharp + ((k * 7919) % 5) as f64 - 2.0).round().clamp(0.0, 255.0) as u8
-        });
-        Picture::from(Image { width, height, pixels: pixels.collect() })
+        };
+        Image::from_fn(width, height, pixel).into()
     }
 
     #[test]

@@ -157,9 +157,8 @@ mod tests {
             let reflectance = if (x / 20 + y / 20).is_multiple_of(2) { 0.85 } else { 0.08 };
             (veil + gain * light * reflectance + noise).round() as u16
         };
-        let pixels = (0..width * height).map(|k| grey(k % width, k / width)).collect();
         let place = |c: usize, r: usize| Some(Point2::new(20.0 * (c + 1) as f64 - 0.5, 20.0 * (r + 1) as f64 - 0.5));
-        (Image { width, height, pixels }, Lattice::from_fn(9, 7, place))
+        (Image::from_fn(width, height, grey), Lattice::from_fn(9, 7, place))
     }
 
     #[test]

@@ -181,9 +181,9 @@ mod tests {
     /// A window of the model's own grey values, at 256 steps a grey value.
     fn window(model: &Model, half: usize, band_px: f64) -> Window {
         let side = 2 * half + 1;
-        let place = |k: usize| ((k % side) as f64 - half as f64, (k / side) as f64 - half as f64);
-        let pixels = (0..side * side).map(|k| (256.0 * model.grey(place(k))).round() as u16).collect();
-        let picture = Image { width: side, height: side, pixels };
+        let from_middle = |at: usize| at as f64 - half as f64;
+        let grey = |x: usize, y: usize| 256.0 * model.grey((from_middle(x), from_middle(y)));
+        let picture = Image::from_fn(side, side, |x, y| grey(x, y).round() as u16);
         let halves = model.angles_rad.map(|a| Vector2::new(a.cos(), a.sin()) * half as f64);
         let start = Point2::new(half as f64, half as f64);
         let mut window = Window::default();

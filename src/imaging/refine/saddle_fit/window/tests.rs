@@ -1,8 +1,7 @@
 use super::*;
 
 fn ramp() -> Image<u8> {
-    let pixels = (0..100 * 100).map(|k| (k % 100 + k / 100) as u8).collect();
-    Image { width: 100, height: 100, pixels }
+    Image::from_fn(100, 100, |x, y| (x + y) as u8)
 }
 
 /// Sums of all products of `(1, x, y, grey)` over the whole window.
