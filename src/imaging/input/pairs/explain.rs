@@ -7,7 +7,8 @@ use super::names::{Open, Reach, stem};
 use super::readings::{Reading, Told};
 use super::{Halves, PairBy, Pairing, Source};
 use crate::diagnostic::count;
-use crate::imaging::{Error, Side, image, video};
+use crate::imaging::error::of_video;
+use crate::imaging::{Error, Side, image};
 
 /// Folders, and readings, that a message shows at most.
 const MOST_SHOWN: usize = 8;
@@ -181,7 +182,7 @@ fn without_pictures(source: &Source<'_>, folders: &[Folder]) -> (String, String)
         statement,
         others
             .iter()
-            .find_map(|file| video::hint(file))
+            .find_map(|file| of_video(file))
             .unwrap_or_else(|| "save pictures of other formats as PNG".to_owned()),
     )
 }
