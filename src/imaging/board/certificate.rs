@@ -40,6 +40,16 @@ pub enum Kind {
     },
 }
 
+impl Kind {
+    /// The codes of its markers, where it has any.
+    pub fn dictionary(self) -> Option<Dictionary> {
+        match self {
+            Kind::Checker => None,
+            Kind::Charuco { dictionary, .. } | Kind::Tags { family: dictionary, .. } => Some(dictionary),
+        }
+    }
+}
+
 /// A board of squares: so many, of such a size.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(try_from = "String")]

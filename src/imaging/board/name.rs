@@ -147,12 +147,8 @@ impl Board {
 
     /// Whether it is this board, or this board with the first markers of its dictionary alone.
     pub fn has_all_of(&self, other: &Board) -> bool {
-        let dictionary = |board: &Board| match board.kind {
-            Kind::Checker => None,
-            Kind::Charuco { dictionary, .. } | Kind::Tags { family: dictionary, .. } => Some(dictionary),
-        };
         self == other
-            || dictionary(self).zip(dictionary(other)).is_some_and(|(own, others)| {
+            || self.kind.dictionary().zip(other.kind.dictionary()).is_some_and(|(own, others)| {
                 own.begins_with(others) && other.with_dictionary(own).is_some_and(|same| same == *self)
             })
     }

@@ -22,10 +22,7 @@ const MOST_COLUMNS: usize = 40;
 /// Why none of these grids is a part of the board.
 pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Refusal {
     let none = || Refusal::from("no board found".to_owned());
-    let dictionary = match board.kind {
-        Kind::Checker => return none(),
-        Kind::Charuco { dictionary, .. } | Kind::Tags { family: dictionary, .. } => dictionary,
-    };
+    let Some(dictionary) = board.kind.dictionary() else { return none() };
     let largest = grids.iter().max_by_key(|grid| grid.count());
     let Some(grid) = largest.filter(|grid| grid.count() >= 4) else { return none() };
     let size = (grid.columns, grid.rows);

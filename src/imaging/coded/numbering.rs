@@ -74,9 +74,8 @@ fn turned(read: &Read, size: (usize, usize), quarters: usize) -> Read {
 
 /// The number of the marker in a square of the board; `None` where there is none or no such square.
 fn marker_in(board: &Board, layout: Layout, (x, y): (isize, isize)) -> Option<usize> {
-    let (columns, rows) = (board.squares.columns as isize, board.squares.rows as isize);
-    let inside = (0..columns).contains(&x) && (0..rows).contains(&y);
-    (inside && layout.holds_marker(x, y)).then(|| layout.number(board.squares, x as usize, y as usize))
+    let holds = is_inside(board, (x, y)) && layout.holds_marker(x, y);
+    holds.then(|| layout.number(board.squares, x as usize, y as usize))
 }
 
 /// The bits of the marker in a square of the board, row by row as they are printed; `None` where there is none.

@@ -35,8 +35,8 @@ pub(super) fn turn_by_colours(small: &Grey8, grid: Places, board: Board) -> Plac
 /// that uneven light does not matter.
 fn first_square_is_dark(small: &Grey8, grid: &Places) -> bool {
     let centre = |col: usize, row: usize| {
-        let p = [grid.get(col, row)?, grid.get(col + 1, row)?, grid.get(col, row + 1)?, grid.get(col + 1, row + 1)?];
-        let sum = p.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / 4.0;
+        let [a, b, d, c] = grid.square(col, row)?;
+        let sum = [a, b, c, d].iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / 4.0;
         let (x, y) = (sum.x.round(), sum.y.round());
         let inside = x >= 0.0 && y >= 0.0 && x < small.width as f64 && y < small.height as f64;
         inside.then(|| f64::from(small.pixels[y as usize * small.width + x as usize]))

@@ -11,7 +11,7 @@ use nalgebra::{Point2, Vector2};
 use super::Detected;
 use crate::imaging::Board;
 use crate::imaging::image::Grey8;
-use crate::imaging::lattice::{Lattice, Places};
+use crate::imaging::lattice::Places;
 use crate::statistics::median;
 
 /// Share of a line beyond the border that must look like corners; the board's own outer edge shows none.
@@ -58,7 +58,7 @@ enum End {
 fn beyond(copy: &Grey8, grid: &Places) -> End {
     let Some(usual) = usual(copy, grid) else { return End::Squares };
     let goes_on = |steps: f64| {
-        let seen = (0..grid.rows).filter_map(|row| contrast(copy, grid, (-1, row as isize), steps, None));
+        let seen = (0..grid.rows).filter_map(|row| contrast(copy, grid, (-1, row), steps, None));
         seen.filter(|c| c / usual > CONTRAST).count() as f64 >= SHARE * grid.rows as f64
     };
     match is_cut(copy, grid, -1) {
@@ -85,7 +85,7 @@ pub(super) fn without_cut_lines(copy: &Grey8, grid: &Places, board: Board) -> Op
 
 /// The grid with so many columns at the most, and whether one of two that are alike was left out.
 fn without_cut_columns(copy: &Grey8, mut grid: Places, columns: usize) -> Option<(Places, bool)> {
-    let filled = |grid: &Places| (0..grid.rows).filter(|&row| grid.get(0, row).is_some()).count();
+    let filled = |grid: &Places| grid.rows_at_front().count();
     let mut is_chosen = false;
     while grid.columns > columns {
         let turned = grid.half_turn();
@@ -95,8 +95,7 @@ fn without_cut_columns(copy: &Grey8, mut grid: Places, columns: usize) -> Option
         }
         is_chosen |= first && last && grid.columns == columns + 1 && filled(&grid) == filled(&turned);
         let from_first = first && (!last || filled(&grid) <= filled(&turned));
-        let ahead = if from_first { grid } else { turned };
-        grid = Lattice::from_fn(ahead.columns - 1, ahead.rows, |col, row| ahead.get(col + 1, row).copied());
+        grid = if from_first { grid } else { turned }.without_front();
     }
     Some((grid, is_chosen))
 }
@@ -104,7 +103,7 @@ fn without_cut_columns(copy: &Grey8, mut grid: Places, columns: usize) -> Option
 /// True where before a column, the first or one further out, there are parts of squares at the most.
 fn is_cut(copy: &Grey8, grid: &Places, column: isize) -> bool {
     let Some(usual) = usual(copy, grid) else { return false };
-    let before = |row: usize| contrast(copy, grid, (column, row as isize), IN_SQUARES, Some(WHOLE));
+    let before = |row: usize| contrast(copy, grid, (column, row), IN_SQUARES, Some(WHOLE));
     let known: Vec<f64> = (0..grid.rows).filter_map(before).collect();
     let whole = known.iter().filter(|c| **c / usual > WHOLE_CONTRAST).count();
     !known.is_empty() && whole * BY_CHANCE <= known.len()
@@ -112,35 +111,34 @@ fn is_cut(copy: &Grey8, grid: &Places, column: isize) -> bool {
 
 /// Whether a corner of the grid has four squares of the contrast that most have, in their order of colours.
 pub(super) fn is_crossing(copy: &Grey8, grid: &Places, (col, row): (usize, usize)) -> bool {
-    let here = contrast(copy, grid, (col as isize, row as isize), IN_SQUARES, None);
+    let here = contrast(copy, grid, (col as isize, row), IN_SQUARES, None);
     usual(copy, grid).zip(here).is_some_and(|(usual, here)| here / usual > CONTRAST)
 }
 
 /// Contrast of most corners, with the sign that the order of colours gives it.
 fn usual(copy: &Grey8, grid: &Places) -> Option<f64> {
-    let seen =
-        grid.iter().filter_map(|(col, row, _)| contrast(copy, grid, (col as isize, row as isize), IN_SQUARES, None));
-    median(seen)
+    median(grid.iter().filter_map(|(col, row, _)| contrast(copy, grid, (col as isize, row), IN_SQUARES, None)))
 }
 
 /// The grid without what is no crossing of four squares: at a board's end the outer corners of its dark squares on a light margin.
 pub(super) fn without_ends(copy: &Grey8, grid: Places) -> Places {
-    let at = |col: usize, row: usize, steps: f64| contrast(copy, &grid, (col as isize, row as isize), steps, None);
+    let at = |col: usize, row: usize, steps: f64| contrast(copy, &grid, (col as isize, row), steps, None);
     let mut seen: Vec<f64> = grid.iter().filter_map(|(col, row, _)| at(col, row, IN_SQUARES)).map(f64::abs).collect();
     seen.sort_by(f64::total_cmp);
     // On a board of nine corners those at its end may be nearly as many.
     let Some(usual) = seen.get(3 * seen.len() / 4).copied() else { return grid };
-    Lattice::from_fn(grid.columns, grid.rows, |col, row| {
+    grid.filter_map(|col, row, place| {
         let mut seen = NEARER.into_iter().filter_map(|steps| at(col, row, steps)).peekable();
         let crosses = seen.peek().is_none() || seen.any(|c| c.abs() > END_CONTRAST * usual);
-        grid.get(col, row).copied().filter(|_| crosses)
+        crosses.then_some(*place)
     })
 }
 
-/// Contrast of the four squares round a corner of the grid, or round a place one square beyond it, so many steps along both edges from it, with the
+/// Contrast of the four squares round a corner of the grid, or round a place one square before its first column, so many steps along both edges from it, with the
 /// sign that the order of colours gives it: the lesser of both differences between neighbours across an edge and their
 /// neighbours across the other, and none where they have two signs, as across the board's outer edge. `before`: how many steps against the columns' order. `None` outside of the picture.
-fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, isize), steps: f64, before: Option<f64>) -> Option<f64> {
+fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, usize), steps: f64, before: Option<f64>) -> Option<f64> {
+    let row = row as isize;
     let (place, along, across) = local(grid, col, row)?;
     let before = before.unwrap_or(steps);
     let at = |a: f64, b: f64| {
@@ -155,18 +153,14 @@ fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, isize), steps: f64,
     Some(if mean > 0.0 { least.max(0.0) } else { most.min(0.0) })
 }
 
-/// A corner of the grid or a place one square beyond it, and the steps to the next column and the next row there.
+/// A corner of the grid or a place one square before its first column, and the steps to the next column and the next row there.
 fn local(grid: &Places, col: isize, row: isize) -> Option<(Point2<f64>, Vector2<f64>, Vector2<f64>)> {
-    let (columns, rows) = (grid.columns as isize, grid.rows as isize);
-    let inward = |at: isize, size: isize| isize::from(at < 0) - isize::from(at >= size);
-    let (dc, dr) = (inward(col, columns), inward(row, rows));
-    let place =
-        if (dc, dr) == (0, 0) { *grid.around(col, row)? } else { grid.next((col + dc, row + dr), (-dc, -dr))?.0 };
-    let (c, r) = (col.clamp(0, columns - 1), row.clamp(0, rows - 1));
+    let place = if col < 0 { grid.next((0, row), (-1, 0))?.0 } else { *grid.around(col, row)? };
+    let col = col.max(0);
     let step = |dc: isize, dr: isize| {
-        let here = grid.around(c, r)?;
-        let next = grid.around(c + dc, r + dr).map(|p| p - here);
-        next.or_else(|| grid.around(c - dc, r - dr).map(|p| here - p))
+        let here = grid.around(col, row)?;
+        let next = grid.around(col + dc, row + dr).map(|p| p - here);
+        next.or_else(|| grid.around(col - dc, row - dr).map(|p| here - p))
     };
     Some((place, step(1, 0)?, step(0, 1)?))
 }
@@ -175,6 +169,7 @@ fn local(grid: &Places, col: isize, row: isize) -> Option<(Point2<f64>, Vector2<
 mod tests {
     use super::*;
     use crate::imaging::image::pyramid::Level;
+    use crate::imaging::lattice::Lattice;
 
     /// A board of 7x6 squares of 12 px in a light margin, of which the inner corners in the given ranges were found.
     fn found(cols: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> Detected {

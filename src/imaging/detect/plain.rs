@@ -8,13 +8,11 @@
 //! classic detector is not among the attempts, because fine texture keeps it busy for minutes (and what it finds is found without
 //! it). Goes wrong: no board, another board, or a board of which too little is in view; each is a reason in words.
 
-use nalgebra::Point2;
-
 use super::colour::{right_handed, turn_by_colours};
 use super::detected::{COARSE_PX, Detected, LEAST_SEEN, Open, Refusal, glance_level, on_a_copy};
 use super::growth::largest_grid;
 use super::{continuation, extent};
-use crate::imaging::image::pyramid::{Level, factor_for};
+use crate::imaging::image::pyramid::{Level, factor_for, to_full_size};
 use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Lattice, Places, Renumbering};
 use crate::imaging::{Board, Squares};
@@ -124,8 +122,8 @@ fn with_open_numbers(picture: &Picture, seen: Option<(Places, Level)>, board: Bo
         |grid: &Places| grid.count() >= LEAST_SEEN && grid.count() as f64 >= LEAST * board.corner_count() as f64;
     let Some((grid, level)) = seen.filter(|(grid, _)| is_enough(grid)) else { return Err(refusal) };
     let small = level.copy(picture);
-    let mut ways = ways_to_lie(&small, &grid, board).into_iter();
-    let mut ways = ways.by_ref().map(|way| turn_by_colours(&small, right_handed(way), board));
+    let ways = ways_to_lie(&small, &grid, board).into_iter();
+    let mut ways = ways.map(|way| turn_by_colours(&small, right_handed(way), board));
     let Some(first) = ways.next() else { return Err(refusal) };
     let others = ways.filter_map(|way| Renumbering::between(&first, &way)).collect();
     Ok(Detected { open: Some(Open { others, refusal }), ..on_a_copy(picture, level, &small, first) })
@@ -152,9 +150,10 @@ fn at_a_glance(picture: &Picture, board: Board) -> Option<Detected> {
 fn found(small: &Grey8, attempt: Attempt, board: Board, search: &mut Search) -> Option<Places> {
     if attempt.way == Way::Sectors {
         // Where OpenCV cannot work at all, it has found nothing.
-        let corners = find_board(&small.pixels, small.width, (board.columns(), board.rows())).ok().flatten()?;
+        let (columns, rows) = (board.columns(), board.rows());
+        let corners = find_board(&small.pixels, small.width, (columns, rows)).ok().flatten()?;
         // Where a line is hidden it takes the board's outline for one.
-        let grid = whole(board, corners);
+        let grid = Lattice { columns, rows, cells: corners.into_iter().map(Some).collect() };
         return Some(grid.clone()).filter(|_| extent::without_outline(small, grid).count() == board.corner_count());
     }
     let grid = grown(small, board.corner_count())?;
@@ -180,15 +179,7 @@ pub(super) fn ladder(picture: &Picture) -> Vec<Attempt> {
     /// Shorter sides than this hold no board that sectors would show, px.
     const LEAST_FOR_SECTORS_PX: usize = 48;
     let first = factor_for(picture, COARSE_PX);
-    let mut finer = vec![];
-    let mut factor = first;
-    while factor > 1 {
-        factor = factor.div_ceil(2);
-        finer.push(Level::Reduced(factor));
-    }
-    if first == 1 {
-        finer.push(Level::Doubled);
-    }
+    let finer = to_full_size(picture, COARSE_PX).skip(1).chain((first == 1).then_some(Level::Doubled));
     let (first, coarser) = (Level::Reduced(first), Level::Reduced(2 * first));
     let grown = [first, coarser].into_iter().chain(finer).map(|level| Attempt { level, way: Way::Grow });
     let side = |level: &Level| picture.width().min(picture.height()) as f64 / level.scale();
@@ -199,10 +190,6 @@ pub(super) fn ladder(picture: &Picture) -> Vec<Attempt> {
 pub(super) fn grown(small: &Grey8, enough: usize) -> Option<Places> {
     let grid = extent::without_chance_lines(small, continuation::without_ends(small, largest_grid(small, enough)?));
     Some(extent::without_outline(small, grid)).filter(|grid| grid.columns > 1 && grid.rows > 1)
-}
-
-fn whole(board: Board, corners: Vec<Point2<f64>>) -> Places {
-    Lattice { columns: board.columns(), rows: board.rows(), cells: corners.into_iter().map(Some).collect() }
 }
 
 /// A grid as the board's, without lines of squares that are cut where those are too many.
@@ -248,7 +235,11 @@ fn refusal(seen: Option<&Places>, board: Board) -> Refusal {
 
 /// The board that a picture shows, whatever was asked for, where all its corners are there.
 pub fn size_seen(detected: &Detected) -> Option<Squares> {
-    let grid = grown(&detected.copy, usize::MAX)?;
+    whole_squares(&grown(&detected.copy, usize::MAX)?)
+}
+
+/// The squares of a board whose corners a grid holds; `None` where one of them is missing.
+pub(super) fn whole_squares(grid: &Places) -> Option<Squares> {
     let (columns, rows) = (grid.columns.max(grid.rows) + 1, grid.columns.min(grid.rows) + 1);
     (grid.count() == grid.columns * grid.rows).then_some(Squares { columns, rows })
 }

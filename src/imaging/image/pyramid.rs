@@ -84,6 +84,12 @@ pub fn factor_for(picture: &Picture, pixels: usize) -> usize {
     ratio.sqrt().floor().max(1.0) as usize
 }
 
+/// Copies from one of about so many pixels to full size, each of about half the factor of the one before it.
+pub fn to_full_size(picture: &Picture, pixels: usize) -> impl Iterator<Item = Level> + use<> {
+    let halved = |factor: &usize| (*factor > 1).then(|| factor.div_ceil(2));
+    std::iter::successors(Some(factor_for(picture, pixels)), halved).map(Level::Reduced)
+}
+
 /// A copy reduced by a whole factor; what is left over at the right and lower border is dropped. `lines` are those of a block that count.
 fn reduced(picture: &Picture, factor: usize, lines: &dyn Fn(usize) -> Vec<usize>) -> Grey8 {
     let factor = factor.clamp(1, picture.width().min(picture.height()).clamp(1, MOST_REDUCED));

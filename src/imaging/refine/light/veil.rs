@@ -96,9 +96,7 @@ impl Line {
 /// Light and dark round every corner whose four squares are seen whole and unclipped.
 fn pairs<T: Copy + Into<f64>>(image: &Image<T>, clip_level: f64, places: &Places) -> Vec<Pair> {
     let square = |col: usize, row: usize| -> Option<f64> {
-        let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(c, r)| places.get(col + c, row + r).copied());
-        let [a, b, c, d] = corners;
-        let (a, b, c, d) = (a?, b?, c?, d?);
+        let [a, b, d, c] = places.square(col, row)?;
         let middle = Point2::from((a.coords + b.coords + c.coords + d.coords) / 4.0);
         let sides = [b - a, c - a, d - b, d - c];
         let side = sides.iter().map(Vector2::norm).fold(f64::INFINITY, f64::min);
