@@ -124,7 +124,7 @@ impl<T: Sample> Full<'_, T> {
         let mut best = *first;
         // The first fit was pulled by what the second one leaves out: a third one sees that, too.
         for _ in 0..2 {
-            let keep = Explained::by(&best, board.roughness(), self.clip_level - self.veil, clips);
+            let keep = Explained::by(&best, board.roughness, self.clip_level - self.veil, clips);
             let start = Model { corner: Vector2::zeros(), ..best.fit.model };
             let again = self.fit_kept(most_half_px, &Cell { place: best.px, ..*cell }, &start, &keep, window);
             let dropped = |again: &Measured| again.fit.left_out.saturating_sub(first.fit.left_out);

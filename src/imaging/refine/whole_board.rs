@@ -101,8 +101,7 @@ impl<T: Sample> Full<'_, T> {
     /// Variance of the slope of stray light by the near windows, in each of which it is fitted without a bound.
     fn stray_light(&self, seen: &Lattice<Windows>, window: &mut Window) -> Option<f64> {
         let unbound = self.with_stray(stray::UNBOUND);
-        let mut fits = Lattice::from_fn(seen.columns, seen.rows, |col, row| {
-            let windows = seen.get(col, row)?;
+        let mut fits = seen.filter_map(|_, _, windows| {
             let near = windows.near.or(windows.full)?;
             unbound.fit_from(&near, full_size::near_half_px(&windows.start), windows, window)
         });
@@ -127,8 +126,7 @@ impl<T: Sample> Full<'_, T> {
             Some(detected.level.to_picture(px))
         });
         let scale = detected.level.scale();
-        let near: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            let from = coarse.get(col, row)?;
+        let near = coarse.filter_map(|col, row, from| {
             let bends = at(&coarse_bends, col, row);
             let cell = Cell { own_bends: bends.map(|bend| bend.is_none()), ..Cell::of(&places, col, row)? };
             let cell = cell.with_markers(&places, (col, row), detected.print);
@@ -150,15 +148,9 @@ impl<T: Sample> Full<'_, T> {
         let near_only: Vec<Measured> = near.iter().filter_map(|(_, _, windows)| windows.near).collect();
         let board = acceptance::Board::of(&near_only, &[]);
         let near_bends = bends_by(&near, &places, |windows| windows.near.filter(|near| board.accepts(near)));
-        let near = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            Some(near.get(col, row)?.clone().rebent(at(&near_bends, col, row)))
-        });
+        let near = near.filter_map(|col, row, windows| Some(windows.clone().rebent(at(&near_bends, col, row))));
         let (windows, board) = self.large(&near, &places, window);
-        let measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            let seen = windows.get(col, row)?;
-            let corner = self.largest_free(seen, &board, window)?;
-            Some(seen.with_lines(corner))
-        });
+        let measured = windows.filter_map(|_, _, seen| Some(seen.with_lines(self.largest_free(seen, &board, window)?)));
         Seen { windows, board, measured }
     }
 
@@ -172,20 +164,18 @@ impl<T: Sample> Full<'_, T> {
     ) -> (Lattice<Windows>, acceptance::Board) {
         // How much edges bend is seen on some of the corners as well: where full windows are of no use, most need not be looked at.
         let few = near.count() < LEAST_TRIED * TRIED;
-        let tried = Lattice::from_fn(near.columns, near.rows, |col, row| {
-            let seen = near.get(col, row).filter(|_| few || (col + row).is_multiple_of(TRIED))?;
-            Some(self.full(seen.clone(), 1.0, window))
+        let tried = near.filter_map(|col, row, seen| {
+            (few || (col + row).is_multiple_of(TRIED)).then(|| self.full(seen.clone(), 1.0, window))
         });
         let mut within = |share: f64| {
-            let seen = Lattice::from_fn(near.columns, near.rows, |col, row| {
+            let seen = near.filter_map(|col, row, from| {
                 let known = tried.get(col, row).filter(|_| share == 1.0).cloned();
-                known.or_else(|| Some(self.full(near.get(col, row)?.clone(), share, window)))
+                known.or_else(|| Some(self.full(from.clone(), share, window)))
             });
             let board = usual(&seen);
             let bends = bends_by(&seen, places, |windows| windows.free(&board).copied());
-            let seen = Lattice::from_fn(near.columns, near.rows, |col, row| {
-                Some(seen.get(col, row)?.clone().rebent(bends[row * near.columns + col]))
-            });
+            let rebent = |col: usize, row: usize| bends[row * near.columns + col];
+            let seen = seen.filter_map(|col, row, windows| Some(windows.clone().rebent(rebent(col, row))));
             let board = usual(&seen);
             (seen, board)
         };
