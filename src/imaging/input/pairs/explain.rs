@@ -88,8 +88,18 @@ fn common(a: &str, b: &str) -> usize {
 pub fn not_taken(reading: &Reading, folders: &[Folder]) -> Option<String> {
     let others = folders.iter().filter(|folder| !folder.pictures.is_empty() && !reading.places.contains(&folder.path));
     let shown: Vec<String> = others.map(|f| format!("{} ({})", name(f), count(f.pictures.len(), "picture"))).collect();
-    let more = if shown.len() > MOST_SHOWN { ", ..." } else { "" };
-    (!shown.is_empty()).then(|| format!("not taken: {}{more}", shown[..shown.len().min(MOST_SHOWN)].join(", ")))
+    (!shown.is_empty()).then(|| format!("not taken: {}", listed(&shown, MOST_SHOWN)))
+}
+
+/// The first so many, and whether there are more.
+fn listed<S: AsRef<str>>(all: &[S], most: usize) -> String {
+    let first: Vec<&str> = all.iter().take(most).map(AsRef::as_ref).collect();
+    format!("{}{}", first.join(", "), if all.len() > most { ", ..." } else { "" })
+}
+
+/// What files are called.
+fn called(paths: &[Utf8PathBuf]) -> Vec<&str> {
+    paths.iter().filter_map(|path| path.file_name()).collect()
 }
 
 fn name(folder: &Folder) -> String {
@@ -97,14 +107,11 @@ fn name(folder: &Folder) -> String {
 }
 
 /// The folders, how many pictures each holds, and two of their names.
-fn found(folders: &[Folder]) -> String {
-    let holding: Vec<&Folder> = folders.iter().filter(|folder| !folder.pictures.is_empty()).collect();
+fn found(holding: &[&Folder]) -> String {
     let mut text = String::new();
     for folder in holding.iter().take(MOST_SHOWN) {
-        let names: Vec<&str> = folder.pictures.iter().take(2).filter_map(|p| p.file_name()).collect();
-        let more = if folder.pictures.len() > names.len() { ", ..." } else { "" };
         let pictures = count(folder.pictures.len(), "picture");
-        text.push_str(&format!("\n  {}: {pictures} ({}{more})", name(folder), names.join(", ")));
+        text.push_str(&format!("\n  {}: {pictures} ({})", name(folder), listed(&called(&folder.pictures), 2)));
     }
     if holding.len() > MOST_SHOWN {
         text.push_str(&format!("\n  and {} more folders with pictures", holding.len() - MOST_SHOWN));
@@ -155,7 +162,7 @@ pub fn none(source: &Source<'_>, folders: &[Folder], readings: &[Reading]) -> Er
             None => untold(source, &holding, pictures),
         },
     };
-    let statement = statement + &found(folders);
+    let statement = statement + &found(&holding);
     Error::Unpaired { path: source.images.to_owned(), statement, hint }
 }
 
@@ -165,26 +172,16 @@ fn without_pictures(source: &Source<'_>, folders: &[Folder]) -> (String, String)
     let below = folders.first().into_iter().flat_map(|root| &root.folders).filter_map(|path| list(path).ok());
     let others: Vec<Utf8PathBuf> =
         folders.iter().flat_map(|f| f.others.clone()).chain(below.flat_map(|f| f.others)).collect();
-    let Some(first) = others.first() else {
+    if others.is_empty() {
         let hint = format!(
             "is the path right? The pictures are in this folder, or in one for each camera: {}",
             by_hand(source)
         );
         return (NONE.to_owned(), hint);
-    };
-    let names = first.file_name().unwrap_or(first.as_str());
-    let statement = format!(
-        "{NONE}, but {} ({names}{})",
-        count(others.len(), "other file"),
-        if others.len() > 1 { ", ..." } else { "" }
-    );
-    (
-        statement,
-        others
-            .iter()
-            .find_map(|file| of_video(file))
-            .unwrap_or_else(|| "save pictures of other formats as PNG".to_owned()),
-    )
+    }
+    let statement = format!("{NONE}, but {} ({})", count(others.len(), "other file"), listed(&called(&others), 1));
+    let of_video = others.iter().find_map(|file| of_video(file));
+    (statement, of_video.unwrap_or_else(|| "save pictures of other formats as PNG".to_owned()))
 }
 
 /// The sides are told, but nothing says which pictures belong together.
@@ -279,10 +276,8 @@ impl Pairing {
     pub fn left_out(&self) -> Option<String> {
         let mut parts = Vec::new();
         if !self.single.is_empty() {
-            let names: Vec<&str> = self.single.iter().take(3).filter_map(|p| p.file_name()).collect();
-            let more = if self.single.len() > names.len() { ", ..." } else { "" };
             let pictures = count(self.single.len(), "picture");
-            parts.push(format!("{pictures} without a partner ({}{more})", names.join(", ")));
+            parts.push(format!("{pictures} without a partner ({})", listed(&called(&self.single), 3)));
         }
         if self.sideless > 0 {
             parts.push(format!("{} whose names tell neither left nor right", count(self.sideless, "picture")));
