@@ -7,7 +7,6 @@ use camino::Utf8Path;
 use image::{DynamicImage, GrayImage, Rgb, RgbImage, imageops};
 use nalgebra::Point2;
 
-use super::detect::COARSE_PX;
 use super::image::pyramid::Small;
 use super::image::{Grey8, Mosaic};
 use super::input::pairs::PairFiles;
@@ -110,7 +109,7 @@ pub fn png(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> 
 }
 
 fn small(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<Small> {
-    Some(Small::of(&super::image::picture(path, mosaic).ok()?, COARSE_PX))
+    Some(Small::coarse(&super::image::picture(path, mosaic).ok()?))
 }
 
 fn grey(copy: &Grey8) -> GrayImage {

@@ -244,20 +244,13 @@ impl Board {
         Point3::new(of(col, self.columns()) * self.square_mm, of(row, self.rows()) * self.square_mm * self.stretch, 0.0)
     }
 
-    /// True where turning the board by 180 degrees in its plane leaves the same picture: both counts of squares odd, or both even.
-    /// (An odd number of squares one way only swaps black and white.) Markers tell it from its turned self.
-    pub fn looks_the_same_after_half_turn(&self) -> bool {
-        !self.is_coded() && self.squares.columns % 2 == self.squares.rows % 2
-    }
-
-    /// The smallest turn, in quarter turns, after which the board looks the same; `None` where only a whole turn does.
+    /// The smallest turn, in quarter turns, after which the board looks the same; `None` where only a whole turn does. That is a half turn at the most
+    /// where both counts of squares are odd, or both even: an odd number of squares one way only swaps black and white. Markers tell a board from its
+    /// turned self.
     pub fn symmetry(&self) -> Option<usize> {
-        let square = self.squares.columns == self.squares.rows;
-        match (self.looks_the_same_after_half_turn(), square && self.squares.columns % 2 == 1) {
-            (false, _) => None,
-            (true, false) => Some(2),
-            (true, true) => Some(1),
-        }
+        let Squares { columns, rows } = self.squares;
+        let is_alike = !self.is_coded() && columns % 2 == rows % 2;
+        is_alike.then_some(if columns == rows && columns % 2 == 1 { 1 } else { 2 })
     }
 
     /// Quarter turns after which the board looks the same: what a picture leaves open.

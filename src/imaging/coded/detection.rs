@@ -15,7 +15,7 @@ use super::numbering::{Placement, Said};
 use super::{explain, faint, local_map, measures, numbering};
 use crate::imaging::Board;
 use crate::imaging::board::{Pitch, Print};
-use crate::imaging::detect::{COARSE_PX, Detected, Refusal, grids, on_a_copy, right_handed};
+use crate::imaging::detect::{Detected, Refusal, grids, on_a_copy, right_handed};
 use crate::imaging::image::pyramid::{Level, to_full_size};
 use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Lattice, Places};
@@ -133,7 +133,7 @@ fn parts_on(
 /// Copies in their order: from coarse to fine.
 fn levels(picture: &Picture) -> impl Iterator<Item = Level> + use<> {
     let doubled = (picture.width() * picture.height() <= MOST_DOUBLED_PX).then_some(Level::Doubled);
-    to_full_size(picture, COARSE_PX).chain(doubled)
+    to_full_size(picture).chain(doubled)
 }
 
 /// The grids of corners on a copy as they lie in the picture, the largest first.

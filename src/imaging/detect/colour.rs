@@ -22,13 +22,11 @@ pub(super) fn turn_by_colours(small: &Grey8, grid: Places, board: Board) -> Plac
     if first_square_is_dark(small, &grid) {
         return grid;
     }
-    if !board.looks_the_same_after_half_turn() {
-        return grid.half_turn();
+    match board.symmetry() {
+        None => grid.half_turn(),
+        Some(2) if board.columns() == board.rows() => grid.quarter_turn(),
+        Some(_) => grid,
     }
-    if board.columns() == board.rows() && board.squares.columns.is_multiple_of(2) {
-        return grid.quarter_turn();
-    }
-    grid
 }
 
 /// True where the squares of the colour of square (0, 0) are the darker ones. Each cell is compared with its neighbours, so

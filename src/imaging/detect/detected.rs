@@ -2,12 +2,9 @@
 
 use crate::imaging::Board;
 use crate::imaging::board::Print;
-use crate::imaging::image::pyramid::{Level, factor_for};
+use crate::imaging::image::pyramid::{Level, coarse_factor};
 use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Places, Renumbering};
-
-/// Pixels of the copy on which boards of any kind are looked for first.
-pub const COARSE_PX: usize = 1_000_000;
 
 /// Grids of fewer corners than this are chance.
 pub const LEAST_SEEN: usize = 12;
@@ -59,10 +56,10 @@ pub struct Open {
     pub refusal: Refusal,
 }
 
-/// The copy on which whole boards with large squares are seen: half as long and wide as that of about [`COARSE_PX`] and made of a few of the
+/// The copy on which whole boards with large squares are seen: half as long and wide as that of [`coarse_factor`] and made of a few of the
 /// picture's lines, of a small picture the same.
 pub fn glance_level(picture: &Picture) -> Level {
-    let first = factor_for(picture, COARSE_PX);
+    let first = coarse_factor(picture);
     if first == 1 { Level::Reduced(1) } else { Level::Skimmed(2 * first) }
 }
 

@@ -1,7 +1,7 @@
 //! Where a plain board is, to about a pixel of a small copy.
 //!
 //! In: a picture and the board's size. Out: a reduced copy and a grid of coarse corners on it, right-handed, columns along
-//! the longer side, turned as far as the colours tell. The copy is an area average of about [`COARSE_PX`] pixels: the board is seen there
+//! the longer side, turned as far as the colours tell. The copy is an area average of about a million pixels: the board is seen there
 //! as well as on 26 Mpx, in a twentieth of the time. Of large pictures a copy of a quarter of that is tried before, and will do where it
 //! shows all of a board with large squares; a ladder of attempts on finer and coarser copies follows where the first fails. Its work is
 //! bounded by the pixels of the copies, whatever they show: no clock decides what is found, and OpenCV's
@@ -9,10 +9,10 @@
 //! it). Goes wrong: no board, another board, or a board of which too little is in view; each is a reason in words.
 
 use super::colour::{right_handed, turn_by_colours};
-use super::detected::{COARSE_PX, Detected, LEAST_SEEN, Open, Refusal, glance_level, on_a_copy};
+use super::detected::{Detected, LEAST_SEEN, Open, Refusal, glance_level, on_a_copy};
 use super::growth::largest_grid;
 use super::{continuation, extent};
-use crate::imaging::image::pyramid::{Level, factor_for, to_full_size};
+use crate::imaging::image::pyramid::{Level, coarse_factor, to_full_size};
 use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Lattice, Places, Renumbering};
 use crate::imaging::{Board, Squares};
@@ -178,8 +178,8 @@ fn holds(grid: &Places, board: Board) -> bool {
 pub(super) fn ladder(picture: &Picture) -> Vec<Attempt> {
     /// Shorter sides than this hold no board that sectors would show, px.
     const LEAST_FOR_SECTORS_PX: usize = 48;
-    let first = factor_for(picture, COARSE_PX);
-    let finer = to_full_size(picture, COARSE_PX).skip(1).chain((first == 1).then_some(Level::Doubled));
+    let first = coarse_factor(picture);
+    let finer = to_full_size(picture).skip(1).chain((first == 1).then_some(Level::Doubled));
     let (first, coarser) = (Level::Reduced(first), Level::Reduced(2 * first));
     let grown = [first, coarser].into_iter().chain(finer).map(|level| Attempt { level, way: Way::Grow });
     let side = |level: &Level| picture.width().min(picture.height()) as f64 / level.scale();

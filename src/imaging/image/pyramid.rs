@@ -63,9 +63,9 @@ pub struct Small {
 }
 
 impl Small {
-    /// Of about so many pixels.
-    pub fn of(picture: &Picture, pixels: usize) -> Small {
-        let level = Level::Reduced(factor_for(picture, pixels));
+    /// The copy on which boards are looked for first.
+    pub fn coarse(picture: &Picture) -> Small {
+        let level = Level::Reduced(coarse_factor(picture));
         Small { copy: level.copy(picture), level }
     }
 
@@ -78,16 +78,19 @@ impl Small {
     }
 }
 
-/// The whole factor that brings a picture closest to `pixels` from above.
-pub fn factor_for(picture: &Picture, pixels: usize) -> usize {
-    let ratio = (picture.width() * picture.height()) as f64 / pixels as f64;
+/// Pixels of the copy on which boards of any kind are looked for first.
+pub const COARSE_PX: usize = 1_000_000;
+
+/// The whole factor that brings a picture closest to [`COARSE_PX`] from above.
+pub fn coarse_factor(picture: &Picture) -> usize {
+    let ratio = (picture.width() * picture.height()) as f64 / COARSE_PX as f64;
     ratio.sqrt().floor().max(1.0) as usize
 }
 
-/// Copies from one of about so many pixels to full size, each of about half the factor of the one before it.
-pub fn to_full_size(picture: &Picture, pixels: usize) -> impl Iterator<Item = Level> + use<> {
+/// Copies from that of [`COARSE_PX`] to full size, each of about half the factor of the one before it.
+pub fn to_full_size(picture: &Picture) -> impl Iterator<Item = Level> + use<> {
     let halved = |factor: &usize| (*factor > 1).then(|| factor.div_ceil(2));
-    std::iter::successors(Some(factor_for(picture, pixels)), halved).map(Level::Reduced)
+    std::iter::successors(Some(coarse_factor(picture)), halved).map(Level::Reduced)
 }
 
 /// A copy reduced by a whole factor; what is left over at the right and lower border is dropped. `lines` are those of a block that count.
