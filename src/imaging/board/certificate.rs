@@ -285,10 +285,7 @@ mod tests {
     fn corners_are_centred() {
         let board = Board::checker("7x6".parse().unwrap(), 10.0);
         assert_eq!(board.corner_count(), 30);
-        let sum: nalgebra::Vector3<f64> = (0..board.rows())
-            .flat_map(|row| (0..board.columns()).map(move |col| (col, row)))
-            .map(|(col, row)| board.corner_mm(col, row).coords)
-            .sum();
+        let sum: nalgebra::Vector3<f64> = board.corners_mm().map(|at| at.coords).sum();
         assert_eq!(sum.norm(), 0.0);
         assert_eq!(board.corner_mm(1, 0).x - board.corner_mm(0, 0).x, 10.0);
     }

@@ -42,13 +42,6 @@ pub struct Placement {
 /// How many markers agree for each that contradicts.
 pub const AGREEING: usize = 3;
 
-impl Placement {
-    /// True where it is more than chance.
-    fn holds(&self, whole: usize) -> bool {
-        self.agreeing > AGREEING * self.contradicting && (self.agreeing >= 2 || whole >= 1)
-    }
-}
-
 /// The number of bits that a marker may be misread in where others agree with it. By the binomial sum, bits without any order then pass for a
 /// given marker once in 480 times for 4x4 bits, in 13 000 for 5x5, in a million for 6x6; a placement needs two that do, or one without a wrong bit.
 fn tolerated(bits: usize) -> usize {
@@ -109,15 +102,9 @@ pub fn place(board: &Board, size: (usize, usize), reads: &[Read]) -> Said {
         [] => Said::Nothing,
         [(only, _)] => Said::Place(only),
         // A layout is the other one moved by a column, but for the board's ends: only markers there tell them apart.
-        [(a, whole_a), (b, whole_b), ..] => {
-            if a.agreeing > b.agreeing && whole_a > whole_b {
-                Said::Place(a)
-            } else if b.agreeing > a.agreeing && whole_b > whole_a {
-                Said::Place(b)
-            } else {
-                Said::ByLayout
-            }
-        }
+        [(a, whole_a), (b, whole_b), ..] if a.agreeing > b.agreeing && whole_a > whole_b => Said::Place(a),
+        [(a, whole_a), (b, whole_b), ..] if b.agreeing > a.agreeing && whole_b > whole_a => Said::Place(b),
+        [_, _, ..] => Said::ByLayout,
     }
 }
 
@@ -147,14 +134,14 @@ fn by_layout(
                     _ => contradicting += 1,
                 }
             }
-            let found = Placement { quarters, col, row, layout, agreeing, contradicting, inverted };
-            if !found.holds(whole) {
+            let is_chance = agreeing <= AGREEING * contradicting || agreeing < 2 && whole < 1;
+            if is_chance {
                 continue;
             }
             let known = best.map_or(0, |(known, _)| known.agreeing);
             rival = rival.max(known.min(agreeing));
             if agreeing > known {
-                best = Some((found, whole));
+                best = Some((Placement { quarters, col, row, layout, agreeing, contradicting, inverted }, whole));
             }
         }
     }

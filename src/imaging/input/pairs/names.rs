@@ -67,17 +67,17 @@ impl Open {
     pub fn new(name: &str, reach: Reach) -> Open {
         let mut found: Vec<Found> = Vec::new();
         for run in runs(name, char::is_alphabetic) {
-            let before = found.len();
             let pieces = pieces(name, run.clone());
-            long_words(name, run.clone(), &pieces, &mut found);
-            if found.len() == before {
-                found.extend(
-                    pieces.iter().filter_map(|p| Some((p.clone(), side_of(&name[p.clone()], &SHORT)?, Weight::Short))),
-                );
+            let short =
+                |piece: &Range<usize>| Some((piece.clone(), side_of(&name[piece.clone()], &SHORT)?, Weight::Short));
+            let mut here: Vec<Found> = long_word(name, run.clone(), &pieces).into_iter().collect();
+            if here.is_empty() {
+                here.extend(pieces.iter().filter_map(short));
             }
-            if found.len() == before && reach == Reach::Letters {
-                found.extend(letters_at_ends(name, run));
+            if here.is_empty() && reach == Reach::Letters {
+                here.extend(letters_at_ends(name, run));
             }
+            found.append(&mut here);
         }
         let mut key = String::new();
         let mut end = 0;
@@ -176,20 +176,16 @@ fn pieces(name: &str, run: Range<usize>) -> Vec<Range<usize>> {
 }
 
 /// The first long word of a run. It stands alone where it is a piece of the run, or where the run has no case that could cut it.
-fn long_words(name: &str, run: Range<usize>, pieces: &[Range<usize>], found: &mut Vec<Found>) {
-    let lower = name[run.clone()].to_lowercase();
+fn long_word(name: &str, run: Range<usize>, pieces: &[Range<usize>]) -> Option<Found> {
     // Where small letters are longer than the capitals, places in one are not places in the other.
-    if lower.len() != run.len() {
-        return;
-    }
+    let lower = Some(name[run.clone()].to_lowercase()).filter(|lower| lower.len() == run.len())?;
     let words = LONG.iter().flat_map(|(left, right)| [(left, Side::Left), (right, Side::Right)]);
     let first = words.filter_map(|(word, side)| Some((lower.find(word)?, word.len(), side))).min_by_key(|w| w.0);
-    if let Some((at, length, side)) = first {
-        let word = run.start + at..run.start + at + length;
-        let ideogram = !name[word.clone()].is_ascii();
-        let alone = pieces.contains(&word) || word == run || ideogram;
-        found.push((word, side, if alone { Weight::Word } else { Weight::Part }));
-    }
+    let (at, length, side) = first?;
+    let word = run.start + at..run.start + at + length;
+    let ideogram = !name[word.clone()].is_ascii();
+    let alone = pieces.contains(&word) || word == run || ideogram;
+    Some((word, side, if alone { Weight::Word } else { Weight::Part }))
 }
 
 fn side_of(word: &str, words: &[(&str, &str)]) -> Option<Side> {
