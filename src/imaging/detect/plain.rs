@@ -22,11 +22,7 @@ use crate::opencv::find_board;
 const WORTH: f64 = 1.03;
 
 /// One attempt: on which copy, in which way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Attempt {
-    pub level: Level,
-    pub way: Way,
-}
+type Attempt = (Level, Way);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Way {
@@ -47,17 +43,17 @@ struct Search {
 
 impl Search {
     /// True where an attempt could only find less than is known.
-    fn is_pointless(&self, attempt: Attempt) -> bool {
+    fn is_pointless(&self, (level, way): Attempt) -> bool {
         /// Squares of this many pixels of a copy are not seen better on a finer one.
         const ENOUGH_PX: f64 = 30.0;
-        match attempt.way {
+        match way {
             // All of it was looked at corner by corner: more looking would only find a part of what is there.
             Way::Sectors => self.partial.is_some() || self.seen.as_ref().is_some_and(|(grid, _)| tells(grid).0),
             Way::Grow => {
                 let partial = self.partial.as_ref().map(|p| (&p.corners, p.level));
                 let known = [partial, self.seen.as_ref().map(|(grid, level)| (grid, *level))];
-                let is_enough = |(grid, level): &(&Places, Level)| {
-                    attempt.level.scale() < level.scale() && grid.step_px().is_some_and(|side| side > ENOUGH_PX)
+                let is_enough = |(grid, of): &(&Places, Level)| {
+                    level.scale() < of.scale() && grid.step_px().is_some_and(|side| side > ENOUGH_PX)
                 };
                 known.iter().flatten().any(is_enough)
             }
@@ -72,18 +68,18 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     }
     let mut search = Search::default();
     let mut last: Option<(Level, Grey8)> = None;
-    for attempt in ladder(picture) {
-        if search.is_pointless(attempt) {
+    for (level, way) in ladder(picture) {
+        if search.is_pointless((level, way)) {
             continue;
         }
         let small = match last.take() {
-            Some((level, small)) if level == attempt.level => small,
-            _ => attempt.level.copy(picture),
+            Some((known, small)) if known == level => small,
+            _ => level.copy(picture),
         };
-        if let Some(grid) = found(&small, attempt, board, &mut search) {
+        if let Some(grid) = found(&small, (level, way), board, &mut search) {
             let complete = grid.count() == board.corner_count();
             // The whole of a board is not less than what else hangs together in the picture; what was grown ends where the board ends.
-            let less = |(seen, _): &(Places, Level)| match attempt.way {
+            let less = |(seen, _): &(Places, Level)| match way {
                 Way::Grow => tells(seen) > tells(&grid),
                 Way::Sectors => seen.count() > grid.count(),
             };
@@ -91,7 +87,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
                 break;
             }
             let grid = turn_by_colours(&small, right_handed(grid), board);
-            let detected = on_a_copy(picture, attempt.level, &small, grid);
+            let detected = on_a_copy(picture, level, &small, grid);
             if complete {
                 return Ok(detected);
             }
@@ -105,7 +101,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
         if search.seen.as_ref().is_some_and(|(grid, _)| tells(grid).0 && holds(grid, board)) {
             break;
         }
-        last = Some((attempt.level, small));
+        last = Some((level, small));
     }
     // A part of a larger grid is not the board with corners missing.
     let larger = search.seen.as_ref().map_or(0, |(grid, _)| grid.count());
@@ -147,8 +143,8 @@ fn at_a_glance(picture: &Picture, board: Board) -> Option<Detected> {
 }
 
 /// The board, or a part of it, by one attempt; another grid is kept as seen.
-fn found(small: &Grey8, attempt: Attempt, board: Board, search: &mut Search) -> Option<Places> {
-    if attempt.way == Way::Sectors {
+fn found(small: &Grey8, (level, way): Attempt, board: Board, search: &mut Search) -> Option<Places> {
+    if way == Way::Sectors {
         // Where OpenCV cannot work at all, it has found nothing.
         let (columns, rows) = (board.columns(), board.rows());
         let corners = find_board(&small.pixels, small.width, (columns, rows)).ok().flatten()?;
@@ -159,7 +155,7 @@ fn found(small: &Grey8, attempt: Attempt, board: Board, search: &mut Search) -> 
     let grid = grown(small, board.corner_count())?;
     let fitting = fitting(small, &grid, board);
     if fitting.is_none() && search.seen.as_ref().is_none_or(|(seen, _)| tells(&grid) > tells(seen)) {
-        search.seen = Some((grid, attempt.level));
+        search.seen = Some((grid, level));
     }
     fitting
 }
@@ -181,10 +177,10 @@ pub(super) fn ladder(picture: &Picture) -> Vec<Attempt> {
     let first = coarse_factor(picture);
     let finer = to_full_size(picture).skip(1).chain((first == 1).then_some(Level::Doubled));
     let (first, coarser) = (Level::Reduced(first), Level::Reduced(2 * first));
-    let grown = [first, coarser].into_iter().chain(finer).map(|level| Attempt { level, way: Way::Grow });
+    let grown = [first, coarser].into_iter().chain(finer).map(|level| (level, Way::Grow));
     let side = |level: &Level| picture.width().min(picture.height()) as f64 / level.scale();
     let sectors = [first, coarser].into_iter().filter(|level| side(level) >= LEAST_FOR_SECTORS_PX as f64);
-    grown.chain(sectors.map(|level| Attempt { level, way: Way::Sectors })).collect()
+    grown.chain(sectors.map(|level| (level, Way::Sectors))).collect()
 }
 
 pub(super) fn grown(small: &Grey8, enough: usize) -> Option<Places> {

@@ -16,16 +16,10 @@ const MOST_SHOWN: usize = 8;
 /// A command to type, with flags behind the places where there are any.
 fn call(source: &Source<'_>, places: &[&Utf8Path], flags: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
-    let mut words = vec!["stereocal".to_owned(), source.command.to_owned()];
-    words.extend(
-        places.iter().map(
-            |place| {
-                if place.as_str().chars().all(plain) { place.to_string() } else { format!("'{place}'") }
-            },
-        ),
-    );
-    words.extend(flags.split_whitespace().map(str::to_owned));
-    format!("`{}`", words.join(" "))
+    let quote = |place: &Utf8Path| if place.as_str().chars().all(plain) { "" } else { "'" };
+    let places: String = places.iter().map(|place| format!(" {0}{place}{0}", quote(place))).collect();
+    let flags = if flags.is_empty() { String::new() } else { format!(" {flags}") };
+    format!("`stereocal {}{places}{flags}`", source.command)
 }
 
 /// What was taken: `31 pairs by number: left stereoLeft/imageL*.png, right stereoRight/imageR*.png`.
