@@ -4,7 +4,7 @@
 //! along the rows shows the order both pictures were read in.
 
 use camino::Utf8Path;
-use image::{DynamicImage, GrayImage, Rgb, RgbImage, imageops};
+use image::{GrayImage, Rgb, RgbImage, imageops};
 use nalgebra::Point2;
 
 use super::image::pyramid::Small;
@@ -49,7 +49,7 @@ impl SideBySide {
         let mut both = GrayImage::new(width, height);
         imageops::replace(&mut both, &left, 0, 0);
         imageops::replace(&mut both, &right, i64::from(left_width), 0);
-        let image = DynamicImage::ImageLuma8(both).into_rgb8();
+        let image = RgbImage::from_fn(width, height, |x, y| Rgb([both.get_pixel(x, y)[0]; 3]));
         SideBySide { image, scales: [left_scale, right_scale], left_width, ring_px }
     }
 

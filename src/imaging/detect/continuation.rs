@@ -134,8 +134,8 @@ pub(super) fn without_ends(copy: &Grey8, grid: Places) -> Places {
     })
 }
 
-/// Contrast of the four squares round a corner of the grid, or round a place one square before its first column, so many steps along both edges from it, with the
-/// sign that the order of colours gives it: the lesser of both differences between neighbours across an edge and their
+/// Contrast of the four squares round a corner of the grid, or round a place one square before its first column, so many steps along both edges
+/// from it, with the sign that the order of colours gives it: the lesser of both differences between neighbours across an edge and their
 /// neighbours across the other, and none where they have two signs, as across the board's outer edge. `before`: how many steps against the columns' order. `None` outside of the picture.
 fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, usize), steps: f64, before: Option<f64>) -> Option<f64> {
     let row = row as isize;

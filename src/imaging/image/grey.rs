@@ -1,8 +1,6 @@
-//! Grey values row by row, as a camera gave them, and the level at which they are clipped.
+//! Grey values row by row, as a camera gave them.
 
 use nalgebra::Point2;
-
-use super::clipping;
 
 /// Values row by row.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,49 +42,5 @@ impl<T: Copy + Into<f64>> Image<T> {
         let (x, y) = (x as usize, y as usize);
         let row = |y: usize| self.pixels[y * self.width + x - 1..][..3].iter().map(|&v| v.into()).sum::<f64>();
         Some((y - 1..=y + 1).map(row).sum::<f64>() / 9.0)
-    }
-}
-
-/// A grey picture and the level at which it is clipped.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Picture {
-    /// Its grey values.
-    pub grey: Grey,
-    clip_level: f64,
-}
-
-impl From<Image<u8>> for Picture {
-    fn from(image: Image<u8>) -> Picture {
-        Picture { clip_level: clipping::level(&image), grey: Grey::Eight(image) }
-    }
-}
-
-impl From<Image<u16>> for Picture {
-    fn from(image: Image<u16>) -> Picture {
-        Picture { clip_level: clipping::level(&image), grey: Grey::Sixteen(image) }
-    }
-}
-
-impl Picture {
-    /// The grey value from which on a pixel tells only "too bright".
-    pub fn clip_level(&self) -> f64 {
-        self.clip_level
-    }
-
-    /// Width, px.
-    pub fn width(&self) -> usize {
-        self.size().0
-    }
-
-    /// Height, px.
-    pub fn height(&self) -> usize {
-        self.size().1
-    }
-
-    fn size(&self) -> (usize, usize) {
-        match &self.grey {
-            Grey::Eight(image) => (image.width, image.height),
-            Grey::Sixteen(image) => (image.width, image.height),
-        }
     }
 }

@@ -16,7 +16,8 @@ pub mod pyramid;
 pub mod raster;
 pub mod wide;
 
+pub use clipping::Picture;
 pub use decode::{decode, picture};
-pub use grey::{Grey, Grey8, Image, Picture};
+pub use grey::{Grey, Grey8, Image};
 pub use limits::{Claim, Header, UNDECODABLE, header, read};
 pub use mosaic::Mosaic;

@@ -1,4 +1,4 @@
-//! What a fit found.
+//! What a fit found, and the corner that it was made for.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
@@ -30,6 +30,17 @@ pub struct Fit {
     pub left_out: usize,
     /// Number of steps to the end.
     pub steps: usize,
+}
+
+/// A corner and all that its fit tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// Raw place in the picture, px.
+    pub px: Point2<f64>,
+    /// The fit it comes from.
+    pub fit: Fit,
+    /// How far the window reaches along the two edges, as a share of the square's side.
+    pub reach: [f64; 2],
 }
 
 impl Fit {

@@ -19,7 +19,7 @@ use nalgebra::Vector2;
 
 pub use evaluation::Misfit;
 use evaluation::{Column, Evaluation, Normal};
-pub use fit::Fit;
+pub use fit::{Fit, Measured};
 pub use model::Model;
 use model::{COLUMNS, LEAST_BLUR_PX, N};
 use window::Window;
