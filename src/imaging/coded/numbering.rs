@@ -33,8 +33,6 @@ pub struct Placement {
     pub layout: Layout,
     /// Markers that agree with it.
     pub agreeing: usize,
-    /// Markers that contradict it.
-    pub contradicting: usize,
     /// Whether the markers are printed white on black.
     pub inverted: bool,
 }
@@ -141,7 +139,7 @@ fn by_layout(
             let known = best.map_or(0, |(known, _)| known.agreeing);
             rival = rival.max(known.min(agreeing));
             if agreeing > known {
-                best = Some((Placement { quarters, col, row, layout, agreeing, contradicting, inverted }, whole));
+                best = Some((Placement { quarters, col, row, layout, agreeing, inverted }, whole));
             }
         }
     }
@@ -207,10 +205,9 @@ mod tests {
                 for quarters in 0..4 {
                     for (col, row) in [(0, 0), (1, 0), (0, 2), (1, 1)] {
                         let (size, reads) = part(&board, layout, col..col + 2, row..row + 2, quarters);
-                        let expected = ((4 - quarters) % 4, col, row, layout, 0);
-                        let told = |found: Placement| {
-                            (found.quarters, found.col, found.row, found.layout, found.contradicting)
-                        };
+                        let expected = ((4 - quarters) % 4, col, row, layout, reads.len());
+                        let told =
+                            |found: Placement| (found.quarters, found.col, found.row, found.layout, found.agreeing);
                         match place(&board.with_layout(layout), size, &reads) {
                             Said::Place(found) => assert_eq!(told(found), expected),
                             other => panic!("{board} {layout:?} {quarters} {col} {row}: {other:?}"),
