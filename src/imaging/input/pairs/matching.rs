@@ -140,7 +140,7 @@ fn name(by: PairBy, key: &str, left: &Utf8Path, right: &Utf8Path) -> String {
         }
         _ if left == right => left.to_owned(),
         _ => {
-            let opened = Reach::ALL.map(|reach| [Open::new(left, reach), Open::new(right, reach)]);
+            let opened = [Reach::Words, Reach::Letters].map(|reach| [Open::new(left, reach), Open::new(right, reach)]);
             let alike = opened.iter().find(|[a, b]| a.key == b.key);
             alike.map_or_else(|| key.to_owned(), |[a, b]| a.without_side(left, b))
         }

@@ -35,11 +35,6 @@ pub enum Reach {
     Letters,
 }
 
-impl Reach {
-    /// Both, the stronger one first.
-    pub const ALL: [Reach; 2] = [Reach::Words, Reach::Letters];
-}
-
 /// A name whose words for a side are left open.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Open {
