@@ -28,18 +28,21 @@ pub fn transform_from_matrix(rotation: Matrix3<f64>, t_mm: Vector3<f64>) -> Tran
 /// The rotation vector of a rotation matrix, rad. Not from the arc cosine of the trace, which has half the digits near zero
 /// and is no number where rounding makes the trace larger than three.
 pub fn rotation_vector_of_matrix(rotation: &Matrix3<f64>) -> Vector3<f64> {
-    let r = rotation;
-    let sine = 0.5 * Vector3::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]);
+    /// Square of the sine up to which a turn is small enough for a short series.
+    const SMALL_SINE_SQUARED: f64 = 1e-3;
+    let sine = 0.5 * twist(rotation);
     let s = sine.norm_squared();
-    if s < SMALL_SINE_SQUARED && r.trace() > 1.0 {
+    if s < SMALL_SINE_SQUARED && rotation.trace() > 1.0 {
         // arcsin(x) / x; the first term left out is below 1e-16.
         return sine * (1.0 + s * (1.0 / 6.0 + s * (3.0 / 40.0 + s * (15.0 / 336.0 + s * (105.0 / 3456.0)))));
     }
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*r)).scaled_axis()
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*rotation)).scaled_axis()
 }
 
-/// Square of the sine up to which a turn is small enough for a short series.
-const SMALL_SINE_SQUARED: f64 = 1e-3;
+/// The vector of a matrix less its transpose: of a rotation its axis, twice the sine of its angle long.
+fn twist(m: &Matrix3<f64>) -> Vector3<f64> {
+    Vector3::new(m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)])
+}
 
 /// Applies a small change, the first six numbers of `delta`: `exp` of three (rad) on the left of the rotation, three (mm) added to the
 /// translation.
@@ -111,20 +114,12 @@ fn sharpened(mut rotation: Matrix3<f64>, matrix: &Matrix3<f64>) -> Matrix3<f64> 
     for _ in 0..4 {
         // Newton's step of the trace over small turns of the rotation.
         let turned = matrix * rotation.transpose();
-        let slope = Vector3::new(
-            turned[(2, 1)] - turned[(1, 2)],
-            turned[(0, 2)] - turned[(2, 0)],
-            turned[(1, 0)] - turned[(0, 1)],
-        );
         let even = 0.5 * (turned + turned.transpose());
-        let Some(step) = (Matrix3::identity() * even.trace() - even).try_inverse().map(|inverse| inverse * slope)
-        else {
-            return rotation;
-        };
-        if !(KNOWN_RAD..NEAR_RAD).contains(&step.norm()) {
-            return rotation;
+        let step = (Matrix3::identity() * even.trace() - even).try_inverse().map(|inverse| inverse * twist(&turned));
+        match step.filter(|step| (KNOWN_RAD..NEAR_RAD).contains(&step.norm())) {
+            Some(step) => rotation = Rotation3::from_scaled_axis(step).into_inner() * rotation,
+            None => break,
         }
-        rotation = Rotation3::from_scaled_axis(step).into_inner() * rotation;
     }
     rotation
 }

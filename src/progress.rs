@@ -6,11 +6,11 @@
 
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Write};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -27,91 +27,67 @@ pub fn be_quiet() {
 
 /// A step of a command. It is over when it is dropped.
 pub struct Step {
-    shown: Shown,
+    /// Not drawn where lines are said, or nothing.
+    bar: ProgressBar,
     begun: AtomicBool,
-}
-
-enum Shown {
-    Nothing,
-    Bar(ProgressBar),
-    Lines { state: Arc<State>, stop: Option<Sender<()>>, ticker: Option<JoinHandle<()>> },
-}
-
-struct State {
-    length: u64,
-    done: AtomicU64,
-    label: Mutex<String>,
-    start: Instant,
+    /// What says lines, and what stops it when it is dropped.
+    ticker: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
 /// Starts a step of `length` equal parts, 0 where their number is not known.
 pub fn bar(label: &str, length: u64) -> Step {
-    Step { shown: shown(label, length), begun: AtomicBool::new(false) }
-}
-
-fn shown(label: &str, length: u64) -> Shown {
-    if QUIET.load(Ordering::Relaxed) {
-        return Shown::Nothing;
-    }
+    let is_quiet = QUIET.load(Ordering::Relaxed);
     let asked_for_plain = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty())
         || std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-    if !asked_for_plain && std::io::stderr().is_terminal() {
-        return Shown::Bar(drawn(label, length));
+    let is_drawn = !is_quiet && !asked_for_plain && std::io::stderr().is_terminal();
+    let target = if is_drawn { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let bar = ProgressBar::with_draw_target(Some(length), target);
+    if is_drawn {
+        let template =
+            if length == 0 { "{msg:32} {elapsed} {spinner}" } else { "{msg:32} [{bar:28}] {pos}/{len}, {eta} left" };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        bar.enable_steady_tick(Duration::from_millis(250));
     }
-    #[expect(clippy::disallowed_methods, reason = "only for the time left that is shown")]
-    let start = Instant::now();
-    let state = Arc::new(State { length, done: AtomicU64::new(0), label: Mutex::new(label.to_owned()), start });
+    let bar = bar.with_message(label.to_owned());
+    let ticker = if is_quiet || is_drawn { None } else { ticker(bar.clone()) };
+    Step { bar, begun: AtomicBool::new(false), ticker }
+}
+
+/// Says a line now and then where it has changed.
+fn ticker(bar: ProgressBar) -> Option<(Sender<()>, JoinHandle<()>)> {
     let (stop, stopped) = channel();
-    let seen = Arc::clone(&state);
-    let ticker = std::thread::Builder::new().spawn(move || {
+    let thread = std::thread::Builder::new().spawn(move || {
         let mut last = String::new();
         while stopped.recv_timeout(BETWEEN_LINES) == Err(RecvTimeoutError::Timeout) {
-            let now = seen.line();
+            let now = said(&bar);
             if now != last {
                 line(&now);
             }
             last = now;
         }
     });
-    Shown::Lines { state, stop: Some(stop), ticker: ticker.ok() }
+    thread.ok().map(|thread| (stop, thread))
 }
 
-fn drawn(label: &str, length: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
-    let template =
-        if length == 0 { "{msg:32} {elapsed} {spinner}" } else { "{msg:32} [{bar:28}] {pos}/{len}, {eta} left" };
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style.progress_chars("=> "));
+fn said(bar: &ProgressBar) -> String {
+    let (label, length) = (bar.message(), bar.length().unwrap_or(0));
+    let (done, elapsed) = (bar.position(), bar.elapsed().as_secs_f64());
+    if length == 0 {
+        return format!("{label}: for {elapsed:.0} s now");
     }
-    bar.enable_steady_tick(Duration::from_millis(250));
-    bar.with_message(label.to_owned())
-}
-
-impl State {
-    fn line(&self) -> String {
-        let label = self.label.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let (done, elapsed) = (self.done.load(Ordering::Relaxed), self.start.elapsed().as_secs_f64());
-        if self.length == 0 {
-            return format!("{label}: for {elapsed:.0} s now");
-        }
-        let left = match done {
-            0 => String::new(),
-            _ => format!(", about {:.0} s left", elapsed * self.length.saturating_sub(done) as f64 / done as f64),
-        };
-        format!("{label}: {done} of {}{left}", self.length)
-    }
+    let left = match done {
+        0 => String::new(),
+        _ => format!(", about {:.0} s left", elapsed * length.saturating_sub(done) as f64 / done as f64),
+    };
+    format!("{label}: {done} of {length}{left}")
 }
 
 impl Step {
     /// So many more parts are done.
     pub fn inc(&self, parts: u64) {
-        match &self.shown {
-            Shown::Nothing => {}
-            Shown::Bar(bar) => bar.inc(parts),
-            Shown::Lines { state, .. } => {
-                state.done.fetch_add(parts, Ordering::Relaxed);
-            }
-        }
+        self.bar.inc(parts);
     }
 
     /// A part of this name begins, and the one before it is done.
@@ -119,13 +95,7 @@ impl Step {
         if self.begun.swap(true, Ordering::Relaxed) {
             self.inc(1);
         }
-        match &self.shown {
-            Shown::Nothing => {}
-            Shown::Bar(bar) => bar.set_message(part.to_owned()),
-            Shown::Lines { state, .. } => {
-                part.clone_into(&mut state.label.lock().unwrap_or_else(PoisonError::into_inner));
-            }
-        }
+        self.bar.set_message(part.to_owned());
     }
 
     /// The step is over.
@@ -134,17 +104,12 @@ impl Step {
 
 impl Drop for Step {
     fn drop(&mut self) {
-        match &mut self.shown {
-            Shown::Nothing => {}
-            Shown::Bar(bar) => bar.finish_and_clear(),
-            Shown::Lines { stop, ticker, .. } => {
-                stop.take();
-                if let Some(ticker) = ticker.take() {
-                    // It only prints; how it ended makes no difference.
-                    let _ = ticker.join();
-                }
-            }
+        if let Some((stop, thread)) = self.ticker.take() {
+            drop(stop);
+            // It only prints; how it ended makes no difference.
+            let _ = thread.join();
         }
+        self.bar.finish_and_clear();
     }
 }
 
@@ -178,12 +143,12 @@ mod tests {
     use super::*;
 
     #[test]
-    #[expect(clippy::disallowed_methods, reason = "a start is needed")]
     fn a_line_names_step_count_and_time_left() {
-        let start = Instant::now() - Duration::from_secs(10);
-        let state = State { length: 60, done: AtomicU64::new(12), label: Mutex::new("looking".to_owned()), start };
-        assert_eq!(state.line(), "looking: 12 of 60, about 40 s left");
-        let state = State { length: 0, ..state };
-        assert_eq!(state.line(), "looking: for 10 s now");
+        let after_ten_seconds = |length: u64| {
+            let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::hidden());
+            said(&bar.with_position(12).with_message("looking").with_elapsed(Duration::from_secs(10)))
+        };
+        assert_eq!(after_ten_seconds(60), "looking: 12 of 60, about 40 s left");
+        assert_eq!(after_ten_seconds(0), "looking: for 10 s now");
     }
 }

@@ -48,35 +48,26 @@ pub fn count_squares(pairing: &Pairing, mosaic: Option<Mosaic>) -> Result<Counte
         }
         counts
     };
-    let whole = counts(true);
-    decided(&whole, seen.len()).or_else(|| without_margin(&counts(false), seen.len())).ok_or_else(|| {
-        Error::NotCounted { path: pairing.place.clone(), counts: whole.into_iter().collect(), of: seen.len() }
+    let (whole, of) = (counts(true), seen.len());
+    decided(&whole, of, true).or_else(|| decided(&counts(false), of, false)).ok_or_else(|| Error::NotCounted {
+        path: pairing.place.clone(),
+        counts: whole.into_iter().collect(),
+        of,
     })
 }
 
 /// In how many pictures columns and rows of squares were counted.
 type Counts = BTreeMap<(usize, usize), usize>;
 
-/// The count that the pictures agree on.
-fn decided(counts: &Counts, of: usize) -> Option<Counted> {
-    let ((columns, rows), pictures) = most_frequent(counts)?;
-    let others = counts.values().sum::<usize>() - pictures;
-    let is_clear = pictures >= FEWEST.min(of) && others * AGREEING <= pictures;
-    is_clear.then_some(Counted { squares: Squares { columns, rows }, pictures, ends: true, of })
-}
-
-/// The count of a board without a margin that is seen: what half of the pictures with a grid in full view show, and hardly any shows more. Less
-/// is shown where a hand covers a line.
-fn without_margin(counts: &Counts, of: usize) -> Option<Counted> {
-    let ((columns, rows), pictures) = most_frequent(counts)?;
-    let more: usize = counts.iter().filter(|((c, r), _)| c * r > columns * rows).map(|(_, pictures)| pictures).sum();
-    let all: usize = counts.values().sum();
-    let is_clear = pictures >= FEWEST.min(of) && 2 * pictures > all && more * AGREEING <= pictures;
-    is_clear.then_some(Counted { squares: Squares { columns, rows }, pictures, ends: false, of })
-}
-
-fn most_frequent(counts: &Counts) -> Option<((usize, usize), usize)> {
-    counts.iter().max_by_key(|(_, pictures)| **pictures).map(|(squares, pictures)| (*squares, *pictures))
+/// The count that the pictures agree on, which show where the board `ends`. Of a board without a margin that is seen it is what half of the pictures
+/// with a grid in full view show, and hardly any shows more: less is shown where a hand covers a line.
+fn decided(counts: &Counts, of: usize, ends: bool) -> Option<Counted> {
+    let (&(columns, rows), &pictures) = counts.iter().max_by_key(|(_, pictures)| **pictures)?;
+    let contradicts = |&(c, r): &(usize, usize)| if ends { (c, r) != (columns, rows) } else { c * r > columns * rows };
+    let against: usize = counts.iter().filter(|(squares, _)| contradicts(squares)).map(|(_, pictures)| pictures).sum();
+    let is_most = 2 * pictures > counts.values().sum();
+    let is_clear = pictures >= FEWEST.min(of) && is_most && against * AGREEING <= pictures;
+    is_clear.then_some(Counted { squares: Squares { columns, rows }, pictures, ends, of })
 }
 
 #[cfg(test)]
@@ -86,7 +77,7 @@ mod tests {
     #[test]
     fn pictures_that_contradict_each_other_decide_nothing() {
         let of = |counts: &[((usize, usize), usize)]| {
-            decided(&counts.iter().copied().collect(), 20)
+            decided(&counts.iter().copied().collect(), 20, true)
                 .map(|counted| (counted.squares.to_string(), counted.pictures))
         };
         assert_eq!(of(&[((9, 7), 12)]), Some(("9x7".to_owned(), 12)));
@@ -100,7 +91,7 @@ mod tests {
     #[test]
     fn boards_without_a_margin_are_counted_where_hardly_any_picture_shows_more() {
         let of = |counts: &[((usize, usize), usize)]| {
-            without_margin(&counts.iter().copied().collect(), 20).map(|counted| counted.squares.to_string())
+            decided(&counts.iter().copied().collect(), 20, false).map(|counted| counted.squares.to_string())
         };
         assert_eq!(of(&[((10, 7), 8), ((9, 7), 4), ((8, 7), 1)]), Some("10x7".to_owned()));
         // Hidden in most: the larger count is the board's, and is not told from a chance find.

@@ -1,6 +1,6 @@
 //! What can go wrong between a folder and its corners.
 
-use camino::Utf8PathBuf;
+use camino::{Utf8Path, Utf8PathBuf};
 
 use super::board::{self, Board, Kind};
 use super::corners::{Skipped, reasons, too_few};
@@ -112,6 +112,19 @@ pub enum Error {
 const SAVED_AS: &str = "save the pictures as the camera gives them: PNG, TIFF, BMP, JPEG or PGM of 8 or 16 bits a pixel, up to 300 million \
                         px and 1 GiB when decoded";
 
+/// How pictures come out of a file whose name is that of a video.
+pub fn of_video(file: &Utf8Path) -> Option<String> {
+    /// In small letters.
+    const ENDINGS: [&str; 8] = ["mp4", "avi", "mov", "mkv", "webm", "m4v", "mpg", "wmv"];
+    let ending = file.extension()?.to_ascii_lowercase();
+    ENDINGS.contains(&ending.as_str()).then(|| {
+        format!(
+            "`mkdir left; ffmpeg -i {file} -vf fps=1 left/%03d.png` takes pictures out of a video, and those of the other camera go into right/; \
+             two videos seldom begin at one moment: the board must stand still"
+        )
+    })
+}
+
 /// What pictures have to show of a board.
 fn shown(board: &Board) -> String {
     if board.is_coded() {
@@ -164,7 +177,7 @@ impl Explain for Error {
         match self {
             Error::Files(e) => e.hint(),
             Error::Board(e) => e.hint(),
-            Error::NotAFolder { path } if super::video::hint(path).is_some() => super::video::hint(path),
+            Error::NotAFolder { path } if let Some(hint) = of_video(path) => Some(hint),
             Error::NoFolder { .. } | Error::NotAFolder { .. } => Some(
                 "a folder of pairs holds left/ and right/ with equal names, or left*/right*, *_left/*_right, *_L/*_R names"
                     .to_owned(),

@@ -14,7 +14,7 @@ use super::coded;
 use super::detect::{self, Detected, Refusal, continuation};
 use super::image::pyramid::Small;
 use super::image::{self, Claim, Header, Mosaic, Picture};
-use super::input::cache::{Cache, Look, Sighting};
+use super::input::cache::{self, Cache, Look, Sighting};
 use super::input::pairs::{PairFiles, Pairing};
 use super::lattice::Lattice;
 use super::refine::fields;
@@ -49,7 +49,8 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
         pairing.pairs.par_iter().map(|files| [&files.left, &files.right].map(|path| image::header(path))).collect();
     let sizes = majority_sizes(&headers);
     let bar = progress::bar("looking for the board", 2 * pairing.pairs.len() as u64);
-    let look_at = |indices: &[usize]| look_at_pairs(pairing, &headers, sizes, (wanted, &bar), indices);
+    let folder = Folder { files: &pairing.pairs, headers: &headers, sizes };
+    let look_at = |indices: &[usize]| folder.look_at_pairs(indices, (wanted, &bar));
     let total = pairing.pairs.len();
     let too_few = |found: usize, (skipped, searched): (Vec<Skipped>, usize), other: Option<Board>| Error::TooFewPairs {
         found,
@@ -73,7 +74,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     seen.sort_by_key(|&(i, _)| i);
     bar.finish_and_clear();
     let seen = seen.into_iter().map(|(_, looks)| looks).collect();
-    let seen = in_common_layout(seen, pairing, &headers, sizes, wanted);
+    let seen = folder.in_common_layout(seen, wanted);
     let other = other_board(&seen);
     printed(&wanted.board, &seen).iter().for_each(progress::note);
     let Sorted { found, skipped, open } = sort_out(&pairing.pairs, seen, wanted.board);
@@ -100,73 +101,57 @@ fn first_pairs(total: usize) -> [Vec<usize>; 2] {
     [first, rest]
 }
 
-/// The pictures of some pairs from file to corners.
-fn look_at_pairs(
-    pairing: &Pairing,
-    headers: &[[Announced; 2]],
-    sizes: [(u32, u32); 2],
-    (wanted, bar): (&Wanted<'_>, &progress::Step),
-    indices: &[usize],
-) -> Vec<[Look; 2]> {
-    let looks = indices.par_iter().map(|&i| {
-        let (files, [left, right]) = (&pairing.pairs[i], &headers[i]);
-        let (left, right) = rayon::join(
-            || look(&files.left, left, wanted, sizes, bar),
-            || look(&files.right, right, wanted, [sizes[1], sizes[0]], bar),
-        );
-        [left, right]
-    });
-    looks.collect()
-}
-
-/// Of a board whose layout the pictures tell, those that did not tell it are looked at once more.
-fn in_common_layout(
-    seen: Vec<[Look; 2]>,
-    pairing: &Pairing,
-    headers: &[[Announced; 2]],
-    sizes: [(u32, u32); 2],
-    wanted: &Wanted<'_>,
-) -> Vec<[Look; 2]> {
-    let Some(layout) = common_layout(&seen) else { return seen };
-    let is_open = |look: &&Look| look.as_ref().is_err_and(|refusal| refusal.reason == coded::BY_LAYOUT);
-    let bar = progress::bar("looking once more", seen.iter().flatten().filter(is_open).count() as u64);
-    let wanted = Wanted { board: wanted.board.with_layout(layout), ..*wanted };
-    let again = |side: Look, path: &Utf8Path, header: &Announced, sizes: [(u32, u32); 2]| match side {
-        Err(refusal) if refusal.reason == coded::BY_LAYOUT => look(path, header, &wanted, sizes, &bar),
-        known => known,
-    };
-    let all = seen.into_par_iter().zip(&pairing.pairs).zip(headers);
-    all.map(|(([one, other], files), [left, right])| {
-        [again(one, &files.left, left, sizes), again(other, &files.right, right, [sizes[1], sizes[0]])]
-    })
-    .collect()
-}
-
 /// What a file's header says, or why it says nothing.
 type Announced = Result<Header, String>;
 
-/// One picture from file to corners; the reason where that fails. `sizes` are those of this side's pictures and of the other's.
-fn look(
-    path: &Utf8Path,
-    header: &Announced,
-    wanted: &Wanted<'_>,
+/// The pairs of a folder with what their files announce, and the sizes of most left and most right pictures.
+struct Folder<'a> {
+    files: &'a [PairFiles],
+    headers: &'a [[Announced; 2]],
     sizes: [(u32, u32); 2],
-    bar: &progress::Step,
-) -> Look {
-    bar.inc(1);
-    let [size, other] = sizes;
-    let header = header.as_ref().map_err(String::clone)?;
-    // Depends on the other pictures, so it is not a matter for the cache.
-    let found = (header.width, header.height);
-    if found != size {
-        let why = match found {
-            _ if found == other => ", and those of the other side have its size: are left and right exchanged?",
-            _ if found == (size.1, size.0) => ": is it turned by 90 degrees?",
-            _ => "",
-        };
-        return Err(format!("{}x{} px, most others are {}x{}{why}", found.0, found.1, size.0, size.1).into());
+}
+
+impl Folder<'_> {
+    /// The pictures of some pairs from file to corners.
+    fn look_at_pairs(&self, pairs: &[usize], how: (&Wanted<'_>, &progress::Step)) -> Vec<[Look; 2]> {
+        let look = |side: Side, pair: usize| self.look(pair, side, how);
+        let both = |&pair| <[Look; 2]>::from(rayon::join(|| look(Side::Left, pair), || look(Side::Right, pair)));
+        pairs.par_iter().map(both).collect()
     }
-    read_and_look(path, header, wanted)
+
+    /// Of a board whose layout the pictures tell, those that did not tell it are looked at once more.
+    fn in_common_layout(&self, seen: Vec<[Look; 2]>, wanted: &Wanted<'_>) -> Vec<[Look; 2]> {
+        let Some(layout) = common_layout(&seen) else { return seen };
+        let is_open = |look: &Look| look.as_ref().is_err_and(|refusal| refusal.reason == coded::BY_LAYOUT);
+        let bar = progress::bar("looking once more", seen.iter().flatten().filter(|look| is_open(look)).count() as u64);
+        let wanted = Wanted { board: wanted.board.with_layout(layout), ..*wanted };
+        let again = |(pair, mut sides): (usize, [Look; 2])| {
+            for (side, look) in Side::BOTH.into_iter().zip(&mut sides).filter(|(_, look)| is_open(look)) {
+                *look = self.look(pair, side, (&wanted, &bar));
+            }
+            sides
+        };
+        seen.into_par_iter().enumerate().map(again).collect()
+    }
+
+    /// One picture from file to corners; the reason where that fails.
+    fn look(&self, pair: usize, side: Side, (wanted, bar): (&Wanted<'_>, &progress::Step)) -> Look {
+        bar.inc(1);
+        let [size, other] = [side, side.other()].map(|side| self.sizes[side as usize]);
+        let header = self.headers[pair][side as usize].as_ref().map_err(String::clone)?;
+        // Depends on the other pictures, so it is not a matter for the cache.
+        let found = (header.width, header.height);
+        if found != size {
+            let why = match found {
+                _ if found == other => ", and those of the other side have its size: are left and right exchanged?",
+                _ if found == (size.1, size.0) => ": is it turned by 90 degrees?",
+                _ => "",
+            };
+            return Err(format!("{}x{} px, most others are {}x{}{why}", found.0, found.1, size.0, size.1).into());
+        }
+        let PairFiles { left, right, .. } = &self.files[pair];
+        read_and_look(if side == Side::Left { left } else { right }, header, wanted)
+    }
 }
 
 /// The board's corners in one pair, numbered alike in left and right as far as its colours tell; the reason where there are none.
@@ -185,7 +170,7 @@ fn read_and_look(path: &Utf8Path, header: &Header, wanted: &Wanted<'_>) -> Look 
     let Some(cache) = wanted.cache else { return look_at(bytes, path, wanted).0 };
     let hash = picture_hash(&bytes);
     cache.out.picture_read(path, &hash);
-    let entry = cache.entry(&hash, wanted.board, wanted.mosaic);
+    let entry = cache::entry(&hash, wanted.board, wanted.mosaic);
     cache.read(&entry, wanted.board).unwrap_or_else(|| {
         let (look, thumbnail) = look_at(bytes, path, wanted);
         if let Some(thumbnail) = thumbnail {
@@ -200,7 +185,7 @@ fn read_and_look(path: &Utf8Path, header: &Header, wanted: &Wanted<'_>) -> Look 
 pub fn thumbnail(path: &Utf8Path, wanted: &Wanted<'_>) -> Option<Small> {
     let known = wanted.cache.and_then(|cache| {
         let hash = cache.out.hash_of_picture(path)?;
-        cache.read_thumbnail(&cache.entry(&hash, wanted.board, wanted.mosaic))
+        cache.read_thumbnail(&cache::entry(&hash, wanted.board, wanted.mosaic))
     });
     known.or_else(|| Some(thumbnail_of(&image::picture(path, wanted.mosaic).ok()?, None)))
 }
@@ -268,9 +253,7 @@ fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
         });
     }
     let mut corners = refine::refine(picture, detected);
-    let measured = Lattice::from_fn(corners.columns, corners.rows, |c, r| {
-        corners.get(c, r).filter(|corner| corner.used).map(|corner| corner.px)
-    });
+    let measured = corners.filter_map(|_, _, corner| corner.used.then_some(corner.px));
     if let Some(why) = coded::measures::other_gaps(&board, &measured) {
         return Err(why.into());
     }

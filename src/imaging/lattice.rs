@@ -85,6 +85,26 @@ impl<T: Clone> Lattice<T> {
         self.cells.iter().enumerate().filter_map(move |(i, c)| c.as_ref().map(|c| (i % columns, i / columns, c)))
     }
 
+    /// The four corners of the square after corner `(col, row)`, in order round it; `None` where one is missing.
+    pub fn square(&self, col: usize, row: usize) -> Option<[&T; 4]> {
+        Some([self.get(col, row)?, self.get(col + 1, row)?, self.get(col + 1, row + 1)?, self.get(col, row + 1)?])
+    }
+
+    /// The rows that have a corner in the first column.
+    pub fn rows_at_front(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.rows).filter(|&row| self.get(0, row).is_some())
+    }
+
+    /// The grid without its first column.
+    pub fn without_front(&self) -> Lattice<T> {
+        Lattice::from_fn(self.columns - 1, self.rows, |col, row| self.get(col + 1, row).cloned())
+    }
+
+    /// What some of the corners are or tell, in a grid of the same size.
+    pub fn filter_map<U: Clone>(&self, mut to: impl FnMut(usize, usize, &T) -> Option<U>) -> Lattice<U> {
+        Lattice::from_fn(self.columns, self.rows, |col, row| to(col, row, self.get(col, row)?))
+    }
+
     /// The same corners numbered from the opposite corner of the board.
     pub fn half_turn(&self) -> Lattice<T> {
         Lattice::from_fn(self.columns, self.rows, |col, row| {

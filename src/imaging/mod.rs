@@ -10,7 +10,6 @@ pub mod find;
 pub mod image;
 pub mod input;
 pub mod lattice;
-pub mod open;
 pub mod order;
 pub mod overlay;
 pub mod refine;
@@ -18,7 +17,6 @@ pub mod refine;
 pub mod shot;
 mod shown;
 mod sort;
-mod video;
 
 pub use board::{Board, Squares};
 pub use corners::{Corner, Corners, PairCorners, Side, Skipped};

@@ -4,10 +4,9 @@
 //! along the rows shows the order both pictures were read in.
 
 use camino::Utf8Path;
-use image::{GrayImage, Luma, Rgb, RgbImage, imageops};
+use image::{GrayImage, Rgb, RgbImage, imageops};
 use nalgebra::Point2;
 
-use super::detect::COARSE_PX;
 use super::image::pyramid::Small;
 use super::image::{Grey8, Mosaic};
 use super::input::pairs::PairFiles;
@@ -46,22 +45,24 @@ impl SideBySide {
 
     fn new([(left, left_scale), (right, right_scale)]: [(GrayImage, f64); 2], ring_px: f64) -> SideBySide {
         let (width, height) = (left.width() + right.width(), left.height().max(right.height()));
-        let image = RgbImage::from_fn(width, height, |x, y| {
-            let of = if x < left.width() {
-                left.get_pixel_checked(x, y)
-            } else {
-                right.get_pixel_checked(x - left.width(), y)
-            };
-            let Luma([grey]) = of.copied().unwrap_or(Luma([0]));
-            Rgb([grey; 3])
-        });
-        SideBySide { image, scales: [left_scale, right_scale], left_width: left.width(), ring_px }
+        let left_width = left.width();
+        let mut both = GrayImage::new(width, height);
+        imageops::replace(&mut both, &left, 0, 0);
+        imageops::replace(&mut both, &right, i64::from(left_width), 0);
+        let image = RgbImage::from_fn(width, height, |x, y| Rgb([both.get_pixel(x, y)[0]; 3]));
+        SideBySide { image, scales: [left_scale, right_scale], left_width, ring_px }
     }
 
     /// Where a place in a raw picture lies, px.
     pub fn place(&self, side: Side, px: &Point2<f64>) -> Point2<f64> {
         let at = px.map(|v| (v + 0.5) / self.scales[side as usize] - 0.5);
         if side == Side::Right { Point2::new(at.x + f64::from(self.left_width), at.y) } else { at }
+    }
+
+    fn with_corners(mut self, corners: &PairCorners) -> SideBySide {
+        self.draw(Side::Left, &corners.left);
+        self.draw(Side::Right, &corners.right);
+        self
     }
 
     fn draw(&mut self, side: Side, corners: &[Corner]) {
@@ -81,12 +82,12 @@ impl SideBySide {
 
 /// The pair with its corners; `None` where a picture can't be read any more.
 pub fn drawn(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> Option<SideBySide> {
-    Some(with_corners(SideBySide::read(files, mosaic)?, corners))
+    Some(SideBySide::read(files, mosaic)?.with_corners(corners))
 }
 
 /// Thumbnails of a pair with its corners, together not wider than this, px.
 pub fn drawn_small(thumbnails: [&Small; 2], corners: &PairCorners, width: u32) -> SideBySide {
-    with_corners(SideBySide::new(thumbnails.map(|small| narrowed(small, width / 2)), SMALL_RING_PX), corners)
+    SideBySide::new(thumbnails.map(|small| narrowed(small, width / 2)), SMALL_RING_PX).with_corners(corners)
 }
 
 /// A thumbnail not wider than this, px, and how many pixels of the picture one of it is.
@@ -100,12 +101,6 @@ fn narrowed(small: &Small, width: u32) -> (GrayImage, f64) {
     (imageops::thumbnail(&all, width.max(1), height), scale * by)
 }
 
-fn with_corners(mut both: SideBySide, corners: &PairCorners) -> SideBySide {
-    both.draw(Side::Left, &corners.left);
-    both.draw(Side::Right, &corners.right);
-    both
-}
-
 /// The same as PNG.
 pub fn png(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> Option<Vec<u8>> {
     let mut bytes = std::io::Cursor::new(Vec::new());
@@ -114,13 +109,11 @@ pub fn png(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> 
 }
 
 fn small(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<Small> {
-    Some(Small::of(&super::image::picture(path, mosaic).ok()?, COARSE_PX))
+    Some(Small::coarse(&super::image::picture(path, mosaic).ok()?))
 }
 
 fn grey(copy: &Grey8) -> GrayImage {
-    GrayImage::from_fn(copy.width as u32, copy.height as u32, |x, y| {
-        Luma([copy.pixels[y as usize * copy.width + x as usize]])
-    })
+    GrayImage::from_raw(copy.width as u32, copy.height as u32, copy.pixels.clone()).unwrap_or_default()
 }
 
 fn colour(corner: &Corner) -> [u8; 3] {

@@ -75,7 +75,5 @@ pub fn eight_bits(picture: &Picture) -> &Image<u8> {
 /// The picture with some of its pixels changed.
 pub fn with_pixels(picture: &Picture, change: impl Fn(&Image<u8>, usize, usize) -> u8) -> Picture {
     let image = eight_bits(picture);
-    let (width, height) = (image.width, image.height);
-    let pixels = (0..width * height).map(|k| change(image, k % width, k / width)).collect();
-    Image { width, height, pixels }.into()
+    Image::from_fn(image.width, image.height, |x, y| change(image, x, y)).into()
 }

@@ -1,14 +1,16 @@
 //! What was found in a folder's pictures, sorted by pairs: those of use, those that are not and why, those whose numbers stay open.
 //!
-//! In: what each picture shows. Out: pairs whose corners are numbered alike in left and right.
+//! In: what each picture shows. Out: pairs whose corners are numbered alike in left and right. Numbers stay open of a plain board that is cut or
+//! hidden, where it is not seen how many lines are missing on which side: such a pair comes with all numberings that its corners may have. How the
+//! cameras stand, which other pairs tell, decides between them later (`crate::stereo::pairs::open_numbers`); a pair for which that is not done
+//! counts as one without a board.
 
 use super::board::Board;
 use super::corners::{OpenPair, PairCorners, Skipped};
 use super::detect::Refusal;
-use super::input::cache::Look;
+use super::input::cache::{Look, Sighting};
 use super::input::pairs::PairFiles;
-use super::lattice::{Lattice, Places};
-use super::open::{listed, open_pair};
+use super::lattice::{Lattice, Renumbering};
 use super::{Corner, order};
 
 /// A pair's name and the corners of its left and right picture.
@@ -49,41 +51,60 @@ pub struct Sorted {
 pub fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>, board: Board) -> Sorted {
     let nothing = || Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
     let (mut found, mut skipped, mut open) = (Vec::new(), Vec::new(), Vec::new());
-    for (files, sides) in files.iter().zip(seen) {
+    for (files, looks) in files.iter().zip(seen) {
         let pair = files.pair.clone();
-        let reason = match sides.map(|look| look.map_err(|refusal| refusal.reason)) {
-            [Ok(left), Ok(right)] => {
-                match open_pair(&pair, &[&left, &right], found.len()) {
-                    None => found.push((pair, left.corners, right.corners)),
-                    Some((pair, reason)) => {
-                        open.push(pair);
-                        skipped.push(reason);
-                    }
-                }
-                continue;
-            }
-            [Ok(left), Err(_)] if board.is_coded() => {
-                found.push((pair, left.corners, nothing()));
-                continue;
-            }
-            [Err(_), Ok(right)] if board.is_coded() => {
-                found.push((pair, nothing(), right.corners));
-                continue;
-            }
-            [Err(left), Err(right)] if left == right => format!("both pictures: {left}"),
-            [Err(left), Err(right)] => format!("left picture: {left}; right picture: {right}"),
-            [Err(left), Ok(_)] => format!("left picture: {left}"),
-            [Ok(_), Err(right)] => format!("right picture: {right}"),
-        };
-        skipped.push(Skipped { pair, reason });
+        // Markers number the corners of one picture by itself.
+        let is_enough = board.is_coded() && looks.iter().any(Result::is_ok);
+        let refused = looks.each_ref().map(|look| look.as_ref().err().map(|refusal| refusal.reason.clone()));
+        if let Some(reason) = of_sides(refused).filter(|_| !is_enough) {
+            skipped.push(Skipped { pair, reason });
+            continue;
+        }
+        let sides = looks.map(|look| look.unwrap_or_else(|_| Sighting { corners: nothing(), print: None, open: None }));
+        let left_open = sides.each_ref().map(|side| side.open.as_ref().map(|open| open.refusal.reason.clone()));
+        if let Some(reason) = of_sides(left_open) {
+            skipped.push(Skipped { pair: pair.clone(), reason });
+            open.push(OpenPair { pair, sides: sides.each_ref().map(numberings), before: found.len() });
+        } else {
+            let [left, right] = sides.map(|side| side.corners);
+            found.push((pair, left, right));
+        }
     }
     Sorted { found, skipped, open }
 }
 
+/// What is said of the left picture of a pair and of the right one; `None` where nothing is of either.
+fn of_sides(said: [Option<String>; 2]) -> Option<String> {
+    match said {
+        [None, None] => None,
+        [Some(left), None] => Some(format!("left picture: {left}")),
+        [None, Some(right)] => Some(format!("right picture: {right}")),
+        [Some(left), Some(right)] if left == right => Some(format!("both pictures: {left}")),
+        [Some(left), Some(right)] => Some(format!("left picture: {left}; right picture: {right}")),
+    }
+}
+
+/// The corners of a picture in all ways of numbering them.
+fn numberings(seen: &Sighting) -> Vec<Vec<Corner>> {
+    let lattice = &seen.corners;
+    let others = seen.open.iter().flat_map(|open| &open.others);
+    let renumbered = |numbering: &Renumbering| {
+        let corners = lattice.renumbered(numbering, (lattice.columns, lattice.rows))?;
+        Some(listed(&corners, numbering.quarters))
+    };
+    std::iter::once(listed(lattice, 0)).chain(others.filter_map(renumbered)).collect()
+}
+
+/// The corners of a lattice that was turned, with their numbers in it.
+fn listed(lattice: &Lattice<Corner>, quarters: usize) -> Vec<Corner> {
+    let reach =
+        |c: &Corner| c.reach.map(|[rows, columns]| if quarters % 2 == 1 { [columns, rows] } else { [rows, columns] });
+    lattice.iter().map(|(col, row, c)| Corner { col, row, reach: reach(c), ..*c }).collect()
+}
+
 /// The corners of pairs, numbered alike in left and right.
 pub fn number_alike(found: Vec<Found>, board: Board) -> Vec<PairCorners> {
-    let places = |grid: &Lattice<Corner>| -> Places { grid.map(|c| c.px) };
-    let pairs: Vec<_> = found.iter().map(|(_, left, right)| (places(left), places(right))).collect();
+    let pairs: Vec<_> = found.iter().map(|(_, left, right)| (left.map(|c| c.px), right.map(|c| c.px))).collect();
     let turns = order::agreed_turns(&pairs, board);
     found
         .into_iter()

@@ -40,6 +40,16 @@ pub enum Kind {
     },
 }
 
+impl Kind {
+    /// The codes of its markers, where it has any.
+    pub fn dictionary(self) -> Option<Dictionary> {
+        match self {
+            Kind::Checker => None,
+            Kind::Charuco { dictionary, .. } | Kind::Tags { family: dictionary, .. } => Some(dictionary),
+        }
+    }
+}
+
 /// A board of squares: so many, of such a size.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(try_from = "String")]
@@ -234,20 +244,13 @@ impl Board {
         Point3::new(of(col, self.columns()) * self.square_mm, of(row, self.rows()) * self.square_mm * self.stretch, 0.0)
     }
 
-    /// True where turning the board by 180 degrees in its plane leaves the same picture: both counts of squares odd, or both even.
-    /// (An odd number of squares one way only swaps black and white.) Markers tell it from its turned self.
-    pub fn looks_the_same_after_half_turn(&self) -> bool {
-        !self.is_coded() && self.squares.columns % 2 == self.squares.rows % 2
-    }
-
-    /// The smallest turn, in quarter turns, after which the board looks the same; `None` where only a whole turn does.
+    /// The smallest turn, in quarter turns, after which the board looks the same; `None` where only a whole turn does. That is a half turn at the most
+    /// where both counts of squares are odd, or both even: an odd number of squares one way only swaps black and white. Markers tell a board from its
+    /// turned self.
     pub fn symmetry(&self) -> Option<usize> {
-        let square = self.squares.columns == self.squares.rows;
-        match (self.looks_the_same_after_half_turn(), square && self.squares.columns % 2 == 1) {
-            (false, _) => None,
-            (true, false) => Some(2),
-            (true, true) => Some(1),
-        }
+        let Squares { columns, rows } = self.squares;
+        let is_alike = !self.is_coded() && columns % 2 == rows % 2;
+        is_alike.then_some(if columns == rows && columns % 2 == 1 { 1 } else { 2 })
     }
 
     /// Quarter turns after which the board looks the same: what a picture leaves open.
@@ -282,10 +285,7 @@ mod tests {
     fn corners_are_centred() {
         let board = Board::checker("7x6".parse().unwrap(), 10.0);
         assert_eq!(board.corner_count(), 30);
-        let sum: nalgebra::Vector3<f64> = (0..board.rows())
-            .flat_map(|row| (0..board.columns()).map(move |col| (col, row)))
-            .map(|(col, row)| board.corner_mm(col, row).coords)
-            .sum();
+        let sum: nalgebra::Vector3<f64> = board.corners_mm().map(|at| at.coords).sum();
         assert_eq!(sum.norm(), 0.0);
         assert_eq!(board.corner_mm(1, 0).x - board.corner_mm(0, 0).x, 10.0);
     }

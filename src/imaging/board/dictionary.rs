@@ -5,7 +5,7 @@
 use std::fmt;
 
 use calib_targets_aruco::builtins::{BUILTIN_DICTIONARY_NAMES, builtin_dictionary};
-use calib_targets_aruco::{resolve_dictionary, rotate_code_u64};
+use calib_targets_aruco::rotate_code_u64;
 
 /// What OpenCV's names of families of AprilTags begin with.
 const TAGS: &str = "DICT_APRILTAG_";
@@ -33,8 +33,7 @@ impl Dictionary {
             let short = name.strip_prefix("DICT_").unwrap_or(name);
             text.eq_ignore_ascii_case(name) || text.eq_ignore_ascii_case(short)
         };
-        let known = BUILTIN_DICTIONARY_NAMES.iter().find(same);
-        let found = known.and_then(|name| builtin_dictionary(name)).or_else(|| resolve_dictionary(text));
+        let found = BUILTIN_DICTIONARY_NAMES.iter().find(same).and_then(|name| builtin_dictionary(name));
         found.map(Dictionary).ok_or_else(|| {
             format!("there is no dictionary `{text}`; there are {}", BUILTIN_DICTIONARY_NAMES.join(", "))
         })

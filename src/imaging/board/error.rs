@@ -29,10 +29,6 @@ pub enum Error {
 }
 
 impl Explain for Error {
-    fn place(&self) -> Option<String> {
-        None
-    }
-
     fn hint(&self) -> Option<String> {
         let hint = match self {
             Error::TagCounts { .. } => "`6x6` are six columns of six tags",

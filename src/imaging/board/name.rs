@@ -147,43 +147,36 @@ impl Board {
 
     /// Whether it is this board, or this board with the first markers of its dictionary alone.
     pub fn has_all_of(&self, other: &Board) -> bool {
-        let dictionary = |board: &Board| match board.kind {
-            Kind::Checker => None,
-            Kind::Charuco { dictionary, .. } | Kind::Tags { family: dictionary, .. } => Some(dictionary),
-        };
         self == other
-            || dictionary(self).zip(dictionary(other)).is_some_and(|(own, others)| {
+            || self.kind.dictionary().zip(other.kind.dictionary()).is_some_and(|(own, others)| {
                 own.begins_with(others) && other.with_dictionary(own).is_some_and(|same| same == *self)
             })
     }
 
     /// Why there can be no such board, where there can be none.
     fn check_markers(&self) -> Result<(), String> {
-        let (marker_mm, dictionary) = match self.kind {
-            Kind::Checker => return Ok(()),
-            Kind::Charuco { marker_mm, dictionary, .. } => (marker_mm, dictionary),
-            Kind::Tags { gap_mm, .. } if !GAPS.contains(&(gap_mm / self.square_mm)) => {
-                return Err(format!("gaps of {gap_mm} mm between tags of {} mm are no grid's", self.square_mm));
+        let square_mm = self.square_mm;
+        match self.kind {
+            Kind::Charuco { marker_mm, .. } if marker_mm >= square_mm => {
+                Err(format!("a marker of {marker_mm} mm does not fit into a square of {square_mm} mm"))
+            }
+            Kind::Charuco { dictionary, .. } => {
+                // The old layout of an even number of rows has markers in the other squares, and as many.
+                let markers = self.squares.columns * self.squares.rows / 2;
+                let (name, count) = (dictionary.name(), dictionary.count());
+                let lacks = format!("{} squares hold {markers} markers, {name} has {count}", self.squares);
+                if markers <= count { Ok(()) } else { Err(lacks) }
+            }
+            Kind::Tags { gap_mm, .. } if !GAPS.contains(&(gap_mm / square_mm)) => {
+                Err(format!("gaps of {gap_mm} mm between tags of {square_mm} mm are no grid's"))
             }
             Kind::Tags { family, .. } => {
                 let ([columns, rows], name, count) = (self.tags(), family.tag_name(), family.count());
-                return if columns * rows <= count {
-                    Ok(())
-                } else {
-                    Err(format!("{columns}x{rows} tags are {}, {name} has {count}", columns * rows))
-                };
+                let lacks = format!("{columns}x{rows} tags are {}, {name} has {count}", columns * rows);
+                if columns * rows <= count { Ok(()) } else { Err(lacks) }
             }
-        };
-        if marker_mm >= self.square_mm {
-            return Err(format!("a marker of {marker_mm} mm does not fit into a square of {} mm", self.square_mm));
+            Kind::Checker => Ok(()),
         }
-        // The old layout of an even number of rows has markers in the other squares, and as many.
-        let markers = self.squares.columns * self.squares.rows / 2;
-        if markers > dictionary.count() {
-            let (name, count) = (dictionary.name(), dictionary.count());
-            return Err(format!("{} squares hold {markers} markers, {name} has {count}", self.squares));
-        }
-        Ok(())
     }
 }
 

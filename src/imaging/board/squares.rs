@@ -1,6 +1,7 @@
 //! How many squares or tags a board has.
 
 use std::fmt;
+use std::ops::Range;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
@@ -30,24 +31,21 @@ impl FromStr for Squares {
 impl Squares {
     /// Reads `6x6` as six columns of six tags.
     pub fn of_tags(text: &str) -> Result<Squares, Error> {
-        let refuse = || Error::TagCounts { found: text.to_owned() };
-        let (a, b) = text.split_once(['x', 'X']).ok_or_else(refuse)?;
-        let count = |text: &str| text.trim().parse().ok().filter(|count| (1..100).contains(count)).ok_or_else(refuse);
-        Ok(Squares { columns: count(a)?, rows: count(b)? })
+        counts(text, 1..100).ok_or_else(|| Error::TagCounts { found: text.to_owned() })
     }
 
     /// Reads `8x11` as eight columns of eleven squares.
     pub fn as_printed(text: &str) -> Result<Squares, Error> {
-        let refuse = || Error::Size { found: text.to_owned() };
-        let (a, b) = text.split_once(['x', 'X']).ok_or_else(refuse)?;
-        let a: usize = a.trim().parse().map_err(|_| refuse())?;
-        let b: usize = b.trim().parse().map_err(|_| refuse())?;
         // Two inner corners each way are the least that has a direction; 200 is far beyond any picture.
-        if a.min(b) < 3 || a.max(b) > 200 {
-            return Err(refuse());
-        }
-        Ok(Squares { columns: a, rows: b })
+        counts(text, 3..201).ok_or_else(|| Error::Size { found: text.to_owned() })
     }
+}
+
+/// Two counts in a range, columns first.
+fn counts(text: &str, range: Range<usize>) -> Option<Squares> {
+    let (columns, rows) = text.split_once(['x', 'X'])?;
+    let count = |text: &str| text.trim().parse().ok().filter(|count| range.contains(count));
+    Some(Squares { columns: count(columns)?, rows: count(rows)? })
 }
 
 impl TryFrom<String> for Squares {

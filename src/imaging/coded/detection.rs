@@ -15,8 +15,8 @@ use super::numbering::{Placement, Said};
 use super::{explain, faint, local_map, measures, numbering};
 use crate::imaging::Board;
 use crate::imaging::board::{Pitch, Print};
-use crate::imaging::detect::{COARSE_PX, Detected, Refusal, grids, on_a_copy, right_handed};
-use crate::imaging::image::pyramid::{Level, factor_for};
+use crate::imaging::detect::{Detected, Refusal, grids, on_a_copy, right_handed};
+use crate::imaging::image::pyramid::{Level, to_full_size};
 use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Lattice, Places};
 
@@ -42,11 +42,9 @@ pub fn with_markers(picture: &Picture) -> Option<String> {
     const GRIDS: usize = 3;
     /// Most markers leave at least as much of a square free on each side.
     const MARGIN: f64 = 0.1;
-    levels(picture).into_iter().take(COPIES).find_map(|level| {
-        let found = grids(&level.copy(picture), Pitch::Even, MARGIN, false).into_iter().take(GRIDS);
-        let mut in_picture =
-            found.map(|grid| without_strays(right_handed(grid.map(|p| level.to_picture(p))), Pitch::Even));
-        let dictionary = in_picture.find_map(|grid| explain::dictionary_in(picture, &grid))?;
+    levels(picture).take(COPIES).find_map(|level| {
+        let mut found = grids_on((level, &level.copy(picture)), Pitch::Even, MARGIN, false).take(GRIDS);
+        let dictionary = found.find_map(|grid| explain::dictionary_in(picture, &grid))?;
         Some(format!("{HAS_MARKERS}{} in its squares", dictionary.said()))
     })
 }
@@ -71,9 +69,9 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     let mut missed = Missed::default();
     for level in levels(picture) {
         let copy = level.copy(picture);
-        let parts = parts_on(picture, &board, &fields, (level, &copy), &mut missed)?;
+        let parts = parts_on(picture, &board, (&fields, margin), (level, &copy), &mut missed)?;
         // Of a part of a board: the rest may be farther away.
-        let is_whole = count(&parts) == board.columns() * board.rows();
+        let is_whole = count(&parts) == board.corner_count();
         let side_px = |part: &Part| if is_whole { part.corners.side_px(pitch) } else { part.corners.least_step_px() };
         let step_px = parts.first().and_then(side_px).map_or(0.0, |px| px / level.scale());
         if !parts.is_empty() && best.as_ref().is_none_or(|(known, ..)| count(&parts) > count(known)) {
@@ -111,19 +109,16 @@ struct Missed {
 fn parts_on(
     picture: &Picture,
     board: &Board,
-    fields: &[Fields],
-    (level, copy): (Level, &Grey8),
+    (fields, margin): (&[Fields], f64),
+    copy: (Level, &Grey8),
     missed: &mut Missed,
 ) -> Result<Vec<Part>, Refusal> {
-    let pitch = board.pitch();
-    let margin = fields.iter().map(|fields| fields.margin()).fold(f64::INFINITY, f64::min);
     let mut parts: Vec<Part> = Vec::new();
     for foreshortened in [false, true] {
-        if merged(board, &parts).count() == board.columns() * board.rows() {
+        if merged(board, &parts).count() == board.corner_count() {
             break;
         }
-        for grid in grids(copy, pitch, margin, foreshortened).into_iter().take(MOST_GRIDS) {
-            let grid = without_strays(right_handed(grid.map(|p| level.to_picture(p))), pitch);
+        for grid in grids_on(copy, board.pitch(), margin, foreshortened).take(MOST_GRIDS) {
             match number(picture, board, fields, &grid) {
                 Numbered::Part(part) => add(board, &mut parts, part)?,
                 Numbered::ByLayout => missed.by_layout = true,
@@ -136,17 +131,20 @@ fn parts_on(
 }
 
 /// Copies in their order: from coarse to fine.
-fn levels(picture: &Picture) -> Vec<Level> {
-    let mut factor = factor_for(picture, COARSE_PX);
-    let mut levels = vec![Level::Reduced(factor)];
-    while factor > 1 {
-        factor = factor.div_ceil(2);
-        levels.push(Level::Reduced(factor));
-    }
-    if picture.width() * picture.height() <= MOST_DOUBLED_PX {
-        levels.push(Level::Doubled);
-    }
-    levels
+fn levels(picture: &Picture) -> impl Iterator<Item = Level> + use<> {
+    let doubled = (picture.width() * picture.height() <= MOST_DOUBLED_PX).then_some(Level::Doubled);
+    to_full_size(picture).chain(doubled)
+}
+
+/// The grids of corners on a copy as they lie in the picture, the largest first.
+fn grids_on(
+    (level, copy): (Level, &Grey8),
+    pitch: Pitch,
+    margin: f64,
+    foreshortened: bool,
+) -> impl Iterator<Item = Places> + use<> {
+    let in_picture = move |grid: Places| without_strays(right_handed(grid.map(|p| level.to_picture(p))), pitch);
+    grids(copy, pitch, margin, foreshortened).into_iter().map(in_picture)
 }
 
 /// The grid without corners that lie elsewhere than their neighbours say, the worst first.

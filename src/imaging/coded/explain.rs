@@ -22,10 +22,7 @@ const MOST_COLUMNS: usize = 40;
 /// Why none of these grids is a part of the board.
 pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Refusal {
     let none = || Refusal::from("no board found".to_owned());
-    let dictionary = match board.kind {
-        Kind::Checker => return none(),
-        Kind::Charuco { dictionary, .. } | Kind::Tags { family: dictionary, .. } => dictionary,
-    };
+    let Some(dictionary) = board.kind.dictionary() else { return none() };
     let largest = grids.iter().max_by_key(|grid| grid.count());
     let Some(grid) = largest.filter(|grid| grid.count() >= 4) else { return none() };
     let size = (grid.columns, grid.rows);
@@ -65,8 +62,7 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Refusal
 pub fn dictionary_in(picture: &Picture, grid: &Places) -> Option<Dictionary> {
     /// In the squares of a plain board nothing has a marker's outline; of what lies round it one or two may be read as one.
     const FEWEST_UNASKED: usize = 4;
-    let fields = SHARES.into_iter().flat_map(|share| (4..=7).map(move |bits| Fields::of_marker(share, bits)));
-    let known = fields.flat_map(|fields| {
+    let known = of_markers(SHARES.into_iter()).flat_map(|fields| {
         let reads = markers_in(picture, grid, Pitch::Even, fields);
         let all = if reads.len() < FEWEST_UNASKED { Vec::new() } else { Dictionary::all().collect() };
         let of = move |dictionary: Dictionary| (known_in(dictionary, &reads), dictionary, reads.len());
@@ -115,13 +111,15 @@ fn other_markers(picture: &Picture, board: &Board, (dictionary, own): (Dictionar
     reason.into()
 }
 
+/// How markers of such shares of a square may be divided.
+fn of_markers(shares: impl Iterator<Item = f64>) -> impl Iterator<Item = Fields> {
+    shares.flat_map(|share| (4..=7).map(move |bits| Fields::of_marker(share, bits)))
+}
+
 /// How the markers of other boards may be divided.
 fn other_fields(board: &Board, own: Fields) -> Vec<Fields> {
     match board.pitch() {
-        Pitch::Even => {
-            let shares = std::iter::once(own.share).chain(SHARES);
-            shares.flat_map(|share| (4..=7).map(move |bits| Fields::of_marker(share, bits))).collect()
-        }
+        Pitch::Even => of_markers(std::iter::once(own.share).chain(SHARES)).collect(),
         Pitch::Tags { gap } => {
             let borders = TAG_BORDERS.into_iter();
             borders.flat_map(|border| (4..=7).map(move |bits| Fields::of_tag(gap, bits, border))).collect()

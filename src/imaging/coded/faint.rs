@@ -115,12 +115,11 @@ fn judged(board: &Board, size: (usize, usize), seen: &[Faint], best: Way) -> Sai
     correlations.sort_by(f64::total_cmp);
     let well = correlations.get(3 * correlations.len() / 4).copied().unwrap_or(0.0);
     let agreeing = correlations.iter().filter(|correlation| **correlation > well / 2.0).count();
-    let contradicting = correlations.len() - agreeing;
-    if agreeing <= AGREEING * contradicting {
+    if agreeing <= AGREEING * (correlations.len() - agreeing) {
         return Said::Nothing;
     }
     let (col, row) = shift;
-    Said::Place(Placement { quarters, col, row, layout, agreeing, contradicting, inverted: score < 0.0 })
+    Said::Place(Placement { quarters, col, row, layout, agreeing, inverted: score < 0.0 })
 }
 
 #[cfg(test)]

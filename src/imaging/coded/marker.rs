@@ -203,11 +203,8 @@ pub fn read(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Op
     if wrong(&outline, true) || wrong(&paper, false) {
         return None;
     }
-    let mut code = 0;
-    for k in 0..bits * bits {
-        let (i, j) = (k % bits + border, k / bits + border);
-        code |= u64::from(is_black(grid[j * side + i])) << k;
-    }
+    let bit = |k: usize| u64::from(is_black(grid[(k / bits + border) * side + k % bits + border])) << k;
+    let code = (0..bits * bits).map(bit).sum();
     Some(Marker { code, bits, inverted, contrast: (white - black).abs() })
 }
 

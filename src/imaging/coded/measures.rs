@@ -84,11 +84,7 @@ fn seen_share(picture: &Picture, corners: &Places, layout: Layout, fields: Field
     let maps: Vec<_> = corners
         .iter()
         .filter(|(col, row, _)| layout.holds_marker(*col as isize + 1, *row as isize + 1))
-        .filter_map(|(col, row, _)| {
-            let square = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(c, r)| corners.get(col + c, row + r).copied());
-            let [Some(a), Some(b), Some(c), Some(d)] = square else { return None };
-            square_map(&[a, b, c, d])
-        })
+        .filter_map(|(col, row, _)| square_map(&corners.square(col, row)?.map(|p| *p)))
         .collect();
     let contrast = |share: f64| {
         let (outside, inside) = ((1.0 - share) / 2.0 - 0.25 * field, (1.0 - share) / 2.0 + 0.25 * field);

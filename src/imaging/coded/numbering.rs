@@ -33,21 +33,12 @@ pub struct Placement {
     pub layout: Layout,
     /// Markers that agree with it.
     pub agreeing: usize,
-    /// Markers that contradict it.
-    pub contradicting: usize,
     /// Whether the markers are printed white on black.
     pub inverted: bool,
 }
 
 /// How many markers agree for each that contradicts.
 pub const AGREEING: usize = 3;
-
-impl Placement {
-    /// True where it is more than chance.
-    fn holds(&self, whole: usize) -> bool {
-        self.agreeing > AGREEING * self.contradicting && (self.agreeing >= 2 || whole >= 1)
-    }
-}
 
 /// The number of bits that a marker may be misread in where others agree with it. By the binomial sum, bits without any order then pass for a
 /// given marker once in 480 times for 4x4 bits, in 13 000 for 5x5, in a million for 6x6; a placement needs two that do, or one without a wrong bit.
@@ -74,9 +65,8 @@ fn turned(read: &Read, size: (usize, usize), quarters: usize) -> Read {
 
 /// The number of the marker in a square of the board; `None` where there is none or no such square.
 fn marker_in(board: &Board, layout: Layout, (x, y): (isize, isize)) -> Option<usize> {
-    let (columns, rows) = (board.squares.columns as isize, board.squares.rows as isize);
-    let inside = (0..columns).contains(&x) && (0..rows).contains(&y);
-    (inside && layout.holds_marker(x, y)).then(|| layout.number(board.squares, x as usize, y as usize))
+    let holds = is_inside(board, (x, y)) && layout.holds_marker(x, y);
+    holds.then(|| layout.number(board.squares, x as usize, y as usize))
 }
 
 /// The bits of the marker in a square of the board, row by row as they are printed; `None` where there is none.
@@ -110,15 +100,9 @@ pub fn place(board: &Board, size: (usize, usize), reads: &[Read]) -> Said {
         [] => Said::Nothing,
         [(only, _)] => Said::Place(only),
         // A layout is the other one moved by a column, but for the board's ends: only markers there tell them apart.
-        [(a, whole_a), (b, whole_b), ..] => {
-            if a.agreeing > b.agreeing && whole_a > whole_b {
-                Said::Place(a)
-            } else if b.agreeing > a.agreeing && whole_b > whole_a {
-                Said::Place(b)
-            } else {
-                Said::ByLayout
-            }
-        }
+        [(a, whole_a), (b, whole_b), ..] if a.agreeing > b.agreeing && whole_a > whole_b => Said::Place(a),
+        [(a, whole_a), (b, whole_b), ..] if b.agreeing > a.agreeing && whole_b > whole_a => Said::Place(b),
+        [_, _, ..] => Said::ByLayout,
     }
 }
 
@@ -148,14 +132,14 @@ fn by_layout(
                     _ => contradicting += 1,
                 }
             }
-            let found = Placement { quarters, col, row, layout, agreeing, contradicting, inverted };
-            if !found.holds(whole) {
+            let is_chance = agreeing <= AGREEING * contradicting || agreeing < 2 && whole < 1;
+            if is_chance {
                 continue;
             }
             let known = best.map_or(0, |(known, _)| known.agreeing);
             rival = rival.max(known.min(agreeing));
             if agreeing > known {
-                best = Some((found, whole));
+                best = Some((Placement { quarters, col, row, layout, agreeing, inverted }, whole));
             }
         }
     }
@@ -221,10 +205,9 @@ mod tests {
                 for quarters in 0..4 {
                     for (col, row) in [(0, 0), (1, 0), (0, 2), (1, 1)] {
                         let (size, reads) = part(&board, layout, col..col + 2, row..row + 2, quarters);
-                        let expected = ((4 - quarters) % 4, col, row, layout, 0);
-                        let told = |found: Placement| {
-                            (found.quarters, found.col, found.row, found.layout, found.contradicting)
-                        };
+                        let expected = ((4 - quarters) % 4, col, row, layout, reads.len());
+                        let told =
+                            |found: Placement| (found.quarters, found.col, found.row, found.layout, found.agreeing);
                         match place(&board.with_layout(layout), size, &reads) {
                             Said::Place(found) => assert_eq!(told(found), expected),
                             other => panic!("{board} {layout:?} {quarters} {col} {row}: {other:?}"),

@@ -22,21 +22,19 @@ pub(super) fn turn_by_colours(small: &Grey8, grid: Places, board: Board) -> Plac
     if first_square_is_dark(small, &grid) {
         return grid;
     }
-    if !board.looks_the_same_after_half_turn() {
-        return grid.half_turn();
+    match board.symmetry() {
+        None => grid.half_turn(),
+        Some(2) if board.columns() == board.rows() => grid.quarter_turn(),
+        Some(_) => grid,
     }
-    if board.columns() == board.rows() && board.squares.columns.is_multiple_of(2) {
-        return grid.quarter_turn();
-    }
-    grid
 }
 
 /// True where the squares of the colour of square (0, 0) are the darker ones. Each cell is compared with its neighbours, so
 /// that uneven light does not matter.
 fn first_square_is_dark(small: &Grey8, grid: &Places) -> bool {
     let centre = |col: usize, row: usize| {
-        let p = [grid.get(col, row)?, grid.get(col + 1, row)?, grid.get(col, row + 1)?, grid.get(col + 1, row + 1)?];
-        let sum = p.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / 4.0;
+        let [a, b, d, c] = grid.square(col, row)?;
+        let sum = [a, b, c, d].iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / 4.0;
         let (x, y) = (sum.x.round(), sum.y.round());
         let inside = x >= 0.0 && y >= 0.0 && x < small.width as f64 && y < small.height as f64;
         inside.then(|| f64::from(small.pixels[y as usize * small.width + x as usize]))

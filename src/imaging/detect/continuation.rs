@@ -11,7 +11,7 @@ use nalgebra::{Point2, Vector2};
 use super::Detected;
 use crate::imaging::Board;
 use crate::imaging::image::Grey8;
-use crate::imaging::lattice::{Lattice, Places};
+use crate::imaging::lattice::Places;
 use crate::statistics::median;
 
 /// Share of a line beyond the border that must look like corners; the board's own outer edge shows none.
@@ -58,7 +58,7 @@ enum End {
 fn beyond(copy: &Grey8, grid: &Places) -> End {
     let Some(usual) = usual(copy, grid) else { return End::Squares };
     let goes_on = |steps: f64| {
-        let seen = (0..grid.rows).filter_map(|row| contrast(copy, grid, (-1, row as isize), steps, None));
+        let seen = (0..grid.rows).filter_map(|row| contrast(copy, grid, (-1, row), steps, None));
         seen.filter(|c| c / usual > CONTRAST).count() as f64 >= SHARE * grid.rows as f64
     };
     match is_cut(copy, grid, -1) {
@@ -85,7 +85,7 @@ pub(super) fn without_cut_lines(copy: &Grey8, grid: &Places, board: Board) -> Op
 
 /// The grid with so many columns at the most, and whether one of two that are alike was left out.
 fn without_cut_columns(copy: &Grey8, mut grid: Places, columns: usize) -> Option<(Places, bool)> {
-    let filled = |grid: &Places| (0..grid.rows).filter(|&row| grid.get(0, row).is_some()).count();
+    let filled = |grid: &Places| grid.rows_at_front().count();
     let mut is_chosen = false;
     while grid.columns > columns {
         let turned = grid.half_turn();
@@ -95,8 +95,7 @@ fn without_cut_columns(copy: &Grey8, mut grid: Places, columns: usize) -> Option
         }
         is_chosen |= first && last && grid.columns == columns + 1 && filled(&grid) == filled(&turned);
         let from_first = first && (!last || filled(&grid) <= filled(&turned));
-        let ahead = if from_first { grid } else { turned };
-        grid = Lattice::from_fn(ahead.columns - 1, ahead.rows, |col, row| ahead.get(col + 1, row).copied());
+        grid = if from_first { grid } else { turned }.without_front();
     }
     Some((grid, is_chosen))
 }
@@ -104,7 +103,7 @@ fn without_cut_columns(copy: &Grey8, mut grid: Places, columns: usize) -> Option
 /// True where before a column, the first or one further out, there are parts of squares at the most.
 fn is_cut(copy: &Grey8, grid: &Places, column: isize) -> bool {
     let Some(usual) = usual(copy, grid) else { return false };
-    let before = |row: usize| contrast(copy, grid, (column, row as isize), IN_SQUARES, Some(WHOLE));
+    let before = |row: usize| contrast(copy, grid, (column, row), IN_SQUARES, Some(WHOLE));
     let known: Vec<f64> = (0..grid.rows).filter_map(before).collect();
     let whole = known.iter().filter(|c| **c / usual > WHOLE_CONTRAST).count();
     !known.is_empty() && whole * BY_CHANCE <= known.len()
@@ -112,35 +111,34 @@ fn is_cut(copy: &Grey8, grid: &Places, column: isize) -> bool {
 
 /// Whether a corner of the grid has four squares of the contrast that most have, in their order of colours.
 pub(super) fn is_crossing(copy: &Grey8, grid: &Places, (col, row): (usize, usize)) -> bool {
-    let here = contrast(copy, grid, (col as isize, row as isize), IN_SQUARES, None);
+    let here = contrast(copy, grid, (col as isize, row), IN_SQUARES, None);
     usual(copy, grid).zip(here).is_some_and(|(usual, here)| here / usual > CONTRAST)
 }
 
 /// Contrast of most corners, with the sign that the order of colours gives it.
 fn usual(copy: &Grey8, grid: &Places) -> Option<f64> {
-    let seen =
-        grid.iter().filter_map(|(col, row, _)| contrast(copy, grid, (col as isize, row as isize), IN_SQUARES, None));
-    median(seen)
+    median(grid.iter().filter_map(|(col, row, _)| contrast(copy, grid, (col as isize, row), IN_SQUARES, None)))
 }
 
 /// The grid without what is no crossing of four squares: at a board's end the outer corners of its dark squares on a light margin.
 pub(super) fn without_ends(copy: &Grey8, grid: Places) -> Places {
-    let at = |col: usize, row: usize, steps: f64| contrast(copy, &grid, (col as isize, row as isize), steps, None);
+    let at = |col: usize, row: usize, steps: f64| contrast(copy, &grid, (col as isize, row), steps, None);
     let mut seen: Vec<f64> = grid.iter().filter_map(|(col, row, _)| at(col, row, IN_SQUARES)).map(f64::abs).collect();
     seen.sort_by(f64::total_cmp);
     // On a board of nine corners those at its end may be nearly as many.
     let Some(usual) = seen.get(3 * seen.len() / 4).copied() else { return grid };
-    Lattice::from_fn(grid.columns, grid.rows, |col, row| {
+    grid.filter_map(|col, row, place| {
         let mut seen = NEARER.into_iter().filter_map(|steps| at(col, row, steps)).peekable();
         let crosses = seen.peek().is_none() || seen.any(|c| c.abs() > END_CONTRAST * usual);
-        grid.get(col, row).copied().filter(|_| crosses)
+        crosses.then_some(*place)
     })
 }
 
-/// Contrast of the four squares round a corner of the grid, or round a place one square beyond it, so many steps along both edges from it, with the
-/// sign that the order of colours gives it: the lesser of both differences between neighbours across an edge and their
+/// Contrast of the four squares round a corner of the grid, or round a place one square before its first column, so many steps along both edges
+/// from it, with the sign that the order of colours gives it: the lesser of both differences between neighbours across an edge and their
 /// neighbours across the other, and none where they have two signs, as across the board's outer edge. `before`: how many steps against the columns' order. `None` outside of the picture.
-fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, isize), steps: f64, before: Option<f64>) -> Option<f64> {
+fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, usize), steps: f64, before: Option<f64>) -> Option<f64> {
+    let row = row as isize;
     let (place, along, across) = local(grid, col, row)?;
     let before = before.unwrap_or(steps);
     let at = |a: f64, b: f64| {
@@ -155,18 +153,14 @@ fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, isize), steps: f64,
     Some(if mean > 0.0 { least.max(0.0) } else { most.min(0.0) })
 }
 
-/// A corner of the grid or a place one square beyond it, and the steps to the next column and the next row there.
+/// A corner of the grid or a place one square before its first column, and the steps to the next column and the next row there.
 fn local(grid: &Places, col: isize, row: isize) -> Option<(Point2<f64>, Vector2<f64>, Vector2<f64>)> {
-    let (columns, rows) = (grid.columns as isize, grid.rows as isize);
-    let inward = |at: isize, size: isize| isize::from(at < 0) - isize::from(at >= size);
-    let (dc, dr) = (inward(col, columns), inward(row, rows));
-    let place =
-        if (dc, dr) == (0, 0) { *grid.around(col, row)? } else { grid.next((col + dc, row + dr), (-dc, -dr))?.0 };
-    let (c, r) = (col.clamp(0, columns - 1), row.clamp(0, rows - 1));
+    let place = if col < 0 { grid.next((0, row), (-1, 0))?.0 } else { *grid.around(col, row)? };
+    let col = col.max(0);
     let step = |dc: isize, dr: isize| {
-        let here = grid.around(c, r)?;
-        let next = grid.around(c + dc, r + dr).map(|p| p - here);
-        next.or_else(|| grid.around(c - dc, r - dr).map(|p| here - p))
+        let here = grid.around(col, row)?;
+        let next = grid.around(col + dc, row + dr).map(|p| p - here);
+        next.or_else(|| grid.around(col - dc, row - dr).map(|p| here - p))
     };
     Some((place, step(1, 0)?, step(0, 1)?))
 }
@@ -175,21 +169,20 @@ fn local(grid: &Places, col: isize, row: isize) -> Option<(Point2<f64>, Vector2<
 mod tests {
     use super::*;
     use crate::imaging::image::pyramid::Level;
+    use crate::imaging::lattice::Lattice;
 
     /// A board of 7x6 squares of 12 px in a light margin, of which the inner corners in the given ranges were found.
     fn found(cols: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> Detected {
-        let colour = |x: usize, y: usize| {
+        let copy = Grey8::from_fn(108, 96, |x, y| {
             let (i, j) = (x as isize / 12 - 1, y as isize / 12 - 1);
             let black = (0..7).contains(&i) && (0..6).contains(&j) && (i + j) % 2 == 0;
             if black { 40 } else { 200 }
-        };
-        let pixels = (0..108 * 96).map(|k| colour(k % 108, k / 108)).collect();
-        let copy = Grey8 { width: 108, height: 96, pixels };
+        });
         let corners = Lattice::from_fn(cols.len(), rows.len(), |col, row| {
             let (x, y) = ((cols.start + col + 2) * 12, (rows.start + row + 2) * 12);
             Some(Point2::new(x as f64 - 0.5, y as f64 - 0.5))
         });
-        Detected { corners, copy, level: Level::Reduced(1), print: None, open: None }
+        Detected::plain(corners, copy, Level::Reduced(1))
     }
 
     #[test]
@@ -219,19 +212,11 @@ mod tests {
     fn cut(share: f64) -> (Grey8, Places) {
         let (left, right) = (24.0 - 12.0 * share, 24.0 + 7.0 * 12.0 + 12.0 * share);
         let bottom = 24.0 + 6.0 * 12.0 + 12.0 * share;
-        let colour = |x: usize, y: usize| {
+        let copy = Grey8::from_fn(144, 132, |x, y| {
             let inside = |v: usize, to: f64| v as f64 >= left && (v as f64) < to;
-            let black = (x / 12 + y / 12).is_multiple_of(2);
-            if !inside(x, right) || !inside(y, bottom) {
-                70
-            } else if black {
-                40
-            } else {
-                200
-            }
-        };
-        let copy =
-            Grey8 { width: 144, height: 132, pixels: (0..144 * 132).map(|k| colour(k % 144, k / 144)).collect() };
+            let grey = if (x / 12 + y / 12).is_multiple_of(2) { 40 } else { 200 };
+            if inside(x, right) && inside(y, bottom) { grey } else { 70 }
+        });
         let place = |v: usize| (24 + 12 * v) as f64 - 0.5;
         (copy, Lattice::from_fn(8, 7, |col, row| Some(Point2::new(place(col), place(row)))))
     }
@@ -247,13 +232,7 @@ mod tests {
             // Which of two lines that are alike is not the board's cannot be told; and there are no more of them.
             assert_eq!(without_cut_lines(&copy, &grid, board("8x7")), None);
             assert_eq!(without_cut_lines(&copy, &grid, board("6x5")), None);
-            let detected = |corners: Places| Detected {
-                corners,
-                copy: copy.clone(),
-                level: Level::Reduced(1),
-                print: None,
-                open: None,
-            };
+            let detected = |corners: Places| Detected::plain(corners, copy.clone(), Level::Reduced(1));
             let inner = Lattice::from_fn(6, 5, |col, row| grid.get(col + 1, row + 1).copied());
             assert_eq!(lines_beyond(&detected(inner)), (0, 0));
             let part = Lattice::from_fn(7, 7, |col, row| grid.get(col, row).copied());
@@ -266,18 +245,14 @@ mod tests {
     fn the_edge_of_the_margin_is_no_line_of_corners() {
         // Squares cut to a half, a light margin, and a dark wall whose edge lies where the next line of corners would be, or near it.
         for margin in [0.2, 0.35, 0.45, 0.5, 0.55, 0.7, 1.0] {
-            let (Grey8 { width, height, mut pixels }, grid) = cut(0.5);
-            for (k, grey) in pixels.iter_mut().enumerate() {
-                let (x, y) = ((k % width) as f64, (k / width) as f64);
-                let outside = |v: f64, to: f64| (18.0 - v).max(v - to);
+            let (board, grid) = cut(0.5);
+            let copy = Grey8::from_fn(board.width, board.height, |x, y| {
+                let outside = |v: usize, to: f64| (18.0 - v as f64).max(v as f64 - to);
                 let beyond = outside(x, 113.0).max(outside(y, 101.0)) / 12.0;
-                if beyond > 0.0 {
-                    *grey = if beyond < margin { 200 } else { 40 };
-                }
-            }
-            let copy = Grey8 { width, height, pixels };
-            let detected = Detected { corners: grid, copy, level: Level::Reduced(1), print: None, open: None };
-            assert_eq!(lines_beyond(&detected), (0, 0), "{margin}");
+                let wall = if beyond < margin { 200 } else { 40 };
+                if beyond > 0.0 { wall } else { board.pixels[y * board.width + x] }
+            });
+            assert_eq!(lines_beyond(&Detected::plain(grid, copy, Level::Reduced(1))), (0, 0), "{margin}");
         }
     }
 

@@ -4,7 +4,7 @@
 //! next line of corners would be in view. Goes wrong: a board that is cut, hidden or in glare gives none, or too few of the second kind.
 
 use super::extent;
-use super::plain::{Attempt, Way, grown, ladder};
+use super::plain::{Way, grown, ladder, whole_squares};
 use crate::imaging::Squares;
 use crate::imaging::image::Picture;
 
@@ -18,14 +18,11 @@ pub struct Seen {
 
 /// The squares of the whole board that a picture shows.
 pub fn squares_of(picture: &Picture) -> Option<Seen> {
-    let levels = ladder(picture).into_iter().filter_map(|Attempt { level, way }| (way == Way::Grow).then_some(level));
     let mut most: Option<Seen> = None;
-    for level in levels {
+    for (level, _) in ladder(picture).into_iter().filter(|(_, way)| *way == Way::Grow) {
         let small = level.copy(picture);
-        let Some(grid) = grown(&small, usize::MAX).filter(|grid| grid.count() == grid.columns * grid.rows) else {
-            continue;
-        };
-        let squares = Squares { columns: grid.columns.max(grid.rows) + 1, rows: grid.columns.min(grid.rows) + 1 };
+        let Some(grid) = grown(&small, usize::MAX) else { continue };
+        let Some(squares) = whole_squares(&grid) else { continue };
         if extent::ends_on_all_sides(&small, &grid) {
             return Some(Seen { squares, ends: true });
         }

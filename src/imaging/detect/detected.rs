@@ -2,12 +2,9 @@
 
 use crate::imaging::Board;
 use crate::imaging::board::Print;
-use crate::imaging::image::pyramid::{Level, factor_for};
+use crate::imaging::image::pyramid::{Level, coarse_factor};
 use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Places, Renumbering};
-
-/// Pixels of the copy on which boards of any kind are looked for first.
-pub const COARSE_PX: usize = 1_000_000;
 
 /// Grids of fewer corners than this are chance.
 pub const LEAST_SEEN: usize = 12;
@@ -25,6 +22,13 @@ pub struct Detected {
     pub print: Option<Print>,
     /// What else the numbers of its corners could be, where that is open.
     pub open: Option<Open>,
+}
+
+impl Detected {
+    /// A board without markers whose numbers are not open.
+    pub fn plain(corners: Places, copy: Grey8, level: Level) -> Detected {
+        Detected { corners, copy, level, print: None, open: None }
+    }
 }
 
 /// Why a picture gave no corners.
@@ -52,23 +56,21 @@ pub struct Open {
     pub refusal: Refusal,
 }
 
-/// The copy on which whole boards with large squares are seen: half as long and wide as that of about [`COARSE_PX`] and made of a few of the
+/// The copy on which whole boards with large squares are seen: half as long and wide as that of [`coarse_factor`] and made of a few of the
 /// picture's lines, of a small picture the same.
 pub fn glance_level(picture: &Picture) -> Level {
-    let first = factor_for(picture, COARSE_PX);
+    let first = coarse_factor(picture);
     if first == 1 { Level::Reduced(1) } else { Level::Skimmed(2 * first) }
 }
 
 /// What was found on a copy, on one that is no finer than the picture.
 pub fn on_a_copy(picture: &Picture, level: Level, small: &Grey8, corners: Places) -> Detected {
     match level {
-        Level::Reduced(_) | Level::Skimmed(_) => {
-            Detected { corners, copy: small.clone(), level, print: None, open: None }
-        }
+        Level::Reduced(_) | Level::Skimmed(_) => Detected::plain(corners, small.clone(), level),
         Level::Doubled => {
             let level = Level::Reduced(1);
             let corners = corners.map(|p| level.to_copy(&Level::Doubled.to_picture(p)));
-            Detected { corners, copy: level.copy(picture), level, print: None, open: None }
+            Detected::plain(corners, level.copy(picture), level)
         }
     }
 }

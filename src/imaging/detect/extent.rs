@@ -77,10 +77,8 @@ fn missing_before(missing: usize, ends: impl Fn() -> [End; 2]) -> Vec<usize> {
 }
 
 /// The grid without outer lines that are chance finds beside the board, in a numbering from any of its ends.
-pub fn without_chance_lines(small: &Grey8, grid: Places) -> Places {
-    let filled =
-        |grid: &Places| (0..grid.rows).filter(|&row| grid.get(0, row).is_some()).count() as f64 / grid.rows as f64;
-    let mut grid = grid;
+pub fn without_chance_lines(small: &Grey8, mut grid: Places) -> Places {
+    let filled = |grid: &Places| grid.rows_at_front().count() as f64 / grid.rows as f64;
     loop {
         let is_chance = |turned: &Places| {
             let lacks = next_places(turned, 1).into_iter().enumerate().filter(|(row, _)| turned.get(0, *row).is_none());
@@ -93,7 +91,7 @@ pub fn without_chance_lines(small: &Grey8, grid: Places) -> Places {
         let sides =
             (0..4).map(|quarters| grid.turned(quarters)).filter(|turned| turned.columns > 0 && is_chance(turned));
         let Some(sparsest) = sides.min_by(|a, b| filled(a).total_cmp(&filled(b))) else { return grid };
-        grid = Lattice::from_fn(sparsest.columns - 1, sparsest.rows, |col, row| sparsest.get(col + 1, row).copied());
+        grid = sparsest.without_front();
     }
 }
 
@@ -102,25 +100,23 @@ pub fn without_chance_lines(small: &Grey8, grid: Places) -> Places {
 pub fn whole_without_sparse_line(grid: &Places, board: Board) -> Option<Places> {
     let size = [board.columns(), board.rows()];
     (0..4).map(|quarters| grid.turned(quarters)).filter(|turned| turned.columns > 1).find_map(|turned| {
-        let found = (0..turned.rows).filter(|&row| turned.get(0, row).is_some()).count();
-        let is_whole = turned.count() - found == board.corner_count();
-        let fits = [[turned.columns - 1, turned.rows], [turned.rows, turned.columns - 1]].contains(&size);
-        (2 * found <= turned.rows && is_whole && fits)
-            .then(|| Lattice::from_fn(turned.columns - 1, turned.rows, |col, row| turned.get(col + 1, row).copied()))
+        let left = turned.without_front();
+        let is_whole = left.count() == board.corner_count();
+        let fits = [[left.columns, left.rows], [left.rows, left.columns]].contains(&size);
+        (2 * turned.rows_at_front().count() <= turned.rows && is_whole && fits).then_some(left)
     })
 }
 
 /// The grid without outer lines that are no corners but the board's own outline: without such a line the grid is seen to end there as a board does.
 /// So it does where a finger lies on the dark squares beyond a line of corners; these are crossings of four squares, and the outline has none.
-pub fn without_outline(small: &Grey8, grid: Places) -> Places {
-    let mut grid = grid;
+pub fn without_outline(small: &Grey8, mut grid: Places) -> Places {
     for _ in 0..4 {
         grid = grid.quarter_turn();
         // Of chance finds alone nothing may be left.
         if grid.columns < 3 {
             continue;
         }
-        let inner = Lattice::from_fn(grid.columns - 1, grid.rows, |col, row| grid.get(col + 1, row).copied());
+        let inner = grid.without_front();
         if end(small, &inner) == End::Board && !are_crossings(small, &grid) {
             grid = inner;
         }
@@ -130,24 +126,26 @@ pub fn without_outline(small: &Grey8, grid: Places) -> Places {
 
 /// Whether most corners of the first column are crossings of four squares.
 fn are_crossings(small: &Grey8, grid: &Places) -> bool {
-    let found: Vec<usize> = (0..grid.rows).filter(|&row| grid.get(0, row).is_some()).collect();
-    let crossings = found.iter().filter(|&&row| continuation::is_crossing(small, grid, (0, row))).count();
-    2 * crossings > found.len()
+    let crossings = grid.rows_at_front().filter(|&row| continuation::is_crossing(small, grid, (0, row))).count();
+    2 * crossings > grid.rows_at_front().count()
 }
 
+/// Where the next corner of a line would be, and the step that leads there, px.
+type Next = (Point2<f64>, Vector2<f64>);
+
 /// Where the corners of the line before a column are, as far as the grid goes on evenly; each with the step that leads there.
-fn next_places(grid: &Places, column: usize) -> Vec<Option<(Point2<f64>, Vector2<f64>)>> {
+fn next_places(grid: &Places, column: usize) -> Vec<Option<Next>> {
     (0..grid.rows).map(|row| grid.next((column as isize, row as isize), (-1, 0))).collect()
 }
 
 /// True for a place so near to the picture's border, or beyond it, that a corner there is not seen.
-fn is_outside(small: &Grey8, (place, _): &(Point2<f64>, Vector2<f64>)) -> bool {
+fn is_outside(small: &Grey8, (place, _): &Next) -> bool {
     let (x, y) = (small.width as f64 - 1.0 - CLOSE_PX, small.height as f64 - 1.0 - CLOSE_PX);
     !(place.x >= CLOSE_PX && place.y >= CLOSE_PX && place.x <= x && place.y <= y)
 }
 
 /// True for a place less than a square from being outside.
-fn is_near_border(small: &Grey8, (place, step): &(Point2<f64>, Vector2<f64>)) -> bool {
+fn is_near_border(small: &Grey8, (place, step): &Next) -> bool {
     is_outside(small, &(place + step, *step))
 }
 
@@ -162,7 +160,7 @@ fn end(small: &Grey8, grid: &Places) -> End {
     }
     // At the middle between two corners: the grey of the square before them, of the one beyond, and of the margin.
     let greys = |in_square: f64, in_margin: f64| -> Vec<Option<[f64; 3]>> {
-        let of = |two: &[Option<(Point2<f64>, Vector2<f64>)>]| {
+        let of = |two: &[Option<Next>]| {
             let [Some((a, step_a)), Some((b, step_b))] = *two else { return None };
             let (middle, step) = (nalgebra::center(&a, &b), (step_a + step_b) / 2.0);
             let at = |steps: f64| small.mean_at(middle + step * (steps - 1.0));
@@ -224,16 +222,10 @@ mod tests {
             let (wide, high) = (board.squares.columns as isize, board.squares.rows as isize);
             let black = (0..wide).contains(&i) && (0..high).contains(&j) && (i + j) % 2 == 0;
             let paper = (-1..=wide).contains(&i) && (-1..=high).contains(&j);
-            if hidden(x, y) || !paper {
-                120
-            } else if black {
-                30
-            } else {
-                220
-            }
+            let grey = if black { 30 } else { 220 };
+            if hidden(x, y) || !paper { 120 } else { grey }
         };
-        let small =
-            Grey8 { width: w, height: h, pixels: (0..w * h).map(|k| colour((k % w) as f64, (k / w) as f64)).collect() };
+        let small = Grey8::from_fn(w, h, |x, y| colour(x as f64, y as f64));
         let place = |col: usize, row: usize| Point2::new(at.0 + SIDE * col as f64, at.1 + SIDE * row as f64);
         let is = |col: usize, row: usize| {
             let p = place(col, row);
@@ -281,18 +273,12 @@ mod tests {
     #[test]
     fn the_outline_is_no_line_of_corners() {
         let small = |hidden: bool| {
-            let colour = |x: usize, y: usize| {
+            Grey8::from_fn(120, 100, |x, y| {
                 let (i, j) = (x / 10, y / 10);
                 let black = (2..10).contains(&i) && (2..8).contains(&j) && (i + j) % 2 == 0;
-                if hidden && x > 92 {
-                    120
-                } else if black {
-                    30
-                } else {
-                    220
-                }
-            };
-            Grey8 { width: 120, height: 100, pixels: (0..120 * 100).map(|k| colour(k % 120, k / 120)).collect() }
+                let grey = if black { 30 } else { 220 };
+                if hidden && x > 92 { 120 } else { grey }
+            })
         };
         // From the first column on, of which 2 is the outline.
         let grid = |first: usize, last: usize| {

@@ -52,7 +52,7 @@ pub fn largest_grid(picture: &Grey8, enough: usize) -> Option<Places> {
             break;
         }
         seeds += 1;
-        let grown = grow(&candidates, &near, Pitch::Even, first, longest_step(picture, best.len()));
+        let grown = near.grow(Pitch::Even, first, longest_step(picture, best.len()));
         if grown.len() >= 9 {
             grown.iter().for_each(|&(_, i)| taken[i] = true);
         }
@@ -86,13 +86,10 @@ pub fn grids(picture: &Grey8, pitch: Pitch, margin: f64, foreshortened: bool) ->
             break;
         }
         seeds += 1;
-        let grown = grow(&candidates, &near, pitch, first, longest_step(picture, 1));
+        let grown = near.grow(pitch, first, longest_step(picture, 1));
         if grown.len() >= FEWEST {
-            let is_new = grown.iter().any(|&(_, i)| !taken[i]);
             grown.iter().for_each(|&(_, i)| taken[i] = true);
-            if is_new {
-                found.push(grown);
-            }
+            found.push(grown);
         }
     }
     // Stable: equal ones stay in the order of their seeds.
@@ -122,14 +119,8 @@ impl<'a> Near<'a> {
     fn new(picture: &'a Grey8, candidates: &'a [Candidate]) -> Near<'a> {
         let cells_of = |size: usize| cell_of(size as f64, usize::MAX) + 1;
         let (columns, rows) = (cells_of(picture.width), cells_of(picture.height));
-        let mut near = Near {
-            picture,
-            candidates,
-            aside: ASIDE,
-            foreshortened: false,
-            columns,
-            cells: vec![Vec::new(); columns * rows],
-        };
+        let cells = vec![Vec::new(); columns * rows];
+        let mut near = Near { picture, candidates, aside: ASIDE, foreshortened: false, columns, cells };
         for (i, c) in candidates.iter().enumerate() {
             let [x, y] = near.cell(&c.at);
             near.cells[y * columns + x].push((c.at, i));
@@ -158,9 +149,7 @@ impl<'a> Near<'a> {
         found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         found
     }
-}
 
-impl Near<'_> {
     /// True where two candidates are the ends of a square's edge: their colours are those of neighbours, and along both halves of the way
     /// from one to the other it is bright on the side on which it is bright at the ends.
     fn edge(&self, a: usize, b: usize) -> bool {
@@ -211,6 +200,71 @@ impl Near<'_> {
         }
         sum
     }
+
+    /// A grid from one candidate on: places with the candidate there. No neighbour of the first one is farther than `longest`, px. The nearest neighbours
+    /// of a tag's corner are those beyond the gap: lines are numbered so that one before the first begins a tag.
+    fn grow(&self, pitch: Pitch, first: usize, longest: f64) -> Vec<(Place, usize)> {
+        let Some(seed_steps) = self.seed_steps(first, longest) else { return Vec::new() };
+        let candidates = self.candidates;
+        let mut placed: BTreeMap<Place, usize> = BTreeMap::from([((0, 0), first)]);
+        let mut used = vec![false; candidates.len()];
+        used[first] = true;
+        let mut queue = VecDeque::from([(0, 0)]);
+        while let Some((i, j)) = queue.pop_front() {
+            for (di, dj) in [(1, 0), (0, 1), (-1, 0), (0, -1)] {
+                let next = (i + di, j + dj);
+                if placed.contains_key(&next) {
+                    continue;
+                }
+                let at = |place: Place| placed.get(&place).map(|&k| candidates[k].at);
+                let Some(here) = placed.get(&(i, j)).map(|&k| candidates[k]) else { continue };
+                let step = step_at(&at, pitch, (i, j), (di, dj))
+                    .unwrap_or_else(|| if di != 0 { seed_steps[0] * di as f64 } else { seed_steps[1] * dj as f64 });
+                let stray = STRAY * step.norm();
+                let around = [(1, 0), (0, 1), (-1, 0), (0, -1)].map(|(di, dj)| placed.get(&(next.0 + di, next.1 + dj)));
+                let found = self
+                    .within(&(here.at + step), stray, |_, k| !used[k])
+                    .into_iter()
+                    .find(|&(_, k)| around.iter().flatten().all(|&&neighbour| self.edge(neighbour, k)));
+                if let Some((_, k)) = found {
+                    used[k] = true;
+                    placed.insert(next, k);
+                    queue.push_back(next);
+                }
+            }
+        }
+        placed.into_iter().collect()
+    }
+
+    /// Steps to the neighbours of a corner along its two edges: the nearest of opposite colouring, and the nearest of those in
+    /// another direction, no farther than `longest`, px.
+    fn seed_steps(&self, first: usize, longest: f64) -> Option<[Vector2<f64>; 2]> {
+        /// Edges nearer to each other than this are no board's, rad.
+        const LEAST_ANGLE: f64 = 0.35;
+        let here = &self.candidates[first];
+        let mut nearest: Option<Vector2<f64>> = None;
+        // In rings: most candidates have their neighbours near, and those that have none see much of the picture.
+        let (mut inner, mut reach) = (0.0, 8.0_f64);
+        while inner < longest {
+            reach = (2.0 * reach).min(longest);
+            let ring =
+                |distance: f64, k: usize| (distance > inner || inner == 0.0) && k != first && self.ends(first, k);
+            for (_, k) in self.within(&here.at, reach, ring) {
+                let step = self.candidates[k].at - here.at;
+                let elsewhere =
+                    |a: &Vector2<f64>| (a.perp(&step).abs() / (a.norm() * step.norm())).asin() > LEAST_ANGLE;
+                if !nearest.as_ref().is_none_or(elsewhere) || !self.shows_edge(first, k) {
+                    continue;
+                }
+                match nearest {
+                    None => nearest = Some(step),
+                    Some(a) => return Some([a, step]),
+                }
+            }
+            inner = reach;
+        }
+        None
+    }
 }
 
 /// The cell of a place along one side, the first or the last one where it lies beyond.
@@ -239,40 +293,6 @@ fn longest_step(picture: &Grey8, corners: usize) -> f64 {
     (LONGER * share.sqrt()).min(LONGEST)
 }
 
-/// A grid from one candidate on: places with the candidate there. No neighbour of the first one is farther than `longest`, px. The nearest neighbours
-/// of a tag's corner are those beyond the gap: lines are numbered so that one before the first begins a tag.
-fn grow(candidates: &[Candidate], near: &Near, pitch: Pitch, first: usize, longest: f64) -> Vec<(Place, usize)> {
-    let Some(seed_steps) = seed_steps(candidates, near, first, longest) else { return Vec::new() };
-    let mut placed: BTreeMap<Place, usize> = BTreeMap::from([((0, 0), first)]);
-    let mut used = vec![false; candidates.len()];
-    used[first] = true;
-    let mut queue = VecDeque::from([(0, 0)]);
-    while let Some((i, j)) = queue.pop_front() {
-        for (di, dj) in [(1, 0), (0, 1), (-1, 0), (0, -1)] {
-            let next = (i + di, j + dj);
-            if placed.contains_key(&next) {
-                continue;
-            }
-            let at = |place: Place| placed.get(&place).map(|&k| candidates[k].at);
-            let Some(here) = placed.get(&(i, j)).map(|&k| candidates[k]) else { continue };
-            let step = step_at(&at, pitch, (i, j), (di, dj))
-                .unwrap_or_else(|| if di != 0 { seed_steps[0] * di as f64 } else { seed_steps[1] * dj as f64 });
-            let stray = STRAY * step.norm();
-            let around = [(1, 0), (0, 1), (-1, 0), (0, -1)].map(|(di, dj)| placed.get(&(next.0 + di, next.1 + dj)));
-            let found = near
-                .within(&(here.at + step), stray, |_, k| !used[k])
-                .into_iter()
-                .find(|&(_, k)| around.iter().flatten().all(|&&neighbour| near.edge(neighbour, k)));
-            if let Some((_, k)) = found {
-                used[k] = true;
-                placed.insert(next, k);
-                queue.push_back(next);
-            }
-        }
-    }
-    placed.into_iter().collect()
-}
-
 /// The step from a place in a direction, from the steps before it or beside it.
 fn step_at(
     at: &dyn Fn(Place) -> Option<Point2<f64>>,
@@ -290,34 +310,6 @@ fn step_at(
         let (i, j) = (i + side * dj, j + side * di);
         Some(at((i + di, j + dj))? - at((i, j))?)
     })
-}
-
-/// Steps to the neighbours of a corner along its two edges: the nearest of opposite colouring, and the nearest of those in
-/// another direction, no farther than `longest`, px.
-fn seed_steps(candidates: &[Candidate], near: &Near, first: usize, longest: f64) -> Option<[Vector2<f64>; 2]> {
-    /// Edges nearer to each other than this are no board's, rad.
-    const LEAST_ANGLE: f64 = 0.35;
-    let here = &candidates[first];
-    let mut nearest: Option<Vector2<f64>> = None;
-    // In rings: most candidates have their neighbours near, and those that have none see much of the picture.
-    let (mut inner, mut reach) = (0.0, 8.0_f64);
-    while inner < longest {
-        reach = (2.0 * reach).min(longest);
-        let ring = |distance: f64, k: usize| (distance > inner || inner == 0.0) && k != first && near.ends(first, k);
-        for (_, k) in near.within(&here.at, reach, ring) {
-            let step = candidates[k].at - here.at;
-            let elsewhere = |a: &Vector2<f64>| (a.perp(&step).abs() / (a.norm() * step.norm())).asin() > LEAST_ANGLE;
-            if !nearest.as_ref().is_none_or(elsewhere) || !near.shows_edge(first, k) {
-                continue;
-            }
-            match nearest {
-                None => nearest = Some(step),
-                Some(a) => return Some([a, step]),
-            }
-        }
-        inner = reach;
-    }
-    None
 }
 
 fn as_grid(grown: &[(Place, usize)], candidates: &[Candidate], pitch: Pitch) -> Option<Places> {
@@ -345,28 +337,18 @@ mod tests {
 
     /// A board of 8x6 squares, skewed, with a part painted over.
     fn picture(hidden: impl Fn(f64, f64) -> bool) -> Grey8 {
-        let (w, h) = (240, 200);
-        let pixels = (0..w * h)
-            .map(|k| {
-                let mut sum = 0.0;
-                for (a, b) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
-                    let (x, y) = ((k % w) as f64 + a - 30.0, (k / w) as f64 + b - 20.0);
-                    let (u, v) = ((x - 0.2 * y) / 20.0, (y - 0.1 * x) / 20.0);
-                    let inside = (0.0..8.0).contains(&u) && (0.0..6.0).contains(&v);
-                    let black = inside && (u.floor() + v.floor()) as i32 % 2 == 0;
-                    let grey = if hidden(u, v) {
-                        130.0
-                    } else if black {
-                        30.0
-                    } else {
-                        210.0
-                    };
-                    sum += grey / 4.0;
-                }
-                sum as u8
-            })
-            .collect();
-        Grey8 { width: w, height: h, pixels }
+        Grey8::from_fn(240, 200, |x, y| {
+            let mut sum = 0.0;
+            for (a, b) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
+                let (x, y) = (x as f64 + a - 30.0, y as f64 + b - 20.0);
+                let (u, v) = ((x - 0.2 * y) / 20.0, (y - 0.1 * x) / 20.0);
+                let inside = (0.0..8.0).contains(&u) && (0.0..6.0).contains(&v);
+                let black = inside && (u.floor() + v.floor()) as i32 % 2 == 0;
+                let grey = if black { 30.0 } else { 210.0 };
+                sum += if hidden(u, v) { 130.0 } else { grey } / 4.0;
+            }
+            sum as u8
+        })
     }
 
     fn size(grid: &Places) -> (usize, usize) {

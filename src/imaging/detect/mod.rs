@@ -14,6 +14,6 @@ mod saddles;
 
 pub use board::detect;
 pub use colour::right_handed;
-pub use detected::{COARSE_PX, Detected, LEAST_SEEN, Open, Refusal, glance_level, on_a_copy};
+pub use detected::{Detected, LEAST_SEEN, Open, Refusal, glance_level, on_a_copy};
 pub use growth::grids;
 pub use plain::size_seen;

@@ -1,20 +1,18 @@
 //! Where a plain board is, to about a pixel of a small copy.
 //!
 //! In: a picture and the board's size. Out: a reduced copy and a grid of coarse corners on it, right-handed, columns along
-//! the longer side, turned as far as the colours tell. The copy is an area average of about [`COARSE_PX`] pixels: the board is seen there
+//! the longer side, turned as far as the colours tell. The copy is an area average of about a million pixels: the board is seen there
 //! as well as on 26 Mpx, in a twentieth of the time. Of large pictures a copy of a quarter of that is tried before, and will do where it
 //! shows all of a board with large squares; a ladder of attempts on finer and coarser copies follows where the first fails. Its work is
 //! bounded by the pixels of the copies, whatever they show: no clock decides what is found, and OpenCV's
 //! classic detector is not among the attempts, because fine texture keeps it busy for minutes (and what it finds is found without
 //! it). Goes wrong: no board, another board, or a board of which too little is in view; each is a reason in words.
 
-use nalgebra::Point2;
-
 use super::colour::{right_handed, turn_by_colours};
-use super::detected::{COARSE_PX, Detected, LEAST_SEEN, Open, Refusal, glance_level, on_a_copy};
+use super::detected::{Detected, LEAST_SEEN, Open, Refusal, glance_level, on_a_copy};
 use super::growth::largest_grid;
 use super::{continuation, extent};
-use crate::imaging::image::pyramid::{Level, factor_for};
+use crate::imaging::image::pyramid::{Level, coarse_factor, to_full_size};
 use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Lattice, Places, Renumbering};
 use crate::imaging::{Board, Squares};
@@ -24,11 +22,7 @@ use crate::opencv::find_board;
 const WORTH: f64 = 1.03;
 
 /// One attempt: on which copy, in which way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Attempt {
-    pub level: Level,
-    pub way: Way,
-}
+type Attempt = (Level, Way);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Way {
@@ -49,17 +43,17 @@ struct Search {
 
 impl Search {
     /// True where an attempt could only find less than is known.
-    fn is_pointless(&self, attempt: Attempt) -> bool {
+    fn is_pointless(&self, (level, way): Attempt) -> bool {
         /// Squares of this many pixels of a copy are not seen better on a finer one.
         const ENOUGH_PX: f64 = 30.0;
-        match attempt.way {
+        match way {
             // All of it was looked at corner by corner: more looking would only find a part of what is there.
             Way::Sectors => self.partial.is_some() || self.seen.as_ref().is_some_and(|(grid, _)| tells(grid).0),
             Way::Grow => {
                 let partial = self.partial.as_ref().map(|p| (&p.corners, p.level));
                 let known = [partial, self.seen.as_ref().map(|(grid, level)| (grid, *level))];
-                let is_enough = |(grid, level): &(&Places, Level)| {
-                    attempt.level.scale() < level.scale() && grid.step_px().is_some_and(|side| side > ENOUGH_PX)
+                let is_enough = |(grid, of): &(&Places, Level)| {
+                    level.scale() < of.scale() && grid.step_px().is_some_and(|side| side > ENOUGH_PX)
                 };
                 known.iter().flatten().any(is_enough)
             }
@@ -74,18 +68,18 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     }
     let mut search = Search::default();
     let mut last: Option<(Level, Grey8)> = None;
-    for attempt in ladder(picture) {
-        if search.is_pointless(attempt) {
+    for (level, way) in ladder(picture) {
+        if search.is_pointless((level, way)) {
             continue;
         }
         let small = match last.take() {
-            Some((level, small)) if level == attempt.level => small,
-            _ => attempt.level.copy(picture),
+            Some((known, small)) if known == level => small,
+            _ => level.copy(picture),
         };
-        if let Some(grid) = found(&small, attempt, board, &mut search) {
+        if let Some(grid) = found(&small, (level, way), board, &mut search) {
             let complete = grid.count() == board.corner_count();
             // The whole of a board is not less than what else hangs together in the picture; what was grown ends where the board ends.
-            let less = |(seen, _): &(Places, Level)| match attempt.way {
+            let less = |(seen, _): &(Places, Level)| match way {
                 Way::Grow => tells(seen) > tells(&grid),
                 Way::Sectors => seen.count() > grid.count(),
             };
@@ -93,7 +87,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
                 break;
             }
             let grid = turn_by_colours(&small, right_handed(grid), board);
-            let detected = on_a_copy(picture, attempt.level, &small, grid);
+            let detected = on_a_copy(picture, level, &small, grid);
             if complete {
                 return Ok(detected);
             }
@@ -107,7 +101,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
         if search.seen.as_ref().is_some_and(|(grid, _)| tells(grid).0 && holds(grid, board)) {
             break;
         }
-        last = Some((attempt.level, small));
+        last = Some((level, small));
     }
     // A part of a larger grid is not the board with corners missing.
     let larger = search.seen.as_ref().map_or(0, |(grid, _)| grid.count());
@@ -124,8 +118,8 @@ fn with_open_numbers(picture: &Picture, seen: Option<(Places, Level)>, board: Bo
         |grid: &Places| grid.count() >= LEAST_SEEN && grid.count() as f64 >= LEAST * board.corner_count() as f64;
     let Some((grid, level)) = seen.filter(|(grid, _)| is_enough(grid)) else { return Err(refusal) };
     let small = level.copy(picture);
-    let mut ways = ways_to_lie(&small, &grid, board).into_iter();
-    let mut ways = ways.by_ref().map(|way| turn_by_colours(&small, right_handed(way), board));
+    let ways = ways_to_lie(&small, &grid, board).into_iter();
+    let mut ways = ways.map(|way| turn_by_colours(&small, right_handed(way), board));
     let Some(first) = ways.next() else { return Err(refusal) };
     let others = ways.filter_map(|way| Renumbering::between(&first, &way)).collect();
     Ok(Detected { open: Some(Open { others, refusal }), ..on_a_copy(picture, level, &small, first) })
@@ -145,22 +139,23 @@ fn at_a_glance(picture: &Picture, board: Board) -> Option<Detected> {
         return None;
     }
     let corners = turn_by_colours(&copy, right_handed(grid), board);
-    Some(Detected { corners, copy, level, print: None, open: None })
+    Some(Detected::plain(corners, copy, level))
 }
 
 /// The board, or a part of it, by one attempt; another grid is kept as seen.
-fn found(small: &Grey8, attempt: Attempt, board: Board, search: &mut Search) -> Option<Places> {
-    if attempt.way == Way::Sectors {
+fn found(small: &Grey8, (level, way): Attempt, board: Board, search: &mut Search) -> Option<Places> {
+    if way == Way::Sectors {
         // Where OpenCV cannot work at all, it has found nothing.
-        let corners = find_board(&small.pixels, small.width, (board.columns(), board.rows())).ok().flatten()?;
+        let (columns, rows) = (board.columns(), board.rows());
+        let corners = find_board(&small.pixels, small.width, (columns, rows)).ok().flatten()?;
         // Where a line is hidden it takes the board's outline for one.
-        let grid = whole(board, corners);
+        let grid = Lattice { columns, rows, cells: corners.into_iter().map(Some).collect() };
         return Some(grid.clone()).filter(|_| extent::without_outline(small, grid).count() == board.corner_count());
     }
     let grid = grown(small, board.corner_count())?;
     let fitting = fitting(small, &grid, board);
     if fitting.is_none() && search.seen.as_ref().is_none_or(|(seen, _)| tells(&grid) > tells(seen)) {
-        search.seen = Some((grid, attempt.level));
+        search.seen = Some((grid, level));
     }
     fitting
 }
@@ -179,30 +174,18 @@ fn holds(grid: &Places, board: Board) -> bool {
 pub(super) fn ladder(picture: &Picture) -> Vec<Attempt> {
     /// Shorter sides than this hold no board that sectors would show, px.
     const LEAST_FOR_SECTORS_PX: usize = 48;
-    let first = factor_for(picture, COARSE_PX);
-    let mut finer = vec![];
-    let mut factor = first;
-    while factor > 1 {
-        factor = factor.div_ceil(2);
-        finer.push(Level::Reduced(factor));
-    }
-    if first == 1 {
-        finer.push(Level::Doubled);
-    }
+    let first = coarse_factor(picture);
+    let finer = to_full_size(picture).skip(1).chain((first == 1).then_some(Level::Doubled));
     let (first, coarser) = (Level::Reduced(first), Level::Reduced(2 * first));
-    let grown = [first, coarser].into_iter().chain(finer).map(|level| Attempt { level, way: Way::Grow });
+    let grown = [first, coarser].into_iter().chain(finer).map(|level| (level, Way::Grow));
     let side = |level: &Level| picture.width().min(picture.height()) as f64 / level.scale();
     let sectors = [first, coarser].into_iter().filter(|level| side(level) >= LEAST_FOR_SECTORS_PX as f64);
-    grown.chain(sectors.map(|level| Attempt { level, way: Way::Sectors })).collect()
+    grown.chain(sectors.map(|level| (level, Way::Sectors))).collect()
 }
 
 pub(super) fn grown(small: &Grey8, enough: usize) -> Option<Places> {
     let grid = extent::without_chance_lines(small, continuation::without_ends(small, largest_grid(small, enough)?));
     Some(extent::without_outline(small, grid)).filter(|grid| grid.columns > 1 && grid.rows > 1)
-}
-
-fn whole(board: Board, corners: Vec<Point2<f64>>) -> Places {
-    Lattice { columns: board.columns(), rows: board.rows(), cells: corners.into_iter().map(Some).collect() }
 }
 
 /// A grid as the board's, without lines of squares that are cut where those are too many.
@@ -248,7 +231,11 @@ fn refusal(seen: Option<&Places>, board: Board) -> Refusal {
 
 /// The board that a picture shows, whatever was asked for, where all its corners are there.
 pub fn size_seen(detected: &Detected) -> Option<Squares> {
-    let grid = grown(&detected.copy, usize::MAX)?;
+    whole_squares(&grown(&detected.copy, usize::MAX)?)
+}
+
+/// The squares of a board whose corners a grid holds; `None` where one of them is missing.
+pub(super) fn whole_squares(grid: &Places) -> Option<Squares> {
     let (columns, rows) = (grid.columns.max(grid.rows) + 1, grid.columns.min(grid.rows) + 1);
     (grid.count() == grid.columns * grid.rows).then_some(Squares { columns, rows })
 }
@@ -260,13 +247,12 @@ mod tests {
 
     /// A board of 8x6 squares of `side` px in a light margin, its crossings at whole multiples of `side`.
     fn picture(size: usize, side: usize) -> Picture {
-        let grey = |x: usize, y: usize| {
+        let image = Image::from_fn(size, size, |x, y| {
             let (i, j) = (x / side, y / side);
             let dark = (1..=8).contains(&i) && (1..=6).contains(&j) && (i + j) % 2 == 0;
             if dark { 40 } else { 200u8 }
-        };
-        let pixels = (0..size * size).map(|k| grey(k % size, k / size)).collect();
-        Picture::from(Image { width: size, height: size, pixels })
+        });
+        image.into()
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! From which grey value on a pixel tells only "too bright".
+//! From which grey value on a pixel tells only "too bright", and pictures that know it.
 //!
 //! In: grey values. Out: the clip level; values at or above it are left out of every fit. It is the end of the range that the values
 //! use (8, 10, 12, 14 or 16 bits, also where a camera shifts its bits to the top), or a level below it at which the histogram
@@ -7,7 +7,7 @@
 //! dark with noise is clipped, for light has the more noise the brighter it is. A drawn picture without noise is not clipped.
 //! Goes wrong: values that were changed after clipping (flat-field correction) have no common level.
 
-use super::Image;
+use super::grey::{Grey, Image};
 
 /// Values of about this many pixels are looked at.
 const LOOKED_AT: usize = 1 << 20;
@@ -51,8 +51,52 @@ impl Value for u16 {
     }
 }
 
+/// A grey picture and the level at which it is clipped.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Its grey values.
+    pub grey: Grey,
+    clip_level: f64,
+}
+
+impl From<Image<u8>> for Picture {
+    fn from(image: Image<u8>) -> Picture {
+        Picture { clip_level: level(&image), grey: Grey::Eight(image) }
+    }
+}
+
+impl From<Image<u16>> for Picture {
+    fn from(image: Image<u16>) -> Picture {
+        Picture { clip_level: level(&image), grey: Grey::Sixteen(image) }
+    }
+}
+
+impl Picture {
+    /// The grey value from which on a pixel tells only "too bright".
+    pub fn clip_level(&self) -> f64 {
+        self.clip_level
+    }
+
+    /// Width, px.
+    pub fn width(&self) -> usize {
+        self.size().0
+    }
+
+    /// Height, px.
+    pub fn height(&self) -> usize {
+        self.size().1
+    }
+
+    fn size(&self) -> (usize, usize) {
+        match &self.grey {
+            Grey::Eight(image) => (image.width, image.height),
+            Grey::Sixteen(image) => (image.width, image.height),
+        }
+    }
+}
+
 /// The clip level of a grey picture.
-pub(super) fn level<T: Value>(image: &Image<T>) -> f64 {
+fn level<T: Value>(image: &Image<T>) -> f64 {
     channel_level(&image.pixels, 1, 0)
 }
 

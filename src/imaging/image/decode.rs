@@ -1,12 +1,13 @@
 //! From a file's bytes to grey values.
 
 use camino::Utf8Path;
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageFormat, ImageReader};
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::{Claim, Mosaic, Picture, UNDECODABLE, channels, integrity, limits, mosaic};
+use super::limits::{self, undecodable};
+use super::{Claim, Mosaic, Picture, UNDECODABLE, channels, integrity, mosaic};
 
 /// Decodes the bytes of a file; the reason where that is not possible or the file is cut or damaged. `path` only helps to tell the
 /// format. A grey picture that is a raw colour mosaic needs its pattern.
@@ -20,9 +21,11 @@ pub fn decode(bytes: &[u8], path: &Utf8Path, pattern: Option<Mosaic>) -> Result<
         DynamicImage::ImageRgba8(rgb) => Ok(channels::grey(&rgb, 4, size).into()),
         DynamicImage::ImageRgb16(rgb) => Ok(channels::grey(&rgb, 3, size).into()),
         DynamicImage::ImageRgba16(rgb) => Ok(channels::grey(&rgb, 4, size).into()),
-        _ => Err(floating_point()),
+        _ => Err(undecodable(FLOATING_POINT)),
     }
 }
+
+const FLOATING_POINT: &str = "floating-point pixels";
 
 /// A picture file read and decoded, by itself.
 pub fn picture(path: &Utf8Path, pattern: Option<Mosaic>) -> Result<Picture, String> {
@@ -37,35 +40,19 @@ pub(super) fn decoded(bytes: &[u8], path: &Utf8Path) -> Result<DynamicImage, Str
     integrity::check(bytes, format)?;
     let decoded = if format == Some(ImageFormat::Jpeg) { jpeg(bytes)? } else { other(bytes, format)? };
     match decoded {
-        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => Err(floating_point()),
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => Err(undecodable(FLOATING_POINT)),
         decoded => Ok(decoded),
     }
 }
 
-fn floating_point() -> String {
-    format!("{UNDECODABLE}: floating-point pixels")
-}
-
 fn other(bytes: &[u8], format: Option<ImageFormat>) -> Result<DynamicImage, String> {
-    let mut reader = ImageReader::new(std::io::Cursor::new(bytes));
-    match format {
-        Some(format) => reader.set_format(format),
-        None => return Err(format!("{UNDECODABLE}: neither PNG, TIFF, BMP, JPEG nor PGM")),
-    }
-    // What the header announces is checked before anything of that size is allocated.
-    reader.limits(Limits::no_limits());
-    let decoder = reader.into_decoder().map_err(undecodable)?;
-    limits::check(image::ImageDecoder::dimensions(&decoder), image::ImageDecoder::total_bytes(&decoder))?;
-    DynamicImage::from_decoder(decoder).map_err(undecodable)
-}
-
-fn undecodable(e: image::ImageError) -> String {
-    format!("{UNDECODABLE}: {e}")
+    let format = format.ok_or_else(|| undecodable("neither PNG, TIFF, BMP, JPEG nor PGM"))?;
+    let reader = ImageReader::with_format(std::io::Cursor::new(bytes), format);
+    DynamicImage::from_decoder(limits::decoder(reader)?).map_err(undecodable)
 }
 
 /// Decodes a JPEG by the letter: the decoder of the `image` crate, told not to fill in what is missing.
 fn jpeg(bytes: &[u8]) -> Result<DynamicImage, String> {
-    let undecodable = |e: zune_jpeg::errors::DecodeErrors| format!("{UNDECODABLE}: {e}");
     let options = DecoderOptions::default()
         .set_strict_mode(true)
         .set_max_width(usize::from(u16::MAX))

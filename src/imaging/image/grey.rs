@@ -25,6 +25,13 @@ pub enum Grey {
     Sixteen(Image<u16>),
 }
 
+impl<T> Image<T> {
+    /// A picture filled by column and row, in order.
+    pub fn from_fn(width: usize, height: usize, mut at: impl FnMut(usize, usize) -> T) -> Image<T> {
+        Image { width, height, pixels: (0..width * height).map(|k| at(k % width, k / width)).collect() }
+    }
+}
+
 impl<T: Copy + Into<f64>> Image<T> {
     /// Mean of the 3 x 3 pixels at a place; `None` at the picture's border.
     pub fn mean_at(&self, at: Point2<f64>) -> Option<f64> {

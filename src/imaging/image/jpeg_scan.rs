@@ -40,10 +40,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
             0xC0 | 0xC1 => tables.frame(body).ok_or(BROKEN)?,
             0xC4 => tables.codes(body).ok_or(BROKEN)?,
             0xC2 | 0xC3 | 0xC5..=0xC7 | 0xC9..=0xCF => return Ok(()),
-            0xDD => {
-                tables.restart =
-                    usize::from(u16::from_be_bytes([*body.first().ok_or(BROKEN)?, *body.get(1).ok_or(BROKEN)?]))
-            }
+            0xDD => tables.restart = number(body, 0).ok_or(BROKEN)?,
             0xDA => {
                 at = tables.scan(body, bytes, next)?;
                 scans += 1;
@@ -57,8 +54,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
 
 impl Tables {
     fn frame(&mut self, body: &[u8]) -> Option<()> {
-        let number = |at: usize| Some(usize::from(u16::from_be_bytes([*body.get(at)?, *body.get(at + 1)?])));
-        self.size = (number(3)?, number(1)?);
+        self.size = (number(body, 3)?, number(body, 1)?);
         let of = |three: &[u8]| Component {
             id: three[0],
             across: usize::from(three[1] >> 4),
@@ -229,8 +225,7 @@ impl<'a> Bits<'a> {
 }
 
 /// The segment at a place: its marker, its body, and where the next one begins.
-pub(super) fn segment(bytes: &[u8], at: usize) -> Option<(u8, &[u8], usize)> {
-    let mut at = at;
+pub(super) fn segment(bytes: &[u8], mut at: usize) -> Option<(u8, &[u8], usize)> {
     // Fill bytes may stand before a marker.
     while bytes.get(at..at + 2)? == [0xFF, 0xFF] {
         at += 1;
@@ -239,8 +234,12 @@ pub(super) fn segment(bytes: &[u8], at: usize) -> Option<(u8, &[u8], usize)> {
     if marker == 0xD9 {
         return Some((marker, &[], at + 2));
     }
-    let length = usize::from(u16::from_be_bytes([*bytes.get(at + 2)?, *bytes.get(at + 3)?]));
-    Some((marker, bytes.get(at + 4..at + 2 + length.max(2))?, at + 2 + length.max(2)))
+    let next = at + 2 + number(bytes, at + 2)?.max(2);
+    Some((marker, bytes.get(at + 4..next)?, next))
+}
+
+fn number(bytes: &[u8], at: usize) -> Option<usize> {
+    Some(usize::from(u16::from_be_bytes([*bytes.get(at)?, *bytes.get(at + 1)?])))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! allocated before it is known to be bounded; all workers together hold no more than a fixed number of bytes.
 
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::sync::{Condvar, Mutex, PoisonError};
 
 use camino::Utf8Path;
@@ -39,7 +39,6 @@ pub struct Header {
 
 /// Reads a picture's header; the reason where it is none that may be decoded. Pipes and devices are not opened.
 pub fn header(path: &Utf8Path) -> Result<Header, String> {
-    let unreadable = |e: std::io::Error| format!("cannot be read: {e}");
     let metadata = std::fs::metadata(path).map_err(unreadable)?;
     if !metadata.is_file() {
         return Err("is not a regular file".to_owned());
@@ -53,24 +52,35 @@ pub fn header(path: &Utf8Path) -> Result<Header, String> {
         ));
     }
     let file = BufReader::new(File::open(path).map_err(unreadable)?);
-    let (size, decoded_bytes) = announced(file, path)?;
-    check(size, decoded_bytes)?;
-    Ok(Header { width: size.0, height: size.1, file_bytes, decoded_bytes })
-}
-
-/// Width, height and bytes of the samples that an encoded picture announces.
-fn announced<R: Read + Seek + std::io::BufRead>(source: R, path: &Utf8Path) -> Result<((u32, u32), u64), String> {
-    let undecodable = |e: image::ImageError| format!("{UNDECODABLE}: {e}");
-    let mut reader = ImageReader::new(source).with_guessed_format().map_err(|e| format!("cannot be read: {e}"))?;
+    let mut reader = ImageReader::new(file).with_guessed_format().map_err(unreadable)?;
     if reader.format().is_none()
         && let Ok(format) = ImageFormat::from_path(path)
     {
         reader.set_format(format);
     }
+    let decoder = decoder(reader)?;
+    let (width, height) = decoder.dimensions();
+    Ok(Header { width, height, file_bytes, decoded_bytes: decoder.total_bytes() })
+}
+
+/// The decoder of a picture, nothing of which is allocated before what its header announces was checked.
+pub(super) fn decoder<'a, R: BufRead + Seek + 'a>(
+    mut reader: ImageReader<R>,
+) -> Result<impl ImageDecoder + 'a, String> {
     // Sizes are checked by `check`, with a reason that says what was found.
     reader.limits(Limits::no_limits());
     let decoder = reader.into_decoder().map_err(undecodable)?;
-    Ok((decoder.dimensions(), decoder.total_bytes()))
+    check(decoder.dimensions(), decoder.total_bytes())?;
+    Ok(decoder)
+}
+
+fn unreadable(e: std::io::Error) -> String {
+    format!("cannot be read: {e}")
+}
+
+/// The reason for a file that is no picture.
+pub(super) fn undecodable(why: impl std::fmt::Display) -> String {
+    format!("{UNDECODABLE}: {why}")
 }
 
 /// Checks what is about to be decoded.
@@ -99,7 +109,6 @@ fn mib(bytes: u64) -> u64 {
 
 /// Reads a file whose header was looked at, no more of it than it had then.
 pub fn read(path: &Utf8Path, header: &Header) -> Result<Vec<u8>, String> {
-    let unreadable = |e: std::io::Error| format!("cannot be read: {e}");
     let file = File::open(path).map_err(unreadable)?;
     let mut bytes = Vec::with_capacity(header.file_bytes as usize);
     file.take(header.file_bytes).read_to_end(&mut bytes).map_err(unreadable)?;

@@ -12,13 +12,12 @@ mod integrity;
 mod jpeg_scan;
 mod limits;
 mod mosaic;
-mod picture;
 pub mod pyramid;
 pub mod raster;
 pub mod wide;
 
+pub use clipping::Picture;
 pub use decode::{decode, picture};
 pub use grey::{Grey, Grey8, Image};
 pub use limits::{Claim, Header, UNDECODABLE, header, read};
 pub use mosaic::Mosaic;
-pub use picture::Picture;

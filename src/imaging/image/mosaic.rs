@@ -112,12 +112,12 @@ where
     match (pattern, seen) {
         (None, None) => Ok(image.into()),
         (None, Some((greens, share))) => {
-            let mut fitting = ALL.into_iter().filter(|pattern| pattern.greens() == greens);
+            let fitting = ALL.into_iter().filter(|pattern| pattern.greens() == greens);
             // Which of them it is makes no difference to the match.
             if let (true, Some(pattern)) = (share < NEARLY_ALIKE, fitting.clone().next()) {
                 return Ok(matched(&image, &cells, pattern).into());
             }
-            let fitting: Vec<String> = fitting.by_ref().map(|p| format!("`--bayer {p}`")).collect();
+            let fitting: Vec<String> = fitting.map(|p| format!("`--bayer {p}`")).collect();
             Err(format!(
                 "is a raw colour mosaic (neighbouring pixels differ by {:.0} %): {} reads it, by the camera's data sheet",
                 100.0 * share,
@@ -220,13 +220,10 @@ mod tests {
 
     /// Squares of 40 px behind filters, with a little noise.
     fn mosaic(gains: [f64; 4], offset: f64) -> Image<u8> {
-        let (width, height) = (400, 300);
-        let grey = |k: usize| {
-            let (x, y) = (k % width, k / width);
+        Image::from_fn(400, 300, |x, y| {
             let light = if (x / 40 + y / 40) % 2 == 0 { 180.0 } else { 30.0 };
-            offset + gains[2 * (y % 2) + x % 2] * light + (k * 7919 % 5) as f64 - 2.0
-        };
-        Image { width, height, pixels: (0..width * height).map(|k| grey(k) as u8).collect() }
+            (offset + gains[2 * (y % 2) + x % 2] * light + ((400 * y + x) * 7919 % 5) as f64 - 2.0) as u8
+        })
     }
 
     #[test]

@@ -63,9 +63,9 @@ pub struct Small {
 }
 
 impl Small {
-    /// Of about so many pixels.
-    pub fn of(picture: &Picture, pixels: usize) -> Small {
-        let level = Level::Reduced(factor_for(picture, pixels));
+    /// The copy on which boards are looked for first.
+    pub fn coarse(picture: &Picture) -> Small {
+        let level = Level::Reduced(coarse_factor(picture));
         Small { copy: level.copy(picture), level }
     }
 
@@ -78,10 +78,19 @@ impl Small {
     }
 }
 
-/// The whole factor that brings a picture closest to `pixels` from above.
-pub fn factor_for(picture: &Picture, pixels: usize) -> usize {
-    let ratio = (picture.width() * picture.height()) as f64 / pixels as f64;
+/// Pixels of the copy on which boards of any kind are looked for first.
+pub const COARSE_PX: usize = 1_000_000;
+
+/// The whole factor that brings a picture closest to [`COARSE_PX`] from above.
+pub fn coarse_factor(picture: &Picture) -> usize {
+    let ratio = (picture.width() * picture.height()) as f64 / COARSE_PX as f64;
     ratio.sqrt().floor().max(1.0) as usize
+}
+
+/// Copies from that of [`COARSE_PX`] to full size, each of about half the factor of the one before it.
+pub fn to_full_size(picture: &Picture) -> impl Iterator<Item = Level> + use<> {
+    let halved = |factor: &usize| (*factor > 1).then(|| factor.div_ceil(2));
+    std::iter::successors(Some(coarse_factor(picture)), halved).map(Level::Reduced)
 }
 
 /// A copy reduced by a whole factor; what is left over at the right and lower border is dropped. `lines` are those of a block that count.
@@ -268,18 +277,13 @@ fn doubled(small: &Grey8) -> Grey8 {
         let other = if i.is_multiple_of(2) { (i / 2).saturating_sub(1) } else { (i / 2 + 1).min(size - 1) };
         [(i / 2, 3u32), (other, 1u32)]
     };
-    let mut pixels = Vec::with_capacity(4 * w * h);
-    for y in 0..2 * h {
-        let lines = near(y, h);
-        for x in 0..2 * w {
-            let columns = near(x, w);
-            let weigh = |(row, a): (usize, u32)| {
-                columns.iter().map(|&(col, b)| a * b * u32::from(small.pixels[row * w + col])).sum::<u32>()
-            };
-            pixels.push(((lines.into_iter().map(weigh).sum::<u32>() + 8) / 16) as u8);
-        }
-    }
-    Grey8 { width: 2 * w, height: 2 * h, pixels }
+    Grey8::from_fn(2 * w, 2 * h, |x, y| {
+        let columns = near(x, w);
+        let weigh = |(row, a): (usize, u32)| {
+            columns.iter().map(|&(col, b)| a * b * u32::from(small.pixels[row * w + col])).sum::<u32>()
+        };
+        ((near(y, h).into_iter().map(weigh).sum::<u32>() + 8) / 16) as u8
+    })
 }
 
 #[cfg(test)]
@@ -298,8 +302,7 @@ mod tests {
     fn every_factor_gives_means() {
         let (width, height) = (97, 41);
         let grey = |x: usize, y: usize| (x * x * 7 + y * 13 + x * y * 3) % 251;
-        let pixels = (0..width * height).map(|k| grey(k % width, k / width) as u8).collect();
-        let picture = Picture::from(Image { width, height, pixels });
+        let picture = Picture::from(Image::from_fn(width, height, |x, y| grey(x, y) as u8));
         for factor in 1..=9 {
             let copy = Level::Reduced(factor).copy(&picture);
             assert_eq!((copy.width, copy.height), (width / factor, height / factor));
@@ -318,9 +321,7 @@ mod tests {
             let lines = skimmed_lines(factor);
             assert!(lines.is_sorted_by(|a, b| a < b) && lines.iter().all(|&line| line < factor), "{factor}: {lines:?}");
             // A ramp shows whether the copy is shifted.
-            let ramp = |k: usize| (2 * (k % (3 * factor)) + 2 * (k / (3 * factor))) as u8;
-            let pixels = (0..6 * factor * factor).map(ramp).collect();
-            let picture = Picture::from(Image { width: 3 * factor, height: 2 * factor, pixels });
+            let picture = Picture::from(Image::from_fn(3 * factor, 2 * factor, |x, y| (2 * x + 2 * y) as u8));
             let (skimmed, all) = (Level::Skimmed(factor).copy(&picture), Level::Reduced(factor).copy(&picture));
             assert_eq!(skimmed, all, "{factor}: {lines:?}");
         }

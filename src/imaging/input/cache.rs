@@ -10,8 +10,7 @@ use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
 
 use crate::files::OutDir;
 use crate::imaging::board::{Kind, Layout, Print};
-use crate::imaging::detect::Open;
-use crate::imaging::detect::Refusal;
+use crate::imaging::detect::{Open, Refusal};
 use crate::imaging::image::Grey8;
 use crate::imaging::image::pyramid::{Level, Small};
 use crate::imaging::lattice::{Lattice, Renumbering};
@@ -44,16 +43,6 @@ pub struct Cache<'a> {
 }
 
 impl Cache<'_> {
-    /// The entry of a picture file with this hash.
-    pub fn entry(&self, picture_hash: &str, board: Board, mosaic: Option<Mosaic>) -> String {
-        let mut hash = Xxh3Default::new();
-        hash.update(ALGORITHM.as_bytes());
-        hash.update(board.key().as_bytes());
-        hash.update(mosaic.map_or("grey", Mosaic::name).as_bytes());
-        hash.update(picture_hash.as_bytes());
-        format!("{:032x}", hash.digest128())
-    }
-
     /// What a former run found.
     pub fn read(&self, entry: &str, board: Board) -> Option<Look> {
         parse(&std::fs::read_to_string(self.out.join(&corners_file(entry))).ok()?, board)
@@ -78,6 +67,15 @@ impl Cache<'_> {
         bytes.extend_from_slice(&copy.pixels);
         let _ = self.out.write_scratch(&thumbnail_file(entry), &bytes);
     }
+}
+
+/// The entry of a picture file with this hash.
+pub fn entry(picture_hash: &str, board: Board, mosaic: Option<Mosaic>) -> String {
+    let mut hash = Xxh3Default::new();
+    for part in [ALGORITHM, &board.key(), mosaic.map_or("grey", Mosaic::name), picture_hash] {
+        hash.update(part.as_bytes());
+    }
+    format!("{:032x}", hash.digest128())
 }
 
 fn corners_file(entry: &str) -> String {
@@ -107,16 +105,12 @@ fn parse_thumbnail(bytes: &[u8]) -> Option<Small> {
 fn text(look: &Look) -> String {
     let mut body = format!("{ALGORITHM}\n");
     match look {
-        Err(Refusal { reason, seen }) => {
-            let seen = seen.map_or("-".to_owned(), |board| board.to_string());
-            body.push_str(&format!("none {seen} {}\n", reason.replace('\n', " ")));
-        }
+        Err(refusal) => body.push_str(&format!("none {}\n", refused(refusal, ' '))),
         Ok(Sighting { corners, print, open }) => {
-            if let Some(Open { others, refusal: Refusal { reason, seen } }) = open {
-                let seen = seen.map_or("-".to_owned(), |board| board.to_string());
+            if let Some(Open { others, refusal }) = open {
                 let others: Vec<String> =
                     others.iter().map(|o| format!("{},{},{}", o.quarters, o.columns, o.rows)).collect();
-                body.push_str(&format!("open {};{seen};{}\n", others.join(" "), reason.replace('\n', " ")));
+                body.push_str(&format!("open {};{}\n", others.join(" "), refused(refusal, ';')));
             }
             if let Some(Print { share, layout, inverted, .. }) = print {
                 let old = u8::from(*layout == Layout::Old);
@@ -141,30 +135,10 @@ fn parse(text: &str, board: Board) -> Option<Look> {
     }
     let body = body.strip_prefix(ALGORITHM)?.strip_prefix('\n')?;
     if let Some(refusal) = body.strip_prefix("none ") {
-        let (seen, reason) = refusal.split_once(' ')?;
-        let seen = parse_seen(seen, board)?;
-        return Some(Err(Refusal { reason: reason.strip_suffix('\n')?.to_owned(), seen }));
+        return Some(Err(parse_refused(refusal.strip_suffix('\n')?, ' ', board)?));
     }
-    let (open, body) = match body.strip_prefix("open ") {
-        None => (None, body),
-        Some(rest) => {
-            let (line, rest) = rest.split_once('\n')?;
-            (Some(parse_open(line, board)?), rest)
-        }
-    };
-    let (print, body) = match body.strip_prefix("print ") {
-        None => (None, body),
-        Some(rest) => {
-            let (line, rest) = rest.split_once('\n')?;
-            let [share, old, inverted] = line.split(' ').collect::<Vec<_>>().try_into().ok()?;
-            let layout = match board.layouts()[..] {
-                [only] if old == "0" => only,
-                _ if old == "1" => Layout::Old,
-                _ => Layout::New,
-            };
-            (Some(Print { share: share.parse().ok()?, pitch: board.pitch(), layout, inverted: inverted == "1" }), rest)
-        }
-    };
+    let (open, body) = headed(body, "open ", |line| parse_open(line, board))?;
+    let (print, body) = headed(body, "print ", |line| parse_print(line, board))?;
     let mut grid: Lattice<Corner> = Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
     for line in body.lines() {
         let numbers: Vec<f64> = line.split(' ').map(|n| n.parse().ok()).collect::<Option<_>>()?;
@@ -181,6 +155,24 @@ fn parse(text: &str, board: Board) -> Option<Look> {
         *grid.cells.get_mut(row * board.columns() + col)? = Some(corner);
     }
     Some(Ok(Sighting { corners: grid, print, open }))
+}
+
+/// What a line says that begins so, where the text begins with one, and the lines behind it.
+fn headed<'a, T>(body: &'a str, word: &str, parse: impl Fn(&str) -> Option<T>) -> Option<(Option<T>, &'a str)> {
+    let Some(rest) = body.strip_prefix(word) else { return Some((None, body)) };
+    let (line, rest) = rest.split_once('\n')?;
+    Some((Some(parse(line)?), rest))
+}
+
+/// The board that a picture shows instead, and why that is no use.
+fn refused(Refusal { reason, seen }: &Refusal, between: char) -> String {
+    let seen = seen.map_or("-".to_owned(), |board| board.to_string());
+    format!("{seen}{between}{}", reason.replace('\n', " "))
+}
+
+fn parse_refused(text: &str, between: char, board: Board) -> Option<Refusal> {
+    let (seen, reason) = text.split_once(between)?;
+    Some(Refusal { reason: reason.to_owned(), seen: parse_seen(seen, board)? })
 }
 
 /// The other board that a picture shows. An entry is for boards of all lengths of one ratio: they are those of the board that is looked for.
@@ -201,14 +193,23 @@ fn parse_seen(text: &str, board: Board) -> Option<Option<Board>> {
 
 /// From a line of the entry.
 fn parse_open(line: &str, board: Board) -> Option<Open> {
-    let [others, seen, reason] = line.splitn(3, ';').collect::<Vec<_>>().try_into().ok()?;
+    let (others, refusal) = line.split_once(';')?;
     let other = |text: &str| {
         let [quarters, columns, rows] = text.split(',').collect::<Vec<_>>().try_into().ok()?;
         Some(Renumbering { quarters: quarters.parse().ok()?, columns: columns.parse().ok()?, rows: rows.parse().ok()? })
     };
-    let seen = parse_seen(seen, board)?;
     let others = others.split_whitespace().map(other).collect::<Option<_>>()?;
-    Some(Open { others, refusal: Refusal { reason: reason.to_owned(), seen } })
+    Some(Open { others, refusal: parse_refused(refusal, ';', board)? })
+}
+
+fn parse_print(line: &str, board: Board) -> Option<Print> {
+    let [share, old, inverted] = line.split(' ').collect::<Vec<_>>().try_into().ok()?;
+    let layout = match board.layouts()[..] {
+        [only] if old == "0" => only,
+        _ if old == "1" => Layout::Old,
+        _ => Layout::New,
+    };
+    Some(Print { share: share.parse().ok()?, pitch: board.pitch(), layout, inverted: inverted == "1" })
 }
 
 #[cfg(test)]
@@ -280,11 +281,7 @@ mod tests {
 
     #[test]
     fn the_entry_follows_picture_and_board() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = OutDir::open(camino::Utf8Path::from_path(dir.path()).unwrap()).unwrap();
-        let cache = Cache { out: &out, thumbnails: true };
         let other = Board::checker("5x3".parse().unwrap(), 10.0);
-        let entry = |hash: &str, board, mosaic| cache.entry(hash, board, mosaic);
         let first = entry("a", board(), None);
         assert_eq!(first, entry("a", board(), None));
         for other in [entry("b", board(), None), entry("a", other, None), entry("a", board(), Some(Mosaic::Rggb))] {
@@ -334,29 +331,25 @@ mod tests {
     fn the_algorithm_is_named_by_what_it_finds() {
         let board = Board::checker("9x7".parse().unwrap(), 10.0);
         let eight = |size: usize, side: f64, zigzag: f64| {
-            let pixels = golden_picture(size, side, 255.0, zigzag).into_iter().map(|v| v as u8).collect();
-            Picture::from(Image { width: size, height: size, pixels })
+            let pixels = golden_picture(size, side, 255.0, zigzag);
+            Picture::from(Image::from_fn(size, size, |x, y| pixels[y * size + x] as u8))
         };
-        let sixteen = golden_picture(600, 50.0, 4000.0, 0.0).into_iter().map(|v| v as u16).collect();
-        let sixteen = Picture::from(Image { width: 600, height: 600, pixels: sixteen });
+        let sixteen = golden_picture(600, 50.0, 4000.0, 0.0);
+        let sixteen = Picture::from(Image::from_fn(600, 600, |x, y| sixteen[y * 600 + x] as u16));
         let mut hash = Xxh3Default::new();
         let eights = [(640, 52.0, 0.0), (2048, 170.0, 0.0), (2048, 170.0, 0.01), (2600, 12.0, 0.0)];
         let eights = eights.map(|(size, side, zigzag)| eight(size, side, zigzag));
         // What is clipped, and what glares on one side, as damaged pictures do.
+        let pixels = golden_picture(640, 52.0, 255.0, 0.0);
         let damaged = |change: &dyn Fn(usize, f64) -> f64| {
-            let pixels = golden_picture(640, 52.0, 255.0, 0.0).into_iter().enumerate();
-            let pixels = pixels.map(|(k, v)| change(k % 640, v).min(255.0) as u8).collect();
-            Picture::from(Image { width: 640, height: 640, pixels })
+            Picture::from(Image::from_fn(640, 640, |x, y| change(x, pixels[y * 640 + x]).min(255.0) as u8))
         };
         let clipped = damaged(&|_, v| v.min(170.0));
         let glary = damaged(&|x, v| v + 60.0 * (x as f64 / 400.0).powi(2));
         // And what the border cuts, on one side and on two.
         let cut = |left: usize, top: usize| {
-            let pixels = golden_picture(640, 52.0, 255.0, 0.0);
-            let (width, height) = (640 - left, 640 - top);
-            let pixels =
-                (0..width * height).map(|k| pixels[(k / width + top) * 640 + k % width + left] as u8).collect();
-            Picture::from(Image { width, height, pixels })
+            let pixel = |x: usize, y: usize| pixels[(y + top) * 640 + x + left] as u8;
+            Picture::from(Image::from_fn(640 - left, 640 - top, pixel))
         };
         // Boards with markers: whole, foreshortened, and seen in part.
         let coded = [([0.3, -0.25, 0.2], 0.0, 560.0), ([1.2, 0.07, 0.1], 0.0, 300.0), ([0.3, -0.25, 0.2], 60.0, 300.0)];

@@ -186,20 +186,15 @@ fn gather(rows: Vec<Row>, board: Board) -> (Vec<PairCorners>, Vec<Skipped>) {
     for mut pair in pairs {
         pair.left.sort_by_key(|c| (c.row, c.col));
         pair.right.sort_by_key(|c| (c.row, c.col));
-        if board.is_coded() {
-            kept.push(pair);
-            continue;
-        }
-        for (list, side) in [(&pair.left, Side::Left), (&pair.right, Side::Right)] {
-            if list.is_empty() {
+        let sides = [(&pair.left, Side::Left), (&pair.right, Side::Right)];
+        let without = sides.into_iter().find(|(corners, _)| corners.is_empty() && !board.is_coded());
+        match without.map(|(_, side)| side) {
+            None => kept.push(pair),
+            Some(side) => {
                 let reason = format!("no corners in the {} picture", side.name());
-                skipped.push(Skipped { pair: pair.pair.clone(), reason });
+                skipped.push(Skipped { pair: pair.pair, reason });
             }
         }
-        if pair.left.is_empty() || pair.right.is_empty() {
-            continue;
-        }
-        kept.push(pair);
     }
     (kept, skipped)
 }

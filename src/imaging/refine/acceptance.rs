@@ -85,7 +85,8 @@ fn roughness(fit: &Fit) -> f64 {
 /// What is usual on a board.
 pub(super) struct Board {
     arm_misfit: f64,
-    roughness: f64,
+    /// Residual as a share of half the contrast.
+    pub(super) roughness: f64,
     variance_px2: f64,
     /// Variance (both axes together) by which places in small and large windows differ beyond their noise, px^2: where crossings are off
     /// their places edges bend, and a larger window sees less of it.
@@ -109,11 +110,6 @@ impl Board {
             variance_px2: usual_variance(corners.iter()),
             bent_px2: if bent { apart_px2 - by_noise_px2 } else { 0.0 },
         }
-    }
-
-    /// The usual residual as a share of half the contrast.
-    pub(super) fn roughness(&self) -> f64 {
-        self.roughness
     }
 
     /// True where a larger window tells the same as a smaller one: a hidden or unprinted neighbour square shows as a shift or as misfit.

@@ -19,7 +19,7 @@ const HALO_BLURS: f64 = 1.0;
 
 /// A first fit of each corner on the reduced copy.
 pub(super) fn coarse(detected: &Detected, window: &mut Window) -> Lattice<Measured> {
-    Lattice::from_fn(detected.corners.columns, detected.corners.rows, |col, row| {
+    detected.corners.filter_map(|col, row, _| {
         let cell = Cell::of(&detected.corners, col, row)?;
         let cell = cell.with_markers(&detected.corners, (col, row), detected.print);
         let (fit, reach) = coarse_fit(&detected.copy, &cell, window)?;

@@ -53,9 +53,8 @@ fn shift<T: Copy + Into<i32>>(image: &Image<T>, places: &Places) -> Option<f64> 
 
 /// Mean square of the shifts between columns, px^2.
 fn between_columns<T: Copy + Into<i32>>(image: &Image<T>, places: &Places) -> f64 {
-    let (width, height) = (image.height, image.width);
-    let pixels = (0..width * height).map(|k| image.pixels[(k % width) * image.width + k / width]).collect();
-    let turned = seen(&Image { width, height, pixels }, &places.map(|p| Point2::new(p.y, p.x)));
+    let turned = Image::from_fn(image.height, image.width, |x, y| image.pixels[x * image.width + y]);
+    let turned = seen(&turned, &places.map(|p| Point2::new(p.y, p.x)));
     turned.map_or(0.0, |seen| square(&seen, 0) / seen.len() as f64)
 }
 
@@ -139,19 +138,17 @@ mod tests {
     /// Squares of 30 px, turned, blurred by a linear ramp, with noise; odd rows are taken `shift` px later.
     fn picture(turn: f64, moved: f64) -> (Picture, Places) {
         let (sin, cos) = turn.sin_cos();
-        let grey = |k: usize| {
-            let (x, y) =
-                ((k % 300) as f64 - if (k / 300) % 2 == 1 { moved } else { 0.0 } - 150.0, (k / 300) as f64 - 150.0);
+        let image = Image::from_fn(300, 300, |col, row| {
+            let (x, y) = (col as f64 - if row % 2 == 1 { moved } else { 0.0 } - 150.0, row as f64 - 150.0);
             let saw = |v: f64| ((((v / 30.0).rem_euclid(2.0) - 1.0).abs() - 0.5) * 30.0 / 1.5).clamp(-1.0, 1.0);
-            let noise = (k * 7919 % 13) as f64 / 3.0 - 2.0;
-            120.0 + 80.0 * saw(cos * x + sin * y) * saw(cos * y - sin * x) + noise
-        };
-        let pixels = (0..300 * 300).map(|k| grey(k).round() as u8).collect();
+            let noise = ((300 * row + col) * 7919 % 13) as f64 / 3.0 - 2.0;
+            (120.0 + 80.0 * saw(cos * x + sin * y) * saw(cos * y - sin * x) + noise).round() as u8
+        });
         let places = Lattice::from_fn(7, 7, |col, row| {
             let (u, v) = (30.0 * (col as f64 - 3.0) + 15.0, 30.0 * (row as f64 - 3.0) + 15.0);
             Some(Point2::new(150.0 + cos * u - sin * v, 150.0 + sin * u + cos * v))
         });
-        (Picture::from(Image { width: 300, height: 300, pixels }), places)
+        (image.into(), places)
     }
 
     #[test]
@@ -185,14 +182,9 @@ mod tests {
                 (1.0 - v) * ((1.0 - u) * g(c, r) + u * g(c + 1, r))
                     + v * ((1.0 - u) * g(c, r + 1) + u * g(c + 1, r + 1))
             };
-            let pixel = |k: usize| {
-                let (x, y) = (k % 300, k / 300);
-                let by = |n: usize| if n.is_multiple_of(2) { 0.5 * zigzag } else { -0.5 * zigzag };
-                at(x as f64 + by(y), y as f64 + by(x)).round() as u8
-            };
-            let pixels = (0..300 * 300).map(pixel).collect();
-            let mosaic = Picture::from(Image { width: 300, height: 300, pixels });
-            assert_eq!(shift_between_fields(&mosaic, &places), None, "{zigzag}");
+            let by = |n: usize| if n.is_multiple_of(2) { 0.5 * zigzag } else { -0.5 * zigzag };
+            let mosaic = Image::from_fn(300, 300, |x, y| at(x as f64 + by(y), y as f64 + by(x)).round() as u8);
+            assert_eq!(shift_between_fields(&mosaic.into(), &places), None, "{zigzag}");
         }
     }
 }

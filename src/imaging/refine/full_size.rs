@@ -86,11 +86,10 @@ impl<T: Sample> Full<'_, T> {
     /// A fit in the full window or in a share of it, started where the one in the near window ended: most steps are taken where they are
     /// cheap, and the blur is that of the picture, not of the copy, so fewer pixels count as near an edge.
     pub(super) fn full(&self, seen: Windows, share: f64, window: &mut Window) -> Windows {
-        let mut within = |half_px: f64| match &seen.near {
-            _ if seen.alone => self.fit_within(half_px, &seen.cell, &seen.start, window),
+        let mut within = |half_px: f64| match seen.near.filter(|_| !seen.alone) {
+            Some(near) => self.fit_from(&near, half_px, &seen, window),
             // Squares that are not alike all over show in a small window as a light that changes, and in a large one hardly.
             None => self.fit_within(half_px, &seen.cell, &seen.start, window),
-            Some(near) => self.fit_from(near, half_px, &seen, window),
         };
         // What is hardly larger than the near window is not made smaller.
         let share_px = share * half_px(seen.cell.side(), margin_px(&seen.start, &seen.cell));
@@ -124,7 +123,7 @@ impl<T: Sample> Full<'_, T> {
         let mut best = *first;
         // The first fit was pulled by what the second one leaves out: a third one sees that, too.
         for _ in 0..2 {
-            let keep = Explained::by(&best, board.roughness(), self.clip_level - self.veil, clips);
+            let keep = Explained::by(&best, board.roughness, self.clip_level - self.veil, clips);
             let start = Model { corner: Vector2::zeros(), ..best.fit.model };
             let again = self.fit_kept(most_half_px, &Cell { place: best.px, ..*cell }, &start, &keep, window);
             let dropped = |again: &Measured| again.fit.left_out.saturating_sub(first.fit.left_out);

@@ -7,12 +7,11 @@ mod curvature;
 pub mod fields;
 mod full_size;
 pub mod light;
-mod measured;
 mod outlying_pixels;
 pub mod saddle_fit;
 mod scatter;
 mod whole_board;
 mod windows;
 
-pub use measured::Measured;
+pub use saddle_fit::Measured;
 pub use whole_board::{measure, refine};

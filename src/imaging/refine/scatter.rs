@@ -160,9 +160,8 @@ fn trigamma(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix2, Point2, Vector2};
+    use nalgebra::Point2;
 
-    use super::super::saddle_fit::Model;
     use super::*;
     use crate::simulate::draws::{Draws, Purpose};
 
@@ -172,27 +171,8 @@ mod tests {
         Lattice::from_fn(columns, columns, |col, row| {
             let factor = variance(row * columns + col, &mut draws);
             let mut arm = || factor * draws.normal().powi(2);
-            let fit = Fit {
-                model: Model {
-                    corner: Vector2::zeros(),
-                    angles_rad: [0.0, 1.5],
-                    blur_px: [1.0; 2],
-                    level: 100.0,
-                    half_contrast: 50.0,
-                    light_slope: Vector2::zeros(),
-                    bend: [0.0; 2],
-                },
-                covariance_px2: Matrix2::identity(),
-                place_by_light: Matrix2::identity(),
-                light_covariance: Matrix2::identity(),
-                residual: 1.0,
-                arm_misfit: [[1.0; 2]; 2],
-                misfits: [(); 2].map(|()| Misfit { chi_square: arm() + arm(), freedom: 2.0 }),
-                stray: None,
-                pixels: 400,
-                left_out: 0,
-                steps: 3,
-            };
+            let misfits = [(); 2].map(|()| Misfit { chi_square: arm() + arm(), freedom: 2.0 });
+            let fit = Fit { misfits, ..Fit::example() };
             Some(Measured { px: Point2::new(col as f64, row as f64), fit, reach: [0.5; 2] })
         })
     }

@@ -18,9 +18,8 @@ use super::curvature::{Bend, Point, Rule, bends};
 use super::full_size::Full;
 use super::light::illumination;
 use super::light::stray::{self, Slope};
-use super::measured::Measured;
-use super::saddle_fit::Model;
 use super::saddle_fit::window::{Sample, Window};
+use super::saddle_fit::{Measured, Model};
 use super::scatter::Scatter;
 use super::windows::{Windows, bends_by, usual};
 use super::{acceptance, full_size, scatter};
@@ -101,8 +100,7 @@ impl<T: Sample> Full<'_, T> {
     /// Variance of the slope of stray light by the near windows, in each of which it is fitted without a bound.
     fn stray_light(&self, seen: &Lattice<Windows>, window: &mut Window) -> Option<f64> {
         let unbound = self.with_stray(stray::UNBOUND);
-        let mut fits = Lattice::from_fn(seen.columns, seen.rows, |col, row| {
-            let windows = seen.get(col, row)?;
+        let mut fits = seen.filter_map(|_, _, windows| {
             let near = windows.near.or(windows.full)?;
             unbound.fit_from(&near, full_size::near_half_px(&windows.start), windows, window)
         });
@@ -127,8 +125,7 @@ impl<T: Sample> Full<'_, T> {
             Some(detected.level.to_picture(px))
         });
         let scale = detected.level.scale();
-        let near: Lattice<Windows> = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            let from = coarse.get(col, row)?;
+        let near = coarse.filter_map(|col, row, from| {
             let bends = at(&coarse_bends, col, row);
             let cell = Cell { own_bends: bends.map(|bend| bend.is_none()), ..Cell::of(&places, col, row)? };
             let cell = cell.with_markers(&places, (col, row), detected.print);
@@ -150,15 +147,9 @@ impl<T: Sample> Full<'_, T> {
         let near_only: Vec<Measured> = near.iter().filter_map(|(_, _, windows)| windows.near).collect();
         let board = acceptance::Board::of(&near_only, &[]);
         let near_bends = bends_by(&near, &places, |windows| windows.near.filter(|near| board.accepts(near)));
-        let near = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            Some(near.get(col, row)?.clone().rebent(at(&near_bends, col, row)))
-        });
+        let near = near.filter_map(|col, row, windows| Some(windows.clone().rebent(at(&near_bends, col, row))));
         let (windows, board) = self.large(&near, &places, window);
-        let measured = Lattice::from_fn(columns, coarse.rows, |col, row| {
-            let seen = windows.get(col, row)?;
-            let corner = self.largest_free(seen, &board, window)?;
-            Some(seen.with_lines(corner))
-        });
+        let measured = windows.filter_map(|_, _, seen| Some(seen.with_lines(self.largest_free(seen, &board, window)?)));
         Seen { windows, board, measured }
     }
 
@@ -172,20 +163,18 @@ impl<T: Sample> Full<'_, T> {
     ) -> (Lattice<Windows>, acceptance::Board) {
         // How much edges bend is seen on some of the corners as well: where full windows are of no use, most need not be looked at.
         let few = near.count() < LEAST_TRIED * TRIED;
-        let tried = Lattice::from_fn(near.columns, near.rows, |col, row| {
-            let seen = near.get(col, row).filter(|_| few || (col + row).is_multiple_of(TRIED))?;
-            Some(self.full(seen.clone(), 1.0, window))
+        let tried = near.filter_map(|col, row, seen| {
+            (few || (col + row).is_multiple_of(TRIED)).then(|| self.full(seen.clone(), 1.0, window))
         });
         let mut within = |share: f64| {
-            let seen = Lattice::from_fn(near.columns, near.rows, |col, row| {
+            let seen = near.filter_map(|col, row, from| {
                 let known = tried.get(col, row).filter(|_| share == 1.0).cloned();
-                known.or_else(|| Some(self.full(near.get(col, row)?.clone(), share, window)))
+                known.or_else(|| Some(self.full(from.clone(), share, window)))
             });
             let board = usual(&seen);
             let bends = bends_by(&seen, places, |windows| windows.free(&board).copied());
-            let seen = Lattice::from_fn(near.columns, near.rows, |col, row| {
-                Some(seen.get(col, row)?.clone().rebent(bends[row * near.columns + col]))
-            });
+            let rebent = |col: usize, row: usize| bends[row * near.columns + col];
+            let seen = seen.filter_map(|col, row, windows| Some(windows.clone().rebent(rebent(col, row))));
             let board = usual(&seen);
             (seen, board)
         };
@@ -236,24 +225,24 @@ mod tests {
     use statrs::function::erf::erf;
 
     const SIDE_PX: f64 = 60.0;
+    const BLUR_PX: f64 = 0.9;
+
+    /// Light minus dark across the nearest of lines 0 to `lines`, which are a `side` apart, in the signs of the squares.
+    fn across(px: f64, lines: f64, side: f64) -> f64 {
+        let nearest = (px / side).round().clamp(0.0, lines);
+        let sign = if nearest.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
+        sign * erf((px - nearest * side) / (BLUR_PX * 2f64.sqrt()))
+    }
 
     /// A board of 8x7 squares whose every other row of crossings is off by `zigzag_px` along the rows, with noise of 2 grey levels.
     fn zigzag_board(zigzag_px: f64) -> Picture {
-        const BLUR_PX: f64 = 0.9;
-        let (width, height) = (600, 540);
-        // Light minus dark across the nearest of the lines that are a square apart, in the signs of the squares.
-        let across = |px: f64, lines: f64| {
-            let nearest = (px / SIDE_PX).round().clamp(0.0, lines);
-            let sign = if nearest.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
-            sign * erf((px - nearest * SIDE_PX) / (BLUR_PX * 2f64.sqrt()))
-        };
         let grey = |x: f64, y: f64| {
             let y = y - 60.3;
             let x = x - 60.7 - zigzag_px * ((y / SIDE_PX).rem_euclid(2.0) - 1.0).abs();
             let inside = (0.0..8.0 * SIDE_PX).contains(&x) && (0.0..7.0 * SIDE_PX).contains(&y);
-            if inside { 120.0 - 80.0 * across(x, 8.0) * across(y, 7.0) } else { 200.0 }
+            if inside { 120.0 - 80.0 * across(x, 8.0, SIDE_PX) * across(y, 7.0, SIDE_PX) } else { 200.0 }
         };
-        noisy(width, height, 11, grey)
+        noisy(600, 540, 11, grey)
     }
 
     /// A picture of these grey values with noise of 2 grey levels.
@@ -263,11 +252,11 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 40) as f64 / f64::from(1u32 << 24) - 0.5
         };
-        let pixels = (0..width * height).map(|k| {
+        let pixel = |x: usize, y: usize| {
             let noise = 2.0 * 12f64.sqrt() * uniform();
-            (grey((k % width) as f64, (k / width) as f64) + noise).round().clamp(0.0, 255.0) as u8
-        });
-        Picture::from(Image { width, height, pixels: pixels.collect() })
+            (grey(x as f64, y as f64) + noise).round().clamp(0.0, 255.0) as u8
+        };
+        Image::from_fn(width, height, pixel).into()
     }
 
     #[test]
@@ -303,12 +292,6 @@ mod tests {
     fn haze_that_grows_over_a_slanted_board_moves_no_corner() {
         const SIDE: f64 = 40.0;
         const SLANT: f64 = 0.45;
-        const BLUR: f64 = 0.9;
-        let across = |px: f64, lines: f64| {
-            let nearest = (px / SIDE).round().clamp(0.0, lines);
-            let sign = if nearest.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
-            sign * erf((px - nearest * SIDE) / (BLUR * 2f64.sqrt()))
-        };
         let board = Board::checker("10x7".parse().unwrap(), 10.0);
         for seed in 0..4 {
             let stretch = (1.0 + SLANT * SLANT).sqrt();
@@ -316,7 +299,7 @@ mod tests {
             let grey = |x: f64, y: f64| {
                 let (u, v) = ((x - x0 - SLANT * (y - y0)) / stretch, y - y0);
                 let inside = (0.0..10.0 * SIDE).contains(&u) && (0.0..7.0 * SIDE).contains(&v);
-                let board = if inside { 90.0 - 50.0 * across(u, 10.0) * across(v, 7.0) } else { 140.0 };
+                let board = if inside { 90.0 - 50.0 * across(u, 10.0, SIDE) * across(v, 7.0, SIDE) } else { 140.0 };
                 board + 0.12 * x
             };
             let picture = noisy(700, 400, seed, grey);
@@ -348,17 +331,17 @@ mod tests {
             let all = (0..PARTS * PARTS).map(|k| grey(part(x, k % PARTS), part(y, k / PARTS)));
             all.sum::<f64>() / (PARTS * PARTS) as f64
         };
-        let plain: Vec<f64> = (0..width * height).map(|k| pixel(k % width, k / width)).collect();
-        let pixels = (0..width * height).map(|k| {
-            let (x, y) = (k % width, k / width);
+        let plain = Image::from_fn(width, height, pixel).pixels;
+        let pixel = |x: usize, y: usize| {
+            let k = y * width + x;
             let beside = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(dx, dy): (isize, isize)| {
                 let (x, y) = (x.saturating_add_signed(dx).min(width - 1), y.saturating_add_signed(dy).min(height - 1));
                 plain[y * width + x]
             });
             let sharp = plain[k] + overshoot * (4.0 * plain[k] - beside.iter().sum::<f64>());
             (sharp + ((k * 7919) % 5) as f64 - 2.0).round().clamp(0.0, 255.0) as u8
-        });
-        Picture::from(Image { width, height, pixels: pixels.collect() })
+        };
+        Image::from_fn(width, height, pixel).into()
     }
 
     #[test]

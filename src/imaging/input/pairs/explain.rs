@@ -1,41 +1,25 @@
 //! What is said of a folder that was read, or could not be: what was found, and the call that would do.
 
-use std::fmt;
-
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::listing::{Aside, Folder, list};
-use super::names::{Open, Reach};
+use super::names::{Open, Reach, stem};
 use super::readings::{Reading, Told};
 use super::{Halves, PairBy, Pairing, Source};
 use crate::diagnostic::count;
-use crate::imaging::{Error, Side, image, video};
+use crate::imaging::error::of_video;
+use crate::imaging::{Error, Side, image};
 
 /// Folders, and readings, that a message shows at most.
 const MOST_SHOWN: usize = 8;
 
-/// A command to type.
-pub struct Call<'a> {
-    command: &'a str,
-    places: Vec<&'a Utf8Path>,
-    flag: &'a str,
-}
-
-impl<'a> Call<'a> {
-    fn new(source: &Source<'a>, places: Vec<&'a Utf8Path>, flag: &'a str) -> Call<'a> {
-        Call { command: source.command, places, flag }
-    }
-}
-
-impl fmt::Display for Call<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "`stereocal {}", self.command)?;
-        for place in &self.places {
-            let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
-            if place.as_str().chars().all(plain) { write!(f, " {place}")? } else { write!(f, " '{place}'")? }
-        }
-        if self.flag.is_empty() { write!(f, "`") } else { write!(f, " {}`", self.flag) }
-    }
+/// A command to type, with flags behind the places where there are any.
+fn call(source: &Source<'_>, places: &[&Utf8Path], flags: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
+    let quote = |place: &Utf8Path| if place.as_str().chars().all(plain) { "" } else { "'" };
+    let places: String = places.iter().map(|place| format!(" {0}{place}{0}", quote(place))).collect();
+    let flags = if flags.is_empty() { String::new() } else { format!(" {flags}") };
+    format!("`stereocal {}{places}{flags}`", source.command)
 }
 
 /// What was taken: `31 pairs by number: left stereoLeft/imageL*.png, right stereoRight/imageR*.png`.
@@ -65,8 +49,7 @@ pub fn taken(reading: &Reading, top: &Utf8Path) -> String {
 /// Whether the left pictures are all called right ones, and the right pictures left ones.
 fn names_disagree(reading: &Reading) -> bool {
     let all = |side: Side, paths: &[Utf8PathBuf]| {
-        let told = |path: &Utf8PathBuf| Open::new(path.file_stem().unwrap_or_default(), Reach::Words).side();
-        paths.iter().all(|path| told(path) == Some(side.other()))
+        paths.iter().all(|path| Open::new(stem(path), Reach::Words).side() == Some(side.other()))
     };
     Side::BOTH.into_iter().all(|side| all(side, &reading.sides[side as usize]))
 }
@@ -99,8 +82,18 @@ fn common(a: &str, b: &str) -> usize {
 pub fn not_taken(reading: &Reading, folders: &[Folder]) -> Option<String> {
     let others = folders.iter().filter(|folder| !folder.pictures.is_empty() && !reading.places.contains(&folder.path));
     let shown: Vec<String> = others.map(|f| format!("{} ({})", name(f), count(f.pictures.len(), "picture"))).collect();
-    let more = if shown.len() > MOST_SHOWN { ", ..." } else { "" };
-    (!shown.is_empty()).then(|| format!("not taken: {}{more}", shown[..shown.len().min(MOST_SHOWN)].join(", ")))
+    (!shown.is_empty()).then(|| format!("not taken: {}", listed(&shown, MOST_SHOWN)))
+}
+
+/// The first so many, and whether there are more.
+fn listed<S: AsRef<str>>(all: &[S], most: usize) -> String {
+    let first: Vec<&str> = all.iter().take(most).map(AsRef::as_ref).collect();
+    format!("{}{}", first.join(", "), if all.len() > most { ", ..." } else { "" })
+}
+
+/// What files are called.
+fn called(paths: &[Utf8PathBuf]) -> Vec<&str> {
+    paths.iter().filter_map(|path| path.file_name()).collect()
 }
 
 fn name(folder: &Folder) -> String {
@@ -108,14 +101,11 @@ fn name(folder: &Folder) -> String {
 }
 
 /// The folders, how many pictures each holds, and two of their names.
-fn found(folders: &[Folder]) -> String {
-    let holding: Vec<&Folder> = folders.iter().filter(|folder| !folder.pictures.is_empty()).collect();
+fn found(holding: &[&Folder]) -> String {
     let mut text = String::new();
     for folder in holding.iter().take(MOST_SHOWN) {
-        let names: Vec<&str> = folder.pictures.iter().take(2).filter_map(|p| p.file_name()).collect();
-        let more = if folder.pictures.len() > names.len() { ", ..." } else { "" };
         let pictures = count(folder.pictures.len(), "picture");
-        text.push_str(&format!("\n  {}: {pictures} ({}{more})", name(folder), names.join(", ")));
+        text.push_str(&format!("\n  {}: {pictures} ({})", name(folder), listed(&called(&folder.pictures), 2)));
     }
     if holding.len() > MOST_SHOWN {
         text.push_str(&format!("\n  and {} more folders with pictures", holding.len() - MOST_SHOWN));
@@ -131,7 +121,7 @@ pub fn several(source: &Source<'_>, readings: &[Reading]) -> Error {
         statement.push_str(&format!("\n  {}", taken(reading, source.images)));
         let places: Vec<&Utf8Path> = reading.places.iter().map(Utf8PathBuf::as_path).collect();
         if places != [source.images] {
-            calls.push(Call::new(source, places, "").to_string());
+            calls.push(call(source, &places, ""));
         }
     }
     if readings.len() > MOST_SHOWN {
@@ -159,14 +149,14 @@ pub fn none(source: &Source<'_>, folders: &[Folder], readings: &[Reading]) -> Er
             Some((have, lacks)) => (
                 format!("there is {have}/ but no {lacks}/"),
                 match left_first(&holding).as_slice() {
-                    [a, b] => Call::new(source, vec![&a.path, &b.path], "").to_string(),
+                    [a, b] => call(source, &[&a.path, &b.path], ""),
                     _ => by_hand(source),
                 },
             ),
             None => untold(source, &holding, pictures),
         },
     };
-    let statement = statement + &found(folders);
+    let statement = statement + &found(&holding);
     Error::Unpaired { path: source.images.to_owned(), statement, hint }
 }
 
@@ -176,26 +166,16 @@ fn without_pictures(source: &Source<'_>, folders: &[Folder]) -> (String, String)
     let below = folders.first().into_iter().flat_map(|root| &root.folders).filter_map(|path| list(path).ok());
     let others: Vec<Utf8PathBuf> =
         folders.iter().flat_map(|f| f.others.clone()).chain(below.flat_map(|f| f.others)).collect();
-    let Some(first) = others.first() else {
+    if others.is_empty() {
         let hint = format!(
             "is the path right? The pictures are in this folder, or in one for each camera: {}",
             by_hand(source)
         );
         return (NONE.to_owned(), hint);
-    };
-    let names = first.file_name().unwrap_or(first.as_str());
-    let statement = format!(
-        "{NONE}, but {} ({names}{})",
-        count(others.len(), "other file"),
-        if others.len() > 1 { ", ..." } else { "" }
-    );
-    (
-        statement,
-        others
-            .iter()
-            .find_map(|file| video::hint(file))
-            .unwrap_or_else(|| "save pictures of other formats as PNG".to_owned()),
-    )
+    }
+    let statement = format!("{NONE}, but {} ({})", count(others.len(), "other file"), listed(&called(&others), 1));
+    let of_video = others.iter().find_map(|file| of_video(file));
+    (statement, of_video.unwrap_or_else(|| "save pictures of other formats as PNG".to_owned()))
 }
 
 /// The sides are told, but nothing says which pictures belong together.
@@ -211,8 +191,7 @@ fn unmatched(source: &Source<'_>, reading: &Reading) -> (String, String) {
         count(left + right, "picture")
     );
     let hint = if left == right {
-        let places = std::iter::once(source.images).chain(source.right).collect();
-        format!("{} pairs them in the order of their names", Call::new(source, places, "--pair-by order"))
+        format!("{} pairs them in the order of their names", call(source, &source.places(), "--pair-by order"))
     } else {
         format!(
             "name partners alike; {left} left pictures and {right} right ones cannot be paired in their order either"
@@ -258,7 +237,7 @@ pub fn same(source: &Source<'_>) -> Error {
 fn untold(source: &Source<'_>, holding: &[&Folder], pictures: usize) -> (String, String) {
     let two_views = holding.iter().find_map(|folder| Some((folder, as_of_two(folder.pictures.first()?)?)));
     let halves = two_views.map(|(folder, halves)| {
-        let call = Call::new(source, vec![&folder.path], halves.flag());
+        let call = call(source, &[&folder.path], halves.flag());
         let [left, right] = halves.words();
         format!("if the {left} half of each picture is the left camera's and the {right} one the right's: {call}")
     });
@@ -266,7 +245,7 @@ fn untold(source: &Source<'_>, holding: &[&Folder], pictures: usize) -> (String,
     let (statement, hint) = match below.as_slice() {
         [first, second, ..] => (
             format!("which of these {} are left and right is not told", count(below.len(), "folder")),
-            format!("name two: {}", Call::new(source, vec![&first.path, &second.path], "")),
+            format!("name two: {}", call(source, &[&first.path, &second.path], "")),
         ),
         _ => (
             format!("no pair found: the names of {} tell neither left nor right", count(pictures, "picture")),
@@ -291,10 +270,8 @@ impl Pairing {
     pub fn left_out(&self) -> Option<String> {
         let mut parts = Vec::new();
         if !self.single.is_empty() {
-            let names: Vec<&str> = self.single.iter().take(3).filter_map(|p| p.file_name()).collect();
-            let more = if self.single.len() > names.len() { ", ..." } else { "" };
             let pictures = count(self.single.len(), "picture");
-            parts.push(format!("{pictures} without a partner ({}{more})", names.join(", ")));
+            parts.push(format!("{pictures} without a partner ({})", listed(&called(&self.single), 3)));
         }
         if self.sideless > 0 {
             parts.push(format!("{} whose names tell neither left nor right", count(self.sideless, "picture")));

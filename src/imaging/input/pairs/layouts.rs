@@ -22,7 +22,7 @@ use Outcome::{InOrder, Pairs, Refused};
 /// Repository and folder, the files, and what comes of it.
 type Layout = (&'static str, &'static [&'static str], Outcome);
 
-const LAYOUTS: [Layout; 37] = [
+const LAYOUTS: [Layout; 34] = [
     // Two folders called left and right.
     (
         "thiyagu1/Handy_Calib_Images: .",
@@ -54,11 +54,6 @@ const LAYOUTS: [Layout; 37] = [
         Pairs(24, ["0", "23"], "left/*.png"),
     ),
     (
-        "SharkPeppero/stereo_calibration: data/20250510_180342",
-        &["left/left_{0..23}.png", "right/right_{0..23}.png"],
-        Pairs(24, ["0", "23"], "left/left_*.png"),
-    ),
-    (
         "mengxz0203/RCS_3D: images",
         &[
             "left/left{01,05,06,08,09,12,15}.jpg",
@@ -67,11 +62,6 @@ const LAYOUTS: [Layout; 37] = [
             "test/right/right{1..15}.jpg",
         ],
         Pairs(3, ["09", "15"], "left/left*.jpg"),
-    ),
-    (
-        "janicema0702/polyu-research: calib",
-        &["left/{1..8}.jpg", "right/{1,2,4,5,6,7,8}.jpg"],
-        Pairs(7, ["1", "8"], "left/*.jpg"),
     ),
     // The same one level deeper.
     ("janicema0702/polyu-research: .", &["calib/{left,right}/{1..8}.jpg"], Pairs(8, ["1", "8"], "calib/left/*.jpg")),
@@ -204,11 +194,6 @@ const LAYOUTS: [Layout; 37] = [
         "sourishg/stereo-calibration: calib_imgs",
         &["{1,2}/left{1..20}.jpg", "{1,2}/right{1..19}.jpg"],
         Refused(&["2 ways", "camera-check IMAGES/1`", "camera-check IMAGES/2`"]),
-    ),
-    (
-        "QLHua001/StereoCalib: example",
-        &["calib_imgs/{left,right}{0..6}.jpg", "calib_imgs_{2,3}/{left,right}{0..26}.jpg"],
-        Refused(&["3 ways", "camera-check IMAGES/calib_imgs_3`"]),
     ),
     (
         "TemugeB/python_stereo_camera_calibrate: .",

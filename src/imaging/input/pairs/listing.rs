@@ -3,8 +3,6 @@
 //! Hidden files and folders are passed over, and so are folders that this program wrote its results into: a run inside the folder of
 //! pictures must not find what it wrote the last time.
 
-use std::collections::BTreeMap;
-
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::names::natural_order;
@@ -47,16 +45,9 @@ pub struct Aside {
     pub again: usize,
 }
 
-impl std::ops::Add for Aside {
-    type Output = Aside;
-    fn add(self, more: Aside) -> Aside {
-        Aside { other: self.other + more.other, again: self.again + more.again }
-    }
-}
-
 impl std::iter::Sum for Aside {
     fn sum<I: Iterator<Item = Aside>>(all: I) -> Aside {
-        all.fold(Aside::default(), |sum, one| sum + one)
+        all.fold(Aside::default(), |sum, one| Aside { other: sum.other + one.other, again: sum.again + one.again })
     }
 }
 
@@ -95,21 +86,16 @@ pub fn list(folder: &Utf8Path) -> Result<Folder> {
     Ok(entries)
 }
 
-/// Keeps one picture of those of one name, the one in the format that loses least; how many went.
+/// Keeps one picture of those of one name, the first in the format that loses least; how many went.
 fn once(pictures: &mut Vec<Utf8PathBuf>) -> usize {
     let rank = |path: &Utf8Path| {
         let extension = path.extension().map(str::to_ascii_lowercase);
         EXTENSIONS.iter().position(|known| extension.as_deref() == Some(known))
     };
-    let mut best: BTreeMap<Utf8PathBuf, Utf8PathBuf> = BTreeMap::new();
-    for path in pictures.iter() {
-        let kept = best.entry(path.with_extension("")).or_insert_with(|| path.clone());
-        if rank(path) < rank(kept) {
-            kept.clone_from(path);
-        }
-    }
     let before = pictures.len();
-    pictures.retain(|path| best.get(&path.with_extension("")) == Some(path));
+    pictures.sort_by_key(|path| (path.with_extension(""), rank(path)));
+    pictures.dedup_by_key(|path| path.with_extension(""));
+    pictures.sort();
     before - pictures.len()
 }
 

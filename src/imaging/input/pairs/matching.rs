@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use camino::{Utf8Path, Utf8PathBuf};
 
-use super::names::{Open, Reach, SEPARATORS, natural_order, numbers};
+use super::names::{Open, Reach, SEPARATORS, natural_order, numbers, stem};
 use super::{PairBy, PairFiles};
 use crate::imaging::{Error, Result, Side};
 
@@ -93,10 +93,6 @@ pub fn pair(left: &[Utf8PathBuf], right: &[Utf8PathBuf], by: Option<PairBy>) -> 
     }
 }
 
-fn stem(path: &Utf8Path) -> &str {
-    path.file_stem().unwrap_or_default()
-}
-
 /// Pairs by a key that each name has; `None` is a name without one.
 pub fn by_key(sides: [&[Utf8PathBuf]; 2], by: PairBy, key: &dyn Fn(&[&str]) -> Vec<Option<String>>) -> Result<Matched> {
     let mut keyed: BTreeMap<(String, String), [Vec<&Utf8PathBuf>; 2]> = BTreeMap::new();
@@ -144,7 +140,7 @@ fn name(by: PairBy, key: &str, left: &Utf8Path, right: &Utf8Path) -> String {
         }
         _ if left == right => left.to_owned(),
         _ => {
-            let opened = Reach::ALL.map(|reach| [Open::new(left, reach), Open::new(right, reach)]);
+            let opened = [Reach::Words, Reach::Letters].map(|reach| [Open::new(left, reach), Open::new(right, reach)]);
             let alike = opened.iter().find(|[a, b]| a.key == b.key);
             alike.map_or_else(|| key.to_owned(), |[a, b]| a.without_side(left, b))
         }

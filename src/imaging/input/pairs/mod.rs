@@ -7,7 +7,6 @@
 //! and the call that would do.
 
 mod explain;
-mod find;
 mod folders;
 mod halves;
 #[cfg(test)]

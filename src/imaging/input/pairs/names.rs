@@ -7,6 +7,8 @@
 use std::cmp::Ordering;
 use std::ops::Range;
 
+use camino::Utf8Path;
+
 use crate::imaging::Side;
 
 /// Words for left and right that are found anywhere in a run of letters.
@@ -33,20 +35,13 @@ pub enum Reach {
     Letters,
 }
 
-impl Reach {
-    /// Both, the stronger one first.
-    pub const ALL: [Reach; 2] = [Reach::Words, Reach::Letters];
-}
-
 /// A name whose words for a side are left open.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Open {
     /// The name with a mark in place of each word.
     pub key: String,
-    /// What the words tell, in their order.
-    pub sides: Vec<Side>,
-    words: Vec<Range<usize>>,
-    weights: Vec<Weight>,
+    /// In their order.
+    words: Vec<Found>,
 }
 
 /// How much a word says by itself.
@@ -67,17 +62,17 @@ impl Open {
     pub fn new(name: &str, reach: Reach) -> Open {
         let mut found: Vec<Found> = Vec::new();
         for run in runs(name, char::is_alphabetic) {
-            let before = found.len();
             let pieces = pieces(name, run.clone());
-            long_words(name, run.clone(), &pieces, &mut found);
-            if found.len() == before {
-                found.extend(
-                    pieces.iter().filter_map(|p| Some((p.clone(), side_of(&name[p.clone()], &SHORT)?, Weight::Short))),
-                );
+            let short =
+                |piece: &Range<usize>| Some((piece.clone(), side_of(&name[piece.clone()], &SHORT)?, Weight::Short));
+            let mut here: Vec<Found> = long_word(name, run.clone(), &pieces).into_iter().collect();
+            if here.is_empty() {
+                here.extend(pieces.iter().filter_map(short));
             }
-            if found.len() == before && reach == Reach::Letters {
-                found.extend(letters_at_ends(name, run));
+            if here.is_empty() && reach == Reach::Letters {
+                here.extend(letters_at_ends(name, run));
             }
+            found.append(&mut here);
         }
         let mut key = String::new();
         let mut end = 0;
@@ -87,47 +82,54 @@ impl Open {
             end = word.end;
         }
         key.push_str(&name[end..]);
-        let weights = found.iter().map(|(_, _, weight)| *weight).collect();
-        let sides = found.iter().map(|(_, side, _)| *side).collect();
-        Open { key, sides, words: found.into_iter().map(|(word, _, _)| word).collect(), weights }
+        Open { key, words: found }
     }
 
     /// The side that the name tells by itself: that of its long words, else that of its short ones.
     pub fn side(&self) -> Option<Side> {
-        let of = |weight: Weight| {
-            let words = self.sides.iter().zip(&self.weights).filter(move |(_, w)| **w == weight);
-            words.map(|(side, _)| *side).collect::<Vec<Side>>()
+        let of = |weight: Weight| -> Vec<Side> {
+            self.words.iter().filter(|(_, _, w)| *w == weight).map(|(_, side, _)| *side).collect()
         };
         let told = Some(of(Weight::Word)).filter(|sides| !sides.is_empty()).unwrap_or_else(|| of(Weight::Short));
         let (first, last) = (*told.first()?, *told.last()?);
         match told.iter().all(|side| *side == first) {
             true => Some(first),
             // Of words that disagree the one at the start of the name counts, else the one at its end.
-            false if self.key.starts_with('\0') => self.sides.first().copied(),
+            false if self.key.starts_with('\0') => self.words.first().map(|(_, side, _)| *side),
             false => self.key.ends_with('\0').then_some(last),
         }
     }
 
+    /// The words in which it differs from another of the same key, each with the side that it tells.
+    fn differing<'a>(&'a self, other: &'a Open) -> impl Iterator<Item = (&'a Range<usize>, Side)> {
+        let both = self.words.iter().zip(&other.words).filter(|((_, mine, _), (_, theirs, _))| mine != theirs);
+        both.map(|((word, mine, _), _)| (word, *mine))
+    }
+
     /// The side of this name beside another of the same key: they differ in words for a side only, each time the same way round.
     pub fn side_beside(&self, other: &Open) -> Option<Side> {
-        let mut differing = self.sides.iter().zip(&other.sides).filter(|(mine, theirs)| mine != theirs);
-        let (first, _) = differing.next()?;
-        let same_key = self.key == other.key && self.sides.len() == other.sides.len();
-        (same_key && differing.all(|(mine, _)| mine == first)).then_some(*first)
+        let mut differing = self.differing(other);
+        let (_, first) = differing.next()?;
+        let same_key = self.key == other.key && self.words.len() == other.words.len();
+        (same_key && differing.all(|(_, mine)| mine == first)).then_some(first)
     }
 
     /// The name without the words in which it differs from another one of the same key.
     pub fn without_side(&self, name: &str, other: &Open) -> String {
         let mut kept = String::new();
         let mut end = 0;
-        let words = self.words.iter().zip(self.sides.iter().zip(&other.sides));
-        for (word, _) in words.filter(|(_, (mine, theirs))| mine != theirs) {
+        for (word, _) in self.differing(other) {
             push_apart(&mut kept, &name[end..word.start]);
             end = word.end;
         }
         push_apart(&mut kept, &name[end..]);
         kept.trim_matches(SEPARATORS).to_owned()
     }
+}
+
+/// The name of a file without its ending.
+pub fn stem(path: &Utf8Path) -> &str {
+    path.file_stem().unwrap_or_default()
 }
 
 /// Signs that hold words apart and mean nothing by themselves.
@@ -169,20 +171,16 @@ fn pieces(name: &str, run: Range<usize>) -> Vec<Range<usize>> {
 }
 
 /// The first long word of a run. It stands alone where it is a piece of the run, or where the run has no case that could cut it.
-fn long_words(name: &str, run: Range<usize>, pieces: &[Range<usize>], found: &mut Vec<Found>) {
-    let lower = name[run.clone()].to_lowercase();
+fn long_word(name: &str, run: Range<usize>, pieces: &[Range<usize>]) -> Option<Found> {
     // Where small letters are longer than the capitals, places in one are not places in the other.
-    if lower.len() != run.len() {
-        return;
-    }
+    let lower = Some(name[run.clone()].to_lowercase()).filter(|lower| lower.len() == run.len())?;
     let words = LONG.iter().flat_map(|(left, right)| [(left, Side::Left), (right, Side::Right)]);
     let first = words.filter_map(|(word, side)| Some((lower.find(word)?, word.len(), side))).min_by_key(|w| w.0);
-    if let Some((at, length, side)) = first {
-        let word = run.start + at..run.start + at + length;
-        let ideogram = !name[word.clone()].is_ascii();
-        let alone = pieces.contains(&word) || word == run || ideogram;
-        found.push((word, side, if alone { Weight::Word } else { Weight::Part }));
-    }
+    let (at, length, side) = first?;
+    let word = run.start + at..run.start + at + length;
+    let ideogram = !name[word.clone()].is_ascii();
+    let alone = pieces.contains(&word) || word == run || ideogram;
+    Some((word, side, if alone { Weight::Word } else { Weight::Part }))
 }
 
 fn side_of(word: &str, words: &[(&str, &str)]) -> Option<Side> {
@@ -208,21 +206,9 @@ pub fn numbers(name: &str) -> Vec<&str> {
 
 /// A name cut into its numbers and what stands between them, letters cut where the case changes.
 pub fn tokens(name: &str) -> Vec<&str> {
-    let kind = |c: char| {
-        if c.is_ascii_digit() {
-            0
-        } else if c.is_alphabetic() {
-            1
-        } else {
-            2
-        }
-    };
-    let mut cut: Vec<Range<usize>> = Vec::new();
-    for k in 0..3 {
-        for run in runs(name, |c| kind(c) == k) {
-            if k == 1 { cut.extend(pieces(name, run)) } else { cut.push(run) }
-        }
-    }
+    let mut cut = runs(name, |c| c.is_ascii_digit());
+    cut.extend(runs(name, char::is_alphabetic).into_iter().flat_map(|run| pieces(name, run)));
+    cut.extend(runs(name, |c| !c.is_ascii_digit() && !c.is_alphabetic()));
     cut.sort_by_key(|run| run.start);
     cut.into_iter().map(|run| &name[run]).collect()
 }

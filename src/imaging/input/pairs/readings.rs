@@ -6,11 +6,11 @@
 
 use std::collections::BTreeMap;
 
-use camino::{Utf8Path, Utf8PathBuf};
+use camino::Utf8PathBuf;
 
 use super::listing::{Aside, Folder};
 use super::matching::{self, Matched, by_key};
-use super::names::{Open, Reach, SEPARATORS, natural_order, tokens};
+use super::names::{Open, Reach, SEPARATORS, natural_order, stem, tokens};
 use super::{PairBy, PairFiles};
 use crate::imaging::{Result, Side};
 
@@ -34,6 +34,9 @@ pub enum Told {
     /// Nothing; there are two.
     Two,
 }
+
+/// What is told by names read so far, the stronger first.
+const BY_NAMES: [(Reach, Told); 2] = [(Reach::Words, Told::Words), (Reach::Letters, Told::Letters)];
 
 /// One way to read a folder.
 #[derive(Debug, Clone)]
@@ -70,7 +73,7 @@ pub fn two_folders(left: &Folder, right: &Folder, told: Told, by: Option<PairBy>
         sides: [left.pictures.clone(), right.pictures.clone()],
         matched: matching::pair(&left.pictures, &right.pictures, by)?,
         sideless: 0,
-        aside: left.aside + right.aside,
+        aside: [left.aside, right.aside].into_iter().sum(),
     })
 }
 
@@ -106,7 +109,7 @@ fn by_folders(below: &[&Folder]) -> Option<Reading> {
     if rest.iter().filter(alike).count() < rest.len() {
         return None;
     }
-    let by_words = Reach::ALL.into_iter().zip([Told::Words, Told::Letters]).find_map(|(reach, told)| {
+    let by_words = BY_NAMES.into_iter().find_map(|(reach, told)| {
         let [a, b] = [&called[0], &called[1]].map(|name| Open::new(name, reach));
         a.side_beside(&b).map(|side| (told, side))
     });
@@ -131,7 +134,7 @@ fn by_folders(below: &[&Folder]) -> Option<Reading> {
 
 /// What tells the sides of two folders, and the side of the first; `None` where they are not the two sides of something.
 fn tell(first: &Folder, second: &Folder, alone: bool) -> Option<(Told, Side)> {
-    for (reach, told) in Reach::ALL.into_iter().zip([Told::Words, Told::Letters]) {
+    for (reach, told) in BY_NAMES {
         let open = |folder: &Folder| Open::new(&folder.below, reach);
         if let Some(side) = open(first).side_beside(&open(second)) {
             return Some((told, side));
@@ -178,14 +181,10 @@ fn common_side(folder: &Folder) -> Option<Side> {
     sides.all(|side| side == Some(first)).then_some(first)
 }
 
-fn stem(path: &Utf8Path) -> &str {
-    path.file_stem().unwrap_or_default()
-}
-
 /// The readings of one folder by its names: words for the side where there are some, else each place at which all names have one of two
 /// numbers or words.
 fn by_names(folder: &Folder, by: Option<PairBy>) -> Vec<Result<Reading>> {
-    for (reach, told) in Reach::ALL.into_iter().zip([Told::Words, Told::Letters]) {
+    for (reach, told) in BY_NAMES {
         let sides = told_by_names(folder, reach);
         if sides.iter().any(Vec::is_empty) {
             continue;

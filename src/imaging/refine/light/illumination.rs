@@ -108,7 +108,7 @@ fn draw(corner: &mut Measured, light: Vector2<f64>, variance: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::refine::saddle_fit::{Fit, Misfit, Model};
+    use crate::imaging::refine::saddle_fit::{Fit, Model};
 
     /// A board of fits whose places are off by what their gradients are off by, times a blur of 2 px squared; deviations of
     /// the gradients repeat with period `prime`.
@@ -117,27 +117,12 @@ mod tests {
             let at = Point2::new(col as f64 * 30.0, row as f64 * 30.0);
             let k = row * columns + col;
             let wrong = Vector2::new((k * 37 % 101) as f64 - 50.0, (k * 61 % 101) as f64 - 50.0) * 3.4e-6;
-            let model = Model {
-                corner: wrong * -4.0,
-                angles_rad: [0.0, 1.5],
-                blur_px: [2.0; 2],
-                level: 100.0,
-                half_contrast: 50.0,
-                light_slope: light(at) + wrong,
-                bend: [0.0; 2],
-            };
             let fit = Fit {
-                model,
+                model: Model { corner: wrong * -4.0, light_slope: light(at) + wrong, ..Model::example() },
                 covariance_px2: Matrix2::identity() * 2.0 * 16e-8,
                 place_by_light: Matrix2::identity() * -4e-8,
                 light_covariance: Matrix2::identity() * 1e-8,
-                residual: 1.0,
-                arm_misfit: [[1.0; 2]; 2],
-                misfits: [Misfit::default(); 2],
-                stray: None,
-                pixels: 100,
-                left_out: 0,
-                steps: 3,
+                ..Fit::example()
             };
             Some(Measured { px: at + wrong * -4.0, fit, reach: [0.7; 2] })
         })

@@ -96,9 +96,7 @@ impl Line {
 /// Light and dark round every corner whose four squares are seen whole and unclipped.
 fn pairs<T: Copy + Into<f64>>(image: &Image<T>, clip_level: f64, places: &Places) -> Vec<Pair> {
     let square = |col: usize, row: usize| -> Option<f64> {
-        let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(c, r)| places.get(col + c, row + r).copied());
-        let [a, b, c, d] = corners;
-        let (a, b, c, d) = (a?, b?, c?, d?);
+        let [a, b, d, c] = places.square(col, row)?;
         let middle = Point2::from((a.coords + b.coords + c.coords + d.coords) / 4.0);
         let sides = [b - a, c - a, d - b, d - c];
         let side = sides.iter().map(Vector2::norm).fold(f64::INFINITY, f64::min);
@@ -157,9 +155,8 @@ mod tests {
             let reflectance = if (x / 20 + y / 20).is_multiple_of(2) { 0.85 } else { 0.08 };
             (veil + gain * light * reflectance + noise).round() as u16
         };
-        let pixels = (0..width * height).map(|k| grey(k % width, k / width)).collect();
         let place = |c: usize, r: usize| Some(Point2::new(20.0 * (c + 1) as f64 - 0.5, 20.0 * (r + 1) as f64 - 0.5));
-        (Image { width, height, pixels }, Lattice::from_fn(9, 7, place))
+        (Image::from_fn(width, height, grey), Lattice::from_fn(9, 7, place))
     }
 
     #[test]

@@ -5,9 +5,9 @@
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
-use super::equations::{Column, Equations, Fit, LEAST_BLUR_PX};
-use super::evaluation::{Arm, Evaluation, Misfit, STRAY_COLUMNS, misfits};
-use super::model::{COLUMNS, Model, N};
+use super::evaluation::{Arm, Column, Evaluation, Misfit, STRAY_COLUMNS, misfits};
+use super::fit::Fit;
+use super::model::{COLUMNS, LEAST_BLUR_PX, Model, N};
 use super::window::Window;
 
 /// Rounding to whole grey values alone leaves this variance.
@@ -37,18 +37,19 @@ fn noise_by(window: &Window, cost: f64, near_cost: f64) -> (f64, f64) {
 }
 
 /// What the equations at the end of a fit tell of it. The model has taken their step already.
-pub(super) fn plain(model: &Model, last: &Equations, window: &Window, own: [bool; 2]) -> Option<Fit> {
+pub(super) fn plain(model: &Model, last: &Evaluation<COLUMNS>, window: &Window, own: [bool; 2]) -> Option<Fit> {
     const PARAMETERS: [usize; N] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9];
     // A blur at its bound is not known the better for it.
-    let inverse = last.matrix.cholesky()?.inverse();
+    let (matrix, gradient) = last.equations();
+    let inverse = matrix.cholesky()?.inverse();
     let (parameters, bends) = (PARAMETERS, [None; 2]);
-    let (cost, freedom) = noise_by(window, last.cost, last.near_cost);
+    let (cost, freedom) = noise_by(window, last.cost(), last.near_cost);
     if own == [false; 2] {
         let end = End { cost, freedom, arms: last.arms, parameters, step: Column::zeros(), inverse, bends };
         return Some(end.fit(*model));
     }
-    let step = inverse * last.gradient;
-    let cost = cost - step.dot(&last.gradient);
+    let step = inverse * gradient;
+    let cost = cost - step.dot(&gradient);
     let end = End { cost, freedom, arms: last.arms, parameters, step, inverse, bends }.with_own_bends(own)?;
     Some(end.fit(model.add(&(end.step - step), LEAST_BLUR_PX)))
 }

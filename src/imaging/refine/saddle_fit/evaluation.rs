@@ -2,7 +2,7 @@
 //!
 //! Each kind of pixel has them from the fewest columns that span its derivatives, and a linear map takes those to the model's parameters.
 
-use nalgebra::{Matrix2, Matrix4, Matrix4x2, SMatrix, Vector2, Vector4};
+use nalgebra::{Matrix2, Matrix4, Matrix4x2, SMatrix, SVector, Vector2, Vector4};
 
 use super::crossing::Crossing;
 use super::model::{COLUMNS, Edge, Light, Model, N};
@@ -24,6 +24,22 @@ pub struct Evaluation<const C: usize> {
     pub near_cost: f64,
     /// For each edge, on either side of the crossing.
     pub arms: [[Arm<C>; 2]; 2],
+}
+
+/// The normal matrix of a least-squares step, and its gradient.
+pub type Normal = SMatrix<f64, N, N>;
+pub type Column = SVector<f64, N>;
+
+impl<const C: usize> Evaluation<C> {
+    /// Sum of squared residuals.
+    pub fn cost(&self) -> f64 {
+        self.sums[(N, N)]
+    }
+
+    /// The equations of a step.
+    pub fn equations(&self) -> (Normal, Column) {
+        (self.sums.fixed_view::<N, N>(0, 0).into_owned(), self.sums.fixed_view::<N, 1>(0, N).into_owned())
+    }
 }
 
 /// A chi-squared, and what it is in the mean where residuals are noise and nothing else.

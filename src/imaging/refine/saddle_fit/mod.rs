@@ -7,22 +7,21 @@
 
 mod crossing;
 mod end;
-mod equations;
 mod evaluation;
+mod fit;
 pub mod model;
 mod own_bends;
 mod products;
 mod special;
 pub mod window;
 
-use nalgebra::{Point2, Vector2};
+use nalgebra::Vector2;
 
-pub use equations::Fit;
-use equations::{Column, Equations, LEAST_BLUR_PX, Normal};
-use evaluation::Evaluation;
 pub use evaluation::Misfit;
+use evaluation::{Column, Evaluation, Normal};
+pub use fit::{Fit, Measured};
 pub use model::Model;
-use model::N;
+use model::{COLUMNS, LEAST_BLUR_PX, N};
 use window::Window;
 
 /// Steps after which a fit that still moves is given up; a good start needs three to six.
@@ -56,18 +55,6 @@ impl Model {
             }
         }
     }
-
-    /// The equations of a least-squares step.
-    fn equations(&self, window: &Window) -> Equations {
-        let Evaluation { sums, near_cost, arms } = self.evaluate(window);
-        Equations {
-            cost: sums[(N, N)],
-            near_cost,
-            matrix: sums.fixed_view::<N, N>(0, 0).into_owned(),
-            gradient: sums.fixed_view::<N, 1>(0, N).into_owned(),
-            arms,
-        }
-    }
 }
 
 /// Solves for level and contrast, where the start has none, with the rest as it is and even light. `None` where the pixels don't determine them.
@@ -76,7 +63,7 @@ fn with_levels(start: &Model, window: &Window) -> Option<Model> {
         return Some(*start);
     }
     let even = Model { level: 0.0, half_contrast: 0.0, light_slope: Vector2::zeros(), ..*start };
-    let Equations { matrix, gradient, .. } = even.equations(window);
+    let (matrix, gradient) = even.evaluate(window).equations();
     let d = matrix.fixed_view::<2, 2>(6, 6).into_owned().cholesky()?.solve(&gradient.fixed_rows::<2>(6).into_owned());
     Some(Model { level: d[0], half_contrast: d[1], ..even })
 }
@@ -105,11 +92,16 @@ pub fn fit(start: &Model, window: &Window, beside: Beside) -> Option<Fit> {
         None => end::plain(&model, &last, window, beside.bends)?,
     };
     let fit = Fit { pixels: count, left_out: window.left_out, steps, ..fit };
-    (fit.covariance_px2.iter().all(|v| v.is_finite()) && last.cost.is_finite()).then_some(fit)
+    (fit.covariance_px2.iter().all(|v| v.is_finite()) && last.cost().is_finite()).then_some(fit)
 }
 
-/// The model at the end of all steps, the equations one short step before it, and the number of steps.
-fn settled(start: Model, window: &Window, freedom: f64, least_blur_px: f64) -> Option<(Model, Equations, usize)> {
+/// The model at the end of all steps, what the pixels made of it one short step before, and the number of steps.
+fn settled(
+    start: Model,
+    window: &Window,
+    freedom: f64,
+    least_blur_px: f64,
+) -> Option<(Model, Evaluation<COLUMNS>, usize)> {
     /// Where the undamped step would gain less than this share of one pixel's variance, nothing moves by more than a third of its sigma;
     /// that step is still taken, and steps shrink at least tenfold by then, so less than a thirtieth is left. Of 2400 corners half were
     /// within 0.0002 sigma of where further steps took them, and 99 of 100 within 0.002.
@@ -119,10 +111,10 @@ fn settled(start: Model, window: &Window, freedom: f64, least_blur_px: f64) -> O
     /// Residuals of less than this share of the grey value, which no camera has, are mostly such rounding.
     const LEAST_RESIDUAL: f64 = 1e-4;
     let mut model = start;
-    let mut at = model.equations(window);
+    let mut at = model.evaluate(window);
     let mut damping = 1e-3;
     for steps in 1..=MAX_STEPS {
-        let (mut matrix, mut gradient) = (at.matrix, at.gradient);
+        let (mut matrix, mut gradient) = at.equations();
         model.hold_least_blur(&mut matrix, &mut gradient, least_blur_px);
         // A damped step gains little because it is short: only the undamped one tells how far the end is.
         let whole = matrix.cholesky()?.solve(&gradient);
@@ -130,7 +122,7 @@ fn settled(start: Model, window: &Window, freedom: f64, least_blur_px: f64) -> O
             return None;
         }
         let grey = model.level.abs() + model.half_contrast.abs();
-        if gradient.dot(&whole) < SETTLED * (at.cost / freedom).max((LEAST_RESIDUAL * grey).powi(2)) {
+        if gradient.dot(&whole) < SETTLED * (at.cost() / freedom).max((LEAST_RESIDUAL * grey).powi(2)) {
             return Some((model.add(&whole, least_blur_px), at, steps));
         }
         let mut damped = matrix;
@@ -138,10 +130,10 @@ fn settled(start: Model, window: &Window, freedom: f64, least_blur_px: f64) -> O
             damped[(i, i)] *= 1.0 + damping;
         }
         let next = model.add(&damped.cholesky()?.solve(&gradient), least_blur_px);
-        let there = next.equations(window);
+        let there = next.evaluate(window);
         // The gain that counts is the one that came out, as far as rounding lets it be seen.
-        let rounding = 2.0 * ROUNDING * grey * (at.cost * freedom).sqrt();
-        if there.cost <= at.cost + rounding {
+        let rounding = 2.0 * ROUNDING * grey * (at.cost() * freedom).sqrt();
+        if there.cost() <= at.cost() + rounding {
             (model, at) = (next, there);
             damping = (damping * 0.1).max(1e-9);
         } else {
@@ -154,26 +146,10 @@ fn settled(start: Model, window: &Window, freedom: f64, least_blur_px: f64) -> O
     None
 }
 
-impl Fit {
-    /// The fit with all its covariances `factor` times as large.
-    pub fn scattering(self, factor: f64) -> Fit {
-        Fit {
-            covariance_px2: self.covariance_px2 * factor,
-            place_by_light: self.place_by_light * factor,
-            light_covariance: self.light_covariance * factor,
-            stray: self.stray.map(|(slope, own)| (slope, own * factor)),
-            ..self
-        }
-    }
-
-    /// The corner in the picture whose window started at `start`, px.
-    pub fn place(&self, start: &Point2<f64>) -> Point2<f64> {
-        start + self.model.corner
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use nalgebra::Point2;
+
     use super::window::{Below, Frame};
     use super::*;
     use crate::imaging::image::Image;
@@ -181,9 +157,9 @@ mod tests {
     /// A window of the model's own grey values, at 256 steps a grey value.
     fn window(model: &Model, half: usize, band_px: f64) -> Window {
         let side = 2 * half + 1;
-        let place = |k: usize| ((k % side) as f64 - half as f64, (k / side) as f64 - half as f64);
-        let pixels = (0..side * side).map(|k| (256.0 * model.grey(place(k))).round() as u16).collect();
-        let picture = Image { width: side, height: side, pixels };
+        let from_middle = |at: usize| at as f64 - half as f64;
+        let grey = |x: usize, y: usize| 256.0 * model.grey((from_middle(x), from_middle(y)));
+        let picture = Image::from_fn(side, side, |x, y| grey(x, y).round() as u16);
         let halves = model.angles_rad.map(|a| Vector2::new(a.cos(), a.sin()) * half as f64);
         let start = Point2::new(half as f64, half as f64);
         let mut window = Window::default();

@@ -21,6 +21,9 @@ use std::f32::consts::{FRAC_1_SQRT_2, FRAC_2_SQRT_PI};
 pub const N: usize = 10;
 /// The parameters' derivatives and the residual.
 pub const COLUMNS: usize = N + 1;
+/// Least blur, px: that of the box of a pixel alone, 1/sqrt(12). Sharpened pictures would fit less, with a slope that no pixel sees.
+pub const LEAST_BLUR_PX: f64 = 0.3;
+
 /// The corner; places relative to the window's start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Model {

@@ -206,20 +206,18 @@ impl Window {
                 }
                 let dx = run.start as f64 - cut.start.x;
                 let side = cut.bands.map(|band| usize::from(band.at(dx, dy) > 0.0));
-                match [0, 1].map(|k| near[k].contains(&run.start)) {
-                    [true, true] => self.left_out += push(&mut self.crossing, row, run, (veil, keep), (dx, dy)),
-                    [true, false] => {
-                        self.left_out += push(&mut self.arms[0][side[1]], row, run, (veil, keep), (dx, dy))
-                    }
-                    [false, true] => {
-                        self.left_out += push(&mut self.arms[1][side[0]], row, run, (veil, keep), (dx, dy))
-                    }
+                let groups = match [0, 1].map(|k| near[k].contains(&run.start)) {
+                    [true, true] => &mut self.crossing,
+                    [true, false] => &mut self.arms[0][side[1]],
+                    [false, true] => &mut self.arms[1][side[0]],
                     [false, false] if y.is_multiple_of(step) => {
                         let alike = usize::from(side[0] == side[1]);
                         self.left_out += add(&mut self.flat[alike], row, run, (veil, keep), (dx, dy));
+                        continue;
                     }
-                    [false, false] => {}
-                }
+                    [false, false] => continue,
+                };
+                self.left_out += push(groups, row, run, (veil, keep), (dx, dy));
             }
         }
     }

@@ -1,8 +1,13 @@
 use super::*;
 
 fn ramp() -> Image<u8> {
-    let pixels = (0..100 * 100).map(|k| (k % 100 + k / 100) as u8).collect();
-    Image { width: 100, height: 100, pixels }
+    Image::from_fn(100, 100, |x, y| (x + y) as u8)
+}
+
+fn collected(picture: &Image<u8>, start: Point2<f64>, halves: [Vector2<f64>; 2], band_px: f64) -> Window {
+    let mut window = Window::default();
+    window.collect(picture, 0.0, &Below(256.0), &Frame { start, halves, band_px, hidden: [None; 2] });
+    window
 }
 
 /// Sums of all products of `(1, x, y, grey)` over the whole window.
@@ -36,7 +41,6 @@ fn expected(halves: [Vector2<f64>; 2], is_hidden: impl Fn(Vector2<f64>) -> bool)
 
 #[test]
 fn every_pixel_inside_is_counted_once() {
-    let (picture, mut window) = (ramp(), Window::default());
     for halves in [
         [Vector2::new(30.0, 8.0), Vector2::new(-8.0, 30.0)],
         [Vector2::new(30.0, 0.0), Vector2::new(0.0, 30.0)],
@@ -44,11 +48,12 @@ fn every_pixel_inside_is_counted_once() {
     ] {
         let expected = expected(halves, |_| false);
         for band_px in [f64::MAX, 6.0, 0.4] {
-            window.collect(&picture, 0.0, &Below(256.0), &Frame { start: START, halves, band_px, hidden: [None; 2] });
+            let window = collected(&ramp(), START, halves, band_px);
             // Sums of a few thousand products of numbers with seven digits.
             assert!((total(&window) - expected).amax() < 1e-7 * expected.amax(), "{halves:?} {band_px}");
             assert_eq!(window.count(), expected[(0, 0)] as usize);
         }
+        let window = collected(&ramp(), START, halves, 0.4);
         assert!(window.near() < window.count() / 4);
     }
 }
@@ -70,14 +75,8 @@ fn what_is_hidden_is_left_out_and_nothing_else() {
 
 #[test]
 fn pixels_are_sorted_by_the_edges_they_see() {
-    let (picture, mut window) = (ramp(), Window::default());
     let halves = [Vector2::new(30.0, 3.0), Vector2::new(-9.0, 28.0)];
-    window.collect(
-        &picture,
-        0.0,
-        &Below(256.0),
-        &Frame { start: Point2::new(50.0, 50.0), halves, band_px: 5.0, hidden: [None; 2] },
-    );
+    let window = collected(&ramp(), Point2::new(50.0, 50.0), halves, 5.0);
     let normals = halves.map(|v| Vector2::new(-v.y, v.x).normalize());
     let across = |group: &Group, l: usize| normals.map(|n| n.dot(&Vector2::new(group.x[l], group.y[l]).cast()));
     let each = |groups: &Groups, holds: &dyn Fn([f64; 2]) -> bool| {
@@ -98,13 +97,7 @@ fn a_large_window_takes_all_of_its_edges_and_a_third_of_its_rows_elsewhere() {
     let (side, half) = (401, 180.0);
     let picture = Image { width: side, height: side, pixels: vec![100u8; side * side] };
     let halves = [Vector2::new(half, 0.0), Vector2::new(0.0, half)];
-    let mut window = Window::default();
-    window.collect(
-        &picture,
-        0.0,
-        &Below(256.0),
-        &Frame { start: Point2::new(200.0, 200.0), halves, band_px: 5.0, hidden: [None; 2] },
-    );
+    let window = collected(&picture, Point2::new(200.0, 200.0), halves, 5.0);
     // Bands of 11 px along 361; of the 350 rows outside the band across, those that 3 divides.
     assert_eq!(window.near(), 2 * 11 * 361 - 11 * 11);
     let rows = (20..=380).filter(|y: &usize| y.abs_diff(200) > 5 && y.is_multiple_of(3)).count();
