@@ -104,9 +104,7 @@ impl Calibration {
     pub fn move_rig(&mut self, step: &DVector<f64>) {
         self.values.shared = self.layout.step(&self.values.shared, step.as_slice());
         for (pose, view) in self.values.poses.iter_mut().zip(&self.views) {
-            if let Some(fit) = board_pose::follow(&self.values.shared, view, *pose) {
-                *pose = fit.left_from_board;
-            }
+            *pose = board_pose::follow(&self.values.shared, view, *pose).unwrap_or(*pose);
         }
     }
 

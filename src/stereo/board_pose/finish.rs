@@ -219,10 +219,10 @@ impl Finisher<'_> {
             let pose = self.run.starts[j].pose?;
             let mine = self.run.starts[i].pose.unwrap_or(pose);
             for pose in [pose, mine] {
-                if fits(self.known.mixed(view, other), &pose) {
+                if fits(view.paired(Side::Left, other), &pose) {
                     return Some(self.mixed_up("left", "right", j));
                 }
-                if fits(self.known.mixed(other, view), &pose) {
+                if fits(other.paired(Side::Left, view), &pose) {
                     return Some(self.mixed_up("right", "left", j));
                 }
             }

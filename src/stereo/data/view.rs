@@ -48,6 +48,13 @@ impl View {
         View { pair: self.pair.clone(), observations }
     }
 
+    /// The corners of one picture, and those of the other side's picture in another pair.
+    pub fn paired(&self, side: Side, with: &View) -> View {
+        let mut paired = self.only(side);
+        paired.observations.extend(with.only(side.other()).observations);
+        paired
+    }
+
     /// Renumbers the right picture's corners as on a board that is turned in its plane by so many quarter turns. A board with unequal
     /// sides takes half turns only.
     pub fn turn_right(&mut self, board: &Board, quarters: usize) {

@@ -13,9 +13,9 @@ use crate::statistics::median;
 use crate::stereo::Lens;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::view::View;
+use crate::stereo::init::board_pose::misfit_px;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::pairs::Cause;
-use crate::stereo::pairs::misfit::misfit_px;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::uncertainty;
 

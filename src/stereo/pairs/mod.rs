@@ -2,7 +2,6 @@
 
 pub mod candidates;
 pub mod discarded;
-pub mod misfit;
 mod mixups;
 mod moved;
 pub mod numbering;

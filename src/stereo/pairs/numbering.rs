@@ -12,10 +12,10 @@ use nalgebra::Vector3;
 
 use crate::geometry::{Transform, rotation_vector, transform};
 use crate::imaging::Board;
+use crate::statistics::median;
 use crate::stereo::Side;
 use crate::stereo::data::view::View;
 use crate::stereo::init::board_pose;
-use crate::stereo::init::relative_pose::{agreed_transform, deviation};
 use crate::stereo::model::parameters::Shared;
 
 /// What a board's pose is multiplied with when its corners are renumbered by [`View::turn_right`].
@@ -50,6 +50,26 @@ pub fn agreed(
     };
     let of_pairs = poses.iter().map(|pair| pair.as_ref().and_then(nearest).unwrap_or(0)).collect();
     Some((right_from_left, of_pairs))
+}
+
+/// How far two rigs are apart: the angle between the rotations plus the distance of the translations in units of the
+/// boards' distance.
+fn deviation(a: &Transform, b: &Transform, distance_mm: f64) -> f64 {
+    rotation_vector(&(a.inverse() * b)).norm()
+        + (a.translation.vector - b.translation.vector).norm() / distance_mm.max(f64::MIN_POSITIVE)
+}
+
+/// The `right_from_left` that the pairs agree on: the one whose deviation from all pairs is smallest in the median. A pair may
+/// offer several (a board that looks the same after a half turn); its nearest counts.
+fn agreed_transform(choices: &[Vec<Transform>], distance_mm: f64) -> Option<Transform> {
+    let off = |a: &Transform| {
+        let nearest = |pair: &Vec<Transform>| {
+            pair.iter().map(|b| deviation(a, b, distance_mm)).min_by(f64::total_cmp).unwrap_or(f64::INFINITY)
+        };
+        // Boards that are all seen alike leave two equal answers: cameras side by side are rolled less than a half turn.
+        median(choices.iter().map(nearest)).unwrap_or(f64::INFINITY) + 1e-3 * rotation_vector(a).norm()
+    };
+    choices.iter().flatten().min_by(|a, b| off(a).total_cmp(&off(b))).copied()
 }
 
 #[cfg(test)]

@@ -12,19 +12,15 @@ use rayon::prelude::*;
 use crate::geometry::Transform;
 use crate::imaging::{Side, Skipped};
 use crate::statistics::median;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::residuals;
 use crate::stereo::data::view::View;
+use crate::stereo::init::board_pose::misfit_px;
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::discarded::too_few_pairs;
-use crate::stereo::pairs::misfit::misfit_px;
 use crate::stereo::pairs::{DiscardedPair, mixups, moved, numbering};
-use crate::stereo::solve::levenberg_marquardt::{self, Search};
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
-use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 use crate::stereo::{Error, Lens, Rig};
 
 /// A pair that misses the rig by so many times what pairs usually do is not one of them.
@@ -148,20 +144,17 @@ fn bundle(
     start: &Shared,
     priors: &Priors,
 ) -> Result<Shared, Error> {
-    let mut seen: Vec<View> = members.iter().map(|&i| views[i].clone()).collect();
     let poses = members.iter().filter_map(|&i| Some(misfits[i]?.1)).collect();
-    let mut values = Values { shared: start.clone(), poses };
-    let layout = Layout::rig(FIRST_LENS, false);
-    values.shared.rig.left.lens = FIRST_LENS;
-    values.shared.rig.right.lens = FIRST_LENS;
+    let values = Values { shared: start.clone(), poses };
+    let views = members.iter().map(|&i| views[i].clone()).collect();
+    let mut problem = Problem { views, values, priors: priors.clone() };
+    let rig = &mut problem.values.shared.rig;
+    (rig.left.lens, rig.right.lens) = (FIRST_LENS, FIRST_LENS);
     // Twice: the scatter is known only after the first solution.
     for _ in 0..2 {
-        let left = residuals::active(&seen, &values).ok_or_else(Error::undetermined)?;
-        Noise::from_median(&left).apply(&mut seen);
-        let loss = Loss::Cauchy(CAUCHY_WIDTH);
-        values = levenberg_marquardt::solve_with(&seen, &layout, priors, values, loss, Search::ROUGH).values;
+        problem.search_roughly(&Layout::rig(FIRST_LENS, false)).ok_or_else(Error::undetermined)?;
     }
-    Ok(values.shared)
+    Ok(problem.values.shared)
 }
 
 /// Which of these pairs are a run of two or more at the beginning or at the end of the series, with poses on the rig.

@@ -19,13 +19,12 @@ use crate::stereo::Error;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
 use crate::stereo::findings::hypothesis::{self, Hypothesis};
-use crate::stereo::init::board_pose;
+use crate::stereo::init::board_pose::{self, misfit_px};
 use crate::stereo::init::homography::FEWEST_CORNERS;
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::known_lenses::KnownLenses;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::model::rig::Rig;
-use crate::stereo::pairs::misfit::misfit_px;
 use crate::stereo::pairs::{Cause, numbering};
 use crate::stereo::select::model_comparison::Trial;
 use crate::stereo::select::stated_uncertainty::{scatter_beside, step};
@@ -187,7 +186,7 @@ fn step_from_old(solved: &Solved, rig: &Rig, layout: &Layout) -> Option<(DVector
     let mut problem = solved.problem.clone();
     problem.values.shared.rig = rig.clone();
     for (pose, view) in problem.values.poses.iter_mut().zip(&problem.views) {
-        *pose = board_pose::follow(&problem.values.shared, view, *pose)?.left_from_board;
+        *pose = board_pose::follow(&problem.values.shared, view, *pose)?;
     }
     let (matrix, gradient) = normal_equations::eliminate(&problem.equations(layout)?, 0.0)?;
     Some((-normal_equations::solve_scaled(&matrix, &gradient)?, uncertainty::invert(&matrix)?))

@@ -224,10 +224,10 @@ struct Miss {
 
 /// What a rig leaves of a pair that it has not seen; `near` is a pose close to the pair's.
 fn miss(shared: &Shared, view: &View, near: Transform) -> Option<Miss> {
-    let fit = board_pose::follow(shared, view, near)?;
+    let left_from_board = board_pose::follow(shared, view, near)?;
     let mut sum = Miss { squares_px2: 0.0, corners: 0, loss: 0.0 };
     for o in view.observations.iter().filter(|o| o.active) {
-        let r = residual_px(shared, &fit.left_from_board, o)?;
+        let r = residual_px(shared, &left_from_board, o)?;
         sum.squares_px2 += r.norm_squared();
         sum.loss += o.whiten(r).norm_squared();
         sum.corners += 1;

@@ -311,7 +311,7 @@ mod tests {
     use crate::stereo::synthetic::World;
 
     fn cost(shared: &Shared, layout: &Layout, pose: &Transform, view: &View) -> f64 {
-        block(shared, layout, pose, view, Loss::Cauchy(2.0)).unwrap().cost
+        block(shared, layout, pose, view, Loss::Cauchy).unwrap().cost
     }
 
     #[test]
@@ -324,7 +324,7 @@ mod tests {
         }
         let shared = Shared { rig: world.rig.clone(), shape_mm: [0.1, -0.2, 0.15] };
         let pose = &world.poses[0];
-        let analytic = block(&shared, &layout, pose, &view, Loss::Cauchy(2.0)).unwrap();
+        let analytic = block(&shared, &layout, pose, &view, Loss::Cauchy).unwrap();
         // A cost of some thousands is known to 1e-12; halved by steps that move pixels by about 1e-4.
         let close = |numeric: f64, analytic: f64, what: &str| {
             assert!((numeric - analytic).abs() < 1e-4 * (1.0 + analytic.abs()), "{what}: {numeric} and {analytic}");

@@ -17,7 +17,7 @@ use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search, Solution, Stop};
 use crate::stereo::solve::normal_equations::Equations;
 use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, Uncertainty, worst_focal_sigma};
 
 /// Rounds of fitting the scatter and solving again.
@@ -71,19 +71,25 @@ impl Problem {
     /// Solves robustly, then with the likeliest scatter of the corners, Gaussian or with heavy tails. No corner is thrown away: what lies far
     /// off counts little, and its whitener says so afterwards.
     pub fn solve(&self, layout: &Layout) -> Result<Solved, Error> {
-        let Problem { mut views, mut values, priors } = self.with_layout(layout);
-        let unknowns = layout.count() + 6 * views.len();
-        let corners = views.iter().map(|view| view.observations.len()).sum::<usize>();
+        let mut problem = self.with_layout(layout);
+        let unknowns = layout.count() + 6 * problem.views.len();
+        let corners = problem.views.iter().map(|view| view.observations.len()).sum::<usize>();
         if 2 * corners <= unknowns {
             return Err(Error::TooFewCorners { corners, unknowns });
         }
         // Twice: the scatter is known only after the first solution.
         for _ in 0..2 {
-            Noise::from_median(&residuals::active(&views, &values).ok_or_else(unseen)?).apply(&mut views);
-            let (loss, search) = (Loss::Cauchy(CAUCHY_WIDTH), Search::ROUGH);
-            values = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search).values;
+            problem.search_roughly(layout).ok_or_else(unseen)?;
         }
-        Problem { views, values, priors }.solve_near(layout)
+        problem.solve_near(layout)
+    }
+
+    /// Moves the values by a robust search with corners that weigh by what these values leave of them. `None` where one lies behind its camera.
+    pub fn search_roughly(&mut self, layout: &Layout) -> Option<()> {
+        let Problem { views, values, priors } = self;
+        Noise::from_median(&residuals::active(views, values)?).apply(views);
+        *values = levenberg_marquardt::solve(views, layout, priors, values.clone(), Loss::Cauchy, Search::ROUGH).values;
+        Some(())
     }
 
     /// The same from values near the minimum: without the robust search.
@@ -94,7 +100,7 @@ impl Problem {
         for _ in 0..MOST_ROUNDS {
             noise.apply(&mut views);
             let search = if loss == Loss::Squared { Search::NEAR } else { Search::ROBUST };
-            let solution = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search);
+            let solution = levenberg_marquardt::solve(&views, layout, &priors, values, loss, search);
             // With a robust loss the last word is that of the weighted squares below.
             if loss == Loss::Squared {
                 converged(&solution)?;
@@ -115,7 +121,7 @@ impl Problem {
         if loss != Loss::Squared {
             weigh(&mut views, &values, loss);
             let (loss, search) = (Loss::Squared, Search::NEAR);
-            let solution = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search);
+            let solution = levenberg_marquardt::solve(&views, layout, &priors, values, loss, search);
             converged(&solution)?;
             values = solution.values;
         }
@@ -143,8 +149,7 @@ impl Problem {
     pub fn refit(&self, layout: &Layout) -> Option<Values> {
         let start = self.with_layout(layout);
         let (views, priors) = (&start.views, &start.priors);
-        let solution =
-            levenberg_marquardt::solve_with(views, layout, priors, start.values, Loss::Squared, Search::TRIAL);
+        let solution = levenberg_marquardt::solve(views, layout, priors, start.values, Loss::Squared, Search::TRIAL);
         (solution.stop == Stop::Minimum).then_some(solution.values)
     }
 

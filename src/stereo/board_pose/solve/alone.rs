@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Point3, Vector2};
 
 use crate::geometry::{Transform, perturb};
-use crate::imaging::{Board, Side};
+use crate::imaging::Board;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::bundle::Promise;
 use crate::stereo::board_pose::solve::estimate::{Estimate, leave_outliers_out};
@@ -12,7 +12,7 @@ use crate::stereo::board_pose::start::enough;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::root_mean_square;
 use crate::stereo::data::view::View;
-use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::triangulate::{common, triangulate};
 
 /// Steps of the search; the start is within a pixel.
@@ -66,7 +66,7 @@ impl<'a> Known<'a> {
     pub fn fit(&self, view: &View, start: &Transform) -> Option<Alone> {
         let mut view = view.clone();
         view.observations.iter_mut().for_each(|o| o.active = true);
-        let mut pose = self.search(&view, *start, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?;
+        let mut pose = self.search(&view, *start, Loss::Cauchy, Promise::ROUGH)?;
         for _ in 0..ROUNDS {
             let miss = |o: &Observation| Some(o.whiten(self.residual(&pose, o)?).norm() * self.inflation.sqrt());
             leave_outliers_out(&mut view, miss, self.excess);
@@ -135,12 +135,5 @@ impl<'a> Known<'a> {
             })
             .collect();
         root_mean_square(&squares)
-    }
-
-    /// The pictures of two poses as one pair: the left one of the first, the right one of the second.
-    pub fn mixed(&self, left: &View, right: &View) -> View {
-        let mut mixed = left.only(Side::Left);
-        mixed.observations.extend(right.only(Side::Right).observations);
-        mixed
     }
 }

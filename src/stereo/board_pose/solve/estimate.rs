@@ -22,7 +22,7 @@ use crate::stereo::data::corner_noise::{Noise, whitener};
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::data::view::View;
-use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
 
 /// Rounds of least squares with new weights.
@@ -87,7 +87,7 @@ fn roughly(bundle: &mut Bundle, mut values: Values) -> Option<Values> {
     for _ in 0..2 {
         let noise = Noise::from_median(&residuals(bundle, &values, |_| true));
         bundle.weigh(&values, &noise);
-        values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?.0;
+        values = bundle.solve(values, Loss::Cauchy, Promise::ROUGH)?.0;
     }
     bundle.shape.stretch_mm = stretch_mm;
     Some(values)
