@@ -6,7 +6,7 @@
 use nalgebra::DVector;
 
 use crate::imaging::{Board, Corners, Side, Skipped};
-use crate::stereo::board_pose::print_share::PrintShare;
+use crate::stereo::board_pose::print_share::print_share;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
 use crate::stereo::data::view::View;
@@ -82,6 +82,11 @@ impl Calibration {
         self.known_sides.iter().all(|known| *known)
     }
 
+    /// Names of the pairs that were used.
+    pub fn pair_names(&self) -> Vec<String> {
+        self.views.iter().map(|view| view.pair.clone()).collect()
+    }
+
     /// The rig with its covariance.
     pub fn rig(&self) -> &Rig {
         &self.values.shared.rig
@@ -152,10 +157,10 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
         .solve(&layout)
         .map_err(|e| e.without(&skipped).of_lens(options.lens))?;
     let neighbours = solved.neighbours(&corners.board);
-    let inflation = neighbours.inflation() * solved.loss_factor;
+    let inflation = solved.inflation(&corners.board);
     let by_noise = solved.uncertainty(&layout).map_err(|e| e.of_lens(options.lens))?.scaled(inflation);
     let without_scatter = by_noise.shared.clone();
-    let print = PrintShare::of(&solved, &corners.board, &layout);
+    let print = print_share(&solved, &corners.board, &layout);
     let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
     let Stated { mut uncertainty, pair_scatter, witnesses } =
         stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, scatter, print_excess);

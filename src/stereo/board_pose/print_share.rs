@@ -7,16 +7,17 @@
 //! through the normal equations to the shared numbers. Windows see a part of each crossing's deviation and of its neighbours' (`window`):
 //! what is smooth over the board reaches the lens and the rig whole, though crossings are seen to scatter less than they do.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix2, Point3, Vector2, Vector3};
 
+use crate::geometry::Transform;
 use crate::imaging::Board;
-use crate::stereo::board_pose::solve::pose_block::{PoseBlock, SeenFrom, crossings};
+use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, SeenFrom, crossings};
 use crate::stereo::board_pose::solve::totals::Totals;
 use crate::stereo::board_pose::solve::window::{SeenShares, Window};
 use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::view::View;
-use crate::stereo::model::board_shape::{NUMBERS, lift};
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::data::view::{View, in_use};
+use crate::stereo::model::board_shape::{height_mm, lift};
+use crate::stereo::model::parameters::{Layout, Values};
 use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
@@ -25,8 +26,6 @@ use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 /// The print of a calibration board, and what it does.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrintShare {
-    /// Standard deviation of a crossing along x and along y, mm.
-    pub crossing_mm: f64,
     /// The corners' own noise, without the print.
     pub own_noise: Noise,
     /// Covariance of the shared numbers, in the layout's order: the corners' own noise and the print.
@@ -35,56 +34,56 @@ pub struct PrintShare {
     pub excess: f64,
 }
 
-impl PrintShare {
-    /// Finds the print. `None` where the views do not determine the shared numbers.
-    pub fn of(solved: &Solved, board: &Board, layout: &Layout) -> Option<PrintShare> {
-        print_share(solved, board, layout, solved.neighbours(board).inflation() * solved.loss_factor)
-    }
-}
-
 /// Which of the rig's numbers each shared number that comes first in the layout is.
 pub(super) fn rig_basis(layout: &Layout) -> DMatrix<f64> {
     let numbers: Vec<usize> = layout.names().iter().filter_map(|name| rig_number(name)).collect();
     DMatrix::from_fn(RIG_NUMBERS, numbers.len(), |number, column| f64::from(numbers[column] == number))
 }
 
-fn print_share(solved: &Solved, board: &Board, layout: &Layout, inflation: f64) -> Option<PrintShare> {
+/// Sums over the pairs of a calibration, whose crossings are where its board's shape puts them; `each` gets every pair's parts. `basis`: see
+/// [`rig_basis`].
+pub(super) fn totals_of_pairs(
+    views: &[View],
+    values: &Values,
+    board: &Board,
+    basis: &DMatrix<f64>,
+    mut each: impl FnMut(PoseBlock, Eliminated),
+) -> Option<Totals> {
+    let shape = &values.shared.shape_mm;
+    let height = |at: Point3<f64>| Vector3::new(0.0, 0.0, height_mm(&lift(board, &at), shape));
+    let places = crossings(board, &board.corners_mm().map(height).collect::<Vec<_>>());
+    let pairs: Vec<_> = views.iter().zip(&values.poses).collect();
+    let block = |&(view, pose): &(&View, &Transform)| {
+        PoseBlock::of(&SeenFrom { rig: &values.shared.rig, crossings: &places, board, pose, view }, Loss::Squared)
+    };
+    Totals::of(&pairs, (basis, places.len()), block, |_, block, part| each(block, part))
+}
+
+/// Finds the print. `None` where the views do not determine the shared numbers.
+pub fn print_share(solved: &Solved, board: &Board, layout: &Layout) -> Option<PrintShare> {
     let Problem { views, values, priors } = &solved.problem;
-    let noise = &solved.noise;
-    let m = board.corner_count();
-    let lifts: Vec<[f64; NUMBERS]> = board.corners_mm().map(|at| lift(board, &at)).collect();
-    let shape = values.shared.shape_mm;
-    let heights = lifts.iter().map(|l| Vector3::new(0.0, 0.0, l.iter().zip(&shape).map(|(l, s)| l * s).sum()));
-    let places = crossings(board, &heights.collect::<Vec<_>>());
+    let (noise, inflation) = (&solved.noise, solved.inflation(board));
     let names = layout.names();
     let basis = rig_basis(layout);
     let rig_count = basis.ncols();
-    let size = rig_count + 3 * m;
     let seen = Seen::of(board, views);
-    let pairs: Vec<_> = views.iter().zip(&values.poses).collect();
     let mut told = 0.0;
-    let Totals { matrix, gradient, .. } = Totals::of(
-        &pairs,
-        (&basis, m),
-        |&(view, pose)| {
-            PoseBlock::of(&SeenFrom { rig: &values.shared.rig, crossings: &places, board, pose, view }, Loss::Squared)
-        },
-        |_, block, _| told += block.told_in_plane(),
-    )?;
-    let numbers = 2.0 * views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count() as f64;
+    let Totals { matrix, gradient, .. } =
+        totals_of_pairs(views, values, board, &basis, |block, _| told += block.told_in_plane())?;
+    let numbers = 2.0 * in_use(views).count() as f64;
     let sums = Sums { matrix, gradient, told: told * seen.usual_variance(), numbers };
     let variance = sums.print_variance(rig_count, &seen);
     // The difference of two large numbers where the print is most of it; but pixels scatter corners as much as the refinement says.
     let stated = noise.stated_share(views);
     let own_share = (1.0 - variance * sums.told / sums.numbers).max(stated);
     // The board's paraboloids are heights of its crossings.
-    let mut to_shared = DMatrix::zeros(size, names.len());
+    let mut to_shared = DMatrix::zeros(sums.gradient.len(), names.len());
     for i in 0..rig_count {
         to_shared[(i, i)] = 1.0;
     }
-    for (k, lift) in lifts.iter().enumerate() {
-        for (column, by) in (rig_count..names.len()).zip(lift) {
-            to_shared[(rig_count + 3 * k + 2, column)] = *by;
+    for (k, at) in board.corners_mm().enumerate() {
+        for (column, by) in (rig_count..names.len()).zip(lift(board, &at)) {
+            to_shared[(rig_count + 3 * k + 2, column)] = by;
         }
     }
     let by_all = to_shared.tr_mul(&sums.matrix);
@@ -95,7 +94,7 @@ fn print_share(solved: &Solved, board: &Board, layout: &Layout, inflation: f64) 
     seen.columns(&by_print, rig_count).into_iter().for_each(add);
     let excess = (&by_all * to_shared).component_mul(&covariance).sum() / (inflation * names.len() as f64);
     let own_noise = noise.of_share(own_share, stated);
-    Some(PrintShare { crossing_mm: variance.sqrt(), own_noise, covariance, excess: excess.max(1.0) })
+    Some(PrintShare { own_noise, covariance, excess: excess.max(1.0) })
 }
 
 struct Sums {

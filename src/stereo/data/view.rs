@@ -94,6 +94,11 @@ impl View {
     }
 }
 
+/// The active corners of all these pairs.
+pub fn in_use(views: &[View]) -> impl Iterator<Item = &Observation> + Clone {
+    views.iter().flat_map(|view| &view.observations).filter(|o| o.active)
+}
+
 fn observation(board: &Board, side: Side, corner: &Corner) -> Observation {
     let board_mm = board.corner_mm(corner.col, corner.row);
     // A covariance that isn't one (not positive, not finite) says nothing: as if none had been given.

@@ -12,7 +12,7 @@ use super::{Along, Finding, Kind};
 use crate::statistics::median;
 use crate::stereo::Lens;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::view::View;
+use crate::stereo::data::view::{View, in_use};
 use crate::stereo::init::board_pose::misfit_px;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::pairs::Cause;
@@ -56,8 +56,7 @@ struct Misfit {
 
 /// Standard deviation of most corners as their refinement states it, px; zero where it gave none.
 fn corner_sigma_px(views: &[View]) -> f64 {
-    let observations = views.iter().flat_map(|view| view.observations.iter().filter(|o| o.active));
-    median(observations.map(|o| (0.5 * o.covariance_px2.trace()).sqrt())).unwrap_or(0.0)
+    median(in_use(views).map(|o| (0.5 * o.covariance_px2.trace()).sqrt())).unwrap_or(0.0)
 }
 
 /// Pictures that were not taken at one moment: neither the corners nor a lens explain so much.
@@ -67,7 +66,6 @@ fn not_simultaneous(alone_px: f64, misfit: Misfit) -> Finding {
         kind: Kind::Pair,
         size: Some(misfit.usual_px),
         unit: "px",
-        effect_mm: None,
         action: format!(
             "the pictures of the pairs were not taken at one moment: half of the pairs miss the rig by {:.2} px and more, each camera alone \
              by {alone_px:.2} px; the worst are {}. Trigger both cameras at once, or hold the board still",
@@ -75,8 +73,7 @@ fn not_simultaneous(alone_px: f64, misfit: Misfit) -> Finding {
             misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ")
         ),
         pairs: misfit.worst_first,
-        along: None,
-        remedy: None,
+        ..Finding::default()
     }
 }
 
@@ -119,10 +116,9 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
     Some(Finding {
         cause: Cause::OtherBoard.word().to_owned(),
         kind: Kind::Step,
-        pairs: calibration.views.iter().map(|view| view.pair.clone()).collect(),
+        pairs: calibration.pair_names(),
         size: Some(100.0 * stretch),
         unit: "%",
-        effect_mm: None,
         action: format!(
             "the board's {} are {:.digits$} times as wide as high, not {said:.digits$} times as was said: with that half of the pairs miss \
              the rig by {left_px:.3} px and more, instead of {before_px:.3} px. Measure the board along and across, and give \
@@ -130,8 +126,7 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
             calibration.board.unit(),
             said * (1.0 + stretch),
         ),
-        along: None,
-        remedy: None,
+        ..Finding::default()
     })
 }
 
@@ -175,9 +170,7 @@ fn median_px(problem: &Problem) -> Option<f64> {
 
 /// The layout with at least the terms that nearly all lenses need: misfit that the board made may have left fewer.
 fn with_usual_lens(layout: &Layout) -> Layout {
-    let richer = |lens: Option<Lens>| {
-        lens.map(|lens| if lens.free_count() < Lens::Brown5.free_count() { Lens::Brown5 } else { lens })
-    };
+    let richer = |lens: Option<Lens>| lens.map(|lens| lens.max(Lens::Brown5));
     Layout { left: richer(layout.left), right: richer(layout.right), ..*layout }
 }
 

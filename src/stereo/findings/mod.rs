@@ -46,7 +46,7 @@ const PERMUTATIONS: usize = 400;
 const FEWEST: usize = 6;
 
 /// Over which pairs something happened.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// From one pair on.
@@ -54,11 +54,12 @@ pub enum Kind {
     /// Evenly from the first pair to the last.
     Drift,
     /// In single pairs.
+    #[default]
     Pair,
 }
 
 /// Something that happened.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Finding {
     /// The cause, or the causes that these pairs do not tell apart, with `|` between them.
     pub cause: String,
@@ -133,13 +134,13 @@ pub fn of_lenses(calibration: &Calibration, lengths: &VolumeLengths) -> Option<F
     Some(Finding {
         cause: if causes.is_empty() { Cause::Unknown.word().to_owned() } else { causes },
         kind: Kind::Step,
-        pairs: calibration.views.iter().map(|view| view.pair.clone()).collect(),
+        pairs: calibration.pair_names(),
         size: check.focus_change,
         unit: if check.focus_change.is_some() { "%" } else { "" },
         effect_mm: otherwise.map(|mm| (mm - lengths.length_mm).abs()).reduce(f64::max),
         action: check.statement.clone(),
-        along: None,
         remedy: Some(check.remedy().to_owned()),
+        ..Finding::default()
     })
 }
 
@@ -153,12 +154,8 @@ pub fn of_pairs(discarded: &[DiscardedPair]) -> Vec<Finding> {
                 cause: pair.cause.word().to_owned(),
                 kind: Kind::Pair,
                 pairs: vec![pair.pair.clone()],
-                size: None,
-                unit: "",
-                effect_mm: None,
                 action: pair.reason.clone(),
-                along: None,
-                remedy: None,
+                ..Finding::default()
             }),
         }
     }

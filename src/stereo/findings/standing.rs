@@ -102,7 +102,7 @@ fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Resu
     let mut findings = Vec::new();
     if run.len() >= 2 {
         let at_end = corners.pairs.last().is_some_and(|pair| run.contains(&pair.pair));
-        let pairs = if at_end { run.clone() } else { found.views.iter().map(|view| view.pair.clone()).collect() };
+        let pairs = if at_end { run.clone() } else { found.pair_names() };
         let change = another_rig(told, pairs);
         for discarded in found.discarded.pairs.iter_mut().filter(|d| run.contains(&d.pair)) {
             *discarded = DiscardedPair::new(&discarded.pair, of_rig(&change), change.action.clone());
@@ -129,7 +129,7 @@ fn another_rig(told: Option<Finding>, pairs: Vec<String>) -> Finding {
         );
         let cause = format!("{}|{}", Cause::CameraMoved.word(), Cause::Focus.word());
         let remedy = hold(&cause, None);
-        Finding { cause, kind: Kind::Step, pairs, size: None, unit: "", effect_mm: None, action, along: None, remedy }
+        Finding { cause, kind: Kind::Step, pairs, action, remedy, ..Finding::default() }
     })
 }
 

@@ -40,8 +40,7 @@ pub fn at_share(
         shifts.push(of_pair);
     }
     let mut still = calibrate(&moved, options).ok()?;
-    let pairs = |calibration: &Calibration| calibration.views.iter().map(|v| v.pair.clone()).collect::<Vec<_>>();
-    if pairs(&still) != pairs(found) {
+    if still.pair_names() != found.pair_names() {
         return None;
     }
     for (view, shifts) in still.views.iter_mut().zip(&shifts) {

@@ -24,21 +24,18 @@ const SAME_POSE: f64 = 0.03;
 
 /// The group of every pair: pairs with nearly the same pose are one group, numbered in the order of their first pairs.
 pub fn groups(views: &[View], poses: &[Transform]) -> Vec<usize> {
-    let edge = edge_mm(views);
-    let limit_mm = 2.0 * SAME_POSE * edge[0].hypot(edge[1]);
-    merge(&distances_mm(edge, poses), |_, _, distance_mm| distance_mm < limit_mm, 1)
+    let (distances, limit_mm) = distances_mm(views, poses);
+    merge(&distances, |_, _, distance_mm| distance_mm < limit_mm, 1)
 }
 
 /// The fold of every pair, at most `most` of them: blocks of similar poses, no fold with more than about twice its share of the pairs.
 pub fn folds(views: &[View], poses: &[Transform], most: usize) -> Vec<usize> {
     let count = poses.len();
     let largest = 2 * count.div_ceil(most.max(1));
-    let edge = edge_mm(views);
-    let limit_mm = 2.0 * SAME_POSE * edge[0].hypot(edge[1]);
+    let (distances, limit_mm) = distances_mm(views, poses);
     // More than a quarter of the pairs is no fold: what is left would be another calibration.
     let twins = |a: usize, b: usize, distance_mm: f64| distance_mm < limit_mm && 4 * (a + b) <= count;
     let fits = |a: usize, b: usize, distance_mm: f64| twins(a, b, distance_mm) || a + b <= largest;
-    let distances = distances_mm(edge, poses);
     if count <= most { merge(&distances, twins, 1) } else { merge(&distances, fits, most) }
 }
 
@@ -69,19 +66,16 @@ fn merge(distances: &DMatrix<f64>, may: impl Fn(usize, usize, f64) -> bool, enou
     of
 }
 
-/// Root mean square distance between any two poses of the board's outermost corners, mm.
-fn distances_mm([x, y]: [f64; 2], poses: &[Transform]) -> DMatrix<f64> {
+/// Root mean square distance between any two poses of the outermost corners that were seen, mm, and that up to which two are one pose.
+fn distances_mm(views: &[View], poses: &[Transform]) -> (DMatrix<f64>, f64) {
+    let all = views.iter().flat_map(|view| &view.observations);
+    let [x, y] = all.fold([0.0, 0.0], |[x, y]: [f64; 2], o| [x.max(o.board_mm.x.abs()), y.max(o.board_mm.y.abs())]);
     let outer = [(-x, -y), (x, -y), (-x, y), (x, y)].map(|(x, y)| Point3::new(x, y, 0.0));
-    DMatrix::from_fn(poses.len(), poses.len(), |i, j| {
+    let distances = DMatrix::from_fn(poses.len(), poses.len(), |i, j| {
         let squares = outer.iter().map(|at| (poses[i] * at - poses[j] * at).norm_squared()).sum::<f64>();
         (squares / outer.len() as f64).sqrt()
-    })
-}
-
-/// Where the outermost corners that were seen lie on the board, mm from its middle.
-fn edge_mm(views: &[View]) -> [f64; 2] {
-    let all = views.iter().flat_map(|view| &view.observations);
-    all.fold([0.0, 0.0], |[x, y]: [f64; 2], o| [x.max(o.board_mm.x.abs()), y.max(o.board_mm.y.abs())])
+    });
+    (distances, 2.0 * SAME_POSE * x.hypot(y))
 }
 
 /// How many folds an assignment has.

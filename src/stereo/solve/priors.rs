@@ -235,7 +235,7 @@ impl Priors {
     fn place(&self, layout: &Layout, number: Number, known: bool) -> Option<usize> {
         match number {
             Number::Camera(side, at) => {
-                let lens = if side == Side::Left { layout.left } else { layout.right }?;
+                let lens = layout.lens(side)?;
                 let told = known || !(4..9).contains(&at) || lens <= Lens::Brown5 || self.rational_held;
                 (told && at < layout.camera_count(side)).then(|| layout.camera_start(side) + at)
             }

@@ -84,6 +84,16 @@ impl Problem {
         problem.solve_near(layout)
     }
 
+    /// The same with the board's shape free or not, as it is forced, or else free where the pairs tell it; with the layout that was solved.
+    pub fn solve_bent_or_flat(
+        &self,
+        forced: Option<bool>,
+        layout: impl Fn(bool) -> Layout,
+    ) -> Result<(Solved, Layout), Error> {
+        let solve = |shape: bool| self.solve(&layout(shape)).map(|solved| (solved, layout(shape)));
+        solve(forced.unwrap_or(true)).or_else(|_| solve(forced.unwrap_or(false)))
+    }
+
     /// Moves the values by a robust search with corners that weigh by what these values leave of them. `None` where one lies behind its camera.
     pub fn search_roughly(&mut self, layout: &Layout) -> Option<()> {
         let Problem { views, values, priors } = self;
@@ -125,8 +135,7 @@ impl Problem {
             converged(&solution)?;
             values = solution.values;
         }
-        let squares: Vec<f64> = left.iter().map(|(_, r)| r.norm_squared()).collect();
-        let rms_px = residuals::root_mean_square(&squares).unwrap_or(0.0);
+        let rms_px = residuals::root_mean_square(left.iter().map(|(_, r)| r.norm_squared())).unwrap_or(0.0);
         Ok(Solved { problem: Problem { views, values, priors }, noise, loss, loss_factor, log_likelihood, rms_px })
     }
 
@@ -165,6 +174,11 @@ impl Solved {
         let Problem { views, values, .. } = &self.problem;
         let of_view = |(view, pose)| residuals::of_view(&values.shared, view, pose);
         NeighbourCorrelation::of(board, views.iter().zip(&values.poses).map(of_view))
+    }
+
+    /// Variance of the unknowns over what the weighted normal equations say: what neighbouring corners share, and the loss.
+    pub fn inflation(&self, board: &Board) -> f64 {
+        self.neighbours(board).inflation() * self.loss_factor
     }
 
     /// Covariance of everything; an error where the views do not tell.

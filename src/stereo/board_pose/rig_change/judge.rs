@@ -75,8 +75,7 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
     let known = on_rig.amount.powi(2).max(f64::MIN_POSITIVE);
     let Some(free) = with_cause(&found, on_rig, f64::INFINITY, usual) else { return (found, None) };
     let shifts_mm = shifts_mm(&found, &free);
-    let squares: Vec<f64> = shifts_mm.iter().flatten().map(|shift| shift.norm_squared()).collect();
-    let moves_mm = root_mean_square(&squares).unwrap_or(0.0);
+    let moves_mm = root_mean_square(shifts_mm.iter().flatten().map(|shift| shift.norm_squared())).unwrap_or(0.0);
     let changed = Changed { explanations: equals, moves_mm, beyond: beyond(&found, &free, &shifts_mm), fall: best };
     match with_cause(&found, on_rig, known, usual) {
         Some(allowed) => (allowed, Some(changed)),

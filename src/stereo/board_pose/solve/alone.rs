@@ -80,12 +80,11 @@ impl<'a> Known<'a> {
             view.observations.iter().filter(|o| o.active).filter_map(|o| Some((o, self.residual(&pose, o)?))).collect();
         let freedom = 2.0 * active.len() as f64 - 6.0;
         let sum: f64 = active.iter().map(|(o, r)| o.whiten(*r).norm_squared()).sum();
-        let squares: Vec<f64> = active.iter().map(|(_, r)| r.norm_squared()).collect();
         Some(Alone {
             part,
             chi_square: sum * self.inflation / freedom.max(1.0),
             freedom,
-            rms_px: root_mean_square(&squares)?,
+            rms_px: root_mean_square(active.iter().map(|(_, r)| r.norm_squared()))?,
             fit_rms_mm: self.fit_rms_mm(&view, &pose),
             pose,
             view,
@@ -125,15 +124,11 @@ impl<'a> Known<'a> {
     }
 
     fn fit_rms_mm(&self, view: &View, pose: &Transform) -> Option<f64> {
-        let squares: Vec<f64> = common(view)
-            .into_iter()
-            .filter_map(|(l, r)| {
-                // Both pictures see the crossing through windows of their own.
-                let seen_off_mm = 0.5 * (l.seen_off_mm + r.seen_off_mm);
-                let place = pose * (self.crossings[self.board.index(l.col, l.row)] + seen_off_mm);
-                Some((triangulate(&self.rig, l, r)?.point_mm - place).norm_squared())
-            })
-            .collect();
-        root_mean_square(&squares)
+        root_mean_square(common(view).into_iter().filter_map(|(l, r)| {
+            // Both pictures see the crossing through windows of their own.
+            let seen_off_mm = 0.5 * (l.seen_off_mm + r.seen_off_mm);
+            let place = pose * (self.crossings[self.board.index(l.col, l.row)] + seen_off_mm);
+            Some((triangulate(&self.rig, l, r)?.point_mm - place).norm_squared())
+        }))
     }
 }

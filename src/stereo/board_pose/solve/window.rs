@@ -9,7 +9,7 @@ use nalgebra::{SVector, Vector2, Vector3};
 
 use crate::imaging::Board;
 use crate::stereo::data::observation::Observation;
-use crate::stereo::data::view::View;
+use crate::stereo::data::view::{View, in_use};
 
 /// Which crossings' deviations a window sees of a coordinate, with their shares: the crossing's own first; `None` stands for a crossing
 /// at the board's rim.
@@ -77,7 +77,7 @@ pub(in crate::stereo::board_pose) fn crossing_means<const N: usize>(
     of: impl Fn(&Observation) -> SVector<f64, N>,
 ) -> Vec<SVector<f64, N>> {
     let mut sums = vec![(0.0, SVector::zeros()); board.corner_count()];
-    for o in views.iter().flat_map(|view| &view.observations).filter(|o| o.active) {
+    for o in in_use(views) {
         let (number, sum) = &mut sums[board.index(o.col, o.row)];
         *number += 1.0;
         *sum += of(o);

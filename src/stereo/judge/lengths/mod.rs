@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::imaging::Board;
 use crate::stereo::Rig;
+use crate::stereo::data::residuals::mean;
 use crate::stereo::data::view::View;
 use crate::stereo::judge::verdict::{Expansion, Extremes, LengthError};
 use crate::stereo::triangulate::{RigCovariance, SpacePoint, common, triangulate};
@@ -143,7 +144,7 @@ pub(super) fn all_ranges(board: &Board, measured: &[Measured]) -> Vec<Range> {
 
 fn range(board: &Board, measured: &[Measured], axis: Axis, squares: usize) -> Option<Range> {
     let errors: Vec<f64> = measured.iter().flat_map(|m| m.errors(axis, squares)).collect();
-    let mean = mean(&errors)?;
+    let mean = mean(errors.iter().copied())?;
     let spread: f64 = errors.iter().map(|e| (e - mean) * (e - mean)).sum();
     Some(Range {
         axis,
@@ -174,8 +175,4 @@ impl Measured {
 /// A length as a person writes it: 38.1 for three squares of 12.7.
 pub(super) fn as_written_mm(length_mm: f64) -> f64 {
     (length_mm * 1e9).round() / 1e9
-}
-
-pub(super) fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }

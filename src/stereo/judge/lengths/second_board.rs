@@ -7,10 +7,11 @@ use serde::Serialize;
 
 use crate::imaging::{Corners, Skipped};
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::data::residuals::mean;
 use crate::stereo::data::view::View;
 use crate::stereo::init::homography::FEWEST_CORNERS;
 use crate::stereo::judge::doubtful_corners::{self, DoubtfulCorners};
-use crate::stereo::judge::lengths::{self, Range, all_ranges, mean, measure};
+use crate::stereo::judge::lengths::{self, Range, all_ranges, measure};
 use crate::stereo::judge::verdict::{Expansion, Extremes};
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::parameters::Shared;
@@ -70,7 +71,7 @@ pub fn second_board(calibration: &Calibration, corners: &Corners, board_mm: Opti
     let covariance = rig.covariance.as_ref().map(RigCovariance::new);
     let extremes = lengths::extremes(&measured, |_| covariance.as_ref(), expansion, 1.0);
     let scales: Vec<f64> = measured.iter().map(|m| m.scale_error(board)).collect();
-    let scale_error = mean(&scales);
+    let scale_error = mean(scales.iter().copied());
     let scale_error_sigma = scale_error.map(|mean| {
         let spread: f64 = scales.iter().map(|s| (s - mean) * (s - mean)).sum();
         let n = scales.len() as f64;

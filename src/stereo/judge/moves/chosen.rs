@@ -35,8 +35,7 @@ fn named(places: &Places, stated: &StatedMove, names: &[String; 2]) -> Result<Re
                 stated.length_mm, names[0], names[1], skipped.reason
             )));
         } else {
-            let pairs = calibration.views.iter().map(|view| view.pair.clone()).collect();
-            return Err(Error::NoSuchPair { pair: name.clone(), pairs });
+            return Err(Error::NoSuchPair { pair: name.clone(), pairs: calibration.pair_names() });
         }
     }
     let slide = places.slide(ends);
