@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Point3, Vector2, Vector3};
 
 use crate::geometry::Transform;
 use crate::imaging::Board;
-use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, SeenFrom, crossings};
+use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, Scene};
 use crate::stereo::board_pose::solve::totals::Totals;
 use crate::stereo::board_pose::solve::window::{SeenShares, Window};
 use crate::stereo::data::corner_noise::Noise;
@@ -51,12 +51,10 @@ pub(super) fn totals_of_pairs(
 ) -> Option<Totals> {
     let shape = &values.shared.shape_mm;
     let height = |at: Point3<f64>| Vector3::new(0.0, 0.0, height_mm(&lift(board, &at), shape));
-    let places = crossings(board, &board.corners_mm().map(height).collect::<Vec<_>>());
+    let scene = Scene::new(values.shared.rig.clone(), board, &board.corners_mm().map(height).collect::<Vec<_>>());
     let pairs: Vec<_> = views.iter().zip(&values.poses).collect();
-    let block = |&(view, pose): &(&View, &Transform)| {
-        PoseBlock::of(&SeenFrom { rig: &values.shared.rig, crossings: &places, board, pose, view }, Loss::Squared)
-    };
-    Totals::of(&pairs, (basis, places.len()), block, |_, block, part| each(block, part))
+    let block = |&(view, pose): &(&View, &Transform)| PoseBlock::of(&scene, pose, view, Loss::Squared);
+    Totals::of(&pairs, (basis, scene.crossings.len()), block, |_, block, part| each(block, part))
 }
 
 /// Finds the print. `None` where the views do not determine the shared numbers.

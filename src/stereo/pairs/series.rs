@@ -18,7 +18,7 @@ use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::discarded::too_few_pairs;
-use crate::stereo::pairs::{DiscardedPair, mixups, moved, numbering};
+use crate::stereo::pairs::{Cause, DiscardedPair, mixups, moved, numbering};
 use crate::stereo::solve::priors::Priors;
 use crate::stereo::solve::problem::Problem;
 use crate::stereo::{Error, Lens, Rig};
@@ -83,29 +83,21 @@ pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
         members.extend(&runs_kept);
         members.sort_unstable();
     }
-    let is_out = |i: &usize| !runs_kept.contains(i);
-    let open: Vec<(usize, Option<f64>)> = strays
-        .iter()
-        .zip(&mixed_up)
-        .filter(|(i, why)| why.is_none() && is_out(i))
-        .map(|(&i, _)| (i, misfits[i].map(|(px, _)| px)))
-        .collect();
-    let mut moved = moved::explain(&series, &open, usual_px).into_iter();
-    let discarded: Vec<DiscardedPair> = strays
-        .iter()
-        .zip(mixed_up)
-        .filter(|(i, _)| is_out(i))
-        .filter_map(|(&i, reason)| Some((i, reason.or_else(|| moved.next())?)))
-        .map(|(i, (cause, reason))| DiscardedPair::new(&views[i].pair, cause, reason))
-        .collect();
+    let out: Vec<_> = strays.into_iter().zip(mixed_up).filter(|(i, _)| !runs_kept.contains(i)).collect();
+    let open = out.iter().filter(|(_, why)| why.is_none()).map(|(i, _)| (*i, misfits[*i].map(|(px, _)| px)));
+    let mut moved = moved::explain(&series, &open.collect::<Vec<_>>(), usual_px).into_iter();
+    let discard = |(i, why): (usize, Option<(Cause, String)>)| {
+        let (cause, reason) = why.or_else(|| moved.next())?;
+        Some(DiscardedPair::new(&views[i].pair, cause, reason))
+    };
+    let discarded: Vec<DiscardedPair> = out.into_iter().filter_map(discard).collect();
     check(candidates, &misfits, usual_px, &members, &discarded)?;
     let values = Values { shared, poses: members.iter().filter_map(|&i| Some(misfits[i]?.1)).collect() };
     let views = members.iter().map(|&i| views[i].clone()).collect();
     let mut discarded: Vec<DiscardedPair> = discarded.into_iter().chain(candidates.discarded.iter().cloned()).collect();
     discarded.sort_by(|a, b| a.pair.cmp(&b.pair));
-    let runs = runs_kept.len();
-    let alone_px = alone_px_of(candidates);
-    Ok(Series { problem: Problem { views, values, priors }, discarded, runs, alone_px })
+    let (problem, runs) = (Problem { views, values, priors }, runs_kept.len());
+    Ok(Series { problem, discarded, runs, alone_px: alone_px_of(candidates) })
 }
 
 /// The pairs with the numbering that they agree on, and the rig in the middle of their own.

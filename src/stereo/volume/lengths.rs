@@ -9,13 +9,12 @@ use nalgebra::{DVector, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::imaging::{Board, Side};
-use crate::stereo::Error;
-use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::observation::Observation;
 use crate::stereo::model::parameters::Layout;
 use crate::stereo::triangulate::{RigCovariance, SpacePoint, rig_number, triangulate};
-use crate::stereo::volume::{Extent, Volume};
+use crate::stereo::volume::{Extent, Volume, bounds};
+use crate::stereo::{Error, Rig};
 
 /// Squares of the lengths that a rig is judged by: 70 mm on the paper's board.
 pub const LONG_SQUARES: usize = 7;
@@ -223,14 +222,11 @@ fn places(calibration: &Calibration, extent: Extent) -> Vec<Point3<f64>> {
         .views
         .iter()
         .zip(&calibration.values.poses)
-        .flat_map(|(view, pose)| view.active(Side::Left).map(move |o| pose * o.board_mm));
-    let (low, high) = match extent {
-        Extent::Box([x0, y0, z0, x1, y1, z1]) => (Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)),
-        _ => points.fold((Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)), |(low, high), p| {
-            (low.inf(&p.coords), high.sup(&p.coords))
-        }),
-    };
-    lattice([low, high])
+        .flat_map(|(view, pose)| view.active(Side::Left).map(move |o| (pose * o.board_mm).coords));
+    lattice(match extent {
+        Extent::Box([x0, y0, z0, x1, y1, z1]) => [Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)],
+        _ => bounds(points),
+    })
 }
 
 /// Places through a box, from its lowest to its highest corner.

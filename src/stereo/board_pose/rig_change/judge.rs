@@ -12,7 +12,6 @@ use crate::statistics::median;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, shifts_mm, stretch};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
 use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
-use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
 use crate::stereo::board_pose::solve::prior::{bent_modes, stretch_length_mm};
 use crate::stereo::data::residuals::root_mean_square;
 
@@ -142,14 +141,12 @@ fn amount_of(fit: &Estimate<'_>, cause: Cause) -> Option<f64> {
 
 /// Minus twice the logarithm of the likelihood, but for a constant: corners and what was known before.
 fn deviance(fit: &Estimate<'_>) -> f64 {
-    let rig = fit.bundle.rig_at(&fit.values);
-    let places = crossings(fit.bundle.board, &fit.values.deviations_mm);
+    let scene = fit.bundle.scene(&fit.values);
     let mut sum = 0.0;
     for (view, pose) in fit.bundle.views.iter().zip(&fit.values.poses) {
         let Some(pose) = pose else { continue };
         for o in &view.observations {
-            let square =
-                residual(&rig, &places, fit.bundle.board, pose, o).map_or(MOST_SQUARE, |r| o.whiten(r).norm_squared());
+            let square = scene.residual(pose, o).map_or(MOST_SQUARE, |r| o.whiten(r).norm_squared());
             sum += square.min(MOST_SQUARE) - 2.0 * o.whitener.determinant().abs().ln();
         }
     }

@@ -9,7 +9,7 @@ use nalgebra::{Matrix2, Vector3};
 use crate::imaging::{Board, Side};
 use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
-use crate::stereo::board_pose::solve::pose_block::{OUTLIER, crossings, residual};
+use crate::stereo::board_pose::solve::pose_block::OUTLIER;
 use crate::stereo::board_pose::solve::window::{Window, crossing_means};
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::observation::Observation;
@@ -77,15 +77,14 @@ fn px_per_mm(rig: &Rig, side: Side, depth_mm: f64) -> f64 {
 
 /// Standard deviation of what bent edges add to a corner along x and along y beyond its noise, mm, by crossing.
 pub(in crate::stereo::board_pose) fn edge_bends_mm(bundle: &Bundle<'_>, values: &Values, noise: &Noise) -> Vec<f64> {
-    let rig = bundle.rig_at(values);
-    let places = crossings(bundle.board, &values.deviations_mm);
-    let mut sums = vec![Sums::default(); places.len()];
+    let scene = bundle.scene(values);
+    let mut sums = vec![Sums::default(); scene.crossings.len()];
     for (view, pose) in bundle.views.iter().zip(&values.poses) {
         let Some(pose) = pose else { continue };
         for o in &view.observations {
             let k = bundle.board.index(o.col, o.row);
-            let Some(miss) = residual(&rig, &places, bundle.board, pose, o) else { continue };
-            let scale = px_per_mm(&rig, o.side, (pose * places[k]).z);
+            let Some(miss) = scene.residual(pose, o) else { continue };
+            let scale = px_per_mm(&scene.rig, o.side, (pose * scene.crossing(o)).z);
             let variance = noise.covariance(o).trace() / 2.0;
             // What is farther off is no bend of edges.
             let most_px = values.deviations_mm[k].xy().norm() * scale + OUTLIER * variance.sqrt();
