@@ -124,15 +124,20 @@ impl World {
         self
     }
 
+    /// The same with the right camera turned (a rotation vector, rad) and shifted in its own frame.
+    pub fn with_camera_moved(&self, turn: Vector3<f64>, shift_mm: Vector3<f64>) -> World {
+        let mut moved = self.clone();
+        moved.rig.right_from_left = transform(turn, shift_mm) * self.rig.right_from_left;
+        moved
+    }
+
     /// The same where the right camera turns by so much at random between pairs, as a board in a hand before cameras that nobody triggers looks.
     pub fn corners_by_hand(&self, seed: u64, turn_deg: f64) -> Corners {
         let mut all = self.corners(seed);
         let mut draws = Draws::new(seed, Purpose::Points, 17);
         for i in 0..all.pairs.len() {
             let turn = Vector3::from_fn(|_, _| draws.normal()) * turn_deg.to_radians();
-            let mut turned = self.clone();
-            turned.rig.right_from_left = transform(turn, Vector3::zeros()) * self.rig.right_from_left;
-            all.pairs[i] = turned.corners(seed).pairs[i].clone();
+            all.pairs[i] = self.with_camera_moved(turn, Vector3::zeros()).corners(seed).pairs[i].clone();
         }
         all
     }

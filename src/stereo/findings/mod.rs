@@ -250,18 +250,13 @@ fn shuffled(count: usize, seed: usize) -> Vec<usize> {
     order
 }
 
-impl Candidate<'_> {
-    /// Logarithm of its likelihood but for a constant, less what its numbers cost.
-    fn evidence(&self, scatter: f64, pairs: usize) -> f64 {
-        0.5 * self.change.gain / scatter - 0.5 * self.change.amounts.len() as f64 * (pairs as f64).ln()
-    }
-}
-
 /// The candidates that are not told apart from the one that explains most, that one first.
 fn likeliest<'a, 'b>(candidates: &'b [Candidate<'a>], pairs: usize) -> Vec<&'b Candidate<'a>> {
     // The scatter of the one that explains most is what the others are judged by.
     let scatter = candidates.iter().map(|c| c.change.scatter).fold(f64::INFINITY, f64::min).max(1.0);
-    let evidence = |c: &Candidate| c.evidence(scatter, pairs);
+    // Logarithm of the likelihood but for a constant, less what the numbers cost.
+    let evidence =
+        |c: &Candidate| 0.5 * c.change.gain / scatter - 0.5 * c.change.amounts.len() as f64 * (pairs as f64).ln();
     let top = candidates.iter().map(&evidence).fold(f64::NEG_INFINITY, f64::max);
     let mut equals: Vec<&Candidate> = candidates.iter().filter(|c| top - evidence(c) < TOLD_APART).collect();
     equals.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
@@ -270,11 +265,6 @@ fn likeliest<'a, 'b>(candidates: &'b [Candidate<'a>], pairs: usize) -> Vec<&'b C
         equals.retain(|c| c.hypothesis.is_some());
     }
     equals
-}
-
-/// The causes of candidates that are not told apart, each once, with `|` between them.
-fn causes(equals: &[&Candidate]) -> String {
-    Cause::words(equals.iter().map(|candidate| candidate.hypothesis.map_or(Cause::CameraMoved, |h| h.cause)))
 }
 
 /// What happened and by how much, in words, for each cause that it may have been.
@@ -305,10 +295,8 @@ fn finding(
         Some(h) => &h.direction * amounts[0],
         None => any.iter().zip(amounts.iter()).fold(DVector::zeros(any[0].len()), |sum, (d, a)| sum + d * *a),
     };
-    let (size, unit) = match shown.hypothesis {
-        Some(h) => (amounts[0], h.unit),
-        None => (whole.rows(calibration.layout.transform_start(), 3).norm().to_degrees(), "deg"),
-    };
+    let turned_deg = || whole.rows(calibration.layout.transform_start(), 3).norm().to_degrees();
+    let (size, unit) = shown.hypothesis.map_or_else(|| (turned_deg(), "deg"), |h| (amounts[0], h.unit));
     let changes = lengths.changes_by_step_mm(&calibration.layout, &whole);
     let effect_mm = changes.into_iter().fold(0.0, |most: f64, mm| most.max(mm.abs()));
     let name = |i: usize| calibration.views[i].pair.clone();
@@ -322,7 +310,7 @@ fn finding(
         let at = if before == after { format!("pair {before}") } else { format!("pairs {before} and {after}") };
         action += &format!("; the rig is that of the middle of the series, at {at}");
     }
-    let cause = causes(&equals);
+    let cause = Cause::words(equals.iter().map(|c| c.hypothesis.map_or(Cause::CameraMoved, |h| h.cause)));
     Some(Finding {
         remedy: hold(&cause, None),
         cause,

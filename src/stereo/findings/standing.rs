@@ -153,10 +153,9 @@ pub fn calibrate_since(corners: &Corners, pair: &str, asked: &Asked) -> Result<(
 
 /// Adds pairs that are not used.
 fn leave_out(found: &mut Calibration, pairs: Vec<DiscardedPair>) {
-    found.skipped.extend(pairs.iter().map(DiscardedPair::skipped));
-    found.skipped.sort_by(|a, b| a.pair.cmp(&b.pair));
-    let mut all: Vec<DiscardedPair> = found.discarded.pairs.iter().cloned().chain(pairs).collect();
+    let mut all = [std::mem::take(&mut found.discarded.pairs), pairs].concat();
     all.sort_by(|a, b| a.pair.cmp(&b.pair));
+    found.skipped = all.iter().map(DiscardedPair::skipped).collect();
     found.discarded = Discarded::new(&found.views, all);
 }
 
@@ -266,8 +265,7 @@ fn trailing(found: &mut Calibration, corners: &Corners) {
         |pair: &&PairCorners| found.discarded.pairs.iter().any(|d| d.pair == pair.pair && d.cause.may_be_the_rig());
     let after: Vec<String> =
         corners.pairs[last + 1..].iter().filter(contradicts).map(|pair| pair.pair.clone()).collect();
-    found.standing =
-        Standing { unconfirmed: [found.standing.unconfirmed.clone(), after].concat(), ..found.standing.clone() };
+    found.standing.unconfirmed.extend(after);
 }
 
 /// The pairs of the rig that stood before a step.

@@ -193,8 +193,7 @@ fn a_second_board_of_another_pitch_fails_and_one_that_cannot_be_measured_does_no
         assert_eq!(line(&judged, "second board").allows, Verdict::Fail, "{factor}: {:#?}", judged.evidence);
     }
     // A camera that was turned by 0.2 degrees since.
-    let mut moved = fresh.clone();
-    moved.rig.right_from_left = transform(Vector3::new(0.0, 0.0035, 0.0), Vector3::zeros()) * moved.rig.right_from_left;
+    let moved = fresh.with_camera_moved(Vector3::new(0.0, 0.0035, 0.0), Vector3::zeros());
     let judged = judge_with(&corners, Some(&moved.corners(66)));
     assert_eq!(line(&judged, "second board").allows, Verdict::Fail, "{:#?}", judged.evidence);
     let mut nothing = of_pitch(1.0);
@@ -208,8 +207,7 @@ fn a_second_board_of_another_pitch_fails_and_one_that_cannot_be_measured_does_no
 fn last_pairs_that_contradict_the_rig_leave_open_whether_it_stands() {
     let world = world(10, 67);
     let mut corners = world.corners(68);
-    let mut moved = world.clone();
-    moved.rig.right_from_left = transform(Vector3::new(0.0, 0.01, 0.0), Vector3::zeros()) * moved.rig.right_from_left;
+    let moved = world.with_camera_moved(Vector3::new(0.0, 0.01, 0.0), Vector3::zeros());
     corners.pairs[9].right = moved.corners(68).pairs[9].right.clone();
     let judged = judge(&corners);
     assert_eq!(

@@ -12,7 +12,6 @@ use crate::geometry::Transform;
 use crate::stereo::data::view::View;
 use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::solve::normal_equations::{self, Equations};
-use crate::stereo::solve::priors::Information;
 use crate::stereo::solve::uncertainty::{self, worst_focal_sigma};
 
 /// Folds over the pairs; with fewer pairs each is a fold of its own.
@@ -108,29 +107,18 @@ pub fn leave_out(
     let reduced: Option<Vec<(DMatrix<f64>, DVector<f64>)>> =
         pairs.map(|(curved, block)| Some((curved.reduced(0.0)?.0, block.reduced(0.0)?.1))).collect();
     let Some(reduced) = reduced else { return vec![None; count(fold_of)] };
-    (0..count(fold_of))
-        .map(|fold| without(&equations.prior, &reduced, layout, shared, |i| fold_of[i] != fold))
-        .map(|without| without.filter(|w| worst_focal_sigma(&w.covariance, layout, &shared.rig) <= focal_sigma))
-        .collect()
-}
-
-/// The calibration without some pairs. `None` where nothing holds the rest.
-fn without(
-    prior: &Information,
-    reduced: &[(DMatrix<f64>, DVector<f64>)],
-    layout: &Layout,
-    shared: &Shared,
-    keep: impl Fn(usize) -> bool,
-) -> Option<Without> {
-    let (mut matrix, mut gradient) = (prior.matrix.clone(), prior.gradient.clone());
-    for (_, (own, own_gradient)) in reduced.iter().enumerate().filter(|(i, _)| keep(*i)) {
-        matrix += own;
-        gradient += own_gradient;
-    }
-    let covariance = uncertainty::invert(&matrix)?;
-    let step = -normal_equations::solve_scaled(&matrix, &gradient)?;
-    let shared = layout.step(shared, step.as_slice());
-    Some(Without { step, covariance, shared })
+    let without = |fold: usize| {
+        let (mut matrix, mut gradient) = (equations.prior.matrix.clone(), equations.prior.gradient.clone());
+        for ((own, own_gradient), _) in reduced.iter().zip(fold_of).filter(|(_, of)| **of != fold) {
+            matrix += own;
+            gradient += own_gradient;
+        }
+        let covariance = uncertainty::invert(&matrix)?;
+        let step = -normal_equations::solve_scaled(&matrix, &gradient)?;
+        let is_told = worst_focal_sigma(&covariance, layout, &shared.rig) <= focal_sigma;
+        is_told.then(|| Without { shared: layout.step(shared, step.as_slice()), step, covariance })
+    };
+    (0..count(fold_of)).map(without).collect()
 }
 
 #[cfg(test)]

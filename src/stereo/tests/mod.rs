@@ -9,6 +9,8 @@ mod refusals;
 mod scatter;
 mod target;
 
+use nalgebra::DMatrix;
+
 use crate::imaging::Corners;
 use crate::stereo::calibrate::{Calibration, calibrate};
 use crate::stereo::judge::assessment::Judged;
@@ -20,6 +22,11 @@ use crate::stereo::synthetic::{self, BROWN4, World};
 
 fn judged(corners: &Corners, options: &Options, tolerance_mm: f64) -> Judged {
     synthetic::judged(&calibrate(corners, options).unwrap(), Vec::new(), Standards::default(), tolerance_mm)
+}
+
+/// The stated covariance of some numbers.
+fn covariance_of(calibration: &Calibration, names: &[&str]) -> DMatrix<f64> {
+    calibration.rig().covariance.as_ref().unwrap().part(names).unwrap()
 }
 
 /// Deviations of the shared numbers from the truth, in the coordinates of the covariance.

@@ -6,7 +6,6 @@ use super::*;
 use crate::geometry::transform;
 use crate::imaging::{Board, Squares};
 use crate::stereo::Lens;
-use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::view::View;
 use crate::stereo::triangulate::{common, triangulate};
 use crate::stereo::{Camera, Rig};

@@ -20,7 +20,7 @@ const STEPS: usize = 20;
 const ROUNDS: usize = 3;
 
 /// The shared values as a pose sees them.
-pub(in crate::stereo::board_pose) struct Known<'a> {
+pub struct Known<'a> {
     scene: Scene<'a>,
     basis: &'a DMatrix<f64>,
     inflation: f64,
@@ -28,7 +28,7 @@ pub(in crate::stereo::board_pose) struct Known<'a> {
     excess: f64,
 }
 
-pub(in crate::stereo::board_pose) struct Alone {
+pub struct Alone {
     /// `left_from_board`.
     pub pose: Transform,
     /// Its corners; outliers are inactive.

@@ -24,7 +24,7 @@ const STEPS: usize = 12;
 /// How close to the minimum a search goes: it is done when a step promises to lower the cost by less than this, in squared residuals of
 /// unit variance. A thousandth of a standard deviation lowers it by a millionth.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stereo::board_pose) struct Promise(pub f64);
+pub struct Promise(pub f64);
 
 impl Promise {
     /// For values that are a result.
@@ -35,7 +35,7 @@ impl Promise {
 
 /// Values of all unknowns.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct Values {
+pub struct Values {
     /// Of the rig's prior.
     pub rig: DVector<f64>,
     /// The crossings' deviations from the drawing, mm.
@@ -46,7 +46,7 @@ pub(in crate::stereo::board_pose) struct Values {
 
 /// The problem: what was seen and what is known before.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct Bundle<'a> {
+pub struct Bundle<'a> {
     /// The target as drawn.
     pub board: &'a Board,
     /// Every pose's corners.
@@ -61,7 +61,7 @@ pub(in crate::stereo::board_pose) struct Bundle<'a> {
 
 /// The normal equations.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct Normal {
+pub struct Normal {
     /// What the corners say.
     pub told: Totals,
     /// What is known before.

@@ -37,7 +37,7 @@ impl Bundle<'_> {
     /// Sets the crossings to what their corners, each through its own window, show on the whole; and with it what each corner sees. `told` is
     /// how much of a change of what is seen a crossing follows, between none and one: of what a window hardly sees, corners that are known
     /// badly would else make any deviation.
-    pub(in crate::stereo::board_pose) fn unbend(&mut self, values: &mut Values, told: &[Vector3<f64>]) {
+    pub fn unbend(&mut self, values: &mut Values, told: &[Vector3<f64>]) {
         let board = self.board;
         let windows = Window::means(board, &self.views);
         let off = crossing_means(board, &self.views, |o| o.seen_off_mm);
@@ -57,12 +57,7 @@ impl Bundle<'_> {
     }
 
     /// A corner with what its crossing's edges add to its covariance.
-    pub(in crate::stereo::board_pose) fn with_edge_bend(
-        &self,
-        rig: &Rig,
-        depth_mm: f64,
-        o: &Observation,
-    ) -> Observation {
+    pub fn with_edge_bend(&self, rig: &Rig, depth_mm: f64, o: &Observation) -> Observation {
         let bend_px = self.edge_bends_mm[self.board.index(o.col, o.row)] * px_per_mm(rig, o.side, depth_mm);
         let mut o = *o;
         o.covariance_px2 += Matrix2::identity() * (bend_px * bend_px);
@@ -76,7 +71,7 @@ fn px_per_mm(rig: &Rig, side: Side, depth_mm: f64) -> f64 {
 }
 
 /// Standard deviation of what bent edges add to a corner along x and along y beyond its noise, mm, by crossing.
-pub(in crate::stereo::board_pose) fn edge_bends_mm(bundle: &Bundle<'_>, values: &Values, noise: &Noise) -> Vec<f64> {
+pub fn edge_bends_mm(bundle: &Bundle<'_>, values: &Values, noise: &Noise) -> Vec<f64> {
     let scene = bundle.scene(values);
     let mut sums = vec![Sums::default(); scene.crossings.len()];
     for (view, pose) in bundle.views.iter().zip(&values.poses) {

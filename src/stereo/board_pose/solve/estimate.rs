@@ -32,7 +32,7 @@ const ROUNDS: usize = 6;
 const SETTLED: f64 = 0.01;
 
 /// Fewest poses that tell a target's print from noise.
-pub(in crate::stereo::board_pose) const TELLING_POSES: usize = 3;
+pub const TELLING_POSES: usize = 3;
 
 /// The certificate counts as much as this many crossings' worth of evidence on how far crossings deviate.
 const CERTIFICATE_COUNT: f64 = 0.1;
@@ -48,7 +48,7 @@ const FIXED_POINT_STEPS: usize = 30;
 
 /// A minimum with its weights.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct Estimate<'a> {
+pub struct Estimate<'a> {
     /// The problem with the whiteners, the outliers and the shape's prior that were found.
     pub bundle: Bundle<'a>,
     pub values: Values,
@@ -66,7 +66,7 @@ pub(in crate::stereo::board_pose) struct Estimate<'a> {
 
 /// What pictures of the rig did at its calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stereo::board_pose) struct Usual {
+pub struct Usual {
     /// How corners scattered, where that is known.
     pub noise: Option<Noise>,
     /// How far pairs scattered about the rig beyond that, as [`Estimate::excess`]; one where that is not known.
@@ -95,7 +95,7 @@ fn roughly(bundle: &mut Bundle, mut values: Values) -> Option<Values> {
 
 /// Finds the minimum. `usual` is what counts at least; `excess` is held where it is known. `None` where the
 /// corners do not determine the poses.
-pub(in crate::stereo::board_pose) fn estimate<'a>(
+pub fn estimate<'a>(
     mut bundle: Bundle<'a>,
     start: Values,
     usual: Usual,
@@ -177,11 +177,7 @@ impl Estimate<'_> {
 
 /// Leaves out the corners of a pose that miss their prediction by more than chance allows; `miss` is in standard deviations of their noise. A pose
 /// that misses the rig as a whole, as the usual one does with this [`Estimate::excess`], has no more outliers for it.
-pub(in crate::stereo::board_pose) fn leave_outliers_out(
-    view: &mut View,
-    miss: impl Fn(&Observation) -> Option<f64>,
-    excess: f64,
-) {
+pub fn leave_outliers_out(view: &mut View, miss: impl Fn(&Observation) -> Option<f64>, excess: f64) {
     let misses: Vec<Option<f64>> = view.observations.iter().map(miss).collect();
     let whole = median(misses.iter().flatten().copied()).unwrap_or(0.0) / MEDIAN_MISS;
     let allowed = OUTLIER * whole.clamp(1.0, excess.max(1.0).sqrt());

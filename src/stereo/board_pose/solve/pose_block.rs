@@ -18,16 +18,16 @@ use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::triangulate::RIG_NUMBERS;
 
 /// Whitened residuals beyond this are outliers.
-pub(in crate::stereo::board_pose) const OUTLIER: f64 = 5.3;
+pub const OUTLIER: f64 = 5.3;
 
 /// Where the numbers of `right_from_left` begin among the rig's.
-pub(in crate::stereo::board_pose) const TRANSFORM: usize = 2 * CAMERA_NUMBERS;
+pub const TRANSFORM: usize = 2 * CAMERA_NUMBERS;
 
 /// A square matrix over the rig's numbers.
-pub(in crate::stereo::board_pose) type RigMatrix = SMatrix<f64, RIG_NUMBERS, RIG_NUMBERS>;
+pub type RigMatrix = SMatrix<f64, RIG_NUMBERS, RIG_NUMBERS>;
 
 /// A target as it is found to be, and the rig that sees it.
-pub(in crate::stereo::board_pose) struct Scene<'a> {
+pub struct Scene<'a> {
     pub rig: Rig,
     /// The target as drawn.
     pub board: &'a Board,
@@ -70,15 +70,15 @@ impl<'a> Scene<'a> {
 }
 
 /// Sums over one pose's corners.
-pub(in crate::stereo::board_pose) struct PoseBlock {
-    pub(super) shared: CornerSums,
+pub struct PoseBlock {
+    pub shared: CornerSums,
     rig_pose: SMatrix<f64, RIG_NUMBERS, 6>,
     crossings_pose: Vec<Matrix3x6<f64>>,
     pose: PoseSums,
 }
 
 /// The part of the pose alone.
-pub(in crate::stereo::board_pose) struct PoseSums {
+pub struct PoseSums {
     matrix: Matrix6<f64>,
     gradient: Vector6<f64>,
     /// Half the robust sum of squares.
@@ -86,23 +86,23 @@ pub(in crate::stereo::board_pose) struct PoseSums {
 }
 
 /// The part of what all poses share: it is added up over the poses before anything is made of it.
-pub(super) struct CornerSums {
+pub struct CornerSums {
     /// Its upper triangle.
     rig: Box<RigMatrix>,
-    pub(super) rig_gradient: SVector<f64, RIG_NUMBERS>,
-    pub(super) crossings: Vec<CrossingSums>,
+    pub rig_gradient: SVector<f64, RIG_NUMBERS>,
+    pub crossings: Vec<CrossingSums>,
 }
 
 /// The part of one crossing.
 #[derive(Clone)]
-pub(super) struct CrossingSums {
-    pub(super) own: Matrix3<f64>,
-    pub(super) rig: SMatrix<f64, RIG_NUMBERS, 3>,
-    pub(super) gradient: Vector3<f64>,
+pub struct CrossingSums {
+    pub own: Matrix3<f64>,
+    pub rig: SMatrix<f64, RIG_NUMBERS, 3>,
+    pub gradient: Vector3<f64>,
 }
 
 impl CornerSums {
-    pub(super) fn zeros(crossings: usize) -> CornerSums {
+    pub fn zeros(crossings: usize) -> CornerSums {
         let none = CrossingSums { own: Matrix3::zeros(), rig: SMatrix::zeros(), gradient: Vector3::zeros() };
         CornerSums {
             rig: Box::new(RigMatrix::zeros()),
@@ -111,7 +111,7 @@ impl CornerSums {
         }
     }
 
-    pub(super) fn add(&mut self, other: &CornerSums) {
+    pub fn add(&mut self, other: &CornerSums) {
         *self.rig += &*other.rig;
         self.rig_gradient += other.rig_gradient;
         for (all, one) in self.crossings.iter_mut().zip(&other.crossings) {
@@ -122,7 +122,7 @@ impl CornerSums {
     }
 
     /// The rig's numbers by themselves, whole.
-    pub(super) fn rig(&self) -> RigMatrix {
+    pub fn rig(&self) -> RigMatrix {
         RigMatrix::from_fn(|i, j| self.rig[(i.min(j), i.max(j))])
     }
 }
@@ -261,7 +261,7 @@ impl PoseBlock {
 
 /// A pose's share with the pose eliminated.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct Eliminated {
+pub struct Eliminated {
     /// Shared by pose, before the elimination.
     pub mixed: DMatrix<f64>,
     /// The rig's raw numbers by pose, before the elimination.

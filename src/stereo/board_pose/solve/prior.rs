@@ -24,7 +24,7 @@ const LEAST_OWN: f64 = 1e-6;
 
 /// What the calibration says.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct RigPrior {
+pub struct RigPrior {
     /// The rig as calibrated.
     pub rig: Rig,
     /// Names of the numbers with a covariance.
@@ -110,7 +110,7 @@ fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// What is known of the target, as standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stereo::board_pose) struct ShapePrior {
+pub struct ShapePrior {
     /// Of a crossing along x and along y, mm.
     pub in_plane_mm: f64,
     /// Of a crossing's height, mm.
@@ -122,7 +122,7 @@ pub(in crate::stereo::board_pose) struct ShapePrior {
 }
 
 /// Unit vectors in the space of all deviations (x, y, z of every crossing): shifts, turn and tilts, which the frame takes up.
-pub(in crate::stereo::board_pose) fn frame_modes(board: &Board) -> Vec<DVector<f64>> {
+pub fn frame_modes(board: &Board) -> Vec<DVector<f64>> {
     type Way = fn(&Point3<f64>) -> Vector3<f64>;
     let ways: [Way; 6] = [
         |_| Vector3::x(),
@@ -136,7 +136,7 @@ pub(in crate::stereo::board_pose) fn frame_modes(board: &Board) -> Vec<DVector<f
 }
 
 /// Orthogonal unit vectors of a bow along either axis and of a twist, without shift and tilts.
-pub(in crate::stereo::board_pose) fn bent_modes(board: &Board) -> Vec<DVector<f64>> {
+pub fn bent_modes(board: &Board) -> Vec<DVector<f64>> {
     let mut found: Vec<DVector<f64>> = frame_modes(board);
     let frame = found.len();
     for k in 0..board_shape::NUMBERS {
@@ -151,12 +151,12 @@ pub(in crate::stereo::board_pose) fn bent_modes(board: &Board) -> Vec<DVector<f6
 }
 
 /// The unit vector of a common stretch.
-pub(in crate::stereo::board_pose) fn stretch_mode(board: &Board) -> DVector<f64> {
+pub fn stretch_mode(board: &Board) -> DVector<f64> {
     mode(board, |p| p.coords)
 }
 
 /// Length of the vector of all deviations when the board is stretched by the whole of its size, mm.
-pub(in crate::stereo::board_pose) fn stretch_length_mm(board: &Board) -> f64 {
+pub fn stretch_length_mm(board: &Board) -> f64 {
     board.corners_mm().map(|p| p.coords.norm_squared()).sum::<f64>().sqrt()
 }
 
@@ -169,12 +169,7 @@ fn mode(board: &Board, way: impl Fn(&Point3<f64>) -> Vector3<f64>) -> DVector<f6
 }
 
 /// The weights of all that is known before, as a matrix over the shared unknowns. `data` is what the corners say.
-pub(in crate::stereo::board_pose) fn weights(
-    rig: &RigPrior,
-    shape: &ShapePrior,
-    board: &Board,
-    data: &DMatrix<f64>,
-) -> DMatrix<f64> {
+pub fn weights(rig: &RigPrior, shape: &ShapePrior, board: &Board, data: &DMatrix<f64>) -> DMatrix<f64> {
     let n = rig.basis.ncols();
     let m = 3 * board.corner_count();
     let mut weights = DMatrix::zeros(n + m, n + m);
