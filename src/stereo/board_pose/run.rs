@@ -12,17 +12,17 @@ use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
 use crate::stereo::board_pose::rig_change::consistency::{self, Along};
 use crate::stereo::board_pose::rig_change::flip::Flip;
 use crate::stereo::board_pose::rig_change::judge::{Changed, scaled};
+use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::solve::alone::Known;
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
 use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::view::View;
-use crate::stereo::volume::Volume;
-
-use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior};
 use crate::stereo::board_pose::start::{Start, baseline_ratio, starts};
 use crate::stereo::board_pose::turns;
+use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::data::view::View;
+use crate::stereo::pairs::candidates;
+use crate::stereo::volume::Volume;
 
 /// Poses that stray this far beyond the limit in relation to the worst are left out together with it.
 const TOGETHER: f64 = 0.2;
@@ -280,7 +280,6 @@ impl<'a> Run<'a> {
 }
 
 fn same_pictures(a: &PairCorners, b: &PairCorners) -> bool {
-    let same =
-        |a: &[Corner], b: &[Corner]| !a.is_empty() && a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.px == b.px);
-    same(&a.left, &b.left) || same(&a.right, &b.right)
+    let seen_twice = |a: &[Corner], b: &[Corner]| !a.is_empty() && candidates::same(a, b);
+    seen_twice(&a.left, &b.left) || seen_twice(&a.right, &b.right)
 }

@@ -8,7 +8,6 @@
 
 pub mod common_misfit;
 pub mod hypothesis;
-mod remedy;
 pub mod series;
 mod shifted;
 pub mod standing;
@@ -26,7 +25,6 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use crate::difference::TOLD_APART;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::hypothesis::{Hypothesis, any_place};
-use crate::stereo::findings::remedy::hold;
 use crate::stereo::findings::series::{Change, Line, Linear};
 use crate::stereo::model::parameters::Layout;
 use crate::stereo::pairs::{Cause, DiscardedPair};
@@ -326,5 +324,25 @@ fn finding(
             by_pair: best.by_pair.clone(),
             relative_variance: shown.change.scatter / shown.change.gain,
         }),
+    })
+}
+
+/// What to do about a change of the rig, for a person who photographs again: hold what changed. `causes` are words with `|` between them; `since` are the pairs after the last change of a rig that went on
+/// changing, where they are enough for a rig. `None` where no hold helps.
+pub(super) fn hold(causes: &str, since: Option<&[String]>) -> Option<String> {
+    let is = |of: &[Cause]| causes.split('|').any(|word| of.iter().any(|cause| cause.word() == word));
+    let unknown = is(&[Cause::Unknown]);
+    let moved = unknown || is(&[Cause::Yaw, Cause::Pitch, Cause::Roll, Cause::Baseline, Cause::CameraMoved]);
+    let hold = [
+        (unknown || is(&[Cause::Focus])).then_some("lock the focus of both cameras"),
+        moved.then_some("clamp both cameras"),
+    ];
+    let hold: Vec<&str> = hold.into_iter().flatten().collect();
+    let again = (!hold.is_empty()).then(|| format!("{}, and take all pairs again", hold.join(" and ")))?;
+    Some(match since {
+        Some([first, others @ ..]) => {
+            format!("{again}; or `--since {first}`: the rig of the last {} pairs", others.len() + 1)
+        }
+        _ => again,
     })
 }

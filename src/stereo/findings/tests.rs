@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 use crate::geometry::transform;
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::findings::Finding;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
+use crate::stereo::findings::{Finding, hold};
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::options::Options;
 use crate::stereo::synthetic::{BROWN4, World};
@@ -251,4 +251,15 @@ fn a_bowed_board_is_no_other_one() {
             assert!(told.is_empty(), "{bow_mm}: {told:?}");
         }
     }
+}
+
+#[test]
+fn what_changed_is_held() {
+    let said = |causes| hold(causes, None).unwrap_or_default();
+    assert_eq!(said("focus"), "lock the focus of both cameras, and take all pairs again");
+    assert_eq!(said("yaw|baseline"), "clamp both cameras, and take all pairs again");
+    assert!(said("focus|yaw").starts_with("lock the focus of both cameras and clamp both cameras"));
+    assert!(said("unknown") == said("focus|camera-moved") && said("other-board").is_empty());
+    let pairs = ["0017".to_owned(), "0018".to_owned()];
+    assert!(hold("unknown", Some(&pairs)).unwrap().ends_with("or `--since 0017`: the rig of the last 2 pairs"));
 }

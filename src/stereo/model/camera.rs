@@ -2,21 +2,21 @@
 
 use nalgebra::{Matrix3, Point2, Point3};
 
-/// How many numbers of OpenCV's distortion vector are free.
+/// How many numbers of OpenCV's distortion vector are free: the value of each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Lens {
     /// `k1 k2`; `p1 p2` stay zero.
-    Radial2,
+    Radial2 = 2,
     /// `k1 k2 p1 p2`.
-    Brown4,
+    Brown4 = 4,
     /// `k1 k2 p1 p2 k3`.
-    Brown5,
+    Brown5 = 5,
     /// Adds the denominators `k4 k5 k6`.
-    Rational8,
+    Rational8 = 8,
     /// Adds the thin prism `s1..s4`.
-    ThinPrism12,
+    ThinPrism12 = 12,
     /// Adds the tilted sensor `tauX tauY`.
-    Tilted14,
+    Tilted14 = 14,
 }
 
 impl Lens {
@@ -26,14 +26,7 @@ impl Lens {
 
     /// Number of free distortion parameters.
     pub fn free_count(self) -> usize {
-        match self {
-            Lens::Radial2 => 2,
-            Lens::Brown4 => 4,
-            Lens::Brown5 => 5,
-            Lens::Rational8 => 8,
-            Lens::ThinPrism12 => 12,
-            Lens::Tilted14 => 14,
-        }
+        self as usize
     }
 
     /// Length of the distortion vector in files: one that OpenCV takes.

@@ -36,24 +36,21 @@ impl Candidates {
         let mut views = Vec::new();
         let fewest = if corners.board.is_coded() { 0 } else { FEWEST_CORNERS.max(fewest_corners(&corners.board)) };
         for (i, pair) in corners.pairs.iter().enumerate() {
-            if let Some(first) = corners.pairs[..i].iter().find(|first| same_corners(first, pair)) {
-                let reason = format!("the same pictures as pair {}", first.pair);
-                discarded.push(DiscardedPair::new(&pair.pair, Cause::Duplicate, reason));
-                continue;
-            }
-            if one_picture(pair) {
-                let reason = format!("{ONE_PICTURE}: both cameras need their own");
+            let first = corners.pairs[..i].iter().find(|first| same_corners(first, pair));
+            let again = first.map(|first| format!("the same pictures as pair {}", first.pair));
+            let one = || one_picture(pair).then(|| format!("{ONE_PICTURE}: both cameras need their own"));
+            if let Some(reason) = again.or_else(one) {
                 discarded.push(DiscardedPair::new(&pair.pair, Cause::Duplicate, reason));
                 continue;
             }
             let view = View::new(&corners.board, pair, fewest);
             let [left, right] = Side::BOTH.map(|side| view.active(side).count());
             let is_enough = if corners.board.is_coded() { tells_a_pose(&view) } else { left.min(right) >= fewest };
-            if !is_enough {
+            if is_enough {
+                views.push(view);
+            } else {
                 let reason = too_few_corners(pair, [left, right]);
                 discarded.push(DiscardedPair::new(&view.pair, Cause::NoBoard, reason));
-            } else {
-                views.push(view);
             }
         }
         let fewest_pairs = fewest_pairs(known);
@@ -113,7 +110,7 @@ fn one_picture(pair: &PairCorners) -> bool {
 }
 
 /// True for corners of one picture: no two pictures have the same noise.
-fn same(a: &[Corner], b: &[Corner]) -> bool {
+pub fn same(a: &[Corner], b: &[Corner]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.px == b.px)
 }
 

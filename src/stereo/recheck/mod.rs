@@ -249,7 +249,7 @@ impl Looks<'_> {
         let seen = (self.difference.level(self.chance()) + SEEN) * sigma;
         Some(CauseSeen {
             cause: h.cause,
-            words: h.words.clone(),
+            words: h.words.to_owned(),
             amount,
             sigma,
             unit: h.unit,

@@ -53,6 +53,16 @@ impl LensCheck {
     pub fn contradicts(&self) -> bool {
         self.chi_square > self.limit
     }
+
+    /// What to do where the pictures contradict the lenses.
+    pub fn remedy(&self) -> &'static str {
+        match self.causes.as_slice() {
+            [Cause::Exchanged] => {
+                "give each lens to the other camera: `--intrinsics FILE,left` and `--intrinsics FILE,right`"
+            }
+            _ => "give the lenses as they are now, or leave `--intrinsics` out and photograph more pairs",
+        }
+    }
 }
 
 /// What is free beside lenses that are known, and what is expected.
@@ -182,18 +192,6 @@ struct Explanation {
     sides: Vec<Side>,
     /// Logarithm of its likelihood but for a constant, less what its numbers cost.
     evidence: f64,
-}
-
-impl LensCheck {
-    /// What to do where the pictures contradict the lenses.
-    pub fn remedy(&self) -> &'static str {
-        match self.causes.as_slice() {
-            [Cause::Exchanged] => {
-                "give each lens to the other camera: `--intrinsics FILE,left` and `--intrinsics FILE,right`"
-            }
-            _ => "give the lenses as they are now, or leave `--intrinsics` out and photograph more pairs",
-        }
-    }
 }
 
 /// The causes that explain the difference and are not told apart, the likeliest first.

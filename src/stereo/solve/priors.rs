@@ -161,15 +161,10 @@ impl Priors {
         };
         one(2, 0.5 * (width - 1.0), CENTRE_SHARE * width);
         one(3, 0.5 * (height - 1.0), CENTRE_SHARE * width);
-        for (at, power, share) in
-            [(4, 2, RADIAL_AT_CORNER[0]), (5, 4, RADIAL_AT_CORNER[1]), (8, 6, RADIAL_AT_CORNER[2])]
-        {
-            one(at, 0.0, share / corner.powi(power));
-        }
-        for (at, power, share) in
-            [(9, 2, RATIONAL_AT_CORNER[0]), (10, 4, RATIONAL_AT_CORNER[1]), (11, 6, RATIONAL_AT_CORNER[2])]
-        {
-            one(at, 0.0, share / corner.powi(power));
+        for (places, shares) in [([4, 5, 8], RADIAL_AT_CORNER), ([9, 10, 11], RATIONAL_AT_CORNER)] {
+            for ((at, power), share) in places.into_iter().zip([2, 4, 6]).zip(shares) {
+                one(at, 0.0, share / corner.powi(power));
+            }
         }
         one(6, 0.0, TANGENTIAL);
         one(7, 0.0, TANGENTIAL);
