@@ -71,8 +71,8 @@ fn search(shared: &Shared, view: &View, start: Transform, loss: Loss, search: Se
 /// `left_from_board` as one picture alone shows it, from the homography of its undistorted rays. `None` where its corners give none.
 pub fn of_picture(shared: &Shared, view: &View, side: Side) -> Option<Transform> {
     let camera = shared.rig.camera(side);
-    let points: Vec<_> = view.active(side).filter_map(|o| Some((o.board_mm, camera.undistort(&o.px)?))).collect();
-    let camera_from_board = pose(&homography(&points)?.0)?;
+    let points = view.active(side).filter_map(|o| Some((o.board_mm, camera.undistort(&o.px)?)));
+    let camera_from_board = pose(&homography(points)?.0)?;
     Some(match side {
         Side::Left => camera_from_board,
         Side::Right => shared.rig.right_from_left.inverse() * camera_from_board,

@@ -14,7 +14,7 @@ use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::residuals::{self, median_px};
 use crate::stereo::data::view::View;
 use crate::stereo::init::board_pose;
-use crate::stereo::init::homography::{focal_lengths, homography, pixel_pairs, pose};
+use crate::stereo::init::homography::{self, focal_lengths, pose};
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::solve::priors::Priors;
@@ -43,7 +43,7 @@ pub fn one_camera(views: &[View], side: Side, size: (u32, u32), diagonal_mm: f64
     let pictures: Vec<View> = views.iter().map(|view| as_left(view, side)).collect();
     let center = Point2::new((f64::from(size.0) - 1.0) / 2.0, (f64::from(size.1) - 1.0) / 2.0);
     let homographies: Vec<Option<(Matrix3<f64>, f64)>> =
-        pictures.iter().map(|view| homography(&pixel_pairs(view.active(Side::Left)))).collect();
+        pictures.iter().map(|view| homography::of_picture(view, Side::Left)).collect();
     let good = well_formed(&homographies);
     let chosen: Vec<Matrix3<f64>> = good.iter().filter_map(|&i| homographies[i].map(|(h, _)| h)).collect();
     let longer = f64::from(size.0.max(size.1));

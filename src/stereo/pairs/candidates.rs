@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
 use crate::stereo::data::view::View;
 use crate::stereo::error::{Error, ONE_PICTURE};
-use crate::stereo::init::homography::{FEWEST_CORNERS, homography, pixel_pairs};
+use crate::stereo::init::homography::{self, FEWEST_CORNERS};
 use crate::stereo::init::single_camera::{self, OneCamera};
 use crate::stereo::model::known_lenses::KnownLenses;
 use crate::stereo::pairs::discarded::too_few_pairs;
@@ -96,7 +96,7 @@ fn too_few_corners(pair: &PairCorners, counting: [usize; 2]) -> String {
 
 /// True where one of the pictures tells how the board lies; whatever the other one shows then counts as well.
 fn tells_a_pose(view: &View) -> bool {
-    Side::BOTH.into_iter().any(|side| homography(&pixel_pairs(view.active(side))).is_some())
+    Side::BOTH.into_iter().any(|side| homography::of_picture(view, side).is_some())
 }
 
 /// True for corners of the same pictures.

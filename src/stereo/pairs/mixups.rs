@@ -17,8 +17,9 @@ use crate::stereo::init::board_pose;
 use crate::stereo::init::single_camera::as_left;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::pairs::Cause;
-use crate::stereo::solve::levenberg_marquardt::{self, Search};
+use crate::stereo::solve::levenberg_marquardt::Search;
 use crate::stereo::solve::priors::Priors;
+use crate::stereo::solve::problem::Problem;
 use crate::stereo::solve::robust_loss::Loss;
 
 /// Corners of a picture that are enough to try an idea on.
@@ -163,10 +164,8 @@ impl Scene<'_> {
         let Some(pose) = board_pose::of_picture(&shared, &view, Side::Left) else { return false };
         let layout = Layout::one_camera(camera.lens);
         let priors = Priors::of_one_camera(&camera, self.series.board.diagonal_mm());
-        let (loss, search) = (Loss::Cauchy, Search::ROUGH);
-        let start = Values { shared, poses: vec![pose] };
-        let views = std::slice::from_ref(&view);
-        let found = levenberg_marquardt::solve(views, &layout, &priors, start, loss, search).values;
+        let start = Problem { views: vec![view.clone()], values: Values { shared, poses: vec![pose] }, priors };
+        let found = start.search(&layout, Loss::Cauchy, Search::ROUGH).values;
         let left_px = found.poses.first().and_then(|pose| median_px(&found.shared, pose, &view, Side::Left));
         left_px.is_some_and(|px| px <= self.series.limit_px)
     }

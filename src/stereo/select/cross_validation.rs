@@ -15,7 +15,7 @@ use crate::stereo::solve::normal_equations::{self, Equations};
 use crate::stereo::solve::uncertainty::{self, worst_focal_sigma};
 
 /// Folds over the pairs; with fewer pairs each is a fold of its own.
-pub const FOLDS: usize = 10;
+const FOLDS: usize = 10;
 
 /// Poses whose corners lie closer together than this share of the board's diagonal (root mean square) are one pose: between them the
 /// perspective changes by less than corners scatter.
@@ -27,15 +27,15 @@ pub fn groups(views: &[View], poses: &[Transform]) -> Vec<usize> {
     merge(&distances, |_, _, distance_mm| distance_mm < limit_mm, 1)
 }
 
-/// The fold of every pair, at most `most` of them: blocks of similar poses, no fold with more than about twice its share of the pairs.
-pub fn folds(views: &[View], poses: &[Transform], most: usize) -> Vec<usize> {
+/// The fold of every pair, at most [`FOLDS`] of them: blocks of similar poses, no fold with more than about twice its share of the pairs.
+pub fn folds(views: &[View], poses: &[Transform]) -> Vec<usize> {
     let count = poses.len();
-    let largest = 2 * count.div_ceil(most.max(1));
+    let largest = 2 * count.div_ceil(FOLDS);
     let (distances, limit_mm) = distances_mm(views, poses);
     // More than a quarter of the pairs is no fold: what is left would be another calibration.
     let twins = |a: usize, b: usize, distance_mm: f64| distance_mm < limit_mm && 4 * (a + b) <= count;
     let fits = |a: usize, b: usize, distance_mm: f64| twins(a, b, distance_mm) || a + b <= largest;
-    if count <= most { merge(&distances, twins, 1) } else { merge(&distances, fits, most) }
+    if count <= FOLDS { merge(&distances, twins, 1) } else { merge(&distances, fits, FOLDS) }
 }
 
 /// Joins the nearest two clusters (complete linkage) that `may` be joined, by their sizes and distance, until `enough` are left. Where
@@ -146,7 +146,10 @@ mod tests {
             let all = leave_out(&equations, &equations, &layout, &found.values.shared, &fold_of, WORST_FOCAL_SIGMA);
             for (fold, without) in all.iter().enumerate() {
                 let without = without.as_ref().unwrap();
-                let searched = found.problem().subset(|i| fold_of[i] != fold).refit(&layout).unwrap();
+                let mut others = found.problem();
+                others.views.remove(fold);
+                others.values.poses.remove(fold);
+                let searched = others.refit(&layout).unwrap();
                 let (step, search) = (layout.numbers(&without.shared), layout.numbers(&searched.shared));
                 for (i, name) in layout.names().iter().enumerate() {
                     let sigma = without.covariance[(i, i)].sqrt();
@@ -172,15 +175,15 @@ mod tests {
         // The seventh moved up by one.
         assert_eq!(of[3], of[7]);
         assert_eq!(count(&of), 8);
-        assert_eq!(folds(&seen, &poses, FOLDS), of);
+        assert_eq!(folds(&seen, &poses), of);
         // All alike: a fold of more than a quarter would leave another calibration.
         let same = vec![world.poses[0]; 12];
-        let of = folds(&seen, &same, FOLDS);
+        let of = folds(&seen, &same);
         let size = |fold| of.iter().filter(|f| **f == fold).count();
         assert!((0..count(&of)).all(|fold| (1..=3).contains(&size(fold))), "{of:?}");
         assert_eq!(count(&groups(&seen, &same)), 1);
         let many = World::new(35, 4);
-        let of = folds(&views(&many), &many.poses, FOLDS);
+        let of = folds(&views(&many), &many.poses);
         let size = |fold| of.iter().filter(|f| **f == fold).count();
         assert_eq!(count(&of), FOLDS);
         assert!((0..FOLDS).all(|fold| (1..=8).contains(&size(fold))), "{of:?}");

@@ -10,7 +10,7 @@ use crate::stereo::data::residuals::residual_px;
 use crate::stereo::data::view::{View, in_use};
 use crate::stereo::init::board_pose;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
-use crate::stereo::select::cross_validation::{self, FOLDS};
+use crate::stereo::select::cross_validation;
 use crate::stereo::solve::levenberg_marquardt;
 use crate::stereo::solve::normal_equations::Equations;
 use crate::stereo::solve::priors::Priors;
@@ -188,7 +188,7 @@ fn hold_out(problem: &Problem, layout: Layout) -> Option<(Trial, f64)> {
     // A lens that all pairs together do not determine is none.
     let (trial, equations) = Trial::with_equations(problem, layout)?;
     let views = &problem.views;
-    let fold_of = cross_validation::folds(views, &trial.values.poses, FOLDS);
+    let fold_of = cross_validation::folds(views, &trial.values.poses);
     let shared = &trial.values.shared;
     let rigs = cross_validation::leave_out(&equations, &equations, &layout, shared, &fold_of, WORST_FOCAL_SIGMA);
     let rigs = rigs.into_iter().map(|without| Some(without?.shared)).collect::<Option<Vec<Shared>>>()?;

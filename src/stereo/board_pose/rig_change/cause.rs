@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::geometry::nearest_rotation;
 use crate::imaging::Board;
+use crate::stereo::board_pose::solve::bundle::Bundle;
 use crate::stereo::board_pose::solve::estimate::Estimate;
 use crate::stereo::board_pose::solve::prior::{stretch_length_mm, stretch_mode};
 use crate::stereo::data::observation::Side;
@@ -161,7 +162,7 @@ pub(in crate::stereo::board_pose) fn stretch(found: &Estimate<'_>) -> [f64; 2] {
     let n = found.values.rig.len();
     let mode = stretch_mode(found.bundle.board);
     let m = mode.len();
-    let deviations = DVector::from_iterator(m, found.values.deviations_mm.iter().flat_map(|d| [d.x, d.y, d.z]));
+    let deviations = Bundle::shared(&found.values).rows(n, m).into_owned();
     let length = stretch_length_mm(found.bundle.board);
     let variance = mode.dot(&(found.covariance.view((n, n), (m, m)) * &mode));
     [mode.dot(&deviations) / length, variance.max(0.0).sqrt() / length]

@@ -45,8 +45,6 @@ pub struct Changed {
     pub moves_mm: f64,
     /// By how much that exceeds their uncertainty: chi-square with three degrees of freedom, the median over the poses.
     pub beyond: f64,
-    /// How many times less unlikely it makes what is seen: the fall of chi-square.
-    pub fall: f64,
 }
 
 /// Names what changed, where more than chance did; and the estimate to go on with, in which the change is allowed for.
@@ -75,7 +73,7 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
     let Some(free) = with_cause(&found, on_rig, f64::INFINITY, usual) else { return (found, None) };
     let shifts_mm = shifts_mm(&found, &free);
     let moves_mm = root_mean_square(shifts_mm.iter().flatten().map(|shift| shift.norm_squared())).unwrap_or(0.0);
-    let changed = Changed { explanations: equals, moves_mm, beyond: beyond(&found, &free, &shifts_mm), fall: best };
+    let changed = Changed { explanations: equals, moves_mm, beyond: beyond(&found, &free, &shifts_mm) };
     match with_cause(&found, on_rig, known, usual) {
         Some(allowed) => (allowed, Some(changed)),
         None => (free, Some(changed)),

@@ -40,26 +40,18 @@ pub struct RigPrior {
 impl RigPrior {
     /// From the calibration's covariance; without one the rig is taken as it is.
     pub fn new(rig: &Rig) -> RigPrior {
-        let known = |c: &Covariance| -> Vec<(usize, String, usize)> {
-            let named = c.order.iter().enumerate();
-            let with_place = named.filter_map(|(at, name)| Some((at, name.clone(), rig_number(name)?)));
-            with_place.filter(|(at, _, _)| c.matrix[(*at, *at)] > 0.0).collect()
+        let known = |c: &Covariance| -> Vec<(String, usize)> {
+            let varying = c.order.iter().enumerate().filter(|(at, _)| c.matrix[(*at, *at)] > 0.0);
+            varying.filter_map(|(_, name)| Some((name.clone(), rig_number(name)?))).collect()
         };
-        let known: Vec<_> = rig.covariance.as_ref().map_or_else(Vec::new, known);
-        let at: Vec<usize> = known.iter().map(|(at, _, _)| *at).collect();
-        let places: Vec<usize> = known.iter().map(|(_, _, place)| *place).collect();
-        let covariance = rig.covariance.as_ref().map_or_else(
-            || DMatrix::zeros(0, 0),
-            |c| {
-                DMatrix::from_fn(at.len(), at.len(), |i, j| 0.5 * (c.matrix[(at[i], at[j])] + c.matrix[(at[j], at[i])]))
-            },
-        );
-        let root = root(&covariance);
+        let known = rig.covariance.as_ref().map_or_else(Vec::new, known);
+        let (names, places): (Vec<String>, Vec<usize>) = known.into_iter().unzip();
+        let covariance = rig.covariance.as_ref().and_then(|c| c.part(&names)).unwrap_or_else(|| DMatrix::zeros(0, 0));
+        let root = root(&(0.5 * (&covariance + covariance.transpose())));
         let mut basis = DMatrix::zeros(RIG_NUMBERS, root.ncols());
         for (row, &place) in places.iter().enumerate() {
             basis.row_mut(place).copy_from(&root.row(row));
         }
-        let names = known.into_iter().map(|(_, name, _)| name).collect();
         RigPrior { rig: rig.clone(), names, places, variances: vec![1.0; basis.ncols()], basis }
     }
 

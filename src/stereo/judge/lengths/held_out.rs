@@ -15,7 +15,7 @@ use crate::stereo::judge::doubtful_corners::{self, DoubtfulCorners};
 use crate::stereo::judge::lengths::{self, Axis, Measured, Range, all_ranges, measure};
 use crate::stereo::judge::verdict::{Expansion, Extremes};
 use crate::stereo::model::rig::Covariance;
-use crate::stereo::select::cross_validation::{self, FOLDS, Without};
+use crate::stereo::select::cross_validation::{self, Without};
 use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, WORST_FOCAL_SIGMA};
 use crate::stereo::triangulate::{RigCovariance, common};
 use crate::stereo::volume::lengths::LONG_SQUARES;
@@ -174,7 +174,7 @@ fn check_baseline(calibration: &Calibration) -> Result<(), Error> {
 fn folds(calibration: &Calibration) -> Option<Folds> {
     let Calibration { views, values, layout, .. } = calibration;
     let equations = calibration.problem().equations(layout)?;
-    let of_pair = cross_validation::folds(views, &values.poses, FOLDS);
+    let of_pair = cross_validation::folds(views, &values.poses);
     let within = |sure| cross_validation::leave_out(&equations, &equations, layout, &values.shared, &of_pair, sure);
     let mut without = within(WORST_FOCAL_SIGMA);
     let determined = without.iter().any(Option::is_some);
