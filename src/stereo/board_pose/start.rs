@@ -37,12 +37,8 @@ pub(super) struct Start {
 /// A start for every pair, in the same order.
 pub(super) fn starts(rig: &Rig, board: &Board, pairs: &[PairCorners]) -> Vec<Start> {
     let shared = Shared { rig: rig.clone(), shape_mm: FLAT };
-    let mut views: Vec<View> = pairs.par_iter().map(|pair| View::new(board, pair, FEWEST_CORNERS)).collect();
-    views.par_iter_mut().for_each(|view| {
-        if let Some(quarters) = numbering::on_rig(&shared, board, view) {
-            view.turn_right(board, quarters);
-        }
-    });
+    let mut views: Vec<View> =
+        pairs.par_iter().map(|pair| numbering::seen_on_rig(&shared, board, pair, None)).collect();
     let mut poses: Vec<Option<Transform>> = vec![None; views.len()];
     // Twice: the scatter is known only after the first fit.
     for _ in 0..2 {

@@ -11,11 +11,13 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::Vector3;
 
 use crate::geometry::{Transform, rotation_vector, transform};
-use crate::imaging::Board;
+use crate::imaging::{Board, PairCorners};
 use crate::statistics::median;
 use crate::stereo::Side;
+use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::View;
 use crate::stereo::init::board_pose;
+use crate::stereo::init::homography::FEWEST_CORNERS;
 use crate::stereo::model::parameters::Shared;
 
 /// What a board's pose is multiplied with when its corners are renumbered by [`View::turn_right`].
@@ -30,6 +32,17 @@ pub fn on_rig(shared: &Shared, board: &Board, view: &View) -> Option<usize> {
     let (left, right) = (left?, right?);
     let angle = |quarters: usize| rotation_vector(&(right * renumbered(quarters) * left.inverse())).norm();
     board.turns_left_open().into_iter().min_by(|a, b| angle(*a).total_cmp(&angle(*b)))
+}
+
+/// A pair's corners, weighed by their noise where it is known, and numbered as a rig has it: how the cameras stand decides between numberings
+/// that the pictures leave open.
+pub fn seen_on_rig(shared: &Shared, board: &Board, pair: &PairCorners, noise: Option<&Noise>) -> View {
+    let mut view = View::new(board, pair, FEWEST_CORNERS);
+    if let Some(noise) = noise {
+        noise.apply(std::slice::from_mut(&mut view));
+    }
+    view.turn_right(board, on_rig(shared, board, &view).unwrap_or(0));
+    view
 }
 
 /// Where the right camera stands as most pairs have it, and the turn of each pair's right numbering that agrees with it.

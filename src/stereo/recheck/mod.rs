@@ -20,7 +20,6 @@ use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::view::{View, in_use};
 use crate::stereo::findings::hypothesis::{self, Hypothesis};
 use crate::stereo::init::board_pose::{self, misfit_px};
-use crate::stereo::init::homography::FEWEST_CORNERS;
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::known_lenses::KnownLenses;
 use crate::stereo::model::parameters::{Layout, Shared, Values};
@@ -198,12 +197,7 @@ fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>) {
     let mut skipped = corners.skipped.clone();
     let (mut views, mut poses) = (Vec::new(), Vec::new());
     for pair in &corners.pairs {
-        let mut seen = [View::new(&corners.board, pair, FEWEST_CORNERS)];
-        if let Some(noise) = &before.noise {
-            noise.apply(&mut seen);
-        }
-        let [mut view] = seen;
-        view.turn_right(&corners.board, numbering::on_rig(&shared, &corners.board, &view).unwrap_or(0));
+        let view = numbering::seen_on_rig(&shared, &corners.board, pair, before.noise.as_ref());
         match misfit_px(&shared, &view) {
             Some((_, pose)) => {
                 views.push(view);

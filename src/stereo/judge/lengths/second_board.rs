@@ -8,8 +8,6 @@ use serde::Serialize;
 use crate::imaging::{Corners, Skipped};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::residuals::mean;
-use crate::stereo::data::view::View;
-use crate::stereo::init::homography::FEWEST_CORNERS;
 use crate::stereo::judge::doubtful_corners::{self, DoubtfulCorners};
 use crate::stereo::judge::lengths::{self, Range, all_ranges, measure};
 use crate::stereo::judge::verdict::{Expansion, Extremes};
@@ -49,12 +47,8 @@ pub fn second_board(calibration: &Calibration, corners: &Corners, board_mm: Opti
     let mut skipped = corners.skipped.clone();
     let (mut measured, mut names) = (Vec::new(), Vec::new());
     for pair in &corners.pairs {
-        let mut views = [View::new(board, pair, FEWEST_CORNERS)];
-        calibration.noise.apply(&mut views);
-        let [mut view] = views;
-        // How the cameras stand decides between numberings that the pictures leave open; lengths have no part in it.
-        view.turn_right(board, numbering::on_rig(&shared, board, &view).unwrap_or(0));
-        let lengths = measure(rig, board, &view);
+        // Lengths have no part in how it is numbered.
+        let lengths = measure(rig, board, &numbering::seen_on_rig(&shared, board, pair, Some(&calibration.noise)));
         if lengths.lengths.is_empty() {
             let reason =
                 "no length of the second board can be measured in it: no two corners are seen in both pictures";
