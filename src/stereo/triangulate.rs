@@ -57,17 +57,6 @@ pub fn rig_number(name: &str) -> Option<usize> {
     }
 }
 
-/// The name of a number of the rig in `calibration.json`.
-pub fn rig_number_name(number: usize) -> String {
-    match number.checked_sub(2 * CAMERA_NUMBERS) {
-        Some(i) => format!("right_from_left.{}", TRANSFORM_NAMES[i]),
-        None => {
-            let side = if number < CAMERA_NUMBERS { Side::Left } else { Side::Right };
-            format!("{}.{}", side.name(), CAMERA_NAMES[number % CAMERA_NUMBERS])
-        }
-    }
-}
-
 /// Triangulates; both observations carry their whiteners. `None` for parallel rays, points behind a camera, pixels without a ray.
 pub fn triangulate(rig: &Rig, left: &Observation, right: &Observation) -> Option<SpacePoint> {
     let (mut point, gap_mm) = between_rays(rig, &left.px, &right.px)?;

@@ -55,10 +55,15 @@ impl View {
         paired
     }
 
-    /// Renumbers the right picture's corners as on a board that is turned in its plane by so many quarter turns. A board with unequal
-    /// sides takes half turns only.
+    /// Renumbers the right picture's corners, see [`View::turn`].
     pub fn turn_right(&mut self, board: &Board, quarters: usize) {
-        for o in self.observations.iter_mut().filter(|o| o.side == Side::Right) {
+        self.turn(board, Side::Right, quarters);
+    }
+
+    /// Renumbers a picture's corners as on a board that is turned in its plane by so many quarter turns. A board with unequal
+    /// sides takes half turns only.
+    pub fn turn(&mut self, board: &Board, side: Side, quarters: usize) {
+        for o in self.observations.iter_mut().filter(|o| o.side == side) {
             let (col, row) = (o.col, o.row);
             let (last_col, last_row) = (board.columns() - 1, board.rows() - 1);
             let place = match quarters % 4 {

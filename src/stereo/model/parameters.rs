@@ -47,6 +47,10 @@ impl Layout {
     /// Nothing shared is free: only the boards' poses are looked for.
     pub const POSES_ONLY: Layout = Layout { left: None, right: None, transform: false, shape: false };
 
+    /// All numbers of a rig, in their order.
+    pub const WHOLE_RIG: Layout =
+        Layout { left: Some(Lens::Tilted14), right: Some(Lens::Tilted14), transform: true, shape: false };
+
     /// The left camera alone.
     pub fn one_camera(lens: Lens) -> Layout {
         Layout { left: Some(lens), ..Layout::POSES_ONLY }
@@ -69,10 +73,7 @@ impl Layout {
 
     /// Where a camera's numbers begin.
     pub fn camera_start(&self, side: Side) -> usize {
-        match side {
-            Side::Left => 0,
-            Side::Right => self.camera_count(Side::Left),
-        }
+        if side == Side::Left { 0 } else { self.camera_count(Side::Left) }
     }
 
     /// Where `right_from_left` begins.

@@ -382,7 +382,6 @@ mod tests {
                 right[at + r] += b.pose_gradient[r];
             }
         }
-        let shared = Shared { rig: world.rig.clone(), shape_mm: [0.0; 3] };
         let prior = Priors::NONE.information(&layout, &shared);
         let (matrix, gradient) = eliminate(&Equations { blocks, prior }, 0.0).unwrap();
         let eliminated = solve_scaled(&matrix, &gradient).unwrap();

@@ -147,13 +147,10 @@ impl VolumeLengths {
         length_mm: f64,
         sigma_px: f64,
     ) -> VolumeLengths {
-        let of_place = |at: &Point3<f64>, directions: &[Vector3<f64>]| -> Vec<VolumeLength> {
-            let length =
-                |direction: &Vector3<f64>| length(rig, covariance, at, direction * length_mm, sigma_px, &volume);
-            directions.iter().filter_map(length).collect()
-        };
         let through = |directions: &[Vector3<f64>]| -> Vec<VolumeLength> {
-            places.par_iter().flat_map_iter(|at| of_place(at, directions)).collect()
+            let length = |at, along| length(rig, covariance, at, along, sigma_px, &volume);
+            let of_place = |at| directions.iter().filter_map(move |d| length(at, d * length_mm));
+            places.par_iter().flat_map_iter(of_place).collect()
         };
         let (lengths, along_sight) = (through(directions), through(&[Vector3::z()]));
         VolumeLengths { length_mm, lengths, along_sight, volume, extent: Extent::Boards }

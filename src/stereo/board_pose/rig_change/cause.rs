@@ -8,13 +8,13 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::geometry::nearest_rotation;
 use crate::imaging::Board;
+use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::bundle::Bundle;
 use crate::stereo::board_pose::solve::estimate::Estimate;
 use crate::stereo::board_pose::solve::prior::{stretch_length_mm, stretch_mode};
 use crate::stereo::data::observation::Side;
 use crate::stereo::findings::hypothesis::{moved, refocused, turned};
 use crate::stereo::model::parameters::Layout;
-use crate::stereo::{Lens, Rig};
 
 /// One thing that may have changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,8 +48,7 @@ impl Cause {
 
     /// The change of the rig's numbers by one unit; `None` for the target's pitch.
     pub(in crate::stereo::board_pose) fn direction(self, rig: &Rig) -> Option<DVector<f64>> {
-        // All numbers of a rig, in their order.
-        let layout = &Layout::rig(Lens::Tilted14, false);
+        let layout = &Layout::WHOLE_RIG;
         let along = |axis: usize| Vector3::ith(axis, 1.0);
         match self {
             Cause::Pitch => None,

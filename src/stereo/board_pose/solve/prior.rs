@@ -12,9 +12,10 @@ use crate::imaging::Board;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::pose_block::TRANSFORM;
 use crate::stereo::model::board_shape::{self, lift};
+use crate::stereo::model::parameters::Layout;
 use crate::stereo::model::projection::CAMERA_NUMBERS;
 use crate::stereo::model::rig::Covariance;
-use crate::stereo::triangulate::{RIG_NUMBERS, rig_number, rig_number_name};
+use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
 /// How tightly the deviations are held free of shift, turn and tilt, as a multiple of what the corners say about them.
 const HELD: f64 = 1e4;
@@ -62,10 +63,10 @@ impl RigPrior {
         prior.basis = prior.basis.insert_column(at, 0.0);
         prior.basis.set_column(at, direction);
         prior.variances.push(variance);
-        for (place, _) in direction.iter().enumerate().filter(|(_, by)| **by != 0.0) {
-            if !prior.places.contains(&place) {
+        for ((place, name), by) in Layout::WHOLE_RIG.names().into_iter().enumerate().zip(direction) {
+            if *by != 0.0 && !prior.places.contains(&place) {
                 prior.places.push(place);
-                prior.names.push(rig_number_name(place));
+                prior.names.push(name);
             }
         }
         prior
