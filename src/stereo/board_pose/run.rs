@@ -163,16 +163,15 @@ impl<'a> Run<'a> {
             return None;
         }
         let better = |px: f64| px < 0.3 * misfit_px;
-        let misfit = |pairs: Vec<PairCorners>| {
+        let misfit = |change: &dyn Fn(&PairCorners) -> PairCorners| {
+            let pairs: Vec<PairCorners> = self.pairs.iter().map(change).collect();
             let others = starts(&self.known.rig, &self.known.board, &pairs);
             median(others.iter().map(|s| s.misfit_px)).unwrap_or(f64::INFINITY)
         };
         let exchange =
             |p: &PairCorners| PairCorners { pair: p.pair.clone(), left: p.right.clone(), right: p.left.clone() };
-        let exchanged = (misfit(self.pairs.iter().map(exchange).collect()), Judgement::Exchanged);
-        let flipped = Flip::ALL.map(|flip| {
-            (misfit(self.pairs.iter().map(|pair| self.flipped(pair, flip)).collect()), Judgement::Mirrored(flip))
-        });
+        let exchanged = (misfit(&exchange), Judgement::Exchanged);
+        let flipped = Flip::ALL.map(|flip| (misfit(&|pair| self.flipped(pair, flip)), Judgement::Mirrored(flip)));
         // A rig that is nearly its own mirror image fits both ways.
         let others = std::iter::once(exchanged).chain(flipped).filter(|(px, _)| better(*px));
         if let Some((_, judgement)) = others.min_by(|a, b| a.0.total_cmp(&b.0)) {
@@ -196,12 +195,9 @@ impl<'a> Run<'a> {
             return None;
         }
         let [amount, sigma] = stretch(&found);
-        let moves: Vec<f64> = present
-            .iter()
-            .filter_map(|&i| {
-                Some((found.values.poses[i]?.translation.vector - self.starts[i].pose?.translation.vector).norm())
-            })
-            .collect();
+        let moves = present.iter().filter_map(|&i| {
+            Some((found.values.poses[i]?.translation.vector - self.starts[i].pose?.translation.vector).norm())
+        });
         let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY };
         let moves_mm = median(moves).unwrap_or(0.0);
         Some(Judgement::Contradicts(Changed { explanations: vec![explanation], moves_mm, beyond: f64::INFINITY }))
@@ -260,16 +256,11 @@ impl<'a> Run<'a> {
         });
         Series {
             poses: poses.collect(),
-            shape: None,
-            shared: None,
             judgement,
-            noise_px: None,
-            usual_px: None,
-            prior_chi_square: None,
-            chi_square: None,
             excess: 1.0,
             usual_excess: 1.0,
             notes: self.notes,
+            ..Series::default()
         }
     }
 }

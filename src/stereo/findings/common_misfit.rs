@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use super::{Along, Finding, Kind};
+use crate::imaging::Side;
 use crate::statistics::median;
 use crate::stereo::Lens;
 use crate::stereo::calibrate::Calibration;
@@ -39,7 +40,9 @@ const MOST_STRETCH: f64 = 0.1;
 pub fn look(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
     let told = |finding: &Finding| finding.along.clone().filter(|along| along.by_pair.len() == calibration.views.len());
     let misfit = misfit_without(calibration, changes.iter().find_map(told));
-    if misfit.usual_px < TIMES * corner_sigma_px(&calibration.views) {
+    // As the refinement states it; zero where it gave none.
+    let corner_sigma_px = median(in_use(&calibration.views).map(|o| (0.5 * o.covariance_px2.trace()).sqrt()));
+    if misfit.usual_px < TIMES * corner_sigma_px.unwrap_or(0.0) {
         return None;
     }
     let is_shared = misfit.usual_px > TIMES * calibration.alone_px;
@@ -52,11 +55,6 @@ struct Misfit {
     usual_px: f64,
     /// The pairs, the worst first.
     worst_first: Vec<String>,
-}
-
-/// Standard deviation of most corners as their refinement states it, px; zero where it gave none.
-fn corner_sigma_px(views: &[View]) -> f64 {
-    median(in_use(views).map(|o| (0.5 * o.covariance_px2.trace()).sqrt())).unwrap_or(0.0)
 }
 
 /// Pictures that were not taken at one moment: neither the corners nor a lens explain so much.
@@ -101,7 +99,9 @@ fn left_px(shared: &Shared, view: &View) -> f64 {
 fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
     /// Most of it that may be left. One number of sixteen that a rig has takes up little of what has another cause.
     const LEFT: f64 = 0.5;
-    let layout = with_usual_lens(&calibration.layout);
+    // With at least the terms that nearly all lenses need: misfit that the board made may have left fewer.
+    let [left, right] = Side::BOTH.map(|side| calibration.layout.lens(side).map(|lens| lens.max(Lens::Brown5)));
+    let layout = Layout { left, right, ..calibration.layout };
     // What a richer lens takes up is not the board's.
     let problem = refitted(&calibration.problem(), &layout)?;
     let before_px = median_px(&problem)?.min(misfit.usual_px);
@@ -166,12 +166,6 @@ fn refitted(problem: &Problem, layout: &Layout) -> Option<Problem> {
 fn median_px(problem: &Problem) -> Option<f64> {
     let shared = &problem.values.shared;
     median(problem.views.par_iter().map(|view| left_px(shared, view)).collect::<Vec<f64>>())
-}
-
-/// The layout with at least the terms that nearly all lenses need: misfit that the board made may have left fewer.
-fn with_usual_lens(layout: &Layout) -> Layout {
-    let richer = |lens: Option<Lens>| lens.map(|lens| lens.max(Lens::Brown5));
-    Layout { left: richer(layout.left), right: richer(layout.right), ..*layout }
 }
 
 /// The pairs of a board that is wider by this share for its height.

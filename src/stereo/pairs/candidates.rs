@@ -36,10 +36,12 @@ impl Candidates {
         let mut views = Vec::new();
         let fewest = if corners.board.is_coded() { 0 } else { FEWEST_CORNERS.max(fewest_corners(&corners.board)) };
         for (i, pair) in corners.pairs.iter().enumerate() {
-            let first = corners.pairs[..i].iter().find(|first| same_corners(first, pair));
+            let is_same = |first: &&PairCorners| same(&first.left, &pair.left) && same(&first.right, &pair.right);
+            let first = corners.pairs[..i].iter().find(is_same);
             let again = first.map(|first| format!("the same pictures as pair {}", first.pair));
-            let one = || one_picture(pair).then(|| format!("{ONE_PICTURE}: both cameras need their own"));
-            if let Some(reason) = again.or_else(one) {
+            let is_one = !pair.left.is_empty() && same(&pair.left, &pair.right);
+            let one = is_one.then(|| format!("{ONE_PICTURE}: both cameras need their own"));
+            if let Some(reason) = again.or(one) {
                 discarded.push(DiscardedPair::new(&pair.pair, Cause::Duplicate, reason));
                 continue;
             }
@@ -97,16 +99,6 @@ fn too_few_corners(pair: &PairCorners, counting: [usize; 2]) -> String {
 /// True where one of the pictures tells how the board lies; whatever the other one shows then counts as well.
 fn tells_a_pose(view: &View) -> bool {
     Side::BOTH.into_iter().any(|side| homography::of_picture(view, side).is_some())
-}
-
-/// True for corners of the same pictures.
-fn same_corners(a: &PairCorners, b: &PairCorners) -> bool {
-    same(&a.left, &b.left) && same(&a.right, &b.right)
-}
-
-/// True where both sides of a pair are one picture.
-fn one_picture(pair: &PairCorners) -> bool {
-    !pair.left.is_empty() && same(&pair.left, &pair.right)
 }
 
 /// True for corners of one picture: no two pictures have the same noise.
