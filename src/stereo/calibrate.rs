@@ -7,12 +7,9 @@ use nalgebra::DVector;
 
 use crate::imaging::{Board, Corners, Side, Skipped};
 use crate::stereo::board_pose::print_share::print_share;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{NeighbourCorrelation, Noise, View};
 use crate::stereo::init::board_pose;
-use crate::stereo::model::parameters::{Layout, Values};
-use crate::stereo::model::rig::Covariance;
+use crate::stereo::model::{Covariance, Layout, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::series::{self, Series};
 use crate::stereo::pairs::{Discarded, DiscardedPair, Standing};
@@ -22,9 +19,7 @@ use crate::stereo::select::model_comparison::LensScore;
 use crate::stereo::select::options::{Choice, Options};
 use crate::stereo::select::pair_scatter::PairScatter;
 use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::Problem;
-use crate::stereo::solve::uncertainty::Uncertainty;
+use crate::stereo::solve::{Priors, Problem, Uncertainty};
 use crate::stereo::{Error, Rig};
 
 /// A calibrated rig with all that it was made from.

@@ -18,7 +18,7 @@ use crate::stereo::board_pose::solve::estimate::Estimate;
 use crate::stereo::board_pose::solve::prior::frame_modes;
 use crate::stereo::board_pose::solve::window::Window;
 use crate::stereo::board_pose::start::{FEWEST_CORNERS, Start, enough};
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 
 /// Standard deviations by which a pose's own chi-square may exceed one before its covariance grows.
 const POSE_SIGMAS: f64 = 3.0;

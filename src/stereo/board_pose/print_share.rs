@@ -14,13 +14,11 @@ use crate::imaging::Board;
 use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, Scene};
 use crate::stereo::board_pose::solve::totals::Totals;
 use crate::stereo::board_pose::solve::window::{SeenShares, Window};
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::view::{View, in_use};
+use crate::stereo::data::{Noise, View, in_use};
 use crate::stereo::model::board_shape::{height_mm, lift};
-use crate::stereo::model::parameters::{Layout, Values};
-use crate::stereo::solve::problem::{Problem, Solved};
-use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::model::{Layout, Values};
 use crate::stereo::solve::uncertainty::invert;
+use crate::stereo::solve::{Loss, Problem, Solved};
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
 /// The print of a calibration board, and what it does.

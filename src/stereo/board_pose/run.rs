@@ -19,8 +19,7 @@ use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
 use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior};
 use crate::stereo::board_pose::start::{Start, baseline_ratio, starts};
 use crate::stereo::board_pose::turns;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{Noise, View};
 use crate::stereo::pairs::candidates;
 use crate::stereo::volume::Volume;
 

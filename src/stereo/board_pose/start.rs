@@ -11,13 +11,11 @@ use crate::geometry::Transform;
 use crate::imaging::{Board, PairCorners, Side};
 use crate::statistics::median;
 use crate::stereo::Rig;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::of_view;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{Noise, Observation, View};
 use crate::stereo::init::board_pose;
+use crate::stereo::model::Shared;
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::parameters::Shared;
 use crate::stereo::pairs::numbering;
 
 /// Fewest corners in each picture for six unknowns with something to spare.

@@ -7,7 +7,7 @@
 use crate::geometry::{Transform, rotation_vector};
 use crate::imaging::{Board, Side};
 use crate::measurements::{RobotPose, Role};
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 use crate::stereo::pairs::numbering::renumbered;
 
 /// Two numberings whose turns from the neighbour differ by less than this, rad, are both possible.

@@ -7,9 +7,8 @@
 use nalgebra::{Matrix2, Vector2};
 
 use crate::statistics::median;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::data::view::{View, in_use};
-use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::data::{Observation, View, in_use};
+use crate::stereo::solve::Loss;
 
 /// The noise model of all corners.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,9 +6,8 @@ use crate::geometry::Transform;
 use crate::imaging::Side;
 use crate::statistics::median;
 use crate::stereo::Rig;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::data::view::View;
-use crate::stereo::model::parameters::{Shared, Values};
+use crate::stereo::data::{Observation, View};
+use crate::stereo::model::{Shared, Values};
 
 /// Predicted minus seen, px. `None` for a corner behind its camera.
 pub fn residual_px(shared: &Shared, left_from_board: &Transform, o: &Observation) -> Option<Vector2<f64>> {

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector3};
 
 use crate::imaging::{Board, Corner, PairCorners, Side};
-use crate::stereo::data::observation::Observation;
+use crate::stereo::data::Observation;
 use crate::stereo::model::board_shape::lift;
 
 /// How far a corner that was found but could not be measured may be off, px.

@@ -13,11 +13,11 @@ use crate::imaging::Side;
 use crate::statistics::median;
 use crate::stereo::Lens;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::view::{View, in_use};
+use crate::stereo::data::{View, in_use};
 use crate::stereo::init::board_pose::misfit_px;
-use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::model::{Layout, Shared};
 use crate::stereo::pairs::Cause;
-use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::Problem;
 use crate::stereo::solve::uncertainty;
 
 /// A lens or a rig that lacks something leaves no more than about this many times what single pictures do.

@@ -2,7 +2,7 @@
 
 use nalgebra::{DVector, Vector3};
 
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::Layout;
 use crate::stereo::pairs::Cause;
 use crate::stereo::{Rig, Side};
 

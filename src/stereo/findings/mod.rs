@@ -26,7 +26,7 @@ use crate::difference::TOLD_APART;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::hypothesis::{Hypothesis, any_place};
 use crate::stereo::findings::series::{Change, Line, Linear};
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::Layout;
 use crate::stereo::pairs::{Cause, DiscardedPair};
 use crate::stereo::volume::lengths::VolumeLengths;
 

@@ -10,7 +10,7 @@ use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
 use crate::stereo::calibrate::{Calibration, calibrate, calibrate_with};
 use crate::stereo::findings::{self, Finding, Kind, common_misfit, hold, shifted, without_drift};
-use crate::stereo::model::rig::Covariance;
+use crate::stereo::model::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
 use crate::stereo::select::options::Options;
 use crate::stereo::volume::Extent;

@@ -5,13 +5,12 @@
 
 use crate::geometry::Transform;
 use crate::imaging::Side;
+use crate::stereo::data::View;
 use crate::stereo::data::residuals::median_px;
-use crate::stereo::data::view::View;
 use crate::stereo::init::homography::{homography, pose};
-use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::solve::{Loss, Priors};
 
 /// Fits the pose to the view's active corners, of which those far off hardly count, to about a tenth of a standard deviation. `None` where they do
 /// not determine it.

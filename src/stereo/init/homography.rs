@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Matrix3, Point2, Point3, Vector3};
 use crate::geometry::{Transform, transform_from_matrix};
 use crate::imaging::Side;
 use crate::statistics::median;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 
 /// Fewest corners that determine a homography with something to spare.
 pub const FEWEST_CORNERS: usize = 6;

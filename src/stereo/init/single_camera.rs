@@ -10,15 +10,13 @@ use nalgebra::{Matrix3, Point2};
 use crate::geometry::Transform;
 use crate::imaging::Side;
 use crate::statistics::median;
-use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::residuals::{self, median_px};
-use crate::stereo::data::view::View;
+use crate::stereo::data::{Noise, View};
 use crate::stereo::init::board_pose;
 use crate::stereo::init::homography::{self, focal_lengths, pose};
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::parameters::{Layout, Shared, Values};
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::Problem;
+use crate::stereo::model::{Layout, Shared, Values};
+use crate::stereo::solve::{Priors, Problem};
 use crate::stereo::{Camera, Lens, Rig};
 
 /// Lens of the first fit: distortion that any picture determines.

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::{Corners, Side};
 use crate::linear_algebra::to_unit_diagonal;
-use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::data::Noise;
 use crate::stereo::model::parameters::{CAMERA_NAMES, Layout};
 use crate::stereo::{Camera, Error, Lens, Rig};
 

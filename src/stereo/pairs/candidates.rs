@@ -4,11 +4,11 @@
 use rayon::prelude::*;
 
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 use crate::stereo::error::{Error, ONE_PICTURE};
 use crate::stereo::init::homography::{self, FEWEST_CORNERS};
 use crate::stereo::init::single_camera::{self, OneCamera};
-use crate::stereo::model::known_lenses::KnownLenses;
+use crate::stereo::model::KnownLenses;
 use crate::stereo::pairs::discarded::too_few_pairs;
 use crate::stereo::pairs::{Cause, DiscardedPair, fewest_pairs};
 

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::imaging::{Side, Skipped};
 use crate::stereo::Error;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 
 /// What happened to a pair, or to the rig over the pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]

@@ -11,16 +11,14 @@ use rayon::prelude::*;
 use crate::geometry::Transform;
 use crate::imaging::{Board, Side};
 use crate::stereo::Rig;
+use crate::stereo::data::View;
 use crate::stereo::data::residuals::median_px;
-use crate::stereo::data::view::View;
 use crate::stereo::init::board_pose;
 use crate::stereo::init::single_camera::as_left;
-use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::pairs::Cause;
 use crate::stereo::solve::levenberg_marquardt::Search;
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::Problem;
-use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::solve::{Loss, Priors, Problem};
 
 /// Corners of a picture that are enough to try an idea on.
 const ENOUGH_CORNERS: usize = 40;

@@ -8,7 +8,7 @@ pub mod numbering;
 pub mod open_numbers;
 pub mod series;
 
-use crate::stereo::model::known_lenses::KnownLenses;
+use crate::stereo::model::KnownLenses;
 
 pub use discarded::{Cause, Discarded, DiscardedPair, PictureCorners, Standing};
 

@@ -10,9 +10,9 @@ use nalgebra::Vector3;
 
 use crate::geometry::rotation_vector;
 use crate::statistics::median;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 use crate::stereo::init::board_pose;
-use crate::stereo::model::parameters::Shared;
+use crate::stereo::model::Shared;
 use crate::stereo::pairs::Cause;
 use crate::stereo::pairs::mixups::Series;
 use crate::stereo::pairs::numbering::renumbered;

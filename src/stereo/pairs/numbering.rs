@@ -14,11 +14,10 @@ use crate::geometry::{Transform, rotation_vector, transform};
 use crate::imaging::{Board, PairCorners};
 use crate::statistics::median;
 use crate::stereo::Side;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{Noise, View};
 use crate::stereo::init::board_pose;
 use crate::stereo::init::homography::FEWEST_CORNERS;
-use crate::stereo::model::parameters::Shared;
+use crate::stereo::model::Shared;
 
 /// What a board's pose is multiplied with when its corners are renumbered by [`View::turn_right`].
 pub fn renumbered(quarters: usize) -> Transform {

@@ -12,15 +12,14 @@ use rayon::prelude::*;
 use crate::geometry::Transform;
 use crate::imaging::{Side, Skipped};
 use crate::statistics::median;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 use crate::stereo::init::board_pose::misfit_px;
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::discarded::too_few_pairs;
 use crate::stereo::pairs::{Cause, DiscardedPair, mixups, moved, numbering};
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::{Priors, Problem};
 use crate::stereo::{Error, Lens, Rig};
 
 /// A pair that misses the rig by so many times what pairs usually do is not one of them.

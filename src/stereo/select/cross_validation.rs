@@ -9,8 +9,8 @@
 use nalgebra::{DMatrix, DVector, Point3};
 
 use crate::geometry::Transform;
-use crate::stereo::data::view::View;
-use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::data::View;
+use crate::stereo::model::{Layout, Shared};
 use crate::stereo::solve::normal_equations::{self, Equations};
 use crate::stereo::solve::uncertainty::{self, worst_focal_sigma};
 

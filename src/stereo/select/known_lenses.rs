@@ -12,14 +12,13 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::difference::{Difference, SEEN, TOLD_APART};
 use crate::imaging::{Board, Side};
-use crate::stereo::data::view::in_use;
-use crate::stereo::model::known_lenses::KnownLenses;
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::data::in_use;
+use crate::stereo::model::{KnownLenses, Layout};
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::model_comparison::{Trial, gain_of_terms};
 use crate::stereo::select::options::{Choice, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
-use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::Problem;
 use crate::stereo::{Error, Rig};
 
 /// Chance that one of the four tests (all numbers, the focus of either side and of both) contradicts a lens that is right: one set of pairs in a

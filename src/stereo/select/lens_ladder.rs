@@ -10,14 +10,13 @@
 
 use crate::imaging::Board;
 use crate::stereo::board_pose::print_share::print_share;
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::Layout;
 use crate::stereo::select::known_lenses;
 use crate::stereo::select::model_comparison::{Chance, LensScore, OF_PAIR, Trial, gain_of_terms, score, simplest};
 use crate::stereo::select::options::{Choice, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::uncertainty;
+use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Error, Lens};
 
 /// Chooses what is free, where it is not forced.

@@ -7,16 +7,13 @@ use crate::geometry::Transform;
 use crate::statistics::chi_square_quantile;
 use crate::stereo::Lens;
 use crate::stereo::data::residuals::residual_px;
-use crate::stereo::data::view::{View, in_use};
+use crate::stereo::data::{View, in_use};
 use crate::stereo::init::board_pose;
-use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::select::cross_validation;
 use crate::stereo::solve::levenberg_marquardt;
-use crate::stereo::solve::normal_equations::Equations;
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::Problem;
-use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::{self, WORST_FOCAL_SIGMA, worst_focal_sigma};
+use crate::stereo::solve::{Equations, Loss, Priors, Problem};
 
 /// Standard errors by which a richer model must predict better: one is what half of the useless terms reach by chance when the
 /// best of several is taken.

@@ -12,10 +12,10 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::Layout;
 use crate::stereo::select::cross_validation::Without;
 use crate::stereo::select::pair_motion;
-use crate::stereo::solve::normal_equations::Equations;
+use crate::stereo::solve::Equations;
 
 /// How the pairs scatter.
 #[derive(Debug, Clone, PartialEq, Serialize)]

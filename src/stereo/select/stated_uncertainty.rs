@@ -10,14 +10,13 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::Board;
 use crate::statistics::chi_square_quantile;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::data::Noise;
+use crate::stereo::model::{Layout, Shared};
 use crate::stereo::select::cross_validation;
 use crate::stereo::select::model_comparison::{LensScore, Trial};
 use crate::stereo::select::pair_scatter::{Jackknife, PairScatter};
-use crate::stereo::solve::normal_equations::Equations;
-use crate::stereo::solve::problem::{Problem, Solved};
-use crate::stereo::solve::uncertainty::{Uncertainty, WORST_FOCAL_SIGMA};
+use crate::stereo::solve::uncertainty::WORST_FOCAL_SIGMA;
+use crate::stereo::solve::{Equations, Problem, Solved, Uncertainty};
 use crate::stereo::{Lens, Rig};
 
 /// Quantile of the normal distribution at whose level of chi-squared additional terms are more than chance: one clean set of pairs in two hundred

@@ -12,11 +12,10 @@ use nalgebra::{DVector, Vector6};
 use rayon::prelude::*;
 
 use crate::geometry::perturb;
-use crate::stereo::data::view::View;
-use crate::stereo::model::parameters::{Layout, Values};
-use crate::stereo::solve::normal_equations::{self, Block, Equations};
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::data::View;
+use crate::stereo::model::{Layout, Values};
+use crate::stereo::solve::normal_equations::{self, Block};
+use crate::stereo::solve::{Equations, Loss, Priors};
 
 /// The search is done when even a strongly damped step does not lower the cost.
 const MAX_DAMPING: f64 = 1e12;

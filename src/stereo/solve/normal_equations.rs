@@ -9,14 +9,13 @@ use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Matrix6, Point3, RowVector3
 use crate::geometry::{Transform, rotation_matrix};
 use crate::imaging::Side;
 use crate::linear_algebra::to_unit_diagonal;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{Observation, View};
 use crate::stereo::model::board_shape;
-use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::model::projection::CAMERA_NUMBERS;
+use crate::stereo::model::{Layout, Shared};
+use crate::stereo::solve::Loss;
 use crate::stereo::solve::gram_matrix::{Products, WIDEST};
 use crate::stereo::solve::priors::Information;
-use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::{Camera, Rig};
 
 /// One pair's share of the normal equations.
@@ -307,7 +306,7 @@ mod tests {
     use super::*;
     use crate::geometry::perturb;
     use crate::stereo::Lens;
-    use crate::stereo::solve::priors::Priors;
+    use crate::stereo::solve::Priors;
     use crate::stereo::synthetic::World;
 
     fn cost(shared: &Shared, layout: &Layout, pose: &Transform, view: &View) -> f64 {

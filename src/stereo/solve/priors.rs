@@ -9,8 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::Side;
 use crate::stereo::model::board_shape;
-use crate::stereo::model::known_lenses::KnownLenses;
-use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::model::{KnownLenses, Layout, Shared};
 use crate::stereo::{Camera, Lens, Rig};
 
 /// What distortion does at the corner of the picture, as shares of the corner's distance from the middle: k1, k2, k3.

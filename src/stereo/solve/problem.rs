@@ -7,18 +7,13 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::imaging::Board;
 use crate::stereo::Error;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
-use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{NeighbourCorrelation, Noise, Observation, View};
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search, Solution, Stop};
-use crate::stereo::solve::normal_equations::Equations;
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::robust_loss::Loss;
-use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, Uncertainty, worst_focal_sigma};
+use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, worst_focal_sigma};
+use crate::stereo::solve::{Equations, Loss, Priors, Uncertainty};
 
 /// Rounds of fitting the scatter and solving again.
 const MOST_ROUNDS: usize = 12;

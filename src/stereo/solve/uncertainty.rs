@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DMatrixViewMut, Matrix6};
 use rayon::prelude::*;
 
 use crate::linear_algebra::to_unit_diagonal;
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::Layout;
 use crate::stereo::solve::normal_equations::{self, Block, Equations};
 use crate::stereo::{Rig, Side};
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::stereo::board_pose::pair_excess::pair_excess;
-use crate::stereo::model::known_lenses::KnownLenses;
+use crate::stereo::model::KnownLenses;
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::known_lenses::LensCheck;
 use crate::stereo::{Error, Side};

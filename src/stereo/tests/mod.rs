@@ -16,7 +16,7 @@ use crate::stereo::calibrate::{Calibration, calibrate};
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::ledger::Standards;
 use crate::stereo::judge::lengths::held_out;
-use crate::stereo::model::parameters::Shared;
+use crate::stereo::model::Shared;
 use crate::stereo::select::options::Options;
 use crate::stereo::select::stated_uncertainty;
 use crate::stereo::synthetic::{self, BROWN4, World};

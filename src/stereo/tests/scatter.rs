@@ -7,7 +7,7 @@ use crate::simulate::draws::{Draws, Purpose};
 use crate::statistics::median;
 use crate::stereo::Lens;
 use crate::stereo::board_pose::pair_excess::pair_excess;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 use crate::stereo::judge::verdict::{LengthError, Verdict};
 use crate::stereo::triangulate::{RigCovariance, common, triangulate};
 

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use crate::imaging::{Board, Side};
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::data::Observation;
+use crate::stereo::model::Layout;
 use crate::stereo::triangulate::{RigCovariance, SpacePoint, rig_number, triangulate};
 use crate::stereo::volume::{Extent, Volume, bounds};
 use crate::stereo::{Error, Rig};

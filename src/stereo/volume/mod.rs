@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 use crate::imaging::Side;
 use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::view::View;
-use crate::stereo::model::parameters::Values;
+use crate::stereo::data::View;
+use crate::stereo::model::Values;
 use crate::stereo::volume::outline::Hull;
 
 /// What a verdict is asked for.

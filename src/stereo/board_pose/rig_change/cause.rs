@@ -14,7 +14,7 @@ use crate::stereo::board_pose::solve::estimate::Estimate;
 use crate::stereo::board_pose::solve::prior::{stretch_length_mm, stretch_mode};
 use crate::stereo::data::observation::Side;
 use crate::stereo::findings::hypothesis::{moved, refocused, turned};
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::Layout;
 
 /// One thing that may have changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

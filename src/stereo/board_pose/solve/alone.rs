@@ -7,10 +7,9 @@ use crate::stereo::board_pose::solve::bundle::Promise;
 use crate::stereo::board_pose::solve::estimate::{Estimate, leave_outliers_out};
 use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, PoseSums, Scene};
 use crate::stereo::board_pose::start::enough;
-use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::root_mean_square;
-use crate::stereo::data::view::View;
-use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::data::{Observation, View};
+use crate::stereo::solve::Loss;
 use crate::stereo::triangulate::{common, triangulate};
 
 /// Steps of the search; the start is within a pixel.

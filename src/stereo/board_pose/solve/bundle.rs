@@ -13,9 +13,9 @@ use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, Scene};
 use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior, weights};
 use crate::stereo::board_pose::solve::totals::Totals;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
+use crate::stereo::solve::Loss;
 use crate::stereo::solve::normal_equations::{inverse6, solve_scaled};
-use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
 
 /// Steps of one search at most; each squares what is left.

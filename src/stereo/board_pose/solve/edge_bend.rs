@@ -11,8 +11,7 @@ use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
 use crate::stereo::board_pose::solve::pose_block::OUTLIER;
 use crate::stereo::board_pose::solve::window::{Window, crossing_means};
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::observation::Observation;
+use crate::stereo::data::{Noise, Observation};
 
 /// Standard deviations by which the corners of a crossing must scatter beyond their noise.
 const TELLING: f64 = 4.0;
@@ -117,7 +116,7 @@ mod tests {
     use super::*;
     use crate::imaging::Squares;
     use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior};
-    use crate::stereo::data::view::View;
+    use crate::stereo::data::View;
     use crate::stereo::synthetic::World;
 
     fn board() -> Board {

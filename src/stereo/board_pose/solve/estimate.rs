@@ -18,11 +18,9 @@ use crate::stereo::board_pose::solve::edge_bend::edge_bends_mm;
 use crate::stereo::board_pose::solve::pose_block::OUTLIER;
 use crate::stereo::board_pose::solve::prior::{bent_modes, stretch_mode, weights};
 use crate::stereo::board_pose::start::enough;
-use crate::stereo::data::corner_noise::{Noise, whitener};
-use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::data::view::View;
-use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::data::corner_noise::whitener;
+use crate::stereo::data::{NeighbourCorrelation, Noise, Observation, View};
+use crate::stereo::solve::Loss;
 use crate::stereo::solve::uncertainty::invert;
 
 /// Rounds of least squares with new weights.

@@ -12,9 +12,8 @@ use crate::imaging::Board;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::pose_block::TRANSFORM;
 use crate::stereo::model::board_shape::{self, lift};
-use crate::stereo::model::parameters::Layout;
 use crate::stereo::model::projection::CAMERA_NUMBERS;
-use crate::stereo::model::rig::Covariance;
+use crate::stereo::model::{Covariance, Layout};
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
 /// How tightly the deviations are held free of shift, turn and tilt, as a multiple of what the corners say about them.

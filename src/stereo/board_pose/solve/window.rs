@@ -8,8 +8,7 @@
 use nalgebra::{SVector, Vector2, Vector3};
 
 use crate::imaging::Board;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::data::view::{View, in_use};
+use crate::stereo::data::{Observation, View, in_use};
 
 /// Which crossings' deviations a window sees of a coordinate, with their shares: the crossing's own first; `None` stands for a crossing
 /// at the board's rim.

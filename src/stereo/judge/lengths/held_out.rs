@@ -9,12 +9,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::data::View;
 use crate::stereo::data::residuals::{mean, root_mean_square};
-use crate::stereo::data::view::View;
 use crate::stereo::judge::doubtful_corners::{self, DoubtfulCorners};
 use crate::stereo::judge::lengths::{self, Axis, Measured, Range, all_ranges, measure};
 use crate::stereo::judge::verdict::{Expansion, Extremes};
-use crate::stereo::model::rig::Covariance;
+use crate::stereo::model::Covariance;
 use crate::stereo::select::cross_validation::{self, Without};
 use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, WORST_FOCAL_SIGMA};
 use crate::stereo::triangulate::{RigCovariance, common};

@@ -11,8 +11,8 @@ use serde::Serialize;
 
 use crate::imaging::Board;
 use crate::stereo::Rig;
+use crate::stereo::data::View;
 use crate::stereo::data::residuals::mean;
-use crate::stereo::data::view::View;
 use crate::stereo::judge::verdict::{Expansion, Extremes, LengthError};
 use crate::stereo::triangulate::{RigCovariance, SpacePoint, common, triangulate};
 

@@ -11,8 +11,8 @@ use crate::stereo::data::residuals::mean;
 use crate::stereo::judge::doubtful_corners::{self, DoubtfulCorners};
 use crate::stereo::judge::lengths::{self, Range, all_ranges, measure};
 use crate::stereo::judge::verdict::{Expansion, Extremes};
+use crate::stereo::model::Shared;
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::parameters::Shared;
 use crate::stereo::pairs::numbering;
 use crate::stereo::triangulate::RigCovariance;
 
