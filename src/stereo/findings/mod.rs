@@ -295,8 +295,7 @@ fn finding(
     };
     let turned_deg = || whole.rows(calibration.layout.transform_start(), 3).norm().to_degrees();
     let (size, unit) = shown.hypothesis.map_or_else(|| (turned_deg(), "deg"), |h| (amounts[0], h.unit));
-    let changes = lengths.changes_by_step_mm(&calibration.layout, &whole);
-    let effect_mm = changes.into_iter().fold(0.0, |most: f64, mm| most.max(mm.abs()));
+    let effect_mm = lengths.most_changed_mm(&calibration.layout, &whole);
     let name = |i: usize| calibration.views[i].pair.clone();
     let which = match best.kind {
         Kind::Step => format!("from pair {} on", name(best.first)),

@@ -67,19 +67,18 @@ impl KnownLenses {
 
     /// Both sides' together; where both know a side, the other's.
     pub fn and(self, other: KnownLenses) -> KnownLenses {
-        let takes_other = |side: Side| other.camera(side).is_some();
-        let cameras = Side::BOTH.map(|side| if takes_other(side) { other.camera(side) } else { self.camera(side) });
-        let stated = Side::BOTH.map(|side| if takes_other(side) { &other } else { &self }.stated[side as usize]);
-        let mut both = KnownLenses { stated, ..KnownLenses::of_cameras(cameras.map(|camera| camera.copied())) };
+        let from = |side: Side| if other.camera(side).is_some() { &other } else { &self };
+        let stated = Side::BOTH.map(|side| from(side).stated[side as usize]);
+        let cameras = Side::BOTH.map(|side| from(side).camera(side).copied());
+        let mut both = KnownLenses { stated, ..KnownLenses::of_cameras(cameras) };
         let numbers = both.numbers();
-        let place = |of: &KnownLenses, number: &(Side, usize)| of.numbers().iter().position(|n| n == number);
-        let from = |number: &(Side, usize)| if takes_other(number.0) { &other } else { &self };
+        let place = |number: &(Side, usize)| from(number.0).numbers().iter().position(|n| n == number);
         for (i, a) in numbers.iter().enumerate() {
             for (j, b) in numbers.iter().enumerate() {
                 // What two calibrations say is independent.
-                let same = std::ptr::eq(from(a), from(b));
-                let at = place(from(a), a).zip(place(from(a), b)).filter(|_| same);
-                both.covariance[(i, j)] = at.map_or(0.0, |at| from(a).covariance[at]);
+                let same = std::ptr::eq(from(a.0), from(b.0));
+                let at = place(a).zip(place(b)).filter(|_| same);
+                both.covariance[(i, j)] = at.map_or(0.0, |at| from(a.0).covariance[at]);
             }
         }
         both.pair_excess = self.pair_excess.max(other.pair_excess);

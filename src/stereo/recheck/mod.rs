@@ -137,10 +137,8 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let views = &solved.problem.views;
     let volume = before.volume.clone().unwrap_or_else(|| Volume::of_boards(&trial.values, views));
     let lengths = VolumeLengths::of_volume(&before.rig, &volume, length_mm);
-    let moves = |step: &DVector<f64>| {
-        let whole = step.clone().resize_vertically(layout.count(), 0.0);
-        lengths.changes_by_step_mm(&layout, &whole).into_iter().fold(0.0, |most: f64, mm| most.max(mm.abs()))
-    };
+    let moves =
+        |step: &DVector<f64>| lengths.most_changed_mm(&layout, &step.clone().resize_vertically(layout.count(), 0.0));
     let compared = Layout { shape: false, ..layout };
     let hypotheses = hypothesis::all(&compared, &before.rig);
     let looks = Looks {

@@ -166,12 +166,13 @@ impl VolumeLengths {
         self.lengths.par_iter().map(|length| length.measured_by(rig)).collect()
     }
 
-    /// By how much a step of the shared numbers changes each length, mm.
-    pub fn changes_by_step_mm(&self, layout: &Layout, step: &DVector<f64>) -> Vec<f64> {
+    /// By how much a step of the shared numbers changes a length at most, mm.
+    pub fn most_changed_mm(&self, layout: &Layout, step: &DVector<f64>) -> f64 {
         let numbers: Vec<(usize, usize)> =
             layout.names().iter().enumerate().filter_map(|(at, name)| Some((at, rig_number(name)?))).collect();
-        let change = |length: &VolumeLength| numbers.iter().map(|&(at, number)| length.slope(number) * step[at]).sum();
-        self.lengths.iter().map(change).collect()
+        let change =
+            |length: &VolumeLength| numbers.iter().map(|&(at, number)| length.slope(number) * step[at]).sum::<f64>();
+        self.lengths.iter().map(change).fold(0.0, |most, mm| most.max(mm.abs()))
     }
 }
 

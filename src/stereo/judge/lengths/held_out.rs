@@ -134,7 +134,9 @@ pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accu
         .views
         .par_iter()
         .enumerate()
-        .map(|(i, view)| folds.of(i).map_or(Measured::NOTHING, |fold| measure(&fold.rig, &calibration.board, view)))
+        .map(|(i, view)| {
+            folds.of(i).map_or_else(Measured::default, |fold| measure(&fold.rig, &calibration.board, view))
+        })
         .collect();
     let names: Vec<&str> = calibration.views.iter().map(|view| view.pair.as_str()).collect();
     let usual_px = calibration.noise.typical_px(&calibration.views);

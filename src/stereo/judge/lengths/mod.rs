@@ -52,7 +52,8 @@ pub(super) struct Length {
     pub(super) ends: (usize, usize),
 }
 
-/// What a rig makes of a pair.
+/// What a rig makes of a pair; nothing where none has measured it.
+#[derive(Default)]
 pub(super) struct Measured {
     /// The corners that both pictures show.
     pub(super) points: Vec<SpacePoint>,
@@ -62,12 +63,6 @@ pub(super) struct Measured {
     pub(super) doubtful: Vec<bool>,
     /// All lengths between them along rows and columns.
     pub(super) lengths: Vec<Length>,
-}
-
-impl Measured {
-    /// A pair that no rig has measured.
-    pub(super) const NOTHING: Measured =
-        Measured { points: Vec::new(), sigmas_px: Vec::new(), doubtful: Vec::new(), lengths: Vec::new() };
 }
 
 /// Triangulates the corners of a pair and measures all lengths along rows and columns.
