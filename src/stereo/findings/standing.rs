@@ -80,12 +80,8 @@ fn stands_since(corners: &Corners, asked: &Asked, later: Later, change: Finding)
 /// The rig without the first or the last pairs that contradict the others; `told` is the step that these are, where it was found.
 fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Result<(Calibration, Vec<Finding>), Error> {
     let mut found = calibrate(corners, &asked.options)?;
-    let contradicts = |pair: &PairCorners| {
-        let of_pair = found.discarded.pairs.iter().find(|d| d.pair == pair.pair);
-        of_pair.is_some_and(|d| d.cause.may_be_the_rig())
-    };
     let names = |pairs: &mut dyn Iterator<Item = &PairCorners>| -> Vec<String> {
-        pairs.take_while(|pair| contradicts(pair)).map(|pair| pair.pair.clone()).collect()
+        pairs.take_while(|pair| is_of_another_rig(&found, pair)).map(|pair| pair.pair.clone()).collect()
     };
     let first = names(&mut corners.pairs.iter());
     let mut last = names(&mut corners.pairs.iter().rev());
@@ -260,11 +256,14 @@ fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked, corners: 
 fn trailing(found: &mut Calibration, corners: &Corners) {
     let used = |pair: &PairCorners| found.views.iter().any(|view| view.pair == pair.pair);
     let Some(last) = corners.pairs.iter().rposition(used) else { return };
-    let contradicts =
-        |pair: &&PairCorners| found.discarded.pairs.iter().any(|d| d.pair == pair.pair && d.cause.may_be_the_rig());
-    let after: Vec<String> =
-        corners.pairs[last + 1..].iter().filter(contradicts).map(|pair| pair.pair.clone()).collect();
+    let after = corners.pairs[last + 1..].iter().filter(|pair| is_of_another_rig(found, pair));
+    let after: Vec<String> = after.map(|pair| pair.pair.clone()).collect();
     found.standing.unconfirmed.extend(after);
+}
+
+/// Whether a pair is left out because it contradicts the others, by what may be the rig.
+fn is_of_another_rig(found: &Calibration, pair: &PairCorners) -> bool {
+    found.discarded.pairs.iter().any(|d| d.pair == pair.pair && d.cause.may_be_the_rig())
 }
 
 /// The pairs of the rig that stood before a step.

@@ -1,7 +1,7 @@
-//! Starting values: each camera alone, then where they stand to each other.
+//! Starting values: each camera alone.
 //!
-//! In: views. Out: two cameras, `right_from_left`, a pose a pair, and each picture's own residual. Method: Zhang's focal length from
-//! the homographies, a bundle of one camera with a robust loss, the relative pose that most pairs agree with.
+//! In: the views of one side. Out: its camera, a pose a picture, and each picture's own residual. Method: Zhang's focal length from
+//! the homographies, a bundle of one camera with a robust loss.
 //! Goes wrong: no picture tells the focal length (fronto-parallel boards only); then a few usual focal lengths are tried and
 //! the best fit is kept, and the covariance at the end says what it is worth.
 
