@@ -95,7 +95,7 @@ fn headers(pairs: &[PairFiles], rig: &Rig) -> Result<Vec<[std::result::Result<He
     for of_pair in &headers {
         for (side, header) in Side::BOTH.into_iter().zip(of_pair) {
             if let Ok(header) = header {
-                rig.check_picture_size(side, (header.width, header.height))?;
+                rig.camera(side).check_picture_size(side, (header.width, header.height))?;
             }
         }
     }

@@ -154,8 +154,8 @@ impl MeasureFile {
         let (board, rig) = (&known.board, &known.rig);
         let targets: Vec<&TargetPose> = series.poses.iter().filter_map(|m| m.target.as_ref().ok()).collect();
         let rms = |of: fn(&TargetPose) -> Option<f64>| {
-            let squares: Vec<f64> = targets.iter().filter_map(|t| of(t)).map(|value| value * value).collect();
-            crate::stereo::data::residuals::root_mean_square(&squares)
+            let squares = targets.iter().filter_map(|t| of(t)).map(|value| value * value);
+            crate::stereo::data::residuals::root_mean_square(squares)
         };
         let sigma = |axis: usize| median(targets.iter().map(|t| t.covariance[(3 + axis, 3 + axis)].sqrt()));
         let missing = |m: &MeasuredPose| {

@@ -6,13 +6,10 @@
 use nalgebra::DVector;
 
 use crate::imaging::{Board, Corners, Side, Skipped};
-use crate::stereo::board_pose::print_share::PrintShare;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
-use crate::stereo::data::view::View;
+use crate::stereo::board_pose::print_share::print_share;
+use crate::stereo::data::{NeighbourCorrelation, Noise, View};
 use crate::stereo::init::board_pose;
-use crate::stereo::model::parameters::{Layout, Values};
-use crate::stereo::model::rig::Covariance;
+use crate::stereo::model::{Covariance, Layout, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::series::{self, Series};
 use crate::stereo::pairs::{Discarded, DiscardedPair, Standing};
@@ -22,9 +19,7 @@ use crate::stereo::select::model_comparison::LensScore;
 use crate::stereo::select::options::{Choice, Options};
 use crate::stereo::select::pair_scatter::PairScatter;
 use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::Problem;
-use crate::stereo::solve::uncertainty::Uncertainty;
+use crate::stereo::solve::{Priors, Problem, Uncertainty};
 use crate::stereo::{Error, Rig};
 
 /// A calibrated rig with all that it was made from.
@@ -82,6 +77,11 @@ impl Calibration {
         self.known_sides.iter().all(|known| *known)
     }
 
+    /// Names of the pairs that were used.
+    pub fn pair_names(&self) -> Vec<String> {
+        self.views.iter().map(|view| view.pair.clone()).collect()
+    }
+
     /// The rig with its covariance.
     pub fn rig(&self) -> &Rig {
         &self.values.shared.rig
@@ -104,9 +104,7 @@ impl Calibration {
     pub fn move_rig(&mut self, step: &DVector<f64>) {
         self.values.shared = self.layout.step(&self.values.shared, step.as_slice());
         for (pose, view) in self.values.poses.iter_mut().zip(&self.views) {
-            if let Some(fit) = board_pose::follow(&self.values.shared, view, *pose) {
-                *pose = fit.left_from_board;
-            }
+            *pose = board_pose::follow(&self.values.shared, view, *pose).unwrap_or(*pose);
         }
     }
 
@@ -154,10 +152,10 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
         .solve(&layout)
         .map_err(|e| e.without(&skipped).of_lens(options.lens))?;
     let neighbours = solved.neighbours(&corners.board);
-    let inflation = neighbours.inflation() * solved.loss_factor;
+    let inflation = solved.inflation(&corners.board);
     let by_noise = solved.uncertainty(&layout).map_err(|e| e.of_lens(options.lens))?.scaled(inflation);
     let without_scatter = by_noise.shared.clone();
-    let print = PrintShare::of(&solved, &corners.board, &layout);
+    let print = print_share(&solved, &corners.board, &layout);
     let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
     let Stated { mut uncertainty, pair_scatter, witnesses } =
         stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, scatter, print_excess);

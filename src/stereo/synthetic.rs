@@ -1,17 +1,18 @@
 //! A rig, boards and corners whose truth is known, for the tests of this stage, and what is asked of a calibration there.
 
-use nalgebra::{Matrix2, Point2, Vector2, Vector3};
+use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 
 use crate::geometry::{Transform, transform};
 use crate::imaging::{Board, Corner, Corners, PairCorners, Squares};
 use crate::simulate::draws::{Draws, Purpose};
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::data::{Observation, View};
 use crate::stereo::findings::Finding;
 use crate::stereo::judge::assessment::{Demand, Judged};
-use crate::stereo::judge::ledger::LensPairs;
-use crate::stereo::judge::ledger::Standards;
+use crate::stereo::judge::ledger::{LensPairs, Standards};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::select::options::Options;
+use crate::stereo::triangulate::{common, triangulate};
 use crate::stereo::volume::Extent;
 use crate::stereo::{Camera, Lens, Rig};
 
@@ -124,15 +125,20 @@ impl World {
         self
     }
 
+    /// The same with the right camera turned (a rotation vector, rad) and shifted in its own frame.
+    pub fn with_camera_moved(&self, turn: Vector3<f64>, shift_mm: Vector3<f64>) -> World {
+        let mut moved = self.clone();
+        moved.rig.right_from_left = transform(turn, shift_mm) * self.rig.right_from_left;
+        moved
+    }
+
     /// The same where the right camera turns by so much at random between pairs, as a board in a hand before cameras that nobody triggers looks.
     pub fn corners_by_hand(&self, seed: u64, turn_deg: f64) -> Corners {
         let mut all = self.corners(seed);
         let mut draws = Draws::new(seed, Purpose::Points, 17);
         for i in 0..all.pairs.len() {
             let turn = Vector3::from_fn(|_, _| draws.normal()) * turn_deg.to_radians();
-            let mut turned = self.clone();
-            turned.rig.right_from_left = transform(turn, Vector3::zeros()) * self.rig.right_from_left;
-            all.pairs[i] = turned.corners(seed).pairs[i].clone();
+            all.pairs[i] = self.with_camera_moved(turn, Vector3::zeros()).corners(seed).pairs[i].clone();
         }
         all
     }
@@ -179,7 +185,20 @@ impl World {
         }
     }
 
-    fn corner_mm(&self, col: usize, row: usize) -> nalgebra::Point3<f64> {
+    /// For every pair, where its corners are on a flat board, mm, and where a rig measures them in exact pixels.
+    pub fn measured_exactly(&self, rig: &Rig) -> Vec<Vec<[Point3<f64>; 2]>> {
+        let exact = World { sigma_px: 0.0, bow_mm: [0.0; 2], twist_mm: 0.0, ..self.clone() };
+        let of_pair = |(pair, pose): (&PairCorners, &Transform)| {
+            let view = View::new(&self.board, pair, 0);
+            let of = |(left, right): (&Observation, &Observation)| {
+                [pose * left.board_mm, triangulate(rig, left, right).unwrap().point_mm]
+            };
+            common(&view).into_iter().map(of).collect()
+        };
+        exact.corners(1).pairs.iter().zip(&self.poses).map(of_pair).collect()
+    }
+
+    fn corner_mm(&self, col: usize, row: usize) -> Point3<f64> {
         let mut at = self.board.corner_mm(col, row);
         let edge = self.board.corner_mm(self.board.columns() - 1, self.board.rows() - 1);
         let (c, r) = (col as f64, row as f64);

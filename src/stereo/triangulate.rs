@@ -9,10 +9,10 @@ use nalgebra::{Matrix3, Matrix4x3, Point2, Point3, Vector2, Vector3, Vector4};
 use crate::geometry::rotation_matrix;
 use crate::imaging::Side;
 use crate::stereo::Rig;
-use crate::stereo::data::observation::Observation;
+use crate::stereo::data::Observation;
+use crate::stereo::model::Covariance;
 use crate::stereo::model::parameters::{CAMERA_NAMES, TRANSFORM_NAMES};
 use crate::stereo::model::projection::CAMERA_NUMBERS;
-use crate::stereo::model::rig::Covariance;
 
 /// Numbers of a rig: both cameras, then `right_from_left`.
 pub const RIG_NUMBERS: usize = 2 * CAMERA_NUMBERS + 6;
@@ -54,17 +54,6 @@ pub fn rig_number(name: &str) -> Option<usize> {
         "right" => camera(CAMERA_NUMBERS),
         "right_from_left" => TRANSFORM_NAMES.iter().position(|n| *n == number).map(|i| 2 * CAMERA_NUMBERS + i),
         _ => None,
-    }
-}
-
-/// The name of a number of the rig in `calibration.json`.
-pub fn rig_number_name(number: usize) -> String {
-    match number.checked_sub(2 * CAMERA_NUMBERS) {
-        Some(i) => format!("right_from_left.{}", TRANSFORM_NAMES[i]),
-        None => {
-            let side = if number < CAMERA_NUMBERS { Side::Left } else { Side::Right };
-            format!("{}.{}", side.name(), CAMERA_NAMES[number % CAMERA_NUMBERS])
-        }
     }
 }
 
@@ -190,7 +179,7 @@ pub fn common(view: &crate::stereo::data::view::View) -> Vec<(&Observation, &Obs
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stereo::data::view::View;
+    use crate::stereo::data::View;
     use crate::stereo::synthetic::World;
 
     fn seen(sigma_px: f64, seed: u64) -> (World, View) {

@@ -79,7 +79,7 @@ pub struct Shared {
 }
 
 /// Everything about a run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Series {
     /// A row a pose, in the order of the run.
     pub poses: Vec<MeasuredPose>,

@@ -18,7 +18,7 @@ use crate::stereo::board_pose::solve::estimate::Estimate;
 use crate::stereo::board_pose::solve::prior::frame_modes;
 use crate::stereo::board_pose::solve::window::Window;
 use crate::stereo::board_pose::start::{FEWEST_CORNERS, Start, enough};
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 
 /// Standard deviations by which a pose's own chi-square may exceed one before its covariance grows.
 const POSE_SIGMAS: f64 = 3.0;
@@ -37,16 +37,10 @@ impl Run<'_> {
         let names = named(found);
         let shared_covariance = with_rim(found);
         let covariance = &names * &shared_covariance * names.transpose();
-        let alone: Vec<Option<Alone>> = {
-            self.starts
-                .par_iter()
-                .enumerate()
-                .map(|(i, start)| {
-                    let begin = found.values.poses[i].as_ref().or(start.pose.as_ref())?;
-                    known.fit(&found.bundle.views[i], begin)
-                })
-                .collect()
+        let alone_at = |(i, start): (usize, &Start)| {
+            known.fit(&found.bundle.views[i], found.values.poses[i].as_ref().or(start.pose.as_ref())?)
         };
+        let alone: Vec<Option<Alone>> = self.starts.par_iter().enumerate().map(alone_at).collect();
         let ended = match &judgement {
             Judgement::Contradicts(_) | Judgement::Loose { .. } | Judgement::Unexplained { .. } => {
                 judgement.describe(&self.known.rig, &self.known.board)
@@ -63,12 +57,9 @@ impl Run<'_> {
                 (None, None) => finisher.pose(i, each[i].as_ref()),
             })
             .collect();
-        let sums: (f64, f64) = alone
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| self.taking_part[*i])
-            .filter_map(|(_, a)| a.as_ref())
-            .fold((0.0, 0.0), |s, a| (s.0 + a.chi_square * a.freedom, s.1 + a.freedom));
+        let taking_part = alone.iter().zip(&self.taking_part).filter_map(|(a, part)| a.as_ref().filter(|_| *part));
+        let (sum, freedom) =
+            taking_part.fold((0.0, 0.0), |s: (f64, f64), a| (s.0 + a.chi_square * a.freedom, s.1 + a.freedom));
         let noise_px = found.noise.typical_px(&found.bundle.views);
         let usual_px = self.known.noise.map(|noise| noise.typical_px(&found.bundle.views));
         let against = usual_px.map_or(1.0, |usual| (noise_px / usual).powi(2));
@@ -81,7 +72,7 @@ impl Run<'_> {
             noise_px: Some(noise_px),
             usual_px,
             prior_chi_square: Some(prior_chi_square(found)),
-            chi_square: Some(sums.0 / sums.1.max(1.0) * against),
+            chi_square: Some(sum / freedom.max(1.0) * against),
             excess: found.excess,
             usual_excess: self.known.usual().excess_here(&found.noise, &found.bundle.views).max(1.0),
             notes: self.notes,
@@ -105,10 +96,8 @@ impl Finisher<'_> {
         let Some(alone) = &self.alone[i] else {
             return Err(self.no_pose(i, start));
         };
-        let change = match change {
-            Some(change) => Some(*change),
-            None => consistency::of_outsider(&alone.part, &self.found.covariance),
-        };
+        let outside = || consistency::of_outsider(&alone.part, &self.found.covariance);
+        let change = change.copied().or_else(outside);
         let own = alone.chi_square.clamp(1.0, OUTSIDER_LIMIT);
         if let Some(change) = change.filter(|c| c.fall > self.run.known.pose_limit() * own) {
             return Err(self.two_moments(i, alone, &change));
@@ -180,14 +169,13 @@ impl Finisher<'_> {
             let reason = format!("too few corners: {left} left, {right} right, at least {} each", FEWEST_CORNERS);
             return Refusal { status: "too few corners", reason };
         }
-        if let Some(partner) = self.partner(i) {
-            return partner;
-        }
-        let reason =
-            "left and right do not show the same target at the same place: most corners miss the rig's prediction; \
-                      taken at two moments, or a picture of another pose"
-                .to_owned();
-        Refusal { status: "two moments", reason }
+        self.partner(i).unwrap_or_else(|| Refusal {
+            status: "two moments",
+            reason:
+                "left and right do not show the same target at the same place: most corners miss the rig's prediction; \
+                     taken at two moments, or a picture of another pose"
+                    .to_owned(),
+        })
     }
 
     fn two_moments(&self, i: usize, alone: &Alone, change: &Change) -> Refusal {
@@ -219,10 +207,10 @@ impl Finisher<'_> {
             let pose = self.run.starts[j].pose?;
             let mine = self.run.starts[i].pose.unwrap_or(pose);
             for pose in [pose, mine] {
-                if fits(self.known.mixed(view, other), &pose) {
+                if fits(view.paired(Side::Left, other), &pose) {
                     return Some(self.mixed_up("left", "right", j));
                 }
-                if fits(self.known.mixed(other, view), &pose) {
+                if fits(other.paired(Side::Left, view), &pose) {
                     return Some(self.mixed_up("right", "left", j));
                 }
             }

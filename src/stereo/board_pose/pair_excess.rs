@@ -4,15 +4,11 @@
 //! [`crate::stereo::board_pose::series`] finds of a run is compared with it. Pictures that were triggered have one, those of a board that is held by
 //! hand more. Method: Rao's score of a change of `right_from_left` at each pair, as for the poses of a run.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::DMatrix;
 
-use crate::stereo::board_pose::print_share::rig_basis;
+use crate::stereo::board_pose::print_share::{rig_basis, totals_of_pairs};
 use crate::stereo::board_pose::rig_change::consistency::{Change, of_member, of_usual};
-use crate::stereo::board_pose::solve::pose_block::{PoseBlock, SeenFrom, crossings};
-use crate::stereo::board_pose::solve::totals::Totals;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::model::board_shape::lift;
-use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
 
 /// Two standard deviations of the excess of one pair that chance alone makes, as the median of many has it.
@@ -37,25 +33,15 @@ fn beyond_chance(each: &[Option<Change>]) -> f64 {
 /// What a change at each pair alone would gain. The rig was fitted to the same pairs, of which few determine it no better than their own
 /// change, so that it is free beside the change; the board's shape is held.
 fn changes(calibration: &Calibration) -> Option<Vec<Option<Change>>> {
-    let (board, shared, layout) = (&calibration.board, &calibration.values.shared, &calibration.layout);
-    let height = |l: &[f64]| Vector3::new(0.0, 0.0, l.iter().zip(&shared.shape_mm).map(|(l, s)| l * s).sum());
-    let heights: Vec<Vector3<f64>> = board.corners_mm().map(|at| height(&lift(board, &at))).collect();
-    let places = crossings(board, &heights);
+    let Calibration { board, layout, views, values, priors, .. } = calibration;
     let basis = rig_basis(layout);
     let n = basis.ncols();
-    let pairs: Vec<_> = calibration.views.iter().zip(&calibration.values.poses).collect();
     let mut parts = Vec::new();
-    let totals = Totals::of(
-        &pairs,
-        (&basis, places.len()),
-        |&(view, pose)| {
-            PoseBlock::of(&SeenFrom { rig: &shared.rig, crossings: &places, board, pose, view }, Loss::Squared)
-        },
-        |_, _, part| parts.push(part),
-    )?;
-    let known = calibration.priors.information(layout, shared).matrix;
+    let totals = totals_of_pairs(views, values, board, &basis, |_, part| parts.push(part))?;
+    let known = priors.information(layout, &values.shared).matrix;
     let rig = invert(&(totals.matrix.view((0, 0), (n, n)) + known.view((0, 0), (n, n))))?;
-    let mut covariance = DMatrix::zeros(n + 3 * places.len(), n + 3 * places.len());
+    let size = totals.matrix.nrows();
+    let mut covariance = DMatrix::zeros(size, size);
     covariance.view_mut((0, 0), (n, n)).copy_from(&rig);
     Some(parts.iter().map(|part| of_member(part, &covariance)).collect())
 }

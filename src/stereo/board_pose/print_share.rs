@@ -7,26 +7,23 @@
 //! through the normal equations to the shared numbers. Windows see a part of each crossing's deviation and of its neighbours' (`window`):
 //! what is smooth over the board reaches the lens and the rig whole, though crossings are seen to scatter less than they do.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix2, Point3, Vector2, Vector3};
 
+use crate::geometry::Transform;
 use crate::imaging::Board;
-use crate::stereo::board_pose::solve::pose_block::{PoseBlock, SeenFrom, crossings};
+use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, Scene};
 use crate::stereo::board_pose::solve::totals::Totals;
 use crate::stereo::board_pose::solve::window::{SeenShares, Window};
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::view::View;
-use crate::stereo::model::board_shape::{NUMBERS, lift};
-use crate::stereo::model::parameters::Layout;
-use crate::stereo::solve::problem::{Problem, Solved};
-use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::data::{Noise, View, in_use};
+use crate::stereo::model::board_shape::{height_mm, lift};
+use crate::stereo::model::{Layout, Values};
 use crate::stereo::solve::uncertainty::invert;
+use crate::stereo::solve::{Loss, Problem, Solved};
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
 /// The print of a calibration board, and what it does.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrintShare {
-    /// Standard deviation of a crossing along x and along y, mm.
-    pub crossing_mm: f64,
     /// The corners' own noise, without the print.
     pub own_noise: Noise,
     /// Covariance of the shared numbers, in the layout's order: the corners' own noise and the print.
@@ -35,139 +32,110 @@ pub struct PrintShare {
     pub excess: f64,
 }
 
-impl PrintShare {
-    /// Finds the print. `None` where the views do not determine the shared numbers.
-    pub fn of(solved: &Solved, board: &Board, layout: &Layout) -> Option<PrintShare> {
-        print_share(solved, board, layout, solved.neighbours(board).inflation() * solved.loss_factor)
-    }
-}
-
 /// Which of the rig's numbers each shared number that comes first in the layout is.
 pub(super) fn rig_basis(layout: &Layout) -> DMatrix<f64> {
     let numbers: Vec<usize> = layout.names().iter().filter_map(|name| rig_number(name)).collect();
     DMatrix::from_fn(RIG_NUMBERS, numbers.len(), |number, column| f64::from(numbers[column] == number))
 }
 
-fn print_share(solved: &Solved, board: &Board, layout: &Layout, inflation: f64) -> Option<PrintShare> {
+/// Sums over the pairs of a calibration, whose crossings are where its board's shape puts them; `each` gets every pair's parts. `basis`: see
+/// [`rig_basis`].
+pub(super) fn totals_of_pairs(
+    views: &[View],
+    values: &Values,
+    board: &Board,
+    basis: &DMatrix<f64>,
+    mut each: impl FnMut(PoseBlock, Eliminated),
+) -> Option<Totals> {
+    let shape = &values.shared.shape_mm;
+    let height = |at: Point3<f64>| Vector3::new(0.0, 0.0, height_mm(&lift(board, &at), shape));
+    let scene = Scene::new(values.shared.rig.clone(), board, &board.corners_mm().map(height).collect::<Vec<_>>());
+    let pairs: Vec<_> = views.iter().zip(&values.poses).collect();
+    let block = |&(view, pose): &(&View, &Transform)| PoseBlock::of(&scene, pose, view, Loss::Squared);
+    Totals::of(&pairs, (basis, scene.crossings.len()), block, |_, block, part| each(block, part))
+}
+
+/// Finds the print. `None` where the views do not determine the shared numbers.
+pub fn print_share(solved: &Solved, board: &Board, layout: &Layout) -> Option<PrintShare> {
     let Problem { views, values, priors } = &solved.problem;
-    let noise = &solved.noise;
-    let m = board.corner_count();
-    let lifts: Vec<[f64; NUMBERS]> = board.corners_mm().map(|at| lift(board, &at)).collect();
-    let shape = values.shared.shape_mm;
-    let heights = lifts.iter().map(|l| Vector3::new(0.0, 0.0, l.iter().zip(&shape).map(|(l, s)| l * s).sum()));
-    let places = crossings(board, &heights.collect::<Vec<_>>());
+    let (noise, inflation) = (&solved.noise, solved.inflation(board));
     let names = layout.names();
     let basis = rig_basis(layout);
     let rig_count = basis.ncols();
-    let size = rig_count + 3 * m;
-    let seen = Seen::of(board, views);
-    let pairs: Vec<_> = views.iter().zip(&values.poses).collect();
+    let seen: Vec<[SeenShares; 2]> =
+        Window::means(board, views).iter().map(|window| [0, 1].map(|axis| window.shares(axis))).collect();
+    // What the corners say of their crossings' places in the plane, summed; and how many numbers they are.
     let mut told = 0.0;
-    let Totals { matrix, gradient, .. } = Totals::of(
-        &pairs,
-        (&basis, m),
-        |&(view, pose)| {
-            PoseBlock::of(&SeenFrom { rig: &values.shared.rig, crossings: &places, board, pose, view }, Loss::Squared)
-        },
-        |_, block, _| told += block.told_in_plane(),
-    )?;
-    let numbers = 2.0 * views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count() as f64;
-    let sums = Sums { matrix, gradient, told: told * seen.usual_variance(), numbers };
-    let variance = sums.print_variance(rig_count, &seen);
+    let totals = totals_of_pairs(views, values, board, &basis, |block, _| told += block.told_in_plane())?;
+    told *= usual_variance(&seen);
+    let numbers = 2.0 * in_use(views).count() as f64;
+    let variance = print_variance(&totals, &seen, rig_count, told / numbers.max(1.0));
     // The difference of two large numbers where the print is most of it; but pixels scatter corners as much as the refinement says.
     let stated = noise.stated_share(views);
-    let own_share = (1.0 - variance * sums.told / sums.numbers).max(stated);
+    let own_share = (1.0 - variance * told / numbers).max(stated);
     // The board's paraboloids are heights of its crossings.
-    let mut to_shared = DMatrix::zeros(size, names.len());
+    let mut to_shared = DMatrix::zeros(totals.gradient.len(), names.len());
     for i in 0..rig_count {
         to_shared[(i, i)] = 1.0;
     }
-    for (k, lift) in lifts.iter().enumerate() {
-        for (column, by) in (rig_count..names.len()).zip(lift) {
-            to_shared[(rig_count + 3 * k + 2, column)] = *by;
+    for (k, at) in board.corners_mm().enumerate() {
+        for (column, by) in (rig_count..names.len()).zip(lift(board, &at)) {
+            to_shared[(rig_count + 3 * k + 2, column)] = by;
         }
     }
-    let by_all = to_shared.tr_mul(&sums.matrix);
+    let by_all = to_shared.tr_mul(&totals.matrix);
     let inverse = invert(&(&by_all * &to_shared + priors.information(layout, &values.shared).matrix))?;
     let by_print = &inverse * &by_all;
     let mut covariance = &inverse * (own_share * inflation);
     let add = |column: DVector<f64>| covariance.ger(variance, &column, &column, 1.0);
-    seen.columns(&by_print, rig_count).into_iter().for_each(add);
+    by_deviations(&by_print, &seen, rig_count).into_iter().for_each(add);
     let excess = (&by_all * to_shared).component_mul(&covariance).sum() / (inflation * names.len() as f64);
     let own_noise = noise.of_share(own_share, stated);
-    Some(PrintShare { crossing_mm: variance.sqrt(), own_noise, covariance, excess: excess.max(1.0) })
+    Some(PrintShare { own_noise, covariance, excess: excess.max(1.0) })
 }
 
-struct Sums {
-    /// Rig and crossings with all poses eliminated.
-    matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
-    /// What the corners say of their crossings' places in the plane, summed; and how many numbers they are.
-    told: f64,
-    numbers: f64,
+/// Mean variance of what windows see of a crossing's coordinate, for a unit variance of the deviations.
+fn usual_variance(seen: &[[SeenShares; 2]]) -> f64 {
+    let of = |shares: &SeenShares| shares.iter().map(|(_, share)| share * share).sum::<f64>();
+    seen.iter().flatten().map(of).sum::<f64>() / (2 * seen.len()) as f64
 }
 
-/// What the windows see of the crossings' deviations: each coordinate of a crossing as shares of deviations.
-struct Seen {
-    /// For each crossing, for x and y.
-    shares: Vec<[SeenShares; 2]>,
-}
-
-impl Seen {
-    /// On the average over the views.
-    fn of(board: &Board, views: &[View]) -> Seen {
-        Seen {
-            shares: Window::means(board, views).iter().map(|window| [0, 1].map(|axis| window.shares(axis))).collect(),
-        }
-    }
-
-    /// Mean variance of what is seen of a crossing's coordinate, for a unit variance of the deviations.
-    fn usual_variance(&self) -> f64 {
-        let all = self.shares.iter().flatten();
-        all.map(|seen| seen.iter().map(|(_, share)| share * share).sum::<f64>()).sum::<f64>()
-            / (2 * self.shares.len()) as f64
-    }
-
-    /// A matrix with a column for each coordinate of each crossing, from `first` on and three a crossing, as columns for each independent
-    /// deviation in the plane: those of the crossings, then those at the rim.
-    fn columns(&self, matrix: &DMatrix<f64>, first: usize) -> Vec<DVector<f64>> {
-        let m = self.shares.len();
-        let mut columns = vec![DVector::zeros(matrix.nrows()); 2 * m];
-        for (k, of_crossing) in self.shares.iter().enumerate() {
-            for (axis, seen) in of_crossing.iter().enumerate() {
-                let column = matrix.column(first + 3 * k + axis);
-                for (from, share) in seen.iter().filter(|(_, share)| *share != 0.0) {
-                    match from {
-                        Some(j) => columns[2 * j + axis].axpy(*share, &column, 1.0),
-                        None => columns.push(column * *share),
-                    }
+/// A matrix with a column for each coordinate of each crossing, from `first` on and three a crossing, as columns for each independent
+/// deviation in the plane: those of the crossings, then those at the rim. `seen` is what windows see of them, for each crossing, in x and y.
+fn by_deviations(matrix: &DMatrix<f64>, seen: &[[SeenShares; 2]], first: usize) -> Vec<DVector<f64>> {
+    let mut columns = vec![DVector::zeros(matrix.nrows()); 2 * seen.len()];
+    for (k, of_crossing) in seen.iter().enumerate() {
+        for (axis, shares) in of_crossing.iter().enumerate() {
+            let column = matrix.column(first + 3 * k + axis);
+            for (from, share) in shares.iter().filter(|(_, share)| *share != 0.0) {
+                match from {
+                    Some(j) => columns[2 * j + axis].axpy(*share, &column, 1.0),
+                    None => columns.push(column * *share),
                 }
             }
         }
-        columns
     }
+    columns
 }
 
-impl Sums {
-    /// Variance of a crossing's coordinate, mm^2. The expected sum of squared scores is a straight line in it.
-    fn print_variance(&self, rig_count: usize, seen: &Seen) -> f64 {
-        let (mut scores, mut slope, mut count) = (0.0, 0.0, 0.0);
-        let columns = seen.columns(&self.matrix, rig_count);
-        for k in 0..seen.shares.len() {
-            let at = rig_count + 3 * k;
-            let own = Matrix2::from_fn(|i, j| self.matrix[(at + i, at + j)]);
-            let Some(inverse) = own.try_inverse().filter(|i| i.iter().all(|v| v.is_finite())) else { continue };
-            let gradient = Vector2::new(self.gradient[at], self.gradient[at + 1]);
-            scores += gradient.dot(&(inverse * gradient));
-            let through = columns.iter().fold(Matrix2::zeros(), |sum: Matrix2<f64>, column| {
-                let here = Vector2::new(column[at], column[at + 1]);
-                sum + here * here.transpose()
-            });
-            slope += (inverse * through).trace();
-            count += 2.0;
-        }
-        let chance = self.told / self.numbers.max(1.0);
-        let variance = (scores - count) / (slope - count * chance);
-        if variance.is_finite() { variance.clamp(0.0, 0.999 / chance) } else { 0.0 }
+/// Variance of a crossing's coordinate, mm^2. The expected sum of squared scores is a straight line in it; `chance` is what the corners say of
+/// what is seen of their crossings, a number, the mean.
+fn print_variance(totals: &Totals, seen: &[[SeenShares; 2]], rig_count: usize, chance: f64) -> f64 {
+    let (mut scores, mut slope, mut count) = (0.0, 0.0, 0.0);
+    let columns = by_deviations(&totals.matrix, seen, rig_count);
+    for k in 0..seen.len() {
+        let at = rig_count + 3 * k;
+        let own = Matrix2::from_fn(|i, j| totals.matrix[(at + i, at + j)]);
+        let Some(inverse) = own.try_inverse().filter(|i| i.iter().all(|v| v.is_finite())) else { continue };
+        let gradient = Vector2::new(totals.gradient[at], totals.gradient[at + 1]);
+        scores += gradient.dot(&(inverse * gradient));
+        let through = columns.iter().fold(Matrix2::zeros(), |sum: Matrix2<f64>, column| {
+            let here = Vector2::new(column[at], column[at + 1]);
+            sum + here * here.transpose()
+        });
+        slope += (inverse * through).trace();
+        count += 2.0;
     }
+    let variance = (scores - count) / (slope - count * chance);
+    if variance.is_finite() { variance.clamp(0.0, 0.999 / chance) } else { 0.0 }
 }

@@ -12,17 +12,16 @@ use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
 use crate::stereo::board_pose::rig_change::consistency::{self, Along};
 use crate::stereo::board_pose::rig_change::flip::Flip;
 use crate::stereo::board_pose::rig_change::judge::{Changed, scaled};
+use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::solve::alone::Known;
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
 use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::view::View;
-use crate::stereo::volume::Volume;
-
-use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior};
 use crate::stereo::board_pose::start::{Start, baseline_ratio, starts};
 use crate::stereo::board_pose::turns;
+use crate::stereo::data::{Noise, View};
+use crate::stereo::pairs::candidates;
+use crate::stereo::volume::Volume;
 
 /// Poses that stray this far beyond the limit in relation to the worst are left out together with it.
 const TOGETHER: f64 = 0.2;
@@ -163,16 +162,15 @@ impl<'a> Run<'a> {
             return None;
         }
         let better = |px: f64| px < 0.3 * misfit_px;
-        let misfit = |pairs: Vec<PairCorners>| {
+        let misfit = |change: &dyn Fn(&PairCorners) -> PairCorners| {
+            let pairs: Vec<PairCorners> = self.pairs.iter().map(change).collect();
             let others = starts(&self.known.rig, &self.known.board, &pairs);
             median(others.iter().map(|s| s.misfit_px)).unwrap_or(f64::INFINITY)
         };
         let exchange =
             |p: &PairCorners| PairCorners { pair: p.pair.clone(), left: p.right.clone(), right: p.left.clone() };
-        let exchanged = (misfit(self.pairs.iter().map(exchange).collect()), Judgement::Exchanged);
-        let flipped = Flip::ALL.map(|flip| {
-            (misfit(self.pairs.iter().map(|pair| self.flipped(pair, flip)).collect()), Judgement::Mirrored(flip))
-        });
+        let exchanged = (misfit(&exchange), Judgement::Exchanged);
+        let flipped = Flip::ALL.map(|flip| (misfit(&|pair| self.flipped(pair, flip)), Judgement::Mirrored(flip)));
         // A rig that is nearly its own mirror image fits both ways.
         let others = std::iter::once(exchanged).chain(flipped).filter(|(px, _)| better(*px));
         if let Some((_, judgement)) = others.min_by(|a, b| a.0.total_cmp(&b.0)) {
@@ -196,20 +194,12 @@ impl<'a> Run<'a> {
             return None;
         }
         let [amount, sigma] = stretch(&found);
-        let moves: Vec<f64> = present
-            .iter()
-            .filter_map(|&i| {
-                Some((found.values.poses[i]?.translation.vector - self.starts[i].pose?.translation.vector).norm())
-            })
-            .collect();
+        let moves = present.iter().filter_map(|&i| {
+            Some((found.values.poses[i]?.translation.vector - self.starts[i].pose?.translation.vector).norm())
+        });
         let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY };
         let moves_mm = median(moves).unwrap_or(0.0);
-        Some(Judgement::Contradicts(Changed {
-            explanations: vec![explanation],
-            moves_mm,
-            beyond: f64::INFINITY,
-            fall: f64::INFINITY,
-        }))
+        Some(Judgement::Contradicts(Changed { explanations: vec![explanation], moves_mm, beyond: f64::INFINITY }))
     }
 
     /// A pair as it would have been found in pictures that are the other way round, each with the camera that it has.
@@ -265,22 +255,16 @@ impl<'a> Run<'a> {
         });
         Series {
             poses: poses.collect(),
-            shape: None,
-            shared: None,
             judgement,
-            noise_px: None,
-            usual_px: None,
-            prior_chi_square: None,
-            chi_square: None,
             excess: 1.0,
             usual_excess: 1.0,
             notes: self.notes,
+            ..Series::default()
         }
     }
 }
 
 fn same_pictures(a: &PairCorners, b: &PairCorners) -> bool {
-    let same =
-        |a: &[Corner], b: &[Corner]| !a.is_empty() && a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.px == b.px);
-    same(&a.left, &b.left) || same(&a.right, &b.right)
+    let seen_twice = |a: &[Corner], b: &[Corner]| !a.is_empty() && candidates::same(a, b);
+    seen_twice(&a.left, &b.left) || seen_twice(&a.right, &b.right)
 }

@@ -11,15 +11,12 @@ use crate::geometry::Transform;
 use crate::imaging::{Board, PairCorners, Side};
 use crate::statistics::median;
 use crate::stereo::Rig;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::of_view;
-use crate::stereo::data::view::View;
-use crate::stereo::init::board_pose::{self, PoseFit};
+use crate::stereo::data::{Noise, Observation, View};
+use crate::stereo::init::board_pose;
+use crate::stereo::model::Shared;
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::parameters::Shared;
 use crate::stereo::pairs::numbering;
-use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
 
 /// Fewest corners in each picture for six unknowns with something to spare.
 pub const FEWEST_CORNERS: usize = 6;
@@ -38,16 +35,12 @@ pub(super) struct Start {
 /// A start for every pair, in the same order.
 pub(super) fn starts(rig: &Rig, board: &Board, pairs: &[PairCorners]) -> Vec<Start> {
     let shared = Shared { rig: rig.clone(), shape_mm: FLAT };
-    let mut views: Vec<View> = pairs.par_iter().map(|pair| View::new(board, pair, FEWEST_CORNERS)).collect();
-    views.par_iter_mut().for_each(|view| {
-        if let Some(quarters) = numbering::on_rig(&shared, board, view) {
-            view.turn_right(board, quarters);
-        }
-    });
+    let mut views: Vec<View> =
+        pairs.par_iter().map(|pair| numbering::seen_on_rig(&shared, board, pair, None)).collect();
     let mut poses: Vec<Option<Transform>> = vec![None; views.len()];
     // Twice: the scatter is known only after the first fit.
     for _ in 0..2 {
-        let robust = |(view, known): (&View, &Option<Transform>)| Some(robust(&shared, view, *known)?.left_from_board);
+        let robust = |(view, known): (&View, &Option<Transform>)| robust(&shared, view, *known);
         poses = views.par_iter().zip(&poses).map(robust).collect();
         let left: Vec<(Observation, Vector2<f64>)> = views
             .iter()
@@ -71,12 +64,11 @@ pub(super) fn enough(view: &View) -> bool {
     Side::BOTH.iter().all(|side| view.active(*side).count() >= FEWEST_CORNERS)
 }
 
-fn robust(shared: &Shared, view: &View, known: Option<Transform>) -> Option<PoseFit> {
-    let loss = Loss::Cauchy(CAUCHY_WIDTH);
+fn robust(shared: &Shared, view: &View, known: Option<Transform>) -> Option<Transform> {
     match known {
         _ if !enough(view) => None,
-        Some(known) => board_pose::refit(shared, view, known, loss),
-        None => board_pose::fit(shared, view, loss),
+        Some(known) => board_pose::refit(shared, view, known),
+        None => board_pose::fit(shared, view),
     }
 }
 
@@ -85,9 +77,8 @@ fn robust(shared: &Shared, view: &View, known: Option<Transform>) -> Option<Pose
 pub(super) fn baseline_ratio(rig: &Rig, views: &[View]) -> Option<f64> {
     let shared = Shared { rig: rig.clone(), shape_mm: FLAT };
     let ratio = |view: &View| {
-        let alone = Side::BOTH.map(|side| board_pose::fit(&shared, &view.only(side), Loss::Cauchy(CAUCHY_WIDTH)));
-        let [left, right] = alone;
-        let right_from_left = rig.right_from_left * right?.left_from_board * left?.left_from_board.inverse();
+        let [left, right] = board_pose::of_each_alone(&shared, view);
+        let right_from_left = rig.right_from_left * right? * left?.inverse();
         Some(right_from_left.translation.vector.norm() / rig.baseline_mm())
     };
     let ratios: Vec<Option<f64>> = views.par_iter().map(ratio).collect();

@@ -5,9 +5,9 @@
 //! of one group is against another's (the camera was moved between them) the pictures alone do not tell.
 
 use crate::geometry::{Transform, rotation_vector};
-use crate::imaging::Board;
+use crate::imaging::{Board, Side};
 use crate::measurements::{RobotPose, Role};
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 use crate::stereo::pairs::numbering::renumbered;
 
 /// Two numberings whose turns from the neighbour differ by less than this, rad, are both possible.
@@ -76,7 +76,7 @@ fn settle_group(
             doubtful.push(i);
         }
         let quarters = turns[0].1;
-        turn_both(board, &mut views[i], quarters);
+        Side::BOTH.into_iter().for_each(|side| views[i].turn(board, side, quarters));
         poses[i] = Some(pose * renumbered(quarters));
     }
     doubtful.sort_unstable();
@@ -90,15 +90,4 @@ fn nearest(at: &[&RobotPose], done: &[usize], open: &[usize]) -> Option<(usize, 
     };
     let all = open.iter().enumerate().flat_map(|(k, &i)| done.iter().map(move |&d| (k, i, d)));
     all.min_by(|a, b| distance(a.1, a.2).total_cmp(&distance(b.1, b.2))).map(|(k, _, from)| (k, from))
-}
-
-/// Renumbers both pictures.
-fn turn_both(board: &Board, view: &mut View, quarters: usize) {
-    view.turn_right(board, quarters);
-    let mut exchanged = view.exchanged();
-    exchanged.turn_right(board, quarters);
-    let mut back = exchanged.exchanged();
-    // Left corners first.
-    back.observations.sort_by_key(|o| o.side);
-    *view = back;
 }

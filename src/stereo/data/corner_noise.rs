@@ -7,9 +7,8 @@
 use nalgebra::{Matrix2, Vector2};
 
 use crate::statistics::median;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::data::view::View;
-use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::data::{Observation, View, in_use};
+use crate::stereo::solve::Loss;
 
 /// The noise model of all corners.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,9 +38,8 @@ impl Noise {
 
     /// Share of the active corners' variance that the refinement's covariances are. The whiteners are this noise's.
     pub fn stated_share(&self, views: &[View]) -> f64 {
-        let active = || views.iter().flat_map(|view| &view.observations).filter(|o| o.active);
         let stated = |o: &Observation| (o.whitener * o.covariance_px2 * o.whitener.transpose()).trace() / 2.0;
-        self.factor * active().map(stated).sum::<f64>() / active().count().max(1) as f64
+        self.factor * in_use(views).map(stated).sum::<f64>() / in_use(views).count().max(1) as f64
     }
 
     /// The noise of corners of whose variance only this share is their own: what was added gives way first. `stated` is the share of the
@@ -107,8 +105,7 @@ impl Noise {
 
     /// Median over the corners of the standard deviation of a coordinate, px.
     pub fn typical_px(&self, views: &[View]) -> f64 {
-        let active = views.iter().flat_map(|view| view.observations.iter().filter(|o| o.active));
-        median(active.map(|o| (self.covariance(o).trace() / 2.0).sqrt())).unwrap_or(self.added_px)
+        median(in_use(views).map(|o| (self.covariance(o).trace() / 2.0).sqrt())).unwrap_or(self.added_px)
     }
 }
 

@@ -5,3 +5,8 @@ pub mod neighbour_correlation;
 pub mod observation;
 pub mod residuals;
 pub mod view;
+
+pub use corner_noise::Noise;
+pub use neighbour_correlation::NeighbourCorrelation;
+pub use observation::Observation;
+pub use view::{View, in_use};

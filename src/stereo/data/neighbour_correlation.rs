@@ -12,7 +12,7 @@ use nalgebra::{Point2, Vector2};
 use serde::Serialize;
 
 use crate::imaging::{Board, Side};
-use crate::stereo::data::observation::Observation;
+use crate::stereo::data::Observation;
 
 /// Standard errors beyond which a correlation is not chance.
 pub const SURE: f64 = 4.0;

@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 
 use crate::imaging::Board;
 pub use crate::imaging::Side;
-use crate::stereo::model::board_shape::{NUMBERS, lift};
+use crate::stereo::model::board_shape::{NUMBERS, height_mm, lift};
 
 /// A corner of the board seen in one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,8 +54,7 @@ impl Observation {
 
     /// Place on a board bent by these numbers, mm.
     pub fn board_point(&self, shape_mm: &[f64; NUMBERS]) -> Point3<f64> {
-        let z = self.lift.iter().zip(shape_mm).map(|(lift, height)| lift * height).sum();
-        Point3::new(self.board_mm.x, self.board_mm.y, z)
+        Point3::new(self.board_mm.x, self.board_mm.y, height_mm(&self.lift, shape_mm))
     }
 
     /// Makes it the corner at another place of the board.

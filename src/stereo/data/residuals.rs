@@ -6,9 +6,8 @@ use crate::geometry::Transform;
 use crate::imaging::Side;
 use crate::statistics::median;
 use crate::stereo::Rig;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::data::view::View;
-use crate::stereo::model::parameters::{Shared, Values};
+use crate::stereo::data::{Observation, View};
+use crate::stereo::model::{Shared, Values};
 
 /// Predicted minus seen, px. `None` for a corner behind its camera.
 pub fn residual_px(shared: &Shared, left_from_board: &Transform, o: &Observation) -> Option<Vector2<f64>> {
@@ -42,8 +41,7 @@ pub fn of_view(shared: &Shared, view: &View, pose: &Transform) -> Vec<(Observati
 
 /// Root mean square of the length of the 2-D residuals of one picture's active corners, px, as OpenCV defines it.
 pub fn rms_px(shared: &Shared, left_from_board: &Transform, view: &View, side: Side) -> Option<f64> {
-    let squares: Vec<f64> = of_picture(shared, left_from_board, view, side)?.iter().map(|r| r.norm_squared()).collect();
-    root_mean_square(&squares)
+    root_mean_square(of_picture(shared, left_from_board, view, side)?.iter().map(|r| r.norm_squared()))
 }
 
 /// Median length of one picture's residuals, px.
@@ -55,7 +53,13 @@ fn of_picture(shared: &Shared, left_from_board: &Transform, view: &View, side: S
     view.active(side).map(|o| residual_px(shared, left_from_board, o)).collect()
 }
 
+/// The mean; `None` of nothing.
+pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.into_iter().collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
 /// Root of the mean of squares; `None` of nothing.
-pub fn root_mean_square(squares: &[f64]) -> Option<f64> {
-    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+pub fn root_mean_square(squares: impl IntoIterator<Item = f64>) -> Option<f64> {
+    mean(squares).map(f64::sqrt)
 }

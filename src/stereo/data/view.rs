@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector3};
 
 use crate::imaging::{Board, Corner, PairCorners, Side};
-use crate::stereo::data::observation::Observation;
+use crate::stereo::data::Observation;
 use crate::stereo::model::board_shape::lift;
 
 /// How far a corner that was found but could not be measured may be off, px.
@@ -48,10 +48,22 @@ impl View {
         View { pair: self.pair.clone(), observations }
     }
 
-    /// Renumbers the right picture's corners as on a board that is turned in its plane by so many quarter turns. A board with unequal
-    /// sides takes half turns only.
+    /// The corners of one picture, and those of the other side's picture in another pair.
+    pub fn paired(&self, side: Side, with: &View) -> View {
+        let mut paired = self.only(side);
+        paired.observations.extend(with.only(side.other()).observations);
+        paired
+    }
+
+    /// Renumbers the right picture's corners, see [`View::turn`].
     pub fn turn_right(&mut self, board: &Board, quarters: usize) {
-        for o in self.observations.iter_mut().filter(|o| o.side == Side::Right) {
+        self.turn(board, Side::Right, quarters);
+    }
+
+    /// Renumbers a picture's corners as on a board that is turned in its plane by so many quarter turns. A board with unequal
+    /// sides takes half turns only.
+    pub fn turn(&mut self, board: &Board, side: Side, quarters: usize) {
+        for o in self.observations.iter_mut().filter(|o| o.side == side) {
             let (col, row) = (o.col, o.row);
             let (last_col, last_row) = (board.columns() - 1, board.rows() - 1);
             let place = match quarters % 4 {
@@ -85,6 +97,11 @@ impl View {
         };
         View { pair: self.pair.clone(), observations: Side::BOTH.into_iter().flat_map(some).collect() }
     }
+}
+
+/// The active corners of all these pairs.
+pub fn in_use(views: &[View]) -> impl Iterator<Item = &Observation> + Clone {
+    views.iter().flat_map(|view| &view.observations).filter(|o| o.active)
 }
 
 fn observation(board: &Board, side: Side, corner: &Corner) -> Observation {

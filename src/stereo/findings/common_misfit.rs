@@ -9,14 +9,15 @@
 use rayon::prelude::*;
 
 use super::{Along, Finding, Kind};
+use crate::imaging::Side;
 use crate::statistics::median;
 use crate::stereo::Lens;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::view::View;
-use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::data::{View, in_use};
+use crate::stereo::init::board_pose::misfit_px;
+use crate::stereo::model::{Layout, Shared};
 use crate::stereo::pairs::Cause;
-use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::Problem;
 use crate::stereo::solve::uncertainty;
 
 /// A lens or a rig that lacks something leaves no more than about this many times what single pictures do.
@@ -39,7 +40,9 @@ const MOST_STRETCH: f64 = 0.1;
 pub fn look(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
     let told = |finding: &Finding| finding.along.clone().filter(|along| along.by_pair.len() == calibration.views.len());
     let misfit = misfit_without(calibration, changes.iter().find_map(told));
-    if misfit.usual_px < TIMES * corner_sigma_px(&calibration.views) {
+    // As the refinement states it; zero where it gave none.
+    let corner_sigma_px = median(in_use(&calibration.views).map(|o| (0.5 * o.covariance_px2.trace()).sqrt()));
+    if misfit.usual_px < TIMES * corner_sigma_px.unwrap_or(0.0) {
         return None;
     }
     let is_shared = misfit.usual_px > TIMES * calibration.alone_px;
@@ -54,12 +57,6 @@ struct Misfit {
     worst_first: Vec<String>,
 }
 
-/// Standard deviation of most corners as their refinement states it, px; zero where it gave none.
-fn corner_sigma_px(views: &[View]) -> f64 {
-    let observations = views.iter().flat_map(|view| view.observations.iter().filter(|o| o.active));
-    median(observations.map(|o| (0.5 * o.covariance_px2.trace()).sqrt())).unwrap_or(0.0)
-}
-
 /// Pictures that were not taken at one moment: neither the corners nor a lens explain so much.
 fn not_simultaneous(alone_px: f64, misfit: Misfit) -> Finding {
     Finding {
@@ -67,7 +64,6 @@ fn not_simultaneous(alone_px: f64, misfit: Misfit) -> Finding {
         kind: Kind::Pair,
         size: Some(misfit.usual_px),
         unit: "px",
-        effect_mm: None,
         action: format!(
             "the pictures of the pairs were not taken at one moment: half of the pairs miss the rig by {:.2} px and more, each camera alone \
              by {alone_px:.2} px; the worst are {}. Trigger both cameras at once, or hold the board still",
@@ -75,8 +71,7 @@ fn not_simultaneous(alone_px: f64, misfit: Misfit) -> Finding {
             misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ")
         ),
         pairs: misfit.worst_first,
-        along: None,
-        remedy: None,
+        ..Finding::default()
     }
 }
 
@@ -104,7 +99,9 @@ fn left_px(shared: &Shared, view: &View) -> f64 {
 fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
     /// Most of it that may be left. One number of sixteen that a rig has takes up little of what has another cause.
     const LEFT: f64 = 0.5;
-    let layout = with_usual_lens(&calibration.layout);
+    // With at least the terms that nearly all lenses need: misfit that the board made may have left fewer.
+    let [left, right] = Side::BOTH.map(|side| calibration.layout.lens(side).map(|lens| lens.max(Lens::Brown5)));
+    let layout = Layout { left, right, ..calibration.layout };
     // What a richer lens takes up is not the board's.
     let problem = refitted(&calibration.problem(), &layout)?;
     let before_px = median_px(&problem)?.min(misfit.usual_px);
@@ -119,10 +116,9 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
     Some(Finding {
         cause: Cause::OtherBoard.word().to_owned(),
         kind: Kind::Step,
-        pairs: calibration.views.iter().map(|view| view.pair.clone()).collect(),
+        pairs: calibration.pair_names(),
         size: Some(100.0 * stretch),
         unit: "%",
-        effect_mm: None,
         action: format!(
             "the board's {} are {:.digits$} times as wide as high, not {said:.digits$} times as was said: with that half of the pairs miss \
              the rig by {left_px:.3} px and more, instead of {before_px:.3} px. Measure the board along and across, and give \
@@ -130,8 +126,7 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
             calibration.board.unit(),
             said * (1.0 + stretch),
         ),
-        along: None,
-        remedy: None,
+        ..Finding::default()
     })
 }
 
@@ -171,14 +166,6 @@ fn refitted(problem: &Problem, layout: &Layout) -> Option<Problem> {
 fn median_px(problem: &Problem) -> Option<f64> {
     let shared = &problem.values.shared;
     median(problem.views.par_iter().map(|view| left_px(shared, view)).collect::<Vec<f64>>())
-}
-
-/// The layout with at least the terms that nearly all lenses need: misfit that the board made may have left fewer.
-fn with_usual_lens(layout: &Layout) -> Layout {
-    let richer = |lens: Option<Lens>| {
-        lens.map(|lens| if lens.free_count() < Lens::Brown5.free_count() { Lens::Brown5 } else { lens })
-    };
-    Layout { left: richer(layout.left), right: richer(layout.right), ..*layout }
 }
 
 /// The pairs of a board that is wider by this share for its height.

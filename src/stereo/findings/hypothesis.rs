@@ -2,7 +2,7 @@
 
 use nalgebra::{DVector, Vector3};
 
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::Layout;
 use crate::stereo::pairs::Cause;
 use crate::stereo::{Rig, Side};
 
@@ -11,7 +11,7 @@ use crate::stereo::{Rig, Side};
 pub struct Hypothesis {
     pub cause: Cause,
     /// For a person: what changed.
-    pub words: String,
+    pub words: &'static str,
     /// How the shared numbers change by one unit of it, in the layout's order.
     pub direction: DVector<f64>,
     pub unit: &'static str,
@@ -25,15 +25,14 @@ pub fn all(layout: &Layout, rig: &Rig) -> Vec<Hypothesis> {
     let longer = moved(layout, translation / translation.norm().max(f64::MIN_POSITIVE));
     // Larger squares make everything seem nearer, the baseline too; one unit is a per cent.
     let larger = moved(layout, -0.01 * translation);
-    let shifted = |axis: Vector3<f64>| moved(layout, axis);
-    let of = |cause, words: &str, direction, unit| Hypothesis { cause, words: words.to_owned(), direction, unit };
+    let of = |cause, words, direction, unit| Hypothesis { cause, words, direction, unit };
     vec![
         of(Cause::Yaw, "the right camera turned about its vertical axis", turn(Vector3::y()), "deg"),
         of(Cause::Pitch, "the right camera turned about its horizontal axis", turn(Vector3::x()), "deg"),
         of(Cause::Roll, "the right camera turned about its line of sight", turn(Vector3::z()), "deg"),
         of(Cause::Baseline, "the baseline changed", longer, "mm"),
-        of(Cause::CameraMoved, "the right camera moved along its line of sight", shifted(Vector3::z()), "mm"),
-        of(Cause::CameraMoved, "the right camera moved up or down", shifted(Vector3::y()), "mm"),
+        of(Cause::CameraMoved, "the right camera moved along its line of sight", moved(layout, Vector3::z()), "mm"),
+        of(Cause::CameraMoved, "the right camera moved up or down", moved(layout, Vector3::y()), "mm"),
         of(Cause::Focus, "the left camera's focal length changed", focal(&[Side::Left]), "%"),
         of(Cause::Focus, "the right camera's focal length changed", focal(&[Side::Right]), "%"),
         of(Cause::Focus, "both focal lengths changed", focal(&Side::BOTH), "%"),

@@ -8,7 +8,6 @@
 
 pub mod common_misfit;
 pub mod hypothesis;
-mod remedy;
 pub mod series;
 mod shifted;
 pub mod standing;
@@ -26,9 +25,8 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use crate::difference::TOLD_APART;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::hypothesis::{Hypothesis, any_place};
-use crate::stereo::findings::remedy::hold;
 use crate::stereo::findings::series::{Change, Line, Linear};
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::Layout;
 use crate::stereo::pairs::{Cause, DiscardedPair};
 use crate::stereo::volume::lengths::VolumeLengths;
 
@@ -46,7 +44,7 @@ const PERMUTATIONS: usize = 400;
 const FEWEST: usize = 6;
 
 /// Over which pairs something happened.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// From one pair on.
@@ -54,11 +52,12 @@ pub enum Kind {
     /// Evenly from the first pair to the last.
     Drift,
     /// In single pairs.
+    #[default]
     Pair,
 }
 
 /// Something that happened.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Finding {
     /// The cause, or the causes that these pairs do not tell apart, with `|` between them.
     pub cause: String,
@@ -133,13 +132,13 @@ pub fn of_lenses(calibration: &Calibration, lengths: &VolumeLengths) -> Option<F
     Some(Finding {
         cause: if causes.is_empty() { Cause::Unknown.word().to_owned() } else { causes },
         kind: Kind::Step,
-        pairs: calibration.views.iter().map(|view| view.pair.clone()).collect(),
+        pairs: calibration.pair_names(),
         size: check.focus_change,
         unit: if check.focus_change.is_some() { "%" } else { "" },
         effect_mm: otherwise.map(|mm| (mm - lengths.length_mm).abs()).reduce(f64::max),
         action: check.statement.clone(),
-        along: None,
         remedy: Some(check.remedy().to_owned()),
+        ..Finding::default()
     })
 }
 
@@ -153,12 +152,8 @@ pub fn of_pairs(discarded: &[DiscardedPair]) -> Vec<Finding> {
                 cause: pair.cause.word().to_owned(),
                 kind: Kind::Pair,
                 pairs: vec![pair.pair.clone()],
-                size: None,
-                unit: "",
-                effect_mm: None,
                 action: pair.reason.clone(),
-                along: None,
-                remedy: None,
+                ..Finding::default()
             }),
         }
     }
@@ -253,18 +248,13 @@ fn shuffled(count: usize, seed: usize) -> Vec<usize> {
     order
 }
 
-impl Candidate<'_> {
-    /// Logarithm of its likelihood but for a constant, less what its numbers cost.
-    fn evidence(&self, scatter: f64, pairs: usize) -> f64 {
-        0.5 * self.change.gain / scatter - 0.5 * self.change.amounts.len() as f64 * (pairs as f64).ln()
-    }
-}
-
 /// The candidates that are not told apart from the one that explains most, that one first.
 fn likeliest<'a, 'b>(candidates: &'b [Candidate<'a>], pairs: usize) -> Vec<&'b Candidate<'a>> {
     // The scatter of the one that explains most is what the others are judged by.
     let scatter = candidates.iter().map(|c| c.change.scatter).fold(f64::INFINITY, f64::min).max(1.0);
-    let evidence = |c: &Candidate| c.evidence(scatter, pairs);
+    // Logarithm of the likelihood but for a constant, less what the numbers cost.
+    let evidence =
+        |c: &Candidate| 0.5 * c.change.gain / scatter - 0.5 * c.change.amounts.len() as f64 * (pairs as f64).ln();
     let top = candidates.iter().map(&evidence).fold(f64::NEG_INFINITY, f64::max);
     let mut equals: Vec<&Candidate> = candidates.iter().filter(|c| top - evidence(c) < TOLD_APART).collect();
     equals.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
@@ -273,11 +263,6 @@ fn likeliest<'a, 'b>(candidates: &'b [Candidate<'a>], pairs: usize) -> Vec<&'b C
         equals.retain(|c| c.hypothesis.is_some());
     }
     equals
-}
-
-/// The causes of candidates that are not told apart, each once, with `|` between them.
-fn causes(equals: &[&Candidate]) -> String {
-    Cause::words(equals.iter().map(|candidate| candidate.hypothesis.map_or(Cause::CameraMoved, |h| h.cause)))
 }
 
 /// What happened and by how much, in words, for each cause that it may have been.
@@ -308,12 +293,9 @@ fn finding(
         Some(h) => &h.direction * amounts[0],
         None => any.iter().zip(amounts.iter()).fold(DVector::zeros(any[0].len()), |sum, (d, a)| sum + d * *a),
     };
-    let (size, unit) = match shown.hypothesis {
-        Some(h) => (amounts[0], h.unit),
-        None => (whole.rows(calibration.layout.transform_start(), 3).norm().to_degrees(), "deg"),
-    };
-    let changes = lengths.changes_by_step_mm(&calibration.layout, &whole);
-    let effect_mm = changes.into_iter().fold(0.0, |most: f64, mm| most.max(mm.abs()));
+    let turned_deg = || whole.rows(calibration.layout.transform_start(), 3).norm().to_degrees();
+    let (size, unit) = shown.hypothesis.map_or_else(|| (turned_deg(), "deg"), |h| (amounts[0], h.unit));
+    let effect_mm = lengths.most_changed_mm(&calibration.layout, &whole);
     let name = |i: usize| calibration.views[i].pair.clone();
     let which = match best.kind {
         Kind::Step => format!("from pair {} on", name(best.first)),
@@ -325,7 +307,7 @@ fn finding(
         let at = if before == after { format!("pair {before}") } else { format!("pairs {before} and {after}") };
         action += &format!("; the rig is that of the middle of the series, at {at}");
     }
-    let cause = causes(&equals);
+    let cause = Cause::words(equals.iter().map(|c| c.hypothesis.map_or(Cause::CameraMoved, |h| h.cause)));
     Some(Finding {
         remedy: hold(&cause, None),
         cause,
@@ -341,5 +323,25 @@ fn finding(
             by_pair: best.by_pair.clone(),
             relative_variance: shown.change.scatter / shown.change.gain,
         }),
+    })
+}
+
+/// What to do about a change of the rig, for a person who photographs again: hold what changed. `causes` are words with `|` between them; `since` are the pairs after the last change of a rig that went on
+/// changing, where they are enough for a rig. `None` where no hold helps.
+pub(super) fn hold(causes: &str, since: Option<&[String]>) -> Option<String> {
+    let is = |of: &[Cause]| causes.split('|').any(|word| of.iter().any(|cause| cause.word() == word));
+    let unknown = is(&[Cause::Unknown]);
+    let moved = unknown || is(&[Cause::Yaw, Cause::Pitch, Cause::Roll, Cause::Baseline, Cause::CameraMoved]);
+    let hold = [
+        (unknown || is(&[Cause::Focus])).then_some("lock the focus of both cameras"),
+        moved.then_some("clamp both cameras"),
+    ];
+    let hold: Vec<&str> = hold.into_iter().flatten().collect();
+    let again = (!hold.is_empty()).then(|| format!("{}, and take all pairs again", hold.join(" and ")))?;
+    Some(match since {
+        Some([first, others @ ..]) => {
+            format!("{again}; or `--since {first}`: the rig of the last {} pairs", others.len() + 1)
+        }
+        _ => again,
     })
 }

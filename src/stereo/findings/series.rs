@@ -8,8 +8,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::stereo::model::parameters::Layout;
-use crate::stereo::solve::problem::Problem;
+use crate::stereo::model::Layout;
+use crate::stereo::solve::Problem;
 use crate::stereo::solve::uncertainty::invert;
 
 /// Fewest pairs for which the board's place is a nuisance: three numbers more must leave some for the scatter.

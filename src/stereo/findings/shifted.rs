@@ -35,6 +35,6 @@ pub fn explain(error: Error, corners: &Corners, fitting: impl Fn(&Corners) -> Op
 
 /// Each pair whose left picture is taken, with that whose right one is, so many pairs later.
 fn partners(corners: &Corners, by: isize) -> Vec<(&PairCorners, &PairCorners)> {
-    let later = |i: usize| corners.pairs.get(i.checked_add_signed(by)?);
-    corners.pairs.iter().enumerate().filter_map(|(i, left)| Some((left, later(i)?))).collect()
+    let pairs = corners.pairs.iter().enumerate();
+    pairs.filter_map(|(i, left)| Some((left, corners.pairs.get(i.checked_add_signed(by)?)?))).collect()
 }

@@ -9,9 +9,8 @@
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
 use crate::stereo::calibrate::{Calibration, calibrate, calibrate_with};
-use crate::stereo::findings::remedy::hold;
-use crate::stereo::findings::{self, Finding, Kind, common_misfit, shifted, without_drift};
-use crate::stereo::model::rig::Covariance;
+use crate::stereo::findings::{self, Finding, Kind, common_misfit, hold, shifted, without_drift};
+use crate::stereo::model::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
 use crate::stereo::select::options::Options;
 use crate::stereo::volume::Extent;
@@ -81,12 +80,8 @@ fn stands_since(corners: &Corners, asked: &Asked, later: Later, change: Finding)
 /// The rig without the first or the last pairs that contradict the others; `told` is the step that these are, where it was found.
 fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Result<(Calibration, Vec<Finding>), Error> {
     let mut found = calibrate(corners, &asked.options)?;
-    let contradicts = |pair: &PairCorners| {
-        let of_pair = found.discarded.pairs.iter().find(|d| d.pair == pair.pair);
-        of_pair.is_some_and(|d| d.cause.may_be_the_rig())
-    };
     let names = |pairs: &mut dyn Iterator<Item = &PairCorners>| -> Vec<String> {
-        pairs.take_while(|pair| contradicts(pair)).map(|pair| pair.pair.clone()).collect()
+        pairs.take_while(|pair| is_of_another_rig(&found, pair)).map(|pair| pair.pair.clone()).collect()
     };
     let first = names(&mut corners.pairs.iter());
     let mut last = names(&mut corners.pairs.iter().rev());
@@ -102,7 +97,7 @@ fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Resu
     let mut findings = Vec::new();
     if run.len() >= 2 {
         let at_end = corners.pairs.last().is_some_and(|pair| run.contains(&pair.pair));
-        let pairs = if at_end { run.clone() } else { found.views.iter().map(|view| view.pair.clone()).collect() };
+        let pairs = if at_end { run.clone() } else { found.pair_names() };
         let change = another_rig(told, pairs);
         for discarded in found.discarded.pairs.iter_mut().filter(|d| run.contains(&d.pair)) {
             *discarded = DiscardedPair::new(&discarded.pair, of_rig(&change), change.action.clone());
@@ -129,7 +124,7 @@ fn another_rig(told: Option<Finding>, pairs: Vec<String>) -> Finding {
         );
         let cause = format!("{}|{}", Cause::CameraMoved.word(), Cause::Focus.word());
         let remedy = hold(&cause, None);
-        Finding { cause, kind: Kind::Step, pairs, size: None, unit: "", effect_mm: None, action, along: None, remedy }
+        Finding { cause, kind: Kind::Step, pairs, action, remedy, ..Finding::default() }
     })
 }
 
@@ -153,10 +148,9 @@ pub fn calibrate_since(corners: &Corners, pair: &str, asked: &Asked) -> Result<(
 
 /// Adds pairs that are not used.
 fn leave_out(found: &mut Calibration, pairs: Vec<DiscardedPair>) {
-    found.skipped.extend(pairs.iter().map(DiscardedPair::skipped));
-    found.skipped.sort_by(|a, b| a.pair.cmp(&b.pair));
-    let mut all: Vec<DiscardedPair> = found.discarded.pairs.iter().cloned().chain(pairs).collect();
+    let mut all = [std::mem::take(&mut found.discarded.pairs), pairs].concat();
     all.sort_by(|a, b| a.pair.cmp(&b.pair));
+    found.skipped = all.iter().map(DiscardedPair::skipped).collect();
     found.discarded = Discarded::new(&found.views, all);
 }
 
@@ -262,12 +256,14 @@ fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked, corners: 
 fn trailing(found: &mut Calibration, corners: &Corners) {
     let used = |pair: &PairCorners| found.views.iter().any(|view| view.pair == pair.pair);
     let Some(last) = corners.pairs.iter().rposition(used) else { return };
-    let contradicts =
-        |pair: &&PairCorners| found.discarded.pairs.iter().any(|d| d.pair == pair.pair && d.cause.may_be_the_rig());
-    let after: Vec<String> =
-        corners.pairs[last + 1..].iter().filter(contradicts).map(|pair| pair.pair.clone()).collect();
-    found.standing =
-        Standing { unconfirmed: [found.standing.unconfirmed.clone(), after].concat(), ..found.standing.clone() };
+    let after = corners.pairs[last + 1..].iter().filter(|pair| is_of_another_rig(found, pair));
+    let after: Vec<String> = after.map(|pair| pair.pair.clone()).collect();
+    found.standing.unconfirmed.extend(after);
+}
+
+/// Whether a pair is left out because it contradicts the others, by what may be the rig.
+fn is_of_another_rig(found: &Calibration, pair: &PairCorners) -> bool {
+    found.discarded.pairs.iter().any(|d| d.pair == pair.pair && d.cause.may_be_the_rig())
 }
 
 /// The pairs of the rig that stood before a step.

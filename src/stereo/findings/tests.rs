@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 use crate::geometry::transform;
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::findings::Finding;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
+use crate::stereo::findings::{Finding, hold};
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::options::Options;
 use crate::stereo::synthetic::{BROWN4, World};
@@ -22,10 +22,12 @@ fn worlds(pairs: usize, seed: u64) -> [World; 2] {
 fn planted(world: &World, seed: u64, range: impl Iterator<Item = usize>, change: impl Fn(&mut World)) -> Corners {
     let mut other = world.clone();
     change(&mut other);
-    let (mut corners, others) = (world.corners(seed), other.corners(seed));
-    for i in range {
-        corners.pairs[i] = others.pairs[i].clone();
-    }
+    shown_by(world.corners(seed), &other, seed, range)
+}
+
+fn shown_by(mut corners: Corners, other: &World, seed: u64, range: impl Iterator<Item = usize>) -> Corners {
+    let others = other.corners(seed);
+    range.for_each(|i| corners.pairs[i] = others.pairs[i].clone());
     corners
 }
 
@@ -65,10 +67,9 @@ fn a_camera_that_moved_leaves_the_last_rig() {
     ];
     for (what, turn, shift) in shifts {
         for (w, world) in worlds(12, 3).into_iter().enumerate() {
+            let after = world.with_camera_moved(turn, shift);
             for first in [6, 8] {
-                let corners = planted(&world, 4, first..12, |after| {
-                    after.rig.right_from_left = transform(turn, shift) * world.rig.right_from_left;
-                });
+                let corners = shown_by(world.corners(4), &after, 4, first..12);
                 let (found, told) = standing(&corners);
                 let before: Vec<&str> = found.discarded.pairs.iter().map(|d| d.pair.as_str()).collect();
                 let expected: Vec<String> = (0..first).map(|i| format!("{i:02}")).collect();
@@ -76,15 +77,11 @@ fn a_camera_that_moved_leaves_the_last_rig() {
                 let named = ["yaw", "baseline", "camera-moved"].iter().any(|cause| told[0].cause.contains(cause));
                 assert!(named && told.len() == 1, "{what}: {told:?}");
                 assert_eq!(found.standing.since, Some(format!("{first:02}")));
-                let off = found.rig().right_from_left.translation.vector
-                    - (transform(turn, shift) * world.rig.right_from_left).translation.vector;
+                let off = found.rig().right_from_left.translation.vector - after.rig.right_from_left.translation.vector;
                 assert!(off.norm() < 0.15, "{what}: {off}");
             }
             // Too few pairs of the rig that stands: said, and the rig of the others is no longer confirmed.
-            let corners = planted(&world, 4, 10..12, |after| {
-                after.rig.right_from_left = transform(turn, shift) * world.rig.right_from_left;
-            });
-            let (found, told) = standing(&corners);
+            let (found, told) = standing(&shown_by(world.corners(4), &after, 4, 10..12));
             assert_eq!(found.standing.unconfirmed, ["10", "11"], "{what} in world {w}: {:?} {told:?}", found.skipped);
         }
     }
@@ -133,23 +130,20 @@ fn two_pairs_out_of_step() {
 fn a_rig_that_drifts_is_that_of_the_middle_and_no_picture_was_late() {
     for size_deg in [0.01_f64, 0.05] {
         for (w, world) in worlds(12, 21).into_iter().enumerate() {
-            let turned = |share: f64| {
-                let turn = transform(Vector3::y() * size_deg.to_radians() * share, Vector3::zeros());
-                turn * world.rig.right_from_left
-            };
+            let turned =
+                |share: f64| world.with_camera_moved(Vector3::y() * size_deg.to_radians() * share, Vector3::zeros());
             let mut corners = world.corners(22);
             for i in 0..12 {
-                let at = planted(&world, 22, std::iter::once(i), |other| {
-                    other.rig.right_from_left = turned(i as f64 / 11.0);
-                });
-                corners.pairs[i] = at.pairs[i].clone();
+                corners = shown_by(corners, &turned(i as f64 / 11.0), 22, i..=i);
             }
             let (found, told) = standing(&corners);
             let causes: Vec<&str> = told.iter().map(|finding| finding.cause.as_str()).collect();
             assert!(causes.len() == 1 && causes[0].contains("yaw"), "{size_deg} deg in world {w}: {causes:?}");
             assert!(found.skipped.is_empty() && found.since_moment.len() == 1, "{:?}", found.skipped);
             assert_eq!(found.moment(), ["05", "06"]);
-            let off = (found.rig().right_from_left.rotation * turned(0.5).rotation.inverse()).scaled_axis().y;
+            let off = (found.rig().right_from_left.rotation * turned(0.5).rig.right_from_left.rotation.inverse())
+                .scaled_axis()
+                .y;
             let at = found.layout.transform_start() + 1;
             let sigma = found.uncertainty.shared[(at, at)].sqrt();
             let limit = 4.0 * sigma;
@@ -257,4 +251,15 @@ fn a_bowed_board_is_no_other_one() {
             assert!(told.is_empty(), "{bow_mm}: {told:?}");
         }
     }
+}
+
+#[test]
+fn what_changed_is_held() {
+    let said = |causes| hold(causes, None).unwrap_or_default();
+    assert_eq!(said("focus"), "lock the focus of both cameras, and take all pairs again");
+    assert_eq!(said("yaw|baseline"), "clamp both cameras, and take all pairs again");
+    assert!(said("focus|yaw").starts_with("lock the focus of both cameras and clamp both cameras"));
+    assert!(said("unknown") == said("focus|camera-moved") && said("other-board").is_empty());
+    let pairs = ["0017".to_owned(), "0018".to_owned()];
+    assert!(hold("unknown", Some(&pairs)).unwrap().ends_with("or `--since 0017`: the rig of the last 2 pairs"));
 }

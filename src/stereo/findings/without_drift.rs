@@ -28,7 +28,7 @@ pub fn at_share(
     for (i, view) in found.views.iter().enumerate() {
         let shared = |share: f64| found.layout.step(&found.values.shared, along.to(share).as_slice());
         let (own, common) = (shared(along.by_pair[i]), shared(share));
-        let pose = board_pose::follow(&own, view, found.values.poses[i])?.left_from_board;
+        let pose = board_pose::follow(&own, view, found.values.poses[i])?;
         let of_corner = |o| {
             let by: Vector2<f64> = residual_px(&common, &pose, o)? - residual_px(&own, &pose, o)?;
             Some(Shift { side: o.side, seen: o.px, moved: o.px + by })
@@ -40,8 +40,7 @@ pub fn at_share(
         shifts.push(of_pair);
     }
     let mut still = calibrate(&moved, options).ok()?;
-    let pairs = |calibration: &Calibration| calibration.views.iter().map(|v| v.pair.clone()).collect::<Vec<_>>();
-    if pairs(&still) != pairs(found) {
+    if still.pair_names() != found.pair_names() {
         return None;
     }
     for (view, shifts) in still.views.iter_mut().zip(&shifts) {

@@ -6,8 +6,9 @@
 use nalgebra::{DMatrix, Matrix3, Point2, Point3, Vector3};
 
 use crate::geometry::{Transform, transform_from_matrix};
+use crate::imaging::Side;
 use crate::statistics::median;
-use crate::stereo::data::observation::Observation;
+use crate::stereo::data::View;
 
 /// Fewest corners that determine a homography with something to spare.
 pub const FEWEST_CORNERS: usize = 6;
@@ -17,17 +18,17 @@ const FAR_MEDIANS: f64 = 6.0;
 
 /// The homography from the board's plane (mm) to given picture coordinates, and the median of what it leaves: a wrong corner among
 /// many good ones is left out. `None` for too few corners or corners on a line.
-pub fn homography(points: &[(Point3<f64>, Point2<f64>)]) -> Option<(Matrix3<f64>, f64)> {
-    let mut kept = points.to_vec();
-    let mut found = direct(&kept)?;
+pub fn homography(points: impl IntoIterator<Item = (Point3<f64>, Point2<f64>)>) -> Option<(Matrix3<f64>, f64)> {
+    let points: Vec<_> = points.into_iter().collect();
+    let mut found = direct(&points)?;
     // A wrong corner pulls the first fit toward itself; the second is nearly free of it, the third free.
+    let miss = |h: &Matrix3<f64>, pair: &(Point3<f64>, Point2<f64>)| (apply(h, &pair.0) - pair.1).norm();
     for _ in 0..2 {
-        let miss = |(board, picture): &(Point3<f64>, Point2<f64>)| (apply(&found, board) - picture).norm();
-        let limit = FAR_MEDIANS * median(points.iter().map(miss))?;
-        kept = points.iter().filter(|pair| miss(pair) <= limit).copied().collect();
+        let limit = FAR_MEDIANS * median(points.iter().map(|pair| miss(&found, pair)))?;
+        let kept: Vec<_> = points.iter().filter(|pair| miss(&found, pair) <= limit).copied().collect();
         found = direct(&kept)?;
     }
-    let left = median(points.iter().map(|(board, picture)| (apply(&found, board) - picture).norm()))?;
+    let left = median(points.iter().map(|pair| miss(&found, pair)))?;
     left.is_finite().then_some((found, left))
 }
 
@@ -118,9 +119,9 @@ pub fn pose(normalised_from_board: &Matrix3<f64>) -> Option<Transform> {
     (rotation.determinant() > 0.0).then(|| transform_from_matrix(rotation, t))
 }
 
-/// Board points and pixels of observations.
-pub fn pixel_pairs<'a>(observations: impl Iterator<Item = &'a Observation>) -> Vec<(Point3<f64>, Point2<f64>)> {
-    observations.map(|o| (o.board_mm, o.px)).collect()
+/// The homography from the board's plane to a picture, as [`homography`] has it.
+pub fn of_picture(view: &View, side: Side) -> Option<(Matrix3<f64>, f64)> {
+    homography(view.active(side).map(|o| (o.board_mm, o.px)))
 }
 
 #[cfg(test)]
@@ -144,7 +145,7 @@ mod tests {
             transform(Vector3::new(0.4, 0.1, 0.2), Vector3::new(5.0, -8.0, 200.0)),
             transform(Vector3::new(-0.1, 0.5, -0.3), Vector3::new(-15.0, 4.0, 230.0)),
         ];
-        let all: Vec<Matrix3<f64>> = poses.iter().map(|pose| homography(&picture(&camera, pose)).unwrap().0).collect();
+        let all: Vec<Matrix3<f64>> = poses.iter().map(|pose| homography(picture(&camera, pose)).unwrap().0).collect();
         let (fx, fy) = focal_lengths(&all, &Point2::new(camera.cx, camera.cy)).unwrap();
         assert!((fx - 800.0).abs() < 1e-6 && (fy - 780.0).abs() < 1e-6, "{fx} {fy}");
         for (h, truth) in all.iter().zip(&poses) {
@@ -159,7 +160,7 @@ mod tests {
         let all: Vec<Matrix3<f64>> = [0.0, 0.3]
             .map(|turn| transform(Vector3::new(0.0, 0.0, turn), Vector3::new(3.0, 2.0, 200.0)))
             .iter()
-            .map(|pose| homography(&picture(&camera, pose)).unwrap().0)
+            .map(|pose| homography(picture(&camera, pose)).unwrap().0)
             .collect();
         let found = focal_lengths(&all, &Point2::new(camera.cx, camera.cy));
         assert!(found.is_none_or(|(fx, _)| (fx - 800.0).abs() > 1.0), "{found:?}");
@@ -169,6 +170,6 @@ mod tests {
     fn corners_on_a_line_have_no_homography() {
         let line: Vec<_> =
             (0..10).map(|i| (Point3::new(f64::from(i), 0.0, 0.0), Point2::new(f64::from(i) * 3.0, 5.0))).collect();
-        assert!(homography(&line).is_none());
+        assert!(homography(line).is_none());
     }
 }

@@ -1,7 +1,7 @@
-//! Starting values: each camera alone, then where they stand to each other.
+//! Starting values: each camera alone.
 //!
-//! In: views. Out: two cameras, `right_from_left`, a pose a pair, and each picture's own residual. Method: Zhang's focal length from
-//! the homographies, a bundle of one camera with a robust loss, the relative pose that most pairs agree with.
+//! In: the views of one side. Out: its camera, a pose a picture, and each picture's own residual. Method: Zhang's focal length from
+//! the homographies, a bundle of one camera with a robust loss.
 //! Goes wrong: no picture tells the focal length (fronto-parallel boards only); then a few usual focal lengths are tried and
 //! the best fit is kept, and the covariance at the end says what it is worth.
 
@@ -10,17 +10,13 @@ use nalgebra::{Matrix3, Point2};
 use crate::geometry::Transform;
 use crate::imaging::Side;
 use crate::statistics::median;
-use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::data::residuals::{self, median_px};
-use crate::stereo::data::view::View;
+use crate::stereo::data::{Noise, View};
 use crate::stereo::init::board_pose;
-use crate::stereo::init::homography::{focal_lengths, homography, pixel_pairs, pose};
+use crate::stereo::init::homography::{self, focal_lengths, pose};
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::parameters::{Layout, Shared, Values};
-use crate::stereo::solve::levenberg_marquardt::{self, Search};
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::robust_loss::CAUCHY_WIDTH;
-use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::model::{Layout, Shared, Values};
+use crate::stereo::solve::{Priors, Problem};
 use crate::stereo::{Camera, Lens, Rig};
 
 /// Lens of the first fit: distortion that any picture determines.
@@ -45,7 +41,7 @@ pub fn one_camera(views: &[View], side: Side, size: (u32, u32), diagonal_mm: f64
     let pictures: Vec<View> = views.iter().map(|view| as_left(view, side)).collect();
     let center = Point2::new((f64::from(size.0) - 1.0) / 2.0, (f64::from(size.1) - 1.0) / 2.0);
     let homographies: Vec<Option<(Matrix3<f64>, f64)>> =
-        pictures.iter().map(|view| homography(&pixel_pairs(view.active(Side::Left)))).collect();
+        pictures.iter().map(|view| homography::of_picture(view, Side::Left)).collect();
     let good = well_formed(&homographies);
     let chosen: Vec<Matrix3<f64>> = good.iter().filter_map(|&i| homographies[i].map(|(h, _)| h)).collect();
     let longer = f64::from(size.0.max(size.1));
@@ -71,7 +67,7 @@ pub fn known_camera(views: &[View], side: Side, camera: Camera) -> OneCamera {
     let shared = Shared { rig, shape_mm: FLAT };
     let pictures = views.iter().map(|view| as_left(view, side));
     let poses_and_px = pictures.map(|picture| {
-        let pose = board_pose::fit(&shared, &picture, Loss::Cauchy(CAUCHY_WIDTH))?.left_from_board;
+        let pose = board_pose::fit(&shared, &picture)?;
         Some((pose, median_px(&shared, &pose, &picture, Side::Left)))
     });
     let (poses, median_px) = poses_and_px.map(|found| (found.map(|f| f.0), found.and_then(|f| f.1))).unzip();
@@ -104,27 +100,28 @@ fn from_focal_length(
 ) -> Option<(f64, OneCamera)> {
     let inverse = camera.matrix().try_inverse()?;
     let start_of = |i: usize| homographies[i].and_then(|(h, _)| pose(&(inverse * h)));
-    let mut chosen: Vec<(usize, Transform)> = good.iter().filter_map(|&i| Some((i, start_of(i)?))).collect();
-    let mut views: Vec<View> = chosen.iter().map(|&(i, _)| pictures[i].clone()).collect();
+    let (mut chosen, poses): (Vec<usize>, Vec<Transform>) =
+        good.iter().filter_map(|&i| Some((i, start_of(i)?))).unzip();
     let rig = Rig { left: camera, right: camera, right_from_left: Transform::identity(), covariance: None };
-    let poses = chosen.iter().map(|(_, pose)| *pose).collect();
-    let mut values = Values { shared: Shared { rig, shape_mm: FLAT }, poses };
-    let priors = Priors::of_one_camera(&camera, diagonal_mm);
-    let mut cost = f64::INFINITY;
+    let mut problem = Problem {
+        views: chosen.iter().map(|&i| pictures[i].clone()).collect(),
+        values: Values { shared: Shared { rig, shape_mm: FLAT }, poses },
+        priors: Priors::of_one_camera(&camera, diagonal_mm),
+    };
     for lens in [FIRST_LENS, FIRST_LENS, Lens::Brown5] {
-        values.shared.rig.left.lens = lens;
-        let noise = Noise::from_median(&residuals::active(&views, &values)?);
-        noise.apply(&mut views);
-        let loss = Loss::Cauchy(CAUCHY_WIDTH);
-        let layout = Layout::one_camera(lens);
-        values = levenberg_marquardt::solve_with(&views, &layout, &priors, values, loss, Search::ROUGH).values;
-        cost = residuals::active(&views, &values).map(|r| Noise::from_median(&r).added_px)?;
+        problem.values.shared.rig.left.lens = lens;
+        problem.search_roughly(&Layout::one_camera(lens))?;
     }
-    (views, values) = with_the_others(pictures, &mut chosen, views, values, &priors);
-    cost = residuals::active(&views, &values).map(|r| Noise::from_median(&r).added_px).unwrap_or(cost);
+    let scatter_px = |problem: &Problem| {
+        residuals::active(&problem.views, &problem.values).map(|left| Noise::from_median(&left).added_px)
+    };
+    let first_px = scatter_px(&problem)?;
+    add_the_others(pictures, &mut chosen, &mut problem);
+    let cost = scatter_px(&problem).unwrap_or(first_px);
+    let values = problem.values;
     let camera = values.shared.rig.left;
     let mut poses = vec![None; pictures.len()];
-    for ((i, _), pose) in chosen.iter().zip(&values.poses) {
+    for (i, pose) in chosen.iter().zip(&values.poses) {
         poses[*i] = Some(*pose);
     }
     let median_px = (0..pictures.len())
@@ -135,30 +132,22 @@ fn from_focal_length(
 
 /// The camera on all pictures: those that bend too much for a homography have one once the lens is known. Nothing is rejected here; the
 /// loss is robust.
-fn with_the_others(
-    pictures: &[View],
-    chosen: &mut Vec<(usize, Transform)>,
-    mut views: Vec<View>,
-    mut values: Values,
-    priors: &Priors,
-) -> (Vec<View>, Values) {
-    let others: Vec<usize> = (0..pictures.len()).filter(|i| chosen.iter().all(|(known, _)| known != i)).collect();
+fn add_the_others(pictures: &[View], chosen: &mut Vec<usize>, problem: &mut Problem) {
+    let others: Vec<usize> = (0..pictures.len()).filter(|i| !chosen.contains(i)).collect();
     if others.is_empty() {
-        return (views, values);
+        return;
     }
     for i in others {
-        if let Some(fit) = board_pose::fit(&values.shared, &pictures[i], Loss::Cauchy(CAUCHY_WIDTH)) {
-            chosen.push((i, fit.left_from_board));
-            views.push(pictures[i].clone());
-            values.poses.push(fit.left_from_board);
+        if let Some(pose) = board_pose::fit(&problem.values.shared, &pictures[i]) {
+            chosen.push(i);
+            problem.views.push(pictures[i].clone());
+            problem.values.poses.push(pose);
         }
     }
+    let layout = Layout::one_camera(problem.values.shared.rig.left.lens);
     for _ in 0..2 {
-        let Some(left) = residuals::active(&views, &values) else { break };
-        Noise::from_median(&left).apply(&mut views);
-        let layout = Layout::one_camera(values.shared.rig.left.lens);
-        let loss = Loss::Cauchy(CAUCHY_WIDTH);
-        values = levenberg_marquardt::solve_with(&views, &layout, priors, values, loss, Search::ROUGH).values;
+        if problem.search_roughly(&layout).is_none() {
+            break;
+        }
     }
-    (views, values)
 }

@@ -9,6 +9,7 @@ use nalgebra::Vector2;
 use serde::Serialize;
 
 use crate::imaging::Side;
+use crate::stereo::Camera;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::neighbour_correlation::{NeighbourCorrelation, SURE};
 use crate::stereo::data::observation::Observation;
@@ -72,15 +73,10 @@ impl ResidualPattern {
 /// Looks for patterns.
 pub fn check(calibration: &Calibration) -> ResidualPattern {
     let shared = &calibration.values.shared;
-    let mut fields = Side::BOTH.map(|side| {
-        let camera = shared.rig.camera(side);
-        Gather::new(side, camera.width, camera.height)
-    });
+    let mut fields = Side::BOTH.map(|side| Gather::new(side, shared.rig.camera(side)));
     for (view, pose) in calibration.views.iter().zip(&calibration.values.poses) {
         for (o, residual) in of_view(shared, view, pose) {
-            let [left, right] = &mut fields;
-            let field = if o.side == Side::Left { left } else { right };
-            field.add(&o, residual);
+            fields[o.side as usize].add(&o, residual);
         }
     }
     ResidualPattern { neighbours: calibration.neighbours, fields: fields.into_iter().map(Gather::finish).collect() }
@@ -95,11 +91,11 @@ struct Gather {
 }
 
 impl Gather {
-    fn new(side: Side, width: u32, height: u32) -> Gather {
+    fn new(side: Side, camera: &Camera) -> Gather {
         let cells = CELLS * CELLS;
         Gather {
             side,
-            size: [f64::from(width.max(1)), f64::from(height.max(1))],
+            size: [camera.width, camera.height].map(|size| f64::from(size.max(1))),
             sums: vec![Vector2::zeros(); cells],
             variances: vec![0.0; cells],
             counts: vec![0; cells],

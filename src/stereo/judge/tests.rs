@@ -2,9 +2,8 @@
 
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
-use crate::geometry::{Transform, transform};
-use crate::imaging::{Corner, Corners, PairCorners};
-use crate::stereo::data::view::View;
+use crate::geometry::transform;
+use crate::imaging::{Corner, Corners};
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::ledger::Standards;
@@ -12,7 +11,6 @@ use crate::stereo::judge::lengths::second_board::second_board;
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::select::options::Options;
 use crate::stereo::synthetic::{self, World};
-use crate::stereo::triangulate::{common, triangulate};
 use crate::stereo::volume::Extent;
 use crate::stereo::{Camera, Lens, Rig};
 
@@ -38,20 +36,12 @@ fn calibrated_and_judged(corners: &Corners, second: Option<&Corners>) -> (Rig, J
 
 /// The largest error with which a rig measures lengths between the corners of the world's boards, mm, from places without noise.
 fn largest_true_error_mm(world: &World, rig: &Rig) -> f64 {
-    let exact = World { sigma_px: 0.0, ..world.clone() }.corners(1);
-    let of_pair = |(pair, pose): (&PairCorners, &Transform)| {
-        let view = View::new(&world.board, pair, 0);
-        let points: Vec<_> = common(&view)
-            .into_iter()
-            .map(|(left, right)| (pose * left.board_mm, triangulate(rig, left, right).unwrap().point_mm))
-            .collect();
-        let off = |(i, (a, a1)): (usize, &(Point3<f64>, Point3<f64>))| {
-            let errors = points[i..].iter().map(|(b, b1)| ((b1 - a1).norm() - (b - a).norm()).abs());
-            errors.fold(0.0, f64::max)
-        };
-        points.iter().enumerate().map(off).fold(0.0, f64::max)
+    let of_pair = |points: &Vec<[Point3<f64>; 2]>| {
+        let error = |[a, a1]: &[Point3<f64>; 2], [b, b1]: &[Point3<f64>; 2]| ((b1 - a1).norm() - (b - a).norm()).abs();
+        let all = points.iter().enumerate().flat_map(|(i, a)| points[i..].iter().map(move |b| error(a, b)));
+        all.fold(0.0, f64::max)
     };
-    exact.pairs.iter().zip(&world.poses).map(of_pair).fold(0.0, f64::max)
+    world.measured_exactly(rig).iter().map(of_pair).fold(0.0, f64::max)
 }
 
 fn judge(corners: &Corners) -> Judged {
@@ -193,8 +183,7 @@ fn a_second_board_of_another_pitch_fails_and_one_that_cannot_be_measured_does_no
         assert_eq!(line(&judged, "second board").allows, Verdict::Fail, "{factor}: {:#?}", judged.evidence);
     }
     // A camera that was turned by 0.2 degrees since.
-    let mut moved = fresh.clone();
-    moved.rig.right_from_left = transform(Vector3::new(0.0, 0.0035, 0.0), Vector3::zeros()) * moved.rig.right_from_left;
+    let moved = fresh.with_camera_moved(Vector3::new(0.0, 0.0035, 0.0), Vector3::zeros());
     let judged = judge_with(&corners, Some(&moved.corners(66)));
     assert_eq!(line(&judged, "second board").allows, Verdict::Fail, "{:#?}", judged.evidence);
     let mut nothing = of_pitch(1.0);
@@ -208,8 +197,7 @@ fn a_second_board_of_another_pitch_fails_and_one_that_cannot_be_measured_does_no
 fn last_pairs_that_contradict_the_rig_leave_open_whether_it_stands() {
     let world = world(10, 67);
     let mut corners = world.corners(68);
-    let mut moved = world.clone();
-    moved.rig.right_from_left = transform(Vector3::new(0.0, 0.01, 0.0), Vector3::zeros()) * moved.rig.right_from_left;
+    let moved = world.with_camera_moved(Vector3::new(0.0, 0.01, 0.0), Vector3::zeros());
     corners.pairs[9].right = moved.corners(68).pairs[9].right.clone();
     let judged = judge(&corners);
     assert_eq!(

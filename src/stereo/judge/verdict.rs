@@ -9,25 +9,21 @@ pub const COVERAGE: f64 = 2.0;
 const LARGEST_OF_MANY: f64 = 5.0;
 
 /// What the verdict is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// Within tolerance, uncertainty included.
     Pass,
-    /// Out of tolerance, whatever the uncertainty.
-    Fail,
     /// The uncertainty reaches across the tolerance.
     Undecided,
+    /// Out of tolerance, whatever the uncertainty.
+    Fail,
 }
 
 impl Verdict {
-    /// Of two verdicts on one rig: a pass needs both.
+    /// Of two verdicts on one rig the worse one: a pass needs both.
     pub fn and(self, other: Verdict) -> Verdict {
-        match (self, other) {
-            (Verdict::Fail, _) | (_, Verdict::Fail) => Verdict::Fail,
-            (Verdict::Undecided, _) | (_, Verdict::Undecided) => Verdict::Undecided,
-            (Verdict::Pass, Verdict::Pass) => Verdict::Pass,
-        }
+        self.max(other)
     }
 
     /// A pass where the value is within the limit (a value that is no number is not), undecided otherwise: for what casts doubt on a

@@ -3,13 +3,14 @@
 //! In: a calibration. Out: how the views are spread, and advice where something is missing. Tilt separates the focal length from the distance; corners near
 //! the borders determine the lens; different distances separate the lens from the focal length.
 
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Point2, Point3};
 
 use crate::diagnostic::count;
 use crate::imaging::Side;
 use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::residual_correlation::{CELLS, Field, ResidualPattern};
+use crate::stereo::volume::{range, tilts_deg};
 
 /// Tilts between the boards below this leave the focal length to the distortion, deg.
 const LEAST_TILT_DEG: f64 = 15.0;
@@ -47,29 +48,19 @@ impl Coverage {
     /// Looks how the views are spread.
     pub fn of(calibration: &Calibration, residual_pattern: &ResidualPattern) -> Coverage {
         let poses = &calibration.values.poses;
-        let range = |values: &mut dyn Iterator<Item = f64>| {
-            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], t| [l.min(t), h.max(t)])
-        };
-        let normals: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.rotation * Vector3::z()).collect();
-        let tilts_deg = [1usize, 0].map(|axis| {
-            let [low, high] = range(&mut normals.iter().map(|n| n[axis].atan2(n.z).to_degrees()));
-            high - low
-        });
+        let [x_least, x_most, y_least, y_most] = tilts_deg(&calibration.values);
         let fields = [&residual_pattern.fields[0], &residual_pattern.fields[1]];
-        let depths_mm = range(&mut poses.iter().map(|pose| pose.translation.vector.z));
-        let mut corner_depths =
-            calibration.views.iter().zip(poses).flat_map(|(view, pose)| {
-                view.observations.iter().filter(|o| o.active).map(move |o| (pose * o.board_mm).z)
-            });
-        let corner_depths_mm = range(&mut corner_depths);
+        let depths_mm = range(poses.iter().map(|pose| pose.translation.vector.z));
+        let corner_depths_mm = range(calibration.views.iter().zip(poses).flat_map(|(view, pose)| {
+            view.observations.iter().filter(|o| o.active).map(move |o| (pose * o.board_mm).z)
+        }));
         let rig = calibration.rig();
         let from_right =
-            range(&mut poses.iter().map(|pose| (rig.right_from_left * Point3::from(pose.translation.vector)).z));
+            range(poses.iter().map(|pose| (rig.right_from_left * Point3::from(pose.translation.vector)).z));
         // Where a board could have been seen by both cameras at the distances that were worked at.
         let common = [(Side::Left, depths_mm), (Side::Right, from_right)].map(|(side, depths)| {
-            let cells = &fields[usize::from(side == Side::Right)].cells;
+            let cells = fields[side as usize].cells.iter();
             cells
-                .iter()
                 .map(|c| c.corners >= SEEN || is_common(rig, side, Point2::new(c.x_px, c.y_px), depths))
                 .collect::<Vec<bool>>()
         });
@@ -78,6 +69,7 @@ impl Coverage {
             seen as f64 / common[side].iter().filter(|common| **common).count().max(1) as f64
         });
         let empty = [0, 1].map(|side| empty_region(fields[side], &common[side]));
+        let tilts_deg = [x_most - x_least, y_most - y_least];
         Coverage { pairs: calibration.views.len(), tilts_deg, depths_mm, corner_depths_mm, field_shares, empty }
     }
 

@@ -14,6 +14,11 @@ pub const NUMBERS: usize = 3;
 /// The shape of a flat board.
 pub const FLAT: [f64; NUMBERS] = [0.0; NUMBERS];
 
+/// Height of a place of a bent board, mm, from how much one unit of each number lifts it.
+pub fn height_mm(lift: &[f64; NUMBERS], shape_mm: &[f64; NUMBERS]) -> f64 {
+    lift.iter().zip(shape_mm).map(|(lift, height)| lift * height).sum()
+}
+
 /// How much one unit of each number of the shape lifts a place of the board: `1 - x^2`, `1 - y^2` and `x y` over [-1, 1]^2.
 pub fn lift(board: &Board, at: &Point3<f64>) -> [f64; NUMBERS] {
     let edge = board.corner_mm(board.columns() - 1, board.rows() - 1);

@@ -2,21 +2,21 @@
 
 use nalgebra::{Matrix3, Point2, Point3};
 
-/// How many numbers of OpenCV's distortion vector are free.
+/// How many numbers of OpenCV's distortion vector are free: the value of each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Lens {
     /// `k1 k2`; `p1 p2` stay zero.
-    Radial2,
+    Radial2 = 2,
     /// `k1 k2 p1 p2`.
-    Brown4,
+    Brown4 = 4,
     /// `k1 k2 p1 p2 k3`.
-    Brown5,
+    Brown5 = 5,
     /// Adds the denominators `k4 k5 k6`.
-    Rational8,
+    Rational8 = 8,
     /// Adds the thin prism `s1..s4`.
-    ThinPrism12,
+    ThinPrism12 = 12,
     /// Adds the tilted sensor `tauX tauY`.
-    Tilted14,
+    Tilted14 = 14,
 }
 
 impl Lens {
@@ -26,14 +26,7 @@ impl Lens {
 
     /// Number of free distortion parameters.
     pub fn free_count(self) -> usize {
-        match self {
-            Lens::Radial2 => 2,
-            Lens::Brown4 => 4,
-            Lens::Brown5 => 5,
-            Lens::Rational8 => 8,
-            Lens::ThinPrism12 => 12,
-            Lens::Tilted14 => 14,
-        }
+        self as usize
     }
 
     /// Length of the distortion vector in files: one that OpenCV takes.
@@ -131,6 +124,16 @@ impl Camera {
         (miss.amax() < 1e-10).then_some(n)
     }
 
+    /// `fx fy cx cy k1 k2 ...`; the terms beyond the lens are zero.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+        [self.fx, self.fy, self.cx, self.cy].into_iter().chain(self.distortion)
+    }
+
+    /// One of these.
+    pub fn number(&self, at: usize) -> f64 {
+        self.numbers().nth(at).unwrap_or(0.0)
+    }
+
     /// Adds a step to `fx fy cx cy k1 k2 ...`, as many of them as it has.
     pub fn add(&mut self, step: &[f64]) {
         let Camera { fx, fy, cx, cy, distortion, .. } = self;
@@ -153,12 +156,21 @@ impl Camera {
 
 /// OpenCV's matrix of a tilted sensor, `[[R33, 0, -R13], [0, R33, -R23], [0, 0, 1]] R(tau_x, tau_y)`.
 pub fn tilt_matrix(tau_x: f64, tau_y: f64) -> Matrix3<f64> {
+    let [about_x, about_y] = tilts(tau_x, tau_y);
+    let r = about_y * about_x;
+    onto_tilted(&r, 1.0) * r
+}
+
+/// The turns of a tilted sensor about x and about y.
+pub fn tilts(tau_x: f64, tau_y: f64) -> [Matrix3<f64>; 2] {
     let (sx, cx) = tau_x.sin_cos();
     let (sy, cy) = tau_y.sin_cos();
-    let about_x = Matrix3::new(1.0, 0.0, 0.0, 0.0, cx, sx, 0.0, -sx, cx);
-    let about_y = Matrix3::new(cy, 0.0, -sy, 0.0, 1.0, 0.0, sy, 0.0, cy);
-    let r = about_y * about_x;
-    Matrix3::new(r[(2, 2)], 0.0, -r[(0, 2)], 0.0, r[(2, 2)], -r[(1, 2)], 0.0, 0.0, 1.0) * r
+    [Matrix3::new(1.0, 0.0, 0.0, 0.0, cx, sx, 0.0, -sx, cx), Matrix3::new(cy, 0.0, -sy, 0.0, 1.0, 0.0, sy, 0.0, cy)]
+}
+
+/// The matrix before `R` in [`tilt_matrix`]; its last element is zero in the derivative.
+pub fn onto_tilted(r: &Matrix3<f64>, last: f64) -> Matrix3<f64> {
+    Matrix3::new(r[(2, 2)], 0.0, -r[(0, 2)], 0.0, r[(2, 2)], -r[(1, 2)], 0.0, 0.0, last)
 }
 
 #[cfg(test)]

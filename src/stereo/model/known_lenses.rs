@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::{Corners, Side};
 use crate::linear_algebra::to_unit_diagonal;
-use crate::stereo::data::corner_noise::Noise;
+use crate::stereo::data::Noise;
 use crate::stereo::model::parameters::{CAMERA_NAMES, Layout};
 use crate::stereo::{Camera, Error, Lens, Rig};
 
@@ -36,18 +36,10 @@ impl KnownLenses {
     pub fn of_rig(rig: &Rig, sides: &[Side]) -> KnownLenses {
         let camera = |side: Side| sides.contains(&side).then(|| *rig.camera(side));
         let mut known = KnownLenses::of_cameras(Side::BOTH.map(camera));
-        let Some(stated) = &rig.covariance else { return known };
-        let numbers = known.numbers();
-        let places: Option<Vec<usize>> = numbers
-            .iter()
-            .map(|(side, at)| {
-                let name = format!("{}.{}", side.name(), CAMERA_NAMES[*at]);
-                stated.order.iter().position(|stated| *stated == name)
-            })
-            .collect();
-        let Some(places) = places else { return known };
-        let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| stated.matrix[(places[i], places[j])]);
-        if root(&covariance).is_some() {
+        let name = |(side, at): (Side, usize)| format!("{}.{}", side.name(), CAMERA_NAMES[at]);
+        let names: Vec<String> = known.numbers().into_iter().map(name).collect();
+        let covariance = rig.covariance.as_ref().and_then(|stated| stated.part(&names));
+        if let Some(covariance) = covariance.filter(|covariance| root(covariance).is_some()) {
             known.covariance = covariance;
             known.stated = Side::BOTH.map(|side| sides.contains(&side));
         }
@@ -75,19 +67,18 @@ impl KnownLenses {
 
     /// Both sides' together; where both know a side, the other's.
     pub fn and(self, other: KnownLenses) -> KnownLenses {
-        let takes_other = |side: Side| other.camera(side).is_some();
-        let cameras = Side::BOTH.map(|side| if takes_other(side) { other.camera(side) } else { self.camera(side) });
-        let stated = Side::BOTH.map(|side| if takes_other(side) { &other } else { &self }.stated[side as usize]);
-        let mut both = KnownLenses { stated, ..KnownLenses::of_cameras(cameras.map(|camera| camera.copied())) };
+        let from = |side: Side| if other.camera(side).is_some() { &other } else { &self };
+        let stated = Side::BOTH.map(|side| from(side).stated[side as usize]);
+        let cameras = Side::BOTH.map(|side| from(side).camera(side).copied());
+        let mut both = KnownLenses { stated, ..KnownLenses::of_cameras(cameras) };
         let numbers = both.numbers();
-        let place = |of: &KnownLenses, number: &(Side, usize)| of.numbers().iter().position(|n| n == number);
-        let from = |number: &(Side, usize)| if takes_other(number.0) { &other } else { &self };
+        let place = |number: &(Side, usize)| from(number.0).numbers().iter().position(|n| n == number);
         for (i, a) in numbers.iter().enumerate() {
             for (j, b) in numbers.iter().enumerate() {
                 // What two calibrations say is independent.
-                let same = std::ptr::eq(from(a), from(b));
-                let at = place(from(a), a).zip(place(from(a), b)).filter(|_| same);
-                both.covariance[(i, j)] = at.map_or(0.0, |at| from(a).covariance[at]);
+                let same = std::ptr::eq(from(a.0), from(b.0));
+                let at = place(a).zip(place(b)).filter(|_| same);
+                both.covariance[(i, j)] = at.map_or(0.0, |at| from(a.0).covariance[at]);
             }
         }
         both.pair_excess = self.pair_excess.max(other.pair_excess);
@@ -129,7 +120,7 @@ impl KnownLenses {
     }
 
     pub fn values(&self) -> DVector<f64> {
-        let value = |(side, at): (Side, usize)| self.camera(side).map_or(0.0, |camera| number(camera, at));
+        let value = |(side, at): (Side, usize)| self.camera(side).map_or(0.0, |camera| camera.number(at));
         DVector::from_iterator(self.covariance.nrows(), self.numbers().into_iter().map(value))
     }
 
@@ -148,7 +139,7 @@ impl KnownLenses {
     pub fn focal_direction(&self, side: Side) -> Option<DVector<f64>> {
         let camera = self.camera(side)?;
         let numbers = self.numbers();
-        let of = |(of, at): (Side, usize)| if of == side && at < 2 { number(camera, at) } else { 0.0 };
+        let of = |(of, at): (Side, usize)| if of == side && at < 2 { camera.number(at) } else { 0.0 };
         Some(DVector::from_iterator(numbers.len(), numbers.into_iter().map(of)))
     }
 
@@ -182,11 +173,6 @@ impl KnownLenses {
         let covariance = DMatrix::from_fn(n, n, |i, j| places[i].zip(places[j]).map_or(0.0, |at| self.covariance[at]));
         KnownLenses { covariance, cameras: swapped.cameras, stated: [self.stated[1], self.stated[0]], ..self.clone() }
     }
-}
-
-fn number(camera: &Camera, at: usize) -> f64 {
-    let Camera { fx, fy, cx, cy, distortion, .. } = camera;
-    [*fx, *fy, *cx, *cy].into_iter().chain(*distortion).nth(at).unwrap_or(0.0)
 }
 
 /// What moves a point at the corner of the picture by [`TOLERANCE`] times the focal length.

@@ -7,3 +7,7 @@ pub mod parameters;
 pub mod projection;
 pub mod rectification;
 pub mod rig;
+
+pub use known_lenses::KnownLenses;
+pub use parameters::{Layout, Shared, Values};
+pub use rig::Covariance;

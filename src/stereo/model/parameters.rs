@@ -47,6 +47,10 @@ impl Layout {
     /// Nothing shared is free: only the boards' poses are looked for.
     pub const POSES_ONLY: Layout = Layout { left: None, right: None, transform: false, shape: false };
 
+    /// All numbers of a rig, in their order.
+    pub const WHOLE_RIG: Layout =
+        Layout { left: Some(Lens::Tilted14), right: Some(Lens::Tilted14), transform: true, shape: false };
+
     /// The left camera alone.
     pub fn one_camera(lens: Lens) -> Layout {
         Layout { left: Some(lens), ..Layout::POSES_ONLY }
@@ -57,21 +61,19 @@ impl Layout {
         Layout { left: Some(lens), right: Some(lens), transform: true, shape }
     }
 
+    /// The lens of a camera whose numbers are free.
+    pub fn lens(&self, side: Side) -> Option<Lens> {
+        [self.left, self.right][side as usize]
+    }
+
     /// Free numbers of one camera.
     pub fn camera_count(&self, side: Side) -> usize {
-        let lens = match side {
-            Side::Left => self.left,
-            Side::Right => self.right,
-        };
-        lens.map_or(0, |lens| 4 + lens.free_count())
+        self.lens(side).map_or(0, |lens| 4 + lens.free_count())
     }
 
     /// Where a camera's numbers begin.
     pub fn camera_start(&self, side: Side) -> usize {
-        match side {
-            Side::Left => 0,
-            Side::Right => self.camera_count(Side::Left),
-        }
+        if side == Side::Left { 0 } else { self.camera_count(Side::Left) }
     }
 
     /// Where `right_from_left` begins.
@@ -107,9 +109,8 @@ impl Layout {
     /// Their values, in the same order; `right_from_left` as rotation vector and translation.
     pub fn numbers(&self, shared: &Shared) -> Vec<f64> {
         let mut numbers = Vec::with_capacity(self.count());
-        for (side, camera) in Side::BOTH.into_iter().zip([&shared.rig.left, &shared.rig.right]) {
-            let all = [camera.fx, camera.fy, camera.cx, camera.cy].into_iter().chain(camera.distortion);
-            numbers.extend(all.take(self.camera_count(side)));
+        for side in Side::BOTH {
+            numbers.extend(shared.rig.camera(side).numbers().take(self.camera_count(side)));
         }
         if self.transform {
             numbers.extend(crate::geometry::rotation_vector(&shared.rig.right_from_left).iter());

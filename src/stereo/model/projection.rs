@@ -6,7 +6,7 @@
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point2, Point3, Vector2, Vector3};
 
 use crate::stereo::Camera;
-use crate::stereo::model::camera::tilt_matrix;
+use crate::stereo::model::camera::{onto_tilted, tilt_matrix, tilts};
 
 /// Numbers of a camera: `fx fy cx cy`, then OpenCV's 14 distortion coefficients.
 pub const CAMERA_NUMBERS: usize = 18;
@@ -126,15 +126,11 @@ fn tilt(flat: Bent, tau_x: f64, tau_y: f64) -> Bent {
 fn tilt_matrix_slopes(tau_x: f64, tau_y: f64) -> (Matrix3<f64>, Matrix3<f64>) {
     let (sx, cx) = tau_x.sin_cos();
     let (sy, cy) = tau_y.sin_cos();
-    let about_x = Matrix3::new(1.0, 0.0, 0.0, 0.0, cx, sx, 0.0, -sx, cx);
-    let about_y = Matrix3::new(cy, 0.0, -sy, 0.0, 1.0, 0.0, sy, 0.0, cy);
+    let [about_x, about_y] = tilts(tau_x, tau_y);
     let about_x_slope = Matrix3::new(0.0, 0.0, 0.0, 0.0, -sx, cx, 0.0, -cx, -sx);
     let about_y_slope = Matrix3::new(-sy, 0.0, -cy, 0.0, 0.0, 0.0, cy, 0.0, -sy);
     let r = about_y * about_x;
-    let project = |r: &Matrix3<f64>, one: f64| {
-        Matrix3::new(r[(2, 2)], 0.0, -r[(0, 2)], 0.0, r[(2, 2)], -r[(1, 2)], 0.0, 0.0, one)
-    };
-    let slope = |r_slope: Matrix3<f64>| project(&r_slope, 0.0) * r + project(&r, 1.0) * r_slope;
+    let slope = |r_slope: Matrix3<f64>| onto_tilted(&r_slope, 0.0) * r + onto_tilted(&r, 1.0) * r_slope;
     (slope(about_y * about_x_slope), slope(about_y_slope * about_x))
 }
 
@@ -152,17 +148,6 @@ pub(crate) mod tests {
         let all = [-0.21, 0.13, 1.1e-3, -7e-4, 0.05, 0.02, -0.03, 0.004, 1e-3, -2e-4, 5e-4, 3e-4, 0.015, -0.02];
         camera.distortion[..lens.free_count()].copy_from_slice(&all[..lens.free_count()]);
         camera
-    }
-
-    /// The number of a camera, as `by_camera` counts them.
-    fn number(camera: &mut Camera, index: usize) -> &mut f64 {
-        match index {
-            0 => &mut camera.fx,
-            1 => &mut camera.fy,
-            2 => &mut camera.cx,
-            3 => &mut camera.cy,
-            i => &mut camera.distortion[i - 4],
-        }
     }
 
     /// Central differences with steps near the cube root of the rounding error are good to about 1e-9 of the value.
@@ -186,10 +171,13 @@ pub(crate) mod tests {
                 }
                 for index in 0..4 + lens.free_count() {
                     let step = if index < 4 { 1e-2 } else { 1e-5 };
-                    let (mut plus, mut minus) = (camera, camera);
-                    *number(&mut plus, index) += step;
-                    *number(&mut minus, index) -= step;
-                    let numeric = (plus.project(&point) - minus.project(&point)) / (2.0 * step);
+                    let changed = |by: f64| {
+                        let (mut changed, mut change) = (camera, [0.0; CAMERA_NUMBERS]);
+                        change[index] = by;
+                        changed.add(&change);
+                        changed.project(&point)
+                    };
+                    let numeric = (changed(step) - changed(-step)) / (2.0 * step);
                     let off = (numeric - analytic.by_camera[index]).norm();
                     assert!(off < DIFFERENCE * (1.0 + numeric.norm()), "{lens:?} number {index}: off by {off}");
                 }

@@ -39,6 +39,15 @@ pub struct Covariance {
     pub matrix: DMatrix<f64>,
 }
 
+impl Covariance {
+    /// That of some numbers, in their order. `None` where one of them is not in it.
+    pub fn part(&self, names: &[impl AsRef<str>]) -> Option<DMatrix<f64>> {
+        let place = |name: &str| self.order.iter().position(|own| own == name);
+        let places = names.iter().map(|name| place(name.as_ref())).collect::<Option<Vec<usize>>>()?;
+        Some(DMatrix::from_fn(places.len(), places.len(), |i, j| self.matrix[(places[i], places[j])]))
+    }
+}
+
 impl Rig {
     /// The camera of a side.
     pub fn camera(&self, side: Side) -> &Camera {
@@ -142,13 +151,8 @@ impl Rig {
 
     /// Pictures of another size than the calibration's were binned, cut or taken by other cameras.
     pub fn check_size(&self, corners: &Corners) -> Result<(), Error> {
-        self.check_picture_size(Side::Left, corners.left_size)?;
-        self.check_picture_size(Side::Right, corners.right_size)
-    }
-
-    /// The same for one picture's width and height, px.
-    pub fn check_picture_size(&self, side: Side, (found_width, found_height): (u32, u32)) -> Result<(), Error> {
-        self.camera(side).check_picture_size(side, (found_width, found_height))
+        self.left.check_picture_size(Side::Left, corners.left_size)?;
+        self.right.check_picture_size(Side::Right, corners.right_size)
     }
 
     /// Raw picture points, left and right, of a point in the left camera's frame, px.

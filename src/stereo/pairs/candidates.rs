@@ -4,11 +4,11 @@
 use rayon::prelude::*;
 
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 use crate::stereo::error::{Error, ONE_PICTURE};
-use crate::stereo::init::homography::{FEWEST_CORNERS, homography, pixel_pairs};
+use crate::stereo::init::homography::{self, FEWEST_CORNERS};
 use crate::stereo::init::single_camera::{self, OneCamera};
-use crate::stereo::model::known_lenses::KnownLenses;
+use crate::stereo::model::KnownLenses;
 use crate::stereo::pairs::discarded::too_few_pairs;
 use crate::stereo::pairs::{Cause, DiscardedPair, fewest_pairs};
 
@@ -36,24 +36,23 @@ impl Candidates {
         let mut views = Vec::new();
         let fewest = if corners.board.is_coded() { 0 } else { FEWEST_CORNERS.max(fewest_corners(&corners.board)) };
         for (i, pair) in corners.pairs.iter().enumerate() {
-            if let Some(first) = corners.pairs[..i].iter().find(|first| same_corners(first, pair)) {
-                let reason = format!("the same pictures as pair {}", first.pair);
-                discarded.push(DiscardedPair::new(&pair.pair, Cause::Duplicate, reason));
-                continue;
-            }
-            if one_picture(pair) {
-                let reason = format!("{ONE_PICTURE}: both cameras need their own");
+            let is_same = |first: &&PairCorners| same(&first.left, &pair.left) && same(&first.right, &pair.right);
+            let first = corners.pairs[..i].iter().find(is_same);
+            let again = first.map(|first| format!("the same pictures as pair {}", first.pair));
+            let is_one = !pair.left.is_empty() && same(&pair.left, &pair.right);
+            let one = is_one.then(|| format!("{ONE_PICTURE}: both cameras need their own"));
+            if let Some(reason) = again.or(one) {
                 discarded.push(DiscardedPair::new(&pair.pair, Cause::Duplicate, reason));
                 continue;
             }
             let view = View::new(&corners.board, pair, fewest);
             let [left, right] = Side::BOTH.map(|side| view.active(side).count());
             let is_enough = if corners.board.is_coded() { tells_a_pose(&view) } else { left.min(right) >= fewest };
-            if !is_enough {
+            if is_enough {
+                views.push(view);
+            } else {
                 let reason = too_few_corners(pair, [left, right]);
                 discarded.push(DiscardedPair::new(&view.pair, Cause::NoBoard, reason));
-            } else {
-                views.push(view);
             }
         }
         let fewest_pairs = fewest_pairs(known);
@@ -99,21 +98,11 @@ fn too_few_corners(pair: &PairCorners, counting: [usize; 2]) -> String {
 
 /// True where one of the pictures tells how the board lies; whatever the other one shows then counts as well.
 fn tells_a_pose(view: &View) -> bool {
-    Side::BOTH.into_iter().any(|side| homography(&pixel_pairs(view.active(side))).is_some())
-}
-
-/// True for corners of the same pictures.
-fn same_corners(a: &PairCorners, b: &PairCorners) -> bool {
-    same(&a.left, &b.left) && same(&a.right, &b.right)
-}
-
-/// True where both sides of a pair are one picture.
-fn one_picture(pair: &PairCorners) -> bool {
-    !pair.left.is_empty() && same(&pair.left, &pair.right)
+    Side::BOTH.into_iter().any(|side| homography::of_picture(view, side).is_some())
 }
 
 /// True for corners of one picture: no two pictures have the same noise.
-fn same(a: &[Corner], b: &[Corner]) -> bool {
+pub fn same(a: &[Corner], b: &[Corner]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.px == b.px)
 }
 

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::imaging::{Side, Skipped};
 use crate::stereo::Error;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 
 /// What happened to a pair, or to the rig over the pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -130,9 +130,6 @@ impl DiscardedPair {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PictureCorners {
     pub pair: String,
-    /// Which of its pictures.
-    #[serde(skip)]
-    pub side: Side,
     /// Corners that imaging relies on.
     pub seen: usize,
     /// How many of them lie too far from the rig's prediction for their own scatter.
@@ -156,7 +153,7 @@ impl Discarded {
         let pictures = used.iter().flat_map(|view| {
             Side::BOTH.map(|side| {
                 let seen = view.observations.iter().filter(|o| o.side == side).count();
-                PictureCorners { pair: view.pair.clone(), side, seen, rejected: seen - view.active(side).count() }
+                PictureCorners { pair: view.pair.clone(), seen, rejected: seen - view.active(side).count() }
             })
         });
         Discarded { pairs_in_all: used.len() + pairs.len(), pictures: pictures.collect(), pairs }

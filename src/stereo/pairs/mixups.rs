@@ -11,16 +11,14 @@ use rayon::prelude::*;
 use crate::geometry::Transform;
 use crate::imaging::{Board, Side};
 use crate::stereo::Rig;
+use crate::stereo::data::View;
 use crate::stereo::data::residuals::median_px;
-use crate::stereo::data::view::View;
 use crate::stereo::init::board_pose;
 use crate::stereo::init::single_camera::as_left;
-use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::pairs::Cause;
-use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::solve::levenberg_marquardt::{self, Search};
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::solve::levenberg_marquardt::Search;
+use crate::stereo::solve::{Loss, Priors, Problem};
 
 /// Corners of a picture that are enough to try an idea on.
 const ENOUGH_CORNERS: usize = 40;
@@ -45,9 +43,6 @@ pub struct Series<'a> {
     pub limit_px: f64,
 }
 
-/// The poses that each of a pair's pictures gives the board alone, as `left_from_board` on the common rig.
-pub type Alone = [Option<Transform>; 2];
-
 /// What was mixed up in each of these pairs, where something was: with it undone the pair fits the rig of the others.
 pub fn explain(series: &Series, strays: &[usize]) -> Vec<Option<(Cause, String)>> {
     if strays.is_empty() {
@@ -55,7 +50,7 @@ pub fn explain(series: &Series, strays: &[usize]) -> Vec<Option<(Cause, String)>
     }
     let views: Vec<View> = series.views.iter().map(|view| view.thinned(ENOUGH_CORNERS)).collect();
     let scene = Scene { series, views };
-    let alone: Vec<Alone> = scene.views.par_iter().map(|view| series.alone(view)).collect();
+    let alone: Vec<Alone> = scene.views.par_iter().map(|view| board_pose::of_each_alone(series.shared, view)).collect();
     strays.par_iter().map(|&i| scene.files(i).or_else(|| scene.partner(i, &alone))).collect()
 }
 
@@ -92,40 +87,34 @@ fn mirror(p: Point2<f64>, width: f64, _: f64) -> Point2<f64> {
     Point2::new(width - 1.0 - p.x, p.y)
 }
 
+/// The poses that each of a pair's pictures gives the board alone, as `left_from_board` on the common rig.
+type Alone = [Option<Transform>; 2];
+
 /// A series with few corners a picture.
 struct Scene<'a> {
     series: &'a Series<'a>,
     views: Vec<View>,
 }
 
-impl Series<'_> {
-    /// The poses that each of a pair's pictures gives the board alone.
-    pub fn alone(&self, view: &View) -> Alone {
-        let of = |side| board_pose::fit(self.shared, &view.only(side), Loss::Cauchy(CAUCHY_WIDTH));
-        Side::BOTH.map(|side| of(side).map(|fit| fit.left_from_board))
-    }
-}
-
 impl Scene<'_> {
     /// True where the view fits on a rig, within a share of the limit, in one of the numberings that the board's outline allows.
     fn fits(&self, shared: &Shared, view: &View, share: f64) -> bool {
         let limit = share * self.series.limit_px;
-        self.series.board.turns_of_outline().into_iter().any(|quarters| {
-            let mut turned = view.clone();
-            turned.turn_right(self.series.board, quarters);
-            misfit_px(shared, &turned).is_some_and(|(px, _)| px <= limit)
-        })
+        self.series.board.turns_of_outline().into_iter().any(|quarters| self.fits_turned(shared, view, quarters, limit))
+    }
+
+    /// The same in the numbering after so many quarter turns of the right picture's, within so many px.
+    fn fits_turned(&self, shared: &Shared, view: &View, quarters: usize, limit_px: f64) -> bool {
+        let mut turned = view.clone();
+        turned.turn_right(self.series.board, quarters);
+        board_pose::fits_within(shared, &turned, limit_px)
     }
 
     /// What was done to the pair's own files.
     fn files(&self, i: usize) -> Option<(Cause, String)> {
         let (shared, view) = (self.series.shared, &self.views[i]);
-        let turned = |&quarters: &usize| {
-            let mut turned = view.clone();
-            turned.turn_right(self.series.board, quarters);
-            misfit_px(shared, &turned).is_some_and(|(px, _)| px <= self.series.limit_px)
-        };
-        if self.series.board.turns_of_outline().iter().filter(|&&quarters| quarters != 0).any(turned) {
+        let mut turns = self.series.board.turns_of_outline().into_iter().filter(|quarters| *quarters != 0);
+        if turns.any(|quarters| self.fits_turned(shared, view, quarters, self.series.limit_px)) {
             let reason = "the corners are numbered from another end of the board in the right picture than in the left";
             return Some((Cause::Numbering, reason.to_owned()));
         }
@@ -173,10 +162,8 @@ impl Scene<'_> {
         let Some(pose) = board_pose::of_picture(&shared, &view, Side::Left) else { return false };
         let layout = Layout::one_camera(camera.lens);
         let priors = Priors::of_one_camera(&camera, self.series.board.diagonal_mm());
-        let (loss, search) = (Loss::Cauchy(CAUCHY_WIDTH), Search::ROUGH);
-        let start = Values { shared, poses: vec![pose] };
-        let views = std::slice::from_ref(&view);
-        let found = levenberg_marquardt::solve_with(views, &layout, &priors, start, loss, search).values;
+        let start = Problem { views: vec![view.clone()], values: Values { shared, poses: vec![pose] }, priors };
+        let found = start.search(&layout, Loss::Cauchy, Search::ROUGH).values;
         let left_px = found.poses.first().and_then(|pose| median_px(&found.shared, pose, &view, Side::Left));
         left_px.is_some_and(|px| px <= self.series.limit_px)
     }
@@ -191,11 +178,11 @@ impl Scene<'_> {
                 .filter_map(|j| Some(((alone[j][other as usize]?.translation.vector - here).norm(), j)))
                 .collect();
             others.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let home = others.into_iter().take(NEAREST).map(|(_, j)| j).find(|&j| {
-                let mut mixed = self.views[i].only(side);
-                mixed.observations.extend(self.views[j].only(other).observations);
-                self.fits(self.series.shared, &mixed, 1.0)
-            })?;
+            let home = others
+                .into_iter()
+                .take(NEAREST)
+                .map(|(_, j)| j)
+                .find(|&j| self.fits(self.series.shared, &self.views[i].paired(side, &self.views[j]), 1.0))?;
             let reason = format!(
                 "the pictures do not belong together: the {} one was taken at the same time as the {} one of pair {}",
                 side.name(),

@@ -2,14 +2,13 @@
 
 pub mod candidates;
 pub mod discarded;
-pub mod misfit;
 mod mixups;
 mod moved;
 pub mod numbering;
 pub mod open_numbers;
 pub mod series;
 
-use crate::stereo::model::known_lenses::KnownLenses;
+use crate::stereo::model::KnownLenses;
 
 pub use discarded::{Cause, Discarded, DiscardedPair, PictureCorners, Standing};
 

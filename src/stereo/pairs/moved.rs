@@ -10,14 +10,12 @@ use nalgebra::Vector3;
 
 use crate::geometry::rotation_vector;
 use crate::statistics::median;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
 use crate::stereo::init::board_pose;
-use crate::stereo::model::parameters::Shared;
+use crate::stereo::model::Shared;
 use crate::stereo::pairs::Cause;
-use crate::stereo::pairs::misfit::misfit_px;
 use crate::stereo::pairs::mixups::Series;
 use crate::stereo::pairs::numbering::renumbered;
-use crate::stereo::solve::robust_loss::Loss;
 
 /// Pairs that usually miss their rig by so many times what each camera leaves of its own pictures were not taken at one moment.
 const TIMES: f64 = 3.0;
@@ -92,12 +90,12 @@ fn other_board(share: f64, baseline_mm: f64, shown_again: bool) -> String {
 
 fn apart(series: &Series, i: usize, missed_px: Option<f64>) -> Option<Apart> {
     let view = &series.views[i];
-    let [left, right] = series.alone(view);
+    let [left, right] = board_pose::of_each_alone(series.shared, view);
     let (left, right) = left.zip(right)?;
     let way_mm = right.translation.vector - left.translation.vector;
     let centre = series.shared.rig.right_from_left.inverse().translation.vector;
     let (larger, share) = of_best_size(series.shared, view, way_mm.dot(&centre) / centre.norm_squared());
-    let fits = missed_px.is_some() && misfit_px(series.shared, &larger).is_some_and(|(px, _)| px <= series.limit_px);
+    let fits = missed_px.is_some() && board_pose::fits_within(series.shared, &larger, series.limit_px);
     let turn = |quarters| rotation_vector(&(right * renumbered(quarters) * left.inverse())).norm();
     let turned_rad = series.board.turns_of_outline().into_iter().map(turn).fold(f64::INFINITY, f64::min);
     Some(Apart { way_mm, turned_rad, larger: fits.then_some(share) })
@@ -110,7 +108,7 @@ fn of_best_size(shared: &Shared, view: &View, start: f64) -> (View, f64) {
         sized.observations.iter_mut().for_each(|o| o.board_mm *= 1.0 + share);
         sized
     };
-    let cost = |share: f64| board_pose::fit(shared, &sized(share), Loss::Squared).map_or(f64::INFINITY, |fit| fit.cost);
+    let cost = |share: f64| board_pose::least_cost(shared, &sized(share)).unwrap_or(f64::INFINITY);
     let (mut share, mut width) = (start, 0.5 * start.abs());
     // Near its minimum the cost is a parabola in the share.
     for _ in 0..5 {

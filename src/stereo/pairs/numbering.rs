@@ -11,12 +11,13 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::Vector3;
 
 use crate::geometry::{Transform, rotation_vector, transform};
-use crate::imaging::Board;
+use crate::imaging::{Board, PairCorners};
+use crate::statistics::median;
 use crate::stereo::Side;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{Noise, View};
 use crate::stereo::init::board_pose;
-use crate::stereo::init::relative_pose::{agreed_transform, deviation};
-use crate::stereo::model::parameters::Shared;
+use crate::stereo::init::homography::FEWEST_CORNERS;
+use crate::stereo::model::Shared;
 
 /// What a board's pose is multiplied with when its corners are renumbered by [`View::turn_right`].
 pub fn renumbered(quarters: usize) -> Transform {
@@ -30,6 +31,17 @@ pub fn on_rig(shared: &Shared, board: &Board, view: &View) -> Option<usize> {
     let (left, right) = (left?, right?);
     let angle = |quarters: usize| rotation_vector(&(right * renumbered(quarters) * left.inverse())).norm();
     board.turns_left_open().into_iter().min_by(|a, b| angle(*a).total_cmp(&angle(*b)))
+}
+
+/// A pair's corners, weighed by their noise where it is known, and numbered as a rig has it: how the cameras stand decides between numberings
+/// that the pictures leave open.
+pub fn seen_on_rig(shared: &Shared, board: &Board, pair: &PairCorners, noise: Option<&Noise>) -> View {
+    let mut view = View::new(board, pair, FEWEST_CORNERS);
+    if let Some(noise) = noise {
+        noise.apply(std::slice::from_mut(&mut view));
+    }
+    view.turn_right(board, on_rig(shared, board, &view).unwrap_or(0));
+    view
 }
 
 /// Where the right camera stands as most pairs have it, and the turn of each pair's right numbering that agrees with it.
@@ -50,6 +62,26 @@ pub fn agreed(
     };
     let of_pairs = poses.iter().map(|pair| pair.as_ref().and_then(nearest).unwrap_or(0)).collect();
     Some((right_from_left, of_pairs))
+}
+
+/// How far two rigs are apart: the angle between the rotations plus the distance of the translations in units of the
+/// boards' distance.
+fn deviation(a: &Transform, b: &Transform, distance_mm: f64) -> f64 {
+    rotation_vector(&(a.inverse() * b)).norm()
+        + (a.translation.vector - b.translation.vector).norm() / distance_mm.max(f64::MIN_POSITIVE)
+}
+
+/// The `right_from_left` that the pairs agree on: the one whose deviation from all pairs is smallest in the median. A pair may
+/// offer several (a board that looks the same after a half turn); its nearest counts.
+fn agreed_transform(choices: &[Vec<Transform>], distance_mm: f64) -> Option<Transform> {
+    let off = |a: &Transform| {
+        let nearest = |pair: &Vec<Transform>| {
+            pair.iter().map(|b| deviation(a, b, distance_mm)).min_by(f64::total_cmp).unwrap_or(f64::INFINITY)
+        };
+        // Boards that are all seen alike leave two equal answers: cameras side by side are rolled less than a half turn.
+        median(choices.iter().map(nearest)).unwrap_or(f64::INFINITY) + 1e-3 * rotation_vector(a).norm()
+    };
+    choices.iter().flatten().min_by(|a, b| off(a).total_cmp(&off(b))).copied()
 }
 
 #[cfg(test)]

@@ -10,11 +10,11 @@ use rayon::prelude::*;
 use crate::imaging::corners::OpenPair;
 use crate::imaging::{Board, Corners, PairCorners};
 use crate::stereo::Rig;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
+use crate::stereo::init::board_pose::misfit_px;
+use crate::stereo::model::Shared;
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::parameters::Shared;
 use crate::stereo::pairs::candidates::Candidates;
-use crate::stereo::pairs::misfit::misfit_px;
 use crate::stereo::pairs::series;
 use crate::stereo::select::options::Options;
 

@@ -12,19 +12,14 @@ use rayon::prelude::*;
 use crate::geometry::Transform;
 use crate::imaging::{Side, Skipped};
 use crate::statistics::median;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::residuals;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
+use crate::stereo::init::board_pose::misfit_px;
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::discarded::too_few_pairs;
-use crate::stereo::pairs::misfit::misfit_px;
-use crate::stereo::pairs::{DiscardedPair, mixups, moved, numbering};
-use crate::stereo::solve::levenberg_marquardt::{self, Search};
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::Problem;
-use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::pairs::{Cause, DiscardedPair, mixups, moved, numbering};
+use crate::stereo::solve::{Priors, Problem};
 use crate::stereo::{Error, Lens, Rig};
 
 /// A pair that misses the rig by so many times what pairs usually do is not one of them.
@@ -87,29 +82,21 @@ pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
         members.extend(&runs_kept);
         members.sort_unstable();
     }
-    let is_out = |i: &usize| !runs_kept.contains(i);
-    let open: Vec<(usize, Option<f64>)> = strays
-        .iter()
-        .zip(&mixed_up)
-        .filter(|(i, why)| why.is_none() && is_out(i))
-        .map(|(&i, _)| (i, misfits[i].map(|(px, _)| px)))
-        .collect();
-    let mut moved = moved::explain(&series, &open, usual_px).into_iter();
-    let discarded: Vec<DiscardedPair> = strays
-        .iter()
-        .zip(mixed_up)
-        .filter(|(i, _)| is_out(i))
-        .filter_map(|(&i, reason)| Some((i, reason.or_else(|| moved.next())?)))
-        .map(|(i, (cause, reason))| DiscardedPair::new(&views[i].pair, cause, reason))
-        .collect();
+    let out: Vec<_> = strays.into_iter().zip(mixed_up).filter(|(i, _)| !runs_kept.contains(i)).collect();
+    let open = out.iter().filter(|(_, why)| why.is_none()).map(|(i, _)| (*i, misfits[*i].map(|(px, _)| px)));
+    let mut moved = moved::explain(&series, &open.collect::<Vec<_>>(), usual_px).into_iter();
+    let discard = |(i, why): (usize, Option<(Cause, String)>)| {
+        let (cause, reason) = why.or_else(|| moved.next())?;
+        Some(DiscardedPair::new(&views[i].pair, cause, reason))
+    };
+    let discarded: Vec<DiscardedPair> = out.into_iter().filter_map(discard).collect();
     check(candidates, &misfits, usual_px, &members, &discarded)?;
     let values = Values { shared, poses: members.iter().filter_map(|&i| Some(misfits[i]?.1)).collect() };
     let views = members.iter().map(|&i| views[i].clone()).collect();
     let mut discarded: Vec<DiscardedPair> = discarded.into_iter().chain(candidates.discarded.iter().cloned()).collect();
     discarded.sort_by(|a, b| a.pair.cmp(&b.pair));
-    let runs = runs_kept.len();
-    let alone_px = alone_px_of(candidates);
-    Ok(Series { problem: Problem { views, values, priors }, discarded, runs, alone_px })
+    let (problem, runs) = (Problem { views, values, priors }, runs_kept.len());
+    Ok(Series { problem, discarded, runs, alone_px: alone_px_of(candidates) })
 }
 
 /// The pairs with the numbering that they agree on, and the rig in the middle of their own.
@@ -148,20 +135,17 @@ fn bundle(
     start: &Shared,
     priors: &Priors,
 ) -> Result<Shared, Error> {
-    let mut seen: Vec<View> = members.iter().map(|&i| views[i].clone()).collect();
     let poses = members.iter().filter_map(|&i| Some(misfits[i]?.1)).collect();
-    let mut values = Values { shared: start.clone(), poses };
-    let layout = Layout::rig(FIRST_LENS, false);
-    values.shared.rig.left.lens = FIRST_LENS;
-    values.shared.rig.right.lens = FIRST_LENS;
+    let values = Values { shared: start.clone(), poses };
+    let views = members.iter().map(|&i| views[i].clone()).collect();
+    let mut problem = Problem { views, values, priors: priors.clone() };
+    let rig = &mut problem.values.shared.rig;
+    (rig.left.lens, rig.right.lens) = (FIRST_LENS, FIRST_LENS);
     // Twice: the scatter is known only after the first solution.
     for _ in 0..2 {
-        let left = residuals::active(&seen, &values).ok_or_else(Error::undetermined)?;
-        Noise::from_median(&left).apply(&mut seen);
-        let loss = Loss::Cauchy(CAUCHY_WIDTH);
-        values = levenberg_marquardt::solve_with(&seen, &layout, priors, values, loss, Search::ROUGH).values;
+        problem.search_roughly(&Layout::rig(FIRST_LENS, false)).ok_or_else(Error::undetermined)?;
     }
-    Ok(values.shared)
+    Ok(problem.values.shared)
 }
 
 /// Which of these pairs are a run of two or more at the beginning or at the end of the series, with poses on the rig.

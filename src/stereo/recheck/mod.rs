@@ -16,23 +16,18 @@ use serde::Serialize;
 use crate::difference::{Difference, SEEN, TOLD_APART};
 use crate::imaging::{Board, Corners, Skipped};
 use crate::stereo::Error;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{Noise, View, in_use};
 use crate::stereo::findings::hypothesis::{self, Hypothesis};
-use crate::stereo::init::board_pose;
-use crate::stereo::init::homography::FEWEST_CORNERS;
+use crate::stereo::init::board_pose::{self, misfit_px};
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::known_lenses::KnownLenses;
-use crate::stereo::model::parameters::{Layout, Shared, Values};
 use crate::stereo::model::rig::Rig;
-use crate::stereo::pairs::misfit::misfit_px;
+use crate::stereo::model::{KnownLenses, Layout, Shared, Values};
 use crate::stereo::pairs::{Cause, numbering};
 use crate::stereo::select::model_comparison::Trial;
 use crate::stereo::select::stated_uncertainty::{scatter_beside, step};
 use crate::stereo::solve::normal_equations;
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::uncertainty;
+use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::volume::Volume;
 use crate::stereo::volume::lengths::{VolumeLengths, long_mm};
 
@@ -56,7 +51,7 @@ pub struct Before {
     pub pair_excess: f64,
     /// How many pairs with poses of their own made it, where its file says so.
     pub pairs: Option<usize>,
-    /// The volume that it was checked for.
+    /// The volume that it was checked for; that of the new boards where its file does not say.
     pub volume: Option<Volume>,
 }
 
@@ -139,21 +134,19 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     });
 
     let length_mm = long_mm(&corners.board);
-    let lengths = VolumeLengths::of_volume(&before.rig, &before.volume_of(&trial, &solved.problem.views), length_mm);
-    let moves = |step: &DVector<f64>| {
-        let whole = step.clone().resize_vertically(layout.count(), 0.0);
-        lengths.changes_by_step_mm(&layout, &whole).into_iter().fold(0.0, |most: f64, mm| most.max(mm.abs()))
-    };
+    let views = &solved.problem.views;
+    let volume = before.volume.clone().unwrap_or_else(|| Volume::of_boards(&trial.values, views));
+    let lengths = VolumeLengths::of_volume(&before.rig, &volume, length_mm);
+    let moves =
+        |step: &DVector<f64>| lengths.most_changed_mm(&layout, &step.clone().resize_vertically(layout.count(), 0.0));
     let compared = Layout { shape: false, ..layout };
     let hypotheses = hypothesis::all(&compared, &before.rig);
-    let views = &solved.problem.views;
-    let corner_count = views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count();
     let looks = Looks {
         difference: &difference,
         from_old: from_old.as_ref(),
         layout: &compared,
         hypotheses: &hypotheses,
-        corners: corner_count,
+        corners: in_use(views).count(),
     };
     let of_cause = |h| looks.of_cause(h, &moves);
     let causes = hypotheses.iter().map(of_cause).collect::<Option<Vec<_>>>().ok_or_else(Error::undetermined)?;
@@ -165,7 +158,7 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
         None => 0.0,
     };
     let seen_mm = causes.iter().map(|cause| cause.seen_mm).fold(0.0, f64::max);
-    let pairs = solved.problem.views.iter().map(|view| view.pair.clone()).collect();
+    let pairs = views.iter().map(|view| view.pair.clone()).collect();
     Ok(Recheck { pairs, skipped, length_mm, causes, change, effect_mm, seen_mm })
 }
 
@@ -187,7 +180,7 @@ fn step_from_old(solved: &Solved, rig: &Rig, layout: &Layout) -> Option<(DVector
     let mut problem = solved.problem.clone();
     problem.values.shared.rig = rig.clone();
     for (pose, view) in problem.values.poses.iter_mut().zip(&problem.views) {
-        *pose = board_pose::follow(&problem.values.shared, view, *pose)?.left_from_board;
+        *pose = board_pose::follow(&problem.values.shared, view, *pose)?;
     }
     let (matrix, gradient) = normal_equations::eliminate(&problem.equations(layout)?, 0.0)?;
     Some((-normal_equations::solve_scaled(&matrix, &gradient)?, uncertainty::invert(&matrix)?))
@@ -199,12 +192,7 @@ fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>) {
     let mut skipped = corners.skipped.clone();
     let (mut views, mut poses) = (Vec::new(), Vec::new());
     for pair in &corners.pairs {
-        let mut seen = [View::new(&corners.board, pair, FEWEST_CORNERS)];
-        if let Some(noise) = &before.noise {
-            noise.apply(&mut seen);
-        }
-        let [mut view] = seen;
-        view.turn_right(&corners.board, numbering::on_rig(&shared, &corners.board, &view).unwrap_or(0));
+        let view = numbering::seen_on_rig(&shared, &corners.board, pair, before.noise.as_ref());
         match misfit_px(&shared, &view) {
             Some((_, pose)) => {
                 views.push(view);
@@ -224,16 +212,7 @@ fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>) {
 impl Before {
     /// The covariance of cameras and transform in the layout's order. `None` where the calibration has none of one of its numbers.
     fn covariance(&self, layout: &Layout) -> Option<DMatrix<f64>> {
-        let stated = self.rig.covariance.as_ref()?;
-        let names = layout.names();
-        let place = |name: &String| stated.order.iter().position(|stated| stated == name);
-        let places = names[..layout.shape_start()].iter().map(place).collect::<Option<Vec<usize>>>()?;
-        Some(DMatrix::from_fn(places.len(), places.len(), |i, j| stated.matrix[(places[i], places[j])]))
-    }
-
-    /// The volume of the calibration; where its file does not say, that of the new boards.
-    fn volume_of(&self, trial: &Trial, views: &[View]) -> Volume {
-        self.volume.clone().unwrap_or_else(|| Volume::of_boards(&trial.values, views))
+        self.rig.covariance.as_ref()?.part(&layout.names()[..layout.shape_start()])
     }
 }
 
@@ -259,7 +238,7 @@ impl Looks<'_> {
         let seen = (self.difference.level(self.chance()) + SEEN) * sigma;
         Some(CauseSeen {
             cause: h.cause,
-            words: h.words.clone(),
+            words: h.words.to_owned(),
             amount,
             sigma,
             unit: h.unit,

@@ -9,14 +9,13 @@
 use nalgebra::{DMatrix, DVector, Point3};
 
 use crate::geometry::Transform;
-use crate::stereo::data::view::View;
-use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::data::View;
+use crate::stereo::model::{Layout, Shared};
 use crate::stereo::solve::normal_equations::{self, Equations};
-use crate::stereo::solve::priors::Information;
 use crate::stereo::solve::uncertainty::{self, worst_focal_sigma};
 
 /// Folds over the pairs; with fewer pairs each is a fold of its own.
-pub const FOLDS: usize = 10;
+const FOLDS: usize = 10;
 
 /// Poses whose corners lie closer together than this share of the board's diagonal (root mean square) are one pose: between them the
 /// perspective changes by less than corners scatter.
@@ -24,22 +23,19 @@ const SAME_POSE: f64 = 0.03;
 
 /// The group of every pair: pairs with nearly the same pose are one group, numbered in the order of their first pairs.
 pub fn groups(views: &[View], poses: &[Transform]) -> Vec<usize> {
-    let edge = edge_mm(views);
-    let limit_mm = 2.0 * SAME_POSE * edge[0].hypot(edge[1]);
-    merge(&distances_mm(edge, poses), |_, _, distance_mm| distance_mm < limit_mm, 1)
+    let (distances, limit_mm) = distances_mm(views, poses);
+    merge(&distances, |_, _, distance_mm| distance_mm < limit_mm, 1)
 }
 
-/// The fold of every pair, at most `most` of them: blocks of similar poses, no fold with more than about twice its share of the pairs.
-pub fn folds(views: &[View], poses: &[Transform], most: usize) -> Vec<usize> {
+/// The fold of every pair, at most [`FOLDS`] of them: blocks of similar poses, no fold with more than about twice its share of the pairs.
+pub fn folds(views: &[View], poses: &[Transform]) -> Vec<usize> {
     let count = poses.len();
-    let largest = 2 * count.div_ceil(most.max(1));
-    let edge = edge_mm(views);
-    let limit_mm = 2.0 * SAME_POSE * edge[0].hypot(edge[1]);
+    let largest = 2 * count.div_ceil(FOLDS);
+    let (distances, limit_mm) = distances_mm(views, poses);
     // More than a quarter of the pairs is no fold: what is left would be another calibration.
     let twins = |a: usize, b: usize, distance_mm: f64| distance_mm < limit_mm && 4 * (a + b) <= count;
     let fits = |a: usize, b: usize, distance_mm: f64| twins(a, b, distance_mm) || a + b <= largest;
-    let distances = distances_mm(edge, poses);
-    if count <= most { merge(&distances, twins, 1) } else { merge(&distances, fits, most) }
+    if count <= FOLDS { merge(&distances, twins, 1) } else { merge(&distances, fits, FOLDS) }
 }
 
 /// Joins the nearest two clusters (complete linkage) that `may` be joined, by their sizes and distance, until `enough` are left. Where
@@ -69,19 +65,16 @@ fn merge(distances: &DMatrix<f64>, may: impl Fn(usize, usize, f64) -> bool, enou
     of
 }
 
-/// Root mean square distance between any two poses of the board's outermost corners, mm.
-fn distances_mm([x, y]: [f64; 2], poses: &[Transform]) -> DMatrix<f64> {
+/// Root mean square distance between any two poses of the outermost corners that were seen, mm, and that up to which two are one pose.
+fn distances_mm(views: &[View], poses: &[Transform]) -> (DMatrix<f64>, f64) {
+    let all = views.iter().flat_map(|view| &view.observations);
+    let [x, y] = all.fold([0.0, 0.0], |[x, y]: [f64; 2], o| [x.max(o.board_mm.x.abs()), y.max(o.board_mm.y.abs())]);
     let outer = [(-x, -y), (x, -y), (-x, y), (x, y)].map(|(x, y)| Point3::new(x, y, 0.0));
-    DMatrix::from_fn(poses.len(), poses.len(), |i, j| {
+    let distances = DMatrix::from_fn(poses.len(), poses.len(), |i, j| {
         let squares = outer.iter().map(|at| (poses[i] * at - poses[j] * at).norm_squared()).sum::<f64>();
         (squares / outer.len() as f64).sqrt()
-    })
-}
-
-/// Where the outermost corners that were seen lie on the board, mm from its middle.
-fn edge_mm(views: &[View]) -> [f64; 2] {
-    let all = views.iter().flat_map(|view| &view.observations);
-    all.fold([0.0, 0.0], |[x, y]: [f64; 2], o| [x.max(o.board_mm.x.abs()), y.max(o.board_mm.y.abs())])
+    });
+    (distances, 2.0 * SAME_POSE * x.hypot(y))
 }
 
 /// How many folds an assignment has.
@@ -114,29 +107,18 @@ pub fn leave_out(
     let reduced: Option<Vec<(DMatrix<f64>, DVector<f64>)>> =
         pairs.map(|(curved, block)| Some((curved.reduced(0.0)?.0, block.reduced(0.0)?.1))).collect();
     let Some(reduced) = reduced else { return vec![None; count(fold_of)] };
-    (0..count(fold_of))
-        .map(|fold| without(&equations.prior, &reduced, layout, shared, |i| fold_of[i] != fold))
-        .map(|without| without.filter(|w| worst_focal_sigma(&w.covariance, layout, &shared.rig) <= focal_sigma))
-        .collect()
-}
-
-/// The calibration without some pairs. `None` where nothing holds the rest.
-fn without(
-    prior: &Information,
-    reduced: &[(DMatrix<f64>, DVector<f64>)],
-    layout: &Layout,
-    shared: &Shared,
-    keep: impl Fn(usize) -> bool,
-) -> Option<Without> {
-    let (mut matrix, mut gradient) = (prior.matrix.clone(), prior.gradient.clone());
-    for (_, (own, own_gradient)) in reduced.iter().enumerate().filter(|(i, _)| keep(*i)) {
-        matrix += own;
-        gradient += own_gradient;
-    }
-    let covariance = uncertainty::invert(&matrix)?;
-    let step = -normal_equations::solve_scaled(&matrix, &gradient)?;
-    let shared = layout.step(shared, step.as_slice());
-    Some(Without { step, covariance, shared })
+    let without = |fold: usize| {
+        let (mut matrix, mut gradient) = (equations.prior.matrix.clone(), equations.prior.gradient.clone());
+        for ((own, own_gradient), _) in reduced.iter().zip(fold_of).filter(|(_, of)| **of != fold) {
+            matrix += own;
+            gradient += own_gradient;
+        }
+        let covariance = uncertainty::invert(&matrix)?;
+        let step = -normal_equations::solve_scaled(&matrix, &gradient)?;
+        let is_told = worst_focal_sigma(&covariance, layout, &shared.rig) <= focal_sigma;
+        is_told.then(|| Without { shared: layout.step(shared, step.as_slice()), step, covariance })
+    };
+    (0..count(fold_of)).map(without).collect()
 }
 
 #[cfg(test)]
@@ -164,7 +146,10 @@ mod tests {
             let all = leave_out(&equations, &equations, &layout, &found.values.shared, &fold_of, WORST_FOCAL_SIGMA);
             for (fold, without) in all.iter().enumerate() {
                 let without = without.as_ref().unwrap();
-                let searched = found.problem().subset(|i| fold_of[i] != fold).refit(&layout).unwrap();
+                let mut others = found.problem();
+                others.views.remove(fold);
+                others.values.poses.remove(fold);
+                let searched = others.refit(&layout).unwrap();
                 let (step, search) = (layout.numbers(&without.shared), layout.numbers(&searched.shared));
                 for (i, name) in layout.names().iter().enumerate() {
                     let sigma = without.covariance[(i, i)].sqrt();
@@ -190,15 +175,15 @@ mod tests {
         // The seventh moved up by one.
         assert_eq!(of[3], of[7]);
         assert_eq!(count(&of), 8);
-        assert_eq!(folds(&seen, &poses, FOLDS), of);
+        assert_eq!(folds(&seen, &poses), of);
         // All alike: a fold of more than a quarter would leave another calibration.
         let same = vec![world.poses[0]; 12];
-        let of = folds(&seen, &same, FOLDS);
+        let of = folds(&seen, &same);
         let size = |fold| of.iter().filter(|f| **f == fold).count();
         assert!((0..count(&of)).all(|fold| (1..=3).contains(&size(fold))), "{of:?}");
         assert_eq!(count(&groups(&seen, &same)), 1);
         let many = World::new(35, 4);
-        let of = folds(&views(&many), &many.poses, FOLDS);
+        let of = folds(&views(&many), &many.poses);
         let size = |fold| of.iter().filter(|f| **f == fold).count();
         assert_eq!(count(&of), FOLDS);
         assert!((0..FOLDS).all(|fold| (1..=8).contains(&size(fold))), "{of:?}");

@@ -12,13 +12,13 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::difference::{Difference, SEEN, TOLD_APART};
 use crate::imaging::{Board, Side};
-use crate::stereo::model::known_lenses::KnownLenses;
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::data::in_use;
+use crate::stereo::model::{KnownLenses, Layout};
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::model_comparison::{Trial, gain_of_terms};
 use crate::stereo::select::options::{Choice, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
-use crate::stereo::solve::problem::Problem;
+use crate::stereo::solve::Problem;
 use crate::stereo::{Error, Rig};
 
 /// Chance that one of the four tests (all numbers, the focus of either side and of both) contradicts a lens that is right: one set of pairs in a
@@ -52,17 +52,23 @@ impl LensCheck {
     pub fn contradicts(&self) -> bool {
         self.chi_square > self.limit
     }
+
+    /// What to do where the pictures contradict the lenses.
+    pub fn remedy(&self) -> &'static str {
+        match self.causes.as_slice() {
+            [Cause::Exchanged] => {
+                "give each lens to the other camera: `--intrinsics FILE,left` and `--intrinsics FILE,right`"
+            }
+            _ => "give the lenses as they are now, or leave `--intrinsics` out and photograph more pairs",
+        }
+    }
 }
 
 /// What is free beside lenses that are known, and what is expected.
 pub fn choose(start: &Problem, board: &Board, known: &KnownLenses, options: &Options) -> Result<Choice, Error> {
     let lens = options.lens.unwrap_or(SIMPLEST);
     let problem = start_of(start, known);
-    let fit = |shape| {
-        let layout = known.layout(lens, shape);
-        problem.solve(&layout).map(|solved| (solved, layout))
-    };
-    let (mut solved, layout) = fit(options.shape.unwrap_or(true)).or_else(|_| fit(options.shape.unwrap_or(false)))?;
+    let (mut solved, layout) = problem.solve_bent_or_flat(options.shape, |shape| known.layout(lens, shape))?;
     let [scatter, _] =
         stated_uncertainty::scatter_beside(&solved, &layout, board, known.pair_excess, known.noise.as_ref());
     // Corners weigh by their noise alone; beside them, what is known counts by as much more as the pairs scatter beyond it.
@@ -82,10 +88,9 @@ pub fn choose(start: &Problem, board: &Board, known: &KnownLenses, options: &Opt
 /// The pairs with the known cameras to start from, and what is known of them.
 fn start_of(start: &Problem, known: &KnownLenses) -> Problem {
     let mut problem = Problem { priors: start.priors.knowing(known), ..start.clone() };
-    let rig = &mut problem.values.shared.rig;
-    for (side, camera) in [(Side::Left, &mut rig.left), (Side::Right, &mut rig.right)] {
-        if let Some(known) = known.camera(side) {
-            *camera = *known;
+    for side in Side::BOTH {
+        if let Some(camera) = known.camera(side) {
+            *problem.values.shared.rig.camera_mut(side) = *camera;
         }
     }
     problem
@@ -112,7 +117,7 @@ pub fn check(start: &Problem, known: &KnownLenses, layout: &Layout, board: &Boar
         covariance: DMatrix::from_fn(n, n, |i, j| scatter * trial.covariance[(places[i], places[j])]),
         pairs: known.pairs.unwrap_or(0).max(solved.problem.views.len()),
         scatter: beyond,
-        corners: solved.problem.views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count(),
+        corners: in_use(&solved.problem.views).count(),
     };
     let difference = pictures.difference(known)?;
     let (chi_square, limit) = contradiction(known, &difference);
@@ -186,18 +191,6 @@ struct Explanation {
     sides: Vec<Side>,
     /// Logarithm of its likelihood but for a constant, less what its numbers cost.
     evidence: f64,
-}
-
-impl LensCheck {
-    /// What to do where the pictures contradict the lenses.
-    pub fn remedy(&self) -> &'static str {
-        match self.causes.as_slice() {
-            [Cause::Exchanged] => {
-                "give each lens to the other camera: `--intrinsics FILE,left` and `--intrinsics FILE,right`"
-            }
-            _ => "give the lenses as they are now, or leave `--intrinsics` out and photograph more pairs",
-        }
-    }
 }
 
 /// The causes that explain the difference and are not told apart, the likeliest first.

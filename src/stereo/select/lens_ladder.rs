@@ -9,15 +9,14 @@
 //! [`crate::stereo::judge::lengths::model_disagreement`] says what is at stake.
 
 use crate::imaging::Board;
-use crate::stereo::board_pose::print_share::PrintShare;
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::board_pose::print_share::print_share;
+use crate::stereo::model::Layout;
 use crate::stereo::select::known_lenses;
 use crate::stereo::select::model_comparison::{Chance, LensScore, OF_PAIR, Trial, gain_of_terms, score, simplest};
 use crate::stereo::select::options::{Choice, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::{Problem, Solved};
 use crate::stereo::solve::uncertainty;
+use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Error, Lens};
 
 /// Chooses what is free, where it is not forced.
@@ -32,16 +31,12 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
         return Ok(Choice { layout, near: None, priors, scatter: None, scores: Vec::new() });
     }
     // Weights from a model that is at least as rich as most need; the comparison uses the same for all.
-    let fit = |shape| {
-        let layout = Layout::rig(SIMPLEST, shape);
-        start.solve(&layout).map(|solved| (solved, layout))
-    };
-    let (mut solved, layout) =
-        fit(forced_shape.unwrap_or(true)).or_else(|_| fit(forced_shape.unwrap_or(false))).map_err(|e| match e {
-            // Not even the simplest search ends: the pairs leave a valley, not a minimum.
-            Error::NotConverged { .. } => Error::undetermined(),
-            other => other,
-        })?;
+    let simple = start.solve_bent_or_flat(forced_shape, |shape| Layout::rig(SIMPLEST, shape));
+    let (mut solved, layout) = simple.map_err(|e| match e {
+        // Not even the simplest search ends: the pairs leave a valley, not a minimum.
+        Error::NotConverged { .. } => Error::undetermined(),
+        other => other,
+    })?;
     if let Some(wide) = of_wide_lens(start, &solved, &layout) {
         solved = wide;
     }
@@ -73,7 +68,7 @@ pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choic
 }
 
 fn print_excess(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
-    PrintShare::of(solved, board, layout).map_or(1.0, |print| print.excess)
+    print_share(solved, board, layout).map_or(1.0, |print| print.excess)
 }
 
 /// The corners as the richest lens weighs them with which the pairs tell how they scatter, what is expected beside pairs that scatter so, and

@@ -7,16 +7,13 @@ use crate::geometry::Transform;
 use crate::statistics::chi_square_quantile;
 use crate::stereo::Lens;
 use crate::stereo::data::residuals::residual_px;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{View, in_use};
 use crate::stereo::init::board_pose;
-use crate::stereo::model::parameters::{Layout, Shared, Values};
-use crate::stereo::select::cross_validation::{self, FOLDS};
+use crate::stereo::model::{Layout, Shared, Values};
+use crate::stereo::select::cross_validation;
 use crate::stereo::solve::levenberg_marquardt;
-use crate::stereo::solve::normal_equations::Equations;
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::problem::Problem;
-use crate::stereo::solve::robust_loss::Loss;
-use crate::stereo::solve::uncertainty::{self, WORST_FOCAL_SIGMA, determines_cameras};
+use crate::stereo::solve::uncertainty::{self, WORST_FOCAL_SIGMA, worst_focal_sigma};
+use crate::stereo::solve::{Equations, Loss, Priors, Problem};
 
 /// Standard errors by which a richer model must predict better: one is what half of the useless terms reach by chance when the
 /// best of several is taken.
@@ -82,7 +79,7 @@ pub struct Trial {
     /// Covariance of rig and shape.
     pub covariance: DMatrix<f64>,
     /// Sum of the squared whitened residuals of the pairs it was fitted to, and of what the lens misses of what is expected of lenses.
-    chi_square: f64,
+    pub chi_square: f64,
     /// How many corners they are.
     corners: usize,
     /// The held-out loss of each pair.
@@ -116,28 +113,17 @@ impl Trial {
         let views = &problem.views;
         let equations = levenberg_marquardt::equations(views, &layout, &problem.priors, &values, Loss::Squared)?;
         let covariance = uncertainty::of_equations(&equations)?.shared;
-        if !determines_cameras(&covariance, &layout, &values.shared.rig) {
-            return None;
-        }
-        let chi_square = 2.0 * equations.cost();
-        let corners = views.iter().flat_map(|view| &view.observations).filter(|o| o.active).count();
-        Some((
-            Trial {
-                layout,
-                values,
-                priors: problem.priors.clone(),
-                covariance,
-                chi_square,
-                corners,
-                by_pair: Vec::new(),
-            },
-            equations,
-        ))
-    }
-
-    /// Sum of the squared whitened residuals of the pairs it was fitted to.
-    pub fn chi_square(&self) -> f64 {
-        self.chi_square
+        let is_told = worst_focal_sigma(&covariance, &layout, &values.shared.rig) <= WORST_FOCAL_SIGMA;
+        let trial = Trial {
+            layout,
+            values,
+            priors: problem.priors.clone(),
+            covariance,
+            chi_square: 2.0 * equations.cost(),
+            corners: in_use(views).count(),
+            by_pair: Vec::new(),
+        };
+        is_told.then_some((trial, equations))
     }
 
     /// Logarithm of the determinant of the covariance. `None` where it has none.
@@ -184,18 +170,14 @@ impl Trial {
 pub fn gain_of_terms(priors: &Priors, richer: &Trial, simpler: &Trial, scatter: f64) -> Option<f64> {
     let added = (richer.layout.count() - simpler.layout.count()) as f64;
     let wider = 0.5 * (richer.log_volume()? - simpler.log_volume()? + added * scatter.ln());
-    let fall = 0.5 * (simpler.chi_square() - richer.chi_square()) / scatter;
+    let fall = 0.5 * (simpler.chi_square - richer.chi_square) / scatter;
     Some(fall + wider - priors.log_width(&richer.layout, &simpler.layout))
 }
 
 /// A lens calibrated with all pairs, and how it predicts pairs that it has not seen.
 pub fn score(problem: &Problem, lens: Lens, shape: bool) -> LensScore {
-    hold_out(problem, Layout::rig(lens, shape)).map_or(LensScore::untried(lens), |(trial, rms_px)| LensScore {
-        held_out_rms_px: Some(rms_px),
-        loss: Some(trial.loss()),
-        trial: Some(trial),
-        ..LensScore::untried(lens)
-    })
+    let (trial, held_out_rms_px) = hold_out(problem, Layout::rig(lens, shape)).unzip();
+    LensScore { model: lens.name(), held_out_rms_px, loss: trial.as_ref().map(Trial::loss), trial }
 }
 
 /// The model with all pairs and, fold by fold, on those it has not seen. `None` where the pairs do not determine it.
@@ -203,7 +185,7 @@ fn hold_out(problem: &Problem, layout: Layout) -> Option<(Trial, f64)> {
     // A lens that all pairs together do not determine is none.
     let (trial, equations) = Trial::with_equations(problem, layout)?;
     let views = &problem.views;
-    let fold_of = cross_validation::folds(views, &trial.values.poses, FOLDS);
+    let fold_of = cross_validation::folds(views, &trial.values.poses);
     let shared = &trial.values.shared;
     let rigs = cross_validation::leave_out(&equations, &equations, &layout, shared, &fold_of, WORST_FOCAL_SIGMA);
     let rigs = rigs.into_iter().map(|without| Some(without?.shared)).collect::<Option<Vec<Shared>>>()?;
@@ -224,10 +206,10 @@ struct Miss {
 
 /// What a rig leaves of a pair that it has not seen; `near` is a pose close to the pair's.
 fn miss(shared: &Shared, view: &View, near: Transform) -> Option<Miss> {
-    let fit = board_pose::follow(shared, view, near)?;
+    let left_from_board = board_pose::follow(shared, view, near)?;
     let mut sum = Miss { squares_px2: 0.0, corners: 0, loss: 0.0 };
     for o in view.observations.iter().filter(|o| o.active) {
-        let r = residual_px(shared, &fit.left_from_board, o)?;
+        let r = residual_px(shared, &left_from_board, o)?;
         sum.squares_px2 += r.norm_squared();
         sum.loss += o.whiten(r).norm_squared();
         sum.corners += 1;

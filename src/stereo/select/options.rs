@@ -1,10 +1,9 @@
 //! What may be forced or known of lens and board, and what was chosen.
 
 use crate::stereo::Lens;
-use crate::stereo::model::known_lenses::KnownLenses;
-use crate::stereo::model::parameters::{Layout, Values};
+use crate::stereo::model::{KnownLenses, Layout, Values};
 use crate::stereo::select::model_comparison::LensScore;
-use crate::stereo::solve::priors::Priors;
+use crate::stereo::solve::Priors;
 
 /// The lens of all cameras whose pictures do not ask for more. What hand-held pictures leave open of its terms is held by what is expected of
 /// lenses, so that nothing simpler is needed.

@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::Layout;
 use crate::stereo::solve::normal_equations::{Block, Equations};
 use crate::stereo::solve::uncertainty::invert;
 

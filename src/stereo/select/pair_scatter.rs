@@ -12,10 +12,10 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::Layout;
 use crate::stereo::select::cross_validation::Without;
 use crate::stereo::select::pair_motion;
-use crate::stereo::solve::normal_equations::Equations;
+use crate::stereo::solve::Equations;
 
 /// How the pairs scatter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -147,8 +147,7 @@ fn roots(covariance: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let values = DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| v.powf(p)));
         &eigen.eigenvectors * values * eigen.eigenvectors.transpose()
     };
-    let scaled = |m: DMatrix<f64>, of: &dyn Fn(f64) -> f64| DMatrix::from_diagonal(&scale.map(of)) * m;
-    let root = scaled(power(0.5), &|s| s);
+    let root = DMatrix::from_diagonal(&scale) * power(0.5);
     let inverse = power(-0.5) * DMatrix::from_diagonal(&scale.map(|s| 1.0 / s));
     Some((root, inverse))
 }

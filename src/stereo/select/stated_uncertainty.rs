@@ -10,16 +10,14 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::Board;
 use crate::statistics::chi_square_quantile;
-use crate::stereo::Lens;
-use crate::stereo::Rig;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::data::Noise;
+use crate::stereo::model::{Layout, Shared};
 use crate::stereo::select::cross_validation;
 use crate::stereo::select::model_comparison::{LensScore, Trial};
 use crate::stereo::select::pair_scatter::{Jackknife, PairScatter};
-use crate::stereo::solve::normal_equations::Equations;
-use crate::stereo::solve::problem::{Problem, Solved};
-use crate::stereo::solve::uncertainty::{Uncertainty, WORST_FOCAL_SIGMA};
+use crate::stereo::solve::uncertainty::WORST_FOCAL_SIGMA;
+use crate::stereo::solve::{Equations, Problem, Solved, Uncertainty};
+use crate::stereo::{Lens, Rig};
 
 /// Quantile of the normal distribution at whose level of chi-squared additional terms are more than chance: one clean set of pairs in two hundred
 /// has such a witness.
@@ -82,7 +80,7 @@ pub fn state(
 /// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs tell; at least that of the
 /// corners. `None` where the pairs do not tell how they scatter.
 pub fn told_scatter(solved: &Solved, layout: &Layout, board: &Board) -> Option<f64> {
-    let inflation = corner_scatter(solved, board);
+    let inflation = solved.inflation(board);
     let by_noise = solved.uncertainty(layout).ok()?.scaled(inflation);
     let ratio = scattered(solved, layout, &by_noise.shared, inflation, 1.0)?.2.ratio?;
     Some(inflation * ratio.max(1.0))
@@ -90,11 +88,7 @@ pub fn told_scatter(solved: &Solved, layout: &Layout, board: &Board) -> Option<f
 
 /// The same, by the corners alone where the pairs do not tell.
 pub fn excess_scatter(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
-    told_scatter(solved, layout, board).unwrap_or_else(|| corner_scatter(solved, board))
-}
-
-fn corner_scatter(solved: &Solved, board: &Board) -> f64 {
-    solved.neighbours(board).inflation() * solved.loss_factor
+    told_scatter(solved, layout, board).unwrap_or_else(|| solved.inflation(board))
 }
 
 /// Variance of the numbers over that of the weighted normal equations, by these pairs or as an earlier calibration of the rig knows it, whichever is
@@ -107,7 +101,7 @@ pub fn scatter_beside(
     noise: Option<&Noise>,
 ) -> [f64; 2] {
     let scatter = excess_scatter(solved, layout, board).max(pair_excess) * solved.noise_of(noise);
-    [scatter, scatter / corner_scatter(solved, board)]
+    [scatter, scatter / solved.inflation(board)]
 }
 
 /// The normal equations, the covariance of the shared numbers that allows for the pairs' scatter, and that scatter.
@@ -136,7 +130,7 @@ fn witnesses(problem: &Problem, layout: &Layout, richer: Vec<Layout>, factor: f6
         .filter_map(|richer| {
             let trial = Trial::new(problem, richer)?;
             let added = richer.count().checked_sub(layout.count())?;
-            let chi_square_fall = (chosen.chi_square() - trial.chi_square()) / factor;
+            let chi_square_fall = (chosen.chi_square - trial.chi_square) / factor;
             let step = step(layout, &chosen.values.shared, &trial.values.shared);
             let rig = trial.values.shared.rig;
             (chi_square_fall > chi_square_quantile(added as f64, MORE_THAN_CHANCE)).then_some(Witness {

@@ -12,12 +12,10 @@ use nalgebra::{DVector, Vector6};
 use rayon::prelude::*;
 
 use crate::geometry::perturb;
-use crate::stereo::data::view::View;
-use crate::stereo::model::parameters::Layout;
-use crate::stereo::model::parameters::Values;
-use crate::stereo::solve::normal_equations::{self, Block, Equations};
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::robust_loss::Loss;
+use crate::stereo::data::View;
+use crate::stereo::model::{Layout, Values};
+use crate::stereo::solve::normal_equations::{self, Block};
+use crate::stereo::solve::{Equations, Loss, Priors};
 
 /// The search is done when even a strongly damped step does not lower the cost.
 const MAX_DAMPING: f64 = 1e12;
@@ -87,20 +85,8 @@ pub struct Solution {
     pub steps: usize,
 }
 
-/// Minimises with nothing expected of the shared numbers. Views and `start.poses` correspond by place.
-pub fn solve(views: &[View], layout: &Layout, start: Values, loss: Loss, search: Search) -> Solution {
-    solve_with(views, layout, &Priors::NONE, start, loss, search)
-}
-
-/// Minimises with what is expected of the shared numbers.
-pub fn solve_with(
-    views: &[View],
-    layout: &Layout,
-    priors: &Priors,
-    start: Values,
-    loss: Loss,
-    search: Search,
-) -> Solution {
+/// Minimises with what is expected of the shared numbers. Views and `start.poses` correspond by place.
+pub fn solve(views: &[View], layout: &Layout, priors: &Priors, start: Values, loss: Loss, search: Search) -> Solution {
     let of = |values: &Values| equations(views, layout, priors, values, loss);
     let Some(mut equations) = of(&start) else {
         return Solution { values: start, cost: f64::INFINITY, stop: Stop::NoStart, steps: 0 };

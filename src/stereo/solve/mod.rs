@@ -7,3 +7,9 @@ pub mod priors;
 pub mod problem;
 pub mod robust_loss;
 pub mod uncertainty;
+
+pub use normal_equations::Equations;
+pub use priors::Priors;
+pub use problem::{Problem, Solved};
+pub use robust_loss::Loss;
+pub use uncertainty::Uncertainty;

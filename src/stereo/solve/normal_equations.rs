@@ -9,14 +9,13 @@ use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Matrix6, Point3, RowVector3
 use crate::geometry::{Transform, rotation_matrix};
 use crate::imaging::Side;
 use crate::linear_algebra::to_unit_diagonal;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{Observation, View};
 use crate::stereo::model::board_shape;
-use crate::stereo::model::parameters::{Layout, Shared};
 use crate::stereo::model::projection::CAMERA_NUMBERS;
+use crate::stereo::model::{Layout, Shared};
+use crate::stereo::solve::Loss;
 use crate::stereo::solve::gram_matrix::{Products, WIDEST};
 use crate::stereo::solve::priors::Information;
-use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::{Camera, Rig};
 
 /// One pair's share of the normal equations.
@@ -307,11 +306,11 @@ mod tests {
     use super::*;
     use crate::geometry::perturb;
     use crate::stereo::Lens;
-    use crate::stereo::solve::priors::Priors;
+    use crate::stereo::solve::Priors;
     use crate::stereo::synthetic::World;
 
     fn cost(shared: &Shared, layout: &Layout, pose: &Transform, view: &View) -> f64 {
-        block(shared, layout, pose, view, Loss::Cauchy(2.0)).unwrap().cost
+        block(shared, layout, pose, view, Loss::Cauchy).unwrap().cost
     }
 
     #[test]
@@ -324,7 +323,7 @@ mod tests {
         }
         let shared = Shared { rig: world.rig.clone(), shape_mm: [0.1, -0.2, 0.15] };
         let pose = &world.poses[0];
-        let analytic = block(&shared, &layout, pose, &view, Loss::Cauchy(2.0)).unwrap();
+        let analytic = block(&shared, &layout, pose, &view, Loss::Cauchy).unwrap();
         // A cost of some thousands is known to 1e-12; halved by steps that move pixels by about 1e-4.
         let close = |numeric: f64, analytic: f64, what: &str| {
             assert!((numeric - analytic).abs() < 1e-4 * (1.0 + analytic.abs()), "{what}: {numeric} and {analytic}");
@@ -382,7 +381,6 @@ mod tests {
                 right[at + r] += b.pose_gradient[r];
             }
         }
-        let shared = Shared { rig: world.rig.clone(), shape_mm: [0.0; 3] };
         let prior = Priors::NONE.information(&layout, &shared);
         let (matrix, gradient) = eliminate(&Equations { blocks, prior }, 0.0).unwrap();
         let eliminated = solve_scaled(&matrix, &gradient).unwrap();

@@ -9,8 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::Side;
 use crate::stereo::model::board_shape;
-use crate::stereo::model::known_lenses::KnownLenses;
-use crate::stereo::model::parameters::{Layout, Shared};
+use crate::stereo::model::{KnownLenses, Layout, Shared};
 use crate::stereo::{Camera, Lens, Rig};
 
 /// What distortion does at the corner of the picture, as shares of the corner's distance from the middle: k1, k2, k3.
@@ -161,15 +160,10 @@ impl Priors {
         };
         one(2, 0.5 * (width - 1.0), CENTRE_SHARE * width);
         one(3, 0.5 * (height - 1.0), CENTRE_SHARE * width);
-        for (at, power, share) in
-            [(4, 2, RADIAL_AT_CORNER[0]), (5, 4, RADIAL_AT_CORNER[1]), (8, 6, RADIAL_AT_CORNER[2])]
-        {
-            one(at, 0.0, share / corner.powi(power));
-        }
-        for (at, power, share) in
-            [(9, 2, RATIONAL_AT_CORNER[0]), (10, 4, RATIONAL_AT_CORNER[1]), (11, 6, RATIONAL_AT_CORNER[2])]
-        {
-            one(at, 0.0, share / corner.powi(power));
+        for (places, shares) in [([4, 5, 8], RADIAL_AT_CORNER), ([9, 10, 11], RATIONAL_AT_CORNER)] {
+            for ((at, power), share) in places.into_iter().zip([2, 4, 6]).zip(shares) {
+                one(at, 0.0, share / corner.powi(power));
+            }
         }
         one(6, 0.0, TANGENTIAL);
         one(7, 0.0, TANGENTIAL);
@@ -235,7 +229,7 @@ impl Priors {
     fn place(&self, layout: &Layout, number: Number, known: bool) -> Option<usize> {
         match number {
             Number::Camera(side, at) => {
-                let lens = if side == Side::Left { layout.left } else { layout.right }?;
+                let lens = layout.lens(side)?;
                 let told = known || !(4..9).contains(&at) || lens <= Lens::Brown5 || self.rational_held;
                 (told && at < layout.camera_count(side)).then(|| layout.camera_start(side) + at)
             }

@@ -7,18 +7,13 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::imaging::Board;
 use crate::stereo::Error;
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
-use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{NeighbourCorrelation, Noise, Observation, View};
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::parameters::{Layout, Shared, Values};
+use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search, Solution, Stop};
-use crate::stereo::solve::normal_equations::Equations;
-use crate::stereo::solve::priors::Priors;
-use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
-use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, Uncertainty, worst_focal_sigma};
+use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, worst_focal_sigma};
+use crate::stereo::solve::{Equations, Loss, Priors, Uncertainty};
 
 /// Rounds of fitting the scatter and solving again.
 const MOST_ROUNDS: usize = 12;
@@ -71,80 +66,81 @@ impl Problem {
     /// Solves robustly, then with the likeliest scatter of the corners, Gaussian or with heavy tails. No corner is thrown away: what lies far
     /// off counts little, and its whitener says so afterwards.
     pub fn solve(&self, layout: &Layout) -> Result<Solved, Error> {
-        let Problem { mut views, mut values, priors } = self.with_layout(layout);
-        let unknowns = layout.count() + 6 * views.len();
-        let corners = views.iter().map(|view| view.observations.len()).sum::<usize>();
+        let mut problem = self.with_layout(layout);
+        let unknowns = layout.count() + 6 * problem.views.len();
+        let corners = problem.views.iter().map(|view| view.observations.len()).sum::<usize>();
         if 2 * corners <= unknowns {
             return Err(Error::TooFewCorners { corners, unknowns });
         }
         // Twice: the scatter is known only after the first solution.
         for _ in 0..2 {
-            Noise::from_median(&residuals::active(&views, &values).ok_or_else(unseen)?).apply(&mut views);
-            let (loss, search) = (Loss::Cauchy(CAUCHY_WIDTH), Search::ROUGH);
-            values = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search).values;
+            problem.search_roughly(layout).ok_or_else(unseen)?;
         }
-        Problem { views, values, priors }.solve_near(layout)
+        problem.solve_near(layout)
     }
 
-    /// The same from values near the minimum: without the robust search.
+    /// The same with the board's shape free or not, as it is forced, or else free where the pairs tell it; with the layout that was solved.
+    pub fn solve_bent_or_flat(
+        &self,
+        forced: Option<bool>,
+        layout: impl Fn(bool) -> Layout,
+    ) -> Result<(Solved, Layout), Error> {
+        let solve = |shape: bool| self.solve(&layout(shape)).map(|solved| (solved, layout(shape)));
+        solve(forced.unwrap_or(true)).or_else(|_| solve(forced.unwrap_or(false)))
+    }
+
+    /// Moves the values by a robust search with corners that weigh by what these values leave of them. `None` where one lies behind its camera.
+    pub fn search_roughly(&mut self, layout: &Layout) -> Option<()> {
+        Noise::from_median(&residuals::active(&self.views, &self.values)?).apply(&mut self.views);
+        self.values = self.search(layout, Loss::Cauchy, Search::ROUGH).values;
+        Some(())
+    }
+
+    /// A search with the weights as they are.
+    pub fn search(&self, layout: &Layout, loss: Loss, search: Search) -> Solution {
+        levenberg_marquardt::solve(&self.views, layout, &self.priors, self.values.clone(), loss, search)
+    }
+
+    /// Residuals of the active corners; an error where one lies behind its camera.
+    fn left(&self) -> Result<Vec<(Observation, Vector2<f64>)>, Error> {
+        residuals::active(&self.views, &self.values).ok_or_else(unseen)
+    }
+
+    /// Solves from values near the minimum: without the robust search.
     pub fn solve_near(&self, layout: &Layout) -> Result<Solved, Error> {
-        let Problem { mut views, mut values, priors } = self.with_layout(layout);
-        let unknowns = layout.count() + 6 * views.len();
-        let (mut noise, mut loss) = Noise::likeliest(&residuals::active(&views, &values).ok_or_else(unseen)?, unknowns);
+        let mut problem = self.with_layout(layout);
+        let unknowns = layout.count() + 6 * problem.views.len();
+        let (mut noise, mut loss) = Noise::likeliest(&problem.left()?, unknowns);
         for _ in 0..MOST_ROUNDS {
-            noise.apply(&mut views);
-            let search = if loss == Loss::Squared { Search::NEAR } else { Search::ROBUST };
-            let solution = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search);
+            noise.apply(&mut problem.views);
             // With a robust loss the last word is that of the weighted squares below.
-            if loss == Loss::Squared {
-                converged(&solution)?;
-            }
-            values = solution.values;
+            problem.values = match loss {
+                Loss::Squared => converged(problem.search(layout, loss, Search::NEAR))?,
+                _ => problem.search(layout, loss, Search::ROBUST).values,
+            };
             let before = (noise, loss);
-            (noise, loss) = Noise::likeliest(&residuals::active(&views, &values).ok_or_else(unseen)?, unknowns);
+            (noise, loss) = Noise::likeliest(&problem.left()?, unknowns);
             let moved = |a: f64, b: f64| (a - b).abs() > 1e-4 * b;
             if loss == before.1 && !moved(before.0.added_px, noise.added_px) && !moved(before.0.factor, noise.factor) {
                 break;
             }
         }
-        noise.apply(&mut views);
-        let left = residuals::active(&views, &values).ok_or_else(unseen)?;
-        let whitened = |o: &Observation, r: &Vector2<f64>| o.whiten(*r).norm_squared();
+        noise.apply(&mut problem.views);
+        let left = problem.left()?;
         let log_likelihood = noise.log_likelihood(&left, loss);
-        let loss_factor = loss.variance_factor(left.iter().map(|(o, r)| whitened(o, r)));
+        let loss_factor = loss.variance_factor(left.iter().map(|(o, r)| o.whiten(*r).norm_squared()));
         if loss != Loss::Squared {
-            weigh(&mut views, &values, loss);
-            let (loss, search) = (Loss::Squared, Search::NEAR);
-            let solution = levenberg_marquardt::solve_with(&views, layout, &priors, values, loss, search);
-            converged(&solution)?;
-            values = solution.values;
+            weigh(&mut problem.views, &problem.values, loss);
+            problem.values = converged(problem.search(layout, Loss::Squared, Search::NEAR))?;
         }
-        let squares: Vec<f64> = left.iter().map(|(_, r)| r.norm_squared()).collect();
-        let rms_px = residuals::root_mean_square(&squares).unwrap_or(0.0);
-        Ok(Solved { problem: Problem { views, values, priors }, noise, loss, loss_factor, log_likelihood, rms_px })
-    }
-
-    /// The same without some pairs: `keep` says which stay.
-    pub fn subset(&self, keep: impl Fn(usize) -> bool) -> Problem {
-        let kept = |i: &usize| keep(*i);
-        let all = 0..self.views.len();
-        Problem {
-            views: all.clone().filter(kept).map(|i| self.views[i].clone()).collect(),
-            values: Values {
-                shared: self.values.shared.clone(),
-                poses: all.filter(kept).map(|i| self.values.poses[i]).collect(),
-            },
-            priors: self.priors.clone(),
-        }
+        let rms_px = residuals::root_mean_square(left.iter().map(|(_, r)| r.norm_squared())).unwrap_or(0.0);
+        Ok(Solved { problem, noise, loss, loss_factor, log_likelihood, rms_px })
     }
 
     /// Solves again by least squares with the weights and outliers as they are: for folds. `None` where the search does not
     /// end at a minimum: these pairs do not determine this lens.
     pub fn refit(&self, layout: &Layout) -> Option<Values> {
-        let start = self.with_layout(layout);
-        let (views, priors) = (&start.views, &start.priors);
-        let solution =
-            levenberg_marquardt::solve_with(views, layout, priors, start.values, Loss::Squared, Search::TRIAL);
+        let solution = self.with_layout(layout).search(layout, Loss::Squared, Search::TRIAL);
         (solution.stop == Stop::Minimum).then_some(solution.values)
     }
 
@@ -160,6 +156,11 @@ impl Solved {
         let Problem { views, values, .. } = &self.problem;
         let of_view = |(view, pose)| residuals::of_view(&values.shared, view, pose);
         NeighbourCorrelation::of(board, views.iter().zip(&values.poses).map(of_view))
+    }
+
+    /// Variance of the unknowns over what the weighted normal equations say: what neighbouring corners share, and the loss.
+    pub fn inflation(&self, board: &Board) -> f64 {
+        self.neighbours(board).inflation() * self.loss_factor
     }
 
     /// Covariance of everything; an error where the views do not tell.
@@ -206,11 +207,11 @@ fn unseen() -> Error {
     Error::NotConverged { steps: 0 }
 }
 
-/// An error where a search did not end at a minimum. A lens that was asked for may have numbers that these views do not tell apart; the covariance
+/// The values where a search ended at a minimum. A lens that was asked for may have numbers that these views do not tell apart; the covariance
 /// says which.
-fn converged(solution: &Solution) -> Result<(), Error> {
+fn converged(solution: Solution) -> Result<Values, Error> {
     match solution.stop {
-        Stop::Minimum | Stop::Valley => Ok(()),
+        Stop::Minimum | Stop::Valley => Ok(solution.values),
         _ => Err(Error::NotConverged { steps: solution.steps }),
     }
 }

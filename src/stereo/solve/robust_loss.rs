@@ -1,15 +1,15 @@
 //! How much a corner that lies far off counts.
 
 /// Width of the robust loss in standard deviations: 95 % efficient for Gaussian noise (Holland & Welsch 1977).
-pub const CAUCHY_WIDTH: f64 = 2.385;
+const CAUCHY_WIDTH: f64 = 2.385;
 
 /// A function of the squared whitened residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Loss {
     /// Plain least squares: efficient, and at the mercy of a single wrong corner.
     Squared,
-    /// Cauchy's, with its width in standard deviations: corners far beyond it hardly count.
-    Cauchy(f64),
+    /// Cauchy's: corners far beyond its width hardly count.
+    Cauchy,
     /// The likelihood of Student's distribution in two dimensions with so many degrees of freedom.
     Student(f64),
 }
@@ -19,8 +19,8 @@ impl Loss {
     pub fn cost_and_weight(self, squared: f64) -> (f64, f64) {
         match self {
             Loss::Squared => (0.5 * squared, 1.0),
-            Loss::Cauchy(width) => {
-                let c2 = width * width;
+            Loss::Cauchy => {
+                let c2 = CAUCHY_WIDTH * CAUCHY_WIDTH;
                 (0.5 * c2 * (squared / c2).ln_1p(), 1.0 / (1.0 + squared / c2))
             }
             Loss::Student(freedom) => {
@@ -34,7 +34,7 @@ impl Loss {
     pub fn slope_along(self, weighed: f64) -> f64 {
         match self {
             Loss::Squared => 1.0,
-            Loss::Cauchy(width) => (1.0 - 2.0 * weighed / (width * width)).max(0.0),
+            Loss::Cauchy => (1.0 - 2.0 * weighed / (CAUCHY_WIDTH * CAUCHY_WIDTH)).max(0.0),
             Loss::Student(freedom) => (1.0 - 2.0 * weighed / (freedom + 2.0)).max(0.0),
         }
     }
@@ -62,7 +62,7 @@ mod tests {
 
     #[test]
     fn weight_is_twice_the_slope_of_the_cost() {
-        for loss in [Loss::Squared, Loss::Cauchy(2.5), Loss::Student(8.0)] {
+        for loss in [Loss::Squared, Loss::Cauchy, Loss::Student(8.0)] {
             for s in [0.1, 1.0, 30.0] {
                 let h = 1e-5 * s;
                 let slope = (loss.cost_and_weight(s + h).0 - loss.cost_and_weight(s - h).0) / (2.0 * h);
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn the_slope_along_a_residual_is_that_of_its_gradient() {
-        for loss in [Loss::Squared, Loss::Cauchy(2.5), Loss::Student(8.0)] {
+        for loss in [Loss::Squared, Loss::Cauchy, Loss::Student(8.0)] {
             let gradient = |r: f64| loss.cost_and_weight(r * r).1 * r;
             for r in [0.1, 0.7, 1.5, 6.0] {
                 let h = 1e-6 * r;

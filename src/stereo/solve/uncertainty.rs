@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DMatrixViewMut, Matrix6};
 use rayon::prelude::*;
 
 use crate::linear_algebra::to_unit_diagonal;
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::model::Layout;
 use crate::stereo::solve::normal_equations::{self, Block, Equations};
 use crate::stereo::{Rig, Side};
 
@@ -48,13 +48,18 @@ impl Uncertainty {
         let change = &shared - &self.shared;
         for (pose, block) in self.poses.iter_mut().zip(blocks) {
             let Some(inverse) = block.pose_inverse(0.0) else { continue };
-            let through = inverse * block.mixed.transpose();
-            let spread = &through * &change * through.transpose();
-            *pose += Matrix6::from_fn(|i, j| spread[(i, j)]);
+            *pose += of_pose(block, &inverse, &change);
         }
         self.shared = shared;
         self
     }
+}
+
+/// What a covariance of the shared numbers adds to that of a pose, which is `inverse` by its own corners.
+fn of_pose(block: &Block, inverse: &Matrix6<f64>, shared: &DMatrix<f64>) -> Matrix6<f64> {
+    let through = inverse * block.mixed.transpose();
+    let spread = &through * shared * through.transpose();
+    Matrix6::from_fn(|i, j| spread[(i, j)])
 }
 
 /// Covariance at a minimum, from the equations there. `None` where the views do not determine the unknowns.
@@ -67,9 +72,7 @@ pub fn of_equations(equations: &Equations) -> Option<Uncertainty> {
         .iter()
         .map(|block| {
             let inverse = block.pose_inverse(0.0)?;
-            let through = inverse * block.mixed.transpose();
-            let spread = &through * &shared * through.transpose();
-            Some(inverse + Matrix6::from_fn(|i, j| spread[(i, j)]))
+            Some(inverse + of_pose(block, &inverse, &shared))
         })
         .collect::<Option<Vec<_>>>()?;
     Some(Uncertainty { shared, poses })
@@ -99,16 +102,11 @@ pub fn invert(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(n, n, |i, j| 0.5 * (inverse[(i, j)] + inverse[(j, i)]) * scale[i] * scale[j]))
 }
 
-/// Whether this covariance of the shared numbers determines both focal lengths.
-pub fn determines_cameras(shared: &DMatrix<f64>, layout: &Layout, rig: &Rig) -> bool {
-    worst_focal_sigma(shared, layout, rig) <= WORST_FOCAL_SIGMA
-}
-
 /// Largest relative standard deviation of a focal length.
 pub fn worst_focal_sigma(shared: &DMatrix<f64>, layout: &Layout, rig: &Rig) -> f64 {
     let mut worst: f64 = 0.0;
-    for (side, camera) in Side::BOTH.into_iter().zip([&rig.left, &rig.right]) {
-        let at = layout.camera_start(side);
+    for side in Side::BOTH {
+        let (camera, at) = (rig.camera(side), layout.camera_start(side));
         for (i, focal) in [camera.fx, camera.fy].into_iter().enumerate() {
             worst = worst.max(shared[(at + i, at + i)].sqrt() / focal.abs());
         }

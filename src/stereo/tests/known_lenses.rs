@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::stereo::board_pose::pair_excess::pair_excess;
-use crate::stereo::model::known_lenses::KnownLenses;
+use crate::stereo::model::KnownLenses;
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::known_lenses::LensCheck;
 use crate::stereo::{Error, Side};
@@ -34,10 +34,8 @@ fn three_pairs_find_the_rig_where_the_lenses_are_known() {
         let found = calibrate(&world.corners(seed), &knowing(known(seed + 100))).unwrap();
         let check = found.lens_check.as_ref().unwrap();
         assert!(!check.contradicts() && check.causes.is_empty(), "{seed}: {check:?}");
-        let covariance = found.rig().covariance.as_ref().unwrap();
-        let at = covariance.order.iter().position(|name| name == "right_from_left.tx_mm").unwrap();
         let off = (found.rig().right_from_left.translation.x - world.rig.right_from_left.translation.x).abs();
-        let sigma = covariance.matrix[(at, at)].sqrt();
+        let sigma = covariance_of(&found, &["right_from_left.tx_mm"])[(0, 0)].sqrt();
         assert!(off < 4.0 * sigma && sigma < 1.0, "{seed}: {off} +- {sigma} mm");
     }
 }
@@ -111,10 +109,8 @@ fn by_hand(turn_deg: f64, told: bool) -> [f64; 2] {
         let found = calibrate(&world.corners_by_hand(seed + 500, turn_deg), &knowing(known.clone())).unwrap();
         let sigma = known.covariance()[(0, 0)].sqrt();
         squares[0] += ((found.rig().left.fx - earlier.rig().left.fx) / sigma).powi(2) / WORLDS as f64;
-        let covariance = found.rig().covariance.as_ref().unwrap();
-        let at = covariance.order.iter().position(|name| name == "right_from_left.tx_mm").unwrap();
         let off = found.rig().right_from_left.translation.x - world.rig.right_from_left.translation.x;
-        squares[1] += off * off / covariance.matrix[(at, at)] / WORLDS as f64;
+        squares[1] += off * off / covariance_of(&found, &["right_from_left.tx_mm"])[(0, 0)] / WORLDS as f64;
     }
     squares
 }

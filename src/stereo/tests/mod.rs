@@ -9,27 +9,29 @@ mod refusals;
 mod scatter;
 mod target;
 
+use nalgebra::{DMatrix, DVector};
+
 use crate::imaging::Corners;
 use crate::stereo::calibrate::{Calibration, calibrate};
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::ledger::Standards;
 use crate::stereo::judge::lengths::held_out;
-use crate::stereo::model::parameters::Shared;
+use crate::stereo::model::Shared;
 use crate::stereo::select::options::Options;
+use crate::stereo::select::stated_uncertainty;
 use crate::stereo::synthetic::{self, BROWN4, World};
 
 fn judged(corners: &Corners, options: &Options, tolerance_mm: f64) -> Judged {
     synthetic::judged(&calibrate(corners, options).unwrap(), Vec::new(), Standards::default(), tolerance_mm)
 }
 
+/// The stated covariance of some numbers.
+fn covariance_of(calibration: &Calibration, names: &[&str]) -> DMatrix<f64> {
+    calibration.rig().covariance.as_ref().unwrap().part(names).unwrap()
+}
+
 /// Deviations of the shared numbers from the truth, in the coordinates of the covariance.
-fn deviations(calibration: &Calibration, world: &World) -> Vec<f64> {
-    let layout = calibration.layout;
+fn deviations(calibration: &Calibration, world: &World) -> DVector<f64> {
     let truth = Shared { rig: world.rig.clone(), shape_mm: [world.bow_mm[0], world.bow_mm[1], world.twist_mm] };
-    let found = layout.numbers(&calibration.values.shared);
-    let mut off: Vec<f64> = found.iter().zip(layout.numbers(&truth)).map(|(a, b)| a - b).collect();
-    // A rotation's covariance is that of the small turn on its left.
-    let turn = calibration.rig().right_from_left.rotation * world.rig.right_from_left.rotation.inverse();
-    off[layout.transform_start()..][..3].copy_from_slice(turn.scaled_axis().as_slice());
-    off
+    stated_uncertainty::step(&calibration.layout, &truth, &calibration.values.shared)
 }

@@ -59,10 +59,7 @@ fn a_picture_of_a_pair_counts_alone() {
     assert_eq!(some.views.len(), 12);
     let without =
         calibrate(&seen(&world, 3, |i, right, col, row| (i >= 9 || i % 3 == 2) && alone(i, right, col, row)), &BROWN4);
-    let sigma = |found: &Calibration| {
-        let at = found.layout.names().iter().position(|name| name == "left.fx").unwrap();
-        found.rig().covariance.as_ref().unwrap().matrix[(at, at)].sqrt()
-    };
+    let sigma = |found: &Calibration| covariance_of(found, &["left.fx"])[(0, 0)].sqrt();
     assert!(sigma(&some) < sigma(&without.unwrap()), "more pictures tell more of a camera");
     let accuracy = held_out::hold_out(&some, None).unwrap();
     assert!(accuracy.pairs.iter().any(|pair| pair.max_abs_error_mm.is_none() && pair.gap_rms_mm.is_none()));

@@ -5,11 +5,17 @@ use nalgebra::Vector3;
 use super::*;
 use crate::geometry::{Transform, transform};
 use crate::stereo::Error;
-use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
-use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::volume::Extent;
+
+/// The right pictures moved to the front by so many pairs, the first ones to the back.
+fn shifted(mut corners: Corners, by: usize) -> Corners {
+    let mut rights: Vec<_> = corners.pairs.iter().map(|p| p.right.clone()).collect();
+    rights.rotate_left(by);
+    corners.pairs.iter_mut().zip(rights).for_each(|(pair, right)| pair.right = right);
+    corners
+}
 
 #[test]
 fn a_pair_that_was_not_taken_at_once_is_named_and_left_out() {
@@ -46,15 +52,8 @@ fn a_gross_corner_is_an_outlier_and_changes_nothing() {
 
 #[test]
 fn pairs_of_nothing_in_common_are_refused_by_name() {
-    let world = World::new(8, 13);
-    let mut corners = world.corners(14);
     // Every right picture belongs to another left one.
-    let mut rights: Vec<_> = corners.pairs.iter().map(|p| p.right.clone()).collect();
-    rights.rotate_left(3);
-    for (pair, right) in corners.pairs.iter_mut().zip(rights) {
-        pair.right = right;
-    }
-    match calibrate(&corners, &Options::default()) {
+    match calibrate(&shifted(World::new(8, 13).corners(14), 3), &Options::default()) {
         Err(Error::Contradiction { agreeing, total, bad, .. }) => {
             assert!(agreeing <= 4 && total == 8 && bad.len() >= 4, "{agreeing} {bad:?}")
         }
@@ -66,12 +65,7 @@ fn pairs_of_nothing_in_common_are_refused_by_name() {
 fn a_series_that_is_shifted_against_the_other_side_is_named() {
     let world = World::new(10, 13);
     for by in [1, 2, 8, 9] {
-        let mut corners = world.corners(14);
-        let mut rights: Vec<_> = corners.pairs.iter().map(|p| p.right.clone()).collect();
-        rights.rotate_left(by);
-        for (pair, right) in corners.pairs.iter_mut().zip(rights) {
-            pair.right = right;
-        }
+        let corners = shifted(world.corners(14), by);
         let asked = Asked { options: Options::default(), tolerance_mm: 0.05, extent: Extent::default() };
         match calibrate_standing(&corners, &asked) {
             Err(Error::Shifted { fit, of, left, right }) => {

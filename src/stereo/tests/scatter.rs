@@ -1,13 +1,13 @@
 //! Predicted scatter against the scatter there is.
 
-use crate::stereo::board_pose::pair_excess::pair_excess;
-use nalgebra::{Matrix2, Matrix4, Point2, Vector2, Vector4};
+use nalgebra::{DVector, Matrix2, Point2, Vector2};
 
 use super::*;
 use crate::simulate::draws::{Draws, Purpose};
+use crate::statistics::median;
 use crate::stereo::Lens;
-use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::view::View;
+use crate::stereo::board_pose::pair_excess::pair_excess;
+use crate::stereo::data::View;
 use crate::stereo::judge::verdict::{LengthError, Verdict};
 use crate::stereo::triangulate::{RigCovariance, common, triangulate};
 
@@ -150,12 +150,6 @@ fn lengths_of_70_mm(calibration: &Calibration, world: &World, seed: u64, ratio: 
     }
 }
 
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted[sorted.len() / 2]
-}
-
 /// Calibrations of a Monte Carlo; more where the environment says so, with the limits that so many allow.
 fn monte_carlo_runs() -> u64 {
     std::env::var("STEREOCAL_MONTE_CARLO").ok().and_then(|n| n.parse().ok()).unwrap_or(40)
@@ -169,16 +163,17 @@ fn predicted_sigmas_are_the_true_ones() {
         let Spread { names, ratios, inside, lengths, lengths_by_calibration } = &spread;
         // So many runs know a standard deviation to 1 / sqrt(2 runs); the numbers are correlated, so their median is hardly better.
         let known_to = 1.0 / (2.0 * runs as f64).sqrt();
+        let middle = median(ratios.iter().copied()).unwrap();
         let table: Vec<String> = names.iter().zip(ratios).map(|(name, ratio)| format!("{name} {ratio:.3}")).collect();
         let said = format!(
             "{runs} runs, shape free: {shape}; predicted / true sigma: median {:.3}, 95 % intervals hold {:.1} %, \
              70 mm lengths {lengths:.3}, their calibration's share {lengths_by_calibration:.3}\n{}",
-            median(ratios),
+            middle,
             100.0 * inside,
             table.join("\n")
         );
         println!("{said}");
-        assert!((median(ratios) - 1.0).abs() < 2.2 * known_to, "{said}");
+        assert!((middle - 1.0).abs() < 2.2 * known_to, "{said}");
         assert!(ratios.iter().all(|r| (r - 1.0).abs() < 4.5 * known_to), "{said}");
         assert!((0.91..0.985).contains(inside), "{said}");
         // 24 lengths a run with corners of their own: known better than any number of the rig.
@@ -240,17 +235,11 @@ fn the_rigs_covariance_holds_for_print_that_is_seen_through_windows() {
                 pairs.flat_map(|p| p.left.iter_mut().chain(&mut p.right)).for_each(|corner| corner.reach = None);
             }
             let found = calibrate(&corners, &BROWN4).unwrap();
-            let off = Vector4::new(
-                found.rig().left.fx - world.rig.left.fx,
-                found.rig().left.cx - world.rig.left.cx,
-                found.rig().right.fx - world.rig.right.fx,
-                found.rig().right.cx - world.rig.right.cx,
-            );
-            let names = ["left.fx", "left.cx", "right.fx", "right.cx"];
-            let order = &found.rig().covariance.as_ref().unwrap().order;
-            let at = names.map(|name| order.iter().position(|n| n == name).unwrap());
-            let covariance = Matrix4::from_fn(|i, j| found.uncertainty.shared[(at[i], at[j])]);
-            off.dot(&(covariance.try_inverse().unwrap() * off)) / 4.0
+            let [found_at, truth_at] = [found.rig(), &world.rig]
+                .map(|rig| DVector::from_vec(vec![rig.left.fx, rig.left.cx, rig.right.fx, rig.right.cx]));
+            let covariance = covariance_of(&found, &["left.fx", "left.cx", "right.fx", "right.cx"]);
+            let off = found_at - truth_at;
+            off.dot(&(covariance.try_inverse().unwrap() * &off)) / 4.0
         };
         (0..30).map(of).sum::<f64>() / 30.0
     };

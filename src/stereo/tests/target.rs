@@ -3,7 +3,6 @@
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::*;
-use crate::geometry::transform;
 use crate::imaging::Board;
 use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use crate::stereo::board_pose::rig_change::cause::Cause;
@@ -75,9 +74,7 @@ fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
     assert_eq!(judged(&world.rig, 10.0), "");
     let pitch = judged(&world.rig, 12.0);
     assert!(pitch.contains("squares are 10.0") || pitch.contains("squares are 9.99"), "{pitch}");
-    let mut turned = world.rig.clone();
-    turned.right_from_left =
-        transform(Vector3::new(0.0, 0.1_f64.to_radians(), 0.0), Vector3::zeros()) * turned.right_from_left;
+    let turned = world.with_camera_moved(Vector3::new(0.0, 0.1_f64.to_radians(), 0.0), Vector3::zeros()).rig;
     let yaw = judged(&turned, 10.0);
     assert!((yaw.contains("-0.10") || yaw.contains("-0.09")) && yaw.contains("yaw"), "{yaw}");
     let exchanged = Rig {
@@ -128,9 +125,7 @@ fn points_are_not_off_by_what_turns_them_all_together() {
     let found = calibrate(&world.corners(38), &tilted).unwrap();
     let known = Knowledge { noise: Some(found.own_noise), ..known(found.rig(), world.board) };
     for turn_deg in [0.02_f64, 0.2] {
-        let mut turned = world.clone();
-        let turn = transform(Vector3::new(0.0, turn_deg.to_radians(), 0.0), Vector3::zeros());
-        turned.rig.right_from_left = turn * turned.rig.right_from_left;
+        let turned = world.with_camera_moved(Vector3::new(0.0, turn_deg.to_radians(), 0.0), Vector3::zeros());
         let measured = series::measure(&known, run_of(turned.corners(39)));
         let (Judgement::Allowed(changed) | Judgement::Contradicts(changed)) = measured.judgement else {
             panic!("{turn_deg}: {:?}", measured.judgement)

@@ -9,13 +9,12 @@ use nalgebra::{DVector, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::imaging::{Board, Side};
-use crate::stereo::Error;
-use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::model::parameters::Layout;
+use crate::stereo::data::Observation;
+use crate::stereo::model::Layout;
 use crate::stereo::triangulate::{RigCovariance, SpacePoint, rig_number, triangulate};
-use crate::stereo::volume::{Extent, Volume};
+use crate::stereo::volume::{Extent, Volume, bounds};
+use crate::stereo::{Error, Rig};
 
 /// Squares of the lengths that a rig is judged by: 70 mm on the paper's board.
 pub const LONG_SQUARES: usize = 7;
@@ -148,13 +147,10 @@ impl VolumeLengths {
         length_mm: f64,
         sigma_px: f64,
     ) -> VolumeLengths {
-        let of_place = |at: &Point3<f64>, directions: &[Vector3<f64>]| -> Vec<VolumeLength> {
-            let length =
-                |direction: &Vector3<f64>| length(rig, covariance, at, direction * length_mm, sigma_px, &volume);
-            directions.iter().filter_map(length).collect()
-        };
         let through = |directions: &[Vector3<f64>]| -> Vec<VolumeLength> {
-            places.par_iter().flat_map_iter(|at| of_place(at, directions)).collect()
+            let length = |at, along| length(rig, covariance, at, along, sigma_px, &volume);
+            let of_place = |at| directions.iter().filter_map(move |d| length(at, d * length_mm));
+            places.par_iter().flat_map_iter(of_place).collect()
         };
         let (lengths, along_sight) = (through(directions), through(&[Vector3::z()]));
         VolumeLengths { length_mm, lengths, along_sight, volume, extent: Extent::Boards }
@@ -170,12 +166,13 @@ impl VolumeLengths {
         self.lengths.par_iter().map(|length| length.measured_by(rig)).collect()
     }
 
-    /// By how much a step of the shared numbers changes each length, mm.
-    pub fn changes_by_step_mm(&self, layout: &Layout, step: &DVector<f64>) -> Vec<f64> {
+    /// By how much a step of the shared numbers changes a length at most, mm.
+    pub fn most_changed_mm(&self, layout: &Layout, step: &DVector<f64>) -> f64 {
         let numbers: Vec<(usize, usize)> =
             layout.names().iter().enumerate().filter_map(|(at, name)| Some((at, rig_number(name)?))).collect();
-        let change = |length: &VolumeLength| numbers.iter().map(|&(at, number)| length.slope(number) * step[at]).sum();
-        self.lengths.iter().map(change).collect()
+        let change =
+            |length: &VolumeLength| numbers.iter().map(|&(at, number)| length.slope(number) * step[at]).sum::<f64>();
+        self.lengths.iter().map(change).fold(0.0, |most, mm| most.max(mm.abs()))
     }
 }
 
@@ -223,14 +220,11 @@ fn places(calibration: &Calibration, extent: Extent) -> Vec<Point3<f64>> {
         .views
         .iter()
         .zip(&calibration.values.poses)
-        .flat_map(|(view, pose)| view.active(Side::Left).map(move |o| pose * o.board_mm));
-    let (low, high) = match extent {
-        Extent::Box([x0, y0, z0, x1, y1, z1]) => (Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)),
-        _ => points.fold((Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)), |(low, high), p| {
-            (low.inf(&p.coords), high.sup(&p.coords))
-        }),
-    };
-    lattice([low, high])
+        .flat_map(|(view, pose)| view.active(Side::Left).map(move |o| (pose * o.board_mm).coords));
+    lattice(match extent {
+        Extent::Box([x0, y0, z0, x1, y1, z1]) => [Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)],
+        _ => bounds(points),
+    })
 }
 
 /// Places through a box, from its lowest to its highest corner.

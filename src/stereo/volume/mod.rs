@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 use crate::imaging::Side;
 use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::view::View;
-use crate::stereo::model::parameters::Values;
+use crate::stereo::data::View;
+use crate::stereo::model::Values;
 use crate::stereo::volume::outline::Hull;
 
 /// What a verdict is asked for.
@@ -96,27 +96,18 @@ impl Volume {
             let (right, below) = (f64::from(camera.width) - 1.0, f64::from(camera.height) - 1.0);
             Hull::of([(0.0, 0.0), (right, 0.0), (right, below), (0.0, below)].map(|(x, y)| nalgebra::Point2::new(x, y)))
         };
-        match extent {
-            Extent::Boards => boards,
-            Extent::All => Volume { left_px: whole(Side::Left), right_px: whole(Side::Right), ..boards },
-            Extent::Box(sides) => Volume {
-                left_px: whole(Side::Left),
-                right_px: whole(Side::Right),
-                depth_mm: [sides[2], sides[5]],
-                ..boards
-            },
-        }
+        let depth_mm = match extent {
+            Extent::Boards => return boards,
+            Extent::All => boards.depth_mm,
+            Extent::Box([_, _, near, _, _, far]) => [near, far],
+        };
+        Volume { left_px: whole(Side::Left), right_px: whole(Side::Right), depth_mm, ..boards }
     }
 
     /// The box in the left camera's frame that holds its left outline at its depths, mm: lowest and highest corner.
     pub fn bounding_box_mm(&self, rig: &Rig) -> [Vector3<f64>; 2] {
         let rays = self.left_px.corners().iter().filter_map(|px| rig.left.undistort(px));
-        let points = rays.flat_map(|ray| self.depth_mm.map(|z| Vector3::new(ray.x * z, ray.y * z, z)));
-        points
-            .fold((Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)), |(low, high), p| {
-                (low.inf(&p), high.sup(&p))
-            })
-            .into()
+        bounds(rays.flat_map(|ray| self.depth_mm.map(|z| Vector3::new(ray.x * z, ray.y * z, z))))
     }
 
     /// Whether a point in the left camera's frame lies in it.
@@ -139,15 +130,22 @@ fn depths_mm(values: &Values, views: &[View]) -> [f64; 2] {
 }
 
 /// Tilts of the boards in the left camera's frame, deg: about x the least and the most, about y the same.
-fn tilts_deg(values: &Values) -> [f64; 4] {
+pub fn tilts_deg(values: &Values) -> [f64; 4] {
     let normals: Vec<Vector3<f64>> = values.poses.iter().map(|pose| pose.rotation * Vector3::z()).collect();
     let about = |axis: usize| range(normals.iter().map(|n| n[axis].atan2(n.z).to_degrees()));
     let ([x_least, x_most], [y_least, y_most]) = (about(1), about(0));
     [x_least, x_most, y_least, y_most]
 }
 
-fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+/// The least and the largest.
+pub fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+}
+
+/// Lowest and highest corner of the box about some points.
+fn bounds(points: impl Iterator<Item = Vector3<f64>>) -> [Vector3<f64>; 2] {
+    let none = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
+    points.fold(none, |[low, high], p| [low.inf(&p), high.sup(&p)])
 }
 
 #[cfg(test)]

@@ -8,12 +8,13 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::geometry::nearest_rotation;
 use crate::imaging::Board;
+use crate::stereo::Rig;
+use crate::stereo::board_pose::solve::bundle::Bundle;
 use crate::stereo::board_pose::solve::estimate::Estimate;
 use crate::stereo::board_pose::solve::prior::{stretch_length_mm, stretch_mode};
 use crate::stereo::data::observation::Side;
 use crate::stereo::findings::hypothesis::{moved, refocused, turned};
-use crate::stereo::model::parameters::Layout;
-use crate::stereo::{Lens, Rig};
+use crate::stereo::model::Layout;
 
 /// One thing that may have changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,8 +48,7 @@ impl Cause {
 
     /// The change of the rig's numbers by one unit; `None` for the target's pitch.
     pub(in crate::stereo::board_pose) fn direction(self, rig: &Rig) -> Option<DVector<f64>> {
-        // All numbers of a rig, in their order.
-        let layout = &Layout::rig(Lens::Tilted14, false);
+        let layout = &Layout::WHOLE_RIG;
         let along = |axis: usize| Vector3::ith(axis, 1.0);
         match self {
             Cause::Pitch => None,
@@ -161,7 +161,7 @@ pub(in crate::stereo::board_pose) fn stretch(found: &Estimate<'_>) -> [f64; 2] {
     let n = found.values.rig.len();
     let mode = stretch_mode(found.bundle.board);
     let m = mode.len();
-    let deviations = DVector::from_iterator(m, found.values.deviations_mm.iter().flat_map(|d| [d.x, d.y, d.z]));
+    let deviations = Bundle::shared(&found.values).rows(n, m).into_owned();
     let length = stretch_length_mm(found.bundle.board);
     let variance = mode.dot(&(found.covariance.view((n, n), (m, m)) * &mode));
     [mode.dot(&deviations) / length, variance.max(0.0).sqrt() / length]

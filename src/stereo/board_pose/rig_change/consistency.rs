@@ -16,14 +16,14 @@ use crate::stereo::board_pose::solve::pose_block::Eliminated;
 use crate::stereo::solve::normal_equations::inverse6;
 
 /// Median of chi-square with six degrees of freedom.
-pub(in crate::stereo::board_pose) const MEDIAN_CHI_SQUARE_6: f64 = 5.348;
+pub const MEDIAN_CHI_SQUARE_6: f64 = 5.348;
 
 /// Numbers of a change.
-pub(in crate::stereo::board_pose) const NUMBERS: f64 = 6.0;
+pub const NUMBERS: f64 = 6.0;
 
 /// A change of `right_from_left`, rotation (rad) and translation (mm), and by how much it would lower chi-square.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stereo::board_pose) struct Change {
+pub struct Change {
     pub change: Vector6<f64>,
     /// Fall of chi-square.
     pub fall: f64,
@@ -31,7 +31,7 @@ pub(in crate::stereo::board_pose) struct Change {
 
 /// A change that comes with the run.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::stereo::board_pose) struct Along {
+pub struct Along {
     /// The change where it is whole.
     pub change: Change,
     /// Which share of it there is at each pose.
@@ -47,25 +47,25 @@ pub(in crate::stereo::board_pose) struct Along {
 }
 
 /// What a change at each pose alone would gain, beside one that all have.
-pub(in crate::stereo::board_pose) fn at_each(normal: &Normal, covariance: &DMatrix<f64>) -> Vec<Option<Change>> {
+pub fn at_each(normal: &Normal, covariance: &DMatrix<f64>) -> Vec<Option<Change>> {
     let whole = vec![1.0; normal.poses.len()];
     let common = Sums::of(normal, &whole).score(covariance).map_or(Vector6::zeros(), |change| change.change);
     left(normal, covariance, &common, &whole)
 }
 
 /// What a change at a pose alone would gain where the minimum, in which it has its part, left all shared values free.
-pub(in crate::stereo::board_pose) fn of_member(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change> {
+pub fn of_member(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change> {
     score(&part.change, &part.change_shared, &part.change_gradient, covariance)
 }
 
 /// What a change would gain at a pose that had no part in the minimum.
-pub(in crate::stereo::board_pose) fn of_outsider(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change> {
+pub fn of_outsider(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change> {
     // The gradient scatters with the pose's own corners and with the shared values, which its corners did not help to find.
     score(&part.change, &part.change_shared, &part.change_gradient, &-covariance)
 }
 
 /// The change along the run that gains most: from one pose on, or growing from the first to the last.
-pub(in crate::stereo::board_pose) fn along(normal: &Normal, covariance: &DMatrix<f64>) -> Option<Along> {
+pub fn along(normal: &Normal, covariance: &DMatrix<f64>) -> Option<Along> {
     let present: Vec<usize> = (0..normal.poses.len()).filter(|&i| normal.poses[i].is_some()).collect();
     let [first, .., last] = present[..] else { return None };
     let whole = Sums::of(normal, &vec![1.0; normal.poses.len()]).score(covariance)?.fall;
@@ -119,7 +119,7 @@ fn left(normal: &Normal, covariance: &DMatrix<f64>, change: &Vector6<f64>, share
 }
 
 /// How much larger the usual score of a pose is than chance, after [`at_each`]: one where the model holds.
-pub(in crate::stereo::board_pose) fn usual_excess(each: &[Option<Change>]) -> f64 {
+pub fn usual_excess(each: &[Option<Change>]) -> f64 {
     let poses = each.iter().flatten().count() as f64;
     // One change that all have was taken off.
     let freed = if poses > 1.0 { poses / (poses - 1.0) } else { 1.0 };
@@ -127,7 +127,7 @@ pub(in crate::stereo::board_pose) fn usual_excess(each: &[Option<Change>]) -> f6
 }
 
 /// The usual score over what chance makes of it.
-pub(in crate::stereo::board_pose) fn of_usual(each: &[Option<Change>]) -> f64 {
+pub fn of_usual(each: &[Option<Change>]) -> f64 {
     median(each.iter().flatten().map(|c| c.fall)).map_or(1.0, |m| m / MEDIAN_CHI_SQUARE_6)
 }
 

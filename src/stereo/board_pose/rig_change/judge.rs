@@ -12,7 +12,6 @@ use crate::statistics::median;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, shifts_mm, stretch};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
 use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
-use crate::stereo::board_pose::solve::pose_block::{crossings, residual};
 use crate::stereo::board_pose::solve::prior::{bent_modes, stretch_length_mm};
 use crate::stereo::data::residuals::root_mean_square;
 
@@ -46,8 +45,6 @@ pub struct Changed {
     pub moves_mm: f64,
     /// By how much that exceeds their uncertainty: chi-square with three degrees of freedom, the median over the poses.
     pub beyond: f64,
-    /// How many times less unlikely it makes what is seen: the fall of chi-square.
-    pub fall: f64,
 }
 
 /// Names what changed, where more than chance did; and the estimate to go on with, in which the change is allowed for.
@@ -75,9 +72,8 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
     let known = on_rig.amount.powi(2).max(f64::MIN_POSITIVE);
     let Some(free) = with_cause(&found, on_rig, f64::INFINITY, usual) else { return (found, None) };
     let shifts_mm = shifts_mm(&found, &free);
-    let squares: Vec<f64> = shifts_mm.iter().flatten().map(|shift| shift.norm_squared()).collect();
-    let moves_mm = root_mean_square(&squares).unwrap_or(0.0);
-    let changed = Changed { explanations: equals, moves_mm, beyond: beyond(&found, &free, &shifts_mm), fall: best };
+    let moves_mm = root_mean_square(shifts_mm.iter().flatten().map(|shift| shift.norm_squared())).unwrap_or(0.0);
+    let changed = Changed { explanations: equals, moves_mm, beyond: beyond(&found, &free, &shifts_mm) };
     match with_cause(&found, on_rig, known, usual) {
         Some(allowed) => (allowed, Some(changed)),
         None => (free, Some(changed)),
@@ -143,14 +139,12 @@ fn amount_of(fit: &Estimate<'_>, cause: Cause) -> Option<f64> {
 
 /// Minus twice the logarithm of the likelihood, but for a constant: corners and what was known before.
 fn deviance(fit: &Estimate<'_>) -> f64 {
-    let rig = fit.bundle.rig_at(&fit.values);
-    let places = crossings(fit.bundle.board, &fit.values.deviations_mm);
+    let scene = fit.bundle.scene(&fit.values);
     let mut sum = 0.0;
     for (view, pose) in fit.bundle.views.iter().zip(&fit.values.poses) {
         let Some(pose) = pose else { continue };
         for o in &view.observations {
-            let square =
-                residual(&rig, &places, fit.bundle.board, pose, o).map_or(MOST_SQUARE, |r| o.whiten(r).norm_squared());
+            let square = scene.residual(pose, o).map_or(MOST_SQUARE, |r| o.whiten(r).norm_squared());
             sum += square.min(MOST_SQUARE) - 2.0 * o.whitener.determinant().abs().ln();
         }
     }

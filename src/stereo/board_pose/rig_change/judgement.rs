@@ -8,9 +8,10 @@ use crate::stereo::board_pose::rig_change::flip::Flip;
 use crate::stereo::board_pose::rig_change::judge::Changed;
 
 /// What is found of the rig as a whole.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub enum Judgement {
     /// It agrees with its calibration.
+    #[default]
     Agrees,
     /// It changed by less than the tolerance; covariances allow for it.
     Allowed(Changed),

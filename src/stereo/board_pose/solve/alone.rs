@@ -1,18 +1,15 @@
 //! One pose with everything shared held: the poses that the bundle did without, and the figures of those that it had.
 
-use nalgebra::{DMatrix, Point3, Vector2};
+use nalgebra::{DMatrix, Vector2};
 
 use crate::geometry::{Transform, perturb};
-use crate::imaging::{Board, Side};
-use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::bundle::Promise;
 use crate::stereo::board_pose::solve::estimate::{Estimate, leave_outliers_out};
-use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, PoseSums, SeenFrom, crossings, residual};
+use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, PoseSums, Scene};
 use crate::stereo::board_pose::start::enough;
-use crate::stereo::data::observation::Observation;
 use crate::stereo::data::residuals::root_mean_square;
-use crate::stereo::data::view::View;
-use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::data::{Observation, View};
+use crate::stereo::solve::Loss;
 use crate::stereo::triangulate::{common, triangulate};
 
 /// Steps of the search; the start is within a pixel.
@@ -22,17 +19,15 @@ const STEPS: usize = 20;
 const ROUNDS: usize = 3;
 
 /// The shared values as a pose sees them.
-pub(in crate::stereo::board_pose) struct Known<'a> {
-    rig: Rig,
-    crossings: Vec<Point3<f64>>,
-    board: &'a Board,
+pub struct Known<'a> {
+    scene: Scene<'a>,
     basis: &'a DMatrix<f64>,
     inflation: f64,
     /// See [`Estimate::excess`].
     excess: f64,
 }
 
-pub(in crate::stereo::board_pose) struct Alone {
+pub struct Alone {
     /// `left_from_board`.
     pub pose: Transform,
     /// Its corners; outliers are inactive.
@@ -53,9 +48,7 @@ impl<'a> Known<'a> {
     /// The values of an estimate.
     pub fn new(found: &'a Estimate<'_>) -> Known<'a> {
         Known {
-            rig: found.bundle.rig_at(&found.values),
-            crossings: crossings(found.bundle.board, &found.values.deviations_mm),
-            board: found.bundle.board,
+            scene: found.bundle.scene(&found.values),
             basis: &found.bundle.rig.basis,
             inflation: found.inflation,
             excess: found.excess,
@@ -66,50 +59,45 @@ impl<'a> Known<'a> {
     pub fn fit(&self, view: &View, start: &Transform) -> Option<Alone> {
         let mut view = view.clone();
         view.observations.iter_mut().for_each(|o| o.active = true);
-        let mut pose = self.search(&view, *start, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?;
+        let mut pose = self.search(&view, *start, Loss::Cauchy, Promise::ROUGH)?;
         for _ in 0..ROUNDS {
-            let miss = |o: &Observation| Some(o.whiten(self.residual(&pose, o)?).norm() * self.inflation.sqrt());
+            let miss = |o: &Observation| Some(o.whiten(self.scene.residual(&pose, o)?).norm() * self.inflation.sqrt());
             leave_outliers_out(&mut view, miss, self.excess);
             if !enough(&view) {
                 return None;
             }
             pose = self.search(&view, pose, Loss::Squared, Promise::RESULT)?;
         }
-        let part = PoseBlock::of(&self.seen(&view, &pose), Loss::Squared)?.eliminate(self.basis)?;
-        let active: Vec<(&Observation, Vector2<f64>)> =
-            view.observations.iter().filter(|o| o.active).filter_map(|o| Some((o, self.residual(&pose, o)?))).collect();
+        let part = PoseBlock::of(&self.scene, &pose, &view, Loss::Squared)?.eliminate(self.basis)?;
+        let active: Vec<(&Observation, Vector2<f64>)> = view
+            .observations
+            .iter()
+            .filter(|o| o.active)
+            .filter_map(|o| Some((o, self.scene.residual(&pose, o)?)))
+            .collect();
         let freedom = 2.0 * active.len() as f64 - 6.0;
         let sum: f64 = active.iter().map(|(o, r)| o.whiten(*r).norm_squared()).sum();
-        let squares: Vec<f64> = active.iter().map(|(_, r)| r.norm_squared()).collect();
         Some(Alone {
             part,
             chi_square: sum * self.inflation / freedom.max(1.0),
             freedom,
-            rms_px: root_mean_square(&squares)?,
-            fit_rms_mm: self.fit_rms_mm(&view, &pose),
+            rms_px: root_mean_square(active.iter().map(|(_, r)| r.norm_squared()))?,
+            fit_rms_mm: fit_rms_mm(&self.scene, &view, &pose),
             pose,
             view,
         })
     }
 
-    fn residual(&self, pose: &Transform, o: &Observation) -> Option<Vector2<f64>> {
-        residual(&self.rig, &self.crossings, self.board, pose, o)
-    }
-
-    fn seen<'b>(&'b self, view: &'b View, pose: &'b Transform) -> SeenFrom<'b> {
-        SeenFrom { rig: &self.rig, crossings: &self.crossings, board: self.board, pose, view }
-    }
-
     /// Gauss-Newton with halved steps.
     fn search(&self, view: &View, start: Transform, loss: Loss, least: Promise) -> Option<Transform> {
         let mut pose = start;
-        let mut at = PoseSums::of(&self.seen(view, &pose), loss)?;
+        let mut at = PoseSums::of(&self.scene, &pose, view, loss)?;
         for _ in 0..STEPS {
             let (step, promise) = at.step()?;
             let mut share = 1.0;
             let better = loop {
                 let trial = perturb(&pose, (step * share).as_slice());
-                match PoseSums::of(&self.seen(view, &trial), loss) {
+                match PoseSums::of(&self.scene, &trial, view, loss) {
                     Some(next) if next.cost <= at.cost => break Some((trial, next)),
                     _ if share < 1e-3 => break None,
                     _ => share *= 0.5,
@@ -123,24 +111,13 @@ impl<'a> Known<'a> {
         }
         Some(pose)
     }
+}
 
-    fn fit_rms_mm(&self, view: &View, pose: &Transform) -> Option<f64> {
-        let squares: Vec<f64> = common(view)
-            .into_iter()
-            .filter_map(|(l, r)| {
-                // Both pictures see the crossing through windows of their own.
-                let seen_off_mm = 0.5 * (l.seen_off_mm + r.seen_off_mm);
-                let place = pose * (self.crossings[self.board.index(l.col, l.row)] + seen_off_mm);
-                Some((triangulate(&self.rig, l, r)?.point_mm - place).norm_squared())
-            })
-            .collect();
-        root_mean_square(&squares)
-    }
-
-    /// The pictures of two poses as one pair: the left one of the first, the right one of the second.
-    pub fn mixed(&self, left: &View, right: &View) -> View {
-        let mut mixed = left.only(Side::Left);
-        mixed.observations.extend(right.only(Side::Right).observations);
-        mixed
-    }
+fn fit_rms_mm(scene: &Scene<'_>, view: &View, pose: &Transform) -> Option<f64> {
+    root_mean_square(common(view).into_iter().filter_map(|(l, r)| {
+        // Both pictures see the crossing through windows of their own.
+        let seen_off_mm = 0.5 * (l.seen_off_mm + r.seen_off_mm);
+        let place = pose * (scene.crossing(l) + seen_off_mm);
+        Some((triangulate(&scene.rig, l, r)?.point_mm - place).norm_squared())
+    }))
 }

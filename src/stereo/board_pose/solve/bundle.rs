@@ -10,12 +10,12 @@ use rayon::prelude::*;
 use crate::geometry::{Transform, perturb};
 use crate::imaging::Board;
 use crate::stereo::Rig;
-use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, SeenFrom, crossings, residual};
+use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, Scene};
 use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior, weights};
 use crate::stereo::board_pose::solve::totals::Totals;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
+use crate::stereo::solve::Loss;
 use crate::stereo::solve::normal_equations::{inverse6, solve_scaled};
-use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::solve::uncertainty::invert;
 
 /// Steps of one search at most; each squares what is left.
@@ -24,7 +24,7 @@ const STEPS: usize = 12;
 /// How close to the minimum a search goes: it is done when a step promises to lower the cost by less than this, in squared residuals of
 /// unit variance. A thousandth of a standard deviation lowers it by a millionth.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stereo::board_pose) struct Promise(pub f64);
+pub struct Promise(pub f64);
 
 impl Promise {
     /// For values that are a result.
@@ -35,7 +35,7 @@ impl Promise {
 
 /// Values of all unknowns.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct Values {
+pub struct Values {
     /// Of the rig's prior.
     pub rig: DVector<f64>,
     /// The crossings' deviations from the drawing, mm.
@@ -46,7 +46,7 @@ pub(in crate::stereo::board_pose) struct Values {
 
 /// The problem: what was seen and what is known before.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct Bundle<'a> {
+pub struct Bundle<'a> {
     /// The target as drawn.
     pub board: &'a Board,
     /// Every pose's corners.
@@ -61,7 +61,7 @@ pub(in crate::stereo::board_pose) struct Bundle<'a> {
 
 /// The normal equations.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct Normal {
+pub struct Normal {
     /// What the corners say.
     pub told: Totals,
     /// What is known before.
@@ -70,7 +70,7 @@ pub(in crate::stereo::board_pose) struct Normal {
     pub poses: Vec<Option<Eliminated>>,
 }
 
-impl Bundle<'_> {
+impl<'a> Bundle<'a> {
     /// The shared unknowns as one vector.
     pub fn shared(values: &Values) -> DVector<f64> {
         let all = values.rig.iter().copied().chain(values.deviations_mm.iter().flat_map(|d| [d.x, d.y, d.z]));
@@ -82,10 +82,14 @@ impl Bundle<'_> {
         self.rig.rig_at(&values.rig)
     }
 
+    /// The rig and the target at these values.
+    pub fn scene(&self, values: &Values) -> Scene<'a> {
+        Scene::new(self.rig_at(values), self.board, &values.deviations_mm)
+    }
+
     /// Linearises. `None` where a corner would lie behind its camera or no pose takes part.
     pub fn normal(&self, values: &Values, loss: Loss) -> Option<Normal> {
-        let rig = self.rig_at(values);
-        let crossings = crossings(self.board, &values.deviations_mm);
+        let scene = self.scene(values);
         let present: Vec<(usize, &Transform)> =
             values.poses.iter().enumerate().filter_map(|(i, pose)| Some((i, pose.as_ref()?))).collect();
         if present.is_empty() {
@@ -94,11 +98,8 @@ impl Bundle<'_> {
         let mut poses = vec![None; values.poses.len()];
         let told = Totals::of(
             &present,
-            (&self.rig.basis, crossings.len()),
-            |&(i, pose)| {
-                let view = &self.views[i];
-                PoseBlock::of(&SeenFrom { rig: &rig, crossings: &crossings, board: self.board, pose, view }, loss)
-            },
+            (&self.rig.basis, scene.crossings.len()),
+            |&(i, pose)| PoseBlock::of(&scene, pose, &self.views[i], loss),
             |k, _, part| poses[present[k].0] = Some(part),
         )?;
         let weights = weights(&self.rig, &self.shape, self.board, &told.matrix);
@@ -107,13 +108,11 @@ impl Bundle<'_> {
 
     /// Cost of the corners at these values; infinite where a corner would lie behind its camera.
     fn cost(&self, values: &Values, weights: &DMatrix<f64>, loss: Loss) -> f64 {
-        let rig = self.rig_at(values);
-        let crossings = crossings(self.board, &values.deviations_mm);
+        let scene = self.scene(values);
         let of = |(view, pose): (&View, &Option<Transform>)| -> f64 {
             let Some(pose) = pose else { return 0.0 };
             let costs = view.observations.iter().filter(|o| o.active).map(|o| {
-                residual(&rig, &crossings, self.board, pose, o)
-                    .map_or(f64::INFINITY, |r| loss.cost_and_weight(o.whiten(r).norm_squared()).0)
+                scene.residual(pose, o).map_or(f64::INFINITY, |r| loss.cost_and_weight(o.whiten(r).norm_squared()).0)
             });
             costs.sum()
         };

@@ -9,10 +9,9 @@ use nalgebra::{Matrix2, Vector3};
 use crate::imaging::{Board, Side};
 use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
-use crate::stereo::board_pose::solve::pose_block::{OUTLIER, crossings, residual};
+use crate::stereo::board_pose::solve::pose_block::OUTLIER;
 use crate::stereo::board_pose::solve::window::{Window, crossing_means};
-use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::data::observation::Observation;
+use crate::stereo::data::{Noise, Observation};
 
 /// Standard deviations by which the corners of a crossing must scatter beyond their noise.
 const TELLING: f64 = 4.0;
@@ -37,7 +36,7 @@ impl Bundle<'_> {
     /// Sets the crossings to what their corners, each through its own window, show on the whole; and with it what each corner sees. `told` is
     /// how much of a change of what is seen a crossing follows, between none and one: of what a window hardly sees, corners that are known
     /// badly would else make any deviation.
-    pub(in crate::stereo::board_pose) fn unbend(&mut self, values: &mut Values, told: &[Vector3<f64>]) {
+    pub fn unbend(&mut self, values: &mut Values, told: &[Vector3<f64>]) {
         let board = self.board;
         let windows = Window::means(board, &self.views);
         let off = crossing_means(board, &self.views, |o| o.seen_off_mm);
@@ -57,12 +56,7 @@ impl Bundle<'_> {
     }
 
     /// A corner with what its crossing's edges add to its covariance.
-    pub(in crate::stereo::board_pose) fn with_edge_bend(
-        &self,
-        rig: &Rig,
-        depth_mm: f64,
-        o: &Observation,
-    ) -> Observation {
+    pub fn with_edge_bend(&self, rig: &Rig, depth_mm: f64, o: &Observation) -> Observation {
         let bend_px = self.edge_bends_mm[self.board.index(o.col, o.row)] * px_per_mm(rig, o.side, depth_mm);
         let mut o = *o;
         o.covariance_px2 += Matrix2::identity() * (bend_px * bend_px);
@@ -76,16 +70,15 @@ fn px_per_mm(rig: &Rig, side: Side, depth_mm: f64) -> f64 {
 }
 
 /// Standard deviation of what bent edges add to a corner along x and along y beyond its noise, mm, by crossing.
-pub(in crate::stereo::board_pose) fn edge_bends_mm(bundle: &Bundle<'_>, values: &Values, noise: &Noise) -> Vec<f64> {
-    let rig = bundle.rig_at(values);
-    let places = crossings(bundle.board, &values.deviations_mm);
-    let mut sums = vec![Sums::default(); places.len()];
+pub fn edge_bends_mm(bundle: &Bundle<'_>, values: &Values, noise: &Noise) -> Vec<f64> {
+    let scene = bundle.scene(values);
+    let mut sums = vec![Sums::default(); scene.crossings.len()];
     for (view, pose) in bundle.views.iter().zip(&values.poses) {
         let Some(pose) = pose else { continue };
         for o in &view.observations {
             let k = bundle.board.index(o.col, o.row);
-            let Some(miss) = residual(&rig, &places, bundle.board, pose, o) else { continue };
-            let scale = px_per_mm(&rig, o.side, (pose * places[k]).z);
+            let Some(miss) = scene.residual(pose, o) else { continue };
+            let scale = px_per_mm(&scene.rig, o.side, (pose * scene.crossing(o)).z);
             let variance = noise.covariance(o).trace() / 2.0;
             // What is farther off is no bend of edges.
             let most_px = values.deviations_mm[k].xy().norm() * scale + OUTLIER * variance.sqrt();
@@ -123,7 +116,7 @@ mod tests {
     use super::*;
     use crate::imaging::Squares;
     use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior};
-    use crate::stereo::data::view::View;
+    use crate::stereo::data::View;
     use crate::stereo::synthetic::World;
 
     fn board() -> Board {

@@ -15,14 +15,12 @@ use crate::statistics::median;
 use crate::stereo::board_pose::rig_change::consistency::{at_each, usual_excess};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Normal, Promise, Values};
 use crate::stereo::board_pose::solve::edge_bend::edge_bends_mm;
-use crate::stereo::board_pose::solve::pose_block::{OUTLIER, crossings, residual};
+use crate::stereo::board_pose::solve::pose_block::OUTLIER;
 use crate::stereo::board_pose::solve::prior::{bent_modes, stretch_mode, weights};
 use crate::stereo::board_pose::start::enough;
-use crate::stereo::data::corner_noise::{Noise, whitener};
-use crate::stereo::data::neighbour_correlation::NeighbourCorrelation;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::data::view::View;
-use crate::stereo::solve::robust_loss::{CAUCHY_WIDTH, Loss};
+use crate::stereo::data::corner_noise::whitener;
+use crate::stereo::data::{NeighbourCorrelation, Noise, Observation, View};
+use crate::stereo::solve::Loss;
 use crate::stereo::solve::uncertainty::invert;
 
 /// Rounds of least squares with new weights.
@@ -32,7 +30,7 @@ const ROUNDS: usize = 6;
 const SETTLED: f64 = 0.01;
 
 /// Fewest poses that tell a target's print from noise.
-pub(in crate::stereo::board_pose) const TELLING_POSES: usize = 3;
+pub const TELLING_POSES: usize = 3;
 
 /// The certificate counts as much as this many crossings' worth of evidence on how far crossings deviate.
 const CERTIFICATE_COUNT: f64 = 0.1;
@@ -48,7 +46,7 @@ const FIXED_POINT_STEPS: usize = 30;
 
 /// A minimum with its weights.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct Estimate<'a> {
+pub struct Estimate<'a> {
     /// The problem with the whiteners, the outliers and the shape's prior that were found.
     pub bundle: Bundle<'a>,
     pub values: Values,
@@ -66,7 +64,7 @@ pub(in crate::stereo::board_pose) struct Estimate<'a> {
 
 /// What pictures of the rig did at its calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stereo::board_pose) struct Usual {
+pub struct Usual {
     /// How corners scattered, where that is known.
     pub noise: Option<Noise>,
     /// How far pairs scattered about the rig beyond that, as [`Estimate::excess`]; one where that is not known.
@@ -85,9 +83,9 @@ impl Usual {
 fn roughly(bundle: &mut Bundle, mut values: Values) -> Option<Values> {
     let stretch_mm = std::mem::replace(&mut bundle.shape.stretch_mm, f64::INFINITY);
     for _ in 0..2 {
-        let noise = Noise::from_median(&residuals(bundle, &values, |_| true));
+        let noise = Noise::from_median(&residuals(bundle, &values, |_| true).concat());
         bundle.weigh(&values, &noise);
-        values = bundle.solve(values, Loss::Cauchy(CAUCHY_WIDTH), Promise::ROUGH)?.0;
+        values = bundle.solve(values, Loss::Cauchy, Promise::ROUGH)?.0;
     }
     bundle.shape.stretch_mm = stretch_mm;
     Some(values)
@@ -95,7 +93,7 @@ fn roughly(bundle: &mut Bundle, mut values: Values) -> Option<Values> {
 
 /// Finds the minimum. `usual` is what counts at least; `excess` is held where it is known. `None` where the
 /// corners do not determine the poses.
-pub(in crate::stereo::board_pose) fn estimate<'a>(
+pub fn estimate<'a>(
     mut bundle: Bundle<'a>,
     start: Values,
     usual: Usual,
@@ -104,7 +102,7 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
     let certificate = bundle.shape;
     let mut values = roughly(&mut bundle, start)?;
     let poses = values.poses.iter().flatten().count();
-    let mut noise = at_least(usual.noise, Noise::from_median(&residuals(&bundle, &values, |_| true)));
+    let mut noise = at_least(usual.noise, Noise::from_median(&residuals(&bundle, &values, |_| true).concat()));
     let usual_excess_here = usual.excess_here(&noise, &bundle.views).max(1.0);
     let (mut inflation, mut excess) = (1.0, known_excess.unwrap_or(usual_excess_here));
     let mut normal = bundle.normal(&values, Loss::Squared)?;
@@ -116,7 +114,8 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
         }
         bundle.weigh(&values, &noise);
         bundle.mark_outliers(&mut values, excess);
-        inflate(&mut bundle.views, inflation * excess);
+        let by = 1.0 / (inflation * excess).sqrt();
+        bundle.views.iter_mut().flat_map(|view| &mut view.observations).for_each(|o| o.whitener *= by);
         (values, normal) = bundle.solve(values, Loss::Squared, Promise::RESULT)?;
         covariance = normal.covariance()?;
         let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm, excess);
@@ -135,11 +134,11 @@ pub(in crate::stereo::board_pose) fn estimate<'a>(
         noise = match usual.noise {
             Some(usual) if poses < TELLING_POSES => usual,
             _ => {
-                let here = Noise::from_mean(&active, (told + 6.0 * poses as f64).round() as usize);
-                at_least(usual.noise, here)
+                let unknowns = (told + 6.0 * poses as f64).round() as usize;
+                at_least(usual.noise, Noise::from_mean(&active.concat(), unknowns))
             }
         };
-        inflation = neighbours(&bundle, &values).inflation();
+        inflation = NeighbourCorrelation::of(bundle.board, active.into_iter()).inflation();
         let close = |a: f64, b: f64| (a - b).abs() <= SETTLED * b.abs().max(1e-5);
         let settled = close(before.0.added_px, noise.added_px)
             && close(before.0.factor, noise.factor)
@@ -176,11 +175,7 @@ impl Estimate<'_> {
 
 /// Leaves out the corners of a pose that miss their prediction by more than chance allows; `miss` is in standard deviations of their noise. A pose
 /// that misses the rig as a whole, as the usual one does with this [`Estimate::excess`], has no more outliers for it.
-pub(in crate::stereo::board_pose) fn leave_outliers_out(
-    view: &mut View,
-    miss: impl Fn(&Observation) -> Option<f64>,
-    excess: f64,
-) {
+pub fn leave_outliers_out(view: &mut View, miss: impl Fn(&Observation) -> Option<f64>, excess: f64) {
     let misses: Vec<Option<f64>> = view.observations.iter().map(miss).collect();
     let whole = median(misses.iter().flatten().copied()).unwrap_or(0.0) / MEDIAN_MISS;
     let allowed = OUTLIER * whole.clamp(1.0, excess.max(1.0).sqrt());
@@ -199,28 +194,19 @@ fn told_of_crossings(normal: &Normal, covariance: &DMatrix<f64>, first: usize) -
         .collect()
 }
 
-/// Residuals in px of the corners that are wanted, where they can be predicted, in the order of the poses.
+/// Residuals in px of the corners that are wanted, where they can be predicted, by pose.
 fn residuals(
     bundle: &Bundle<'_>,
     values: &Values,
     wanted: impl Fn(&Observation) -> bool + Sync,
-) -> Vec<(Observation, Vector2<f64>)> {
-    by_pose(bundle, values, wanted).into_iter().flatten().collect()
-}
-
-fn by_pose(
-    bundle: &Bundle<'_>,
-    values: &Values,
-    wanted: impl Fn(&Observation) -> bool + Sync,
 ) -> Vec<Vec<(Observation, Vector2<f64>)>> {
-    let rig = bundle.rig_at(values);
-    let crossings = crossings(bundle.board, &values.deviations_mm);
+    let scene = bundle.scene(values);
     let of = |(view, pose): (&View, &Option<Transform>)| -> Vec<_> {
         let Some(pose) = pose else { return Vec::new() };
         let wanted = view.observations.iter().filter(|o| wanted(o));
         let with_residual = |o: &Observation| {
-            let depth_mm = (pose * crossings[bundle.board.index(o.col, o.row)]).z;
-            Some((bundle.with_edge_bend(&rig, depth_mm, o), residual(&rig, &crossings, bundle.board, pose, o)?))
+            let depth_mm = (pose * scene.crossing(o)).z;
+            Some((bundle.with_edge_bend(&scene.rig, depth_mm, o), scene.residual(pose, o)?))
         };
         wanted.filter_map(with_residual).collect()
     };
@@ -234,28 +220,18 @@ fn at_least(usual: Option<Noise>, here: Noise) -> Noise {
     Noise { added_px, ..here }
 }
 
-fn inflate(views: &mut [View], inflation: f64) {
-    let by = 1.0 / inflation.sqrt();
-    views.iter_mut().flat_map(|view| &mut view.observations).for_each(|o| o.whitener *= by);
-}
-
-fn neighbours(bundle: &Bundle<'_>, values: &Values) -> NeighbourCorrelation {
-    NeighbourCorrelation::of(bundle.board, by_pose(bundle, values, |o| o.active).into_iter())
-}
-
 impl Bundle<'_> {
     /// Sets the whiteners of all corners: their noise and what bent edges add.
     fn weigh(&mut self, values: &Values, noise: &Noise) {
-        let rig = self.rig_at(values);
-        let crossings = crossings(self.board, &values.deviations_mm);
+        let scene = self.scene(values);
         // A pose that takes no part is about as far away as the others.
         let usual_mm =
             median(values.poses.iter().flatten().map(|pose| pose.translation.vector.z)).unwrap_or(f64::INFINITY);
         let mut views = std::mem::take(&mut self.views);
         views.par_iter_mut().zip(&values.poses).for_each(|(view, pose)| {
             for o in &mut view.observations {
-                let depth_mm = pose.map_or(usual_mm, |pose| (pose * crossings[self.board.index(o.col, o.row)]).z);
-                o.whitener = whitener(&noise.covariance(&self.with_edge_bend(&rig, depth_mm, o)));
+                let depth_mm = pose.map_or(usual_mm, |pose| (pose * scene.crossing(o)).z);
+                o.whitener = whitener(&noise.covariance(&self.with_edge_bend(&scene.rig, depth_mm, o)));
             }
         });
         self.views = views;
@@ -264,12 +240,10 @@ impl Bundle<'_> {
     /// Corners that miss their prediction by more than chance allows are out; the whiteners hold the noise alone.
     /// A pose with too few left takes no part.
     fn mark_outliers(&mut self, values: &mut Values, excess: f64) {
-        let rig = self.rig_at(values);
-        let crossings = crossings(self.board, &values.deviations_mm);
-        let board = self.board;
+        let scene = self.scene(values);
         self.views.par_iter_mut().zip(&mut values.poses).for_each(|(view, place)| {
             let Some(pose) = place else { return };
-            let miss = |o: &Observation| Some(o.whiten(residual(&rig, &crossings, board, pose, o)?).norm());
+            let miss = |o: &Observation| Some(o.whiten(scene.residual(pose, o)?).norm());
             leave_outliers_out(view, miss, excess);
             if !enough(view) {
                 *place = None;

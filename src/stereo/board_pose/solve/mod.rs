@@ -5,11 +5,11 @@
 //! misprinted crossings, `edge_bend` where those are; `estimate` finds the weights with the values, and `alone` fits a pose with everything
 //! shared held.
 
-pub(in crate::stereo::board_pose) mod alone;
-pub(in crate::stereo::board_pose) mod bundle;
-pub(in crate::stereo::board_pose) mod edge_bend;
-pub(in crate::stereo::board_pose) mod estimate;
-pub(in crate::stereo::board_pose) mod pose_block;
-pub(in crate::stereo::board_pose) mod prior;
-pub(in crate::stereo::board_pose) mod totals;
-pub(in crate::stereo::board_pose) mod window;
+pub mod alone;
+pub mod bundle;
+pub mod edge_bend;
+pub mod estimate;
+pub mod pose_block;
+pub mod prior;
+pub mod totals;
+pub mod window;

@@ -13,54 +13,54 @@ use crate::stereo::data::observation::{Observation, Side};
 use crate::stereo::data::residuals::of_point;
 use crate::stereo::data::view::View;
 use crate::stereo::model::projection::CAMERA_NUMBERS;
+use crate::stereo::solve::Loss;
 use crate::stereo::solve::normal_equations::{Way, inverse6, write_turn_and_shift};
-use crate::stereo::solve::robust_loss::Loss;
 use crate::stereo::triangulate::RIG_NUMBERS;
 
 /// Whitened residuals beyond this are outliers.
-pub(in crate::stereo::board_pose) const OUTLIER: f64 = 5.3;
+pub const OUTLIER: f64 = 5.3;
 
 /// Where the numbers of `right_from_left` begin among the rig's.
-pub(in crate::stereo::board_pose) const TRANSFORM: usize = 2 * CAMERA_NUMBERS;
+pub const TRANSFORM: usize = 2 * CAMERA_NUMBERS;
 
 /// A square matrix over the rig's numbers.
-pub(in crate::stereo::board_pose) type RigMatrix = SMatrix<f64, RIG_NUMBERS, RIG_NUMBERS>;
+pub type RigMatrix = SMatrix<f64, RIG_NUMBERS, RIG_NUMBERS>;
 
-/// Where each crossing is on the target, board's frame, mm, row by row.
-pub(in crate::stereo::board_pose) fn crossings(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Point3<f64>> {
-    board.corners_mm().zip(deviations_mm).map(|(at, deviation)| at + deviation).collect()
-}
-
-/// Predicted minus seen, px; what is seen of a misprinted crossing is in [`Observation::seen_off_mm`]. `None` for a corner behind its camera.
-pub(in crate::stereo::board_pose) fn residual(
-    rig: &Rig,
-    crossings: &[Point3<f64>],
-    board: &Board,
-    pose: &Transform,
-    o: &Observation,
-) -> Option<Vector2<f64>> {
-    of_point(rig, pose * (crossings[board.index(o.col, o.row)] + o.seen_off_mm), o)
-}
-
-/// A target in front of the rig, and what was seen of it there.
-pub(in crate::stereo::board_pose) struct SeenFrom<'a> {
-    pub rig: &'a Rig,
-    /// Where each crossing is on the target, as [`crossings`] has them.
-    pub crossings: &'a [Point3<f64>],
+/// A target as it is found to be, and the rig that sees it.
+pub struct Scene<'a> {
+    pub rig: Rig,
     /// The target as drawn.
     pub board: &'a Board,
-    /// `left_from_board`.
-    pub pose: &'a Transform,
-    /// The corners.
-    pub view: &'a View,
+    /// Where each crossing is on the target, board's frame, mm, row by row.
+    pub crossings: Vec<Point3<f64>>,
 }
 
-impl SeenFrom<'_> {
+impl<'a> Scene<'a> {
+    pub fn new(rig: Rig, board: &'a Board, deviations_mm: &[Vector3<f64>]) -> Scene<'a> {
+        let crossings = board.corners_mm().zip(deviations_mm).map(|(at, deviation)| at + deviation).collect();
+        Scene { rig, board, crossings }
+    }
+
+    /// The crossing of a corner.
+    pub fn crossing(&self, o: &Observation) -> Point3<f64> {
+        self.crossings[self.board.index(o.col, o.row)]
+    }
+
+    /// Predicted minus seen, px; what is seen of a misprinted crossing is in [`Observation::seen_off_mm`]. `None` for a corner behind its camera.
+    pub fn residual(&self, left_from_board: &Transform, o: &Observation) -> Option<Vector2<f64>> {
+        of_point(&self.rig, left_from_board * (self.crossing(o) + o.seen_off_mm), o)
+    }
+
     /// Hands over the rows of every active corner, with its side and its crossing's number. `None` where one would lie behind its camera.
-    fn each_corner(&self, mut take: impl FnMut(Side, usize, &[Row; 2])) -> Option<()> {
+    fn each_corner(
+        &self,
+        left_from_board: &Transform,
+        view: &View,
+        mut take: impl FnMut(Side, usize, &[Row; 2]),
+    ) -> Option<()> {
         for side in Side::BOTH {
-            let way = Way::new(self.rig, self.pose, side);
-            for o in self.view.active(side) {
+            let way = Way::new(&self.rig, left_from_board, side);
+            for o in view.active(side) {
                 let at = self.board.index(o.col, o.row);
                 take(side, at, &rows(&way, &(self.crossings[at] + o.seen_off_mm), o)?);
             }
@@ -70,15 +70,15 @@ impl SeenFrom<'_> {
 }
 
 /// Sums over one pose's corners.
-pub(in crate::stereo::board_pose) struct PoseBlock {
-    pub(super) shared: CornerSums,
+pub struct PoseBlock {
+    pub shared: CornerSums,
     rig_pose: SMatrix<f64, RIG_NUMBERS, 6>,
     crossings_pose: Vec<Matrix3x6<f64>>,
     pose: PoseSums,
 }
 
 /// The part of the pose alone.
-pub(in crate::stereo::board_pose) struct PoseSums {
+pub struct PoseSums {
     matrix: Matrix6<f64>,
     gradient: Vector6<f64>,
     /// Half the robust sum of squares.
@@ -86,23 +86,23 @@ pub(in crate::stereo::board_pose) struct PoseSums {
 }
 
 /// The part of what all poses share: it is added up over the poses before anything is made of it.
-pub(super) struct CornerSums {
+pub struct CornerSums {
     /// Its upper triangle.
     rig: Box<RigMatrix>,
-    pub(super) rig_gradient: SVector<f64, RIG_NUMBERS>,
-    pub(super) crossings: Vec<CrossingSums>,
+    pub rig_gradient: SVector<f64, RIG_NUMBERS>,
+    pub crossings: Vec<CrossingSums>,
 }
 
 /// The part of one crossing.
 #[derive(Clone)]
-pub(super) struct CrossingSums {
-    pub(super) own: Matrix3<f64>,
-    pub(super) rig: SMatrix<f64, RIG_NUMBERS, 3>,
-    pub(super) gradient: Vector3<f64>,
+pub struct CrossingSums {
+    pub own: Matrix3<f64>,
+    pub rig: SMatrix<f64, RIG_NUMBERS, 3>,
+    pub gradient: Vector3<f64>,
 }
 
 impl CornerSums {
-    pub(super) fn zeros(crossings: usize) -> CornerSums {
+    pub fn zeros(crossings: usize) -> CornerSums {
         let none = CrossingSums { own: Matrix3::zeros(), rig: SMatrix::zeros(), gradient: Vector3::zeros() };
         CornerSums {
             rig: Box::new(RigMatrix::zeros()),
@@ -111,7 +111,7 @@ impl CornerSums {
         }
     }
 
-    pub(super) fn add(&mut self, other: &CornerSums) {
+    pub fn add(&mut self, other: &CornerSums) {
         *self.rig += &*other.rig;
         self.rig_gradient += other.rig_gradient;
         for (all, one) in self.crossings.iter_mut().zip(&other.crossings) {
@@ -122,7 +122,7 @@ impl CornerSums {
     }
 
     /// The rig's numbers by themselves, whole.
-    pub(super) fn rig(&self) -> RigMatrix {
+    pub fn rig(&self) -> RigMatrix {
         RigMatrix::from_fn(|i, j| self.rig[(i.min(j), i.max(j))])
     }
 }
@@ -141,9 +141,9 @@ impl PoseSums {
     }
 
     /// The sums at these values, without those of a [`PoseBlock`]. `None` where a corner would lie behind its camera.
-    pub fn of(seen: &SeenFrom<'_>, loss: Loss) -> Option<PoseSums> {
+    pub fn of(scene: &Scene<'_>, left_from_board: &Transform, view: &View, loss: Loss) -> Option<PoseSums> {
         let mut sums = PoseSums::zeros();
-        seen.each_corner(|_, _, rows| {
+        scene.each_corner(left_from_board, view, |_, _, rows| {
             let weight = sums.weigh(rows, loss);
             rows.iter().for_each(|row| sums.add(row, weight));
         })?;
@@ -175,14 +175,14 @@ impl PoseSums {
 
 impl PoseBlock {
     /// The sums at these values. `None` where a corner would lie behind its camera.
-    pub fn of(seen: &SeenFrom<'_>, loss: Loss) -> Option<PoseBlock> {
+    pub fn of(scene: &Scene<'_>, left_from_board: &Transform, view: &View, loss: Loss) -> Option<PoseBlock> {
         let mut block = PoseBlock {
-            shared: CornerSums::zeros(seen.crossings.len()),
+            shared: CornerSums::zeros(scene.crossings.len()),
             rig_pose: SMatrix::zeros(),
-            crossings_pose: vec![Matrix3x6::zeros(); seen.crossings.len()],
+            crossings_pose: vec![Matrix3x6::zeros(); scene.crossings.len()],
             pose: PoseSums::zeros(),
         };
-        seen.each_corner(|side, at, rows| {
+        scene.each_corner(left_from_board, view, |side, at, rows| {
             let weight = block.pose.weigh(rows, loss);
             rows.iter().for_each(|row| block.add(row, side, at, weight));
         })?;
@@ -261,7 +261,7 @@ impl PoseBlock {
 
 /// A pose's share with the pose eliminated.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct Eliminated {
+pub struct Eliminated {
     /// Shared by pose, before the elimination.
     pub mixed: DMatrix<f64>,
     /// The rig's raw numbers by pose, before the elimination.

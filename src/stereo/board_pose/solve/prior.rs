@@ -13,8 +13,8 @@ use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::pose_block::TRANSFORM;
 use crate::stereo::model::board_shape::{self, lift};
 use crate::stereo::model::projection::CAMERA_NUMBERS;
-use crate::stereo::model::rig::Covariance;
-use crate::stereo::triangulate::{RIG_NUMBERS, rig_number, rig_number_name};
+use crate::stereo::model::{Covariance, Layout};
+use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
 /// How tightly the deviations are held free of shift, turn and tilt, as a multiple of what the corners say about them.
 const HELD: f64 = 1e4;
@@ -24,7 +24,7 @@ const LEAST_OWN: f64 = 1e-6;
 
 /// What the calibration says.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct RigPrior {
+pub struct RigPrior {
     /// The rig as calibrated.
     pub rig: Rig,
     /// Names of the numbers with a covariance.
@@ -40,26 +40,18 @@ pub(in crate::stereo::board_pose) struct RigPrior {
 impl RigPrior {
     /// From the calibration's covariance; without one the rig is taken as it is.
     pub fn new(rig: &Rig) -> RigPrior {
-        let known = |c: &Covariance| -> Vec<(usize, String, usize)> {
-            let named = c.order.iter().enumerate();
-            let with_place = named.filter_map(|(at, name)| Some((at, name.clone(), rig_number(name)?)));
-            with_place.filter(|(at, _, _)| c.matrix[(*at, *at)] > 0.0).collect()
+        let known = |c: &Covariance| -> Vec<(String, usize)> {
+            let varying = c.order.iter().enumerate().filter(|(at, _)| c.matrix[(*at, *at)] > 0.0);
+            varying.filter_map(|(_, name)| Some((name.clone(), rig_number(name)?))).collect()
         };
-        let known: Vec<_> = rig.covariance.as_ref().map_or_else(Vec::new, known);
-        let at: Vec<usize> = known.iter().map(|(at, _, _)| *at).collect();
-        let places: Vec<usize> = known.iter().map(|(_, _, place)| *place).collect();
-        let covariance = rig.covariance.as_ref().map_or_else(
-            || DMatrix::zeros(0, 0),
-            |c| {
-                DMatrix::from_fn(at.len(), at.len(), |i, j| 0.5 * (c.matrix[(at[i], at[j])] + c.matrix[(at[j], at[i])]))
-            },
-        );
-        let root = root(&covariance);
+        let known = rig.covariance.as_ref().map_or_else(Vec::new, known);
+        let (names, places): (Vec<String>, Vec<usize>) = known.into_iter().unzip();
+        let covariance = rig.covariance.as_ref().and_then(|c| c.part(&names)).unwrap_or_else(|| DMatrix::zeros(0, 0));
+        let root = root(&(0.5 * (&covariance + covariance.transpose())));
         let mut basis = DMatrix::zeros(RIG_NUMBERS, root.ncols());
         for (row, &place) in places.iter().enumerate() {
             basis.row_mut(place).copy_from(&root.row(row));
         }
-        let names = known.into_iter().map(|(_, name, _)| name).collect();
         RigPrior { rig: rig.clone(), names, places, variances: vec![1.0; basis.ncols()], basis }
     }
 
@@ -70,10 +62,10 @@ impl RigPrior {
         prior.basis = prior.basis.insert_column(at, 0.0);
         prior.basis.set_column(at, direction);
         prior.variances.push(variance);
-        for (place, _) in direction.iter().enumerate().filter(|(_, by)| **by != 0.0) {
-            if !prior.places.contains(&place) {
+        for ((place, name), by) in Layout::WHOLE_RIG.names().into_iter().enumerate().zip(direction) {
+            if *by != 0.0 && !prior.places.contains(&place) {
                 prior.places.push(place);
-                prior.names.push(rig_number_name(place));
+                prior.names.push(name);
             }
         }
         prior
@@ -110,7 +102,7 @@ fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// What is known of the target, as standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stereo::board_pose) struct ShapePrior {
+pub struct ShapePrior {
     /// Of a crossing along x and along y, mm.
     pub in_plane_mm: f64,
     /// Of a crossing's height, mm.
@@ -122,7 +114,7 @@ pub(in crate::stereo::board_pose) struct ShapePrior {
 }
 
 /// Unit vectors in the space of all deviations (x, y, z of every crossing): shifts, turn and tilts, which the frame takes up.
-pub(in crate::stereo::board_pose) fn frame_modes(board: &Board) -> Vec<DVector<f64>> {
+pub fn frame_modes(board: &Board) -> Vec<DVector<f64>> {
     type Way = fn(&Point3<f64>) -> Vector3<f64>;
     let ways: [Way; 6] = [
         |_| Vector3::x(),
@@ -136,7 +128,7 @@ pub(in crate::stereo::board_pose) fn frame_modes(board: &Board) -> Vec<DVector<f
 }
 
 /// Orthogonal unit vectors of a bow along either axis and of a twist, without shift and tilts.
-pub(in crate::stereo::board_pose) fn bent_modes(board: &Board) -> Vec<DVector<f64>> {
+pub fn bent_modes(board: &Board) -> Vec<DVector<f64>> {
     let mut found: Vec<DVector<f64>> = frame_modes(board);
     let frame = found.len();
     for k in 0..board_shape::NUMBERS {
@@ -151,12 +143,12 @@ pub(in crate::stereo::board_pose) fn bent_modes(board: &Board) -> Vec<DVector<f6
 }
 
 /// The unit vector of a common stretch.
-pub(in crate::stereo::board_pose) fn stretch_mode(board: &Board) -> DVector<f64> {
+pub fn stretch_mode(board: &Board) -> DVector<f64> {
     mode(board, |p| p.coords)
 }
 
 /// Length of the vector of all deviations when the board is stretched by the whole of its size, mm.
-pub(in crate::stereo::board_pose) fn stretch_length_mm(board: &Board) -> f64 {
+pub fn stretch_length_mm(board: &Board) -> f64 {
     board.corners_mm().map(|p| p.coords.norm_squared()).sum::<f64>().sqrt()
 }
 
@@ -169,12 +161,7 @@ fn mode(board: &Board, way: impl Fn(&Point3<f64>) -> Vector3<f64>) -> DVector<f6
 }
 
 /// The weights of all that is known before, as a matrix over the shared unknowns. `data` is what the corners say.
-pub(in crate::stereo::board_pose) fn weights(
-    rig: &RigPrior,
-    shape: &ShapePrior,
-    board: &Board,
-    data: &DMatrix<f64>,
-) -> DMatrix<f64> {
+pub fn weights(rig: &RigPrior, shape: &ShapePrior, board: &Board, data: &DMatrix<f64>) -> DMatrix<f64> {
     let n = rig.basis.ncols();
     let m = 3 * board.corner_count();
     let mut weights = DMatrix::zeros(n + m, n + m);

@@ -24,7 +24,7 @@ struct SharedSums<'a> {
 
 /// Sums over all poses for what they share, with every pose eliminated.
 #[derive(Debug, Clone)]
-pub(in crate::stereo::board_pose) struct Totals {
+pub struct Totals {
     /// Shared by shared.
     pub matrix: DMatrix<f64>,
     /// Of the shared unknowns.

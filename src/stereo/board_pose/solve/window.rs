@@ -8,16 +8,15 @@
 use nalgebra::{SVector, Vector2, Vector3};
 
 use crate::imaging::Board;
-use crate::stereo::data::observation::Observation;
-use crate::stereo::data::view::View;
+use crate::stereo::data::{Observation, View, in_use};
 
 /// Which crossings' deviations a window sees of a coordinate, with their shares: the crossing's own first; `None` stands for a crossing
 /// at the board's rim.
-pub(in crate::stereo::board_pose) type SeenShares = [(Option<usize>, f64); 3];
+pub type SeenShares = [(Option<usize>, f64); 3];
 
 /// A window about a crossing.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::stereo::board_pose) struct Window<'a> {
+pub struct Window<'a> {
     board: &'a Board,
     /// Column and row of the crossing.
     place: (usize, usize),
@@ -27,18 +26,18 @@ pub(in crate::stereo::board_pose) struct Window<'a> {
 
 impl<'a> Window<'a> {
     /// The window of a corner.
-    pub(in crate::stereo::board_pose) fn of(board: &'a Board, o: &Observation) -> Window<'a> {
+    pub fn of(board: &'a Board, o: &Observation) -> Window<'a> {
         Window { board, place: (o.col, o.row), reach: o.reach }
     }
 
     /// For each crossing, row by row, a window with the mean reach of its corners'.
-    pub(in crate::stereo::board_pose) fn means(board: &'a Board, views: &[View]) -> Vec<Window<'a>> {
+    pub fn means(board: &'a Board, views: &[View]) -> Vec<Window<'a>> {
         let reaches = crossing_means(board, views, |o| Vector2::from(o.reach));
         reaches.iter().enumerate().map(|(k, r)| Window { board, place: board.place(k), reach: [r.x, r.y] }).collect()
     }
 
     /// What it sees of the coordinate along x (0) or y (1).
-    pub(in crate::stereo::board_pose) fn shares(&self, axis: usize) -> SeenShares {
+    pub fn shares(&self, axis: usize) -> SeenShares {
         let at = |dc: isize, dr: isize| {
             let (col, row) = (self.place.0.checked_add_signed(dc), self.place.1.checked_add_signed(dr));
             let inside = col.zip(row).filter(|&(c, r)| c < self.board.columns() && r < self.board.rows());
@@ -50,7 +49,7 @@ impl<'a> Window<'a> {
     }
 
     /// What it sees of the crossings' deviations, less the crossing's own deviation, mm.
-    pub(in crate::stereo::board_pose) fn seen_off(&self, deviations_mm: &[Vector3<f64>]) -> Vector3<f64> {
+    pub fn seen_off(&self, deviations_mm: &[Vector3<f64>]) -> Vector3<f64> {
         let own = deviations_mm[self.board.index(self.place.0, self.place.1)];
         let of = |axis: usize| {
             let shares = self.shares(axis);
@@ -62,7 +61,7 @@ impl<'a> Window<'a> {
 
     /// Variance that crossings at the board's rim, with a unit variance of their own, add to the deviation along x (0) or y (1) of the
     /// crossing: those bend edges as the others do and are never seen.
-    pub(in crate::stereo::board_pose) fn rim_variance(&self, axis: usize) -> f64 {
+    pub fn rim_variance(&self, axis: usize) -> f64 {
         let shares = self.shares(axis);
         // What is seen of them is taken for the crossing's own deviation, of which less is seen.
         let (_, own) = shares[0];
@@ -71,13 +70,13 @@ impl<'a> Window<'a> {
 }
 
 /// For each crossing, row by row, the mean over its corners in use; zero where there is none.
-pub(in crate::stereo::board_pose) fn crossing_means<const N: usize>(
+pub fn crossing_means<const N: usize>(
     board: &Board,
     views: &[View],
     of: impl Fn(&Observation) -> SVector<f64, N>,
 ) -> Vec<SVector<f64, N>> {
     let mut sums = vec![(0.0, SVector::zeros()); board.corner_count()];
-    for o in views.iter().flat_map(|view| &view.observations).filter(|o| o.active) {
+    for o in in_use(views) {
         let (number, sum) = &mut sums[board.index(o.col, o.row)];
         *number += 1.0;
         *sum += of(o);

@@ -158,9 +158,8 @@ pub(super) fn residuals(case: &Case) -> Evidence {
 
 pub(super) fn folds(case: &Case) -> Evidence {
     let layout = &case.calibration.layout;
-    let changes =
-        case.facts.accuracy.fold_steps.iter().flat_map(|step| case.facts.volume.changes_by_step_mm(layout, step));
-    let value = changes.fold(0.0_f64, |most, mm| most.max(mm.abs()));
+    let changes = case.facts.accuracy.fold_steps.iter().map(|step| case.facts.volume.most_changed_mm(layout, step));
+    let value = changes.fold(0.0, f64::max);
     let unchecked = &case.facts.accuracy.unchecked;
     let alone = if unchecked.is_empty() {
         String::new()

@@ -238,10 +238,10 @@ pub(super) fn lenses_of_these_pairs(case: &Case) -> Option<Evidence> {
     })
 }
 
-/// Whether the pictures agree with lenses that were known.
 /// Name of the line on lenses that were known beforehand.
 pub const KNOWN_LENSES: &str = "known lenses";
 
+/// Whether the pictures agree with lenses that were known.
 pub(super) fn known_lenses(case: &Case) -> Option<Evidence> {
     let check = case.calibration.lens_check.as_ref()?;
     let seen: Vec<String> = Side::BOTH

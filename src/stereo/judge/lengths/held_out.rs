@@ -9,12 +9,13 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
+use crate::stereo::data::residuals::{mean, root_mean_square};
 use crate::stereo::judge::doubtful_corners::{self, DoubtfulCorners};
-use crate::stereo::judge::lengths::{self, Axis, Measured, Range, all_ranges, mean, measure};
+use crate::stereo::judge::lengths::{self, Axis, Measured, Range, all_ranges, measure};
 use crate::stereo::judge::verdict::{Expansion, Extremes};
-use crate::stereo::model::rig::Covariance;
-use crate::stereo::select::cross_validation::{self, FOLDS, Without};
+use crate::stereo::model::Covariance;
+use crate::stereo::select::cross_validation::{self, Without};
 use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, WORST_FOCAL_SIGMA};
 use crate::stereo::triangulate::{RigCovariance, common};
 use crate::stereo::volume::lengths::LONG_SQUARES;
@@ -133,7 +134,9 @@ pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accu
         .views
         .par_iter()
         .enumerate()
-        .map(|(i, view)| folds.of(i).map_or(Measured::NOTHING, |fold| measure(&fold.rig, &calibration.board, view)))
+        .map(|(i, view)| {
+            folds.of(i).map_or_else(Measured::default, |fold| measure(&fold.rig, &calibration.board, view))
+        })
         .collect();
     let names: Vec<&str> = calibration.views.iter().map(|view| view.pair.as_str()).collect();
     let usual_px = calibration.noise.typical_px(&calibration.views);
@@ -173,7 +176,7 @@ fn check_baseline(calibration: &Calibration) -> Result<(), Error> {
 fn folds(calibration: &Calibration) -> Option<Folds> {
     let Calibration { views, values, layout, .. } = calibration;
     let equations = calibration.problem().equations(layout)?;
-    let of_pair = cross_validation::folds(views, &values.poses, FOLDS);
+    let of_pair = cross_validation::folds(views, &values.poses);
     let within = |sure| cross_validation::leave_out(&equations, &equations, layout, &values.shared, &of_pair, sure);
     let mut without = within(WORST_FOCAL_SIGMA);
     let determined = without.iter().any(Option::is_some);
@@ -204,7 +207,7 @@ fn summarise(
     let long = [largest(LONG_SQUARES, board.columns()), largest(LONG_SQUARES, board.rows())];
     let pairs = calibration.views.iter().zip(measured).map(|(view, m)| pair(view, m, short, long)).collect();
     let expansion = Expansion::new(calibration.pair_scatter.groups, board_mm);
-    let rays_chi_square = mean(&measured.iter().flat_map(|m| &m.points).map(|p| p.chi_square).collect::<Vec<_>>())?;
+    let rays_chi_square = mean(measured.iter().flat_map(|m| &m.points).map(|p| p.chi_square))?;
     let share = rays_chi_square.clamp(f64::MIN_POSITIVE, 1.0);
     let unchecked = calibration.views.iter().enumerate().filter(|(i, _)| !folds.determined || folds.of(*i).is_none());
     let unchecked = unchecked.map(|(_, view)| view.pair.clone()).collect();
@@ -232,13 +235,12 @@ fn epipolar(folds: &Folds, measured: &[Measured]) -> Option<EpipolarError> {
         Some(sure.map(move |(p, _)| p.gap_mm.abs() * focal / p.point_mm.z))
     });
     let misses: Vec<f64> = misses.flatten().collect();
-    let squares: Vec<f64> = misses.iter().map(|px| px * px).collect();
-    Some(EpipolarError { rms_px: mean(&squares)?.sqrt(), max_px: misses.into_iter().fold(0.0, f64::max) })
+    let rms_px = root_mean_square(misses.iter().map(|px| px * px))?;
+    Some(EpipolarError { rms_px, max_px: misses.into_iter().fold(0.0, f64::max) })
 }
 
 fn pair(view: &View, measured: &Measured, short: [usize; 2], long: [usize; 2]) -> HeldOutPair {
-    let mean_of = |axis, squares| mean(&measured.errors(axis, squares).collect::<Vec<_>>());
-    let gaps: Vec<f64> = measured.points.iter().map(|p| p.gap_mm * p.gap_mm).collect();
+    let mean_of = |axis, squares| mean(measured.errors(axis, squares));
     HeldOutPair {
         pair: view.pair.clone(),
         mean_error_x_short_mm: mean_of(Axis::X, short[0]),
@@ -246,7 +248,7 @@ fn pair(view: &View, measured: &Measured, short: [usize; 2], long: [usize; 2]) -
         mean_error_x_long_mm: mean_of(Axis::X, long[0]),
         mean_error_y_long_mm: mean_of(Axis::Y, long[1]),
         max_abs_error_mm: measured.worst_mm(),
-        gap_rms_mm: mean(&gaps).map(f64::sqrt),
+        gap_rms_mm: root_mean_square(measured.points.iter().map(|p| p.gap_mm * p.gap_mm)),
         long_errors_mm: measured.errors(Axis::X, long[0]).chain(measured.errors(Axis::Y, long[1])).collect(),
     }
 }

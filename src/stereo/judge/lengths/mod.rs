@@ -11,7 +11,8 @@ use serde::Serialize;
 
 use crate::imaging::Board;
 use crate::stereo::Rig;
-use crate::stereo::data::view::View;
+use crate::stereo::data::View;
+use crate::stereo::data::residuals::mean;
 use crate::stereo::judge::verdict::{Expansion, Extremes, LengthError};
 use crate::stereo::triangulate::{RigCovariance, SpacePoint, common, triangulate};
 
@@ -51,7 +52,8 @@ pub(super) struct Length {
     pub(super) ends: (usize, usize),
 }
 
-/// What a rig makes of a pair.
+/// What a rig makes of a pair; nothing where none has measured it.
+#[derive(Default)]
 pub(super) struct Measured {
     /// The corners that both pictures show.
     pub(super) points: Vec<SpacePoint>,
@@ -61,12 +63,6 @@ pub(super) struct Measured {
     pub(super) doubtful: Vec<bool>,
     /// All lengths between them along rows and columns.
     pub(super) lengths: Vec<Length>,
-}
-
-impl Measured {
-    /// A pair that no rig has measured.
-    pub(super) const NOTHING: Measured =
-        Measured { points: Vec::new(), sigmas_px: Vec::new(), doubtful: Vec::new(), lengths: Vec::new() };
 }
 
 /// Triangulates the corners of a pair and measures all lengths along rows and columns.
@@ -143,7 +139,7 @@ pub(super) fn all_ranges(board: &Board, measured: &[Measured]) -> Vec<Range> {
 
 fn range(board: &Board, measured: &[Measured], axis: Axis, squares: usize) -> Option<Range> {
     let errors: Vec<f64> = measured.iter().flat_map(|m| m.errors(axis, squares)).collect();
-    let mean = mean(&errors)?;
+    let mean = mean(errors.iter().copied())?;
     let spread: f64 = errors.iter().map(|e| (e - mean) * (e - mean)).sum();
     Some(Range {
         axis,
@@ -174,8 +170,4 @@ impl Measured {
 /// A length as a person writes it: 38.1 for three squares of 12.7.
 pub(super) fn as_written_mm(length_mm: f64) -> f64 {
     (length_mm * 1e9).round() / 1e9
-}
-
-pub(super) fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }

@@ -7,13 +7,12 @@ use serde::Serialize;
 
 use crate::imaging::{Corners, Skipped};
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::view::View;
-use crate::stereo::init::homography::FEWEST_CORNERS;
+use crate::stereo::data::residuals::mean;
 use crate::stereo::judge::doubtful_corners::{self, DoubtfulCorners};
-use crate::stereo::judge::lengths::{self, Range, all_ranges, mean, measure};
+use crate::stereo::judge::lengths::{self, Range, all_ranges, measure};
 use crate::stereo::judge::verdict::{Expansion, Extremes};
+use crate::stereo::model::Shared;
 use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::parameters::Shared;
 use crate::stereo::pairs::numbering;
 use crate::stereo::triangulate::RigCovariance;
 
@@ -48,12 +47,8 @@ pub fn second_board(calibration: &Calibration, corners: &Corners, board_mm: Opti
     let mut skipped = corners.skipped.clone();
     let (mut measured, mut names) = (Vec::new(), Vec::new());
     for pair in &corners.pairs {
-        let mut views = [View::new(board, pair, FEWEST_CORNERS)];
-        calibration.noise.apply(&mut views);
-        let [mut view] = views;
-        // How the cameras stand decides between numberings that the pictures leave open; lengths have no part in it.
-        view.turn_right(board, numbering::on_rig(&shared, board, &view).unwrap_or(0));
-        let lengths = measure(rig, board, &view);
+        // Lengths have no part in how it is numbered.
+        let lengths = measure(rig, board, &numbering::seen_on_rig(&shared, board, pair, Some(&calibration.noise)));
         if lengths.lengths.is_empty() {
             let reason =
                 "no length of the second board can be measured in it: no two corners are seen in both pictures";
@@ -70,7 +65,7 @@ pub fn second_board(calibration: &Calibration, corners: &Corners, board_mm: Opti
     let covariance = rig.covariance.as_ref().map(RigCovariance::new);
     let extremes = lengths::extremes(&measured, |_| covariance.as_ref(), expansion, 1.0);
     let scales: Vec<f64> = measured.iter().map(|m| m.scale_error(board)).collect();
-    let scale_error = mean(&scales);
+    let scale_error = mean(scales.iter().copied());
     let scale_error_sigma = scale_error.map(|mean| {
         let spread: f64 = scales.iter().map(|s| (s - mean) * (s - mean)).sum();
         let n = scales.len() as f64;

@@ -162,15 +162,14 @@ impl KnownMoves {
         let (causes, surest, why) = (self.causes(), self.surest()?, self.why()?);
         let of = |m: &&KnownMove| m.contradicts();
         Some(Finding {
-            cause: causes.iter().map(|cause| cause.word()).collect::<Vec<_>>().join("|"),
+            cause: Cause::words(causes.into_iter()),
             kind: Kind::Pair,
             pairs: self.measured.iter().filter(of).flat_map(|m| m.pairs.clone()).collect(),
             size: Some(100.0 * surest.scale_error),
             unit: "%",
             effect_mm: Some(surest.scale_error.abs() * length_mm),
             action: format!("{}: {why}", surest.statement()),
-            along: None,
-            remedy: None,
+            ..Finding::default()
         })
     }
 }
