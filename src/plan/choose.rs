@@ -61,14 +61,8 @@ impl Information {
         }
     }
 
-    /// The offsets that a gradient is explained by.
-    #[cfg(test)]
-    pub fn solved(&self, gradient: &nalgebra::DVector<f64>) -> nalgebra::DVector<f64> {
-        self.covariance() * gradient
-    }
-
     /// Covariance of all unknowns.
-    fn covariance(&self) -> DMatrix<f64> {
+    pub(super) fn covariance(&self) -> DMatrix<f64> {
         let n = self.normal.nrows();
         // Units differ by orders of magnitude: scaled to a diagonal of ones.
         let scale: Vec<f64> = self.normal.diagonal().iter().map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt()).collect();
@@ -77,21 +71,23 @@ impl Information {
         DMatrix::from_fn(n, n, |r, c| inverse[(r, c)] * scale[r] * scale[c])
     }
 
+    /// Covariance of the robot's parameters.
+    fn of_parameters(&self) -> DMatrix<f64> {
+        self.covariance().resize(self.count, self.count, 0.0)
+    }
+
     /// Expected error over the fresh poses, root mean square, mm.
     pub fn rms_mm(&self, problem: &Problem) -> f64 {
-        let covariance = self.covariance();
-        let covariance = covariance.view((0, 0), (self.count, self.count));
-        problem.weight().component_mul(&covariance).sum().max(0.0).sqrt()
+        problem.weight.component_mul(&self.of_parameters()).sum().max(0.0).sqrt()
     }
 
     /// Expected error at each fresh pose: place, mm.
     pub fn map(&self, problem: &Problem) -> Vec<(Vector3<f64>, f64)> {
-        let covariance = self.covariance();
-        let covariance = covariance.view((0, 0), (self.count, self.count));
+        let covariance = self.of_parameters();
         let at = |(place, columns): &(Vector3<f64>, DMatrix<f64>)| {
-            (*place, (columns * covariance * columns.transpose()).trace().max(0.0).sqrt())
+            (*place, (columns * &covariance * columns.transpose()).trace().max(0.0).sqrt())
         };
-        problem.fresh().iter().map(at).collect()
+        problem.fresh.iter().map(at).collect()
     }
 
     /// The expected error after so many of these poses in their order, spread over the list.
@@ -135,7 +131,7 @@ impl Blocks {
         let (count, width) = (problem.count(), problem.count() + FRAME);
         let covariance = information.covariance();
         let tall = covariance.columns(0, count);
-        let weighed = tall * problem.weight() * tall.transpose();
+        let weighed = tall * &problem.weight * tall.transpose();
         let block = |matrix: &DMatrix<f64>, group: usize| {
             let index = |k: usize| if k < count { k } else { k + FRAME * group };
             (0..width)

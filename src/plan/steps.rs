@@ -46,13 +46,12 @@ pub fn plan(
     settings: &Settings,
     measured: Option<(&[Measurement], &str)>,
 ) -> Result<Plan> {
-    planned(robot, scene, settings, measured).map_err(|error| match error {
+    planned(robot, scene, settings, measured).map_err(|mut error| {
         // Where cameras stand already, another sphere is none that they see.
-        Error::TooFew { group, found, tried, needed, asked, .. } if measured.is_none() => {
-            let reached_mm = reached_mm(robot, scene, settings, &group);
-            Error::TooFew { group, found, tried, needed, asked, reached_mm }
+        if let (Error::TooFew { group, reached_mm: nearest, .. }, None) = (&mut error, measured) {
+            *nearest = reached_mm(robot, scene, settings, group);
         }
-        other => other,
+        error
     })
 }
 

@@ -225,6 +225,10 @@ mod tests {
     const SAME_MM: f64 = 1e-9;
     const SAME_RAD: f64 = 1e-12;
 
+    fn turning(point_mm: Point3<f64>, direction: Vector3<f64>) -> Axis {
+        Axis { point_mm, direction, limits_rad: None, slides: false }
+    }
+
     fn assert_same(axes: &[Axis], root_from_flange: &Transform, q: &[f64]) {
         let robot = robot("r", axes, root_from_flange);
         let mut expected = Transform::identity();
@@ -273,13 +277,8 @@ mod tests {
     #[test]
     fn a_vertical_first_axis_needs_no_base() {
         for z in [1.0, -1.0] {
-            let axis = |p: [f64; 3], u: [f64; 3]| Axis {
-                point_mm: p.into(),
-                direction: u.into(),
-                limits_rad: None,
-                slides: false,
-            };
-            let axes = [axis([0.0, 0.0, 100.0], [0.0, 0.0, z]), axis([25.0, 0.0, 400.0], [0.0, 1.0, 0.0])];
+            let first = turning(Point3::new(0.0, 0.0, 100.0), Vector3::z() * z);
+            let axes = [first, turning(Point3::new(25.0, 0.0, 400.0), Vector3::y())];
             let flange = transform(Vector3::zeros(), Vector3::new(300.0, 0.0, 400.0));
             assert_eq!(robot("r", &axes, &flange).ends.root_from_frame0, Transform::identity());
             assert_same(&axes, &flange, &[0.3, -0.7]);
@@ -291,13 +290,8 @@ mod tests {
         for lean in [1e-12, 1e-9, 1e-4, -1e-9] {
             for z in [1.0, -1.0] {
                 let direction = Vector3::new(lean, -lean, z).normalize();
-                let first = Axis { point_mm: Point3::new(1.0, 2.0, 300.0), direction, limits_rad: None, slides: false };
-                let second = Axis {
-                    point_mm: Point3::new(1.0, 2.0, 500.0),
-                    direction: Vector3::y(),
-                    limits_rad: None,
-                    slides: false,
-                };
+                let first = turning(Point3::new(1.0, 2.0, 300.0), direction);
+                let second = turning(Point3::new(1.0, 2.0, 500.0), Vector3::y());
                 let flange = transform(Vector3::zeros(), Vector3::new(800.0, 0.0, 400.0));
                 assert_same(&[first, second], &flange, &[2.0, -0.7]);
             }

@@ -10,35 +10,27 @@ use super::{Advice, Check, Corrections, Ends, Error, Joint, Result, Robot};
 use crate::diagnostic::Place;
 use crate::files;
 
+/// What is `None` does not stand in the file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RobotRecord {
     name: String,
     convention: String,
     /// Unit vector along gravity in the base frame.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     gravity_direction: Option<[f64; 3]>,
     /// What the run that found it says of its use.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     check: Option<Check>,
     joint: Vec<JointRecord>,
     #[serde(default)]
     tool: ToolRecord,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     gravity: Option<GravityRecord>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     bending: Option<Terms<GravityTermRecord>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     harmonics: Option<Terms<HarmonicTermRecord>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     wobble: Option<Terms<HarmonicTermRecord>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     couplings: Option<Terms<CouplingTermRecord>>,
     /// `root_from_frame0`
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     base: Option<PoseRecord>,
     /// `last_frame_from_flange`
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     flange: Option<PoseRecord>,
 }
 
@@ -46,7 +38,7 @@ struct RobotRecord {
 #[serde(deny_unknown_fields)]
 struct JointRecord {
     /// `revolute` (the default) or `prismatic`.
-    #[serde(default, rename = "type", skip_serializing_if = "Option::is_none")]
+    #[serde(rename = "type")]
     kind: Option<String>,
     alpha_deg: f64,
     a_mm: f64,
@@ -54,9 +46,7 @@ struct JointRecord {
     beta_deg: f64,
     theta_deg: f64,
     d_mm: f64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     limits_deg: Option<[f64; 2]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     limits_mm: Option<[f64; 2]>,
     /// 1 or -1: how the controller counts it.
     #[serde(default = "one", skip_serializing_if = "is_one")]
@@ -76,7 +66,6 @@ struct ToolRecord {
 #[serde(deny_unknown_fields)]
 struct GravityRecord {
     /// Where older files say `gravity_direction`.
-    #[serde(default, skip_serializing)]
     direction: Option<[f64; 3]>,
     #[serde(default)]
     terms: Vec<GravityTermRecord>,

@@ -148,8 +148,7 @@ impl Explain for Error {
                  identified.toml that it wrote; `stereocal robot show FILE` says what each of them is"
                     .to_owned(),
             ),
-            Error::NotExportable { hint, .. } => Some(hint.clone()),
-            Error::Table { hint, .. } => Some(hint.clone()),
+            Error::NotExportable { hint, .. } | Error::Table { hint, .. } => Some(hint.clone()),
             Error::File { .. } => None,
             Error::Files(e) => e.hint(),
         }

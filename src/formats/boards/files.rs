@@ -35,25 +35,25 @@ pub fn named(text: &str) -> Result<Board, String> {
     let of_file = match kind.as_deref() {
         Some("yaml" | "yml") => by_kalibr,
         Some("json") => by_calibrator,
-        _ => return text.parse().map_err(|error: crate::imaging::board::Error| error.to_string()),
+        _ => return parsed(text),
     };
     let content = files::read_text(path, "file of a board", None).map_err(|error| format!("{path}: {error}"))?;
     of_file(&content).map_err(|why| format!("{path}: {why}"))
 }
 
+/// The board of a name in this program's words.
+fn parsed(name: &str) -> Result<Board, String> {
+    name.parse().map_err(|error: crate::imaging::board::Error| error.to_string())
+}
+
 /// A checkerboard by its inner corners, mm.
 fn checker(columns: f64, rows: f64, square_mm: f64) -> Result<Board, String> {
-    let count = |corners: f64, what: &str| {
-        let is_count = corners.fract() == 0.0 && (2.0..200.0).contains(&corners);
-        if is_count {
-            Ok(corners as usize + 1)
-        } else {
-            Err(format!("{corners} {what} of inner corners are no board's"))
-        }
+    let count = |corners: f64, what: &str| match corners.fract() == 0.0 && (2.0..200.0).contains(&corners) {
+        true => Ok(corners as usize + 1),
+        false => Err(format!("{corners} {what} of inner corners are no board's")),
     };
     let (columns, rows) = (count(columns, "columns")?, count(rows, "rows")?);
-    let name = format!("checker:{}:{square_mm}", Squares { columns, rows });
-    name.parse().map_err(|error: crate::imaging::board::Error| error.to_string())
+    parsed(&format!("checker:{}:{square_mm}", Squares { columns, rows }))
 }
 
 /// Rounds off what a length in metres brings along as binary fraction, mm.
@@ -89,8 +89,7 @@ fn by_kalibr(text: &str) -> Result<Board, String> {
                 return Err("`codeOffset` is not 0: only boards whose tags begin with number 0 are read".to_owned());
             }
             // The file names no family: Kalibr knows but this one.
-            let name = format!("apriltag:{columns}x{rows}:tag36h11:{tag_mm}:{gap_mm}");
-            name.parse().map_err(|error: crate::imaging::board::Error| error.to_string())
+            parsed(&format!("apriltag:{columns}x{rows}:tag36h11:{tag_mm}:{gap_mm}"))
         }
         "circlegrid" => {
             Err("a grid of circles; only boards of squares are read: checkerboards, ChArUco boards and AprilGrids"
@@ -166,8 +165,7 @@ fn by_generator(name: &str) -> Option<Result<Board, String>> {
             )));
         }
     };
-    let parse = |name: String| name.parse::<Board>().map_err(|error| error.to_string());
-    Some(board.ok_or_else(|| format!("`{name}` does not say rows and columns")).and_then(parse))
+    Some(board.ok_or_else(|| format!("`{name}` does not say rows and columns")).and_then(|name| parsed(&name)))
 }
 
 #[cfg(test)]
