@@ -63,15 +63,6 @@ impl Language {
     pub fn has_data_file(self, path: &Utf8Path) -> bool {
         self == Language::Krl && path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("src"))
     }
-
-    /// What a number of a target is times degrees.
-    fn per_degree(self, pulses: bool, pulses_per_deg: &[f64], joint: usize) -> f64 {
-        match self {
-            Language::UrScript => 1f64.to_radians(),
-            Language::Jbi if pulses => pulses_per_deg.get(joint).copied().unwrap_or(1.0),
-            _ => 1.0,
-        }
-    }
 }
 
 /// A joint target of a program.
@@ -112,9 +103,14 @@ impl Joints<'_> {
         self.slides.len()
     }
 
-    /// Metres of UR's language are the exception among the lengths; no UR slides.
+    /// What a number of a target is times degrees (mm). Metres of UR's language are the exception among the lengths; no UR slides.
     pub(super) fn factor(&self, language: Language, pulses: bool, joint: usize) -> f64 {
-        if self.slides[joint] && !pulses { 1.0 } else { language.per_degree(pulses, self.pulses_per_deg, joint) }
+        match language {
+            _ if self.slides[joint] && !pulses => 1.0,
+            Language::UrScript => 1f64.to_radians(),
+            Language::Jbi if pulses => self.pulses_per_deg.get(joint).copied().unwrap_or(1.0),
+            _ => 1.0,
+        }
     }
 }
 

@@ -106,7 +106,11 @@ pub fn code(text: &str, mark: &str) -> String {
 
 /// Places of the words: letters, digits, `_`, and KUKA's `$` and `#`. Numbers are words too.
 pub fn words(code: &str) -> impl Iterator<Item = Range<usize>> + '_ {
-    let part = |c: char| c.is_alphanumeric() || "_$#".contains(c);
+    runs(code, |c| c.is_alphanumeric() || "_$#".contains(c))
+}
+
+/// Places of the runs of such characters.
+pub fn runs(code: &str, part: fn(char) -> bool) -> impl Iterator<Item = Range<usize>> + '_ {
     let mut at = 0;
     std::iter::from_fn(move || {
         let start = at + code[at..].find(part)?;

@@ -9,10 +9,10 @@ pub struct Fields {
 
 impl Fields {
     /// From cells in their order.
-    pub fn new<'a>(cells: impl Iterator<Item = &'a str>) -> Fields {
+    pub fn new(cells: impl IntoIterator<Item = impl AsRef<str>>) -> Fields {
         let (mut text, mut ends) = (String::new(), Vec::new());
         for cell in cells {
-            text.push_str(cell);
+            text.push_str(cell.as_ref());
             // A row has less than 2^32 bytes.
             ends.push(text.len() as u32);
         }

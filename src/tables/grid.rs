@@ -36,6 +36,11 @@ pub struct Grid {
 }
 
 impl Grid {
+    /// One without rows.
+    pub fn empty(path: &Utf8Path, form: Form, encoding: Option<&'static str>) -> Grid {
+        Grid { path: path.to_owned(), form, encoding, rows: Vec::new() }
+    }
+
     /// Reads a file; `what` names it in the message when it is not there, `hint` says what makes it.
     pub fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<Grid> {
         Grid::of(path, source::read(path, what, hint)?, None)
@@ -63,7 +68,7 @@ impl Grid {
     }
 
     fn of(path: &Utf8Path, source: Source, joints: Option<usize>) -> Result<Grid> {
-        let empty = |form, encoding| Grid { path: path.to_owned(), form, encoding, rows: Vec::new() };
+        let empty = |form, encoding| Grid::empty(path, form, encoding);
         match source {
             Source::Sheet { rows, name, others } => {
                 let mut grid = empty(Form::Sheet(name, others), None);
@@ -221,21 +226,16 @@ fn unguarded(field: &str) -> &str {
 fn delimiter(text: &str) -> char {
     // (rows of equally many cells, numbers among their cells)
     let score = |delimiter: char| {
-        let mut grid =
-            Grid { path: Utf8PathBuf::new(), form: Form::Delimited(delimiter), encoding: None, rows: Vec::new() };
+        let mut grid = Grid::empty(Utf8Path::new(""), Form::Delimited(delimiter), None);
         if grid.fill(text, delimiter, SEEN_ROWS).is_err() {
             return (0, 0);
         }
         let mut counts: Vec<usize> = grid.rows.iter().map(|(_, row)| row.len()).filter(|&n| n > 1).collect();
         counts.sort_unstable();
-        let Some(mode) =
-            counts.chunk_by(|a, b| a == b).max_by_key(|chunk| chunk.len()).map(|chunk| (chunk[0], chunk.len()))
-        else {
-            return (0, 0);
-        };
-        let of_mode = grid.rows.iter().filter(|(_, row)| row.len() == mode.0);
-        let numbers = of_mode.flat_map(|(_, row)| row.iter()).map(cells::count).sum();
-        (mode.1, numbers)
+        let Some(usual) = counts.chunk_by(|a, b| a == b).max_by_key(|chunk| chunk.len()) else { return (0, 0) };
+        let rows = grid.rows.iter().filter(|(_, row)| row.len() == usual[0]);
+        let numbers = rows.flat_map(|(_, row)| row.iter()).map(cells::count).sum();
+        (usual.len(), numbers)
     };
     let scores = [',', ';', '\t', '|', ' '].map(|d| (d, score(d)));
     let most = scores.iter().map(|(_, (rows, _))| *rows).max().unwrap_or(0);

@@ -61,7 +61,7 @@ fn is_decimal_comma(cell: &str) -> bool {
         && (behind.len() != 3 || digits.is_empty() || digits.len() > 3 || digits == "0")
 }
 
-fn is_number(text: &str) -> bool {
+pub(super) fn is_number(text: &str) -> bool {
     text.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.')) && text.parse::<f64>().is_ok()
 }
 

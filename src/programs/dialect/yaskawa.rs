@@ -83,12 +83,7 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
 
 /// Places of what stands between blanks.
 fn tokens(line: &str) -> impl Iterator<Item = Range<usize>> + '_ {
-    let mut at = 0;
-    std::iter::from_fn(move || {
-        let start = at + line[at..].find(|c: char| !c.is_ascii_whitespace())?;
-        at = line[start..].find(|c: char| c.is_ascii_whitespace()).map_or(line.len(), |length| start + length);
-        Some(start..at)
-    })
+    scan::runs(line, |c| !c.is_ascii_whitespace())
 }
 
 /// Whether an instruction moves, to its target or otherwise: `MOVJ`, `MOVL`, `MOVC`, `MOVS`, `SMOVL`, `IMOV`, ... A remark begins with an

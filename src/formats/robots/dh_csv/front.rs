@@ -57,12 +57,8 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
     };
     if text.as_deref().and_then(files::kind::kind) == Some("a robot file") {
         let hint = "`stereocal robot show FILE` says it in words; the commands take it by `--robot FILE`";
-        return Err(files::Error::format(
-            path,
-            None,
-            "this is a robot file already: there is nothing to import",
-            Some(hint),
-        ));
+        let message = "this is a robot file already: there is nothing to import";
+        return Err(files::Error::format(path, None, message, Some(hint)));
     }
     let Some(text) = text else { return of_grid(&Grid::read(path, WHAT, HINT)?, asked, None) };
     let text = without_entities(&text);
@@ -91,7 +87,7 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
 }
 
 fn empty(path: &Utf8Path) -> Grid {
-    Grid { path: path.to_owned(), form: Form::Delimited(','), encoding: None, rows: Vec::new() }
+    Grid::empty(path, Form::Delimited(','), None)
 }
 
 /// The names of `--columns`.
@@ -152,8 +148,8 @@ fn of_links(path: &Utf8Path, read: &Text, links: &Links, asked: &Asked) -> Resul
     let unit = if values().any(|v| v.radians) { " [rad]" } else { "" };
     let names = [format!("alpha{unit}"), "a".to_owned(), format!("theta{unit}"), "d".to_owned()];
     let cell = |v: &Value| if v.variable { format!("q + {}", v.number) } else { v.number.to_string() };
-    let cells = |row: &[Value; 4]| Fields::new(row.iter().map(cell).collect::<Vec<_>>().iter().map(String::as_str));
-    let rows: Vec<(u64, Fields)> = links.rows.iter().map(|(line, row)| (*line, cells(row))).collect();
+    let rows: Vec<(u64, Fields)> =
+        links.rows.iter().map(|(line, row)| (*line, Fields::new(row.iter().map(cell)))).collect();
     let grid = Grid { rows: rows.clone(), ..empty(path) };
     let table = Table { names: Some(&names), ..table(&grid, &rows, asked, read.words, None) };
     let mut found = reading(&table, [0, 1, 2, 3])?;
@@ -182,15 +178,9 @@ fn without_entities(text: &str) -> Cow<'_, str> {
         let decoded = piece.split_once(';').and_then(|(code, rest)| {
             let number =
                 code.strip_prefix('x').map_or_else(|| code.parse().ok(), |hex| u32::from_str_radix(hex, 16).ok());
-            Some((char::from_u32(number?)?, rest))
+            Some(format!("{}{rest}", char::from_u32(number?)?))
         });
-        match decoded {
-            Some((c, rest)) => {
-                plain.push(c);
-                plain.push_str(rest);
-            }
-            None => plain.push_str(&format!("&#{piece}")),
-        }
+        plain.push_str(&decoded.unwrap_or_else(|| format!("&#{piece}")));
     }
     plain.into()
 }

@@ -76,7 +76,7 @@ pub fn matrix(text: &str, known: &Known, width: usize) -> Result<Option<Matrix>,
         return Err((at as u64 + 1, wrong + ", and without this row it is another robot"));
     }
     let cells = |at: usize| match &read[at].1 {
-        Line::Row(cells) => Some((at as u64 + 1, Fields::new(cells.iter().copied()))),
+        Line::Row(cells) => Some((at as u64 + 1, Fields::new(cells))),
         _ => None,
     };
     let named = lines[run.start.saturating_sub(ABOVE)..=run.start].iter().rev().find_map(|line| order(line));
