@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use super::judge::{NEAR, Way, left_of};
 use super::part::{At, Part};
-use super::pick::columns_flag_with;
+use super::pick::columns_flag;
 use crate::files::Error;
 use crate::robot::Robot;
 use crate::tables::names::What;
@@ -92,7 +92,7 @@ impl Apart {
             self.values.len(),
             self.apart_mm
         );
-        let flag = |name: &str| columns_flag_with(parts, &self.joints, &self.points, Some((self.at, name)));
+        let flag = |name: &str| columns_flag(parts, &self.joints, &self.points, Some((self.at, name)));
         let hint = format!(
             "`--columns {}` if it says which target was measured, `--columns {}` if it says where the robot or the sensor stood",
             flag("target"),
