@@ -125,7 +125,6 @@ pub struct Check {
     /// What would have been seen, mm.
     pub seen_mm: f64,
     /// The length that both are for, mm; none of a robot.
-    #[serde(default)]
     pub length_mm: Option<f64>,
 }
 

@@ -90,18 +90,13 @@ impl Explain for Error {
         }
     }
     fn hint(&self) -> Option<String> {
+        let said = |hint: &str| Some(hint.to_owned());
         match self {
             Error::Files(e) => e.hint(),
-            Error::BoardTooLarge { .. } => {
-                Some("the field is about 256 mm wide; take fewer or smaller squares".to_owned())
-            }
-            Error::OutOfReach { .. } => {
-                Some("the spheres of the presets suit the robot of Table 1 of the paper".to_owned())
-            }
-            Error::Joints { .. } => {
-                Some("take the robot.toml that `stereocal simulate` writes and change its numbers".to_owned())
-            }
-            Error::Occupied { .. } => Some("`--out DIR` names another folder, or remove the old pictures".to_owned()),
+            Error::BoardTooLarge { .. } => said("the field is about 256 mm wide; take fewer or smaller squares"),
+            Error::OutOfReach { .. } => said("the spheres of the presets suit the robot of Table 1 of the paper"),
+            Error::Joints { .. } => said("take the robot.toml that `stereocal simulate` writes and change its numbers"),
+            Error::Occupied { .. } => said("`--out DIR` names another folder, or remove the old pictures"),
             Error::Encode(_) => None,
         }
     }
