@@ -9,6 +9,7 @@ use crate::diagnostic::at_most;
 use crate::files::{self, OutDir, Result};
 use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
+use crate::linear_algebra::rows;
 use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::corner_noise::Noise;
@@ -218,14 +219,11 @@ impl From<&Rig> for CalibrationFile {
             version: VERSION,
             left: (&rig.left).into(),
             right: (&rig.right).into(),
-            right_from_left: RigRecord {
-                rotation: r.row_iter().map(|row| row.iter().copied().collect()).collect(),
-                translation_mm: vec![t.x, t.y, t.z],
-            },
-            covariance: rig.covariance.as_ref().map(|c| CovarianceRecord {
-                order: c.order.clone(),
-                matrix: c.matrix.row_iter().map(|row| row.iter().copied().collect()).collect(),
-            }),
+            right_from_left: RigRecord { rotation: rows(&r), translation_mm: vec![t.x, t.y, t.z] },
+            covariance: rig
+                .covariance
+                .as_ref()
+                .map(|c| CovarianceRecord { order: c.order.clone(), matrix: rows(&c.matrix) }),
             corner_noise: None,
             boards: None,
             volume: None,

@@ -7,13 +7,12 @@ use serde::Serialize;
 
 use crate::geometry::rotation_vector;
 use crate::imaging::{Board, Corners};
+use crate::linear_algebra::rows;
 use crate::measurements::{pose_fields, pose_header, quoted};
 use crate::statistics::median;
 use crate::stereo::Rig;
-use crate::stereo::board_pose::TargetPose;
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
-use crate::stereo::board_pose::{Knowledge, MeasuredPose, Series};
-use crate::stereo::board_pose::{Shape, Shared};
+use crate::stereo::board_pose::{Knowledge, MeasuredPose, Series, Shape, Shared, TargetPose};
 use crate::stereo::volume::Volume;
 
 /// Columns behind the joints.
@@ -239,7 +238,7 @@ fn row(m: &MeasuredPose) -> Row {
 }
 
 fn shape_record(shape: &Shape, board: &Board) -> ShapeRecord {
-    let crossing = |(k, (d, s)): (usize, (&nalgebra::Vector3<f64>, &nalgebra::Vector3<f64>))| CrossingRecord {
+    let crossing = |(k, (d, s)): (usize, (&Vector3<f64>, &Vector3<f64>))| CrossingRecord {
         col: board.place(k).0,
         row: board.place(k).1,
         dx_mm: d.x,
@@ -261,7 +260,7 @@ fn shape_record(shape: &Shape, board: &Board) -> ShapeRecord {
 fn shared_record(shared: &Shared, poses: &[MeasuredPose]) -> SharedRecord {
     let of = |m: &MeasuredPose| {
         let by_shared = &m.target.as_ref().ok()?.sensitivity;
-        let mut sensitivity: Vec<Vec<f64>> = by_shared.row_iter().map(|row| row.iter().copied().collect()).collect();
+        let mut sensitivity: Vec<Vec<f64>> = rows(by_shared);
         // Turns stand first inside, points in files.
         sensitivity.rotate_left(3);
         Some(SensitivityRecord { pose: m.at.pose.clone(), sensitivity })
@@ -269,7 +268,7 @@ fn shared_record(shared: &Shared, poses: &[MeasuredPose]) -> SharedRecord {
     SharedRecord {
         parameters: shared.parameters.clone(),
         change: shared.change.clone(),
-        covariance: shared.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        covariance: rows(&shared.covariance),
         rows: ORDER,
         poses: poses.iter().filter_map(of).collect(),
     }

@@ -1,9 +1,10 @@
 //! `rectified.json`: the matrices of rectified pictures as OpenCV has them, and how well their rows agree.
 
-use nalgebra::{Matrix, Matrix3, Matrix3x4, RawStorage, Storage};
+use nalgebra::{Matrix3, Matrix3x4};
 use serde::Serialize;
 
 use crate::imaging::{Board, Skipped};
+use crate::linear_algebra::rows;
 use crate::stereo::model::rectification::{Matrices, RowResidual, Scaling};
 use crate::stereo::{Rig, Side};
 
@@ -116,10 +117,4 @@ impl RectifiedFile {
         self.residual = residual;
         self
     }
-}
-
-fn rows<R: nalgebra::Dim, C: nalgebra::Dim, S: Storage<f64, R, C> + RawStorage<f64, R, C>>(
-    m: &Matrix<f64, R, C, S>,
-) -> Vec<Vec<f64>> {
-    m.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
