@@ -44,7 +44,6 @@ pub struct CalibrationFile {
     /// The volume that the verdict was for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     volume: Option<Volume>,
-    /// The verdict on the rig.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     check: Option<Check>,
     /// The board that calibrated, by its name.
@@ -93,7 +92,6 @@ pub struct Calibrated {
     pub pairs: Option<usize>,
     /// The volume that the verdict was for.
     pub volume: Option<Volume>,
-    /// The verdict.
     pub check: Option<Check>,
     pub board: Option<Board>,
     /// The calibration's last pairs, where they contradict the rig.

@@ -83,7 +83,6 @@ struct JudgedLength {
 }
 
 impl CameraCheckFile {
-    /// Gathers the figures.
     pub fn new(calibration: &Calibration, judged: &Judged) -> CameraCheckFile {
         let accuracy = &judged.facts.accuracy;
         let worst = &accuracy.extremes.largest;

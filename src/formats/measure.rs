@@ -65,7 +65,6 @@ pub struct MeasureFile {
     shared: Option<SharedRecord>,
 }
 
-/// What is found of the rig.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct RigRecord {
     state: &'static str,
@@ -148,7 +147,6 @@ struct SensitivityRecord {
 }
 
 impl MeasureFile {
-    /// Gathers the figures.
     pub fn new(series: &Series, corners: &Corners, known: &Knowledge) -> MeasureFile {
         let (board, rig) = (&known.board, &known.rig);
         let targets: Vec<&TargetPose> = series.poses.iter().filter_map(|m| m.target.as_ref().ok()).collect();

@@ -88,7 +88,6 @@ pub struct RecheckFile {
 }
 
 impl RecheckFile {
-    /// Gathers the figures.
     pub fn new(recheck: &Recheck, standing: Standing, against: &Utf8Path, tolerance_mm: f64) -> RecheckFile {
         RecheckFile {
             standing,
@@ -116,7 +115,6 @@ pub struct Check {
     /// How many pairs, or poses.
     #[serde(alias = "poses")]
     pub pairs: usize,
-    /// What was said.
     pub standing: Standing,
     /// The cause; empty where nothing changed.
     pub cause: String,

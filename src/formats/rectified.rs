@@ -13,9 +13,7 @@ use crate::stereo::{Rig, Side};
 pub struct RectifiedFile {
     /// "rectify", or "undistort" where each picture was straightened by itself.
     pub mode: &'static str,
-    /// Width of the pictures written, px.
     pub width: u32,
-    /// Height of the pictures written, px.
     pub height: u32,
     /// `stereoRectify`'s `alpha`; null where pictures were only straightened.
     pub alpha: Option<f64>,
@@ -53,11 +51,9 @@ pub struct Coverage {
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RectifiedPair {
-    /// Its name.
     pub pair: String,
     /// The left picture, below the results folder.
     pub left: String,
-    /// The right picture.
     pub right: String,
     /// How far its rows differ; null where the board was not found.
     pub residual: Option<RowResidual>,

@@ -79,11 +79,8 @@ fn coordinates(part: &Part) -> Option<[usize; 3]> {
     }
 }
 
-/// What was taken of a set of files.
 pub(super) struct Taken<'a> {
-    /// The files.
     pub parts: &'a [Part],
-    /// Columns and units.
     pub way: &'a Way,
     /// Who says so.
     pub basis: Basis,
@@ -139,7 +136,6 @@ impl Taken<'_> {
         from_table(&Table::new(path, header, rows)?)
     }
 
-    /// Number of rows.
     fn count(&self) -> usize {
         self.parts[self.way.picked.joints[0].part].rows.len()
     }

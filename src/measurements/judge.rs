@@ -46,9 +46,7 @@ const ROWS: usize = 60;
 /// A way to read a table.
 #[derive(Debug, Clone)]
 pub(super) struct Way {
-    /// The columns.
     pub picked: Picked,
-    /// Unit of the joints.
     pub joints: Unit,
     /// Unit of points or distances.
     pub lengths: Unit,
@@ -76,7 +74,6 @@ pub(super) enum Basis {
     Sizes,
 }
 
-/// What came out.
 pub(super) enum Verdict {
     /// This way.
     Taken(Way, Basis),

@@ -22,7 +22,6 @@ pub(super) struct Picked {
 }
 
 impl Picked {
-    /// Joints and coordinates.
     pub fn columns(&self) -> impl Iterator<Item = At> {
         self.joints.iter().copied().chain(self.points.iter().flat_map(|(_, at)| *at))
     }
@@ -46,7 +45,6 @@ impl Picked {
         self.points.first().map_or(Vec::new(), |(_, at)| at.to_vec())
     }
 
-    /// Whether there is something measured.
     pub fn is_measured(&self) -> bool {
         !self.points.is_empty() || self.distance.is_some()
     }

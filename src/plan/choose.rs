@@ -44,7 +44,6 @@ impl Information {
         self.update(rows, 1.0);
     }
 
-    /// Takes a pose away that was added.
     fn remove(&mut self, rows: &Rows) {
         self.update(rows, -1.0);
     }

@@ -36,11 +36,9 @@ const PAPER_AZIMUTH_DEG: f64 = -30.0;
 /// A rig with the target before it.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    /// The cameras.
     pub rig: Rig,
     /// The middle of the field: a target with the identity there faces both cameras.
     pub left_from_field: Transform,
-    /// The target.
     pub board: Board,
     /// Standard deviation of a corner's coordinate, px.
     pub corner_px: f64,
@@ -55,7 +53,6 @@ pub struct Scene {
 /// One placement of the cameras: a group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placement {
-    /// The group's name.
     pub name: String,
     /// Middle of the sphere, base frame, mm.
     pub center_mm: Vector3<f64>,

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use camino::Utf8Path;
 
-/// A maker's language.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Language {
     /// Universal Robots, `.script`.

@@ -30,7 +30,6 @@ struct JointScrews {
     /// Axis of alpha and a, and a point on it.
     x: Vector3<f64>,
     before: Point3<f64>,
-    /// Axis of beta.
     y: Vector3<f64>,
     /// Axis of theta and d; both this and `y` pass through `origin`.
     z: Vector3<f64>,

@@ -44,18 +44,10 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Reading or writing files.
     #[error(transparent)]
     Files(#[from] crate::files::Error),
-    /// No pose shows the whole board in both pictures.
     #[error("a board of {squares} squares of {square_mm} mm does not fit into the field of both cameras")]
-    BoardTooLarge {
-        /// The board.
-        squares: String,
-        /// Its squares' side, mm.
-        square_mm: f64,
-    },
-    /// The robot cannot go there, or not in view.
+    BoardTooLarge { squares: String, square_mm: f64 },
     #[error(
         "group {group}: no pose round ({:.0}, {:.0}, {:.0}) mm that the robot reaches within its limits and both cameras see",
         point_mm[0], point_mm[1], point_mm[2]
@@ -65,18 +57,11 @@ pub enum Error {
         /// Its start point, mm.
         point_mm: [f64; 3],
     },
-    /// The true robot is another kind of robot.
     #[error("the true robot has {found} joints; the nominal one has {needed}")]
-    Joints {
-        /// Its joints.
-        found: usize,
-        /// Those of Table 1.
-        needed: usize,
-    },
+    Joints { found: usize, needed: usize },
     /// Pictures of something else stand where these would go.
     #[error("the folder holds pictures that are not of this world, {name} for one; they would be taken for its own")]
     Occupied { name: String, folder: Utf8PathBuf },
-    /// A picture could not be encoded.
     #[error("cannot encode a picture: {0}")]
     Encode(#[from] image::ImageError),
 }

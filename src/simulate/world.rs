@@ -53,7 +53,6 @@ pub struct Shot {
     pub stem: String,
     /// Whether the target is in it, or else the check board.
     pub shows_target: bool,
-    /// Where the board is.
     pub left_from_board: Transform,
     /// Which placement of the cameras: what stands behind depends on it.
     pub placement: u64,

@@ -19,12 +19,10 @@ impl Fields {
         Fields { text: text.into(), ends: ends.into() }
     }
 
-    /// Number of fields.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }

@@ -23,7 +23,6 @@ const MOST_SHEET_BYTES: usize = 64 << 20;
 /// Bytes of a file that tell an encoding without a mark.
 const SEEN: usize = 4096;
 
-/// What a file holds.
 pub(super) enum Source {
     /// Text, and its encoding where that is not UTF-8.
     Text(String, Option<&'static str>),

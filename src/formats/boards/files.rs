@@ -64,7 +64,6 @@ fn mm(metres: f64) -> f64 {
 /// Longest side of a tag in Kalibr's file, mm: longer ones were meant as mm.
 const MOST_TAG_MM: f64 = 3000.0;
 
-/// Kalibr's target file.
 fn by_kalibr(text: &str) -> Result<Board, String> {
     let without_comments: String =
         text.lines().map(|line| line.split_once('#').map_or(line, |(before, _)| before).to_owned() + "\n").collect();

@@ -11,7 +11,6 @@ pub(in crate::formats) const METRE: f64 = 1e-3;
 pub struct ExportedFile {
     /// Its name in the results folder.
     pub name: &'static str,
-    /// Its content.
     pub text: String,
 }
 

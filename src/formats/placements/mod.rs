@@ -11,7 +11,6 @@ use crate::geometry::{Transform, rotation_matrix};
 /// What the frames are called.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frames {
-    /// The robot's base.
     pub base: String,
     pub flange: String,
     /// The left camera's optical frame.
@@ -22,9 +21,7 @@ pub struct Frames {
 /// One placement to write.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placement<'a> {
-    /// Names of the frames.
     pub frames: &'a Frames,
-    /// Where the camera stands.
     pub base_from_camera: Transform,
     /// Where the target sits, where its turn is known.
     pub flange_from_target: Option<Transform>,

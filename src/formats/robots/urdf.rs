@@ -37,7 +37,6 @@ pub enum Kind {
 #[derive(Debug, Clone, PartialEq)]
 pub struct UrdfJoint {
     pub name: String,
-    /// What it does.
     pub kind: Kind,
     pub word: String,
     /// The joint that it follows, where it does.
@@ -60,7 +59,6 @@ pub struct UrdfJoint {
 /// A description.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Urdf {
-    /// The robot's name.
     pub name: String,
     pub joints: Vec<UrdfJoint>,
     /// The link that is no joint's child.

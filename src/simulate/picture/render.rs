@@ -19,9 +19,7 @@ const TILE: usize = 16;
 /// A picture as a camera delivers it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// Width, px.
     pub width: usize,
-    /// Height, px.
     pub height: usize,
     /// 8 or 16.
     pub file_bits: u8,
