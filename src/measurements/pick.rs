@@ -153,7 +153,9 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
         // Where the robot was sent and where it says that it is: the identified robot corrects commands.
         let (first, second) = (&complete[0].0, &complete[1].0);
         let message = format!("two sets of joints would do: {} and {}", listed(parts, first), listed(parts, second));
-        let flag = |joints: &[At]| columns_flag(parts, joints, &points_for_flag(parts), None);
+        // Nothing of the points where they are not clear.
+        let points = points(parts).ok().and_then(|sets| sets.first().map(|(_, at, _)| at.to_vec())).unwrap_or_default();
+        let flag = |joints: &[At]| columns_flag(parts, joints, &points, None);
         let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(first), flag(second));
         return Err(parts[first[0].part].refuse(message, Some(&hint)));
     }
@@ -170,11 +172,6 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
         }
         _ => Ok(Vec::new()),
     }
-}
-
-/// The measured point, for a message about joints; nothing where it is not clear.
-fn points_for_flag(parts: &[Part]) -> Vec<At> {
-    points(parts).ok().and_then(|sets| sets.first().map(|(_, at, _)| at.to_vec())).unwrap_or_default()
 }
 
 /// The measured points: the name of each target, its columns, and whether they call themselves measured.

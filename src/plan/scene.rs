@@ -21,11 +21,6 @@ const BORDER: f64 = 0.02;
 /// Starts for the posture at a sphere's middle.
 const STARTS: usize = 200;
 
-/// Reach of the paper's robot, as [`reach_mm`] counts it.
-fn paper_reach_mm() -> f64 {
-    reach_mm(&Robot::paper())
-}
-
 /// The paper's start points, mm.
 const PAPER_CENTERS_MM: [[f64; 3]; 4] =
     [[200.0, 0.0, 379.0], [-200.0, 0.0, 379.0], [0.0, 200.0, 379.0], [0.0, -230.0, 379.0]];
@@ -174,7 +169,7 @@ pub fn base_from_flange(robot: &Robot, base_from_target: &Transform) -> Transfor
 /// The placements: one direction of the flange for all spheres as in the paper, the first that all of them can have; a sphere of its own
 /// direction where there is none.
 pub fn placements(robot: &Robot, scene: &Scene, settings: &Settings) -> Result<Vec<Placement>> {
-    let scale = reach_mm(robot) / paper_reach_mm();
+    let scale = reach_mm(robot) / reach_mm(&Robot::paper());
     let paper = || PAPER_CENTERS_MM.iter().map(|c| Vector3::from(*c) * scale).collect();
     let centers: Vec<Vector3<f64>> = if settings.centers_mm.is_empty() { paper() } else { settings.centers_mm.clone() };
     let field = |center: &Vector3<f64>, direction: &Vector3<f64>| {

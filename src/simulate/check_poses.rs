@@ -7,6 +7,7 @@ use super::draws::{Draws, Purpose};
 use super::physical_board::PhysicalBoard;
 use super::rig::left_from_field;
 use crate::geometry::{Transform, transform};
+use crate::imaging::Board;
 use crate::stereo::Rig;
 
 /// How boards are held before the cameras.
@@ -62,11 +63,9 @@ pub fn held(
     seed: u64,
 ) -> Result<Vec<Transform>, Error> {
     let accept = |left_from_board: &Transform| seen_by_both(rig, board, left_from_board);
-    (0..count).map(|k| pose(left_from_field, holding, k, seed, &accept).ok_or_else(|| too_large(board))).collect()
-}
-
-fn too_large(board: &PhysicalBoard) -> Error {
-    Error::BoardTooLarge { squares: board.drawing.squares.to_string(), square_mm: board.drawing.square_mm }
+    let Board { squares, square_mm, .. } = board.drawing;
+    let too_large = || Error::BoardTooLarge { squares: squares.to_string(), square_mm };
+    (0..count).map(|k| pose(left_from_field, holding, k, seed, &accept).ok_or_else(too_large)).collect()
 }
 
 /// One pose out of the draws, the first that is accepted.

@@ -78,10 +78,16 @@ impl Grid {
             Source::Text(text, encoding) => {
                 if let Some((rows, form)) = joints.and_then(|joints| program_lines::read(path, &text, joints)) {
                     let grid = Grid { rows, ..empty(form, encoding) };
-                    return match &grid.form {
-                        Form::Program { calls, .. } if calls.len() > 1 => Err(grid.of_several_calls(calls)),
-                        _ => Ok(grid),
-                    };
+                    if let Form::Program { calls, .. } = &grid.form
+                        && calls.len() > 1
+                    {
+                        let calls = calls.join("`, `");
+                        let message =
+                            format!("lists of numbers in calls of `{calls}`: not all of them can be joint targets");
+                        let hint = "leave the lines with joint targets alone, or make a table of them";
+                        return Err(grid.refuse(grid.rows[0].0, message, Some(hint)));
+                    }
+                    return Ok(grid);
                 }
                 if let Some(rows) = joints.and_then(|_| cells::named(&text)) {
                     return Ok(Grid { rows, ..empty(Form::Delimited(','), encoding) });
@@ -162,12 +168,6 @@ impl Grid {
     fn unreadable(&self, e: &csv::Error) -> Error {
         let line = e.position().map(csv::Position::line);
         Error::format(&self.path, line, format!("not readable as CSV: {e}"), None)
-    }
-
-    fn of_several_calls(&self, calls: &[String]) -> Error {
-        let message =
-            format!("lists of numbers in calls of `{}`: not all of them can be joint targets", calls.join("`, `"));
-        self.refuse(self.rows[0].0, message, Some("leave the lines with joint targets alone, or make a table of them"))
     }
 
     /// A complaint about a line.

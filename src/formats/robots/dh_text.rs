@@ -163,12 +163,12 @@ impl Scan<'_> {
                 '(' | '[' | '{' => self.depth += 1,
                 ')' | ']' | '}' => {
                     self.depth = self.depth.saturating_sub(1);
-                    self.close();
+                    self.close(self.depth + 1);
                 }
                 '\n' => {
                     self.line += 1;
                     if self.depth == 0 && self.text[self.at + 1..].trim_start_matches(' ').starts_with("- ") {
-                        self.end_block();
+                        self.close(0);
                     }
                 }
                 _ => {}
@@ -179,18 +179,15 @@ impl Scan<'_> {
         Ok(())
     }
 
-    /// A link whose brackets are closed takes nothing more.
-    fn close(&mut self) {
-        let depth = self.depth;
-        if let Some(link) = self.links.last_mut().filter(|link| link.depth > depth) {
+    /// A link as deep as that, or deeper, takes nothing more.
+    fn close(&mut self, depth: usize) {
+        if let Some(link) = self.links.last_mut().filter(|link| link.depth >= depth) {
             link.depth = usize::MAX;
         }
     }
 
-    fn end_block(&mut self) {
-        if let Some(link) = self.links.last_mut().filter(|link| link.depth == 0) {
-            link.depth = usize::MAX;
-        }
+    fn evaluate(&self, text: &str) -> Option<Value> {
+        evaluate(text, &|name| self.known.get(name).copied())
     }
 
     /// A name of so many bytes: a call, a parameter with its value, or a number that gets a name.
@@ -219,8 +216,7 @@ impl Scan<'_> {
                 return Ok(());
             }
             let text = &value[..extent(value)];
-            let known = |name: &str| self.known.get(name).copied();
-            match evaluate(text, &known) {
+            match self.evaluate(text) {
                 Some(v) if !v.variable || which == 2 => {
                     self.put(which, v);
                     self.at = value_at + text.len();
@@ -235,8 +231,7 @@ impl Scan<'_> {
                 _ => {}
             }
         } else if let Some((which, number)) = numbered::parameter(word) {
-            let known = |name: &str| self.known.get(name).copied();
-            if let Some(v) = evaluate(&value[..extent(value)], &known).filter(|v| !v.variable || which == 2) {
+            if let Some(v) = self.evaluate(&value[..extent(value)]).filter(|v| !v.variable || which == 2) {
                 self.numbered[which].entry(number).or_insert((self.line, v));
             }
         }
@@ -261,10 +256,8 @@ impl Scan<'_> {
             link.limits = Some([*low, *high]);
         }
         if word == "flip" && value.trim_start().starts_with(['T', 't']) {
-            return Err((
-                self.line,
-                "`flip`: a joint that counts the other way, which a table has no place for".to_owned(),
-            ));
+            let message = "`flip`: a joint that counts the other way, which a table has no place for";
+            return Err((self.line, message.to_owned()));
         }
         Ok(())
     }
@@ -277,8 +270,7 @@ impl Scan<'_> {
         let mut rest = value;
         for name in names {
             let text = &rest[..extent(rest)];
-            let known = |name: &str| self.known.get(name).copied();
-            if let Some(v) = evaluate(text, &known).filter(|v| !v.variable) {
+            if let Some(v) = self.evaluate(text).filter(|v| !v.variable) {
                 self.known.insert(name, v);
             }
             rest = rest[text.len()..].strip_prefix(',').unwrap_or("");
