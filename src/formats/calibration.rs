@@ -99,21 +99,6 @@ pub struct Calibrated {
 }
 
 impl Calibrated {
-    /// A rig of which nothing else is known.
-    fn of_rig(rig: Rig) -> Calibrated {
-        Calibrated {
-            rig,
-            noise: None,
-            pair_excess: None,
-            farthest_pair: None,
-            pairs: None,
-            volume: None,
-            check: None,
-            board: None,
-            unconfirmed: Vec::new(),
-        }
-    }
-
     /// What its own calibration says against the rig, for those who use it.
     pub fn doubts(&self) -> Vec<String> {
         let changed = self.unconfirmed.first().map(|last| {
@@ -345,12 +330,17 @@ pub fn read(path: &Utf8Path) -> Result<Calibrated> {
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
     let text = files::read_text(path, WHAT, Some(hint))?;
     let refused = |message: String| files::Error::format(path, None, message, None);
-    if let Some(rig) = export::read(path, &text) {
-        return Ok(Calibrated::of_rig(rig.map_err(refused)?));
+    let (file, rig) = match export::read(path, &text) {
+        // Of such a rig nothing else is known.
+        Some(rig) => rig.map(|rig| (CalibrationFile::from(&rig), rig)),
+        None => {
+            let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
+            file.rig().map(|rig| (file, rig))
+        }
     }
-    let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
+    .map_err(refused)?;
     Ok(Calibrated {
-        rig: file.rig().map_err(refused)?,
+        rig,
         noise: file.noise(),
         pair_excess: file.corner_noise.and_then(|n| n.pair_excess).filter(|e| *e >= 1.0),
         farthest_pair: file.corner_noise.and_then(|n| n.farthest_pair),

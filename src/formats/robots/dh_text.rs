@@ -61,19 +61,7 @@ pub struct Links {
 pub fn read(text: &str, prose: bool) -> Result<Text, Wrong> {
     let (code, comments) = comments::split(text);
     let words = if prose { Words::of(text, "") } else { Words::of(&comments, &code) };
-    let mut scan = Scan {
-        text: &code,
-        at: 0,
-        depth: 0,
-        line: 1,
-        known: Known::new(),
-        links: Vec::new(),
-        lists: Default::default(),
-        families: BTreeMap::new(),
-        of_calls: None,
-        numbered: Default::default(),
-        wrong: None,
-    };
+    let mut scan = Scan { text: &code, line: 1, ..Scan::default() };
     scan.run()?;
     let lower = code.to_lowercase();
     if ["'prismatic'", "\"prismatic\"", ": prismatic"].iter().any(|word| lower.contains(word)) && scan.links.len() > 1 {
@@ -129,6 +117,7 @@ fn links(scan: Scan, limited: bool) -> Result<Option<Links>, Wrong> {
     }))
 }
 
+#[derive(Default)]
 struct Scan<'a> {
     text: &'a str,
     at: usize,

@@ -190,17 +190,10 @@ impl Urdf {
 
     /// Names of the moving joints before a link.
     fn moving(&self, tip: &str) -> Vec<&str> {
-        let mut link = tip;
-        let mut names = Vec::new();
-        while let Some(joint) = self.joints.iter().find(|j| j.child == link)
-            && names.len() <= self.joints.len()
-        {
-            if joint.kind != Kind::Fixed {
-                names.push(joint.name.as_str());
-            }
-            link = &joint.parent;
-        }
-        names
+        let before = |link: &str| self.joints.iter().find(|j| j.child == link);
+        let joints = std::iter::successors(before(tip), |joint| before(&joint.parent));
+        let moving = joints.filter(|joint| joint.kind != Kind::Fixed).map(|joint| joint.name.as_str());
+        moving.take(self.joints.len() + 1).collect()
     }
 
     /// The end of the longest chain, where all other ends hang on it or a name tells.

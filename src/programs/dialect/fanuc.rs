@@ -193,7 +193,7 @@ fn number(point: &str) -> Option<u64> {
     rest[digits..].starts_with([':', ']', ' ']).then(|| rest[..digits].parse().ok()).flatten()
 }
 
-pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(String, String)> {
+pub(super) fn program(name: &str, stops: &[Written], motion: &Motion, _: bool) -> Vec<(String, String)> {
     let name = name.to_ascii_uppercase();
     let mut lines = vec!["!DO[1] triggers the cameras ;".to_owned(), "!PR[n] holds stop n's joints ;".to_owned()];
     let mut positions = String::new();

@@ -115,7 +115,7 @@ fn point(code: &str, at: std::ops::Range<usize>) -> std::ops::Range<usize> {
     scan::trimmed(code, first.start..stop.map_or(first.end, |w| first.start + w.start))
 }
 
-pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(String, String)> {
+pub(super) fn program(name: &str, stops: &[Written], motion: &Motion, _: bool) -> Vec<(String, String)> {
     let aggregate = |list: &[String]| {
         let parts: Vec<String> =
             scan::axes('A', list.len()).iter().zip(list).map(|(n, v)| format!("{n} {v}")).collect();

@@ -177,7 +177,7 @@ fn jointtarget(list: &[String]) -> String {
     format!("[[{}],[{}]]", filled(robot, "0").join(","), filled(external, "9E9").join(","))
 }
 
-pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(String, String)> {
+pub(super) fn program(name: &str, stops: &[Written], motion: &Motion, _: bool) -> Vec<(String, String)> {
     let mut text = format!(
         "MODULE {name}\n  ! Signal doTrigger triggers the cameras; the log holds name and joints, deg.\n  VAR iodev log;\n  \
          PROC note(string stop)\n    VAR jointtarget now;\n    now := CJointT();\n    \
