@@ -82,6 +82,7 @@ impl Explain for Error {
     }
 
     fn hint(&self) -> Option<String> {
+        let said = |hint: &str| Some(hint.to_owned());
         match self {
             Error::Unknown { nearest, .. } => {
                 let nearest =
@@ -94,16 +95,13 @@ impl Explain for Error {
             Error::Ambiguous { candidates, .. } => {
                 candidates.first().map(|name| format!("`stereocal robot new {name}` takes the first"))
             }
-            Error::Occupied { .. } => Some("`--force` overwrites it, `--out DIR` puts it elsewhere".to_owned()),
+            Error::Occupied { .. } => said("`--force` overwrites it, `--out DIR` puts it elsewhere"),
             Error::AngleCount { needed, .. } => Some(format!("{needed} angles in degrees with commas between")),
-            Error::Different { .. } => {
-                Some("both files are of one robot, before and after `stereocal identify`".to_owned())
-            }
+            Error::Different { .. } => said("both files are of one robot, before and after `stereocal identify`"),
             Error::Exchanged { robot, identified } => Some(format!("`--robot {identified} --identified {robot}`")),
-            Error::OtherArm { .. } => Some(
+            Error::OtherArm { .. } => said(
                 "`--robot` names the file that `identify` was given, with the same signs and zeros of the joints, `--identified` the \
-                 identified.toml that it wrote; `stereocal robot show FILE` says what each of them is"
-                    .to_owned(),
+                 identified.toml that it wrote; `stereocal robot show FILE` says what each of them is",
             ),
             Error::NotExportable { hint, .. } | Error::Table { hint, .. } => Some(hint.clone()),
             Error::File { .. } => None,

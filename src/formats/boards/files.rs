@@ -173,10 +173,8 @@ mod tests {
 
     /// What a file of this name and content is read as.
     fn read(name: &str, content: &str) -> Result<String, String> {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join(name);
-        std::fs::write(&path, content).unwrap();
-        named(path.to_str().unwrap()).map(|board| board.to_string())
+        let (_folder, path) = files::temporary(name, content);
+        named(path.as_str()).map(|board| board.to_string())
     }
 
     #[test]
