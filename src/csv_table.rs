@@ -111,15 +111,11 @@ impl<'a> Table<'a> {
 /// A text as a field of a CSV file: quoted where it must be, and harmless to a spreadsheet.
 pub fn quoted(field: &str) -> String {
     let guarded = if is_formula(field.trim_start_matches('\'')) { format!("'{field}") } else { field.to_owned() };
-    let mut writer = csv::WriterBuilder::new().terminator(csv::Terminator::Any(b'\n')).from_writer(Vec::new());
     // Semicolons and tabs are quoted too: this program's reader, and others, guess the delimiter from the header.
-    if guarded.contains([';', '\t']) {
-        return format!("\"{}\"", guarded.replace('"', "\"\""));
+    match guarded.contains([',', ';', '\t', '"', '\r', '\n']) {
+        true => format!("\"{}\"", guarded.replace('"', "\"\"")),
+        false => guarded,
     }
-    // The second field keeps an empty one from being written as a pair of quotes; writing into memory has no way to fail.
-    let bytes = writer.write_record([guarded.as_str(), ""]).ok().and_then(|()| writer.into_inner().ok());
-    let line = bytes.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
-    line.strip_suffix(",\n").unwrap_or_default().to_owned()
 }
 
 #[cfg(test)]

@@ -57,6 +57,10 @@ pub(super) struct Way {
 }
 
 impl Way {
+    fn unjudged(picked: &Picked, joints: Unit, lengths: Unit) -> Way {
+        Way { picked: picked.clone(), joints, lengths, left: None, left_mm: f64::INFINITY }
+    }
+
     /// Whether the points are the nominal robot's own.
     pub fn is_computed(&self) -> bool {
         self.left.is_some() && self.left_mm < COMPUTED_MM
@@ -117,17 +121,12 @@ fn in_all_units(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Fo
 
 /// The candidates in the units that nobody need say, or in those that are stated, unjudged.
 pub(super) fn usual(candidates: &[Picked], forced: Forced) -> Vec<Way> {
-    let mut ways = Vec::new();
-    for picked in candidates {
-        for joints in [Unit::Deg, Unit::Rad] {
-            for lengths in [Unit::Mm, Unit::M] {
-                let joints = forced.joints.or(picked.joint_unit).unwrap_or(joints);
-                let lengths = forced.lengths.or(picked.length_unit).unwrap_or(lengths);
-                ways.push(Way { picked: picked.clone(), joints, lengths, left: None, left_mm: f64::INFINITY });
-            }
-        }
-    }
-    ways
+    let units = [(Unit::Deg, Unit::Mm), (Unit::Deg, Unit::M), (Unit::Rad, Unit::Mm), (Unit::Rad, Unit::M)];
+    let way = |picked: &Picked, (joints, lengths): (Unit, Unit)| {
+        let joints = forced.joints.or(picked.joint_unit).unwrap_or(joints);
+        Way::unjudged(picked, joints, forced.lengths.or(picked.length_unit).unwrap_or(lengths))
+    };
+    candidates.iter().flat_map(|picked| units.map(|units| way(picked, units))).collect()
 }
 
 /// Judges all ways.
@@ -268,9 +267,8 @@ fn by_sizes(parts: &[Part], picked: &Picked, forced: Forced, ways: &[Way]) -> Ve
         forced.lengths.or(picked.length_unit).or_else(|| (largest(parts, &mut measured) > METRES).then_some(Unit::Mm));
     match (joints, lengths) {
         (Some(joints), Some(lengths)) => {
-            let plain = Way { picked: picked.clone(), joints, lengths, left: None, left_mm: f64::INFINITY };
             let judged = ways.iter().find(|way| way.joints == joints && way.lengths == lengths).cloned();
-            Verdict::Taken(judged.unwrap_or(plain), Basis::Sizes)
+            Verdict::Taken(judged.unwrap_or_else(|| Way::unjudged(picked, joints, lengths)), Basis::Sizes)
         }
         (joints, _) => Verdict::NoUnit { joints: joints.is_none() },
     }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::pool::Candidate;
 use super::predict::{FRAME, Problem, Rows};
 use super::settings::COUNTS;
+use crate::linear_algebra::to_unit_diagonal;
 
 /// Poses that every placement gets before the others are shared out: its own transform needs three.
 const LEAST_A_GROUP: usize = 4;
@@ -63,10 +64,10 @@ impl Information {
     /// Covariance of all unknowns.
     pub(super) fn covariance(&self) -> DMatrix<f64> {
         let n = self.normal.nrows();
-        // Units differ by orders of magnitude: scaled to a diagonal of ones.
-        let scale: Vec<f64> = self.normal.diagonal().iter().map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt()).collect();
-        let scaled = DMatrix::from_fn(n, n, |r, c| self.normal[(r, c)] * scale[r] * scale[c]);
-        let inverse = scaled.cholesky().map_or_else(|| DMatrix::zeros(n, n), |c| c.inverse());
+        // Units differ by orders of magnitude.
+        let unit = to_unit_diagonal(&self.normal);
+        let inverse = unit.and_then(|(scaled, scale)| Some((scaled.cholesky()?.inverse(), scale)));
+        let Some((inverse, scale)) = inverse else { return DMatrix::zeros(n, n) };
         DMatrix::from_fn(n, n, |r, c| inverse[(r, c)] * scale[r] * scale[c])
     }
 

@@ -24,7 +24,7 @@ const NO_MARK: &str = "\n";
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
     let names = scan::axes('J', count);
     let position = |at: usize| {
-        let (numbers, _) = scan::labelled(text, at, &names, &["deg", "mm", ","])?;
+        let numbers = scan::labelled(text, at, &names, &["deg", "mm", ","])?;
         let before = &text[..at];
         let open = before.rfind("P[")?;
         let name = before[open..].split_inclusive(']').next().map(str::to_owned);

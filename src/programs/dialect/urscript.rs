@@ -50,7 +50,7 @@ pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
         if !before.ends_with(['(', '=', ',', '[']) {
             return None;
         }
-        let (numbers, end) = scan::list_of(text, at + 1, count + 1, angle);
+        let (numbers, end) = scan::list(text, at + 1, count + 1, angle);
         scan::word(text, end, "]").filter(|_| numbers.len() == count)?;
         let assigned = before.strip_suffix('=');
         let name = assigned.map(|before| before.split_whitespace().last().unwrap_or_default().to_owned());

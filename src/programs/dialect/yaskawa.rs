@@ -38,7 +38,7 @@ fn position(text: &str, at: usize, line: &str, count: usize) -> Option<Target> {
     if number.is_empty() || !number.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
-    let (mut numbers, _) = scan::list(text, at + name.len() + 1, MOST_AXES);
+    let (mut numbers, _) = scan::list(text, at + name.len() + 1, MOST_AXES, scan::number);
     // Axes that the arm lacks are written as zero.
     if numbers.iter().skip(count).any(|(value, _)| *value != 0.0) {
         return None;
