@@ -258,7 +258,7 @@ fn shape_record(shape: &Shape, board: &Board) -> ShapeRecord {
 fn shared_record(shared: &Shared, poses: &[MeasuredPose]) -> SharedRecord {
     let of = |m: &MeasuredPose| {
         let by_shared = &m.target.as_ref().ok()?.sensitivity;
-        let mut sensitivity: Vec<Vec<f64>> = rows(by_shared);
+        let mut sensitivity = rows(by_shared);
         // Turns stand first inside, points in files.
         sensitivity.rotate_left(3);
         Some(SensitivityRecord { pose: m.at.pose.clone(), sensitivity })
@@ -319,11 +319,8 @@ fn grown(series: &Series) -> Vec<String> {
     let noted = |m: &MeasuredPose| {
         let t = m.target.as_ref().ok()?;
         (t.chi_square > NOTED).then(|| {
-            format!(
-                "pose {} fits {:.1} times as badly as the others: its covariance is larger for it",
-                m.at.pose,
-                t.chi_square.sqrt()
-            )
+            let (pose, times) = (&m.at.pose, t.chi_square.sqrt());
+            format!("pose {pose} fits {times:.1} times as badly as the others: its covariance is larger for it")
         })
     };
     let mut all: Vec<String> = series.poses.iter().filter_map(noted).collect();

@@ -177,16 +177,10 @@ impl Part {
             _ if NOTHING.contains(&cell.to_lowercase().as_str()) => Ok(None),
             _ => {
                 let numbers = self.rows.iter().filter(|(_, r)| r[column].parse::<f64>().is_ok()).count();
-                let message = format!(
-                    "`{}` is not a number: `{cell}` ({numbers} of {} rows have one)",
-                    self.column_name(column),
-                    self.rows.len()
-                );
-                Err(self.grid.refuse(
-                    *line,
-                    message,
-                    Some("mend or remove the row, or leave the cell empty where nothing was measured"),
-                ))
+                let (name, count) = (self.column_name(column), self.rows.len());
+                let message = format!("`{name}` is not a number: `{cell}` ({numbers} of {count} rows have one)");
+                let hint = "mend or remove the row, or leave the cell empty where nothing was measured";
+                Err(self.grid.refuse(*line, message, Some(hint)))
             }
         }
     }

@@ -261,10 +261,8 @@ fn name_columns(parts: &mut [Part], columns: &str, count: usize) -> Result<bool>
     let each = parts.len() > 1 && complete && parts.iter().all(|p| words.len() <= p.width() && !p.is_program());
     if !each && words.len() > total {
         let message = format!("`--columns` names {} columns, but there are {total}", words.len());
-        return Err(parts[0].refuse(
-            message,
-            Some("one name a column in their order, those of all files side by side; `-` skips one"),
-        ));
+        let hint = "one name a column in their order, those of all files side by side; `-` skips one";
+        return Err(parts[0].refuse(message, Some(hint)));
     }
     if let Some(word) = words.iter().zip(&names).find(|(word, name)| **word != "-" && name.what == What::Other) {
         let message = format!("`--columns` has `{}`, which is no name of a column", word.0);

@@ -140,11 +140,8 @@ pub(super) fn open(parts: &[Part], a: &Way, b: &Way) -> Error {
             pick::asked(parts, &a.picked.joints, [first.min(second), first.max(second)], false)
         }
         _ => {
-            let message = format!(
-                "two sets of joints would do, {} and {}",
-                listed(parts, &a.picked.joints),
-                listed(parts, &b.picked.joints)
-            );
+            let [first, second] = [a, b].map(|way| listed(parts, &way.picked.joints));
+            let message = format!("two sets of joints would do, {first} and {second}");
             let flag = |way: &Way| columns_flag(parts, &way.picked.joints, &way.picked.first_point(), None);
             let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(a), flag(b));
             parts[0].refuse(message, Some(&hint))
@@ -159,17 +156,11 @@ pub(super) fn wrong_unit(parts: &[Part], stated: &Way, better: &Way) -> Error {
         true => ("points", better.picked.first_point(), stated.lengths, better.lengths),
     };
     let factor = stated.left.unwrap_or(f64::NAN) / better.left.unwrap_or(f64::NAN).max(f64::MIN_POSITIVE);
+    let (names, said_word, found_word) = (listed(parts, &columns), said.word(), found.word());
     let message = format!(
-        "the names call the {what} ({}) {}, but the nominal robot is {factor:.0} times nearer to the points with {}",
-        listed(parts, &columns),
-        said.word(),
-        found.word()
+        "the names call the {what} ({names}) {said_word}, but the nominal robot is {factor:.0} times nearer to the points with {found_word}"
     );
-    let hint = format!(
-        "`--units {}` if they are {}; `--units {}` keeps what the names say",
-        found.flag(),
-        found.word(),
-        said.flag()
-    );
+    let (said, found) = (said.flag(), found.flag());
+    let hint = format!("`--units {found}` if they are {found_word}; `--units {said}` keeps what the names say");
     parts[columns[0].part].refuse(message, Some(&hint))
 }

@@ -85,11 +85,9 @@ pub fn pose(
             let room = 1.0 - attempt as f64 / ATTEMPTS as f64;
             let tilt = draws.uniform(holding.tilt_deg.0, holding.tilt_deg.1).to_radians();
             let turn = draws.uniform(-holding.turn_deg, holding.turn_deg).to_radians();
-            let place = Vector3::new(
-                room * draws.uniform(-holding.sideways_mm, holding.sideways_mm),
-                room * draws.uniform(-holding.sideways_mm, holding.sideways_mm),
-                draws.uniform(holding.depth_mm.0, holding.depth_mm.1),
-            );
+            let mut sideways = || room * draws.uniform(-holding.sideways_mm, holding.sideways_mm);
+            let (x, y) = (sideways(), sideways());
+            let place = Vector3::new(x, y, draws.uniform(holding.depth_mm.0, holding.depth_mm.1));
             let tilted = UnitQuaternion::from_scaled_axis(Vector3::new(about.cos(), about.sin(), 0.0) * tilt);
             let turned = UnitQuaternion::from_scaled_axis(Vector3::z() * (turn + holding.upright_deg.to_radians()));
             left_from_field * transform((tilted * turned).scaled_axis(), place)

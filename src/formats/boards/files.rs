@@ -182,6 +182,7 @@ mod tests {
         let checker = "target_type: 'checkerboard' #gridtype\ntargetCols: 6               #number of internal corners\n\
                        targetRows: 7\nrowSpacingMeters: 0.06      #size of one chessboard square [m]\ncolSpacingMeters: 0.06\n";
         assert_eq!(read("target.yaml", checker), Ok("checker:8x7:60".to_owned()));
+        let grid = "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.024\ntagSpacing: 0.3\ncodeOffset: 5\n";
         for (text, why) in [
             (checker.replace("colSpacingMeters: 0.06", "colSpacingMeters: 0.05"), "50 x 60 mm"),
             (checker.replace("targetCols: 6 ", "targetCols: 1 "), "no board's"),
@@ -189,19 +190,9 @@ mod tests {
             (checker.replace("targetRows: 7", "targetRows: seven"), "not a number"),
             ("target_type: 'circlegrid'\ntargetCols: 6\n".to_owned(), "grid of circles"),
             ("target_type: 'aprilgrid'\ntagCols: 6\n".to_owned(), "tagRows"),
-            (
-                "target_type: 'aprilgrid'\ntagCols: 6.5\ntagRows: 6\ntagSize: 0.088\ntagSpacing: 0.3\n".to_owned(),
-                "6.5x6",
-            ),
-            (
-                "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 24\ntagSpacing: 0.3\n".to_owned(),
-                "in metres",
-            ),
-            (
-                "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.024\ntagSpacing: 0.3\ncodeOffset: 5\n"
-                    .to_owned(),
-                "codeOffset",
-            ),
+            (grid.replace("Cols: 6", "Cols: 6.5").replace("codeOffset: 5\n", ""), "6.5x6"),
+            (grid.replace("0.024", "24"), "in metres"),
+            (grid.to_owned(), "codeOffset"),
             ("target_type: 'dots'\n".to_owned(), "`dots`"),
             ("cam0:\n".to_owned(), "no target file"),
         ] {

@@ -73,10 +73,6 @@ pub fn read(left: &str, right: &str) -> Result<Rig, String> {
     let shift_mm = p[3] / p[0] / METRE;
     let rotation = right_turn.transpose() * left_turn;
     let translation = right_turn.transpose() * Vector3::new(shift_mm, 0.0, 0.0);
-    checked::rig(
-        (read_camera(left)?, read_camera(right)?),
-        ("the product of the rectifications", rotation),
-        translation,
-        None,
-    )
+    let rotation = ("the product of the rectifications", rotation);
+    checked::rig((read_camera(left)?, read_camera(right)?), rotation, translation, None)
 }
