@@ -38,14 +38,11 @@ pub(super) fn candidates(parts: &[Part], picked: &Picked, count: usize) -> Vec<P
 
 /// The same of these columns without names, and of those whose names are not known.
 fn of_columns(parts: &[Part], picked: &Picked, count: usize, free: fn(&Part) -> Vec<usize>) -> Vec<Picked> {
-    let free: Vec<Vec<At>> = parts
-        .iter()
-        .enumerate()
-        .map(|(part, file)| {
-            let columns = free(file).into_iter().chain(file.spare());
-            columns.take(MOST_FREE).map(|column| At { part, column }).collect()
-        })
-        .collect();
+    let of_file = |(part, file): (usize, &Part)| -> Vec<At> {
+        let columns = free(file).into_iter().chain(file.spare());
+        columns.take(MOST_FREE).map(|column| At { part, column }).collect()
+    };
+    let free: Vec<Vec<At>> = parts.iter().enumerate().map(of_file).collect();
     let mut list = Vec::new();
     for joints in blocks(parts, &free, count, !picked.joints.is_empty()) {
         let joints = if picked.joints.is_empty() { joints } else { picked.joints.clone() };

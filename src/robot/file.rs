@@ -299,27 +299,23 @@ fn coupling(t: &CouplingTerm) -> CouplingTermRecord {
 impl From<&Robot> for RobotRecord {
     fn from(robot: &Robot) -> RobotRecord {
         let direction = robot.corrections.gravity_direction;
-        let degrees = |limits: Option<(f64, f64)>| limits.map(|(low, high)| [low.to_degrees(), high.to_degrees()]);
+        let joint = |j: &Joint| JointRecord {
+            kind: j.slides.then(|| "prismatic".to_owned()),
+            alpha_deg: j.alpha_rad.to_degrees(),
+            a_mm: j.a_mm,
+            beta_deg: j.beta_rad.to_degrees(),
+            theta_deg: j.theta_rad.to_degrees(),
+            d_mm: j.d_mm,
+            limits_deg: j.limits_rad.filter(|_| !j.slides).map(|(low, high)| [low.to_degrees(), high.to_degrees()]),
+            limits_mm: j.limits_rad.filter(|_| j.slides).map(<[f64; 2]>::from),
+            sign: j.sign,
+        };
         RobotRecord {
             name: robot.name.clone(),
             convention: "mdh".to_owned(),
             check: None,
             gravity_direction: (direction != Corrections::default().gravity_direction).then(|| direction.into()),
-            joint: robot
-                .joints
-                .iter()
-                .map(|j| JointRecord {
-                    kind: j.slides.then(|| "prismatic".to_owned()),
-                    alpha_deg: j.alpha_rad.to_degrees(),
-                    a_mm: j.a_mm,
-                    beta_deg: j.beta_rad.to_degrees(),
-                    theta_deg: j.theta_rad.to_degrees(),
-                    d_mm: j.d_mm,
-                    limits_deg: degrees(j.limits_rad.filter(|_| !j.slides)),
-                    limits_mm: j.limits_rad.filter(|_| j.slides).map(<[f64; 2]>::from),
-                    sign: j.sign,
-                })
-                .collect(),
+            joint: robot.joints.iter().map(joint).collect(),
             tool: ToolRecord { x_mm: robot.tool_mm.x, y_mm: robot.tool_mm.y, z_mm: robot.tool_mm.z },
             gravity: table(&robot.corrections.gravity, weight)
                 .map(|gravity| GravityRecord { direction: None, terms: gravity.terms }),

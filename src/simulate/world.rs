@@ -210,20 +210,17 @@ impl World {
         let backdrops: Vec<Backdrop> = views.into_par_iter().map(|(p, side)| self.backdrop(p, side)).collect();
         let bar = progress::bar("rendering", 2 * shots.len() as u64);
         let jobs: Vec<(&Shot, Side)> = shots.iter().flat_map(|shot| Side::BOTH.map(|side| (shot, side))).collect();
-        let done: Result<Vec<()>> = jobs
-            .par_iter()
-            .map(|&(shot, side)| {
-                let backdrop = &backdrops[of_side(shot.placement, side) as usize];
-                let holder = self.holder(shot);
-                let scene = self.scene(shot, side, backdrop, &holder);
-                let picture = Renderer::new(&scene).picture(&normals);
-                out.write(&format!("{}/{}/{}.png", shot.folder, side.name(), shot.stem), &png(&picture)?)?;
-                bar.inc(1);
-                Ok(())
-            })
-            .collect();
+        let done = jobs.par_iter().try_for_each(|&(shot, side)| {
+            let backdrop = &backdrops[of_side(shot.placement, side) as usize];
+            let holder = self.holder(shot);
+            let scene = self.scene(shot, side, backdrop, &holder);
+            let picture = Renderer::new(&scene).picture(&normals);
+            out.write(&format!("{}/{}/{}.png", shot.folder, side.name(), shot.stem), &png(&picture)?)?;
+            bar.inc(1);
+            Ok(())
+        });
         bar.finish_and_clear();
-        done.map(|_| ())
+        done
     }
 
     /// The target's true mark point at a pose, left camera's frame, mm, and its rotation vector.

@@ -225,13 +225,11 @@ impl Urdf {
 
     /// The text with other origins for some joints: everything else stays as it is.
     pub fn with_origins(&self, origins: &[(&UrdfJoint, Transform)]) -> String {
-        let mut edits: Vec<(std::ops::Range<usize>, String)> = origins
-            .iter()
-            .map(|(joint, origin)| match &joint.origin_at {
-                Ok(range) => (range.clone(), origin_element(origin)),
-                Err(at) => (*at..*at, format!("\n    {}", origin_element(origin))),
-            })
-            .collect();
+        let edit = |(joint, origin): &(&UrdfJoint, Transform)| match &joint.origin_at {
+            Ok(range) => (range.clone(), origin_element(origin)),
+            Err(at) => (*at..*at, format!("\n    {}", origin_element(origin))),
+        };
+        let mut edits: Vec<(std::ops::Range<usize>, String)> = origins.iter().map(edit).collect();
         edits.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
         let mut text = self.text.clone();
         for (range, element) in edits {
