@@ -63,14 +63,13 @@ impl RectifiedFile {
     /// Of pictures on common rows.
     pub fn rectified(rig: &Rig, matrices: &Matrices, scaling: Scaling, coverage: Coverage) -> RectifiedFile {
         let common = if matrices.in_columns() { "columns" } else { "rows" };
-        let ((r1, p1), (r2, p2)) = (matrices.of(Side::Left), matrices.of(Side::Right));
         RectifiedFile {
             mode: "rectify",
             alpha: Some(scaling.alpha),
             zero_disparity: Some(scaling.zero_disparity),
             q: Some(rows(&matrices.disparity_to_depth)),
             common: Some(common),
-            ..RectifiedFile::of(rig, [r1, r2], [p1, p2], coverage)
+            ..RectifiedFile::of(rig, Side::BOTH.map(|side| matrices.of(side)), coverage)
         }
     }
 
@@ -78,15 +77,10 @@ impl RectifiedFile {
     pub fn undistorted(rig: &Rig, coverage: Coverage) -> RectifiedFile {
         let one = Matrix3::identity();
         let [p1, p2] = [&rig.left, &rig.right].map(|camera| camera.matrix().insert_column(3, 0.0));
-        RectifiedFile::of(rig, [&one, &one], [&p1, &p2], coverage)
+        RectifiedFile::of(rig, [(&one, &p1), (&one, &p2)], coverage)
     }
 
-    fn of(
-        rig: &Rig,
-        [r1, r2]: [&Matrix3<f64>; 2],
-        [p1, p2]: [&Matrix3x4<f64>; 2],
-        coverage: Coverage,
-    ) -> RectifiedFile {
+    fn of(rig: &Rig, [(r1, p1), (r2, p2)]: [(&Matrix3<f64>, &Matrix3x4<f64>); 2], coverage: Coverage) -> RectifiedFile {
         RectifiedFile {
             mode: "undistort",
             width: rig.left.width,

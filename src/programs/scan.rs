@@ -26,12 +26,7 @@ pub fn word(text: &str, at: usize, word: &str) -> Option<usize> {
 }
 
 /// Numbers, or what else is a `number` in a language, from `at` with commas between, up to `most` of them, and the place behind the last.
-pub fn list(
-    text: &str,
-    at: usize,
-    most: usize,
-    number: impl Fn(&str, usize) -> Option<Number>,
-) -> (Vec<Number>, usize) {
+pub fn list(text: &str, at: usize, most: usize, number: fn(&str, usize) -> Option<Number>) -> (Vec<Number>, usize) {
     let (mut numbers, mut end) = (Vec::new(), at);
     while numbers.len() < most {
         let from = if numbers.is_empty() { Some(end) } else { word(text, end, ",") };
