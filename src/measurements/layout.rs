@@ -128,7 +128,7 @@ fn distances(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> Vec<f64> {
     (0..rows).take(ROWS).filter_map(apart).collect()
 }
 
-/// Whether these distances are one, but for gross errors at less than half of the rows, and none of them is zero.
+/// Whether these distances are one that is not zero, but for gross errors at less than half of the rows.
 pub(super) fn is_kept(apart: Vec<f64>) -> bool {
     let Some(middle) = median(apart.iter().copied()) else { return false };
     let off = median(apart.iter().map(|d| (d - middle).abs())).unwrap_or(f64::INFINITY);

@@ -21,41 +21,30 @@ impl Language {
     pub const ALL: [Language; 5] =
         [Language::UrScript, Language::Rapid, Language::Krl, Language::FanucLs, Language::Jbi];
 
-    pub fn name(self) -> &'static str {
+    /// Its name, endings of its files in small letters, and what it calls the number behind the six axes of a robot.
+    fn known(self) -> (&'static str, &'static [&'static str], Option<&'static str>) {
         match self {
-            Language::UrScript => "URScript",
-            Language::Rapid => "ABB RAPID",
-            Language::Krl => "KUKA KRL",
-            Language::FanucLs => "Fanuc LS",
-            Language::Jbi => "Yaskawa JBI",
+            Language::UrScript => ("URScript", &["script", "urscript"], None),
+            Language::Rapid => ("ABB RAPID", &["mod", "modx", "prg"], Some("`eax_a`")),
+            Language::Krl => ("KUKA KRL", &["src", "dat"], Some("`E1`")),
+            Language::FanucLs => ("Fanuc LS", &["ls"], Some("`E1`")),
+            Language::Jbi => ("Yaskawa JBI", &["jbi"], Some("the seventh number")),
         }
     }
 
-    /// Endings of its files, small letters.
-    fn endings(self) -> &'static [&'static str] {
-        match self {
-            Language::UrScript => &["script", "urscript"],
-            Language::Rapid => &["mod", "modx", "prg"],
-            Language::Krl => &["src", "dat"],
-            Language::FanucLs => &["ls"],
-            Language::Jbi => &["jbi"],
-        }
+    pub fn name(self) -> &'static str {
+        self.known().0
     }
 
     /// The language of a file, by its ending.
     pub fn of(path: &Utf8Path) -> Option<Language> {
         let ending = path.extension()?.to_ascii_lowercase();
-        Language::ALL.into_iter().find(|language| language.endings().contains(&ending.as_str()))
+        Language::ALL.into_iter().find(|language| language.known().1.contains(&ending.as_str()))
     }
 
     /// What the language calls the number behind the six axes of a robot; `None` where all are in one list.
     pub fn seventh(self) -> Option<&'static str> {
-        match self {
-            Language::UrScript => None,
-            Language::Rapid => Some("`eax_a`"),
-            Language::Krl | Language::FanucLs => Some("`E1`"),
-            Language::Jbi => Some("the seventh number"),
-        }
+        self.known().2
     }
 
     /// Whether points of this file stand in one of data beside it.
