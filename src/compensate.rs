@@ -133,8 +133,7 @@ impl Compensator {
         let mut unlimited = identified.clone();
         unlimited.joints.iter_mut().for_each(|joint| joint.limits_rad = None);
         let slides = identified.joints.iter().any(|j| j.slides);
-        let links = identified.joints.iter().map(|j| j.a_mm.hypot(j.d_mm)).sum::<f64>();
-        let reach_mm = if slides { f64::INFINITY } else { links };
+        let reach_mm = if slides { f64::INFINITY } else { identified.reach_mm() };
         Compensator { nominal, identified, unlimited, nominal_tool, identified_tool, reach_mm }
     }
 

@@ -139,11 +139,6 @@ fn half_plate(board: &Board) -> (f64, f64) {
     (width, height)
 }
 
-/// Length of the stretched arm, mm: what the paper's spheres are scaled by.
-pub fn reach_mm(robot: &Robot) -> f64 {
-    robot.joints.iter().map(|j| j.a_mm.hypot(j.d_mm)).sum()
-}
-
 /// The target's printed side looks along the flange's z: its own z points back.
 pub fn flange_from_target(robot: &Robot) -> Transform {
     transform(Vector3::x() * std::f64::consts::PI, robot.tool_mm)
@@ -169,7 +164,8 @@ pub fn base_from_flange(robot: &Robot, base_from_target: &Transform) -> Transfor
 /// The placements: one direction of the flange for all spheres as in the paper, the first that all of them can have; a sphere of its own
 /// direction where there is none.
 pub fn placements(robot: &Robot, scene: &Scene, settings: &Settings) -> Result<Vec<Placement>> {
-    let scale = reach_mm(robot) / reach_mm(&Robot::paper());
+    // The paper's spheres are scaled by the reach.
+    let scale = robot.reach_mm() / Robot::paper().reach_mm();
     let paper = || PAPER_CENTERS_MM.iter().map(|c| Vector3::from(*c) * scale).collect();
     let centers: Vec<Vector3<f64>> = if settings.centers_mm.is_empty() { paper() } else { settings.centers_mm.clone() };
     let field = |center: &Vector3<f64>, direction: &Vector3<f64>| {

@@ -1,4 +1,4 @@
-//! `robot.toml`: a robot's parameters as a person writes them, degrees and mm.
+//! `robot.toml`: a robot's parameters as a person writes them, degrees and mm, and what the run that found it says of its use.
 
 use camino::Utf8Path;
 use nalgebra::Vector3;
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
 use super::ends::PoseRecord;
-use super::{Advice, Check, Corrections, Ends, Error, Joint, Result, Robot};
+use super::{Corrections, Ends, Error, Joint, Result, Robot};
 use crate::diagnostic::Place;
 use crate::files;
 
@@ -325,6 +325,45 @@ impl From<&Robot> for RobotRecord {
             couplings: table(&robot.corrections.couplings, coupling),
             base: PoseRecord::of(&robot.ends.root_from_frame0),
             flange: PoseRecord::of(&robot.ends.last_frame_from_flange),
+        }
+    }
+}
+
+/// What to do with the robot that was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Advice {
+    Use,
+    /// Use it once the reason was looked at.
+    Check,
+    /// Nothing better than the nominal robot was found, and that is the result.
+    KeepNominal,
+    DoNotUse,
+}
+
+/// The advice with its reason, as files carry it to whatever uses the robot.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Check {
+    pub advice: Advice,
+    /// Why, in one sentence; empty where there is nothing to say.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub reason: String,
+}
+
+impl Check {
+    /// Whether what is made of the robot is advised against.
+    pub fn is_against(&self) -> bool {
+        self.advice == Advice::DoNotUse
+    }
+
+    /// What a user of `file` must know; `None` where there is nothing to say.
+    pub fn warning(&self, file: &Utf8Path) -> Option<String> {
+        let reason = &self.reason;
+        match self.advice {
+            Advice::DoNotUse => Some(format!("do not use {file}, says its own `check`: {reason}")),
+            Advice::Check => Some(format!("check before you use {file}, says its own `check`: {reason}")),
+            Advice::Use | Advice::KeepNominal => None,
         }
     }
 }
