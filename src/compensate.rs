@@ -133,8 +133,7 @@ impl Compensator {
         let mut unlimited = identified.clone();
         unlimited.joints.iter_mut().for_each(|joint| joint.limits_rad = None);
         let slides = identified.joints.iter().any(|j| j.slides);
-        let links = identified.joints.iter().map(|j| j.a_mm.hypot(j.d_mm)).sum::<f64>();
-        let reach_mm = if slides { f64::INFINITY } else { links };
+        let reach_mm = if slides { f64::INFINITY } else { identified.reach_mm() };
         Compensator { nominal, identified, unlimited, nominal_tool, identified_tool, reach_mm }
     }
 
@@ -178,12 +177,11 @@ impl Compensator {
                 let kept = || self.kept(&self.base_from_flange(&meant), given);
                 Compensated { readings: outside.map_or_else(kept, Err), miss_mm }
             }
-            Target::Pose { root_from_tool, near_rad: Some(near) } => {
-                Compensated { readings: self.near(&self.base_from_flange(root_from_tool), near), miss_mm: None }
-            }
-            Target::Pose { root_from_tool, near_rad: None } => {
+            Target::Pose { root_from_tool, near_rad } => {
                 let wanted = self.base_from_flange(root_from_tool);
-                Compensated { readings: self.anywhere(&wanted, posture), miss_mm: None }
+                let near = |near: &Vec<f64>| self.near(&wanted, near);
+                let readings = near_rad.as_ref().map_or_else(|| self.anywhere(&wanted, posture), near);
+                Compensated { readings, miss_mm: None }
             }
         }
     }
@@ -251,9 +249,9 @@ impl Compensator {
 }
 
 /// The pose of a row `x y z` (mm), `rx ry rz` (rad).
-pub fn pose(numbers: &[f64; 6]) -> Transform {
-    let [x, y, z, rx, ry, rz] = *numbers;
-    transform(Vector3::new(rx, ry, rz), Vector3::new(x, y, z))
+pub fn pose(numbers: &[f64]) -> Transform {
+    let [place, turn] = [&numbers[..3], &numbers[3..6]].map(Vector3::from_column_slice);
+    transform(turn, place)
 }
 
 #[cfg(test)]
@@ -265,6 +263,8 @@ mod tests {
     /// The contract's round trip.
     const SAME_MM: f64 = 1e-3;
     const SAME_RAD: f64 = 1e-6;
+
+    const BENT: [f64; 6] = [0.3, -1.2, 1.4, -0.9, -1.3, 0.4];
 
     /// An arm that is off as machines are, with every kind of term.
     fn real(nominal: &Robot) -> Robot {
@@ -292,7 +292,6 @@ mod tests {
     #[test]
     fn the_real_tool_goes_where_the_nominal_one_was_meant_to_be() {
         for name in ["ur5e", "abb-irb120", "kuka-iiwa14", "fanuc-lrmate200id", "paper"] {
-            let Some(_) = catalogue::robot(name) else { panic!("no {name}") };
             let nominal = named(name);
             let identified = real(&nominal);
             let targets: Vec<Target> = (0..200)
@@ -321,12 +320,11 @@ mod tests {
         let nominal = named("ur5e");
         let identified = real(&nominal);
         let compensator = Compensator::new(&nominal, &identified, None);
-        let q = [0.3, -1.2, 1.4, -0.9, -1.3, 0.4];
-        let root_from_tool = compensator.reached(&q);
-        let near_rad = Some(q.iter().map(|v| v + 0.1).collect::<Vec<f64>>());
+        let root_from_tool = compensator.reached(&BENT);
+        let near_rad = Some(BENT.map(|v| v + 0.1).to_vec());
         let named = compensator.compensate(&[Target::Pose { root_from_tool, near_rad }]);
         let readings = named[0].readings.as_ref().unwrap();
-        assert!(readings.iter().zip(&q).all(|(a, b)| (a - b).abs() < 1e-6));
+        assert!(readings.iter().zip(&BENT).all(|(a, b)| (a - b).abs() < 1e-6));
         let free = compensator.compensate(&[Target::Pose { root_from_tool, near_rad: None }]);
         let there = compensator.reached(free[0].readings.as_ref().unwrap());
         assert!((there.translation.vector - root_from_tool.translation.vector).norm() < SAME_MM);
@@ -344,13 +342,12 @@ mod tests {
         assert!(matches!(there, Refusal::OutOfReach { short_mm } if short_mm > 1000.0), "{there}");
         let stretched = said(&identified, Target::Readings(vec![0.3, -1.2, 0.0, -0.9, -1.3, 0.4]));
         assert!(matches!(stretched, Refusal::OutOfReach { .. } | Refusal::Singular { .. }), "{stretched}");
-        let q = vec![0.3, -1.2, 1.4, -0.9, -1.3, 0.4];
         identified.joints[3].limits_rad = Some((-0.5, 0.5));
-        let limited = said(&identified, Target::Readings(q));
+        let limited = said(&identified, Target::Readings(BENT.to_vec()));
         assert!(matches!(limited, Refusal::Outside { joint: 4, .. }), "{limited}");
         // A target that the nominal robot reaches and the real one only beyond a limit.
         identified.joints[3].limits_rad = Some((-1.5, -0.899));
-        let limited = said(&identified, Target::Readings(vec![0.3, -1.2, 1.4, -0.9, -1.3, 0.4]));
+        let limited = said(&identified, Target::Readings(BENT.to_vec()));
         assert!(matches!(limited, Refusal::Limit { joint: 4, .. }), "{limited}");
     }
 
@@ -360,12 +357,11 @@ mod tests {
         let nominal = named("ur5e");
         let identified = real(&nominal);
         let tool_mm = Vector3::new(0.0, 0.0, 150.0);
-        let q = vec![0.3, -1.2, 1.4, -0.9, -1.3, 0.4];
         let compensator = Compensator::new(&nominal, &identified, Some(tool_mm));
-        let readings = compensator.compensate(&[Target::Readings(q.clone())])[0].readings.clone().unwrap();
+        let readings = compensator.compensate(&[Target::Readings(BENT.to_vec())])[0].readings.clone().unwrap();
         let tool = Transform::from(tool_mm);
         let at = |robot: &Robot, q: &[f64]| robot.base_from_flange(q) * tool;
-        let off = at(&nominal, &q).inverse() * at(&identified, &readings);
+        let off = at(&nominal, &BENT).inverse() * at(&identified, &readings);
         assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD);
     }
 }

@@ -21,7 +21,6 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Reading or writing files.
     #[error(transparent)]
     Files(#[from] crate::files::Error),
     /// All that is wrong, at once.
@@ -32,12 +31,7 @@ pub enum Error {
     },
     /// Something else that was asked for and cannot be.
     #[error("{message}")]
-    Usage {
-        /// What.
-        message: String,
-        /// What to try.
-        hint: String,
-    },
+    Usage { message: String, hint: String },
 }
 
 impl Explain for Error {

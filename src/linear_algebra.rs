@@ -3,7 +3,7 @@
 //! Rank is treated in one way: a symmetric matrix is brought to a unit diagonal, so that radians and mm are comparable, and what it says along
 //! eigenvectors below `RANK` is nothing. Such directions stay where they are.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Dim, Matrix, RawStorage, SymmetricEigen};
 
 /// Relative size below which an eigenvalue of a normal matrix counts as zero.
 const RANK: f64 = 1e-13;
@@ -70,6 +70,11 @@ impl Eliminated {
 pub fn without(columns: &DMatrix<f64>, others: &DMatrix<f64>) -> DMatrix<f64> {
     // The inner product is of few columns and may be taken one by one.
     columns - others * (pseudo_inverse(others.tr_mul(others)) * product(others, columns))
+}
+
+/// A matrix row by row, as files have it.
+pub fn rows<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(matrix: &Matrix<f64, R, C, S>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
 #[cfg(test)]

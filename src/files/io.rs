@@ -246,6 +246,15 @@ impl PermissionsLikeOthers for tempfile::Builder<'_, '_> {
     }
 }
 
+/// A file of this content for a test, in a folder that goes with the first of what is returned.
+#[cfg(test)]
+pub fn temporary(name: &str, content: impl AsRef<[u8]>) -> (tempfile::TempDir, Utf8PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = Utf8PathBuf::from_path_buf(folder.path().join(name)).unwrap();
+    std::fs::write(&path, content).unwrap();
+    (folder, path)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

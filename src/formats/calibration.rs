@@ -9,6 +9,7 @@ use crate::diagnostic::at_most;
 use crate::files::{self, OutDir, Result};
 use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
+use crate::linear_algebra::rows;
 use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::corner_noise::Noise;
@@ -43,7 +44,6 @@ pub struct CalibrationFile {
     /// The volume that the verdict was for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     volume: Option<Volume>,
-    /// The verdict on the rig.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     check: Option<Check>,
     /// The board that calibrated, by its name.
@@ -92,7 +92,6 @@ pub struct Calibrated {
     pub pairs: Option<usize>,
     /// The volume that the verdict was for.
     pub volume: Option<Volume>,
-    /// The verdict.
     pub check: Option<Check>,
     pub board: Option<Board>,
     /// The calibration's last pairs, where they contradict the rig.
@@ -100,21 +99,6 @@ pub struct Calibrated {
 }
 
 impl Calibrated {
-    /// A rig of which nothing else is known.
-    fn of_rig(rig: Rig) -> Calibrated {
-        Calibrated {
-            rig,
-            noise: None,
-            pair_excess: None,
-            farthest_pair: None,
-            pairs: None,
-            volume: None,
-            check: None,
-            board: None,
-            unconfirmed: Vec::new(),
-        }
-    }
-
     /// What its own calibration says against the rig, for those who use it.
     pub fn doubts(&self) -> Vec<String> {
         let changed = self.unconfirmed.first().map(|last| {
@@ -218,14 +202,11 @@ impl From<&Rig> for CalibrationFile {
             version: VERSION,
             left: (&rig.left).into(),
             right: (&rig.right).into(),
-            right_from_left: RigRecord {
-                rotation: r.row_iter().map(|row| row.iter().copied().collect()).collect(),
-                translation_mm: vec![t.x, t.y, t.z],
-            },
-            covariance: rig.covariance.as_ref().map(|c| CovarianceRecord {
-                order: c.order.clone(),
-                matrix: c.matrix.row_iter().map(|row| row.iter().copied().collect()).collect(),
-            }),
+            right_from_left: RigRecord { rotation: rows(&r), translation_mm: vec![t.x, t.y, t.z] },
+            covariance: rig
+                .covariance
+                .as_ref()
+                .map(|c| CovarianceRecord { order: c.order.clone(), matrix: rows(&c.matrix) }),
             corner_noise: None,
             boards: None,
             volume: None,
@@ -349,12 +330,17 @@ pub fn read(path: &Utf8Path) -> Result<Calibrated> {
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";
     let text = files::read_text(path, WHAT, Some(hint))?;
     let refused = |message: String| files::Error::format(path, None, message, None);
-    if let Some(rig) = export::read(path, &text) {
-        return Ok(Calibrated::of_rig(rig.map_err(refused)?));
+    let (file, rig) = match export::read(path, &text) {
+        // Of such a rig nothing else is known.
+        Some(rig) => rig.map(|rig| (CalibrationFile::from(&rig), rig)),
+        None => {
+            let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
+            file.rig().map(|rig| (file, rig))
+        }
     }
-    let file = files::read_json::<CalibrationFile>(path, WHAT, Some(hint))?;
+    .map_err(refused)?;
     Ok(Calibrated {
-        rig: file.rig().map_err(refused)?,
+        rig,
         noise: file.noise(),
         pair_excess: file.corner_noise.and_then(|n| n.pair_excess).filter(|e| *e >= 1.0),
         farthest_pair: file.corner_noise.and_then(|n| n.farthest_pair),

@@ -83,10 +83,11 @@ struct JudgedLength {
 }
 
 impl CameraCheckFile {
-    /// Gathers the figures.
     pub fn new(calibration: &Calibration, judged: &Judged) -> CameraCheckFile {
         let accuracy = &judged.facts.accuracy;
         let worst = &accuracy.extremes.largest;
+        let lenses = findings::of_lenses(calibration, &judged.facts.volume);
+        let found = judged.facts.findings.iter().cloned().chain(lenses).chain(judged.of_scale());
         let all = || calibration.views.iter().flat_map(|view| &view.observations);
         CameraCheckFile {
             passed: judged.verdict == Verdict::Pass,
@@ -98,15 +99,7 @@ impl CameraCheckFile {
             within_95_mm: accuracy.extremes.one_in_twenty_mm,
             volume: judged.facts.volume.volume.clone(),
             moment: calibration.moment(),
-            findings: judged
-                .facts
-                .findings
-                .iter()
-                .cloned()
-                .chain(findings::of_lenses(calibration, &judged.facts.volume))
-                .chain(judged.of_scale())
-                .chain(findings::of_pairs(&calibration.discarded.pairs))
-                .collect(),
+            findings: found.chain(findings::of_pairs(&calibration.discarded.pairs)).collect(),
             judged_length: JudgedLength {
                 error_mm: worst.error_mm,
                 uncertainty_mm: worst.expanded_without_corners_mm(),

@@ -116,13 +116,8 @@ fn check_covariance(covariance: &Covariance) -> Result<(), String> {
     }
     let correlation = |i: usize, j: usize| match (i == j, sigma[i] * sigma[j]) {
         (true, _) => 1.0 + ROUNDING,
-        (_, 0.0) => {
-            if s[(i, j)] == 0.0 {
-                0.0
-            } else {
-                f64::NAN
-            }
-        }
+        (_, 0.0) if s[(i, j)] == 0.0 => 0.0,
+        (_, 0.0) => f64::NAN,
         (_, product) => s[(i, j)] / product,
     };
     let r = DMatrix::from_fn(n, n, correlation);
@@ -173,10 +168,9 @@ mod tests {
     fn cameras_are_those_that_can_be() {
         let pinhole = [500.0, 500.0, 320.0, 240.0];
         camera((640.0, 480.0), &pinhole, Lens::Brown5, &[0.1, 0.0, 0.0, 0.0, 0.2]).unwrap();
-        assert!(camera((0.0, 480.0), &pinhole, Lens::Brown4, &[]).is_err());
-        assert!(camera((640.5, 480.0), &pinhole, Lens::Brown4, &[]).is_err());
-        assert!(camera((f64::NAN, 480.0), &pinhole, Lens::Brown4, &[]).is_err());
-        assert!(camera((640.0, 1e300), &pinhole, Lens::Brown4, &[]).is_err());
+        for size in [(0.0, 480.0), (640.5, 480.0), (f64::NAN, 480.0), (640.0, 1e300)] {
+            assert!(camera(size, &pinhole, Lens::Brown4, &[]).is_err(), "{size:?}");
+        }
         assert!(camera((640.0, 480.0), &[1e300, 500.0, 0.0, 0.0], Lens::Brown4, &[]).is_err());
         assert!(camera((640.0, 480.0), &[500.0, 500.0, f64::INFINITY, 0.0], Lens::Brown4, &[]).is_err());
         assert!(camera((640.0, 480.0), &pinhole, Lens::Brown4, &[1e300]).is_err());

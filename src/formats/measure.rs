@@ -7,13 +7,12 @@ use serde::Serialize;
 
 use crate::geometry::rotation_vector;
 use crate::imaging::{Board, Corners};
+use crate::linear_algebra::rows;
 use crate::measurements::{pose_fields, pose_header, quoted};
 use crate::statistics::median;
 use crate::stereo::Rig;
-use crate::stereo::board_pose::TargetPose;
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
-use crate::stereo::board_pose::{Knowledge, MeasuredPose, Series};
-use crate::stereo::board_pose::{Shape, Shared};
+use crate::stereo::board_pose::{Knowledge, MeasuredPose, Series, Shape, Shared, TargetPose};
 use crate::stereo::volume::Volume;
 
 /// Columns behind the joints.
@@ -66,7 +65,6 @@ pub struct MeasureFile {
     shared: Option<SharedRecord>,
 }
 
-/// What is found of the rig.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct RigRecord {
     state: &'static str,
@@ -149,7 +147,6 @@ struct SensitivityRecord {
 }
 
 impl MeasureFile {
-    /// Gathers the figures.
     pub fn new(series: &Series, corners: &Corners, known: &Knowledge) -> MeasureFile {
         let (board, rig) = (&known.board, &known.rig);
         let targets: Vec<&TargetPose> = series.poses.iter().filter_map(|m| m.target.as_ref().ok()).collect();
@@ -239,7 +236,7 @@ fn row(m: &MeasuredPose) -> Row {
 }
 
 fn shape_record(shape: &Shape, board: &Board) -> ShapeRecord {
-    let crossing = |(k, (d, s)): (usize, (&nalgebra::Vector3<f64>, &nalgebra::Vector3<f64>))| CrossingRecord {
+    let crossing = |(k, (d, s)): (usize, (&Vector3<f64>, &Vector3<f64>))| CrossingRecord {
         col: board.place(k).0,
         row: board.place(k).1,
         dx_mm: d.x,
@@ -261,7 +258,7 @@ fn shape_record(shape: &Shape, board: &Board) -> ShapeRecord {
 fn shared_record(shared: &Shared, poses: &[MeasuredPose]) -> SharedRecord {
     let of = |m: &MeasuredPose| {
         let by_shared = &m.target.as_ref().ok()?.sensitivity;
-        let mut sensitivity: Vec<Vec<f64>> = by_shared.row_iter().map(|row| row.iter().copied().collect()).collect();
+        let mut sensitivity = rows(by_shared);
         // Turns stand first inside, points in files.
         sensitivity.rotate_left(3);
         Some(SensitivityRecord { pose: m.at.pose.clone(), sensitivity })
@@ -269,7 +266,7 @@ fn shared_record(shared: &Shared, poses: &[MeasuredPose]) -> SharedRecord {
     SharedRecord {
         parameters: shared.parameters.clone(),
         change: shared.change.clone(),
-        covariance: shared.covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        covariance: rows(&shared.covariance),
         rows: ORDER,
         poses: poses.iter().filter_map(of).collect(),
     }
@@ -322,11 +319,8 @@ fn grown(series: &Series) -> Vec<String> {
     let noted = |m: &MeasuredPose| {
         let t = m.target.as_ref().ok()?;
         (t.chi_square > NOTED).then(|| {
-            format!(
-                "pose {} fits {:.1} times as badly as the others: its covariance is larger for it",
-                m.at.pose,
-                t.chi_square.sqrt()
-            )
+            let (pose, times) = (&m.at.pose, t.chi_square.sqrt());
+            format!("pose {pose} fits {times:.1} times as badly as the others: its covariance is larger for it")
         })
     };
     let mut all: Vec<String> = series.poses.iter().filter_map(noted).collect();

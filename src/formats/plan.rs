@@ -28,7 +28,6 @@ pub struct Determined {
 /// The placement of the cameras that a group was planned for.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Group {
-    /// Its name.
     pub group: String,
     /// Middle of its sphere, base frame, mm.
     pub center_mm: [f64; 3],
@@ -40,7 +39,6 @@ pub struct Group {
 /// A rigid transform.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CamFromBase {
-    /// Three rows of three.
     pub rotation: [[f64; 3]; 3],
     pub translation_mm: [f64; 3],
 }
@@ -56,7 +54,6 @@ pub struct PlanFile {
     pub paper: Option<Determined>,
     /// Candidates that were chosen from.
     pub pool: usize,
-    /// The placements.
     pub groups: Vec<Group>,
     /// What is not checked or only assumed.
     pub warnings: Vec<String>,

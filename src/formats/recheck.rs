@@ -88,7 +88,6 @@ pub struct RecheckFile {
 }
 
 impl RecheckFile {
-    /// Gathers the figures.
     pub fn new(recheck: &Recheck, standing: Standing, against: &Utf8Path, tolerance_mm: f64) -> RecheckFile {
         RecheckFile {
             standing,
@@ -116,7 +115,6 @@ pub struct Check {
     /// How many pairs, or poses.
     #[serde(alias = "poses")]
     pub pairs: usize,
-    /// What was said.
     pub standing: Standing,
     /// The cause; empty where nothing changed.
     pub cause: String,
@@ -125,7 +123,6 @@ pub struct Check {
     /// What would have been seen, mm.
     pub seen_mm: f64,
     /// The length that both are for, mm; none of a robot.
-    #[serde(default)]
     pub length_mm: Option<f64>,
 }
 

@@ -1,9 +1,10 @@
 //! `rectified.json`: the matrices of rectified pictures as OpenCV has them, and how well their rows agree.
 
-use nalgebra::{Matrix, Matrix3, Matrix3x4, RawStorage, Storage};
+use nalgebra::{Matrix3, Matrix3x4};
 use serde::Serialize;
 
 use crate::imaging::{Board, Skipped};
+use crate::linear_algebra::rows;
 use crate::stereo::model::rectification::{Matrices, RowResidual, Scaling};
 use crate::stereo::{Rig, Side};
 
@@ -12,9 +13,7 @@ use crate::stereo::{Rig, Side};
 pub struct RectifiedFile {
     /// "rectify", or "undistort" where each picture was straightened by itself.
     pub mode: &'static str,
-    /// Width of the pictures written, px.
     pub width: u32,
-    /// Height of the pictures written, px.
     pub height: u32,
     /// `stereoRectify`'s `alpha`; null where pictures were only straightened.
     pub alpha: Option<f64>,
@@ -52,11 +51,9 @@ pub struct Coverage {
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RectifiedPair {
-    /// Its name.
     pub pair: String,
     /// The left picture, below the results folder.
     pub left: String,
-    /// The right picture.
     pub right: String,
     /// How far its rows differ; null where the board was not found.
     pub residual: Option<RowResidual>,
@@ -66,14 +63,13 @@ impl RectifiedFile {
     /// Of pictures on common rows.
     pub fn rectified(rig: &Rig, matrices: &Matrices, scaling: Scaling, coverage: Coverage) -> RectifiedFile {
         let common = if matrices.in_columns() { "columns" } else { "rows" };
-        let ((r1, p1), (r2, p2)) = (matrices.of(Side::Left), matrices.of(Side::Right));
         RectifiedFile {
             mode: "rectify",
             alpha: Some(scaling.alpha),
             zero_disparity: Some(scaling.zero_disparity),
             q: Some(rows(&matrices.disparity_to_depth)),
             common: Some(common),
-            ..RectifiedFile::of(rig, [r1, r2], [p1, p2], coverage)
+            ..RectifiedFile::of(rig, Side::BOTH.map(|side| matrices.of(side)), coverage)
         }
     }
 
@@ -81,15 +77,10 @@ impl RectifiedFile {
     pub fn undistorted(rig: &Rig, coverage: Coverage) -> RectifiedFile {
         let one = Matrix3::identity();
         let [p1, p2] = [&rig.left, &rig.right].map(|camera| camera.matrix().insert_column(3, 0.0));
-        RectifiedFile::of(rig, [&one, &one], [&p1, &p2], coverage)
+        RectifiedFile::of(rig, [(&one, &p1), (&one, &p2)], coverage)
     }
 
-    fn of(
-        rig: &Rig,
-        [r1, r2]: [&Matrix3<f64>; 2],
-        [p1, p2]: [&Matrix3x4<f64>; 2],
-        coverage: Coverage,
-    ) -> RectifiedFile {
+    fn of(rig: &Rig, [(r1, p1), (r2, p2)]: [(&Matrix3<f64>, &Matrix3x4<f64>); 2], coverage: Coverage) -> RectifiedFile {
         RectifiedFile {
             mode: "undistort",
             width: rig.left.width,
@@ -116,10 +107,4 @@ impl RectifiedFile {
         self.residual = residual;
         self
     }
-}
-
-fn rows<R: nalgebra::Dim, C: nalgebra::Dim, S: Storage<f64, R, C> + RawStorage<f64, R, C>>(
-    m: &Matrix<f64, R, C, S>,
-) -> Vec<Vec<f64>> {
-    m.row_iter().map(|row| row.iter().copied().collect()).collect()
 }

@@ -11,7 +11,6 @@ pub const HISTORY: &str = "verify.csv";
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RobotRecheckFile {
-    /// What is said of the robot.
     pub standing: Standing,
     tolerance_mm: f64,
     /// The robot that was compared with.
@@ -32,7 +31,6 @@ pub struct RobotRecheckFile {
 }
 
 impl RobotRecheckFile {
-    /// Gathers the figures.
     pub fn new(recheck: &Recheck, against: &Utf8Path, tolerance_mm: f64, own_data: bool) -> RobotRecheckFile {
         let changed = !recheck.cause().is_empty();
         let standing = match Standing::of(changed, recheck.effect_mm, recheck.seen_mm, tolerance_mm) {

@@ -60,15 +60,12 @@ pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
         let given = !joints.is_empty() && (poses.is_empty() || joints.iter().any(|&c| !row[c].is_empty()));
         let numbers =
             |columns: &[usize]| columns.iter().map(|&c| table.number(*line, row, c)).collect::<Result<Vec<_>>>();
-        let given = if given { Some(numbers(&joints)?) } else { None };
+        let given = given.then(|| numbers(&joints)).transpose()?;
         let near_rad = given.as_ref().map(|readings| radians(readings, robot));
         let target = match (poses.is_empty(), near_rad) {
             (true, readings) => Target::Readings(readings.unwrap_or_default()),
             (false, near_rad) => {
-                let mut numbers = [0.0; 6];
-                for (number, &column) in numbers.iter_mut().zip(&poses) {
-                    *number = table.number(*line, row, column)?;
-                }
+                let numbers = numbers(&poses)?;
                 let turn_rad = numbers[3].hypot(numbers[4]).hypot(numbers[5]);
                 if turn_rad > std::f64::consts::TAU {
                     let message =
@@ -120,19 +117,15 @@ pub fn radians(readings: &[f64], robot: &Robot) -> Vec<f64> {
 /// `compensated.csv`: a row a target with its readings, deg (mm), where there are any, and `ok` or the reason.
 pub fn to_csv<'a>(robot: &Robot, rows: impl Iterator<Item = (&'a str, Option<Vec<f64>>, String)>) -> String {
     let mut text = String::from("name");
-    robot
-        .joints
-        .iter()
-        .enumerate()
-        .for_each(|(j, joint)| text.push_str(&format!(",{}", reading_name(j, joint.slides))));
+    for (j, joint) in robot.joints.iter().enumerate() {
+        let _ = write!(text, ",{}", reading_name(j, joint.slides));
+    }
     text.push_str(",status\n");
     for (name, readings, status) in rows {
         text.push_str(&quoted(name));
         for j in 0..robot.joints.len() {
-            text.push(',');
-            if let Some(reading) = readings.as_ref().and_then(|r| r.get(j)) {
-                let _ = write!(text, "{reading}");
-            }
+            let reading = readings.as_ref().and_then(|r| r.get(j)).map_or_else(String::new, f64::to_string);
+            let _ = write!(text, ",{reading}");
         }
         let _ = writeln!(text, ",{}", quoted(&status));
     }

@@ -6,9 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use super::judge::{NEAR, Way, left_of};
+use super::judge::{NEAR, Way};
 use super::part::{At, Part};
-use super::pick::columns_flag_with;
+use super::pick::columns_flag;
 use crate::files::Error;
 use crate::robot::Robot;
 use crate::tables::names::What;
@@ -53,7 +53,7 @@ fn of_way(parts: &[Part], way: &Way, robot: &Robot) -> Option<Apart> {
         return None;
     }
     let rows = parts[picked.joints[0].part].rows.len();
-    let left = |rows: &[usize]| left_of(parts, picked, robot, way.joints, way.lengths, rows);
+    let left = |rows: &[usize]| way.left_of(parts, robot, rows);
     let all: Vec<usize> = (0..rows).collect();
     let (_, together_mm) = left(&all).filter(|(_, mm)| *mm > LEAST_MM)?;
     let columns = parts.iter().enumerate().filter(|(_, p)| !p.is_program() && p.rows.len() == rows);
@@ -92,7 +92,7 @@ impl Apart {
             self.values.len(),
             self.apart_mm
         );
-        let flag = |name: &str| columns_flag_with(parts, &self.joints, &self.points, Some((self.at, name)));
+        let flag = |name: &str| columns_flag(parts, &self.joints, &self.points, Some((self.at, name)));
         let hint = format!(
             "`--columns {}` if it says which target was measured, `--columns {}` if it says where the robot or the sensor stood",
             flag("target"),

@@ -10,9 +10,9 @@ use super::pick::listed;
 use super::rows::{Measurement, from_table, reading_name};
 use crate::csv_table::Table;
 use crate::files::Result;
-use crate::tables::Fields;
-use crate::tables::Form;
+use crate::robot::Robot;
 use crate::tables::names::{Name, What};
+use crate::tables::{Fields, Form};
 
 /// Makes files with a multiple of the others' rows, so many readings a pose, as long as these: one row a pose, the readings side by side. Says
 /// whether there were any.
@@ -79,16 +79,12 @@ fn coordinates(part: &Part) -> Option<[usize; 3]> {
     }
 }
 
-/// What was taken of a set of files.
 pub(super) struct Taken<'a> {
-    /// The files.
     pub parts: &'a [Part],
-    /// Columns and units.
     pub way: &'a Way,
     /// Who says so.
     pub basis: Basis,
-    /// Which joints slide.
-    pub slides: &'a [bool],
+    pub robot: &'a Robot,
     /// Which of several tables it is.
     pub number: Option<usize>,
 }
@@ -96,13 +92,12 @@ pub(super) struct Taken<'a> {
 impl Taken<'_> {
     pub fn rows(&self) -> Result<Vec<Measurement>> {
         let picked = &self.way.picked;
-        let joints_in = &self.parts[picked.joints[0].part];
         let places = self.targets_as_readings();
         let own = self.own();
         let mut header: Vec<String> = ["pose", "group", "role"].map(str::to_owned).into();
         let several = picked.points.len() > 1 && !places;
         header.extend((several && !own.contains_key("target")).then(|| "target".to_owned()));
-        header.extend(self.slides.iter().enumerate().map(|(j, slides)| reading_name(j, *slides)));
+        header.extend(self.robot.joints.iter().enumerate().map(|(j, joint)| reading_name(j, joint.slides)));
         header.extend(match picked.distance {
             Some(_) => vec!["distance_mm".to_owned()],
             None => ["x_mm", "y_mm", "z_mm"].map(str::to_owned).to_vec(),
@@ -115,14 +110,14 @@ impl Taken<'_> {
             None => picked.points.iter().map(|(name, at)| (name.as_str(), at.to_vec())).collect(),
         };
         let mut rows = Vec::new();
-        for row in 0..joints_in.rows.len() {
+        for row in 0..self.count() {
             for (k, (target, columns)) in measured.iter().enumerate() {
                 let repeated = (places && measured.len() > 1).then_some(k + 1);
                 let mut cells = self.named(row, repeated, &own);
                 cells.extend((several && !own.contains_key("target")).then(|| (*target).to_owned()));
-                for (at, slides) in picked.joints.iter().zip(self.slides) {
+                for (at, joint) in picked.joints.iter().zip(&self.robot.joints) {
                     let value = self.parts[at.part].number(row, at.column)?;
-                    let unit = if *slides { self.way.lengths } else { self.way.joints };
+                    let unit = if joint.slides { self.way.lengths } else { self.way.joints };
                     cells.push(unit.converted(value).to_string());
                 }
                 let mut numbers = Vec::new();
@@ -134,11 +129,15 @@ impl Taken<'_> {
                 cells.extend(numbers.iter().map(|v| v.filter(|_| whole).map_or_else(String::new, |v| v.to_string())));
                 cells.extend(more.iter().map(|(_, at)| self.cell(row, *at).to_owned()));
                 let line = columns.first().map_or(0, |at| self.parts[at.part].rows[row].0);
-                rows.push((line, Fields::new(cells.iter().map(String::as_str))));
+                rows.push((line, Fields::new(cells)));
             }
         }
         let path = &self.parts[picked.points.first().map_or(picked.joints[0].part, |(_, at)| at[0].part)].grid.path;
         from_table(&Table::new(path, header, rows)?)
+    }
+
+    fn count(&self) -> usize {
+        self.parts[self.way.picked.joints[0].part].rows.len()
     }
 
     fn cell(&self, row: usize, at: At) -> &str {
@@ -188,7 +187,7 @@ impl Taken<'_> {
     pub fn sentence(&self) -> String {
         let picked = &self.way.picked;
         let files: Vec<String> = self.parts.iter().map(Part::file_name).collect();
-        let count = self.parts[picked.joints[0].part].rows.len();
+        let count = self.count();
         let from = |columns: &[At]| {
             let of = if self.parts.len() > 1 {
                 format!(" of {}", self.parts[columns[0].part].file_name())
@@ -265,21 +264,12 @@ impl Taken<'_> {
         const NAMED: usize = 12;
         let of_measure = |name: &String| name.ends_with("_rad2") || ["fit_rms_mm", "corners"].contains(&name.as_str());
         let picked = &self.way.picked;
-        let taken: Vec<At> = picked
-            .joints
-            .iter()
-            .copied()
-            .chain(picked.points.iter().flat_map(|(_, at)| *at))
-            .chain(picked.distance)
-            .collect();
-        let own: Vec<At> = self.own().into_values().collect();
+        let taken: Vec<At> = picked.columns().chain(picked.distance).chain(self.own().into_values()).collect();
         let mut left = Vec::new();
         for (part, file) in self.parts.iter().enumerate().filter(|(_, p)| !p.is_program()) {
             let is_left = |column: &usize| {
                 let at = At { part, column: *column };
-                matches!(file.kinds[*column], Kind::Numbers | Kind::Beyond)
-                    && !taken.contains(&at)
-                    && !own.contains(&at)
+                matches!(file.kinds[*column], Kind::Numbers | Kind::Beyond) && !taken.contains(&at)
             };
             let names = (0..file.width()).filter(is_left).map(|column| file.column_name(column));
             left.extend(names.filter(|name| !of_measure(name)));

@@ -13,8 +13,8 @@ use nalgebra::{Point3, Vector3};
 use super::layout::point;
 use super::part::{At, Part};
 use super::pick::Picked;
-use crate::robot::Robot;
 use crate::robot::tool_fit::{Start, middle_spread};
+use crate::robot::{Joint, Robot};
 use crate::tables::names::{Unit, What};
 
 /// What is left as a share of the points' spread at the most where columns and units are right and the robot's file is of this robot: a robot of a
@@ -46,9 +46,7 @@ const ROWS: usize = 60;
 /// A way to read a table.
 #[derive(Debug, Clone)]
 pub(super) struct Way {
-    /// The columns.
     pub picked: Picked,
-    /// Unit of the joints.
     pub joints: Unit,
     /// Unit of points or distances.
     pub lengths: Unit,
@@ -59,6 +57,45 @@ pub(super) struct Way {
 }
 
 impl Way {
+    fn unjudged(picked: &Picked, joints: Unit, lengths: Unit) -> Way {
+        Way { picked: picked.clone(), joints, lengths, left: None, left_mm: f64::INFINITY }
+    }
+
+    /// With what the nominal robot leaves of these columns in these units; of rows that name their placement or their target those of the one
+    /// that has most.
+    fn judged(mut self, parts: &[Part], robot: &Robot) -> Way {
+        let rows = most_alike(parts, &self.picked);
+        let some: Vec<usize> = rows.iter().copied().step_by(rows.len().div_ceil(ROWS).max(1)).collect();
+        if let Some((left, left_mm)) = self.left_of(parts, robot, &some) {
+            (self.left, self.left_mm) = (Some(left), left_mm);
+        }
+        self
+    }
+
+    /// The same of these rows, as a share of the spread of the points and in mm.
+    pub(super) fn left_of(&self, parts: &[Part], robot: &Robot, rows: &[usize]) -> Option<(f64, f64)> {
+        let Way { picked, joints, lengths, .. } = self;
+        let (_, at) = picked.points.first()?;
+        let (mut readings, mut points) = (Vec::new(), Vec::<Point3<f64>>::new());
+        for &row in rows {
+            let reading = |(at, joint): (&At, &Joint)| {
+                let value = parts[at.part].optional(row, at.column).ok().flatten()?;
+                Some(if joint.slides { lengths.converted(value) } else { joints.converted(value).to_radians() })
+            };
+            let angles: Option<Vec<f64>> = picked.joints.iter().zip(&robot.joints).map(reading).collect();
+            if let (Some(angles), Some(point)) = (angles, point(parts, row, at)) {
+                readings.push(angles);
+                points.push(point.map(|v| lengths.converted(v)));
+            }
+        }
+        let from = if picked.is_sure(parts) { Start::Around } else { Start::File };
+        let fit = robot.fit_tool(&readings, &points, from).filter(|_| readings.len() >= FEWEST)?;
+        let predicted: Vec<Vector3<f64>> = readings.iter().map(|q| robot.target_mm(q).coords).collect();
+        // Tiny motions under a tool that all but cancels them would come near to points that are small by a wrong unit.
+        let least = middle_spread(&predicted)?.min(fit.spread_mm);
+        (least > 0.0).then(|| (fit.left_mm / least, fit.left_mm))
+    }
+
     /// Whether the points are the nominal robot's own.
     pub fn is_computed(&self) -> bool {
         self.left.is_some() && self.left_mm < COMPUTED_MM
@@ -76,7 +113,6 @@ pub(super) enum Basis {
     Sizes,
 }
 
-/// What came out.
 pub(super) enum Verdict {
     /// This way.
     Taken(Way, Basis),
@@ -107,9 +143,7 @@ fn in_all_units(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Fo
                 // Nobody writes others without saying so.
                 let usual = matches!(lengths, Unit::Mm | Unit::M);
                 if stated.map_or(usual, |s| s == lengths || forced.lengths.is_none() && usual) {
-                    let (left, left_mm) = left(parts, picked, robot, joints, lengths).unzip();
-                    let left_mm = left_mm.unwrap_or(f64::INFINITY);
-                    ways.push(Way { picked: picked.clone(), joints, lengths, left, left_mm });
+                    ways.push(Way::unjudged(picked, joints, lengths).judged(parts, robot));
                 }
             }
         }
@@ -120,17 +154,12 @@ fn in_all_units(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Fo
 
 /// The candidates in the units that nobody need say, or in those that are stated, unjudged.
 pub(super) fn usual(candidates: &[Picked], forced: Forced) -> Vec<Way> {
-    let mut ways = Vec::new();
-    for picked in candidates {
-        for joints in [Unit::Deg, Unit::Rad] {
-            for lengths in [Unit::Mm, Unit::M] {
-                let joints = forced.joints.or(picked.joint_unit).unwrap_or(joints);
-                let lengths = forced.lengths.or(picked.length_unit).unwrap_or(lengths);
-                ways.push(Way { picked: picked.clone(), joints, lengths, left: None, left_mm: f64::INFINITY });
-            }
-        }
-    }
-    ways
+    let units = [(Unit::Deg, Unit::Mm), (Unit::Deg, Unit::M), (Unit::Rad, Unit::Mm), (Unit::Rad, Unit::M)];
+    let way = |picked: &Picked, (joints, lengths): (Unit, Unit)| {
+        let joints = forced.joints.or(picked.joint_unit).unwrap_or(joints);
+        Way::unjudged(picked, joints, forced.lengths.or(picked.length_unit).unwrap_or(lengths))
+    };
+    candidates.iter().flat_map(|picked| units.map(|units| way(picked, units))).collect()
 }
 
 /// Judges all ways.
@@ -218,8 +247,8 @@ fn points_that_fit(
 fn computed_beside_measured(parts: &[Part], best: &Way, robot: &Robot) -> Option<(Way, Way)> {
     let alone = |target: &(String, [At; 3])| {
         let picked = Picked { points: vec![target.clone()], ..best.picked.clone() };
-        let (left, left_mm) = left(parts, &picked, robot, best.joints, best.lengths)?;
-        Some(Way { picked, left: Some(left), left_mm, ..best.clone() })
+        let way = Way::unjudged(&picked, best.joints, best.lengths).judged(parts, robot);
+        Some(way).filter(|way| way.left.is_some())
     };
     let ways: Vec<Way> = best.picked.points.iter().filter(|_| best.picked.points.len() > 1).filter_map(alone).collect();
     let computed = ways.iter().find(|way| way.is_computed())?;
@@ -271,20 +300,11 @@ fn by_sizes(parts: &[Part], picked: &Picked, forced: Forced, ways: &[Way]) -> Ve
         forced.lengths.or(picked.length_unit).or_else(|| (largest(parts, &mut measured) > METRES).then_some(Unit::Mm));
     match (joints, lengths) {
         (Some(joints), Some(lengths)) => {
-            let plain = Way { picked: picked.clone(), joints, lengths, left: None, left_mm: f64::INFINITY };
             let judged = ways.iter().find(|way| way.joints == joints && way.lengths == lengths).cloned();
-            Verdict::Taken(judged.unwrap_or(plain), Basis::Sizes)
+            Verdict::Taken(judged.unwrap_or_else(|| Way::unjudged(picked, joints, lengths)), Basis::Sizes)
         }
         (joints, _) => Verdict::NoUnit { joints: joints.is_none() },
     }
-}
-
-/// What the nominal robot leaves of these columns in these units, as a share of the spread of the points and in mm; of rows that name their placement
-/// or their target those of the one that has most.
-fn left(parts: &[Part], picked: &Picked, robot: &Robot, joints: Unit, lengths: Unit) -> Option<(f64, f64)> {
-    let rows = most_alike(parts, picked);
-    let some: Vec<usize> = rows.iter().copied().step_by(rows.len().div_ceil(ROWS).max(1)).collect();
-    left_of(parts, picked, robot, joints, lengths, &some)
 }
 
 /// The rows of the placement and the target, where names say them, that have most rows.
@@ -304,38 +324,4 @@ fn most_alike(parts: &[Part], picked: &Picked) -> Vec<usize> {
         sets.entry((cell(group, row), cell(target, row))).or_default().push(row);
     }
     sets.into_values().max_by_key(Vec::len).unwrap_or_default()
-}
-
-/// The same of these rows.
-pub(super) fn left_of(
-    parts: &[Part],
-    picked: &Picked,
-    robot: &Robot,
-    joints: Unit,
-    lengths: Unit,
-    rows: &[usize],
-) -> Option<(f64, f64)> {
-    let (_, at) = picked.points.first()?;
-    let (mut readings, mut points) = (Vec::new(), Vec::<Point3<f64>>::new());
-    for &row in rows {
-        let angles: Option<Vec<f64>> = picked
-            .joints
-            .iter()
-            .zip(&robot.joints)
-            .map(|(at, joint)| {
-                let value = parts[at.part].optional(row, at.column).ok().flatten()?;
-                Some(if joint.slides { lengths.converted(value) } else { joints.converted(value).to_radians() })
-            })
-            .collect();
-        if let (Some(angles), Some(point)) = (angles, point(parts, row, at)) {
-            readings.push(angles);
-            points.push(point.map(|v| lengths.converted(v)));
-        }
-    }
-    let from = if picked.is_sure(parts) { Start::Around } else { Start::File };
-    let fit = robot.fit_tool(&readings, &points, from).filter(|_| readings.len() >= FEWEST)?;
-    let predicted: Vec<Vector3<f64>> = readings.iter().map(|q| robot.target_mm(q).coords).collect();
-    // Tiny motions under a tool that all but cancels them would come near to points that are small by a wrong unit.
-    let least = middle_spread(&predicted)?.min(fit.spread_mm);
-    (least > 0.0).then(|| (fit.left_mm / least, fit.left_mm))
 }

@@ -168,11 +168,9 @@ fn contradiction(parts: &[Part], first: &Key, other: &Key) -> Option<String> {
         let part = &parts[key.part];
         format!("`{}` in `{}` of {}", &part.rows[row].1[key.column], part.column_name(key.column), part.file_name())
     };
+    let (number, first, other) = (row + 1, of(first), of(other));
     Some(format!(
-        "row {} is {} and {}: the rows are paired in their order; look whether they belong together",
-        row + 1,
-        of(first),
-        of(other)
+        "row {number} is {first} and {other}: the rows are paired in their order; look whether they belong together"
     ))
 }
 

@@ -38,14 +38,11 @@ pub(super) fn candidates(parts: &[Part], picked: &Picked, count: usize) -> Vec<P
 
 /// The same of these columns without names, and of those whose names are not known.
 fn of_columns(parts: &[Part], picked: &Picked, count: usize, free: fn(&Part) -> Vec<usize>) -> Vec<Picked> {
-    let free: Vec<Vec<At>> = parts
-        .iter()
-        .enumerate()
-        .map(|(part, file)| {
-            let columns = free(file).into_iter().chain(file.spare());
-            columns.take(MOST_FREE).map(|column| At { part, column }).collect()
-        })
-        .collect();
+    let of_file = |(part, file): (usize, &Part)| -> Vec<At> {
+        let columns = free(file).into_iter().chain(file.spare());
+        columns.take(MOST_FREE).map(|column| At { part, column }).collect()
+    };
+    let free: Vec<Vec<At>> = parts.iter().enumerate().map(of_file).collect();
     let mut list = Vec::new();
     for joints in blocks(parts, &free, count, !picked.joints.is_empty()) {
         let joints = if picked.joints.is_empty() { joints } else { picked.joints.clone() };
@@ -62,7 +59,7 @@ fn of_columns(parts: &[Part], picked: &Picked, count: usize, free: fn(&Part) -> 
         let of_points = |points: Vec<(String, [At; 3])>| Picked { joints: joints.clone(), points, ..picked.clone() };
         if total > 3 && total.is_multiple_of(3) {
             let all: Vec<[At; 3]> = rest.iter().flat_map(|of| of.chunks_exact(3)).map(|c| [c[0], c[1], c[2]]).collect();
-            let kept = all.windows(2).all(|two| keeps_distance(parts, &two[0], &two[1]));
+            let kept = all.windows(2).all(|two| is_kept(distances(parts, &two[0], &two[1])));
             let whole = 3 * all.len() == total;
             let several = of_points(all.into_iter().enumerate().map(|(i, at)| ((i + 1).to_string(), at)).collect());
             // Two that are nearly one may be what was commanded and what was measured: without names only three or more are readings of one point.
@@ -118,11 +115,6 @@ fn blocks(parts: &[Part], free: &[Vec<At>], count: usize, known: bool) -> Vec<Ve
     free.iter().flat_map(|of| of.windows(count).filter(apart).map(<[At]>::to_vec)).collect()
 }
 
-/// Whether two points keep their distance from row to row, and are not one.
-fn keeps_distance(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> bool {
-    is_kept(distances(parts, a, b))
-}
-
 /// Whether two points are at other distances from row to row.
 pub(super) fn changes_distance(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> bool {
     let apart = distances(parts, a, b);
@@ -136,7 +128,7 @@ fn distances(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> Vec<f64> {
     (0..rows).take(ROWS).filter_map(apart).collect()
 }
 
-/// Whether these distances are one, but for gross errors at less than half of the rows.
+/// Whether these distances are one that is not zero, but for gross errors at less than half of the rows.
 pub(super) fn is_kept(apart: Vec<f64>) -> bool {
     let Some(middle) = median(apart.iter().copied()) else { return false };
     let off = median(apart.iter().map(|d| (d - middle).abs())).unwrap_or(f64::INFINITY);

@@ -23,7 +23,6 @@ pub(super) enum Kind {
     Numbers,
     /// The row's number.
     Counts,
-    /// Nothing but zeros.
     Zeros,
     Words,
     /// Numbers in a column that flags do not name.
@@ -42,7 +41,6 @@ pub(super) struct Part {
     pub meanings: Option<Vec<Name>>,
     /// Line and cells, all of one length.
     pub rows: Vec<(u64, Fields)>,
-    /// What is in each column.
     pub kinds: Vec<Kind>,
     /// The column by which rows were joined with those of another file.
     pub key: Option<usize>,
@@ -95,7 +93,6 @@ impl Part {
         Some(self.refuse(message, Some(hint)))
     }
 
-    /// Number of columns.
     pub fn width(&self) -> usize {
         self.kinds.len()
     }
@@ -105,7 +102,6 @@ impl Part {
         self.kinds.len() / self.times
     }
 
-    /// Whether it is a program's.
     pub fn is_program(&self) -> bool {
         matches!(self.grid.form, Form::Program { .. })
     }
@@ -181,16 +177,10 @@ impl Part {
             _ if NOTHING.contains(&cell.to_lowercase().as_str()) => Ok(None),
             _ => {
                 let numbers = self.rows.iter().filter(|(_, r)| r[column].parse::<f64>().is_ok()).count();
-                let message = format!(
-                    "`{}` is not a number: `{cell}` ({numbers} of {} rows have one)",
-                    self.column_name(column),
-                    self.rows.len()
-                );
-                Err(self.grid.refuse(
-                    *line,
-                    message,
-                    Some("mend or remove the row, or leave the cell empty where nothing was measured"),
-                ))
+                let (name, count) = (self.column_name(column), self.rows.len());
+                let message = format!("`{name}` is not a number: `{cell}` ({numbers} of {count} rows have one)");
+                let hint = "mend or remove the row, or leave the cell empty where nothing was measured";
+                Err(self.grid.refuse(*line, message, Some(hint)))
             }
         }
     }

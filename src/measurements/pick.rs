@@ -22,7 +22,6 @@ pub(super) struct Picked {
 }
 
 impl Picked {
-    /// Joints and coordinates.
     pub fn columns(&self) -> impl Iterator<Item = At> {
         self.joints.iter().copied().chain(self.points.iter().flat_map(|(_, at)| *at))
     }
@@ -34,17 +33,26 @@ impl Picked {
 
     /// With the units that the columns state.
     pub fn with_units(mut self, parts: &[Part]) -> Picked {
-        let unit = |at: &At| parts[at.part].meanings.as_ref().and_then(|m| m[at.column].unit);
+        let unit = |at: &At| unit(parts, at);
         let mut measured = self.points.iter().flat_map(|(_, at)| at).chain(self.distance.iter());
         self.length_unit = measured.find_map(unit).filter(|u| !u.is_angle());
         self.joint_unit = self.joints.iter().find_map(unit).filter(|u| u.is_angle());
         self
     }
 
-    /// Whether there is something measured.
+    /// The columns of the first point, where there is one.
+    pub fn first_point(&self) -> Vec<At> {
+        self.points.first().map_or(Vec::new(), |(_, at)| at.to_vec())
+    }
+
     pub fn is_measured(&self) -> bool {
         !self.points.is_empty() || self.distance.is_some()
     }
+}
+
+/// The unit that a column states.
+fn unit(parts: &[Part], at: &At) -> Option<Unit> {
+    parts[at.part].meanings.as_ref()?[at.column].unit
 }
 
 /// A set of columns that belong together.
@@ -95,7 +103,7 @@ pub(super) fn by_names(parts: &[Part], count: usize) -> Result<Picked> {
         _ => picked.points = points.into_iter().map(|(name, at, _)| (name, at)).collect(),
     }
     let picked = picked.with_units(parts);
-    let unit = |at: &At| parts[at.part].meanings.as_ref().and_then(|m| m[at.column].unit);
+    let unit = |at: &At| unit(parts, at);
     let measured = picked.points.iter().flat_map(|(_, at)| at).chain(picked.distance.iter());
     let mixed = |columns: Vec<At>| {
         let units: Vec<Unit> = columns.iter().filter_map(unit).collect();
@@ -118,14 +126,17 @@ pub(super) fn joints_alone(parts: &[Part], count: usize) -> Result<Picked> {
 
 /// Whether a file names as many joints as the robot has; a quaternion `Q0..Q3` is none.
 pub(super) fn names_joints(part: &Part, count: usize) -> bool {
-    let number = |n: &Name| if let What::Joint(i) = n.what { Some(i) } else { None };
-    groups(std::slice::from_ref(part), number).iter().any(|group| group.columns.len() == count)
+    groups(std::slice::from_ref(part), joint_number).iter().any(|group| group.columns.len() == count)
+}
+
+fn joint_number(name: &Name) -> Option<usize> {
+    if let What::Joint(number) = name.what { Some(number) } else { None }
 }
 
 fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
     let mut complete: Vec<(Vec<At>, Option<bool>)> = Vec::new();
     let mut largest: Option<(usize, usize)> = None;
-    for mut group in groups(parts, |n| if let What::Joint(i) = n.what { Some(i) } else { None }) {
+    for mut group in groups(parts, joint_number) {
         group.columns.sort_unstable();
         if let Some(two) = group.columns.windows(2).find(|two| two[0].0 == two[1].0) {
             return Err(twice(parts, &format!("joint {}", two[0].0), &[two[0].1, two[1].1]));
@@ -142,7 +153,9 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
         // Where the robot was sent and where it says that it is: the identified robot corrects commands.
         let (first, second) = (&complete[0].0, &complete[1].0);
         let message = format!("two sets of joints would do: {} and {}", listed(parts, first), listed(parts, second));
-        let flag = |joints: &[At]| columns_flag(parts, joints, &points_for_flag(parts));
+        // Nothing of the points where they are not clear.
+        let points = points(parts).ok().and_then(|sets| sets.first().map(|(_, at, _)| at.to_vec())).unwrap_or_default();
+        let flag = |joints: &[At]| columns_flag(parts, joints, &points, None);
         let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(first), flag(second));
         return Err(parts[first[0].part].refuse(message, Some(&hint)));
     }
@@ -152,18 +165,11 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
             let message = format!(
                 "{found} columns of joints, but the robot has {count} joints, counted from 1 or 0 without a gap"
             );
-            Err(parts[part].refuse(
-                message,
-                Some("`--robot FILE` names the robot that was measured; `--columns` names the columns"),
-            ))
+            let hint = "`--robot FILE` names the robot that was measured; `--columns` names the columns";
+            Err(parts[part].refuse(message, Some(hint)))
         }
         _ => Ok(Vec::new()),
     }
-}
-
-/// The measured point, for a message about joints; nothing where it is not clear.
-fn points_for_flag(parts: &[Part]) -> Vec<At> {
-    points(parts).ok().and_then(|sets| sets.first().map(|(_, at, _)| at.to_vec())).unwrap_or_default()
 }
 
 /// The measured points: the name of each target, its columns, and whether they call themselves measured.
@@ -292,7 +298,7 @@ pub(super) fn asked(parts: &[Part], joints: &[At], [first, second]: [&[At; 3]; 2
         listed(parts, first),
         listed(parts, second)
     );
-    let flag = |points: &[At]| columns_flag(parts, joints, points);
+    let flag = |points: &[At]| columns_flag(parts, joints, points, None);
     let both = if readings {
         format!(", `--columns {}` both as readings of one point", flag(&[*first, *second].concat()))
     } else {
@@ -302,16 +308,10 @@ pub(super) fn asked(parts: &[Part], joints: &[At], [first, second]: [&[At; 3]; 2
     parts[first[0].part].refuse(message, Some(&hint))
 }
 
-/// What `--columns` must say to take these columns; joints or points that names say are added.
-pub(super) fn columns_flag(parts: &[Part], joints: &[At], points: &[At]) -> String {
-    columns_flag_with(parts, joints, points, None)
-}
-
-/// The same with one more column and its name.
-pub(super) fn columns_flag_with(parts: &[Part], joints: &[At], points: &[At], more: Option<(At, &str)>) -> String {
-    let number = |n: &Name| if let What::Joint(i) = n.what { Some(i) } else { None };
+/// What `--columns` must say to take these columns, and one `more` by its name; joints or points that names say are added.
+pub(super) fn columns_flag(parts: &[Part], joints: &[At], points: &[At], more: Option<(At, &str)>) -> String {
     let mut named: Vec<(usize, At)> =
-        groups(parts, number).into_iter().map(|g| g.columns).max_by_key(Vec::len).unwrap_or_default();
+        groups(parts, joint_number).into_iter().map(|g| g.columns).max_by_key(Vec::len).unwrap_or_default();
     named.sort_unstable();
     let named: Vec<At> = named.into_iter().map(|(_, at)| at).collect();
     let named_joints = if joints.is_empty() { named.as_slice() } else { joints };

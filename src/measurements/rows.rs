@@ -301,11 +301,10 @@ pub fn pose_fields(pose: &RobotPose) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files;
 
     fn read_str(text: &str) -> Result<Vec<Measurement>> {
-        let dir = tempfile::tempdir().unwrap();
-        let path = Utf8Path::from_path(dir.path()).unwrap().join("m.csv");
-        std::fs::write(&path, text).unwrap();
+        let (_folder, path) = files::temporary("m.csv", text);
         read(&path)
     }
 
@@ -333,9 +332,7 @@ mod tests {
         };
         for slides in [vec![], vec![false, true]] {
             let poses = [pose("a", slides.clone()), pose("b", slides)];
-            let dir = tempfile::tempdir().unwrap();
-            let path = Utf8Path::from_path(dir.path()).unwrap().join("poses.csv");
-            std::fs::write(&path, poses_csv(poses.iter())).unwrap();
+            let (_folder, path) = files::temporary("poses.csv", poses_csv(poses.iter()));
             assert_eq!(read_poses(&path).unwrap(), poses);
         }
     }

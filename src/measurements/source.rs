@@ -109,8 +109,7 @@ impl Source {
             let joined = keys::align(&mut set)?;
             let widened = assemble::widen(&mut set)?;
             let (way, basis) = self.way(&set, robot, widened)?;
-            let (way, slides) = (way, robot.joints.iter().map(|j| j.slides).collect::<Vec<_>>());
-            let taken = Taken { parts: &set, way: &way, basis, slides: &slides, number: several.then_some(number + 1) };
+            let taken = Taken { parts: &set, way: &way, basis, robot, number: several.then_some(number + 1) };
             rows.extend(taken.rows()?);
             said.push(taken.sentence());
             said.extend(joined);
@@ -199,11 +198,11 @@ impl Source {
                 .find_map(Part::mixed)
                 .unwrap_or_else(|| unsettled::lacking(parts, &picked, count)));
         }
+        // Columns that are named are not asked about.
+        let apart = |ways| if self.columns.is_some() { None } else { apart::clearest(parts, ways, robot) };
         match judge::decide(parts, &candidates, robot, self.forced()) {
             Verdict::Taken(way, basis) => {
-                let apart =
-                    if self.columns.is_some() { None } else { apart::clearest(parts, vec![way.clone()], robot) };
-                apart.map_or(Ok((way, basis)), |apart| Err(apart.asked(parts)))
+                apart(vec![way.clone()]).map_or(Ok((way, basis)), |apart| Err(apart.asked(parts)))
             }
             Verdict::WrongUnit { stated, better } => Err(unsettled::wrong_unit(parts, &stated, &better)),
             Verdict::Open(..) if widened => Err(unsettled::rows_of_pose(parts)),
@@ -219,10 +218,8 @@ impl Source {
                 Err(parts[0].refuse(message, Some(hint)))
             }
             Verdict::None => {
-                let ways = || judge::usual(&candidates, self.forced());
-                let apart = if self.columns.is_some() { None } else { apart::clearest(parts, ways(), robot) };
                 let mixed = || parts.iter().find_map(Part::mixed);
-                Err(apart
+                Err(apart(judge::usual(&candidates, self.forced()))
                     .map(|a| a.asked(parts))
                     .or_else(mixed)
                     .or_else(|| self.other_units(parts, &candidates, robot))
@@ -230,9 +227,7 @@ impl Source {
             }
         }
     }
-}
 
-impl Source {
     /// That the units that were typed are what is in the way.
     fn other_units(&self, parts: &[Part], candidates: &[Picked], robot: &Robot) -> Option<Error> {
         let forced = Some(self.forced()).filter(|forced| *forced != Forced::default())?;
@@ -266,10 +261,8 @@ fn name_columns(parts: &mut [Part], columns: &str, count: usize) -> Result<bool>
     let each = parts.len() > 1 && complete && parts.iter().all(|p| words.len() <= p.width() && !p.is_program());
     if !each && words.len() > total {
         let message = format!("`--columns` names {} columns, but there are {total}", words.len());
-        return Err(parts[0].refuse(
-            message,
-            Some("one name a column in their order, those of all files side by side; `-` skips one"),
-        ));
+        let hint = "one name a column in their order, those of all files side by side; `-` skips one";
+        return Err(parts[0].refuse(message, Some(hint)));
     }
     if let Some(word) = words.iter().zip(&names).find(|(word, name)| **word != "-" && name.what == What::Other) {
         let message = format!("`--columns` has `{}`, which is no name of a column", word.0);

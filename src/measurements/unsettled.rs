@@ -63,11 +63,10 @@ fn touches(parts: &[Part], count: usize) -> &'static str {
 
 /// The columns have names, and nothing comes near to the nominal robot by them.
 fn contradicted(parts: &[Part], first: &Picked, forced: Forced) -> Option<Error> {
-    let points = || first.points.first().map_or(Vec::new(), |(_, at)| at.to_vec());
     let against =
         |forced: Option<Unit>, named: Option<Unit>| forced.zip(named).filter(|(forced, named)| forced != named);
     let joints = against(forced.joints, first.joint_unit).map(|units| (first.joints.clone(), units));
-    let lengths = || against(forced.lengths, first.length_unit).map(|units| (points(), units));
+    let lengths = || against(forced.lengths, first.length_unit).map(|units| (first.first_point(), units));
     let (columns, (forced, named)) = joints.or_else(lengths)?;
     let message = format!(
         "`--units {}` contradicts the names {}, which say {}, and with it nothing comes near to the nominal robot",
@@ -136,20 +135,14 @@ pub(super) fn rows_of_pose(parts: &[Part]) -> Error {
 
 /// That two ways would do, with the flags that take either.
 pub(super) fn open(parts: &[Part], a: &Way, b: &Way) -> Error {
-    let point = |way: &Way| way.picked.points.first().map(|(_, at)| *at);
-    match (point(a), point(b)) {
-        (Some(first), Some(second)) if first != second && a.picked.joints == b.picked.joints => {
-            let (first, second) = if first <= second { (first, second) } else { (second, first) };
-            pick::asked(parts, &a.picked.joints, [&first, &second], false)
+    match (a.picked.points.first(), b.picked.points.first()) {
+        (Some((_, first)), Some((_, second))) if first != second && a.picked.joints == b.picked.joints => {
+            pick::asked(parts, &a.picked.joints, [first.min(second), first.max(second)], false)
         }
         _ => {
-            let message = format!(
-                "two sets of joints would do, {} and {}",
-                listed(parts, &a.picked.joints),
-                listed(parts, &b.picked.joints)
-            );
-            let flag =
-                |way: &Way| columns_flag(parts, &way.picked.joints, &point(way).map_or(Vec::new(), |p| p.to_vec()));
+            let [first, second] = [a, b].map(|way| listed(parts, &way.picked.joints));
+            let message = format!("two sets of joints would do, {first} and {second}");
+            let flag = |way: &Way| columns_flag(parts, &way.picked.joints, &way.picked.first_point(), None);
             let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(a), flag(b));
             parts[0].refuse(message, Some(&hint))
         }
@@ -160,23 +153,14 @@ pub(super) fn open(parts: &[Part], a: &Way, b: &Way) -> Error {
 pub(super) fn wrong_unit(parts: &[Part], stated: &Way, better: &Way) -> Error {
     let (what, columns, said, found) = match stated.joints == better.joints {
         false => ("joints", better.picked.joints.clone(), stated.joints, better.joints),
-        true => {
-            let points = better.picked.points.first().map_or(Vec::new(), |(_, at)| at.to_vec());
-            ("points", points, stated.lengths, better.lengths)
-        }
+        true => ("points", better.picked.first_point(), stated.lengths, better.lengths),
     };
     let factor = stated.left.unwrap_or(f64::NAN) / better.left.unwrap_or(f64::NAN).max(f64::MIN_POSITIVE);
+    let (names, said_word, found_word) = (listed(parts, &columns), said.word(), found.word());
     let message = format!(
-        "the names call the {what} ({}) {}, but the nominal robot is {factor:.0} times nearer to the points with {}",
-        listed(parts, &columns),
-        said.word(),
-        found.word()
+        "the names call the {what} ({names}) {said_word}, but the nominal robot is {factor:.0} times nearer to the points with {found_word}"
     );
-    let hint = format!(
-        "`--units {}` if they are {}; `--units {}` keeps what the names say",
-        found.flag(),
-        found.word(),
-        said.flag()
-    );
+    let (said, found) = (said.flag(), found.flag());
+    let hint = format!("`--units {found}` if they are {found_word}; `--units {said}` keeps what the names say");
     parts[columns[0].part].refuse(message, Some(&hint))
 }

@@ -32,10 +32,8 @@ pub fn place(
     let refuse = |message: String| Error::Measured { message, place: file.to_owned() };
     let joints = rows.first().map_or(0, |r| r.at.joints_deg.len());
     if joints != robot.joints.len() {
-        return Err(refuse(format!(
-            "the rows have {joints} joint readings, the robot has {} joints",
-            robot.joints.len()
-        )));
+        let needed = robot.joints.len();
+        return Err(refuse(format!("the rows have {joints} joint readings, the robot has {needed} joints")));
     }
     let mut earlier = Vec::new();
     for (group, placement) in placements.iter_mut().enumerate() {

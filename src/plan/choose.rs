@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::pool::Candidate;
 use super::predict::{FRAME, Problem, Rows};
 use super::settings::COUNTS;
+use crate::linear_algebra::to_unit_diagonal;
 
 /// Poses that every placement gets before the others are shared out: its own transform needs three.
 const LEAST_A_GROUP: usize = 4;
@@ -44,7 +45,6 @@ impl Information {
         self.update(rows, 1.0);
     }
 
-    /// Takes a pose away that was added.
     fn remove(&mut self, rows: &Rows) {
         self.update(rows, -1.0);
     }
@@ -61,37 +61,33 @@ impl Information {
         }
     }
 
-    /// The offsets that a gradient is explained by.
-    #[cfg(test)]
-    pub fn solved(&self, gradient: &nalgebra::DVector<f64>) -> nalgebra::DVector<f64> {
-        self.covariance() * gradient
+    /// Covariance of all unknowns.
+    pub(super) fn covariance(&self) -> DMatrix<f64> {
+        let n = self.normal.nrows();
+        // Units differ by orders of magnitude.
+        let unit = to_unit_diagonal(&self.normal);
+        let inverse = unit.and_then(|(scaled, scale)| Some((scaled.cholesky()?.inverse(), scale)));
+        let Some((inverse, scale)) = inverse else { return DMatrix::zeros(n, n) };
+        DMatrix::from_fn(n, n, |r, c| inverse[(r, c)] * scale[r] * scale[c])
     }
 
-    /// Covariance of all unknowns.
-    fn covariance(&self) -> DMatrix<f64> {
-        let n = self.normal.nrows();
-        // Units differ by orders of magnitude: scaled to a diagonal of ones.
-        let scale: Vec<f64> = self.normal.diagonal().iter().map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt()).collect();
-        let scaled = DMatrix::from_fn(n, n, |r, c| self.normal[(r, c)] * scale[r] * scale[c]);
-        let inverse = scaled.cholesky().map_or_else(|| DMatrix::zeros(n, n), |c| c.inverse());
-        DMatrix::from_fn(n, n, |r, c| inverse[(r, c)] * scale[r] * scale[c])
+    /// Covariance of the robot's parameters.
+    fn of_parameters(&self) -> DMatrix<f64> {
+        self.covariance().resize(self.count, self.count, 0.0)
     }
 
     /// Expected error over the fresh poses, root mean square, mm.
     pub fn rms_mm(&self, problem: &Problem) -> f64 {
-        let covariance = self.covariance();
-        let covariance = covariance.view((0, 0), (self.count, self.count));
-        problem.weight().component_mul(&covariance).sum().max(0.0).sqrt()
+        problem.weight.component_mul(&self.of_parameters()).sum().max(0.0).sqrt()
     }
 
     /// Expected error at each fresh pose: place, mm.
     pub fn map(&self, problem: &Problem) -> Vec<(Vector3<f64>, f64)> {
-        let covariance = self.covariance();
-        let covariance = covariance.view((0, 0), (self.count, self.count));
+        let covariance = self.of_parameters();
         let at = |(place, columns): &(Vector3<f64>, DMatrix<f64>)| {
-            (*place, (columns * covariance * columns.transpose()).trace().max(0.0).sqrt())
+            (*place, (columns * &covariance * columns.transpose()).trace().max(0.0).sqrt())
         };
-        problem.fresh().iter().map(at).collect()
+        problem.fresh.iter().map(at).collect()
     }
 
     /// The expected error after so many of these poses in their order, spread over the list.
@@ -135,7 +131,7 @@ impl Blocks {
         let (count, width) = (problem.count(), problem.count() + FRAME);
         let covariance = information.covariance();
         let tall = covariance.columns(0, count);
-        let weighed = tall * problem.weight() * tall.transpose();
+        let weighed = tall * &problem.weight * tall.transpose();
         let block = |matrix: &DMatrix<f64>, group: usize| {
             let index = |k: usize| if k < count { k } else { k + FRAME * group };
             (0..width)

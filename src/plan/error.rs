@@ -9,7 +9,6 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The middle of a sphere.
     #[error(
         "group {group}: the robot does not reach ({}, {}, {}) mm with its flange level or pointing down, within its limits",
         tenths(point_mm[0]), tenths(point_mm[1]), tenths(point_mm[2])
@@ -20,30 +19,24 @@ pub enum Error {
         /// The nearest point of that line from the base that it reaches, mm.
         nearest_mm: Option<[f64; 3]>,
     },
-    /// The rig's field is too small for the target.
     #[error(
         "the rig never sees a target of {width_mm:.0} x {height_mm:.0} mm wholly in both pictures; its field is about {field_mm:.0} mm at {distance_mm:.0} mm"
     )]
     NeverSeen {
-        /// The target's plate.
         width_mm: f64,
-        /// The target's plate.
         height_mm: f64,
         /// Width that both cameras see.
         field_mm: f64,
         /// Distance of the field's middle.
         distance_mm: f64,
     },
-    /// Too few candidates.
     #[error(
         "group {group}: {found} of {tried} poses that were tried are in view and can be reached within the joints' limits; {needed} are needed"
     )]
     TooFew {
         group: String,
-        /// Candidates found.
         found: usize,
         tried: usize,
-        /// Asked for.
         needed: usize,
         /// Whether it is so many because so many poses were asked for.
         asked: bool,
@@ -52,11 +45,7 @@ pub enum Error {
     },
     /// The measurements are of other groups, or of nothing.
     #[error("{message}")]
-    Measured {
-        /// What is wrong.
-        message: String,
-        place: String,
-    },
+    Measured { message: String, place: String },
 }
 
 /// Nearer to the base than that no flange comes, mm.

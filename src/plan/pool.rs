@@ -62,11 +62,8 @@ pub enum Kind {
 
 /// What candidates are drawn from.
 pub struct Pool<'a> {
-    /// The nominal robot.
     pub robot: &'a Robot,
-    /// The cameras.
     pub scene: &'a Scene,
-    /// What to plan.
     pub settings: &'a Settings,
     pub placements: &'a [Placement],
     pub noise: PoseNoise,

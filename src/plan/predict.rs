@@ -65,8 +65,10 @@ pub struct Problem {
     /// Parameters before these move the whole robot, which the placements' own transforms take up.
     moving: usize,
     centers_mm: Vec<Vector3<f64>>,
-    fresh: Vec<(Vector3<f64>, DMatrix<f64>)>,
-    weight: DMatrix<f64>,
+    /// Fresh poses: place and derivatives less the rigid motion.
+    pub(super) fresh: Vec<(Vector3<f64>, DMatrix<f64>)>,
+    /// Mean over the fresh poses of the products of derivatives: the mean square error is its product with the covariance.
+    pub(super) weight: DMatrix<f64>,
 }
 
 impl Problem {
@@ -147,16 +149,6 @@ impl Problem {
     /// Number of placements.
     pub fn groups(&self) -> usize {
         self.centers_mm.len()
-    }
-
-    /// Mean over the fresh poses of the products of derivatives: the mean square error is its product with the covariance.
-    pub fn weight(&self) -> &DMatrix<f64> {
-        &self.weight
-    }
-
-    /// Fresh poses: place and derivatives less the rigid motion.
-    pub fn fresh(&self) -> &[(Vector3<f64>, DMatrix<f64>)] {
-        &self.fresh
     }
 
     /// Variances before anything is measured.

@@ -21,11 +21,6 @@ const BORDER: f64 = 0.02;
 /// Starts for the posture at a sphere's middle.
 const STARTS: usize = 200;
 
-/// Reach of the paper's robot, as [`reach_mm`] counts it.
-fn paper_reach_mm() -> f64 {
-    reach_mm(&Robot::paper())
-}
-
 /// The paper's start points, mm.
 const PAPER_CENTERS_MM: [[f64; 3]; 4] =
     [[200.0, 0.0, 379.0], [-200.0, 0.0, 379.0], [0.0, 200.0, 379.0], [0.0, -230.0, 379.0]];
@@ -36,11 +31,9 @@ const PAPER_AZIMUTH_DEG: f64 = -30.0;
 /// A rig with the target before it.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    /// The cameras.
     pub rig: Rig,
     /// The middle of the field: a target with the identity there faces both cameras.
     pub left_from_field: Transform,
-    /// The target.
     pub board: Board,
     /// Standard deviation of a corner's coordinate, px.
     pub corner_px: f64,
@@ -55,7 +48,6 @@ pub struct Scene {
 /// One placement of the cameras: a group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placement {
-    /// The group's name.
     pub name: String,
     /// Middle of the sphere, base frame, mm.
     pub center_mm: Vector3<f64>,
@@ -147,11 +139,6 @@ fn half_plate(board: &Board) -> (f64, f64) {
     (width, height)
 }
 
-/// Length of the stretched arm, mm: what the paper's spheres are scaled by.
-pub fn reach_mm(robot: &Robot) -> f64 {
-    robot.joints.iter().map(|j| j.a_mm.hypot(j.d_mm)).sum()
-}
-
 /// The target's printed side looks along the flange's z: its own z points back.
 pub fn flange_from_target(robot: &Robot) -> Transform {
     transform(Vector3::x() * std::f64::consts::PI, robot.tool_mm)
@@ -177,7 +164,8 @@ pub fn base_from_flange(robot: &Robot, base_from_target: &Transform) -> Transfor
 /// The placements: one direction of the flange for all spheres as in the paper, the first that all of them can have; a sphere of its own
 /// direction where there is none.
 pub fn placements(robot: &Robot, scene: &Scene, settings: &Settings) -> Result<Vec<Placement>> {
-    let scale = reach_mm(robot) / paper_reach_mm();
+    // The paper's spheres are scaled by the reach.
+    let scale = robot.reach_mm() / Robot::paper().reach_mm();
     let paper = || PAPER_CENTERS_MM.iter().map(|c| Vector3::from(*c) * scale).collect();
     let centers: Vec<Vector3<f64>> = if settings.centers_mm.is_empty() { paper() } else { settings.centers_mm.clone() };
     let field = |center: &Vector3<f64>, direction: &Vector3<f64>| {

@@ -39,20 +39,17 @@ pub struct Plan {
 /// What every plan's user must know.
 pub const COLLISIONS: &str = "collisions of the arm with itself, the cameras and the cell are not checked: run the program slowly, hand on the stop";
 
-/// Plans. `measured` are rows of earlier poses, and the file they come from.
-pub fn plan(
-    robot: &Robot,
-    scene: &Scene,
-    settings: &Settings,
-    measured: Option<(&[Measurement], &str)>,
-) -> Result<Plan> {
-    planned(robot, scene, settings, measured).map_err(|error| match error {
+/// Rows of earlier poses, and the file they come from.
+pub type Measured<'a> = Option<(&'a [Measurement], &'a str)>;
+
+/// Plans.
+pub fn plan(robot: &Robot, scene: &Scene, settings: &Settings, measured: Measured) -> Result<Plan> {
+    planned(robot, scene, settings, measured).map_err(|mut error| {
         // Where cameras stand already, another sphere is none that they see.
-        Error::TooFew { group, found, tried, needed, asked, .. } if measured.is_none() => {
-            let reached_mm = reached_mm(robot, scene, settings, &group);
-            Error::TooFew { group, found, tried, needed, asked, reached_mm }
+        if let (Error::TooFew { group, reached_mm: nearest, .. }, None) = (&mut error, measured) {
+            *nearest = reached_mm(robot, scene, settings, group);
         }
-        other => other,
+        error
     })
 }
 
@@ -86,12 +83,7 @@ fn reached_mm(robot: &Robot, scene: &Scene, settings: &Settings, group: &str) ->
     centers.iter().find(reaches).map(|center| center.map(f64::round).into())
 }
 
-fn planned(
-    robot: &Robot,
-    scene: &Scene,
-    settings: &Settings,
-    measured: Option<(&[Measurement], &str)>,
-) -> Result<Plan> {
+fn planned(robot: &Robot, scene: &Scene, settings: &Settings, measured: Measured) -> Result<Plan> {
     let mut placements = scene::placements(robot, scene, settings)?;
     let mut warnings = vec![COLLISIONS.to_owned()];
     let earlier = match measured {

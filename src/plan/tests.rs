@@ -140,9 +140,9 @@ fn the_promise_is_the_spread_of_fits() {
                 }
             }
         }
-        let offsets = information.solved(&pull);
+        let offsets = information.covariance() * &pull;
         let offsets = offsets.rows(0, problem.count());
-        sum += (problem.weight() * offsets).dot(&offsets);
+        sum += (&problem.weight * offsets).dot(&offsets);
     }
     let realised = (sum / f64::from(runs)).sqrt();
     let promised = expected.iter().find(|e| e.0 == 24).unwrap().1;

@@ -68,10 +68,8 @@ impl Instruction {
         target: std::ops::Range<usize>,
         moves_by: Result<Vec<usize>, Cause>,
     ) -> Instruction {
-        let quoted: Vec<&str> = text[target].split_whitespace().collect();
-        let quoted = quoted.join(" ");
         // Bytes of any encoding stand here.
-        let quoted = quoted.replace(char::is_control, "?");
+        let quoted = text[target].split_whitespace().collect::<Vec<_>>().join(" ").replace(char::is_control, "?");
         let short: String = quoted.chars().take(QUOTED).collect();
         let target = if short.len() < quoted.len() { format!("{short}...") } else { quoted };
         Instruction { line: scan::line(text, word.start), word: text[word].to_owned(), target, moves_by }

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use camino::Utf8Path;
 
-/// A maker's language.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Language {
     /// Universal Robots, `.script`.
@@ -22,55 +21,35 @@ impl Language {
     pub const ALL: [Language; 5] =
         [Language::UrScript, Language::Rapid, Language::Krl, Language::FanucLs, Language::Jbi];
 
-    pub fn name(self) -> &'static str {
+    /// Its name, endings of its files in small letters, and what it calls the number behind the six axes of a robot.
+    fn known(self) -> (&'static str, &'static [&'static str], Option<&'static str>) {
         match self {
-            Language::UrScript => "URScript",
-            Language::Rapid => "ABB RAPID",
-            Language::Krl => "KUKA KRL",
-            Language::FanucLs => "Fanuc LS",
-            Language::Jbi => "Yaskawa JBI",
+            Language::UrScript => ("URScript", &["script", "urscript"], None),
+            Language::Rapid => ("ABB RAPID", &["mod", "modx", "prg"], Some("`eax_a`")),
+            Language::Krl => ("KUKA KRL", &["src", "dat"], Some("`E1`")),
+            Language::FanucLs => ("Fanuc LS", &["ls"], Some("`E1`")),
+            Language::Jbi => ("Yaskawa JBI", &["jbi"], Some("the seventh number")),
         }
     }
 
-    /// Endings of its files, small letters.
-    fn endings(self) -> &'static [&'static str] {
-        match self {
-            Language::UrScript => &["script", "urscript"],
-            Language::Rapid => &["mod", "modx", "prg"],
-            Language::Krl => &["src", "dat"],
-            Language::FanucLs => &["ls"],
-            Language::Jbi => &["jbi"],
-        }
+    pub fn name(self) -> &'static str {
+        self.known().0
     }
 
     /// The language of a file, by its ending.
     pub fn of(path: &Utf8Path) -> Option<Language> {
         let ending = path.extension()?.to_ascii_lowercase();
-        Language::ALL.into_iter().find(|language| language.endings().contains(&ending.as_str()))
+        Language::ALL.into_iter().find(|language| language.known().1.contains(&ending.as_str()))
     }
 
     /// What the language calls the number behind the six axes of a robot; `None` where all are in one list.
     pub fn seventh(self) -> Option<&'static str> {
-        match self {
-            Language::UrScript => None,
-            Language::Rapid => Some("`eax_a`"),
-            Language::Krl | Language::FanucLs => Some("`E1`"),
-            Language::Jbi => Some("the seventh number"),
-        }
+        self.known().2
     }
 
     /// Whether points of this file stand in one of data beside it.
     pub fn has_data_file(self, path: &Utf8Path) -> bool {
         self == Language::Krl && path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("src"))
-    }
-
-    /// What a number of a target is times degrees.
-    fn per_degree(self, pulses: bool, pulses_per_deg: &[f64], joint: usize) -> f64 {
-        match self {
-            Language::UrScript => 1f64.to_radians(),
-            Language::Jbi if pulses => pulses_per_deg.get(joint).copied().unwrap_or(1.0),
-            _ => 1.0,
-        }
     }
 }
 
@@ -112,9 +91,14 @@ impl Joints<'_> {
         self.slides.len()
     }
 
-    /// Metres of UR's language are the exception among the lengths; no UR slides.
+    /// What a number of a target is times degrees (mm). Metres of UR's language are the exception among the lengths; no UR slides.
     pub(super) fn factor(&self, language: Language, pulses: bool, joint: usize) -> f64 {
-        if self.slides[joint] && !pulses { 1.0 } else { language.per_degree(pulses, self.pulses_per_deg, joint) }
+        match language {
+            _ if self.slides[joint] && !pulses => 1.0,
+            Language::UrScript => 1f64.to_radians(),
+            Language::Jbi if pulses => self.pulses_per_deg.get(joint).copied().unwrap_or(1.0),
+            _ => 1.0,
+        }
     }
 }
 

@@ -17,11 +17,10 @@ mod scan;
 #[cfg(test)]
 mod tests;
 mod variables;
-mod write;
 
+pub use dialect::program;
 pub use encoding::{Encoding, decoded};
 pub use instruction::{Cause, Instruction};
 pub use joint_order::JointOrder;
 pub use language::{Joints, Language, Motion, Stop, Target};
 pub use read::{Program, targets, with_readings};
-pub use write::program;

@@ -19,7 +19,7 @@ impl Program {
     /// Reads a program. An error says what could not be understood.
     pub fn read(language: Language, text: &str, joints: Joints) -> Result<Program, String> {
         let targets = all_targets(language, text, joints)?;
-        let motions = dialect::motions(language, text, &targets);
+        let motions = (dialect::of(language).motions)(text, &targets);
         Ok(Program { targets, motions })
     }
 
@@ -50,7 +50,7 @@ pub fn targets(language: Language, text: &str, joints: Joints) -> Result<Vec<Tar
 
 /// Every list of joint values, in the order of the text.
 fn all_targets(language: Language, text: &str, joints: Joints) -> Result<Vec<Target>, String> {
-    let found = dialect::targets(language, text, joints.count());
+    let found = (dialect::of(language).targets)(text, joints.count());
     if found.iter().any(|t| t.pulses) && joints.pulses_per_deg.len() != joints.count() {
         return Err(format!(
             "the targets are in pulses; the number of pulses a degree of each of the {} joints is needed",

@@ -25,18 +25,8 @@ pub fn word(text: &str, at: usize, word: &str) -> Option<usize> {
     same.then_some(start + word.len())
 }
 
-/// Numbers from `at` with commas between, up to `most` of them, and the place behind the last.
-pub fn list(text: &str, at: usize, most: usize) -> (Vec<Number>, usize) {
-    list_of(text, at, most, number)
-}
-
-/// The same of what else is a number in a language.
-pub fn list_of(
-    text: &str,
-    at: usize,
-    most: usize,
-    number: impl Fn(&str, usize) -> Option<Number>,
-) -> (Vec<Number>, usize) {
+/// Numbers, or what else is a `number` in a language, from `at` with commas between, up to `most` of them, and the place behind the last.
+pub fn list(text: &str, at: usize, most: usize, number: fn(&str, usize) -> Option<Number>) -> (Vec<Number>, usize) {
     let (mut numbers, mut end) = (Vec::new(), at);
     while numbers.len() < most {
         let from = if numbers.is_empty() { Some(end) } else { word(text, end, ",") };
@@ -47,8 +37,8 @@ pub fn list_of(
     (numbers, end)
 }
 
-/// Numbers behind `labels` in their order, each label with blanks and signs of `between` behind it; the place behind the last.
-pub fn labelled(text: &str, at: usize, labels: &[String], between: &[&str]) -> Option<(Vec<Number>, usize)> {
+/// Numbers behind `labels` in their order, each label with blanks and signs of `between` behind it.
+pub fn labelled(text: &str, at: usize, labels: &[String], between: &[&str]) -> Option<Vec<Number>> {
     let (mut numbers, mut end) = (Vec::new(), at);
     for label in labels {
         for skipped in between {
@@ -60,7 +50,7 @@ pub fn labelled(text: &str, at: usize, labels: &[String], between: &[&str]) -> O
         end = found.1.end;
         numbers.push(found);
     }
-    Some((numbers, end))
+    Some(numbers)
 }
 
 /// A target of these numbers; named by its line where it has no name. `open` is the bracket that it begins with, where it has one.
@@ -106,7 +96,11 @@ pub fn code(text: &str, mark: &str) -> String {
 
 /// Places of the words: letters, digits, `_`, and KUKA's `$` and `#`. Numbers are words too.
 pub fn words(code: &str) -> impl Iterator<Item = Range<usize>> + '_ {
-    let part = |c: char| c.is_alphanumeric() || "_$#".contains(c);
+    runs(code, |c| c.is_alphanumeric() || "_$#".contains(c))
+}
+
+/// Places of the runs of such characters.
+pub fn runs(code: &str, part: fn(char) -> bool) -> impl Iterator<Item = Range<usize>> + '_ {
     let mut at = 0;
     std::iter::from_fn(move || {
         let start = at + code[at..].find(part)?;

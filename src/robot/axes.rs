@@ -62,10 +62,8 @@ pub fn robot(name: &str, axes: &[Axis], root_from_flange: &Transform) -> Robot {
 
 /// The same with another sine up to which neighbouring axes count as parallel.
 pub fn robot_with(name: &str, axes: &[Axis], root_from_flange: &Transform, parallel_sin: f64) -> Robot {
-    let (root_from_frame0, first) = base(axes.first());
+    let (root_from_frame0, mut before, mut frame) = base(axes.first());
     let mut joints = Vec::with_capacity(axes.len());
-    let mut before = first.joint;
-    let mut frame = OnAxis { origin: first.origin, x: first.x, z: Vector3::z() };
     for (axis, next) in axes.iter().zip(axes.iter().skip(1).map(Some).chain([None])) {
         frame.z = axis.direction;
         let leave = match next {
@@ -76,11 +74,7 @@ pub fn robot_with(name: &str, axes: &[Axis], root_from_flange: &Transform, paral
         before.d_mm = (leave.origin - frame.origin).dot(&frame.z) + 0.0;
         (before.limits_rad, before.slides) = (axis.limits_rad, axis.slides);
         joints.push(before);
-        if next.is_some() {
-            (before, frame) = (leave.next, leave.arrives);
-        } else {
-            frame = OnAxis { origin: leave.origin, x: leave.x, z: frame.z };
-        }
+        (before, frame) = (leave.next, leave.arrives);
     }
     let last_frame_from_flange = clean(frame.transform().inverse() * root_from_flange);
     let corrections =
@@ -96,32 +90,24 @@ fn clean(a_from_b: Transform) -> Transform {
     if small { Transform::identity() } else { a_from_b }
 }
 
-struct First {
-    joint: Joint,
-    origin: Point3<f64>,
-    x: Vector3<f64>,
-}
-
-/// Frame 0, and the first joint's frame before its own turn. A first axis that is vertical leaves frame 0 parallel to the root.
-fn base(first: Option<&Axis>) -> (Transform, First) {
-    let at = |origin, x, joint| First { joint, origin, x };
+/// Frame 0, the link to the first joint, and its frame before its own turn. A first axis that is vertical leaves frame 0 parallel to the root.
+fn base(first: Option<&Axis>) -> (Transform, Joint, OnAxis) {
+    let at = |origin, x| OnAxis { origin, x, z: Vector3::z() };
     let Some(axis) = first else {
-        return (Transform::identity(), at(Point3::origin(), Vector3::x(), Joint::default()));
+        return (Transform::identity(), Joint::default(), at(Point3::origin(), Vector3::x()));
     };
     let u = axis.direction;
     if u.x == 0.0 && u.y == 0.0 {
         let origin = Point3::new(axis.point_mm.x, axis.point_mm.y, 0.0);
         let alpha_rad = if u.z > 0.0 { 0.0 } else { std::f64::consts::PI };
-        return (
-            Transform::translation(origin.x, origin.y, 0.0),
-            at(origin, Vector3::x(), Joint { alpha_rad, ..Joint::default() }),
-        );
+        let link = Joint { alpha_rad, ..Joint::default() };
+        return (Transform::translation(origin.x, origin.y, 0.0), link, at(origin, Vector3::x()));
     }
     let turn = turn_from_z(&u);
     // The point of the axis nearest to the root's origin.
     let origin = axis.point_mm - u * axis.point_mm.coords.dot(&u);
     let root_from_frame0 = Transform::from_parts(origin.coords.into(), turn);
-    (root_from_frame0, at(origin, turn * Vector3::x(), Joint::default()))
+    (root_from_frame0, Joint::default(), at(origin, turn * Vector3::x()))
 }
 
 /// The shortest turn from z to a direction; by half-angle sums, which keep all digits of a small one.
@@ -225,6 +211,10 @@ mod tests {
     const SAME_MM: f64 = 1e-9;
     const SAME_RAD: f64 = 1e-12;
 
+    fn turning(point_mm: Point3<f64>, direction: Vector3<f64>) -> Axis {
+        Axis { point_mm, direction, limits_rad: None, slides: false }
+    }
+
     fn assert_same(axes: &[Axis], root_from_flange: &Transform, q: &[f64]) {
         let robot = robot("r", axes, root_from_flange);
         let mut expected = Transform::identity();
@@ -273,13 +263,8 @@ mod tests {
     #[test]
     fn a_vertical_first_axis_needs_no_base() {
         for z in [1.0, -1.0] {
-            let axis = |p: [f64; 3], u: [f64; 3]| Axis {
-                point_mm: p.into(),
-                direction: u.into(),
-                limits_rad: None,
-                slides: false,
-            };
-            let axes = [axis([0.0, 0.0, 100.0], [0.0, 0.0, z]), axis([25.0, 0.0, 400.0], [0.0, 1.0, 0.0])];
+            let first = turning(Point3::new(0.0, 0.0, 100.0), Vector3::z() * z);
+            let axes = [first, turning(Point3::new(25.0, 0.0, 400.0), Vector3::y())];
             let flange = transform(Vector3::zeros(), Vector3::new(300.0, 0.0, 400.0));
             assert_eq!(robot("r", &axes, &flange).ends.root_from_frame0, Transform::identity());
             assert_same(&axes, &flange, &[0.3, -0.7]);
@@ -291,13 +276,8 @@ mod tests {
         for lean in [1e-12, 1e-9, 1e-4, -1e-9] {
             for z in [1.0, -1.0] {
                 let direction = Vector3::new(lean, -lean, z).normalize();
-                let first = Axis { point_mm: Point3::new(1.0, 2.0, 300.0), direction, limits_rad: None, slides: false };
-                let second = Axis {
-                    point_mm: Point3::new(1.0, 2.0, 500.0),
-                    direction: Vector3::y(),
-                    limits_rad: None,
-                    slides: false,
-                };
+                let first = turning(Point3::new(1.0, 2.0, 300.0), direction);
+                let second = turning(Point3::new(1.0, 2.0, 500.0), Vector3::y());
                 let flange = transform(Vector3::zeros(), Vector3::new(800.0, 0.0, 400.0));
                 assert_same(&[first, second], &flange, &[2.0, -0.7]);
             }

@@ -106,10 +106,8 @@ impl Robot {
     pub fn bent_with(&self, joints_rad: &[f64], torques: &Torques) -> Bent {
         let mut bent = Bent { joints: self.joints.clone(), joints_rad: self.corrected_with(joints_rad, torques) };
         for term in &self.corrections.bending {
-            bent.tilt(
-                term.joint,
-                torques.levers_across_m(term.joint, term.point).map(|lever| term.k_rad_per_m * lever),
-            );
+            let levers_m = torques.levers_across_m(term.joint, term.point);
+            bent.tilt(term.joint, levers_m.map(|lever| term.k_rad_per_m * lever));
         }
         for term in &self.corrections.wobble {
             if let Some(&q) = joints_rad.get(term.joint) {

@@ -111,6 +111,11 @@ impl Robot {
         places
     }
 
+    /// Length of the stretched arm, mm.
+    pub fn reach_mm(&self) -> f64 {
+        self.joints.iter().map(|j| j.a_mm.hypot(j.d_mm)).sum()
+    }
+
     /// The numbers, from 1, of joints whose limits are not known.
     pub fn joints_without_limits(&self) -> Vec<String> {
         let open = self.joints.iter().zip(1..).filter(|(joint, _)| joint.limits_rad.is_none());

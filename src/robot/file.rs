@@ -1,4 +1,4 @@
-//! `robot.toml`: a robot's parameters as a person writes them, degrees and mm.
+//! `robot.toml`: a robot's parameters as a person writes them, degrees and mm, and what the run that found it says of its use.
 
 use camino::Utf8Path;
 use nalgebra::Vector3;
@@ -6,39 +6,31 @@ use serde::{Deserialize, Serialize};
 
 use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
 use super::ends::PoseRecord;
-use super::{Advice, Check, Corrections, Ends, Error, Joint, Result, Robot};
+use super::{Corrections, Ends, Error, Joint, Result, Robot};
 use crate::diagnostic::Place;
 use crate::files;
 
+/// What is `None` does not stand in the file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RobotRecord {
     name: String,
     convention: String,
     /// Unit vector along gravity in the base frame.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     gravity_direction: Option<[f64; 3]>,
     /// What the run that found it says of its use.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     check: Option<Check>,
     joint: Vec<JointRecord>,
     #[serde(default)]
     tool: ToolRecord,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     gravity: Option<GravityRecord>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     bending: Option<Terms<GravityTermRecord>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     harmonics: Option<Terms<HarmonicTermRecord>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     wobble: Option<Terms<HarmonicTermRecord>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     couplings: Option<Terms<CouplingTermRecord>>,
     /// `root_from_frame0`
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     base: Option<PoseRecord>,
     /// `last_frame_from_flange`
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     flange: Option<PoseRecord>,
 }
 
@@ -46,7 +38,7 @@ struct RobotRecord {
 #[serde(deny_unknown_fields)]
 struct JointRecord {
     /// `revolute` (the default) or `prismatic`.
-    #[serde(default, rename = "type", skip_serializing_if = "Option::is_none")]
+    #[serde(rename = "type")]
     kind: Option<String>,
     alpha_deg: f64,
     a_mm: f64,
@@ -54,9 +46,7 @@ struct JointRecord {
     beta_deg: f64,
     theta_deg: f64,
     d_mm: f64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     limits_deg: Option<[f64; 2]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     limits_mm: Option<[f64; 2]>,
     /// 1 or -1: how the controller counts it.
     #[serde(default = "one", skip_serializing_if = "is_one")]
@@ -76,7 +66,6 @@ struct ToolRecord {
 #[serde(deny_unknown_fields)]
 struct GravityRecord {
     /// Where older files say `gravity_direction`.
-    #[serde(default, skip_serializing)]
     direction: Option<[f64; 3]>,
     #[serde(default)]
     terms: Vec<GravityTermRecord>,
@@ -310,27 +299,23 @@ fn coupling(t: &CouplingTerm) -> CouplingTermRecord {
 impl From<&Robot> for RobotRecord {
     fn from(robot: &Robot) -> RobotRecord {
         let direction = robot.corrections.gravity_direction;
-        let degrees = |limits: Option<(f64, f64)>| limits.map(|(low, high)| [low.to_degrees(), high.to_degrees()]);
+        let joint = |j: &Joint| JointRecord {
+            kind: j.slides.then(|| "prismatic".to_owned()),
+            alpha_deg: j.alpha_rad.to_degrees(),
+            a_mm: j.a_mm,
+            beta_deg: j.beta_rad.to_degrees(),
+            theta_deg: j.theta_rad.to_degrees(),
+            d_mm: j.d_mm,
+            limits_deg: j.limits_rad.filter(|_| !j.slides).map(|(low, high)| [low.to_degrees(), high.to_degrees()]),
+            limits_mm: j.limits_rad.filter(|_| j.slides).map(<[f64; 2]>::from),
+            sign: j.sign,
+        };
         RobotRecord {
             name: robot.name.clone(),
             convention: "mdh".to_owned(),
             check: None,
             gravity_direction: (direction != Corrections::default().gravity_direction).then(|| direction.into()),
-            joint: robot
-                .joints
-                .iter()
-                .map(|j| JointRecord {
-                    kind: j.slides.then(|| "prismatic".to_owned()),
-                    alpha_deg: j.alpha_rad.to_degrees(),
-                    a_mm: j.a_mm,
-                    beta_deg: j.beta_rad.to_degrees(),
-                    theta_deg: j.theta_rad.to_degrees(),
-                    d_mm: j.d_mm,
-                    limits_deg: degrees(j.limits_rad.filter(|_| !j.slides)),
-                    limits_mm: j.limits_rad.filter(|_| j.slides).map(<[f64; 2]>::from),
-                    sign: j.sign,
-                })
-                .collect(),
+            joint: robot.joints.iter().map(joint).collect(),
             tool: ToolRecord { x_mm: robot.tool_mm.x, y_mm: robot.tool_mm.y, z_mm: robot.tool_mm.z },
             gravity: table(&robot.corrections.gravity, weight)
                 .map(|gravity| GravityRecord { direction: None, terms: gravity.terms }),
@@ -340,6 +325,45 @@ impl From<&Robot> for RobotRecord {
             couplings: table(&robot.corrections.couplings, coupling),
             base: PoseRecord::of(&robot.ends.root_from_frame0),
             flange: PoseRecord::of(&robot.ends.last_frame_from_flange),
+        }
+    }
+}
+
+/// What to do with the robot that was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Advice {
+    Use,
+    /// Use it once the reason was looked at.
+    Check,
+    /// Nothing better than the nominal robot was found, and that is the result.
+    KeepNominal,
+    DoNotUse,
+}
+
+/// The advice with its reason, as files carry it to whatever uses the robot.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Check {
+    pub advice: Advice,
+    /// Why, in one sentence; empty where there is nothing to say.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub reason: String,
+}
+
+impl Check {
+    /// Whether what is made of the robot is advised against.
+    pub fn is_against(&self) -> bool {
+        self.advice == Advice::DoNotUse
+    }
+
+    /// What a user of `file` must know; `None` where there is nothing to say.
+    pub fn warning(&self, file: &Utf8Path) -> Option<String> {
+        let reason = &self.reason;
+        match self.advice {
+            Advice::DoNotUse => Some(format!("do not use {file}, says its own `check`: {reason}")),
+            Advice::Check => Some(format!("check before you use {file}, says its own `check`: {reason}")),
+            Advice::Use | Advice::KeepNominal => None,
         }
     }
 }

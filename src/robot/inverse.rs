@@ -196,40 +196,32 @@ pub fn best_posture(robot: &Robot, base_from_flange: &Transform, starts: usize) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::Joint;
     use crate::robot::corrections::CouplingTerm;
 
-    fn with_limits(mut robot: Robot) -> Robot {
-        robot.joints.iter_mut().for_each(|j: &mut Joint| j.limits_rad = Some((-2.8, 2.8)));
-        robot
-    }
+    const THERE: [f64; 6] = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
 
-    fn with_wide_limits(mut robot: Robot) -> Robot {
-        robot.joints.iter_mut().for_each(|j: &mut Joint| j.limits_rad = Some((-TAU, TAU)));
-        robot
+    fn within(most: f64) -> Robot {
+        Robot::paper().within(&[(-most, most); 6])
     }
 
     #[test]
     fn forward_of_inverse_is_the_pose() {
-        let robot = with_limits(Robot::paper());
-        let there = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
-        let wanted = robot.base_from_flange(&there);
-        let start: Vec<f64> = there.iter().map(|q| q + 0.3).collect();
+        let robot = within(2.8);
+        let wanted = robot.base_from_flange(&THERE);
+        let start = THERE.map(|q| q + 0.3);
         let q = from_start(&robot, &wanted, &start).unwrap();
         assert!(miss(&robot, &wanted, &q).norm() < REACHED_MM);
-        for (a, b) in q.iter().zip(&there) {
-            assert!((a - b).abs() < 1e-6, "the nearby solution is the one we came from");
-        }
+        let is_same = q.iter().zip(&THERE).all(|(a, b)| (a - b).abs() < 1e-6);
+        assert!(is_same, "the nearby solution is the one we came from");
     }
 
     #[test]
     fn a_solution_has_no_whole_turns_that_its_start_has_not() {
-        for robot in [Robot::paper(), with_wide_limits(Robot::paper())] {
-            let there = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
-            let wanted = robot.base_from_flange(&there);
-            let wild = Approach { joints_rad: there.iter().map(|q| q + TAU).collect(), miss_mm: 0.0 };
+        for robot in [Robot::paper(), within(TAU)] {
+            let wanted = robot.base_from_flange(&THERE);
+            let wild = Approach { joints_rad: THERE.iter().map(|q| q + TAU).collect(), miss_mm: 0.0 };
             let q = unwound(&robot, &wanted, wild, &[0.0; 6]);
-            assert!(q.joints_rad.iter().zip(&there).all(|(a, b)| (a - b).abs() < 1e-12), "{q:?}");
+            assert!(q.joints_rad.iter().zip(&THERE).all(|(a, b)| (a - b).abs() < 1e-12), "{q:?}");
             for k in 0..40 {
                 let start = spread_start(&robot, k);
                 let Some(q) = from_start(&robot, &wanted, &start) else { continue };
@@ -261,23 +253,21 @@ mod tests {
     #[test]
     fn limits_are_kept() {
         let mut robot = Robot::paper();
-        let there = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
-        let wanted = robot.base_from_flange(&there);
+        let wanted = robot.base_from_flange(&THERE);
         robot.joints[0].limits_rad = Some((-0.3, 0.3));
-        if let Some(q) = from_start(&robot, &wanted, &there) {
+        if let Some(q) = from_start(&robot, &wanted, &THERE) {
             assert!(q[0].abs() <= 0.3);
         }
     }
 
     #[test]
     fn a_stretched_wrist_is_not_free() {
-        let robot = with_limits(Robot::paper());
-        let bent = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
-        let mut stretched = bent;
+        let robot = within(2.8);
+        let mut stretched = THERE;
         stretched[4] = 0.0;
-        assert!(freedom_mm(&robot, &bent) > 20.0, "{}", freedom_mm(&robot, &bent));
+        assert!(freedom_mm(&robot, &THERE) > 20.0, "{}", freedom_mm(&robot, &THERE));
         assert!(freedom_mm(&robot, &stretched) < 1e-9);
-        assert!((room_rad(&robot, &bent) - (2.8 - 1.1)).abs() < 1e-12);
+        assert!((room_rad(&robot, &THERE) - (2.8 - 1.1)).abs() < 1e-12);
     }
 
     #[test]
@@ -297,13 +287,12 @@ mod tests {
         let coupling = |joint, of, ratio| CouplingTerm { joint, of, ratio };
         robot.corrections.couplings = vec![coupling(2, 1, 1.0), coupling(4, 4, 0.01), coupling(5, 4, -0.5)];
         robot.joints[3].slides = true;
-        let q = [0.4, -0.6, 1.1, 0.3, -0.9, 0.7];
-        let wanted = robot.base_from_flange(&q);
-        let j = jacobian(&robot, &q);
+        let wanted = robot.base_from_flange(&THERE);
+        let j = jacobian(&robot, &THERE);
         let h = 1e-6;
         for k in 0..6 {
             let shifted = |by: f64| {
-                let mut q = q;
+                let mut q = THERE;
                 q[k] += by;
                 miss(&robot, &wanted, &q)
             };

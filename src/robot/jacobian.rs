@@ -19,7 +19,8 @@ pub type Feature = [f64; 2];
 #[derive(Debug, Clone)]
 pub struct Screws {
     joints: Vec<JointScrews>,
-    base_from_flange: Matrix3<f64>,
+    /// Rotation of the flange, base frame.
+    pub base_from_flange: Matrix3<f64>,
     /// The target's mark point, mm.
     pub target_mm: Point3<f64>,
 }
@@ -29,7 +30,6 @@ struct JointScrews {
     /// Axis of alpha and a, and a point on it.
     x: Vector3<f64>,
     before: Point3<f64>,
-    /// Axis of beta.
     y: Vector3<f64>,
     /// Axis of theta and d; both this and `y` pass through `origin`.
     z: Vector3<f64>,
@@ -103,11 +103,6 @@ impl Screws {
         let mut joints = Vec::with_capacity(bent.joints.len());
         let (base_from_flange, target_mm) = links.along(bent, tool_mm, |joint| joints.push(joint));
         Screws { joints, base_from_flange, target_mm }
-    }
-
-    /// Rotation of the flange, base frame.
-    pub fn base_from_flange(&self) -> &Matrix3<f64> {
-        &self.base_from_flange
     }
 
     /// Derivative of the target's point, mm per mm or mrad. `feature` is the parameter's factor at this pose (see [`feature`]).

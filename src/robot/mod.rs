@@ -5,7 +5,6 @@ pub mod axes;
 pub mod bent;
 pub mod catalogue;
 pub mod chain;
-pub mod check;
 pub mod corrections;
 pub mod ends;
 pub mod file;
@@ -18,9 +17,9 @@ pub mod tool_fit;
 use crate::diagnostic::{Explain, Place};
 
 pub use chain::{Joint, Robot};
-pub use check::{Advice, Check};
 pub use corrections::Corrections;
 pub use ends::Ends;
+pub use file::{Advice, Check};
 pub use parameters::{Parameter, Unit};
 
 /// Result of reading a robot.
@@ -30,87 +29,44 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Reading or writing files.
     #[error(transparent)]
     Files(#[from] crate::files::Error),
     /// The file says something that is no robot.
     #[error("{message}")]
-    File {
-        /// What was found and what was needed.
-        message: String,
-        place: Place,
-    },
+    File { message: String, place: Place },
     /// A table that could be read in several ways, or in none.
     #[error("{message}")]
-    Table {
-        /// What was found.
-        message: String,
-        place: String,
-        /// What settles it.
-        hint: String,
-    },
-    /// No arm of this name is known.
+    Table { message: String, place: String, hint: String },
     #[error("no arm `{name}` is known")]
     Unknown {
-        /// What was asked for.
         name: String,
         /// The name most like it, where one is like it.
         nearest: Option<String>,
     },
-    /// Several arms may be meant.
     #[error("`{name}` may be any of {}", candidates.join(", "))]
-    Ambiguous {
-        /// What was asked for.
-        name: String,
-        /// Their names.
-        candidates: Vec<&'static str>,
-    },
-    /// A robot file is there already.
+    Ambiguous { name: String, candidates: Vec<&'static str> },
     #[error("a robot file is there already")]
     Occupied { path: String },
-    /// Two robots of different joints.
     #[error("the identified robot has {identified} joints, the nominal one {nominal}")]
-    Different {
-        /// Joints of the identified one.
-        identified: String,
-        /// Joints of the nominal one.
-        nominal: String,
-    },
+    Different { identified: String, nominal: String },
     /// `identify` wrote the file of the nominal robot, and not the other one.
     #[error(
         "`--robot` names a robot that `identify` found, and `--identified` one that it did not find: are they exchanged?"
     )]
-    Exchanged {
-        /// The file of `--robot`.
-        robot: String,
-        /// The file of `--identified`.
-        identified: String,
-    },
+    Exchanged { robot: String, identified: String },
     /// Robots whose links are farther apart than robots are built.
     #[error("`{identified}` is not the arm of `{robot}`: {apart}")]
     OtherArm {
-        /// The file of `--robot`.
         robot: String,
-        /// The file of `--identified`.
         identified: String,
         /// Which links, and by how much.
         apart: String,
     },
     /// A format that does not fit this robot.
     #[error("{message}")]
-    NotExportable {
-        message: String,
-        /// What would do.
-        hint: String,
-    },
-    /// As many angles as joints are needed.
+    NotExportable { message: String, hint: String },
     #[error("{found} joint angles, but the robot has {needed} joints")]
-    AngleCount {
-        /// Given.
-        found: usize,
-        /// Joints.
-        needed: usize,
-    },
+    AngleCount { found: usize, needed: usize },
 }
 
 impl Explain for Error {
@@ -125,6 +81,7 @@ impl Explain for Error {
     }
 
     fn hint(&self) -> Option<String> {
+        let said = |hint: &str| Some(hint.to_owned());
         match self {
             Error::Unknown { nearest, .. } => {
                 let nearest =
@@ -137,19 +94,15 @@ impl Explain for Error {
             Error::Ambiguous { candidates, .. } => {
                 candidates.first().map(|name| format!("`stereocal robot new {name}` takes the first"))
             }
-            Error::Occupied { .. } => Some("`--force` overwrites it, `--out DIR` puts it elsewhere".to_owned()),
+            Error::Occupied { .. } => said("`--force` overwrites it, `--out DIR` puts it elsewhere"),
             Error::AngleCount { needed, .. } => Some(format!("{needed} angles in degrees with commas between")),
-            Error::Different { .. } => {
-                Some("both files are of one robot, before and after `stereocal identify`".to_owned())
-            }
+            Error::Different { .. } => said("both files are of one robot, before and after `stereocal identify`"),
             Error::Exchanged { robot, identified } => Some(format!("`--robot {identified} --identified {robot}`")),
-            Error::OtherArm { .. } => Some(
+            Error::OtherArm { .. } => said(
                 "`--robot` names the file that `identify` was given, with the same signs and zeros of the joints, `--identified` the \
-                 identified.toml that it wrote; `stereocal robot show FILE` says what each of them is"
-                    .to_owned(),
+                 identified.toml that it wrote; `stereocal robot show FILE` says what each of them is",
             ),
-            Error::NotExportable { hint, .. } => Some(hint.clone()),
-            Error::Table { hint, .. } => Some(hint.clone()),
+            Error::NotExportable { hint, .. } | Error::Table { hint, .. } => Some(hint.clone()),
             Error::File { .. } => None,
             Error::Files(e) => e.hint(),
         }

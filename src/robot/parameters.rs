@@ -37,9 +37,7 @@ pub enum Parameter {
 /// Unit of a parameter in vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unit {
-    /// Lengths.
     Mm,
-    /// Angles.
     Mrad,
 }
 

@@ -208,17 +208,22 @@ mod tests {
     use super::*;
     use crate::geometry::transform;
 
+    /// What a sensor somewhere sees of the paper's robot with this tool.
+    fn seen(tool_mm: Vector3<f64>, joints: &[Vec<f64>]) -> Vec<Point3<f64>> {
+        let truth = Robot { tool_mm, ..Robot::paper() };
+        let sensor = transform(Vector3::new(0.4, 2.0, -0.7), Vector3::new(900.0, -2000.0, 300.0));
+        joints.iter().map(|q| sensor * truth.target_mm(q)).collect()
+    }
+
     #[test]
     fn a_tool_that_the_file_lacks_is_found() {
         for size in [0.0, 50.0, 400.0] {
-            let mut truth = Robot::paper();
-            truth.tool_mm = Vector3::new(0.4, -0.3, 0.86) * size;
-            let sensor = transform(Vector3::new(0.4, 2.0, -0.7), Vector3::new(900.0, -2000.0, 300.0));
+            let tool_mm = Vector3::new(0.4, -0.3, 0.86) * size;
             let joints: Vec<Vec<f64>> =
                 (0..20).map(|i| (0..6).map(|j| ((7 * i + 3 * j * j) as f64).sin() * 1.4).collect()).collect();
-            let points: Vec<Point3<f64>> = joints.iter().map(|q| sensor * truth.target_mm(q)).collect();
+            let points = seen(tool_mm, &joints);
             let found = Robot::paper().fit_tool(&joints, &points, Start::File).unwrap();
-            assert!((found.tool_mm - truth.tool_mm).norm() < 1e-3 && found.left_mm < 1e-3, "{size}: {found:?}");
+            assert!((found.tool_mm - tool_mm).norm() < 1e-3 && found.left_mm < 1e-3, "{size}: {found:?}");
             // Metres taken for mm leave about as much as the points are apart.
             let small: Vec<Point3<f64>> = points.iter().map(|p| p / 1000.0).collect();
             assert!(Robot::paper().fit_tool(&joints, &small, Start::Around).unwrap().left_mm > 10.0);
@@ -227,21 +232,16 @@ mod tests {
             for bad in [3, 11, 12, 17] {
                 failed[bad] = Point3::origin();
                 let found = Robot::paper().fit_tool(&joints, &failed, Start::File).unwrap();
-                assert!(found.left_mm < 1e-3 && (found.tool_mm - truth.tool_mm).norm() < 1e-3, "{size}: {found:?}");
+                assert!(found.left_mm < 1e-3 && (found.tool_mm - tool_mm).norm() < 1e-3, "{size}: {found:?}");
             }
         }
     }
 
     #[test]
     fn a_tool_about_which_the_wrist_turns_is_found() {
-        let mut truth = Robot::paper();
-        truth.tool_mm = Vector3::new(24.0, -10.0, 55.0);
-        let sensor = transform(Vector3::new(0.4, 2.0, -0.7), Vector3::new(900.0, -2000.0, 300.0));
         let turns = |i: usize| vec![0.3, -0.2, 0.4, 0.1, (0.7 * i as f64).sin() * 0.8, 0.4 * i as f64 - 2.0];
         let joints: Vec<Vec<f64>> = (0..12).map(turns).collect();
-        let points: Vec<Point3<f64>> = joints.iter().map(|q| sensor * truth.target_mm(q)).collect();
-        let mut nominal = Robot::paper();
-        nominal.tool_mm = Vector3::zeros();
-        assert!(nominal.fit_tool(&joints, &points, Start::Around).unwrap().left_mm < 1e-2);
+        let points = seen(Vector3::new(24.0, -10.0, 55.0), &joints);
+        assert!(Robot::paper().fit_tool(&joints, &points, Start::Around).unwrap().left_mm < 1e-2);
     }
 }

@@ -7,6 +7,7 @@ use super::draws::{Draws, Purpose};
 use super::physical_board::PhysicalBoard;
 use super::rig::left_from_field;
 use crate::geometry::{Transform, transform};
+use crate::imaging::Board;
 use crate::stereo::Rig;
 
 /// How boards are held before the cameras.
@@ -62,11 +63,9 @@ pub fn held(
     seed: u64,
 ) -> Result<Vec<Transform>, Error> {
     let accept = |left_from_board: &Transform| seen_by_both(rig, board, left_from_board);
-    (0..count).map(|k| pose(left_from_field, holding, k, seed, &accept).ok_or_else(|| too_large(board))).collect()
-}
-
-fn too_large(board: &PhysicalBoard) -> Error {
-    Error::BoardTooLarge { squares: board.drawing.squares.to_string(), square_mm: board.drawing.square_mm }
+    let Board { squares, square_mm, .. } = board.drawing;
+    let too_large = || Error::BoardTooLarge { squares: squares.to_string(), square_mm };
+    (0..count).map(|k| pose(left_from_field, holding, k, seed, &accept).ok_or_else(too_large)).collect()
 }
 
 /// One pose out of the draws, the first that is accepted.
@@ -80,20 +79,17 @@ pub fn pose(
     let mut draws = Draws::new(seed, Purpose::CheckPoses, k as u64);
     // Directions of tilt a golden angle apart leave no side out, however many pairs there are.
     let about = k as f64 * 2.399_963 + draws.uniform(-0.3, 0.3);
-    (0..ATTEMPTS)
-        .map(|attempt| {
-            // A board that fills the picture has little room: later attempts stay nearer to the middle.
-            let room = 1.0 - attempt as f64 / ATTEMPTS as f64;
-            let tilt = draws.uniform(holding.tilt_deg.0, holding.tilt_deg.1).to_radians();
-            let turn = draws.uniform(-holding.turn_deg, holding.turn_deg).to_radians();
-            let place = Vector3::new(
-                room * draws.uniform(-holding.sideways_mm, holding.sideways_mm),
-                room * draws.uniform(-holding.sideways_mm, holding.sideways_mm),
-                draws.uniform(holding.depth_mm.0, holding.depth_mm.1),
-            );
-            let tilted = UnitQuaternion::from_scaled_axis(Vector3::new(about.cos(), about.sin(), 0.0) * tilt);
-            let turned = UnitQuaternion::from_scaled_axis(Vector3::z() * (turn + holding.upright_deg.to_radians()));
-            left_from_field * transform((tilted * turned).scaled_axis(), place)
-        })
-        .find(|left_from_board| accept(left_from_board))
+    let drawn = |attempt: usize| {
+        // A board that fills the picture has little room: later attempts stay nearer to the middle.
+        let room = 1.0 - attempt as f64 / ATTEMPTS as f64;
+        let tilt = draws.uniform(holding.tilt_deg.0, holding.tilt_deg.1).to_radians();
+        let turn = draws.uniform(-holding.turn_deg, holding.turn_deg).to_radians();
+        let mut sideways = || room * draws.uniform(-holding.sideways_mm, holding.sideways_mm);
+        let (x, y) = (sideways(), sideways());
+        let place = Vector3::new(x, y, draws.uniform(holding.depth_mm.0, holding.depth_mm.1));
+        let tilted = UnitQuaternion::from_scaled_axis(Vector3::new(about.cos(), about.sin(), 0.0) * tilt);
+        let turned = UnitQuaternion::from_scaled_axis(Vector3::z() * (turn + holding.upright_deg.to_radians()));
+        left_from_field * transform((tilted * turned).scaled_axis(), place)
+    };
+    (0..ATTEMPTS).map(drawn).find(|left_from_board| accept(left_from_board))
 }

@@ -72,19 +72,16 @@ fn rectangle(width: f64, height: f64) -> Vec<Point2<f64>> {
 }
 
 fn disc(radius: f64) -> Vec<Point2<f64>> {
-    (0..DISC_SIDES)
-        .map(|k| (k as f64 / DISC_SIDES as f64 * std::f64::consts::TAU).sin_cos())
-        .map(|(sin, cos)| Point2::new(radius * cos, radius * sin))
-        .collect()
+    let turns = (0..DISC_SIDES).map(|k| (k as f64 / DISC_SIDES as f64 * std::f64::consts::TAU).sin_cos());
+    turns.map(|(sin, cos)| Point2::new(radius * cos, radius * sin)).collect()
 }
 
 fn irregular(draws: &mut Draws) -> Vec<Point2<f64>> {
     let sides = 3 + draws.bits() % 5;
-    (0..sides)
-        .map(|k| {
-            let (sin, cos) = ((k as f64 + draws.uniform(-0.3, 0.3)) / sides as f64 * std::f64::consts::TAU).sin_cos();
-            let radius = draws.uniform(20.0, 80.0);
-            Point2::new(radius * cos, radius * sin)
-        })
-        .collect()
+    let corner = |k: u64| {
+        let (sin, cos) = ((k as f64 + draws.uniform(-0.3, 0.3)) / sides as f64 * std::f64::consts::TAU).sin_cos();
+        let radius = draws.uniform(20.0, 80.0);
+        Point2::new(radius * cos, radius * sin)
+    };
+    (0..sides).map(corner).collect()
 }

@@ -44,18 +44,10 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Reading or writing files.
     #[error(transparent)]
     Files(#[from] crate::files::Error),
-    /// No pose shows the whole board in both pictures.
     #[error("a board of {squares} squares of {square_mm} mm does not fit into the field of both cameras")]
-    BoardTooLarge {
-        /// The board.
-        squares: String,
-        /// Its squares' side, mm.
-        square_mm: f64,
-    },
-    /// The robot cannot go there, or not in view.
+    BoardTooLarge { squares: String, square_mm: f64 },
     #[error(
         "group {group}: no pose round ({:.0}, {:.0}, {:.0}) mm that the robot reaches within its limits and both cameras see",
         point_mm[0], point_mm[1], point_mm[2]
@@ -65,18 +57,11 @@ pub enum Error {
         /// Its start point, mm.
         point_mm: [f64; 3],
     },
-    /// The true robot is another kind of robot.
     #[error("the true robot has {found} joints; the nominal one has {needed}")]
-    Joints {
-        /// Its joints.
-        found: usize,
-        /// Those of Table 1.
-        needed: usize,
-    },
+    Joints { found: usize, needed: usize },
     /// Pictures of something else stand where these would go.
     #[error("the folder holds pictures that are not of this world, {name} for one; they would be taken for its own")]
     Occupied { name: String, folder: Utf8PathBuf },
-    /// A picture could not be encoded.
     #[error("cannot encode a picture: {0}")]
     Encode(#[from] image::ImageError),
 }
@@ -90,18 +75,13 @@ impl Explain for Error {
         }
     }
     fn hint(&self) -> Option<String> {
+        let said = |hint: &str| Some(hint.to_owned());
         match self {
             Error::Files(e) => e.hint(),
-            Error::BoardTooLarge { .. } => {
-                Some("the field is about 256 mm wide; take fewer or smaller squares".to_owned())
-            }
-            Error::OutOfReach { .. } => {
-                Some("the spheres of the presets suit the robot of Table 1 of the paper".to_owned())
-            }
-            Error::Joints { .. } => {
-                Some("take the robot.toml that `stereocal simulate` writes and change its numbers".to_owned())
-            }
-            Error::Occupied { .. } => Some("`--out DIR` names another folder, or remove the old pictures".to_owned()),
+            Error::BoardTooLarge { .. } => said("the field is about 256 mm wide; take fewer or smaller squares"),
+            Error::OutOfReach { .. } => said("the spheres of the presets suit the robot of Table 1 of the paper"),
+            Error::Joints { .. } => said("take the robot.toml that `stereocal simulate` writes and change its numbers"),
+            Error::Occupied { .. } => said("`--out DIR` names another folder, or remove the old pictures"),
             Error::Encode(_) => None,
         }
     }

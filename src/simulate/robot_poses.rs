@@ -1,5 +1,7 @@
 //! Where the cameras stand, and where the robot is sent: poses on spheres that it reaches and both cameras see.
 
+use std::f64::consts::PI;
+
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::Error;
@@ -54,7 +56,7 @@ pub struct Arm {
 
 /// The target's printed side faces along the flange's z-axis: its own z-axis points back into the flange.
 fn flange_from_target(robot: &Robot, mounting_rad: Vector3<f64>) -> Transform {
-    let facing = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
+    let facing = UnitQuaternion::from_scaled_axis(Vector3::x() * PI);
     let turned = UnitQuaternion::from_scaled_axis(mounting_rad) * facing;
     transform(turned.scaled_axis(), robot.tool_mm)
 }
@@ -123,24 +125,17 @@ impl<'a> Group<'a> {
         let wanted = self.base_from_flange(self.sphere.center_mm, UnitQuaternion::identity());
         let nominal = &self.arm.nominal;
         let mut starts = Draws::new(0, Purpose::RobotPoses, self.index as u64);
-        let merit = |q: &[f64]| inverse::merit(nominal, q);
         let mut best: Option<(f64, Vec<f64>)> = None;
         for attempt in 0..ATTEMPTS {
             if attempt >= POSTURE_STARTS && best.is_some() {
                 break;
             }
-            let start: Vec<f64> = nominal
-                .joints
-                .iter()
-                .map(|joint| {
-                    let (low, high) = joint.limits_rad.unwrap_or((-std::f64::consts::PI, std::f64::consts::PI));
-                    starts.uniform(0.8 * low, 0.8 * high)
-                })
-                .collect();
-            if let Some(q) = inverse::from_start(nominal, &wanted, &start)
-                && best.as_ref().is_none_or(|(most, _)| merit(&q) > *most)
-            {
-                best = Some((merit(&q), q));
+            let ranges = nominal.joints.iter().map(|joint| joint.limits_rad.unwrap_or((-PI, PI)));
+            let start: Vec<f64> = ranges.map(|(low, high)| starts.uniform(0.8 * low, 0.8 * high)).collect();
+            let Some(q) = inverse::from_start(nominal, &wanted, &start) else { continue };
+            let merit = inverse::merit(nominal, &q);
+            if best.as_ref().is_none_or(|(most, _)| merit > *most) {
+                best = Some((merit, q));
             }
         }
         let out_of_reach = || Error::OutOfReach { group: self.name(), point_mm: self.sphere.center_mm.into() };
@@ -148,7 +143,7 @@ impl<'a> Group<'a> {
     }
 
     fn name(&self) -> String {
-        format!("{}", self.index + 1)
+        (self.index + 1).to_string()
     }
 
     /// The flange's pose that brings the mark point to `point_mm`, turned by `turn` from the group's orientation.

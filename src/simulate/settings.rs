@@ -53,7 +53,6 @@ pub struct Settings {
     pub seed: u64,
     /// Pairs of pictures of the check board.
     pub check_pairs: usize,
-    /// The groups of poses.
     pub spheres: Vec<Sphere>,
     /// Radius of the spheres, mm.
     pub radius_mm: f64,
@@ -61,7 +60,6 @@ pub struct Settings {
     pub samples: usize,
     /// Poses to verify with, over all groups.
     pub verify: usize,
-    /// How the flange is turned.
     pub orientation: Orientation,
     /// The check board as drawn.
     pub check_board: Board,
@@ -71,9 +69,7 @@ pub struct Settings {
     pub target_board: Board,
     /// The target as made.
     pub target_workmanship: Workmanship,
-    /// The boards' print.
     pub print: Print,
-    /// The lenses' spread.
     pub optics: Optics,
     pub lighting: Lighting,
     pub sensor: Sensor,

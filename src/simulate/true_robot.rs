@@ -49,11 +49,8 @@ pub fn add_effects(robot: &mut Robot, nominal: &Robot, deviations: &RobotDeviati
     if per_m > 0.0 {
         for (joint, point) in [(1, LoadPoint::Origin(2)), (1, LoadPoint::Origin(4)), (2, LoadPoint::Origin(4))] {
             if joint < robot.joints.len() {
-                robot.corrections.gravity.push(GravityTerm {
-                    joint,
-                    point,
-                    k_rad_per_m: per_m * draws.uniform(0.5, 1.0),
-                });
+                let k_rad_per_m = per_m * draws.uniform(0.5, 1.0);
+                robot.corrections.gravity.push(GravityTerm { joint, point, k_rad_per_m });
             }
         }
     }

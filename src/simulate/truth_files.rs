@@ -4,11 +4,10 @@ use std::fmt::Write as _;
 
 use super::draws::{Draws, Purpose};
 use super::world::World;
-
 use crate::files::{OutDir, Result};
 use crate::formats::calibration::CalibrationFile;
 use crate::imaging::input::corners_csv;
-use crate::measurements::{RobotPose, pose_fields, pose_header, poses_csv};
+use crate::measurements::{pose_fields, pose_header, poses_csv};
 use crate::robot::file::to_toml;
 
 /// The columns of `measurements.csv` behind the pose.
@@ -46,10 +45,9 @@ fn measurements_csv(world: &World, noise_mm: f64) -> String {
         let variance = noise_mm * noise_mm;
         let covariance =
             if noise_mm > 0.0 { format!("{variance},0,0,{variance},0,{variance}") } else { ",,,,,".to_owned() };
-        let row: &RobotPose = &pose.commanded;
         // Rotations are left out with noise: nothing says how well they would be known.
         let rotation = if noise_mm > 0.0 { ",,".to_owned() } else { format!("{},{},{}", r.x, r.y, r.z) };
-        let _ = writeln!(text, "{},{},{},{},{covariance},{rotation},,,ok", pose_fields(row), p.x, p.y, p.z);
+        let _ = writeln!(text, "{},{},{},{},{covariance},{rotation},,,ok", pose_fields(&pose.commanded), p.x, p.y, p.z);
     }
     text
 }

@@ -53,7 +53,6 @@ pub struct Shot {
     pub stem: String,
     /// Whether the target is in it, or else the check board.
     pub shows_target: bool,
-    /// Where the board is.
     pub left_from_board: Transform,
     /// Which placement of the cameras: what stands behind depends on it.
     pub placement: u64,
@@ -113,8 +112,7 @@ impl World {
     pub fn backdrop(&self, placement: u64, side: Side) -> Backdrop {
         let (camera, camera_from_left) = self.camera(side);
         let patches = clutter::behind(self.settings.seed, placement);
-        let index = 2 * placement + u64::from(side == Side::Right);
-        Backdrop::new(&camera, &camera_from_left, &patches, self.settings.seed, index)
+        Backdrop::new(&camera, &camera_from_left, &patches, self.settings.seed, of_side(placement, side))
     }
 
     /// What carries the board of a shot.
@@ -136,7 +134,7 @@ impl World {
             lighting: lighting(&self.settings, shot.number, side),
             sensor: self.settings.sensor,
             seed: self.settings.seed,
-            picture: 2 * shot.number + u64::from(side == Side::Right),
+            picture: of_side(shot.number, side),
         }
     }
 
@@ -189,7 +187,7 @@ impl World {
     pub fn check_unoccupied(&self, out: &OutDir) -> Result<(), Error> {
         let names: Vec<(&str, String)> =
             self.shots().iter().map(|shot| (shot.folder, format!("{}.png", shot.stem))).collect();
-        for (folder, side) in ["check", "poses"].into_iter().flat_map(|f| [(f, Side::Left), (f, Side::Right)]) {
+        for (folder, side) in ["check", "poses"].into_iter().flat_map(|f| Side::BOTH.map(|side| (f, side))) {
             let path = out.join(&format!("{folder}/{}", side.name()));
             let Ok(entries) = path.read_dir_utf8() else { continue };
             for entry in entries.flatten() {
@@ -208,30 +206,21 @@ impl World {
         let shots = self.shots();
         let normals = NormalTable::new();
         let placements = 1 + self.settings.spheres.len() as u64;
-        let sides = [Side::Left, Side::Right];
-        let backdrops: Vec<Backdrop> = (0..placements)
-            .flat_map(|p| sides.map(|side| (p, side)))
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .map(|(placement, side)| self.backdrop(placement, side))
-            .collect();
+        let views: Vec<(u64, Side)> = (0..placements).flat_map(|p| Side::BOTH.map(|side| (p, side))).collect();
+        let backdrops: Vec<Backdrop> = views.into_par_iter().map(|(p, side)| self.backdrop(p, side)).collect();
         let bar = progress::bar("rendering", 2 * shots.len() as u64);
-        let jobs: Vec<(&Shot, Side)> =
-            shots.iter().flat_map(|shot| [(shot, Side::Left), (shot, Side::Right)]).collect();
-        let done: Result<Vec<()>> = jobs
-            .par_iter()
-            .map(|&(shot, side)| {
-                let backdrop = &backdrops[2 * shot.placement as usize + usize::from(side == Side::Right)];
-                let holder = self.holder(shot);
-                let scene = self.scene(shot, side, backdrop, &holder);
-                let picture = Renderer::new(&scene).picture(&normals);
-                out.write(&format!("{}/{}/{}.png", shot.folder, side.name(), shot.stem), &png(&picture)?)?;
-                bar.inc(1);
-                Ok(())
-            })
-            .collect();
+        let jobs: Vec<(&Shot, Side)> = shots.iter().flat_map(|shot| Side::BOTH.map(|side| (shot, side))).collect();
+        let done = jobs.par_iter().try_for_each(|&(shot, side)| {
+            let backdrop = &backdrops[of_side(shot.placement, side) as usize];
+            let holder = self.holder(shot);
+            let scene = self.scene(shot, side, backdrop, &holder);
+            let picture = Renderer::new(&scene).picture(&normals);
+            out.write(&format!("{}/{}/{}.png", shot.folder, side.name(), shot.stem), &png(&picture)?)?;
+            bar.inc(1);
+            Ok(())
+        });
         bar.finish_and_clear();
-        done.map(|_| ())
+        done
     }
 
     /// The target's true mark point at a pose, left camera's frame, mm, and its rotation vector.
@@ -240,10 +229,15 @@ impl World {
     }
 }
 
+/// Left and right of a pair, numbered one after the other.
+fn of_side(pair: u64, side: Side) -> u64 {
+    2 * pair + u64::from(side == Side::Right)
+}
+
 /// The light of one side of a pair: the two cameras see it from two sides, and each pair a little differently.
 pub fn lighting(settings: &Settings, pair: u64, side: Side) -> Lighting {
     let mut lighting = settings.lighting;
-    let mut draws = Draws::new(settings.seed, Purpose::Lighting, 2 * pair + u64::from(side == Side::Right));
+    let mut draws = Draws::new(settings.seed, Purpose::Lighting, of_side(pair, side));
     lighting.gradient.0 += draws.uniform(-0.05, 0.05);
     lighting.gradient.1 += draws.uniform(-0.05, 0.05);
     lighting.exposure *= draws.uniform(0.93, 1.05);

@@ -6,6 +6,7 @@
 
 use super::fields::Fields;
 use super::names::{Name, Unit, What};
+use super::numbers::is_number;
 
 /// Numbers of the longest list that is a part of a pose: a transform.
 const LONGEST: usize = 16;
@@ -41,13 +42,13 @@ pub(super) fn named(text: &str) -> Option<Vec<(u64, Fields)>> {
         {
             return None;
         }
-        let names = Fields::new(names.into_iter());
+        let names = Fields::new(names);
         if rows.is_empty() {
             rows.push((number, names));
         } else if rows[0].1 != names {
             return None;
         }
-        rows.push((number, Fields::new(values.into_iter())));
+        rows.push((number, Fields::new(values)));
     }
     (rows.len() > 2).then_some(rows)
 }
@@ -100,8 +101,7 @@ pub(super) fn plain(rows: &mut Vec<(u64, Fields)>, blanks: bool) {
             Column::Unit(_) => vec![with_unit(cell).map_or(cell.to_owned(), |(number, _)| number)],
             _ => vec![cell.to_owned()],
         });
-        let cells: Vec<String> = cells.collect();
-        *row = Fields::new(cells.iter().map(String::as_str));
+        *row = Fields::new(cells);
     }
 }
 
@@ -160,10 +160,6 @@ fn with_unit(cell: &str) -> Option<(String, String)> {
     }
     let plain = number.trim().replace(',', ".").replace('\u{2212}', "-");
     (is_number(&plain) && Unit::of(unit).is_some()).then(|| (plain, unit.to_owned()))
-}
-
-fn is_number(word: &str) -> bool {
-    word.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.')) && word.parse::<f64>().is_ok()
 }
 
 /// Names for the numbers of a list: joints are counted, three numbers are a point, and so is the last column of a transform.

@@ -9,22 +9,20 @@ pub struct Fields {
 
 impl Fields {
     /// From cells in their order.
-    pub fn new<'a>(cells: impl Iterator<Item = &'a str>) -> Fields {
+    pub fn new(cells: impl IntoIterator<Item = impl AsRef<str>>) -> Fields {
         let (mut text, mut ends) = (String::new(), Vec::new());
         for cell in cells {
-            text.push_str(cell);
+            text.push_str(cell.as_ref());
             // A row has less than 2^32 bytes.
             ends.push(text.len() as u32);
         }
         Fields { text: text.into(), ends: ends.into() }
     }
 
-    /// Number of fields.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }

@@ -36,6 +36,11 @@ pub struct Grid {
 }
 
 impl Grid {
+    /// One without rows.
+    pub fn empty(path: &Utf8Path, form: Form, encoding: Option<&'static str>) -> Grid {
+        Grid { path: path.to_owned(), form, encoding, rows: Vec::new() }
+    }
+
     /// Reads a file; `what` names it in the message when it is not there, `hint` says what makes it.
     pub fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<Grid> {
         Grid::of(path, source::read(path, what, hint)?, None)
@@ -63,7 +68,7 @@ impl Grid {
     }
 
     fn of(path: &Utf8Path, source: Source, joints: Option<usize>) -> Result<Grid> {
-        let empty = |form, encoding| Grid { path: path.to_owned(), form, encoding, rows: Vec::new() };
+        let empty = |form, encoding| Grid::empty(path, form, encoding);
         match source {
             Source::Sheet { rows, name, others } => {
                 let mut grid = empty(Form::Sheet(name, others), None);
@@ -73,10 +78,16 @@ impl Grid {
             Source::Text(text, encoding) => {
                 if let Some((rows, form)) = joints.and_then(|joints| program_lines::read(path, &text, joints)) {
                     let grid = Grid { rows, ..empty(form, encoding) };
-                    return match &grid.form {
-                        Form::Program { calls, .. } if calls.len() > 1 => Err(grid.of_several_calls(calls)),
-                        _ => Ok(grid),
-                    };
+                    if let Form::Program { calls, .. } = &grid.form
+                        && calls.len() > 1
+                    {
+                        let calls = calls.join("`, `");
+                        let message =
+                            format!("lists of numbers in calls of `{calls}`: not all of them can be joint targets");
+                        let hint = "leave the lines with joint targets alone, or make a table of them";
+                        return Err(grid.refuse(grid.rows[0].0, message, Some(hint)));
+                    }
+                    return Ok(grid);
                 }
                 if let Some(rows) = joints.and_then(|_| cells::named(&text)) {
                     return Ok(Grid { rows, ..empty(Form::Delimited(','), encoding) });
@@ -159,12 +170,6 @@ impl Grid {
         Error::format(&self.path, line, format!("not readable as CSV: {e}"), None)
     }
 
-    fn of_several_calls(&self, calls: &[String]) -> Error {
-        let message =
-            format!("lists of numbers in calls of `{}`: not all of them can be joint targets", calls.join("`, `"));
-        self.refuse(self.rows[0].0, message, Some("leave the lines with joint targets alone, or make a table of them"))
-    }
-
     /// A complaint about a line.
     pub fn refuse(&self, line: u64, message: String, hint: Option<&str>) -> Error {
         Error::format(&self.path, Some(line), message, hint)
@@ -221,21 +226,16 @@ fn unguarded(field: &str) -> &str {
 fn delimiter(text: &str) -> char {
     // (rows of equally many cells, numbers among their cells)
     let score = |delimiter: char| {
-        let mut grid =
-            Grid { path: Utf8PathBuf::new(), form: Form::Delimited(delimiter), encoding: None, rows: Vec::new() };
+        let mut grid = Grid::empty(Utf8Path::new(""), Form::Delimited(delimiter), None);
         if grid.fill(text, delimiter, SEEN_ROWS).is_err() {
             return (0, 0);
         }
         let mut counts: Vec<usize> = grid.rows.iter().map(|(_, row)| row.len()).filter(|&n| n > 1).collect();
         counts.sort_unstable();
-        let Some(mode) =
-            counts.chunk_by(|a, b| a == b).max_by_key(|chunk| chunk.len()).map(|chunk| (chunk[0], chunk.len()))
-        else {
-            return (0, 0);
-        };
-        let of_mode = grid.rows.iter().filter(|(_, row)| row.len() == mode.0);
-        let numbers = of_mode.flat_map(|(_, row)| row.iter()).map(cells::count).sum();
-        (mode.1, numbers)
+        let Some(usual) = counts.chunk_by(|a, b| a == b).max_by_key(|chunk| chunk.len()) else { return (0, 0) };
+        let rows = grid.rows.iter().filter(|(_, row)| row.len() == usual[0]);
+        let numbers = rows.flat_map(|(_, row)| row.iter()).map(cells::count).sum();
+        (usual.len(), numbers)
     };
     let scores = [',', ';', '\t', '|', ' '].map(|d| (d, score(d)));
     let most = scores.iter().map(|(_, (rows, _))| *rows).max().unwrap_or(0);

@@ -196,6 +196,18 @@ fn even(grid: &Grid, first: usize, names: usize) -> Result<Vec<(u64, Fields)>> {
     Ok(even)
 }
 
+/// Names with those that belong to the one before put behind it.
+fn joined(names: &[String], belongs: impl Fn(&str, &str) -> bool) -> Vec<String> {
+    let mut joined: Vec<String> = Vec::new();
+    for (i, name) in names.iter().enumerate() {
+        match joined.last_mut().filter(|_| belongs(&names[i - 1], name)) {
+            Some(before) => *before = format!("{before} {name}"),
+            None => joined.push(name.clone()),
+        }
+    }
+    joined
+}
+
 /// Names, one a column: without a comment's mark, with units put back to the names that blanks cut off, with one for numbers of rows.
 fn fitted(grid: &Grid, line: u64, mut names: Vec<String>, rows: &[(u64, Fields)], width: usize) -> Result<Vec<String>> {
     if names.first().is_some_and(|name| matches!(name.as_str(), "#" | "%" | "//")) {
@@ -205,29 +217,14 @@ fn fitted(grid: &Grid, line: u64, mut names: Vec<String>, rows: &[(u64, Fields)]
         *first = first.trim_start_matches(['#', '%']).trim().to_owned();
     }
     if names.len() > width {
-        let mut joined: Vec<String> = Vec::new();
-        for name in &names {
-            match joined.last_mut() {
-                Some(before) if name.starts_with(['[', '(']) => *before = format!("{before} {name}"),
-                _ => joined.push(name.clone()),
-            }
-        }
-        names = joined;
+        names = joined(&names, |_, name| name.starts_with(['[', '(']));
     }
     while names.len() > width && names.last().is_some_and(String::is_empty) {
         names.pop();
     }
     if names.len() > width {
         // `Nominal X Nominal Y`: blanks cut these off from what they are said of.
-        let mut joined: Vec<String> = Vec::new();
-        let mut open = false;
-        for name in &names {
-            match joined.last_mut().filter(|_| open) {
-                Some(before) => *before = format!("{before} {name}"),
-                None => joined.push(name.clone()),
-            }
-            open = is_said_of_another(name);
-        }
+        let joined = joined(&names, |before, _| is_said_of_another(before));
         names = if joined.len() == width { joined } else { names };
     }
     // Names of rows have no name of their own.
@@ -240,11 +237,8 @@ fn fitted(grid: &Grid, line: u64, mut names: Vec<String>, rows: &[(u64, Fields)]
     }
     if names.len() != width {
         let message = format!("{} names for {width} columns", names.len());
-        return Err(grid.refuse(
-            line,
-            message,
-            Some("`--columns NAME,NAME,...` names the columns in their order, `-` skips one"),
-        ));
+        let hint = "`--columns NAME,NAME,...` names the columns in their order, `-` skips one";
+        return Err(grid.refuse(line, message, Some(hint)));
     }
     Ok(names)
 }
@@ -252,13 +246,10 @@ fn fitted(grid: &Grid, line: u64, mut names: Vec<String>, rows: &[(u64, Fields)]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use camino::{Utf8Path, Utf8PathBuf};
 
     fn read(text: &str) -> Result<Headed> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = Utf8PathBuf::from_path_buf(folder.path().join("t.csv")).unwrap();
-        std::fs::write(&path, text).unwrap();
-        split(&Grid::read(Utf8Path::new(path.as_str()), "the table", "")?)
+        let (_folder, path) = files::temporary("t.csv", text);
+        split(&Grid::read(&path, "the table", "")?)
     }
 
     fn names(text: &str) -> Option<Vec<String>> {

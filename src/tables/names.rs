@@ -8,17 +8,11 @@
 /// A unit of a joint or of a length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unit {
-    /// Degrees.
     Deg,
-    /// Radians.
     Rad,
-    /// Millimetres.
     Mm,
-    /// Metres.
     M,
-    /// Micrometres.
     Um,
-    /// Centimetres.
     Cm,
     Inch,
 }
@@ -90,7 +84,6 @@ pub enum What {
     Distance,
     /// A column of the measurements' own format, by its name.
     Own(&'static str),
-    /// Nothing of these.
     Other,
 }
 

@@ -61,18 +61,13 @@ fn is_decimal_comma(cell: &str) -> bool {
         && (behind.len() != 3 || digits.is_empty() || digits.len() > 3 || digits == "0")
 }
 
-fn is_number(text: &str) -> bool {
+pub(super) fn is_number(text: &str) -> bool {
     text.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.')) && text.parse::<f64>().is_ok()
 }
 
 /// Without blanks between digits and apostrophes that set thousands apart, with a plain minus sign and an exponent's `e` for Fortran's `D`.
 fn bare(cell: &str) -> String {
-    let plain: String = cell
-        .trim()
-        .chars()
-        .filter(|c| !matches!(c, '\u{a0}' | '\u{202f}' | '\u{2009}' | '\u{2007}'))
-        .map(|c| if c == '\u{2212}' { '-' } else { c })
-        .collect();
+    let plain = cell.trim().replace(['\u{a0}', '\u{202f}', '\u{2009}', '\u{2007}'], "").replace('\u{2212}', "-");
     if plain.contains(' ') || plain.contains('\'') || plain.contains('\u{2019}') {
         let grouped = [' ', '\'', '\u{2019}']
             .iter()

@@ -25,10 +25,7 @@ pub(super) fn read(path: &Utf8Path, text: &str, joints: usize) -> Option<(Vec<(u
         if let Ok(targets) = found
             && !targets.is_empty()
         {
-            let row = |t: &programs::Target| {
-                let cells: Vec<String> = t.readings.iter().map(f64::to_string).collect();
-                (t.line, Fields::new(cells.iter().map(String::as_str)))
-            };
+            let row = |t: &programs::Target| (t.line, Fields::new(t.readings.iter().map(f64::to_string)));
             let rows: Vec<(u64, Fields)> = targets.iter().map(row).collect();
             let others = lines.saturating_sub(rows.len());
             return Some((rows, Form::Program { others, degrees: true, calls: Vec::new() }));

@@ -23,7 +23,6 @@ const MOST_SHEET_BYTES: usize = 64 << 20;
 /// Bytes of a file that tell an encoding without a mark.
 const SEEN: usize = 4096;
 
-/// What a file holds.
 pub(super) enum Source {
     /// Text, and its encoding where that is not UTF-8.
     Text(String, Option<&'static str>),
@@ -200,17 +199,14 @@ mod tests {
 
     #[test]
     fn files_of_other_programs_are_refused_with_how_to_export_them() {
-        let folder = tempfile::tempdir().unwrap();
         let refused = |name: &str, bytes: &[u8]| {
-            let path = Utf8PathBuf::from_path_buf(folder.path().join(name)).unwrap();
-            std::fs::write(&path, bytes).unwrap();
+            let (_folder, path) = crate::files::temporary(name, bytes);
             read(&path, "the table", "").err().map(|e| crate::diagnostic::report(&e)).unwrap()
         };
         assert!(refused("a.mat", b"MATLAB 5.0 MAT-file").contains("writematrix"));
         assert!(refused("b.dat", b"MATLAB 5.0 MAT-file").contains("MATLAB file"));
         assert!(refused("a.npy", b"\x93NUMPY\x01").contains("numpy.savetxt"));
-        let lines = Utf8PathBuf::from_path_buf(folder.path().join("lines.csv")).unwrap();
-        std::fs::write(&lines, b"j1,x\0\r\n1,2\0\r\n").unwrap();
+        let (_folder, lines) = crate::files::temporary("lines.csv", b"j1,x\0\r\n1,2\0\r\n");
         let Ok(Source::Text(text, None)) = read(&lines, "the table", "") else { panic!("not read") };
         assert_eq!(text.lines().collect::<Vec<_>>(), ["j1,x", "1,2"]);
         assert!(refused("a.csv", b"\x00\x01\x02\xffabc").contains("no spreadsheet"));

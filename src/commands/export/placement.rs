@@ -7,7 +7,7 @@ use crate::config::{self, Config};
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::placements::record::{GroupRecord, PLACEMENT, PlacementFile};
-use crate::formats::placements::{Frames, Placement, easy_handeye, file_storage, ros_static_tf};
+use crate::formats::placements::{Frames, Placement, plain};
 
 /// Runs the command.
 pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome> {
@@ -36,11 +36,11 @@ pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome>
         };
         let placement = Placement { frames: &frames, base_from_camera, flange_from_target };
         let (name, text) = match args.format {
-            PlacementFormat::RosStaticTf => (format!("static_tf{suffix}.launch.yaml"), ros_static_tf::text(&placement)),
-            PlacementFormat::Opencv => (format!("placement_opencv{suffix}.yml"), file_storage::text(&placement)),
+            PlacementFormat::RosStaticTf => (format!("static_tf{suffix}.launch.yaml"), placement.ros_static_tf()),
+            PlacementFormat::Opencv => (format!("placement_opencv{suffix}.yml"), placement.file_storage()),
             PlacementFormat::EasyHandeye => {
                 let namespace = format!("easy_handeye{suffix}");
-                (format!("{namespace}.yaml"), easy_handeye::text(&placement, &namespace))
+                (format!("{namespace}.yaml"), placement.easy_handeye(&namespace))
             }
         };
         out.write(&name, text.as_bytes())?;
@@ -73,9 +73,4 @@ fn groups<'a>(args: &ExportPlacement, file: &'a PlacementFile) -> Result<Vec<&'a
         _ => "the placement holds no group: distances do not tell where the sensor stands".to_owned(),
     };
     Err(config::Error::Invalid { problems: vec![problem] }.into())
-}
-
-/// A name that files and ROS frames may have.
-fn plain(name: &str) -> String {
-    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }

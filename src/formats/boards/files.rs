@@ -35,25 +35,25 @@ pub fn named(text: &str) -> Result<Board, String> {
     let of_file = match kind.as_deref() {
         Some("yaml" | "yml") => by_kalibr,
         Some("json") => by_calibrator,
-        _ => return text.parse().map_err(|error: crate::imaging::board::Error| error.to_string()),
+        _ => return parsed(text),
     };
     let content = files::read_text(path, "file of a board", None).map_err(|error| format!("{path}: {error}"))?;
     of_file(&content).map_err(|why| format!("{path}: {why}"))
 }
 
+/// The board of a name in this program's words.
+fn parsed(name: &str) -> Result<Board, String> {
+    name.parse().map_err(|error: crate::imaging::board::Error| error.to_string())
+}
+
 /// A checkerboard by its inner corners, mm.
 fn checker(columns: f64, rows: f64, square_mm: f64) -> Result<Board, String> {
-    let count = |corners: f64, what: &str| {
-        let is_count = corners.fract() == 0.0 && (2.0..200.0).contains(&corners);
-        if is_count {
-            Ok(corners as usize + 1)
-        } else {
-            Err(format!("{corners} {what} of inner corners are no board's"))
-        }
+    let count = |corners: f64, what: &str| match corners.fract() == 0.0 && (2.0..200.0).contains(&corners) {
+        true => Ok(corners as usize + 1),
+        false => Err(format!("{corners} {what} of inner corners are no board's")),
     };
     let (columns, rows) = (count(columns, "columns")?, count(rows, "rows")?);
-    let name = format!("checker:{}:{square_mm}", Squares { columns, rows });
-    name.parse().map_err(|error: crate::imaging::board::Error| error.to_string())
+    parsed(&format!("checker:{}:{square_mm}", Squares { columns, rows }))
 }
 
 /// Rounds off what a length in metres brings along as binary fraction, mm.
@@ -64,7 +64,6 @@ fn mm(metres: f64) -> f64 {
 /// Longest side of a tag in Kalibr's file, mm: longer ones were meant as mm.
 const MOST_TAG_MM: f64 = 3000.0;
 
-/// Kalibr's target file.
 fn by_kalibr(text: &str) -> Result<Board, String> {
     let without_comments: String =
         text.lines().map(|line| line.split_once('#').map_or(line, |(before, _)| before).to_owned() + "\n").collect();
@@ -89,8 +88,7 @@ fn by_kalibr(text: &str) -> Result<Board, String> {
                 return Err("`codeOffset` is not 0: only boards whose tags begin with number 0 are read".to_owned());
             }
             // The file names no family: Kalibr knows but this one.
-            let name = format!("apriltag:{columns}x{rows}:tag36h11:{tag_mm}:{gap_mm}");
-            name.parse().map_err(|error: crate::imaging::board::Error| error.to_string())
+            parsed(&format!("apriltag:{columns}x{rows}:tag36h11:{tag_mm}:{gap_mm}"))
         }
         "circlegrid" => {
             Err("a grid of circles; only boards of squares are read: checkerboards, ChArUco boards and AprilGrids"
@@ -166,8 +164,7 @@ fn by_generator(name: &str) -> Option<Result<Board, String>> {
             )));
         }
     };
-    let parse = |name: String| name.parse::<Board>().map_err(|error| error.to_string());
-    Some(board.ok_or_else(|| format!("`{name}` does not say rows and columns")).and_then(parse))
+    Some(board.ok_or_else(|| format!("`{name}` does not say rows and columns")).and_then(|name| parsed(&name)))
 }
 
 #[cfg(test)]
@@ -176,10 +173,8 @@ mod tests {
 
     /// What a file of this name and content is read as.
     fn read(name: &str, content: &str) -> Result<String, String> {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join(name);
-        std::fs::write(&path, content).unwrap();
-        named(path.to_str().unwrap()).map(|board| board.to_string())
+        let (_folder, path) = files::temporary(name, content);
+        named(path.as_str()).map(|board| board.to_string())
     }
 
     #[test]
@@ -187,6 +182,7 @@ mod tests {
         let checker = "target_type: 'checkerboard' #gridtype\ntargetCols: 6               #number of internal corners\n\
                        targetRows: 7\nrowSpacingMeters: 0.06      #size of one chessboard square [m]\ncolSpacingMeters: 0.06\n";
         assert_eq!(read("target.yaml", checker), Ok("checker:8x7:60".to_owned()));
+        let grid = "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.024\ntagSpacing: 0.3\ncodeOffset: 5\n";
         for (text, why) in [
             (checker.replace("colSpacingMeters: 0.06", "colSpacingMeters: 0.05"), "50 x 60 mm"),
             (checker.replace("targetCols: 6 ", "targetCols: 1 "), "no board's"),
@@ -194,19 +190,9 @@ mod tests {
             (checker.replace("targetRows: 7", "targetRows: seven"), "not a number"),
             ("target_type: 'circlegrid'\ntargetCols: 6\n".to_owned(), "grid of circles"),
             ("target_type: 'aprilgrid'\ntagCols: 6\n".to_owned(), "tagRows"),
-            (
-                "target_type: 'aprilgrid'\ntagCols: 6.5\ntagRows: 6\ntagSize: 0.088\ntagSpacing: 0.3\n".to_owned(),
-                "6.5x6",
-            ),
-            (
-                "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 24\ntagSpacing: 0.3\n".to_owned(),
-                "in metres",
-            ),
-            (
-                "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.024\ntagSpacing: 0.3\ncodeOffset: 5\n"
-                    .to_owned(),
-                "codeOffset",
-            ),
+            (grid.replace("Cols: 6", "Cols: 6.5").replace("codeOffset: 5\n", ""), "6.5x6"),
+            (grid.replace("0.024", "24"), "in metres"),
+            (grid.to_owned(), "codeOffset"),
             ("target_type: 'dots'\n".to_owned(), "`dots`"),
             ("cam0:\n".to_owned(), "no target file"),
         ] {

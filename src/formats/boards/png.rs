@@ -7,7 +7,6 @@ use png::{BitDepth, ColorType, Encoder, PixelDimensions, Unit};
 
 use super::sheet::Sheet;
 
-/// Millimetres of an inch.
 const INCH_MM: f64 = 25.4;
 /// Most dots of a sheet: A0 at 300 per inch has 140 million.
 const MOST_DOTS: f64 = 4e8;

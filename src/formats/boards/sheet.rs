@@ -196,17 +196,15 @@ impl Sheet {
 fn ruler(x: f64, y: f64, length: f64) -> Vec<Patch> {
     const LINE_MM: f64 = 0.2;
     const HIGH_MM: f64 = 4.0;
-    let mut patches = vec![Patch { x, y, width: length, height: LINE_MM, is_black: true }];
     let ticks = (length / TICK_MM).round() as usize;
-    for k in 0..=ticks {
-        let at = match k {
-            0 => x,
-            _ if k == ticks => x + length - LINE_MM,
-            _ => x + k as f64 * TICK_MM - LINE_MM / 2.0,
-        };
-        patches.push(Patch { x: at, y, width: LINE_MM, height: HIGH_MM, is_black: true });
-    }
-    patches
+    let at = |k: usize| match k {
+        0 => x,
+        _ if k == ticks => x + length - LINE_MM,
+        _ => x + k as f64 * TICK_MM - LINE_MM / 2.0,
+    };
+    let line = Patch { x, y, width: length, height: LINE_MM, is_black: true };
+    let tick = |k: usize| Patch { x: at(k), width: LINE_MM, height: HIGH_MM, ..line };
+    std::iter::once(line).chain((0..=ticks).map(tick)).collect()
 }
 
 #[cfg(test)]

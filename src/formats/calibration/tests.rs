@@ -1,19 +1,23 @@
 use super::*;
 use crate::geometry::transform;
 
+/// Two plain cameras side by side, one of whose numbers is uncertain.
+fn plain() -> Rig {
+    Rig {
+        left: Camera::pinhole(640, 480, 500.0),
+        right: Camera::pinhole(640, 480, 500.0),
+        right_from_left: transform(Vector3::zeros(), Vector3::new(-120.0, 0.0, 0.0)),
+        covariance: Some(Covariance { order: vec!["left.fx".into()], matrix: DMatrix::from_element(1, 1, 0.5) }),
+    }
+}
+
 #[test]
 fn a_rig_survives_the_file() {
-    let mut left = Camera::pinhole(640, 480, 500.0);
-    left.distortion[0] = -0.25;
-    let mut right = left;
-    right.lens = Lens::Brown5;
-    right.distortion[4] = 0.125;
-    let rig = Rig {
-        left,
-        right,
-        right_from_left: transform(Vector3::new(0.01, -0.3, 0.02), Vector3::new(-120.0, 1.0, 20.0)),
-        covariance: Some(Covariance { order: vec!["left.fx".into()], matrix: DMatrix::from_element(1, 1, 0.5) }),
-    };
+    let mut rig = plain();
+    rig.left.distortion[0] = -0.25;
+    rig.right = Camera { lens: Lens::Brown5, ..rig.left };
+    rig.right.distortion[4] = 0.125;
+    rig.right_from_left = transform(Vector3::new(0.01, -0.3, 0.02), Vector3::new(-120.0, 1.0, 20.0));
     let text = files::to_json(&CalibrationFile::from(&rig));
     let back = serde_json::from_str::<CalibrationFile>(&text).unwrap().rig().unwrap();
     assert_eq!(back.left, rig.left);
@@ -43,13 +47,7 @@ fn a_folder_stands_for_the_one_calibration_in_it() {
 
 #[test]
 fn what_is_no_rig_is_refused_by_name() {
-    let good = Rig {
-        left: Camera::pinhole(640, 480, 500.0),
-        right: Camera::pinhole(640, 480, 500.0),
-        right_from_left: transform(Vector3::zeros(), Vector3::new(-120.0, 0.0, 0.0)),
-        covariance: Some(Covariance { order: vec!["left.fx".into()], matrix: DMatrix::from_element(1, 1, 0.5) }),
-    };
-    let good = serde_json::to_value(CalibrationFile::from(&good)).unwrap();
+    let good = serde_json::to_value(CalibrationFile::from(&plain())).unwrap();
     let refused = |pointer: &str, value: serde_json::Value| {
         let mut changed = good.clone();
         *changed.pointer_mut(pointer).unwrap() = value;
@@ -76,16 +74,10 @@ fn what_is_no_rig_is_refused_by_name() {
 
 #[test]
 fn a_rig_that_did_not_pass_says_so_to_those_who_use_it() {
-    let rig = Rig {
-        left: Camera::pinhole(640, 480, 500.0),
-        right: Camera::pinhole(640, 480, 500.0),
-        right_from_left: transform(Vector3::zeros(), Vector3::new(-120.0, 0.0, 0.0)),
-        covariance: None,
-    };
     let folder = tempfile::tempdir().unwrap();
     let path = Utf8Path::from_path(folder.path()).unwrap().join("calibration.json");
     let doubts = |check: Option<(Verdict, Option<f64>)>, unconfirmed: &[&str]| {
-        let mut file = CalibrationFile::from(&rig);
+        let mut file = CalibrationFile::from(&plain());
         file.check = check.map(|(verdict, trusted_mm)| Check { verdict, tolerance_mm: 0.05, trusted_mm });
         file.unconfirmed = unconfirmed.iter().map(|pair| (*pair).to_owned()).collect();
         std::fs::write(&path, files::to_json(&file)).unwrap();

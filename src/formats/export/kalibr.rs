@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::scan::{list, word};
-use super::written::{ExportedFile, METRE, camera, numbers, refuse};
+use super::written::{ExportedFile, METRE, camera, numbers, within};
 use crate::formats::checked;
 use crate::geometry::rotation_matrix;
 use crate::stereo::{Camera, Error, Lens, Rig};
@@ -12,9 +12,7 @@ use crate::stereo::{Camera, Error, Lens, Rig};
 pub fn files(rig: &Rig) -> Result<Vec<ExportedFile>, Error> {
     let mut text = String::new();
     for (i, camera) in [&rig.left, &rig.right].into_iter().enumerate() {
-        if camera.lens > Lens::Brown4 {
-            return Err(refuse("kalibr", camera.lens, Lens::Brown4));
-        }
+        within("kalibr", camera, Lens::Brown4)?;
         text.push_str(&format!("cam{i}:\n"));
         if i == 1 {
             let r = rotation_matrix(&rig.right_from_left);

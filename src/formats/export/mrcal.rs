@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::scan::{list, word};
-use super::written::{ExportedFile, METRE, camera, numbers, refuse};
+use super::written::{ExportedFile, METRE, camera, numbers, within};
 use crate::formats::checked;
 use crate::geometry::{Transform, rotation_matrix, rotation_vector, transform};
 use crate::stereo::{Camera, Error, Lens, Rig};
@@ -17,9 +17,7 @@ pub fn files(rig: &Rig) -> Result<Vec<ExportedFile>, Error> {
 }
 
 fn text(camera: &Camera, camera_from_left: &Transform) -> Result<String, Error> {
-    if camera.lens > Lens::ThinPrism12 {
-        return Err(refuse("mrcal", camera.lens, Lens::ThinPrism12));
-    }
+    within("mrcal", camera, Lens::ThinPrism12)?;
     let n = camera.lens.vector_length();
     let intrinsics =
         [camera.fx, camera.fy, camera.cx, camera.cy].into_iter().chain(camera.distortion[..n].iter().copied());
@@ -50,15 +48,16 @@ pub fn read_camera(text: &str) -> Result<Camera, String> {
 
 fn one(text: &str) -> Result<(Camera, Transform), String> {
     let model = word(text, "lensmodel")?;
-    let count = match model {
-        "LENSMODEL_PINHOLE" => 0,
-        "LENSMODEL_OPENCV4" => 4,
-        "LENSMODEL_OPENCV5" => 5,
-        "LENSMODEL_OPENCV8" => 8,
-        "LENSMODEL_OPENCV12" => 12,
+    let count = match model.strip_prefix("LENSMODEL_") {
+        Some("PINHOLE") => 0,
+        Some("OPENCV4") => 4,
+        Some("OPENCV5") => 5,
+        Some("OPENCV8") => 8,
+        Some("OPENCV12") => 12,
         _ => {
-            let known = "only LENSMODEL_PINHOLE and LENSMODEL_OPENCV4, 5, 8 and 12 are read";
-            return Err(format!("lens model {model}: {known}"));
+            return Err(format!(
+                "lens model {model}: only LENSMODEL_PINHOLE and LENSMODEL_OPENCV4, 5, 8 and 12 are read"
+            ));
         }
     };
     let intrinsics = list(text, "intrinsics", None)?;

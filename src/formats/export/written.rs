@@ -11,7 +11,6 @@ pub(in crate::formats) const METRE: f64 = 1e-3;
 pub struct ExportedFile {
     /// Its name in the results folder.
     pub name: &'static str,
-    /// Its content.
     pub text: String,
 }
 
@@ -32,6 +31,8 @@ pub(super) fn camera(size: (f64, f64), pinhole: &[f64], distortion: &[f64]) -> R
     checked::camera(size, pinhole, checked::lens_of_length(distortion.len())?, distortion)
 }
 
-pub(super) fn refuse(format: &'static str, lens: Lens, most: Lens) -> Error {
-    Error::LensNotExportable { format, lens: lens.name(), most: most.name() }
+/// Refuses a lens that a format has no terms for.
+pub(super) fn within(format: &'static str, camera: &Camera, most: Lens) -> Result<(), Error> {
+    let (lens, name) = (camera.lens, camera.lens.name());
+    if lens > most { Err(Error::LensNotExportable { format, lens: name, most: most.name() }) } else { Ok(()) }
 }

@@ -41,9 +41,7 @@ pub struct PlacementFile {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GroupRecord {
-    /// Its name.
     pub group: String,
-    /// Where the sensor stands.
     pub base_from_rig: TransformRecord,
     /// How far the predicted target is to be expected from the true one, at the poses of the group.
     pub error_mm: Lengths,
@@ -63,7 +61,6 @@ pub struct TransformRecord {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Held {
-    /// Their names.
     pub parameters: Vec<String>,
     pub because: String,
 }

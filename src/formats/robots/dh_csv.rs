@@ -7,10 +7,8 @@
 //! numbers rule out; refused with the line.
 
 mod beside;
-mod convention;
 mod front;
 mod names;
-mod orders;
 mod reading;
 mod table;
 mod units;

@@ -61,19 +61,7 @@ pub struct Links {
 pub fn read(text: &str, prose: bool) -> Result<Text, Wrong> {
     let (code, comments) = comments::split(text);
     let words = if prose { Words::of(text, "") } else { Words::of(&comments, &code) };
-    let mut scan = Scan {
-        text: &code,
-        at: 0,
-        depth: 0,
-        line: 1,
-        known: Known::new(),
-        links: Vec::new(),
-        lists: Default::default(),
-        families: BTreeMap::new(),
-        of_calls: None,
-        numbered: Default::default(),
-        wrong: None,
-    };
+    let mut scan = Scan { text: &code, line: 1, ..Scan::default() };
     scan.run()?;
     let lower = code.to_lowercase();
     if ["'prismatic'", "\"prismatic\"", ": prismatic"].iter().any(|word| lower.contains(word)) && scan.links.len() > 1 {
@@ -129,6 +117,7 @@ fn links(scan: Scan, limited: bool) -> Result<Option<Links>, Wrong> {
     }))
 }
 
+#[derive(Default)]
 struct Scan<'a> {
     text: &'a str,
     at: usize,
@@ -163,12 +152,12 @@ impl Scan<'_> {
                 '(' | '[' | '{' => self.depth += 1,
                 ')' | ']' | '}' => {
                     self.depth = self.depth.saturating_sub(1);
-                    self.close();
+                    self.close(self.depth + 1);
                 }
                 '\n' => {
                     self.line += 1;
                     if self.depth == 0 && self.text[self.at + 1..].trim_start_matches(' ').starts_with("- ") {
-                        self.end_block();
+                        self.close(0);
                     }
                 }
                 _ => {}
@@ -179,18 +168,15 @@ impl Scan<'_> {
         Ok(())
     }
 
-    /// A link whose brackets are closed takes nothing more.
-    fn close(&mut self) {
-        let depth = self.depth;
-        if let Some(link) = self.links.last_mut().filter(|link| link.depth > depth) {
+    /// A link as deep as that, or deeper, takes nothing more.
+    fn close(&mut self, depth: usize) {
+        if let Some(link) = self.links.last_mut().filter(|link| link.depth >= depth) {
             link.depth = usize::MAX;
         }
     }
 
-    fn end_block(&mut self) {
-        if let Some(link) = self.links.last_mut().filter(|link| link.depth == 0) {
-            link.depth = usize::MAX;
-        }
+    fn evaluate(&self, text: &str) -> Option<Value> {
+        evaluate(text, &|name| self.known.get(name).copied())
     }
 
     /// A name of so many bytes: a call, a parameter with its value, or a number that gets a name.
@@ -219,8 +205,7 @@ impl Scan<'_> {
                 return Ok(());
             }
             let text = &value[..extent(value)];
-            let known = |name: &str| self.known.get(name).copied();
-            match evaluate(text, &known) {
+            match self.evaluate(text) {
                 Some(v) if !v.variable || which == 2 => {
                     self.put(which, v);
                     self.at = value_at + text.len();
@@ -235,8 +220,7 @@ impl Scan<'_> {
                 _ => {}
             }
         } else if let Some((which, number)) = numbered::parameter(word) {
-            let known = |name: &str| self.known.get(name).copied();
-            if let Some(v) = evaluate(&value[..extent(value)], &known).filter(|v| !v.variable || which == 2) {
+            if let Some(v) = self.evaluate(&value[..extent(value)]).filter(|v| !v.variable || which == 2) {
                 self.numbered[which].entry(number).or_insert((self.line, v));
             }
         }
@@ -261,10 +245,8 @@ impl Scan<'_> {
             link.limits = Some([*low, *high]);
         }
         if word == "flip" && value.trim_start().starts_with(['T', 't']) {
-            return Err((
-                self.line,
-                "`flip`: a joint that counts the other way, which a table has no place for".to_owned(),
-            ));
+            let message = "`flip`: a joint that counts the other way, which a table has no place for";
+            return Err((self.line, message.to_owned()));
         }
         Ok(())
     }
@@ -277,8 +259,7 @@ impl Scan<'_> {
         let mut rest = value;
         for name in names {
             let text = &rest[..extent(rest)];
-            let known = |name: &str| self.known.get(name).copied();
-            if let Some(v) = evaluate(text, &known).filter(|v| !v.variable) {
+            if let Some(v) = self.evaluate(text).filter(|v| !v.variable) {
                 self.known.insert(name, v);
             }
             rest = rest[text.len()..].strip_prefix(',').unwrap_or("");

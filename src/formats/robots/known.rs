@@ -14,24 +14,17 @@ use crate::identify::model::ladder::Terms;
 use crate::measurements::Given;
 use crate::robot::{Joint, Parameter, Robot};
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
 struct Identified {
     expected: Option<Expected>,
-    #[serde(default)]
     scatter_mm: f64,
-    #[serde(default)]
     scatter_rad: Option<f64>,
-    #[serde(default)]
     smooth: Option<Smooth>,
-    #[serde(default)]
     whole_covariance: Option<Covariance>,
-    #[serde(default)]
     rows: Given,
-    #[serde(default)]
     targets: Option<Targets>,
-    #[serde(default)]
     chosen: String,
-    #[serde(default)]
     methods: Vec<Method>,
 }
 
@@ -91,12 +84,12 @@ fn beside(robot: &Utf8Path) -> Option<Identified> {
 
 /// How far to trust a robot: what its identification says that a coordinate is off by, or a common arm's repeatability.
 pub fn trust(robot: &Utf8Path) -> Trust {
-    let identified = beside(robot);
+    let identified = beside(robot).unwrap_or_default();
     // Over the root of three, and of a mean length over that of its square.
     let of_coordinate = |e: &Expected| e.mean_mm / (MEAN_OVER_RMS * 3f64.sqrt());
     Trust {
-        point_mm: identified.as_ref().and_then(|i| i.expected.as_ref()).map_or(REPEATABILITY_MM, of_coordinate),
-        rotation_rad: identified.and_then(|i| i.scatter_rad),
+        point_mm: identified.expected.as_ref().map_or(REPEATABILITY_MM, of_coordinate),
+        rotation_rad: identified.scatter_rad,
     }
 }
 
@@ -110,7 +103,7 @@ pub fn identified_over(file: &Utf8Path, robot: &Robot) -> Option<Vec<(f64, f64)>
 
 /// The rows that a robot was identified from; none where nothing beside its file says so.
 pub fn given(file: &Utf8Path) -> Given {
-    beside(file).map_or_else(Given::default, |identified| identified.rows)
+    beside(file).unwrap_or_default().rows
 }
 
 /// Where targets stand from the mark point along the flange's axes, mm, by name, where the robot joined them; none where their poses did.

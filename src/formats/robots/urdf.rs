@@ -37,7 +37,6 @@ pub enum Kind {
 #[derive(Debug, Clone, PartialEq)]
 pub struct UrdfJoint {
     pub name: String,
-    /// What it does.
     pub kind: Kind,
     pub word: String,
     /// The joint that it follows, where it does.
@@ -60,7 +59,6 @@ pub struct UrdfJoint {
 /// A description.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Urdf {
-    /// The robot's name.
     pub name: String,
     pub joints: Vec<UrdfJoint>,
     /// The link that is no joint's child.
@@ -192,17 +190,10 @@ impl Urdf {
 
     /// Names of the moving joints before a link.
     fn moving(&self, tip: &str) -> Vec<&str> {
-        let mut link = tip;
-        let mut names = Vec::new();
-        while let Some(joint) = self.joints.iter().find(|j| j.child == link)
-            && names.len() <= self.joints.len()
-        {
-            if joint.kind != Kind::Fixed {
-                names.push(joint.name.as_str());
-            }
-            link = &joint.parent;
-        }
-        names
+        let before = |link: &str| self.joints.iter().find(|j| j.child == link);
+        let joints = std::iter::successors(before(tip), |joint| before(&joint.parent));
+        let moving = joints.filter(|joint| joint.kind != Kind::Fixed).map(|joint| joint.name.as_str());
+        moving.take(self.joints.len() + 1).collect()
     }
 
     /// The end of the longest chain, where all other ends hang on it or a name tells.
@@ -234,13 +225,11 @@ impl Urdf {
 
     /// The text with other origins for some joints: everything else stays as it is.
     pub fn with_origins(&self, origins: &[(&UrdfJoint, Transform)]) -> String {
-        let mut edits: Vec<(std::ops::Range<usize>, String)> = origins
-            .iter()
-            .map(|(joint, origin)| match &joint.origin_at {
-                Ok(range) => (range.clone(), origin_element(origin)),
-                Err(at) => (*at..*at, format!("\n    {}", origin_element(origin))),
-            })
-            .collect();
+        let edit = |(joint, origin): &(&UrdfJoint, Transform)| match &joint.origin_at {
+            Ok(range) => (range.clone(), origin_element(origin)),
+            Err(at) => (*at..*at, format!("\n    {}", origin_element(origin))),
+        };
+        let mut edits: Vec<(std::ops::Range<usize>, String)> = origins.iter().map(edit).collect();
         edits.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
         let mut text = self.text.clone();
         for (range, element) in edits {

@@ -115,7 +115,7 @@ impl Kinematics {
         };
         Place {
             point_mm: screws.target_mm,
-            rotation: *screws.base_from_flange(),
+            rotation: screws.base_from_flange,
             point_columns: columns(&|p, f| screws.point_column(p, f)),
             rotation_columns: columns(&|p, f| screws.rotation_column(p, f)),
         }

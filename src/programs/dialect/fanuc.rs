@@ -24,7 +24,7 @@ const NO_MARK: &str = "\n";
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
     let names = scan::axes('J', count);
     let position = |at: usize| {
-        let (numbers, _) = scan::labelled(text, at, &names, &["deg", "mm", ","])?;
+        let numbers = scan::labelled(text, at, &names, &["deg", "mm", ","])?;
         let before = &text[..at];
         let open = before.rfind("P[")?;
         let name = before[open..].split_inclusive(']').next().map(str::to_owned);
@@ -51,7 +51,7 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
             let end = code[target.clone()].find(char::is_whitespace).map_or(target.end, |k| target.start + k);
             return Instruction::new(text, word, target.start..end, Err(Cause::Elsewhere));
         };
-        let moves_by = points.iter().map(|point| position(text, end, &code[point.clone()], targets, &written));
+        let moves_by = points.iter().map(|point| position(&text[end..], &code[point.clone()], targets, &written));
         let moves_by = moves_by.collect::<Result<Vec<usize>, Cause>>();
         let group = group.filter(|group| *group != "GP1").map(|_| Cause::Group);
         let moves_by = moves_by.and_then(|found| match option(&code[last..end_of_it]).or(group) {
@@ -158,13 +158,7 @@ fn points(code: &str, at: Range<usize>) -> Vec<Range<usize>> {
 }
 
 /// The joint target of a point of a motion, from the positions behind `/POS`.
-fn position(
-    text: &str,
-    positions: usize,
-    point: &str,
-    targets: &[Target],
-    written: &[Option<u64>],
-) -> Result<usize, Cause> {
+fn position(positions: &str, point: &str, targets: &[Target], written: &[Option<u64>]) -> Result<usize, Cause> {
     let number = number(point).ok_or(Cause::Elsewhere)?;
     let mut found = targets.iter().enumerate().filter(|(_, t)| self::number(&t.name) == Some(number));
     match (found.next(), found.next()) {
@@ -172,10 +166,8 @@ fn position(
         (Some((k, _)), None) => Ok(k),
         (Some(_), Some(_)) => Err(Cause::Groups),
         (None, _) => {
-            let listed = text[positions..]
-                .match_indices("P[")
-                .find(|(at, _)| self::number(&text[positions + at..]) == Some(number));
-            let body = listed.and_then(|(at, _)| text[positions + at..].split('}').next());
+            let mut listed = positions.match_indices("P[").map(|(at, _)| &positions[at..]);
+            let body = listed.find(|at| self::number(at) == Some(number)).and_then(|at| at.split('}').next());
             Err(match body {
                 None => Cause::Elsewhere,
                 // Of a tool that is held in place, RX.
@@ -193,7 +185,7 @@ fn number(point: &str) -> Option<u64> {
     rest[digits..].starts_with([':', ']', ' ']).then(|| rest[..digits].parse().ok()).flatten()
 }
 
-pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(String, String)> {
+pub(super) fn program(name: &str, stops: &[Written], motion: &Motion, _: bool) -> Vec<(String, String)> {
     let name = name.to_ascii_uppercase();
     let mut lines = vec!["!DO[1] triggers the cameras ;".to_owned(), "!PR[n] holds stop n's joints ;".to_owned()];
     let mut positions = String::new();

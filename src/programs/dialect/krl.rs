@@ -47,14 +47,9 @@ const SYNTAX: Syntax = Syntax {
     },
 };
 
-/// Names of the axes: those of the robot, then external ones.
-fn axes(count: usize) -> Vec<String> {
-    (0..count).map(|k| if k < 6 { format!("A{}", k + 1) } else { format!("E{}", k - 5) }).collect()
-}
-
 /// Aggregates of all axes in any order, with or without their type before them.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
-    let names = axes(count);
+    let names = scan::axes('A', count);
     let text = &scan::code(text, ";");
     let aggregate = |at: usize| {
         let typed = ["E6AXIS", "AXIS"].iter().find_map(|t| scan::word(text, at + 1, t));
@@ -120,9 +115,10 @@ fn point(code: &str, at: std::ops::Range<usize>) -> std::ops::Range<usize> {
     scan::trimmed(code, first.start..stop.map_or(first.end, |w| first.start + w.start))
 }
 
-pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(String, String)> {
+pub(super) fn program(name: &str, stops: &[Written], motion: &Motion, _: bool) -> Vec<(String, String)> {
     let aggregate = |list: &[String]| {
-        let parts: Vec<String> = axes(list.len()).iter().zip(list).map(|(n, v)| format!("{n} {v}")).collect();
+        let parts: Vec<String> =
+            scan::axes('A', list.len()).iter().zip(list).map(|(n, v)| format!("{n} {v}")).collect();
         format!("{{{}}}", parts.join(","))
     };
     let mut text = format!(

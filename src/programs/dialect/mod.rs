@@ -7,27 +7,27 @@ mod urscript;
 mod yaskawa;
 
 use crate::programs::instruction::Instruction;
-use crate::programs::language::{Language, Motion, Target, Written};
+use crate::programs::language::{Joints, Language, Motion, Stop, Target, Written, number};
 
-/// Every list of joint values, in the order of the text, as it stands there.
-pub(super) fn targets(language: Language, text: &str, count: usize) -> Vec<Target> {
-    match language {
-        Language::UrScript => urscript::targets(text, count),
-        Language::Rapid => rapid::targets(text, count),
-        Language::Krl => krl::targets(text, count),
-        Language::FanucLs => fanuc::targets(text, count),
-        Language::Jbi => yaskawa::targets(text, count),
-    }
+/// What is known of a language.
+pub(super) struct Dialect {
+    /// Every list of joint values, in the order of the text, as it stands there.
+    pub targets: fn(text: &str, count: usize) -> Vec<Target>,
+    /// Every instruction that moves the robot, in the order of the text.
+    pub motions: fn(text: &str, targets: &[Target]) -> Vec<Instruction>,
+    /// Files of a program that visits the stops, whose numbers may be pulses: name and text.
+    program: fn(name: &str, stops: &[Written], motion: &Motion, pulses: bool) -> Vec<(String, String)>,
 }
 
-/// Every instruction that moves the robot, in the order of the text.
-pub(super) fn motions(language: Language, text: &str, targets: &[Target]) -> Vec<Instruction> {
+pub(super) fn of(language: Language) -> Dialect {
     match language {
-        Language::UrScript => urscript::motions(text, targets),
-        Language::Rapid => rapid::motions(text, targets),
-        Language::Krl => krl::motions(text, targets),
-        Language::FanucLs => fanuc::motions(text, targets),
-        Language::Jbi => yaskawa::motions(text, targets),
+        Language::UrScript => {
+            Dialect { targets: urscript::targets, motions: urscript::motions, program: urscript::program }
+        }
+        Language::Rapid => Dialect { targets: rapid::targets, motions: rapid::motions, program: rapid::program },
+        Language::Krl => Dialect { targets: krl::targets, motions: krl::motions, program: krl::program },
+        Language::FanucLs => Dialect { targets: fanuc::targets, motions: fanuc::motions, program: fanuc::program },
+        Language::Jbi => Dialect { targets: yaskawa::targets, motions: yaskawa::motions, program: yaskawa::program },
     }
 }
 
@@ -39,19 +39,27 @@ pub(super) fn written(language: Language, before: &str, number: String, value: f
     }
 }
 
-/// Files of a program that visits the stops: name and text.
-pub(super) fn program(
+/// Files of a program that moves to the stops, waits, triggers and logs: name and text.
+pub fn program(
     language: Language,
     name: &str,
-    stops: &[Written],
+    stops: &[Stop],
     motion: &Motion,
-    pulses: bool,
+    joints: Joints,
 ) -> Vec<(String, String)> {
-    match language {
-        Language::UrScript => urscript::program(name, stops, motion),
-        Language::Rapid => rapid::program(name, stops, motion),
-        Language::Krl => krl::program(name, stops, motion),
-        Language::FanucLs => fanuc::program(name, stops, motion),
-        Language::Jbi => yaskawa::program(name, stops, motion, pulses),
-    }
+    let pulses = !joints.pulses_per_deg.is_empty();
+    let list = |readings: &[f64]| -> Vec<String> {
+        let value = |(joint, r): (usize, &f64)| r * joints.factor(language, pulses, joint);
+        readings.iter().enumerate().map(value).map(|v| number(language, pulses, v)).collect()
+    };
+    let stops: Vec<Written> = stops
+        .iter()
+        .map(|s| Written { name: plain(&s.name), readings: list(&s.readings), approach: list(&s.approach) })
+        .collect();
+    (of(language).program)(name, &stops, motion, pulses)
+}
+
+/// A name that stands in a comment or a string of every language.
+fn plain(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() || "_-.".contains(c) { c } else { '_' }).collect()
 }

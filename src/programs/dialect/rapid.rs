@@ -59,7 +59,7 @@ pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
     let text = &scan::code(text, "!");
     let value = |at: usize| {
         let inner = scan::word(text, at + 1, "[")?;
-        let (mut numbers, end) = scan::list(text, inner, AXES + 1);
+        let (mut numbers, end) = scan::list(text, inner, AXES + 1, scan::number);
         // Axes that the arm lacks are written as zero.
         if !(numbers.len() == first || numbers.len() == AXES) {
             return None;
@@ -68,7 +68,7 @@ pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
         numbers.truncate(first);
         if count > AXES {
             let external = scan::word(text, end, ",").and_then(|at| scan::word(text, at, "["))?;
-            numbers.extend(scan::list(text, external, count - AXES).0);
+            numbers.extend(scan::list(text, external, count - AXES, scan::number).0);
         }
         let before = text[..at].trim_end();
         let name = before.strip_suffix(":=").and_then(|b| b.split_whitespace().last()).map(str::to_owned);
@@ -177,7 +177,7 @@ fn jointtarget(list: &[String]) -> String {
     format!("[[{}],[{}]]", filled(robot, "0").join(","), filled(external, "9E9").join(","))
 }
 
-pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(String, String)> {
+pub(super) fn program(name: &str, stops: &[Written], motion: &Motion, _: bool) -> Vec<(String, String)> {
     let mut text = format!(
         "MODULE {name}\n  ! Signal doTrigger triggers the cameras; the log holds name and joints, deg.\n  VAR iodev log;\n  \
          PROC note(string stop)\n    VAR jointtarget now;\n    now := CJointT();\n    \

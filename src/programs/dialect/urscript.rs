@@ -11,24 +11,9 @@ use crate::programs::variables::{Syntax, Variables};
 const MOVES: [(&str, usize); 7] =
     [("movej", 1), ("movel", 1), ("movep", 1), ("movec", 2), ("servoj", 1), ("optimovej", 1), ("optimovel", 1)];
 /// Calls that move by a speed, a force or a path that is set elsewhere, or follow poses.
-const LED: [&str; 16] = [
-    "servoc",
-    "servol",
-    "speedj",
-    "speedl",
-    "force_mode",
-    "freedrive_mode",
-    "teach_mode",
-    "path_offset_set",
-    "screw_driving",
-    "track_conveyor_linear",
-    "track_conveyor_circular",
-    "freedrive_mode_no_incorrect_payload_check",
-    "path_offset_enable",
-    "torque_command",
-    "direct_torque",
-    "jog_start",
-];
+const LED: &str = "servoc servol speedj speedl force_mode freedrive_mode teach_mode path_offset_set screw_driving \
+    track_conveyor_linear track_conveyor_circular freedrive_mode_no_incorrect_payload_check path_offset_enable \
+    torque_command direct_torque jog_start";
 /// Calls of a path that is put together elsewhere, and of its parts, which are poses.
 const PATHS: [(&str, Cause); 5] = [
     ("mc_add_linear", Cause::Cartesian),
@@ -38,18 +23,8 @@ const PATHS: [(&str, Cause); 5] = [
     ("mc_run_motion", Cause::Elsewhere),
 ];
 /// Functions whose value is a pose, or joint angles that belong to one.
-const POSES: [&str; 10] = [
-    "p[",
-    "get_inverse_kin",
-    "get_actual_tcp_pose",
-    "get_target_tcp_pose",
-    "get_forward_kin",
-    "pose_trans",
-    "pose_add",
-    "pose_sub",
-    "pose_inv",
-    "interpolate_pose",
-];
+const POSES: &str = "p[ get_inverse_kin get_actual_tcp_pose get_target_tcp_pose get_forward_kin pose_trans pose_add pose_sub \
+    pose_inv interpolate_pose";
 
 const SYNTAX: Syntax = Syntax {
     assign: "=",
@@ -58,7 +33,7 @@ const SYNTAX: Syntax = Syntax {
     routines: &["def", "thread"],
     // Every call gets values.
     calls: None,
-    cartesian: |value| POSES.iter().any(|p| value.starts_with(p)),
+    cartesian: |value| POSES.split(' ').any(|pose| value.starts_with(pose)),
 };
 
 /// The function that makes radians of degrees.
@@ -75,7 +50,7 @@ pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
         if !before.ends_with(['(', '=', ',', '[']) {
             return None;
         }
-        let (numbers, end) = scan::list_of(text, at + 1, count + 1, angle);
+        let (numbers, end) = scan::list(text, at + 1, count + 1, angle);
         scan::word(text, end, "]").filter(|_| numbers.len() == count)?;
         let assigned = before.strip_suffix('=');
         let name = assigned.map(|before| before.split_whitespace().last().unwrap_or_default().to_owned());
@@ -114,7 +89,7 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
         };
         let end = scan::closed(&code, open - 1).map_or(code.len(), |end| end - 1);
         let arguments = scan::parts(&code, open..end);
-        let led = LED.contains(&name).then_some(Cause::Led);
+        let led = LED.split(' ').any(|led| led == name).then_some(Cause::Led);
         let path = || PATHS.iter().find(|(path, _)| *path == name).map(|(_, cause)| cause.clone());
         if let Some(cause) = led.or_else(path) {
             found.push(Instruction::new(text, word, open..open, Err(cause)));
@@ -146,7 +121,7 @@ fn unnamed(code: &str, at: std::ops::Range<usize>) -> std::ops::Range<usize> {
     }
 }
 
-pub(super) fn program(name: &str, stops: &[Written], motion: &Motion) -> Vec<(String, String)> {
+pub(super) fn program(name: &str, stops: &[Written], motion: &Motion, _: bool) -> Vec<(String, String)> {
     let speed = FULL_SPEED * motion.speed_percent / 100.0;
     let mut text =
         format!("def {name}():\n  # digital output 0 triggers the cameras; the log shows name and joints, rad\n");

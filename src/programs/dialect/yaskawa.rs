@@ -38,7 +38,7 @@ fn position(text: &str, at: usize, line: &str, count: usize) -> Option<Target> {
     if number.is_empty() || !number.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
-    let (mut numbers, _) = scan::list(text, at + name.len() + 1, MOST_AXES);
+    let (mut numbers, _) = scan::list(text, at + name.len() + 1, MOST_AXES, scan::number);
     // Axes that the arm lacks are written as zero.
     if numbers.iter().skip(count).any(|(value, _)| *value != 0.0) {
         return None;
@@ -83,12 +83,7 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
 
 /// Places of what stands between blanks.
 fn tokens(line: &str) -> impl Iterator<Item = Range<usize>> + '_ {
-    let mut at = 0;
-    std::iter::from_fn(move || {
-        let start = at + line[at..].find(|c: char| !c.is_ascii_whitespace())?;
-        at = line[start..].find(|c: char| c.is_ascii_whitespace()).map_or(line.len(), |length| start + length);
-        Some(start..at)
-    })
+    scan::runs(line, |c| !c.is_ascii_whitespace())
 }
 
 /// Whether an instruction moves, to its target or otherwise: `MOVJ`, `MOVL`, `MOVC`, `MOVS`, `SMOVL`, `IMOV`, ... A remark begins with an

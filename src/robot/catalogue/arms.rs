@@ -235,17 +235,12 @@ pub const ARMS: &[Arm] = &[
 /// The name of the paper's robot, which is not among [`ARMS`].
 pub const PAPER: &str = "paper";
 
-/// Ranges for the paper's robot, deg. The paper gives none; these are a common arm's.
-const PAPER_LIMITS_DEG: [[f64; 2]; 6] =
-    [[-175.0, 175.0], [-130.0, 130.0], [-150.0, 150.0], [-175.0, 175.0], [-175.0, 175.0], [-175.0, 175.0]];
+/// Ranges for the paper's robot, deg either way. The paper gives none; these are a common arm's.
+const PAPER_LIMITS_DEG: [f64; 6] = [175.0, 130.0, 150.0, 175.0, 175.0, 175.0];
 
 /// The paper's robot, with ranges for its joints.
 pub fn paper() -> Robot {
-    let mut robot = Robot::paper();
-    for (joint, [low, high]) in robot.joints.iter_mut().zip(PAPER_LIMITS_DEG) {
-        joint.limits_rad = Some((low.to_radians(), high.to_radians()));
-    }
-    robot
+    Robot::paper().within(&PAPER_LIMITS_DEG.map(|most| ((-most).to_radians(), most.to_radians())))
 }
 
 /// The arm of a name, as its maker delivers it.

@@ -16,7 +16,6 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// An empty grid.
     pub fn new(width: usize, height: usize) -> Coverage {
         Coverage { width, height, cells: vec![0.0; (width + 1) * height] }
     }

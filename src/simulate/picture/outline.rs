@@ -19,7 +19,6 @@ const NEAREST_MM: f64 = 1.0;
 /// A closed chain of points in a picture, clockwise on the screen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outline {
-    /// The points, px.
     pub points: Vec<Point2<f64>>,
     /// Smallest x and y, px.
     pub low: Point2<f64>,

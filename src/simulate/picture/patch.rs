@@ -8,7 +8,6 @@ use crate::geometry::Transform;
 /// Brightness of a surface: at its first corner and how it changes per mm along its x and y. 1 is the board's white.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tone {
-    /// Reflectance.
     pub value: f64,
     /// Change across its whole extent in the picture, along x and y, as a share.
     pub slope: (f64, f64),
@@ -36,6 +35,5 @@ pub struct Patch {
     pub parent_from_patch: Transform,
     /// Its corners in that plane, mm.
     pub corners_mm: Vec<Point2<f64>>,
-    /// Its brightness.
     pub tone: Tone,
 }

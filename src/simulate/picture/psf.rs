@@ -72,12 +72,11 @@ impl Taps {
         let density = |x: f64| -> f64 {
             (0..fine_steps).map(|i| (-0.5 * ((x - (i as f64 + 0.5) * h) / sigma).powi(2)).exp()).sum()
         };
-        let mut weights: Vec<f64> = (0..count)
-            .map(|k| {
-                let start = (first + k as isize) as f64 * cell;
-                (0..STEPS).map(|i| density(start + (i as f64 + 0.5) * cell / STEPS as f64)).sum()
-            })
-            .collect();
+        let weight = |k: usize| -> f64 {
+            let start = (first + k as isize) as f64 * cell;
+            (0..STEPS).map(|i| density(start + (i as f64 + 0.5) * cell / STEPS as f64)).sum()
+        };
+        let mut weights: Vec<f64> = (0..count).map(weight).collect();
         let total: f64 = weights.iter().sum();
         weights.iter_mut().for_each(|w| *w /= total);
         Taps { first, weights: weights.iter().map(|&w| w as f32).collect() }
@@ -96,14 +95,13 @@ const PUPIL_POINTS: usize = 8192;
 pub fn pupil() -> Vec<(f32, f32)> {
     let half = PUPIL_POINTS / 2;
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-    (0..half)
-        .flat_map(|k| {
-            let radius = ((k as f64 + 0.5) / half as f64).sqrt();
-            let (sin, cos) = (k as f64 * golden).sin_cos();
-            let (x, y) = ((radius * cos) as f32, (radius * sin) as f32);
-            [(x, y), (-x, -y)]
-        })
-        .collect()
+    let opposite = |k: usize| {
+        let radius = ((k as f64 + 0.5) / half as f64).sqrt();
+        let (sin, cos) = (k as f64 * golden).sin_cos();
+        let (x, y) = ((radius * cos) as f32, (radius * sin) as f32);
+        [(x, y), (-x, -y)]
+    };
+    (0..half).flat_map(opposite).collect()
 }
 
 /// Where the rays of one scene point land, as weights on fine cells: what is not Gaussian in the lens.
@@ -189,12 +187,8 @@ mod tests {
             let sum: f32 = taps.weights.iter().sum();
             assert!((sum - 1.0).abs() < 1e-6);
             let middle = FINE as f64 / 2.0;
-            let variance: f64 = taps
-                .weights
-                .iter()
-                .enumerate()
-                .map(|(k, &w)| f64::from(w) * (((k as isize + taps.first) as f64 + 0.5 - middle) / FINE as f64).powi(2))
-                .sum();
+            let off = |k: usize| ((k as isize + taps.first) as f64 + 0.5 - middle) / FINE as f64;
+            let variance: f64 = taps.weights.iter().enumerate().map(|(k, &w)| f64::from(w) * off(k).powi(2)).sum();
             let cell = 1.0 / FINE as f64;
             // Weights sampled at the cells' centres lack a cell's own variance once, and gave up two.
             let expected = sigma * sigma + 1.0 / 12.0 - cell * cell / 6.0;

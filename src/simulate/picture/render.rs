@@ -19,9 +19,7 @@ const TILE: usize = 16;
 /// A picture as a camera delivers it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// Width, px.
     pub width: usize,
-    /// Height, px.
     pub height: usize,
     /// 8 or 16.
     pub file_bits: u8,
@@ -282,12 +280,9 @@ impl Scene<'_> {
     fn largest_spot_cells(&self) -> usize {
         let (w, h) = (f64::from(self.camera.width), f64::from(self.camera.height));
         // Depth and field vary evenly over a plane: the largest spot is at one of the corners or at a border's middle.
-        (0..9)
-            .map(|k| Point2::new(w * f64::from(k % 3) / 2.0, h * f64::from(k / 3) / 2.0))
-            .map(|px| self.spot_at(&px))
-            .map(|(disc, flare)| Spot::reach_cells(disc, flare.0.hypot(flare.1)))
-            .max()
-            .unwrap_or(0)
+        let spots = (0..9).map(|k| Point2::new(w * f64::from(k % 3) / 2.0, h * f64::from(k / 3) / 2.0));
+        let reach = |(disc, flare): (f64, (f64, f64))| Spot::reach_cells(disc, flare.0.hypot(flare.1));
+        spots.map(|px| reach(self.spot_at(&px))).max().unwrap_or(0)
     }
 }
 

@@ -17,23 +17,18 @@ use crate::stereo::Camera;
 pub struct Print {
     /// White squares and margin.
     pub white: f64,
-    /// Black squares.
     pub black: f64,
     /// The plate's bevelled rim.
     pub rim: f64,
-    /// Width of the rim, mm.
     pub rim_mm: f64,
 }
 
 /// Everything that makes one picture.
 #[derive(Debug, Clone)]
 pub struct Scene<'a> {
-    /// The camera that takes it.
     pub camera: Camera,
-    /// The lens's spread.
     pub optics: Optics,
     pub board: &'a PhysicalBoard,
-    /// Where it is.
     pub camera_from_board: Transform,
     pub print: Print,
     /// What carries the board, in the board's frame, from behind to before.
@@ -42,7 +37,6 @@ pub struct Scene<'a> {
     pub backdrop: &'a Backdrop,
     pub lighting: Lighting,
     pub sensor: Sensor,
-    /// Seed of the noise.
     pub seed: u64,
     /// Number of the picture, so that each has noise of its own.
     pub picture: u64,

@@ -58,11 +58,6 @@ impl Sensor {
     pub fn top(&self) -> f64 {
         f64::from((1u32 << self.bits) - 1)
     }
-
-    /// Factor from its numbers to those in a file: 1 for 8 bits, else the high bits of 16.
-    pub fn file_scale(&self) -> u16 {
-        if self.bits <= 8 { 1 } else { 1 << (16 - self.bits) }
-    }
 }
 
 /// Turns light into numbers, with noise from streams of its own for each picture and tile.
@@ -87,7 +82,8 @@ impl<'a> Exposer<'a> {
         let read = (self.sensor.read_noise_e * f64::from(per_e)) as f32;
         let read_variance = read * read;
         let dark = self.sensor.dark as f32;
-        let scale = self.sensor.file_scale();
+        // In a file the numbers of more than 8 bits are the high bits of 16.
+        let scale = if self.sensor.bits <= 8 { 1 } else { 1 << (16 - self.sensor.bits) };
         let mut draws = Draws::new(self.seed, Purpose::Pixels, self.picture << 32 | tile);
         let mut bits = 0u64;
         for (k, (value, number)) in light.iter().zip(numbers).enumerate() {

@@ -9,7 +9,6 @@ use crate::tables::names::{self, Unit};
 /// The least and the largest angle of a joint.
 pub(super) type Limits = (f64, f64);
 
-/// What a table has beside the parameters.
 pub(super) struct Beside {
     pub beta_deg: Vec<Option<f64>>,
     pub limits_deg: Vec<Option<Limits>>,

@@ -6,7 +6,6 @@ use camino::Utf8Path;
 
 use super::beside;
 use super::names::{HINT, named};
-use super::orders::without_names;
 use super::reading::{Reading, reading};
 use super::table::Table;
 use crate::files::{self, Result};
@@ -27,6 +26,9 @@ pub struct Asked<'a> {
 }
 
 const WHAT: &str = "the table of Denavit-Hartenberg parameters";
+
+/// Orders in which tables without names are written.
+const ORDERS: [[usize; 4]; 4] = [[0, 1, 3, 2], [0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 1, 0]];
 
 /// Extensions of files that are tables whatever stands in them.
 const TABLES: [&str; 5] = ["csv", "tsv", "xlsx", "xls", "ods"];
@@ -57,12 +59,8 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
     };
     if text.as_deref().and_then(files::kind::kind) == Some("a robot file") {
         let hint = "`stereocal robot show FILE` says it in words; the commands take it by `--robot FILE`";
-        return Err(files::Error::format(
-            path,
-            None,
-            "this is a robot file already: there is nothing to import",
-            Some(hint),
-        ));
+        let message = "this is a robot file already: there is nothing to import";
+        return Err(files::Error::format(path, None, message, Some(hint)));
     }
     let Some(text) = text else { return of_grid(&Grid::read(path, WHAT, HINT)?, asked, None) };
     let text = without_entities(&text);
@@ -91,7 +89,7 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
 }
 
 fn empty(path: &Utf8Path) -> Grid {
-    Grid { path: path.to_owned(), form: Form::Delimited(','), encoding: None, rows: Vec::new() }
+    Grid::empty(path, Form::Delimited(','), None)
 }
 
 /// The names of `--columns`.
@@ -116,6 +114,43 @@ fn ways(table: &Table) -> Result<Vec<Reading>> {
         Some(names) => Ok(vec![reading(table, named(table.grid, names)?)?]),
         None => without_names(table),
     }
+}
+
+/// Every order that the columns of a table without names may have.
+fn without_names(table: &Table) -> Result<Vec<Reading>> {
+    let rows = table.rows;
+    // Columns of words and of the joint's number are no parameters.
+    let is_number = |c: usize| rows.iter().all(|(_, r)| table.value(&r[c]).is_some());
+    let free: Vec<usize> =
+        (0..rows[0].1.len()).filter(|&c| is_number(c) && !(table.counts(c) && rows.len() > 2)).collect();
+    let [w, x, y, z] = free[..] else {
+        let message = format!("{} columns of numbers without names; four are needed", free.len());
+        let hint = format!(
+            "`--columns NAME,NAME,...` names all {} in their order, of them alpha, a, d and theta; `-` skips one",
+            rows[0].1.len()
+        );
+        return Err(table.grid.refuse(rows[0].0, message, Some(&hint)));
+    };
+    let columns = [w, x, y, z];
+    let in_order = |order: &[usize; 4]| {
+        let mut of_row = [0; 4];
+        order.iter().zip(columns).for_each(|(&which, column)| of_row[which] = column);
+        of_row
+    };
+    // Lengths in the place of angles are no multiples of a quarter turn.
+    let (mut readings, mut wrong) = (Vec::new(), None);
+    for order in &ORDERS {
+        match reading(table, in_order(order)) {
+            Ok(found) => readings.push(found),
+            Err(e) => wrong = wrong.or(Some(e)),
+        }
+    }
+    if let Some(wrong) = wrong.filter(|_| readings.is_empty()) {
+        return Err(wrong);
+    }
+    let regular = |r: &&Reading| r.rows.iter().all(|row| row[0].abs() <= 180.0 && row[2].abs() <= 360.0);
+    let likely: Vec<Reading> = readings.iter().filter(regular).cloned().collect();
+    Ok(if likely.is_empty() { readings } else { likely })
 }
 
 /// The rows of a file; `words` are of all its text, where that is known.
@@ -152,8 +187,8 @@ fn of_links(path: &Utf8Path, read: &Text, links: &Links, asked: &Asked) -> Resul
     let unit = if values().any(|v| v.radians) { " [rad]" } else { "" };
     let names = [format!("alpha{unit}"), "a".to_owned(), format!("theta{unit}"), "d".to_owned()];
     let cell = |v: &Value| if v.variable { format!("q + {}", v.number) } else { v.number.to_string() };
-    let cells = |row: &[Value; 4]| Fields::new(row.iter().map(cell).collect::<Vec<_>>().iter().map(String::as_str));
-    let rows: Vec<(u64, Fields)> = links.rows.iter().map(|(line, row)| (*line, cells(row))).collect();
+    let rows: Vec<(u64, Fields)> =
+        links.rows.iter().map(|(line, row)| (*line, Fields::new(row.iter().map(cell)))).collect();
     let grid = Grid { rows: rows.clone(), ..empty(path) };
     let table = Table { names: Some(&names), ..table(&grid, &rows, asked, read.words, None) };
     let mut found = reading(&table, [0, 1, 2, 3])?;
@@ -182,15 +217,9 @@ fn without_entities(text: &str) -> Cow<'_, str> {
         let decoded = piece.split_once(';').and_then(|(code, rest)| {
             let number =
                 code.strip_prefix('x').map_or_else(|| code.parse().ok(), |hex| u32::from_str_radix(hex, 16).ok());
-            Some((char::from_u32(number?)?, rest))
+            Some(format!("{}{rest}", char::from_u32(number?)?))
         });
-        match decoded {
-            Some((c, rest)) => {
-                plain.push(c);
-                plain.push_str(rest);
-            }
-            None => plain.push_str(&format!("&#{piece}")),
-        }
+        plain.push_str(&decoded.unwrap_or_else(|| format!("&#{piece}")));
     }
     plain.into()
 }

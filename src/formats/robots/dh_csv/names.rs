@@ -27,18 +27,16 @@ const SAID_BESIDE: [&str; 5] = ["twist", "length", "angle", "offset", "linkoffse
 
 /// The columns of alpha, a, theta and d of a table with names.
 pub(super) fn named(grid: &Grid, names: &[String]) -> Result<[usize; 4]> {
-    let [alpha, a, theta, d] = NAMES.map(|name| find(grid, names, name));
+    let [alpha, a, theta, d] = [0, 1, 2, 3].map(|which| find(grid, names, which));
     Ok([alpha?, a?, theta?, d?])
 }
 
 /// The column of a parameter.
-fn find(grid: &Grid, names: &[String], wanted: &str) -> Result<usize> {
-    let unit = if matches!(wanted, "alpha" | "theta") { "deg" } else { "mm" };
-    let own = format!("{wanted}_{unit}");
-    if let Some(at) = names.iter().position(|n| n.eq_ignore_ascii_case(&own)) {
+fn find(grid: &Grid, names: &[String], which: usize) -> Result<usize> {
+    let (wanted, own) = (NAMES[which], OWN[which]);
+    if let Some(at) = names.iter().position(|n| n.eq_ignore_ascii_case(own)) {
         return Ok(at);
     }
-    let which = NAMES.iter().position(|n| *n == wanted).unwrap_or(0);
     let says = |name: &String| {
         let words = plain(name).0;
         // `Link twist (alpha)`, `theta offset`: the letter says it.

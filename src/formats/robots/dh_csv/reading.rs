@@ -1,4 +1,5 @@
-//! One way to read a table, and its robot.
+//! One way to read a table, and its robot: whether alpha and a of a row stand before the joint (modified, Craig) or behind it (classic, Denavit
+//! and Hartenberg), and what tells it.
 
 use std::fmt::Write as _;
 
@@ -11,6 +12,10 @@ use crate::geometry::Transform;
 use crate::robot::Robot;
 use crate::robot::catalogue::{Convention, Row, from_rows};
 use crate::tables::names::Unit;
+
+/// What a row at an end of the table may have but for its joint: alpha and a that are zero, or alpha that is not.
+const PLAIN: &str = "neither twist nor length";
+const TWIST: &str = "a twist";
 
 /// A way to read a table.
 #[derive(Debug, Clone)]
@@ -59,6 +64,52 @@ impl Reading {
     /// Whether it has a column that stands beside alpha and a of a modified table alone.
     pub fn is_modified(&self) -> bool {
         self.beta_deg.iter().any(Option::is_some)
+    }
+
+    /// The convention and why, or why it is open: what names, calls and words say, else what the table's ends show.
+    pub fn convention(&self) -> (Option<Convention>, String) {
+        if self.is_modified() {
+            return (Some(Convention::Modified), "`beta_deg` stands beside alpha and a of a modified table".to_owned());
+        }
+        let (shown, ends) = self.shown();
+        match (self.stated, self.words, shown) {
+            (Some((stated, why)), ..) => (Some(stated), why.to_owned()),
+            (None, Some(said), Some(shown)) if said != shown => {
+                (None, format!("words of the file say {}, but {ends} as of the other", said.name()))
+            }
+            (None, Some(said), _) => (Some(said), "words of the file say so".to_owned()),
+            _ if self.calls => {
+                (Some(Convention::Classic), "links of a toolbox are where nothing else is said".to_owned())
+            }
+            (None, None, Some(shown)) => {
+                let other = if shown == Convention::Classic { Convention::Modified } else { Convention::Classic };
+                (Some(shown), format!("{ends}; `--dh {}` reads it the other way", other.name()))
+            }
+            _ if self.own => (Some(Convention::Modified), "the names are of this program's tables".to_owned()),
+            _ => (None, ends),
+        }
+    }
+
+    /// What the table's ends show. An arm stands on its base and ends in a flange: the twist between its last axes is in the last row of a modified
+    /// table, whose first row is none between axes, and that between its first axes in the first row of a classic one, whose last row is none. A length
+    /// tells nothing: a modified table may begin beside the first axis, and a classic one end at the tip of a gripper.
+    fn shown(&self) -> (Option<Convention>, String) {
+        let end = |row: &Row| match (row[0] != 0.0, row[1] != 0.0) {
+            (true, _) => TWIST,
+            (false, true) => "a length without a twist",
+            _ => PLAIN,
+        };
+        let (Some(first), Some(last)) = (self.rows.first().map(end), self.rows.last().map(end)) else {
+            return (None, "the table is empty".to_owned());
+        };
+        let why = format!("the first row has {first} and the last {last}");
+        let shown = match (first, last) {
+            _ if self.rows.len() < 3 => None,
+            (TWIST, PLAIN) => Some(Convention::Classic),
+            (PLAIN, TWIST) => Some(Convention::Modified),
+            _ => None,
+        };
+        (shown, why)
     }
 }
 

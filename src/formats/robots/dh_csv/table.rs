@@ -34,7 +34,6 @@ impl Table<'_> {
         from(0) || from(1)
     }
 
-    /// The number of a cell.
     pub fn number(&self, line: u64, row: &Fields, column: usize) -> Result<Value> {
         let refuse = || self.grid.refuse(line, format!("`{}` is not a number", &row[column]), Some(HINT));
         self.value(&row[column]).filter(|value| value.number.is_finite()).ok_or_else(refuse)

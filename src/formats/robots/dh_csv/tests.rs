@@ -5,9 +5,7 @@ use crate::robot::catalogue::Convention;
 use crate::tables::names::Unit;
 
 fn of(name: &str, text: &str, asked: Asked) -> Result<Vec<Reading>> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = camino::Utf8PathBuf::from_path_buf(folder.path().join(name)).unwrap();
-    std::fs::write(&path, text).unwrap();
+    let (_folder, path) = crate::files::temporary(name, text);
     readings(&path, &asked)
 }
 

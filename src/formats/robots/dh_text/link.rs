@@ -18,7 +18,6 @@ pub(super) const KEYS: [&[&str]; 4] = [
     &["d", "link_offset"],
 ];
 
-/// One link while it is read.
 #[derive(Debug, Clone)]
 pub(super) struct Link {
     pub line: u64,

@@ -76,7 +76,7 @@ pub fn matrix(text: &str, known: &Known, width: usize) -> Result<Option<Matrix>,
         return Err((at as u64 + 1, wrong + ", and without this row it is another robot"));
     }
     let cells = |at: usize| match &read[at].1 {
-        Line::Row(cells) => Some((at as u64 + 1, Fields::new(cells.iter().copied()))),
+        Line::Row(cells) => Some((at as u64 + 1, Fields::new(cells))),
         _ => None,
     };
     let named = lines[run.start.saturating_sub(ABOVE)..=run.start].iter().rev().find_map(|line| order(line));
@@ -160,12 +160,9 @@ fn order(line: &str) -> Option<[&'static str; 4]> {
         "d" => Some("d"),
         _ => None,
     };
-    let words: Vec<String> = names::words(line)
-        .0
-        .into_iter()
-        .filter(|w| !INDICES.contains(&w.as_str()) && w.parse::<f64>().is_err())
-        .collect();
-    let found: Vec<Option<&'static str>> = words.iter().map(name).collect();
+    let (words, _) = names::words(line);
+    let says = |w: &&String| !INDICES.contains(&w.as_str()) && w.parse::<f64>().is_err();
+    let found: Vec<Option<&'static str>> = words.iter().filter(says).map(name).collect();
     let all = |window: &&[Option<&'static str>]| ["alpha", "a", "theta", "d"].iter().all(|n| window.contains(&Some(n)));
     let window = found.windows(4).find(all)?;
     Some([window[0]?, window[1]?, window[2]?, window[3]?])
