@@ -41,16 +41,6 @@ pub enum Unit {
     Mrad,
 }
 
-impl Unit {
-    /// As in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Unit::Mm => "mm",
-            Unit::Mrad => "mrad",
-        }
-    }
-}
-
 impl Parameter {
     /// Unit in files, and what to multiply mm or mrad by.
     pub fn file_unit(self) -> (&'static str, f64) {

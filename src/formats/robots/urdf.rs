@@ -192,8 +192,9 @@ impl Urdf {
     fn moving(&self, tip: &str) -> Vec<&str> {
         let before = |link: &str| self.joints.iter().find(|j| j.child == link);
         let joints = std::iter::successors(before(tip), |joint| before(&joint.parent));
-        let moving = joints.filter(|joint| joint.kind != Kind::Fixed).map(|joint| joint.name.as_str());
-        moving.take(self.joints.len() + 1).collect()
+        // Joints that form a circle have no end.
+        let joints = joints.take(self.joints.len());
+        joints.filter(|joint| joint.kind != Kind::Fixed).map(|joint| joint.name.as_str()).collect()
     }
 
     /// The end of the longest chain, where all other ends hang on it or a name tells.
