@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::dataset::{Dataset, Reading};
+use super::dataset::Dataset;
 use crate::identify::Error;
 
 /// Joints within this, rad or mm, are the same.
@@ -13,14 +13,7 @@ const SAME_POINT_MM: f64 = 1e-9;
 
 /// Refuses points of which all are one although the robot moved: nothing was measured.
 pub fn check_points(set: &Dataset) -> Result<(), Error> {
-    let points: Vec<Point3<f64>> = set
-        .poses
-        .iter()
-        .filter_map(|pose| match pose.reading {
-            Reading::Position { point_mm, .. } => Some(point_mm),
-            _ => None,
-        })
-        .collect();
+    let points: Vec<Point3<f64>> = set.poses.iter().filter_map(|pose| pose.reading.point_mm()).collect();
     let is_one = points.len() > 1 && points.iter().all(|point| (point - points[0]).norm() <= SAME_POINT_MM);
     let moved = set.poses.iter().any(|pose| pose.joints_rad != set.poses[0].joints_rad);
     match is_one && moved {
@@ -50,5 +43,5 @@ pub fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
 pub fn constant_joints(set: &Dataset) -> Vec<usize> {
     let Some(first) = set.poses.first() else { return Vec::new() };
     let constant = |j: &usize| set.poses.iter().all(|p| (p.joints_rad[*j] - first.joints_rad[*j]).abs() <= SAME_JOINT);
-    (0..first.joints_rad.len()).filter(constant).collect()
+    (0..set.joint_count()).filter(constant).collect()
 }

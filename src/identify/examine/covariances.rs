@@ -193,9 +193,11 @@ fn scale(set: &mut Dataset, name: &str, factor: f64) {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Matrix3, Matrix3xX, Vector3};
+
     use super::*;
     use crate::identify::synthetic;
-    use crate::measurements::Observed;
+    use crate::measurements::Measurement;
 
     const NOISE_MM: f64 = 0.02;
 
@@ -204,12 +206,10 @@ mod tests {
     fn examined(of_group: f64, of_all: f64) -> (Vec<String>, f64) {
         let world = synthetic::world(120, NOISE_MM, 4);
         let mut rows = world.rows.clone();
-        for row in &mut rows {
-            let sd_mm = NOISE_MM * of_all * if row.at.group == "g1" { of_group } else { 1.0 };
-            if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
-                *covariance_mm2 = Some(nalgebra::Matrix3::identity() * sd_mm * sd_mm);
-            }
-        }
+        synthetic::state(&mut rows, |at| {
+            let sd_mm = NOISE_MM * of_all * if at.group == "g1" { of_group } else { 1.0 };
+            Some(Matrix3::identity() * sd_mm * sd_mm)
+        });
         let set = Dataset::new(&rows).unwrap();
         let (set, findings) = examine(&set, &world.nominal, &Settings::default());
         let first = |name: &str| {
@@ -241,21 +241,18 @@ mod tests {
         let world = synthetic::world(120, NOISE_MM, 4);
         let mut rows = world.rows.clone();
         // The first group stands where the calibration's error is large.
-        let column = |i: usize, row: &crate::measurements::Measurement| {
-            nalgebra::Vector3::z() * if row.at.group == "g1" { 0.2 * (1.7 * i as f64).sin() } else { 0.0 }
+        let column = |i: usize, row: &Measurement| {
+            Vector3::z() * if row.at.group == "g1" { 0.2 * (1.7 * i as f64).sin() } else { 0.0 }
         };
         for (i, row) in rows.iter_mut().enumerate() {
             let moved = column(i, row);
-            if let Observed::Position { point_mm, covariance_mm2, .. } = &mut row.observed {
-                *point_mm += moved;
-                *covariance_mm2 = Some(nalgebra::Matrix3::identity() * NOISE_MM * NOISE_MM);
-            }
+            *synthetic::point(row) += moved;
         }
+        synthetic::state(&mut rows, |_| Some(Matrix3::identity() * NOISE_MM * NOISE_MM));
         let mut set = Dataset::new(&rows).unwrap();
         let said = |set: &Dataset| examine(set, &world.nominal, &Settings::default()).1.len();
         assert_eq!(said(&set), 1);
-        set.shared =
-            rows.iter().enumerate().map(|(i, row)| nalgebra::Matrix3xX::from_columns(&[column(i, row)])).collect();
+        set.shared = rows.iter().enumerate().map(|(i, row)| Matrix3xX::from_columns(&[column(i, row)])).collect();
         assert_eq!((set.shared.len(), said(&set)), (set.poses.len(), 0));
     }
 

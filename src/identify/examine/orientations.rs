@@ -189,11 +189,8 @@ mod tests {
             let (right, mended, said) = said(written);
             assert!(said.as_ref().is_some_and(|s| s.contains(name)), "{name}: {said:?}");
             for (a, b) in right.poses.iter().zip(&mended.poses) {
-                let turn = |p: &crate::identify::data::dataset::Pose| match p.reading {
-                    Reading::Position { rotation_rad, .. } => rotation_rad.map(UnitQuaternion::from_scaled_axis),
-                    _ => None,
-                };
-                assert!(turn(a).unwrap().angle_to(&turn(b).unwrap()) < 1e-6, "{name}");
+                let [a, b] = [a, b].map(|p| UnitQuaternion::from_scaled_axis(p.reading.rotation_rad().unwrap()));
+                assert!(a.angle_to(&b) < 1e-6, "{name}");
             }
         }
     }

@@ -69,10 +69,19 @@ pub struct Deletion {
 }
 
 impl Identification {
+    /// The robot to use.
+    pub fn robot(&self) -> &Robot {
+        &self.candidates[self.chosen].robot
+    }
+
+    /// The problem that it solves; `None` where it is the nominal one.
+    pub fn formulation(&self) -> Option<&Formulation> {
+        self.candidates[self.chosen].found.as_ref().map(|(formulation, _)| formulation)
+    }
+
     /// A scale of the readings, as the chosen robot has it.
     pub fn scale(&self, set: &Dataset) -> Option<CommonScale> {
-        let (formulation, _) = self.candidates[self.chosen].found.as_ref()?;
-        CommonScale::new(set, &self.terms, formulation)
+        CommonScale::new(set, &self.terms, self.formulation()?)
     }
 
     pub(super) fn keep_nominal(&mut self, robot: &Robot, model: Model, held_out_mm: Option<f64>) {

@@ -1,5 +1,4 @@
 use super::*;
-use crate::identify::data::dataset::Reading;
 use crate::identify::synthetic::{World, planned, point};
 use crate::measurements::{Measurement, Observed};
 use crate::tables::names::Unit;
@@ -175,11 +174,7 @@ fn rows_in_metres_among_others_are_named_and_speak_against_the_file() {
         assert_eq!(against[0].rows.len(), rows.len().div_ceil(share));
         let right = Dataset::new(&rows).unwrap();
         for (pose, right) in mended.poses.iter().zip(&right.poses) {
-            let (Reading::Position { point_mm: a, .. }, Reading::Position { point_mm: b, .. }) =
-                (&pose.reading, &right.reading)
-            else {
-                continue;
-            };
+            let (a, b) = (pose.reading.point_mm().unwrap(), right.reading.point_mm().unwrap());
             assert!((a - b).norm() < 1e-6);
         }
     }

@@ -6,7 +6,7 @@ use crate::geometry::{Transform, rotation_vector, transform};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::placement::{Placed, Uncertain, is_held};
 use crate::identify::run::identify;
-use crate::identify::settings::{Extensions, Method, Model, Settings};
+use crate::identify::settings::{Extensions, Model, Settings};
 use crate::identify::synthetic::{self, World};
 use crate::robot::{Parameter, Robot};
 
@@ -105,7 +105,7 @@ impl Tally {
 }
 
 fn tally(robots: u64, samples: usize, oriented: bool, extensions: Extensions) -> Tally {
-    let settings = Settings { method: Some(Method::TrustRegion), extensions, ..Settings::default() };
+    let settings = Settings { extensions, ..synthetic::settings() };
     let mut tally = Tally::default();
     for seed in 0..robots {
         let (world, fresh) = (world(samples, oriented, seed), world(24, false, 500 + seed));
@@ -138,7 +138,7 @@ fn stated_uncertainties_are_those_of_simulated_robots() {
 fn what_is_held_is_what_a_placement_stands_for() {
     let world = world(40, true, 1);
     let set = Dataset::new(&world.rows).unwrap();
-    let settings = Settings { method: Some(Method::TrustRegion), extensions: Extensions::None, ..Settings::default() };
+    let settings = Settings { extensions: Extensions::None, ..synthetic::settings() };
     let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
     let placed = found.placed(&set, &world.nominal, &settings).unwrap().unwrap();
     for parameter in world.nominal.mdh_parameters() {
@@ -153,7 +153,7 @@ fn what_is_held_is_what_a_placement_stands_for() {
 fn a_robot_found_by_distances_and_a_nominal_one_are_placed_too() {
     let world = world(40, false, 2);
     let set = Dataset::new(&world.rows).unwrap();
-    let plain = Settings { method: Some(Method::TrustRegion), extensions: Extensions::None, ..Settings::default() };
+    let plain = Settings { extensions: Extensions::None, ..synthetic::settings() };
     let by_distance = Settings { model: Some(Model::CenterDistance), ..plain.clone() };
     let mut nominal = identify(&set, &world.nominal, &plain, 1, &|_| {}).unwrap();
     nominal.keep_nominal(&world.nominal, Model::Position, None);
@@ -162,7 +162,7 @@ fn a_robot_found_by_distances_and_a_nominal_one_are_placed_too() {
     {
         let placed = found.placed(&set, &world.nominal, settings).unwrap().unwrap();
         assert_eq!(placed.groups.len(), 4);
-        let is_nominal = found.candidates[found.chosen].found.is_none();
+        let is_nominal = found.formulation().is_none();
         let (sensor, _) = truth(&world, placed.robot(), placed.groups[0].0);
         let off = error(&placed.sensor_from_base(0), &sensor);
         let bound = if is_nominal { 5.0 } else { 1.0 };

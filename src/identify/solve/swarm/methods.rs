@@ -39,17 +39,9 @@ mod tests {
         let world = synthetic::world(SAMPLES, noise_mm, 7);
         let set = Dataset::new(&world.rows).unwrap();
         let parameters = world.nominal.mdh_parameters();
-        Formulation::new(&Task {
-            set: &set,
-            robot: &world.nominal,
-            parameters: &parameters,
-            extras: &[],
-            rows: &set.fit_rows(),
-            model: Model::CenterDistance,
-            smooth: None,
-            settings: &paper_settings(),
-        })
-        .unwrap()
+        let (rows, settings) = (set.fit_rows(), paper_settings());
+        let plain = Task::plain(&set, &world.nominal, &parameters, &rows, &settings);
+        Formulation::new(&Task { model: Model::CenterDistance, ..plain }).unwrap()
     }
 
     /// Best of many trust-region starts drawn in the box.
