@@ -42,6 +42,12 @@ impl<'a> Fit<'a> {
         Fit { rows, base, spread, lower, upper: bounds.to_vec(), prior, unit_mm }
     }
 
+    /// Without a box.
+    pub fn free(rows: &'a Rows, base: &'a Base, spread: DMatrix<f64>, prior: DMatrix<f64>) -> Fit<'a> {
+        let bounds = vec![f64::INFINITY; prior.ncols()];
+        Fit::new(std::borrow::Cow::Borrowed(rows), base, spread, &bounds, prior)
+    }
+
     /// Offsets of all parameters of the robot, then of the extras.
     pub fn offsets(&self, x: &[f64]) -> Vec<f64> {
         let (of_base, extras) = x.split_at(self.base.rank());

@@ -39,10 +39,11 @@ struct Number {
 /// The residual of a row: a length, or a point along the axes of its covariance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Residual {
-    row: usize,
+    /// Of the data set.
+    pub(super) row: usize,
     weight: f64,
     numbers: [Number; 3],
-    count: usize,
+    pub(super) count: usize,
 }
 
 impl Number {
@@ -77,18 +78,9 @@ impl Residual {
         Some(Residual { row, weight, numbers, count })
     }
 
-    /// Its row of the data set.
-    pub(super) fn row(&self) -> usize {
-        self.row
-    }
-
     /// Root mean square of its numbers, mm.
     pub(super) fn size_mm(&self) -> f64 {
         (self.numbers().iter().map(|n| n.square).sum::<f64>() / self.count as f64).sqrt()
-    }
-
-    pub(super) fn count(&self) -> usize {
-        self.count
     }
 
     fn numbers(&self) -> &[Number] {
