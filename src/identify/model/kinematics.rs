@@ -41,6 +41,11 @@ pub struct Place {
     pub rotation_columns: Matrix3xX<f64>,
 }
 
+/// Number of columns of these places.
+pub fn column_count(places: &[Place]) -> usize {
+    places.first().map_or(0, |place| place.point_columns.ncols())
+}
+
 impl Kinematics {
     /// `joints_rad`: one vector of commanded angles a pose, of the robot's joint count.
     /// Weights have their levers on the chain of `load_chain`.
@@ -81,10 +86,10 @@ impl Kinematics {
         let place = |pose: &PoseConstants| {
             self.bend(&robot, pose, offsets, &mut bent);
             if derivatives {
-                self.with_columns(&robot, &links, pose, &bent)
-            } else {
-                without_columns(&robot, &links, &bent)
+                return self.with_columns(&robot, &links, pose, &bent);
             }
+            let (rotation, point_mm) = links.end(&bent, &robot.tool_mm);
+            Place { point_mm, rotation, point_columns: Matrix3xX::zeros(0), rotation_columns: Matrix3xX::zeros(0) }
         };
         self.poses.iter().map(place).collect()
     }
@@ -120,9 +125,4 @@ impl Kinematics {
             rotation_columns: columns(&|p, f| screws.rotation_column(p, f)),
         }
     }
-}
-
-fn without_columns(robot: &Robot, links: &Links, bent: &Bent) -> Place {
-    let (rotation, point_mm) = links.end(bent, &robot.tool_mm);
-    Place { point_mm, rotation, point_columns: Matrix3xX::zeros(0), rotation_columns: Matrix3xX::zeros(0) }
 }

@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector, Vector3};
 
 use super::distances::{Center, Wire};
-use super::eliminate::{Block, Evaluated, Unknowns};
+use super::eliminate::{Block, Unknowns};
 use super::pairwise::{CHUNK, Pairs};
 use super::points::Points;
 use super::smooth::Field;
@@ -15,8 +15,7 @@ use super::touch::{Contact, Touch};
 use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, KnownDistance, Reading};
 use crate::identify::model::kinematics::{Kinematics, Place};
-use crate::identify::residuals::raw::Raw;
-use crate::identify::sensor::{Extra, Length, Scatter, Spot};
+use crate::identify::sensor::{Extra, Length, Raw, Scatter, Spot};
 use crate::identify::settings::Model;
 use crate::robot::{Parameter, Robot};
 
@@ -71,7 +70,8 @@ impl Rows {
         let joints: Vec<&[f64]> = used.iter().map(|&i| set.poses[i].joints_rad.as_slice()).collect();
         let kinematics = Kinematics::new(robot, load_chain, parameters, &joints);
         let places = kinematics.places(&vec![0.0; parameters.len()], false);
-        let blocks = Inputs { spec, used: &used, places: &places, by_group: by_group(set, rows) }.blocks();
+        let by_group = (0..set.groups.len()).map(|group| set.of_group(rows, group)).collect();
+        let blocks = Inputs { spec, used: &used, places: &places, by_group }.blocks();
         Rows { kinematics, rows: used, blocks, scatter: spec.scatter, extras: spec.extras.to_vec() }
     }
 
@@ -94,17 +94,16 @@ impl Rows {
     pub fn evaluate(&self, offsets: &[f64], derivatives: bool) -> (DVector<f64>, DMatrix<f64>) {
         let (of_robot, extras) = self.split(offsets);
         let places = self.kinematics.places(of_robot, derivatives);
-        let parts: Vec<Evaluated> =
+        let parts: Vec<(DVector<f64>, DMatrix<f64>)> =
             self.blocks.iter().map(|b| b.evaluate(&places, extras, &self.scatter, derivatives)).collect();
-        let rows = parts.iter().map(|p| p.residuals.len()).sum();
+        let rows = parts.iter().map(|(residuals, _)| residuals.len()).sum();
         let columns = if derivatives { offsets.len() } else { 0 };
         let (mut residuals, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, columns));
         let mut row = 0;
-        for part in parts {
-            let count = part.residuals.len();
-            residuals.rows_mut(row, count).copy_from(&part.residuals);
-            jacobian.rows_mut(row, count).copy_from(&part.jacobian);
-            row += count;
+        for (of_block, columns) in parts {
+            residuals.rows_mut(row, of_block.len()).copy_from(&of_block);
+            jacobian.rows_mut(row, of_block.len()).copy_from(&columns);
+            row += of_block.len();
         }
         (residuals, jacobian)
     }
@@ -146,7 +145,7 @@ impl Rows {
 
     /// Degrees of freedom that residuals lose to smooth errors that placements share.
     pub fn lost_to_smooth(&self) -> f64 {
-        let lost = |b: &Block| if let Block::Points(Points { field: Some(f), .. }) = b { f.lost() } else { 0.0 };
+        let lost = |b: &Block| if let Block::Points(Points { field: Some(f), .. }) = b { f.lost } else { 0.0 };
         self.blocks.iter().map(lost).sum()
     }
 
@@ -155,7 +154,7 @@ impl Rows {
         let (mut sum, mut count) = (0.0, 0);
         for block in &self.blocks {
             if let Block::Points(Points { field: Some(field), spots, .. }) = block {
-                sum += field.left_mm2() * spots.len() as f64;
+                sum += field.left_mm2 * spots.len() as f64;
                 count += spots.len();
             }
         }
@@ -171,13 +170,14 @@ impl Rows {
         let mut fixed = self.clone();
         fixed.scatter.smooth = None;
         let off = |length: &mut Length| {
-            length.length_mm -= length.extra.iter().zip(extras).map(|(x, e)| x * e).sum::<f64>();
+            length.length_mm -= length.gained(extras);
             length.extra = RowDVector::zeros(0);
         };
         for (block, unknowns) in fixed.blocks.iter_mut().zip(&unknowns) {
             match block {
-                Block::Center(c) => c.lengths.iter_mut().for_each(off),
-                Block::Wire(w) => w.lengths.iter_mut().for_each(off),
+                Block::Center(Center { lengths, .. }) | Block::Wire(Wire { lengths, .. }) => {
+                    lengths.iter_mut().for_each(off);
+                }
                 Block::Points(p) => {
                     if let Unknowns::Frame(frame) = unknowns {
                         let smooth = p.smooth_mm(&places, extras, frame);
@@ -200,14 +200,6 @@ impl Rows {
         fixed.extras.clear();
         fixed
     }
-}
-
-fn by_group(set: &Dataset, rows: &[usize]) -> Vec<Vec<usize>> {
-    let mut lists = vec![Vec::new(); set.groups.len()];
-    for &row in rows {
-        lists[set.poses[row].group].push(row);
-    }
-    lists
 }
 
 /// What a point of a placement gains with each extra unknown, mm (see [`Extra`]).

@@ -234,8 +234,6 @@ struct Estimate<'a> {
     x: Vec<f64>,
     /// The robot on whose chain weights have their levers.
     load_chain: Robot,
-    /// Number of unknowns that the data have determined.
-    effective: f64,
 }
 
 impl<'a> Estimate<'a> {
@@ -249,7 +247,7 @@ impl<'a> Estimate<'a> {
         task.check_count(&rows, &base)?;
         let x = vec![0.0; base.rank() + task.extras.len()];
         let scatter = estimate_scatter(&rows, &vec![0.0; rows.offset_count()], 0.0, None, scatter);
-        Ok(Estimate { task, base, scatter, tolerance: Tolerance::default(), x, load_chain, effective: 0.0 })
+        Ok(Estimate { task, base, scatter, tolerance: Tolerance::default(), x, load_chain })
     }
 
     fn rows(&self) -> Rows {
@@ -272,7 +270,6 @@ impl<'a> Estimate<'a> {
         let offsets = fit.offsets(&x);
         let effective = determined(&fit, &x, &prior);
         let lost = (task.model == Model::Pose).then(|| freedom::lost(&fit, &x, &prior)).flatten();
-        self.effective = effective;
         self.scatter = estimate_scatter(&rows, &offsets, effective, lost, self.scatter);
         self.load_chain = task.robot.shifted(task.parameters, &offsets);
         self.x = x;

@@ -5,9 +5,8 @@
 //! right sum of squares the one of least determinant is the most probable; where the data do not tell the two apart, C is taken at
 //! its word.
 
-use crate::identify::residuals::raw::Raw;
 use crate::identify::residuals::rows::Rows;
-use crate::identify::sensor::{EVIDENCE, Scatter};
+use crate::identify::sensor::{EVIDENCE, Raw, Scatter};
 use crate::statistics::median;
 
 /// Least scatter, mm and rad: far below any instrument; keeps weights finite for exact data.
