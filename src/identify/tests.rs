@@ -242,8 +242,7 @@ fn a_zero_that_is_off_costs_next_to_nothing_and_is_said() {
         let (set, found) = world.identified(&rows);
         let said = findings(&set, &found, &Default::default());
         let said = said.iter().any(|f| f.finding.contains("the zero of the readings is off"));
-        let (extras, values): (Vec<_>, Vec<f64>) = found.extras.iter().copied().unzip();
-        let judge = Judge { extras: &extras, values: &values, ..Judge::plain(&set, &found.fitted, true) };
+        let judge = Judge { extras: &found.extras, ..Judge::plain(&set, &found.fitted, true) };
         let errors = judge.errors(found.robot(), &set.verify_rows());
         (Spread::new(errors.iter().filter_map(|e| e.distance_mm)).mean_abs_mm.unwrap(), said)
     };

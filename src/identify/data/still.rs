@@ -23,7 +23,7 @@ pub fn check_points(set: &Dataset) -> Result<(), Error> {
 }
 
 /// Rows of the same group at the same joints.
-pub fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
+pub fn repeated(set: &Dataset) -> Vec<String> {
     let mut order: Vec<usize> = (0..set.poses.len()).collect();
     let key = |i: usize| (set.poses[i].group, &set.poses[i].joints_rad);
     order.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
@@ -34,9 +34,7 @@ pub fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
     let mut rows: Vec<usize> = order.windows(2).filter(|w| same(w[0], w[1])).flat_map(|w| [w[0], w[1]]).collect();
     rows.sort_unstable();
     rows.dedup();
-    let found =
-        "poses that the robot came back to: they say how well it repeats, and nothing about its links".to_owned();
-    (!rows.is_empty()).then(|| (set.names(&rows), found))
+    set.names(&rows)
 }
 
 /// Joints that do not move.

@@ -181,9 +181,6 @@ impl<'a> Search<'a> {
         let squares: f64 = parts.iter().map(|(_, p, _)| p.linear.residuals.norm_squared()).sum();
         let mut placed = Vec::new();
         for (block, placement, own) in parts {
-            if matches!(block, Block::Pairwise(_)) {
-                continue;
-            }
             let of_rows = ranges(placement.poses.iter().map(|pose| Some(rows.rows[(*pose)?])));
             let (linear, inverse) =
                 (&placement.linear, Rc::new(pseudo_inverse(placement.with_others(&(&normal - own)))));
@@ -249,14 +246,13 @@ impl<'a> Search<'a> {
 
     /// The rows of a placement sorted by each joint.
     fn orders(&self, placed: &Placed) -> Vec<Vec<usize>> {
-        let joints = self.set.poses.first().map_or(0, |p| p.joints_rad.len());
         let sorted = |j: usize| {
             let mut order: Vec<usize> = (0..placed.rows.len()).collect();
             let angle = |k: &usize| self.set.poses[placed.rows[*k].0].joints_rad[j];
             order.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
             order
         };
-        (0..joints).map(sorted).collect()
+        (0..self.set.joint_count()).map(sorted).collect()
     }
 
     /// Groups whose placement moves evenly along their rows; where one of them is to be cut, only if that explains less.

@@ -9,6 +9,8 @@
 //! What goes wrong: a model whose parameters move the target by so much that a linear model does not hold; nominal errors of 5 mm on a
 //! metre leave some hundredths.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -88,11 +90,9 @@ impl CrossValidation {
         }
         if !whole_placements {
             // A placement of few rows has fewer regions than there are numbers for.
-            let mut used: Vec<usize> = cells.iter().map(|c: &Cell| c.fold).filter(|f| *f < SKIPPED).collect();
-            used.sort_unstable();
-            used.dedup();
+            let used: BTreeSet<usize> = cells.iter().map(|c: &Cell| c.fold).filter(|f| *f < SKIPPED).collect();
             for cell in cells.iter_mut().filter(|c| c.fold < SKIPPED) {
-                cell.fold = used.binary_search(&cell.fold).unwrap_or(0);
+                cell.fold = used.range(..cell.fold).count();
             }
         }
         let folds = cells.iter().map(|c| c.fold + 1).filter(|f| *f < SKIPPED).max().unwrap_or(0);
@@ -155,8 +155,8 @@ impl CrossValidation {
     /// Standard deviations of the model's parameters that make the data most probable, and the logarithm of that probability.
     pub fn tolerance(&self, parameters: &[Parameter]) -> (Tolerance, f64) {
         let columns = self.columns(parameters);
-        let normal = picked(&self.whole.normal, &columns);
-        let gradient = DVector::from_iterator(columns.len(), columns.iter().map(|&c| self.whole.gradient[c]));
+        let normal = self.whole.normal.select_rows(&columns).select_columns(&columns);
+        let gradient = self.whole.gradient.select_rows(&columns);
         Tolerance::from_evidence_of_all(parameters, &self.extras, &normal, &gradient)
     }
 
@@ -176,7 +176,7 @@ impl CrossValidation {
         };
         let mut pulls = vec![DVector::<f64>::zeros(n); self.folds.len()];
         let mut informations = vec![DMatrix::<f64>::zeros(n, n); self.folds.len()];
-        for cell in &self.cells {
+        for cell in self.cells.iter().filter(|cell| cell.fold < SKIPPED) {
             let Some(follow) = &self.whole.follows[cell.block] else { continue };
             // The parameters' columns with the placement following them, and the residuals at the solution.
             let all = x.len();
@@ -190,9 +190,6 @@ impl CrossValidation {
             moves.rows_mut(0, all + 1).copy_from(&kept);
             moves.rows_mut(all + 1, follow.nrows()).copy_from(&-(follow * kept));
             let products = moves.transpose() * &cell.normal * &moves;
-            if cell.fold >= SKIPPED {
-                continue;
-            }
             pulls[cell.fold] += products.view((0, n), (n, 1)).column(0);
             informations[cell.fold] += products.view((0, 0), (n, n));
         }
@@ -285,27 +282,16 @@ impl Fold {
 }
 
 fn sum<'a>(cells: impl Iterator<Item = &'a Cell>) -> Option<DMatrix<f64>> {
-    cells.fold(None, |sum: Option<DMatrix<f64>>, cell| {
-        Some(match sum {
-            Some(sum) => sum + &cell.normal,
-            None => cell.normal.clone(),
-        })
-    })
-}
-
-fn picked(matrix: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
-    DMatrix::from_fn(columns.len(), columns.len(), |r, c| matrix[(columns[r], columns[c])])
+    cells.map(|cell| cell.normal.clone()).reduce(|sum, normal| sum + normal)
 }
 
 /// The region of each residual; `None` for what belongs to no pose.
 fn labels(set: &Dataset, rows: &Rows, poses: &[Option<usize>], regions: usize) -> Vec<Option<usize>> {
-    let mut present: Vec<usize> = poses.iter().flatten().copied().collect();
-    present.sort_unstable();
-    present.dedup();
+    let present: BTreeSet<usize> = poses.iter().flatten().copied().collect();
     let mut label = vec![0; rows.rows.len()];
     let mut next = 0;
     let regions = regions.min(present.len()).max(1);
-    divide(set, rows, present, regions, &mut next, &mut label);
+    divide(set, rows, present.into_iter().collect(), regions, &mut next, &mut label);
     poses.iter().map(|p| p.map(|p| label[p])).collect()
 }
 

@@ -90,16 +90,13 @@ fn mean_of_repeats(errors: Vec<RowError>) -> Option<RowError> {
 mod tests {
     use super::*;
     use crate::identify::synthetic;
+    use crate::measurements::RobotPose;
 
     #[test]
     fn every_row_is_left_out_once_in_each_repeat_and_rows_of_one_pose_together() {
         let mut world = synthetic::world(60, 0.01, 1);
-        let again = world.rows[20].at.joints_deg.clone();
-        world.rows[40].at = crate::measurements::RobotPose {
-            joints_deg: again,
-            group: world.rows[20].at.group.clone(),
-            ..world.rows[40].at.clone()
-        };
+        let RobotPose { joints_deg, group, .. } = world.rows[20].at.clone();
+        world.rows[40].at = RobotPose { joints_deg, group, ..world.rows[40].at.clone() };
         let set = Dataset::new(&world.rows).unwrap();
         let rows = set.fit_rows();
         for of_row in folds(&set, &rows) {

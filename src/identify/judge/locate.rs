@@ -105,7 +105,7 @@ fn fitted(task: &Task, trust: Trust) -> Result<Located, Error> {
         stated: found.stated.max(1.0),
         smooth: None,
     };
-    let load_chain = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
+    let load_chain = task.robot.shifted(task.parameters, &offsets);
     formulation.rows = task.rows_at(scatter, &load_chain);
     if let Some(direction) = open_direction(&formulation.rows, &offsets, task.parameters.len()) {
         return Err(Error::Open { direction });
@@ -148,14 +148,9 @@ fn misfit(task: &Task, trust: Trust, offsets: &[f64]) -> (f64, usize, f64) {
         let step = pseudo_inverse(product(&jacobian, &jacobian)) * jacobian.tr_mul(&residuals);
         at.iter_mut().zip(step.iter()).for_each(|(x, s)| *x -= s);
     }
-    let raw = rows.raw(&at);
-    let squares: Vec<f64> = raw
-        .iter()
-        .filter_map(|(_, _, raw)| match raw {
-            Raw::Point(off, _) => Some(off.norm_squared()),
-            _ => None,
-        })
-        .collect();
+    let square =
+        |(_, _, raw): (usize, f64, Raw)| if let Raw::Point(off, _) = raw { Some(off.norm_squared()) } else { None };
+    let squares: Vec<f64> = rows.raw(&at).into_iter().filter_map(square).collect();
     let rms = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
     (chi_square, (3 * squares.len()).saturating_sub(unknowns), rms)
 }

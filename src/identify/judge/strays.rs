@@ -64,10 +64,10 @@ fn nearest(judge: &Judge, robot: &Robot) -> Vec<usize> {
     for _ in 0..ROUNDS {
         let mut all = sizes(judge, robot, &placing, judge.fitted);
         all.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let order: Vec<usize> = all.iter().map(|(row, _)| *row).collect();
         let mut near = Vec::new();
         for group in 0..judge.set.groups.len() {
-            let of_group: Vec<usize> =
-                all.iter().map(|(row, _)| *row).filter(|&row| judge.set.poses[row].group == group).collect();
+            let of_group = judge.set.of_group(&order, group);
             let spare = if of_group.len() < FEWEST { 0 } else { of_group.len() / SHARE };
             near.extend(&of_group[..of_group.len() - spare]);
         }

@@ -110,16 +110,15 @@ impl Expected {
         let smooth_mm2 = formulation.rows.left_by_smooth_mm2();
         let (mut squares, mut of_robots) = (vec![0.0; places.len()], vec![0.0; places.len()]);
         for group in 0..set.groups.len() {
-            let placing: Vec<usize> = fitted.iter().copied().filter(|&i| set.poses[i].group == group).collect();
             let motion = |i: usize| rigid_columns(&places[i].point_mm.coords);
             let mut normal = DMatrix::zeros(count + 6, count + 6);
-            for &i in &placing {
+            for i in set.of_group(fitted, group) {
                 let mut columns = places[i].point_columns.clone().resize_horizontally(count + 6, 0.0);
                 columns.fixed_columns_mut::<6>(count).copy_from(&motion(i));
                 normal += columns.tr_mul(&columns);
             }
             let Eliminated { follow, inverse, .. } = Eliminated::new(&normal, count);
-            for i in (0..places.len()).filter(|&i| set.poses[i].group == group) {
+            for i in set.rows(|pose| pose.group == group) {
                 let columns = &places[i].point_columns - motion(i) * &follow;
                 let of_robot = (&columns * &covariance * columns.transpose()).trace();
                 // The placement itself is found through the scatter of the rows it is fitted to.
@@ -197,19 +196,18 @@ impl Expected {
 
 /// From where to where each joint was read, deg (mm where it slides).
 fn ranges(set: &Dataset) -> Vec<[f64; 2]> {
-    let count = set.poses.first().map_or(0, |p| p.joints_rad.len());
     let range = |j: usize| {
         let values = set.poses.iter().map(|p| p.joints_rad[j]);
         let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
-        if set.slides.get(j) == Some(&true) { [low, high] } else { [low.to_degrees(), high.to_degrees()] }
+        if set.is_sliding(j) { [low, high] } else { [low.to_degrees(), high.to_degrees()] }
     };
-    (0..count).map(range).collect()
+    (0..set.joint_count()).map(range).collect()
 }
 
 /// The ranges of the joints that were measured, for a person.
 pub fn region(set: &Dataset) -> String {
     let of_joint = |(j, [low, high]): (usize, [f64; 2])| {
-        let unit = if set.slides.get(j) == Some(&true) { "mm" } else { "deg" };
+        let unit = if set.is_sliding(j) { "mm" } else { "deg" };
         format!("j{} {:.0}..{:.0} {unit}", j + 1, low.round() + 0.0, high.round() + 0.0)
     };
     ranges(set).into_iter().enumerate().map(of_joint).collect::<Vec<_>>().join(", ")

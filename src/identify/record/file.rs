@@ -107,9 +107,8 @@ pub struct Smooth {
 impl Smooth {
     /// Of the chosen fit.
     pub fn new(found: &Identification) -> Option<Smooth> {
-        let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
-        let error = formulation.rows.scatter.smooth?;
-        Some(Smooth { error, left_mm: formulation.rows.left_by_smooth_mm2().sqrt() })
+        let rows = &found.formulation()?.rows;
+        Some(Smooth { error: rows.scatter.smooth?, left_mm: rows.left_by_smooth_mm2().sqrt() })
     }
 }
 

@@ -7,7 +7,7 @@ use super::findings::Findings;
 use super::parameters::{self, Identifiability, MethodRecord};
 use super::quality::quality;
 use super::touched::Touched;
-use crate::identify::data::dataset::{Dataset, Reading};
+use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::sessions::Along;
 use crate::identify::judge::uncertainty::{Covariance, Expected};
 use crate::identify::run::{Identification, certainty};
@@ -39,7 +39,7 @@ impl Record {
         let chosen = &found.candidates[found.chosen];
         // Nominal has nothing to say about what the poses determine; the fit that it was kept against has.
         let fitted = chosen.found.as_ref().or(found.candidates.first().and_then(|c| c.found.as_ref()));
-        let identifiability = fitted.map_or_else(Identifiability::nothing, |(f, _)| parameters::identifiability(f));
+        let identifiability = fitted.map_or_else(Identifiability::default, |(f, _)| parameters::identifiability(f));
         let methods: Vec<MethodRecord> = found
             .candidates
             .iter()
@@ -103,9 +103,6 @@ fn tool(set: &Dataset, nominal: &Robot) -> Option<([f64; 3], f64)> {
 pub(super) fn most_points(set: &Dataset) -> (Vec<Vec<f64>>, Vec<Point3<f64>>) {
     let of_group = |g: usize| set.rows(|p| p.group == g && p.on_body_mm.is_none());
     let rows = (0..set.groups.len()).map(of_group).max_by_key(Vec::len).unwrap_or_default();
-    let point = |&r: &usize| match set.poses[r].reading {
-        Reading::Position { point_mm, .. } => Some((set.poses[r].joints_rad.clone(), point_mm)),
-        _ => None,
-    };
+    let point = |&r: &usize| Some((set.poses[r].joints_rad.clone(), set.poses[r].reading.point_mm()?));
     rows.iter().filter_map(point).unzip()
 }

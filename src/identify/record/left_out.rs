@@ -42,7 +42,7 @@ struct Rows<'a> {
 
 fn of_rows(rows: &Rows) -> Option<LeftOut> {
     let set = rows.set;
-    let joints = set.poses.first().map_or(0, |pose| pose.joints_rad.len());
+    let joints = set.joint_count();
     let tests = 3 * joints;
     let moving = (0..joints).filter_map(|joint| moves(rows, joint, tests));
     let at_an_end = || (0..joints).filter_map(|joint| beyond(rows, joint, tests)).next();
@@ -98,10 +98,7 @@ fn beyond(of: &Rows, joint: usize, tests: usize) -> Option<LeftOut> {
     }
     let kept = all.iter().filter(|(_, out, _)| !out).map(|(q, ..)| *q);
     let end = if way == "below" { kept.fold(f64::INFINITY, f64::min) } else { kept.fold(f64::NEG_INFINITY, f64::max) };
-    let (end, unit) = match of.set.slides.get(joint) {
-        Some(true) => (end, "mm"),
-        _ => (end.to_degrees(), "deg"),
-    };
+    let (end, unit) = if of.set.is_sliding(joint) { (end, "mm") } else { (end.to_degrees(), "deg") };
     let said = format!(
         "every row in which joint {} is {way} {end:.1} {unit} was left out ({}): the robot that was found does not hold there",
         joint + 1,

@@ -54,7 +54,7 @@ pub struct ParameterRecord {
 }
 
 /// What the poses determine.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Identifiability {
     /// Number of base parameters.
     pub rank: usize,
@@ -69,20 +69,6 @@ pub struct Identifiability {
     pub observability: Option<Observability>,
     /// Base parameters that the data leave as uncertain as the prior.
     pub weak: Vec<String>,
-}
-
-impl Identifiability {
-    pub(super) fn nothing() -> Identifiability {
-        Identifiability {
-            rank: 0,
-            parameters: 0,
-            zero: Vec::new(),
-            dependent: Vec::new(),
-            condition: None,
-            observability: None,
-            weak: Vec::new(),
-        }
-    }
 }
 
 pub(super) fn identifiability(formulation: &Formulation) -> Identifiability {

@@ -55,9 +55,7 @@ pub fn certainty(judged: &[Judged], terms: &Terms) -> Vec<Certainty> {
     };
     let nominal = judged.iter().find(|j| j.of == Terms::NOMINAL);
     let others = judged.iter().filter(|j| j.of != Terms::NOMINAL && !j.of.contains(terms));
-    let next = others
-        .filter(|j| j.held_out_mm.is_some())
-        .min_by(|a, b| a.held_out_mm.unwrap_or(f64::INFINITY).total_cmp(&b.held_out_mm.unwrap_or(f64::INFINITY)));
+    let next = others.filter_map(|j| Some((j.held_out_mm?, j))).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, j)| j);
     nominal.filter(|n| n.of != *terms).into_iter().chain(next).map(against).collect()
 }
 

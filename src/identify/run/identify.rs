@@ -11,9 +11,8 @@
 
 use super::forward_selection::Judged;
 use super::found::{Candidate, Deletion, Identification};
-use super::gross::Gross;
 use super::held_out::Against;
-use super::session::Session;
+use super::session::{Gross, Session};
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::shared;
@@ -230,7 +229,7 @@ impl Session<'_> {
     /// What the fit becomes without each fold of the rows, each time that they are cut into folds.
     fn deletions(&self, model: Model, parameters: &[Parameter], at: &Formulation) -> Vec<Deletion> {
         let offsets = at.offsets_of();
-        let load_chain = self.robot.shifted(parameters, &offsets[..parameters.len()]);
+        let load_chain = self.robot.shifted(parameters, &offsets);
         // What is smooth over a placement makes one of all its rows; without it rows can be left out.
         let scatter = Scatter { smooth: None, ..at.rows.scatter };
         let task = Task { smooth: None, ..self.task(parameters, model) };

@@ -43,7 +43,7 @@ impl Identification {
         let offsets: Vec<f64> = kept.iter().map(|&k| whole[k]).collect();
         let shared = shared.select_rows(&kept).select_columns(&kept);
         let parameters = formulation.parameters();
-        let load_chain = nominal.shifted(parameters, &whole[..count]);
+        let load_chain = nominal.shifted(parameters, &whole);
         let task = Task {
             set,
             robot: nominal,

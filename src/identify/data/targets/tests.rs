@@ -250,8 +250,7 @@ fn targets_that_no_pose_shows_together_are_joined_by_the_robot() {
         let set = Dataset::of_robot(rows, &world.nominal).unwrap();
         assert_eq!((set.skipped.len(), set.poses.len()), (0, rows.len()));
         let found = synthetic::identified(&set, &world.nominal);
-        let (extras, values): (Vec<_>, Vec<_>) = found.extras.iter().copied().unzip();
-        let judge = Judge { extras: &extras, values: &values, ..Judge::plain(&set, &found.fitted, true) };
+        let judge = Judge { extras: &found.extras, ..Judge::plain(&set, &found.fitted, true) };
         let errors =
             judge.errors(found.robot(), &found.fitted).into_iter().filter_map(|e| e.point_mm).map(|e| e.norm());
         assert!(errors.fold(0.0, f64::max) < 10.0 * NOISE_MM);

@@ -5,6 +5,8 @@
 //! a tool that was moved between parts costs one robot nothing. Gauss and Newton's steps with the placements eliminated; the links are held by
 //! a loose prior. Goes wrong: parts whose rows are no more than their unknowns; they leave nothing, and count no degrees of freedom.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 
 use crate::geometry::{fitted_frame, rigid_columns};
@@ -74,11 +76,10 @@ impl Left {
         (self.squares / self.freedom()).sqrt()
     }
 
-    /// Weights of all rows without those of these that are gross errors.
-    pub(super) fn weights(&self, rows: &[usize], count: usize) -> Vec<f64> {
-        let (mut weights, limit) = (vec![1.0; count], GROSS * typical_mm(&self.errors_mm));
+    /// Takes the weight of those of its rows that are gross errors.
+    pub(super) fn leave_out_gross(&self, rows: &[usize], weights: &mut [f64]) {
+        let limit = GROSS * typical_mm(&self.errors_mm);
         rows.iter().zip(&self.errors_mm).filter(|(_, error)| **error > limit).for_each(|(&row, _)| weights[row] = 0.0);
-        weights
     }
 
     pub(super) fn and(mut self, other: Left) -> Left {
@@ -97,12 +98,6 @@ struct Normal {
     matrix: DMatrix<f64>,
     numbers: f64,
     errors_mm: Vec<f64>,
-}
-
-/// What is left somewhere, and where to go from there.
-struct At {
-    left: Left,
-    step: DVector<f64>,
 }
 
 /// One robot for some parts: their rows, where the unknowns start, and how many steps are taken.
@@ -153,9 +148,7 @@ impl Points {
     pub(super) fn without_gross(&self, parts: &[Vec<usize>]) -> Vec<f64> {
         let mut kept = vec![1.0; self.points_mm.len()];
         for part in parts {
-            let (left, _) = self.bounded(part, None);
-            let limit = GROSS * typical_mm(&left.errors_mm);
-            part.iter().zip(&left.errors_mm).filter(|(_, error)| **error > limit).for_each(|(&row, _)| kept[row] = 0.0);
+            self.bounded(part, None).0.leave_out_gross(part, &mut kept);
         }
         kept
     }
@@ -174,14 +167,14 @@ impl Points {
     ) -> (Left, DVector<f64>) {
         let Fit { parts, mut x, steps } = fit;
         let kinematics: Vec<Kinematics> = parts.iter().map(|part| self.kinematics(part)).collect();
-        let mut at = self.at(parts, &kinematics, &x, &weights, FIRST_MM);
+        let (mut left, mut step) = self.at(parts, &kinematics, &x, &weights, FIRST_MM);
         for _ in 0..steps {
-            x += &at.step;
-            weigh(&at.left.errors_mm, &mut weights);
-            let scatter_mm = at.left.scatter_mm().clamp(LEAST_MM, LARGEST_MM);
-            at = self.at(parts, &kinematics, &x, &weights, scatter_mm);
+            x += &step;
+            weigh(&left.errors_mm, &mut weights);
+            let scatter_mm = left.scatter_mm().clamp(LEAST_MM, LARGEST_MM);
+            (left, step) = self.at(parts, &kinematics, &x, &weights, scatter_mm);
         }
-        (at.left, x)
+        (left, x)
     }
 
     /// What is left at these values of the unknowns, and the step from there.
@@ -192,7 +185,7 @@ impl Points {
         x: &DVector<f64>,
         weights: &[f64],
         scatter_mm: f64,
-    ) -> At {
+    ) -> (Left, DVector<f64>) {
         let count = x.len();
         let (normal, mut left) = self.normals(parts, kinematics, x, weights);
         let measured = normal.view((0, 0), (count, count)).into_owned();
@@ -200,7 +193,7 @@ impl Points {
         let inverse = pseudo_inverse(&measured + DMatrix::from_diagonal(&prior));
         left.taken = product(&inverse, &measured).trace();
         let step = &inverse * (normal.view((0, count), (count, 1)) - prior.component_mul(x));
-        At { left, step: step.column(0).into_owned() }
+        (left, step.column(0).into_owned())
     }
 
     /// Normal equations of all parts, and what is left there.
@@ -263,10 +256,7 @@ impl Points {
         let moved: Vec<Point3<f64>> =
             part.iter().zip(&places).map(|(&row, place)| place.point_mm + self.of_tool(row, place, offsets)).collect();
         let mut sum = Normal { matrix: DMatrix::zeros(kept, kept), numbers: 0.0, errors_mm: vec![0.0; part.len()] };
-        let mut groups: Vec<usize> = part.iter().map(|&row| self.groups[row]).collect();
-        groups.sort_unstable();
-        groups.dedup();
-        for group in groups {
+        for group in part.iter().map(|&row| self.groups[row]).collect::<BTreeSet<usize>>() {
             let of_group: Vec<usize> = (0..part.len()).filter(|&i| self.groups[part[i]] == group).collect();
             let pair = |&i: &usize| (self.points_mm[part[i]], moved[i], weights[part[i]]);
             let weight: f64 = of_group.iter().map(|&i| weights[part[i]]).sum();

@@ -3,14 +3,12 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
-use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::locate::Trust;
 use crate::identify::judge::placement::Uncertain;
 use crate::identify::run::identify;
 use crate::identify::settings::{Extensions, Settings};
 use crate::identify::synthetic;
 use crate::measurements::Measurement;
-use crate::robot::{Parameter, Robot};
 
 const NOISE_MM: f64 = 0.03;
 const NOISE_RAD: f64 = 2e-4;
