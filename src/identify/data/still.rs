@@ -1,5 +1,7 @@
 //! What did not move: poses that the robot came back to, and joints that are the same in all rows.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Point3;
 
 use super::dataset::Dataset;
@@ -24,17 +26,20 @@ pub fn check_points(set: &Dataset) -> Result<(), Error> {
 
 /// Rows of the same group at the same joints.
 pub fn repeated(set: &Dataset) -> Vec<String> {
-    let mut order: Vec<usize> = (0..set.poses.len()).collect();
-    let key = |i: usize| (set.poses[i].group, &set.poses[i].joints_rad);
-    order.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
+    let order = by_joints(set, set.rows(|_| true));
     let same = |a: usize, b: usize| {
         let pairs = set.poses[a].joints_rad.iter().zip(&set.poses[b].joints_rad);
         set.poses[a].group == set.poses[b].group && pairs.into_iter().all(|(p, q)| (p - q).abs() <= SAME_JOINT)
     };
-    let mut rows: Vec<usize> = order.windows(2).filter(|w| same(w[0], w[1])).flat_map(|w| [w[0], w[1]]).collect();
-    rows.sort_unstable();
-    rows.dedup();
-    set.names(&rows)
+    let rows: BTreeSet<usize> = order.windows(2).filter(|w| same(w[0], w[1])).flat_map(|w| [w[0], w[1]]).collect();
+    set.names(&rows.into_iter().collect::<Vec<_>>())
+}
+
+/// Rows by group, and within it by their joints.
+pub fn by_joints(set: &Dataset, mut rows: Vec<usize>) -> Vec<usize> {
+    let key = |i: usize| (set.poses[i].group, &set.poses[i].joints_rad);
+    rows.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
+    rows
 }
 
 /// Joints that do not move.

@@ -9,6 +9,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::errors::{Judge, RowError};
 use crate::identify::data::dataset::Dataset;
+use crate::identify::data::still::by_joints;
 use crate::measurements::Role;
 use crate::robot::Robot;
 
@@ -20,9 +21,9 @@ pub const REPEATS: usize = 4;
 
 /// The fold of each row of the data set, a list a repeat; `None` for rows that are not among these, and for centres.
 pub fn folds(set: &Dataset, rows: &[usize]) -> Vec<Vec<Option<usize>>> {
-    let mut order: Vec<usize> = rows.iter().copied().filter(|&r| set.poses[r].role != Role::Center).collect();
+    let kept = rows.iter().copied().filter(|&r| set.poses[r].role != Role::Center);
+    let order = by_joints(set, kept.collect());
     let key = |r: usize| (set.poses[r].group, &set.poses[r].joints_rad);
-    order.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
     let poses: Vec<&[usize]> = order.chunk_by(|&a, &b| key(a) == key(b)).collect();
     (1..=REPEATS as u64)
         .map(|repeat| {

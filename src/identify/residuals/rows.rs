@@ -3,6 +3,8 @@
 //! In: the data set, the rows to use with their weights, the model, the parameters that may move, the sensor's extra unknowns.
 //! Out: white residuals and derivatives with respect to all parameters and extras, the placements' unknowns eliminated.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector, Vector3};
 
 use super::distances::{Center, Wire};
@@ -10,10 +12,11 @@ use super::eliminate::{Block, Unknowns};
 use super::pairwise::{CHUNK, Pairs};
 use super::points::Points;
 use super::smooth::Field;
-use super::starts::{first_anchor, frames_and_turn, middle};
+use super::starts::{first_anchor, frames_and_turn};
 use super::touch::{Contact, Touch};
 use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, KnownDistance, Reading};
+use crate::identify::data::targets::middle;
 use crate::identify::model::kinematics::{Kinematics, Place};
 use crate::identify::sensor::{Extra, Length, Raw, Scatter, Spot};
 use crate::identify::settings::Model;
@@ -268,13 +271,9 @@ impl Inputs<'_> {
         let set = self.spec.set;
         let touched: Vec<(usize, Vec<(usize, f64)>)> = (0..set.groups.len())
             .filter_map(|g| {
-                let contact = |&i: &usize| match set.poses[i].reading {
-                    Reading::Distance { distance_mm, sigma_mm } if set.touches(i) && distance_mm == 0.0 => {
-                        Some((i, sigma_mm.map_or(0.0, |s| s * s)))
-                    }
-                    _ => None,
-                };
-                let list: Vec<(usize, f64)> = self.by_group[g].iter().filter_map(contact).collect();
+                let touches = self.by_group[g].iter().filter(|&&i| set.touches(i));
+                let list: Vec<(usize, f64)> =
+                    touches.map(|&i| (i, set.poses[i].reading.variance_mm2().unwrap_or(0.0))).collect();
                 (!list.is_empty()).then_some((g, list))
             })
             .collect();
@@ -303,10 +302,7 @@ impl Inputs<'_> {
             let known = set.known.iter().enumerate().filter_map(known).collect();
             Block::Touch(Touch { sockets, contacts, known })
         };
-        let mut roots: Vec<usize> = touched.iter().map(|(g, _)| tied[*g]).collect();
-        roots.sort_unstable();
-        roots.dedup();
-        roots.into_iter().map(block).collect()
+        touched.iter().map(|(g, _)| tied[*g]).collect::<BTreeSet<usize>>().into_iter().map(block).collect()
     }
 
     fn spot(&self, row: usize) -> Option<Spot> {

@@ -12,6 +12,8 @@
 //! their size that of the other rows' residuals. A row that was kept is doubtful where the others are so far from it as one set in a
 //! thousand would have such a row by chance.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -114,18 +116,15 @@ impl Robust<'_> {
 
     /// Of other rows those that are so many standard deviations of reading and prediction off.
     pub fn far_off(&self, others: &[usize], sigmas: f64) -> Vec<usize> {
-        let mut rows = [self.task.rows, others].concat();
-        rows.sort_unstable();
-        rows.dedup();
+        let rows: BTreeSet<usize> = self.task.rows.iter().chain(others).copied().collect();
+        let rows: Vec<usize> = rows.into_iter().collect();
         let mut weights = self.weights.clone();
         others.iter().for_each(|&row| weights[row] = NEGLIGIBLE);
         let with = Robust { task: Task { rows: &rows, ..self.task }, weights, ..self.clone() };
         let deleted = with.deleted();
-        let mut far: Vec<usize> = others.iter().copied().filter(|&r| deleted[r].size() > sigmas).collect();
-        far.extend(self.far_off_alone(others, sigmas));
-        far.sort_unstable();
-        far.dedup();
-        far
+        let far = others.iter().copied().filter(|&r| deleted[r].size() > sigmas);
+        let far: BTreeSet<usize> = far.chain(self.far_off_alone(others, sigmas)).collect();
+        far.into_iter().collect()
     }
 
     /// The same of placements of which no row is fitted: nothing says where they are but their own rows, of which most are right.
@@ -133,9 +132,8 @@ impl Robust<'_> {
         let set = self.task.set;
         let mut far = Vec::new();
         for group in 0..set.groups.len() {
-            let of = |row: &&usize| set.poses[**row].group == group;
-            let rows: Vec<usize> = others.iter().filter(of).copied().collect();
-            if rows.len() < LEAST_ALONE || self.task.rows.iter().any(|row| of(&row)) {
+            let rows = set.of_group(others, group);
+            if rows.len() < LEAST_ALONE || !set.of_group(self.task.rows, group).is_empty() {
                 continue;
             }
             let alone = Task { rows: &rows, robot: &self.robot, parameters: &[], extras: &[], ..self.task };
