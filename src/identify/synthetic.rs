@@ -16,7 +16,6 @@ pub struct World {
     /// As its maker delivers it.
     pub nominal: Robot,
     pub truth: Robot,
-    /// What was measured.
     pub rows: Vec<Measurement>,
 }
 
@@ -118,6 +117,19 @@ pub fn planned(
 /// Elbow up, all round the base.
 fn starts() -> Vec<Vec<f64>> {
     (0..8).map(|k| vec![0.785 * k as f64 - 3.0, 0.6, -1.2, 0.5, 1.3, 0.2]).collect()
+}
+
+/// Distances of all spheres' poses to the first sphere's centre, as one group: by the index of the row, where the robot is and where from.
+pub fn to_first(world: &World, distance: impl Fn(usize, Point3<f64>, Point3<f64>) -> f64) -> Dataset {
+    let place = |row: &Measurement| world.truth.target_mm(&row.at.joints_rad());
+    let (mut rows, from) = (world.rows.clone(), place(&world.rows[0]));
+    let mut index = 0..;
+    rows.retain(|row| index.next() == Some(0) || row.at.role != Role::Center);
+    for (i, row) in rows.iter_mut().enumerate() {
+        row.at.group = "one".into();
+        row.observed = Observed::Distance { distance_mm: distance(i, place(row), from), sigma_mm: None };
+    }
+    Dataset::new(&rows).unwrap()
 }
 
 /// What a tracker reads of several targets on the flange, by their places in the last joint's frame, mm, and the noise of a coordinate.

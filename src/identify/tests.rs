@@ -11,7 +11,7 @@ use crate::identify::settings::{Extensions, Method, Model, Prior, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::task::Task;
 use crate::identify::synthetic::{self, World};
-use crate::measurements::{Measurement, Observed, Role};
+use crate::measurements::{Observed, Role};
 use crate::robot::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
 use crate::robot::{Parameter, Robot};
 
@@ -228,18 +228,11 @@ fn cameras_of_a_wrong_scale_do_not_stretch_the_robot() {
 fn a_zero_that_is_off_costs_next_to_nothing_and_is_said() {
     let world = synthetic::planned(200, 40, 25.0, NOISE_MM, 5, &|_| {});
     let error = |zero_mm: f64| {
-        // Distances of all spheres' poses to the first sphere's centre: on one sphere a zero is a scale.
-        let place = |row: &Measurement| world.truth.target_mm(&row.at.joints_rad());
-        let mut rows: Vec<_> = world.rows.iter().filter(|r| r.at.role != Role::Center).cloned().collect();
-        rows.insert(0, world.rows[0].clone());
-        let from = place(&rows[0]);
-        for (i, row) in rows.iter_mut().enumerate() {
-            let noise_mm = 1.4 * NOISE_MM * (2.7 * i as f64).sin();
-            let distance_mm = (place(row) - from).norm() + zero_mm + noise_mm;
-            row.at.group = "one".into();
-            row.observed = Observed::Distance { distance_mm, sigma_mm: None };
-        }
-        let (set, found) = world.identified(&rows);
+        // On one sphere a zero is a scale.
+        let set = synthetic::to_first(&world, |i, place, from| {
+            (place - from).norm() + zero_mm + 1.4 * NOISE_MM * (2.7 * i as f64).sin()
+        });
+        let found = synthetic::identified(&set, &world.nominal);
         let said = findings(&set, &found, &Default::default());
         let said = said.iter().any(|f| f.finding.contains("the zero of the readings is off"));
         let judge = Judge { extras: &found.extras, ..Judge::plain(&set, &found.fitted, true) };

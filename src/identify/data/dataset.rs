@@ -79,7 +79,6 @@ pub struct Pose {
     pub role: Role,
     /// Commanded angles, rad.
     pub joints_rad: Vec<f64>,
-    /// What was read.
     pub reading: Reading,
     /// Where on a body of several targets the point stands, from its mark point and in the body's frame, mm; `None` for the mark point itself.
     pub on_body_mm: Option<Vector3<f64>>,
@@ -104,7 +103,6 @@ pub struct Skipped {
 /// All that can be used, in the order of the file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Dataset {
-    /// What the readings are.
     pub kind: Kind,
     /// Placements, in order of appearance.
     pub groups: Vec<Group>,

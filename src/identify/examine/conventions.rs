@@ -71,7 +71,6 @@ pub struct Mended {
     pub set: Dataset,
     /// The robot as it is to be used.
     pub robot: Robot,
-    /// What was mended.
     pub findings: Vec<Finding>,
     /// What was mended and yet speaks against the file: its rows are not of one kind.
     pub against: Vec<Finding>,

@@ -24,7 +24,7 @@ use crate::identify::solve::linearised::Linearised;
 use crate::linear_algebra::{Eliminated, pseudo_inverse};
 use crate::robot::Parameter;
 
-/// CrossValidation in all, about.
+/// Cells in all, about.
 const CELLS: usize = 12;
 
 /// The fold of rows that are always fitted.
@@ -60,7 +60,8 @@ pub struct CrossValidation {
     folds: Vec<Fold>,
     /// All cells fitted.
     whole: Fold,
-    whole_placements: bool,
+    /// Whether whole placements are held out, not regions of them.
+    pub whole_placements: bool,
     /// Root of the variance that stands for one, mm.
     unit_mm: f64,
 }
@@ -69,7 +70,7 @@ pub struct CrossValidation {
 type LabelsOfPoses<'a> = dyn Fn(&[Option<usize>]) -> Vec<Option<usize>> + 'a;
 
 impl CrossValidation {
-    /// CrossValidation of these labels, one a residual of each placement; `fold` is that of a placement's label.
+    /// By these labels, one a residual of each placement; `fold` is that of a placement's label.
     fn new(
         problem: &Linearised,
         rows: &Rows,
@@ -98,7 +99,7 @@ impl CrossValidation {
         let folds = cells.iter().map(|c| c.fold + 1).filter(|f| *f < SKIPPED).max().unwrap_or(0);
         let make = |f: Option<usize>| Fold::new(&cells, problem.placements.len(), problem.shared, f);
         CrossValidation {
-            parameters: rows.kinematics.parameters().to_vec(),
+            parameters: rows.kinematics.parameters.clone(),
             extras: rows.extras.clone(),
             folds: (0..folds).map(|f| make(Some(f))).collect(),
             whole: make(None),
@@ -140,11 +141,6 @@ impl CrossValidation {
             Some(columns.iter().map(|&c| change[c]).collect())
         };
         self.folds.iter().map(change).collect()
-    }
-
-    /// Whether whole placements are held out, not regions of them.
-    pub fn whole_placements(&self) -> bool {
-        self.whole_placements
     }
 
     fn columns(&self, parameters: &[Parameter]) -> Vec<usize> {

@@ -20,15 +20,12 @@ pub const PLACED_BY_ITSELF: usize = 4;
 /// Figures of absolute errors, as in Table 3 of the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// Number of errors.
     pub count: usize,
     /// Mean of their absolute values, mm.
     pub mean_abs_mm: Option<f64>,
     /// Standard deviation of their absolute values, mm.
     pub std_mm: Option<f64>,
-    /// Largest, mm.
     pub max_abs_mm: Option<f64>,
-    /// Smallest, mm.
     pub min_abs_mm: Option<f64>,
 }
 
@@ -81,7 +78,6 @@ impl RowError {
 /// Errors as all robots are judged in one run.
 #[derive(Debug, Clone)]
 pub struct Judge<'a> {
-    /// The measurements.
     pub set: &'a Dataset,
     /// Rows that place the sensor.
     pub fitted: &'a [usize],
@@ -102,9 +98,7 @@ impl<'a> Judge<'a> {
         let scatter = Scatter::of_point(PLACING_SCATTER_MM);
         Judge { set, fitted, scatter, wire_offset, extras: &[] }
     }
-}
 
-impl Judge<'_> {
     /// Errors of `rows`. Rows of groups that cannot be placed are left out.
     pub fn errors(&self, robot: &Robot, rows: &[usize]) -> Vec<RowError> {
         let mut list = Vec::with_capacity(rows.len());

@@ -49,9 +49,7 @@ pub struct Trust {
 /// Where everything is.
 #[derive(Debug, Clone)]
 pub struct Located {
-    /// The placements.
     pub placed: Placed,
-    /// How the points agree with the robot.
     pub fit: Fit,
 }
 

@@ -75,7 +75,8 @@ pub struct Placed {
     /// Mean square of what a fresh pose is off by beside all this, mm^2: its scatter, and what placements share of smooth errors.
     pub fresh_mm2: f64,
     kinematics: Kinematics,
-    robot: Robot,
+    /// The robot that was found.
+    pub robot: Robot,
     offsets: Vec<f64>,
     extras: Vec<Extra>,
     /// Of the shared offsets, then six numbers a group.
@@ -88,8 +89,8 @@ impl Placed {
     pub fn new(set: &Dataset, rows: &Rows, offsets: &[f64], shared: &DMatrix<f64>, common: f64) -> Option<Placed> {
         let linear = Linearised::new(rows, offsets);
         let (of_robot, of_extras) = rows.split(offsets);
-        let parameters = rows.kinematics.parameters();
-        let robot = rows.kinematics.nominal().shifted(parameters, of_robot);
+        let parameters = &rows.kinematics.parameters;
+        let robot = rows.kinematics.nominal.shifted(parameters, of_robot);
         let (mut groups, mut follows, mut own) = (Vec::new(), Vec::new(), Vec::new());
         let mut turn = None;
         for ((block, unknowns), placement) in rows.blocks.iter().zip(rows.unknowns(offsets)).zip(&linear.placements) {
@@ -120,11 +121,6 @@ impl Placed {
         })
     }
 
-    /// The robot that was found.
-    pub fn robot(&self) -> &Robot {
-        &self.robot
-    }
-
     /// `sensor_from_base` of one of the groups, in their order here.
     pub fn sensor_from_base(&self, index: usize) -> Uncertain {
         let at = self.offsets.len() + self.extras.len() + 6 * index;
@@ -135,7 +131,7 @@ impl Placed {
     /// `last_frame_from_target`; numbers that were not found have no variance.
     pub fn target(&self) -> Uncertain {
         let count = self.offsets.len();
-        let parameter = |p| self.kinematics.parameters().iter().position(|q| *q == p);
+        let parameter = |p| self.kinematics.parameters.iter().position(|q| *q == p);
         let extra = |e| self.extras.iter().position(|q| *q == e).map(|k| k + count);
         let place = |k: usize| if k < 3 { extra(Extra::Target(k)) } else { parameter(Parameter::V(k - 3)) };
         let unit = |k: usize| if k < 3 { RAD_PER_MRAD } else { 1.0 };
@@ -149,8 +145,8 @@ impl Placed {
     /// The target's point in the frame of a group's sensor at each of these joints (rad), and its covariance, mm^2: what the next reading there
     /// is without its own noise and scatter.
     pub fn points(&self, index: usize, joints: &[&[f64]]) -> Vec<(Vector3<f64>, Matrix3<f64>)> {
-        let nominal = self.kinematics.nominal();
-        let kinematics = Kinematics::new(nominal, &self.robot, self.kinematics.parameters(), joints);
+        let nominal = &self.kinematics.nominal;
+        let kinematics = Kinematics::new(nominal, &self.robot, &self.kinematics.parameters, joints);
         let frame = &self.groups[index].1;
         let of_place = |place: Place| {
             let turned = frame.rotation * place.point_mm.coords;
@@ -164,9 +160,7 @@ impl Placed {
         };
         kinematics.places(&self.offsets, true).into_iter().map(of_place).collect()
     }
-}
 
-impl Placed {
     /// How far off the target is to be expected at the poses of one of the groups: against where it is at such a pose, beside the noise of a
     /// reading that its covariance states.
     pub fn expected(&self, set: &Dataset, index: usize) -> Lengths {

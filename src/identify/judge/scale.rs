@@ -60,7 +60,7 @@ impl CommonScale {
             return None;
         }
         let (base, parameters) = (&formulation.base, formulation.parameters());
-        let nominal = formulation.rows.kinematics.nominal();
+        let nominal = &formulation.rows.kinematics.nominal;
         let length = |i: usize| match parameters[i] {
             p @ (Parameter::A(_) | Parameter::D(_) | Parameter::V(_)) => nominal.value(p),
             _ => 0.0,

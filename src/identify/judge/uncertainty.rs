@@ -98,11 +98,11 @@ impl Expected {
     pub fn at(formulation: &Formulation, set: &Dataset, fitted: &[usize], rows: &[usize]) -> Expected {
         let joints: Vec<&[f64]> = set.poses.iter().map(|p| p.joints_rad.as_slice()).collect();
         let kinematics = &formulation.rows.kinematics;
-        let nominal = kinematics.nominal();
+        let nominal = &kinematics.nominal;
         let offsets = formulation.offsets_of();
-        let count = kinematics.parameters().len();
-        let robot = nominal.shifted(kinematics.parameters(), &offsets[..count]);
-        let places = Kinematics::new(nominal, &robot, kinematics.parameters(), &joints).places(&offsets[..count], true);
+        let count = kinematics.parameters.len();
+        let robot = nominal.shifted(&kinematics.parameters, &offsets[..count]);
+        let places = Kinematics::new(nominal, &robot, &kinematics.parameters, &joints).places(&offsets[..count], true);
         let covariance = formulation.whole_covariance();
         let times = times_without(formulation, set);
         let scatter = formulation.rows.scatter.point_mm;
@@ -140,6 +140,14 @@ impl Expected {
             joint_ranges: ranges(set),
             map: rows.iter().map(length).collect(),
         }
+    }
+
+    /// What it comes to.
+    pub fn sentence(&self) -> String {
+        format!(
+            "expected position error after a rigid fit: {:.4} mm on average, {:.4} mm at the worst pose, 95 % below {:.4} mm",
+            self.mean_mm, self.max_mm, self.p95_mm
+        )
     }
 }
 
@@ -182,16 +190,6 @@ fn times_without(formulation: &Formulation, set: &Dataset) -> Vec<f64> {
         }
     }
     times
-}
-
-impl Expected {
-    /// What it comes to.
-    pub fn sentence(&self) -> String {
-        format!(
-            "expected position error after a rigid fit: {:.4} mm on average, {:.4} mm at the worst pose, 95 % below {:.4} mm",
-            self.mean_mm, self.max_mm, self.p95_mm
-        )
-    }
 }
 
 /// From where to where each joint was read, deg (mm where it slides).

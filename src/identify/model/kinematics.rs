@@ -13,8 +13,10 @@ use crate::robot::{Joint, Parameter, Robot};
 /// A robot at fixed commanded poses with chosen parameters free.
 #[derive(Debug, Clone)]
 pub struct Kinematics {
-    nominal: Robot,
-    parameters: Vec<Parameter>,
+    /// The robot whose parameters are offset.
+    pub nominal: Robot,
+    /// The free parameters.
+    pub parameters: Vec<Parameter>,
     poses: Vec<PoseConstants>,
 }
 
@@ -66,16 +68,6 @@ impl Kinematics {
         };
         let poses = joints_rad.iter().map(constants).collect();
         Kinematics { nominal: nominal.clone(), parameters: parameters.to_vec(), poses }
-    }
-
-    /// The free parameters.
-    pub fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    /// The robot whose parameters are offset.
-    pub fn nominal(&self) -> &Robot {
-        &self.nominal
     }
 
     /// Every pose, with derivatives where asked.

@@ -194,10 +194,8 @@ impl Tolerance {
 /// Data that are linear in the base parameters and extras.
 #[derive(Debug, Clone, Copy)]
 pub struct Likelihood<'a> {
-    /// The base parameters.
     pub base: &'a Base,
     pub parameters: &'a [Parameter],
-    /// Unknowns of the sensor.
     pub extras: &'a [Extra],
     /// The product of the white Jacobian with itself.
     pub normal: &'a DMatrix<f64>,

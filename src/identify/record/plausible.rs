@@ -75,7 +75,7 @@ fn term_limit(parameter: Parameter) -> Option<f64> {
 /// The determined parameters whose correction is beyond its limit, for a sentence.
 fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>) -> Option<String> {
     let formulation = found.formulation()?;
-    let (covariance, nominal) = (formulation.robot_covariance(), formulation.rows.kinematics.nominal());
+    let (covariance, nominal) = (formulation.robot_covariance(), &formulation.rows.kinematics.nominal);
     let parameters = formulation.parameters();
     let moved = |p: Parameter| found.robot().value(p) - nominal.value(p);
     let base = &formulation.base;

@@ -11,14 +11,12 @@ use crate::identify::sensor::{Length, Raw, Scatter};
 pub struct Center {
     /// Index of the centre among the places.
     pub center: usize,
-    /// The distances.
     pub lengths: Vec<Length>,
 }
 
 /// Distances to a fixed point that is unknown.
 #[derive(Debug, Clone)]
 pub struct Wire {
-    /// The distances.
     pub lengths: Vec<Length>,
     /// Where the search for the point starts, base frame, mm.
     pub anchor_mm: Vector3<f64>,

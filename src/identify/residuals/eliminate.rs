@@ -40,7 +40,6 @@ pub enum Block {
 /// The unknowns of a placement.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Unknowns {
-    /// None.
     Nothing,
     /// The wire's fixed point, base frame, and its reading at length zero, mm.
     Anchor(Vector3<f64>, f64),
@@ -72,7 +71,6 @@ impl Block {
         }
     }
 
-    /// Number of residuals.
     pub fn row_count(&self) -> usize {
         match self {
             Block::Center(Center { lengths, .. }) | Block::Wire(Wire { lengths, .. }) => lengths.len(),

@@ -16,14 +16,12 @@ const LINE: f64 = 0.01;
 /// The points of one placement.
 #[derive(Debug, Clone)]
 pub struct Points {
-    /// What was measured.
     pub spots: Vec<Spot>,
     /// Where the search for the transform starts.
     pub sensor_from_base: Transform,
     pub on_a_line: bool,
     /// The target's orientation on the flange before the extra unknowns turn it.
     pub flange_from_target: Matrix3<f64>,
-    /// Whether orientations are used.
     pub oriented: bool,
     /// Which of the extra unknowns turn the target: index and axis.
     pub target: Vec<(usize, usize)>,

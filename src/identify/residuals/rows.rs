@@ -25,7 +25,6 @@ use crate::robot::{Parameter, Robot};
 /// What to build residuals from.
 #[derive(Debug, Clone, Copy)]
 pub struct RowSpec<'a> {
-    /// The measurements.
     pub set: &'a Dataset,
     /// The robot whose parameters are offset.
     pub robot: &'a Robot,
@@ -39,7 +38,6 @@ pub struct RowSpec<'a> {
     pub rows: &'a [usize],
     /// Roots of the rows' weights, one a row of the data set; empty where all count fully.
     pub weights: &'a [f64],
-    /// What counts as a residual.
     pub model: Model,
     /// Scatter beyond the measurement's covariance.
     pub scatter: Scatter,
@@ -54,7 +52,6 @@ pub struct Rows {
     pub kinematics: Kinematics,
     /// Which row of the data set each place is.
     pub rows: Vec<usize>,
-    /// Residuals.
     pub blocks: Vec<Block>,
     /// Scatter beyond the measurement's covariance.
     pub scatter: Scatter,
@@ -80,7 +77,7 @@ impl Rows {
 
     /// Number of offsets: the robot's parameters, then the extra unknowns.
     pub fn offset_count(&self) -> usize {
-        self.kinematics.parameters().len() + self.extras.len()
+        self.kinematics.parameters.len() + self.extras.len()
     }
 
     /// Numbers measured, less the unknowns of the placements.
@@ -90,7 +87,7 @@ impl Rows {
 
     /// The robot's offsets and the extras' values in one vector of offsets.
     pub fn split<'a>(&self, offsets: &'a [f64]) -> (&'a [f64], &'a [f64]) {
-        offsets.split_at(self.kinematics.parameters().len())
+        offsets.split_at(self.kinematics.parameters.len())
     }
 
     /// White residuals and derivatives with respect to all offsets.

@@ -21,9 +21,7 @@ use crate::robot::Parameter;
 /// A rung of the ladder, or a model, and how it did.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Judged {
-    /// The model's name.
     pub model: &'static str,
-    /// The terms in words.
     pub terms: String,
     #[serde(skip)]
     pub of: Terms,
@@ -135,7 +133,7 @@ impl Session<'_> {
         };
         let worth = |new: &(Terms, Ways), old: &(Terms, Ways)| {
             evidence(&new.0) - evidence(&old.0) > EVIDENCE
-                && match regions.whole_placements() || old.0 == Terms::NOMINAL {
+                && match regions.whole_placements || old.0 == Terms::NOMINAL {
                     true => clearly(&new.1, &old.1),
                     false => root_mean_of(&new.1) < root_mean_of(&old.1),
                 }
@@ -185,7 +183,7 @@ impl Session<'_> {
         let rows = self.task(all, model).rows_at(scatter, &load_chain);
         let linearised = Linearised::new(&rows, &wide);
         let regions = CrossValidation::by_regions(&linearised, &rows, self.set, self.settings.folds);
-        if regions.whole_placements() {
+        if regions.whole_placements {
             return vec![regions];
         }
         let scattered = folds::folds(self.set, &self.rows);

@@ -29,7 +29,6 @@ pub struct Candidate {
 /// Everything that was found.
 #[derive(Debug, Clone)]
 pub struct Identification {
-    /// Methods and models, fitted.
     pub candidates: Vec<Candidate>,
     /// Index of the one to use.
     pub chosen: usize,
@@ -43,7 +42,6 @@ pub struct Identification {
     pub doubtful: Vec<usize>,
     /// Verify rows that are as far off as those left out; they are still counted.
     pub verify_outliers: Vec<usize>,
-    /// Rows that were fitted.
     pub fitted: Vec<usize>,
     /// The scatter that is left of the chosen fit.
     pub scatter: Scatter,

@@ -14,9 +14,7 @@ use crate::linear_algebra::product;
 /// What the solvers minimise.
 #[derive(Debug, Clone)]
 pub struct Fit<'a> {
-    /// The residuals.
     pub rows: std::borrow::Cow<'a, Rows>,
-    /// What can be determined.
     pub base: &'a Base,
     /// All parameters of the robot from the base parameters.
     spread: DMatrix<f64>,

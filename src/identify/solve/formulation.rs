@@ -45,11 +45,9 @@ const NO_ZERO_MM: f64 = 10.0;
 /// Everything the solvers share.
 #[derive(Debug, Clone)]
 pub struct Formulation {
-    /// What counts as a residual.
     pub model: Model,
     /// Residuals with their final weights.
     pub rows: Rows,
-    /// What the poses determine.
     pub base: Base,
     /// Half-widths of the box, one a base parameter, mm and mrad.
     pub bounds: Vec<f64>,
@@ -108,7 +106,7 @@ impl Formulation {
 
     /// The parameters that the vector of all offsets stands for.
     pub fn parameters(&self) -> &[Parameter] {
-        self.rows.kinematics.parameters()
+        &self.rows.kinematics.parameters
     }
 
     /// Offsets of all parameters and extras where the free fit ended.
@@ -134,7 +132,7 @@ impl Formulation {
 
     /// Rows of the prior of these standard deviations; none without one.
     fn prior(&self, tolerance: &Tolerance, extras: &[Extra]) -> DMatrix<f64> {
-        let unscaled = (!self.scale_seen).then_some(self.rows.kinematics.nominal());
+        let unscaled = (!self.scale_seen).then_some(&self.rows.kinematics.nominal);
         prior_rows(tolerance, &self.base, self.parameters(), extras, self.held, unscaled)
     }
 

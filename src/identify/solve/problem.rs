@@ -56,7 +56,6 @@ pub struct Solution {
     /// The best point.
     pub x: Vec<f64>,
     pub cost: f64,
-    /// Iterations made.
     pub iterations: usize,
     /// Evaluations of the residuals; a Jacobian counts as one for each of its columns.
     pub evaluations: usize,
@@ -64,6 +63,5 @@ pub struct Solution {
     pub history: Vec<f64>,
     /// Evaluations used at each entry of the history.
     pub history_evaluations: Vec<usize>,
-    /// Why it stopped.
     pub stop: Stop,
 }

@@ -22,6 +22,9 @@ use crate::robot::Robot;
 const ROBUST_ROUNDS: usize = 14;
 const BOUNDED_ROUNDS: usize = 8;
 
+/// Rounds in which the placement of a robot that is not fitted settles.
+const PLACING_ROUNDS: usize = 4;
+
 /// Steps of the trust region between two estimates of weights.
 const STEPS_A_ROUND: usize = 2;
 
@@ -78,12 +81,7 @@ impl<'a> Task<'a> {
         }
         Ok(robust)
     }
-}
 
-/// Rounds in which the placement of a robot that is not fitted settles.
-const PLACING_ROUNDS: usize = 4;
-
-impl Task<'_> {
     /// What is left of the robot as it is, with nothing but the sensor placed: mean size a coordinate, mm, after a few rounds of bounded
     /// influence, or the first figure that is beyond `hopeless_mm`.
     pub fn unfitted_mm(&self, hopeless_mm: f64) -> f64 {
@@ -145,7 +143,6 @@ pub struct Robust<'a> {
     pub scores: Vec<f64>,
     /// Offsets of parameters and extras.
     pub offsets: Vec<f64>,
-    /// The robot found.
     pub robot: Robot,
     pub scatter: Scatter,
 }

@@ -20,7 +20,6 @@ pub const FIRST_SCATTER_MM: f64 = 0.1;
 /// Of what a formulation is made.
 #[derive(Debug, Clone, Copy)]
 pub struct Task<'a> {
-    /// The measurements.
     pub set: &'a Dataset,
     /// The nominal robot.
     pub robot: &'a Robot,
@@ -30,7 +29,6 @@ pub struct Task<'a> {
     pub extras: &'a [Extra],
     /// Rows to fit.
     pub rows: &'a [usize],
-    /// What counts as a residual.
     pub model: Model,
     /// A smooth error that the points of a placement share.
     pub smooth: Option<SmoothError>,

@@ -31,6 +31,13 @@ struct Tools {
     weights: Vec<f64>,
 }
 
+impl Tools {
+    /// Whether a sensor that was moved explains the rows as well.
+    fn is_placed(&self) -> bool {
+        self.placed.scatter_mm() < BEATS * self.apart.scatter_mm()
+    }
+}
+
 /// Steps of a joint's zero by which its best value is found.
 const STEP_RAD: f64 = 1e-3;
 const STEP_MM: f64 = 0.5;
@@ -171,15 +178,7 @@ impl Table {
         // How the joint is counted is how its zero is.
         Some((left(off), self.points.robot.joints[joint].sign * off))
     }
-}
 
-impl Tools {
-    fn is_placed(&self) -> bool {
-        self.placed.scatter_mm() < BEATS * self.apart.scatter_mm()
-    }
-}
-
-impl Table {
     /// The two stretches of rows that are of different tools.
     fn tools_of_stretches(&self) -> Option<Tools> {
         let count = self.rows.len();

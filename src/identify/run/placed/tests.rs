@@ -72,7 +72,7 @@ impl Tally {
     fn add(&mut self, world: &World, fresh: &World, placed: &Placed) {
         for index in 0..placed.groups.len() {
             let group = placed.groups[index].0;
-            let (sensor, target) = truth(world, placed.robot(), group);
+            let (sensor, target) = truth(world, &placed.robot, group);
             let of_sensor = placed.sensor_from_base(index);
             for (uncertain, truth) in [(of_sensor.clone(), sensor), (of_sensor.inverse(), sensor.inverse())] {
                 let off = error(&uncertain, &truth);
@@ -144,7 +144,7 @@ fn what_is_held_is_what_a_placement_stands_for() {
     for parameter in world.nominal.mdh_parameters() {
         // Of what moves the target on the flange the last joint takes the share that its tolerance has beside the target's.
         let held = is_held(parameter, usize::MAX);
-        let off = (placed.robot().value(parameter) - world.nominal.value(parameter)).abs();
+        let off = (placed.robot.value(parameter) - world.nominal.value(parameter)).abs();
         assert!(!held || off < 1e-9, "{} moved by {off}", parameter.name());
     }
 }
@@ -163,7 +163,7 @@ fn a_robot_found_by_distances_and_a_nominal_one_are_placed_too() {
         let placed = found.placed(&set, &world.nominal, settings).unwrap().unwrap();
         assert_eq!(placed.groups.len(), 4);
         let is_nominal = found.formulation().is_none();
-        let (sensor, _) = truth(&world, placed.robot(), placed.groups[0].0);
+        let (sensor, _) = truth(&world, &placed.robot, placed.groups[0].0);
         let off = error(&placed.sensor_from_base(0), &sensor);
         let bound = if is_nominal { 5.0 } else { 1.0 };
         assert!(off.fixed_rows::<3>(3).norm() < bound, "{is_nominal} {off}");
