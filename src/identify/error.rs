@@ -145,14 +145,15 @@ impl Explain for Error {
             Error::JointCount { missing: Some(column), .. } => {
                 Some(format!("add column `{column}`, or name the robot that was measured with `--robot FILE`"))
             }
-            Error::JointCount { .. } => Some("`--robot FILE` names the robot that was measured".to_owned()),
+            Error::JointCount { .. } | Error::OtherRobot { .. } => {
+                Some("`--robot FILE` names the robot that was measured".to_owned())
+            }
             Error::NothingDetermined { .. } | Error::TooFew { .. } | Error::NothingJudged { .. } => {
                 Some("measure more poses, spread over the workspace and with varied orientation".to_owned())
             }
             Error::TooFewToPlace { .. } | Error::Open { .. } => Some(
                 "turn the flange about two axes that are not parallel, by 20 deg or more, over three poses or more of each group".to_owned(),
             ),
-            Error::OtherRobot { .. } => Some("`--robot FILE` names the robot that was measured".to_owned()),
             Error::CamerasOnHand { .. } => Some(
                 "with orientations, give each row the inverse of its pose (point -R'p, rotation vector -r): the board is then the sensor, and \
                  flange_from_target is where the camera sits on the hand"

@@ -297,11 +297,6 @@ impl Dataset {
             && matches!(pose.reading, Reading::Distance { distance_mm, .. } if distance_mm == 0.0)
     }
 
-    /// Whether every pose has a covariance.
-    pub fn has_covariances(&self) -> bool {
-        self.poses.iter().all(|p| p.reading.covariance_mm2().is_some())
-    }
-
     /// Whether cameras read it: they state an orientation and a covariance with each point. Other instruments (a tracker, a wire, a probe) state
     /// at most one of these.
     pub fn is_of_cameras(&self) -> bool {

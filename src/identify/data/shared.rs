@@ -71,7 +71,8 @@ pub fn take(path: &Utf8Path, set: &mut Dataset) {
 /// length, and nothing in the residuals tells; with the scale unknown, the links' tolerance has a say. Several targets are a tracker's, whose
 /// scale is its laser's.
 pub fn suppose_scale(set: &mut Dataset) {
-    if !set.shared.is_empty() || set.targets.is_some() || !set.has_rotations() || !set.has_covariances() {
+    let is_stated = set.poses.iter().all(|pose| pose.reading.covariance_mm2().is_some());
+    if !set.shared.is_empty() || set.targets.is_some() || !set.has_rotations() || !is_stated {
         return;
     }
     let point = |pose: &Pose| pose.reading.point_mm().map_or_else(Vector3::zeros, |point| point.coords);

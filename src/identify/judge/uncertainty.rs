@@ -174,13 +174,9 @@ fn times_without(formulation: &Formulation, set: &Dataset) -> Vec<f64> {
     for placement in Linearised::new(&rows, &offsets[..count]).placements {
         let Eliminated { follow, inverse, .. } = placement.eliminated();
         let columns = &placement.linear.jacobian - &placement.linear.design * follow;
-        for place in 0..rows.rows.len() {
-            let of_row: Vec<usize> =
-                (0..placement.poses.len()).filter(|&k| placement.poses[k] == Some(place)).collect();
-            if of_row.is_empty() {
-                continue;
-            }
-            let (columns, own) = (columns.select_rows(&of_row), placement.linear.design.select_rows(&of_row));
+        for (place, at) in placement.by_pose() {
+            let of_row = |all: &DMatrix<f64>| all.rows(at.start, at.len()).into_owned();
+            let (columns, own) = (of_row(&columns), of_row(&placement.linear.design));
             let predicted = &columns * &covariance * columns.transpose() + &own * &inverse * own.transpose();
             let shares = predicted.symmetric_eigenvalues().map(|share| share.clamp(0.0, ALL));
             let without = shares.map(|share| share / (1.0 - share)).sum();

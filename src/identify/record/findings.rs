@@ -45,7 +45,7 @@ impl Findings {
             || (left_mm > FAR_BEYOND * conventions::IMPLAUSIBLE_MM).then(|| conventions::unexplained(left_mm));
         let unexplained = unexplained.filter(|_| !is_explained(found)).or_else(beyond_all);
         let is_reached = unexplained.is_none();
-        let left_out = left_out::of_a_joint(set, found);
+        let left_out = left_out::of_a_joint(set, &found.fitted, &found.outliers);
         let is_still = left_out.as_ref().is_some_and(|left_out| left_out.is_still);
         let (of_still, of_end) = if is_still { (left_out, None) } else { (None, left_out) };
         let rounded = rounded::of_joints(set, found);

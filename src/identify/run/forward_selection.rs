@@ -8,9 +8,8 @@ use rayon::prelude::*;
 
 use super::session::Session;
 use crate::identify::Error;
-use crate::identify::judge::cross_validation::CrossValidation;
+use crate::identify::judge::cross_validation::{CrossValidation, HeldOut, clearly_less, root_mean};
 use crate::identify::judge::folds;
-use crate::identify::judge::held_out::{HeldOut, clearly_less, root_mean};
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::sensor::{EVIDENCE, Extra, Scatter, WARPS};
 use crate::identify::settings::Model;

@@ -5,10 +5,9 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::fit::Fit;
-use super::freedom;
 use super::problem::Solution;
 use super::scatter::estimate_scatter;
 use super::task::{FIRST_SCATTER_MM, Task, prior_rows};
@@ -245,7 +244,7 @@ impl<'a> Estimate<'a> {
         task.check_count(&rows, &base)?;
         let x = vec![0.0; base.rank() + task.extras.len()];
         let scatter = estimate_scatter(&rows, &vec![0.0; rows.offset_count()], 0.0, None, scatter);
-        Ok(Estimate { task, base, scatter, tolerance: Tolerance::default(), x, load_chain })
+        Ok(Estimate { task, base, scatter, tolerance: Tolerance::START, x, load_chain })
     }
 
     fn rows(&self) -> Rows {
@@ -262,13 +261,11 @@ impl<'a> Estimate<'a> {
             let (normal, gradient) = self.fit(&rows, DMatrix::zeros(0, self.x.len())).normal(&self.x);
             self.tolerance = likelihood(&self.base, task, &normal, &gradient).most_probable();
         }
-        let prior = task.prior_rows(&self.tolerance, &self.base, held || round == 0);
-        let fit = self.fit(&rows, prior.clone());
+        let fit = self.fit(&rows, task.prior_rows(&self.tolerance, &self.base, held || round == 0));
         let x = trust_region::solve(&fit, &self.x, &task.settings.trust_region).x;
         let offsets = fit.offsets(&x);
-        let effective = determined(&fit, &x, &prior);
-        let lost = (task.model == Model::Pose).then(|| freedom::lost(&fit, &x, &prior)).flatten();
-        self.scatter = estimate_scatter(&rows, &offsets, effective, lost, self.scatter);
+        let lost = (task.model == Model::Pose).then(|| fit.lost(&x)).flatten();
+        self.scatter = estimate_scatter(&rows, &offsets, fit.determined(&x), lost, self.scatter);
         self.load_chain = task.robot.shifted(task.parameters, &offsets);
         self.x = x;
         if round < BASES {
@@ -313,16 +310,6 @@ fn likelihood<'a>(
     gradient: &'a DVector<f64>,
 ) -> Likelihood<'a> {
     Likelihood { base, parameters: task.parameters, extras: task.extras, normal, gradient }
-}
-
-/// Number of unknowns that the data, and not the prior, have determined.
-fn determined(fit: &Fit, x: &[f64], prior: &DMatrix<f64>) -> f64 {
-    let (_, jacobian) = fit.white(x);
-    let normal = product(&jacobian, &jacobian);
-    match Cholesky::new(&normal + prior.tr_mul(prior)) {
-        Some(total) => total.solve(&normal).trace(),
-        None => x.len() as f64,
-    }
 }
 
 fn bounds(base: &Base, parameters: &[Parameter], x: &[f64], settings: &Settings) -> (Vec<f64>, Vec<String>) {

@@ -148,16 +148,7 @@ pub struct Robust<'a> {
 }
 
 /// The prior of robust fits, where its size is not yet known from the data.
-const LOOSE: Tolerance = Tolerance {
-    lengths_mm: 3.0,
-    angles_mrad: 10.0,
-    target_mm: 100.0,
-    gravity_mrad_per_m: 10.0,
-    harmonics_mrad: 1.0,
-    couplings_per_mille: 1.0,
-    zero_mm: 1.0,
-    warps_per_mille: 1.0,
-};
+const LOOSE: Tolerance = Tolerance { lengths_mm: 3.0, target_mm: 100.0, gravity_mrad_per_m: 10.0, ..Tolerance::START };
 
 impl Robust<'_> {
     /// The rows with their weights.

@@ -158,7 +158,7 @@ pub(super) fn robust_scatter(
 }
 
 /// The scatter at which the white sum of squares equals the degrees of freedom (Pearson's equation); for points and orientations apart. `lost` is
-/// what the fit took of either ([`super::freedom`]); where it is not known, each number loses the same share to parameters and placements.
+/// what the fit took of either; where it is not known, each number loses the same share to parameters and placements.
 pub(super) fn estimate_scatter(
     rows: &Rows,
     offsets: &[f64],

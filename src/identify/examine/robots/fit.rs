@@ -124,11 +124,6 @@ impl Points {
         self.tools.iter().copied().max().unwrap_or(0)
     }
 
-    /// A robot a part, each with what it leaves.
-    pub(super) fn apart(&self, parts: &[Vec<usize>], weights: &[f64]) -> Vec<Left> {
-        parts.iter().map(|part| self.together(std::slice::from_ref(part), weights)).collect()
-    }
-
     /// One robot for all these rows with the influence of gross errors bounded: where it ends, and what it leaves.
     pub(super) fn bounded(&self, rows: &[usize], near: Option<&DVector<f64>>) -> (Left, DVector<f64>) {
         let parts = [rows.to_vec()];

@@ -277,7 +277,8 @@ impl Table {
     /// What robots of their own leave in these parts, and what one leaves.
     fn compared(&self, parts: &[Vec<usize>]) -> Option<Compared> {
         let weights = self.points.without_gross(parts);
-        let each = self.points.apart(parts, &weights);
+        let alone = |part: &Vec<usize>| self.points.together(std::slice::from_ref(part), &weights);
+        let each: Vec<Left> = parts.iter().map(alone).collect();
         let apart = each.iter().cloned().reduce(Left::and)?;
         Some(Compared { each, apart, together: self.points.together(parts, &weights) })
     }
