@@ -34,14 +34,11 @@ impl Spread {
     pub fn new(errors_mm: impl IntoIterator<Item = f64>) -> Spread {
         let errors: Vec<f64> = errors_mm.into_iter().map(f64::abs).collect();
         let count = errors.len();
-        if count == 0 {
-            return Spread { count, mean_abs_mm: None, std_mm: None, max_abs_mm: None, min_abs_mm: None };
-        }
         let mean = errors.iter().sum::<f64>() / count as f64;
         let squares: f64 = errors.iter().map(|e| (e - mean).powi(2)).sum();
         Spread {
             count,
-            mean_abs_mm: Some(mean),
+            mean_abs_mm: (count > 0).then_some(mean),
             std_mm: (count > 1).then(|| (squares / (count - 1) as f64).sqrt()),
             max_abs_mm: errors.iter().copied().reduce(f64::max),
             min_abs_mm: errors.iter().copied().reduce(f64::min),

@@ -81,7 +81,7 @@ pub fn locate(set: &Dataset, robot: &Robot, trust: Trust, settings: &Settings) -
     let tool = [Parameter::V(0), Parameter::V(1), Parameter::V(2)];
     let extras = set.target_unknowns(oriented);
     let model = if oriented { Model::Pose } else { Model::Position };
-    let with = |parameters| Task { set, robot, parameters, extras, rows: &rows, model, smooth: None, settings };
+    let with = |parameters| Task { extras, model, ..Task::plain(set, robot, parameters, &rows, settings) };
     match fitted(&with(&tool), trust) {
         // Points alone may leave open what the file says.
         Err(Error::Open { .. } | Error::TooFew { .. } | Error::NothingDetermined { .. }) if !oriented => {

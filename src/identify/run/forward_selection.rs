@@ -11,6 +11,7 @@ use crate::identify::Error;
 use crate::identify::judge::cross_validation::{CrossValidation, HeldOut, clearly_less, root_mean};
 use crate::identify::judge::folds;
 use crate::identify::model::ladder::{Chain, Terms};
+use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{EVIDENCE, Extra, Scatter, WARPS};
 use crate::identify::settings::Model;
 use crate::identify::solve::formulation::Formulation;
@@ -173,14 +174,7 @@ impl Session<'_> {
         scatter: Scatter,
         model: Model,
     ) -> Vec<CrossValidation> {
-        let offsets = at.offsets_of();
-        let (of_robot, extras) = offsets.split_at(reference.len());
-        let mut wide: Vec<f64> =
-            all.iter().map(|p| reference.iter().position(|q| q == p).map_or(0.0, |i| of_robot[i])).collect();
-        wide.extend_from_slice(extras);
-        let load_chain = self.robot.shifted(reference, of_robot);
-        let rows = self.task(all, model).rows_at(scatter, &load_chain);
-        let linearised = Linearised::new(&rows, &wide);
+        let (rows, linearised) = self.linearised(all, reference, at, scatter, model);
         let regions = CrossValidation::by_regions(&linearised, &rows, self.set, self.settings.folds);
         if regions.whole_placements {
             return vec![regions];
@@ -189,6 +183,24 @@ impl Session<'_> {
         let others: Vec<CrossValidation> =
             scattered.iter().map(|of_row| CrossValidation::by_folds(&linearised, &rows, of_row)).collect();
         std::iter::once(regions).chain(others).collect()
+    }
+
+    /// The rows of all these parameters at a scatter, linearised where a formulation of some of them ended.
+    pub(super) fn linearised(
+        &self,
+        all: &[Parameter],
+        reference: &[Parameter],
+        at: &Formulation,
+        scatter: Scatter,
+        model: Model,
+    ) -> (Rows, Linearised) {
+        let offsets = at.offsets_of();
+        let (of_robot, extras) = offsets.split_at(reference.len());
+        let of_all = all.iter().map(|p| reference.iter().position(|q| q == p).map_or(0.0, |i| of_robot[i]));
+        let wide: Vec<f64> = of_all.chain(extras.iter().copied()).collect();
+        let rows = self.task(all, model).rows_at(scatter, &self.robot.shifted(reference, of_robot));
+        let linearised = Linearised::new(&rows, &wide);
+        (rows, linearised)
     }
 
     /// Takes the warps of cameras about whose errors nothing is stated where they make the data much more probable at one and the same

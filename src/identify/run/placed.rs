@@ -44,16 +44,8 @@ impl Identification {
         let shared = shared.select_rows(&kept).select_columns(&kept);
         let parameters = formulation.parameters();
         let load_chain = nominal.shifted(parameters, &whole);
-        let task = Task {
-            set,
-            robot: nominal,
-            parameters,
-            extras: &extras,
-            rows: &self.fitted,
-            model: formulation.model,
-            smooth: None,
-            settings,
-        };
+        let plain = Task::plain(set, nominal, parameters, &self.fitted, settings);
+        let task = Task { extras: &extras, model: formulation.model, ..plain };
         let rows = task.rows_at(formulation.rows.scatter, &load_chain);
         Ok(Placed::new(set, &rows, &offsets, &shared, formulation.common))
     }
@@ -65,16 +57,10 @@ impl Identification {
         let mut extras: Vec<Extra> = self.extras.iter().map(|(extra, _)| *extra).collect();
         extras.extend(turned.iter().filter(|t| !self.extras.iter().any(|(e, _)| e == *t)));
         let parameters = self.terms.parameters(nominal);
-        Formulation::new(&Task {
-            set,
-            robot: nominal,
-            parameters: &parameters,
-            extras: &extras,
-            rows: &self.fitted,
-            model: if oriented { Model::Pose } else { Model::Position },
-            smooth: self.smooth.map(|told| told.error),
-            settings,
-        })
+        let plain = Task::plain(set, nominal, &parameters, &self.fitted, settings);
+        let (model, smooth) =
+            (if oriented { Model::Pose } else { Model::Position }, self.smooth.map(|told| told.error));
+        Formulation::new(&Task { extras: &extras, model, smooth, ..plain })
     }
 }
 

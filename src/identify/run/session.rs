@@ -35,18 +35,9 @@ pub(super) struct Session<'a> {
 
 impl Session<'_> {
     pub(super) fn task<'b>(&'b self, parameters: &'b [Parameter], model: Model) -> Task<'b> {
-        let Session { set, robot, settings, .. } = *self;
         let extras = if model == Model::PairwiseDistance { &[] } else { self.extras.as_slice() };
-        Task {
-            set,
-            robot,
-            parameters,
-            extras,
-            rows: &self.rows,
-            model,
-            smooth: self.smooth.map(|told| told.error),
-            settings,
-        }
+        let plain = Task::plain(self.set, self.robot, parameters, &self.rows, self.settings);
+        Task { extras, model, smooth: self.smooth.map(|told| told.error), ..plain }
     }
 
     /// Leaves out the rows that a robust fit gives no weight, and names them; and others that are far off.

@@ -16,14 +16,9 @@ pub trait Problem: Sync {
     /// The residuals at `x` and their derivatives, a column a parameter.
     fn linearised(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>);
 
-    /// Half the sum of the squared residuals.
-    fn cost(&self, x: &[f64]) -> f64 {
-        0.5 * self.residuals(x).norm_squared()
-    }
-
     /// The cost of many points that stand one after the other in `xs`. The same for any number of threads.
     fn costs(&self, xs: &[f64]) -> Vec<f64> {
-        xs.par_chunks(self.lower().len().max(1)).map(|x| self.cost(x)).collect()
+        xs.par_chunks(self.lower().len().max(1)).map(|x| 0.5 * self.residuals(x).norm_squared()).collect()
     }
 
     /// Number of parameters.
