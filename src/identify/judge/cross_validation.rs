@@ -117,13 +117,11 @@ impl CrossValidation {
     /// Regions of joint space, or whole placements where there are three; `most` is the largest number of folds.
     pub fn by_regions(problem: &Linearised, rows: &Rows, set: &Dataset, most: usize) -> CrossValidation {
         let count = problem.placements.len();
-        let (regions, whole) =
-            (if count >= WHOLE { CELLS.div_ceil(count).min(3) } else { most / count.max(1) }, count >= WHOLE);
+        let whole = count >= WHOLE;
+        let regions = if whole { CELLS.div_ceil(count).min(3) } else { most / count.max(1) };
         let labels = |poses: &[Option<usize>]| labels(set, rows, poses, regions);
-        match whole {
-            true => CrossValidation::new(problem, rows, &labels, &|block, _| block % most, true),
-            false => CrossValidation::new(problem, rows, &labels, &|block, region| block * regions + region, false),
-        }
+        let fold = |block: usize, region: usize| if whole { block % most } else { block * regions + region };
+        CrossValidation::new(problem, rows, &labels, &fold, whole)
     }
 
     /// Rows here and there: `of_row` is the fold of each row of the data set.

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector};
 
 use super::distances::{Center, Wire};
 use super::eliminate::{Block, Unknowns};
@@ -179,15 +179,13 @@ impl Rows {
                     lengths.iter_mut().for_each(off);
                 }
                 Block::Points(p) => {
-                    if let Unknowns::Frame(frame) = unknowns {
-                        let smooth = p.smooth_mm(&places, extras, frame);
-                        // Residuals are predicted less measured.
-                        p.spots.iter_mut().zip(smooth).for_each(|(spot, error)| spot.point_mm += error);
-                    }
-                    p.field = None;
-                    p.flange_from_target = p.turned_target(extras);
+                    let Unknowns::Frame(frame) = unknowns else { continue };
+                    let smooth = p.smooth_mm(&places, extras, frame);
+                    (p.field, p.flange_from_target) = (None, p.turned_target(extras));
                     p.target.clear();
-                    for spot in &mut p.spots {
+                    for (spot, error) in p.spots.iter_mut().zip(smooth) {
+                        // Residuals are predicted less measured.
+                        spot.point_mm += error;
                         for (column, e) in spot.extra.column_iter().zip(extras) {
                             spot.point_mm -= column * *e;
                         }
@@ -219,8 +217,9 @@ struct Inputs<'a> {
 }
 
 impl Inputs<'_> {
-    fn place_of(&self, row: usize) -> Option<usize> {
-        self.used.binary_search(&row).ok()
+    /// The place of a row that is used.
+    fn place_of(&self, row: usize) -> usize {
+        self.used.partition_point(|&used| used < row)
     }
 
     fn weight(&self, row: usize) -> f64 {
@@ -242,7 +241,7 @@ impl Inputs<'_> {
         let zero = |e: &Extra| if *e == Extra::Zero { 1.0 } else { 0.0 };
         let length = |&i: &usize| match self.spec.set.poses[i].reading {
             Reading::Distance { distance_mm, sigma_mm } if distance_mm > 0.0 => Some(Length {
-                pose: self.place_of(i)?,
+                pose: self.place_of(i),
                 length_mm: distance_mm,
                 variance_mm2: sigma_mm.map_or(0.0, |s| s * s),
                 weight: self.weight(i),
@@ -254,7 +253,7 @@ impl Inputs<'_> {
         if lengths.is_empty() {
             return None;
         }
-        match self.spec.set.groups[group].center.and_then(|c| self.place_of(c)) {
+        match self.spec.set.groups[group].center.map(|c| self.place_of(c)) {
             Some(center) => Some(Block::Center(Center { center, lengths })),
             None => {
                 let anchor_mm = first_anchor(self.places, &lengths);
@@ -266,14 +265,8 @@ impl Inputs<'_> {
     /// One block for all sockets that known distances tie together.
     fn touches(&self) -> Vec<Block> {
         let set = self.spec.set;
-        let touched: Vec<(usize, Vec<(usize, f64)>)> = (0..set.groups.len())
-            .filter_map(|g| {
-                let touches = self.by_group[g].iter().filter(|&&i| set.touches(i));
-                let list: Vec<(usize, f64)> =
-                    touches.map(|&i| (i, set.poses[i].reading.variance_mm2().unwrap_or(0.0))).collect();
-                (!list.is_empty()).then_some((g, list))
-            })
-            .collect();
+        let touches = |group: usize| self.by_group[group].iter().copied().filter(|&i| set.touches(i));
+        let touched = || (0..set.groups.len()).filter(|&group| touches(group).next().is_some());
         // The lowest group that a group is tied to, by repeated lowering: there are few.
         let mut tied: Vec<usize> = (0..set.groups.len()).collect();
         for _ in 0..set.known.len() {
@@ -283,43 +276,40 @@ impl Inputs<'_> {
             }
         }
         let block = |root: usize| {
-            let members: Vec<&(usize, Vec<(usize, f64)>)> = touched.iter().filter(|(g, _)| tied[*g] == root).collect();
-            let (mut sockets, mut contacts) = (Vec::new(), Vec::new());
-            for (socket, (_, list)) in members.iter().enumerate() {
-                let points: Vec<Vector3<f64>> =
-                    list.iter().filter_map(|(i, _)| Some(self.places[self.place_of(*i)?].point_mm.coords)).collect();
-                sockets.push(middle(&points));
-                contacts.extend(list.iter().filter_map(|&(i, variance_mm2)| {
-                    Some(Contact { pose: self.place_of(i)?, socket, variance_mm2, weight: self.weight(i) })
-                }));
-            }
-            let at = |group: usize| members.iter().position(|(g, _)| *g == group);
+            let members: Vec<usize> = touched().filter(|&group| tied[group] == root).collect();
+            let point = |i: usize| self.places[self.place_of(i)].point_mm.coords;
+            let sockets = members.iter().map(|&group| middle(&touches(group).map(point).collect::<Vec<_>>())).collect();
+            let contact = |socket: usize, i: usize| Contact {
+                pose: self.place_of(i),
+                socket,
+                variance_mm2: set.poses[i].reading.variance_mm2().unwrap_or(0.0),
+                weight: self.weight(i),
+            };
+            let of_socket = |(socket, &group): (usize, &usize)| touches(group).map(move |i| contact(socket, i));
+            let contacts = members.iter().enumerate().flat_map(of_socket).collect();
+            let at = |group: usize| members.iter().position(|g| *g == group);
             let known =
                 |(index, k): (usize, &KnownDistance)| Some((index, KnownDistance { a: at(k.a)?, b: at(k.b)?, ..*k }));
             let known = set.known.iter().enumerate().filter_map(known).collect();
             Block::Touch(Touch { sockets, contacts, known })
         };
-        touched.iter().map(|(g, _)| tied[*g]).collect::<BTreeSet<usize>>().into_iter().map(block).collect()
+        touched().map(|group| tied[group]).collect::<BTreeSet<usize>>().into_iter().map(block).collect()
     }
 
     fn spot(&self, row: usize) -> Option<Spot> {
-        let pose = self.place_of(row)?;
-        match &self.spec.set.poses[row].reading {
-            Reading::Position { point_mm, covariance_mm2, rotation_rad } => {
-                let (weight, covariance_mm2) = (self.weight(row), covariance_mm2.unwrap_or_else(Matrix3::zeros));
-                Some(Spot {
-                    pose,
-                    point_mm: *point_mm,
-                    on_body_mm: self.spec.set.poses[row].on_body_mm,
-                    covariance_mm2,
-                    whitener: self.spec.scatter.whitener(&covariance_mm2) * weight,
-                    rotation: rotation_rad.map(|r| Rotation3::new(r).into_inner()),
-                    weight,
-                    extra: point_extra(self.spec.set, row, point_mm, self.spec.extras),
-                })
-            }
-            _ => None,
-        }
+        let (pose, weight) = (&self.spec.set.poses[row], self.weight(row));
+        let point_mm = pose.reading.point_mm()?;
+        let covariance_mm2 = pose.reading.covariance_mm2().unwrap_or_else(Matrix3::zeros);
+        Some(Spot {
+            pose: self.place_of(row),
+            point_mm,
+            on_body_mm: pose.on_body_mm,
+            covariance_mm2,
+            whitener: self.spec.scatter.whitener(&covariance_mm2) * weight,
+            rotation: pose.reading.rotation_rad().map(|r| Rotation3::new(r).into_inner()),
+            weight,
+            extra: point_extra(self.spec.set, row, &point_mm, self.spec.extras),
+        })
     }
 
     fn center_distances(&self, group: usize) -> Option<Block> {
