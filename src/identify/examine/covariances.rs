@@ -83,14 +83,11 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, V
 fn seen(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<Seen>, Error> {
     let rows = set.fit_rows();
     let name = |row: usize| set.groups[set.poses[row].group].name.as_str();
-    let mut of_groups: BTreeMap<&str, (usize, f64)> = BTreeMap::new();
-    for &row in &rows {
-        let (count, sum) = of_groups.entry(name(row)).or_default();
-        *count += 1;
-        *sum += set.poses[row].reading.variance_mm2().unwrap_or(0.0);
-    }
-    let stated: BTreeMap<&str, f64> =
-        of_groups.iter().map(|(name, (count, sum))| (*name, sum / *count as f64)).collect();
+    let mut of_groups: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    rows.iter().for_each(|&row| of_groups.entry(name(row)).or_default().push(row));
+    let variance = |row: &usize| set.poses[*row].reading.variance_mm2().unwrap_or(0.0);
+    let mean = |rows: &Vec<usize>| rows.iter().map(variance).sum::<f64>() / rows.len() as f64;
+    let stated: BTreeMap<&str, f64> = of_groups.iter().map(|(name, rows)| (*name, mean(rows))).collect();
     if stated.len() < GROUPS || stated.values().any(|s| *s <= 0.0) {
         return Ok(Vec::new());
     }
@@ -107,8 +104,7 @@ fn seen(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<Seen>, 
     let deleted = robust.deleted();
     let unit_mm2 = robust.scatter.stated * middle_mm2 + robust.scatter.point_mm.powi(2);
     let of_group = |(name_of, stated_mm2): (&&str, &f64)| {
-        let of_group = rows.iter().copied().filter(|&r| name(r) == *name_of).map(|r| deleted[r]);
-        let rows: Vec<_> = of_group.filter(|d| d.numbers > 0).collect();
+        let rows: Vec<_> = of_groups[name_of].iter().map(|&row| deleted[row]).filter(|d| d.numbers > 0).collect();
         let numbers = rows.first()?.numbers;
         if numbers * rows.len() < FEWEST {
             return None;

@@ -48,13 +48,10 @@ impl Strays {
     }
 }
 
-fn size_mm(error: &RowError) -> Option<f64> {
-    error.point_mm.map(|p| p.norm()).or(error.distance_mm.map(f64::abs))
-}
-
 /// Errors of these rows by their rows, with the sensor placed by those nearest.
 fn sizes(judge: &Judge, robot: &Robot, placing: &[usize], rows: &[usize]) -> Vec<(usize, f64)> {
     let judge = Judge { fitted: placing, ..judge.clone() };
+    let size_mm = |error: &RowError| error.point_mm.map(|p| p.norm()).or(error.distance_mm.map(f64::abs));
     judge.errors(robot, rows).iter().filter_map(|error| Some((error.row, size_mm(error)?))).collect()
 }
 

@@ -222,8 +222,7 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
 
 /// Sessions and drifts.
 pub fn along_the_rows(along: &Along) -> Vec<Finding> {
-    let mut list = Vec::new();
-    list.extend(along.robots.clone());
+    let mut list: Vec<Finding> = along.robots.iter().cloned().collect();
     let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
     let drifts = |s: &Session| along.drifting.contains(&s.group);
     let ranges = |of: &dyn Fn(&&Session) -> bool| -> Vec<String> {

@@ -149,12 +149,8 @@ impl Block {
         }
     }
 
-    /// The unknowns at their best.
-    pub fn solved(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> Unknowns {
-        self.solve(places, extras, scatter).0
-    }
-
-    fn solve(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> (Unknowns, DVector<f64>, DMatrix<f64>) {
+    /// The unknowns at their best, and there white residuals and their derivatives with respect to them.
+    pub fn solve(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> (Unknowns, DVector<f64>, DMatrix<f64>) {
         let mut at = self.start(places);
         let (mut residuals, mut design) = self.inner(places, extras, scatter, &at);
         if self.unknown_count() == 0 {

@@ -112,7 +112,7 @@ impl Rows {
     pub fn raw(&self, offsets: &[f64]) -> Vec<(usize, f64, Raw)> {
         let (of_robot, extras) = self.split(offsets);
         let places = self.kinematics.places(of_robot, false);
-        let of_block = |b: &Block| b.raw(&places, extras, &b.solved(&places, extras, &self.scatter));
+        let of_block = |b: &Block| b.raw(&places, extras, &b.solve(&places, extras, &self.scatter).0);
         self.blocks.iter().flat_map(of_block).map(|(place, w, raw)| (self.rows[place], w, raw)).collect()
     }
 
@@ -120,7 +120,7 @@ impl Rows {
     pub fn unknowns(&self, offsets: &[f64]) -> Vec<Unknowns> {
         let (of_robot, extras) = self.split(offsets);
         let places = self.kinematics.places(of_robot, false);
-        self.blocks.iter().map(|b| b.solved(&places, extras, &self.scatter)).collect()
+        self.blocks.iter().map(|b| b.solve(&places, extras, &self.scatter).0).collect()
     }
 
     /// The variance that stands for one, mm^2: costs are multiplied by it.
