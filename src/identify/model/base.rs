@@ -73,9 +73,14 @@ impl Base {
         let mut work = jacobian.select_columns(&alive);
         let (order, rank) = pivoted(&mut work, threshold);
         let mut free: Vec<usize> = order[..rank].iter().map(|&c| alive[c]).collect();
-        let mut dependent: Vec<usize> = order[rank..].iter().map(|&c| alive[c]).collect();
         free.sort_unstable();
-        dependent.sort_unstable();
+        Base::of_free(jacobian, free, zero)
+    }
+
+    /// With these base parameters.
+    fn of_free(jacobian: &DMatrix<f64>, free: Vec<usize>, zero: Vec<usize>) -> Base {
+        let is_dependent = |i: &usize| !free.contains(i) && !zero.contains(i);
+        let dependent: Vec<usize> = (0..jacobian.ncols()).filter(is_dependent).collect();
         let coefficients = combinations(jacobian, &free, &dependent);
         let singular_values = singular_values(jacobian, &free);
         Base { free, zero, dependent, coefficients, singular_values }
@@ -101,11 +106,7 @@ impl Base {
             }
             kept.remove(worst.1);
         }
-        let dependent: Vec<usize> =
-            (0..jacobian.ncols()).filter(|i| !kept.contains(i) && !reference.zero.contains(i)).collect();
-        let coefficients = combinations(jacobian, &kept, &dependent);
-        let singular_values = singular_values(jacobian, &kept);
-        Base { free: kept, zero: reference.zero, dependent, coefficients, singular_values }
+        Base::of_free(jacobian, kept, reference.zero)
     }
 
     /// The base parameters of a robot whose parameters are off by these.

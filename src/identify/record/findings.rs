@@ -46,13 +46,12 @@ impl Findings {
         let unexplained = unexplained.filter(|_| !is_explained(found)).or_else(beyond_all);
         let is_reached = unexplained.is_none();
         let left_out = left_out::of_a_joint(set, &found.fitted, &found.outliers);
-        let is_still = left_out.as_ref().is_some_and(|left_out| left_out.is_still);
-        let (of_still, of_end) = if is_still { (left_out, None) } else { (None, left_out) };
+        let (of_still, of_end): (Vec<_>, Vec<_>) = left_out.into_iter().partition(|left_out| left_out.is_still);
         let rounded = rounded::of_joints(set, found);
         let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
         let against: Vec<Finding> = of_still
-            .map(|left_out| left_out.finding)
             .into_iter()
+            .map(|left_out| left_out.finding)
             .chain(of_rounding)
             .chain(unexplained)
             .chain(plausible::of_another_robot(found))
@@ -63,7 +62,7 @@ impl Findings {
         let scale = found.scale(set).filter(|scale| scale.is_significant() && is_reached).map(|scale| {
             Finding::new(scale.sentence(), "the robot that was found has this scale; check it on a known length")
         });
-        let of_rows = of_end.map(|left_out| left_out.finding).into_iter().chain(rounded);
+        let of_rows = of_end.into_iter().map(|left_out| left_out.finding).chain(rounded);
         let terms = plausible::of_terms(found);
         let doubts = examined
             .into_iter()

@@ -98,7 +98,9 @@ impl Formulation {
         };
         if held {
             let (normal, gradient) = formulation.normal();
-            formulation.most = likelihood(&formulation.base, task, &normal, &gradient).at_most(&tolerance);
+            let (base, Task { parameters, extras, .. }) = (&formulation.base, *task);
+            let data = Likelihood { base, parameters, extras, normal: &normal, gradient: &gradient };
+            formulation.most = data.at_most(&tolerance);
         }
         Ok(formulation)
     }
@@ -259,7 +261,9 @@ impl<'a> Estimate<'a> {
         let (task, rows) = (self.task, self.rows());
         if held {
             let (normal, gradient) = self.fit(&rows, DMatrix::zeros(0, self.x.len())).normal(&self.x);
-            self.tolerance = likelihood(&self.base, task, &normal, &gradient).most_probable();
+            let (base, Task { parameters, extras, .. }) = (&self.base, *task);
+            let data = Likelihood { base, parameters, extras, normal: &normal, gradient: &gradient };
+            self.tolerance = data.most_probable();
         }
         let fit = self.fit(&rows, task.prior_rows(&self.tolerance, &self.base, held || round == 0));
         let x = trust_region::solve(&fit, &self.x, &task.settings.trust_region).x;
@@ -301,15 +305,6 @@ fn whole_spread(spread: DMatrix<f64>, extras: usize) -> DMatrix<f64> {
     let mut whole = spread.resize(rows + extras, columns + extras, 0.0);
     whole.view_mut((rows, columns), (extras, extras)).fill_with_identity();
     whole
-}
-
-fn likelihood<'a>(
-    base: &'a Base,
-    task: &Task<'a>,
-    normal: &'a DMatrix<f64>,
-    gradient: &'a DVector<f64>,
-) -> Likelihood<'a> {
-    Likelihood { base, parameters: task.parameters, extras: task.extras, normal, gradient }
 }
 
 fn bounds(base: &Base, parameters: &[Parameter], x: &[f64], settings: &Settings) -> (Vec<f64>, Vec<String>) {

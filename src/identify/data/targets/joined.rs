@@ -127,10 +127,9 @@ fn placements(seen: &[Seen], nominal: &Robot) -> Option<(BTreeMap<String, Transf
     for row in seen {
         groups.entry(&row.0.at.group).or_default().push(row);
     }
-    let joints = |rows: &[&Seen]| rows.iter().map(|(row, _)| row.at.joints_rad()).collect::<Vec<_>>();
-    let points = |rows: &[&Seen]| rows.iter().map(|(_, point)| *point).collect::<Vec<_>>();
     let most = groups.values().max_by_key(|rows| rows.len()).filter(|rows| rows.len() >= FEWEST)?;
-    let fit = nominal.fit_tool(&joints(most), &points(most), Start::Around)?;
+    let (joints, points): (Vec<_>, Vec<_>) = most.iter().map(|(row, point)| (row.at.joints_rad(), *point)).unzip();
+    let fit = nominal.fit_tool(&joints, &points, Start::Around)?;
     let place = |(group, rows): (&&str, &Vec<&Seen>)| {
         let predicted = rows.iter().map(|(row, point)| {
             (nominal.base_from_flange(&row.at.joints_rad()) * Point3::from(fit.tool_mm), *point, 1.0)
