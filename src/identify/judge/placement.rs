@@ -123,9 +123,14 @@ impl Placed {
 
     /// `sensor_from_base` of one of the groups, in their order here.
     pub fn sensor_from_base(&self, index: usize) -> Uncertain {
-        let at = self.offsets.len() + self.extras.len() + 6 * index;
+        let at = self.column(index);
         let covariance = self.covariance.fixed_view::<6, 6>(at, at).into_owned();
         Uncertain { transform: self.groups[index].1, covariance }
+    }
+
+    /// Where the six numbers of a group begin in the covariance.
+    fn column(&self, index: usize) -> usize {
+        self.offsets.len() + self.extras.len() + 6 * index
     }
 
     /// `last_frame_from_target`; numbers that were not found have no variance.
@@ -153,8 +158,7 @@ impl Placed {
             let mut columns = DMatrix::zeros(3, self.covariance.ncols());
             let robot = place.point_columns.ncols();
             columns.view_mut((0, 0), (3, robot)).copy_from(&(rotation_matrix(frame) * place.point_columns));
-            let at = self.offsets.len() + self.extras.len() + 6 * index;
-            columns.fixed_view_mut::<3, 6>(0, at).copy_from(&rigid_columns(&turned));
+            columns.fixed_view_mut::<3, 6>(0, self.column(index)).copy_from(&rigid_columns(&turned));
             let covariance = &columns * &self.covariance * columns.transpose();
             (turned + frame.translation.vector, covariance.fixed_view::<3, 3>(0, 0).into_owned())
         };

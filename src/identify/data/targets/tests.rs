@@ -27,6 +27,12 @@ fn one(rows: &[Measurement]) -> (Vec<Measurement>, Targets) {
     as_one(rows).unwrap().unwrap()
 }
 
+/// The true robot with the mean of so many targets for its tool.
+fn with_mean(world: &synthetic::World, count: usize) -> Robot {
+    let mean = TARGETS[..count].iter().map(|(_, p)| p).sum::<Vector3<f64>>() / count as f64;
+    Robot { tool_mm: mean, ..world.truth.clone() }
+}
+
 fn refusal(rows: &[Measurement]) -> String {
     as_one(rows).err().unwrap().to_string()
 }
@@ -39,8 +45,7 @@ fn the_mark_point_is_the_mean_and_turns_with_the_flange() {
         assert_eq!((poses.len(), targets.names.len(), targets.oriented), (world.rows.len(), count, true));
         let scatter_mm = targets.scatter_mm.unwrap();
         assert!((scatter_mm / NOISE_MM - 1.0).abs() < 0.15, "{scatter_mm}");
-        let mean = TARGETS[..count].iter().map(|(_, p)| p).sum::<Vector3<f64>>() / count as f64;
-        let truth = Robot { tool_mm: mean, ..world.truth.clone() };
+        let truth = with_mean(&world, count);
         let mut turns = Vec::new();
         let mut distances = Vec::new();
         for pair in poses.iter().filter(|p| p.at.group == "g0").collect::<Vec<_>>().windows(2) {
@@ -225,16 +230,13 @@ fn mean_miss(world: &synthetic::World, robot: &Robot, truth: &Robot) -> f64 {
 fn single_targets_tell_as_much_of_the_robot_as_their_points() {
     for (count, from) in [(3, 14), (2, 14)] {
         let world = synthetic::world(40, 0.0, 3);
-        let mean = TARGETS[..count].iter().map(|(_, p)| p).sum::<Vector3<f64>>() / count as f64;
-        let truth = Robot { tool_mm: mean, ..world.truth.clone() };
-        let (mut alone, mut all) = (0.0, 0.0);
-        for (rows, off) in
-            [(single(&rows(count, 3), count, from), &mut all), (rows(count, 3)[..count * from].to_vec(), &mut alone)]
-        {
-            let (set, found) = world.identified(&rows);
+        let truth = with_mean(&world, count);
+        let miss = |rows: &[Measurement]| {
+            let (set, found) = world.identified(rows);
             assert_eq!(set.skipped, []);
-            *off = mean_miss(&world, found.robot(), &truth);
-        }
+            mean_miss(&world, found.robot(), &truth)
+        };
+        let (all, alone) = (miss(&single(&rows(count, 3), count, from)), miss(&rows(count, 3)[..count * from]));
         assert!(
             all < 0.05 && all < alone,
             "{count} targets, {from} whole poses: {all} with the single ones, {alone} without"
@@ -276,8 +278,7 @@ fn targets_that_no_pose_shows_together_are_joined_by_the_robot() {
 fn few_whole_poses_tell_where_the_single_targets_of_all_others_stand() {
     for (count, from) in [(3, 1), (3, 2), (3, 14), (3, 44)] {
         let world = synthetic::world(40, 0.0, 3);
-        let mean = TARGETS[..count].iter().map(|(_, p)| p).sum::<Vector3<f64>>() / count as f64;
-        let truth = Robot { tool_mm: mean, ..world.truth.clone() };
+        let truth = with_mean(&world, count);
         let set = Dataset::new(&single(&rows(count, 3), count, from)).unwrap();
         let fitted: Vec<usize> = (0..set.poses.len()).collect();
         let errors = Judge::plain(&set, &fitted, false).errors(&truth, &fitted);
