@@ -42,9 +42,9 @@ pub fn by_joints(set: &Dataset, mut rows: Vec<usize>) -> Vec<usize> {
     rows
 }
 
-/// Joints that do not move.
-pub fn constant_joints(set: &Dataset) -> Vec<usize> {
+/// Joints that do not move, by their numbers from 1.
+pub fn constant_joints(set: &Dataset) -> Vec<String> {
     let Some(first) = set.poses.first() else { return Vec::new() };
     let constant = |j: &usize| set.poses.iter().all(|p| (p.joints_rad[*j] - first.joints_rad[*j]).abs() <= SAME_JOINT);
-    (0..set.joint_count()).filter(constant).collect()
+    (0..set.joint_count()).filter(constant).map(|joint| (joint + 1).to_string()).collect()
 }

@@ -259,7 +259,7 @@ impl Record {
 
 /// Several joints that did not move.
 fn still(set: &Dataset) -> Option<String> {
-    let joints: Vec<String> = constant_joints(set).into_iter().map(|joint| (joint + 1).to_string()).collect();
+    let joints = constant_joints(set);
     (joints.len() > 1).then(|| {
         format!(
             "joints {} did not move: the identified robot is right for these readings of theirs only; move every joint between poses",

@@ -187,21 +187,18 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
         let finding = "poses that the robot came back to: they say how well it repeats, and nothing about its links";
         add(finding.to_owned(), names, "all of them are used");
     }
-    let constant: Vec<String> = constant_joints(set).into_iter().map(|joint| (joint + 1).to_string()).collect();
-    if !constant.is_empty() {
-        add(
-            match &constant[..] {
-                [one] => {
-                    format!("joint {one} is the same in all rows: its parameters cannot be told from its neighbours'")
-                }
-                all => format!(
-                    "joints {} are the same in all rows: their parameters cannot be told from their neighbours'",
-                    all.join(", ")
-                ),
-            },
-            Vec::new(),
-            "move every joint between poses",
-        );
+    let constant = match &constant_joints(set)[..] {
+        [] => None,
+        [one] => {
+            Some(format!("joint {one} is the same in all rows: its parameters cannot be told from its neighbours'"))
+        }
+        all => Some(format!(
+            "joints {} are the same in all rows: their parameters cannot be told from their neighbours'",
+            all.join(", ")
+        )),
+    };
+    if let Some(finding) = constant {
+        add(finding, Vec::new(), "move every joint between poses");
     }
     if let Some(finding) = stated_covariances(set, found) {
         add(finding, Vec::new(), "the fit uses the scatter that it found");
