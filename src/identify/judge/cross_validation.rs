@@ -36,7 +36,7 @@ const WHOLE: usize = 3;
 pub type HeldOut = Vec<(f64, f64)>;
 
 /// Chance with which a model that is no better may seem so: several are tried on every rung.
-pub const CHANCE: f64 = 0.01;
+const CHANCE: f64 = 0.01;
 
 /// A region of a placement.
 #[derive(Debug, Clone)]

@@ -190,8 +190,8 @@ impl<'a> Judge<'a> {
             self.of_touches(&touches, &predicted, list);
             return;
         }
-        let zero = |extras: &[(Extra, f64)]| extras.iter().filter(|(e, _)| *e == Extra::Zero).map(|(_, v)| *v).sum();
-        let center = self.set.groups[group].center.map(|c| (predicted(c), zero(self.extras)));
+        let zero_mm: f64 = self.extras.iter().filter(|(e, _)| *e == Extra::Zero).map(|(_, v)| *v).sum();
+        let center = self.set.groups[group].center.map(|c| (predicted(c), zero_mm));
         let placed = center.or_else(|| {
             let (rows, values) = self.placed(robot, placing, Model::CenterDistance);
             rows.unknowns(&values).into_iter().find_map(|unknowns| match unknowns {
