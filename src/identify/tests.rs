@@ -7,7 +7,7 @@ use crate::identify::judge::errors::{Judge, Spread};
 use crate::identify::record::findings::{Findings, findings};
 use crate::identify::record::quality;
 use crate::identify::run::identify;
-use crate::identify::settings::{Extensions, Method, Model, Prior, Settings};
+use crate::identify::settings::{Extensions, Method, Model, Prior, Redundancy, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::task::Task;
 use crate::identify::synthetic::{self, World};
@@ -47,10 +47,10 @@ fn mean_errors(world: &World, method: Method, seed: u64) -> (f64, f64) {
     (mean(&world.nominal), mean(found.robot()))
 }
 
-fn base_names(world: &World) -> (Formulation, Vec<String>) {
+fn base_names(world: &World, redundancy: Redundancy) -> (Formulation, Vec<String>) {
     let set = Dataset::new(&world.rows).unwrap();
     let parameters = world.nominal.mdh_parameters();
-    let off = Settings { prior: Prior::Off, ..Settings::default() };
+    let off = Settings { redundancy, prior: Prior::Off, ..Settings::default() };
     let prepared = formulated(&set, &world.nominal, &parameters, Model::CenterDistance, &off);
     (prepared, parameters.iter().map(|p| p.name()).collect())
 }
@@ -82,7 +82,7 @@ fn a_target_that_the_file_puts_on_the_last_axis_is_found_where_it_is() {
 
 #[test]
 fn equation_13_and_what_it_misses() {
-    let (varied, names) = base_names(&synthetic::planned(262, 0, 25.0, 0.0, 3, &|_| {}));
+    let (varied, names) = base_names(&synthetic::planned(262, 0, 25.0, 0.0, 3, &|_| {}), Redundancy::Qr);
     let zero: Vec<&str> = varied.base.zero.iter().map(|&i| names[i].as_str()).collect();
     // Eq. (13) has a_0 and d_1; alpha_0 and theta_1 move the whole robot too, and no distance sees that.
     assert_eq!(zero, ["alpha_0", "a_0", "theta_1", "d_1"]);
@@ -95,7 +95,7 @@ fn equation_13_and_what_it_misses() {
 #[test]
 fn one_orientation_hides_the_tool_and_more() {
     for seed in [3, 4] {
-        let (fixed, names) = base_names(&synthetic::planned(262, 0, 0.0, 0.0, seed, &|_| {}));
+        let (fixed, names) = base_names(&synthetic::planned(262, 0, 0.0, 0.0, seed, &|_| {}), Redundancy::Qr);
         let zero: Vec<&str> = fixed.base.zero.iter().map(|&i| names[i].as_str()).collect();
         for hidden in ["d_6", "v_x", "v_y", "v_z"] {
             assert!(zero.contains(&hidden), "{hidden}: {zero:?}");
@@ -107,14 +107,7 @@ fn one_orientation_hides_the_tool_and_more() {
 #[test]
 fn the_nineteen_of_the_paper_are_more_than_its_plan_determines() {
     let world = synthetic::planned(262, 0, 0.0, 0.0, 3, &|_| {});
-    let set = Dataset::new(&world.rows).unwrap();
-    let parameters = world.nominal.mdh_parameters();
-    let settings = Settings {
-        redundancy: crate::identify::settings::Redundancy::Correlation,
-        prior: Prior::Off,
-        ..Settings::default()
-    };
-    let prepared = formulated(&set, &world.nominal, &parameters, Model::CenterDistance, &settings);
+    let (prepared, _) = base_names(&world, Redundancy::Correlation);
     assert!(prepared.base.rank() <= 14, "{}", prepared.base.rank());
 }
 
